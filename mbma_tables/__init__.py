@@ -1,0 +1,75 @@
+"""Contact of rough surfaces by the magnification-based multi-asperity (MBMA) model.
+
+The public names load what they need when first used, so that importing the package stays cheap.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mbma_tables.errors import (
+        ConvergenceError,
+        InputError,
+        MbmaError,
+        NotSelfAffineError,
+        OutOfRangeError,
+    )
+    from mbma_tables.islands import greenwood_tripp
+    from mbma_tables.islands.height_integrals import height_integral
+    from mbma_tables.islands.island import Island, island
+    from mbma_tables.surfaces.readings import Reading
+    from mbma_tables.surfaces.surface import Surface
+    from mbma_tables.totals import theories
+    from mbma_tables.totals.contact import Contact, contact
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "Contact": "mbma_tables.totals.contact",
+    "ConvergenceError": "mbma_tables.errors",
+    "InputError": "mbma_tables.errors",
+    "Island": "mbma_tables.islands.island",
+    "MbmaError": "mbma_tables.errors",
+    "NotSelfAffineError": "mbma_tables.errors",
+    "OutOfRangeError": "mbma_tables.errors",
+    "Reading": "mbma_tables.surfaces.readings",
+    "Surface": "mbma_tables.surfaces.surface",
+    "contact": "mbma_tables.totals.contact",
+    "height_integral": "mbma_tables.islands.height_integrals",
+    "island": "mbma_tables.islands.island",
+}
+_MODULES = {
+    "greenwood_tripp": "mbma_tables.islands.greenwood_tripp",
+    "theories": "mbma_tables.totals.theories",
+}
+
+__all__ = [
+    "Contact",
+    "ConvergenceError",
+    "InputError",
+    "Island",
+    "MbmaError",
+    "NotSelfAffineError",
+    "OutOfRangeError",
+    "Reading",
+    "Surface",
+    "contact",
+    "greenwood_tripp",
+    "height_integral",
+    "island",
+    "theories",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return importlib.import_module(_MODULES[name])
+    if name in _HOMES:
+        return getattr(importlib.import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'mbma_tables' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,58 @@
+"""Checks of what a caller passes in: one message per fault, with the offending entries."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mbma_tables.errors import InputError, OutOfRangeError
+
+SHOWN = 3  # offending entries quoted in a message
+
+FloatArray = NDArray[np.float64]
+
+
+def describe_entries(values: FloatArray, mask: NDArray[np.bool_]) -> str:
+    """The first few entries under `mask`, with their index where the array is not a scalar."""
+    if values.ndim == 0:
+        return f"{values[()]:.17g}"
+    places = np.argwhere(mask)
+    quoted = [f"{values[tuple(p)]:.17g} at {tuple(int(i) for i in p)}" for p in places[:SHOWN]]
+    more = len(places) - SHOWN
+    return ", ".join(quoted) + (f" and {more} more" if more > 0 else "")
+
+
+def finite_array(name: str, value: ArrayLike) -> FloatArray:
+    """`value` as a float64 array; empty, complex, non-numeric, NaN or infinite input is refused."""
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind not in "fiu":
+            raise TypeError(f"entries of type {given.dtype}")
+        array: FloatArray = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError) as fault:
+        raise InputError(f"{name} must be real numbers: {fault}") from None
+    if array.size == 0:
+        raise InputError(f"{name} is empty: at least one number is needed")
+    bad = ~np.isfinite(array)
+    if bad.any():
+        raise InputError(f"{name} must be finite, got {describe_entries(array, bad)}")
+    return array
+
+
+def require(name: str, value: FloatArray, good: Any, allowed: str) -> None:
+    """Refuse the entries of `value` where `good` is false; `allowed` says what would have been right."""
+    bad = ~np.asarray(good, dtype=bool)
+    if bad.any():
+        raise OutOfRangeError(f"{name} must be {allowed}, got {describe_entries(value, bad)}", bad)
+
+
+def broadcast_shape(**arguments: Any) -> tuple[int, ...]:
+    """The common shape of named arrays, or one message that lists theirs."""
+    shapes = {name: np.shape(value) for name, value in arguments.items()}
+    try:
+        return np.broadcast_shapes(*shapes.values())
+    except ValueError:
+        listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+        raise InputError(f"arguments do not broadcast: {listed}") from None

@@ -1,0 +1,48 @@
+"""The errors of this library, each a subclass of `MbmaError`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class MbmaError(Exception):
+    """Base of every error that this library raises on purpose."""
+
+
+class InputError(MbmaError, ValueError):
+    """An argument that has no meaning here: NaN, a wrong sign, a wrong shape, an unknown name."""
+
+
+class OutOfRangeError(InputError):
+    """Numbers outside the covered range.
+
+    Attributes
+    ----------
+    mask : numpy.ndarray of bool
+        True where the entry is out of range, in the shape of the broadcast arguments.
+    """
+
+    def __init__(self, message: str, mask: Any) -> None:
+        super().__init__(message)
+        self.mask = mask
+
+
+class ConvergenceError(MbmaError, ArithmeticError):
+    """An iteration that did not reach its tolerance.
+
+    Attributes
+    ----------
+    mask : numpy.ndarray of bool
+        True where it failed, in the shape of the broadcast arguments.
+    result : object
+        What was reached all the same, for inspection; entries under `mask` are not answers.
+    """
+
+    def __init__(self, message: str, mask: Any, result: Any = None) -> None:
+        super().__init__(message)
+        self.mask = mask
+        self.result = result
+
+
+class NotSelfAffineError(MbmaError, ValueError):
+    """A measured map or spectrum that is no self-affine surface; the message says why."""

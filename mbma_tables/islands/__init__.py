@@ -1,0 +1,1 @@
+"""Contact islands: height integrals, the Greenwood-Tripp problem, geometry."""

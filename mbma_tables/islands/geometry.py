@@ -1,0 +1,132 @@
+"""From an island's approach delta to its band, radii, densities, X and mu (Section 3.2).
+
+Units as in `surfaces.spectrum`: heights in s, lengths in 1/q0. With e = zeta_1^(-2H) the ends are carried as
+
+    zeta_d^(-2H) = e + a,   zeta_u^(-2H) = e + b
+
+so that m0 = a - b, h_d = sqrt(a), h_u = sqrt(b) and log(zeta_u/zeta_d) = log1p((a - b)/(e + b))/(2H) keep
+their digits when both ends run into zeta_1, that is when delta goes to 0.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from mbma_tables.arguments import FloatArray
+from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, alpha_of, m0_of, m2_of, m4_of
+
+FIELDS = (
+    "zeta_d",
+    "zeta_u",
+    "R_d",
+    "R_u",
+    "D",
+    "sigma",
+    "h_d",
+    "h_u",
+    "eta",
+    "X",
+    "mu",
+    "D_d",
+    "sigma_d",
+)
+
+
+@njit(cache=True, error_model="numpy")
+def floor_offset(hurst: float, zeta_1: float, floor: float) -> float:
+    """floor^(-2H) - zeta_1^(-2H) without cancellation: the largest a (or b) above a floor."""
+    e = math.exp(-2.0 * hurst * math.log(zeta_1))
+    return e * math.expm1(2.0 * hurst * math.log1p((zeta_1 - floor) / floor))
+
+
+@njit(cache=True, error_model="numpy")
+def _log_band(hurst: float, e: float, log_zeta_1: float, offset: float) -> float:
+    """log(zeta) where zeta^(-2H) = e + offset."""
+    return log_zeta_1 - math.log1p(offset / e) / (2.0 * hurst)
+
+
+@njit(cache=True, error_model="numpy")
+def summit_sigma(m0: float, alpha: float, summits: bool) -> float:
+    """Standard deviation of summit heights (2), or of all heights where a reading says so."""
+    return math.sqrt((1.0 - BROADENING / alpha) * m0) if summits else math.sqrt(m0)
+
+
+@njit(cache=True, error_model="numpy")
+def island_fields(
+    approach: float,
+    hurst: float,
+    zeta_1: float,
+    reading: tuple[float, float, float, float, float, bool, bool],
+) -> tuple[float, float, float, float, float, float, float, float, float, float, float, float, float]:
+    """`FIELDS` of the island at delta = approach * h_rms, in units of s and 1/q0.
+
+    `reading` is `Reading.numbers`. Equations: zeta_d (27), zeta_u (30), R_d (26), R_u (29), D and sigma (32),
+    h_d (B.3), h_u (B.12), eta (39), D_d and sigma_d (43).
+    """
+    divisor, beta, phi, floor_d, floor_u, offset, summits = reading
+    log_zeta_1 = math.log(zeta_1)
+    e = math.exp(-2.0 * hurst * log_zeta_1)
+    # delta/s = approach * sqrt(1 - e)
+    room = math.sqrt(-math.expm1(-2.0 * hurst * log_zeta_1))
+    root_a = 4.0 / 3.0 * beta * approach
+    root_b = phi / (1.0 + phi) * room * approach
+    a = root_a * root_a
+    b = root_b * root_b
+    top_a = floor_offset(hurst, zeta_1, floor_d)
+    top_b = floor_offset(hurst, zeta_1, floor_u)
+    log_d = _log_band(hurst, e, log_zeta_1, a)
+    log_u = _log_band(hurst, e, log_zeta_1, b)
+    zeta_d = math.exp(log_d)
+    zeta_u = math.exp(log_u)
+    if a >= top_a:
+        a = top_a
+        root_a = math.sqrt(top_a)
+        log_d = math.log(floor_d)
+        zeta_d = floor_d
+    if b >= top_b:
+        b = top_b
+        root_b = math.sqrt(top_b)
+        log_u = math.log(floor_u)
+        zeta_u = floor_u
+
+    # the band [zeta_d, zeta_u]; m0 = a - b, and alpha from the width alone
+    width = math.log1p((a - b) / (e + b)) / (2.0 * hurst)
+    D = m4_of(hurst, log_d, width) / (divisor * m2_of(hurst, log_d, width))
+    # (root_a - root_b) (root_a + root_b) does not underflow where a and b do
+    m0_root = math.sqrt((root_a - root_b) * (root_a + root_b))
+    sigma = m0_root * summit_sigma(1.0, alpha_of(hurst, width), summits)
+    R_d = RADIUS / math.sqrt(m4_of(hurst, 0.0, log_d))
+    R_u = RADIUS / math.sqrt(m4_of(hurst, 0.0, log_u))
+    D_d = m4_of(hurst, 0.0, log_d) / (divisor * m2_of(hurst, 0.0, log_d))
+    sigma_d = summit_sigma(m0_of(hurst, 0.0, log_d), alpha_of(hurst, log_d), summits)
+
+    m4_all = m4_of(hurst, 0.0, log_zeta_1)
+    D_top = m4_all / (divisor * m2_of(hurst, 0.0, log_zeta_1))
+    R_top = RADIUS / math.sqrt(m4_all)
+    eta = (
+        0.75
+        * (math.pi * D_top) ** (1.0 / 3.0)
+        * (1.5 * R_top) ** (2.0 / 3.0)
+        * (root_b / (phi * R_u)) ** (1.0 / 3.0)
+    )
+    h_d = root_a if offset else 0.0
+    X = (room * approach - h_d) / sigma
+    mu = 8.0 / 3.0 * D * sigma * math.sqrt(2.0 * R_u * R_d)
+    return zeta_d, zeta_u, R_d, R_u, D, sigma, h_d, root_b, eta, X, mu, D_d, sigma_d
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def fill_islands(
+    approach: FloatArray,
+    hurst: FloatArray,
+    zeta_1: FloatArray,
+    reading: tuple[float, float, float, float, float, bool, bool],
+    out: FloatArray,
+) -> None:
+    """`island_fields` of each entry into the columns of `out` (13, entries)."""
+    for k in range(approach.size):
+        fields = island_fields(approach[k], hurst[k], zeta_1[k], reading)
+        for column in range(13):
+            out[column, k] = fields[column]

@@ -1,0 +1,253 @@
+"""The island problem of Greenwood and Tripp (1967): a rough elastic sphere on a plane (Eqs. 34, 36, 37, 40).
+
+Heights are in units of the summits' standard deviation sigma, radii in units of L = sqrt(2 R_d sigma):
+
+    d(rho) = rho^2 - X + w(rho),   p = (mu/2) F_{3/2}(d),   w = (4/pi) integral t/(t + rho) p K(k) dt
+
+so that every island of every surface is one point of two functions Phi_F(X, mu) and Phi_A(X, mu).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mbma_tables.arguments import FloatArray, finite_array, require
+from mbma_tables.errors import ConvergenceError, InputError
+from mbma_tables.islands.classical import solve_classical
+from mbma_tables.islands.newton import solve_islands
+from mbma_tables.islands.spectral import basis
+
+Method = Literal["newton", "classical"]
+
+LEVELS = np.array([*range(12, 64, 4), *range(64, 128, 8), *range(128, 256, 32), *range(256, 513, 64)])
+TIGHTEST = 1e-13
+CLASSICAL_RINGS = 200
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class IslandSolution:
+    """Solutions of the island problem.
+
+    Attributes
+    ----------
+    X, mu : ndarray
+        The arguments, broadcast.
+    phi_F, phi_A : ndarray
+        Force over E* sigma L and area over eta pi D R_u sigma L^2.
+    error : ndarray
+        Estimate of the larger relative error of the two.
+    iterations, nodes : ndarray of int
+        Newton steps (or damped iterations) and nodes (or rings) of each solution.
+    """
+
+    X: FloatArray
+    mu: FloatArray
+    phi_F: FloatArray
+    phi_A: FloatArray
+    error: FloatArray
+    iterations: NDArray[np.int64]
+    nodes: NDArray[np.int64]
+    method: Method
+    rtol: float
+    damping: float
+    max_iterations: int
+
+    @functools.cached_property
+    def _profiles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        count = int(np.max(self.nodes))
+        shape = (*np.shape(self.X), count)
+        if self.method == "newton":
+            flat = _newton(np.ravel(self.X), np.ravel(self.mu), self.rtol, count, profiles=True)
+            rho, pressure, gap = flat.rho, flat.pressure, flat.gap
+        else:
+            rows = [
+                solve_classical(x, m, count, self.damping, self.rtol, self.max_iterations)[4:]
+                for x, m in zip(np.ravel(self.X), np.ravel(self.mu), strict=True)
+            ]
+            rho, pressure, gap = (np.array(column) for column in zip(*rows, strict=True))
+        return rho.reshape(shape), pressure.reshape(shape), gap.reshape(shape)
+
+    @property
+    def rho(self) -> FloatArray:
+        """Radii of the profiles over L, shape (..., nodes); solved for when first asked."""
+        return self._profiles[0]
+
+    @property
+    def pressure(self) -> FloatArray:
+        """p(rho) over E* sigma/L, shape (..., nodes)."""
+        return self._profiles[1]
+
+    @property
+    def gap(self) -> FloatArray:
+        """d(rho) over sigma, between the deformed sphere and the summits' mid-plane, shape (..., nodes)."""
+        return self._profiles[2]
+
+
+@dataclasses.dataclass
+class _Batch:
+    phi: FloatArray
+    steps: NDArray[np.int64]
+    rho: FloatArray
+    pressure: FloatArray
+    gap: FloatArray
+
+
+def _newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int, profiles: bool) -> _Batch:
+    """All entries on one basis; profiles are empty unless asked for."""
+    b = basis(nodes)
+    phi = np.empty((X.size, 3))
+    squared = np.empty(X.size)
+    steps = np.empty(X.size, dtype=np.int64)
+    w = np.empty((X.size if profiles else 1, nodes))
+    p = np.empty_like(w)
+    solve_islands(X, mu, rtol, b.v, b.root_weights, b.modes, b.operator, phi, squared, steps, w, p)
+    phi[:, 0] *= mu
+    if not profiles:
+        return _Batch(phi, steps, *(np.empty((0, nodes)),) * 3)
+    reach = squared[:, None] * b.v
+    gap = reach - X[:, None] + w / b.root_weights
+    return _Batch(phi, steps, np.sqrt(reach), mu[:, None] * p / b.root_weights, gap)
+
+
+def nodes_needed(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
+    """Gauss nodes that usually give `rtol`; the estimate of each solution decides."""
+    digits = max(-math.log10(rtol), 3.0)
+    softness = np.log10(np.maximum(mu, 1.0)) / 12
+    wanted: FloatArray = digits * np.sqrt(np.maximum(X, 0) + 5) * (1 + softness)
+    return wanted
+
+
+def _levels(X: FloatArray, mu: FloatArray, rtol: float) -> NDArray[np.intp]:
+    wanted = np.searchsorted(LEVELS, nodes_needed(X, mu, rtol))
+    return np.minimum(wanted, len(LEVELS) - 1)
+
+
+def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None) -> dict[str, Any]:
+    phi = np.full((X.size, 3), np.nan)
+    steps = np.zeros(X.size, dtype=np.int64)
+    used = np.zeros(X.size, dtype=np.int64)
+    if nodes is not None:
+        batch = _newton(X, mu, rtol, nodes, profiles=False)
+        phi, steps, used = batch.phi, batch.steps, np.full(X.size, nodes)
+        failed = ~np.isfinite(phi).all(axis=1)
+    else:
+        level = _levels(X, mu, rtol)
+        failed = np.ones(X.size, dtype=bool)
+        for number, count in enumerate(LEVELS):
+            now = np.flatnonzero(failed & (level <= number))
+            if now.size == 0:
+                continue
+            batch = _newton(X[now], mu[now], rtol, int(count), profiles=False)
+            phi[now], used[now] = batch.phi, count
+            steps[now] += batch.steps
+            failed[now] = ~(batch.phi[:, 2] <= rtol)
+    return {"phi": phi, "iterations": steps, "nodes": used, "failed": failed}
+
+
+def _solve_classical(
+    X: FloatArray, mu: FloatArray, rtol: float, rings: int, damping: float, max_iterations: int
+) -> dict[str, Any]:
+    phi = np.full((X.size, 3), np.nan)
+    steps = np.zeros(X.size, dtype=np.int64)
+    failed = np.ones(X.size, dtype=bool)
+    for k in range(X.size):
+        fine = solve_classical(X[k], mu[k], rings, damping, rtol, max_iterations)
+        coarse = solve_classical(X[k], mu[k], rings // 2, damping, rtol, max_iterations)
+        steps[k] = fine[0]
+        phi[k, :2] = fine[2:4]
+        change = [abs(c / f - 1) if f else 0.0 for f, c in zip(fine[2:4], coarse[2:4], strict=True)]
+        phi[k, 2] = max(change) + rtol
+        failed[k] = not (fine[1] and coarse[1])
+    return {"phi": phi, "iterations": steps, "nodes": np.full(X.size, rings), "failed": failed}
+
+
+def solve(
+    X: ArrayLike,
+    mu: ArrayLike,
+    rtol: float = 1e-10,
+    nodes: int | None = None,
+    method: Method = "newton",
+    damping: float = 0.3,
+    max_iterations: int = 2000,
+) -> IslandSolution:
+    """Solve the island problem for phi_F, phi_A and the profiles of pressure and gap.
+
+    Parameters
+    ----------
+    X : array_like
+        Approach over the summits' standard deviation, Delta/sigma.
+    mu : array_like
+        Stiffness of the roughness against the sphere, (8/3) D sigma sqrt(2 R_u R_d), at least 0;
+        broadcasts against `X`.
+    rtol : float
+        Relative error asked of phi_F and phi_A, at least 1e-13; it sets the node count.
+    nodes : int, optional
+        Use this many Gauss nodes (or rings) instead; then `error` tells what they gave.
+    method : {"newton", "classical"}
+        Newton on the spectral discretisation, or the damped iteration of Greenwood and Tripp (1967) on
+        `nodes` rings (200 if not given), whose mesh error `error` states and `rtol` does not control.
+    damping, max_iterations : float, int
+        For "classical": the share of each correction that is taken, and the steps allowed.
+
+    Returns
+    -------
+    IslandSolution
+
+    Raises
+    ------
+    InputError
+        NaN, infinite or empty input, a negative `mu`, an `rtol` outside [1e-13, 0.1].
+    ConvergenceError
+        Where the accuracy was not reached; its `mask` says which entries, its `result` holds the rest.
+    """
+    approach, stiffness = finite_array("X", X), finite_array("mu", mu)
+    require("mu", stiffness, stiffness >= 0, "at least 0")
+    if not TIGHTEST <= rtol <= 0.1:
+        raise InputError(f"rtol must lie in [{TIGHTEST:g}, 0.1], got {rtol!r}")
+    if nodes is not None and not 8 <= nodes <= 4096:
+        raise InputError(f"nodes must lie in [8, 4096], got {nodes!r}")
+    if not 0 < damping <= 1:
+        raise InputError(f"damping must lie in (0, 1], got {damping!r}")
+    try:
+        shape = np.broadcast_shapes(approach.shape, stiffness.shape)
+    except ValueError as fault:
+        raise InputError(f"X and mu do not broadcast: {fault}") from None
+    flat_X = np.broadcast_to(approach, shape).ravel()
+    flat_mu = np.broadcast_to(stiffness, shape).ravel()
+    if method == "newton":
+        found = _solve_newton(flat_X, flat_mu, rtol, nodes)
+    elif method == "classical":
+        rings = nodes or CLASSICAL_RINGS
+        found = _solve_classical(flat_X, flat_mu, rtol, rings, damping, max_iterations)
+    else:
+        raise InputError(f"method must be 'newton' or 'classical', got {method!r}")
+    result = IslandSolution(
+        X=flat_X.reshape(shape),
+        mu=flat_mu.reshape(shape),
+        phi_F=found["phi"][:, 0].reshape(shape),
+        phi_A=found["phi"][:, 1].reshape(shape),
+        error=found["phi"][:, 2].reshape(shape),
+        iterations=found["iterations"].reshape(shape),
+        nodes=found["nodes"].reshape(shape),
+        method=method,
+        rtol=rtol,
+        damping=damping,
+        max_iterations=max_iterations,
+    )
+    failed = found["failed"].reshape(shape)
+    if failed.any():
+        first = int(np.flatnonzero(failed.ravel())[0])
+        raise ConvergenceError(
+            f"{method} did not reach the accuracy asked for at {int(failed.sum())} of {failed.size} "
+            f"entries, the first at X = {flat_X[first]:.6g}, mu = {flat_mu[first]:.6g} "
+            f"(reached {found['phi'][first, 2]:.1e}, asked {rtol:.1e})",
+            failed,
+            result,
+        )
+    return result

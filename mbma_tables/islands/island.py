@@ -1,0 +1,147 @@
+"""One contact island, or many: its band, radii, densities, and the force and area that it carries."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.islands.geometry import FIELDS, fill_islands
+from mbma_tables.models import get_model
+from mbma_tables.surfaces.readings import Reading, get_reading
+from mbma_tables.surfaces.surface import Surface
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Island:
+    """Contact islands at approaches delta = z_max - d, in the surface's own length unit.
+
+    Attributes
+    ----------
+    delta : ndarray
+        Approach [length], broadcast against the surface.
+    zeta_d, zeta_u : ndarray
+        Magnifications between which roughness deforms (27, 30).
+    R_d, R_u : ndarray
+        Radii of the island's sphere and of its summits (26, 29) [length].
+    D, sigma : ndarray
+        Density [1/length^2] and standard deviation of height [length] of its summits (32).
+    h_d : ndarray
+        Roughness above zeta_d (B.3) [length].
+    eta : ndarray
+        Share of a summit's contact that finer roughness leaves (39).
+    X, mu : ndarray
+        The two numbers of the island problem (34, 36, 37).
+    force, area : ndarray
+        F^i [E_star length^2] and A^i [length^2] (40).
+    error : ndarray
+        Bound on the relative error of both.
+    reading, tier : str
+        What made them.
+    """
+
+    delta: Any
+    zeta_d: Any
+    zeta_u: Any
+    R_d: Any
+    R_u: Any
+    D: Any
+    sigma: Any
+    h_d: Any
+    eta: Any
+    X: Any
+    mu: Any
+    force: Any
+    area: Any
+    error: Any
+    reading: str
+    tier: str
+
+
+def geometry(
+    approach: FloatArray, hurst: FloatArray, zeta_1: FloatArray, reading: Reading
+) -> dict[str, FloatArray]:
+    """`FIELDS` of islands at delta/h_rms = approach > 0, in units of s and 1/q0; arguments of one shape."""
+    out = np.empty((len(FIELDS), approach.size))
+    fill_islands(approach.ravel(), hurst.ravel(), zeta_1.ravel(), reading.numbers, out)
+    return dict(zip(FIELDS, out.reshape((len(FIELDS), *approach.shape)), strict=True))
+
+
+def scale_force(g: dict[str, FloatArray]) -> FloatArray:
+    """F^i over E* s/q0 per unit of Phi_F: sigma L."""
+    return g["sigma"] * np.sqrt(2 * g["R_d"] * g["sigma"])
+
+
+def scale_area(g: dict[str, FloatArray]) -> FloatArray:
+    """A^i over 1/q0^2 per unit of Phi_A: eta pi D R_u sigma L^2."""
+    return 2 * math.pi * g["eta"] * g["D"] * g["R_u"] * g["R_d"] * g["sigma"] ** 2
+
+
+def island(
+    surface: Surface,
+    delta: ArrayLike,
+    tier: str = "exact",
+    reading: str | Reading = "reported",
+    E_star: float = 1.0,
+    rtol: float = 1e-9,
+) -> Island:
+    """Contact islands of a surface at the approaches `delta`.
+
+    Parameters
+    ----------
+    surface : Surface
+        One surface or a batch; it broadcasts against `delta`.
+    delta : array_like
+        Approach z_max - d of the island [length], positive.
+    tier : {"exact", "rigid"}
+        The island model.
+    reading : {"reported", "printed"} or Reading
+        Which reading of the paper's equations.
+    E_star : float
+        Effective modulus; force is in its unit times length squared.
+    rtol : float
+        Relative error asked of force and area.
+
+    Returns
+    -------
+    Island
+
+    Raises
+    ------
+    InputError, OutOfRangeError, ConvergenceError
+    """
+    approach = finite_array("delta", delta)
+    require("delta", approach, approach > 0, "positive")
+    modulus = finite_array("E_star", E_star)
+    require("E_star", modulus, modulus > 0, "positive")
+    rule = get_reading(reading)
+    model = get_model(tier, rtol)
+    shape = broadcast_shape(delta=approach, surface=surface.hurst)
+    approach, hurst, zeta_1 = (
+        np.broadcast_to(array, shape) for array in (approach / surface.h_rms, surface.hurst, surface.zeta_1)
+    )
+    g = geometry(approach, hurst, zeta_1, rule)
+    phi = model.answer(g["X"], g["mu"])
+    s, q0 = surface.s, surface.q0
+    units = {
+        "R_d": 1 / (s * q0**2),
+        "R_u": 1 / (s * q0**2),
+        "D": q0**2,
+        "sigma": s,
+        "h_d": s,
+    }
+    names = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
+    values = {name: (g[name] * units.get(name, 1.0))[()] for name in names}
+    return Island(
+        delta=np.broadcast_to(np.asarray(delta, dtype=float), shape)[()],
+        force=(modulus * s / q0 * scale_force(g) * phi.phi_F)[()],
+        area=(scale_area(g) * phi.phi_A / q0**2)[()],
+        error=np.asarray(phi.error)[()],
+        reading=rule.name,
+        tier=model.name,
+        **values,
+    )

@@ -1,0 +1,1 @@
+"""Rough surfaces: spectra, surfaces, readings, measured maps, the paper's cases."""

@@ -1,0 +1,90 @@
+"""Readings of the paper: the few choices that its text leaves open or prints wrongly, by name.
+
+`printed` is exactly the printed equations. `reported`, the default, takes every summit density without its
+pi, and so gives the results that the paper reports. Nothing else is tuned.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Literal
+
+from mbma_tables.errors import InputError
+from mbma_tables.surfaces.spectrum import NAYAK
+
+
+@dataclasses.dataclass(frozen=True)
+class Reading:
+    """One reading of the paper's equations; make another with ``dataclasses.replace``.
+
+    Attributes
+    ----------
+    name : str
+        Stands in every result that it made.
+    density_divisor : float
+        Summit density is m4/(density_divisor m2), wherever one enters (Eqs. 2, 32, 39, 43a).
+    jacobian : {"printed", "exact"}
+        K1 of (47): 1 - 4 beta/3, or 1 - (4 beta/3)/sqrt(1 - zeta_1^(-2H)) as (46) with (27b) gives.
+    offset : bool
+        Whether islands stand h_d below z_max (Eqs. 35, 41).
+    summit_sigma : bool
+        sigma of an island and of the islands' heights is the summits' (Eqs. 32, 43a); else sqrt(m0).
+    beta : float
+        Share of the approach that deforms the sphere (B.6).
+    phi : float
+        Roughness over Hertz deformation below which roughness does not matter (28).
+    floor_d, floor_u : float
+        Least zeta_d (27a) and zeta_u (30a).
+    """
+
+    name: str
+    density_divisor: float = NAYAK
+    jacobian: Literal["printed", "exact"] = "printed"
+    offset: bool = True
+    summit_sigma: bool = True
+    beta: float = 1 / 3
+    phi: float = 0.05
+    floor_d: float = 1.5
+    floor_u: float = 3.0
+
+    def __post_init__(self) -> None:
+        allowed = {
+            "density_divisor must be positive": self.density_divisor > 0,
+            "jacobian must be 'printed' or 'exact'": self.jacobian in ("printed", "exact"),
+            "beta must lie in (0, 3/4)": 0 < self.beta < 0.75,
+            "phi must be positive, with phi/(1 + phi) < 4 beta/3": 0
+            < self.phi / (1 + self.phi)
+            < 4 * self.beta / 3,
+            "floors must satisfy 1 < floor_d < floor_u": 1 < self.floor_d < self.floor_u,
+        }
+        for rule, kept in allowed.items():
+            if not kept:
+                raise InputError(f"reading {self.name!r}: {rule}")
+
+    @property
+    def numbers(self) -> tuple[float, float, float, float, float, bool, bool]:
+        """What compiled code needs: density divisor, beta, phi, floors, offset, summit_sigma."""
+        return (
+            float(self.density_divisor),
+            float(self.beta),
+            float(self.phi),
+            float(self.floor_d),
+            float(self.floor_u),
+            bool(self.offset),
+            bool(self.summit_sigma),
+        )
+
+
+PRINTED = Reading("printed")
+REPORTED = Reading("reported", density_divisor=NAYAK / math.pi)
+READINGS = {reading.name: reading for reading in (REPORTED, PRINTED)}
+
+
+def get_reading(reading: str | Reading) -> Reading:
+    """The reading of that name, or the reading itself."""
+    if isinstance(reading, Reading):
+        return reading
+    if reading not in READINGS:
+        raise InputError(f"reading must be one of {sorted(READINGS)} or a Reading, got {reading!r}")
+    return READINGS[reading]
