@@ -48,6 +48,21 @@ def require(name: str, value: FloatArray, good: Any, allowed: str) -> None:
         raise OutOfRangeError(f"{name} must be {allowed}, got {describe_entries(value, bad)}", bad)
 
 
+def number_in(name: str, value: Any, low: float, high: float) -> float:
+    """`value` as a float within [low, high]."""
+    number = finite_array(name, value)
+    if number.ndim or not low <= number <= high:
+        raise InputError(f"{name} must be a number in [{low:g}, {high:g}], got {value!r}")
+    return float(number)
+
+
+def whole_number_in(name: str, value: Any, low: int, high: int) -> int:
+    """`value` as an int within [low, high]."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not low <= value <= high:
+        raise InputError(f"{name} must be a whole number in [{low}, {high}], got {value!r}")
+    return int(value)
+
+
 def broadcast_shape(**arguments: Any) -> tuple[int, ...]:
     """The common shape of named arrays, or one message that lists theirs."""
     shapes = {name: np.shape(value) for name, value in arguments.items()}

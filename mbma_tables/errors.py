@@ -46,3 +46,11 @@ class ConvergenceError(MbmaError, ArithmeticError):
 
 class NotSelfAffineError(MbmaError, ValueError):
     """A measured map or spectrum that is no self-affine surface; the message says why."""
+
+
+class TableFileError(MbmaError, OSError):
+    """A table file that cannot be used: unreadable, damaged, edited, of another format or kind."""
+
+
+class StaleTableWarning(UserWarning):
+    """A table made by another version of the solver than the one installed."""

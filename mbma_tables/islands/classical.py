@@ -26,8 +26,8 @@ def ring_matrix(rings: int) -> FloatArray:
     complement = ((t - rho) / (t + rho)) ** 2
     np.fill_diagonal(complement, 1.0)
     matrix: FloatArray = 4 / np.pi * t / (t + rho) * scipy.special.ellipkm1(complement) / rings
-    # K(k) ~ ln(8 rho/|t - rho|) next to t = rho, integrated over the ring's own width
-    np.fill_diagonal(matrix, 2 / np.pi * (np.log(16 * r * rings) + 1) / rings)
+    # the midpoint rule across ln|t - rho| is of second order with ln(h/2 pi) in the ring itself
+    np.fill_diagonal(matrix, 2 / np.pi * np.log(16 * np.pi * r * rings) / rings)
     return matrix
 
 

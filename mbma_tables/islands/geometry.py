@@ -15,7 +15,7 @@ import math
 from numba import njit
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, alpha_of, m0_of, m2_of, m4_of
+from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, alpha_of, m0_of, m4_of, summit_rate
 
 FIELDS = (
     "zeta_d",
@@ -93,24 +93,19 @@ def island_fields(
 
     # the band [zeta_d, zeta_u]; m0 = a - b, and alpha from the width alone
     width = math.log1p((a - b) / (e + b)) / (2.0 * hurst)
-    D = m4_of(hurst, log_d, width) / (divisor * m2_of(hurst, log_d, width))
-    # (root_a - root_b) (root_a + root_b) does not underflow where a and b do
-    m0_root = math.sqrt((root_a - root_b) * (root_a + root_b))
+    D = summit_rate(hurst, log_d, width) / divisor
+    # a and b may underflow where their roots do not
+    m0_root = math.sqrt(root_a - root_b) * math.sqrt(root_a + root_b)
     sigma = m0_root * summit_sigma(1.0, alpha_of(hurst, width), summits)
     R_d = RADIUS / math.sqrt(m4_of(hurst, 0.0, log_d))
     R_u = RADIUS / math.sqrt(m4_of(hurst, 0.0, log_u))
-    D_d = m4_of(hurst, 0.0, log_d) / (divisor * m2_of(hurst, 0.0, log_d))
+    D_d = summit_rate(hurst, 0.0, log_d) / divisor
     sigma_d = summit_sigma(m0_of(hurst, 0.0, log_d), alpha_of(hurst, log_d), summits)
 
     m4_all = m4_of(hurst, 0.0, log_zeta_1)
-    D_top = m4_all / (divisor * m2_of(hurst, 0.0, log_zeta_1))
+    D_top = summit_rate(hurst, 0.0, log_zeta_1) / divisor
     R_top = RADIUS / math.sqrt(m4_all)
-    eta = (
-        0.75
-        * (math.pi * D_top) ** (1.0 / 3.0)
-        * (1.5 * R_top) ** (2.0 / 3.0)
-        * (root_b / (phi * R_u)) ** (1.0 / 3.0)
-    )
+    eta = 0.75 * (math.pi * D_top) ** (1.0 / 3.0) * (1.5 * R_top) ** (2.0 / 3.0) * (root_b / (phi * R_u)) ** (1.0 / 3.0)
     h_d = root_a if offset else 0.0
     X = (room * approach - h_d) / sigma
     mu = 8.0 / 3.0 * D * sigma * math.sqrt(2.0 * R_u * R_d)

@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.arguments import FloatArray, finite_array, require
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, number_in, require, whole_number_in
 from mbma_tables.errors import ConvergenceError, InputError
 from mbma_tables.islands.classical import solve_classical
 from mbma_tables.islands.newton import solve_islands
@@ -208,16 +208,11 @@ def solve(
     """
     approach, stiffness = finite_array("X", X), finite_array("mu", mu)
     require("mu", stiffness, stiffness >= 0, "at least 0")
-    if not TIGHTEST <= rtol <= 0.1:
-        raise InputError(f"rtol must lie in [{TIGHTEST:g}, 0.1], got {rtol!r}")
-    if nodes is not None and not 8 <= nodes <= 4096:
-        raise InputError(f"nodes must lie in [8, 4096], got {nodes!r}")
-    if not 0 < damping <= 1:
-        raise InputError(f"damping must lie in (0, 1], got {damping!r}")
-    try:
-        shape = np.broadcast_shapes(approach.shape, stiffness.shape)
-    except ValueError as fault:
-        raise InputError(f"X and mu do not broadcast: {fault}") from None
+    rtol = number_in("rtol", rtol, TIGHTEST, 0.1)
+    nodes = None if nodes is None else whole_number_in("nodes", nodes, 8, 4096)
+    damping = number_in("damping", damping, 1e-6, 1.0)
+    max_iterations = whole_number_in("max_iterations", max_iterations, 1, 10**9)
+    shape = broadcast_shape(X=approach, mu=stiffness)
     flat_X = np.broadcast_to(approach, shape).ravel()
     flat_mu = np.broadcast_to(stiffness, shape).ravel()
     if method == "newton":

@@ -81,7 +81,7 @@ def f_one(x: float) -> float:
 def f_three_halves(x: float) -> float:
     """F_{3/2}(x), compiled."""
     piece, t, base, weight = _locate(x)
-    return _horner(_THREE_HALVES[piece], t) * (base * math.sqrt(base) * weight)
+    return _horner(_THREE_HALVES[piece], t) * (base * (math.sqrt(base) * weight))
 
 
 @njit(cache=True, error_model="numpy")

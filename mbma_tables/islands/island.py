@@ -62,9 +62,7 @@ class Island:
     tier: str
 
 
-def geometry(
-    approach: FloatArray, hurst: FloatArray, zeta_1: FloatArray, reading: Reading
-) -> dict[str, FloatArray]:
+def geometry(approach: FloatArray, hurst: FloatArray, zeta_1: FloatArray, reading: Reading) -> dict[str, FloatArray]:
     """`FIELDS` of islands at delta/h_rms = approach > 0, in units of s and 1/q0; arguments of one shape."""
     out = np.empty((len(FIELDS), approach.size))
     fill_islands(approach.ravel(), hurst.ravel(), zeta_1.ravel(), reading.numbers, out)

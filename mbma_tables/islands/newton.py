@@ -211,9 +211,7 @@ def solve_islands(
                 pi[i] = 0.5 * f_three_halves(squared * v[i] - X[entry]) * root_weights[i]
             continue
         while True:
-            used, left = newton_steps(
-                X[entry], mu[entry], squared, v, root_weights, operator, 0.01 * rtol, wi, pi
-            )
+            used, left = newton_steps(X[entry], mu[entry], squared, v, root_weights, operator, 0.01 * rtol, wi, pi)
             steps[entry] += used
             for i in range(n):
                 gap = squared * v[i] - X[entry] + wi[i] / root_weights[i]

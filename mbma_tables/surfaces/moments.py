@@ -14,6 +14,12 @@ from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.surface import LARGEST_ZETA_1, LEAST_ZETA_1
 
 
+def _interval(least: FloatArray, most: FloatArray) -> str:
+    if least.size == 1:
+        return f"in ({least.item():.6g}, {most.item():.6g}]"
+    return f"between {least.min():.6g} and {most.max():.6g} for these surfaces"
+
+
 def band_from_moments(
     hurst: ArrayLike, m0: ArrayLike, m2: ArrayLike, m4: ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -24,10 +30,7 @@ def band_from_moments(
     OutOfRangeError
         Where no band with 3 < zeta_1 <= 1e8 has the ratio alpha = m0 m4/m2^2.
     """
-    given = {
-        name: finite_array(name, value)
-        for name, value in {"hurst": hurst, "m0": m0, "m2": m2, "m4": m4}.items()
-    }
+    given = {name: finite_array(name, value) for name, value in {"hurst": hurst, "m0": m0, "m2": m2, "m4": m4}.items()}
     require("hurst", given["hurst"], (given["hurst"] > 0) & (given["hurst"] <= 1), "in (0, 1]")
     for name in ("m0", "m2", "m4"):
         require(name, given[name], given[name] > 0, "positive")
@@ -37,20 +40,17 @@ def band_from_moments(
         raise InputError(f"hurst, m0, m2 and m4 do not broadcast: {fault}") from None
     alpha = (a / b) * (c / b)
     low, high = math.log(LEAST_ZETA_1), math.log(LARGEST_ZETA_1)
+    least, most = (np.vectorize(spectrum.alpha_of)(h, end) for end in (low, high))
+    require(
+        "alpha = m0 m4/m2^2",
+        alpha,
+        (alpha > least) & (alpha <= most),
+        f"{_interval(least, most)}, what 3 < zeta_1 <= 1e8 gives at this hurst",
+    )
     log_zeta = np.empty(h.shape)
     for place in np.ndindex(h.shape):
-        own, target = float(h[place]), float(alpha[place])
-        least = spectrum.alpha_of(own, low)
-        most = spectrum.alpha_of(own, high)
-        inside = np.array(least < target <= most)
-        require(
-            "alpha = m0 m4/m2^2",
-            np.asarray(target),
-            inside,
-            f"in ({least:.6g}, {most:.6g}], what 3 < zeta_1 <= 1e8 gives at hurst = {own:g}",
-        )
         log_zeta[place] = brentq(
-            lambda x, own=own, target=target: math.log(spectrum.alpha_of(own, x) / target),
+            lambda x, own=float(h[place]), goal=float(alpha[place]): math.log(spectrum.alpha_of(own, x) / goal),
             low,
             high,
             xtol=1e-15,

@@ -50,12 +50,10 @@ class Reading:
 
     def __post_init__(self) -> None:
         allowed = {
-            "density_divisor must be positive": self.density_divisor > 0,
+            "density_divisor must be positive and finite": 0 < self.density_divisor < math.inf,
             "jacobian must be 'printed' or 'exact'": self.jacobian in ("printed", "exact"),
             "beta must lie in (0, 3/4)": 0 < self.beta < 0.75,
-            "phi must be positive, with phi/(1 + phi) < 4 beta/3": 0
-            < self.phi / (1 + self.phi)
-            < 4 * self.beta / 3,
+            "phi must be positive, with phi/(1 + phi) < 4 beta/3": 0 < self.phi / (1 + self.phi) < 4 * self.beta / 3,
             "floors must satisfy 1 < floor_d < floor_u": 1 < self.floor_d < self.floor_u,
         }
         for rule, kept in allowed.items():
@@ -85,6 +83,6 @@ def get_reading(reading: str | Reading) -> Reading:
     """The reading of that name, or the reading itself."""
     if isinstance(reading, Reading):
         return reading
-    if reading not in READINGS:
+    if not isinstance(reading, str) or reading not in READINGS:
         raise InputError(f"reading must be one of {sorted(READINGS)} or a Reading, got {reading!r}")
     return READINGS[reading]

@@ -20,37 +20,44 @@ BROADENING = 0.8968  # summit variance is (1 - BROADENING/alpha) m0, Eq. (2)
 
 @njit(cache=True, error_model="numpy")
 def _growth(power: float, log_ratio: float) -> float:
-    """(r^power - 1)/power with r = exp(log_ratio); its limit log_ratio at power 0."""
+    """(r^power - 1)/(power log r) with r = exp(log_ratio): 1 where either is 0."""
     x = power * log_ratio
-    return log_ratio * (math.expm1(x) / x) if x != 0.0 else log_ratio
+    return math.expm1(x) / x if x != 0.0 else 1.0
 
 
 @njit(cache=True, error_model="numpy")
 def m0_of(hurst: float, log_za: float, log_ratio: float) -> float:
     """Variance of height over the band, Eq. (7), in s^2."""
-    return 2.0 * hurst * math.exp(-2.0 * hurst * log_za) * _growth(-2.0 * hurst, log_ratio)
+    return 2.0 * hurst * math.exp(-2.0 * hurst * log_za) * log_ratio * _growth(-2.0 * hurst, log_ratio)
 
 
 @njit(cache=True, error_model="numpy")
 def m2_of(hurst: float, log_za: float, log_ratio: float) -> float:
     """Variance of a profile's slope over the band, Eq. (7), in (s q0)^2."""
     power = 2.0 - 2.0 * hurst
-    return hurst * math.exp(power * log_za) * _growth(power, log_ratio)
+    return hurst * math.exp(power * log_za) * log_ratio * _growth(power, log_ratio)
 
 
 @njit(cache=True, error_model="numpy")
 def m4_of(hurst: float, log_za: float, log_ratio: float) -> float:
     """Variance of a profile's second derivative over the band, Eq. (7), in (s q0^2)^2."""
     power = 4.0 - 2.0 * hurst
-    return 0.75 * hurst * math.exp(power * log_za) * _growth(power, log_ratio)
+    return 0.75 * hurst * math.exp(power * log_za) * log_ratio * _growth(power, log_ratio)
 
 
 @njit(cache=True, error_model="numpy")
 def alpha_of(hurst: float, log_ratio: float) -> float:
     """Nayak's bandwidth parameter m0 m4/m2^2, Eq. (3): a function of zb/za alone, 1.5 where that is 1."""
-    # m4/m0 grows like exp(4 log_ratio): grouped so that nothing overflows
-    m2 = m2_of(hurst, 0.0, log_ratio)
-    return (m0_of(hurst, 0.0, log_ratio) / m2) * (m4_of(hurst, 0.0, log_ratio) / m2)
+    g2 = _growth(2.0 - 2.0 * hurst, log_ratio)
+    # grouped so that nothing overflows
+    return 1.5 * (_growth(-2.0 * hurst, log_ratio) / g2) * (_growth(4.0 - 2.0 * hurst, log_ratio) / g2)
+
+
+@njit(cache=True, error_model="numpy")
+def summit_rate(hurst: float, log_za: float, log_ratio: float) -> float:
+    """m4/m2 over the band [q0^2], which summit densities are made of, Eq. (2); finite for a band of no width."""
+    growth = _growth(4.0 - 2.0 * hurst, log_ratio) / _growth(2.0 - 2.0 * hurst, log_ratio)
+    return 0.75 * math.exp(2.0 * log_za) * growth
 
 
 @vectorize(["f8(f8, f8, f8, i8)"], cache=True)  # type: ignore[no-untyped-call]

@@ -107,17 +107,26 @@ class Surface:
         return get_case(name).surface
 
     @classmethod
-    def from_psd(cls, q: ArrayLike, C: ArrayLike, *, h_max: float, convention: str = "paper") -> Surface:
-        """The self-affine surface fitted to a measured spectrum; see `mbma_tables.surfaces.maps`."""
+    def from_psd(
+        cls,
+        q: ArrayLike,
+        C: ArrayLike,
+        *,
+        h_max: float,
+        convention: str = "paper",
+        band: tuple[float, float] | None = None,
+    ) -> Surface:
+        """The self-affine surface fitted to a measured spectrum; see `mbma_tables.surfaces.maps.surface_from_psd`."""
         from mbma_tables.surfaces.maps import surface_from_psd
 
-        return surface_from_psd(q, C, h_max=h_max, convention=convention)
+        return surface_from_psd(q, C, h_max=h_max, convention=convention, band=band)
 
     @classmethod
-    def from_map(
-        cls, heights: Any, dx: float | None = None, dy: float | None = None, **options: Any
-    ) -> Surface:
-        """The self-affine surface fitted to a measured map; see `mbma_tables.surfaces.maps`."""
+    def from_map(cls, heights: Any, dx: float | None = None, dy: float | None = None, **options: Any) -> Surface:
+        """The self-affine surface fitted to a measured map.
+
+        `options` are `periodic`, `detrend`, `h_max` and `band` of `mbma_tables.surfaces.maps.surface_from_map`.
+        """
         from mbma_tables.surfaces.maps import surface_from_map
 
         return surface_from_map(heights, dx, dy, **options)

@@ -57,7 +57,7 @@ GAUSS[1:10:2] = _GAUSS_WEIGHTS
 GAUSS[-2:-11:-2] = _GAUSS_WEIGHTS
 
 BATCH = 2048  # intervals evaluated together: bounds the memory, not the work
-DEPTH = 40  # halvings of an interval before giving up
+DEPTH = 64  # halvings of an interval before giving up
 
 Integrand = Callable[[NDArray[np.intp], FloatArray], FloatArray]
 
@@ -94,6 +94,7 @@ def integrate(
     high: FloatArray,
     count: int,
     rtol: float,
+    components: int = 1,
 ) -> Integrals:
     """Integrate `count` positive integrands, each over the intervals that it owns.
 
@@ -109,6 +110,8 @@ def integrate(
         Number of integrals; one that owns no interval is 0.
     rtol : float
         Relative tolerance, met by the estimates of every component of every integral.
+    components : int
+        Components of the answer where there is no interval to tell.
 
     Returns
     -------
@@ -119,6 +122,9 @@ def integrate(
     ConvergenceError
         Where `DEPTH` halvings did not suffice; `mask` says which integrals.
     """
+    if owner.size == 0:
+        nothing = np.zeros((count, components))
+        return Integrals(nothing, nothing, 0)
     value, error = _evaluate(integrand, owner, low, high)
     evaluations = owner.size * NODES.size
     unfinished = np.zeros(count, dtype=bool)
@@ -139,8 +145,7 @@ def integrate(
         evaluations += new_owner.size * NODES.size
         keep = ~split
         owner, low, high = (
-            np.concatenate([old[keep], new])
-            for old, new in ((owner, new_owner), (low, new_low), (high, new_high))
+            np.concatenate([old[keep], new]) for old, new in ((owner, new_owner), (low, new_low), (high, new_high))
         )
         value = np.concatenate([value[keep], new_value])
         error = np.concatenate([error[keep], new_error])

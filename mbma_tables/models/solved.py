@@ -1,42 +1,18 @@
-"""Island models: anything that answers (X, mu) with force and area. Totals ask no more."""
+"""Island models that need no table: the exact solver and the rigid sphere."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Literal, Protocol
 
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import InputError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.height_integrals import height_integral
+from mbma_tables.models.protocol import IslandAnswer
 
-Tier = Literal["exact", "rigid"]
-
-TIGHTEST_ISLAND = greenwood_tripp.TIGHTEST
 CLOSED_FORM_ERROR = 1e-14
-
-
-@dataclasses.dataclass(frozen=True)
-class IslandAnswer:
-    """Phi_F and Phi_A of islands, with a bound on their relative error; arrays of one shape."""
-
-    phi_F: FloatArray
-    phi_A: FloatArray
-    error: FloatArray
-
-
-class IslandModel(Protocol):
-    """What the layers above need of an island model."""
-
-    @property
-    def name(self) -> str:
-        """The tier that selects it."""
-
-    def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
-        """Phi_F and Phi_A at finite X and mu >= 0."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,12 +39,3 @@ class RigidModel:
         force = np.asarray(mu * (math.pi / 5) * height_integral(2.5, -X))
         area = np.asarray(math.pi / 2 * height_integral(2.0, -X))
         return IslandAnswer(force, area, np.full(force.shape, CLOSED_FORM_ERROR))
-
-
-def get_model(tier: str, rtol: float) -> IslandModel:
-    """The island model of a tier, accurate enough for results at `rtol`."""
-    if tier == "exact":
-        return ExactModel(max(0.1 * rtol, TIGHTEST_ISLAND))
-    if tier == "rigid":
-        return RigidModel()
-    raise InputError(f"tier must be 'exact' or 'rigid', got {tier!r}")

@@ -1,0 +1,56 @@
+"""The command line `mbma`: contact, curves and islands of a surface, as a table, JSON, CSV or a picture.
+
+Bad input ends with one or two lines on stderr and exit code 2, before anything is written. Whatever needs
+numba or scipy is imported where a command runs, so that ``--help`` answers at once.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import click
+
+from mbma_tables import __version__
+from mbma_tables.cli.commands import contact_command, curve_command, island_command, surfaces_command
+from mbma_tables.errors import MbmaError
+
+BAD_INPUT = 2
+
+
+def _describe(fault: Exception) -> str:
+    """One line for what went wrong, and for misuse of the command line a second with a hint."""
+    if isinstance(fault, click.ClickException):
+        line = " ".join(fault.format_message().split())
+        if isinstance(fault, click.UsageError) and fault.ctx is not None:
+            return f"{line}\n(see '{fault.ctx.command_path} --help')"
+        return line
+    if isinstance(fault, OSError) and fault.strerror is not None:
+        return fault.strerror if fault.filename is None else f"{fault.filename}: {fault.strerror}"
+    return " ".join(str(fault).split())
+
+
+class Program(click.Group):
+    """A group of commands whose every known fault ends in a short message."""
+
+    def main(self, *args: Any, **extra: Any) -> Any:
+        """Run, and exit with 0, or with 2 for bad input."""
+        extra["standalone_mode"] = False
+        try:
+            code = super().main(*args, **extra)
+        except click.Abort:
+            sys.exit(1)
+        except (click.ClickException, MbmaError, OSError) as fault:
+            click.echo(f"mbma: {_describe(fault)}", err=True)
+            sys.exit(BAD_INPUT)
+        sys.exit(code if isinstance(code, int) else 0)
+
+
+@click.group("mbma", cls=Program, no_args_is_help=False, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="mbma")
+def main() -> None:
+    """Contact of rough surfaces by the MBMA model: force and real contact area against gap."""
+
+
+for command in (contact_command, curve_command, island_command, surfaces_command):
+    main.add_command(command)

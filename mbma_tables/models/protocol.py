@@ -1,0 +1,28 @@
+"""What an island model is: anything that answers (X, mu) with force and area."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Protocol
+
+from mbma_tables.arguments import FloatArray
+
+
+@dataclasses.dataclass(frozen=True)
+class IslandAnswer:
+    """Phi_F and Phi_A of islands, with a bound on their relative error; arrays of one shape."""
+
+    phi_F: FloatArray
+    phi_A: FloatArray
+    error: FloatArray
+
+
+class IslandModel(Protocol):
+    """What the layers above need of an island model."""
+
+    @property
+    def name(self) -> str:
+        """The tier that selects it."""
+
+    def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
+        """Phi_F and Phi_A at finite X and mu >= 0."""

@@ -1,0 +1,109 @@
+"""Pictures of compression: force against gap, and real contact area against force.
+
+Figures are drawn without pyplot, so nothing of the caller's matplotlib state is read or changed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from mbma_tables.arguments import FloatArray, finite_array
+from mbma_tables.errors import InputError, MbmaError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FORCE_LABEL = "force  F/(A0 E*)"
+
+
+@dataclasses.dataclass(frozen=True)
+class Curve:
+    """One line of a picture; three arrays of one length.
+
+    Attributes
+    ----------
+    label : str
+        Stands in the legend.
+    gap : ndarray
+        Mean separation u/h_rms (50).
+    force : ndarray
+        F/A0, or F/(A0 E*).
+    area : ndarray
+        A/A0.
+    """
+
+    label: str
+    gap: FloatArray
+    force: FloatArray
+    area: FloatArray
+
+    def __post_init__(self) -> None:
+        shapes = set()
+        for name in ("gap", "force", "area"):
+            array = finite_array(f"{name} of {self.label!r}", getattr(self, name))
+            shapes.add(array.shape)
+            object.__setattr__(self, name, array)
+        if len(shapes) > 1 or self.gap.ndim != 1:
+            raise InputError(f"{self.label!r}: gap, force and area must be 1-D and of one length")
+        if not ((self.force > 0) & (self.area > 0)).any():
+            raise InputError(f"{self.label!r} has no contact to draw on logarithmic axes")
+
+
+def draw_compression(curves: Sequence[Curve], title: str = "", force_label: str = FORCE_LABEL) -> Figure:
+    """Two panels: force (logarithmic) against u/h_rms, and area against force (both logarithmic).
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+        At least one; each is one line in both panels, with its points as they are. Points without contact
+        have no place on a logarithmic axis and are left out by it.
+    title : str
+        Stands above both panels.
+    force_label : str
+        What the force is, with its unit.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        For no curves.
+    MbmaError
+        Where matplotlib is missing.
+    """
+    if not curves:
+        raise InputError("no curves to draw: at least one is needed")
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise MbmaError("a plot needs matplotlib: pip install 'mbma_tables[plot]'") from None
+    figure = Figure(figsize=(10, 4.5), layout="constrained")
+    by_gap, by_force = figure.subplots(1, 2)
+    for curve in curves:
+        marker = "." if curve is curves[0] else ""
+        by_gap.plot(curve.gap, curve.force, marker=marker, label=curve.label)
+        by_force.plot(curve.force, curve.area, marker=marker, label=curve.label)
+    by_gap.set_yscale("log", nonpositive="mask")
+    by_force.set_xscale("log", nonpositive="mask")
+    by_force.set_yscale("log", nonpositive="mask")
+    by_gap.set_xlabel("mean separation  u/h_rms")
+    by_gap.set_ylabel(force_label)
+    by_force.set_xlabel(force_label)
+    by_force.set_ylabel("real contact area  A/A0")
+    for axes in (by_gap, by_force):
+        axes.grid(True, which="major", alpha=0.3)
+    by_gap.legend()
+    figure.suptitle(title)
+    return figure
+
+
+def to_png(figure: Figure) -> bytes:
+    """The figure as the content of a PNG file, the same bytes for the same figure."""
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=120)
+    return content.getvalue()

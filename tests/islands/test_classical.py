@@ -1,0 +1,61 @@
+"""The damped iteration of Greenwood and Tripp: agreement, mesh error, divergence."""
+
+import numpy as np
+import pytest
+
+from mbma_tables import ConvergenceError, greenwood_tripp
+
+CASES = [(5.0, 0.01), (5.0, 1.0), (2.0, 0.5), (5.0, 3.0), (0.0, 4.0)]
+
+
+@pytest.mark.parametrize(("X", "mu"), CASES)
+@pytest.mark.parametrize("rings", [50, 200])
+def test_agrees_with_newton_within_its_own_error(X, mu, rings):
+    exact = greenwood_tripp.solve(X, mu, rtol=1e-12)
+    classical = greenwood_tripp.solve(X, mu, method="classical", nodes=rings)
+    assert abs(classical.phi_F / exact.phi_F - 1) <= classical.error
+    assert abs(classical.phi_A / exact.phi_A - 1) <= classical.error
+    assert classical.error < 5e-3
+    assert classical.nodes == rings
+    assert classical.method == "classical"
+
+
+@pytest.mark.parametrize(("X", "mu"), CASES)
+def test_mesh_error_falls_like_the_square_of_the_ring_width(X, mu):
+    exact = greenwood_tripp.solve(X, mu, rtol=1e-12)
+    error = [
+        abs(greenwood_tripp.solve(X, mu, method="classical", nodes=n).phi_F / exact.phi_F - 1) for n in (100, 200, 400)
+    ]
+    order = np.log2(np.array(error[:-1]) / error[1:])
+    assert (order > 1.8).all(), order
+
+
+def test_profiles():
+    classical = greenwood_tripp.solve([2.0, 5.0], 1.0, method="classical", nodes=200)
+    newton = greenwood_tripp.solve([2.0, 5.0], 1.0)
+    assert classical.rho.shape == classical.pressure.shape == classical.gap.shape == (2, 200)
+    for k in range(2):
+        there = np.interp(classical.rho[k], newton.rho[k], newton.pressure[k])
+        inside = classical.rho[k] < 0.7 * newton.rho[k].max()
+        assert np.abs(classical.pressure[k] - there)[inside].max() <= 0.01 * newton.pressure[k].max()
+
+
+def test_divergence_is_an_error_with_its_mask():
+    with pytest.raises(ConvergenceError, match="2 of 4 entries, the first at X = 5, mu = 1000") as caught:
+        greenwood_tripp.solve(5.0, [0.1, 1e3, 1.0, 1e6], method="classical", nodes=60)
+    assert caught.value.mask.tolist() == [False, True, False, True]
+    reached = caught.value.result
+    exact = greenwood_tripp.solve(5.0, 0.1)
+    assert abs(reached.phi_F[0] / exact.phi_F - 1) <= reached.error[0]
+
+
+def test_smaller_damping_reaches_further():
+    with pytest.raises(ConvergenceError):
+        greenwood_tripp.solve(5.0, 10.0, method="classical", nodes=60, damping=0.3)
+    found = greenwood_tripp.solve(5.0, 10.0, method="classical", nodes=60, damping=0.1)
+    assert abs(found.phi_F / greenwood_tripp.solve(5.0, 10.0).phi_F - 1) <= found.error
+
+
+def test_too_few_iterations_is_an_error():
+    with pytest.raises(ConvergenceError):
+        greenwood_tripp.solve(2.0, 0.5, method="classical", nodes=60, max_iterations=5)

@@ -1,0 +1,260 @@
+"""The island problem: resolution, closed-form limits, published codes, invariants, profiles, bad input."""
+
+import csv
+import math
+import pathlib
+
+import numpy as np
+import pytest
+import scipy.integrate
+import scipy.interpolate
+import scipy.special
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbma_tables import ConvergenceError, InputError, OutOfRangeError, greenwood_tripp, height_integral
+
+PUBLISHED = pathlib.Path(__file__).parent.parent / "data" / "greenwood_tripp.csv"
+
+approaches = st.floats(-6, 40)
+stiffnesses = st.floats(-14, 8).map(lambda power: 10**power)
+several = settings(deadline=None, max_examples=60)
+
+
+def rigid(X, mu):
+    """Closed form for a sphere that does not deform."""
+    return mu * math.pi / 5 * height_integral(2.5, -X), math.pi / 2 * height_integral(2.0, -X)
+
+
+def true_error(found, exact):
+    return np.maximum(np.abs(found.phi_F / exact.phi_F - 1), np.abs(found.phi_A / exact.phi_A - 1))
+
+
+def scatter(count, low_X, high_X, low_mu, high_mu, seed):
+    rng = np.random.default_rng(seed)
+    return rng.uniform(low_X, high_X, count), 10 ** rng.uniform(low_mu, high_mu, count)
+
+
+def test_twice_the_nodes():
+    X, mu = scatter(400, -6, 40, -14, 8, seed=1)
+    X[:4], mu[:4] = [-6, -6, 40, 40], [1e-14, 1e8, 1e-14, 1e8]
+    solved = greenwood_tripp.solve(X, mu)
+    error = np.empty_like(X)
+    for count in np.unique(solved.nodes):
+        here = solved.nodes == count
+        twice = greenwood_tripp.solve(X[here], mu[here], rtol=1e-13, nodes=2 * int(count))
+        error[here] = np.maximum(
+            np.abs(solved.phi_F[here] / twice.phi_F - 1), np.abs(solved.phi_A[here] / twice.phi_A - 1)
+        )
+    assert error.max() <= 1e-10
+    assert solved.error.max() <= 1e-10
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9, 1e-11])
+def test_estimate_covers_the_true_error(rtol):
+    X, mu = scatter(2000, -12, 60, -20, 10, seed=round(-math.log10(rtol)))
+    exact = greenwood_tripp.solve(X, mu, rtol=1e-13)
+    solved = greenwood_tripp.solve(X, mu, rtol=rtol)
+    error = true_error(solved, exact)
+    assert error.max() <= rtol
+    assert (error <= solved.error + exact.error).all()
+
+
+@pytest.mark.parametrize("nodes", [16, 32, 64])
+def test_estimate_covers_the_true_error_of_given_nodes(nodes):
+    X, mu = scatter(500, -12, 60, -20, 10, seed=nodes)
+    exact = greenwood_tripp.solve(X, mu, rtol=1e-13)
+    solved = greenwood_tripp.solve(X, mu, nodes=nodes)
+    assert (solved.nodes == nodes).all()
+    assert (true_error(solved, exact) <= solved.error + exact.error).all()
+
+
+def test_no_failure_over_the_whole_range():
+    X, mu = scatter(10_000, -12, 100, -28, 12, seed=2)
+    solved = greenwood_tripp.solve(X, mu, rtol=1e-8)
+    assert solved.error.max() <= 1e-8
+    assert (solved.phi_F > 0).all()
+    assert (solved.phi_A > 0).all()
+
+
+@pytest.mark.parametrize("X", [-6.0, -2.0, 0.0, 3.0, 12.0, 40.0])
+def test_rigid_limit_is_left_at_first_order(X):
+    mu = np.array([1e-3, 1e-4, 1e-5])
+    solved = greenwood_tripp.solve(X, mu, rtol=1e-13)
+    for found, limit in zip((solved.phi_F, solved.phi_A), rigid(X, mu), strict=True):
+        loss = 1 - found / limit
+        assert (loss > -1e-13).all()
+        # a hundredth of mu, a hundredth of the loss, but for second order and rounding
+        assert loss[2] * 100 == pytest.approx(loss[0], rel=0.05, abs=1e-11)
+        assert abs(loss[1] / mu[1] - loss[2] / mu[2]) <= 2 * abs(loss[0] / mu[0] - loss[2] / mu[2]) / 9 + 1e-8
+
+
+@pytest.mark.parametrize("mu", [0.0, 1e-200, 1e-40, 1e-20])
+def test_rigid_limit(mu):
+    X = np.array([-12.0, -3.0, 0.0, 4.0, 24.0, 100.0])
+    solved = greenwood_tripp.solve(X, mu, rtol=1e-13)
+    force, area = rigid(X, mu)
+    assert np.abs(solved.phi_A / area - 1).max() <= 1e-13
+    if mu == 0:
+        assert (solved.phi_F == 0).all()
+    else:
+        assert np.abs(solved.phi_F / force - 1).max() <= 1e-13
+
+
+@pytest.mark.parametrize("mu", [0.1, 1.0, 100.0, 1e4, 1e6, 1e8])
+def test_smooth_hertz_is_approached(mu):
+    X = np.array([20.0, 40, 80, 160, 320])
+    solved = greenwood_tripp.solve(X, mu, rtol=1e-8)
+    ratio = solved.phi_F / (4 / 3 / math.sqrt(2) * X**1.5)
+    distance = np.abs(ratio - 1)
+    assert (np.diff(distance) < 0).all()
+    # the roughness shifts the approach by about the gap that it holds open in the middle
+    shift = X * (ratio ** (2 / 3) - 1)
+    if mu >= 100:
+        assert ((solved.gap[:, 0] < shift) & (shift < solved.gap[:, 0] + 0.6)).all()
+        assert distance[-1] < 1.5 * (solved.gap[-1, 0] + 0.6) / X[-1] * (1 + 0.5 * 6 / X[-1])
+
+
+def test_published_codes():
+    E_star, sigma, density, R_u, R_d = 1.1538e11, 20e-6, 2e8, 30e-6, 10e-3
+    mu = 8 / 3 * density * sigma * math.sqrt(2 * R_u * R_d)
+    L = math.sqrt(2 * R_d * sigma)
+    with PUBLISHED.open() as lines:
+        rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    table = {key: np.array([float(row[key]) for row in rows]) for key in rows[0]}
+    solved = greenwood_tripp.solve(-table["d_over_sigma"], mu)
+    force = E_star * sigma * L * solved.phi_F
+    area = math.pi * density * R_u * sigma * L**2 * solved.phi_A
+    assert mu == pytest.approx(8.2624, abs=5e-5)
+    assert np.abs(table["force_a_N"] / force - 1).max() <= 1.5e-3
+    assert np.abs(table["force_b_N"] / force - 1).max() <= 1.5e-3
+    assert np.abs(table["area_m2"] / area - 1).max() <= 1.5e-3
+
+
+@several
+@given(X=approaches, mu=stiffnesses, rise=st.floats(1e-3, 3))
+def test_rising_with_approach(X, mu, rise):
+    solved = greenwood_tripp.solve([X, X + rise], mu)
+    for phi in (solved.phi_F, solved.phi_A):
+        assert 0 < phi[0] < phi[1]
+
+
+@several
+@given(X=approaches, mu=stiffnesses, factor=st.floats(1.01, 100))
+def test_rising_with_stiffness_and_below_rigid(X, mu, factor):
+    solved = greenwood_tripp.solve(X, [mu, factor * mu])
+    force, area = rigid(X, np.array([mu, factor * mu]))
+    room = 1 + 1e-10
+    assert 0 < solved.phi_F[0] < solved.phi_F[1]
+    # stiffer roughness pushes the sphere away, and touches less
+    assert solved.phi_A[1] <= solved.phi_A[0] * room
+    assert (solved.phi_F <= force * room).all()
+    assert (solved.phi_A <= area * room).all()
+
+
+@pytest.mark.parametrize(("X", "mu"), [(-4.0, 1e3), (2.0, 0.3), (8.0, 20.0), (30.0, 1e5)])
+def test_profiles(X, mu):
+    solved = greenwood_tripp.solve(X, mu, rtol=1e-11)
+    rho, pressure, gap = solved.rho, solved.pressure, solved.gap
+    assert rho.shape == pressure.shape == gap.shape == (solved.nodes,)
+    law = mu / 2 * height_integral(1.5, gap)
+    loud = pressure > 1e-6 * pressure.max()
+    assert np.abs(pressure / law - 1)[loud].max() <= 1e-9
+
+    # Gauss points in rho^2: their rule gives the totals, their interpolant Eq. (37) at any radius
+    x, weights = np.polynomial.legendre.leggauss(rho.size)
+    squared = rho[-1] ** 2 / ((1 + x[-1]) / 2)
+    assert math.pi * squared * (weights / 2) @ pressure == pytest.approx(float(solved.phi_F), rel=1e-10, abs=0)
+    covered = height_integral(1, gap)
+    assert math.pi * squared * (weights / 2) @ covered == pytest.approx(float(solved.phi_A), rel=1e-10, abs=0)
+    at = scipy.interpolate.BarycentricInterpolator(2 * rho**2 / squared - 1, pressure)
+
+    def kernel(t, r):
+        complement = ((t - r) / (t + r)) ** 2
+        return 4 / math.pi * t / (t + r) * at(2 * t * t / squared - 1) * scipy.special.ellipkm1(complement)
+
+    for k in (2, rho.size // 2, rho.size - 3):
+        w = sum(
+            scipy.integrate.quad(kernel, low, high, args=(rho[k],), epsrel=1e-11, limit=200)[0]
+            for low, high in ((0, rho[k]), (rho[k], math.sqrt(squared)))
+        )
+        assert gap[k] == pytest.approx(rho[k] ** 2 - X + w, abs=1e-8 * max(1, abs(X)))
+
+
+def test_shapes_and_untouched_arguments():
+    X, mu = np.array([[1.0], [2.0]]), np.array([0.1, 1.0, 10.0])
+    kept = X.copy(), mu.copy()
+    solved = greenwood_tripp.solve(X, mu)
+    assert np.array_equal(X, kept[0])
+    assert np.array_equal(mu, kept[1])
+    for field in ("X", "mu", "phi_F", "phi_A", "error", "iterations", "nodes"):
+        assert np.shape(getattr(solved, field)) == (2, 3)
+    for field in ("rho", "pressure", "gap"):
+        assert getattr(solved, field).shape == (2, 3, solved.nodes.max())
+    one = greenwood_tripp.solve(2.0, 1.0)
+    assert np.shape(one.phi_F) == ()
+    assert one.phi_F == solved.phi_F[1, 1]
+    assert one.phi_A == solved.phi_A[1, 1]
+
+
+def test_no_touch_is_zero_without_a_warning():
+    solved = greenwood_tripp.solve([-45.0, -1e3, -1e300], [[0.0], [1e-3], [1e12]])
+    assert (solved.phi_F == 0).all()
+    assert (solved.phi_A == 0).all()
+    assert (solved.error == 0).all()
+
+
+def test_underflow_is_smooth():
+    X = np.linspace(-38.5, -36, 60)
+    solved = greenwood_tripp.solve(X, 1.0, rtol=1e-8)
+    assert (np.diff(solved.phi_A) >= 0).all()
+    assert (np.diff(solved.phi_F) >= 0).all()
+
+
+def test_failure_says_where():
+    with pytest.raises(ConvergenceError, match="1 of 3 entries, the first at X = 100000") as caught:
+        greenwood_tripp.solve([1.0, 1e5, 2.0], 1.0, rtol=1e-12)
+    assert caught.value.mask.tolist() == [False, True, False]
+    assert caught.value.result.phi_F[2] == greenwood_tripp.solve(2.0, 1.0, rtol=1e-12).phi_F
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, [1.0, math.nan], [], "deep", 1j, [None], True])
+def test_no_numbers(value):
+    with pytest.raises(InputError, match=r"^X "):
+        greenwood_tripp.solve(value, 1.0)
+    with pytest.raises(InputError, match=r"^mu "):
+        greenwood_tripp.solve(1.0, value)
+
+
+def test_negative_stiffness():
+    with pytest.raises(OutOfRangeError, match=r"mu must be at least 0, got -1 at \(1,\)") as caught:
+        greenwood_tripp.solve(1.0, [1.0, -1.0])
+    assert caught.value.mask.tolist() == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("rtol", 0.0),
+        ("rtol", 1e-14),
+        ("rtol", 0.5),
+        ("rtol", math.nan),
+        ("rtol", "tight"),
+        ("nodes", 7),
+        ("nodes", 5000),
+        ("nodes", 20.5),
+        ("damping", 0.0),
+        ("damping", 1.5),
+        ("damping", math.nan),
+        ("method", "secant"),
+        ("max_iterations", -1),
+    ],
+)
+def test_bad_options(option, value):
+    with pytest.raises(InputError, match=option):
+        greenwood_tripp.solve(1.0, 1.0, **{option: value})
+
+
+def test_shapes_that_do_not_broadcast():
+    with pytest.raises(InputError, match="broadcast"):
+        greenwood_tripp.solve([1.0, 2.0], [1.0, 2.0, 3.0])

@@ -1,0 +1,194 @@
+"""F_n against 40-digit parabolic cylinder functions, and where scipy's own fail."""
+
+import math
+import warnings
+
+import mpmath as mp
+import numpy as np
+import pytest
+import scipy.special
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numba import njit
+
+from mbma_tables import InputError
+from mbma_tables.islands.height_integrals import (
+    ORDERS,
+    f_five_halves,
+    f_half,
+    f_one,
+    f_three_halves,
+    f_two,
+    height_integral,
+    pressure_integrals,
+)
+
+COMPILED = dict(zip(ORDERS, (f_half, f_one, f_three_halves, f_two, f_five_halves), strict=True))
+EDGES = [-8.0, -6.0, -4.0, -2.0, 0.0, 1.0, 4.0]  # where the pieces meet
+
+
+def reference(n: float, x: float) -> mp.mpf:
+    with mp.workdps(40):
+        order, at = mp.mpf(n), mp.mpf(float(x))
+        scale = mp.gamma(order + 1) / mp.sqrt(2 * mp.pi)
+        return scale * mp.exp(-at * at / 4) * mp.pcfu(order + mp.mpf(1) / 2, at)
+
+
+def relative_errors(n: float, x: np.ndarray, values: np.ndarray) -> np.ndarray:
+    with mp.workdps(40):
+        return np.array([float(abs(mp.mpf(float(v)) / reference(n, a) - 1)) for a, v in zip(x, values, strict=True)])
+
+
+def scipy_route(n: float, x: np.ndarray) -> np.ndarray:
+    """The textbook formula in double precision, F_n = Gamma(n+1)/sqrt(2 pi) exp(-x^2/4) D_{-n-1}(x)."""
+    cylinder = scipy.special.pbdv(-n - 1, x)[0]
+    with np.errstate(all="ignore"):
+        return scipy.special.gamma(n + 1) / math.sqrt(2 * math.pi) * np.exp(-x * x / 4) * cylinder
+
+
+def test_reference_is_the_integral():
+    for n, x in ((0.5, -3.0), (1.5, 0.7), (2.5, 6.0)):
+        with mp.workdps(30):
+            direct = mp.quad(
+                lambda z, n=n, x=x: (z - x) ** n * mp.npdf(z), [x, x + 1, x + 3, x + 8, x + 20], maxdegree=10
+            )
+            assert abs(direct / reference(n, x) - 1) < 1e-15
+
+
+@pytest.mark.parametrize("n", ORDERS)
+def test_accuracy_up_to_10(n):
+    rng = np.random.default_rng(round(2 * n))
+    x = np.concatenate(
+        [
+            -(10 ** rng.uniform(0, 6, 120)),
+            rng.uniform(-9, 10, 250),
+            EDGES,
+            np.nextafter(EDGES, -np.inf),
+            np.nextafter(EDGES, np.inf),
+            [-1e6, 10.0],
+        ]
+    )
+    assert relative_errors(n, x, height_integral(n, x)).max() <= 1e-13
+
+
+@pytest.mark.parametrize("n", ORDERS)
+def test_accuracy_up_to_37(n):
+    x = np.append(np.random.default_rng(3).uniform(10, 37, 150), 37.0)
+    assert relative_errors(n, x, height_integral(n, x)).max() <= 5e-13
+
+
+@pytest.mark.parametrize("n", ORDERS)
+def test_smooth_underflow(n):
+    x = np.linspace(37, 45, 4001)
+    with warnings.catch_warnings(), np.errstate(all="raise"):
+        warnings.simplefilter("error")
+        values = height_integral(n, x)
+        far = height_integral(n, [1e3, 1e8, 1e300])
+    assert (np.diff(values) <= 0).all()
+    assert (values[x <= 38] > 0).all()
+    assert (values[x > 40] == 0).all()
+    assert (far == 0).all()
+    # a subnormal number is right to half of the smallest one, beside its own rounding
+    subnormal = x[(values < 2.3e-308) & (x < 39)][::40]
+    for at, value in zip(subnormal, height_integral(n, subnormal), strict=True):
+        true = reference(n, at)
+        assert abs(mp.mpf(float(value)) - true) <= 5e-13 * true + 2 * mp.mpf(5e-324)
+
+
+def test_far_left_is_a_power():
+    x = -(10.0 ** np.arange(9, 100, 10))
+    for n in ORDERS:
+        assert np.abs(height_integral(n, x) / np.abs(x) ** n - 1).max() <= 1e-14
+
+
+@pytest.mark.parametrize("n", ORDERS)
+def test_arrays_and_compiled_calls_agree_to_the_bit(n):
+    x = np.concatenate([np.random.default_rng(0).uniform(-15, 41, 5000), EDGES, [-1e6]])
+    single = COMPILED[n]
+
+    @njit
+    def loop(points, out):
+        for k in range(points.size):
+            out[k] = single(points[k])
+
+    looped = np.empty_like(x)
+    loop(x, looped)
+    array = height_integral(n, x)
+    assert np.array_equal(array, looped)
+    assert np.array_equal(array, [single(at) for at in x])
+    assert np.array_equal(array, [height_integral(n, at) for at in x])
+
+
+def test_the_pair_of_pressure_integrals_has_the_same_bits():
+    x = np.concatenate([np.random.default_rng(1).uniform(-15, 41, 5000), EDGES])
+    pairs = np.array([pressure_integrals(at) for at in x])
+    assert np.array_equal(pairs[:, 1], height_integral(0.5, x))
+    assert np.array_equal(pairs[:, 0], height_integral(1.5, x))
+
+
+@pytest.mark.parametrize("n", [1.5, 2.0, 2.5])
+@settings(deadline=None)
+@given(x=st.floats(-40, 12))
+def test_derivative(n, x):
+    # five points; truncation h^4/30 F^(5), rounding a few 1e-15/h
+    h = 2e-3 / max(1.0, abs(x) / 4)
+    at = height_integral(n, x + h * np.array([-2, -1, 1, 2]))
+    slope = (at[0] - 8 * at[1] + 8 * at[2] - at[3]) / (12 * h)
+    assert slope == pytest.approx(-n * height_integral(n - 1, x), rel=2e-9, abs=0)
+
+
+@settings(deadline=None)
+@given(x=st.floats(-30, 5))
+def test_recurrence(x):
+    # F_0 is the normal distribution's upper tail
+    lower = {1: scipy.special.ndtr(-x), 1.5: height_integral(0.5, x)}
+    for n, below in lower.items():
+        terms = np.array([n * below, -x * height_integral(n, x)])
+        assert abs(terms.sum() - height_integral(n + 1, x)) <= 1e-14 * np.abs(terms).sum()
+
+
+@settings(deadline=None)
+@given(x=st.floats(-1e3, 37))
+def test_positive_and_falling(x):
+    for n in ORDERS:
+        right, left = height_integral(n, [x, x - 1e-3 * max(1, abs(x))])
+        assert 0 < right < left
+
+
+@pytest.mark.parametrize("n", [0.5, 1.5, 2.5])
+def test_scipy_loses_digits_where_this_does_not(n):
+    x = np.array([-6.0, 5.0, 6.0, 10.0])
+    theirs = relative_errors(n, x, scipy_route(n, x))
+    ours = relative_errors(n, x, height_integral(n, x))
+    assert theirs[0] > 1e-12
+    assert theirs[2] > 1e-10
+    assert ours.max() <= 1e-14
+
+
+@pytest.mark.parametrize("n", ORDERS)
+def test_scipy_ends_in_nan_where_this_does_not(n):
+    x = np.array([-1e4, -100.0])
+    assert np.isnan(scipy_route(n, x)).all()
+    assert relative_errors(n, x, height_integral(n, x)).max() <= 1e-14
+
+
+def test_shapes():
+    assert isinstance(height_integral(1.5, 0.3), np.float64)
+    assert height_integral(1.5, np.zeros((2, 3))).shape == (2, 3)
+    strided = np.linspace(-3, 3, 20)[::2]
+    kept = strided.copy()
+    assert np.array_equal(height_integral(2, strided), [height_integral(2, x) for x in strided])
+    assert np.array_equal(strided, kept)
+    assert height_integral(1, [0, 1]).dtype == np.float64
+
+
+@pytest.mark.parametrize("n", [0, 3, 0.7, -0.5, math.nan])
+def test_unknown_order(n):
+    with pytest.raises(InputError, match="n must be one of"):
+        height_integral(n, 0.0)
+
+
+@pytest.mark.parametrize("x", [math.nan, math.inf, [0.0, -math.inf], [], "text", [1j]])
+def test_bad_argument(x):
+    with pytest.raises(InputError, match="x "):
+        height_integral(1.5, x)

@@ -1,0 +1,151 @@
+"""`island`: units, scales, shapes, tiers and bad input."""
+
+import math
+
+import numpy as np
+import pytest
+from exact_geometry import divisor, exact_island
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, height_integral, island
+
+LENGTHS = {"R_d": 1, "R_u": 1, "D": -2, "sigma": 1, "h_d": 1, "delta": 1}
+NUMBERS = ("zeta_d", "zeta_u", "eta", "X", "mu")
+
+
+@pytest.fixture(scope="module")
+def surface():
+    return Surface(0.8, 0.18125, 0.18125 * 216, 1.3, 3.9)
+
+
+@pytest.mark.parametrize("reading", ["reported", "printed"])
+def test_units(surface, reading):
+    for approach in (1e-9, 0.02, 0.7, 8.0):
+        found = island(surface, approach * surface.h_rms, reading=reading)
+        exact = exact_island(approach, surface.hurst, surface.zeta_1, divisor(reading))
+        # the unit of height and of length that the paper's geometry is in
+        s, length = surface.s, 1 / surface.q0
+        units = {"R_d": length**2 / s, "R_u": length**2 / s, "D": length**-2, "sigma": s, "h_d": s}
+        for name in (*NUMBERS, "R_d", "R_u", "D", "sigma", "h_d"):
+            known = float(exact[name]) * units.get(name, 1.0)
+            assert getattr(found, name) == pytest.approx(known, rel=2e-12, abs=0), name
+
+
+@pytest.mark.parametrize("reading", ["reported", "printed"])
+def test_force_and_area(surface, reading):
+    delta = np.array([1e-6, 0.1, 1.0, 6.0])
+    found = island(surface, delta, reading=reading, E_star=7.0)
+    solved = greenwood_tripp.solve(found.X, found.mu, rtol=1e-12)
+    L = np.sqrt(2 * found.R_d * found.sigma)
+    force = 7.0 * found.sigma * L * solved.phi_F
+    area = found.eta * math.pi * found.D * found.R_u * found.sigma * L**2 * solved.phi_A
+    assert np.abs(found.force / force - 1).max() <= 1e-9
+    assert np.abs(found.area / area - 1).max() <= 1e-9
+    assert (np.abs(found.force / force - 1) <= found.error).all()
+    assert found.reading == reading
+    assert found.tier == "exact"
+
+
+def test_rigid_tier(surface):
+    delta = np.array([1e-6, 0.1, 1.0, 6.0])
+    exact, rigid = island(surface, delta), island(surface, delta, tier="rigid")
+    L = np.sqrt(2 * rigid.R_d * rigid.sigma)
+    known = rigid.sigma * L * rigid.mu * math.pi / 5 * height_integral(2.5, -rigid.X)
+    assert np.abs(rigid.force / known - 1).max() <= 1e-14
+    assert (rigid.force >= exact.force).all()
+    assert (rigid.area >= exact.area).all()
+    assert rigid.force[0] == pytest.approx(exact.force[0], rel=1e-4, abs=0)
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    hurst=st.floats(0.1, 1),
+    zeta_1=st.floats(3.01, 1e5),
+    approach=st.floats(1e-9, 5),
+    power=st.floats(-9, 9),
+    modulus=st.floats(1e-3, 1e12),
+)
+def test_any_unit_of_length_and_stress(hurst, zeta_1, approach, power, modulus):
+    unit = 10**power
+    one = island(Surface(hurst, 1.0, zeta_1, 0.3, 1.0), 0.3 * approach)
+    other = island(Surface(hurst, 1 / unit, zeta_1 / unit, 0.3 * unit, unit), 0.3 * approach * unit, E_star=modulus)
+    for name in NUMBERS:
+        assert getattr(other, name) == pytest.approx(getattr(one, name), rel=1e-11, abs=1e-11)
+    for name, dimension in LENGTHS.items():
+        assert getattr(other, name) == pytest.approx(getattr(one, name) * unit**dimension, rel=1e-11, abs=0)
+    assert other.area == pytest.approx(one.area * unit**2, rel=1e-8, abs=0)
+    assert other.force == pytest.approx(one.force * unit**2 * modulus, rel=1e-8, abs=0)
+
+
+def test_batches_equal_loops():
+    surfaces = Surface([[0.4], [0.9]], 1.0, 500.0, [[0.1], [0.2]], 0.5)
+    delta = np.array([1e-5, 0.02, 0.3])
+    batch = island(surfaces, delta)
+    assert batch.force.shape == batch.delta.shape == batch.error.shape == (2, 3)
+    for i, (hurst, h_rms) in enumerate(((0.4, 0.1), (0.9, 0.2))):
+        for j in range(3):
+            one = island(Surface(hurst, 1.0, 500.0, h_rms, 0.5), delta[j])
+            assert np.shape(one.force) == ()
+            for name in (*NUMBERS, *LENGTHS, "force", "area"):
+                assert np.broadcast_to(getattr(batch, name), (2, 3))[i, j] == getattr(one, name), name
+
+
+def test_the_argument_stays(surface):
+    delta = np.array([0.1, 1.0])
+    island(surface, delta)
+    assert delta.tolist() == [0.1, 1.0]
+
+
+@pytest.mark.parametrize("delta", [0.0, -1.0, [1.0, -0.5]])
+def test_no_approach(surface, delta):
+    with pytest.raises(OutOfRangeError, match="delta must be positive") as caught:
+        island(surface, delta)
+    assert caught.value.mask.shape == np.shape(delta)
+    assert caught.value.mask.sum() == 1
+
+
+@pytest.mark.parametrize("delta", [math.nan, [1.0, math.inf], [], "deep", 1j])
+def test_no_number(surface, delta):
+    with pytest.raises(InputError, match="delta"):
+        island(surface, delta)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("tier", "magic"),
+        ("reading", "guessed"),
+        ("E_star", 0.0),
+        ("E_star", -1.0),
+        ("E_star", math.nan),
+        ("rtol", 0.0),
+        ("rtol", -1e-9),
+        ("rtol", 2.0),
+        ("rtol", math.nan),
+    ],
+)
+def test_bad_options(surface, option, value):
+    with pytest.raises(InputError, match=option):
+        island(surface, 1.0, **{option: value})
+
+
+def test_E_star_broadcasts(surface):
+    found = island(surface, [0.1, 1.0], E_star=[[1.0], [2.0], [3.0]])
+    assert found.force.shape == (3, 2)
+
+
+def test_shapes_that_do_not_broadcast():
+    with pytest.raises(InputError, match="broadcast"):
+        island(Surface([0.5, 0.6], 1.0, 100.0, 0.1, 0.3), [0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize("approach", [1e-150, 1e-160, 1e-200, 1e-300])
+def test_vanishing_approach_is_answered_or_refused(surface, approach):
+    room = surface.h_rms / surface.s
+    limit = (room - 4 / 9) / (math.sqrt(1 - 0.8968 / 1.5) * math.sqrt(16 / 81 - room**2 / 441))
+    try:
+        found = island(surface, approach * surface.h_rms)
+    except OutOfRangeError:
+        return
+    assert abs(found.X / limit - 1) <= 1e-12

@@ -1,0 +1,436 @@
+"""Surfaces from spectra and maps: known surfaces come back, everything else is refused with its reason."""
+
+import dataclasses
+import math
+import os
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from mbma_tables import Surface
+from mbma_tables.errors import InputError, MbmaError, NotSelfAffineError, OutOfRangeError
+from mbma_tables.surfaces.maps import radial_spectrum, read_map, surface_from_map, surface_from_psd
+
+SIDE = 2 * math.pi  # so that wavenumbers are whole numbers
+POINTS = 256
+STEP = SIDE / POINTS
+
+
+def synthetic(surface, points=POINTS, *, seed=0, plateau=False, gaussian=False):
+    """A periodic map of side 2 pi with that spectrum and random phases; Gaussian: with random amplitudes too."""
+    noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((points, points))) / points
+    if not gaussian:
+        noise /= np.abs(noise)
+    whole = np.fft.fftfreq(points, 1 / points)
+    q = np.hypot(whole[:, None], whole[None, : points // 2 + 1])
+    inside = np.clip(q, surface.q0, surface.q1)
+    C = np.where((q <= surface.q1) & ((q >= surface.q0) | plateau & (q > 0)), surface.power_spectrum(inside), 0)
+    return np.fft.irfft2(noise * np.sqrt(C) * points**2, s=(points, points))
+
+
+def seen_in(truth, q0, q1):
+    """The truth's own spectrum between q0 and q1."""
+    ratio = (q0 ** (-2 * truth.hurst) - q1 ** (-2 * truth.hurst)) / (
+        truth.q0 ** (-2 * truth.hurst) - truth.q1 ** (-2 * truth.hurst)
+    )
+    return Surface(truth.hurst, q0, q1, truth.h_rms * math.sqrt(ratio), truth.h_max)
+
+
+def topography_class():
+    with warnings.catch_warnings():
+        # its import warns of its own missing optional parts
+        warnings.simplefilter("ignore")
+        return pytest.importorskip("SurfaceTopography").Topography
+
+
+def reference_maps():
+    named = os.environ.get("MBMA_REFERENCE_MAPS")
+    places = [Path(named)] if named else [p / "shared/reference/maps" for p in Path(__file__).parents]
+    return next((place for place in places if place.is_dir()), None)
+
+
+X, Y = np.meshgrid(np.arange(POINTS) / POINTS, np.arange(POINTS) / POINTS, indexing="ij")
+ROUGH = Surface(0.8, 4.0, 100.0, 1.0, 3.0)
+BASE = synthetic(ROUGH, gaussian=True, seed=5)
+CUT_OUT = synthetic(Surface(0.8, 1.0, 400.0, 1.0, 3.0), 1024, gaussian=True, seed=5)[:POINTS, :POINTS]
+
+
+class TestKnownMaps:
+    @pytest.mark.parametrize("hurst", [0.3, 0.5, 0.8, 1.0])
+    @pytest.mark.parametrize("q0", [1.0, 4.0])
+    def test_a_periodic_band_comes_back(self, hurst, q0):
+        truth = Surface(hurst, q0, 100.0, 1.7, 3.0)
+        heights = synthetic(truth)
+        found = Surface.from_map(heights, STEP, periodic=True)
+        assert found.hurst == pytest.approx(hurst, abs=0.01)
+        assert found.q0 == pytest.approx(q0, rel=1e-12)
+        assert found.q1 == pytest.approx(100, rel=1e-3)
+        assert found.h_rms == pytest.approx(truth.h_rms, rel=0.01)
+        assert found.rms_gradient == pytest.approx(truth.rms_gradient, rel=0.01)
+        assert found.h_max == pytest.approx(heights.max(), rel=1e-12)
+        assert (found.fit.roll_off, found.fit.cut_off) == (None, None)
+        assert found.fit.variance_share == pytest.approx(1, rel=1e-9)
+
+    @pytest.mark.parametrize("hurst", [0.3, 0.5, 0.8, 1.0])
+    def test_a_flat_roll_off_is_found(self, hurst):
+        truth = Surface(hurst, 8.0, 100.0, 1.0, 3.0)
+        found = Surface.from_map(synthetic(truth, plateau=True), STEP, periodic=True)
+        assert found.fit.roll_off == found.q0 == pytest.approx(8, rel=0.01)
+        assert found.hurst == pytest.approx(hurst, abs=0.01)
+        assert found.h_rms == pytest.approx(1, rel=0.02)
+        assert found.rms_gradient == pytest.approx(truth.rms_gradient, rel=0.01)
+        # the band holds 1/(1 + H) of the variance but for what lies beyond q1
+        band = (1 - (100 / 8) ** (-2 * hurst)) / hurst
+        assert found.fit.variance_share == pytest.approx(band / (1 + band), abs=0.03)
+
+    @pytest.mark.parametrize("seed", range(4))
+    def test_random_amplitudes_scatter_as_the_fit_says(self, seed):
+        found = Surface.from_map(synthetic(ROUGH, gaussian=True, seed=seed), STEP, periodic=True)
+        assert abs(found.fit.hurst - 0.8) < 4 * found.fit.hurst_error < 0.08
+        assert found.h_rms == pytest.approx(1, rel=0.12)
+        assert found.rms_gradient == pytest.approx(ROUGH.rms_gradient, rel=0.05)
+
+    @pytest.mark.parametrize("hurst", [0.3, 0.5, 0.8, 1.0])
+    @pytest.mark.parametrize("seed", [1, 2])
+    def test_a_cut_out_is_windowed_and_comes_back(self, hurst, seed):
+        # a quarter of the side of a larger surface: sampling scatter of its few long waves, plus the window's bias
+        truth = Surface(hurst, 1.0, 400.0, 1.0, 3.0)
+        heights = synthetic(truth, 1024, gaussian=True, seed=seed)[:POINTS, :POINTS]
+        found = Surface.from_map(heights, SIDE / 1024)
+        assert found.fit.windowed
+        assert found.fit.detrend == "plane"
+        assert found.q0 == pytest.approx(4, rel=1e-12)
+        expected = seen_in(truth, found.q0, found.q1)
+        assert found.hurst == pytest.approx(hurst, abs=0.05)
+        assert found.h_rms == pytest.approx(expected.h_rms, rel=0.15)
+        assert found.rms_gradient == pytest.approx(expected.rms_gradient, rel=0.06)
+
+    def test_a_noise_floor_is_left_out(self):
+        noise = 0.003 * np.random.default_rng(3).standard_normal(BASE.shape)
+        found = Surface.from_map(BASE + noise, STEP, periodic=True)
+        assert found.fit.cut_off == found.q1 == pytest.approx(100, rel=0.1)
+        assert found.hurst == pytest.approx(0.8, abs=0.05)
+
+    def test_a_sharp_end_on_either_side_is_left_out(self):
+        # the window smears the band's ends into its surroundings
+        found = Surface.from_map(BASE, STEP)
+        assert found.fit.roll_off == pytest.approx(4, rel=0.1)
+        assert found.fit.cut_off == pytest.approx(100, rel=0.1)
+        assert found.hurst == pytest.approx(0.8, abs=0.05)
+
+    def test_form_is_removed_by_the_right_trend(self):
+        bowl = CUT_OUT + 30 * (X**2 + Y**2)
+        plain = surface_from_map(CUT_OUT, STEP, detrend="quadratic")
+        found = surface_from_map(bowl, STEP, detrend="quadratic")
+        assert dataclasses.astuple(found.fit)[:3] == pytest.approx(dataclasses.astuple(plain.fit)[:3], rel=1e-6)
+        assert found.h_max == pytest.approx(plain.h_max, rel=1e-9)
+        with pytest.raises(NotSelfAffineError, match="a wave stands out"):
+            surface_from_map(bowl, STEP)
+
+    def test_a_forced_band_is_taken(self):
+        found = surface_from_map(BASE, STEP, periodic=True, band=(8, 60))
+        assert (found.q0, found.q1) == (8.0, 60.0)
+        assert found.h_rms == pytest.approx(seen_in(ROUGH, 8, 60).h_rms, rel=0.05)
+
+    def test_h_max_can_be_given(self):
+        assert surface_from_map(BASE, STEP, periodic=True, h_max=4.5).h_max == 4.5
+
+    def test_a_rectangle_with_oblong_steps(self):
+        heights = synthetic(Surface(0.8, 4.0, 50.0, 1.0, 3.0), gaussian=True, seed=2)[:, ::2]
+        found = surface_from_map(heights, STEP, 2 * STEP, periodic=True)
+        turned = surface_from_map(heights.T, 2 * STEP, STEP, periodic=True)
+        assert found.hurst == pytest.approx(0.8, abs=0.06)
+        assert found.q1 == pytest.approx(50, rel=1e-3)
+        assert turned.h_rms == pytest.approx(found.h_rms, rel=1e-9)
+
+    def test_the_map_is_left_alone(self):
+        given_map = CUT_OUT.copy()
+        surface_from_map(given_map, STEP)
+        np.testing.assert_array_equal(given_map, CUT_OUT)
+
+    def test_above_one_within_the_tolerance_holds_one(self):
+        heights = synthetic(ROUGH)
+        waves = np.fft.fftfreq(POINTS, 1 / POINTS)
+        q = np.hypot(waves[:, None], waves[None, :])
+        steeper = np.fft.ifft2(np.fft.fft2(heights) * np.where(q > 0, q, 1) ** -0.23).real
+        found = surface_from_map(steeper, STEP, periodic=True)
+        assert found.hurst == 1.0
+        assert found.fit.hurst_held
+        assert found.fit.hurst == pytest.approx(1.03, abs=0.005)
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    length=st.floats(1e-9, 1e9),
+    height=st.floats(1e-9, 1e9),
+    lift=st.floats(-1e3, 1e3),
+)
+def test_units_do_not_matter(length, height, lift):
+    plain = surface_from_map(CUT_OUT, STEP)
+    scaled = surface_from_map(height * (CUT_OUT + lift), length * STEP)
+    assert scaled.hurst == pytest.approx(plain.hurst, rel=1e-7)
+    assert scaled.q0 * length == pytest.approx(plain.q0, rel=1e-7)
+    assert scaled.q1 * length == pytest.approx(plain.q1, rel=1e-7)
+    assert scaled.h_rms / height == pytest.approx(plain.h_rms, rel=1e-7)
+    assert scaled.h_max / height == pytest.approx(plain.h_max, rel=1e-7)
+
+
+class TestRadialSpectrum:
+    @pytest.mark.parametrize("shape", [(64, 64), (64, 63), (63, 64), (33, 80)])
+    def test_parseval(self, shape):
+        # waves inside the Nyquist circle only, so that nothing of the variance is left out
+        rng = np.random.default_rng(7)
+        x, y = np.arange(shape[0])[:, None] / shape[0], np.arange(shape[1])[None, :] / shape[1]
+        heights = sum(
+            rng.normal() * np.cos(2 * np.pi * (m * x + n * y) + rng.uniform(0, 6))
+            for m, n in rng.integers(-9, 9, (40, 2))
+        )
+        heights = heights - heights.mean()
+        _, C, waves, _ = radial_spectrum(heights, 0.3, 0.3)
+        cell = (2 * math.pi / 0.3) ** 2 / heights.size
+        assert np.sum(C * waves) * cell == pytest.approx(np.mean(heights**2), rel=1e-12)
+
+    def test_the_integral_is_the_variance(self):
+        # 2 pi integral C q dq over a map with many waves per ring; the rings' count of waves is their area to 1%
+        truth = Surface(0.5, 20.0, 110.0, 1.3, 3.0)
+        q, C, _, _ = radial_spectrum(synthetic(truth), STEP, STEP)
+        edges = np.concatenate([[q[0]], (q[1:] + q[:-1]) / 2, [q[-1]]])
+        assert 2 * math.pi * np.sum(C * q * np.diff(edges)) == pytest.approx(1.3**2, rel=0.01)
+
+    def test_agrees_with_surface_topography(self):
+        topography = topography_class()(BASE, (SIDE, SIDE), periodic=True)
+        edges = np.arange(1, 100, 3) - 0.4375  # edges of this library's rings too
+        _, other = topography.power_spectrum_from_area(collocation=edges)
+        q, C, waves, _ = radial_spectrum(BASE - BASE.mean(), STEP, STEP)
+        place = np.digitize(q, edges) - 1
+        inside = (place >= 0) & (place < len(edges) - 1) & (q >= 4)
+        own = np.bincount(place[inside], (C * waves)[inside], len(edges) - 1)
+        count = np.bincount(place[inside], waves[inside], len(edges) - 1)
+        # the first bin but one holds the map's first waves, and reaches below them
+        np.testing.assert_allclose(own[2:] / count[2:], np.asarray(other)[2:] / (4 * math.pi**2), rtol=1e-10)
+
+
+class TestTopography:
+    def test_is_taken_as_it_is(self):
+        topography = topography_class()(BASE, (SIDE, SIDE), periodic=True, unit="um")
+        found, plain = Surface.from_map(topography), Surface.from_map(BASE, STEP, periodic=True)
+        assert found.h_rms == pytest.approx(plain.h_rms, rel=1e-12)
+        assert found.fit == dataclasses.replace(plain.fit, length_unit="um")
+        assert not found.fit.windowed
+
+    def test_its_own_spectrum_gives_the_same_surface(self):
+        topography = topography_class()(BASE, (SIDE, SIDE), periodic=True)
+        q, C = topography.power_spectrum_from_area(nb_points_per_decade=20)
+        inside = (q > 4) & (q < 95)
+        found = Surface.from_psd(q[inside], C[inside], h_max=3, convention="isotropic")
+        plain = Surface.from_map(BASE, STEP, periodic=True, band=(found.q0, found.q1))
+        assert found.hurst == pytest.approx(plain.hurst, abs=0.02)
+        assert found.h_rms == pytest.approx(plain.h_rms, rel=0.05)
+
+    def test_has_its_own_sizes(self):
+        topography = topography_class()(BASE, (SIDE, SIDE), periodic=True)
+        with pytest.raises(InputError, match="dx and dy belong to a plain array"):
+            surface_from_map(topography, 1.0)
+
+    def test_with_holes_is_refused(self):
+        holed = np.ma.masked_where(BASE > 2.0, BASE)
+        topography = topography_class()(holed, (SIDE, SIDE))
+        with pytest.raises(InputError, match=f"has {holed.mask.sum()} holes among 65536 points: fill them first"):
+            surface_from_map(topography)
+
+    def test_a_line_scan_is_refused(self):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            scans = pytest.importorskip("SurfaceTopography")
+        with pytest.raises(InputError, match="from_psd with convention='profile'"):
+            surface_from_map(scans.UniformLineScan(BASE[0], SIDE))
+
+
+def profile_spectrum(surface, q):
+    """C_1D of an isotropic surface: 4 pi times the integral of C across, by quadrature."""
+    least = max(q, surface.q0)
+
+    def across(t):
+        return surface.power_spectrum(np.clip(np.hypot(q, t), surface.q0, surface.q1))
+
+    low, high = math.sqrt(least**2 - q**2), math.sqrt(surface.q1**2 - q**2)
+    return 4 * math.pi * quad(across, low, high, limit=400, epsrel=1e-9)[0]
+
+
+class TestSpectra:
+    @pytest.mark.parametrize("hurst", [0.3, 0.5, 0.8, 1.0])
+    def test_three_conventions_give_one_surface(self, hurst):
+        truth = Surface(hurst, 2.0, 200.0, 1.5, 4.0)
+        q = np.geomspace(2, 200, 80)[:-1]
+        C = truth.power_spectrum(np.clip(q, truth.q0, truth.q1))
+        line = np.array([profile_spectrum(truth, wave) for wave in q])
+        spectra = {"paper": C, "isotropic": 4 * math.pi**2 * C, "profile": line}
+        for convention, spectrum in spectra.items():
+            found = Surface.from_psd(q, spectrum, h_max=4.0, convention=convention)
+            expected = truth if convention == "profile" else seen_in(truth, q[0], q[-1])
+            assert found.hurst == pytest.approx(hurst, abs=0.002)
+            assert found.q1 == pytest.approx(expected.q1, rel=0.005)
+            assert found.h_rms == pytest.approx(expected.h_rms, rel=0.005)
+            assert found.rms_gradient == pytest.approx(expected.rms_gradient, rel=0.005)
+            assert found.fit.convention == convention
+            assert (found.h_max, found.fit.windowed, found.fit.detrend) == (4.0, False, None)
+
+    @pytest.mark.parametrize("hurst", [0.3, 0.8])
+    def test_a_profile_that_ends_before_the_surface_does(self, hurst):
+        # q1 is not guessed, but the faint drop towards it does not pass for a steeper law
+        truth = Surface(hurst, 2.0, 200.0, 1.5, 4.0)
+        q = np.geomspace(2, 100, 60)
+        found = Surface.from_psd(q, [profile_spectrum(truth, wave) for wave in q], h_max=4.0, convention="profile")
+        assert found.q1 == 100
+        assert found.hurst == pytest.approx(hurst, abs=0.002)
+        assert found.h_rms == pytest.approx(seen_in(truth, 2, 100).h_rms, rel=0.005)
+
+    def test_a_plateau_and_order_and_zeros(self):
+        truth = Surface(0.7, 2.0, 150.0, 1.0, 3.0)
+        q = np.geomspace(0.1, 200, 120)
+        C = np.where(q <= truth.q1, truth.power_spectrum(np.clip(q, 2, 150)), 0)
+        found = surface_from_psd(q[::-1], C[::-1], h_max=3)
+        assert found.fit.roll_off == found.q0 == pytest.approx(2, rel=0.01)
+        assert found.q1 == q[q <= 150][-1]
+        assert found.h_rms == pytest.approx(1, rel=0.01)
+
+    def test_masked_entries_are_left_out(self):
+        q = np.geomspace(1, 100, 40)
+        C = np.ma.masked_array(q**-3.4, np.arange(40) % 7 == 3)
+        C.data[C.mask] = np.nan
+        assert surface_from_psd(q, C, h_max=3).hurst == pytest.approx(0.7, rel=1e-9)
+
+    def test_fit_reads_well(self):
+        q = np.geomspace(1, 100, 40)
+        text = repr(surface_from_psd(q, q**-3.4, h_max=3).fit)
+        assert text.startswith("SpectrumFit(hurst=0.7, hurst_error=")
+        assert "convention='paper'" in text
+
+
+SLOPED = np.geomspace(1, 100, 40)
+
+
+class TestRefused:
+    @pytest.mark.parametrize(
+        ("heights", "options", "reason"),
+        [
+            (BASE[:3, :3], {}, r"3 x 3 points .* least is 32 x 32"),
+            (np.full((64, 64), 7.0), {}, "flat"),
+            (3 * X + 2 * Y + 7, {}, "flat"),
+            (
+                np.random.default_rng(1).standard_normal((128, 128)),
+                {"periodic": True},
+                r"exponent of -[01]\.\d+ .*not above 0",
+            ),
+            (np.random.default_rng(1).standard_normal((128, 128)), {}, "not above 0"),
+            (np.sin(10 * np.pi * X), {"periodic": True}, "only 1 spectral points"),
+            (np.sin(10.6 * np.pi * X), {}, "a wave stands out"),
+            (BASE + 5 * np.sin(40 * np.pi * X), {"periodic": True}, r"a wave stands out: at q = 20\.\d+ "),
+            (np.where(X > 0.37, 1.0, 0.0), {}, "few edges"),
+            (np.where((X - 0.45) ** 2 + (Y - 0.5) ** 2 < 0.09, 1.0, 0.0), {}, "few edges"),
+            (-((X - 0.5) ** 2) - (Y - 0.5) ** 2, {}, "a wave stands out"),
+            (synthetic(ROUGH, 512, gaussian=True)[::2, :256], {}, "not isotropic"),
+            (synthetic(Surface(0.8, 30.0, 91.0, 1.0, 3.0))[:, :], {"periodic": True, "band": (31, 90)}, "too narrow"),
+            (np.where((np.arange(64)[:, None] + np.arange(64)) % 2, 1.0, -1.0), {"periodic": True}, "shorter than two"),
+        ],
+    )
+    def test_maps_that_are_not_self_affine(self, heights, options, reason):
+        with pytest.raises(NotSelfAffineError, match=reason):
+            surface_from_map(heights, STEP, **options)
+
+    @pytest.mark.parametrize(
+        ("C", "reason"),
+        [
+            (SLOPED**0.0, "not above 0"),
+            (SLOPED**-4.5, "exponent of 1.25 .*above 1"),
+            (SLOPED**-3.4 * np.where(np.arange(40) == 20, 50.0, 1.0), "a wave stands out|scatters by"),
+            (SLOPED**-3.4 * 10 ** (np.arange(40) % 2), "scatters by"),
+            (SLOPED * 0, "zero everywhere"),
+            (np.where(SLOPED < 2, SLOPED**-3.4, 0), "too narrow: q1/q0 = 1.805"),
+            (np.where(SLOPED < 1.5, SLOPED**-3.4, 0), "only 4 spectral points"),
+        ],
+    )
+    def test_spectra_that_are_not_self_affine(self, C, reason):
+        with pytest.raises(NotSelfAffineError, match=reason):
+            surface_from_psd(SLOPED, C, h_max=3)
+
+    @pytest.mark.parametrize(
+        ("change", "error", "message"),
+        [
+            ({"heights": np.where(BASE > 2, np.nan, BASE)}, InputError, r"has \d+ holes"),
+            ({"heights": np.ma.masked_greater(BASE, 2)}, InputError, r"has \d+ holes"),
+            ({"heights": np.where(BASE > 2, np.inf, BASE)}, InputError, "heights must be finite"),
+            ({"heights": BASE[0]}, InputError, "two-dimensional"),
+            ({"heights": [[1, 2], [3]]}, InputError, "array of numbers"),
+            ({"heights": [["a"] * 40] * 40}, InputError, "real numbers"),
+            ({"heights": np.zeros((0, 40))}, InputError, "empty"),
+            ({"heights": BASE * 1e40}, OutOfRangeError, "at most 1e30"),
+            ({"dx": None}, InputError, "dx is missing"),
+            ({"dx": -1.0}, OutOfRangeError, "dx must be in"),
+            ({"dx": math.nan}, InputError, "dx must be finite"),
+            ({"dy": 0.0}, OutOfRangeError, "dy must be in"),
+            ({"dx": [1.0, 2.0]}, InputError, "dx must be one number"),
+            ({"detrend": "cubic"}, InputError, "detrend must be one of mean, plane, quadratic"),
+            ({"h_max": -1.0}, OutOfRangeError, "h_max must be positive"),
+            ({"h_max": [1.0, 2.0]}, InputError, "h_max must be one number"),
+            ({"band": (10.0,)}, InputError, "band must be two wavenumbers"),
+            ({"band": (20.0, 10.0)}, InputError, "band must be two wavenumbers"),
+            ({"band": (10.0, 500.0)}, OutOfRangeError, "within the measured range"),
+        ],
+    )
+    def test_bad_maps(self, change, error, message):
+        arguments = {"heights": BASE, "dx": STEP} | change
+        with pytest.raises(error, match=message):
+            surface_from_map(**arguments)
+
+    @pytest.mark.parametrize(
+        ("change", "error", "message"),
+        [
+            ({"q": SLOPED - 1}, OutOfRangeError, "leave q = 0 out"),
+            ({"q": SLOPED[:5]}, InputError, "of one length"),
+            ({"q": []}, InputError, "q is empty"),
+            ({"q": SLOPED.reshape(2, 20), "C": SLOPED.reshape(2, 20)}, InputError, "one-dimensional"),
+            ({"C": -SLOPED}, OutOfRangeError, "zero or positive"),
+            ({"C": np.where(SLOPED > 50, np.nan, SLOPED)}, InputError, "C must be finite"),
+            ({"C": np.where(np.arange(40) == 9, 0, SLOPED**-3)}, OutOfRangeError, "between its first and last"),
+            ({"C": np.ma.masked_array(SLOPED[:9])}, InputError, "of one length"),
+            ({"convention": "german"}, InputError, "paper, isotropic, profile"),
+            ({"h_max": 0}, OutOfRangeError, "h_max must be positive"),
+            ({"band": (0.1, 50)}, OutOfRangeError, "within the measured range"),
+        ],
+    )
+    def test_bad_spectra(self, change, error, message):
+        arguments = {"q": SLOPED, "C": SLOPED**-3.4, "h_max": 3} | change
+        with pytest.raises(error, match=message):
+            surface_from_psd(**arguments)
+
+
+class TestFiles:
+    def test_without_the_reader_says_what_to_install(self, monkeypatch, tmp_path):
+        monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
+        with pytest.raises(MbmaError, match=r"pip install 'mbma_tables\[maps\]'"):
+            read_map(tmp_path / "a.sur")
+
+    def test_no_file_and_no_map(self, tmp_path):
+        topography_class()
+        with pytest.raises(InputError, match="there is no file"):
+            read_map(tmp_path / "a.sur")
+        (tmp_path / "b.sur").write_text("not a map")
+        with pytest.raises(InputError, match=r"cannot read .*b\.sur"):
+            read_map(tmp_path / "b.sur")
+
+    @pytest.mark.parametrize(("name", "reason"), [("al3d-1.al3d", "above 1"), ("di-1.di", "above 1")])
+    def test_measured_maps(self, name, reason):
+        # a lens blurs the first into q^-6.9; the second, of directed features, falls like q^-4.6 from its roll-off
+        topography_class()
+        folder = reference_maps()
+        if folder is None:
+            pytest.skip("no reference maps: set MBMA_REFERENCE_MAPS to their folder")
+        with pytest.raises(NotSelfAffineError, match=reason):
+            surface_from_map(read_map(folder / name))

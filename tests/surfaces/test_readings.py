@@ -1,0 +1,68 @@
+"""Readings: what they say, what they refuse."""
+
+import dataclasses
+import math
+
+import pytest
+
+from mbma_tables import InputError
+from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED, get_reading
+
+
+def test_the_two_readings_differ_by_pi_alone():
+    assert math.pi * REPORTED.density_divisor == pytest.approx(PRINTED.density_divisor, rel=1e-15, abs=0)
+    assert PRINTED.density_divisor == pytest.approx(6 * math.pi * math.sqrt(3), rel=1e-15, abs=0)
+    same = dataclasses.replace(REPORTED, name="printed", density_divisor=PRINTED.density_divisor)
+    assert same == PRINTED
+    assert set(READINGS) == {"reported", "printed"}
+
+
+def test_the_papers_constants():
+    assert (PRINTED.beta, PRINTED.phi) == (1 / 3, 0.05)
+    assert (PRINTED.floor_d, PRINTED.floor_u) == (1.5, 3.0)
+    assert PRINTED.jacobian == "printed"
+    assert PRINTED.offset
+    assert PRINTED.summit_sigma
+
+
+def test_by_name_or_own():
+    assert get_reading("printed") is PRINTED
+    own = dataclasses.replace(PRINTED, name="own", beta=0.3)
+    assert get_reading(own) is own
+    assert own.numbers == (PRINTED.density_divisor, 0.3, 0.05, 1.5, 3.0, True, True)
+
+
+@pytest.mark.parametrize("name", ["guessed", "", None, 3, ["printed"]])
+def test_unknown(name):
+    with pytest.raises(InputError, match="reading must be one of"):
+        get_reading(name)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("density_divisor", 0.0),
+        ("density_divisor", -1.0),
+        ("density_divisor", math.nan),
+        ("density_divisor", math.inf),
+        ("jacobian", "guessed"),
+        ("beta", 0.0),
+        ("beta", 0.75),
+        ("beta", math.nan),
+        ("phi", 0.0),
+        ("phi", 2.0),
+        ("phi", math.nan),
+        ("floor_d", 1.0),
+        ("floor_d", 3.0),
+        ("floor_u", 1.2),
+        ("floor_u", math.nan),
+    ],
+)
+def test_nonsense_is_refused(field, value):
+    with pytest.raises(InputError, match="reading 'own'"):
+        dataclasses.replace(PRINTED, name="own", **{field: value})
+
+
+def test_a_reading_does_not_change():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        PRINTED.beta = 0.5

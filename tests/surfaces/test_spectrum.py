@@ -1,0 +1,117 @@
+"""Band moments against 50 digits, over bands of any width."""
+
+import math
+
+import mpmath as mp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbma_tables.surfaces import spectrum
+
+HURSTS = [1e-3, 0.05, 0.3, 0.5, 0.8, math.nextafter(1, 0), 1.0]
+
+
+def exact_moment(order, hurst, start, log_ratio):
+    """m_n over [za, za exp(log_ratio)], from 2 H integral zeta^(n-1-2H) d zeta times the mean of cos^n."""
+    with mp.workdps(50):
+        h, za, width = mp.mpf(hurst), mp.mpf(start), mp.mpf(log_ratio)
+        power = order - 2 * h
+        angular = {0: mp.mpf(1), 2: mp.mpf(1) / 2, 4: mp.mpf(3) / 8}[order]
+        growth = mp.expm1(power * width) / power if power != 0 else width
+        return 2 * h * angular * za**power * growth
+
+
+def relative(found, exact):
+    with mp.workdps(50):
+        return float(abs(mp.mpf(float(found)) / exact - 1))
+
+
+@pytest.mark.parametrize("order", [0, 2, 4])
+def test_transcription_is_the_integral(order):
+    with mp.workdps(30):
+        for hurst in (0.3, 1.0):
+            angle = mp.quad(lambda x: mp.cos(x) ** order, [0, mp.pi]) / mp.pi
+            h = mp.mpf(hurst)
+            direct = angle * mp.quad(lambda z, h=h: 2 * h * z ** (order - 1 - 2 * h), [2, 5])
+            assert abs(exact_moment(order, hurst, 2, mp.log(mp.mpf(5) / 2)) / direct - 1) < mp.mpf(10) ** -25
+
+
+@pytest.mark.parametrize("hurst", HURSTS)
+@pytest.mark.parametrize("order", [0, 2, 4])
+def test_band_moment_of_whole_surfaces(hurst, order):
+    zeta_1 = np.array([math.nextafter(3, 4), 3.01, 10.0, 216.0, 1e4, 1e6, 1e8])
+    found = spectrum.band_moment(order, hurst, 1.0, zeta_1)
+    with mp.workdps(50):
+        exact = [exact_moment(order, hurst, 1, mp.log(mp.mpf(float(z)))) for z in zeta_1]
+    assert max(map(relative, found, exact)) <= 1e-14
+
+
+@pytest.mark.parametrize("order", [0, 2, 4])
+def test_band_moment_between_any_ends(order):
+    rng = np.random.default_rng(order)
+    hurst = rng.uniform(0.01, 1, 300)
+    start = 10 ** rng.uniform(0, 7, 300)
+    end = start * (1 + 10 ** rng.uniform(-3, 1, 300))
+    found = spectrum.band_moment(order, hurst, start, end)
+    for k in range(300):
+        with mp.workdps(50):
+            width = mp.log(mp.mpf(float(end[k])) / mp.mpf(float(start[k])))
+        assert relative(found[k], exact_moment(order, hurst[k], start[k], width)) <= 2e-14
+
+
+@pytest.mark.parametrize("hurst", HURSTS)
+@pytest.mark.parametrize("width", [1e-300, 1e-12, 1e-6, 0.1, 3.0, math.log(1e8)])
+def test_bands_by_their_log_ratio(hurst, width):
+    log_za = math.log(1.7)
+    with mp.workdps(50):
+        start = mp.exp(mp.mpf(log_za))
+    for order, moment in ((0, spectrum.m0_of), (2, spectrum.m2_of), (4, spectrum.m4_of)):
+        exact = exact_moment(order, hurst, start, width)
+        assert relative(moment(hurst, log_za, width), exact) <= 1e-14
+
+
+@pytest.mark.parametrize("hurst", HURSTS)
+def test_alpha(hurst):
+    for width in (1e-12, 1e-6, 0.01, 0.1, 1.0, 3.0, 10.0, math.log(1e8)):
+        with mp.workdps(50):
+            m0, m2, m4 = (exact_moment(order, hurst, 1, width) for order in (0, 2, 4))
+            exact = m0 * m4 / m2**2
+        assert relative(spectrum.alpha_of(hurst, width), exact) <= 2e-14
+
+
+def test_alpha_of_a_band_without_width():
+    for hurst in HURSTS:
+        for width in (0.0, 1e-300, 1e-15):
+            assert spectrum.alpha_of(hurst, width) == pytest.approx(1.5, rel=1e-14, abs=0)
+        # 1.5 (1 + width^2/3 + ...): the variance of ln zeta^2 over the band
+        excess = spectrum.alpha_of(hurst, 1e-3) / 1.5 - 1
+        assert excess == pytest.approx(1e-6 / 3, rel=1e-3, abs=0)
+
+
+@settings(deadline=None)
+@given(
+    hurst=st.floats(0.01, 1),
+    start=st.floats(1, 1e4),
+    first=st.floats(1e-6, 8),
+    second=st.floats(1e-6, 8),
+)
+def test_moments_of_adjoining_bands_add(hurst, start, first, second):
+    log_za = math.log(start)
+    for moment in (spectrum.m0_of, spectrum.m2_of, spectrum.m4_of):
+        parts = moment(hurst, log_za, first) + moment(hurst, log_za + first, second)
+        assert moment(hurst, log_za, first + second) == pytest.approx(parts, rel=1e-12, abs=0)
+
+
+@settings(deadline=None)
+@given(hurst=st.floats(0.01, 1), width=st.floats(1e-3, 18), step=st.floats(1e-3, 1))
+def test_alpha_rises_with_the_band(hurst, width, step):
+    assert 1.5 <= spectrum.alpha_of(hurst, width) < spectrum.alpha_of(hurst, width + step)
+
+
+def test_shapes():
+    assert np.shape(spectrum.band_moment(2, 0.8, 1.0, 200.0)) == ()
+    found = spectrum.band_moment(2, np.array([[0.5], [0.8]]), 1.0, [10.0, 100.0, 200.0])
+    assert found.shape == (2, 3)
+    assert found[1, 2] == spectrum.band_moment(2, 0.8, 1.0, 200.0)

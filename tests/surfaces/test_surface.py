@@ -1,0 +1,163 @@
+"""`Surface`: its properties against the spectrum itself, units, batches, bad input."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+import scipy.integrate
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbma_tables import InputError, OutOfRangeError, Surface
+
+GOOD = {"hurst": 0.8, "q0": 0.5, "q1": 100.0, "h_rms": 0.2, "h_max": 0.6}
+
+
+def integral(surface, order):
+    """2 pi <cos^n> integral C q^(1+n) dq over the band (Eq. 7), in log q."""
+    angular = {0: 1, 2: 1 / 2, 4: 3 / 8}[order]
+    found, _ = scipy.integrate.quad(
+        lambda x: surface.power_spectrum(math.exp(x)) * math.exp((2 + order) * x),
+        math.log(surface.q0) * (1 + 1e-15),
+        math.log(surface.q1) * (1 - 1e-15),
+        epsabs=0,
+        epsrel=1e-12,
+        limit=200,
+    )
+    return 2 * math.pi * angular * found
+
+
+@pytest.mark.parametrize(("hurst", "zeta_1"), [(0.1, 1e5), (0.5, 3.01), (0.8, 216.0), (1.0, 1e3)])
+def test_moments_are_those_of_the_power_spectrum(hurst, zeta_1):
+    surface = Surface(hurst, 0.37, 0.37 * zeta_1, 0.21, 0.7)
+    assert integral(surface, 0) == pytest.approx(surface.h_rms**2, rel=1e-10, abs=0)
+    assert integral(surface, 0) == pytest.approx(surface.m0, rel=1e-10, abs=0)
+    assert integral(surface, 2) == pytest.approx(surface.m2, rel=1e-10, abs=0)
+    assert integral(surface, 4) == pytest.approx(surface.m4, rel=1e-10, abs=0)
+    # the gradient's two components
+    assert math.sqrt(2 * integral(surface, 2)) == pytest.approx(surface.rms_gradient, rel=1e-10, abs=0)
+
+
+def test_summits_are_nayaks():
+    surface = Surface(**GOOD)
+    m0, m2, m4 = (integral(surface, order) for order in (0, 2, 4))
+    alpha = m0 * m4 / m2**2
+    assert surface.alpha == pytest.approx(alpha, rel=1e-9, abs=0)
+    assert surface.summit_density == pytest.approx(m4 / m2 / (6 * math.pi * math.sqrt(3)), rel=1e-9, abs=0)
+    assert surface.summit_radius == pytest.approx(3 * math.sqrt(math.pi) / (8 * math.sqrt(m4)), rel=1e-9, abs=0)
+    assert surface.summit_sigma == pytest.approx(math.sqrt((1 - 0.8968 / alpha) * m0), rel=1e-9, abs=0)
+
+
+def test_unit_of_height():
+    surface = Surface(**GOOD)
+    assert surface.zeta_1 == 200
+    assert surface.s == pytest.approx(0.2 / math.sqrt(1 - 200**-1.6), rel=1e-15, abs=0)
+
+
+def test_power_spectrum_ends_with_the_band():
+    surface = Surface(**GOOD)
+    assert surface.power_spectrum([0.499, 100.1]).tolist() == [0.0, 0.0]
+    assert (surface.power_spectrum([0.5, 100.0]) > 0).all()
+    ratio = surface.power_spectrum(1.0) / surface.power_spectrum(2.0)
+    assert ratio == pytest.approx(2**3.6, rel=1e-14, abs=0)
+    batch = Surface([0.5, 0.8], 0.5, 100.0, 0.2, 0.6)
+    assert batch.power_spectrum([[1.0], [2.0], [3.0]]).shape == (3, 2)
+
+
+@settings(deadline=None)
+@given(
+    hurst=st.floats(0.05, 1),
+    zeta_1=st.floats(3.01, 1e7),
+    h_rms=st.floats(1e-3, 1e3),
+    power=st.floats(-12, 12),
+)
+def test_any_unit_of_length(hurst, zeta_1, h_rms, power):
+    unit = 10**power
+    one = Surface(hurst, 1.0, zeta_1, h_rms, 3 * h_rms)
+    other = Surface(hurst, 1 / unit, zeta_1 / unit, h_rms * unit, 3 * h_rms * unit)
+    dimensions = {
+        "s": 1,
+        "m0": 2,
+        "m2": 0,
+        "m4": -2,
+        "alpha": 0,
+        "rms_gradient": 0,
+        "summit_density": -2,
+        "summit_radius": 1,
+        "summit_sigma": 1,
+    }
+    for name, dimension in dimensions.items():
+        assert getattr(other, name) == pytest.approx(getattr(one, name) * unit**dimension, rel=1e-12, abs=0), name
+    spectrum = one.power_spectrum(math.sqrt(zeta_1)) * unit**4
+    assert other.power_spectrum(math.sqrt(zeta_1) / unit) == pytest.approx(spectrum, rel=1e-12, abs=0)
+
+
+def test_batches_equal_loops():
+    batch = Surface([[0.3], [1.0]], 0.5, [50.0, 100.0, 1e6], 0.2, 0.6)
+    assert batch.shape == (2, 3)
+    for name in ("zeta_1", "s", "m2", "m4", "alpha", "rms_gradient", "summit_radius", "summit_sigma"):
+        values = getattr(batch, name)
+        assert values.shape == (2, 3)
+        for i, hurst in enumerate((0.3, 1.0)):
+            for j, q1 in enumerate((50.0, 100.0, 1e6)):
+                assert values[i, j] == getattr(Surface(hurst, 0.5, q1, 0.2, 0.6), name)
+
+
+def test_one_surface_has_scalars():
+    surface = Surface(**GOOD)
+    assert surface.shape == ()
+    for name in ("hurst", "q0", "h_max", "m2", "summit_density"):
+        assert isinstance(getattr(surface, name), float)
+
+
+def test_a_surface_does_not_change():
+    h_rms = np.array([0.1, 0.2])
+    surface = Surface(0.8, 0.5, 100.0, h_rms, 0.6)
+    h_rms[0] = 5.0
+    assert surface.h_rms.tolist() == [0.1, 0.2]
+    with pytest.raises(ValueError, match="read-only"):
+        surface.h_rms[0] = 1.0
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        surface.h_rms = 1.0
+
+
+@pytest.mark.parametrize("name", GOOD)
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, [], "rough", None, 1j, [0.5, math.nan]])
+def test_no_numbers(name, value):
+    with pytest.raises(InputError, match=f"^{name} "):
+        Surface(**{**GOOD, name: value})
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("hurst", 0.0), ("hurst", -0.1), ("hurst", 1.01)]
+    + [(name, value) for name in ("q0", "q1", "h_rms", "h_max") for value in (0.0, -1.0)],
+)
+def test_out_of_range(name, value):
+    with pytest.raises(OutOfRangeError, match=f"^{name} must be") as caught:
+        Surface(**{**GOOD, name: [GOOD[name], value]})
+    assert caught.value.mask.tolist() == [False, True]
+
+
+@pytest.mark.parametrize("zeta_1", [0.5, 1.0, 3.0, 1.0001e8])
+def test_band_out_of_range(zeta_1):
+    with pytest.raises(OutOfRangeError, match=r"^q1/q0 must be") as caught:
+        Surface(0.8, 1.0, [200.0, zeta_1], 0.2, 0.6)
+    assert caught.value.mask.tolist() == [False, True]
+
+
+def test_ends_of_the_range():
+    assert Surface(1.0, 1.0, 1e8, 0.2, 0.6).zeta_1 == 1e8
+    assert Surface(1e-3, 1.0, math.nextafter(3, 4), 0.2, 0.6).zeta_1 > 3
+
+
+def test_shapes_that_do_not_broadcast():
+    with pytest.raises(InputError, match=r"do not broadcast: .*q0 \(2,\)"):
+        Surface([0.5, 0.6, 0.7], [1.0, 2.0], 100.0, 0.2, 0.6)
+
+
+@pytest.mark.parametrize("q", [0.0, -1.0, math.nan, [], [1.0, math.inf]])
+def test_bad_wavenumber(q):
+    with pytest.raises(InputError, match=r"^q "):
+        Surface(**GOOD).power_spectrum(q)

@@ -1,0 +1,489 @@
+import csv
+import json
+import os
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from mbma_tables import Surface, contact, island, theories
+from mbma_tables.cli import main
+from mbma_tables.cli.commands import curve_gaps
+from mbma_tables.cli.report import write_files
+from mbma_tables.errors import InputError
+from mbma_tables.materials import effective_modulus
+from mbma_tables.surfaces.cases import CASES
+
+YANG_PERSSON = {"hurst": 0.8, "q0": 60 * np.pi / 1040, "zeta_1": 216.0, "h_rms": 1.0, "h_max": 3.0}
+CONCRETE = {"hurst": 0.7, "m0": 0.071, "m2": 0.27, "m4": 62.0, "h_max": 1.1}
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """Every command runs in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(*arguments: str):
+    result = CliRunner().invoke(main, list(arguments))
+    assert result.exit_code == 0, result.stderr
+    assert result.stderr == ""
+    return result.stdout
+
+
+def refused(folder, *arguments: str) -> str:
+    """What a refusal says; it must be short, and must leave the folder as it was."""
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    result = CliRunner().invoke(main, list(arguments))
+    assert result.exit_code == 2, result.output
+    assert isinstance(result.exception, SystemExit)
+    assert result.stdout == ""
+    assert result.stderr.startswith("mbma: ")
+    assert 1 <= len(result.stderr.splitlines()) <= 2
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+    return result.stderr
+
+
+def options(numbers: dict[str, float]) -> list[str]:
+    return [part for key, value in numbers.items() for part in ("--" + key.replace("_", "-"), repr(value))]
+
+
+def toml(numbers: dict[str, float], table: str = "surface") -> str:
+    return f"[{table}]\n" + "".join(f"{key} = {value!r}\n" for key, value in numbers.items())
+
+
+def table_rows(text: str) -> list[list[str]]:
+    return [line.split() for line in text.split("\n\n")[1].splitlines()]
+
+
+def test_contact_gives_the_closed_check_values():
+    text = run("contact", "--surface", "yang-persson", "-d", "2", "--over-h-rms", "--reading", "printed")
+    names, units, row = table_rows(text)
+    found = dict(zip(names, row, strict=True))
+    assert float(found["force"]) == pytest.approx(2.5114e-5, rel=2e-5)
+    assert float(found["area"]) == pytest.approx(3.1145e-5, rel=2e-5)
+    assert float(found["mean_separation"]) == 2.5
+    assert "reading printed, tier exact" in text
+    assert units[:2] == ["nm", "nm"]
+
+
+def test_contact_json_is_the_librarys_answer_digit_for_digit():
+    arguments = ("-d", "0.5,-0.2", "-d", "-1.1", "--tier", "rigid", "--rtol", "1e-6", "--E-star", "7.5")
+    found = json.loads(run("contact", "--surface", "concrete", *arguments, "--json"))
+    answer = contact(Surface.named("concrete"), [0.5, -0.2, -1.1], tier="rigid", E_star=7.5, rtol=1e-6)
+    for name in ("separation", "mean_separation", "force", "area", "error"):
+        assert found["columns"][name] == getattr(answer, name).tolist()
+    assert (found["reading"], found["tier"], found["rtol"], found["E_star"]) == ("reported", "rigid", 1e-6, 7.5)
+    assert found["arguments"] == {"separation": [0.5, -0.2, -1.1], "name": "concrete", "E_star": 7.5}
+    assert found["units"]["separation"] == "mm"
+    assert found["units"]["force"] == "F/A0"
+    assert found["surface"]["zeta_1"] == Surface.named("concrete").zeta_1
+
+
+def test_force_says_what_it_is_without_a_modulus():
+    found = json.loads(run("contact", "--surface", "concrete", "-d", "0", "--json"))
+    assert found["units"]["force"] == "F/(A0 E*)"
+    assert found["E_star"] is None
+
+
+def test_both_separations_meet():
+    by_gap = json.loads(run("contact", "--surface", "challenge", "-d", "0.4", "--json"))
+    average = (0.4 + float(CASES["challenge"].surface.h_max)) / 2
+    by_average = json.loads(run("contact", "--surface", "challenge", "-u", repr(average), "--json"))
+    assert by_average["columns"]["force"] == pytest.approx(by_gap["columns"]["force"], rel=1e-12)
+    assert by_average["columns"]["mean_separation"] == pytest.approx([average], rel=1e-15)
+
+
+def test_csv_holds_every_digit():
+    text = run("contact", "--surface", "asphalt", "-d", "0.9,0.1", "--csv")
+    lines = text.splitlines()
+    comments = [line for line in lines if line.startswith("#")]
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    answer = contact(Surface.named("asphalt"), [0.9, 0.1])
+    for name in ("separation", "force", "area", "error"):
+        assert [float(row[name]) for row in rows] == getattr(answer, name).tolist()
+    assert any("reading reported" in line for line in comments)
+    assert any("force [F/(A0 E*)]" in line for line in comments)
+
+
+def test_every_source_is_the_same_surface(folder):
+    band = {key: value for key, value in YANG_PERSSON.items() if key != "zeta_1"}
+    band["q1"] = YANG_PERSSON["q0"] * 216
+    surface = Surface.named("yang-persson")
+    moments = {name: float(getattr(surface, name)) for name in ("hurst", "m0", "m2", "m4", "h_max")}
+    files = {
+        "named": '[surface]\nname = "yang-persson"\n',
+        "zeta_1": toml(YANG_PERSSON),
+        "band": toml(band),
+        "moments": toml(moments) + 'length_unit = "nm"\n',
+    }
+    for name, content in files.items():
+        (folder / f"{name}.toml").write_text(content)
+    sources = [
+        ["--surface", "yang-persson"],
+        *(options(numbers) for numbers in (YANG_PERSSON, band, moments)),
+        *(["--file", f"{name}.toml"] for name in files),
+    ]
+    expected = contact(surface, [2.0, 0.5])
+    for source in sources:
+        found = json.loads(run("contact", *source, "-d", "2,0.5", "--json"))
+        for name in ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "m4", "alpha"):
+            assert found["surface"][name] == pytest.approx(getattr(surface, name), rel=1e-11), (source, name)
+        assert found["columns"]["force"] == pytest.approx(expected.force.tolist(), rel=2e-8)
+        assert found["columns"]["area"] == pytest.approx(expected.area.tolist(), rel=2e-8)
+
+
+def test_material_from_options_and_from_a_file(folder):
+    material = {"E1": 10.0, "nu1": 0.5, "E2": 30000.0, "nu2": 0.0}
+    modulus = effective_modulus(*material.values())
+    (folder / "s.toml").write_text(toml(CONCRETE) + toml(material, "material"))
+    (folder / "e.toml").write_text(toml(CONCRETE) + f"[material]\nE_star = {float(modulus)!r}\n")
+    bodies = [part for key, value in material.items() for part in (f"--{key}", str(value))]
+    expected = float(contact(Surface.named("concrete"), 0.3, E_star=modulus).force)
+    for source in (["--surface", "concrete", *bodies], ["--file", "s.toml"], ["--file", "e.toml"]):
+        found = json.loads(run("contact", *source, "-d", "0.3", "--json"))
+        assert found["E_star"] == modulus
+        assert found["columns"]["force"] == pytest.approx([expected], rel=1e-12)
+    other = json.loads(run("contact", "--file", "s.toml", "--E-star", "2", "-d", "0.3", "--json"))
+    assert other["E_star"] == 2.0
+
+
+def test_the_example_file_runs():
+    example = os.path.join(os.path.dirname(__file__), os.pardir, "examples", "concrete.toml")
+    found = json.loads(run("contact", "--file", example, "-d", "0.3", "--json"))
+    assert found["surface"]["length_unit"] == "mm"
+    assert found["surface"]["zeta_1"] == Surface.named("concrete").zeta_1
+    assert found["E_star"] == effective_modulus(10.0, 0.5, 30000.0, 0.2)
+
+
+@pytest.mark.parametrize("points", [5, 6, 41])
+def test_curve_runs_from_first_contact_to_full_compression(points):
+    gap = curve_gaps(1.1, points)
+    assert gap.size == points
+    assert (gap[0], gap[-1]) == (1.1, -1.1)
+    assert (np.diff(gap) < 0).all()
+    assert (1.1 - gap[1]) / 1.1 == pytest.approx(1e-3, rel=1e-12)
+
+
+def test_curve_of_the_concrete_road(folder):
+    text = run("curve", "--surface", "concrete", "--plot", "concrete.png")
+    rows = table_rows(text)
+    answer = contact(Surface.named("concrete"), curve_gaps(1.1, 41))
+    assert len(rows) == 2 + 41
+    force, area = (np.array([float(row[rows[0].index(name)]) for row in rows[2:]]) for name in ("force", "area"))
+    np.testing.assert_allclose(force, answer.force, rtol=5e-6)
+    np.testing.assert_allclose(area, answer.area, rtol=5e-6)
+    assert [path.name for path in folder.iterdir()] == ["concrete.png"]
+    assert (folder / "concrete.png").read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
+
+
+def test_curve_beside_other_theories(folder):
+    arguments = ("--surface", "concrete", "--points", "7", "--compare", "--plot", "c.png", "--E-star", "3")
+    found = json.loads(run("curve", *arguments, "--json"))["columns"]
+    surface = Surface.named("concrete")
+    average, gap = np.array(found["mean_separation"]), np.array(found["separation"])
+    asperities = theories.greenwood_williamson(surface, gap, 3.0)
+    assert found["greenwood_williamson_force"] == asperities.force.tolist()
+    assert found["greenwood_williamson_area"] == asperities.area.tolist()
+    assert found["persson_force"][-1] is None
+    assert found["persson_area"][-1] is None
+    full = theories.persson_force(surface, average[:-1], 3.0)
+    np.testing.assert_allclose(found["persson_force"][:-1], full, rtol=1e-9)
+    np.testing.assert_allclose(found["persson_area"][:-1], theories.persson_area(surface, full, 3.0), rtol=1e-9)
+    simplified = theories.persson_force(surface, average, 3.0, method="simplified")
+    np.testing.assert_allclose(found["persson_simplified_force"], simplified, rtol=1e-12)
+    assert (folder / "c.png").is_file()
+    assert table_rows(run("curve", *arguments))[-1][-4:-2] == ["-", "-"]
+
+
+def test_the_picture_holds_the_table(monkeypatch):
+    import mbma_tables.plots
+
+    drawn = []
+    original = mbma_tables.plots.draw_compression
+    monkeypatch.setattr(mbma_tables.plots, "draw_compression", lambda *given: drawn.append(given) or original(*given))
+    arguments = ("--surface", "concrete", "--points", "9", "--compare", "--plot", "c.png")
+    columns = json.loads(run("curve", *arguments, "--json"))["columns"]
+    curves, title, force_label = drawn[0]
+    assert [curve.label for curve in curves] == [
+        "MBMA, reported",
+        "Greenwood-Williamson",
+        "Persson",
+        "Persson, simplified",
+    ]
+    h_rms = Surface.named("concrete").h_rms
+    for curve, name in zip(curves, ("", "greenwood_williamson_", "persson_", "persson_simplified_"), strict=True):
+        force = [value for value in columns[f"{name}force"] if value is not None]
+        assert curve.force.tolist() == force
+        assert curve.area.tolist() == [value for value in columns[f"{name}area"] if value is not None]
+        assert curve.gap.tolist() == [u / h_rms for u in columns["mean_separation"][: len(force)]]
+    assert title == CASES["concrete"].title
+    assert force_label == "force  F/(A0 E*)"
+
+
+def test_island_is_the_librarys_answer():
+    found = json.loads(run("island", "--surface", "asphalt", "--delta", "0.5,2", "--over-h-rms", "--json"))
+    surface = Surface.named("asphalt")
+    answer = island(surface, np.array([0.5, 2.0]) * surface.h_rms, rtol=1e-8)
+    for name, values in found["columns"].items():
+        assert values == getattr(answer, name).tolist(), name
+    assert set(found["columns"]) == {
+        *("delta", "zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu"),
+        *("force", "area", "error"),
+    }
+    assert found["units"] | {"D": "1/mm^2", "force": "mm^2", "X": "-", "R_d": "mm"} == found["units"]
+
+
+def test_surfaces_lists_every_case():
+    columns = json.loads(run("surfaces", "--json"))["columns"]
+    assert columns["name"] == list(CASES)
+    assert columns["zeta_1"] == [float(case.surface.zeta_1) for case in CASES.values()]
+    assert columns["length_unit"] == [case.length_unit for case in CASES.values()]
+    rows = table_rows(run("surfaces"))
+    assert [row[0] for row in rows[1:]] == list(CASES)
+
+
+def test_out_holds_what_stdout_would(folder):
+    arguments = ("contact", "--surface", "concrete", "-d", "0.5", "--json")
+    expected = run(*arguments)
+    (folder / "o.json").write_text("an older answer")
+    assert run(*arguments, "--out", "o.json") == ""
+    found, wanted = json.loads((folder / "o.json").read_text()), json.loads(expected)
+    assert found == wanted
+    assert [path.name for path in folder.iterdir()] == ["o.json"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (options(YANG_PERSSON | {"h_rms": -1.0}), "h_rms must be positive, got -1"),
+        (options(YANG_PERSSON | {"zeta_1": 3.0}), "zeta_1 must be greater than 3"),
+        (options(YANG_PERSSON | {"zeta_1": -5.0}), "zeta_1 must be greater than 3"),
+        (options(YANG_PERSSON | {"hurst": 1.2}), "hurst must be in (0, 1], got 1.2"),
+        (options(YANG_PERSSON | {"hurst": 0.0}), "hurst must be in (0, 1], got 0"),
+        (options(YANG_PERSSON | {"q0": float("nan")}), "q0 must be finite, got nan"),
+        (options(YANG_PERSSON | {"zeta_1": float("inf")}), "zeta_1 must be finite"),
+        (options(YANG_PERSSON | {"q1": 10.0}), "a surface needs"),
+        (options({"hurst": 0.8, "q0": 1.0}), "a surface needs"),
+        (options(CONCRETE | {"m4": 0.5}), "alpha = m0 m4/m2^2 must be in"),
+        (["--surface", "granite"], "no surface is named 'granite'; there are yang-persson"),
+        ([], "one surface is needed"),
+        (["--surface", "concrete", *options(CONCRETE)], "got --surface and numbers"),
+        (["--surface", "concrete", "--file", "s.toml"], "got --file and --surface"),
+        (["--file", "missing.toml"], "missing.toml: No such file"),
+        (["--file", "."], "Is a directory"),
+        (["--surface", "concrete", "--reading", "mine"], "reading must be one of"),
+        (["--surface", "concrete", "--tier", "fast"], "tier must be"),
+        (["--surface", "concrete", "--rtol", "0"], "rtol must be a number in"),
+        (["--surface", "concrete", "--rtol", "nan"], "rtol must be finite"),
+        (["--surface", "concrete", "--E-star", "0"], "E_star must be positive"),
+        (["--surface", "concrete", "--E-star", "nan"], "E_star must be finite"),
+        (["--surface", "concrete", "--E-star", "1", "--E1", "1"], "a material is E_star alone"),
+        (["--surface", "concrete", "--E1", "1", "--nu1", "0"], "a material is E_star alone"),
+        (
+            ["--surface", "concrete", *["--E1", "1", "--nu1", "0.6", "--E2", "1", "--nu2", "0"]],
+            "nu1 must be in (-1, 0.5]",
+        ),
+        (["--surface", "concrete", "--json", "--csv"], "--json and --csv"),
+        (["--surface", "concrete", "--surfce", "x"], "No such option"),
+        (["--surface", "concrete", "--rtol", "small"], "not a valid float"),
+        (["--surface", "concrete", "--out", "no/such/folder.txt"], "cannot be written"),
+        (["--surface", "concrete", "--out", "."], "not a plain file"),
+    ],
+)
+def test_bad_input_of_every_command(folder, arguments, message):
+    commands = (["contact", "-d", "0.5"], ["curve", "--points", "5", "--plot", "c.png"], ["island", "--delta", "1"])
+    for command in commands:
+        assert message in refused(folder, *command, *arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["contact", "-d", "-1.2"], "separation must be at least -h_max"),
+        (["contact", "-d", "0,nan"], "separation must be finite, got nan at (1,)"),
+        (["contact", "-d", "inf"], "separation must be finite"),
+        (["contact", "-d", ""], "separation is empty"),
+        (["contact", "-d", "1;2"], "'1;2' is not a number"),
+        (["contact", "-u", "-0.1"], "mean_separation must be at least 0"),
+        (["contact"], "either --separation or --mean-separation"),
+        (["contact", "-d", "1", "-u", "1"], "either --separation or --mean-separation"),
+        (["curve", "--points", "4"], "--points"),
+        (["curve", "--plot", "c.pdf"], ".png"),
+        (["curve", "--plot", "c.png", "--out", "c.png"], "same file"),
+        (["curve", "--plot", "no/such/c.png"], "cannot be written"),
+        (["curve", "--plot", "no/such/c.png", "--out", "fine.txt"], "cannot be written"),
+        (["curve", "--out", "no/such/c.txt", "--plot", "fine.png"], "cannot be written"),
+        (["island"], "--delta"),
+        (["island", "--delta", "0"], "delta must be positive, got 0"),
+        (["island", "--delta", "nan"], "delta must be finite"),
+        (["island", "--delta", ""], "delta is empty"),
+    ],
+)
+def test_bad_input_of_one_command(folder, arguments, message):
+    assert message in refused(folder, *arguments, "--surface", "concrete")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("[surface\n", "is no TOML file"),
+        ("[surfaces]\nname = 'concrete'\n", "unknown key 'surfaces'; did you mean 'surface'?"),
+        ("[surface]\nhrust = 0.7\n", "unknown key 'hrust'; did you mean 'hurst'?"),
+        ("[surface]\nname = 'concrete'\n[material]\nEstar = 1\n", "did you mean 'E_star'?"),
+        ("[surface]\nname = 'concrete'\nxyz = 1\n", "unknown key 'xyz'; known are hurst"),
+        ("surface = 3\n", "surface must be a table"),
+        ("", "one of name, map or numbers"),
+        ("[surface]\nname = 'concrete'\nhurst = 0.7\n", "one of name, map or numbers"),
+        ("[surface]\nname = 7\n", "name must be a text"),
+        ("[surface]\nname = 'granite'\n", "no surface is named"),
+        ("[surface]\nname = 'concrete'\nlength_unit = 'm'\n", "length_unit is 'm'"),
+        (toml(CONCRETE).replace("0.7", "'0.7'"), "hurst must be real numbers"),
+        (toml(CONCRETE).replace("0.7", "true"), "hurst must be real numbers"),
+        (toml(CONCRETE).replace("0.7", "[0.7, 0.8]"), "hurst must be one number"),
+        (toml(CONCRETE).replace("0.7", "nan"), "hurst must be finite"),
+        (toml(CONCRETE).replace("0.7", "1" + 400 * "0"), "hurst must be real numbers"),
+        (toml(CONCRETE) + "[material]\nE1 = 1\n", "a material is E_star alone"),
+        ("[surface]\nmap = 'missing.nc'\n", "missing.nc"),
+    ],
+)
+def test_bad_files(folder, content, message):
+    (folder / "s.toml").write_text(content)
+    found = refused(folder, "contact", "--file", "s.toml", "-d", "0.1")
+    assert message in found
+    assert "s.toml" in found or "missing.nc" in found
+
+
+def write_map(path, heights, **options) -> None:
+    # that library's own deprecations and optional parts are not this test's subject
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from SurfaceTopography import Topography
+
+        Topography(heights, (100.0, 100.0), **options).to_netcdf(str(path))
+
+
+def self_affine_heights(points: int, hurst: float) -> np.ndarray:
+    """A periodic map with C ~ q^(-2-2H) exactly up to half the Nyquist wavenumber, random phases."""
+    noise = np.fft.fft2(np.random.default_rng(5).standard_normal((points, points)))
+    waves = np.hypot(*np.meshgrid(np.fft.fftfreq(points), np.fft.fftfreq(points))) * points
+    inside = (waves >= 1) & (waves <= points / 4)
+    amplitude = np.where(inside, np.where(inside, waves, 1.0) ** (-1 - hurst), 0.0)
+    return np.fft.ifft2(noise / np.abs(noise) * amplitude).real * points
+
+
+def test_a_map_is_fitted_and_says_how_well(folder):
+    write_map(folder / "m.nc", self_affine_heights(128, 0.7), unit="um", periodic=True)
+    (folder / "s.toml").write_text("[surface]\nmap = 'm.nc'\n")
+    (folder / "sub").mkdir()
+    os.chdir(folder / "sub")
+    found = json.loads(run("contact", "--map", "../m.nc", "-d", "1", "--over-h-rms", "--json"))
+    assert found["surface"]["hurst"] == pytest.approx(0.7, rel=0.02)
+    assert found["surface"]["q0"] == pytest.approx(2 * np.pi / 100, rel=0.05)
+    assert found["surface"]["length_unit"] == found["units"]["separation"] == "µm"
+    assert found["surface"]["fit"]["hurst"] == found["surface"]["hurst"]
+    by_file = json.loads(run("contact", "--file", "../s.toml", "-d", "1", "--over-h-rms", "--json"))
+    assert by_file["surface"] == found["surface"]
+    assert by_file["columns"] == found["columns"]
+    text = run("contact", "--map", "../m.nc", "-d", "1", "--over-h-rms")
+    assert f"residual {found['surface']['fit']['residual']:.6g}" in text
+
+
+def test_bad_maps(folder):
+    heights = self_affine_heights(64, 0.7)
+    holed = np.ma.masked_array(heights, mask=np.zeros(heights.shape, dtype=bool))
+    holed[3, 4] = np.ma.masked
+    write_map(folder / "holes.nc", holed)
+    write_map(folder / "tiny.nc", np.array([[0.0, 1.0], [2.0, 0.5]]))
+    write_map(folder / "flat.nc", np.ones((64, 64)))
+    (folder / "text.nc").write_text("no map\n")
+    (folder / "three.xyz").write_text("0 0 0\n1 0 1\n0 1 2\n")
+    messages = {
+        "holes.nc": "has 1 holes",
+        "tiny.nc": "2 x 2 points",
+        "flat.nc": "flat",
+        "text.nc": "cannot read",
+        "three.xyz": "three.xyz",
+        "missing.nc": "no file",
+    }
+    for name, message in messages.items():
+        for command in (["contact", "-d", "0.1"], ["curve", "--plot", "c.png"], ["island", "--delta", "1"]):
+            assert message in refused(folder, *command, "--map", name)
+
+
+def test_bytes_that_are_no_text(folder):
+    (folder / "s.toml").write_bytes(b"\xff\xfe\x00")
+    assert "s.toml is no TOML file" in refused(folder, "contact", "--file", "s.toml", "-d", "0.1")
+
+
+def test_missing_matplotlib_leaves_nothing(folder, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    found = refused(folder, "curve", "--surface", "concrete", "--points", "5", "--plot", "c.png", "--out", "c.txt")
+    assert "pip install 'mbma_tables[plot]'" in found
+
+
+def test_unknown_commands(folder):
+    assert "No such command 'plan9'" in refused(folder, "plan9")
+    assert "Missing command" in refused(folder)
+
+
+def test_files_are_written_together_or_not_at_all(folder):
+    old = folder / "old.txt"
+    old.write_bytes(b"old")
+    with pytest.raises(InputError, match="cannot be written"):
+        write_files({old: b"new", folder / "missing" / "x.txt": b"new"})
+    assert old.read_bytes() == b"old"
+    assert [path.name for path in folder.iterdir()] == ["old.txt"]
+    with pytest.raises(InputError, match="not a plain file"):
+        write_files({folder / "new.txt": b"new", type(folder)(os.devnull): b"new"})
+    assert [path.name for path in folder.iterdir()] == ["old.txt"]
+    write_files({old: b"new", folder / "second.txt": b"2"})
+    assert (old.read_bytes(), (folder / "second.txt").read_bytes()) == (b"new", b"2")
+    assert len(list(folder.iterdir())) == 2
+
+
+def test_the_module_runs_and_reports(folder):
+    def start(*arguments: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-W", "error", "-m", "mbma_tables", *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    good = start("contact", "--surface", "yang-persson", "-d", "2", "--reading", "printed", "--json")
+    assert (good.returncode, good.stderr) == (0, "")
+    assert json.loads(good.stdout)["columns"]["force"] == pytest.approx([2.5114e-5], rel=2e-5)
+    bad = start("contact", "--surface", "yang-persson", "-d", "-4")
+    assert (bad.returncode, bad.stdout) == (2, "")
+    assert bad.stderr.startswith("mbma: separation must be at least -h_max")
+    assert len(bad.stderr.splitlines()) == 1
+    assert list(folder.iterdir()) == []
+
+
+def test_a_terminal_without_the_units_letters(folder):
+    name = os.fsdecode(b"caf\xc3\xa9\xff.toml")
+    (folder / name).write_text("[surface]\nlength_unit = 'µm'\n" + toml(CONCRETE).partition("\n")[2], encoding="utf-8")
+    command = [sys.executable, "-m", "mbma_tables", "contact", "--file", name, "-d", "0.5", "--tier", "rigid"]
+    environment = os.environ | {"PYTHONIOENCODING": "ascii"}
+    found = subprocess.run(command, capture_output=True, check=False, env=environment)
+    assert (found.returncode, found.stderr) == (0, b"")
+    assert "surface of café�.toml" in found.stdout.decode("utf-8")
+    assert "h_max 1.1 µm" in found.stdout.decode("utf-8")
+
+
+@pytest.mark.parametrize("command", ["", "contact", "curve", "island", "surfaces"])
+def test_help_answers_without_heavy_imports(command):
+    code = (
+        "import sys\n"
+        "from mbma_tables.cli import main\n"
+        "try:\n"
+        "    main([*sys.argv[1:], '--help'], prog_name='mbma')\n"
+        "except SystemExit as end:\n"
+        "    assert end.code == 0\n"
+        "heavy = {'numba', 'scipy', 'matplotlib', 'SurfaceTopography', 'xarray'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+    )
+    found = subprocess.run([sys.executable, "-c", code, *command.split()], capture_output=True, text=True, check=False)
+    assert found.returncode == 0, found.stderr
+    assert found.stdout.startswith(f"Usage: mbma {command}".rstrip())

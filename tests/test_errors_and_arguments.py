@@ -1,0 +1,84 @@
+"""Typed errors, and the messages of the argument checks."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mbma_tables import ConvergenceError, InputError, MbmaError, NotSelfAffineError, OutOfRangeError
+from mbma_tables.arguments import SHOWN, broadcast_shape, finite_array, require
+
+
+def test_one_base_and_the_builtin_kinds():
+    for kind in (InputError, OutOfRangeError, ConvergenceError, NotSelfAffineError):
+        assert issubclass(kind, MbmaError)
+    assert issubclass(OutOfRangeError, InputError)
+    for kind in (InputError, NotSelfAffineError):
+        assert issubclass(kind, ValueError)
+    assert issubclass(ConvergenceError, ArithmeticError)
+    assert not issubclass(ConvergenceError, ValueError)
+
+
+def test_masks_and_results_travel_with_the_error():
+    mask = np.array([True, False])
+    assert OutOfRangeError("outside", mask).mask is mask
+    fault = ConvergenceError("failed", mask, result="what there is")
+    assert fault.mask is mask
+    assert fault.result == "what there is"
+    assert str(fault) == "failed"
+
+
+@pytest.mark.parametrize(
+    ("value", "shape"), [(3, ()), (2.5, ()), ([1, 2], (2,)), (np.float32(1), ()), (np.ones((2, 1)), (2, 1))]
+)
+def test_numbers_become_float64(value, shape):
+    array = finite_array("x", value)
+    assert array.dtype == np.float64
+    assert array.shape == shape
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (math.nan, "x must be finite, got nan"),
+        ([1.0, math.inf, -math.inf], r"x must be finite, got inf at \(1,\), -inf at \(2,\)$"),
+        ([[1.0, math.nan]], r"x must be finite, got nan at \(0, 1\)$"),
+        ([math.nan] * 5, r"nan at \(2,\) and 2 more$"),
+        ([], "x is empty: at least one number is needed"),
+        (np.ones((0, 3)), "x is empty"),
+        ("deep", "x must be real numbers: entries of type"),
+        (1j, "x must be real numbers: entries of type complex128"),
+        (True, "x must be real numbers: entries of type bool"),
+        (None, "x must be real numbers"),
+        ([1.0, [2.0, 3.0]], "x must be real numbers"),
+        (10**400, "x must be real numbers"),
+        (np.datetime64("2020-01-01"), "x must be real numbers"),
+    ],
+)
+def test_what_is_no_number_is_named(value, message):
+    with pytest.raises(InputError, match=message):
+        finite_array("x", value)
+
+
+def test_out_of_range_entries_are_quoted():
+    value = np.array([0.5, -1.0, -2.0, -3.0, -4.0])
+    with pytest.raises(OutOfRangeError) as caught:
+        require("x", value, value > 0, "positive")
+    assert SHOWN == 3
+    assert str(caught.value) == "x must be positive, got -1 at (1,), -2 at (2,), -3 at (3,) and 1 more"
+    assert caught.value.mask.tolist() == [False, True, True, True, True]
+    with pytest.raises(OutOfRangeError, match=r"^x must be positive, got -1$"):
+        require("x", np.array(-1.0), np.array(False), "positive")
+    require("x", value, value < 1, "below 1")
+
+
+def test_quoted_digits_tell_neighbours_apart():
+    value = np.array(math.nextafter(1, 2))
+    with pytest.raises(OutOfRangeError, match=r"1\.0000000000000002$"):
+        require("x", value, value <= 1, "at most 1")
+
+
+def test_broadcast_shape():
+    assert broadcast_shape(a=np.ones((2, 1)), b=np.ones(3), c=1.0) == (2, 3)
+    with pytest.raises(InputError, match=r"^arguments do not broadcast: a \(2,\), b \(3,\)$"):
+        broadcast_shape(a=np.ones(2), b=np.ones(3))

@@ -1,0 +1,81 @@
+import sys
+
+import numpy as np
+import pytest
+
+from mbma_tables.errors import InputError, MbmaError
+from mbma_tables.plots import Curve, draw_compression, to_png
+
+GAP = np.array([3.0, 2.0, 1.0, 0.0])
+FORCE = np.array([0.0, 2e-5, 3e-4, 2e-2])
+AREA = np.array([0.0, 3e-5, 4e-4, 3e-2])
+
+
+def two_curves() -> list[Curve]:
+    return [Curve("first", GAP, FORCE, AREA), Curve("second", GAP[:3] + 0.5, 2 * FORCE[1:], AREA[1:])]
+
+
+def test_lines_hold_the_arrays_as_given():
+    curves = two_curves()
+    by_gap, by_force = draw_compression(curves).axes
+    for curve, left, right in zip(curves, by_gap.lines, by_force.lines, strict=True):
+        np.testing.assert_array_equal(left.get_xydata(), np.stack([curve.gap, curve.force], axis=1))
+        np.testing.assert_array_equal(right.get_xydata(), np.stack([curve.force, curve.area], axis=1))
+
+
+def test_axes_say_what_they_show():
+    figure = draw_compression(two_curves(), "a title", "force  F/A0 [MPa]")
+    by_gap, by_force = figure.axes
+    assert figure.get_suptitle() == "a title"
+    assert [text.get_text() for text in by_gap.get_legend().get_texts()] == ["first", "second"]
+    assert (by_gap.get_xscale(), by_gap.get_yscale()) == ("linear", "log")
+    assert (by_force.get_xscale(), by_force.get_yscale()) == ("log", "log")
+    assert by_gap.get_xlabel() == "mean separation  u/h_rms"
+    assert by_gap.get_ylabel() == by_force.get_xlabel() == "force  F/A0 [MPa]"
+    assert by_force.get_ylabel() == "real contact area  A/A0"
+
+
+def test_every_point_with_contact_is_in_view():
+    by_gap, by_force = draw_compression(two_curves()).axes
+    for axes, values in ((by_gap, FORCE), (by_force, AREA)):
+        low, high = axes.get_ylim()
+        assert 0 < low < values[1]
+        assert values[-1] < high
+
+
+def test_png_is_one_and_repeats():
+    first, second = (to_png(draw_compression(two_curves(), "title")) for _ in range(2))
+    assert first.startswith(b"\x89PNG\r\n\x1a\n")
+    assert first == second
+
+
+def test_pyplot_stays_out():
+    before = "matplotlib.pyplot" in sys.modules
+    to_png(draw_compression(two_curves()))
+    assert ("matplotlib.pyplot" in sys.modules) == before
+
+
+@pytest.mark.parametrize(
+    ("arrays", "message"),
+    [
+        ((GAP, FORCE, AREA[:2]), "one length"),
+        ((GAP[0], FORCE[1], AREA[1]), "1-D"),
+        ((GAP, FORCE * np.nan, AREA), "must be finite"),
+        (([], [], []), "empty"),
+        ((GAP, 0 * FORCE, AREA), "no contact"),
+    ],
+)
+def test_bad_curves_are_refused(arrays, message):
+    with pytest.raises(InputError, match=message):
+        Curve("name", *arrays)
+
+
+def test_no_curves_are_refused():
+    with pytest.raises(InputError, match="at least one"):
+        draw_compression([])
+
+
+def test_missing_matplotlib_is_named_with_the_cure(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    with pytest.raises(MbmaError, match=r"pip install 'mbma_tables\[plot\]'"):
+        draw_compression(two_curves())

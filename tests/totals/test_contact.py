@@ -1,0 +1,284 @@
+"""`contact` against brute force, its own bound, the paper's case, power laws, limits, invariants, bad input."""
+
+import dataclasses
+import functools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, contact, greenwood_tripp
+from mbma_tables.islands.island import geometry
+from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED, get_reading
+from mbma_tables.totals.contact import kinks
+
+OWN = dataclasses.replace(
+    PRINTED, name="own", jacobian="exact", offset=True, beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5
+)
+LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)
+
+
+def brute(surface, separation, reading):
+    """(48) and (49) in units of E* q0 s and 1, by composite Gauss rules far finer than needed."""
+    rule = get_reading(reading)
+    hurst, zeta_1, h_rms = surface.hurst, surface.zeta_1, surface.h_rms
+    room = h_rms / surface.s
+    reach = (surface.h_max - separation) / h_rms
+    layer = zeta_1**-hurst
+    # geometric towards first contact, even beyond, and broken where the floors are met
+    graded = reach * 2.0 ** -np.arange(math.ceil(math.log2(reach / (1e-9 * min(layer, reach)))))
+    even = np.arange(0, reach, 0.1)
+    own_kinks = [k for k in kinks(hurst, zeta_1, rule) if k < reach]
+    edges = np.unique(np.concatenate([[0.0, reach], graded, even, own_kinks]))
+    x, weights = np.polynomial.legendre.leggauss(16)
+    half = np.diff(edges) / 2
+    delta = ((edges[1:] + edges[:-1])[:, None] / 2 + half[:, None] * x).ravel()
+    measure = (half[:, None] * weights).ravel() * room
+
+    g = geometry(delta, np.full_like(delta, hurst), np.full_like(delta, zeta_1), rule)
+    phi = greenwood_tripp.solve(g["X"], g["mu"], rtol=1e-12)
+    L = np.sqrt(2 * g["R_d"] * g["sigma"])
+    force = g["sigma"] * L * phi.phi_F
+    area = g["eta"] * math.pi * g["D"] * g["R_u"] * g["sigma"] * L**2 * phi.phi_A
+    z = (separation / h_rms + delta) * room - g["h_d"]
+    density = g["D_d"] * np.exp(-0.5 * (z / g["sigma_d"]) ** 2) / (math.sqrt(2 * math.pi) * g["sigma_d"])
+    slope = 4 / 3 * rule.beta
+    if rule.jacobian == "exact":
+        slope = slope / room if rule.offset else 0.0
+    shift = np.where(g["zeta_d"] > rule.floor_d, 1 - slope, 1.0)
+    weight = density * shift * measure
+    return surface.q0 * surface.s * (force @ weight), area @ weight
+
+
+def one_surface(hurst, zeta_1, h_max=3.0, h_rms=1.0):
+    return Surface(hurst, 0.2, 0.2 * zeta_1, h_rms, h_max * h_rms)
+
+
+def scattered(count, seed):
+    rng = np.random.default_rng(seed)
+    hurst = rng.uniform(0.1, 1, count)
+    hurst[::9] = 1
+    zeta_1 = 10 ** rng.uniform(math.log10(3.01), 8, count)
+    zeta_1[::7], zeta_1[::11] = 3.01, 1e8
+    h_max = rng.uniform(2.5, 4.7, count)
+    share = rng.uniform(-1, 1, count)
+    share[::5] = 1 - 10 ** rng.uniform(-4, -0.5, count)[::5]
+    share[3::20], share[4::20] = -1, 0.9999
+    return Surface(hurst, 0.2, 0.2 * zeta_1, 1.0, h_max), share * h_max
+
+
+BRUTE_POINTS = [
+    (0.1, 1e8, 0.9999, "reported"),
+    (0.1, 1e8, 0.3, "printed"),
+    (0.1, 1e8, -1.0, "reported"),
+    (0.1, 3.01, 0.9999, "printed"),
+    (0.1, 3.01, -1.0, "reported"),
+    (0.2, 1e3, 0.6, "reported"),
+    (0.3, 1e5, -0.4, "printed"),
+    (0.4, 30.0, 0.0, "reported"),
+    (0.5, 1e6, 0.99, "reported"),
+    (0.6, 5.0, 0.5, "printed"),
+    (0.7, 500.0, -0.7, "reported"),
+    (0.8, 216.0, 2 / 3, "printed"),
+    (0.8, 216.0, 0.9999, "reported"),
+    (0.85, 1e4, 0.2, OWN),
+    (0.6, 12.0, -0.5, OWN),
+    (0.7, 100.0, 0.4, LEVEL),
+    (0.9, 1e7, 0.95, "reported"),
+    (math.nextafter(1, 0), 50.0, 0.1, "reported"),
+    (1.0, 3.01, 0.9999, "reported"),
+    (1.0, 3.01, -1.0, "printed"),
+    (1.0, 1e8, 0.9999, "printed"),
+    (1.0, 1e8, 0.4, "reported"),
+    (1.0, 1e8, -1.0, "reported"),
+]
+
+
+@pytest.mark.parametrize(("hurst", "zeta_1", "share", "reading"), BRUTE_POINTS)
+def test_against_brute_force(hurst, zeta_1, share, reading):
+    surface = one_surface(hurst, zeta_1, h_max=3.3, h_rms=0.7)
+    separation = share * surface.h_max
+    found = contact(surface, separation, reading=reading, rtol=1e-9)
+    force, area = brute(surface, separation, reading)
+    assert abs(found.force / force - 1) <= 1e-9
+    assert abs(found.area / area - 1) <= 1e-9
+    assert max(abs(found.force / force - 1), abs(found.area / area - 1)) <= found.error + 5e-12
+
+
+@functools.cache
+def fine_contact(reading, count):
+    surfaces, separation = scattered(count, seed=11)
+    return surfaces, separation, contact(surfaces, separation, reading=reading, rtol=2e-11)
+
+
+@pytest.mark.parametrize(
+    ("reading", "count", "rtol"),
+    [("reported", 150, 1e-4), ("reported", 150, 1e-8), ("printed", 50, 1e-4), ("printed", 50, 1e-8)],
+)
+def test_bound_covers_the_true_error(reading, count, rtol):
+    surfaces, separation, fine = fine_contact(reading, count)
+    found = contact(surfaces, separation, reading=reading, rtol=rtol)
+    error = np.maximum(np.abs(found.force / fine.force - 1), np.abs(found.area / fine.area - 1))
+    assert fine.error.max() <= 2e-11
+    assert found.error.max() <= rtol
+    assert (error <= found.error + fine.error).all()
+
+
+def test_the_papers_yang_persson_case():
+    found = contact(Surface.named("yang-persson"), 2.0, reading="printed")
+    assert found.force == pytest.approx(2.5114e-5, abs=5e-10)
+    assert found.area == pytest.approx(3.1145e-5, abs=5e-10)
+    assert found.mean_separation == 2.5
+    assert (found.reading, found.tier) == ("printed", "exact")
+
+
+@pytest.mark.parametrize("reading", READINGS)
+@pytest.mark.parametrize(("hurst", "zeta_1"), [(0.3, 100.0), (0.8, 216.0), (1.0, 1e4), (1.0, 3.01)])
+def test_power_laws_at_first_contact(reading, hurst, zeta_1):
+    surface = Surface(hurst, 0.2, 0.2 * zeta_1, 1.0, 4.0)
+    depth = zeta_1**-hurst * 2.0 ** np.array([-22, -23])
+    depth = 2.0 ** np.round(np.log2(depth))  # 4 - depth is exact
+    found = contact(surface, 4.0 - depth, reading=reading, rtol=1e-10)
+    assert found.force[0] / found.force[1] == pytest.approx(2**3.5, rel=1e-5, abs=0)
+    assert found.area[0] / found.area[1] == pytest.approx(2 ** (10 / 3), rel=1e-5, abs=0)
+
+
+def test_no_cancellation_next_to_first_contact():
+    # the law holds where the depth is a few units in the last place of the separation
+    surface = one_surface(0.8, 216.0, h_max=4.0)
+    depth = np.array([2.0**-48, 2.0**-20])
+    found = contact(surface, 4.0 - depth, rtol=1e-10)
+    assert found.force[0] / found.force[1] == pytest.approx((2.0**-28) ** 3.5, rel=1e-3, abs=0)
+
+
+@pytest.mark.parametrize("tier", ["exact", "rigid"])
+def test_no_contact_is_exactly_zero(tier):
+    surface = one_surface(0.8, 216.0)
+    found = contact(surface, [3.0, math.nextafter(3, 4), 50.0, 1e300], tier=tier)
+    assert found.force.tolist() == [0.0] * 4
+    assert found.area.tolist() == [0.0] * 4
+    assert found.error.tolist() == [0.0] * 4
+    assert contact(surface, math.nextafter(3, 2), tier=tier).force > 0
+
+
+@pytest.mark.parametrize("reading", READINGS)
+def test_rigid_spheres_carry_more(reading):
+    for hurst, zeta_1 in ((0.3, 1e4), (0.8, 216.0), (1.0, 20.0)):
+        surface = one_surface(hurst, zeta_1)
+        separation = np.append(3 - 10.0 ** np.arange(-6, 0.5), [-1.0, -3.0])
+        exact = contact(surface, separation, reading=reading)
+        rigid = contact(surface, separation, reading=reading, tier="rigid")
+        assert (rigid.force >= exact.force).all()
+        assert (rigid.area >= exact.area * (1 - 1e-8)).all()
+        # mu goes to 0 with the approach
+        loss = rigid.force / exact.force - 1
+        assert (np.diff(loss[:7]) > 0).all()
+        assert rigid.tier == "rigid"
+
+
+@pytest.mark.parametrize("reading", READINGS)
+@pytest.mark.parametrize("hurst", [0.5, 0.7, 0.8, 1.0])
+@pytest.mark.parametrize("zeta_1", [10.0, 216.0, 1e5])
+def test_force_rises_as_the_gap_closes(reading, hurst, zeta_1):
+    surface = one_surface(hurst, zeta_1)
+    found = contact(surface, np.linspace(2.999, -3, 80), reading=reading, rtol=1e-6)
+    assert (np.diff(found.force) > 0).all()
+    assert (np.diff(found.area) > 0).all()
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    hurst=st.floats(0.2, 1),
+    zeta_1=st.floats(3.01, 1e5),
+    share=st.floats(-1, 0.99),
+    power=st.floats(-9, 9),
+    modulus=st.floats(1e-3, 1e12),
+)
+def test_any_unit_of_length_and_stress(hurst, zeta_1, share, power, modulus):
+    unit = 10**power
+    one = contact(Surface(hurst, 1.0, zeta_1, 0.3, 1.0), share)
+    other = contact(Surface(hurst, 1 / unit, zeta_1 / unit, 0.3 * unit, unit), share * unit, E_star=modulus)
+    assert other.force == pytest.approx(one.force * modulus, rel=2e-8, abs=0)
+    assert other.area == pytest.approx(one.area, rel=2e-8, abs=0)
+    # h_max + d cancels towards full compression: digits of h_max are what remains
+    assert other.mean_separation == pytest.approx(one.mean_separation * unit, rel=0, abs=1e-15 * unit)
+
+
+def test_force_is_proportional_to_slope():
+    # at equal h_max/h_rms force over E* q0 h_rms, and the area, are the same
+    flat, steep = (contact(Surface(0.8, 0.2, 40.0, h, 3 * h), 1.5 * h) for h in (0.01, 1.0))
+    assert steep.force == pytest.approx(100 * flat.force, rel=2e-8, abs=0)
+    assert steep.area == pytest.approx(flat.area, rel=2e-8, abs=0)
+
+
+def test_batches_equal_loops():
+    surfaces = Surface([[0.4], [0.8]], 0.2, 40.0, 1.0, [[3.0], [3.5]])
+    separation = np.array([-1.0, 1.5, 2.9999, 3.2, 4.0])
+    modulus = np.array([1.0, 2.0, 1.0, 3.0, 1.0])
+    batch = contact(surfaces, separation, E_star=modulus)
+    for name in ("separation", "mean_separation", "force", "area", "error"):
+        assert getattr(batch, name).shape == (2, 5)
+    for i, (hurst, h_max) in enumerate(((0.4, 3.0), (0.8, 3.5))):
+        for j, d in enumerate(separation):
+            one = contact(Surface(hurst, 0.2, 40.0, 1.0, h_max), d, E_star=modulus[j])
+            assert np.shape(one.force) == np.shape(one.area) == np.shape(one.error) == ()
+            assert batch.force[i, j] == pytest.approx(one.force, rel=1e-14, abs=0)
+            assert batch.area[i, j] == pytest.approx(one.area, rel=1e-14, abs=0)
+            assert batch.mean_separation[i, j] == (h_max + d) / 2
+
+
+def test_the_argument_stays():
+    separation = np.array([1.0, 2.0])
+    contact(one_surface(0.8, 216.0), separation, rtol=1e-3)
+    assert separation.tolist() == [1.0, 2.0]
+
+
+def test_below_full_compression():
+    surfaces = Surface([[0.5], [0.8]], 0.2, 40.0, 1.0, [[3.0], [4.0]])
+    with pytest.raises(OutOfRangeError, match="at least -h_max, where the model ends") as caught:
+        contact(surfaces, [0.0, -3.5, -5.0])
+    assert caught.value.mask.tolist() == [[False, True, True], [False, False, True]]
+
+
+def test_failure_has_the_shape_of_the_arguments(monkeypatch):
+    monkeypatch.setattr(greenwood_tripp, "LEVELS", np.array([12]))  # too few nodes for any island at 1e-8
+    surfaces = Surface([[0.5], [0.8]], 0.2, 40.0, 1.0, [[3.0], [4.0]])
+    with pytest.raises(ConvergenceError) as caught:
+        contact(surfaces, [0.0, 3.5, 1.0])
+    assert caught.value.mask.tolist() == [[True, False, True], [True, True, True]]
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, [0.0, math.nan], [], "deep", 1j, None])
+def test_no_number(value):
+    surface = one_surface(0.8, 216.0)
+    with pytest.raises(InputError, match=r"^separation "):
+        contact(surface, value)
+    with pytest.raises(InputError, match=r"^E_star "):
+        contact(surface, 1.0, E_star=value)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("rtol", 0.0),
+        ("rtol", 1e-12),
+        ("rtol", 0.5),
+        ("rtol", math.nan),
+        ("rtol", "tight"),
+        ("tier", "magic"),
+        ("tier", None),
+        ("reading", "guessed"),
+        ("E_star", 0.0),
+        ("E_star", -2.0),
+    ],
+)
+def test_bad_options(option, value):
+    with pytest.raises(InputError, match=option):
+        contact(one_surface(0.8, 216.0), 1.0, **{option: value})
+
+
+def test_shapes_that_do_not_broadcast():
+    with pytest.raises(InputError, match="do not broadcast"):
+        contact(Surface([0.5, 0.6], 0.2, 40.0, 1.0, 3.0), [0.1, 0.2, 0.3])

@@ -1,0 +1,96 @@
+"""The batch quadrature: the rule itself, many integrals of unlike size, failure."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbma_tables import ConvergenceError
+from mbma_tables.totals import quadrature
+from mbma_tables.totals.quadrature import GAUSS, KRONROD, NODES, integrate
+
+
+def run(function, low, high, rtol=1e-10, owner=None):
+    """Integrate one-component `function(owner, x)`."""
+    low, high = np.atleast_1d(np.asarray(low, float)), np.atleast_1d(np.asarray(high, float))
+    owners = np.arange(low.size) if owner is None else np.asarray(owner)
+    return integrate(lambda who, x: function(who[:, None], x)[..., None], owners, low, high, owners.max() + 1, rtol)
+
+
+def test_the_rule_is_exact_for_its_degree():
+    for power in range(32):
+        known = 0 if power % 2 else 2 / (power + 1)
+        assert abs(KRONROD @ NODES**power - known) <= 1e-15
+    for power in range(20):
+        known = 0 if power % 2 else 2 / (power + 1)
+        assert abs(GAUSS @ NODES**power - known) <= 1e-15
+    # and no further
+    assert abs(GAUSS @ NODES**20 - 2 / 21) > 1e-8
+    x, weights = np.polynomial.legendre.leggauss(10)
+    assert np.abs(NODES[GAUSS > 0] - x).max() <= 1e-15
+    assert np.abs(GAUSS[GAUSS > 0] / weights - 1).max() <= 1e-13
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-10, 1e-13])
+def test_each_integral_to_its_own_size(rtol):
+    # integral of scale exp(-(x/width)^2) over [-1, 1]
+    width = np.array([1.0, 1e-1, 1e-3, 1e-4])
+    scale = np.array([1e-200, 1.0, 1e100, 1e-20])
+    found = run(lambda who, x: scale[who] * np.exp(-((x / width[who]) ** 2)), -np.ones(4), np.ones(4), rtol)
+    known = scale * math.sqrt(math.pi) * width * [math.erf(1 / w) for w in width]
+    error = np.abs(found.value[:, 0] / known - 1)
+    assert (error <= np.maximum(found.error[:, 0], 4e-15)).all()
+    assert found.error.max() <= rtol
+
+
+@settings(deadline=None)
+@given(power=st.floats(-0.5, 8), high=st.floats(1e-8, 1e8))
+def test_end_point_powers(power, high):
+    found = run(lambda who, x: x**power, 0.0, high, 1e-8)
+    known = high ** (power + 1) / (power + 1)
+    assert abs(found.value[0, 0] / known - 1) <= 1e-8
+
+
+def test_several_intervals_of_one_owner_and_none():
+    found = integrate(
+        lambda who, x: np.stack([x, x**2], axis=-1),
+        np.array([0, 2, 0]),
+        np.array([0.0, 0.0, 1.0]),
+        np.array([1.0, 3.0, 2.0]),
+        3,
+        1e-12,
+    )
+    assert found.value == pytest.approx(np.array([[2.0, 8 / 3], [0, 0], [4.5, 9.0]]), rel=1e-14, abs=0)
+    assert (found.error[1] == 0).all()
+
+
+def test_no_interval_at_all():
+    found = integrate(
+        lambda who, x: np.ones((*x.shape, 2)), np.zeros(0, dtype=int), np.zeros(0), np.zeros(0), 2, 1e-8, 2
+    )
+    assert found.value.tolist() == [[0.0, 0.0], [0.0, 0.0]]
+
+
+def test_more_intervals_than_a_batch():
+    count = quadrature.BATCH + 7
+    high = np.linspace(1, 2, count)
+    found = run(lambda who, x: 3 * x**2, np.zeros(count), high)
+    assert np.abs(found.value[:, 0] / high**3 - 1).max() <= 1e-14
+    assert found.evaluations == 21 * count
+
+
+def test_only_what_needs_it_is_refined():
+    smooth = run(lambda who, x: np.exp(x), 0.0, 1.0)
+    both = run(lambda who, x: np.where(who == 0, np.exp(x), np.sqrt(np.abs(x - 0.3))), [0, 0], [1, 1])
+    rough = run(lambda who, x: np.sqrt(np.abs(x - 0.3)), 0.0, 1.0)
+    assert both.evaluations == smooth.evaluations + rough.evaluations
+    assert both.value[0, 0] == smooth.value[0, 0]
+    assert both.value[1, 0] == rough.value[0, 0]
+
+
+def test_failure_says_which():
+    with pytest.raises(ConvergenceError, match="1 of 3") as caught:
+        run(lambda who, x: np.where(who == 1, x**-1.0, x), np.zeros(3), np.ones(3))
+    assert caught.value.mask.tolist() == [False, True, False]

@@ -1,0 +1,308 @@
+"""The other theories: against the paper's own number, closed forms, mpmath and each other."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from mbma_tables import InputError, OutOfRangeError, Surface
+from mbma_tables.totals import theories
+
+YANG_PERSSON = Surface.named("yang-persson")
+
+
+def relative(value, expected):
+    return np.max(np.abs(np.asarray(value) / np.asarray(expected) - 1))
+
+
+def printed_separation(hurst, zeta_1, slope, load, digits):
+    """u/h_rms of Eq. (19) as printed, with q0 = 1 and h_rms = slope, by nested quadrature.
+
+    Only exp(-(w p0)^2) at q1 is taken out, since mpmath's tolerance is absolute.
+    """
+    with mpmath.workdps(digits):
+        H, z, h, p0 = (mpmath.mpf(x) for x in (hurst, zeta_1, slope, load))
+        gamma = mpmath.mpf("0.42")
+        scale = H / mpmath.pi * h**2 / (1 - z ** (-2 * H))
+
+        def w(q):
+            power = 2 - 2 * H
+            m2 = mpmath.pi * scale * (mpmath.log(q) if H == 1 else (q**power - 1) / power)
+            return 1 / mpmath.sqrt(m2)
+
+        base = (w(z) * p0) ** 2
+
+        def inner(w_q):
+            span = mpmath.log1p(80 / (w_q * p0) ** 2) / 2
+
+            def integrand(t):  # p' = p0 exp(t)
+                x = w_q * p0 * mpmath.exp(t)
+                return (gamma + 3 * (1 - gamma) * mpmath.erf(x) ** 2) * mpmath.exp(base - x * x)
+
+            return mpmath.quad(integrand, mpmath.linspace(0, span, int(span / 3) + 2))
+
+        def outer(v):  # q = exp(exp(v))
+            log_q = mpmath.exp(v)
+            q = mpmath.exp(log_q)
+            return q**2 * scale * q ** (-2 - 2 * H) * w(q) * inner(w(q)) * q * log_q
+
+        top = mpmath.log(mpmath.log(z))
+        low = max(top + mpmath.log(base / (base + 80)) - 2, -mpmath.mpf(90))
+        pieces = mpmath.linspace(low, top, int((top - low) / 3) + 2)
+        return float(mpmath.sqrt(mpmath.pi) * mpmath.exp(-base) * mpmath.quad(outer, pieces) / h)
+
+
+def surface_of(hurst, zeta_1, slope):
+    return Surface(hurst, slope, slope * zeta_1, 1.0, 3.0)
+
+
+# printed_separation(..., digits=25), up to two minutes each
+PRINTED = [
+    (0.3, 4, 0.2, 2.0, 7.12986115868634175e-24),
+    (0.3, 4, 0.1, 1e-8, 6.7802122365389193113),
+    (0.3, 1e6, 0.01, 2.0, 0.075266609870544353997),
+    (0.5, 1e4, 0.05, 1e-5, 4.986113896081679742),
+    (0.8, 216, 0.18125, 2.0, 4.894496884608888166e-8),
+    (0.8, 216, 0.18125, 1e-8, 7.6679623952348966113),
+    (1.0, 4, 0.3, 2.0, 1.695791671698073388e-17),
+    (1.0, 1e6, 0.05, 1e-3, 1.8002462214981889954),
+]
+
+
+@pytest.mark.parametrize(("hurst", "zeta_1", "slope", "load", "expected"), PRINTED)
+def test_full_double_integral_equals_mpmath(hurst, zeta_1, slope, load, expected):
+    assert relative(theories.persson_separation(surface_of(hurst, zeta_1, slope), load), expected) < 1e-11
+
+
+@pytest.mark.parametrize(("hurst", "zeta_1", "slope", "load"), [(0.3, 4, 0.2, 2.0), (0.9, 10, 0.3, 1.0)])
+def test_full_double_integral_equals_mpmath_computed_here(hurst, zeta_1, slope, load):
+    expected = printed_separation(hurst, zeta_1, slope, load, digits=16)
+    assert relative(theories.persson_separation(surface_of(hurst, zeta_1, slope), load), expected) < 1e-11
+
+
+def test_simplified_force_of_the_yang_persson_case():
+    """The value that follows from Eqs. (20, 21); the paper reads 3.5e-4 off its figure."""
+    force = theories.persson_force(YANG_PERSSON, 3 * YANG_PERSSON.h_rms, method="simplified")
+    assert force == pytest.approx(3.64e-4, rel=1e-3)
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.7, 0.8])
+def test_simplified_constants_equal_their_printed_integrals(hurst):
+    """u0 and lambda by mpmath's quadrature in q, u0 also by a hypergeometric function."""
+    surface = Surface(hurst, 0.02, 3.0, 1.3, 4.0)
+
+    with mpmath.workdps(25):
+        H, s, q0, q1 = (mpmath.mpf(float(v)) for v in (hurst, surface.s, surface.q0, surface.q1))
+
+        def moment(f):
+            def integrand(t):  # q = q0 exp(t^2), since w is infinite at q0
+                q = q0 * mpmath.exp(t * t)
+                C = H / mpmath.pi * (s / q0) ** 2 * (q / q0) ** (-2 - 2 * H)
+                m2 = H * (s * q0) ** 2 * mpmath.expm1((2 - 2 * H) * t * t) / (2 - 2 * H)
+                w = 1 / mpmath.sqrt(m2)
+                return q**2 * C * w * f(w) * 2 * t * q
+
+            return mpmath.quad(integrand, mpmath.linspace(0, mpmath.sqrt(mpmath.log(q1 / q0)), 4))
+
+        total = moment(lambda w: 1)
+        u0 = float(mpmath.sqrt(mpmath.pi) * mpmath.mpf("0.42") * total)
+        scale = float(mpmath.mpf("4.047") * mpmath.exp(-moment(mpmath.log) / total))
+    loads = np.array([1e-7, 1e-4, 1e-2])
+    found = theories.persson_separation(surface, loads, method="simplified")
+    assert relative(found, -u0 * np.log(loads / scale)) < 1e-11
+
+    n = 1 / (2 - 2 * hurst)
+    top = math.sqrt(surface.m2) / (surface.s * surface.q0)
+    closed = top * float(mpmath.hyp2f1(0.5, n, 1.5, -(2 - 2 * hurst) / hurst * top**2))
+    slope = (found[1] - found[0]) / math.log(1e-3)
+    assert relative(slope, 0.42 * 2 / math.sqrt(math.pi) * closed * surface.s) < 1e-11
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.8, 1.0])
+def test_simplified_is_the_light_load_limit_of_full(hurst):
+    """Up to the four digits of 4.047 they are one: at light load the constant of (21b) follows from (19)."""
+    surface = Surface(hurst, 0.1, 20.0, 1.0, 3.0)
+    expected = quad(lambda x: math.erf(x) ** 2 * math.exp(-x * x) / x, 0, 7, epsabs=0, epsrel=1e-12)[0]
+    constant = math.exp(3 * 0.58 / 0.42 * expected - np.euler_gamma / 2)
+    assert constant == pytest.approx(4.047, rel=1e-3)
+    # the next term is of first order in the load
+    u = theories.persson_separation(surface, [1e-13, 1e-15], method="simplified")
+    full, simplified = (theories.persson_force(surface, u, method=m) for m in ("full", "simplified"))
+    assert relative(full / simplified, constant / 4.047) < 1e-9
+
+
+def test_full_and_simplified_agree_within_one_per_cent_at_a_thousandth_of_contact():
+    """And their difference is of first order in the load: about 7% at 1% contact, 40% at 10%."""
+    light = 1e-9 * YANG_PERSSON.rms_gradient
+    force = np.array([1e-5, 1e-4, 1e-3]) * light / theories.persson_area(YANG_PERSSON, light)
+    u = theories.persson_separation(YANG_PERSSON, force)
+    simplified = theories.persson_force(YANG_PERSSON, u, method="simplified")
+    difference = simplified / force - 1
+    assert np.all(np.abs(difference) < 0.01)
+    # what is left at no load is the rounding of 4.047
+    steps = np.diff(difference)
+    assert steps[1] / steps[0] == pytest.approx(10, rel=0.05)
+
+
+@given(
+    st.floats(0.1, 1.0),
+    st.floats(0.7, 6.0),
+    st.floats(-8, 0.5),
+    st.sampled_from(["full", "simplified"]),
+)
+def test_force_and_separation_are_inverse(hurst, log_zeta_1, log_load, method):
+    surface = Surface(hurst, 1e4, 1e4 * 10**log_zeta_1, 1e-5, 3e-5)
+    unit = np.sqrt(surface.m2)
+    load = unit * 10**log_load
+    try:
+        u = theories.persson_separation(surface, load, method=method)
+    except OutOfRangeError:
+        assert method == "simplified"
+        return
+    again = theories.persson_force(surface, u, method=method)
+    assert relative(again, load) < 1e-10
+
+
+@given(st.floats(0.1, 1.0), st.floats(-9, 0.9), st.floats(1e-6, 10))
+def test_separation_falls_with_load_and_scales_with_the_units(hurst, log_load, unit):
+    surface = Surface(hurst, 0.1, 10.0, 2.0, 6.0)
+    scaled = Surface(hurst, 0.1 / unit, 10.0 / unit, 2.0 * unit, 6.0 * unit)
+    load = 10**log_load
+    low, high = theories.persson_separation(surface, [load, 1.01 * load])
+    assert low > high > 0
+    assert relative(theories.persson_separation(scaled, load * 7e9, E_star=7e9), unit * low) < 1e-10
+
+
+def test_full_near_hurst_one_is_continuous():
+    below, at = (
+        theories.persson_separation(Surface(H, 0.1, 100.0, 1.0, 3.0), [1e-6, 1e-2, 1]) for H in (1 - 1e-9, 1.0)
+    )
+    assert relative(below, at) < 1e-7
+
+
+def test_persson_area_limits():
+    surface = Surface(np.array([0.4, 0.8, 1.0]), 0.1, 50.0, 1.0, 3.0)
+    light = 1e-9 * surface.rms_gradient
+    kappa = theories.persson_area(surface, light) / light * surface.rms_gradient
+    assert relative(kappa, math.sqrt(8 / math.pi)) < 1e-10
+    assert np.all(theories.persson_area(surface, 0.0) == 0)
+    assert relative(theories.persson_area(surface, 10 * surface.rms_gradient), 1.0) < 1e-10
+    E_star = 3e9
+    assert relative(theories.persson_area(surface, light * E_star, E_star), kappa * 1e-9) < 1e-14
+
+
+def test_greenwood_williamson_equals_mpmath():
+    d = 1.2345
+    with mpmath.workdps(30):
+        s = YANG_PERSSON
+        sigma = mpmath.sqrt((1 - mpmath.mpf("0.8968") / s.alpha) * s.m0)
+        density = s.m4 / (6 * mpmath.pi * mpmath.sqrt(3) * s.m2)
+        radius = 3 * mpmath.sqrt(mpmath.pi) / (8 * mpmath.sqrt(s.m4))
+
+        def mean(power):
+            def integrand(z):
+                return (z - d) ** power * mpmath.npdf(z, 0, sigma)
+
+            return mpmath.quad(integrand, [d, d + 1, d + 3, d + 8, d + 20])
+
+        force = mpmath.mpf(4) / 3 * density * mpmath.sqrt(radius) * mean(1.5)
+        area = mpmath.pi * density * radius * mean(1)
+    found = theories.greenwood_williamson(YANG_PERSSON, d, E_star=2.5)
+    assert relative(found.force, 2.5 * float(force)) < 1e-11
+    assert relative(found.area, float(area)) < 1e-11
+    assert found.mean_separation == (3 + d) / 2
+
+
+def test_greenwood_williamson_deep_and_far():
+    """Deep, every summit is a Hertz contact of depth -d; far, A/F rises like sqrt(d)."""
+    s = YANG_PERSSON
+    deep = theories.greenwood_williamson(s, -1e6)
+    expected = 4 / 3 * s.summit_density * math.sqrt(s.summit_radius) * 1e9
+    assert relative(deep.force, expected) < 1e-10
+    assert relative(deep.area, math.pi * s.summit_density * s.summit_radius * 1e6) < 1e-10
+    x = 36.0
+    far = theories.greenwood_williamson(s, x * s.summit_sigma)
+    # F_1/F_{3/2} -> sqrt(x)/Gamma(5/2), the next term below 3/x^2
+    ratio = (far.area / far.force) * 4 / (3 * math.pi) / np.sqrt(s.summit_radius / s.summit_sigma)
+    assert relative(ratio, math.sqrt(x) / math.gamma(2.5)) < 3 / x**2
+    assert theories.greenwood_williamson(s, 60.0).force == 0
+
+
+def test_everything_broadcasts_and_keeps_scalars():
+    surface = Surface(np.array([[0.5], [0.8]]), 0.1, 10.0, 1.0, 3.0)
+    one = Surface(0.8, 0.1, 10.0, 1.0, 3.0)
+    x = np.array([0.5, 1.0, 1.5])
+    calls = [
+        lambda s, v: theories.greenwood_williamson(s, v).force,
+        lambda s, v: theories.greenwood_williamson(s, v).area,
+        theories.persson_area,
+        theories.mean_separation,
+        theories.separation,
+    ]
+    for method in ("full", "simplified"):
+        calls.append(lambda s, v, m=method: theories.persson_separation(s, v / 1e3, method=m))
+        calls.append(lambda s, v, m=method: theories.persson_force(s, v, method=m))
+    for call in calls:
+        batch = call(surface, x)
+        assert batch.shape == (2, 3)
+        single = call(one, 1.0)
+        assert isinstance(single, np.float64)
+        assert relative(batch[1, 1], single) < 1e-12
+    assert np.all(x == [0.5, 1.0, 1.5])
+
+
+@given(st.floats(-5, 5))
+def test_the_two_separations_are_inverse(u):
+    d = theories.separation(YANG_PERSSON, u)
+    assert d == 2 * u - 3
+    assert theories.mean_separation(YANG_PERSSON, d) == pytest.approx(u, abs=1e-14)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, [], "1", 1j, [1.0, np.nan]])
+def test_bad_numbers_are_refused(bad):
+    for call in (
+        theories.greenwood_williamson,
+        theories.persson_area,
+        theories.persson_separation,
+        theories.persson_force,
+        theories.mean_separation,
+        theories.separation,
+    ):
+        with pytest.raises(InputError):
+            call(YANG_PERSSON, bad)
+
+
+def test_out_of_range_names_the_entries():
+    with pytest.raises(OutOfRangeError, match="zero or positive") as caught:
+        theories.persson_area(YANG_PERSSON, [1e-3, -1e-3])
+    assert caught.value.mask.tolist() == [False, True]
+    with pytest.raises(OutOfRangeError, match="infinite at zero load"):
+        theories.persson_separation(YANG_PERSSON, 0.0)
+    with pytest.raises(OutOfRangeError, match="lambda") as caught:
+        theories.persson_separation(YANG_PERSSON, [1e-3, 3.0], method="simplified")
+    assert caught.value.mask.tolist() == [False, True]
+    for method, bad in (("full", 0.0), ("full", -1.0), ("simplified", -1e-3)):
+        with pytest.raises(OutOfRangeError, match="mean_separation"):
+            theories.persson_force(YANG_PERSSON, bad, method=method)
+    with pytest.raises(OutOfRangeError, match="normal numbers") as caught:
+        theories.persson_force(YANG_PERSSON, [1.0, 1e4])
+    assert caught.value.mask.tolist() == [False, True]
+    with pytest.raises(InputError, match="method"):
+        theories.persson_force(YANG_PERSSON, 1.0, method="exact")
+    with pytest.raises(OutOfRangeError, match="E_star"):
+        theories.persson_area(YANG_PERSSON, 1.0, E_star=0.0)
+    with pytest.raises(InputError, match="broadcast"):
+        theories.persson_area(Surface([0.5, 0.8], 0.1, 10.0, 1.0, 3.0), [1.0, 2.0, 3.0])
+
+
+def test_extreme_loads_stay_numbers():
+    light = theories.persson_separation(YANG_PERSSON, [1e-300, 1e-150])
+    assert relative(theories.persson_separation(YANG_PERSSON, [1e-300, 1e-150], method="simplified"), light) < 1e-4
+    assert theories.persson_separation(YANG_PERSSON, 1e300) == 0
+    loads = np.array([1e-290, 1e-100, 1e-10, 1.0, 10.0])
+    again = theories.persson_force(YANG_PERSSON, theories.persson_separation(YANG_PERSSON, loads))
+    assert relative(again, loads) < 1e-9
