@@ -13,6 +13,7 @@ import click
 
 from mbma_tables import __version__
 from mbma_tables.cli.commands import contact_command, curve_command, island_command, surfaces_command
+from mbma_tables.cli.tables import tables_group
 from mbma_tables.errors import MbmaError
 
 BAD_INPUT = 2
@@ -52,5 +53,5 @@ def main() -> None:
     """Contact of rough surfaces by the MBMA model: force and real contact area against gap."""
 
 
-for command in (contact_command, curve_command, island_command, surfaces_command):
+for command in (contact_command, curve_command, island_command, surfaces_command, tables_group):
     main.add_command(command)

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, number_in, require, whole_number_in
 from mbma_tables.errors import ConvergenceError, InputError
 from mbma_tables.islands.classical import solve_classical
+from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.islands.newton import solve_islands
 from mbma_tables.islands.spectral import basis
 
@@ -113,6 +114,14 @@ def _newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int, profiles: bo
     reach = squared[:, None] * b.v
     gap = reach - X[:, None] + w / b.root_weights
     return _Batch(phi, steps, np.sqrt(reach), mu[:, None] * p / b.root_weights, gap)
+
+
+def rigid_sphere(X: FloatArray, mu: FloatArray) -> FloatArray:
+    """(Phi_F, Phi_A) where the sphere does not deform, stacked first: the limit of both as mu goes to 0.
+
+    Phi_F = (mu/2) pi F_{5/2}(-X)/(5/2), Phi_A = pi F_2(-X)/2.
+    """
+    return np.stack([math.pi / 5 * mu * height_integral(2.5, -X), math.pi / 2 * height_integral(2.0, -X)])
 
 
 def nodes_needed(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:

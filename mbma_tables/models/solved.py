@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models.protocol import IslandAnswer
 
 CLOSED_FORM_ERROR = 1e-14
@@ -36,6 +34,5 @@ class RigidModel:
 
     def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
         """Phi_F = (mu/2) pi F_{5/2}(-X)/(5/2), Phi_A = pi F_2(-X)/2."""
-        force = np.asarray(mu * (math.pi / 5) * height_integral(2.5, -X))
-        area = np.asarray(math.pi / 2 * height_integral(2.0, -X))
+        force, area = greenwood_tripp.rigid_sphere(X, mu)
         return IslandAnswer(force, area, np.full(force.shape, CLOSED_FORM_ERROR))

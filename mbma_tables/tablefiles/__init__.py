@@ -1,0 +1,1 @@
+"""Table files: what stands in one, how it is written, opened and checked, and how it is interpolated."""

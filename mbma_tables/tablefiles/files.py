@@ -1,0 +1,273 @@
+"""Write, open and check table files (netCDF-4).
+
+A file ends in a line with the SHA-256 of all bytes before it. It is read whole, checked, and only then shown to
+the HDF5 library, which may crash on damaged bytes. HDF5 ignores what follows its own end of file, so every netCDF
+reader opens the file as it is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import pathlib
+import platform
+import tempfile
+import warnings
+from typing import Any
+
+import netCDF4
+import numpy as np
+
+from mbma_tables.errors import StaleTableWarning, TableFileError
+from mbma_tables.tablefiles import provenance
+from mbma_tables.tablefiles.schema import (
+    CONVENTIONS,
+    DEGREES,
+    FORMAT_VERSION,
+    FUNCTIONS,
+    ISLAND4D,
+    KINDS,
+    OUT_OF_RANGE,
+    Axis,
+    TableContent,
+)
+from mbma_tables.tablefiles.splines import padding
+
+SEAL = b"\nmbma-table sha256 "
+SEAL_LENGTH = len(SEAL) + 64 + 1
+LARGEST_FILE = 256 * 2**20
+MODULES = {kind: provenance.SOLVER + (provenance.GEOMETRY if kind == ISLAND4D else ()) for kind in KINDS}
+MEANING = {
+    "log_ratio": "natural logarithm of Phi_{f} over its value for a rigid sphere, at the nodes",
+    "spline": "coefficients of cardinal B-splines that interpolate log_ratio_{f}",
+    "error": "bound on the relative error of Phi_{f} in this part of the table",
+}
+
+
+def versions() -> dict[str, str]:
+    """Versions of what computes."""
+    import numba
+    import scipy
+
+    from mbma_tables import __version__
+
+    return {
+        "mbma_tables": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "numba": numba.__version__,
+        "netCDF4": netCDF4.__version__,
+    }
+
+
+def _plain(value: Any) -> Any:
+    """An attribute as JSON holds it, the same before writing and after reading."""
+    if isinstance(value, np.ndarray):
+        return [_plain(item) for item in value.tolist()]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _attributes_digest(dataset: netCDF4.Dataset) -> str:
+    """SHA-256 of every attribute of a file but this hash itself."""
+    content = {"": {n: _plain(dataset.getncattr(n)) for n in dataset.ncattrs() if n != "attributes_sha256"}}
+    for name, variable in dataset.variables.items():
+        content[name] = {n: _plain(variable.getncattr(n)) for n in variable.ncattrs()}
+        content[name]["dimensions"] = list(variable.dimensions)
+    return provenance.digest_json(content)
+
+
+def _fill(dataset: netCDF4.Dataset, content: TableContent) -> None:
+    def add(name: str, dimensions: tuple[str, ...], values: Any, attributes: dict[str, Any]) -> None:
+        variable = dataset.createVariable(
+            name, "f8", dimensions, zlib=True, complevel=6, shuffle=True, endian="little", fill_value=False
+        )
+        variable.setncatts(attributes)
+        variable[...] = values
+
+    pad = padding(content.degree)
+    names = tuple(axis.name for axis in content.axes)
+    for axis, cells in zip(content.axes, content.local_error.shape, strict=False):
+        dataset.createDimension(axis.name, axis.nodes)
+        dataset.createDimension(f"{axis.name}_knot", axis.nodes + 2 * pad)
+        dataset.createDimension(f"{axis.name}_cell", cells)
+        add(axis.name, (axis.name,), axis.values, axis.attributes())
+    for number, function in enumerate(FUNCTIONS):
+        for what, suffix, array in (
+            ("log_ratio", "", content.log_ratio),
+            ("spline", "_knot", content.coefficients),
+            ("error", "_cell", content.local_error),
+        ):
+            meaning = {"long_name": MEANING[what].format(f=function), "units": "1"}
+            add(
+                f"{what}_{function}",
+                tuple(name + suffix for name in names),
+                array[..., number],
+                meaning,
+            )
+    for name, (dimensions, values, attributes) in content.auxiliary.items():
+        add(name, dimensions, values, attributes)
+    points = next(iter(content.conformance.values())).size
+    dataset.createDimension("conformance", points)
+    for name, values in content.conformance.items():
+        meaning = {"long_name": f"{name} of the conformance points", "units": "1"}
+        add(f"conformance_{name}", ("conformance",), values, meaning)
+
+
+def write_table(path: os.PathLike[str] | str, content: TableContent) -> pathlib.Path:
+    """Write a table file, whole or not at all.
+
+    Raises
+    ------
+    TableFileError
+        Where the folder cannot be written; nothing is left behind.
+    """
+    target = pathlib.Path(path)
+    digest = provenance.digest_arrays(content.arrays())
+    attributes = {
+        "Conventions": CONVENTIONS,
+        "mbma_kind": content.kind,
+        "format_version": FORMAT_VERSION,
+        "data_version": digest[:12],
+        "spline_degree": DEGREES[content.kind],
+        "out_of_range": OUT_OF_RANGE[content.kind],
+        **content.attributes,
+        "values_sha256": digest,
+        "physics_sha256": provenance.physics_digest(MODULES[content.kind]),
+        "physics_modules": " ".join(MODULES[content.kind]),
+        "versions": json.dumps(versions(), sort_keys=True),
+    }
+    try:
+        with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
+            draft = pathlib.Path(folder) / target.name
+            with netCDF4.Dataset(draft, "w", format="NETCDF4") as dataset:
+                _fill(dataset, content)
+                dataset.setncatts(attributes)
+                dataset.setncattr("attributes_sha256", _attributes_digest(dataset))
+            body = draft.read_bytes()
+            with draft.open("ab") as file:
+                file.write(SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n")
+                file.flush()
+                os.fsync(file.fileno())
+            draft.replace(target)
+    except OSError as fault:
+        raise TableFileError(f"cannot write {target}: {fault.strerror or fault}") from None
+    return target
+
+
+def _refuse(path: pathlib.Path, why: str, kind: str = "all") -> TableFileError:
+    return TableFileError(f"{path}: {why}; make it anew with `python -m generate {kind}` or reinstall mbma_tables")
+
+
+def read_sealed(path: pathlib.Path) -> bytes:
+    """The netCDF bytes of a table file, checked against its seal."""
+    try:
+        size = path.stat().st_size
+        if size > LARGEST_FILE:
+            raise _refuse(path, f"{size} bytes are more than any table has")
+        content = path.read_bytes()
+    except OSError as fault:
+        raise _refuse(path, f"cannot be read ({fault.strerror or fault})") from None
+    body, seal = content[:-SEAL_LENGTH], content[-SEAL_LENGTH:]
+    if not seal.startswith(SEAL) or not seal.endswith(b"\n"):
+        raise _refuse(path, "is no table file, or is cut short (no checksum at its end)")
+    if seal[len(SEAL) : -1] != hashlib.sha256(body).hexdigest().encode():
+        raise _refuse(path, "is damaged (its checksum does not match)")
+    return body
+
+
+def _content(dataset: netCDF4.Dataset, kind: str) -> TableContent:
+    attributes = {name: _plain(dataset.getncattr(name)) for name in dataset.ncattrs()}
+    variables = dataset.variables
+
+    def array(name: str) -> Any:
+        return np.ascontiguousarray(variables[name][...].filled(np.nan), dtype=np.float64)
+
+    names = variables["log_ratio_F"].dimensions
+    axes = tuple(
+        Axis(
+            name=name,
+            long_name=variables[name].long_name,
+            transform=variables[name].transform,
+            offset=float(variables[name].offset),
+            low=float(variables[name].first),
+            high=float(variables[name].last),
+            nodes=variables[name].size,
+        )
+        for name in names
+    )
+    main = {f"{what}_{function}" for what in MEANING for function in FUNCTIONS} | set(names)
+    auxiliary = {
+        name: (
+            variable.dimensions,
+            array(name),
+            {n: _plain(variable.getncattr(n)) for n in variable.ncattrs()},
+        )
+        for name, variable in variables.items()
+        if name not in main and not name.startswith("conformance_")
+    }
+    conformance = {
+        name.removeprefix("conformance_"): array(name) for name in variables if name.startswith("conformance_")
+    }
+
+    def both(what: str) -> Any:
+        return np.stack([array(f"{what}_{function}") for function in FUNCTIONS], axis=-1)
+
+    return TableContent(
+        kind=kind,
+        axes=axes,
+        log_ratio=both("log_ratio"),
+        coefficients=both("spline"),
+        local_error=both("error"),
+        auxiliary=auxiliary,
+        conformance=conformance,
+        attributes=attributes,
+    )
+
+
+def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> TableContent:
+    """Open and check a table file.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    kind : str, optional
+        The kind that it must be.
+
+    Raises
+    ------
+    TableFileError
+        Where it is unreadable, damaged, edited, of another format or of another kind.
+
+    Warns
+    -----
+    StaleTableWarning
+        Where the solver has changed since the table was made.
+    """
+    source = pathlib.Path(path)
+    body = read_sealed(source)
+    try:
+        with netCDF4.Dataset(source.name, memory=body) as dataset:
+            attributes = {name: _plain(dataset.getncattr(name)) for name in dataset.ncattrs()}
+            found = attributes.get("mbma_kind")
+            if found not in KINDS or (kind is not None and found != kind):
+                raise _refuse(source, f"holds a table of kind {found!r}, not {kind or KINDS}")
+            if attributes.get("format_version") != FORMAT_VERSION:
+                version = attributes.get("format_version")
+                raise _refuse(source, f"has format {version!r}, this library reads {FORMAT_VERSION}", found)
+            if attributes.get("attributes_sha256") != _attributes_digest(dataset):
+                raise _refuse(source, "has attributes that were edited", found)
+            content = _content(dataset, found)
+    except (OSError, RuntimeError, KeyError, AttributeError, ValueError, IndexError) as fault:
+        raise _refuse(source, f"is no table file ({fault})") from None
+    if provenance.digest_arrays(content.arrays()) != attributes["values_sha256"]:
+        raise _refuse(source, "has values that do not match their hash", content.kind)
+    if attributes["physics_sha256"] != provenance.physics_digest(MODULES[content.kind]):
+        warnings.warn(
+            f"{source} was made by another version of the solver; `python -m generate {content.kind}` makes it anew",
+            StaleTableWarning,
+            stacklevel=2,
+        )
+    return content

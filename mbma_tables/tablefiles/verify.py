@@ -1,0 +1,121 @@
+"""Check a table file: its hashes, its conformance points, and, if asked, the exact solver at some of them."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import warnings
+from typing import Any
+
+import numpy as np
+
+from mbma_tables.arguments import FloatArray
+from mbma_tables.errors import StaleTableWarning, TableFileError
+from mbma_tables.islands import greenwood_tripp
+from mbma_tables.models.raw import hat_scales, to_axes
+from mbma_tables.tablefiles.files import read_table
+from mbma_tables.tablefiles.schema import FUNCTIONS, UNIVERSAL, TableContent
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict:
+    """What a check found.
+
+    Attributes
+    ----------
+    path : str
+    kind : str
+    conformance_error : float
+        Largest relative difference of the table's own answers from those stored, over the conformance points.
+    resolved : int
+        Points solved anew.
+    resolved_error : float
+        Largest relative difference of the new exact answers from those stored; 0 where identical to the bit.
+    stale : str or None
+        Why the table is stale, if it is.
+    """
+
+    path: str
+    kind: str
+    conformance_error: float
+    resolved: int
+    resolved_error: float
+    stale: str | None
+
+    @property
+    def identical(self) -> bool:
+        """Whether the exact answers of this machine are those stored, to the bit."""
+        return self.resolved > 0 and self.resolved_error == 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class _Replay:
+    """Conformance points: (X, mu), what turns Phi into the stored answers, and log(Phi/Phi_rigid) by the table."""
+
+    X: FloatArray
+    mu: FloatArray
+    scales: FloatArray
+    log_ratio: FloatArray
+
+
+def _replay(content: TableContent) -> _Replay:
+    from mbma_tables.models.tabulated import Island4dModel, UniversalModel
+
+    points = content.conformance
+    if content.kind == UNIVERSAL:
+        X, mu = points["X"], points["mu"]
+        return _Replay(X, mu, np.ones((2, X.size)), UniversalModel(content).log_ratio(X, mu))
+    model = Island4dModel(content)
+    raw = [points[name] for name in ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")]
+    place = to_axes(*raw, model.reading)
+    scales = np.stack(hat_scales(place.spread, raw[1], place.hurst, place.sigma, model.reading))
+    return _Replay(place.X, place.mu, scales, model.log_ratio(place))
+
+
+def verify(path: os.PathLike[str] | str, kind: str | None = None, resolve: int = 0) -> Verdict:
+    """Check a table file offline.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    kind : str, optional
+        The kind that it must be.
+    resolve : int
+        Conformance points to solve anew with the exact solver.
+
+    Raises
+    ------
+    TableFileError
+        Where a hash does not match, or an answer is further from the stored one than its tolerance.
+    """
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", StaleTableWarning)
+        content = read_table(path, kind)
+    stale = next((str(w.message) for w in caught if issubclass(w.category, StaleTableWarning)), None)
+    points = content.conformance
+    replay = _replay(content)
+    answers = replay.scales * np.exp(replay.log_ratio) * greenwood_tripp.rigid_sphere(replay.X, replay.mu)
+    own = _compare(path, "its own answers", answers, points, "table", slice(None))
+    count = min(resolve, points["tolerance"].size)
+    exact = 0.0
+    if count:
+        # evenly over the points, so that both halves of them are met
+        chosen = np.linspace(0, points["tolerance"].size - 1, count).astype(int)
+        solved = greenwood_tripp.solve(replay.X[chosen], replay.mu[chosen], rtol=greenwood_tripp.TIGHTEST)
+        answers = replay.scales[:, chosen] * np.stack([solved.phi_F, solved.phi_A])
+        exact = _compare(path, "the exact solver", answers, points, "exact", chosen)
+    return Verdict(os.fspath(path), content.kind, own, count, exact, stale)
+
+
+def _compare(path: Any, who: str, answers: FloatArray, points: dict[str, FloatArray], which: str, chosen: Any) -> float:
+    stored = np.stack([points[f"{which}_{function}"][chosen] for function in FUNCTIONS])
+    difference = np.abs(answers / stored - 1)
+    tolerance = points["tolerance"][chosen]
+    if (difference > tolerance).any():
+        worst = float(difference.max())
+        raise TableFileError(
+            f"{path}: {who} differ from the stored conformance points by {worst:.1e}, more than the "
+            f"{float(tolerance.max()):.1e} allowed"
+        )
+    return float(difference.max())
