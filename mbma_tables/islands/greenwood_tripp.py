@@ -29,6 +29,7 @@ Method = Literal["newton", "classical"]
 LEVELS = np.array([*range(12, 64, 4), *range(64, 128, 8), *range(128, 256, 32), *range(256, 513, 64)])
 TIGHTEST = 1e-13
 CLASSICAL_RINGS = 200
+COARSE_NODES = 12  # of the first guess
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -101,13 +102,14 @@ class _Batch:
 
 def _newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int, profiles: bool) -> _Batch:
     """All entries on one basis; profiles are empty unless asked for."""
-    b = basis(nodes)
+    b, c = basis(nodes), basis(COARSE_NODES)
+    coarse = (c.v, c.root_weights, c.modes, c.operator)
     phi = np.empty((X.size, 3))
     squared = np.empty(X.size)
     steps = np.empty(X.size, dtype=np.int64)
     w = np.empty((X.size if profiles else 1, nodes))
     p = np.empty_like(w)
-    solve_islands(X, mu, rtol, b.v, b.root_weights, b.modes, b.operator, phi, squared, steps, w, p)
+    solve_islands(X, mu, rtol, b.v, b.root_weights, b.modes, b.operator, coarse, phi, squared, steps, w, p)
     phi[:, 0] *= mu
     if not profiles:
         return _Batch(phi, steps, *(np.empty((0, nodes)),) * 3)

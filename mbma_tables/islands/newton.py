@@ -24,6 +24,8 @@ from mbma_tables.islands.height_integrals import (
 )
 
 MAX_STEPS = 200
+COARSE_TOLERANCE = 1e-4
+COARSE_GAIN = 1.5  # a rough solution first, where the basis is larger than its by this factor
 ROUNDING = 1e-14
 TINY = 1e-300
 NEGLIGIBLE = 1e-17  # a relative effect of the deformation below which the sphere is rigid
@@ -172,6 +174,30 @@ def newton_steps(
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
+def coarse_start(
+    X: float,
+    mu: float,
+    squared: float,
+    coarse: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    modes: FloatArray,
+    w: FloatArray,
+) -> int:
+    """Fill `w` with a rough solution on few nodes, carried over by its Legendre modes; returns its steps."""
+    v, root_weights, coarse_modes, operator = coarse
+    few = v.size
+    rough = np.zeros(few)
+    pressure = np.zeros(few)
+    used, left = newton_steps(X, mu, squared, v, root_weights, operator, COARSE_TOLERANCE, rough, pressure)
+    w[:] = 0.0
+    if left <= COARSE_TOLERANCE:
+        for k in range(few):
+            mode = _dot(coarse_modes, k, rough)
+            for i in range(w.size):
+                w[i] += mode * modes[k, i]
+    return used
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
 def solve_islands(
     X: FloatArray,
     mu: FloatArray,
@@ -180,6 +206,7 @@ def solve_islands(
     root_weights: FloatArray,
     modes: FloatArray,
     operator: FloatArray,
+    coarse: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
     phi: FloatArray,
     extent: FloatArray,
     steps: NDArray[np.int64],
@@ -189,7 +216,7 @@ def solve_islands(
     """Solve each (X, mu) on one basis.
 
     `phi` (entries, 3) receives Phi_F/mu, Phi_A and an estimate of their relative error, NaN where Newton
-    failed; `extent` the squared radius a^2. `w` and `p` (entries or 1, nodes) receive the last profiles,
+    failed; `coarse` is the small basis of the first guess, `extent` receives the squared radius a^2. `w` and `p` (entries or 1, nodes) receive the last profiles,
     times root_weights.
     """
     n = v.size
@@ -210,6 +237,8 @@ def solve_islands(
             for i in range(n):
                 pi[i] = 0.5 * f_three_halves(squared * v[i] - X[entry]) * root_weights[i]
             continue
+        if n >= COARSE_GAIN * coarse[0].size:
+            steps[entry] += coarse_start(X[entry], mu[entry], squared, coarse, modes, wi)
         while True:
             used, left = newton_steps(X[entry], mu[entry], squared, v, root_weights, operator, 0.01 * rtol, wi, pi)
             steps[entry] += used

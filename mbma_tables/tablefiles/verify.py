@@ -66,9 +66,9 @@ def _replay(content: TableContent) -> _Replay:
         X, mu = points["X"], points["mu"]
         return _Replay(X, mu, np.ones((2, X.size)), UniversalModel(content).log_ratio(X, mu))
     model = Island4dModel(content)
-    raw = [points[name] for name in ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")]
-    place = to_axes(*raw, model.reading)
-    scales = np.stack(hat_scales(place.spread, raw[1], place.hurst, place.sigma, model.reading))
+    zeta_d, zeta_u, hurst = (points[name] for name in ("zeta_d", "zeta_u", "hurst"))
+    place = to_axes(points["delta_over_h_rms"], zeta_d, zeta_u, hurst, model.reading)
+    scales = np.stack(hat_scales(place.spread, zeta_d, hurst, place.sigma, model.reading))
     return _Replay(place.X, place.mu, scales, model.log_ratio(place))
 
 
