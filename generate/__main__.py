@@ -9,13 +9,14 @@ import shutil
 import sys
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import click
 
 from generate import height_coefficients
 from generate.campaign import Campaign, CampaignError, Executor, Workers
-from generate.configuration import Configuration, load
-from mbma_tables.errors import MbmaError
+from generate.configuration import FEWEST_SHIPPED, Configuration, load
+from mbma_tables.errors import InputError, MbmaError
 
 TABLES = pathlib.Path(__file__).parents[1] / "tables"
 
@@ -34,7 +35,7 @@ def engine(workers: int, scheduler: str | None, processes: bool) -> Iterator[Exe
         import distributed
     except ImportError:
         if scheduler is not None:
-            raise click.UsageError("--scheduler needs dask: pip install 'mbma_tables[distributed]'") from None
+            raise InputError("--scheduler needs dask: pip install 'mbma_tables[distributed]'") from None
         with Workers(workers) as pool:
             yield pool
         return
@@ -43,13 +44,38 @@ def engine(workers: int, scheduler: str | None, processes: bool) -> Iterator[Exe
             cluster = distributed.LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
             client = stack.enter_context(distributed.Client(stack.enter_context(cluster)))
         else:
-            client = stack.enter_context(distributed.Client(scheduler))
-        yield client.get_executor()
+            try:
+                client = stack.enter_context(distributed.Client(scheduler))
+            except (OSError, ValueError) as fault:
+                raise CampaignError(f"no dask scheduler at {scheduler}: {fault}") from None
+        try:
+            yield client.get_executor()
+        except (distributed.KilledWorker, ImportError, RuntimeError) as fault:
+            if isinstance(fault, CampaignError):
+                raise
+            raise CampaignError(
+                f"dask: {fault} (scheduler and workers need this checkout on their path); "
+                "--resume goes on from the chunks that are done"
+            ) from None
+
+
+def destination(what: str, configuration: Configuration, out: pathlib.Path | None) -> pathlib.Path:
+    """Where a table goes; the folder that is shipped takes only what is certified on enough points."""
+    own = f"{configuration.kind}.nc"
+    path = TABLES / own if out is None else out / own if what == "all" else out
+    if path.resolve().parent == TABLES.resolve() and configuration.certificate_points < FEWEST_SHIPPED:
+        raise InputError(
+            f"certificate_points must be at least {FEWEST_SHIPPED} for a table in {TABLES}, "
+            f"got {configuration.certificate_points}; give another place with --out"
+        )
+    if path.is_dir():
+        raise InputError(f"--out must name a file for one table, {path} is a folder")
+    return path
 
 
 def make_table(configuration: Configuration, target: pathlib.Path, executor: Executor | None, resume: bool) -> None:
     """Build, certify and write one table."""
-    from generate.build import Kind, build
+    from generate.build import Kind, UncertifiedError, build
     from generate.island4d import Island4d
     from generate.universal import Universal
     from mbma_tables.tablefiles.files import write_table
@@ -57,10 +83,13 @@ def make_table(configuration: Configuration, target: pathlib.Path, executor: Exe
 
     started = time.perf_counter()
     checkpoints = target.parent / f".{target.name}.checkpoints"
-    if not resume:
-        shutil.rmtree(checkpoints, ignore_errors=True)
     kind: Kind = Universal(configuration) if configuration.kind == UNIVERSAL else Island4d(configuration)
-    content = build(kind, configuration, Campaign(executor, checkpoints))
+    try:
+        content = build(kind, configuration, Campaign(executor, checkpoints, resume))
+    except UncertifiedError:
+        # another resolution shares no chunks with this one
+        shutil.rmtree(checkpoints, ignore_errors=True)
+        raise
     write_table(target, content)
     shutil.rmtree(checkpoints, ignore_errors=True)
     shape = " x ".join(f"{axis.nodes} {axis.name}" for axis in content.axes)
@@ -70,7 +99,25 @@ def make_table(configuration: Configuration, target: pathlib.Path, executor: Exe
     click.echo(f"{time.perf_counter() - started:.1f} s", err=True)
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+class Generator(click.Command):
+    """A command whose every known fault ends in one line and exit code 2."""
+
+    def main(self, *args: Any, **extra: Any) -> Any:
+        """Run, and exit with 0, or with 2 where no table came of it."""
+        extra["standalone_mode"] = False
+        try:
+            super().main(*args, **extra)
+        except click.Abort:
+            click.echo("generate: interrupted; --resume goes on from the chunks that are done", err=True)
+            sys.exit(1)
+        except (click.ClickException, MbmaError, CampaignError, OSError) as fault:
+            text = fault.format_message() if isinstance(fault, click.ClickException) else str(fault)
+            click.echo(f"generate: {' '.join(text.split())}", err=True)
+            sys.exit(2)
+        sys.exit(0)
+
+
+@click.command(cls=Generator, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("what", type=click.Choice(["universal", "island4d", "all"]))
 @click.option(
     "--config", type=click.Path(path_type=pathlib.Path), help="TOML file that changes the shipped configuration."
@@ -81,7 +128,9 @@ def make_table(configuration: Configuration, target: pathlib.Path, executor: Exe
 )
 @click.option("--workers", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True, help="Processes.")
 @click.option("--resume", is_flag=True, help="Go on from the chunks that an earlier run finished.")
-@click.option("--scheduler", help="Address of a dask scheduler to run on.")
+@click.option(
+    "--scheduler", help="Address of a dask scheduler to run on; it and its workers need this checkout on their path."
+)
 @click.option("--processes", is_flag=True, help="Plain processes even where dask is installed.")
 def main(
     what: str,
@@ -95,21 +144,16 @@ def main(
 ) -> None:
     """Make tables anew: universal, island4d, or all (with the coefficients of the height integrals)."""
     if what == "all" and (config is not None or target is not None):
-        raise click.UsageError("--config and --target belong to one table, not to all")
-    try:
-        kinds = ("universal", "island4d") if what == "all" else (what,)
-        chosen = [(kind, load(kind, config, target)) for kind in kinds]
-        if what == "all":
-            height_coefficients.main()
-        with engine(workers, scheduler, processes) as executor:
-            for kind, configuration in chosen:
-                folder = (out if what == "all" else None) or TABLES
-                path = out if out is not None and what != "all" else folder / f"{kind}.nc"
-                path.parent.mkdir(parents=True, exist_ok=True)
-                make_table(configuration, path, executor, resume)
-    except (MbmaError, CampaignError, OSError) as fault:
-        click.echo(f"generate: {fault}", err=True)
-        sys.exit(2)
+        raise InputError("--config and --target belong to one table, not to all")
+    kinds = ("universal", "island4d") if what == "all" else (what,)
+    configurations = [load(kind, config, target) for kind in kinds]
+    paths = [destination(what, configuration, out) for configuration in configurations]
+    if what == "all":
+        height_coefficients.main()
+    with engine(workers, scheduler, processes) as executor:
+        for configuration, path in zip(configurations, paths, strict=True):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            make_table(configuration, path, executor, resume)
 
 
 if __name__ == "__main__":

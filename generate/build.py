@@ -200,7 +200,7 @@ def certify(
     """Errors on held-out points, solved on twice the nodes that made the table."""
     places = held_out(kind, axes, configuration.certificate_points, configuration.seed + 101)
     positions = [axis.position(x) for axis, x in zip(axes, places, strict=True)]
-    if any((np.abs(p - np.round(p)).max() == 0) for p in positions):
+    if any((p == np.round(p)).any() for p in positions):
         raise UncertifiedError(f"{configuration.kind}: a held-out point stands on a node")
     X, mu = kind.arguments(*places)
     truth = solve_all(campaign, "certificate", X, mu, rtol=rtol_for(configuration), refinement=2)

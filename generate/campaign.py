@@ -1,17 +1,22 @@
 """A campaign: many independent chunks of work on any executor, checkpointed one by one.
 
 A chunk is done when its file stands in the checkpoint folder, under a name that is the hash of what was computed;
-files are written under another name first and then renamed. So a killed run loses the chunks under way and no more,
-a resumed one computes what is missing, and neither the number of workers nor an interruption changes a bit.
+files are written under another name first and then renamed, and begin with a checksum of that name and the content.
+So a killed run loses the chunks under way and no more, a resumed one computes what is missing or damaged, and neither
+the number of workers nor an interruption changes a bit.
 """
 
 from __future__ import annotations
 
 import concurrent.futures
+import hashlib
+import io
 import multiprocessing
 import os
 import pathlib
+import shutil
 import tempfile
+import threading
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
@@ -21,13 +26,14 @@ from tqdm import tqdm
 from mbma_tables.arguments import FloatArray
 from mbma_tables.tablefiles.provenance import digest_arrays, digest_json
 
-ATTEMPTS = 3  # a worker that dies costs its chunks; they are given out again this often
+ATTEMPTS = 3  # a worker that dies costs its chunks; they are given out again until this often none was finished
+DIGEST_LENGTH = 64
 
 Work = Callable[..., FloatArray]
 
 
 class CampaignError(RuntimeError):
-    """Chunks that failed however often they were tried."""
+    """Chunks that failed however often they were tried, or that could not be kept."""
 
 
 class Executor(Protocol):
@@ -42,25 +48,61 @@ def chunk_key(identity: str, arguments: Sequence[FloatArray]) -> str:
     return digest_json([identity, digest_arrays({str(k): a for k, a in enumerate(arguments)})])
 
 
-def _load(path: pathlib.Path) -> FloatArray | None:
+def _digest(key: str, body: bytes) -> bytes:
+    return hashlib.sha256(key.encode() + body).hexdigest().encode()
+
+
+def _load(folder: pathlib.Path, key: str) -> FloatArray | None:
+    """A kept result; None where there is none, or where it is damaged or another chunk's."""
     try:
-        loaded: FloatArray = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError):
+        content = (folder / key).read_bytes()
+    except OSError:
         return None
+    digest, body = content[:DIGEST_LENGTH], content[DIGEST_LENGTH:]
+    if digest != _digest(key, body):
+        return None
+    loaded: FloatArray = np.load(io.BytesIO(body), allow_pickle=False)
     return loaded
 
 
-def _store(path: pathlib.Path, result: FloatArray) -> None:
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=".chunk-")
+def _write(folder: pathlib.Path, key: str, content: bytes) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=folder, prefix=".chunk-")
     try:
         with os.fdopen(handle, "wb") as file:
-            np.save(file, result, allow_pickle=False)
+            file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        pathlib.Path(name).replace(path)
+        pathlib.Path(name).replace(folder / key)
     except BaseException:
         pathlib.Path(name).unlink(missing_ok=True)
         raise
+
+
+def _store(folder: pathlib.Path, key: str, result: FloatArray) -> None:
+    body = io.BytesIO()
+    np.save(body, result, allow_pickle=False)
+    content = _digest(key, body.getvalue()) + body.getvalue()
+    try:
+        try:
+            _write(folder, key, content)
+        except FileNotFoundError:
+            # another run of the same table ended and took the folder with it
+            _write(folder, key, content)
+    except OSError as fault:
+        raise CampaignError(f"cannot keep finished chunks in {folder}: {fault.strerror or fault}") from None
+
+
+def _follow_parent() -> None:
+    """End this process when the one that started it is gone, whatever ended that."""
+    parent = multiprocessing.parent_process()
+
+    def watch() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 class Workers:
@@ -74,7 +116,7 @@ class Workers:
         """Start work in a process."""
         if self._pool is None:
             context = multiprocessing.get_context("spawn")
-            self._pool = concurrent.futures.ProcessPoolExecutor(self.count, mp_context=context)
+            self._pool = concurrent.futures.ProcessPoolExecutor(self.count, context, _follow_parent)
         return self._pool.submit(work, *arguments)
 
     def renew(self) -> None:
@@ -99,17 +141,20 @@ class Campaign:
         Where chunks run; None runs them here. `dask.distributed.Client.get_executor()` fits.
     checkpoints : path, optional
         Folder that keeps finished chunks; without it nothing is kept.
+    resume : bool
+        Whether chunks count that the folder held before.
     """
 
     def __init__(
         self,
         executor: Executor | None = None,
         checkpoints: pathlib.Path | None = None,
+        resume: bool = True,
     ) -> None:
         self.executor = executor
         self.checkpoints = checkpoints
-        if checkpoints is not None:
-            checkpoints.mkdir(parents=True, exist_ok=True)
+        self.resume = resume
+        self._own: set[str] = set()
 
     def run(
         self,
@@ -137,28 +182,32 @@ class Campaign:
         Raises
         ------
         CampaignError
-            Where chunks failed `ATTEMPTS` times.
+            Where chunks failed `ATTEMPTS` times, or could not be kept.
         """
         results: dict[int, FloatArray] = {}
-        paths = {}
+        keys = [chunk_key(identity, chunk) for chunk in chunks]
         if self.checkpoints is not None:
-            for number, chunk in enumerate(chunks):
-                paths[number] = self.checkpoints / f"{chunk_key(identity, chunk)}.npy"
-                if (found := _load(paths[number])) is not None:
+            for number, key in enumerate(keys):
+                if (self.resume or key in self._own) and (found := _load(self.checkpoints, key)) is not None:
                     results[number] = found
-        with tqdm(total=len(chunks), initial=len(results), desc=label, unit="chunk", disable=None) as bar:
+        # a terminal may say that it has no columns and no lines
+        size = shutil.get_terminal_size()
+        shape = {"ncols": size.columns, "nrows": size.lines, "disable": None}
+        with tqdm(total=len(chunks), initial=len(results), desc=label, unit="chunk", **shape) as bar:
 
             def keep(number: int, result: FloatArray) -> None:
-                if number in paths:
-                    _store(paths[number], result)
+                if self.checkpoints is not None:
+                    _store(self.checkpoints, keys[number], result)
+                    self._own.add(keys[number])
                 results[number] = result
                 bar.update()
 
-            for _ in range(ATTEMPTS):
+            fruitless = 0
+            while fruitless < ATTEMPTS and len(results) < len(chunks):
+                before = len(results)
                 missing = [number for number in range(len(chunks)) if number not in results]
-                if not missing:
-                    break
                 self._attempt(work, chunks, constants, missing, keep)
+                fruitless = 0 if len(results) > before else fruitless + 1
         if len(results) < len(chunks):
             raise CampaignError(
                 f"{label}: {len(chunks) - len(results)} of {len(chunks)} chunks failed {ATTEMPTS} times; "
@@ -179,13 +228,23 @@ class Campaign:
             for number in missing:
                 keep(number, work(*chunks[number], *constants))
             return
+        waiting: dict[concurrent.futures.Future[FloatArray], int] = {}
+        lost = (concurrent.futures.BrokenExecutor, concurrent.futures.CancelledError)
+        broken = False
         try:
-            waiting = {self.executor.submit(work, *chunks[n], *constants): n for n in missing}
-            for future in concurrent.futures.as_completed(waiting):
-                keep(waiting[future], future.result())
-        except concurrent.futures.BrokenExecutor:
-            if isinstance(self.executor, Workers):
-                self.executor.renew()
+            for number in missing:
+                waiting[self.executor.submit(work, *chunks[number], *constants)] = number
+        except lost:
+            broken = True
+        for future in concurrent.futures.as_completed(waiting):
+            try:
+                result = future.result()
+            except lost:
+                broken = True
+                continue
+            keep(waiting[future], result)
+        if broken and isinstance(self.executor, Workers):
+            self.executor.renew()
 
 
 def split(size: int, *arrays: FloatArray) -> list[list[FloatArray]]:

@@ -10,6 +10,8 @@ from mbma_tables.islands import greenwood_tripp
 from mbma_tables.tablefiles.provenance import SOLVER, digest_json, physics_digest
 
 CHUNK = 2000
+# what decides a chunk's bits: the physics, and how node counts and starts are chosen
+CODE = (*SOLVER, "mbma_tables.islands.greenwood_tripp", "generate.islands")
 
 
 def log_ratio(X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
@@ -29,7 +31,7 @@ def solve_all(
     campaign: Campaign, label: str, X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1
 ) -> FloatArray:
     """`log_ratio` of arrays of any one shape, through a campaign; shape (..., 2)."""
-    identity = digest_json([physics_digest(SOLVER), rtol, refinement])
+    identity = digest_json([physics_digest(CODE), rtol, refinement])
     flat = [np.ascontiguousarray(array, dtype=float).ravel() for array in (X, mu)]
     parts = campaign.run(label, identity, log_ratio, split(CHUNK, *flat), (rtol, refinement))
     return np.concatenate(parts).reshape((*np.shape(X), 2))

@@ -14,9 +14,20 @@ from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.islands.island import geometry
 from mbma_tables.surfaces.readings import READINGS
 from mbma_tables.tablefiles.interpolate import fill_gradient_2d
-from mbma_tables.tablefiles.schema import Axis, TableContent
+from mbma_tables.tablefiles.schema import DEGREES, SYMBOLS, UNIVERSAL, Axis, TableContent, grid_labels, numbered
 
+LOOKUP = (
+    "X = (delta - h_d)/sigma and mu = (8/3) D sigma sqrt(2 R_u R_d) of the island, in any consistent units",
+    "on each axis: p by its position_formula, i = min(floor(p), nodes - 2), u = p - i, w_k(u) of spline_weights; "
+    "for a mu below its first see out_of_range",
+    "g_F = sum over k, m = 0 ... 5 of w_k(u_X) w_m(u_mu) spline_F[i_X + k, i_mu + m]; g_A the same of spline_A",
+    "Phi_F = exp(g_F) pi mu F_5/2(-X)/5 and Phi_A = exp(g_A) pi F_2(-X)/2, F_n as height_integrals says; "
+    "without the exponentials this is the limit of a rigid sphere, mu to 0",
+    "the island's force is E* sigma L Phi_F, its contact area eta pi D R_u sigma L^2 Phi_A, L = sqrt(2 R_d sigma)",
+    "error_F and error_A, as error_field says, bound the relative error of Phi_F and Phi_A",
+)
 VISITED = {"hurst": (0.05, 1.0), "log10_zeta_1": (0.4786, 8.0), "log10_approach": (-7.0, 1.0)}
+RAREST = 400  # islands drawn for each that a narrow table covers
 
 
 def visited_surfaces(count: int, seed: int, ranges: dict[str, tuple[float, float]]) -> list[FloatArray]:
@@ -36,8 +47,10 @@ class Universal:
         """X on log(X + offset), mu on log(mu)."""
         given = self.configuration.axes
         return (
-            make_axis("X", "approach of the island over its summits' sigma", "log", given["X"], nodes["X"]),
-            make_axis("mu", "stiffness of the roughness against the sphere", "log", given["mu"], nodes["mu"]),
+            make_axis("X", "how deep the island is: (delta - h_d)/sigma", "log", given["X"], nodes["X"]),
+            make_axis(
+                "mu", "stiffness of the roughness: (8/3) D sigma sqrt(2 R_u R_d)", "log", given["mu"], nodes["mu"]
+            ),
         )
 
     def arguments(self, *coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -51,6 +64,8 @@ class Universal:
         X = mu = np.empty(0)
         draw = 4 * count
         while X.size < count:
+            if draw > RAREST * count:
+                raise UncertifiedError("universal: hardly a surface visits these axes, so there is nothing to certify")
             hurst, zeta_1, approach = visited_surfaces(draw, self.configuration.seed + 7, VISITED)
             fields = [geometry(approach, hurst, zeta_1, reading) for reading in READINGS.values()]
             X, mu = (np.concatenate([f[name] for f in fields]) for name in ("X", "mu"))
@@ -61,25 +76,31 @@ class Universal:
         return [X[chosen], mu[chosen]]
 
     def auxiliary(self, axes: tuple[Axis, ...]) -> dict[str, Any]:
-        """Nothing more."""
-        return {}
+        """Coordinates of coefficients and error cells."""
+        return grid_labels(axes, DEGREES[UNIVERSAL])
 
     def attributes(self) -> dict[str, Any]:
         """What the file says of itself."""
         return {
             "title": "Island problem of the MBMA model of rough contact (Greenwood and Tripp 1967)",
-            "source": "python -m generate universal",
+            "history": "made by python -m generate universal",
+            "source": "numerical solution of the integral equation by mbma_tables",
             "references": (
                 "Guo, Ma, Zhu: A magnification-based multi-asperity (MBMA) model of rough contact, Eqs. 34-40; "
                 "Greenwood and Tripp (1967)"
             ),
-            "comment": (
-                "F^i = E* sigma L Phi_F, A^i = eta pi D R_u sigma L^2 Phi_A with L = sqrt(2 R_d sigma); serves every "
-                "reading. Phi = Phi_rigid exp(g), g the spline of log_ratio; Phi_F,rigid = mu pi F_5/2(-X)/5, "
-                "Phi_A,rigid = pi F_2(-X)/2, F_n(x) = integral_x^inf (z - x)^n phi(z) dz, "
-                "phi the standard normal density"
+            "summary": (
+                "Force Phi_F and area Phi_A of a contact island, a sphere covered with summits of normally distributed "
+                "heights, as functions of two numbers: X, how deep, and mu, how stiff the roughness is against "
+                "the sphere. With heights in units of sigma and radii rho in units of L: "
+                "d(rho) = rho^2 - X + w(rho), p(rho) = (mu/2) F_3/2(d), w(rho) = (4/pi) integral over t from 0 to "
+                "infinity of t/(t + rho) p(t) K(k) dt, K of modulus k = 2 sqrt(rho t)/(rho + t); "
+                "Phi_F = 2 pi integral of rho p, Phi_A = 2 pi integral of rho F_1(d)"
             ),
+            "symbols": SYMBOLS,
+            **numbered("lookup", LOOKUP),
             "reading": "any",
+            "reading_numbers": "[]",
         }
 
     def conformance(self, places: list[FloatArray]) -> ConformancePoints:
@@ -107,7 +128,7 @@ class Universal:
             "force increasing in X": (force_slope > 0).all(),
             "area increasing in X": (area_slope > 0).all(),
             "force increasing in mu": (1 + out[2] * by_mu > 0).all(),
-            "rigid limit: log ratio proportional to mu at the smallest mu": (
+            "rigid limit: log ratio proportional to mu at the smallest mu (a lower axes.mu.low mends it)": (
                 np.abs(out[2][lowest] * by_mu - out[0][lowest]) <= self.configuration.target
             ).all(),
         }

@@ -15,14 +15,18 @@ if TYPE_CHECKING:
         MbmaError,
         NotSelfAffineError,
         OutOfRangeError,
+        StaleTableWarning,
+        TableFileError,
     )
     from mbma_tables.islands import greenwood_tripp
     from mbma_tables.islands.height_integrals import height_integral
     from mbma_tables.islands.island import Island, island
+    from mbma_tables.models.tabulated import open_table
     from mbma_tables.surfaces.readings import Reading
     from mbma_tables.surfaces.surface import Surface
     from mbma_tables.totals import theories
     from mbma_tables.totals.contact import Contact, contact
+    from mbma_tables.totals.law import ContactLaw, contact_law
 
 __version__ = "0.1.0"
 
@@ -36,9 +40,14 @@ _HOMES = {
     "OutOfRangeError": "mbma_tables.errors",
     "Reading": "mbma_tables.surfaces.readings",
     "Surface": "mbma_tables.surfaces.surface",
+    "ContactLaw": "mbma_tables.totals.law",
+    "StaleTableWarning": "mbma_tables.errors",
+    "TableFileError": "mbma_tables.errors",
     "contact": "mbma_tables.totals.contact",
+    "contact_law": "mbma_tables.totals.law",
     "height_integral": "mbma_tables.islands.height_integrals",
     "island": "mbma_tables.islands.island",
+    "open_table": "mbma_tables.models.tabulated",
 }
 _MODULES = {
     "greenwood_tripp": "mbma_tables.islands.greenwood_tripp",
@@ -47,6 +56,7 @@ _MODULES = {
 
 __all__ = [
     "Contact",
+    "ContactLaw",
     "ConvergenceError",
     "InputError",
     "Island",
@@ -54,11 +64,15 @@ __all__ = [
     "NotSelfAffineError",
     "OutOfRangeError",
     "Reading",
+    "StaleTableWarning",
     "Surface",
+    "TableFileError",
     "contact",
+    "contact_law",
     "greenwood_tripp",
     "height_integral",
     "island",
+    "open_table",
     "theories",
 ]
 

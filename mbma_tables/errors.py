@@ -22,7 +22,7 @@ class OutOfRangeError(InputError):
         True where the entry is out of range, in the shape of the broadcast arguments.
     """
 
-    def __init__(self, message: str, mask: Any) -> None:
+    def __init__(self, message: str, mask: Any = None) -> None:
         super().__init__(message)
         self.mask = mask
 
@@ -38,7 +38,7 @@ class ConvergenceError(MbmaError, ArithmeticError):
         What was reached all the same, for inspection; entries under `mask` are not answers.
     """
 
-    def __init__(self, message: str, mask: Any, result: Any = None) -> None:
+    def __init__(self, message: str, mask: Any = None, result: Any = None) -> None:
         super().__init__(message)
         self.mask = mask
         self.result = result

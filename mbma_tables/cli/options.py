@@ -76,7 +76,9 @@ model_options = _stack(
         metavar="reported|printed",
         help="Reading of the paper's equations.",
     ),
-    click.option("--tier", default="exact", show_default=True, metavar="exact|rigid", help="Island model."),
+    click.option(
+        "--tier", default="exact", show_default=True, metavar="exact|universal|island4d|rigid", help="Island model."
+    ),
     click.option("--rtol", type=float, default=DEFAULT_RTOL, show_default=True, help="Relative error asked for."),
 )
 

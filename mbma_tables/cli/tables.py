@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from mbma_tables.tablefiles.schema import TableContent
 
 
 def _path(name: str) -> Path:
@@ -23,6 +26,20 @@ def _names(given: tuple[str, ...]) -> tuple[str, ...]:
     return given or KINDS
 
 
+def _warn(stale: str | None) -> None:
+    if stale is not None:
+        click.echo(f"mbma: warning: {stale}", err=True)
+
+
+def _open(path: Path, kind: str | None = None) -> TableContent:
+    """A checked table; one line on stderr where it is stale."""
+    from mbma_tables.tablefiles.files import check_table
+
+    content, stale = check_table(path, kind)
+    _warn(stale)
+    return content
+
+
 @click.group("tables")
 def tables_group() -> None:
     """The tables that stand ready: list, info, verify."""
@@ -32,13 +49,12 @@ def tables_group() -> None:
 @click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines.")
 def list_command(as_json: bool) -> None:
     """Kind, size, nodes and largest held-out error of the shipped tables."""
-    from mbma_tables.tablefiles.files import read_table
     from mbma_tables.tablefiles.schema import KINDS
 
     rows: list[dict[str, Any]] = []
     for kind in KINDS:
         path = _path(kind)
-        content = read_table(path, kind)
+        content = _open(path, kind)
         rows.append(
             {
                 "kind": kind,
@@ -67,9 +83,9 @@ def list_command(as_json: bool) -> None:
 @click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines.")
 def info_command(table: str, as_json: bool) -> None:
     """What TABLE (a kind or a file) says of itself."""
-    from mbma_tables.tablefiles.files import read_table
+    from mbma_tables.tablefiles.schema import KINDS
 
-    content = read_table(_path(table))
+    content = _open(_path(table), table if table in KINDS else None)
     axes = {axis.name: {**axis.attributes(), "nodes": axis.nodes} for axis in content.axes}
     if as_json:
         click.echo(json.dumps({"axes": axes, "attributes": content.attributes}, indent=2))
@@ -99,16 +115,16 @@ def verify_command(tables: tuple[str, ...], resolve: int, as_json: bool) -> None
         shown = [{**dataclasses.asdict(v), "identical": v.identical} for v in verdicts]
         click.echo(json.dumps({"tables": shown}, indent=2))
     for verdict in verdicts:
-        if verdict.stale is not None:
-            click.echo(f"mbma: warning: {verdict.stale}", err=True)
+        _warn(verdict.stale)
         if as_json:
             continue
         line = f"{verdict.path}: hashes match; conformance points within {verdict.conformance_error:.1e}"
         if verdict.resolved:
+            reason = "processor or library version" if verdict.stale is None else "version of the solver"
             found = (
                 "identical to the bit"
                 if verdict.identical
-                else f"equal within {verdict.resolved_error:.1e} (another processor or library version)"
+                else f"equal within {verdict.resolved_error:.1e} (another {reason})"
             )
             line += f"; {verdict.resolved} solved anew: {found}"
         click.echo(line)

@@ -31,6 +31,7 @@ FIELDS = (
     "mu",
     "D_d",
     "sigma_d",
+    "width",
 )
 
 
@@ -59,11 +60,11 @@ def island_fields(
     hurst: float,
     zeta_1: float,
     reading: tuple[float, float, float, float, float, bool, bool],
-) -> tuple[float, float, float, float, float, float, float, float, float, float, float, float, float]:
+) -> tuple[float, float, float, float, float, float, float, float, float, float, float, float, float, float]:
     """`FIELDS` of the island at delta = approach * h_rms, in units of s and 1/q0.
 
     `reading` is `Reading.numbers`. Equations: zeta_d (27), zeta_u (30), R_d (26), R_u (29), D and sigma (32),
-    h_d (B.3), h_u (B.12), eta (39), D_d and sigma_d (43).
+    h_d (B.3), h_u (B.12), eta (39), D_d and sigma_d (43); width is log(zeta_u/zeta_d).
     """
     divisor, beta, phi, floor_d, floor_u, offset, summits = reading
     log_zeta_1 = math.log(zeta_1)
@@ -109,7 +110,7 @@ def island_fields(
     h_d = root_a if offset else 0.0
     X = (room * approach - h_d) / sigma
     mu = 8.0 / 3.0 * D * sigma * math.sqrt(2.0 * R_u * R_d)
-    return zeta_d, zeta_u, R_d, R_u, D, sigma, h_d, root_b, eta, X, mu, D_d, sigma_d
+    return zeta_d, zeta_u, R_d, R_u, D, sigma, h_d, root_b, eta, X, mu, D_d, sigma_d, width
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -120,8 +121,8 @@ def fill_islands(
     reading: tuple[float, float, float, float, float, bool, bool],
     out: FloatArray,
 ) -> None:
-    """`island_fields` of each entry into the columns of `out` (13, entries)."""
+    """`island_fields` of each entry into the columns of `out` (14, entries)."""
     for k in range(approach.size):
         fields = island_fields(approach[k], hurst[k], zeta_1[k], reading)
-        for column in range(13):
+        for column in range(14):
             out[column, k] = fields[column]

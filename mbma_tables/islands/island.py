@@ -95,7 +95,7 @@ def island(
         One surface or a batch; it broadcasts against `delta`.
     delta : array_like
         Approach z_max - d of the island [length], positive.
-    tier : {"exact", "rigid"}
+    tier : {"exact", "universal", "island4d", "rigid"}
         The island model.
     reading : {"reported", "printed"} or Reading
         Which reading of the paper's equations.
@@ -117,13 +117,13 @@ def island(
     modulus = finite_array("E_star", E_star)
     require("E_star", modulus, modulus > 0, "positive")
     rule = get_reading(reading)
-    model = get_model(tier, rtol)
+    model = get_model(tier, rtol, rule)
     shape = broadcast_shape(delta=approach, surface=surface.hurst)
     approach, hurst, zeta_1 = (
         np.broadcast_to(array, shape) for array in (approach / surface.h_rms, surface.hurst, surface.zeta_1)
     )
     g = geometry(approach, hurst, zeta_1, rule)
-    phi = model.answer(g["X"], g["mu"])
+    phi = model.of_islands(g | {"hurst": hurst})
     s, q0 = surface.s, surface.q0
     units = {
         "R_d": 1 / (s * q0**2),

@@ -216,8 +216,8 @@ def solve_islands(
     """Solve each (X, mu) on one basis.
 
     `phi` (entries, 3) receives Phi_F/mu, Phi_A and an estimate of their relative error, NaN where Newton
-    failed; `coarse` is the small basis of the first guess, `extent` receives the squared radius a^2. `w` and `p` (entries or 1, nodes) receive the last profiles,
-    times root_weights.
+    failed; `coarse` is the small basis of the first guess, `extent` receives the squared radius a^2. `w` and
+    `p` (entries or 1, nodes) receive the last profiles, times root_weights.
     """
     n = v.size
     covered = np.empty(n)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import abc
 import dataclasses
+from collections.abc import Mapping
 from typing import Protocol
 
 from mbma_tables.arguments import FloatArray
@@ -24,5 +26,17 @@ class IslandModel(Protocol):
     def name(self) -> str:
         """The tier that selects it."""
 
+    def of_islands(self, islands: Mapping[str, FloatArray]) -> IslandAnswer:
+        """Phi_F and Phi_A of islands, given as `islands.geometry.FIELDS` and hurst, arrays of one shape."""
+
+
+class TwoNumberModel(abc.ABC):
+    """A model that needs X and mu of an island and nothing else."""
+
+    @abc.abstractmethod
     def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
         """Phi_F and Phi_A at finite X and mu >= 0."""
+
+    def of_islands(self, islands: Mapping[str, FloatArray]) -> IslandAnswer:
+        """Phi_F and Phi_A of islands."""
+        return self.answer(islands["X"], islands["mu"])

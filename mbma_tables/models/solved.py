@@ -8,13 +8,13 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models.protocol import IslandAnswer
+from mbma_tables.models.protocol import IslandAnswer, TwoNumberModel
 
 CLOSED_FORM_ERROR = 1e-14
 
 
 @dataclasses.dataclass(frozen=True)
-class ExactModel:
+class ExactModel(TwoNumberModel):
     """The island problem solved anew for each island (Newton), to a relative error of `rtol`."""
 
     rtol: float
@@ -27,7 +27,7 @@ class ExactModel:
 
 
 @dataclasses.dataclass(frozen=True)
-class RigidModel:
+class RigidModel(TwoNumberModel):
     """The sphere does not deform (w = 0 in Eq. 34): closed form, exact as mu goes to 0."""
 
     name: str = "rigid"

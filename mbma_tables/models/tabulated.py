@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import os
 import pathlib
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,10 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.islands.greenwood_tripp import rigid_sphere
-from mbma_tables.models.protocol import IslandAnswer
+from mbma_tables.models import universal_kernel
+from mbma_tables.models.protocol import IslandAnswer, TwoNumberModel
 from mbma_tables.models.raw import SPHERE_FLOOR, Coordinates, band_fields, hat_scales, to_axes
+from mbma_tables.models.universal_kernel import Axes
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.files import read_table
 from mbma_tables.tablefiles.interpolate import fill_2d, fill_4d
@@ -22,7 +25,7 @@ from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL, Axis, TableConten
 SECOND_ORDER = 1e-12  # what the expansion about the rigid sphere leaves below mu = 1e-8
 
 
-class UniversalModel:
+class UniversalModel(TwoNumberModel):
     """Phi_F and Phi_A from a universal table.
 
     Parameters
@@ -44,25 +47,70 @@ class UniversalModel:
         fill_2d(self.content.coefficients, self._X.position(X), self._mu.position(lowest), out)
         return out * (np.minimum(mu, self._mu.low) / self._mu.low)
 
-    def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
+    def answer(self, X: FloatArray, mu: FloatArray, parallel: bool = False) -> IslandAnswer:
         """Phi_F and Phi_A with the bound that the table's certificate gives.
+
+        Parameters
+        ----------
+        X, mu : array_like
+            They broadcast.
+        parallel : bool
+            Whether to use all cores, for large batches.
 
         Raises
         ------
         OutOfRangeError
             Where X or mu is not covered.
         """
-        shape = np.shape(X)
-        flat_X, flat_mu = (np.ascontiguousarray(a, dtype=float).ravel() for a in (X, mu))
+        flat_X, flat_mu, shape = self._inside(X, mu)
+        out = np.empty((3, flat_X.size))
+        fill = universal_kernel.fill_phi_parallel if parallel else universal_kernel.fill_phi
+        fill(flat_X, flat_mu, *self.kernel, np.empty(flat_X.size, dtype=np.int64), out)
+        return IslandAnswer(*(row.reshape(shape)[()] for row in out))
+
+    def slopes(self, X: ArrayLike, mu: ArrayLike) -> tuple[IslandAnswer, IslandAnswer, IslandAnswer]:
+        """Answers, and their derivatives by X and by mu, in one pass; the errors are those of the answers."""
+        flat_X, flat_mu, shape = self._inside(X, mu)
+        out = np.empty((7, flat_X.size))
+        universal_kernel.fill_slopes(flat_X, flat_mu, *self.kernel, np.empty(flat_X.size, dtype=np.int64), out)
+        force, F_X, F_mu, area, A_X, A_mu, error = (row.reshape(shape)[()] for row in out)
+        # the kernel gives logarithmic slopes
+        with np.errstate(divide="ignore", invalid="ignore"):
+            by_mu = 1 / flat_mu.reshape(shape)[()]
+        return (
+            IslandAnswer(force, area, error),
+            IslandAnswer(force * F_X, area * A_X, error),
+            IslandAnswer(force * F_mu * by_mu, area * A_mu * by_mu, error),
+        )
+
+    def status(self, X: ArrayLike, mu: ArrayLike) -> tuple[Any, Any]:
+        """Where arguments lie on each axis: -1 below, 0 inside, 1 above. Below in mu is answered, to first order."""
+        places = []
+        for axis, value in zip((self._X, self._mu), (X, mu), strict=True):
+            x = finite_array(axis.name, value)
+            places.append(((x > axis.high).astype(np.int8) - (x < axis.low).astype(np.int8))[()])
+        return places[0], places[1]
+
+    def _inside(self, X: ArrayLike, mu: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
+        """Flat arguments and their common shape, refused where the table does not reach."""
+        given_X, given_mu = finite_array("X", X), finite_array("mu", mu)
         low, high = self._X.low, self._X.high
-        require("X", flat_X, (flat_X >= low) & (flat_X <= high), f"in [{low:g}, {high:g}]")
-        require("mu", flat_mu, flat_mu <= self._mu.high, f"at most {self._mu.high:g}")
-        force, area = rigid_sphere(flat_X, flat_mu) * np.exp(self.log_ratio(flat_X, flat_mu))
-        return IslandAnswer(force.reshape(shape), area.reshape(shape), self.error(flat_X, flat_mu).reshape(shape))
+        require("X", given_X, (given_X >= low) & (given_X <= high), f"in [{low:g}, {high:g}]")
+        require("mu", given_mu, (given_mu >= 0) & (given_mu <= self._mu.high), f"in [0, {self._mu.high:g}]")
+        shape = broadcast_shape(X=given_X, mu=given_mu)
+        flat_X, flat_mu = (np.ascontiguousarray(np.broadcast_to(a, shape)).ravel() for a in (given_X, given_mu))
+        return flat_X, flat_mu, shape
+
+    @functools.cached_property
+    def kernel(self) -> tuple[FloatArray, FloatArray, Axes]:
+        """Coefficients, error field and axes as the compiled totals take them."""
+        X, mu = self._X, self._mu
+        axes = (X.low, X.high, X.offset, X.start, 1 / X.step, mu.low, mu.high, mu.start, 1 / mu.step)
+        return self.content.coefficients, np.ascontiguousarray(self.content.local_error.max(axis=-1)), axes
 
     def error(self, X: FloatArray, mu: FloatArray) -> FloatArray:
         """Bound on the relative error of both functions at flat arguments."""
-        field = self.content.local_error.max(axis=-1)
+        field = self.kernel[1]
         lowest = np.maximum(mu, self._mu.low)
         places = (
             error_cell(axis, cells, axis.position(x))
@@ -130,19 +178,45 @@ class Island4dModel:
             )
         }
         shape = broadcast_shape(**given)
-        delta, low, high, H = (np.broadcast_to(array, shape).ravel() for array in given.values())
+        delta, low, high, H = (np.ascontiguousarray(np.broadcast_to(array, shape)) for array in given.values())
         require("hurst", H, (self._hurst.low <= H) & (self._hurst.high >= H), self._range(self._hurst))
         require("zeta_d", low, low >= SPHERE_FLOOR, f"at least {SPHERE_FLOOR}")
         require("zeta_u", high, high > low, "above zeta_d")
-        place = to_axes(delta, low, high, H, self.reading)
-        spread, X = place.spread, place.X
-        require("zeta_u/zeta_d - 1", spread, spread <= self._spread.high, f"at most {self._spread.high:g}")
-        require("X", X, (self._X.low <= X) & (self._X.high >= X), self._range(self._X))
-        phi_F, phi_A = rigid_sphere(X, place.mu) * np.exp(self.log_ratio(place))
-        force, area = hat_scales(spread, low, H, place.sigma, self.reading)
+        place = to_axes(delta.ravel(), low.ravel(), high.ravel(), H.ravel(), self.reading)
+        self._require_inside(place, shape)
+        phi_F, phi_A = rigid_sphere(place.X, place.mu) * np.exp(self.log_ratio(place))
+        force, area = hat_scales(place.spread, low.ravel(), place.hurst, place.sigma, self.reading)
         answers = (force * phi_F, area * phi_A, self.error(place))
         F_hat, A_hat, error = (a.reshape(shape)[()] for a in answers)
         return F_hat, A_hat, error
+
+    def _require_inside(self, place: Coordinates, shape: tuple[int, ...]) -> None:
+        """Refuse islands beyond the axes; masks in the caller's shape."""
+        spread, X = place.spread.reshape(shape), place.X.reshape(shape)
+        require("zeta_u/zeta_d - 1", spread, spread <= self._spread.high, f"at most {self._spread.high:g}")
+        require("X", X, (self._X.low <= X) & (self._X.high >= X), self._range(self._X))
+
+    def of_islands(self, islands: Mapping[str, FloatArray]) -> IslandAnswer:
+        """Phi_F and Phi_A of islands, through their band and not through mu.
+
+        Raises
+        ------
+        OutOfRangeError
+            Where an island is not covered.
+        """
+        shape = np.shape(islands["X"])
+        X, width, zeta_d, hurst, mu = (
+            np.ascontiguousarray(islands[name], dtype=float).ravel() for name in ("X", "width", "zeta_d", "hurst", "mu")
+        )
+        spread = np.expm1(width)
+        sphere = (SPHERE_FLOOR / zeta_d) ** (4 - 2 * hurst)
+        own, low = islands["hurst"], islands["zeta_d"]
+        require("hurst", own, (self._hurst.low <= own) & (self._hurst.high >= own), self._range(self._hurst))
+        require("zeta_d", low, low >= SPHERE_FLOOR, f"at least {SPHERE_FLOOR}")
+        place = Coordinates(X, spread, sphere, hurst, mu, np.ones_like(X))
+        self._require_inside(place, shape)
+        phi_F, phi_A = rigid_sphere(X, mu) * np.exp(self.log_ratio(place))
+        return IslandAnswer(phi_F.reshape(shape), phi_A.reshape(shape), self.error(place).reshape(shape))
 
     @staticmethod
     def _range(axis: Axis) -> str:
@@ -176,3 +250,19 @@ class Island4dModel:
 def island4d_model(path: os.PathLike[str] | str | None = None) -> Island4dModel:
     """The four-parameter model of the shipped table, or of a file; opened once."""
     return Island4dModel(read_table(path or shipped(ISLAND4D), ISLAND4D))
+
+
+def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Island4dModel:
+    """A table by kind ("universal", "island4d": the shipped ones, opened once) or from a file.
+
+    Raises
+    ------
+    TableFileError
+        Where the file cannot be used; the message says why and what to do.
+    """
+    if table == UNIVERSAL:
+        return universal_model()
+    if table == ISLAND4D:
+        return island4d_model()
+    content = read_table(table)
+    return UniversalModel(content) if content.kind == UNIVERSAL else Island4dModel(content)

@@ -16,6 +16,7 @@ from mbma_tables.surfaces import spectrum
 if TYPE_CHECKING:
     from mbma_tables.surfaces.maps import SpectrumFit
 
+PARAMETERS = ("hurst", "q0", "q1", "h_rms", "h_max")
 LEAST_ZETA_1 = 3.0  # the floors 1.5 and 3 of (27) and (30) need room below zeta_1
 LARGEST_ZETA_1 = 1e8
 
@@ -24,7 +25,8 @@ LARGEST_ZETA_1 = 1e8
 class Surface:
     """A self-affine surface with the spectrum C(q) ~ q^(-2-2H) between q0 and q1 (Eq. 6).
 
-    Any consistent length unit. Every argument may be an array; they broadcast to a batch of surfaces.
+    Any consistent length unit. Every argument may be an array; they broadcast to a batch of surfaces. Where one is
+    an xarray DataArray, dask-backed or not, `contact` answers with DataArrays, and arguments are checked then.
 
     Parameters
     ----------
@@ -53,11 +55,10 @@ class Surface:
     fit: SpectrumFit | None = dataclasses.field(default=None, repr=False, kw_only=True)
 
     def __post_init__(self) -> None:
-        given = {
-            field.name: finite_array(field.name, getattr(self, field.name))
-            for field in dataclasses.fields(self)
-            if field.name != "fit"
-        }
+        if self.labelled:
+            # perhaps lazy: checked block by block, where numbers are computed
+            return
+        given = {name: finite_array(name, getattr(self, name)) for name in PARAMETERS}
         require("hurst", given["hurst"], (given["hurst"] > 0) & (given["hurst"] <= 1), "in (0, 1]")
         for name in ("q0", "q1", "h_rms", "h_max"):
             require(name, given[name], given[name] > 0, "positive")
@@ -130,6 +131,11 @@ class Surface:
         from mbma_tables.surfaces.maps import surface_from_map
 
         return surface_from_map(heights, dx, dy, **options)
+
+    @property
+    def labelled(self) -> bool:
+        """Whether any parameter is an xarray DataArray."""
+        return any(hasattr(getattr(self, name), "dims") for name in PARAMETERS)
 
     @property
     def shape(self) -> tuple[int, ...]:

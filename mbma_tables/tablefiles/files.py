@@ -12,7 +12,9 @@ import json
 import os
 import pathlib
 import platform
+import stat
 import tempfile
+import threading
 import warnings
 from typing import Any
 
@@ -22,13 +24,17 @@ import numpy as np
 from mbma_tables.errors import StaleTableWarning, TableFileError
 from mbma_tables.tablefiles import provenance
 from mbma_tables.tablefiles.schema import (
+    ANSWERS,
     CONVENTIONS,
     DEGREES,
+    DOCUMENTATION,
     FORMAT_VERSION,
     FUNCTIONS,
+    HEIGHT_INTEGRALS,
     ISLAND4D,
     KINDS,
     OUT_OF_RANGE,
+    WEIGHTS,
     Axis,
     TableContent,
 )
@@ -36,12 +42,18 @@ from mbma_tables.tablefiles.splines import padding
 
 SEAL = b"\nmbma-table sha256 "
 SEAL_LENGTH = len(SEAL) + 64 + 1
+ONE_AT_A_TIME = threading.Lock()  # the HDF5 library crashes where threads enter it together
 LARGEST_FILE = 256 * 2**20
 MODULES = {kind: provenance.SOLVER + (provenance.GEOMETRY if kind == ISLAND4D else ()) for kind in KINDS}
 MEANING = {
     "log_ratio": "natural logarithm of Phi_{f} over its value for a rigid sphere, at the nodes",
     "spline": "coefficients of cardinal B-splines that interpolate log_ratio_{f}",
     "error": "bound on the relative error of Phi_{f} in this part of the table",
+}
+CONFORMANCE = {
+    "table": "{answer} by this table, at the conformance points",
+    "exact": "{answer} by the solver, at the conformance points",
+    "tolerance": "largest relative difference to allow at the conformance points",
 }
 
 
@@ -88,6 +100,7 @@ def _fill(dataset: netCDF4.Dataset, content: TableContent) -> None:
 
     pad = padding(content.degree)
     names = tuple(axis.name for axis in content.axes)
+    beside = " ".join(name for name, entry in content.auxiliary.items() if set(entry[0]) <= set(names))
     for axis, cells in zip(content.axes, content.local_error.shape, strict=False):
         dataset.createDimension(axis.name, axis.nodes)
         dataset.createDimension(f"{axis.name}_knot", axis.nodes + 2 * pad)
@@ -100,6 +113,8 @@ def _fill(dataset: netCDF4.Dataset, content: TableContent) -> None:
             ("error", "_cell", content.local_error),
         ):
             meaning = {"long_name": MEANING[what].format(f=function), "units": "1"}
+            if what == "log_ratio" and beside:
+                meaning["coordinates"] = beside
             add(
                 f"{what}_{function}",
                 tuple(name + suffix for name in names),
@@ -111,7 +126,9 @@ def _fill(dataset: netCDF4.Dataset, content: TableContent) -> None:
     points = next(iter(content.conformance.values())).size
     dataset.createDimension("conformance", points)
     for name, values in content.conformance.items():
-        meaning = {"long_name": f"{name} of the conformance points", "units": "1"}
+        what, _, function = name.rpartition("_") if name[-2:] in ("_F", "_A") else (name, "", "")
+        text = CONFORMANCE.get(what, f"argument {name} of the conformance points")
+        meaning = {"long_name": text.format(answer=ANSWERS[content.kind].format(f=function)), "units": "1"}
         add(f"conformance_{name}", ("conformance",), values, meaning)
 
 
@@ -121,18 +138,21 @@ def write_table(path: os.PathLike[str] | str, content: TableContent) -> pathlib.
     Raises
     ------
     TableFileError
-        Where the folder cannot be written; nothing is left behind.
+        Where the folder cannot be written or the disk is full; nothing is left behind.
     """
     target = pathlib.Path(path)
     digest = provenance.digest_arrays(content.arrays())
     attributes = {
         "Conventions": CONVENTIONS,
+        **content.attributes,
         "mbma_kind": content.kind,
         "format_version": FORMAT_VERSION,
         "data_version": digest[:12],
         "spline_degree": DEGREES[content.kind],
+        "spline_weights": WEIGHTS[content.degree],
+        "height_integrals": HEIGHT_INTEGRALS,
         "out_of_range": OUT_OF_RANGE[content.kind],
-        **content.attributes,
+        **DOCUMENTATION,
         "values_sha256": digest,
         "physics_sha256": provenance.physics_digest(MODULES[content.kind]),
         "physics_modules": " ".join(MODULES[content.kind]),
@@ -141,7 +161,7 @@ def write_table(path: os.PathLike[str] | str, content: TableContent) -> pathlib.
     try:
         with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
             draft = pathlib.Path(folder) / target.name
-            with netCDF4.Dataset(draft, "w", format="NETCDF4") as dataset:
+            with ONE_AT_A_TIME, netCDF4.Dataset(draft, "w", format="NETCDF4") as dataset:
                 _fill(dataset, content)
                 dataset.setncatts(attributes)
                 dataset.setncattr("attributes_sha256", _attributes_digest(dataset))
@@ -151,8 +171,10 @@ def write_table(path: os.PathLike[str] | str, content: TableContent) -> pathlib.
                 file.flush()
                 os.fsync(file.fileno())
             draft.replace(target)
-    except OSError as fault:
-        raise TableFileError(f"cannot write {target}: {fault.strerror or fault}") from None
+    # the HDF5 library reports a full disk as a RuntimeError
+    except (OSError, RuntimeError) as fault:
+        why = getattr(fault, "strerror", None) or fault
+        raise TableFileError(f"cannot write {target}: {why}; nothing was changed, choose another folder") from None
     return target
 
 
@@ -163,12 +185,14 @@ def _refuse(path: pathlib.Path, why: str, kind: str = "all") -> TableFileError:
 def read_sealed(path: pathlib.Path) -> bytes:
     """The netCDF bytes of a table file, checked against its seal."""
     try:
-        size = path.stat().st_size
-        if size > LARGEST_FILE:
-            raise _refuse(path, f"{size} bytes are more than any table has")
-        content = path.read_bytes()
+        status = path.stat()
+        size = status.st_size
+        content = path.read_bytes() if stat.S_ISREG(status.st_mode) and size <= LARGEST_FILE else None
     except OSError as fault:
         raise _refuse(path, f"cannot be read ({fault.strerror or fault})") from None
+    if content is None:
+        why = f"{size} bytes are more than any table has" if size > LARGEST_FILE else "is no regular file"
+        raise _refuse(path, why)
     body, seal = content[:-SEAL_LENGTH], content[-SEAL_LENGTH:]
     if not seal.startswith(SEAL) or not seal.endswith(b"\n"):
         raise _refuse(path, "is no table file, or is cut short (no checksum at its end)")
@@ -182,7 +206,7 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> TableContent:
     variables = dataset.variables
 
     def array(name: str) -> Any:
-        return np.ascontiguousarray(variables[name][...].filled(np.nan), dtype=np.float64)
+        return np.ascontiguousarray(variables[name][...], dtype=np.float64)
 
     names = variables["log_ratio_F"].dimensions
     axes = tuple(
@@ -226,6 +250,49 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> TableContent:
     )
 
 
+def _checked(source: pathlib.Path, dataset: netCDF4.Dataset, kind: str | None) -> TableContent:
+    """The content of an open file whose kind, format, attributes and values are as they were written."""
+    # values as they are stored, for their hash
+    dataset.set_auto_maskandscale(False)
+    attributes = {name: _plain(dataset.getncattr(name)) for name in dataset.ncattrs()}
+    found = attributes.get("mbma_kind")
+    if found not in KINDS or (kind is not None and found != kind):
+        raise _refuse(source, f"holds a table of kind {found!r}, not {kind or ' or '.join(KINDS)}", kind or "all")
+    version = attributes.get("format_version")
+    if version != FORMAT_VERSION:
+        raise _refuse(source, f"has format {version!r}, this library reads {FORMAT_VERSION}", found)
+    if attributes.get("attributes_sha256") != _attributes_digest(dataset):
+        raise _refuse(source, "has attributes that were edited", found)
+    # the stored axes, not ones computed anew: another processor's logarithm may differ in the last bit
+    if provenance.digest_arrays({n: v[...] for n, v in dataset.variables.items()}) != attributes["values_sha256"]:
+        raise _refuse(source, "has values that do not match their hash", found)
+    return _content(dataset, found)
+
+
+def check_table(path: os.PathLike[str] | str, kind: str | None = None) -> tuple[TableContent, str | None]:
+    """Open and check a table file as `read_table` does, without its warning.
+
+    Returns
+    -------
+    content : TableContent
+    stale : str or None
+        Why the table is stale, if it is.
+    """
+    source = pathlib.Path(path)
+    body = read_sealed(source)
+    try:
+        with ONE_AT_A_TIME, netCDF4.Dataset(source.name, memory=body) as dataset:
+            content = _checked(source, dataset, kind)
+    except TableFileError:
+        raise
+    except (OSError, RuntimeError, KeyError, AttributeError, TypeError, ValueError, IndexError) as fault:
+        raise _refuse(source, f"is no table file ({fault})") from None
+    if content.attributes["physics_sha256"] == provenance.physics_digest(MODULES[content.kind]):
+        return content, None
+    remedy = f"`python -m generate {content.kind}` makes it anew"
+    return content, f"{source} was made by another version of the solver; {remedy}"
+
+
 def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> TableContent:
     """Open and check a table file.
 
@@ -246,28 +313,7 @@ def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> TableCo
     StaleTableWarning
         Where the solver has changed since the table was made.
     """
-    source = pathlib.Path(path)
-    body = read_sealed(source)
-    try:
-        with netCDF4.Dataset(source.name, memory=body) as dataset:
-            attributes = {name: _plain(dataset.getncattr(name)) for name in dataset.ncattrs()}
-            found = attributes.get("mbma_kind")
-            if found not in KINDS or (kind is not None and found != kind):
-                raise _refuse(source, f"holds a table of kind {found!r}, not {kind or KINDS}")
-            if attributes.get("format_version") != FORMAT_VERSION:
-                version = attributes.get("format_version")
-                raise _refuse(source, f"has format {version!r}, this library reads {FORMAT_VERSION}", found)
-            if attributes.get("attributes_sha256") != _attributes_digest(dataset):
-                raise _refuse(source, "has attributes that were edited", found)
-            content = _content(dataset, found)
-    except (OSError, RuntimeError, KeyError, AttributeError, ValueError, IndexError) as fault:
-        raise _refuse(source, f"is no table file ({fault})") from None
-    if provenance.digest_arrays(content.arrays()) != attributes["values_sha256"]:
-        raise _refuse(source, "has values that do not match their hash", content.kind)
-    if attributes["physics_sha256"] != provenance.physics_digest(MODULES[content.kind]):
-        warnings.warn(
-            f"{source} was made by another version of the solver; `python -m generate {content.kind}` makes it anew",
-            StaleTableWarning,
-            stacklevel=2,
-        )
+    content, stale = check_table(path, kind)
+    if stale is not None:
+        warnings.warn(stale, StaleTableWarning, stacklevel=2)
     return content

@@ -11,6 +11,8 @@ from mbma_tables.arguments import FloatArray
 
 Six = tuple[float, float, float, float, float, float]
 Four = tuple[float, float, float, float]
+Eight = tuple[float, float, float, float, float, float, float, float]
+Ten = tuple[float, float, float, float, float, float, float, float, float, float]
 
 _FAST = {"contract", "reassoc"}
 
@@ -63,21 +65,47 @@ def cell(position: float, nodes: int) -> tuple[int, float]:
     return first, position - first
 
 
+@njit(cache=True, fastmath=_FAST, error_model="numpy", inline="always")
+def _row_2d(
+    c: FloatArray, i: int, j: int, w0: float, w1: float, w2: float, w3: float, w4: float, w5: float
+) -> tuple[float, float]:
+    """Both functions' sums over one row of six coefficients; spelled out, for pairs of them to be vectors."""
+    first = w0 * c[i, j, 0] + w1 * c[i, j + 1, 0] + w2 * c[i, j + 2, 0]
+    first += w3 * c[i, j + 3, 0] + w4 * c[i, j + 4, 0] + w5 * c[i, j + 5, 0]
+    second = w0 * c[i, j, 1] + w1 * c[i, j + 1, 1] + w2 * c[i, j + 2, 1]
+    second += w3 * c[i, j + 3, 1] + w4 * c[i, j + 4, 1] + w5 * c[i, j + 5, 1]
+    return first, second
+
+
 @njit(cache=True, fastmath=_FAST, error_model="numpy")
 def value_2d(c: FloatArray, x: float, y: float) -> tuple[float, float]:
     """Both functions of a quintic table, `c` of shape (nx + 4, ny + 4, 2)."""
     i, u = cell(x, c.shape[0] - 4)
     j, v = cell(y, c.shape[1] - 4)
-    wx, wy = quintic(u), quintic(v)
-    first = second = 0.0
-    for k in range(6):
-        a = b = 0.0
-        for m in range(6):
-            a += wy[m] * c[i + k, j + m, 0]
-            b += wy[m] * c[i + k, j + m, 1]
-        first += wx[k] * a
-        second += wx[k] * b
+    a0, a1, a2, a3, a4, a5 = quintic(u)
+    w0, w1, w2, w3, w4, w5 = quintic(v)
+    f0, g0 = _row_2d(c, i, j, w0, w1, w2, w3, w4, w5)
+    f1, g1 = _row_2d(c, i + 1, j, w0, w1, w2, w3, w4, w5)
+    f2, g2 = _row_2d(c, i + 2, j, w0, w1, w2, w3, w4, w5)
+    f3, g3 = _row_2d(c, i + 3, j, w0, w1, w2, w3, w4, w5)
+    f4, g4 = _row_2d(c, i + 4, j, w0, w1, w2, w3, w4, w5)
+    f5, g5 = _row_2d(c, i + 5, j, w0, w1, w2, w3, w4, w5)
+    first = a0 * f0 + a1 * f1 + a2 * f2 + a3 * f3 + a4 * f4 + a5 * f5
+    second = a0 * g0 + a1 * g1 + a2 * g2 + a3 * g3 + a4 * g4 + a5 * g5
     return first, second
+
+
+@njit(cache=True, fastmath=_FAST, error_model="numpy", inline="always")
+def _mix_six(w: Six, a: float, b: float, c: float, d: float, e: float, f: float) -> float:
+    return w[0] * a + w[1] * b + w[2] * c + w[3] * d + w[4] * e + w[5] * f
+
+
+@njit(cache=True, fastmath=_FAST, error_model="numpy")
+def _row_slopes_2d(c: FloatArray, i: int, j: int, w: Six, s: Six) -> Four:
+    """Both functions' sums over one row, with values and slopes as weights: f, f_y, g, g_y."""
+    f, g = _row_2d(c, i, j, w[0], w[1], w[2], w[3], w[4], w[5])
+    f_y, g_y = _row_2d(c, i, j, s[0], s[1], s[2], s[3], s[4], s[5])
+    return f, f_y, g, g_y
 
 
 @njit(cache=True, fastmath=_FAST, error_model="numpy")
@@ -85,24 +113,52 @@ def gradient_2d(c: FloatArray, x: float, y: float) -> Six:
     """Values and derivatives of both functions: f, f_x, f_y, g, g_x, g_y."""
     i, u = cell(x, c.shape[0] - 4)
     j, v = cell(y, c.shape[1] - 4)
-    wx, wy = quintic(u), quintic(v)
-    sx, sy = quintic_slope(u), quintic_slope(v)
-    f = fx = fy = g = gx = gy = 0.0
-    for k in range(6):
-        a = b = da = db = 0.0
-        for m in range(6):
-            p, q = c[i + k, j + m, 0], c[i + k, j + m, 1]
-            a += wy[m] * p
-            b += wy[m] * q
-            da += sy[m] * p
-            db += sy[m] * q
-        f += wx[k] * a
-        fx += sx[k] * a
-        fy += wx[k] * da
-        g += wx[k] * b
-        gx += sx[k] * b
-        gy += wx[k] * db
-    return f, fx, fy, g, gx, gy
+    wx, wy, sx, sy = quintic(u), quintic(v), quintic_slope(u), quintic_slope(v)
+    f0, p0, g0, q0 = _row_slopes_2d(c, i, j, wy, sy)
+    f1, p1, g1, q1 = _row_slopes_2d(c, i + 1, j, wy, sy)
+    f2, p2, g2, q2 = _row_slopes_2d(c, i + 2, j, wy, sy)
+    f3, p3, g3, q3 = _row_slopes_2d(c, i + 3, j, wy, sy)
+    f4, p4, g4, q4 = _row_slopes_2d(c, i + 4, j, wy, sy)
+    f5, p5, g5, q5 = _row_slopes_2d(c, i + 5, j, wy, sy)
+    return (
+        _mix_six(wx, f0, f1, f2, f3, f4, f5),
+        _mix_six(sx, f0, f1, f2, f3, f4, f5),
+        _mix_six(wx, p0, p1, p2, p3, p4, p5),
+        _mix_six(wx, g0, g1, g2, g3, g4, g5),
+        _mix_six(sx, g0, g1, g2, g3, g4, g5),
+        _mix_six(wx, q0, q1, q2, q3, q4, q5),
+    )
+
+
+@njit(cache=True, fastmath=_FAST, error_model="numpy", inline="always")
+def _line_4d(c: FloatArray, i: int, j: int, k: int, m: int, w: Four) -> tuple[float, float]:
+    """Both functions' sums along the last axis."""
+    w0, w1, w2, w3 = w
+    first = w0 * c[i, j, k, m, 0] + w1 * c[i, j, k, m + 1, 0] + w2 * c[i, j, k, m + 2, 0] + w3 * c[i, j, k, m + 3, 0]
+    second = w0 * c[i, j, k, m, 1] + w1 * c[i, j, k, m + 1, 1] + w2 * c[i, j, k, m + 2, 1] + w3 * c[i, j, k, m + 3, 1]
+    return first, second
+
+
+@njit(cache=True, fastmath=_FAST, error_model="numpy", inline="always")
+def _plane_4d(c: FloatArray, i: int, j: int, k: int, m: int, wz: Four, wt: Four) -> tuple[float, float]:
+    """Both functions' sums over the last two axes."""
+    f0, g0 = _line_4d(c, i, j, k, m, wt)
+    f1, g1 = _line_4d(c, i, j, k + 1, m, wt)
+    f2, g2 = _line_4d(c, i, j, k + 2, m, wt)
+    f3, g3 = _line_4d(c, i, j, k + 3, m, wt)
+    w0, w1, w2, w3 = wz
+    return w0 * f0 + w1 * f1 + w2 * f2 + w3 * f3, w0 * g0 + w1 * g1 + w2 * g2 + w3 * g3
+
+
+@njit(cache=True, fastmath=_FAST, error_model="numpy")
+def _block_4d(c: FloatArray, i: int, j: int, k: int, m: int, wy: Four, wz: Four, wt: Four) -> tuple[float, float]:
+    """Both functions' sums over the last three axes."""
+    f0, g0 = _plane_4d(c, i, j, k, m, wz, wt)
+    f1, g1 = _plane_4d(c, i, j + 1, k, m, wz, wt)
+    f2, g2 = _plane_4d(c, i, j + 2, k, m, wz, wt)
+    f3, g3 = _plane_4d(c, i, j + 3, k, m, wz, wt)
+    w0, w1, w2, w3 = wy
+    return w0 * f0 + w1 * f1 + w2 * f2 + w3 * f3, w0 * g0 + w1 * g1 + w2 * g2 + w3 * g3
 
 
 @njit(cache=True, fastmath=_FAST, error_model="numpy")
@@ -112,20 +168,91 @@ def value_4d(c: FloatArray, x: float, y: float, z: float, t: float) -> tuple[flo
     j, v = cell(y, c.shape[1] - 2)
     k, w = cell(z, c.shape[2] - 2)
     m, s = cell(t, c.shape[3] - 2)
+    wy, wz, wt = cubic(v), cubic(w), cubic(s)
+    f0, g0 = _block_4d(c, i, j, k, m, wy, wz, wt)
+    f1, g1 = _block_4d(c, i + 1, j, k, m, wy, wz, wt)
+    f2, g2 = _block_4d(c, i + 2, j, k, m, wy, wz, wt)
+    f3, g3 = _block_4d(c, i + 3, j, k, m, wy, wz, wt)
+    w0, w1, w2, w3 = cubic(u)
+    return w0 * f0 + w1 * f1 + w2 * f2 + w3 * f3, w0 * g0 + w1 * g1 + w2 * g2 + w3 * g3
+
+
+@njit(cache=True, fastmath=_FAST, error_model="numpy", inline="always")
+def _plane_slopes_4d(c: FloatArray, i: int, j: int, k: int, m: int, wz: Four, wt: Four, sz: Four, st: Four) -> Six:
+    """Over the last two axes: values and both derivatives, f, f_z, f_t, g, g_z, g_t."""
+    f0, g0 = _line_4d(c, i, j, k, m, wt)
+    f1, g1 = _line_4d(c, i, j, k + 1, m, wt)
+    f2, g2 = _line_4d(c, i, j, k + 2, m, wt)
+    f3, g3 = _line_4d(c, i, j, k + 3, m, wt)
+    p0, q0 = _line_4d(c, i, j, k, m, st)
+    p1, q1 = _line_4d(c, i, j, k + 1, m, st)
+    p2, q2 = _line_4d(c, i, j, k + 2, m, st)
+    p3, q3 = _line_4d(c, i, j, k + 3, m, st)
+    w0, w1, w2, w3 = wz
+    s0, s1, s2, s3 = sz
+    return (
+        w0 * f0 + w1 * f1 + w2 * f2 + w3 * f3,
+        s0 * f0 + s1 * f1 + s2 * f2 + s3 * f3,
+        w0 * p0 + w1 * p1 + w2 * p2 + w3 * p3,
+        w0 * g0 + w1 * g1 + w2 * g2 + w3 * g3,
+        s0 * g0 + s1 * g1 + s2 * g2 + s3 * g3,
+        w0 * q0 + w1 * q1 + w2 * q2 + w3 * q3,
+    )
+
+
+@njit(cache=True, fastmath=_FAST, error_model="numpy")
+def _block_slopes_4d(
+    c: FloatArray, i: int, j: int, k: int, m: int, wy: Four, wz: Four, wt: Four, sy: Four, sz: Four, st: Four
+) -> Eight:
+    """Over the last three axes: f, f_y, f_z, f_t, g, g_y, g_z, g_t."""
+    f0, p0, q0, g0, u0, v0 = _plane_slopes_4d(c, i, j, k, m, wz, wt, sz, st)
+    f1, p1, q1, g1, u1, v1 = _plane_slopes_4d(c, i, j + 1, k, m, wz, wt, sz, st)
+    f2, p2, q2, g2, u2, v2 = _plane_slopes_4d(c, i, j + 2, k, m, wz, wt, sz, st)
+    f3, p3, q3, g3, u3, v3 = _plane_slopes_4d(c, i, j + 3, k, m, wz, wt, sz, st)
+    w0, w1, w2, w3 = wy
+    s0, s1, s2, s3 = sy
+    return (
+        w0 * f0 + w1 * f1 + w2 * f2 + w3 * f3,
+        s0 * f0 + s1 * f1 + s2 * f2 + s3 * f3,
+        w0 * p0 + w1 * p1 + w2 * p2 + w3 * p3,
+        w0 * q0 + w1 * q1 + w2 * q2 + w3 * q3,
+        w0 * g0 + w1 * g1 + w2 * g2 + w3 * g3,
+        s0 * g0 + s1 * g1 + s2 * g2 + s3 * g3,
+        w0 * u0 + w1 * u1 + w2 * u2 + w3 * u3,
+        w0 * v0 + w1 * v1 + w2 * v2 + w3 * v3,
+    )
+
+
+@njit(cache=True, fastmath=_FAST, error_model="numpy", inline="always")
+def _mix(w: Four, a: float, b: float, c: float, d: float) -> float:
+    return w[0] * a + w[1] * b + w[2] * c + w[3] * d
+
+
+@njit(cache=True, fastmath=_FAST, error_model="numpy")
+def gradient_4d(c: FloatArray, x: float, y: float, z: float, t: float) -> Ten:
+    """Values and derivatives of both functions: f, f_x, f_y, f_z, f_t, then g and its own."""
+    i, u = cell(x, c.shape[0] - 2)
+    j, v = cell(y, c.shape[1] - 2)
+    k, w = cell(z, c.shape[2] - 2)
+    m, s = cell(t, c.shape[3] - 2)
     wx, wy, wz, wt = cubic(u), cubic(v), cubic(w), cubic(s)
-    first = second = 0.0
-    for a in range(4):
-        for b in range(4):
-            ab = wx[a] * wy[b]
-            for e in range(4):
-                weight = ab * wz[e]
-                p = q = 0.0
-                for f in range(4):
-                    p += wt[f] * c[i + a, j + b, k + e, m + f, 0]
-                    q += wt[f] * c[i + a, j + b, k + e, m + f, 1]
-                first += weight * p
-                second += weight * q
-    return first, second
+    sx, sy, sz, st = cubic_slope(u), cubic_slope(v), cubic_slope(w), cubic_slope(s)
+    f0, y0, z0, t0, g0, a0, b0, e0 = _block_slopes_4d(c, i, j, k, m, wy, wz, wt, sy, sz, st)
+    f1, y1, z1, t1, g1, a1, b1, e1 = _block_slopes_4d(c, i + 1, j, k, m, wy, wz, wt, sy, sz, st)
+    f2, y2, z2, t2, g2, a2, b2, e2 = _block_slopes_4d(c, i + 2, j, k, m, wy, wz, wt, sy, sz, st)
+    f3, y3, z3, t3, g3, a3, b3, e3 = _block_slopes_4d(c, i + 3, j, k, m, wy, wz, wt, sy, sz, st)
+    return (
+        _mix(wx, f0, f1, f2, f3),
+        _mix(sx, f0, f1, f2, f3),
+        _mix(wx, y0, y1, y2, y3),
+        _mix(wx, z0, z1, z2, z3),
+        _mix(wx, t0, t1, t2, t3),
+        _mix(wx, g0, g1, g2, g3),
+        _mix(sx, g0, g1, g2, g3),
+        _mix(wx, a0, a1, a2, a3),
+        _mix(wx, b0, b1, b2, b3),
+        _mix(wx, e0, e1, e2, e3),
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -149,3 +276,12 @@ def fill_4d(c: FloatArray, places: FloatArray, out: FloatArray) -> None:
     """`value_4d` of each column of `places` (4, entries) into the columns of `out` (2, entries)."""
     for k in range(places.shape[1]):
         out[0, k], out[1, k] = value_4d(c, places[0, k], places[1, k], places[2, k], places[3, k])
+
+
+@njit(cache=True, nogil=True)
+def fill_gradient_4d(c: FloatArray, places: FloatArray, out: FloatArray) -> None:
+    """`gradient_4d` of each column of `places` (4, entries) into the columns of `out` (10, entries)."""
+    for k in range(places.shape[1]):
+        both = gradient_4d(c, places[0, k], places[1, k], places[2, k], places[3, k])
+        for row in range(10):
+            out[row, k] = both[row]

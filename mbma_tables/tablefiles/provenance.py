@@ -16,16 +16,18 @@ from typing import Any
 
 import numpy as np
 
-# what decides Phi_F and Phi_A; island4d adds the geometry (its reading's numbers are configuration)
+# what decides Phi_F and Phi_A; island4d adds what its axes mean (its reading's numbers are configuration)
 SOLVER = (
     "mbma_tables.islands._height_coefficients",
     "mbma_tables.islands.height_integrals",
     "mbma_tables.islands.spectral",
     "mbma_tables.islands.newton",
+    "mbma_tables.islands.greenwood_tripp",
 )
 GEOMETRY = (
     "mbma_tables.surfaces.spectrum",
     "mbma_tables.islands.geometry",
+    "mbma_tables.models.raw",
 )
 
 
@@ -37,12 +39,17 @@ def _source(module: str) -> str:
     return pathlib.Path(spec.origin).read_text(encoding="utf-8")
 
 
-def _is_docstring(node: ast.stmt) -> bool:
-    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+def _is_silent(node: Any) -> bool:
+    """Whether a statement computes nothing: an import, a docstring, an annotation without a value."""
+    if isinstance(node, ast.Expr):
+        return isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+    return isinstance(node, ast.Import | ast.ImportFrom) or (isinstance(node, ast.AnnAssign) and node.value is None)
 
 
 def normal_form(node: Any) -> Any:
     """A syntax tree as nested lists that do not depend on the Python version or on formatting."""
+    if isinstance(node, ast.AnnAssign) and node.value is not None:
+        return normal_form(ast.Assign(targets=[node.target], value=node.value))
     if isinstance(node, ast.AST):
         kept = []
         for name, value in sorted(ast.iter_fields(node)):
@@ -54,12 +61,7 @@ def normal_form(node: Any) -> Any:
                 kept.append([name, shown])
         return [type(node).__name__, kept]
     if isinstance(node, list):
-        return [
-            normal_form(item)
-            for item in node
-            if not isinstance(item, ast.Import | ast.ImportFrom)
-            and not (isinstance(item, ast.stmt) and _is_docstring(item))
-        ]
+        return [normal_form(item) for item in node if not _is_silent(item)]
     if node is None or isinstance(node, str):
         return node
     return f"{type(node).__name__}:{node!r}"

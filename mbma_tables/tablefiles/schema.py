@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -22,15 +23,66 @@ UNIVERSAL = "universal"
 ISLAND4D = "island4d"
 KINDS = (UNIVERSAL, ISLAND4D)
 DEGREES = {UNIVERSAL: 5, ISLAND4D: 3}
+ANSWERS = {UNIVERSAL: "Phi_{f}", ISLAND4D: "{f}_hat"}
 
 OUT_OF_RANGE = {
     UNIVERSAL: (
-        "below the smallest mu the stored logarithm is proportional to mu (first order about the rigid sphere, "
-        "within the stated error); anywhere else outside the axes there is no answer: never clamp, never extrapolate"
+        "below the smallest mu, g = g(X, first mu) mu/(first mu): first order about the rigid sphere, "
+        "within the stated error; anywhere else outside the axes there is no answer: never clamp, never extrapolate"
     ),
     ISLAND4D: (
-        "below the smallest spread the stored logarithm is proportional to mu (first order about the rigid "
-        "sphere, within the stated error); anywhere else outside the axes there is no answer"
+        "below the smallest spread, g = g(X, first spread, sphere, hurst) mu/mu(first spread, sphere, hurst): first "
+        "order about the rigid sphere, within the stated error; anywhere else outside the axes there is no answer: "
+        "never clamp, never extrapolate"
+    ),
+}
+
+# w0 ... w_degree of the coefficients i ... i + degree, at u in [0, 1] of cell i, with v = 1 - u
+WEIGHTS = {
+    3: "w0 = v^3/6, w1 = 2/3 - u^2 (1 - u/2), w2 = 2/3 - v^2 (1 - v/2), w3 = u^3/6",
+    5: (
+        "w0 = v^5/120, w1 = (26 - 50 u + 20 u^2 + 20 u^3 - 20 u^4 + 5 u^5)/120, "
+        "w2 = (66 - 60 u^2 + 30 u^4 - 10 u^5)/120, w3 and w4 as w2 and w1 with v for u, w5 = u^5/120"
+    ),
+}
+HEIGHT_INTEGRALS = (
+    "F_n(x) = integral from x to infinity of (z - x)^n phi(z) dz, phi(z) = exp(-z^2/2)/sqrt(2 pi). To 1e-13 for "
+    "-42 <= x <= 7 and n = 2 or 5/2: F_n(x) = h sum over k = -192 ... 272 of "
+    "t^(n + 1) (1 + exp(-u)) phi(x + t), with h = 1/64, u = k h, t = exp(u - exp(-u))"
+)
+SYMBOLS = (
+    "delta approach of the island, h_d how far its top stands below the highest; R_d radius of the sphere "
+    "(band [1, zeta_d]); R_u radius of its summits (band [1, zeta_u]); D density, sigma standard deviation of height "
+    "of its summits (band [zeta_d, zeta_u]); eta share of a summit's contact that is real; E* contact modulus; "
+    "q0 smallest wave number; zeta_1 largest magnification"
+)
+# what every file says of its parts
+DOCUMENTATION = {
+    "certificate": (
+        "largest_error, p99_error and median_error are relative errors of the table on certificate_points held-out "
+        "points, solved on twice the nodes that made the table: half over the whole box, half (visited) at islands "
+        "of random surfaces. axis_errors: largest error (F, A) from interpolating along one axis alone"
+    ),
+    "error_field": (
+        "error_F and error_A bound the relative error, each over one cell of a coarser grid: an axis of n nodes has "
+        "c equal cells in position, and cell k holds the positions with k = min(floor(position c/(n - 1)), c - 1)"
+    ),
+    "conformance": (
+        "Points to replay in any language: conformance_ and the name of an argument; table_F, table_A: what this table "
+        "answers; exact_F, exact_A: what the solver answers; tolerance: largest relative difference to allow between "
+        "a reader's answers and table_F, table_A, or a solver's and exact_F, exact_A"
+    ),
+    "hashes": (
+        "values_sha256: for each variable, sorted by name, the text name:<f8:shape; (shape as (3,) or (3, 4)) and "
+        "then its values as little-endian doubles, last dimension fastest. attributes_sha256: the JSON text of "
+        "{variable: {attribute: value}}, with 'dimensions' as a further attribute of each, '' for the global ones "
+        "without attributes_sha256; keys sorted, no spaces, non-ASCII escaped, shortest floats. configuration_sha256: "
+        "the same form of the list of configuration and reading_numbers. physics_sha256: the syntax trees of "
+        "physics_modules. data_version: the first 12 digits of values_sha256"
+    ),
+    "seal": (
+        "after the netCDF bytes stands one line: a newline, 'mbma-table sha256 ', the SHA-256 of all bytes before that "
+        "newline in 64 hexadecimal digits, a newline; netCDF readers ignore it"
     ),
 }
 
@@ -99,7 +151,7 @@ class Axis:
         """The position in node units as a formula."""
         shifted = f"{self.name} + {self.offset!r}" if self.offset else self.name
         t = f"log({shifted})" if self.transform == "log" else shifted
-        return f"position = ({t} - {self.start!r}) / {self.step!r}"
+        return f"position = ({t} {'-' if self.start >= 0 else '+'} {abs(self.start)!r}) / {self.step!r}"
 
     def attributes(self) -> dict[str, Any]:
         """What the file says of this axis."""
@@ -131,7 +183,8 @@ class TableContent:
     local_error : ndarray
         Largest relative error found near each cell of a coarser grid, times its factor, last axis F, A.
     auxiliary : dict
-        Further variables, name -> (dimension names, values, attributes).
+        Further variables, name -> (dimension names, values, attributes); those over the axes are CF's
+        auxiliary coordinates.
     conformance : dict
         Arguments and answers of the points to replay, name -> (points,) array.
     attributes : dict
@@ -162,6 +215,30 @@ class TableContent:
         named |= {name: entry[1] for name, entry in self.auxiliary.items()}
         named |= {f"conformance_{name}": values for name, values in self.conformance.items()}
         return named
+
+
+def grid_labels(axes: tuple[Axis, ...], degree: int) -> dict[str, Any]:
+    """Coordinates of the spline coefficients and of the error field's cells, as auxiliary variables."""
+    labels: dict[str, Any] = {}
+    for axis in axes:
+        pad = (degree - 1) // 2
+        cells = error_cells(axis)
+        middles = (np.arange(cells) + 0.5) * ((axis.nodes - 1) / cells)
+        knots = np.arange(-pad, axis.nodes + pad, dtype=float)
+        text = f"middle of the error field's cells along {axis.name}, as {axis.name}"
+        labels[f"{axis.name}_cell"] = ((f"{axis.name}_cell",), axis.coordinate(middles), _label(text))
+        text = f"position along {axis.name}, in node units, of the middle of a coefficient's B-spline"
+        labels[f"{axis.name}_knot"] = ((f"{axis.name}_knot",), knots, _label(text))
+    return labels
+
+
+def _label(text: str) -> dict[str, Any]:
+    return {"long_name": text, "units": "1"}
+
+
+def numbered(name: str, lines: Sequence[str]) -> dict[str, str]:
+    """Steps as attributes in their order, one line of a header each."""
+    return {f"{name}_{number:02d}": line for number, line in enumerate(lines, 1)}
 
 
 def error_cells(axis: Axis, largest: int = 32) -> int:

@@ -12,20 +12,22 @@ and A/A0 likewise.
 from __future__ import annotations
 
 import dataclasses
-import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
-from mbma_tables.errors import ConvergenceError
-from mbma_tables.islands.geometry import floor_offset
-from mbma_tables.islands.island import geometry, scale_area, scale_force
-from mbma_tables.models import IslandModel, get_model
+from mbma_tables.errors import ConvergenceError, InputError
+from mbma_tables.models import get_model
+from mbma_tables.models.tabulated import UniversalModel
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.totals.quadrature import integrate
+from mbma_tables.totals.island_sum import sum_islands
+from mbma_tables.totals.looked_up import look_up, look_up_slopes
+from mbma_tables.totals.pairs import Pairs
+
+OUTSIDE = ("raise", "exact", "nan")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -46,8 +48,10 @@ class Contact:
         Bound on the relative error of both, of quadrature and island solutions together.
     reading, tier : str
         What made them.
-    islands : int
-        Islands evaluated.
+    islands : int or None
+        Islands evaluated; None where that is left to dask.
+    force_by, area_by : dict of ndarray, or None
+        Partial derivatives by "separation", "hurst", "q0", "q1", "h_rms" and "h_max", the others held.
     """
 
     separation: Any
@@ -57,102 +61,20 @@ class Contact:
     error: Any
     reading: str
     tier: str
-    islands: int
-
-
-@dataclasses.dataclass(frozen=True)
-class _Pairs:
-    """Flat (surface, gap) pairs in units of h_rms and 1/q0."""
-
-    hurst: FloatArray
-    zeta_1: FloatArray
-    room: FloatArray  # h_rms/s = sqrt(1 - zeta_1^(-2H))
-    reach: FloatArray  # (h_max - d)/h_rms
-    top: FloatArray  # h_max/h_rms
-    layer: FloatArray  # approach at which zeta_d leaves zeta_1, zeta_1^(-H)
-
-
-def kinks(hurst: Any, zeta_1: Any, reading: Reading) -> tuple[Any, Any]:
-    """delta/h_rms at which zeta_d (27) and zeta_u (30) reach their floors; arrays of one shape."""
-    h, z = np.broadcast_arrays(np.asarray(hurst, dtype=float), np.asarray(zeta_1, dtype=float))
-    at_d, at_u = np.empty(h.shape), np.empty(h.shape)
-    for place in np.ndindex(h.shape):
-        own, most = float(h[place]), float(z[place])
-        room = math.sqrt(-math.expm1(-2 * own * math.log(most)))
-        at_d[place] = math.sqrt(floor_offset(own, most, reading.floor_d)) / (4 / 3 * reading.beta)
-        at_u[place] = math.sqrt(floor_offset(own, most, reading.floor_u)) * (1 + reading.phi) / (reading.phi * room)
-    return at_d[()], at_u[()]
-
-
-def _jacobian(reading: Reading, room: FloatArray, below_kink: NDArray[np.bool_]) -> FloatArray:
-    """K1 (47), or what (46) gives."""
-    share = 4 / 3 * reading.beta
-    if reading.jacobian == "printed":
-        return np.where(below_kink, 1 - share, 1.0)
-    slope = share / room if reading.offset else np.zeros_like(room)
-    return np.where(below_kink, 1 - slope, 1.0)
-
-
-def _totals(
-    pairs: _Pairs, reading: Reading, model: IslandModel, rtol: float
-) -> tuple[FloatArray, FloatArray, FloatArray, int]:
-    """F/(A0 E* q0 s), A/A0, the bound on their relative error, and the islands evaluated."""
-    count = pairs.reach.size
-    kink_d, kink_u = kinks(pairs.hurst, pairs.zeta_1, reading)
-    worst_island = np.zeros(count)
-
-    def to_grid(approach: FloatArray, layer: FloatArray) -> FloatArray:
-        # approach = layer sinh(t)^2: a power at 0, geometric beyond the boundary layer
-        return np.arcsinh(np.sqrt(approach / layer))
-
-    def integrand(owner: NDArray[np.intp], t: FloatArray) -> FloatArray:
-        layer, room, hurst, zeta_1 = (
-            np.broadcast_to(field[owner, None], t.shape)
-            for field in (pairs.layer, pairs.room, pairs.hurst, pairs.zeta_1)
-        )
-        approach = layer * np.sinh(t) ** 2
-        g = geometry(approach, hurst, zeta_1, reading)
-        try:
-            phi = model.answer(g["X"], g["mu"])
-        except ConvergenceError as fault:
-            failed = np.zeros(count, dtype=bool)
-            failed[owner[fault.mask.any(axis=1)]] = True
-            raise ConvergenceError(f"an island failed: {fault}", failed) from fault
-        np.maximum.at(worst_island, owner, phi.error.max(axis=1))
-        # z_max/s counted down from h_max, where nothing cancels near first contact
-        below_top = pairs.reach[owner, None] - approach
-        height = (pairs.top[owner, None] - below_top) * room - g["h_d"]
-        weight = (
-            g["D_d"]
-            * np.exp(-0.5 * (height / g["sigma_d"]) ** 2)
-            / (math.sqrt(2 * math.pi) * g["sigma_d"])
-            * _jacobian(reading, room, approach < kink_d[owner, None])
-            * room
-            * layer
-            * np.sinh(2 * t)
-        )
-        force = scale_force(g) * phi.phi_F * weight
-        area = scale_area(g) * phi.phi_A * weight
-        return np.stack([force, area], axis=-1)
-
-    everyone = np.arange(count)
-    edges = [np.minimum(k, pairs.reach) for k in (kink_d, kink_u)]
-    breaks = np.sort(np.stack([np.zeros(count), *edges, np.maximum(pairs.reach, 0)]), axis=0)
-    low, high = (to_grid(np.maximum(b, 0), pairs.layer) for b in (breaks[:-1], breaks[1:]))
-    owner = np.broadcast_to(everyone, low.shape)
-    filled = high > low
-    found = integrate(integrand, owner[filled], low[filled], high[filled], count, rtol, components=2)
-    error = found.error.max(axis=1) + worst_island
-    return found.value[:, 0], found.value[:, 1], error, found.evaluations
+    islands: int | None
+    force_by: dict[str, Any] | None = None
+    area_by: dict[str, Any] | None = None
 
 
 def contact(
     surface: Surface,
     separation: ArrayLike,
-    tier: str = "exact",
+    tier: str = "universal",
     reading: str | Reading = "reported",
     E_star: ArrayLike = 1.0,
     rtol: float = 1e-8,
+    outside: str = "raise",
+    derivatives: bool = False,
 ) -> Contact:
     """Force and real contact area of a surface at given separations (Eqs. 48, 49).
 
@@ -163,14 +85,18 @@ def contact(
     separation : array_like
         d between the rigid plane and the mid-plane [length], at least -h_max (full compression). From h_max
         on there is no contact, and force and area are zero.
-    tier : {"exact", "rigid"}
-        The island model: the full solver, or spheres that do not deform, in closed form.
+    tier : {"universal", "island4d", "exact", "rigid"}
+        The island model: a table, the full solver, or spheres that do not deform, in closed form.
     reading : {"reported", "printed"} or Reading
         Which reading of the paper's equations.
     E_star : array_like
         Effective modulus, (1 - nu1^2)/E1 + (1 - nu2^2)/E2 inverted; force is in its unit.
     rtol : float
-        Relative error asked of force and area, in [1e-11, 0.1].
+        Relative error asked of force and area, in [1e-11, 0.1]. A table adds its own error; `error` holds both.
+    outside : {"raise", "exact", "nan"}
+        For surfaces with islands outside the universal table: an error, the exact solver, or NaN.
+    derivatives : bool
+        Whether `force_by` and `area_by` are asked for (tier "universal").
 
     Returns
     -------
@@ -179,15 +105,26 @@ def contact(
     Raises
     ------
     InputError, OutOfRangeError
-        For NaN, infinite or empty input and separations below -h_max.
+        For NaN, infinite or empty input, separations below -h_max, islands that no table covers.
     ConvergenceError
         Where the accuracy was not reached; its `mask` says which entries.
     """
+    if surface.labelled or hasattr(separation, "dims") or hasattr(E_star, "dims"):
+        # xarray comes in with its own objects
+        from mbma_tables.totals.labelled import contact_of_labelled
+
+        def answer(surface: Surface, separation: Any, E_star: Any) -> Contact:
+            return contact(surface, separation, tier, reading, E_star, rtol, outside, derivatives)
+
+        fields = contact_of_labelled(answer, surface, separation, E_star, derivatives)
+        return Contact(**fields, reading=get_reading(reading).name, tier=tier, islands=None)
     gap = finite_array("separation", separation)
     modulus = finite_array("E_star", E_star)
     require("E_star", modulus, modulus > 0, "positive")
     rule = get_reading(reading)
-    model = get_model(tier, rtol)
+    if outside not in OUTSIDE:
+        raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
+    model = get_model(tier, rtol, rule)
     shape = broadcast_shape(separation=gap, surface=surface.hurst, E_star=modulus)
     gap = np.broadcast_to(gap, shape)
     h_max = np.broadcast_to(np.asarray(surface.h_max), shape)
@@ -198,7 +135,7 @@ def contact(
 
     room = flat(surface.h_rms / surface.s)
     zeta_1, hurst = flat(surface.zeta_1), flat(surface.hurst)
-    pairs = _Pairs(
+    pairs = Pairs(
         hurst=hurst,
         zeta_1=zeta_1,
         room=room,
@@ -206,12 +143,22 @@ def contact(
         top=flat(surface.h_max / surface.h_rms),
         layer=np.exp(-hurst * np.log(zeta_1)),
     )
+    stress = modulus * surface.q0 * surface.s
+    force_by = area_by = None
     try:
-        force, area, error, islands = _totals(pairs, rule, model, 0.5 * rtol)
+        if derivatives:
+            if not isinstance(model, UniversalModel):
+                raise InputError("derivatives come from tier 'universal'")
+            sums, error, islands = look_up_slopes(pairs, rule, model, rtol, outside, shape)
+            force, area = sums[:, 0, 0], sums[:, 1, 0]
+            force_by, area_by = _by_parameter(surface, sums.reshape((*shape, 2, 5)), pairs, stress)
+        elif isinstance(model, UniversalModel):
+            force, area, error, islands = look_up(pairs, rule, model, rtol, outside, shape)
+        else:
+            force, area, error, islands = sum_islands(pairs, rule, model, 0.5 * rtol)
     except ConvergenceError as fault:
         fault.mask = fault.mask.reshape(shape)
         raise
-    stress = modulus * surface.q0 * surface.s
     return Contact(
         separation=gap[()],
         mean_separation=((h_max + gap) / 2)[()],
@@ -221,4 +168,40 @@ def contact(
         reading=rule.name,
         tier=model.name,
         islands=islands,
+        force_by=force_by,
+        area_by=area_by,
     )
+
+
+def _by_parameter(
+    surface: Surface, sums: FloatArray, pairs: Pairs, stress: FloatArray
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Chain rule from H, log(zeta_1), reach and top to the gap and the surface's own parameters."""
+    shape = sums.shape[:-2]
+    reach, top, room, hurst, zeta_1 = (
+        getattr(pairs, name).reshape(shape) for name in ("reach", "top", "room", "hurst", "zeta_1")
+    )
+    h_rms, q0, q1 = surface.h_rms, surface.q0, surface.q1
+    # log(1/room) by H and by log(zeta_1): room^2 = 1 - zeta_1^(-2H)
+    lift = -(1 - room**2) / room**2
+    answers = []
+    for number in range(2):
+        value, by_H, by_zeta, by_reach, by_top = np.moveaxis(sums[..., number, :], -1, 0)
+        scale: Any = 1.0
+        own = np.zeros_like(value)
+        if number == 0:
+            # force carries q0 s = q0 h_rms/room
+            scale = stress
+            by_H = by_H + value * lift * np.log(zeta_1)
+            by_zeta = by_zeta + value * lift * hurst
+            own = value
+        found = {
+            "separation": -by_reach / h_rms,
+            "hurst": by_H,
+            "q0": (own - by_zeta) / q0,
+            "q1": by_zeta / q1,
+            "h_rms": (own - reach * by_reach - top * by_top) / h_rms,
+            "h_max": (by_reach + by_top) / h_rms,
+        }
+        answers.append({name: (scale * slope)[()] for name, slope in found.items()})
+    return answers[0], answers[1]

@@ -1,0 +1,17 @@
+"""Small tables, built once."""
+
+import pytest
+from small_builds import KINDS, small
+
+from generate.build import build
+from generate.campaign import Campaign
+from generate.configuration import load
+
+
+@pytest.fixture(scope="session", params=KINDS)
+def built(request, tmp_path_factory):
+    """(kind, its content) of a small table built here."""
+    path = small(tmp_path_factory.mktemp("built"), request.param)
+    configuration = load(request.param, path)
+    kind = KINDS[request.param](configuration)
+    return kind, build(kind, configuration, Campaign())

@@ -1,0 +1,173 @@
+"""A reader of table files that uses only what docs/tables.md says: numpy, netCDF4 and the standard library.
+
+Slow and plain on purpose: it shares no line with the library that wrote the files.
+"""
+
+import hashlib
+import json
+import math
+
+import netCDF4
+import numpy as np
+
+SEAL = b"\nmbma-table sha256 "
+U = np.arange(-192, 273) / 64
+T = np.exp(U - np.exp(-U))
+
+
+def height_integral(n, x):
+    """F_n(x) by the sum that the files give."""
+    density = np.exp(-((x + T) ** 2) / 2) / math.sqrt(2 * math.pi)
+    return float(np.sum(T ** (n + 1) * (1 + np.exp(-U)) * density)) / 64
+
+
+def weights(degree, u):
+    """B-spline weights of the coefficients i ... i + degree."""
+    v = 1 - u
+    if degree == 3:
+        return np.array([v**3 / 6, 2 / 3 - u**2 * (1 - u / 2), 2 / 3 - v**2 * (1 - v / 2), u**3 / 6])
+
+    def w1(t):
+        return (26 - 50 * t + 20 * t**2 + 20 * t**3 - 20 * t**4 + 5 * t**5) / 120
+
+    def w2(t):
+        return (66 - 60 * t**2 + 30 * t**4 - 10 * t**5) / 120
+
+    return np.array([v**5 / 120, w1(u), w2(u), w2(v), w1(v), u**5 / 120])
+
+
+def seal_matches(path):
+    """Whether the last line of a file is the hash of what stands before it."""
+    body, seal, digest = path.read_bytes().rpartition(SEAL)
+    return bool(seal) and digest == hashlib.sha256(body).hexdigest().encode() + b"\n"
+
+
+def _json_digest(content):
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _plain(value):
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+class Reader:
+    """One table file, held in memory."""
+
+    def __init__(self, path):
+        with netCDF4.Dataset(path) as file:
+            self.attributes = {name: _plain(file.getncattr(name)) for name in file.ncattrs()}
+            self.variables = {name: np.asarray(variable[...]) for name, variable in file.variables.items()}
+            self.described = {
+                name: {n: _plain(variable.getncattr(n)) for n in variable.ncattrs()}
+                for name, variable in file.variables.items()
+            }
+            self.dimensions = {name: list(variable.dimensions) for name, variable in file.variables.items()}
+        self.axes = self.dimensions["log_ratio_F"]
+        self.degree = int(self.attributes["spline_degree"])
+
+    # hashes
+
+    def values_sha256(self):
+        digest = hashlib.sha256()
+        for name in sorted(self.variables):
+            values = self.variables[name].astype("<f8")
+            digest.update(f"{name}:<f8:{values.shape};".encode())
+            digest.update(values.tobytes(order="C"))
+        return digest.hexdigest()
+
+    def attributes_sha256(self):
+        content = {"": {n: v for n, v in self.attributes.items() if n != "attributes_sha256"}}
+        for name, described in self.described.items():
+            content[name] = {**described, "dimensions": self.dimensions[name]}
+        return _json_digest(content)
+
+    def configuration_sha256(self):
+        return _json_digest([json.loads(self.attributes[name]) for name in ("configuration", "reading_numbers")])
+
+    # lookup
+
+    def position(self, name, x):
+        axis, nodes = self.described[name], self.variables[name].size
+        if not axis["first"] <= x <= axis["last"]:
+            raise ValueError(f"{name} = {x} is not covered")
+        ends = (axis["first"], axis["last"], x)
+        low, high, t = (math.log(e + axis["offset"]) if axis["transform"] == "log" else e for e in ends)
+        return (t - low) / ((high - low) / (nodes - 1))
+
+    def spline(self, function, point):
+        """g_F or g_A at coordinates of the axes."""
+        block = self.variables[f"spline_{function}"]
+        for name, x in zip(self.axes, point, strict=True):
+            p = self.position(name, x)
+            i = min(math.floor(p), self.variables[name].size - 2)
+            # each step takes the first axis that is left
+            block = np.tensordot(weights(self.degree, p - i), block[i : i + self.degree + 1], axes=1)
+        return float(block)
+
+    def error(self, function, point):
+        """Bound on the relative error at coordinates of the axes."""
+        field = self.variables[f"error_{function}"]
+        cell = []
+        for name, x, cells in zip(self.axes, point, field.shape, strict=True):
+            nodes = self.variables[name].size
+            cell.append(min(math.floor(self.position(name, x) * cells / (nodes - 1)), cells - 1))
+        return float(field[tuple(cell)])
+
+    def answer(self, **arguments):
+        """What conformance points hold: Phi or hat values, by F and A."""
+        return self.universal(**arguments) if self.attributes["mbma_kind"] == "universal" else self.island(**arguments)
+
+    @staticmethod
+    def rigid(X, mu):
+        return {"F": math.pi * mu * height_integral(2.5, -X) / 5, "A": math.pi * height_integral(2, -X) / 2}
+
+    def universal(self, X, mu):
+        first = self.described["mu"]["first"]
+        inside, share = max(mu, first), min(mu, first) / first
+        rigid = self.rigid(X, mu)
+        return {f: math.exp(share * self.spline(f, (X, inside))) * rigid[f] for f in rigid}
+
+    def band(self, spread, sphere, hurst):
+        """mu, sigma and rate of a band; sphere gives zeta_d."""
+        w, power = math.log1p(spread), 4 - 2 * hurst
+
+        def g(p):
+            return math.expm1(p * w) / (p * w) if p * w else 1.0
+
+        growth = g(power) / g(2 - 2 * hurst)
+        alpha = 1.5 * g(-2 * hurst) * growth / g(2 - 2 * hurst)
+        sigma = math.sqrt((1 - 0.8968 / alpha) * 2 * hurst * w * g(-2 * hurst))
+        rate = 0.75 * growth / json.loads(self.attributes["reading_numbers"])[0]
+        inverse = sphere * 1.25**-power
+        c = 0.75 * hurst / power
+        m4_d, m4_u = c * (1 - inverse), c * (math.exp(power * w) - inverse)
+        radius = 3 * math.sqrt(math.pi) / 8
+        return 8 / 3 * rate * sigma * radius * math.sqrt(2) / (m4_d * m4_u) ** 0.25, sigma, rate
+
+    def island(self, delta_over_h_rms, zeta_d, zeta_u, hurst):
+        spread, power = (zeta_u - zeta_d) / zeta_d, 4 - 2 * hurst
+        sphere = (1.25 / zeta_d) ** power
+        mu, sigma, rate = self.band(spread, sphere, hurst)
+        X = (delta_over_h_rms * zeta_d**hurst - 1) / sigma
+        inside = max(spread, self.described["spread"]["first"])
+        share = mu / self.band(inside, sphere, hurst)[0]
+        rigid = self.rigid(X, mu)
+        phi = {f: math.exp(share * self.spline(f, (X, inside, sphere, hurst))) * rigid[f] for f in rigid}
+        c, radius = 0.75 * hurst / power, 3 * math.sqrt(math.pi) / 8
+        log_d, S, D = math.log(zeta_d), sigma * zeta_d**-hurst, rate * zeta_d**2
+        R_d = radius / math.sqrt(c * math.expm1(power * log_d))
+        R_u = radius / math.sqrt(c * math.expm1(power * (log_d + math.log1p(spread))))
+        return {"F": S * math.sqrt(2 * R_d * S) * phi["F"], "A": 2 * math.pi * D * R_u * R_d * S**2 * phi["A"]}
+
+    def replay(self):
+        """Largest of |own answer/stored - 1|/tolerance over the conformance points."""
+        names = [n.removeprefix("conformance_") for n in self.variables if n.startswith("conformance_")]
+        points = {name: self.variables[f"conformance_{name}"] for name in names}
+        known = [n for n in names if n != "tolerance" and n[:5] not in ("table", "exact")]
+        worst = 0.0
+        for k, tolerance in enumerate(points["tolerance"]):
+            found = self.answer(**{name: float(points[name][k]) for name in known})
+            for f, value in found.items():
+                worst = max(worst, abs(value / points[f"table_{f}"][k] - 1) / tolerance)
+        return worst

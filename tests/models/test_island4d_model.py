@@ -1,0 +1,249 @@
+"""`Island4dModel` against islands of surfaces by geometry and solver, and at every edge."""
+
+import math
+
+import numpy as np
+import pytest
+from small_tables import small_table
+
+from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, island
+from mbma_tables.islands.island import geometry
+from mbma_tables.models import tabulated
+from mbma_tables.models.raw import SPHERE_FLOOR, to_axes
+from mbma_tables.models.tabulated import Island4dModel, island4d_model
+from mbma_tables.surfaces.readings import REPORTED
+from mbma_tables.tablefiles.files import read_table, write_table
+from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
+
+ignore_stale = pytest.mark.filterwarnings("ignore::mbma_tables.errors.StaleTableWarning")
+
+
+@pytest.fixture(scope="module")
+def small():
+    return Island4dModel(small_table(ISLAND4D))
+
+
+def shipped_model():
+    return Island4dModel(read_table(tabulated.shipped(ISLAND4D), ISLAND4D))
+
+
+def visited(count, seed):
+    """Islands that random surfaces visit: (delta/h_rms at zeta_1 without bound, zeta_d, zeta_u, H), F_hat, A_hat."""
+    rng = np.random.default_rng(seed)
+    hurst = rng.uniform(0.3, 1.0, count)
+    zeta_1 = 10 ** rng.uniform(math.log10(3.001), 4, count)
+    g = geometry(10 ** rng.uniform(-6, 1, count), hurst, zeta_1, REPORTED)
+    delta = g["X"] * g["sigma"] + g["zeta_d"] ** -hurst
+    solved = greenwood_tripp.solve(g["X"], g["mu"], rtol=1e-11)
+    force = g["sigma"] * np.sqrt(2 * g["R_d"] * g["sigma"]) * solved.phi_F
+    area = 2 * math.pi * g["D"] * g["R_u"] * g["R_d"] * g["sigma"] ** 2 * solved.phi_A
+    return (delta, g["zeta_d"], g["zeta_u"], hurst), force, area
+
+
+@ignore_stale
+def test_the_shipped_table_over_what_surfaces_visit():
+    raw, force, area = visited(4000, 30)
+    found_F, found_A, bound = shipped_model().lookup(*raw)
+    error = np.maximum(np.abs(found_F / force - 1), np.abs(found_A / area - 1))
+    assert error.max() < 1e-3
+    assert bound.max() < 1e-3
+    assert np.mean(error <= bound) > 0.95
+    # the rest is what rounding zeta_u and delta does to zeta_u/zeta_d - 1 and to X
+    place = to_axes(*raw, REPORTED)
+    rounding = np.finfo(float).eps * (1 / place.spread + 4 * (1 + place.X) / place.sigma)
+    assert (error <= bound + rounding).all()
+    assert (place.spread[error > bound] < 1e-9).all()
+
+
+@ignore_stale
+def test_the_shipped_table_over_the_whole_box():
+    model = shipped_model()
+    rng = np.random.default_rng(31)
+    hurst = rng.uniform(0.3, 1.0, 600)
+    zeta_d = SPHERE_FLOOR * 10 ** rng.uniform(0, 4, 600)
+    zeta_u = zeta_d * (1 + 10 ** rng.uniform(-12, math.log10(2499), 600))
+    X = rng.uniform(0.501, 25.9, 600)
+    sigma = to_axes(np.ones(600), zeta_d, zeta_u, hurst, REPORTED).sigma
+    delta = (X * sigma + 1) * zeta_d**-hurst
+    place = to_axes(delta, zeta_d, zeta_u, hurst, REPORTED)
+    # where X cannot be had from delta to six digits there is nothing to compare
+    kept = (np.abs(place.X / X - 1) < 1e-6) & (place.X > 0.5) & (place.X < 26)
+    assert kept.sum() > 400
+    solved = greenwood_tripp.solve(place.X[kept], place.mu[kept], rtol=1e-11)
+    found_F, found_A, bound = model.lookup(*(a[kept] for a in (delta, zeta_d, zeta_u, hurst)))
+    scales = tabulated.hat_scales(place.spread, zeta_d, hurst, place.sigma, REPORTED)
+    error_F = np.abs(found_F / (scales[0][kept] * solved.phi_F) - 1)
+    error_A = np.abs(found_A / (scales[1][kept] * solved.phi_A) - 1)
+    assert np.maximum(error_F, error_A).max() < 1e-3
+    assert np.mean(np.maximum(error_F, error_A) <= bound) > 0.995
+
+
+@ignore_stale
+def test_an_island_of_a_surface_in_its_own_units():
+    surface = Surface(hurst=0.8, q0=2.0, q1=2000.0, h_rms=0.3, h_max=1.0)
+    delta = np.array([0.01, 0.2, 1.3])
+    own = island(surface, delta, reading="reported", E_star=1.0)
+    X_sigma = own.X * own.sigma / surface.s
+    F_hat, A_hat, bound = shipped_model().lookup(X_sigma + own.zeta_d**-0.8, own.zeta_d, own.zeta_u, 0.8)
+    np.testing.assert_allclose(F_hat * surface.s / surface.q0, own.force, rtol=3 * bound.max())
+    np.testing.assert_allclose(own.eta * A_hat / surface.q0**2, own.area, rtol=3 * bound.max())
+
+
+def inside(small, count, seed):
+    """Raw numbers of islands inside the small table, and their X."""
+    rng = np.random.default_rng(seed)
+    X_axis, spread_axis, _, hurst_axis = small.content.axes
+    hurst = rng.uniform(hurst_axis.low, hurst_axis.high, count)
+    zeta_d = SPHERE_FLOOR * 10 ** rng.uniform(0, 2, count)
+    zeta_u = zeta_d * (1 + 10 ** rng.uniform(-3, np.log10(0.99 * spread_axis.high), count))
+    X = rng.uniform(X_axis.low + 0.01, X_axis.high - 0.01, count)
+    sigma = to_axes(np.ones(count), zeta_d, zeta_u, hurst, REPORTED).sigma
+    return (X * sigma + 1) * zeta_d**-hurst, zeta_d, zeta_u, hurst
+
+
+def test_a_small_table_keeps_its_word(small):
+    raw = inside(small, 400, 32)
+    place = to_axes(*raw, REPORTED)
+    solved = greenwood_tripp.solve(place.X, place.mu)
+    scales = tabulated.hat_scales(place.spread, raw[1], raw[3], place.sigma, REPORTED)
+    F_hat, A_hat, bound = small.lookup(*raw)
+    error = np.maximum(np.abs(F_hat / (scales[0] * solved.phi_F) - 1), np.abs(A_hat / (scales[1] * solved.phi_A) - 1))
+    assert (error <= bound).all()
+
+
+def test_scales_by_the_paper(small):
+    """F_hat and A_hat of a nearly rigid sphere, from radii and density by their own formulas."""
+    H, zeta_d, zeta_u = 0.6, 4.0, 4.0 * (1 + 1e-5)
+
+    def moment(order, low, high):
+        power = order - 2 * H
+        shape = {0: 2.0, 2: 1.0, 4: 0.75}[order]
+        return shape * H * (high**power - low**power) / power
+
+    m0, m2, m4 = (moment(order, zeta_d, zeta_u) for order in (0, 2, 4))
+    sigma = math.sqrt((1 - 0.8968 * m2**2 / (m0 * m4)) * m0)
+    D = math.pi * m4 / m2 / (6 * math.pi * math.sqrt(3))
+    R_d, R_u = (3 * math.sqrt(math.pi) / 8 / math.sqrt(moment(4, 1.0, zeta)) for zeta in (zeta_d, zeta_u))
+    mu = 8 / 3 * D * sigma * math.sqrt(2 * R_u * R_d)
+    X = 3.0
+    solved = greenwood_tripp.solve(X, mu)
+    F_hat, A_hat, bound = small.lookup(X * sigma + zeta_d**-H, zeta_d, zeta_u, H)
+    # sigma from differences of moments keeps six digits
+    assert F_hat == pytest.approx(sigma * math.sqrt(2 * R_d * sigma) * solved.phi_F, rel=1e-4 + bound, abs=0)
+    assert A_hat == pytest.approx(2 * math.pi * D * R_u * R_d * sigma**2 * solved.phi_A, rel=1e-4 + bound, abs=0)
+
+
+def test_broadcasting_scalars_and_input(small):
+    raw = inside(small, 6, 33)
+    one = small.lookup(*(float(a[0]) for a in raw))
+    assert all(np.ndim(x) == 0 for x in one)
+    many = small.lookup(*raw)
+    np.testing.assert_array_equal([x[0] for x in many], one)
+    grid = small.lookup(np.array([[1.5], [1.6], [1.7]]), 2.0, [20.0, 21.0], 0.7)
+    assert all(x.shape == (3, 2) for x in grid)
+    np.testing.assert_array_equal([x[2, 1] for x in grid], small.lookup(1.7, 2.0, 21.0, 0.7))
+    copies = [a.copy() for a in raw]
+    for a in raw:
+        a.setflags(write=False)
+    small.lookup(*raw)
+    np.testing.assert_array_equal(raw, copies)
+
+
+def test_edges_to_the_last_bit(small):
+    delta, zeta_d, zeta_u = 1.5, 2.0, 20.0
+    for hurst in (0.3, 1.0):
+        small.lookup(delta, zeta_d, zeta_u, hurst)
+    for hurst in (np.nextafter(0.3, 0), np.nextafter(1.0, 2)):
+        with pytest.raises(OutOfRangeError, match=r"hurst must be in \[0\.3, 1\]"):
+            small.lookup(delta, zeta_d, zeta_u, hurst)
+    small.lookup(delta, SPHERE_FLOOR, zeta_u, 0.7)
+    with pytest.raises(OutOfRangeError, match=r"zeta_d must be at least 1\.25"):
+        small.lookup(delta, np.nextafter(SPHERE_FLOOR, 0), zeta_u, 0.7)
+    # 2 * 101 is exact, so is the spread of 100
+    small.lookup(3.0, 2.0, 202.0, 0.7)
+    with pytest.raises(OutOfRangeError, match="zeta_u/zeta_d - 1 must be at most 100"):
+        small.lookup(3.0, 2.0, np.nextafter(202.0, 300), 0.7)
+    # one bit apart, at X = 5
+    sigma = to_axes(*(np.array([v]) for v in (1.0, 2.0, np.nextafter(2.0, 3), 0.7)), REPORTED).sigma[0]
+    small.lookup(2.0**-0.7 * (1 + 5 * sigma), 2.0, np.nextafter(2.0, 3), 0.7)
+    for top in (2.0, 1.9):
+        with pytest.raises(OutOfRangeError, match="zeta_u must be above zeta_d"):
+            small.lookup(delta, 2.0, top, 0.7)
+
+
+def test_the_range_of_X_to_the_last_bit_that_delta_has(small):
+    X_axis = small.content.axes[0]
+    for end, outward in ((X_axis.low, -np.inf), (X_axis.high, np.inf)):
+        sigma = to_axes(*(np.array([v]) for v in (1.0, 2.0, 20.0, 0.7)), REPORTED).sigma[0]
+        # walk to the last delta that is inside
+        delta = (end * sigma + 1) * 2.0**-0.7
+        X = [delta]
+        for _ in range(40):
+            X.append(np.nextafter(X[-1], -outward))
+            X.insert(0, np.nextafter(X[0], outward))
+        approach = to_axes(np.array(X), *(np.full(len(X), v) for v in (2.0, 20.0, 0.7)), REPORTED).X
+        good = (approach >= X_axis.low) & (approach <= X_axis.high)
+        assert 0 < good.sum() < good.size
+        small.lookup(np.array(X)[good], 2.0, 20.0, 0.7)
+        for value in np.array(X)[~good]:
+            with pytest.raises(OutOfRangeError, match="X must be in"):
+                small.lookup(value, 2.0, 20.0, 0.7)
+
+
+@pytest.mark.parametrize("position", range(4))
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_no_numbers_are_refused(small, position, bad):
+    raw = [1.5, 2.0, 20.0, 0.7]
+    raw[position] = [raw[position], bad]
+    name = ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")[position]
+    with pytest.raises(InputError, match=f"{name} must be finite, got .* at \\(1,\\)"):
+        small.lookup(*raw)
+
+
+@pytest.mark.parametrize(
+    ("position", "bad"), [(0, 0.1), (0, 1e3), (0, -1.0), (1, 1.0), (1, -3.0), (2, 1e6), (2, 1.0), (3, 0.1), (3, 1.2)]
+)
+def test_what_is_out_of_range_is_marked(small, position, bad):
+    raw = [1.5, 2.0, 20.0, 0.7]
+    raw[position] = [raw[position], bad, raw[position], bad]
+    with pytest.raises(OutOfRangeError) as caught:
+        small.lookup(*raw)
+    np.testing.assert_array_equal(caught.value.mask, [False, True, False, True])
+
+
+def test_empty_and_unlike_shapes(small):
+    with pytest.raises(InputError, match="zeta_d is empty"):
+        small.lookup(1.5, [], 20.0, 0.7)
+    with pytest.raises(InputError, match="do not broadcast"):
+        small.lookup([1.5, 1.6], [2.0, 2.1, 2.2], 20.0, 0.7)
+
+
+def test_below_the_least_spread_to_first_order(small):
+    spread_axis = small.content.axes[1]
+    spread = spread_axis.low * np.array([1.0, 0.5, 1e-2])
+    zeta_d, hurst = np.full(3, 2.0), np.full(3, 0.7)
+    place = to_axes(np.ones(3), zeta_d, zeta_d * (1 + spread), hurst, REPORTED)
+    sigma = place.sigma
+    raw = (4.0 * sigma + 1) * zeta_d**-hurst, zeta_d, zeta_d * (1 + spread), hurst
+    place = to_axes(*raw, REPORTED)
+    ratio = small.log_ratio(place)
+    X_change = place.X / 4 - 1
+    assert np.abs(X_change).max() < 1e-6
+    np.testing.assert_allclose(ratio / place.mu, (ratio / place.mu)[:, :1] * np.ones(3), rtol=1e-4)
+
+
+def test_opened_once_and_only_of_its_kind(tmp_path):
+    path = write_table(tmp_path / "island4d.nc", small_table(ISLAND4D))
+    assert island4d_model(path) is island4d_model(path)
+    assert island4d_model(path).reading is REPORTED
+    write_table(tmp_path / "other.nc", small_table(UNIVERSAL))
+    with pytest.raises(OSError, match="holds a table of kind 'universal', not island4d"):
+        island4d_model(tmp_path / "other.nc")
+
+
+def test_marks_have_the_shape_of_the_arguments(small):
+    delta = np.full((2, 3), 1.5)
+    delta[1, 2] = 1e3
+    with pytest.raises(OutOfRangeError) as caught:
+        small.lookup(delta, 2.0, [20.0, 21.0, 22.0], 0.7)
+    np.testing.assert_array_equal(caught.value.mask, delta > 2)

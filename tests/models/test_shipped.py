@@ -1,0 +1,68 @@
+"""The shipped tables are whole, fresh, as small and as accurate as they must be."""
+
+import json
+
+import pytest
+
+from mbma_tables.models.tabulated import shipped
+from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.tablefiles.files import MODULES, check_table
+from mbma_tables.tablefiles.provenance import digest_json, physics_digest
+from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL, is_finite_content
+from mbma_tables.tablefiles.verify import verify
+
+LARGEST_BYTES = {UNIVERSAL: 2e6, ISLAND4D: 16e6}
+LARGEST_ERROR = {UNIVERSAL: 1e-8, ISLAND4D: 1e-3}
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def table(request):
+    return check_table(shipped(request.param), request.param)[0]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_verified_and_solved_anew(kind):
+    verdict = verify(shipped(kind), kind, resolve=16)
+    assert verdict.resolved == 16
+    assert verdict.stale is None
+    assert verdict.resolved_error < 1e-11
+
+
+def test_made_by_this_solver(table):
+    assert table.attributes["physics_modules"].split() == list(MODULES[table.kind])
+    assert table.attributes["physics_sha256"] == physics_digest(MODULES[table.kind])
+
+
+def test_the_configuration_is_what_its_hash_says(table):
+    reading = list(get_reading(table.attributes["reading"]).numbers) if table.kind == ISLAND4D else []
+    configuration = json.loads(table.attributes["configuration"])
+    assert digest_json([configuration, reading]) == table.attributes["configuration_sha256"]
+    assert configuration["kind"] == table.kind
+
+
+def test_small_enough(table):
+    assert shipped(table.kind).stat().st_size <= LARGEST_BYTES[table.kind]
+
+
+def test_accurate_enough_on_held_out_points(table):
+    attributes = table.attributes
+    assert attributes["certificate_points"] >= 5000
+    for function in "FA":
+        typical, rare, largest = (attributes[f"{what}_error_{function}"] for what in ("median", "p99", "largest"))
+        assert 0 < typical <= rare <= largest <= LARGEST_ERROR[table.kind]
+        assert attributes[f"visited_largest_error_{function}"] <= largest
+    if table.kind == ISLAND4D:
+        assert attributes["visited_p99_error_F"] <= 3e-4
+        assert attributes["visited_p99_error_A"] <= 3e-4
+
+
+def test_the_error_field_covers_the_certificate(table):
+    assert is_finite_content(table)
+    assert (table.local_error > 0).all()
+    for number, function in enumerate("FA"):
+        assert table.local_error[..., number].max() >= table.attributes[f"largest_error_{function}"]
+
+
+def test_conformance_points(table):
+    assert all(values.size >= 32 for values in table.conformance.values())
+    assert 0 < table.conformance["tolerance"].max() < 1e-6

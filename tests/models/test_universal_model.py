@@ -1,0 +1,196 @@
+"""`UniversalModel` against the solver within the error that it states, and at every edge."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from small_tables import small_table
+
+from mbma_tables import OutOfRangeError, greenwood_tripp
+from mbma_tables.models import tabulated
+from mbma_tables.models.tabulated import UniversalModel, universal_model
+from mbma_tables.tablefiles.files import read_table, write_table
+from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL, error_cell
+
+# the shipped table answers rightly even where a line of the solver has changed since
+ignore_stale = pytest.mark.filterwarnings("ignore::mbma_tables.errors.StaleTableWarning")
+
+
+@pytest.fixture(scope="module")
+def small():
+    return UniversalModel(small_table(UNIVERSAL))
+
+
+def shipped_model():
+    return UniversalModel(read_table(tabulated.shipped(UNIVERSAL), UNIVERSAL))
+
+
+def largest_error(model, X, mu):
+    """Largest relative error, largest share of the stated bound, and the bounds."""
+    found = model.answer(X, mu)
+    solved = greenwood_tripp.solve(X, mu, rtol=1e-12)
+    error = np.maximum(np.abs(found.phi_F / solved.phi_F - 1), np.abs(found.phi_A / solved.phi_A - 1))
+    return error, found.error
+
+
+@ignore_stale
+def test_the_shipped_table_keeps_its_word():
+    model = shipped_model()
+    X_axis, mu_axis = model.content.axes
+    rng = np.random.default_rng(20)
+    X = rng.uniform(X_axis.low, X_axis.high, 600)
+    mu = 10 ** rng.uniform(np.log10(mu_axis.low), np.log10(mu_axis.high), 600)
+    error, bound = largest_error(model, X, mu)
+    assert (error <= bound).all()
+    assert bound.max() < 1e-7
+    assert error.max() < 1e-8
+
+
+@ignore_stale
+def test_below_the_shipped_table_to_first_order():
+    model = shipped_model()
+    X_axis, mu_axis = model.content.axes
+    rng = np.random.default_rng(21)
+    X = rng.uniform(X_axis.low, X_axis.high, 300)
+    mu = 10 ** rng.uniform(-30, np.log10(mu_axis.low), 300)
+    error, bound = largest_error(model, X, mu)
+    assert (error <= bound).all()
+    assert error.max() < 1e-8
+
+
+def test_a_small_table_keeps_its_word(small):
+    X_axis, mu_axis = small.content.axes
+    rng = np.random.default_rng(22)
+    X = rng.uniform(X_axis.low, X_axis.high, 400)
+    mu = 10 ** rng.uniform(np.log10(mu_axis.low), np.log10(mu_axis.high), 400)
+    error, bound = largest_error(small, X, mu)
+    assert (error <= bound).all()
+    # a bound that is much too wide would say nothing
+    assert np.median(bound / error) < 100
+
+
+def test_below_a_table_the_logarithm_is_proportional_to_mu(small):
+    X_axis, mu_axis = small.content.axes
+    X = np.linspace(X_axis.low, X_axis.high, 50)
+    edge = small.log_ratio(X, np.full(50, mu_axis.low))
+    for factor in (1.0, 0.5, 1e-3, 1e-24):
+        found = small.log_ratio(X, np.full(50, factor * mu_axis.low))
+        np.testing.assert_allclose(found, factor * edge, rtol=1e-14)
+    rigid = greenwood_tripp.rigid_sphere(X, np.zeros(50))
+    found = small.answer(X, np.zeros(50))
+    np.testing.assert_array_equal(found.phi_F, 0)
+    np.testing.assert_array_equal(found.phi_A, rigid[1])
+
+
+def test_edges_to_the_last_bit(small):
+    X_axis, mu_axis = small.content.axes
+    inside = np.array([1.0])
+    for x in (X_axis.low, X_axis.high):
+        found = small.answer(np.array([x]), inside)
+        solved = greenwood_tripp.solve(x, 1.0)
+        assert abs(found.phi_F[0] / solved.phi_F - 1) <= found.error[0]
+    for x in (np.nextafter(X_axis.low, -np.inf), np.nextafter(X_axis.high, np.inf)):
+        with pytest.raises(OutOfRangeError, match=r"X must be in \[-2, 6\]"):
+            small.answer(np.array([x]), inside)
+    top = small.answer(inside, np.array([mu_axis.high]))
+    assert abs(top.phi_F[0] / greenwood_tripp.solve(1.0, mu_axis.high).phi_F - 1) <= top.error[0]
+    with pytest.raises(OutOfRangeError, match="mu must be at most 100"):
+        small.answer(inside, np.array([np.nextafter(mu_axis.high, np.inf)]))
+
+
+def test_corners_are_nodes_of_the_table(small):
+    X_axis, mu_axis = small.content.axes
+    for i, x in ((0, X_axis.low), (-1, X_axis.high)):
+        for j, m in ((0, mu_axis.low), (-1, mu_axis.high)):
+            found = small.log_ratio(np.array([x]), np.array([m]))[:, 0]
+            np.testing.assert_allclose(found, small.content.log_ratio[i, j], rtol=1e-9)
+
+
+def test_no_step_where_the_table_ends_below(small):
+    _, mu_axis = small.content.axes
+    X = np.linspace(-2, 6, 40)
+    above = small.log_ratio(X, np.full(40, np.nextafter(mu_axis.low, 1)))
+    below = small.log_ratio(X, np.full(40, np.nextafter(mu_axis.low, 0)))
+    np.testing.assert_allclose(above, below, rtol=1e-9)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e9, -1e9])
+def test_what_is_out_of_range_is_marked(small, bad):
+    X = np.array([0.0, bad, 1.0, bad])
+    with pytest.raises(OutOfRangeError) as caught:
+        small.answer(X, np.ones(4))
+    np.testing.assert_array_equal(caught.value.mask, [False, True, False, True])
+    assert "at (1,)" in str(caught.value)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e9])
+def test_a_mu_that_is_out_of_range_is_marked(small, bad):
+    with pytest.raises(OutOfRangeError) as caught:
+        small.answer(np.zeros(3), np.array([1.0, bad, 0.0]))
+    np.testing.assert_array_equal(caught.value.mask, [False, True, False])
+
+
+def test_shapes_and_input_are_kept(small):
+    X = np.linspace(-2, 6, 12).reshape(3, 4)
+    mu = np.logspace(-9, 2, 12).reshape(3, 4)
+    copies = X.copy(), mu.copy()
+    found = small.answer(X, mu)
+    np.testing.assert_array_equal((X, mu), copies)
+    flat = small.answer(X.ravel(), mu.ravel())
+    for name in ("phi_F", "phi_A", "error"):
+        assert getattr(found, name).shape == (3, 4)
+        np.testing.assert_array_equal(getattr(found, name).ravel(), getattr(flat, name))
+    turned = small.answer(X.T, mu.T)
+    np.testing.assert_array_equal(turned.phi_F, found.phi_F.T)
+
+
+def test_the_error_is_that_of_the_cell(small):
+    X_axis, mu_axis = small.content.axes
+    field = small.content.local_error
+    for i in (0, 4, 10):
+        for j in (0, 3, 8):
+            X, mu = X_axis.coordinate(i + 0.5), mu_axis.coordinate(j + 0.5)
+            assert int(error_cell(X_axis, 11, i + 0.5)) == i
+            found = small.answer(np.array([X]), np.array([mu])).error[0]
+            assert found == pytest.approx(field[i, j].max(), rel=1e-10, abs=2e-12)
+
+
+def test_opened_once_and_only_of_its_kind(tmp_path):
+    path = write_table(tmp_path / "universal.nc", small_table(UNIVERSAL))
+    assert universal_model(path) is universal_model(path)
+    assert universal_model(path).name == "universal"
+    write_table(tmp_path / "other.nc", small_table(ISLAND4D))
+    with pytest.raises(OSError, match="holds a table of kind 'island4d', not universal"):
+        universal_model(tmp_path / "other.nc")
+
+
+def test_threads_share_a_model(small):
+    from concurrent.futures import ThreadPoolExecutor
+
+    rng = np.random.default_rng(23)
+    X, mu = rng.uniform(-2, 6, (8, 5000)), 10 ** rng.uniform(-8, 2, (8, 5000))
+    alone = [small.answer(x, m).phi_F for x, m in zip(X, mu, strict=True)]
+    with ThreadPoolExecutor(8) as pool:
+        together = list(pool.map(lambda pair: small.answer(*pair).phi_F, zip(X, mu, strict=True)))
+    np.testing.assert_array_equal(together, alone)
+
+
+def test_content_is_not_changed(small):
+    before = dataclasses.replace(small.content, coefficients=small.content.coefficients.copy())
+    small.answer(np.linspace(-2, 6, 100), np.logspace(-9, 2, 100))
+    np.testing.assert_array_equal(before.coefficients, small.content.coefficients)
+
+
+@pytest.mark.parametrize("shape", [(2, 3), (1, 2, 2)])
+def test_marks_have_the_shape_of_the_arguments(small, shape):
+    X = np.zeros(shape)
+    X.flat[-1] = 7.0
+    for given in ((X, np.ones(shape)), (np.zeros(shape), 1e9 * (X > 0))):
+        with pytest.raises(OutOfRangeError) as caught:
+            small.answer(*given)
+        np.testing.assert_array_equal(caught.value.mask, X > 0)
+
+
+def test_a_negative_mu_is_refused(small):
+    with pytest.raises(OutOfRangeError):
+        small.answer(np.zeros(2), np.array([1.0, -1e-9]))

@@ -1,0 +1,84 @@
+"""Axes: places and coordinates are inverse of each other, ends are exact, the formula says the same."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mbma_tables.tablefiles.schema import Axis, error_cell, error_cells
+
+
+@st.composite
+def axes(draw):
+    transform = draw(st.sampled_from(["linear", "log"]))
+    offset = draw(st.floats(0, 20))
+    if transform == "log":
+        first = 10 ** draw(st.floats(-9, 2))
+        low = first - offset
+        high = first * (1 + 10 ** draw(st.floats(-1, 12))) - offset
+    else:
+        low = draw(st.floats(-50, 50))
+        high = low + 10 ** draw(st.floats(-2, 4))
+    return Axis("x", "a coordinate", transform, offset, low, high, draw(st.integers(2, 400)))
+
+
+@given(axes())
+def test_ends_are_exact(axis):
+    last = axis.nodes - 1
+    assert axis.coordinate(0) == axis.low
+    assert axis.coordinate(last) == axis.high
+    assert axis.values.shape == (axis.nodes,)
+    assert axis.values[0] == axis.low
+    assert axis.values[-1] == axis.high
+    assert (np.diff(axis.values) > 0).all()
+    assert axis.position(axis.low) == 0
+    # within the rounding of t, counted in steps
+    largest = max(abs(axis.start), abs(axis.start + last * axis.step))
+    assert abs(axis.position(axis.high) - last) <= 8e-16 * (last + largest / axis.step)
+
+
+@given(axes(), st.floats(0, 1))
+def test_positions_and_coordinates_are_inverse(axis, share):
+    position = share * (axis.nodes - 1)
+    x = axis.coordinate(position)
+    assert axis.low <= x <= axis.high or 0 < position < axis.nodes - 1
+    # rounding of t and of x, each counted in steps
+    largest = max(abs(axis.start), abs(axis.start + (axis.nodes - 1) * axis.step))
+    scale = 1 / (x + axis.offset) if axis.transform == "log" else 1.0
+    rounding = (largest + (abs(x) + axis.offset) * scale) / axis.step + axis.nodes
+    assert abs(axis.position(x) - position) <= 1e-15 * rounding
+
+
+@given(axes(), st.floats(0, 1))
+def test_the_formula_says_the_same(axis, share):
+    x = axis.coordinate(share * (axis.nodes - 1))
+    name, _, right = axis.formula().partition(" = ")
+    assert name == "position"
+    stated = eval(right, {"__builtins__": {}}, {"log": math.log, "x": float(x)})
+    expected = axis.position(x)
+    largest = max(abs(axis.start), abs(axis.start + (axis.nodes - 1) * axis.step))
+    assert abs(stated - expected) <= 1e-15 * (largest / axis.step + axis.nodes)
+
+
+def test_a_logarithmic_axis_by_hand():
+    axis = Axis("mu", "stiffness", "log", 0.0, 1e-8, 1e6, 15)
+    np.testing.assert_allclose(axis.values, 10.0 ** np.arange(-8, 7), rtol=1e-14)
+    assert axis.step == pytest.approx(math.log(10), rel=1e-14, abs=0)
+    assert axis.position(1.0) == pytest.approx(8, rel=1e-14, abs=0)
+    shifted = Axis("X", "approach", "log", 3.0, -2.0, 97.0, 3)
+    np.testing.assert_allclose(shifted.values, [-2.0, 7.0, 97.0], rtol=1e-14)
+
+
+@given(axes(), st.floats(0, 1))
+def test_error_cells_cover_the_axis_evenly(axis, share):
+    cells = error_cells(axis)
+    assert 1 <= cells <= 32
+    position = share * (axis.nodes - 1)
+    cell = int(error_cell(axis, cells, position))
+    width = (axis.nodes - 1) / cells
+    assert cell == cells - 1 or position < (cell + 1) * width * (1 + 1e-12)
+    assert position >= cell * width * (1 - 1e-12)
+    assert error_cell(axis, cells, 0.0) == 0
+    assert error_cell(axis, cells, axis.nodes - 1.0) == cells - 1

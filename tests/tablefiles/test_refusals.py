@@ -1,0 +1,255 @@
+"""Every damaged, edited or foreign file is refused on open, by a message that names it and the remedy."""
+
+import os
+
+import netCDF4
+import numpy as np
+import pytest
+from small_tables import copied, edited, seal, small_table, unseal
+
+from mbma_tables.errors import StaleTableWarning, TableFileError
+from mbma_tables.tablefiles import files
+from mbma_tables.tablefiles.files import SEAL_LENGTH, read_table, write_table
+from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory):
+    """The bytes of one good file of each kind."""
+    folder = tmp_path_factory.mktemp("good")
+    return {kind: write_table(folder / f"{kind}.nc", small_table(kind)).read_bytes() for kind in KINDS}
+
+
+def refused(path, kind=None):
+    with pytest.raises(TableFileError) as caught:
+        read_table(path, kind)
+    message = str(caught.value)
+    assert message.count(str(path)) == 1
+    assert message.count("`python -m generate ") == 1
+    assert "\n" not in message
+    return message
+
+
+def damages(content, rng):
+    """Without end: one way after the other to damage bytes, each with its name."""
+    size = len(content)
+    body = size - SEAL_LENGTH
+    while True:
+        for low, high in ((0, size), (0, 4096), (body, size)):
+            place, bit = int(rng.integers(low, high)), int(rng.integers(8))
+            yield f"bit {bit} of byte {place}", _put(content, place, bytes([content[place] ^ 1 << bit]))
+        for low in (0, body):
+            length = int(rng.integers(low, size))
+            yield f"cut to {length}", content[:length]
+        yield "head lost", content[int(rng.integers(1, size)) :]
+        extra = bytes(rng.integers(0, 256, int(rng.integers(1, 200)), dtype=np.uint8))
+        yield f"{len(extra)} bytes more", content + extra
+        length = int(rng.integers(1, 2000))
+        first, second = (int(p) for p in rng.integers(0, size - length, 2))
+        yield f"{length} zeros at {first}", _put(content, first, bytes(length))
+        yield f"{length} ones at {first}", _put(content, first, b"\xff" * length)
+        one, other = content[first : first + length], content[second : second + length]
+        yield f"{length} bytes of {first} and {second} swapped", _put(_put(content, first, other), second, one)
+        yield f"{length} bytes repeated", content[:first] + one + content[first:]
+        yield f"{length} bytes left out", content[:first] + content[first + length :]
+
+
+def _put(content, place, piece):
+    return content[:place] + piece + content[place + len(piece) :]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_thousand_ways_to_damage_the_bytes(kind, sources, tmp_path):
+    content = sources[kind]
+    path = tmp_path / f"{kind}.nc"
+    done = 0
+    for what, damaged in damages(content, np.random.default_rng(8)):
+        if damaged == content:
+            continue
+        path.write_bytes(damaged)
+        try:
+            message = refused(path, kind)
+        except BaseException as fault:
+            raise AssertionError(f"{what}: {fault}") from fault
+        assert "damaged" in message or "cut short" in message, what
+        done += 1
+        if done == 1000:
+            break
+
+
+@pytest.mark.parametrize("length", [0, 1, 8, SEAL_LENGTH - 1, SEAL_LENGTH, SEAL_LENGTH + 1])
+def test_almost_nothing_left(length, sources, tmp_path):
+    for piece in (sources[UNIVERSAL][:length], sources[UNIVERSAL][len(sources[UNIVERSAL]) - length :]):
+        path = tmp_path / "universal.nc"
+        path.write_bytes(piece)
+        refused(path)
+
+
+def edits(content):
+    """Every edit of one thing that netCDF tools can make, each with its name."""
+    with netCDF4.Dataset("table", memory=unseal(content)) as dataset:
+        names = list(dataset.variables)
+        attributes = [("", name) for name in dataset.ncattrs()]
+        attributes += [(name, a) for name, variable in dataset.variables.items() for a in variable.ncattrs()]
+        shapes = {name: variable.shape for name, variable in dataset.variables.items()}
+
+    def owner(dataset, name):
+        return dataset[name] if name else dataset
+
+    def change(name, place):
+        def edit(dataset):
+            dataset[name][place] = np.nextafter(float(dataset[name][place]), np.inf)
+
+        return edit
+
+    def swap(first, second):
+        def edit(dataset):
+            dataset.renameVariable(first, "between")
+            dataset.renameVariable(second, first)
+            dataset.renameVariable("between", second)
+
+        return edit
+
+    def attribute(name, key):
+        def edit(dataset):
+            value = owner(dataset, name).getncattr(key)
+            owner(dataset, name).setncattr(key, value + "x" if isinstance(value, str) else value + 1)
+
+        return edit
+
+    for name in names:
+        for place in ((0,) * len(shapes[name]), tuple(n - 1 for n in shapes[name])):
+            yield f"{name}{place} changed", change(name, place)
+        yield f"{name} renamed", lambda d, name=name: d.renameVariable(name, "other")
+        if name.endswith("_F"):
+            yield f"{name} and its A swapped", swap(name, f"{name[:-1]}A")
+    for number, (name, key) in enumerate(attributes):
+        yield f"{name}:{key} edited", attribute(name, key)
+        ways = (
+            lambda d, name=name, key=key: owner(d, name).delncattr(key),
+            lambda d, name=name, key=key: owner(d, name).renameAttribute(key, "other"),
+            lambda d, name=name, key=key: owner(d, name).setncattr(key, [1.5, 2.5]),
+        )
+        yield f"{name}:{key} {('deleted', 'renamed', 'of another type')[number % 3]}", ways[number % 3]
+    yield "attribute added", lambda d: d.setncattr("other", 1)
+    yield "scale factor added", lambda d: d["log_ratio_F"].setncattr("scale_factor", 2.0)
+    yield "variable added", lambda d: d.createVariable("other", "f8", ("X",))
+    yield "kind of the other", lambda d: d.setncattr("mbma_kind", UNIVERSAL if d.mbma_kind == ISLAND4D else ISLAND4D)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_edits_under_a_right_checksum(kind, sources, tmp_path):
+    done = 0
+    for what, edit in edits(sources[kind]):
+        path = edited(tmp_path / f"{kind}.nc", sources[kind], edit)
+        try:
+            refused(path, kind if done % 2 else None)
+        except BaseException as fault:
+            raise AssertionError(f"{what}: {fault}") from fault
+        done += 1
+    assert done > 200
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_variables_left_out_or_in_another_type(kind, sources, tmp_path):
+    path = tmp_path / f"{kind}.nc"
+    # as it is, the copy opens: what is refused below is the change
+    assert read_table(copied(path, sources[kind]), kind).kind == kind
+    with netCDF4.Dataset("table", memory=unseal(sources[kind])) as dataset:
+        names = list(dataset.variables)
+    for number, name in enumerate(names):
+        refused(copied(path, sources[kind], leave_out=name), kind)
+        refused(copied(path, sources[kind], change_type=(name, ("f4", "i4")[number % 2])), kind)
+    # the same numbers in the other byte order are the same table
+    assert read_table(copied(path, sources[kind], change_type=("log_ratio_F", ">f8")), kind).kind == kind
+
+
+def test_an_empty_edit_is_no_edit(sources, tmp_path):
+    for kind in KINDS:
+        found = read_table(edited(tmp_path / "table.nc", sources[kind], lambda d: None), kind)
+        np.testing.assert_array_equal(found.coefficients, small_table(kind).coefficients)
+
+
+def test_the_wrong_kind_under_a_right_name(sources, tmp_path):
+    for kind, other in (KINDS, KINDS[::-1]):
+        path = tmp_path / f"{kind}.nc"
+        path.write_bytes(sources[other])
+        message = refused(path, kind)
+        assert f"holds a table of kind '{other}', not {kind}" in message
+        assert f"`python -m generate {kind}`" in message
+        assert read_table(path).kind == other
+
+
+@pytest.mark.parametrize("version", ["0.9", "1.1", "2.0", 1.0, ""])
+def test_another_format(version, sources, tmp_path):
+    path = edited(tmp_path / "a.nc", sources[UNIVERSAL], lambda d: d.setncattr("format_version", version))
+    message = refused(path)
+    assert f"has format {version!r}, this library reads {files.FORMAT_VERSION}" in message
+    assert "`python -m generate universal`" in message
+
+
+def test_no_table_at_all(tmp_path):
+    assert "No such file" in refused(tmp_path / "missing.nc")
+    assert "No such file" in refused(tmp_path / "no" / "folder.nc")
+    assert "is no regular file" in refused(tmp_path)
+    for name, content in (("empty.nc", b""), ("text.nc", b"X,mu,phi_F\n1,2,3\n" * 50), ("zeros.nc", bytes(5000))):
+        (tmp_path / name).write_bytes(content)
+        assert "is no table file" in refused(tmp_path / name)
+    (tmp_path / "under_a_file").write_bytes(b"")
+    assert "cannot be read" in refused(tmp_path / "under_a_file" / "table.nc")
+    os.mkfifo(tmp_path / "pipe")
+    assert "is no regular file" in refused(tmp_path / "pipe")
+
+
+@pytest.mark.parametrize("format", ["NETCDF4", "NETCDF3_CLASSIC"])
+def test_a_netcdf_file_of_another_purpose(format, tmp_path):
+    path = tmp_path / "foreign.nc"
+    with netCDF4.Dataset(path, "w", format=format) as dataset:
+        dataset.createDimension("X", 3)
+        dataset.createVariable("log_ratio_F", "f8", ("X",))[...] = [1.0, 2.0, 3.0]
+    assert "no checksum at its end" in refused(path)
+    path.write_bytes(seal(path.read_bytes()))
+    assert "holds a table of kind None" in refused(path)
+
+
+@pytest.mark.parametrize("body", [b"", b"no netCDF", bytes(3000), b"\x89HDF\r\n\x1a\n", b"CDF\x01" + bytes(60)])
+def test_a_right_checksum_over_anything(body, tmp_path):
+    path = tmp_path / "table.nc"
+    path.write_bytes(seal(body))
+    refused(path)
+
+
+def test_a_file_larger_than_any_table(tmp_path):
+    path = tmp_path / "large.nc"
+    with path.open("wb") as file:
+        file.truncate(files.LARGEST_FILE + 1)
+    assert f"{files.LARGEST_FILE + 1} bytes are more than any table has" in refused(path)
+
+
+def test_a_file_that_may_not_be_read(sources, tmp_path):
+    path = tmp_path / "secret.nc"
+    path.write_bytes(sources[UNIVERSAL])
+    path.chmod(0)
+    own = os.geteuid()
+    # whoever may read everything becomes nobody for a moment
+    if own == 0:
+        os.seteuid(65534)
+    try:
+        assert "cannot be read (Permission denied)" in refused(path)
+    finally:
+        if own == 0:
+            os.seteuid(own)
+
+
+def test_another_solver_is_a_warning(sources, tmp_path, monkeypatch):
+    for kind in KINDS:
+        path = tmp_path / f"{kind}.nc"
+        path.write_bytes(sources[kind])
+        assert read_table(path, kind).kind == kind
+    monkeypatch.setattr(files.provenance, "physics_digest", lambda modules: "0" * 64)
+    for kind in KINDS:
+        with pytest.warns(StaleTableWarning, match=f"{kind}.nc was made by .*`python -m generate {kind}`") as caught:
+            content = read_table(tmp_path / f"{kind}.nc", kind)
+        assert len(caught) == 1
+        assert caught[0].filename == __file__
+        np.testing.assert_array_equal(content.log_ratio, small_table(kind).log_ratio)

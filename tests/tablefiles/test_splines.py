@@ -1,0 +1,163 @@
+"""Spline coefficients and their compiled evaluation against scipy, polynomials, and arithmetic at 50 digits."""
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
+from small_tables import at_positions
+
+from mbma_tables.tablefiles import interpolate
+from mbma_tables.tablefiles.interpolate import fill_gradient_2d
+from mbma_tables.tablefiles.splines import TAPS, coefficients, padding
+
+WEIGHTS = {3: (interpolate.cubic, interpolate.cubic_slope), 5: (interpolate.quintic, interpolate.quintic_slope)}
+SHAPES = {5: (11, 8), 3: (8, 7, 6, 5)}
+
+
+def node_values(shape, seed=1):
+    """Smooth values and noise, two components."""
+    rng = np.random.default_rng(seed)
+    grid = np.meshgrid(*(np.linspace(0, 2, n) for n in shape), indexing="ij")
+    smooth = np.stack([np.sin(sum(grid)), np.exp(-grid[0] * grid[1])], axis=-1)
+    return smooth + 0.3 * rng.standard_normal((*shape, 2))
+
+
+def by_scipy(values, degree, axes):
+    """The not-a-knot tensor spline of scipy."""
+    knots = []
+    for axis in range(axes):
+        one = make_interp_spline(np.arange(values.shape[axis]), values, k=degree, axis=axis)
+        knots.append(one.t)
+        values = np.moveaxis(one.c, 0, axis) if one.c.shape != values.shape else one.c
+    return NdBSpline(tuple(knots), values, degree)
+
+
+def random_positions(shape, count, seed=2):
+    rng = np.random.default_rng(seed)
+    corners = np.stack(np.meshgrid(*([0.0, n - 1.0] for n in shape), indexing="ij"), -1).reshape(-1, len(shape))
+    inside = rng.uniform(0, 1, (count, len(shape))) * (np.array(shape) - 1)
+    on_nodes = np.floor(rng.uniform(0, 1, (count, len(shape))) * np.array(shape))
+    return [np.ascontiguousarray(column) for column in np.concatenate([corners, inside, on_nodes]).T]
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+def test_tensor_splines_are_those_of_scipy(degree):
+    shape = SHAPES[degree]
+    values = node_values(shape)
+    coefs = coefficients(values, degree, len(shape))
+    assert coefs.shape == (*(n + degree - 1 for n in shape), 2)
+    positions = random_positions(shape, 500)
+    found = at_positions(coefs, positions).T
+    expected = by_scipy(values, degree, len(shape))(np.stack(positions, axis=-1))
+    np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11 * np.abs(values).max())
+
+
+def test_gradients_are_those_of_scipy():
+    shape = SHAPES[5]
+    values = node_values(shape, seed=4)
+    positions = random_positions(shape, 500)
+    out = np.empty((6, positions[0].size))
+    fill_gradient_2d(coefficients(values, 5, 2), *positions, out)
+    spline = by_scipy(values, 5, 2)
+    for rows, nu in (((0, 3), (0, 0)), ((1, 4), (1, 0)), ((2, 5), (0, 1))):
+        expected = spline(np.stack(positions, axis=-1), nu=nu).T
+        np.testing.assert_allclose(out[list(rows)], expected, rtol=1e-10, atol=1e-11 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+def test_nodes_are_met(degree):
+    shape = SHAPES[degree]
+    values = node_values(shape, seed=5)
+    coefs = coefficients(values, degree, len(shape))
+    positions = [g.ravel().astype(float) for g in np.meshgrid(*(np.arange(n) for n in shape), indexing="ij")]
+    found = at_positions(coefs, positions).T.reshape(values.shape)
+    np.testing.assert_allclose(found, values, rtol=0, atol=1e-13 * np.abs(values).max())
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+def test_polynomials_of_the_degree_are_exact(degree):
+    shape = SHAPES[degree]
+    rng = np.random.default_rng(6)
+    factors = [np.polynomial.Polynomial(rng.standard_normal(degree + 1), domain=[0, n - 1]) for n in shape]
+    others = [np.polynomial.Polynomial(rng.standard_normal(degree + 1), domain=[0, n - 1]) for n in shape]
+
+    def both(positions):
+        product = [np.prod([f(p) for f, p in zip(fs, positions, strict=True)], axis=0) for fs in (factors, others)]
+        return np.stack(product, axis=-1)
+
+    values = both(np.meshgrid(*(np.arange(n, dtype=float) for n in shape), indexing="ij"))
+    coefs = coefficients(values, degree, len(shape))
+    positions = random_positions(shape, 300)
+    found = at_positions(coefs, positions).T
+    np.testing.assert_allclose(found, both(positions), rtol=0, atol=1e-12 * np.abs(values).max())
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+@pytest.mark.parametrize("nodes", [7, 12, 300])
+def test_one_axis_against_scipy_and_more_components(degree, nodes):
+    rng = np.random.default_rng(nodes)
+    values = rng.standard_normal((nodes, 3, 2))
+    untouched = values.copy()
+    coefs = coefficients(values, degree, 1)
+    assert coefs.shape == (nodes + degree - 1, 3, 2)
+    np.testing.assert_array_equal(values, untouched)
+    # coefficients of cardinal splines are those of a B-spline on uniform knots
+    pad = padding(degree)
+    knots = np.arange(-degree, nodes + degree, dtype=float)
+    assert len(knots) - degree - 1 == len(coefs) == nodes + 2 * pad
+    places = np.linspace(0, nodes - 1, 977)
+    expected = make_interp_spline(np.arange(nodes), values, k=degree)(places)
+    np.testing.assert_allclose(BSpline(knots, coefs, degree)(places), expected, rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+def test_weights_at_fifty_digits(degree):
+    value, slope = (kernel.py_func for kernel in WEIGHTS[degree])
+    with mpmath.workdps(50):
+        for number in range(degree + 1):
+
+            def exact(u, order=0, number=number):
+                # the cardinal B-spline by divided differences of truncated powers
+                x = u + degree - number
+                terms = (
+                    (-1) ** k * mpmath.binomial(degree + 1, k) * max(x - k, mpmath.mpf(0)) ** (degree - order)
+                    for k in range(degree + 2)
+                )
+                return mpmath.fsum(terms) / mpmath.factorial(degree - order)
+
+            for u in (mpmath.mpf(k) / 17 for k in range(18)):
+                # 2/3 is rounded
+                assert abs(value(u)[number] - exact(u)) < 1e-16
+                assert abs(slope(u)[number] - exact(u, 1)) < 1e-16
+    for u in np.linspace(0, 1, 11):
+        assert sum(WEIGHTS[degree][0](u)) == pytest.approx(1, rel=4e-16, abs=0)
+        assert sum(WEIGHTS[degree][1](u)) == pytest.approx(0, abs=4e-16)
+    np.testing.assert_allclose(value(0.0)[:-1], TAPS[degree], rtol=2e-16)
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+def test_smooth_across_the_borders_of_cells(degree):
+    value, slope = (kernel.py_func for kernel in WEIGHTS[degree])
+    with mpmath.workdps(60):
+        one, zero = mpmath.mpf(1), mpmath.mpf(0)
+        for order in range(degree):
+            for number in range(degree + 2):
+                # the same B-spline seen from the cell before the border and from that behind it
+                before, behind = (
+                    mpmath.diff(lambda u, k=k: value(u)[k], at, order) if 0 <= k <= degree else zero
+                    for k, at in ((number, one), (number - 1, zero))
+                )
+                assert abs(before - behind) < 1e-16
+        for number in range(degree):
+            assert abs(slope(one)[number + 1] - slope(zero)[number]) == 0
+
+
+def test_the_last_node_belongs_to_the_table():
+    assert interpolate.cell(9.0, 10) == (8, 1.0)
+    assert interpolate.cell(0.0, 10) == (0, 0.0)
+    assert interpolate.cell(3.0, 10) == (3, 0.0)
+    assert interpolate.cell(np.nextafter(9.0, 10.0), 10)[0] == 8
+    values = node_values((8, 9))
+    coefs = coefficients(values, 5, 2)
+    found = at_positions(coefs, [np.array([7.0]), np.array([8.0])])[:, 0]
+    np.testing.assert_allclose(found, values[-1, -1], rtol=0, atol=1e-13 * np.abs(values).max())

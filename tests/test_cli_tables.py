@@ -1,0 +1,166 @@
+"""`mbma tables list | info | verify`: what they print, warn of and refuse."""
+
+import dataclasses
+import json
+import pathlib
+
+import pytest
+from click.testing import CliRunner
+
+from mbma_tables import greenwood_tripp
+from mbma_tables.cli import main
+from mbma_tables.models import tabulated
+from mbma_tables.tablefiles import files
+from mbma_tables.tablefiles.files import FORMAT_VERSION, read_table, write_table
+from mbma_tables.tablefiles.schema import KINDS
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Small tables in place of the shipped ones."""
+    monkeypatch.syspath_prepend(pathlib.Path(__file__).parent / "tablefiles")
+    from small_tables import small_table
+
+    for kind in KINDS:
+        write_table(tmp_path / f"{kind}.nc", small_table(kind))
+    monkeypatch.setattr(tabulated, "shipped", lambda kind: tmp_path / f"{kind}.nc")
+    return tmp_path
+
+
+@pytest.fixture
+def stale(monkeypatch):
+    monkeypatch.setattr(files.provenance, "physics_digest", lambda modules: "0" * 64)
+
+
+def run(*arguments, warned=()):
+    result = CliRunner().invoke(main, ["tables", *arguments])
+    assert result.exit_code == 0, result.stderr
+    lines = result.stderr.splitlines()
+    assert len(lines) == len(warned), result.stderr
+    for line, kind in zip(lines, warned, strict=True):
+        assert line.startswith("mbma: warning: ")
+        assert f"{kind}.nc was made by another version of the solver" in line
+        assert f"`python -m generate {kind}`" in line
+    return result.stdout
+
+
+def refused(*arguments):
+    result = CliRunner().invoke(main, ["tables", *arguments])
+    assert result.exit_code == 2, result.output
+    assert isinstance(result.exception, SystemExit)
+    assert result.stdout == ""
+    assert result.stderr.startswith("mbma: ")
+    assert 1 <= len(result.stderr.splitlines()) <= 2
+    return result.stderr
+
+
+def test_list(folder):
+    lines = run("list").splitlines()
+    assert [line.partition(":")[0] for line in lines] == list(KINDS)
+    assert "12 X x 10 mu; reading any" in lines[0]
+    assert "9 X x 10 spread x 6 sphere x 7 hurst; reading reported" in lines[1]
+    rows = json.loads(run("list", "--json"))["tables"]
+    for row, kind, line in zip(rows, KINDS, lines, strict=True):
+        content = read_table(folder / f"{kind}.nc")
+        assert row == {
+            "kind": kind,
+            "path": str(folder / f"{kind}.nc"),
+            "bytes": (folder / f"{kind}.nc").stat().st_size,
+            "nodes": {axis.name: axis.nodes for axis in content.axes},
+            "reading": content.attributes["reading"],
+            "data_version": content.attributes["data_version"],
+            "largest_error": {f: content.attributes[f"largest_error_{f}"] for f in ("F", "A")},
+        }
+        assert f"{row['bytes']} bytes; data {row['data_version']}; {row['path']}" in line
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_info_by_kind_and_by_file(kind, folder):
+    text = run("info", kind)
+    assert run("info", str(folder / f"{kind}.nc")) == text
+    content = read_table(folder / f"{kind}.nc")
+    for axis in content.axes:
+        assert f"axis {axis.name}: {axis.long_name}, {axis.low:g} to {axis.high:g}, {axis.nodes} nodes" in text
+        assert axis.formula() in text
+    for name, value in content.attributes.items():
+        assert f"{name}: {value}\n" in text
+    shown = json.loads(run("info", kind, "--json"))
+    assert shown["attributes"] == content.attributes
+    assert shown["attributes"]["format_version"] == FORMAT_VERSION
+    assert shown["axes"] == {a.name: {**a.attributes(), "nodes": a.nodes} for a in content.axes}
+
+
+def test_verify_all_some_and_files(folder):
+    lines = run("verify").splitlines()
+    assert len(lines) == 2
+    for line, kind in zip(lines, KINDS, strict=True):
+        assert line.startswith(f"{folder / kind}.nc: hashes match; conformance points within ")
+        assert "solved anew" not in line
+    assert run("verify", "island4d").splitlines() == lines[1:]
+    assert run("verify", str(folder / "universal.nc")).splitlines() == lines[:1]
+    assert run("verify", "island4d", "universal").splitlines() == lines[::-1]
+
+
+def test_verify_solves_anew(folder):
+    for line in run("verify", "--resolve", "3").splitlines():
+        assert line.endswith("; 3 solved anew: identical to the bit")
+    tables = json.loads(run("verify", "--resolve", "3", "--json"))["tables"]
+    for row, kind in zip(tables, KINDS, strict=True):
+        numbers = {"conformance_error", "resolved", "resolved_error"}
+        assert row.keys() == {"path", "kind", "stale", "identical"} | numbers
+        assert row["path"] == str(folder / f"{kind}.nc")
+        assert (row["kind"], row["resolved"], row["resolved_error"]) == (kind, 3, 0)
+        assert row["identical"]
+        assert row["stale"] is None
+        assert 0 <= row["conformance_error"] < 1e-11
+
+
+def test_answers_of_another_machine_or_solver(folder, monkeypatch):
+    solve = greenwood_tripp.solve
+
+    def nearby(X, mu, rtol):
+        found = solve(X, mu, rtol=rtol)
+        return dataclasses.replace(found, phi_F=found.phi_F * (1 + 2e-12))
+
+    monkeypatch.setattr(greenwood_tripp, "solve", nearby)
+    text = run("verify", "universal", "--resolve", "3")
+    assert text.endswith("3 solved anew: equal within 2.0e-12 (another processor or library version)\n")
+    monkeypatch.setattr(files.provenance, "physics_digest", lambda modules: "0" * 64)
+    text = run("verify", "universal", "--resolve", "3", warned=["universal"])
+    assert text.endswith("3 solved anew: equal within 2.0e-12 (another version of the solver)\n")
+
+
+def test_stale_tables_are_one_line_each(folder, stale):
+    for command in ("list", "verify"):
+        assert len(run(command, warned=KINDS).splitlines()) == 2
+        assert len(json.loads(run(command, "--json", warned=KINDS))["tables"]) == 2
+    run("info", "universal", warned=["universal"])
+    assert json.loads(run("info", "island4d", "--json", warned=["island4d"]))["attributes"]["mbma_kind"] == "island4d"
+    (row,) = json.loads(run("verify", "universal", "--json", warned=["universal"]))["tables"]
+    assert "makes it anew" in row["stale"]
+
+
+@pytest.mark.parametrize("json_form", [[], ["--json"]])
+def test_a_wrong_checksum_is_an_error(json_form, folder):
+    path = folder / "universal.nc"
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    for arguments in (["list"], ["info", "universal"], ["verify"], ["verify", "island4d", str(path)]):
+        message = refused(*arguments, *json_form)
+        assert f"{path}: is damaged (its checksum does not match)" in message
+        assert "`python -m generate all`" in message
+
+
+def test_a_missing_table_and_a_wrong_kind(folder):
+    assert "univrsal: cannot be read (No such file or directory)" in refused("verify", "univrsal")
+    (folder / "universal.nc").replace(folder / "island4d.nc")
+    assert "holds a table of kind 'universal', not island4d" in refused("verify", "island4d")
+    assert "holds a table of kind 'universal', not island4d" in refused("info", "island4d")
+    assert "universal.nc: cannot be read" in refused("list")
+
+
+def test_misuse(folder):
+    assert "-1" in refused("verify", "--resolve", "-1")
+    assert "TABLE" in refused("info")
+    assert "No such command" in refused("remake")
