@@ -37,7 +37,7 @@ def finite_array(name: str, value: ArrayLike) -> FloatArray:
         raise InputError(f"{name} is empty: at least one number is needed")
     bad = ~np.isfinite(array)
     if bad.any():
-        raise InputError(f"{name} must be finite, got {describe_entries(array, bad)}")
+        raise OutOfRangeError(f"{name} must be finite, got {describe_entries(array, bad)}", bad)
     return array
 
 

@@ -7,6 +7,7 @@ numba or scipy is imported where a command runs, so that ``--help`` answers at o
 from __future__ import annotations
 
 import sys
+import warnings
 from typing import Any
 
 import click
@@ -31,12 +32,18 @@ def _describe(fault: Exception) -> str:
     return " ".join(str(fault).split())
 
 
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    """A warning as one line."""
+    click.echo(f"mbma: warning: {' '.join(str(message).split())}", err=True)
+
+
 class Program(click.Group):
     """A group of commands whose every known fault ends in a short message."""
 
     def main(self, *args: Any, **extra: Any) -> Any:
         """Run, and exit with 0, or with 2 for bad input."""
         extra["standalone_mode"] = False
+        warnings.showwarning = _show_warning
         try:
             code = super().main(*args, **extra)
         except click.Abort:

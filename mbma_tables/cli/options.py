@@ -77,7 +77,7 @@ model_options = _stack(
         help="Reading of the paper's equations.",
     ),
     click.option(
-        "--tier", default="exact", show_default=True, metavar="exact|universal|island4d|rigid", help="Island model."
+        "--tier", default="universal", show_default=True, metavar="exact|universal|island4d|rigid", help="Island model."
     ),
     click.option("--rtol", type=float, default=DEFAULT_RTOL, show_default=True, help="Relative error asked for."),
 )

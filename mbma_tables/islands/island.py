@@ -82,7 +82,7 @@ def scale_area(g: dict[str, FloatArray]) -> FloatArray:
 def island(
     surface: Surface,
     delta: ArrayLike,
-    tier: str = "exact",
+    tier: str = "universal",
     reading: str | Reading = "reported",
     E_star: float = 1.0,
     rtol: float = 1e-9,
@@ -95,7 +95,7 @@ def island(
         One surface or a batch; it broadcasts against `delta`.
     delta : array_like
         Approach z_max - d of the island [length], positive.
-    tier : {"exact", "universal", "island4d", "rigid"}
+    tier : {"universal", "island4d", "exact", "rigid"}
         The island model.
     reading : {"reported", "printed"} or Reading
         Which reading of the paper's equations.

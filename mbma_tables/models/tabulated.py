@@ -22,8 +22,6 @@ from mbma_tables.tablefiles.files import read_table
 from mbma_tables.tablefiles.interpolate import fill_2d, fill_4d
 from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL, Axis, TableContent, error_cell
 
-SECOND_ORDER = 1e-12  # what the expansion about the rigid sphere leaves below mu = 1e-8
-
 
 class UniversalModel(TwoNumberModel):
     """Phi_F and Phi_A from a universal table.
@@ -116,7 +114,7 @@ class UniversalModel(TwoNumberModel):
             error_cell(axis, cells, axis.position(x))
             for axis, cells, x in zip((self._X, self._mu), field.shape, (X, lowest), strict=True)
         )
-        bound: FloatArray = field[tuple(places)] + SECOND_ORDER
+        bound: FloatArray = field[tuple(places)] + universal_kernel.SECOND_ORDER
         return bound
 
 

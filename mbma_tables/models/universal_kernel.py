@@ -19,6 +19,7 @@ from mbma_tables.tablefiles.interpolate import gradient_2d, value_2d
 Axes = tuple[float, float, float, float, float, float, float, float, float]
 OK, X_BELOW, X_ABOVE, MU_ABOVE, UNRESOLVED = 0, 1, 2, 3, 4
 REASONS = {X_BELOW: "X below", X_ABOVE: "X above", MU_ABOVE: "mu above"}
+SECOND_ORDER = 1e-12  # what the expansion about the rigid sphere leaves below mu = 1e-8
 _LOOSE = {"contract", "reassoc", "arcp"}
 
 
@@ -44,7 +45,7 @@ def universal_phi(
     column = min(int(place_mu * errors.shape[1] / (table.shape[1] - 5)), errors.shape[1] - 1)
     phi_F = math.pi / 5.0 * mu * f_five_halves(-X) * math.exp(force * share)
     phi_A = math.pi / 2.0 * f_two(-X) * math.exp(area * share)
-    return OK, phi_F, phi_A, errors[max(row, 0), max(column, 0)]
+    return OK, phi_F, phi_A, errors[max(row, 0), max(column, 0)] + SECOND_ORDER
 
 
 @njit(cache=True, error_model="numpy")
@@ -80,7 +81,7 @@ def universal_slopes(
         math.pi / 2.0 * two * math.exp(g * share),
         g_X * by_X + 2.0 * f_one(-X) / two,
         A_mu,
-        errors[row, column],
+        errors[row, column] + SECOND_ORDER,
     )
 
 

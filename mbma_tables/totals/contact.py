@@ -134,7 +134,9 @@ def contact(
         return np.broadcast_to(np.asarray(field, dtype=float), shape).ravel()
 
     room = flat(surface.h_rms / surface.s)
-    zeta_1, hurst = flat(surface.zeta_1), flat(surface.hurst)
+    most = np.broadcast_to(np.asarray(surface.zeta_1), shape)
+    require("q1/q0", most, most > rule.floor_u, f"greater than {rule.floor_u:g}, the reading's floor of zeta_u")
+    zeta_1, hurst = flat(most), flat(surface.hurst)
     pairs = Pairs(
         hurst=hurst,
         zeta_1=zeta_1,

@@ -55,6 +55,7 @@ def exact_island(approach: float, hurst: float, zeta_1: float, density_divisor: 
             "mu": mp.mpf(8) / 3 * D * sigma * mp.sqrt(2 * R_u * R_d),
             "D_d": D_d,
             "sigma_d": sigma_d,
+            "width": mp.log(zeta_u / zeta_d),
         }
 
 

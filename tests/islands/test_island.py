@@ -44,7 +44,7 @@ def test_force_and_area(surface, reading):
     assert np.abs(found.area / area - 1).max() <= 1e-9
     assert (np.abs(found.force / force - 1) <= found.error).all()
     assert found.reading == reading
-    assert found.tier == "exact"
+    assert found.tier == "universal"
 
 
 def test_rigid_tier(surface):

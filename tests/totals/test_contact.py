@@ -9,10 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, contact, greenwood_tripp
+from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, greenwood_tripp
+from mbma_tables import contact as contact_by_tier
 from mbma_tables.islands.island import geometry
 from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED, get_reading
-from mbma_tables.totals.contact import kinks
+from mbma_tables.totals.pairs import kinks
+
+contact = functools.partial(contact_by_tier, tier="exact")
 
 OWN = dataclasses.replace(
     PRINTED, name="own", jacobian="exact", offset=True, beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5
