@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
+from mbma_tables.errors import InputError
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 
 NAMES = ("force", "area", "error")
@@ -29,6 +31,7 @@ def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
         dask="parallelized",
         output_dtypes=[float] * outputs,
         join="exact",
+        keep_attrs=False,
     )
 
 
@@ -51,8 +54,11 @@ def contact_of_labelled(
         return tuple(getattr(found, name) for name in NAMES) + tuple(slopes)
 
     arguments = (*(getattr(surface, name) for name in PARAMETERS), separation, E_star)
+    for name, given in zip((*PARAMETERS, "separation", "E_star"), arguments, strict=True):
+        if not hasattr(given, "dims") and np.ndim(given):
+            raise InputError(f"beside DataArrays, {name} must be one or a scalar, got shape {np.shape(given)}")
     outputs = apply(block, arguments, len(NAMES) + len(by))
-    force, area, error = outputs[: len(NAMES)]
+    force, area, error = (found.rename(name) for found, name in zip(outputs, NAMES, strict=False))
     force.attrs = {"long_name": "force over nominal area", "units": "unit of E_star"}
     area.attrs = {"long_name": "real over nominal contact area", "units": "1"}
     error.attrs = {"long_name": "bound on the relative error of force and area", "units": "1"}

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.arguments import FloatArray, finite_array, number_in, require
 from mbma_tables.errors import ConvergenceError, InputError
 from mbma_tables.surfaces.readings import Reading, get_reading
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.totals import law_kernel
 from mbma_tables.totals.contact import contact
 from mbma_tables.totals.pairs import kinks
@@ -110,6 +110,12 @@ class ContactLaw:
         OutOfRangeError
             Where the branch does not reach the value; the message says how far it goes.
         """
+        given = area if force is None else force
+        if (force is None or area is None) and hasattr(given, "dims"):
+            from mbma_tables.totals.labelled import apply
+
+            kind = "area" if force is None else "force"
+            return apply(lambda block: self.separation(**{kind: block}), (given,), 1)
         if force is not None and area is None:
             what, name, wanted = law_kernel.FORCE, "force", finite_array("force", force)
         elif area is not None and force is None:
@@ -182,6 +188,8 @@ def contact_law(
     ------
     InputError, OutOfRangeError, ConvergenceError
     """
+    if surface.labelled:
+        surface = Surface(*(np.asarray(getattr(surface, name)) for name in PARAMETERS))
     if surface.shape != ():
         raise InputError(f"a law is of one surface, got a batch of shape {surface.shape}")
     asked = number_in("rtol", rtol, LEAST_RTOL, 0.1)
