@@ -115,11 +115,29 @@ def contact(
         # xarray comes in with its own objects
         from mbma_tables.totals.labelled import contact_of_labelled
 
-        def answer(surface: Surface, separation: Any, E_star: Any) -> Contact:
-            return contact(surface, separation, tier, reading, E_star, rtol, outside, derivatives)
+        # of all gaps: answers do not depend on how they are cut into blocks
+        many = bool(getattr(separation, "size", 1) >= MANY_GAPS)
+
+        def answer(block: Surface, gaps: Any, modulus: Any) -> Contact:
+            return _contact(block, gaps, tier, reading, modulus, rtol, outside, derivatives, many)
 
         fields = contact_of_labelled(answer, surface, separation, E_star, derivatives)
         return Contact(**fields, reading=get_reading(reading).name, tier=tier, islands=None)
+    return _contact(surface, separation, tier, reading, E_star, rtol, outside, derivatives)
+
+
+def _contact(
+    surface: Surface,
+    separation: ArrayLike,
+    tier: str,
+    reading: str | Reading,
+    E_star: ArrayLike,
+    rtol: float,
+    outside: str,
+    derivatives: bool,
+    many: bool | None = None,
+) -> Contact:
+    """`contact` of plain arrays; `many` says whether they are a block of many gaps."""
     gap = finite_array("separation", separation)
     modulus = finite_array("E_star", E_star)
     require("E_star", modulus, modulus > 0, "positive")
@@ -157,7 +175,8 @@ def contact(
             force, area = sums[:, 0, 0], sums[:, 1, 0]
             force_by, area_by = _by_parameter(surface, sums.reshape((*shape, 2, 5)), pairs, stress)
         elif isinstance(model, UniversalModel):
-            frozen = _through_law(surface, gap, modulus, rule, rtol)
+            own = gap.size >= MANY_GAPS if many is None else many
+            frozen = _through_law(surface, gap, modulus, rule, rtol) if own else None
             if frozen is not None:
                 force, area, error = frozen
                 islands = None
@@ -186,7 +205,7 @@ def _through_law(
     surface: Surface, gap: FloatArray, modulus: FloatArray, reading: Reading, rtol: float
 ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """F/(A0 E* q0 s), A/A0 and their error through a law of half the tolerance, where one surface has many gaps."""
-    if surface.shape != () or modulus.ndim or gap.size < MANY_GAPS or rtol < FROZEN_RTOL:
+    if surface.shape != () or modulus.ndim or rtol < FROZEN_RTOL:
         return None
     # laws are made of totals
     from mbma_tables.totals.law import contact_law

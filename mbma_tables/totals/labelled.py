@@ -16,11 +16,6 @@ from mbma_tables.surfaces.surface import PARAMETERS, Surface
 NAMES = ("force", "area", "error")
 
 
-def is_labelled(*arguments: Any) -> bool:
-    """Whether any argument is a DataArray."""
-    return any(isinstance(argument, xr.DataArray) for argument in arguments)
-
-
 def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
     """`function` of broadcast arguments, block by block where they are dask arrays."""
     return xr.apply_ufunc(

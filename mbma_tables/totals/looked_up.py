@@ -16,6 +16,8 @@ from mbma_tables.totals import lookup
 from mbma_tables.totals.island_sum import sum_islands
 from mbma_tables.totals.pairs import Pairs
 
+QUADRATURE_SHARE = 0.9  # of the tolerance asked for; a table's own error comes on top
+
 
 def _refused(
     status: NDArray[np.int64], pairs: Pairs, model: UniversalModel, outside: str, shape: tuple[int, ...]
@@ -48,7 +50,7 @@ def look_up(
         pairs.zeta_1,
         pairs.reach,
         pairs.top,
-        0.5 * rtol,
+        QUADRATURE_SHARE * rtol,
         reading.numbers,
         reading.jacobian == "printed",
         *model.kernel,
@@ -84,7 +86,7 @@ def look_up_slopes(
         pairs.zeta_1,
         pairs.reach,
         pairs.top,
-        0.5 * rtol,
+        QUADRATURE_SHARE * rtol,
         reading.numbers,
         reading.jacobian == "printed",
         *model.kernel,
