@@ -297,9 +297,9 @@ def test_outside_there_is_no_answer(small):
 
 
 def test_error_field_is_read_where_the_library_reads_it(small):
-    from mbma_tables.models.tabulated import universal_model
+    from mbma_tables import open_table
 
-    model, reader = universal_model(small["universal"]), Reader(small["universal"])
+    model, reader = open_table(small["universal"]), Reader(small["universal"])
     rng = np.random.default_rng(5)
     X, mu = rng.uniform(0, 6, 40), np.exp(rng.uniform(math.log(1e-3), math.log(10), 40))
     theirs = model.answer(X, mu).error

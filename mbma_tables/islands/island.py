@@ -117,6 +117,8 @@ def island(
     modulus = finite_array("E_star", E_star)
     require("E_star", modulus, modulus > 0, "positive")
     rule = get_reading(reading)
+    largest = np.asarray(surface.zeta_1)
+    require("q1/q0", largest, largest > rule.floor_u, f"above floor_u = {rule.floor_u:g} of the reading {rule.name!r}")
     model = get_model(tier, rtol, rule)
     shape = broadcast_shape(delta=approach, surface=surface.hurst)
     approach, hurst, zeta_1 = (

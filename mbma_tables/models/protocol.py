@@ -9,6 +9,9 @@ from typing import Protocol
 
 from mbma_tables.arguments import FloatArray
 
+OUTSIDE = ("raise", "exact", "nan")  # what to do about islands that a table does not cover
+EXACT_RTOL = 1e-10  # of the exact solver, where it stands in for a table
+
 
 @dataclasses.dataclass(frozen=True)
 class IslandAnswer:
@@ -26,17 +29,20 @@ class IslandModel(Protocol):
     def name(self) -> str:
         """The tier that selects it."""
 
-    def of_islands(self, islands: Mapping[str, FloatArray]) -> IslandAnswer:
-        """Phi_F and Phi_A of islands, given as `islands.geometry.FIELDS` and hurst, arrays of one shape."""
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
+        """Phi_F and Phi_A of islands, given as `islands.geometry.FIELDS` and hurst, arrays of one shape.
+
+        `outside` is one of `OUTSIDE`.
+        """
 
 
 class TwoNumberModel(abc.ABC):
     """A model that needs X and mu of an island and nothing else."""
 
     @abc.abstractmethod
-    def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
+    def answer(self, X: FloatArray, mu: FloatArray, *, outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A at finite X and mu >= 0."""
 
-    def of_islands(self, islands: Mapping[str, FloatArray]) -> IslandAnswer:
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A of islands."""
-        return self.answer(islands["X"], islands["mu"])
+        return self.answer(islands["X"], islands["mu"], outside=outside)

@@ -20,7 +20,7 @@ class ExactModel(TwoNumberModel):
     rtol: float
     name: str = "exact"
 
-    def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
+    def answer(self, X: FloatArray, mu: FloatArray, *, outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A by `greenwood_tripp.solve`."""
         solved = greenwood_tripp.solve(X, mu, rtol=self.rtol)
         return IslandAnswer(solved.phi_F, solved.phi_A, solved.error)
@@ -32,7 +32,7 @@ class RigidModel(TwoNumberModel):
 
     name: str = "rigid"
 
-    def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
+    def answer(self, X: FloatArray, mu: FloatArray, *, outside: str = "raise") -> IslandAnswer:
         """Phi_F = (mu/2) pi F_{5/2}(-X)/(5/2), Phi_A = pi F_2(-X)/2."""
         force, area = greenwood_tripp.rigid_sphere(X, mu)
         return IslandAnswer(force, area, np.full(force.shape, CLOSED_FORM_ERROR))

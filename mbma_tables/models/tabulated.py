@@ -5,22 +5,24 @@ from __future__ import annotations
 import functools
 import os
 import pathlib
-from collections.abc import Mapping
+import threading
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
-from mbma_tables.islands.greenwood_tripp import rigid_sphere
+from mbma_tables.errors import InputError
+from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models import universal_kernel
-from mbma_tables.models.protocol import IslandAnswer, TwoNumberModel
-from mbma_tables.models.raw import SPHERE_FLOOR, Coordinates, band_fields, hat_scales, to_axes
+from mbma_tables.models.four_numbers import Island4dModel
+from mbma_tables.models.protocol import EXACT_RTOL, OUTSIDE, IslandAnswer, TwoNumberModel
 from mbma_tables.models.universal_kernel import Axes
-from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.files import read_table
-from mbma_tables.tablefiles.interpolate import fill_2d, fill_4d
-from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL, Axis, TableContent, error_cell
+from mbma_tables.tablefiles.interpolate import fill_2d
+from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL, TableContent, error_cell
+
+__all__ = ["Island4dModel", "UniversalModel", "island4d_model", "open_table", "shipped", "universal_model"]
 
 
 class UniversalModel(TwoNumberModel):
@@ -45,7 +47,7 @@ class UniversalModel(TwoNumberModel):
         fill_2d(self.content.coefficients, self._X.position(X), self._mu.position(lowest), out)
         return out * (np.minimum(mu, self._mu.low) / self._mu.low)
 
-    def answer(self, X: FloatArray, mu: FloatArray, parallel: bool = False) -> IslandAnswer:
+    def answer(self, X: ArrayLike, mu: ArrayLike, parallel: bool = False, *, outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A with the bound that the table's certificate gives.
 
         Parameters
@@ -54,16 +56,24 @@ class UniversalModel(TwoNumberModel):
             They broadcast.
         parallel : bool
             Whether to use all cores, for large batches.
+        outside : {"raise", "exact", "nan"}
+            Where X or mu is not covered: an error, the exact solver, or NaN.
 
         Raises
         ------
-        OutOfRangeError
-            Where X or mu is not covered.
+        InputError, OutOfRangeError
         """
-        flat_X, flat_mu, shape = self._inside(X, mu)
+        if outside not in OUTSIDE:
+            raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
+        flat_X, flat_mu, shape = self._inside(X, mu, outside == "raise")
         out = np.empty((3, flat_X.size))
+        status = np.empty(flat_X.size, dtype=np.int64)
         fill = universal_kernel.fill_phi_parallel if parallel else universal_kernel.fill_phi
-        fill(flat_X, flat_mu, *self.kernel, np.empty(flat_X.size, dtype=np.int64), out)
+        fill(flat_X, flat_mu, *self.kernel, status, out)
+        missing = status != universal_kernel.OK
+        if outside == "exact" and missing.any():
+            solved = greenwood_tripp.solve(flat_X[missing], flat_mu[missing], rtol=EXACT_RTOL)
+            out[:, missing] = solved.phi_F, solved.phi_A, solved.error
         return IslandAnswer(*(row.reshape(shape)[()] for row in out))
 
     def slopes(self, X: ArrayLike, mu: ArrayLike) -> tuple[IslandAnswer, IslandAnswer, IslandAnswer]:
@@ -89,12 +99,16 @@ class UniversalModel(TwoNumberModel):
             places.append(((x > axis.high).astype(np.int8) - (x < axis.low).astype(np.int8))[()])
         return places[0], places[1]
 
-    def _inside(self, X: ArrayLike, mu: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
+    def _inside(
+        self, X: ArrayLike, mu: ArrayLike, refuse: bool = True
+    ) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
         """Flat arguments and their common shape, refused where the table does not reach."""
         given_X, given_mu = finite_array("X", X), finite_array("mu", mu)
         low, high = self._X.low, self._X.high
-        require("X", given_X, (given_X >= low) & (given_X <= high), f"in [{low:g}, {high:g}]")
-        require("mu", given_mu, (given_mu >= 0) & (given_mu <= self._mu.high), f"in [0, {self._mu.high:g}]")
+        if refuse:
+            require("X", given_X, (given_X >= low) & (given_X <= high), f"in [{low:g}, {high:g}]")
+            require("mu", given_mu, (given_mu >= 0) & (given_mu <= self._mu.high), f"in [0, {self._mu.high:g}]")
+        require("mu", given_mu, given_mu >= 0, "at least 0")
         shape = broadcast_shape(X=given_X, mu=given_mu)
         flat_X, flat_mu = (np.ascontiguousarray(np.broadcast_to(a, shape)).ravel() for a in (given_X, given_mu))
         return flat_X, flat_mu, shape
@@ -125,129 +139,33 @@ def shipped(kind: str) -> pathlib.Path:
     return inside if inside.exists() else package.parent / "tables" / f"{kind}.nc"
 
 
+_OPENING = threading.Lock()
+
+
 @functools.lru_cache(maxsize=8)
+def _opened(kind: str, path: pathlib.Path) -> UniversalModel | Island4dModel:
+    content = read_table(path, kind)
+    return UniversalModel(content) if kind == UNIVERSAL else Island4dModel(content)
+
+
+def _open_once(kind: str, path: os.PathLike[str] | str | None) -> UniversalModel | Island4dModel:
+    """A table of that kind, opened once whichever thread asks first."""
+    with _OPENING:
+        return _opened(kind, shipped(kind) if path is None else pathlib.Path(path))
+
+
 def universal_model(path: os.PathLike[str] | str | None = None) -> UniversalModel:
     """The universal model of the shipped table, or of a file; opened once."""
-    return UniversalModel(read_table(path or shipped(UNIVERSAL), UNIVERSAL))
+    model = _open_once(UNIVERSAL, path)
+    assert isinstance(model, UniversalModel)
+    return model
 
 
-class Island4dModel:
-    """F_hat and A_hat by the paper's four numbers, from a four-parameter table and nothing else.
-
-    Parameters
-    ----------
-    content : TableContent
-        A table of kind "island4d".
-    """
-
-    name = "island4d"
-
-    def __init__(self, content: TableContent) -> None:
-        self.content = content
-        self.reading = get_reading(content.attributes["reading"])
-        self._X, self._spread, self._sphere, self._hurst = content.axes
-
-    def lookup(
-        self, delta_over_h_rms: ArrayLike, zeta_d: ArrayLike, zeta_u: ArrayLike, hurst: ArrayLike
-    ) -> tuple[Any, Any, Any]:
-        """F_hat = F^i q0/(E* s), A_hat = A^i q0^2/eta and the bound on their relative error.
-
-        Parameters
-        ----------
-        delta_over_h_rms : array_like
-            Approach of the island; h_rms read at zeta_1 without bound, Delta + zeta_d^(-H).
-        zeta_d, zeta_u : array_like
-            Magnifications of Eqs. (27) and (30), 1.25 <= zeta_d < zeta_u.
-        hurst : array_like
-            Hurst exponent.
-
-        Raises
-        ------
-        OutOfRangeError
-            Where an argument, or X that follows from them, is not covered.
-        """
-        given = {
-            name: finite_array(name, value)
-            for name, value in (
-                ("delta_over_h_rms", delta_over_h_rms),
-                ("zeta_d", zeta_d),
-                ("zeta_u", zeta_u),
-                ("hurst", hurst),
-            )
-        }
-        shape = broadcast_shape(**given)
-        delta, low, high, H = (np.ascontiguousarray(np.broadcast_to(array, shape)) for array in given.values())
-        require("hurst", H, (self._hurst.low <= H) & (self._hurst.high >= H), self._range(self._hurst))
-        require("zeta_d", low, low >= SPHERE_FLOOR, f"at least {SPHERE_FLOOR}")
-        require("zeta_u", high, high > low, "above zeta_d")
-        place = to_axes(delta.ravel(), low.ravel(), high.ravel(), H.ravel(), self.reading)
-        self._require_inside(place, shape)
-        phi_F, phi_A = rigid_sphere(place.X, place.mu) * np.exp(self.log_ratio(place))
-        force, area = hat_scales(place.spread, low.ravel(), place.hurst, place.sigma, self.reading)
-        answers = (force * phi_F, area * phi_A, self.error(place))
-        F_hat, A_hat, error = (a.reshape(shape)[()] for a in answers)
-        return F_hat, A_hat, error
-
-    def _require_inside(self, place: Coordinates, shape: tuple[int, ...]) -> None:
-        """Refuse islands beyond the axes; masks in the caller's shape."""
-        spread, X = place.spread.reshape(shape), place.X.reshape(shape)
-        require("zeta_u/zeta_d - 1", spread, spread <= self._spread.high, f"at most {self._spread.high:g}")
-        require("X", X, (self._X.low <= X) & (self._X.high >= X), self._range(self._X))
-
-    def of_islands(self, islands: Mapping[str, FloatArray]) -> IslandAnswer:
-        """Phi_F and Phi_A of islands, through their band and not through mu.
-
-        Raises
-        ------
-        OutOfRangeError
-            Where an island is not covered.
-        """
-        shape = np.shape(islands["X"])
-        X, width, zeta_d, hurst, mu = (
-            np.ascontiguousarray(islands[name], dtype=float).ravel() for name in ("X", "width", "zeta_d", "hurst", "mu")
-        )
-        spread = np.expm1(width)
-        sphere = (SPHERE_FLOOR / zeta_d) ** (4 - 2 * hurst)
-        own, low = islands["hurst"], islands["zeta_d"]
-        require("hurst", own, (self._hurst.low <= own) & (self._hurst.high >= own), self._range(self._hurst))
-        require("zeta_d", low, low >= SPHERE_FLOOR, f"at least {SPHERE_FLOOR}")
-        place = Coordinates(X, spread, sphere, hurst, mu, np.ones_like(X))
-        self._require_inside(place, shape)
-        phi_F, phi_A = rigid_sphere(X, mu) * np.exp(self.log_ratio(place))
-        return IslandAnswer(phi_F.reshape(shape), phi_A.reshape(shape), self.error(place).reshape(shape))
-
-    @staticmethod
-    def _range(axis: Axis) -> str:
-        return f"in [{axis.low:g}, {axis.high:g}]"
-
-    def _positions(self, place: Coordinates) -> FloatArray:
-        inside = (place.X, np.maximum(place.spread, self._spread.low), place.sphere, place.hurst)
-        return np.stack([axis.position(x) for axis, x in zip(self.content.axes, inside, strict=True)])
-
-    def log_ratio(self, place: Coordinates) -> FloatArray:
-        """log(Phi/Phi_rigid) inside the table or below its spread, shape (2, entries)."""
-        out = np.empty((2, place.X.size))
-        fill_4d(self.content.coefficients, self._positions(place), out)
-        lowest = np.maximum(place.spread, self._spread.low)
-        edge = band_fields(lowest, place.sphere, place.hurst, self.reading)[0]
-        scaled: FloatArray = out * (place.mu / edge)
-        return scaled
-
-    def error(self, place: Coordinates) -> FloatArray:
-        """Bound on the relative error of both functions."""
-        field = self.content.local_error.max(axis=-1)
-        cells = (
-            error_cell(axis, count, p)
-            for axis, count, p in zip(self.content.axes, field.shape, self._positions(place), strict=True)
-        )
-        bound: FloatArray = field[tuple(cells)]
-        return bound
-
-
-@functools.lru_cache(maxsize=8)
 def island4d_model(path: os.PathLike[str] | str | None = None) -> Island4dModel:
     """The four-parameter model of the shipped table, or of a file; opened once."""
-    return Island4dModel(read_table(path or shipped(ISLAND4D), ISLAND4D))
+    model = _open_once(ISLAND4D, path)
+    assert isinstance(model, Island4dModel)
+    return model
 
 
 def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Island4dModel:

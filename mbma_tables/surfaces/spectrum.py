@@ -60,7 +60,7 @@ def summit_rate(hurst: float, log_za: float, log_ratio: float) -> float:
     return 0.75 * math.exp(2.0 * log_za) * growth
 
 
-@vectorize(["f8(f8, f8, f8, i8)"], cache=True)  # type: ignore[no-untyped-call]
+@vectorize(["f8(f8, f8, f8, i8)"], cache=True)
 def _moment(hurst: float, log_za: float, log_ratio: float, order: int) -> float:
     if order == 0:
         return m0_of(hurst, log_za, log_ratio)

@@ -5,9 +5,10 @@ Positions are in node units, 0 ... n - 1. Nothing is shared or kept: any thread 
 
 from __future__ import annotations
 
-from numba import njit
+from numba import njit, prange
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.tablefiles.lanes import add_lanes, load_lanes
 
 Six = tuple[float, float, float, float, float, float]
 Four = tuple[float, float, float, float]
@@ -15,6 +16,7 @@ Eight = tuple[float, float, float, float, float, float, float, float]
 Ten = tuple[float, float, float, float, float, float, float, float, float, float]
 
 _FAST = {"contract", "reassoc"}
+ZERO = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @njit(cache=True, fastmath=_FAST, error_model="numpy")
@@ -130,102 +132,35 @@ def gradient_2d(c: FloatArray, x: float, y: float) -> Six:
     )
 
 
-@njit(cache=True, fastmath=_FAST, error_model="numpy", inline="always")
-def _line_4d(c: FloatArray, i: int, j: int, k: int, m: int, w: Four) -> tuple[float, float]:
-    """Both functions' sums along the last axis."""
-    w0, w1, w2, w3 = w
-    first = w0 * c[i, j, k, m, 0] + w1 * c[i, j, k, m + 1, 0] + w2 * c[i, j, k, m + 2, 0] + w3 * c[i, j, k, m + 3, 0]
-    second = w0 * c[i, j, k, m, 1] + w1 * c[i, j, k, m + 1, 1] + w2 * c[i, j, k, m + 2, 1] + w3 * c[i, j, k, m + 3, 1]
-    return first, second
-
-
-@njit(cache=True, fastmath=_FAST, error_model="numpy", inline="always")
-def _plane_4d(c: FloatArray, i: int, j: int, k: int, m: int, wz: Four, wt: Four) -> tuple[float, float]:
-    """Both functions' sums over the last two axes."""
-    f0, g0 = _line_4d(c, i, j, k, m, wt)
-    f1, g1 = _line_4d(c, i, j, k + 1, m, wt)
-    f2, g2 = _line_4d(c, i, j, k + 2, m, wt)
-    f3, g3 = _line_4d(c, i, j, k + 3, m, wt)
-    w0, w1, w2, w3 = wz
-    return w0 * f0 + w1 * f1 + w2 * f2 + w3 * f3, w0 * g0 + w1 * g1 + w2 * g2 + w3 * g3
-
-
 @njit(cache=True, fastmath=_FAST, error_model="numpy")
-def _block_4d(c: FloatArray, i: int, j: int, k: int, m: int, wy: Four, wz: Four, wt: Four) -> tuple[float, float]:
-    """Both functions' sums over the last three axes."""
-    f0, g0 = _plane_4d(c, i, j, k, m, wz, wt)
-    f1, g1 = _plane_4d(c, i, j + 1, k, m, wz, wt)
-    f2, g2 = _plane_4d(c, i, j + 2, k, m, wz, wt)
-    f3, g3 = _plane_4d(c, i, j + 3, k, m, wz, wt)
-    w0, w1, w2, w3 = wy
-    return w0 * f0 + w1 * f1 + w2 * f2 + w3 * f3, w0 * g0 + w1 * g1 + w2 * g2 + w3 * g3
+def _last_axis(w: Four, lanes: Eight) -> tuple[float, float]:
+    """Both functions from the sums over the other axes: four coefficients of two functions each."""
+    return (
+        w[0] * lanes[0] + w[1] * lanes[2] + w[2] * lanes[4] + w[3] * lanes[6],
+        w[0] * lanes[1] + w[1] * lanes[3] + w[2] * lanes[5] + w[3] * lanes[7],
+    )
 
 
 @njit(cache=True, fastmath=_FAST, error_model="numpy")
 def value_4d(c: FloatArray, x: float, y: float, z: float, t: float) -> tuple[float, float]:
-    """Both functions of a cubic table, `c` of shape (n1 + 2, n2 + 2, n3 + 2, n4 + 2, 2)."""
+    """Both functions of a cubic table, `c` of shape (n1 + 2, n2 + 2, n3 + 2, n4 + 2, 2), C-contiguous."""
     i, u = cell(x, c.shape[0] - 2)
     j, v = cell(y, c.shape[1] - 2)
     k, w = cell(z, c.shape[2] - 2)
     m, s = cell(t, c.shape[3] - 2)
-    wy, wz, wt = cubic(v), cubic(w), cubic(s)
-    f0, g0 = _block_4d(c, i, j, k, m, wy, wz, wt)
-    f1, g1 = _block_4d(c, i + 1, j, k, m, wy, wz, wt)
-    f2, g2 = _block_4d(c, i + 2, j, k, m, wy, wz, wt)
-    f3, g3 = _block_4d(c, i + 3, j, k, m, wy, wz, wt)
-    w0, w1, w2, w3 = cubic(u)
-    return w0 * f0 + w1 * f1 + w2 * f2 + w3 * f3, w0 * g0 + w1 * g1 + w2 * g2 + w3 * g3
-
-
-@njit(cache=True, fastmath=_FAST, error_model="numpy", inline="always")
-def _plane_slopes_4d(c: FloatArray, i: int, j: int, k: int, m: int, wz: Four, wt: Four, sz: Four, st: Four) -> Six:
-    """Over the last two axes: values and both derivatives, f, f_z, f_t, g, g_z, g_t."""
-    f0, g0 = _line_4d(c, i, j, k, m, wt)
-    f1, g1 = _line_4d(c, i, j, k + 1, m, wt)
-    f2, g2 = _line_4d(c, i, j, k + 2, m, wt)
-    f3, g3 = _line_4d(c, i, j, k + 3, m, wt)
-    p0, q0 = _line_4d(c, i, j, k, m, st)
-    p1, q1 = _line_4d(c, i, j, k + 1, m, st)
-    p2, q2 = _line_4d(c, i, j, k + 2, m, st)
-    p3, q3 = _line_4d(c, i, j, k + 3, m, st)
-    w0, w1, w2, w3 = wz
-    s0, s1, s2, s3 = sz
-    return (
-        w0 * f0 + w1 * f1 + w2 * f2 + w3 * f3,
-        s0 * f0 + s1 * f1 + s2 * f2 + s3 * f3,
-        w0 * p0 + w1 * p1 + w2 * p2 + w3 * p3,
-        w0 * g0 + w1 * g1 + w2 * g2 + w3 * g3,
-        s0 * g0 + s1 * g1 + s2 * g2 + s3 * g3,
-        w0 * q0 + w1 * q1 + w2 * q2 + w3 * q3,
-    )
-
-
-@njit(cache=True, fastmath=_FAST, error_model="numpy")
-def _block_slopes_4d(
-    c: FloatArray, i: int, j: int, k: int, m: int, wy: Four, wz: Four, wt: Four, sy: Four, sz: Four, st: Four
-) -> Eight:
-    """Over the last three axes: f, f_y, f_z, f_t, g, g_y, g_z, g_t."""
-    f0, p0, q0, g0, u0, v0 = _plane_slopes_4d(c, i, j, k, m, wz, wt, sz, st)
-    f1, p1, q1, g1, u1, v1 = _plane_slopes_4d(c, i, j + 1, k, m, wz, wt, sz, st)
-    f2, p2, q2, g2, u2, v2 = _plane_slopes_4d(c, i, j + 2, k, m, wz, wt, sz, st)
-    f3, p3, q3, g3, u3, v3 = _plane_slopes_4d(c, i, j + 3, k, m, wz, wt, sz, st)
-    w0, w1, w2, w3 = wy
-    s0, s1, s2, s3 = sy
-    return (
-        w0 * f0 + w1 * f1 + w2 * f2 + w3 * f3,
-        s0 * f0 + s1 * f1 + s2 * f2 + s3 * f3,
-        w0 * p0 + w1 * p1 + w2 * p2 + w3 * p3,
-        w0 * q0 + w1 * q1 + w2 * q2 + w3 * q3,
-        w0 * g0 + w1 * g1 + w2 * g2 + w3 * g3,
-        s0 * g0 + s1 * g1 + s2 * g2 + s3 * g3,
-        w0 * u0 + w1 * u1 + w2 * u2 + w3 * u3,
-        w0 * v0 + w1 * v1 + w2 * v2 + w3 * v3,
-    )
-
-
-@njit(cache=True, fastmath=_FAST, error_model="numpy", inline="always")
-def _mix(w: Four, a: float, b: float, c: float, d: float) -> float:
-    return w[0] * a + w[1] * b + w[2] * c + w[3] * d
+    wx, wy, wz = cubic(u), cubic(v), cubic(w)
+    flat = c.reshape(-1)
+    row = 2 * c.shape[3]
+    total = ZERO
+    for a in range(4):
+        for b in range(4):
+            start = 2 * ((((i + a) * c.shape[1] + j + b) * c.shape[2] + k) * c.shape[3] + m)
+            plane = add_lanes(ZERO, wz[0], load_lanes(flat, start))
+            plane = add_lanes(plane, wz[1], load_lanes(flat, start + row))
+            plane = add_lanes(plane, wz[2], load_lanes(flat, start + 2 * row))
+            plane = add_lanes(plane, wz[3], load_lanes(flat, start + 3 * row))
+            total = add_lanes(total, wx[a] * wy[b], plane)
+    return _last_axis(cubic(s), total)
 
 
 @njit(cache=True, fastmath=_FAST, error_model="numpy")
@@ -236,23 +171,29 @@ def gradient_4d(c: FloatArray, x: float, y: float, z: float, t: float) -> Ten:
     k, w = cell(z, c.shape[2] - 2)
     m, s = cell(t, c.shape[3] - 2)
     wx, wy, wz, wt = cubic(u), cubic(v), cubic(w), cubic(s)
-    sx, sy, sz, st = cubic_slope(u), cubic_slope(v), cubic_slope(w), cubic_slope(s)
-    f0, y0, z0, t0, g0, a0, b0, e0 = _block_slopes_4d(c, i, j, k, m, wy, wz, wt, sy, sz, st)
-    f1, y1, z1, t1, g1, a1, b1, e1 = _block_slopes_4d(c, i + 1, j, k, m, wy, wz, wt, sy, sz, st)
-    f2, y2, z2, t2, g2, a2, b2, e2 = _block_slopes_4d(c, i + 2, j, k, m, wy, wz, wt, sy, sz, st)
-    f3, y3, z3, t3, g3, a3, b3, e3 = _block_slopes_4d(c, i + 3, j, k, m, wy, wz, wt, sy, sz, st)
-    return (
-        _mix(wx, f0, f1, f2, f3),
-        _mix(sx, f0, f1, f2, f3),
-        _mix(wx, y0, y1, y2, y3),
-        _mix(wx, z0, z1, z2, z3),
-        _mix(wx, t0, t1, t2, t3),
-        _mix(wx, g0, g1, g2, g3),
-        _mix(sx, g0, g1, g2, g3),
-        _mix(wx, a0, a1, a2, a3),
-        _mix(wx, b0, b1, b2, b3),
-        _mix(wx, e0, e1, e2, e3),
-    )
+    sx, sy, sz = cubic_slope(u), cubic_slope(v), cubic_slope(w)
+    flat = c.reshape(-1)
+    row = 2 * c.shape[3]
+    total = by_x = by_y = by_z = ZERO
+    for a in range(4):
+        for b in range(4):
+            start = 2 * ((((i + a) * c.shape[1] + j + b) * c.shape[2] + k) * c.shape[3] + m)
+            l0, l1 = load_lanes(flat, start), load_lanes(flat, start + row)
+            l2, l3 = load_lanes(flat, start + 2 * row), load_lanes(flat, start + 3 * row)
+            plane = add_lanes(add_lanes(ZERO, wz[0], l0), wz[1], l1)
+            plane = add_lanes(add_lanes(plane, wz[2], l2), wz[3], l3)
+            slope = add_lanes(add_lanes(ZERO, sz[0], l0), sz[1], l1)
+            slope = add_lanes(add_lanes(slope, sz[2], l2), sz[3], l3)
+            total = add_lanes(total, wx[a] * wy[b], plane)
+            by_x = add_lanes(by_x, sx[a] * wy[b], plane)
+            by_y = add_lanes(by_y, wx[a] * sy[b], plane)
+            by_z = add_lanes(by_z, wx[a] * wy[b], slope)
+    f, g = _last_axis(wt, total)
+    fx, gx = _last_axis(wt, by_x)
+    fy, gy = _last_axis(wt, by_y)
+    fz, gz = _last_axis(wt, by_z)
+    ft, gt = _last_axis(cubic_slope(s), total)
+    return f, fx, fy, fz, ft, g, gx, gy, gz, gt
 
 
 @njit(cache=True, nogil=True)
@@ -275,6 +216,13 @@ def fill_gradient_2d(c: FloatArray, x: FloatArray, y: FloatArray, out: FloatArra
 def fill_4d(c: FloatArray, places: FloatArray, out: FloatArray) -> None:
     """`value_4d` of each column of `places` (4, entries) into the columns of `out` (2, entries)."""
     for k in range(places.shape[1]):
+        out[0, k], out[1, k] = value_4d(c, places[0, k], places[1, k], places[2, k], places[3, k])
+
+
+@njit(cache=True, parallel=True)
+def fill_4d_parallel(c: FloatArray, places: FloatArray, out: FloatArray) -> None:
+    """`fill_4d` on all cores, for large batches."""
+    for k in prange(places.shape[1]):
         out[0, k], out[1, k] = value_4d(c, places[0, k], places[1, k], places[2, k], places[3, k])
 
 

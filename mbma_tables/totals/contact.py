@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import get_model
+from mbma_tables.models.protocol import OUTSIDE
 from mbma_tables.models.tabulated import UniversalModel
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
@@ -27,7 +28,6 @@ from mbma_tables.totals.island_sum import sum_islands
 from mbma_tables.totals.looked_up import look_up, look_up_slopes
 from mbma_tables.totals.pairs import Pairs
 
-OUTSIDE = ("raise", "exact", "nan")
 MANY_GAPS = 4096  # on one surface: about what making a law costs
 FROZEN_RTOL = 2e-9
 
@@ -47,7 +47,8 @@ class Contact:
     area : ndarray
         A/A0. The model does not end at 1 under full compression, and this is not clamped.
     error : ndarray
-        Bound on the relative error of both, of quadrature and island solutions together.
+        Bound on the relative error of both against the model that the tier stands for, of quadrature and islands
+        together. For tier "rigid" that model is the undeformed sphere, which may be far from the elastic one.
     reading, tier : str
         What made them.
     islands : int or None
@@ -96,7 +97,7 @@ def contact(
     rtol : float
         Relative error asked of force and area, in [1e-11, 0.1]. A table adds its own error; `error` holds both.
     outside : {"raise", "exact", "nan"}
-        For surfaces with islands outside the universal table: an error, the exact solver, or NaN.
+        For surfaces with islands outside the table: an error, the exact solver, or NaN.
     derivatives : bool
         Whether `force_by` and `area_by` are asked for (tier "universal").
 
@@ -183,7 +184,7 @@ def _contact(
             else:
                 force, area, error, islands = look_up(pairs, rule, model, rtol, outside, shape)
         else:
-            force, area, error, islands = sum_islands(pairs, rule, model, 0.5 * rtol)
+            force, area, error, islands = sum_islands(pairs, rule, model, 0.5 * rtol, outside)
     except ConvergenceError as fault:
         fault.mask = fault.mask.reshape(shape)
         raise

@@ -17,7 +17,7 @@ from mbma_tables.totals.quadrature import integrate
 
 
 def sum_islands(
-    pairs: Pairs, reading: Reading, model: IslandModel, rtol: float
+    pairs: Pairs, reading: Reading, model: IslandModel, rtol: float, outside: str = "raise"
 ) -> tuple[FloatArray, FloatArray, FloatArray, int]:
     """F/(A0 E* q0 s), A/A0, the bound on their relative error, and the islands evaluated."""
     count = pairs.reach.size
@@ -36,12 +36,13 @@ def sum_islands(
         approach = layer * np.sinh(t) ** 2
         g = geometry(approach, hurst, zeta_1, reading)
         try:
-            phi = model.of_islands(g | {"hurst": hurst})
+            phi = model.of_islands(g | {"hurst": hurst}, outside)
         except ConvergenceError as fault:
             failed = np.zeros(count, dtype=bool)
             failed[owner[fault.mask.any(axis=1)]] = True
             raise ConvergenceError(f"an island failed: {fault}", failed) from fault
-        np.maximum.at(worst_island, owner, phi.error.max(axis=1))
+        with np.errstate(invalid="ignore"):
+            np.maximum.at(worst_island, owner, phi.error.max(axis=1))
         # z_max/s counted down from h_max, where nothing cancels near first contact
         below_top = pairs.reach[owner, None] - approach
         height = (pairs.top[owner, None] - below_top) * room - g["h_d"]

@@ -40,8 +40,8 @@ class ContactLaw:
         Gap of first contact [length]; a law covers -h_max <= d, and answers zero from h_max on.
     error : float
         Bound on the relative error of force and area, of the polynomials and of the totals together.
-    turning_point : float or None
-        Gap below which the model's force falls again, where it does; inverses end there.
+    turning_point, area_turning_point : float or None
+        Gap below which the model's force, or area, falls again, where it does (low H); inverses end there.
     reading, tier : str
         What made it.
     """
@@ -50,6 +50,7 @@ class ContactLaw:
     E_star: float
     error: float
     turning_point: float | None
+    area_turning_point: float | None
     reading: str
     tier: str
     breaks: FloatArray
@@ -131,9 +132,8 @@ class ContactLaw:
         return out[()]
 
     def _branch_end(self, what: int) -> float:
-        if what == law_kernel.FORCE and self.turning_point is not None:
-            return self.turning_point
-        return -self.h_max
+        turn = self.turning_point if what == law_kernel.FORCE else self.area_turning_point
+        return -self.h_max if turn is None else turn
 
     def compiled(self, name: str = "force") -> Any:
         """A numba-compiled function of one float, for use in other compiled code: "force", "area", "stiffness"."""
@@ -241,7 +241,8 @@ def contact_law(
         h_max=h_max,
         E_star=modulus,
         error=achieved + worst,
-        turning_point=law_kernel.turning_point(state, SAMPLES),
+        turning_point=law_kernel.turning_point(law_kernel.FORCE, state, SAMPLES),
+        area_turning_point=law_kernel.turning_point(law_kernel.AREA, state, SAMPLES),
         reading=rule.name,
         tier=tier,
         breaks=breaks,

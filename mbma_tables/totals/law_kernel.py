@@ -135,18 +135,18 @@ def energies(state: State) -> FloatArray:
 
 
 @njit(cache=True, error_model="numpy")
-def turning_point(state: State, samples: int) -> float | None:
-    """Gap at which force first stops rising with compression; None where it never does."""
+def turning_point(which: int, state: State, samples: int) -> float | None:
+    """Gap at which force (which = 0) or area (1) first stops rising with compression; None where it never does."""
     breaks, _, layer, h_max, _ = state
     previous = breaks[0]
     for piece in range(breaks.size - 1):
         for k in range(1, samples + 1):
             tau = breaks[piece] + (breaks[piece + 1] - breaks[piece]) * k / samples
-            if _log_slope(0, layer * math.sinh(tau) ** 2, state) <= 0.0:
+            if _log_slope(which, layer * math.sinh(tau) ** 2, state) <= 0.0:
                 low, high = previous, tau
                 for _ in range(INVERSE_STEPS):
                     middle = 0.5 * (low + high)
-                    if _log_slope(0, layer * math.sinh(middle) ** 2, state) <= 0.0:
+                    if _log_slope(which, layer * math.sinh(middle) ** 2, state) <= 0.0:
                         high = middle
                     else:
                         low = middle

@@ -28,6 +28,7 @@ from mbma_tables.totals.lookup import (
 )
 
 STEP = 1e-5  # of H and log(zeta_1): central differences err by its square, about 1e-10
+SHARE = 3e-4  # of the way to the floor of zeta_u, where eta rises like a sixth root
 BY_HURST, BY_LOG_ZETA, BY_REACH, BY_TOP = range(4)
 Numbers = tuple[float, float, float, float, float, bool, bool]
 Four = tuple[Constants, Constants, Constants, Constants]
@@ -64,6 +65,7 @@ def _rule(
     top: float,
     surface: Constants,
     near: Four,
+    rates: tuple[float, float],
     flags: tuple[bool, bool],
     table: FloatArray,
     errors: FloatArray,
@@ -110,8 +112,8 @@ def _rule(
                 height_p + height_m
             )
             by_X, by_mu = X_p - X_m, math.log(mu_p / mu_m)
-            sums[0, 1 + number] += f * (math.log(F_p / F_m) + common + F_X * by_X + F_mu * by_mu) / (2.0 * STEP)
-            sums[1, 1 + number] += g * (math.log(A_p / A_m) + common + A_X * by_X + A_mu * by_mu) / (2.0 * STEP)
+            sums[0, 1 + number] += f * (math.log(F_p / F_m) + common + F_X * by_X + F_mu * by_mu) * rates[number]
+            sums[1, 1 + number] += g * (math.log(A_p / A_m) + common + A_X * by_X + A_mu * by_mu) * rates[number]
     sums[0, 1 + BY_TOP] = -sums[0, 1 + BY_REACH]
     sums[1, 1 + BY_TOP] = -sums[1, 1 + BY_REACH]
     if not (sums[0, 0] > 0.0 and sums[1, 0] > 0.0):
@@ -133,6 +135,7 @@ def total_with_slopes(
     rtol: float,
     surface: Constants,
     near: Four,
+    rates: tuple[float, float],
     printed: bool,
     flags: tuple[bool, bool],
     table: FloatArray,
@@ -168,7 +171,7 @@ def total_with_slopes(
             if fresh[k]:
                 status, own[k], table_error = _rule(
                     bounds[k, 0], bounds[k, 1], floors[k, 0], floors[k, 1],
-                    reach, top, surface, near, flags, table, errors, axes, parts[k],
+                    reach, top, surface, near, rates, flags, table, errors, axes, parts[k],
                 )  # fmt: skip
                 rules += 1
                 if status != OK:
@@ -206,11 +209,11 @@ def total_with_slopes(
         up, down = near[2 * number], near[2 * number + 1]
         if kink_d < reach:
             _, f, g = _integrand(kink_d, True, kink_d > kink_u, reach, top, surface, flags, table, errors, axes)
-            moved = (K1 - 1.0) * (up[10] - down[10]) / (2.0 * STEP)
+            moved = (K1 - 1.0) * (up[10] - down[10]) * rates[number]
             out[0, 1 + number] += f * moved
             out[1, 1 + number] += g * moved
         if not printed:
-            change = math.log(_jacobian(up, printed, flags[0]) / _jacobian(down, printed, flags[0])) / (2.0 * STEP)
+            change = math.log(_jacobian(up, printed, flags[0]) / _jacobian(down, printed, flags[0])) * rates[number]
             for k in range(count):
                 if not floors[k, 0]:
                     out[0, 1 + number] += change * parts[k, 0, 0]
@@ -219,15 +222,17 @@ def total_with_slopes(
 
 
 @njit(cache=True, error_model="numpy")
-def neighbours(hurst: float, zeta_1: float, reading: Numbers) -> Four:
-    """Constants of the surfaces a step of H and of log(zeta_1) up and down."""
-    factor = math.exp(STEP)
-    return (
+def neighbours(hurst: float, zeta_1: float, reading: Numbers) -> tuple[Four, tuple[float, float]]:
+    """Constants of the surfaces a step of H and of log(zeta_1) up and down, and 1 over twice the steps."""
+    step = min(STEP, SHARE * math.log(zeta_1 / reading[4]))
+    factor = math.exp(step)
+    around = (
         surface_constants(hurst + STEP, zeta_1, reading),
         surface_constants(hurst - STEP, zeta_1, reading),
         surface_constants(hurst, zeta_1 * factor, reading),
         surface_constants(hurst, zeta_1 / factor, reading),
     )
+    return around, (0.5 / STEP, 1.0 / math.log(zeta_1 * factor / (zeta_1 / factor)))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -249,13 +254,13 @@ def fill_totals_with_slopes(
     """`total_with_slopes` of each pair into `out` (pairs, 2, 5) and `bound`; returns the islands evaluated."""
     islands = 0
     surface = surface_constants(hurst[0], zeta_1[0], reading)
-    near = neighbours(hurst[0], zeta_1[0], reading)
+    near, rates = neighbours(hurst[0], zeta_1[0], reading)
     for k in range(reach.size):
         if k > 0 and (hurst[k] != hurst[k - 1] or zeta_1[k] != zeta_1[k - 1]):
             surface = surface_constants(hurst[k], zeta_1[k], reading)
-            near = neighbours(hurst[k], zeta_1[k], reading)
+            near, rates = neighbours(hurst[k], zeta_1[k], reading)
         status[k], bound[k], rules = total_with_slopes(
-            reach[k], top[k], rtol, surface, near, printed, (reading[5], reading[6]), table, errors, axes, out[k]
+            reach[k], top[k], rtol, surface, near, rates, printed, (reading[5], reading[6]), table, errors, axes, out[k]
         )
         islands += 31 * rules
     return islands

@@ -9,7 +9,7 @@ from small_tables import small_table
 from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, island
 from mbma_tables.islands.island import geometry
 from mbma_tables.models import tabulated
-from mbma_tables.models.raw import SPHERE_FLOOR, to_axes
+from mbma_tables.models.raw import SPHERE_FLOOR, hat_scales, to_axes
 from mbma_tables.models.tabulated import Island4dModel, island4d_model
 from mbma_tables.surfaces.readings import REPORTED
 from mbma_tables.tablefiles.files import read_table, write_table
@@ -71,7 +71,7 @@ def test_the_shipped_table_over_the_whole_box():
     assert kept.sum() > 400
     solved = greenwood_tripp.solve(place.X[kept], place.mu[kept], rtol=1e-11)
     found_F, found_A, bound = model.lookup(*(a[kept] for a in (delta, zeta_d, zeta_u, hurst)))
-    scales = tabulated.hat_scales(place.spread, zeta_d, hurst, place.sigma, REPORTED)
+    scales = hat_scales(place.spread, zeta_d, hurst, place.sigma, REPORTED)
     error_F = np.abs(found_F / (scales[0][kept] * solved.phi_F) - 1)
     error_A = np.abs(found_A / (scales[1][kept] * solved.phi_A) - 1)
     assert np.maximum(error_F, error_A).max() < 1e-3
@@ -105,7 +105,7 @@ def test_a_small_table_keeps_its_word(small):
     raw = inside(small, 400, 32)
     place = to_axes(*raw, REPORTED)
     solved = greenwood_tripp.solve(place.X, place.mu)
-    scales = tabulated.hat_scales(place.spread, raw[1], raw[3], place.sigma, REPORTED)
+    scales = hat_scales(place.spread, raw[1], raw[3], place.sigma, REPORTED)
     F_hat, A_hat, bound = small.lookup(*raw)
     error = np.maximum(np.abs(F_hat / (scales[0] * solved.phi_F) - 1), np.abs(A_hat / (scales[1] * solved.phi_A) - 1))
     assert (error <= bound).all()
@@ -138,10 +138,10 @@ def test_broadcasting_scalars_and_input(small):
     one = small.lookup(*(float(a[0]) for a in raw))
     assert all(np.ndim(x) == 0 for x in one)
     many = small.lookup(*raw)
-    np.testing.assert_array_equal([x[0] for x in many], one)
+    np.testing.assert_array_equal([x[0] for x in many], list(one))
     grid = small.lookup(np.array([[1.5], [1.6], [1.7]]), 2.0, [20.0, 21.0], 0.7)
     assert all(x.shape == (3, 2) for x in grid)
-    np.testing.assert_array_equal([x[2, 1] for x in grid], small.lookup(1.7, 2.0, 21.0, 0.7))
+    np.testing.assert_array_equal([x[2, 1] for x in grid], list(small.lookup(1.7, 2.0, 21.0, 0.7)))
     copies = [a.copy() for a in raw]
     for a in raw:
         a.setflags(write=False)

@@ -1,0 +1,345 @@
+"""Lookups timed: tables against scipy, tiers against each other, laws against numpy, threads, the first call.
+
+Run with ``python benchmarks/lookup.py``. One core; every ratio is of two times taken in turn in this run, the median
+over the rounds, so that what else the machine does falls on both. Errors stand beside the times.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ["NUMBA_NUM_THREADS"] = "1"
+os.environ["OMP_NUM_THREADS"] = "1"
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+import concurrent.futures
+import dataclasses
+import hashlib
+import json
+import pathlib
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from typing import Any
+
+import click
+import numpy as np
+from scipy.interpolate import RegularGridInterpolator
+
+from mbma_tables import Surface, contact, contact_law, open_table
+from mbma_tables.models import universal_kernel
+from mbma_tables.tablefiles.interpolate import fill_2d, fill_4d, fill_gradient_4d, value_4d
+from mbma_tables.tablefiles.schema import TableContent
+
+ROUNDS = 9
+POINTS = 20_000
+HELD_OUT = 500
+SURFACES = 2_000
+GAPS = 100_000
+NOMINAL_EXACT = 15_000  # islands/s, a rate to compare with that is not measured here
+MIXED = 10_000_000
+THREADS = 16
+SEED = 7
+
+
+@dataclasses.dataclass(frozen=True)
+class Line:
+    """One measured number; `wanted` as a sentence part, empty where nothing is asked."""
+
+    name: str
+    value: float
+    unit: str
+    wanted: str = ""
+    met: bool | None = None
+
+
+LINES: list[Line] = []
+
+
+def report(name: str, value: float, unit: str, at_least: float | None = None, at_most: float | None = None) -> None:
+    """Keep and print a number."""
+    wanted, met = "", None
+    if at_least is not None:
+        wanted, met = f">= {at_least:g}", value >= at_least
+    if at_most is not None:
+        wanted, met = f"<= {at_most:g}", value <= at_most
+    LINES.append(Line(name, float(value), unit, wanted, None if met is None else bool(met)))
+    mark = {None: "", True: "met", False: "MISSED"}[met]
+    click.echo(f"  {name:<72} {value:10.4g} {unit:<6} {wanted:>9} {mark}".rstrip())
+
+
+def rounds(runs: dict[str, Callable[[], Any]], count: int = ROUNDS) -> dict[str, list[float]]:
+    """Seconds of each run in every round; the runs take turns, and a first round, which compiles, is not counted."""
+    taken: dict[str, list[float]] = {name: [] for name in runs}
+    for number in range(count + 1):
+        for name, run in runs.items():
+            start = time.perf_counter()
+            run()
+            spent = time.perf_counter() - start
+            if number:
+                taken[name].append(spent)
+    return taken
+
+
+def times_faster(taken: dict[str, list[float]], slow: str, fast: str) -> float:
+    """Median over rounds of the ratio of two times."""
+    return statistics.median(a / b for a, b in zip(taken[slow], taken[fast], strict=True))
+
+
+def microseconds(taken: list[float], count: int) -> float:
+    """Median time of one of `count`."""
+    return 1e6 * statistics.median(taken) / count
+
+
+def reference(content: TableContent, functions: Any = 0) -> RegularGridInterpolator:
+    """Scipy's cubic interpolator of log_ratio, F or both, on the table's own nodes, in node units."""
+    nodes = [np.arange(axis.nodes, dtype=float) for axis in content.axes]
+    return RegularGridInterpolator(nodes, content.log_ratio[..., functions], method="cubic")
+
+
+def random_places(content: TableContent, rng: np.random.Generator) -> np.ndarray:
+    """Random points in node units, (points, axes)."""
+    return rng.uniform(size=(POINTS, len(content.axes))) * [axis.nodes - 1 for axis in content.axes]
+
+
+def island_tables(rng: np.random.Generator) -> None:
+    """Both tables against RegularGridInterpolator."""
+    raw, universal = open_table("island4d"), open_table("universal")
+    four, two = raw.content, universal.content
+    scipy_four, scipy_two, scipy_both = reference(four), reference(two), reference(four, slice(None))
+    at_four, at_two = random_places(four, rng), random_places(two, rng)
+    columns = np.ascontiguousarray(at_four.T)
+    X, mu = (axis.coordinate(place) for axis, place in zip(two.axes, at_two.T, strict=True))
+    values, slopes = np.empty((2, POINTS)), np.empty((10, POINTS))
+    flat, phi, phi_slopes = np.empty((2, POINTS)), np.empty((3, POINTS)), np.empty((7, POINTS))
+    status = np.empty(POINTS, dtype=np.int64)
+    places = [np.ascontiguousarray(row) for row in at_two.T]
+    taken = rounds(
+        {
+            "scipy 4-D": lambda: scipy_four(at_four),
+            "scipy 4-D, F and A": lambda: scipy_both(at_four),
+            "scipy 2-D": lambda: scipy_two(at_two),
+            "island4d": lambda: fill_4d(four.coefficients, columns, values),
+            "island4d slopes": lambda: fill_gradient_4d(four.coefficients, columns, slopes),
+            "spline 2-D": lambda: fill_2d(two.coefficients, *places, flat),
+            "universal": lambda: universal_kernel.fill_phi(X, mu, *universal.kernel, status, phi),
+            "universal slopes": lambda: universal_kernel.fill_slopes(X, mu, *universal.kernel, status, phi_slopes),
+        }
+    )
+    one = at_four[0]
+    numbers = [float(x) for x in one]
+    scalar = rounds(
+        {
+            "scipy": lambda: [scipy_four(one) for _ in range(200)],
+            "island4d": lambda: [value_4d(four.coefficients, *numbers) for _ in range(200)],
+        }
+    )
+    click.echo(
+        f"\nTables against scipy's RegularGridInterpolator, cubic, {POINTS} random points. Ours answer F and A at"
+    )
+    click.echo("once. Each ratio: against scipy's F alone; per function, twice that; against scipy's F and A at once")
+    for name, spent in taken.items():
+        report(f"time of {name}", microseconds(spent, POINTS), "us")
+
+    def against(text: str, name: str, bar: float) -> None:
+        strict = times_faster(taken, "scipy 4-D", name)
+        report(f"{text}, against F of scipy 4-D", strict, "x", bar)
+        report("  per function", 2 * strict, "x", bar)
+        report("  against F and A of scipy 4-D", times_faster(taken, "scipy 4-D, F and A", name), "x", bar)
+
+    against("island4d value", "island4d", 8)
+    against("island4d value and four derivatives", "island4d slopes", 3)
+    report("scalar call of value_4d from Python", times_faster(scalar, "scipy", "island4d"), "x", 20)
+    against("universal value with error", "universal", 20)
+    report("  against F of scipy 2-D on its own nodes", times_faster(taken, "scipy 2-D", "universal"), "x")
+    against("universal value, two derivatives, error", "universal slopes", 12)
+    report("  against F of scipy 2-D on its own nodes", times_faster(taken, "scipy 2-D", "universal slopes"), "x")
+    report("the quintic spline alone against F of scipy 2-D", times_faster(taken, "scipy 2-D", "spline 2-D"), "x")
+    far_four = np.abs(values[0] - scipy_four(at_four)).max()
+    far_two = np.abs(flat[0] - scipy_two(at_two)).max()
+    report("largest |log_ratio_F - scipy's|, island4d, both cubic, not-a-knot", far_four, "")
+    report("largest |log_ratio_F - scipy's|, universal, quintic against cubic", far_two, "")
+
+
+def held_out(count: int, rng: np.random.Generator) -> tuple[Surface, np.ndarray]:
+    """Random surfaces, and a gap of each between -h_max and 0.9999 h_max."""
+    hurst = rng.uniform(0.3, 1, count)
+    zeta_1 = np.exp(rng.uniform(np.log(3.01), np.log(1e4), count))
+    h_max = rng.uniform(2.5, 4.7, count)
+    return Surface(hurst, 1.0, zeta_1, 1.0, h_max), rng.uniform(-1, 0.9999, count) * h_max
+
+
+def tiers(rng: np.random.Generator) -> None:
+    """Totals of every tier on held-out surfaces: time and error."""
+    surfaces, gaps = held_out(HELD_OUT, rng)
+    start = time.perf_counter()
+    truth = contact(surfaces, gaps, tier="exact", rtol=1e-10)
+    spent_truth = time.perf_counter() - start
+    click.echo(f"\nTotals on {HELD_OUT} held-out surfaces and gaps, against exact at 1e-10")
+    found: dict[str, Any] = {}
+
+    def run(tier: str) -> Callable[[], None]:
+        def call() -> None:
+            found[tier] = contact(surfaces, gaps, tier=tier)
+
+        return call
+
+    taken = rounds({tier: run(tier) for tier in ("universal", "island4d", "rigid")}, 3)
+    taken |= rounds({"exact": run("exact")}, 1)
+    report("exact at 1e-10: time a total", 1e6 * spent_truth / HELD_OUT, "us")
+    for tier in ("exact", "universal", "island4d", "rigid"):
+        error = max(np.abs(found[tier].force / truth.force - 1).max(), np.abs(found[tier].area / truth.area - 1).max())
+        report(f"{tier} at 1e-8: time a total", microseconds(taken[tier], HELD_OUT), "us")
+        report(f"{tier} at 1e-8: largest error of force or area", error, "")
+        stated = float((found[tier].error).max())
+        report(f"{tier} at 1e-8: largest error that it states", stated, "")
+
+
+def totals(rng: np.random.Generator) -> None:
+    """`contact` on many surfaces, with derivatives, and on many gaps of one surface."""
+    surfaces, gaps = held_out(SURFACES, rng)
+    part = SURFACES // 20
+    few = Surface(*(getattr(surfaces, name)[:part] for name in ("hurst", "q0", "q1", "h_rms", "h_max")))
+    taken = rounds(
+        {
+            "exact": lambda: contact(few, gaps[:part], tier="exact"),
+            "few": lambda: contact(few, gaps[:part]),
+            "value": lambda: contact(surfaces, gaps),
+            "slopes": lambda: contact(surfaces, gaps, derivatives=True),
+        },
+        3,
+    )
+    exact = contact(few, gaps[:part], tier="exact").islands
+    looked_up = contact(few, gaps[:part]).islands
+    click.echo(f"\ncontact at 1e-8, one gap on each of {SURFACES} surfaces; exact on the first {part} of them")
+    report("time a total", microseconds(taken["value"], SURFACES), "us")
+    rate = exact / statistics.median(taken["exact"])
+    report("islands solved by exact, a second", rate, "1/s")
+    report("islands looked up, a second", looked_up / statistics.median(taken["few"]), "1/s")
+    report("faster than our own exact tier", times_faster(taken, "exact", "few"), "x")
+    nominal = exact / NOMINAL_EXACT / statistics.median(taken["few"])
+    report(f"faster than a solver of {NOMINAL_EXACT} islands/s at exact's island count", nominal, "x")
+    report("derivatives=True against the value alone", times_faster(taken, "slopes", "value"), "x", at_most=4)
+    one = Surface.named("asphalt")
+    many = rng.uniform(-one.h_max, 0.9999 * one.h_max, GAPS)
+    taken = rounds({"contact": lambda: contact(one, many)}, 1)
+    report(f"{GAPS} random gaps on one surface, contact, a gap", microseconds(taken["contact"], GAPS), "us", at_most=2)
+
+
+def laws(rng: np.random.Generator) -> None:
+    """A frozen surface against numpy and scipy."""
+    surface = Surface.named("asphalt")
+    start = time.perf_counter()
+    law = contact_law(surface)
+    spent = time.perf_counter() - start
+    gaps = rng.uniform(-surface.h_max, 0.9999 * surface.h_max, GAPS)
+    nodes = np.linspace(-surface.h_max, surface.h_max, 1000)
+    values = law.force(nodes)
+    linear = RegularGridInterpolator((nodes,), values)
+    one, point = float(gaps[0]), gaps[:1]
+    taken = rounds(
+        {
+            "law": lambda: law.force(gaps),
+            "numpy": lambda: np.interp(gaps, nodes, values),
+            "scalar law": lambda: [law.force(one) for _ in range(1000)],
+            "scalar scipy": lambda: [linear(point) for _ in range(1000)],
+        }
+    )
+    some = gaps[:2000]
+    truth = contact(surface, some, rtol=1e-10).force
+    click.echo("\ncontact_law of one surface, asphalt")
+    report("making the law", spent, "s")
+    report("law.force, a random gap", microseconds(taken["law"], GAPS), "us", at_most=2)
+    report(
+        "law.force against numpy.interp on 1000 nodes, same points", times_faster(taken, "law", "numpy"), "x", at_most=2
+    )
+    report("scalar call against RegularGridInterpolator's", times_faster(taken, "scalar scipy", "scalar law"), "x", 25)
+    report("largest error of the law", np.abs(law.force(some) / truth - 1).max(), "")
+    report("largest error of numpy.interp", np.abs(np.interp(some, nodes, values) / truth - 1).max(), "")
+
+
+def threads(rng: np.random.Generator) -> None:
+    """Mixed lookups on many threads, compared bit by bit with one thread."""
+    raw, universal = open_table("island4d").content, open_table("universal")
+    law = contact_law(Surface.named("asphalt"))
+    chunk = POINTS
+    jobs = MIXED // chunk
+    at_four, at_two = np.ascontiguousarray(random_places(raw, rng).T), random_places(universal.content, rng).T
+    X, mu = (axis.coordinate(place) for axis, place in zip(universal.content.axes, at_two, strict=True))
+    gaps = rng.uniform(-law.h_max, law.h_max, chunk)
+
+    def job(number: int) -> bytes:
+        # every job its own order of the same points
+        turn = number * 37 % chunk
+        status = np.empty(chunk, dtype=np.int64)
+        if number % 3 == 0:
+            out = np.empty((2, chunk))
+            fill_4d(raw.coefficients, np.roll(at_four, turn, axis=1), out)
+        elif number % 3 == 1:
+            out = np.empty((3, chunk))
+            universal_kernel.fill_phi(np.roll(X, turn), np.roll(mu, turn), *universal.kernel, status, out)
+        else:
+            out = law.force(np.roll(gaps, turn))
+        return hashlib.blake2b(out.tobytes()).digest()
+
+    start = time.perf_counter()
+    alone = [job(number) for number in range(jobs)]
+    single = time.perf_counter() - start
+    start = time.perf_counter()
+    with concurrent.futures.ThreadPoolExecutor(THREADS) as pool:
+        together = list(pool.map(job, range(jobs)))
+    shared = time.perf_counter() - start
+    differing = sum(a != b for a, b in zip(alone, together, strict=True))
+    click.echo(f"\n{jobs * chunk} mixed lookups (both tables, a law) on {THREADS} threads and on one")
+    report("blocks that differ in any bit", differing, "", at_most=0)
+    report(f"one thread against {THREADS} threads ({os.cpu_count()} cores)", single / shared, "x")
+
+
+def fresh_process() -> None:
+    """Import, first lookup with compiled code at hand, and the very first one."""
+    lookup = (
+        "import time; t = time.perf_counter(); import mbma_tables as m; a = time.perf_counter(); "
+        "m.contact(m.Surface(0.8, 1.0, 200.0, 1.0, 3.0), 1.0); b = time.perf_counter(); print(a - t, b - a)"
+    )
+
+    def run(**environment: str) -> list[float]:
+        said = subprocess.check_output([sys.executable, "-c", lookup], env={**os.environ, **environment})
+        return [float(word) for word in said.split()]
+
+    run()
+    warm = np.median([run() for _ in range(5)], axis=0)
+    with tempfile.TemporaryDirectory() as folder:
+        cold = run(NUMBA_CACHE_DIR=folder)
+    click.echo("\nA fresh process")
+    report("import mbma_tables", warm[0], "s", at_most=0.5)
+    report("first lookup after the import, compiled code at hand", warm[1], "s", at_most=2)
+    report("very first lookup, nothing compiled yet", cold[1], "s")
+
+
+@click.command()
+@click.option("--json", "json_path", type=click.Path(path_type=pathlib.Path, dir_okay=False), help="Write the table.")
+@click.option("--threads", "with_threads", is_flag=True, help="10 million lookups on 16 threads as well.")
+def main(json_path: pathlib.Path | None, with_threads: bool) -> None:
+    """Time the lookups."""
+    rng = np.random.default_rng(SEED)
+    load = os.getloadavg()
+    click.echo(f"{os.cpu_count()} cores, load average {load[0]:.2f} at the start; numpy {np.__version__}")
+    island_tables(rng)
+    tiers(rng)
+    totals(rng)
+    laws(rng)
+    if with_threads:
+        threads(rng)
+    fresh_process()
+    end = os.getloadavg()
+    click.echo(f"\nload average {end[0]:.2f} at the end")
+    if json_path is not None:
+        rows = [dataclasses.asdict(line) for line in LINES]
+        json_path.write_text(json.dumps({"load": [load[0], end[0]], "lines": rows}, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,180 @@
+"""The shipped tables' kernels: honest bounds on many fresh points, slopes, the continuation below, one bit pattern."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+
+from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
+from mbma_tables.islands.island import geometry
+from mbma_tables.models import universal_kernel
+from mbma_tables.models.tabulated import island4d_model, universal_model
+from mbma_tables.surfaces.readings import REPORTED
+
+
+def scattered(count, seed, low=None):
+    """Fresh points over the table: X even, mu even in its logarithm."""
+    X_axis, mu_axis = universal_model().content.axes
+    rng = np.random.default_rng(seed)
+    X = rng.uniform(X_axis.low, X_axis.high, count)
+    return X, 10 ** rng.uniform(math.log10(low or mu_axis.low), math.log10(mu_axis.high), count)
+
+
+def error_of(found, solved):
+    return np.maximum(np.abs(found.phi_F / solved.phi_F - 1), np.abs(found.phi_A / solved.phi_A - 1))
+
+
+@functools.cache
+def universal_errors():
+    X, mu = scattered(20_000, seed=60)
+    found = universal_model().answer(X, mu)
+    return error_of(found, greenwood_tripp.solve(X, mu, rtol=1e-12)), found.error
+
+
+def test_no_bound_is_exceeded_on_20000_points():
+    error, bound = universal_errors()
+    assert (error <= bound).all()
+    # as promised in the certificate, and not by a bound that says nothing
+    assert error.max() <= 1e-8
+    assert bound.max() <= 1e-7
+
+
+def test_the_bound_is_not_much_wider_than_the_error():
+    error, bound = universal_errors()
+    ratio = bound / np.maximum(error, np.finfo(float).eps)
+    # where interpolation shows above rounding
+    visible = error > 1e-13
+    assert visible.mean() > 0.8
+    assert np.median(ratio[visible]) <= 30
+    assert np.median(ratio) <= 30
+
+
+def test_island4d_over_what_surfaces_visit():
+    rng = np.random.default_rng(61)
+    count = 20_000
+    hurst = rng.uniform(0.3, 1, count)
+    zeta_1 = 10 ** rng.uniform(math.log10(3.001), 4, count)
+    g = geometry(10 ** rng.uniform(-6, 1, count), hurst, zeta_1, REPORTED)
+    found = island4d_model().of_islands(g | {"hurst": hurst})
+    error = error_of(found, greenwood_tripp.solve(g["X"], g["mu"], rtol=1e-10))
+    assert (error > found.error).mean() < 1e-3
+    assert error.max() <= 1e-3
+    assert found.error.max() <= 1e-3
+    # far inside the rigid limit a table has next to no error to state
+    visible = error > 1e-10
+    assert visible.mean() > 0.5
+    assert np.median((found.error / error)[visible]) <= 100
+
+
+def test_slopes_against_the_solver():
+    X, mu = scattered(300, seed=62, low=1e-7)
+    X_axis, mu_axis = universal_model().content.axes
+    X, mu = np.clip(X, X_axis.low + 0.1, X_axis.high - 0.1), np.minimum(mu, 0.9 * mu_axis.high)
+    value, by_X, by_mu = universal_model().slopes(X, mu)
+    offsets = np.arange(-3.0, 4)
+    weights = np.linalg.solve(np.vander(offsets, increasing=True).T, np.eye(7)[1])
+    in_X = greenwood_tripp.solve(X[:, None] + 1e-2 * offsets, mu[:, None], rtol=1e-12)
+    in_mu = greenwood_tripp.solve(X[:, None], mu[:, None] * (1 + 1e-2 * offsets), rtol=1e-12)
+    for name in ("phi_F", "phi_A"):
+        own = getattr(value, name)
+        true = getattr(in_X, name) @ weights / 1e-2
+        assert (np.abs(getattr(by_X, name) - true) <= 1e-6 * np.maximum(np.abs(true), own)).all()
+        true = getattr(in_mu, name) @ weights / (1e-2 * mu)
+        assert (np.abs(getattr(by_mu, name) - true) <= 1e-6 * np.maximum(np.abs(true), own / mu)).all()
+    plain = universal_model().answer(X, mu)
+    np.testing.assert_allclose(value.phi_F, plain.phi_F, rtol=1e-13)
+    np.testing.assert_allclose(value.phi_A, plain.phi_A, rtol=1e-13)
+    np.testing.assert_array_equal(value.error, plain.error)
+
+
+def test_slopes_below_the_table():
+    """First order in mu about the rigid sphere: slopes are those of what is answered, and meet at the edge."""
+    model = universal_model()
+    edge = model.content.axes[1].low
+    X = np.linspace(-6, 40, 50)
+    for factor in (1e-3, 0.3):
+        mu = np.full(50, factor * edge)
+        value, by_X, by_mu = model.slopes(X, mu)
+        up, down = model.answer(X, 1.01 * mu), model.answer(X, 0.99 * mu)
+        np.testing.assert_allclose(by_mu.phi_F, (up.phi_F - down.phi_F) / (0.02 * mu), rtol=1e-10)
+        right, left = model.answer(X + 1e-4, mu), model.answer(X - 1e-4, mu)
+        for name in ("phi_F", "phi_A"):
+            differences = (getattr(right, name) - getattr(left, name)) / 2e-4
+            np.testing.assert_allclose(getattr(by_X, name), differences, rtol=1e-6)
+            # area falls by a share of about mu: only against itself is that visible
+            assert (np.abs(getattr(by_mu, name)) <= 1e3 * getattr(value, name) / edge).all()
+    above = model.slopes(X, np.full(50, np.nextafter(edge, 1)))
+    below = model.slopes(X, np.full(50, np.nextafter(edge, 0)))
+    np.testing.assert_allclose(above[2].phi_F, below[2].phi_F, rtol=1e-9)
+    # at 1e-8 of the area, its loss has few digits in any table
+    touching = X > 1
+    np.testing.assert_allclose(above[2].phi_A[touching], below[2].phi_A[touching], rtol=1e-3)
+
+
+def test_parallel_gives_the_same_bits():
+    X, mu = scattered(50_000, seed=63, low=1e-14)
+    serial, parallel = universal_model().answer(X, mu), universal_model().answer(X, mu, parallel=True)
+    for name in ("phi_F", "phi_A", "error"):
+        np.testing.assert_array_equal(getattr(serial, name), getattr(parallel, name))
+    X[77] = 1e3
+    with pytest.raises(OutOfRangeError) as caught:
+        universal_model().answer(X, mu, parallel=True)
+    assert caught.value.mask.sum() == 1
+    assert caught.value.mask[77]
+
+
+def test_a_batch_gives_the_bits_of_single_lookups():
+    X, mu = scattered(200, seed=64)
+    batch = universal_model().answer(X, mu)
+    for k in range(200):
+        one = universal_model().answer(X[k], mu[k])
+        assert np.shape(one.phi_F) == ()
+        assert (one.phi_F, one.phi_A, one.error) == (batch.phi_F[k], batch.phi_A[k], batch.error[k])
+    swapped = universal_model().answer(X[:, None], mu[:3])
+    assert swapped.phi_F.shape == (200, 3)
+    assert swapped.phi_A[1, 1] == batch.phi_A[1]
+
+
+def test_codes_of_the_kernel():
+    """Out of range is a code and NaN, to the last bit of each end; never the value of the edge."""
+    model = universal_model()
+    X_axis, mu_axis = model.content.axes
+    cases = [
+        (X_axis.low, 1.0, universal_kernel.OK),
+        (np.nextafter(X_axis.low, -99), 1.0, universal_kernel.X_BELOW),
+        (X_axis.high, 1.0, universal_kernel.OK),
+        (np.nextafter(X_axis.high, 99), 1.0, universal_kernel.X_ABOVE),
+        (1.0, mu_axis.high, universal_kernel.OK),
+        (1.0, np.nextafter(mu_axis.high, np.inf), universal_kernel.MU_ABOVE),
+        (1.0, 0.0, universal_kernel.OK),
+        (math.nan, 1.0, universal_kernel.X_BELOW),
+        (1.0, math.nan, universal_kernel.MU_ABOVE),
+    ]
+    X, mu, expected = (np.array(column) for column in zip(*cases, strict=True))
+    for fill, rows in (
+        (universal_kernel.fill_phi, 3),
+        (universal_kernel.fill_phi_parallel, 3),
+        (universal_kernel.fill_slopes, 7),
+    ):
+        status, out = np.empty(X.size, dtype=np.int64), np.empty((rows, X.size))
+        fill(X, mu, *model.kernel, status, out)
+        np.testing.assert_array_equal(status, expected)
+        assert np.isnan(out[:, expected != universal_kernel.OK]).all()
+        assert np.isfinite(out[:, expected == universal_kernel.OK]).all()
+
+
+def test_where_arguments_lie():
+    model = universal_model()
+    X_axis, mu_axis = model.content.axes
+    in_X, in_mu = model.status([X_axis.low - 1, 0.0, X_axis.high + 1], [[0.0], [1.0], [2 * mu_axis.high]])
+    assert in_X.tolist() == [-1, 0, 1]
+    assert in_mu.tolist() == [[-1], [0], [1]]
+    assert model.status(0.0, 1.0) == (0, 0)
+    with pytest.raises(InputError, match="mu must be finite"):
+        model.status(0.0, math.nan)
+    for method in (model.answer, model.slopes):
+        with pytest.raises(OutOfRangeError, match=r"X must be in \[-6\.25, 41\], got 50 at \(1,\)"):
+            method([0.0, 50.0], 1.0)
+        with pytest.raises(InputError, match="do not broadcast"):
+            method([0.0, 1.0], [1.0, 2.0, 3.0])

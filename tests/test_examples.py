@@ -1,0 +1,221 @@
+"""The examples run, draw, and print numbers that other ways of computing them give too."""
+
+import importlib.util
+import pathlib
+import re
+import runpy
+import sys
+import warnings
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from mbma_tables import StaleTableWarning, Surface, contact
+
+pytest.importorskip("matplotlib")
+
+EXAMPLES = pathlib.Path(__file__).parents[1] / "examples"
+PAGE = EXAMPLES.parent / "docs" / "lookup.md"
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def load(name):
+    if name == "scatter":
+        pytest.importorskip("dask")
+    spec = importlib.util.spec_from_file_location(f"example_{name}", EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    # dataclasses look their module up
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def seal(tmp_path_factory):
+    module = load("seal")
+    picture = tmp_path_factory.mktemp("seal") / "seal.png"
+    return module, module.main(picture, points=4), picture
+
+
+@pytest.fixture(scope="module")
+def scatter(tmp_path_factory):
+    module = load("scatter")
+    picture = tmp_path_factory.mktemp("scatter") / "scatter.png"
+    return module, module.main(picture, samples=20, keep_samples=True), picture
+
+
+@pytest.fixture(scope="module")
+def conductance(tmp_path_factory):
+    module = load("conductance")
+    picture = tmp_path_factory.mktemp("conductance") / "conductance.png"
+    return module, module.main(picture, points=40), picture
+
+
+@pytest.mark.parametrize("name", ["seal", "scatter", "conductance"])
+def test_a_picture_is_drawn(name, request):
+    picture = request.getfixturevalue(name)[2]
+    content = picture.read_bytes()
+    assert content.startswith(PNG)
+    width, height = (int.from_bytes(content[k : k + 4], "big") for k in (16, 20))
+    assert width > 600
+    assert height > 300
+
+
+def direct(module, x):
+    """log(pressure/LIMIT) and log(area) by the exact tier, written again from the problem's statement."""
+    h_rms, h_max = np.exp(x[0]), module.CREST * np.exp(x[0])
+    valley = h_max - x[3] * h_max
+    both = contact(
+        Surface(x[1], module.Q0, np.exp(x[2]), h_rms, h_max),
+        [valley - module.WAVINESS, valley],
+        tier="exact",
+        E_star=module.E_STAR,
+    )
+    return np.log([(both.force[0] + both.force[1]) / 2 / module.LIMIT, both.area[1]])
+
+
+def test_seal_gradients_are_those_of_the_exact_tier(seal):
+    module, found, _ = seal
+    x = found.result.x
+    _, gradients = module.log_answers(x)
+    for axis in range(4):
+        step = np.zeros(4)
+        step[axis] = 1e-4
+        central = (direct(module, x + step) - direct(module, x - step)) / 2e-4
+        # differences of the exact tier at 1e-8 are good to 1e-4 absolutely, and to h^2
+        np.testing.assert_allclose(gradients[:, axis], central, rtol=1e-5, atol=2e-4)
+
+
+def test_seal_optimum_meets_the_conditions_of_karush_kuhn_and_tucker(seal):
+    module, found, _ = seal
+    x = found.result.x
+    assert found.result.success
+    pressure, area = direct(module, x)
+    assert abs(pressure) < 1e-6
+    assert -found.result.fun == pytest.approx(area, rel=1e-6, abs=0)
+    _, (load, gain) = module.log_answers(x)
+    low, high = np.transpose(module.BOUNDS)
+    at_low, at_high = x <= low + 1e-9, x >= high - 1e-9
+    free = ~(at_low | at_high)
+    assert list(free) == [True, False, False, True]
+    # gain = multiplier * load where free, and pushes outwards at the bounds
+    multiplier = gain[free] @ load[free] / (load[free] @ load[free])
+    assert multiplier > 0
+    rest = gain - multiplier * load
+    assert np.abs(rest[free]).max() < 1e-4 * np.abs(gain).max()
+    assert (rest[at_high] > 0).all()
+    assert (rest[at_low] < 0).all()
+
+
+def test_seal_optimum_is_not_below_the_grid(seal):
+    _, found, _ = seal
+    best = found.grid_area.max()
+    assert np.exp(-found.result.fun) >= best
+    # four points an axis come close, or the grid is of another problem
+    assert best > 0.8 * np.exp(-found.result.fun)
+
+
+def test_scatter_is_the_exact_tier_sample_by_sample(scatter):
+    module, spread, _ = scatter
+    surfaces = spread.surfaces
+    assert surfaces.shape == (20,)
+    for k in range(20):
+        own = Surface(surfaces.hurst[k], module.Q0, surfaces.q1[k], surfaces.h_rms[k], surfaces.h_max[k])
+        exact = contact(own, module.GAP, tier="exact", rtol=1e-7)
+        assert spread.force[k] == pytest.approx(exact.force, rel=1.2e-6, abs=0)
+
+
+def test_scatter_samples_have_the_stated_distribution(scatter):
+    module, _, _ = scatter
+    count = 20_000
+    surfaces = module.sample_surfaces(count)
+    for sample, (mean, deviation) in (
+        (np.log(surfaces.h_rms), module.LOG_H_RMS),
+        (np.log(surfaces.q1), module.LOG_Q1),
+    ):
+        values = sample.compute().values
+        assert abs(values - mean).max() <= 3 * deviation * (1 + 1e-12)
+        assert abs(values.mean() - mean) < 5 * deviation / np.sqrt(count)
+        # a normal cut at three deviations keeps 0.98658 of its deviation
+        assert values.std() == pytest.approx(0.98658 * deviation, rel=0.03, abs=0)
+    hurst = surfaces.hurst.compute().values
+    assert hurst.min() >= 0.3
+    assert hurst.max() <= 1
+    assert (np.corrcoef([hurst, surfaces.q1.compute(), surfaces.h_rms.compute()]) - np.eye(3)).max() < 0.05
+
+
+def test_scatter_standard_errors_are_those_of_repeated_samples(scatter):
+    module, _, _ = scatter
+    # forces of one large sample, cut into many of the same size
+    count, repeats = 200, 40
+    force = module.spread_of_force(count * repeats).force.reshape(repeats, count)
+    own = np.quantile(force, module.QUANTILES, axis=1).std(axis=1, ddof=1)
+    stated = module.spread_of_force(count).standard_errors
+    # the deviation of 40 numbers is known to 11%, a stated one to some 20%
+    assert (np.abs(np.log(own / stated)) < np.log(2)).all()
+
+
+def test_scatter_runs_from_the_command_line(tmp_path):
+    picture = tmp_path / "out.png"
+    module = load("scatter")
+    result = CliRunner().invoke(module.command, ["--samples", "50", "--out", str(picture)])
+    assert result.exit_code == 0, result.output
+    assert "50 samples" in result.output
+    assert picture.read_bytes().startswith(PNG)
+
+
+def test_conductance_is_the_finite_difference_of_exact_totals(conductance):
+    module, curve, _ = conductance
+    joint = module.JOINT
+    k_s = 2 / (1 / module.K_STEEL + 1 / module.K_ALUMINIUM)
+    u = np.linspace(0.55, 0.95, 9) * joint.h_max
+    step = 1e-4 * joint.h_rms
+    # d = 2 u - h_max (50)
+    p_minus, p, p_plus = (
+        contact(joint, 2 * (u + k * step) - joint.h_max, tier="exact", E_star=module.E_STAR, rtol=1e-10).force
+        for k in (-1, 0, 1)
+    )
+    h = k_s / module.E_STAR * (p_minus - p_plus) / (2 * step)
+    inside = (p > curve.pressure[0]) & (p < curve.pressure[-1])
+    assert inside.sum() >= 5
+    found = np.exp(np.interp(np.log(p), np.log(curve.pressure), np.log(curve.conductance)))
+    # forty points of a curve, drawn straight between
+    np.testing.assert_allclose(found[inside], h[inside], rtol=5e-3)
+
+
+def test_conductance_of_one_smooth_circular_spot_gives_the_constant(conductance):
+    module, curve, _ = conductance
+    # Hertz: F = 4/3 E* sqrt(R) delta^(3/2), a = sqrt(R delta); Holm: 1/R = 4 a/(1/k1 + 1/k2)
+    radius, delta, E_star = 2e-3, 1e-6, module.E_STAR
+    stiffness = 2 * E_star * np.sqrt(radius * delta)
+    holm = 4 * np.sqrt(radius * delta) / (1 / module.K_STEEL + 1 / module.K_ALUMINIUM)
+    ratio = curve.conductance / curve.stiffness
+    np.testing.assert_allclose(ratio, holm / stiffness, rtol=1e-13)
+
+
+def test_the_page_on_lookups_runs():
+    pytest.importorskip("dask")
+    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert len(blocks) >= 5
+    names = {}
+    with warnings.catch_warnings():
+        # a stale table is another test's matter
+        warnings.simplefilter("ignore", StaleTableWarning)
+        for block in blocks:
+            exec(block, names)
+    assert names["law"].stiffness_mean(0.5) == 2 * names["law"].stiffness(0.5)
+    assert names["lazy"].dims == ("sample", "gap")
+
+
+@pytest.mark.parametrize("name", ["seal", "conductance"])
+def test_runs_as_a_script(name, tmp_path):
+    # the script as it stands, but for where its picture goes
+    text = (EXAMPLES / f"{name}.py").read_text(encoding="utf-8")
+    assert text.count("PICTURE = pathlib.Path(__file__)") == 1
+    (tmp_path / "examples").mkdir()
+    (tmp_path / "docs" / "figures").mkdir(parents=True)
+    script = tmp_path / "examples" / f"{name}.py"
+    script.write_text(text, encoding="utf-8")
+    runpy.run_path(str(script), run_name="__main__")
+    assert (tmp_path / "docs" / "figures" / f"example_{name}.png").read_bytes().startswith(PNG)

@@ -1,0 +1,104 @@
+"""Sixteen threads on one model, one law and one surface: the bits of one thread."""
+
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+
+import numpy as np
+import pytest
+
+from mbma_tables import Surface, contact, contact_law
+from mbma_tables.models.tabulated import universal_model
+
+THREADS = 16
+ENTRIES = 2000
+ROUNDS = 4  # of every question by every thread: about a million lookups in all
+
+
+@pytest.fixture(scope="module")
+def questions():
+    """Functions of a seed, each with lookups of its own."""
+    model = universal_model()
+    X_axis, mu_axis = model.content.axes
+    law = contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0))
+
+    def arguments(seed):
+        rng = np.random.default_rng(seed)
+        X = rng.uniform(X_axis.low, X_axis.high, ENTRIES)
+        return X, 10 ** rng.uniform(-12, np.log10(mu_axis.high), ENTRIES)
+
+    def gaps(seed, count):
+        return np.random.default_rng(seed).uniform(-3, 3, count)
+
+    def values(seed):
+        found = model.answer(*arguments(seed))
+        return [found.phi_F, found.phi_A, found.error]
+
+    def slopes(seed):
+        value, by_X, by_mu = model.slopes(*arguments(seed))
+        return [value.phi_F, by_X.phi_F, by_X.phi_A, by_mu.phi_F, by_mu.phi_A]
+
+    def law_values(seed):
+        d = gaps(seed, ENTRIES)
+        return [law.force(d), law.area(d), law.stiffness(d), law.force(float(d[0]))]
+
+    def inverses(seed):
+        return [law.separation(force=law.force(gaps(seed, 200)))]
+
+    def batches(seed):
+        # 31 islands or more a gap
+        rng = np.random.default_rng(seed)
+        surfaces = Surface(rng.uniform(0.3, 1, 60), 0.2, 0.2 * 10 ** rng.uniform(0.5, 4, 60), 1.0, 3.0)
+        found = contact(surfaces, gaps(seed, 60), rtol=1e-6)
+        return [found.force, found.area, found.error]
+
+    def gradients(seed):
+        found = contact(Surface(0.6, 0.2, 30.0, 1.0, 3.0), gaps(seed, 10), rtol=1e-6, derivatives=True)
+        return [*found.force_by.values(), *found.area_by.values()]
+
+    return [values, slopes, law_values, inverses, batches, gradients]
+
+
+def test_sixteen_threads_give_the_bits_of_one(questions):
+    alone = {
+        (question, seed): questions[question](seed) for question in range(len(questions)) for seed in range(ROUNDS)
+    }
+    barrier = Barrier(THREADS)
+
+    def work(thread):
+        barrier.wait()
+        # every thread in an order of its own, so that unlike questions meet
+        order = np.random.default_rng(1000 + thread).permutation(len(alone))
+        keys = list(alone)
+        differing = []
+        for place in order:
+            question, seed = keys[place]
+            found = questions[question](seed)
+            if not all(np.array_equal(a, b) for a, b in zip(found, alone[keys[place]], strict=True)):
+                differing.append(keys[place])
+        return differing
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        differing = list(pool.map(work, range(THREADS)))
+    assert differing == [[]] * THREADS
+
+
+def test_the_questions_are_not_all_alike(questions):
+    for question in questions:
+        assert not np.array_equal(question(0)[0], question(1)[0])
+
+
+def test_laws_made_by_many_threads_are_one_law():
+    surfaces = [Surface(hurst, 0.2, 60.0, 1.0, 3.0) for hurst in (0.35, 0.6, 0.8, 1.0)]
+    alone = [contact_law(surface, rtol=1e-7) for surface in surfaces]
+    barrier = Barrier(THREADS)
+
+    def make(thread):
+        barrier.wait()
+        return contact_law(surfaces[thread % 4], rtol=1e-7)
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        made = list(pool.map(make, range(THREADS)))
+    for thread, law in enumerate(made):
+        np.testing.assert_array_equal(law.breaks, alone[thread % 4].breaks)
+        np.testing.assert_array_equal(law.pieces, alone[thread % 4].pieces)
+        np.testing.assert_array_equal(law.energies, alone[thread % 4].energies)

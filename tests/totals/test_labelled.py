@@ -1,0 +1,210 @@
+"""xarray in, xarray out; dask stays lazy and gives the same bits; cold tables opened by many threads."""
+
+import subprocess
+import sys
+
+import dask
+import dask.array
+import numpy as np
+import pytest
+import xarray as xr
+from dask.callbacks import Callback
+
+from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
+from mbma_tables.totals.contact import MANY_GAPS
+
+FIELDS = ("force", "area", "error")
+
+
+def gaps_over(n, **kwargs):
+    return xr.DataArray(np.linspace(-2.9, 3.1, n), dims="gap", coords={"gap": np.arange(n)}, name="d", **kwargs)
+
+
+def surfaces_over():
+    hurst = xr.DataArray([0.4, 0.7, 1.0], dims="surface", coords={"surface": ["a", "b", "c"]}, attrs={"units": "1"})
+    h_max = xr.DataArray([3.0, 3.2], dims="case")
+    return Surface(hurst, 0.2, 40.0, 1.0, h_max)
+
+
+class Tasks(Callback):
+    """Counts what dask runs."""
+
+    def __init__(self):
+        super().__init__()
+        self.ran = 0
+
+    def _pretask(self, key, dsk, state):
+        self.ran += 1
+
+
+def test_dimensions_by_name():
+    gaps = gaps_over(7, attrs={"units": "mm", "long_name": "separation"})
+    found = contact(surfaces_over(), gaps)
+    plain = contact(
+        Surface(np.array([0.4, 0.7, 1.0])[:, None, None], 0.2, 40.0, 1.0, np.array([3.0, 3.2])[:, None]), gaps.values
+    )
+    assert found.islands is None
+    assert (found.tier, found.reading) == ("universal", "reported")
+    for name in FIELDS:
+        values = getattr(found, name)
+        assert isinstance(values, xr.DataArray)
+        assert values.name == name
+        assert set(values.dims) == {"surface", "case", "gap"}
+        np.testing.assert_array_equal(values.transpose("surface", "case", "gap"), getattr(plain, name))
+        assert values.surface.values.tolist() == ["a", "b", "c"]
+        assert values.gap.values.tolist() == list(range(7))
+    assert found.force.attrs == {"long_name": "force over nominal area", "units": "unit of E_star"}
+    assert found.area.attrs["units"] == found.error.attrs["units"] == "1"
+    assert found.separation is gaps
+    assert gaps.attrs == {"units": "mm", "long_name": "separation"}
+    np.testing.assert_array_equal(
+        found.mean_separation.transpose("case", "gap"), (np.array([3.0, 3.2])[:, None] + gaps.values) / 2
+    )
+    together = xr.Dataset({name: getattr(found, name) for name in FIELDS})
+    assert together.sizes == {"surface": 3, "case": 2, "gap": 7}
+
+
+@pytest.mark.parametrize("which", ["separation", "surface", "E_star"])
+def test_one_labelled_argument_is_enough(which):
+    label = {name: (lambda x: xr.DataArray(x, dims="t")) if name == which else (lambda x: x[1]) for name in (
+        "separation", "surface", "E_star"
+    )}  # fmt: skip
+    found = contact(
+        Surface(label["surface"]([0.5, 0.8]), 0.2, 40.0, 1.0, 3.0),
+        label["separation"]([0.5, 1.5]),
+        E_star=label["E_star"]([1.0, 2.0]),
+    )
+    assert found.force.dims == ("t",)
+    assert found.force.values[1] == contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), 1.5, E_star=2.0).force
+
+
+def test_no_dimensions_at_all():
+    found = contact(Surface(xr.DataArray(0.8), 0.2, 40.0, 1.0, 3.0), 1.0)
+    assert found.force.shape == ()
+    assert float(found.force) == contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), 1.0).force
+
+
+@pytest.mark.parametrize("scheduler", ["synchronous", "threads"])
+@pytest.mark.parametrize("derivatives", [False, True])
+def test_dask_is_lazy_and_gives_the_same_bits(scheduler, derivatives):
+    gaps, surfaces = gaps_over(50), surfaces_over()
+    eager = contact(surfaces, gaps, derivatives=derivatives)
+    lazy_surfaces = Surface(surfaces.hurst.chunk(surface=2), 0.2, 40.0, 1.0, surfaces.h_max.chunk(case=1))
+    with Tasks() as tasks:
+        lazy = contact(lazy_surfaces, gaps.chunk(gap=11), derivatives=derivatives)
+        outputs = {name: getattr(lazy, name) for name in (*FIELDS, "mean_separation", "separation")}
+        if derivatives:
+            outputs |= {f"force_{name}": slope for name, slope in lazy.force_by.items()}
+            outputs |= {f"area_{name}": slope for name, slope in lazy.area_by.items()}
+        assert all(dask.is_dask_collection(value) for value in outputs.values())
+        assert tasks.ran == 0
+    expected = {name: getattr(eager, name) for name in (*FIELDS, "mean_separation", "separation")}
+    if derivatives:
+        expected |= {f"force_{name}": slope for name, slope in eager.force_by.items()}
+        expected |= {f"area_{name}": slope for name, slope in eager.area_by.items()}
+    with dask.config.set(scheduler=scheduler, num_workers=4), Tasks() as tasks:
+        computed = dask.compute(outputs)[0]
+    assert tasks.ran > 10
+    assert computed.keys() == expected.keys()
+    for name, value in computed.items():
+        assert value.dims == expected[name].dims
+        np.testing.assert_array_equal(value, expected[name])
+    assert lazy.force.attrs == eager.force.attrs
+
+
+def test_the_bits_do_not_depend_on_the_chunks():
+    """Also where so many gaps are asked of one surface that they go through a law."""
+    surface, gaps = Surface(0.8, 0.2, 40.0, 1.0, 3.0), gaps_over(MANY_GAPS + 900)
+    eager, plain = contact(surface, gaps), contact(surface, gaps.values)
+    np.testing.assert_array_equal(eager.force, plain.force)
+    for chunk in (700, 4500):
+        lazy = contact(surface, gaps.chunk(gap=chunk))
+        with dask.config.set(scheduler="threads", num_workers=4):
+            for name in FIELDS:
+                np.testing.assert_array_equal(getattr(lazy, name).compute(), getattr(eager, name))
+    few = contact(surface, gaps[::100])
+    np.testing.assert_allclose(few.force, eager.force[::100], rtol=2e-8)
+
+
+def test_laws_of_dask_arrays():
+    law = contact_law(Surface(0.8, 0.2, 40.0, 1.0, 3.0))
+    gaps = gaps_over(60)
+    for name in ("force", "area", "stiffness", "energy"):
+        function = getattr(law, name)
+        with Tasks() as tasks:
+            lazy = function(gaps.chunk(gap=7))
+            assert dask.is_dask_collection(lazy)
+            assert tasks.ran == 0
+        assert lazy.dims == ("gap",)
+        with dask.config.set(scheduler="threads", num_workers=4):
+            np.testing.assert_array_equal(lazy.compute(), function(gaps.values))
+
+
+def test_outside_and_tiers_go_through():
+    surfaces = Surface(xr.DataArray([0.05, 0.8], dims="s"), 0.2, 0.2e8, 1.0, 3.0)
+    gaps = gaps_over(3)
+    found = contact(surfaces, gaps, outside="nan")
+    assert np.isnan(found.force.sel(s=0)).values.tolist() == [True, True, False]
+    assert np.isfinite(found.force.sel(s=1)).all()
+    with pytest.raises(OutOfRangeError, match="outside the universal table"):
+        contact(surfaces, gaps)
+    rigid = contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), gaps, tier="rigid", reading="printed", rtol=1e-4)
+    assert (rigid.tier, rigid.reading) == ("rigid", "printed")
+    plain = contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), gaps.values, tier="rigid", reading="printed", rtol=1e-4)
+    np.testing.assert_array_equal(rigid.force, plain.force)
+
+
+def test_bad_input_is_refused_when_it_is_computed():
+    surface = Surface(0.8, 0.2, 40.0, 1.0, 3.0)
+    bad = xr.DataArray([1.0, np.nan], dims="t")
+    with pytest.raises(InputError, match=r"separation must be finite, got nan at \(1,\)"):
+        contact(surface, bad)
+    lazy = contact(surface, bad.chunk(t=1)).force
+    with pytest.raises(InputError, match="separation must be finite"):
+        lazy.compute(scheduler="synchronous")
+    wrong = Surface(xr.DataArray([0.8, 1.2], dims="s"), 0.2, 40.0, 1.0, 3.0)
+    with pytest.raises(OutOfRangeError, match=r"hurst must be in \(0, 1\]"):
+        contact(wrong, 1.0)
+
+
+def test_arrays_without_names_beside_named_ones():
+    with pytest.raises(InputError, match=r"beside DataArrays, separation must be one or a scalar, got shape \(3,\)"):
+        contact(surfaces_over(), [0.0, 1.0, 2.0])
+    with pytest.raises(InputError, match=r"beside DataArrays, h_rms must be"):
+        contact(Surface(xr.DataArray([0.8, 0.9], dims="s"), 0.2, 40.0, np.ones(2), 3.0), 1.0)
+
+
+def test_coordinates_that_differ_are_not_joined():
+    hurst = xr.DataArray([0.8, 0.9], dims="t", coords={"t": [0, 1]})
+    with pytest.raises(ValueError, match=r"join|align"):
+        contact(Surface(hurst, 0.2, 40.0, 1.0, 3.0), xr.DataArray([1.0, 2.0], dims="t", coords={"t": [1, 2]}))
+
+
+COLD = """
+import dask, numpy as np, xarray as xr
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+from mbma_tables import Surface, contact
+gaps = xr.DataArray(np.linspace(-2.9, 3.1, 120), dims="gap")
+surface = Surface(xr.DataArray([0.5, 0.8], dims="surface").chunk(surface=1), 0.2, 40.0, 1.0, 3.0)
+with dask.config.set(scheduler="threads", num_workers=8):
+    lazy = contact(surface, gaps.chunk(gap=3)), contact(surface, gaps.chunk(gap=15), tier="island4d", rtol=1e-3)
+    first, second = dask.compute(lazy[0].force, lazy[1].force)
+assert (abs(first - second) <= 0.01 * first).all()
+from mbma_tables.models.tabulated import shipped
+from mbma_tables.tablefiles.files import read_table
+barrier = Barrier(8)
+def read(kind):
+    barrier.wait()
+    return read_table(shipped(kind), kind).coefficients.sum()
+with ThreadPoolExecutor(8) as pool:
+    sums = list(pool.map(read, ["universal", "island4d"] * 4))
+assert len(set(sums)) == 2
+print("whole")
+"""
+
+
+def test_cold_tables_opened_by_many_threads():
+    done = subprocess.run([sys.executable, "-c", COLD], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "whole\n"

@@ -1,0 +1,462 @@
+"""Contact laws against totals, differences and quadrature; inverses; what the model does; use from other codes."""
+
+import functools
+import itertools
+import math
+import pickle
+
+import numpy as np
+import pytest
+import scipy.integrate
+import scipy.optimize
+import xarray as xr
+from numba import njit
+
+from mbma_tables import ContactLaw, ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
+from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.totals import law as law_module
+from mbma_tables.totals.pairs import kinks
+
+# hurst, zeta_1, h_max/h_rms, reading
+CASES = [
+    (0.8, 216.0, 3.0, "reported"),
+    (0.3, 1e4, 4.0, "reported"),
+    (0.5, 1e4, 3.0, "printed"),
+    (1.0, 3.01, 3.3, "reported"),
+    (1.0, 1e4, 4.7, "printed"),
+    (0.3, 3.01, 2.5, "printed"),
+    (0.6, 50.0, 2.5, "reported"),
+]
+FALLING = CASES[1]
+
+
+@functools.cache
+def surface_of(hurst, zeta_1, top):
+    return Surface(hurst, 0.3, 0.3 * zeta_1, 0.7, 0.7 * top)
+
+
+@functools.cache
+def law_of(case, rtol=1e-8):
+    return contact_law(surface_of(*case[:3]), rtol=rtol, reading=case[3])
+
+
+def depths(law, seed, least=1e-9):
+    rng = np.random.default_rng(seed)
+    many = 10 ** rng.uniform(math.log10(least), math.log10(2), 300)
+    return np.concatenate([many, rng.uniform(0, 2, 300), [least, 1.0, 2.0]]) * law.h_max
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("rtol", [1e-4, 1e-8, 1e-9])
+def test_within_its_tolerance_and_its_bound(case, rtol):
+    law = law_of(case, rtol)
+    gaps = law.h_max - depths(law, 50)
+    true = contact(surface_of(*case[:3]), gaps, rtol=1e-11, reading=case[3])
+    error = np.maximum(np.abs(law.force(gaps) / true.force - 1), np.abs(law.area(gaps) / true.area - 1))
+    assert error.max() <= rtol + 1e-11
+    assert (error <= law.error + 1e-11).all()
+    assert law.error <= 1.1 * rtol + 1e-9
+    assert (law.reading, law.tier) == (case[3], "universal")
+
+
+@pytest.mark.parametrize("case", [CASES[0], CASES[3]])
+def test_against_the_solver(case):
+    law = law_of(case)
+    gaps = law.h_max * (1 - np.array([1e-9, 1e-4, 0.03, 0.6, 1.3, 2.0]))
+    true = contact(surface_of(*case[:3]), gaps, tier="exact", rtol=1e-11, reading=case[3])
+    np.testing.assert_allclose(law.force(gaps), true.force, rtol=law.error)
+    np.testing.assert_allclose(law.area(gaps), true.area, rtol=law.error)
+
+
+@pytest.mark.parametrize("tier", ["exact", "rigid", "island4d"])
+def test_of_any_tier(tier):
+    surface = surface_of(*CASES[0][:3])
+    law = contact_law(surface, rtol=1e-5, tier=tier)
+    gaps = law.h_max * (1 - np.array([1e-5, 0.01, 0.3, 0.9, 1.7]))
+    true = contact(surface, gaps, tier=tier, rtol=1e-8)
+    np.testing.assert_allclose(law.force(gaps), true.force, rtol=1.1e-5)
+    np.testing.assert_allclose(law.area(gaps), true.area, rtol=1.1e-5)
+    assert law.tier == tier
+
+
+def slopes_of_totals(case, gaps, span):
+    """-dF/dd and -dA/dd by seven-point differences of tight totals."""
+    offsets = np.arange(-3.0, 4)
+    weights = np.linalg.solve(np.vander(offsets, increasing=True).T, np.eye(7)[1])
+    found = contact(surface_of(*case[:3]), gaps[:, None] + span[:, None] * offsets, rtol=1e-11, reading=case[3])
+    return [-(values @ weights) / span for values in (found.force, found.area)]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_slopes_against_differences(case):
+    law = law_of(case, 1e-9)
+    depth = depths(law, 51, least=1e-4)
+    depth = depth[depth < 1.95 * law.h_max]
+    breaks = np.array([0.7 * k for k in kinks(*case[:2], get_reading(case[3]))])
+    # differences must not reach across a kink
+    depth = depth[(np.abs(depth[:, None] / breaks - 1) > 0.02).all(axis=1)]
+    gaps = law.h_max - depth
+    by_force, by_area = slopes_of_totals(case, gaps, 4e-3 * depth)
+    for found, true, value in (
+        (law.stiffness(gaps), by_force, law.force(gaps)),
+        (law.area_slope(gaps), by_area, law.area(gaps)),
+    ):
+        # where a slope passes through zero the secant sets the scale
+        assert (np.abs(found - true) <= 1e-6 * np.maximum(np.abs(true), value / depth)).all()
+    np.testing.assert_array_equal(law.stiffness_mean(gaps), 2 * law.stiffness(gaps))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_slopes_are_those_of_the_law_itself(case):
+    """A Newton iteration on a law must see the law's own slope, whatever the law's tolerance."""
+    law = law_of(case, 1e-4)
+    centres = law.layer * np.sinh((law.breaks[1:] + law.breaks[:-1]) / 2) ** 2
+    gaps, span = law.h_max - centres, 1e-3 * centres
+    offsets = np.arange(-3.0, 4)
+    weights = np.linalg.solve(np.vander(offsets, increasing=True).T, np.eye(7)[1])
+    points = gaps[:, None] + span[:, None] * offsets
+    for value, slope in ((law.force, law.stiffness), (law.area, law.area_slope)):
+        differences = -(value(points) @ weights) / span
+        scale = np.maximum(np.abs(differences), value(gaps) / centres)
+        assert (np.abs(slope(gaps) - differences) <= 1e-8 * scale).all()
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_energy_is_the_integral_of_force(case):
+    law = law_of(case)
+    roots = np.sqrt(law.layer * np.sinh(law.breaks) ** 2)
+    for depth in law.h_max * np.array([1e-6, 1e-3, 0.05, 0.4, 1.0, 1.999]):
+        ends = [*roots[roots < math.sqrt(depth)], math.sqrt(depth)]
+        # l = x^2; between breaks force is smooth
+        parts = [
+            scipy.integrate.quad(lambda x: law.force(law.h_max - x * x) * 2 * x, a, b, epsabs=0, epsrel=1e-11)[0]
+            for a, b in itertools.pairwise(ends)
+        ]
+        gap = law.h_max - depth
+        rounded = np.finfo(float).eps * law.h_max / depth
+        assert law.energy(gap) == pytest.approx(math.fsum(parts), rel=1e-8 + 10 * rounded, abs=0)
+
+
+def test_energy_against_totals():
+    """Not through the law: Gauss points of the totals themselves."""
+    case = CASES[0]
+    law, surface = law_of(case), surface_of(*case[:3])
+    x, weights = np.polynomial.legendre.leggauss(40)
+    ends = [0.0, *(math.sqrt(0.7 * k) for k in kinks(*case[:2], get_reading(case[3]))), math.sqrt(1.5 * law.h_max)]
+    ends = sorted(e for e in ends if e <= math.sqrt(1.5 * law.h_max))
+    true = 0.0
+    for a, b in itertools.pairwise(ends):
+        root = (a + b) / 2 + (b - a) / 2 * x
+        force = contact(surface, law.h_max - root**2, rtol=1e-11).force
+        true += (b - a) / 2 * np.dot(weights, force * 2 * root)
+    assert law.energy(-0.5 * law.h_max) == pytest.approx(true, rel=1.1e-8, abs=0)
+
+
+@pytest.mark.parametrize("case", [CASES[0], CASES[4]])
+def test_energy_falls_by_the_force(case):
+    law = law_of(case)
+    depth = depths(law, 52, least=1e-3)
+    depth = depth[depth < 1.99 * law.h_max]
+    step = 1e-3 * depth
+    gaps = law.h_max - depth
+    offsets = np.arange(-3.0, 4)
+    weights = np.linalg.solve(np.vander(offsets, increasing=True).T, np.eye(7)[1])
+    slope = law.energy(gaps[:, None] + step[:, None] * offsets) @ weights / step
+    ends = law.layer * np.sinh(law.breaks) ** 2
+    clear = (np.abs(depth[:, None] / ends[1:] - 1) > 0.01).all(axis=1)
+    assert clear.sum() > 300
+    np.testing.assert_allclose(-slope[clear], law.force(gaps)[clear], rtol=1e-8)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_round_trips(case):
+    law = law_of(case)
+    end = -law.h_max if law.turning_point is None else law.turning_point
+    depth = np.append(10 ** np.linspace(-5, 0, 80), np.linspace(0, 1, 41)[1:])
+    gaps = law.h_max - np.unique(depth) * (law.h_max - end)
+    force, area = law.force(gaps), law.area(gaps)
+    back = law.separation(force=force)
+    np.testing.assert_allclose(law.force(back), force, rtol=1e-10)
+    # next to a turning point many gaps carry the same force
+    firm = law.stiffness(gaps) * (law.h_max - gaps) > 1e-2 * force
+    np.testing.assert_allclose((law.h_max - back)[firm], (law.h_max - gaps)[firm], rtol=1e-10)
+    assert firm.sum() > 100
+    rising = np.minimum.accumulate(law.area_slope(gaps[::-1]) > 0)[::-1]
+    back = law.separation(area=area[rising])
+    np.testing.assert_allclose(law.area(back), area[rising], rtol=1e-10)
+    assert rising.sum() > 80
+
+
+def test_inverses_at_the_ends():
+    law = law_of(CASES[0])
+    assert law.separation(force=0.0) == law.h_max
+    assert law.separation(area=0) == law.h_max
+    assert law.separation(force=law.force(-law.h_max)) == pytest.approx(-law.h_max, rel=1e-12, abs=0)
+    for tiny in (5e-324, 1e-300, 1e-60):
+        # one unit in the last place of h_max carries more
+        assert law.separation(force=tiny) == law.h_max
+    many = law.separation(force=[[0.0, 1e-6], [1e-5, 1e-4]])
+    assert many.shape == (2, 2)
+    assert (np.diff(many.ravel()) < 0).all()
+    assert np.shape(law.separation(force=np.float64(1e-6))) == ()
+    assert law.separation(force=1e-6) == many[0, 1]
+
+
+@pytest.mark.parametrize("name", ["force", "area"])
+def test_beyond_the_branch(name):
+    law = law_of(CASES[0])
+    most = getattr(law, name)(-law.h_max)
+    with pytest.raises(OutOfRangeError) as caught:
+        law.separation(**{name: [0.5 * most, 1.001 * most]})
+    assert caught.value.mask.tolist() == [False, True]
+    assert f"{name} must be at most {most:.6g}, at d = {-law.h_max:.6g} where the branch ends" in str(caught.value)
+    with pytest.raises(OutOfRangeError, match=f"{name} must be at least 0"):
+        law.separation(**{name: -1e-9})
+
+
+@pytest.mark.parametrize("given", [{}, {"force": 1e-6, "area": 1e-6}])
+def test_force_or_area(given):
+    with pytest.raises(InputError, match="give force or area, one of them"):
+        law_of(CASES[0]).separation(**given)
+
+
+def test_the_turning_point_at_low_hurst():
+    law, surface = law_of(FALLING), surface_of(*FALLING[:3])
+    turn = law.turning_point
+    assert -law.h_max < turn < 0
+    before, beyond = np.linspace(law.h_max, turn, 200), np.linspace(turn, turn - 0.1 * law.h_max, 50)
+    assert (np.diff(law.force(before)) > 0).all()
+    assert (np.diff(law.force(beyond)) < 0).all()
+    # it is the model's, not the polynomials'
+    near = turn + np.array([-0.02, 0.0, 0.02]) * law.h_max
+    totals = contact(surface, near, rtol=1e-11).force
+    assert totals[1] > max(totals[0], totals[2])
+    peak = law.force(turn)
+    gaps = law.separation(force=peak * np.array([0.5, 0.999, 1 - 1e-6]))
+    assert (gaps > turn).all()
+    np.testing.assert_allclose(law.force(gaps), peak * np.array([0.5, 0.999, 1 - 1e-6]), rtol=1e-10)
+    # what the falling branch carries too is answered on the first
+    assert law.separation(force=law.force(turn - 0.1 * law.h_max)) > turn
+    with pytest.raises(OutOfRangeError, match=rf"at d = {turn:.6g} where the branch ends".replace("-", r"\-")):
+        law.separation(force=1.0001 * peak)
+
+
+def test_area_may_turn_too():
+    surface = Surface(0.2, 0.3, 0.3e7, 0.7, 2.1)
+    law = contact_law(surface, reading="printed")
+    turn = law.area_turning_point
+    assert law.turning_point > turn > -law.h_max
+    assert (np.diff(law.area(np.linspace(law.h_max, turn, 200))) > 0).all()
+    most = law.area(turn)
+    assert law.area(turn - 0.1 * law.h_max) < most
+    wanted = most * np.array([1e-3, 0.5, 0.999])
+    gaps = law.separation(area=wanted)
+    assert (gaps > turn).all()
+    np.testing.assert_allclose(law.area(gaps), wanted, rtol=1e-10)
+    with pytest.raises(OutOfRangeError, match=f"area must be at most {most:.6g}"):
+        law.separation(area=1.0001 * most)
+
+
+@pytest.mark.parametrize("case", [case for case in CASES if case[0] >= 0.5])
+def test_no_turning_point_from_one_half_on(case):
+    law = law_of(case)
+    assert law.turning_point is None
+    assert law.area_turning_point is None
+    assert (np.diff(law.force(np.linspace(law.h_max, -law.h_max, 400))) > 0).all()
+
+
+@pytest.mark.parametrize("case", [CASES[0], (0.8, 1e3, 3.0, "printed")])
+def test_slopes_jump_where_K1_does(case):
+    """Of d/dd the upper limit's share, in which K1 goes from 5/9 to 1, jumps and nothing else does."""
+    law, surface = law_of(case, 1e-9), surface_of(*case[:3])
+    gap = law.h_max - 0.7 * kinks(*case[:2], get_reading(case[3]))[0]
+    sides = gap + np.array([1e-9, -1e-9]) * law.h_max
+    totals = contact(surface, sides, reading=case[3], rtol=1e-11, derivatives=True)
+    for slope, by in ((law.stiffness, totals.force_by), (law.area_slope, totals.area_by)):
+        larger, smaller = slope(sides)
+        model = -by["separation"]
+        # a slope of the law is right to 1e-7, the jump is hundreds of times that
+        assert abs((smaller - larger) - (model[1] - model[0])) <= 1e-7 * larger
+        assert model[1] - model[0] > 2e-5 * larger
+    np.testing.assert_allclose(*law.force(sides), rtol=1e-7)
+
+
+def test_a_pickle_is_the_same_law_and_small():
+    for case in CASES:
+        law = law_of(case)
+        law.force(0.0)
+        kept = pickle.dumps(law)
+        assert len(kept) < 8000
+        back = pickle.loads(kept)
+        assert isinstance(back, ContactLaw)
+        gaps = law.h_max - depths(law, 53)
+        for name in ("force", "area", "stiffness", "area_slope", "energy", "stiffness_mean"):
+            np.testing.assert_array_equal(getattr(back, name)(gaps), getattr(law, name)(gaps))
+        force = law.force(law.h_max * np.array([0.9, 0.5, 0.1]))
+        np.testing.assert_array_equal(back.separation(force=force), law.separation(force=force))
+        assert pickle.dumps(back) == kept
+
+
+def test_inside_other_solvers():
+    law = law_of(CASES[0])
+    # spring and rough contact in series
+    gap = scipy.optimize.brentq(lambda d: law.force(d) - 1e-3 * (2.0 - d), -1.0, 1.9, xtol=1e-14, rtol=1e-14)
+    assert law(gap) == pytest.approx(1e-3 * (2.0 - gap), rel=1e-9, abs=0)
+    work = scipy.integrate.quad(law, 0.5, 1.5, epsabs=0, epsrel=1e-10, limit=200)[0]
+    assert work == pytest.approx(law.energy(0.5) - law.energy(1.5), rel=1e-8, abs=0)
+    # a mass thrown at the surface turns where its energy is the law's
+    start, speed, mass = law.h_max, 0.05, 2.0
+
+    def turned(t, state):
+        return state[1]
+
+    turned.terminal = True
+    path = scipy.integrate.solve_ivp(
+        lambda t, state: [state[1], law.force(state[0]) / mass],
+        (0, 1e3),
+        [start, -speed],
+        events=turned,
+        rtol=1e-10,
+        atol=1e-12,
+    )
+    assert law.energy(path.y_events[0][0, 0]) == pytest.approx(0.5 * mass * speed**2, rel=1e-7, abs=0)
+
+
+@pytest.mark.parametrize("name", ["force", "area", "stiffness", "area_slope", "energy"])
+def test_inside_compiled_code(name):
+    law = law_of(CASES[0])
+    compiled = law.compiled(name)
+
+    @njit
+    def add_up(gaps):
+        total = 0.0
+        for d in gaps:
+            total += compiled(d)
+        return total
+
+    gaps = np.array([2.05, 1.3, 0.2, -1.7])
+    alone = [getattr(law, name)(d) for d in gaps]
+    assert [compiled(d) for d in gaps] == pytest.approx(alone, rel=1e-14, abs=0)
+    assert add_up(gaps) == pytest.approx(math.fsum(alone), rel=1e-14, abs=0)
+    assert compiled(law.h_max + 1) == 0.0
+    assert math.isnan(compiled(math.nextafter(-law.h_max, -9)))
+    assert math.isnan(compiled(math.nan))
+
+
+def test_compiled_names():
+    with pytest.raises(InputError, match="name must be one of"):
+        law_of(CASES[0]).compiled("separation")
+
+
+NAMES = ("force", "area", "stiffness", "stiffness_mean", "area_slope", "energy")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_it_takes(name):
+    law = law_of(CASES[0])
+    function = getattr(law, name)
+    expected = function(1.0)
+    assert type(function(1)) in (float, np.float64)
+    for same in (1, np.float64(1), np.float32(1), np.int16(1), np.array(1), np.array(1.0)):
+        assert function(same) == expected
+        assert np.shape(function(same)) == ()
+    for many in ([1, 0.5], (1, 0.5), np.array([1, 0.5]), np.array([[1, 0.5]])):
+        found = function(many)
+        assert found.shape == np.shape(many)
+        assert found.ravel().tolist() == [expected, function(0.5)]
+    turned = np.arange(6.0).reshape(2, 3).T / 4
+    np.testing.assert_array_equal(function(turned), np.array([[function(float(d)) for d in row] for row in turned]))
+    labelled = function(xr.DataArray([1.0, 0.5], dims="t", coords={"t": [3, 4]}, attrs={"units": "mm"}))
+    assert labelled.dims == ("t",)
+    assert labelled.t.values.tolist() == [3, 4]
+    assert "units" not in labelled.attrs
+    assert labelled.values.tolist() == [expected, function(0.5)]
+
+
+def test_labelled_inverses():
+    law = law_of(CASES[0])
+    force = xr.DataArray([1e-6, 1e-5], dims="t", coords={"t": [3, 4]})
+    for kind in ("force", "area"):
+        back = law.separation(**{kind: force})
+        assert back.dims == ("t",)
+        np.testing.assert_array_equal(back, law.separation(**{kind: force.values}))
+    lazy = law.separation(force=force.chunk(1))
+    assert lazy.chunks is not None
+    np.testing.assert_array_equal(lazy, law.separation(force=force.values))
+
+
+def test_the_ends_and_no_contact():
+    law = law_of(CASES[0])
+    for name in NAMES:
+        function = getattr(law, name)
+        assert function(law.h_max) == 0
+        assert function([1e300, law.h_max]).tolist() == [0, 0]
+        assert math.isfinite(function(-law.h_max))
+        assert function(math.nextafter(law.h_max, 0)) > 0
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, [1.0, math.nan], [], "deep", 1j, None])
+def test_no_number(bad):
+    law = law_of(CASES[0])
+    for name in NAMES:
+        with pytest.raises(InputError, match=r"^separation "):
+            getattr(law, name)(bad)
+    if bad is not None:
+        with pytest.raises(InputError, match=r"^force "):
+            law.separation(force=bad)
+
+
+@pytest.mark.parametrize("below", [-5.0, math.nextafter(-2.1, -9), [1.0, -5.0]])
+def test_below_full_compression(below):
+    law = contact_law(Surface(0.8, 0.3, 30.0, 0.7, 2.1), rtol=1e-4)
+    with pytest.raises(OutOfRangeError, match=r"at least -h_max = -2\.1") as caught:
+        law.force(below)
+    assert caught.value.mask.shape == np.shape(below)
+    assert caught.value.mask.sum() == 1
+
+
+def test_bad_laws(monkeypatch):
+    surface = surface_of(*CASES[0][:3])
+    with pytest.raises(InputError, match=r"one surface, got a batch of shape \(2,\)"):
+        contact_law(Surface([0.5, 0.8], 0.2, 40.0, 1.0, 3.0))
+    for rtol in (0.0, 1e-10, 0.2, math.nan, "tight", [1e-8]):
+        with pytest.raises(InputError, match="rtol"):
+            contact_law(surface, rtol=rtol)
+    for modulus in (0.0, -1.0, math.inf, math.nan, [1.0, 2.0]):
+        with pytest.raises(InputError, match="E_star"):
+            contact_law(surface, E_star=modulus)
+    with pytest.raises(InputError, match="tier"):
+        contact_law(surface, tier="magic")
+    with pytest.raises(InputError, match="reading"):
+        contact_law(surface, reading="guessed")
+    with pytest.raises(OutOfRangeError, match="outside the universal table"):
+        contact_law(Surface(0.05, 0.2, 0.2e8, 1.0, 3.0))
+    monkeypatch.setattr(law_module, "MOST_PIECES", 3)
+    with pytest.raises(ConvergenceError, match="more than 3 pieces"):
+        contact_law(surface)
+
+
+def test_units():
+    """Lengths and moduli scale a law, to the last digits."""
+    law = law_of(CASES[0])
+    surface = surface_of(*CASES[0][:3])
+    small = contact_law(
+        Surface(surface.hurst, surface.q0 * 1e6, surface.q1 * 1e6, surface.h_rms * 1e-6, surface.h_max * 1e-6),
+        E_star=7e10,
+    )
+    gaps = law.h_max * np.array([0.99, 0.5, 0.0, -0.9])
+    np.testing.assert_allclose(small.force(gaps * 1e-6), 7e10 * law.force(gaps), rtol=1e-12)
+    np.testing.assert_allclose(small.area(gaps * 1e-6), law.area(gaps), rtol=1e-12)
+    np.testing.assert_allclose(small.stiffness(gaps * 1e-6), 7e16 * law.stiffness(gaps), rtol=1e-10)
+    np.testing.assert_allclose(small.energy(gaps * 1e-6), 7e4 * law.energy(gaps), rtol=1e-10)
+    np.testing.assert_allclose(
+        small.separation(force=7e10 * law.force(gaps)), gaps * 1e-6, rtol=0, atol=1e-16 + 1e-11 * small.h_max
+    )
+
+
+def test_a_labelled_surface():
+    surface = surface_of(*CASES[0][:3])
+    labelled = Surface(xr.DataArray(0.8), surface.q0, surface.q1, surface.h_rms, surface.h_max)
+    assert contact_law(labelled).force(1.0) == law_of(CASES[0]).force(1.0)
+    with pytest.raises(InputError, match="one surface, got a batch"):
+        contact_law(Surface(xr.DataArray([0.7, 0.8], dims="s"), 0.3, 30.0, 0.7, 2.1))

@@ -1,0 +1,151 @@
+"""The compiled pass: its rule, its islands against `islands.geometry`, its independence of order and batch."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from numpy.polynomial import legendre
+
+from mbma_tables import ConvergenceError, OutOfRangeError, Surface, contact
+from mbma_tables.islands.island import geometry
+from mbma_tables.models.tabulated import universal_model
+from mbma_tables.surfaces.readings import PRINTED, REPORTED
+from mbma_tables.totals import lookup
+from mbma_tables.totals.pairs import kinks
+
+LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)
+
+
+def test_the_rule_by_its_degrees():
+    """31 Kronrod points are exact up to degree 46, 15 Gauss points up to 29, and not beyond."""
+    np.testing.assert_allclose(
+        lookup.NODES[1::2], legendre.leggauss(15)[0], rtol=0, atol=2e-16, err_msg="Gauss points of the rule"
+    )
+    np.testing.assert_allclose(lookup.GAUSS[1::2], legendre.leggauss(15)[1], rtol=1e-14)
+    assert (lookup.GAUSS[::2] == 0).all()
+    for degree in range(0, 50, 2):
+        integral = 2.0 if degree == 0 else 0.0
+        # Legendre polynomials show every digit, powers do not
+        shape = legendre.legval(lookup.NODES, [0] * degree + [1])
+        kronrod, gauss = lookup.KRONROD @ shape, lookup.GAUSS @ shape
+        assert (abs(kronrod - integral) < 1e-14) == (degree <= 46)
+        assert (abs(gauss - integral) < 1e-14) == (degree <= 29)
+
+
+@pytest.mark.parametrize("reading", [REPORTED, PRINTED, LEVEL], ids=lambda reading: reading.name)
+def test_islands_are_those_of_geometry(reading):
+    rng = np.random.default_rng(40)
+    hurst = rng.uniform(0.1, 1, 3000)
+    hurst[::10] = 1
+    hurst[1::10] = 1 - 10 ** rng.uniform(-15, -3, 300)
+    zeta_1 = 10 ** rng.uniform(math.log10(3.01), 8, 3000)
+    x = 10 ** rng.uniform(-12, 1, 3000)
+    g = geometry(x, hurst, zeta_1, reading)
+    at_d, at_u = kinks(hurst, zeta_1, reading)
+    nodes = np.array(
+        [
+            lookup.island_node(
+                x[k],
+                x[k] > at_d[k],
+                x[k] > at_u[k],
+                lookup.surface_constants(hurst[k], zeta_1[k], reading.numbers),
+                reading.offset,
+                reading.summit_sigma,
+            )
+            for k in range(x.size)
+        ]
+    ).T
+    force = g["sigma"] * np.sqrt(2 * g["R_d"] * g["sigma"])
+    area = 2 * math.pi * g["eta"] * g["D"] * g["R_u"] * g["R_d"] * g["sigma"] ** 2
+    expected = np.stack([g["X"], g["mu"], force, area, g["h_d"], g["D_d"], g["sigma_d"]])
+    np.testing.assert_allclose(nodes, expected, rtol=1e-11)
+    assert np.median(np.abs(nodes[:4] / expected[:4] - 1)) < 1e-14
+
+
+def scattered(count):
+    rng = np.random.default_rng(41)
+    hurst = rng.choice([0.3, 0.55, 0.8, 1.0], count)
+    zeta_1 = rng.choice([3.01, 40.0, 1e4], count)
+    return Surface(hurst, 0.2, 0.2 * zeta_1, 1.0, rng.choice([2.5, 4.0], count)), rng.uniform(-2.5, 4.2, count)
+
+
+def test_no_entry_knows_its_neighbours():
+    surfaces, gaps = scattered(300)
+    batch = contact(surfaces, gaps)
+    order = np.random.default_rng(42).permutation(300)
+    names = ("hurst", "q0", "q1", "h_rms", "h_max")
+    shuffled = contact(Surface(*(getattr(surfaces, name)[order] for name in names)), gaps[order])
+    for name in ("force", "area", "error"):
+        np.testing.assert_array_equal(getattr(shuffled, name), getattr(batch, name)[order])
+    for k in range(0, 300, 7):
+        one = contact(Surface(*(getattr(surfaces, name)[k] for name in names)), gaps[k])
+        assert (one.force, one.area, one.error) == (batch.force[k], batch.area[k], batch.error[k])
+
+
+def test_no_step_across_a_kink():
+    """The same integral on either side: value and area slope agree to the last digits that the gap has."""
+    for hurst, zeta_1 in ((0.8, 216.0), (0.4, 10.0), (1.0, 1e4)):
+        surface = Surface(hurst, 0.2, 0.2 * zeta_1, 1.0, 3.0)
+        for kink in kinks(hurst, zeta_1, REPORTED):
+            if kink < 6:
+                gaps = 3.0 - kink + np.array([-1e-12, 1e-12])
+                found = contact(surface, gaps, rtol=1e-11)
+                np.testing.assert_allclose(found.force[0], found.force[1], rtol=2e-10)
+                np.testing.assert_allclose(found.area[0], found.area[1], rtol=2e-10)
+
+
+def test_next_to_first_contact_and_beyond():
+    surface = Surface(0.8, 0.2, 43.2, 1.0, 4.0)
+    found = contact(surface, [math.nextafter(4, 3), 4.0, math.nextafter(4, 5), 1e300], rtol=1e-10)
+    # 2^-51 below h_max: l^(7/2) and l^(10/3) from 2^-31 on
+    near = contact(surface, 4 - 2.0**-31, rtol=1e-10)
+    depth = 4 - math.nextafter(4, 3)
+    assert found.force[0] == pytest.approx(near.force * (depth * 2.0**31) ** 3.5, rel=1e-6, abs=0)
+    assert found.area[0] == pytest.approx(near.area * (depth * 2.0**31) ** (10 / 3), rel=1e-6, abs=0)
+    for name in ("force", "area", "error"):
+        assert getattr(found, name)[1:].tolist() == [0, 0, 0]
+    assert found.islands % 31 == 0
+
+
+def totals(reach, **changed):
+    """`lookup.total` of one surface, with numbers of its own in place of some."""
+    model = universal_model()
+    given = {"top": 3.0, "rtol": 1e-9, "jacobian": 5 / 9} | changed
+    surface = lookup.surface_constants(0.8, 216.0, REPORTED.numbers)
+    return lookup.total(reach, given["top"], given["rtol"], surface, given["jacobian"], (True, True), *model.kernel)
+
+
+def test_the_first_moment_of_the_jacobian():
+    """K1 weighs everything below the kink, which at small reach is everything."""
+    whole, half = totals(1.0, jacobian=1.0), totals(1.0, jacobian=0.5)
+    assert half[1] == pytest.approx(whole[1] / 2, rel=1e-14, abs=0)
+    assert half[2] == pytest.approx(whole[2] / 2, rel=1e-14, abs=0)
+    assert totals(4.0, jacobian=1.0)[1] < 2 * totals(4.0, jacobian=0.5)[1] * (1 - 1e-3)
+
+
+def test_what_cannot_be_resolved_is_said(monkeypatch):
+    """A tolerance below rounding ends in a status, never in a number that looks right."""
+    assert totals(4.0, rtol=1e-9)[0] == lookup.OK
+    status, _, _, error, _ = totals(4.0, rtol=1e-30)
+    assert status == lookup.UNRESOLVED
+    assert math.isnan(error)
+    surface = Surface([[0.5], [0.8]], 0.2, 40.0, 1.0, 3.0)
+
+    def unresolved(*given):
+        *_, status, out = given
+        status[:] = lookup.OK
+        status[3] = lookup.UNRESOLVED
+        out[:] = 1.0
+        return 31
+
+    monkeypatch.setattr(lookup, "fill_totals", unresolved)
+    with pytest.raises(ConvergenceError, match="quadrature did not reach its tolerance") as caught:
+        contact(surface, [0.0, 1.0], outside="nan")
+    assert caught.value.mask.tolist() == [[False, False], [False, True]]
+
+
+def test_an_empty_surface_of_the_table_is_refused_before_the_pass():
+    with pytest.raises(OutOfRangeError) as caught:
+        contact(Surface([0.5, 0.8], 0.2, 40.0, 1.0, 3.0), [[0.0], [-4.0]])
+    assert caught.value.mask.tolist() == [[False, False], [True, True]]

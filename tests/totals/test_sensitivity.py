@@ -1,0 +1,186 @@
+"""Derivatives of totals against differences of the solver's totals, and identities that they must keep."""
+
+import dataclasses
+import functools
+import math
+
+import numpy as np
+import pytest
+
+from mbma_tables import Surface, contact
+from mbma_tables.surfaces.readings import PRINTED, REPORTED, get_reading
+from mbma_tables.totals.pairs import kinks
+
+OWN = dataclasses.replace(PRINTED, name="own", jacobian="exact", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)
+LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)
+NAMES = ("hurst", "q0", "q1", "h_rms", "h_max", "separation")
+
+# hurst, zeta_1, h_max/h_rms, (h_max - d)/h_rms
+CASES = [
+    (0.8, 216.0, 3.0, 1.0),
+    (0.45, 1e4, 3.4, 0.02),
+    (1.0, 60.0, 4.2, 2.5),
+    (1.0, 3.8, 2.6, 4.9),
+    (0.6, 12.0, 4.7, 7.0),
+    (0.9, 1e3, 2.5, 1e-4),
+    (0.7, 3.01, 3.0, 2.0),
+]
+# next to a kink, where a derivative that forgot it would be wrong: the third number is reach over the kink
+AT_KINKS = [(0.9, 100.0, 0, 0.95), (0.9, 100.0, 0, 1.05), (0.9, 100.0, 1, 0.97), (0.9, 100.0, 1, 1.03)]
+
+
+def weights(offsets):
+    """Of values at `offsets`, for the derivative at 0."""
+    return np.linalg.solve(np.vander(offsets, increasing=True).T, np.eye(offsets.size)[1])
+
+
+def differences(numbers, reading, step):
+    """Values and derivatives of force and area by high-order differences of tier "exact"; numbers as `NAMES`."""
+    shifted, spans = [], []
+    for place, name in enumerate(NAMES):
+        backward = name == "hurst" and numbers[place] == 1
+        offsets = np.arange(-6.0, 1) if backward else np.arange(-3.0, 4)
+        span = step * numbers[place]
+        if name in ("q0", "q1"):
+            # next to the floor of zeta_u, area rises like a sixth root of zeta_1 - floor
+            span *= min(1.0, 10 * (numbers[2] / numbers[1] / get_reading(reading).floor_u - 1))
+        if name in ("separation", "h_max"):
+            # the depth is what matters near first contact
+            span = step * (numbers[4] - numbers[5])
+        points = np.repeat(np.asarray(numbers, dtype=float)[:, None], 7, axis=1)
+        points[place] += span * offsets
+        shifted.append(points)
+        spans.append(weights(offsets) / span)
+    points = np.stack(shifted, axis=1)
+    found = contact(Surface(*points[:5]), points[5], tier="exact", reading=reading, rtol=1e-11)
+    return [np.einsum("nk,nk->n", spans, values) for values in (found.force, found.area)]
+
+
+@functools.cache
+def numbers_of(case):
+    hurst, zeta_1, top, reach = case
+    h_rms = 0.7
+    return hurst, 0.3, 0.3 * zeta_1, h_rms, top * h_rms, (top - reach) * h_rms
+
+
+def against_differences(numbers, reading, step):
+    found = contact(Surface(*numbers[:5]), numbers[5], reading=reading, rtol=1e-10, derivatives=True)
+    for value, by, true in zip(
+        (found.force, found.area), (found.force_by, found.area_by), differences(numbers, reading, step), strict=True
+    ):
+        assert sorted(by) == sorted(NAMES)
+        for name, parameter, slope in zip(NAMES, numbers, true, strict=True):
+            scale = max(abs(slope), abs(value / parameter))
+            assert abs(by[name] - slope) <= 1e-6 * scale, name
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("reading", ["reported", "printed"])
+def test_against_differences(case, reading):
+    against_differences(numbers_of(case), reading, 4e-3)
+
+
+@pytest.mark.parametrize("case", [CASES[0], CASES[2], CASES[3]])
+@pytest.mark.parametrize("reading", [OWN, LEVEL], ids=lambda reading: reading.name)
+def test_a_reading_of_ones_own_against_differences(case, reading):
+    against_differences(numbers_of(case), reading, 4e-3)
+
+
+@pytest.mark.parametrize(("hurst", "zeta_1", "which", "share"), AT_KINKS)
+@pytest.mark.parametrize("reading", ["reported", OWN], ids=["reported", "own"])
+def test_next_to_a_kink_against_differences(hurst, zeta_1, which, share, reading):
+    reach = share * kinks(hurst, zeta_1, get_reading(reading))[which]
+    against_differences(numbers_of((hurst, zeta_1, 4.7, reach)), reading, 2e-3)
+
+
+@pytest.mark.parametrize("reading", ["reported", "printed", OWN, LEVEL], ids=["reported", "printed", "own", "level"])
+def test_lengths_scale_out(reading):
+    """Force and area do not know the unit of length: Euler's identity for functions of degree 0."""
+    rng = np.random.default_rng(70)
+    hurst, top = rng.uniform(0.3, 1, 60), rng.uniform(2.5, 4.7, 60)
+    zeta_1, share = 10 ** rng.uniform(0.56, 4, 60), rng.uniform(-1, 1, 60)
+    share[::4] = 1 - 10 ** rng.uniform(-6, -1, 15)
+    surface = Surface(hurst, 0.3, 0.3 * zeta_1, 0.7, 0.7 * top)
+    found = contact(surface, share * surface.h_max, reading=reading, derivatives=True)
+    for by in (found.force_by, found.area_by):
+        terms = np.stack(
+            [
+                surface.h_rms * by["h_rms"],
+                surface.h_max * by["h_max"],
+                found.separation * by["separation"],
+                -surface.q0 * by["q0"],
+                -surface.q1 * by["q1"],
+            ]
+        )
+        assert (np.abs(terms.sum(axis=0)) <= 1e-13 * np.abs(terms).sum(axis=0)).all()
+
+
+def test_slopes_scale_out():
+    """Heights alone: force is of degree 1 in them, area of degree 0; wavenumbers likewise."""
+    surface = Surface([0.3, 0.7, 1.0], 0.3, [3.0, 60.0, 2e3], 0.7, 2.4)
+    gap = np.array([2.39, 1.0, -2.0])
+    found = contact(surface, gap, derivatives=True)
+    for value, by, degree in ((found.force, found.force_by, 1), (found.area, found.area_by, 0)):
+        heights = surface.h_rms * by["h_rms"] + surface.h_max * by["h_max"] + gap * by["separation"]
+        waves = surface.q0 * by["q0"] + surface.q1 * by["q1"]
+        size = np.abs(surface.h_max * by["h_max"]) + np.abs(surface.q0 * by["q0"])
+        assert (np.abs(heights - degree * value) <= 1e-12 * size).all()
+        assert (np.abs(waves - degree * value) <= 1e-12 * size).all()
+
+
+def test_values_are_those_without_derivatives():
+    rng = np.random.default_rng(71)
+    surface = Surface(rng.uniform(0.3, 1, 40), 0.3, 0.3 * 10 ** rng.uniform(0.5, 4, 40), 0.7, 2.4)
+    gap = rng.uniform(-2.4, 2.4, 40)
+    plain, more = contact(surface, gap), contact(surface, gap, derivatives=True)
+    assert plain.force_by is None
+    assert plain.area_by is None
+    np.testing.assert_allclose(more.force, plain.force, rtol=2e-8)
+    np.testing.assert_allclose(more.area, plain.area, rtol=2e-8)
+    tight = contact(surface, gap, rtol=1e-11)
+    assert (np.abs(more.force / tight.force - 1) <= more.error + tight.error).all()
+    assert (np.abs(more.area / tight.area - 1) <= more.error + tight.error).all()
+
+
+def test_next_to_the_floor_of_zeta_u():
+    """Down to zeta_1 = 3, where the step must shrink: area goes with the sixth root of what is left."""
+    left = 10.0 ** np.arange(-9, -2)
+    found = contact(Surface(0.7, 0.3, 0.9 * (1 + left), 0.7, 2.4), 1.0, derivatives=True)
+    for by in (found.force_by, found.area_by):
+        assert all(np.isfinite(slope).all() for slope in by.values())
+    # the numbers themselves: an input of zeta_1 has eps/left of its own
+    power = left * found.area_by["q1"] * 0.9 / found.area
+    np.testing.assert_allclose(power[1:4], 1 / 6, rtol=1e-4)
+    # where 1e-3 is left, against differences that stay well inside
+    step = 0.02 * left[-2]
+    near = contact(Surface(0.7, 0.3, 0.9 * (1 + left[-2] + step * np.arange(-3.0, 4)), 0.7, 2.4), 1.0, rtol=1e-11)
+    for by, values in ((found.force_by, near.force), (found.area_by, near.area)):
+        slope = weights(np.arange(-3.0, 4)) @ values / (0.9 * step)
+        assert abs(by["q1"][-2] - slope) <= 1e-6 * max(abs(slope), values[3] / 0.9)
+
+
+def test_units_shapes_and_no_contact():
+    surface = Surface([[0.5], [1.0]], 0.3, 30.0, 0.7, 2.4)
+    gap = np.array([1.0, 2.4, 5.0])
+    found = contact(surface, gap, derivatives=True)
+    stiff = contact(surface, gap, E_star=[2.0, 3.0, 4.0], derivatives=True)
+    for name in NAMES:
+        assert found.force_by[name].shape == found.area_by[name].shape == (2, 3)
+        # no contact is flat
+        assert (found.force_by[name][:, 1:] == 0).all()
+        assert (found.area_by[name][:, 1:] == 0).all()
+        np.testing.assert_allclose(stiff.force_by[name][:, 0], 2 * found.force_by[name][:, 0], rtol=1e-15)
+        np.testing.assert_array_equal(stiff.area_by[name], found.area_by[name])
+    one = contact(Surface(0.5, 0.3, 30.0, 0.7, 2.4), 1.0, derivatives=True)
+    for name in NAMES:
+        assert np.shape(one.force_by[name]) == ()
+        assert one.force_by[name] == found.force_by[name][0, 0]
+
+
+def test_a_gradient_descends():
+    """What a design loop does: Newton's method in h_rms to a wanted force."""
+    wanted, h_rms = 1e-4, 0.5
+    for _ in range(12):
+        found = contact(Surface(0.8, 0.3, 60.0, h_rms, 2.0), 1.2, derivatives=True)
+        h_rms *= math.exp(-math.log(found.force / wanted) * found.force / (h_rms * found.force_by["h_rms"]))
+    assert contact(Surface(0.8, 0.3, 60.0, h_rms, 2.0), 1.2).force == pytest.approx(wanted, rel=1e-12, abs=0)

@@ -1,0 +1,233 @@
+"""Tiers of `contact` against each other: tables within their certificate, readings, islands outside, bad options."""
+
+import dataclasses
+import functools
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from mbma_tables import InputError, OutOfRangeError, Surface, contact
+from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED
+
+OWN = dataclasses.replace(PRINTED, name="own", jacobian="exact", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)
+LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)
+OPEN = dataclasses.replace(REPORTED, name="open", floor_d=1.3, floor_u=2.2, density_divisor=11.0)
+
+
+def held_out(count, seed, least_hurst=0.3, least_zeta_1=3.01):
+    """Random surfaces and gaps from 0.9999 h_max to -h_max, ends included."""
+    rng = np.random.default_rng(seed)
+    hurst = rng.uniform(least_hurst, 1, count)
+    hurst[::10] = 1
+    zeta_1 = 10 ** rng.uniform(math.log10(least_zeta_1), 4, count)
+    zeta_1[::13], zeta_1[5::17] = least_zeta_1, 1e4
+    h_max = rng.uniform(2.5, 4.7, count)
+    share = rng.uniform(-1, 0.9999, count)
+    share[1::5] = 1 - 10 ** rng.uniform(-4, -0.5, count)[1::5]
+    share[::6], share[3::9] = 0.9999, -1
+    return Surface(hurst, 0.2, 0.2 * zeta_1, 1.0, h_max), share * h_max
+
+
+@functools.cache
+def solved(reading):
+    surfaces, gaps = held_out(80, seed=101)
+    return surfaces, gaps, contact(surfaces, gaps, tier="exact", reading=reading, rtol=1e-10)
+
+
+def apart(found, true):
+    return np.maximum(np.abs(found.force / true.force - 1), np.abs(found.area / true.area - 1))
+
+
+@pytest.mark.parametrize("reading", READINGS)
+@pytest.mark.parametrize("rtol", [1e-8, 1e-10])
+def test_universal_within_1e7_of_exact(reading, rtol):
+    surfaces, gaps, true = solved(reading)
+    found = contact(surfaces, gaps, reading=reading, rtol=rtol)
+    assert found.tier == "universal"
+    error = apart(found, true)
+    assert (error <= found.error).all()
+    assert found.error.max() <= 1e-7
+    assert true.error.max() <= 1e-10
+
+
+def test_island4d_within_1e3_of_exact():
+    surfaces, gaps, true = solved("reported")
+    found = contact(surfaces, gaps, tier="island4d", rtol=1e-6)
+    assert found.tier == "island4d"
+    assert (apart(found, true) <= found.error).all()
+    assert found.error.max() <= 1e-3
+    # a coarser table than the other
+    assert np.median(apart(found, true)) > 1e-8
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-5, 1e-7])
+def test_the_bound_is_true_at_any_tolerance(rtol):
+    surfaces, gaps, true = solved("reported")
+    found = contact(surfaces, gaps, rtol=rtol)
+    assert (apart(found, true) <= found.error).all()
+    assert found.error.max() <= rtol + 1e-7
+
+
+@pytest.mark.parametrize("reading", [OWN, LEVEL, OPEN], ids=lambda reading: reading.name)
+def test_a_reading_of_ones_own(reading):
+    surfaces, gaps = held_out(25, seed=102, least_hurst=0.4, least_zeta_1=3.6)
+    true = contact(surfaces, gaps, tier="exact", reading=reading, rtol=1e-9)
+    found = contact(surfaces, gaps, reading=reading, rtol=1e-9)
+    assert (found.reading, true.reading) == (reading.name, reading.name)
+    error = apart(found, true)
+    assert (error <= found.error + true.error).all()
+    assert found.error.max() <= 1e-7
+    # the reading matters: its name alone did not decide
+    assert (np.abs(contact(surfaces, gaps).area / found.area - 1) > 1e-3).any()
+
+
+@pytest.mark.parametrize("tier", ["universal", "exact", "rigid"])
+def test_a_floor_above_the_largest_magnification(tier):
+    surfaces = Surface([0.5, 0.8], 0.2, [0.68, 40.0], 1.0, 3.0)
+    with pytest.raises(OutOfRangeError, match=r"q1/q0 must be greater than 3\.5, the reading's floor") as caught:
+        contact(surfaces, 1.0, tier=tier, reading=OWN)
+    assert caught.value.mask.tolist() == [True, False]
+
+
+@pytest.mark.parametrize(
+    "reading", ["printed", LEVEL, dataclasses.replace(REPORTED, name="own", density_divisor=11.0)], ids=str
+)
+def test_the_four_parameter_table_is_of_one_reading(reading):
+    with pytest.raises(InputError, match=r"island4d table was made for the reading 'reported', not for .*'universal'"):
+        contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), 1.0, tier="island4d", reading=reading)
+
+
+def test_the_four_parameter_table_serves_readings_that_share_its_islands():
+    # floors, beta and K1 move along the table's axes and do not change it
+    near = dataclasses.replace(REPORTED, name="near", jacobian="exact", floor_d=1.6, beta=0.3)
+    surface, gaps = Surface(0.7, 0.2, 40.0, 1.0, 3.0), np.array([2.5, 1.0, -2.0])
+    found = contact(surface, gaps, tier="island4d", reading=near, rtol=1e-6)
+    true = contact(surface, gaps, tier="exact", reading=near)
+    assert (apart(found, true) <= found.error + true.error).all()
+    assert found.error.max() <= 1e-3
+
+
+ROUGH = Surface([[0.05], [0.8]], 0.2, 0.2 * 1e8, 1.0, 3.0)  # the first row leaves the table where it is pressed
+GAPS = np.array([2.9999, 0.0, -2.0, 3.5])
+MISSING = np.array([[False, True, True, False], [False] * 4])
+
+
+def test_outside_raises_with_a_mask_in_the_callers_shape():
+    with pytest.raises(OutOfRangeError) as caught:
+        contact(ROUGH, GAPS, reading="reported")
+    np.testing.assert_array_equal(caught.value.mask, MISSING)
+    message = str(caught.value)
+    assert "2 of 8 entries" in message
+    assert "(-6.25 <= X <= 41, mu <= 1.1e+06)" in message
+    assert "hurst = 0.05, zeta_1 = 1e+08" in message
+    assert "mu above" in message
+    assert "outside='exact'" in message
+
+
+def test_outside_answered_by_the_solver():
+    found = contact(ROUGH, GAPS, outside="exact")
+    true = contact(ROUGH, GAPS, tier="exact")
+    table = contact(ROUGH, GAPS, outside="nan")
+    for name in ("force", "area", "error"):
+        expected = np.where(MISSING, getattr(true, name), getattr(table, name))
+        np.testing.assert_array_equal(getattr(found, name), expected)
+    assert found.islands > table.islands
+
+
+@pytest.mark.parametrize("derivatives", [False, True])
+def test_outside_as_nan(derivatives):
+    found = contact(ROUGH, GAPS, outside="nan", derivatives=derivatives)
+    inside = contact(Surface(0.8, 0.2, 0.2 * 1e8, 1.0, 3.0), GAPS, derivatives=derivatives)
+    for name in ("force", "area", "error"):
+        np.testing.assert_array_equal(np.isnan(getattr(found, name)), MISSING)
+        np.testing.assert_array_equal(getattr(found, name)[1], getattr(inside, name))
+        assert getattr(found, name)[0, 3] == 0
+    if derivatives:
+        for name, slope in found.force_by.items():
+            np.testing.assert_array_equal(np.isnan(slope), MISSING)
+            np.testing.assert_array_equal(slope[1], inside.force_by[name])
+
+
+def test_outside_in_X():
+    """A reading with hardly any deformation is deeper than the table at any gap."""
+    shallow = dataclasses.replace(REPORTED, name="shallow", beta=0.01, phi=0.001)
+    surface, gaps = Surface(0.9, 0.2, 400.0, 1.0, 4.7), np.array([4.6, -4.7, 4.8])
+    with pytest.raises(OutOfRangeError, match=r"2 of 3 entries .*X above") as caught:
+        contact(surface, gaps, reading=shallow)
+    assert caught.value.mask.tolist() == [True, True, False]
+    found = contact(surface, gaps, reading=shallow, outside="exact")
+    true = contact(surface, gaps, reading=shallow, tier="exact")
+    np.testing.assert_array_equal(found.force, true.force)
+    np.testing.assert_array_equal(found.area, true.area)
+
+
+def test_one_entry_outside_has_a_mask_without_dimensions():
+    surface = Surface(0.05, 0.2, 0.2 * 1e8, 1.0, 3.0)
+    with pytest.raises(OutOfRangeError) as caught:
+        contact(surface, 0.0)
+    assert caught.value.mask.shape == ()
+    assert caught.value.mask
+    assert math.isnan(contact(surface, 0.0, outside="nan").force)
+
+
+def test_bad_options():
+    surface = Surface(0.8, 0.2, 40.0, 1.0, 3.0)
+    with pytest.raises(InputError, match="outside must be one of"):
+        contact(surface, 1.0, outside="clamp")
+    with pytest.raises(InputError, match="tier must be one of"):
+        contact(surface, 1.0, tier="formula4")
+    for tier in ("exact", "island4d", "rigid"):
+        with pytest.raises(InputError, match="derivatives come from tier 'universal'"):
+            contact(surface, 1.0, tier=tier, derivatives=True)
+    with pytest.raises(InputError, match="outside must be 'raise' or 'nan'"):
+        contact(surface, 1.0, outside="exact", derivatives=True)
+
+
+def fresh(code):
+    """What a new interpreter prints as JSON."""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-9], ids=["through a law", "each gap"])
+def test_memory_is_that_of_the_batch(rtol):
+    code = """
+import json, resource, tracemalloc
+import numpy as np
+from mbma_tables import Surface, contact
+surface = Surface(0.8, 0.2, 40.0, 1.0, 3.0)
+gaps = np.linspace(2.5, 3.0, 200_000)
+rtol = {rtol}
+contact(surface, gaps[:10], rtol=rtol)
+contact(surface, gaps[:10], rtol=1e-4)
+contact(surface, gaps[:5000], rtol=1e-4)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+tracemalloc.start()
+found = contact(surface, gaps, rtol=rtol)
+traced = tracemalloc.get_traced_memory()[1]
+grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024
+print(json.dumps([traced / gaps.nbytes, grown / gaps.nbytes, (found.islands or 0) / gaps.size]))
+"""
+    traced, grown, islands = fresh(code.format(rtol=rtol))
+    # an array of every node of every gap would be 31 times the gaps, or more, by itself
+    assert islands == 0 or islands > 30
+    assert traced < 25
+    assert grown < 30
+
+
+def test_importing_and_building_surfaces_open_no_table():
+    loaded = fresh("""
+import builtins, json, os, sys
+opened = []
+sys.addaudithook(lambda event, given: opened.append(str(given[0])) if event == "open" else None)
+import mbma_tables
+mbma_tables.Surface(0.8, 0.2, 40.0, 1.0, 3.0).alpha
+print(json.dumps([sorted(sys.modules), [name for name in opened if name.endswith(".nc")]]))
+""")
+    modules, tables = loaded
+    assert {"netCDF4", "xarray", "dask"}.isdisjoint(modules)
+    assert tables == []
