@@ -117,8 +117,10 @@ class UniversalModel(TwoNumberModel):
     def kernel(self) -> tuple[FloatArray, FloatArray, Axes]:
         """Coefficients, error field and axes as the compiled totals take them."""
         X, mu = self._X, self._mu
-        axes = (X.low, X.high, X.offset, X.start, 1 / X.step, mu.low, mu.high, mu.start, 1 / mu.step)
-        return self.content.coefficients, np.ascontiguousarray(self.content.local_error.max(axis=-1)), axes
+        field = np.ascontiguousarray(self.content.local_error.max(axis=-1))
+        cells = (field.shape[0] / (X.nodes - 1), field.shape[1] / (mu.nodes - 1))
+        axes = (X.low, X.high, X.offset, X.start, 1 / X.step, mu.low, mu.high, mu.start, 1 / mu.step, *cells)
+        return self.content.coefficients, field, axes
 
     def error(self, X: FloatArray, mu: FloatArray) -> FloatArray:
         """Bound on the relative error of both functions at flat arguments."""

@@ -12,15 +12,48 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.islands.height_integrals import f_five_halves, f_one, f_three_halves, f_two
+from mbma_tables.islands import height_integrals as heights
 from mbma_tables.tablefiles.interpolate import gradient_2d, value_2d
 
-# low, high, offset, first t and 1/step of X; low, high, first t and 1/step of mu
-Axes = tuple[float, float, float, float, float, float, float, float, float]
+# low, high, offset, first t and 1/step of X; low, high, first t and 1/step of mu; error cells per node of both
+Axes = tuple[float, float, float, float, float, float, float, float, float, float, float]
 OK, X_BELOW, X_ABOVE, MU_ABOVE, UNRESOLVED = 0, 1, 2, 3, 4
 REASONS = {X_BELOW: "X below", X_ABOVE: "X above", MU_ABOVE: "mu above"}
 SECOND_ORDER = 1e-12  # what the expansion about the rigid sphere leaves below mu = 1e-8
 _LOOSE = {"contract", "reassoc", "arcp"}
+
+
+_locate, _horner = heights._locate, heights._horner
+_ONE, _THREE_HALVES, _TWO, _FIVE_HALVES = heights._ONE, heights._THREE_HALVES, heights._TWO, heights._FIVE_HALVES
+
+
+@njit(cache=True, error_model="numpy")
+def _rigid_integrals(x: float) -> tuple[float, float]:
+    """(F_{5/2}(x), F_2(x)) in one pass, to the bits of `height_integrals`."""
+    piece, t, base, weight = _locate(x)
+    return (
+        _horner(_FIVE_HALVES[piece], t) * (base * base * math.sqrt(base) * weight),
+        _horner(_TWO[piece], t) * (base * base * weight),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _rigid_slopes(x: float) -> tuple[float, float]:
+    """(F_{3/2}(x), F_1(x)), up to factors the derivatives of `_rigid_integrals`."""
+    piece, t, base, weight = _locate(x)
+    return (
+        _horner(_THREE_HALVES[piece], t) * (base * (math.sqrt(base) * weight)),
+        _horner(_ONE[piece], t) * (base * weight),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _error_at(place_X: float, place_mu: float, errors: FloatArray, rate_X: float, rate_mu: float) -> float:
+    """Bound on the error in the cell of a position."""
+    row = max(min(int(place_X * rate_X), errors.shape[0] - 1), 0)
+    column = max(min(int(place_mu * rate_mu), errors.shape[1] - 1), 0)
+    bound: float = errors[row, column] + SECOND_ORDER
+    return bound
 
 
 @njit(cache=True, fastmath=_LOOSE, error_model="numpy")
@@ -28,7 +61,7 @@ def universal_phi(
     X: float, mu: float, table: FloatArray, errors: FloatArray, axes: Axes
 ) -> tuple[int, float, float, float]:
     """Status, Phi_F, Phi_A and the bound on their relative error at (X, mu)."""
-    X_low, X_high, offset, X_start, X_rate, mu_low, mu_high, mu_start, mu_rate = axes
+    X_low, X_high, offset, X_start, X_rate, mu_low, mu_high, mu_start, mu_rate, rate_X, rate_mu = axes
     if not X_low <= X:
         return X_BELOW, math.nan, math.nan, math.nan
     if not X_high >= X:
@@ -41,11 +74,10 @@ def universal_phi(
     force, area = value_2d(table, place_X, place_mu)
     # first order about the rigid sphere below the table
     share = mu / inside
-    row = min(int(place_X * errors.shape[0] / (table.shape[0] - 5)), errors.shape[0] - 1)
-    column = min(int(place_mu * errors.shape[1] / (table.shape[1] - 5)), errors.shape[1] - 1)
-    phi_F = math.pi / 5.0 * mu * f_five_halves(-X) * math.exp(force * share)
-    phi_A = math.pi / 2.0 * f_two(-X) * math.exp(area * share)
-    return OK, phi_F, phi_A, errors[max(row, 0), max(column, 0)] + SECOND_ORDER
+    five, two = _rigid_integrals(-X)
+    phi_F = math.pi / 5.0 * mu * five * math.exp(force * share)
+    phi_A = math.pi / 2.0 * two * math.exp(area * share)
+    return OK, phi_F, phi_A, _error_at(place_X, place_mu, errors, rate_X, rate_mu)
 
 
 @njit(cache=True, error_model="numpy")
@@ -53,7 +85,7 @@ def universal_slopes(
     X: float, mu: float, table: FloatArray, errors: FloatArray, axes: Axes
 ) -> tuple[int, float, float, float, float, float, float, float]:
     """Status; Phi_F and d log Phi_F by X and by log(mu); the same of Phi_A; the bound on the relative error."""
-    X_low, X_high, offset, X_start, X_rate, mu_low, mu_high, mu_start, mu_rate = axes
+    X_low, X_high, offset, X_start, X_rate, mu_low, mu_high, mu_start, mu_rate, rate_X, rate_mu = axes
     nan = math.nan
     if not X_low <= X:
         return X_BELOW, nan, nan, nan, nan, nan, nan, nan
@@ -67,21 +99,20 @@ def universal_slopes(
     f, f_X, f_mu, g, g_X, g_mu = gradient_2d(table, place_X, place_mu)
     share = mu / inside
     by_X = X_rate / (X + offset) * share
-    five, two = f_five_halves(-X), f_two(-X)
-    row = max(min(int(place_X * errors.shape[0] / (table.shape[0] - 5)), errors.shape[0] - 1), 0)
-    column = max(min(int(place_mu * errors.shape[1] / (table.shape[1] - 5)), errors.shape[1] - 1), 0)
+    five, two = _rigid_integrals(-X)
+    three, one = _rigid_slopes(-X)
     # below the table the logarithm is proportional to mu
     F_mu = 1.0 + (f_mu * mu_rate if mu >= mu_low else f * share)
     A_mu = g_mu * mu_rate if mu >= mu_low else g * share
     return (
         OK,
         math.pi / 5.0 * mu * five * math.exp(f * share),
-        f_X * by_X + 2.5 * f_three_halves(-X) / five,
+        f_X * by_X + 2.5 * three / five,
         F_mu,
         math.pi / 2.0 * two * math.exp(g * share),
-        g_X * by_X + 2.0 * f_one(-X) / two,
+        g_X * by_X + 2.0 * one / two,
         A_mu,
-        errors[row, column] + SECOND_ORDER,
+        _error_at(place_X, place_mu, errors, rate_X, rate_mu),
     )
 
 
