@@ -13,7 +13,7 @@ from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, req
 from mbma_tables.islands.geometry import FIELDS, fill_islands
 from mbma_tables.models import get_model
 from mbma_tables.surfaces.readings import Reading, get_reading
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import PARAMETERS, Surface
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -62,6 +62,9 @@ class Island:
     tier: str
 
 
+GEOMETRY = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
+
+
 def geometry(approach: FloatArray, hurst: FloatArray, zeta_1: FloatArray, reading: Reading) -> dict[str, FloatArray]:
     """`FIELDS` of islands at delta/h_rms = approach > 0, in units of s and 1/q0; arguments of one shape."""
     out = np.empty((len(FIELDS), approach.size))
@@ -84,7 +87,7 @@ def island(
     delta: ArrayLike,
     tier: str = "universal",
     reading: str | Reading = "reported",
-    E_star: float = 1.0,
+    E_star: ArrayLike = 1.0,
     rtol: float = 1e-9,
 ) -> Island:
     """Contact islands of a surface at the approaches `delta`.
@@ -99,7 +102,7 @@ def island(
         The island model.
     reading : {"reported", "printed"} or Reading
         Which reading of the paper's equations.
-    E_star : float
+    E_star : array_like
         Effective modulus; force is in its unit times length squared.
     rtol : float
         Relative error asked of force and area.
@@ -112,6 +115,8 @@ def island(
     ------
     InputError, OutOfRangeError, ConvergenceError
     """
+    if surface.labelled or hasattr(delta, "dims") or hasattr(E_star, "dims"):
+        return _of_labelled(surface, delta, tier, reading, E_star, rtol)
     approach = finite_array("delta", delta)
     require("delta", approach, approach > 0, "positive")
     modulus = finite_array("E_star", E_star)
@@ -134,8 +139,7 @@ def island(
         "sigma": s,
         "h_d": s,
     }
-    names = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
-    values = {name: (g[name] * units.get(name, 1.0))[()] for name in names}
+    values = {name: (g[name] * units.get(name, 1.0))[()] for name in GEOMETRY}
     return Island(
         delta=np.broadcast_to(np.asarray(delta, dtype=float), shape)[()],
         force=(modulus * s / q0 * scale_force(g) * phi.phi_F)[()],
@@ -145,3 +149,22 @@ def island(
         tier=model.name,
         **values,
     )
+
+
+def _of_labelled(surface: Surface, delta: Any, tier: str, reading: str | Reading, E_star: Any, rtol: float) -> Island:
+    """`island` of DataArrays, lazily where they are."""
+    # xarray comes in with its own objects
+    from mbma_tables.labels import apply, refuse_unnamed
+
+    names = (*GEOMETRY, "force", "area", "error")
+
+    def block(*fields: Any) -> tuple[Any, ...]:
+        *numbers, own, modulus = fields
+        found = island(Surface(*numbers), own, tier, reading, modulus, rtol)
+        return tuple(np.broadcast_to(getattr(found, name), np.shape(found.force)) for name in names)
+
+    arguments = {name: getattr(surface, name) for name in PARAMETERS} | {"delta": delta, "E_star": E_star}
+    refuse_unnamed(arguments)
+    outputs = apply(block, tuple(arguments.values()), len(names))
+    values = {name: found.rename(name) for name, found in zip(names, outputs, strict=True)}
+    return Island(delta=delta, reading=get_reading(reading).name, tier=tier, **values)

@@ -1,33 +1,13 @@
-"""xarray in, xarray out: surfaces and gaps as DataArrays, dask-backed ones lazily and in parallel.
-
-Blocks are answered by the same functions as plain arrays; which block runs where is dask's business.
-"""
+"""Totals of surfaces and gaps that are DataArrays."""
 
 from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-import xarray as xr
-
-from mbma_tables.errors import InputError
+from mbma_tables.labels import apply, refuse_unnamed
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 
 NAMES = ("force", "area", "error")
-
-
-def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
-    """`function` of broadcast arguments, block by block where they are dask arrays."""
-    return xr.apply_ufunc(
-        function,
-        *arguments,
-        input_core_dims=[[]] * len(arguments),
-        output_core_dims=[[]] * outputs,
-        dask="parallelized",
-        output_dtypes=[float] * outputs,
-        join="exact",
-        keep_attrs=False,
-    )
 
 
 def contact_of_labelled(
@@ -49,9 +29,7 @@ def contact_of_labelled(
         return tuple(getattr(found, name) for name in NAMES) + tuple(slopes)
 
     arguments = (*(getattr(surface, name) for name in PARAMETERS), separation, E_star)
-    for name, given in zip((*PARAMETERS, "separation", "E_star"), arguments, strict=True):
-        if not hasattr(given, "dims") and np.ndim(given):
-            raise InputError(f"beside DataArrays, {name} must be one or a scalar, got shape {np.shape(given)}")
+    refuse_unnamed(dict(zip((*PARAMETERS, "separation", "E_star"), arguments, strict=True)))
     outputs = apply(block, arguments, len(NAMES) + len(by))
     force, area, error = (found.rename(name) for found, name in zip(outputs, NAMES, strict=False))
     force.attrs = {"long_name": "force over nominal area", "units": "unit of E_star"}

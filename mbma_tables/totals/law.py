@@ -66,7 +66,7 @@ class ContactLaw:
         if type(gap) is float and -self.h_max <= gap < math.inf:
             return law_kernel.evaluate(what, gap, self._state, self.energies)
         if hasattr(gap, "dims"):
-            from mbma_tables.totals.labelled import apply
+            from mbma_tables.labels import apply
 
             return apply(lambda block: self._map(what, block), (gap,), 1)
         d = finite_array("separation", gap)
@@ -113,7 +113,7 @@ class ContactLaw:
         """
         given = area if force is None else force
         if (force is None or area is None) and hasattr(given, "dims"):
-            from mbma_tables.totals.labelled import apply
+            from mbma_tables.labels import apply
 
             kind = "area" if force is None else "force"
             return apply(lambda block: self.separation(**{kind: block}), (given,), 1)

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from dask.callbacks import Callback
 
-from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
+from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law, island
 from mbma_tables.totals.contact import MANY_GAPS
 
 FIELDS = ("force", "area", "error")
@@ -208,3 +208,18 @@ def test_cold_tables_opened_by_many_threads():
     done = subprocess.run([sys.executable, "-c", COLD], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout == "whole\n"
+
+
+def test_islands_of_labelled_surfaces_are_lazy_and_the_same():
+    hurst = np.random.default_rng(8).uniform(0.4, 0.9, 12)
+    delta = np.array([0.1, 1.0, 3.0])
+    plain = island(Surface(hurst[:, None], 0.2, 40.0, 1.0, 3.0), delta, E_star=2.0)
+    lazy = island(
+        Surface(xr.DataArray(hurst, dims="sample").chunk(sample=5), 0.2, 40.0, 1.0, 3.0),
+        xr.DataArray(delta, dims="depth"),
+        E_star=2.0,
+    )
+    assert dask.base.is_dask_collection(lazy.force)
+    for name in ("zeta_d", "mu", "force", "area", "error"):
+        found = getattr(lazy, name).transpose("sample", "depth").compute()
+        np.testing.assert_array_equal(found, getattr(plain, name))
