@@ -123,6 +123,12 @@ def surface_constants(
     )
 
 
+@njit(cache=True, error_model="numpy")
+def jacobian_below(surface: Constants, printed: bool, offset: bool) -> float:
+    """K1 (47) below the kink."""
+    return 1.0 - surface[3] / (1.0 if printed else surface[2]) if printed or offset else 1.0
+
+
 @njit(cache=True, fastmath=_LOOSE, error_model="numpy")
 def island_node(x: float, floor_d: bool, floor_u: bool, surface: Constants, offset: bool, summits: bool) -> Node:
     """(X, mu, F_hat per Phi_F, A^i per Phi_A with eta, h_d, D_d, sigma_d) at delta = x h_rms.
@@ -307,8 +313,7 @@ def fill_totals(
     for k in range(reach.size):
         if k > 0 and (hurst[k] != hurst[k - 1] or zeta_1[k] != zeta_1[k - 1]):
             surface = surface_constants(hurst[k], zeta_1[k], reading)
-        slope = surface[3] / (1.0 if printed else surface[2])
-        jacobian = 1.0 - slope if printed or reading[5] else 1.0
+        jacobian = jacobian_below(surface, printed, reading[5])
         status[k], out[0, k], out[1, k], out[2, k], rules = total(
             reach[k], top[k], rtol, surface, jacobian, (reading[5], reading[6]), table, errors, axes
         )

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.models.universal_kernel import OK, UNRESOLVED, Axes, universal_slopes
+from mbma_tables.models.universal_kernel import OK, UNRESOLVED, Axes, universal_phi, universal_slopes
 from mbma_tables.totals.lookup import (
     GAUSS,
     KRONROD,
@@ -24,6 +24,7 @@ from mbma_tables.totals.lookup import (
     SMALL_WIDTH,
     Constants,
     island_node,
+    jacobian_below,
     surface_constants,
 )
 
@@ -49,7 +50,7 @@ def _integrand(
 ) -> tuple[int, float, float]:
     """Status and the integrands of force and area over x = delta/h_rms, without K1."""
     X, mu, per_F, per_A, h_d, D_d, sigma_d = island_node(x, floor_d, floor_u, surface, flags[0], flags[1])
-    status, phi_F, _, _, phi_A, _, _, _ = universal_slopes(X, mu, table, errors, axes)
+    status, phi_F, phi_A, _ = universal_phi(X, mu, table, errors, axes)
     height = ((top - (reach - x)) * surface[2] - h_d) / sigma_d
     weight = D_d * math.exp(-0.5 * height * height) / (math.sqrt(2.0 * math.pi) * sigma_d) * surface[2]
     return status, per_F * phi_F * weight, per_A * phi_A * weight
@@ -122,12 +123,6 @@ def _rule(
     return OK, min(difference, (SAFETY * difference) ** 1.5), doubt
 
 
-@njit(cache=True, error_model="numpy")
-def _jacobian(surface: Constants, printed: bool, offset: bool) -> float:
-    """K1 (47) below the kink."""
-    return 1.0 - surface[3] / (1.0 if printed else surface[2]) if printed or offset else 1.0
-
-
 @njit(cache=True, error_model="numpy", nogil=True)
 def total_with_slopes(
     reach: float,
@@ -148,7 +143,7 @@ def total_with_slopes(
     if not reach > 0.0:
         return OK, 0.0, 0
     layer, kink_d, kink_u = surface[12], surface[10], surface[11]
-    K1 = _jacobian(surface, printed, flags[0])
+    K1 = jacobian_below(surface, printed, flags[0])
     bounds = np.empty((MOST_INTERVALS, 2))
     parts = np.empty((MOST_INTERVALS, 2, 5))
     own = np.empty(MOST_INTERVALS)
@@ -202,18 +197,25 @@ def total_with_slopes(
                 count += 1
     # the upper limit moves with reach, the kink and K1 with H and zeta_1
     status, f, g = _integrand(reach, reach > kink_d, reach > kink_u, reach, top, surface, flags, table, errors, axes)
+    if status != OK:
+        return status, math.nan, rules
     edge = 1.0 if reach > kink_d else K1
     out[0, 1 + BY_REACH] += edge * f
     out[1, 1 + BY_REACH] += edge * g
     for number in range(2):
         up, down = near[2 * number], near[2 * number + 1]
         if kink_d < reach:
-            _, f, g = _integrand(kink_d, True, kink_d > kink_u, reach, top, surface, flags, table, errors, axes)
+            status, f, g = _integrand(kink_d, True, kink_d > kink_u, reach, top, surface, flags, table, errors, axes)
+            if status != OK:
+                return status, math.nan, rules
             moved = (K1 - 1.0) * (up[10] - down[10]) * rates[number]
             out[0, 1 + number] += f * moved
             out[1, 1 + number] += g * moved
         if not printed:
-            change = math.log(_jacobian(up, printed, flags[0]) / _jacobian(down, printed, flags[0])) * rates[number]
+            change = (
+                math.log(jacobian_below(up, printed, flags[0]) / jacobian_below(down, printed, flags[0]))
+                * rates[number]
+            )
             for k in range(count):
                 if not floors[k, 0]:
                     out[0, 1 + number] += change * parts[k, 0, 0]
