@@ -151,5 +151,6 @@ def draw(folder: pathlib.Path) -> None:
         column[1].set(yscale="log", xlabel=r"$u/h_{rms}$", xlim=(0, 3.2))
     axes[0, 0].set_ylabel("area, model / data")
     axes[1, 0].set_ylabel("force, model / data")
-    axes[1, 2].legend(fontsize="small", loc="lower right")
+    # below the panels, where it hides no curve
+    figure.legend(*axes[1, 2].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
     save(figure, "reference")
