@@ -5,7 +5,8 @@ In units of s, 1/q0 and E* q0 s, with y = sqrt(m2) over [1, zeta] (so that w = 1
     u = 2/sqrt(pi) integral_0^Y J(p0/y) / zeta(y) dy,   Y = sqrt(m2) over [1, zeta_1],
     J(a) = integral_a^inf (gamma + 3 (1 - gamma) erf(x)^2) exp(-x^2)/x dx,
 
-where w is infinite at q0 in (19) and nothing is here; u0 and lambda of (21) are moments of 1/zeta(y).
+where w is infinite at q0 in (19) and nothing is here; u0 and lambda of (21) are moments of 1/zeta(y). All take and
+return DataArrays too, dask-backed ones lazily.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from scipy.special import erf, exp1
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.errors import ConvergenceError, InputError
 from mbma_tables.islands.height_integrals import height_integral
+from mbma_tables.labels import takes_labelled
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.quadrature import integrate
@@ -64,6 +66,7 @@ class Asperities:
     area: Any
 
 
+@takes_labelled()
 def mean_separation(surface: Surface, separation: ArrayLike) -> Any:
     """Average interfacial separation u = (h_max + d)/2 [length] at separations d [length], Eq. (50)."""
     gap = finite_array("separation", separation)
@@ -71,6 +74,7 @@ def mean_separation(surface: Surface, separation: ArrayLike) -> Any:
     return (surface.h_max / 2 + gap / 2)[()]
 
 
+@takes_labelled()
 def separation(surface: Surface, mean_separation: ArrayLike) -> Any:
     """Separation d = 2 u - h_max [length] at average interfacial separations u [length], Eq. (50)."""
     average = finite_array("mean_separation", mean_separation)
@@ -78,6 +82,7 @@ def separation(surface: Surface, mean_separation: ArrayLike) -> Any:
     return (2 * average - surface.h_max)[()]
 
 
+@takes_labelled(Asperities)
 def greenwood_williamson(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1.0) -> Asperities:
     """Force and area of equal spheres with Gaussian heights (Eqs. 11, 12), Nayak's summits (Eq. 2).
 
@@ -110,6 +115,7 @@ def greenwood_williamson(surface: Surface, separation: ArrayLike, E_star: ArrayL
     return Asperities(gap[()], mean_separation(surface, gap), (modulus * force)[()], area)
 
 
+@takes_labelled()
 def persson_area(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1.0) -> Any:
     """A/A0 = erf(p0/(2 sqrt(G))) at the largest magnification, G = E*^2 m2/4 (Eq. 18).
 
@@ -137,6 +143,7 @@ def persson_area(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1.0) ->
     return erf(pressure / modulus / np.sqrt(surface.m2))
 
 
+@takes_labelled()
 def persson_separation(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1.0, method: Method = "full") -> Any:
     """Average interfacial separation u of Persson's theory (Eqs. 19-21).
 
@@ -183,6 +190,7 @@ def persson_separation(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1
     return (average.reshape(shape) * surface.s)[()]
 
 
+@takes_labelled()
 def persson_force(
     surface: Surface, mean_separation: ArrayLike, E_star: ArrayLike = 1.0, method: Method = "full"
 ) -> Any:
