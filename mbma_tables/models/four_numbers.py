@@ -14,7 +14,7 @@ from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, req
 from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.models.protocol import EXACT_RTOL, OUTSIDE, IslandAnswer
+from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
 from mbma_tables.models.raw import SPHERE_FLOOR, Coordinates, band_fields, hat_scales, to_axes
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.interpolate import fill_4d, fill_4d_parallel, fill_gradient_4d
@@ -142,7 +142,7 @@ class Island4dModel:
             for axis, x in zip(self.content.axes, place.axes, strict=True)
         )
 
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
         """Phi_F and Phi_A of islands, through their band and not through mu; `outside` as in `lookup`."""
         shape = np.shape(islands["X"])
         X, width, zeta_d, hurst, mu = (

@@ -10,12 +10,17 @@ from typing import Protocol
 from mbma_tables.arguments import FloatArray
 
 OUTSIDE = ("raise", "exact", "nan")  # what to do about islands that a table does not cover
+QUANTITIES = ("force", "area")
+FORCE, AREA, BOTH = 0, 1, 2  # which of them is asked for
 EXACT_RTOL = 1e-10  # of the exact solver, where it stands in for a table
 
 
 @dataclasses.dataclass(frozen=True)
 class IslandAnswer:
-    """Phi_F and Phi_A of islands, with a bound on their relative error; arrays of one shape."""
+    """Phi_F and Phi_A of islands, with a bound on their relative error; arrays of one shape.
+
+    Where a model was asked for one of the two and the other would have cost more, the other is NaN.
+    """
 
     phi_F: FloatArray
     phi_A: FloatArray
@@ -29,10 +34,10 @@ class IslandModel(Protocol):
     def name(self) -> str:
         """The tier that selects it."""
 
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
         """Phi_F and Phi_A of islands, given as `islands.geometry.FIELDS` and hurst, arrays of one shape.
 
-        `outside` is one of `OUTSIDE`.
+        `outside` is one of `OUTSIDE`; `which` is FORCE, AREA or BOTH.
         """
 
 
@@ -43,6 +48,6 @@ class TwoNumberModel(abc.ABC):
     def answer(self, X: FloatArray, mu: FloatArray, *, outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A at finite X and mu >= 0."""
 
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise") -> IslandAnswer:
-        """Phi_F and Phi_A of islands."""
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
+        """Phi_F and Phi_A of islands, both: a model whose halves cost apart has its own."""
         return self.answer(islands["X"], islands["mu"], outside=outside)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models.protocol import IslandAnswer, TwoNumberModel
+from mbma_tables.islands.height_integrals import height_integral
+from mbma_tables.models.protocol import BOTH, FORCE, IslandAnswer, TwoNumberModel
 
 CLOSED_FORM_ERROR = 1e-14
 
@@ -36,3 +39,13 @@ class RigidModel(TwoNumberModel):
         """Phi_F = (mu/2) pi F_{5/2}(-X)/(5/2), Phi_A = pi F_2(-X)/2."""
         force, area = greenwood_tripp.rigid_sphere(X, mu)
         return IslandAnswer(force, area, np.full(force.shape, CLOSED_FORM_ERROR))
+
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
+        """Phi_F and Phi_A of islands, or the one asked for."""
+        X, mu = islands["X"], islands["mu"]
+        if which == BOTH:
+            return self.answer(X, mu, outside=outside)
+        none, error = np.full(X.shape, np.nan), np.full(X.shape, CLOSED_FORM_ERROR)
+        if which == FORCE:
+            return IslandAnswer(math.pi / 5 * mu * height_integral(2.5, -X), none, error)
+        return IslandAnswer(none, math.pi / 2 * height_integral(2.0, -X), error)

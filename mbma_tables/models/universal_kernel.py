@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import height_integrals as heights
+from mbma_tables.models.protocol import FORCE
 from mbma_tables.tablefiles.interpolate import gradient_2d, value_2d
 
 # low, high, offset, first t and 1/step of X; low, high, first t and 1/step of mu; error cells per node of both
@@ -23,28 +24,45 @@ SECOND_ORDER = 1e-12  # what the expansion about the rigid sphere leaves below m
 _LOOSE = {"contract", "reassoc", "arcp"}
 
 
-_locate, _horner = heights._locate, heights._horner
 _ONE, _THREE_HALVES, _TWO, _FIVE_HALVES = heights._ONE, heights._THREE_HALVES, heights._TWO, heights._FIVE_HALVES
 
 
 @njit(cache=True, error_model="numpy")
-def _rigid_integrals(x: float) -> tuple[float, float]:
-    """(F_{5/2}(x), F_2(x)) in one pass, to the bits of `height_integrals`."""
-    piece, t, base, weight = _locate(x)
-    return (
-        _horner(_FIVE_HALVES[piece], t) * (base * base * math.sqrt(base) * weight),
-        _horner(_TWO[piece], t) * (base * base * weight),
-    )
+def _locate(X: float) -> tuple[int, float, float, float]:
+    """`height_integrals._locate` at -X, with one comparison where X lies in [0, 8]."""
+    if 0.0 <= X < 8.0:
+        pair = int(0.5 * X)
+        return 4 - pair, 2.0 * pair + 1.0 - X, 1.0, 1.0
+    return heights._locate(-X)
+
+
+@njit(cache=True, fastmath=_LOOSE, error_model="numpy")
+def _polynomial(row: FloatArray, t: float) -> float:
+    """`height_integrals._horner` in four chains that run side by side."""
+    t2 = t * t
+    t4 = t2 * t2
+    even = row[0] + t4 * (row[4] + t4 * (row[8] + t4 * (row[12] + t4 * row[16])))
+    odd = row[1] + t4 * (row[5] + t4 * (row[9] + t4 * (row[13] + t4 * row[17])))
+    second = row[2] + t4 * (row[6] + t4 * (row[10] + t4 * (row[14] + t4 * row[18])))
+    third = row[3] + t4 * (row[7] + t4 * (row[11] + t4 * row[15]))
+    value: float = even + t2 * second + t * (odd + t2 * third)
+    return value
 
 
 @njit(cache=True, error_model="numpy")
-def _rigid_slopes(x: float) -> tuple[float, float]:
-    """(F_{3/2}(x), F_1(x)), up to factors the derivatives of `_rigid_integrals`."""
-    piece, t, base, weight = _locate(x)
-    return (
-        _horner(_THREE_HALVES[piece], t) * (base * (math.sqrt(base) * weight)),
-        _horner(_ONE[piece], t) * (base * weight),
-    )
+def _rigid_integrals(X: float) -> tuple[float, float]:
+    """(F_{5/2}(-X), F_2(-X)) in one pass."""
+    piece, t, base, weight = _locate(X)
+    common = base * base * weight
+    return _polynomial(_FIVE_HALVES[piece], t) * (math.sqrt(base) * common), _polynomial(_TWO[piece], t) * common
+
+
+@njit(cache=True, error_model="numpy")
+def _rigid_slopes(X: float) -> tuple[float, float]:
+    """(F_{3/2}(-X), F_1(-X)), up to factors the derivatives of `_rigid_integrals`."""
+    piece, t, base, weight = _locate(X)
+    common = base * weight
+    return _polynomial(_THREE_HALVES[piece], t) * (math.sqrt(base) * common), _polynomial(_ONE[piece], t) * common
 
 
 @njit(cache=True, error_model="numpy")
@@ -56,12 +74,10 @@ def _error_at(place_X: float, place_mu: float, errors: FloatArray, rate_X: float
     return bound
 
 
-@njit(cache=True, fastmath=_LOOSE, error_model="numpy")
-def universal_phi(
-    X: float, mu: float, table: FloatArray, errors: FloatArray, axes: Axes
-) -> tuple[int, float, float, float]:
-    """Status, Phi_F, Phi_A and the bound on their relative error at (X, mu)."""
-    X_low, X_high, offset, X_start, X_rate, mu_low, mu_high, mu_start, mu_rate, rate_X, rate_mu = axes
+@njit(cache=True, error_model="numpy", inline="always")
+def _place(X: float, mu: float, axes: Axes) -> tuple[int, float, float, float]:
+    """Status, position on both axes in node units, and mu over the nearest mu that the table holds."""
+    X_low, X_high, offset, X_start, X_rate, mu_low, mu_high, mu_start, mu_rate, _, _ = axes
     if not X_low <= X:
         return X_BELOW, math.nan, math.nan, math.nan
     if not X_high >= X:
@@ -69,15 +85,43 @@ def universal_phi(
     if not mu <= mu_high:
         return MU_ABOVE, math.nan, math.nan, math.nan
     inside = max(mu, mu_low)
-    place_X = (math.log(X + offset) - X_start) * X_rate
-    place_mu = (math.log(inside) - mu_start) * mu_rate
-    force, area = value_2d(table, place_X, place_mu)
     # first order about the rigid sphere below the table
-    share = mu / inside
-    five, two = _rigid_integrals(-X)
+    return OK, (math.log(X + offset) - X_start) * X_rate, (math.log(inside) - mu_start) * mu_rate, mu / inside
+
+
+@njit(cache=True, fastmath=_LOOSE, error_model="numpy")
+def universal_phi(
+    X: float, mu: float, table: FloatArray, errors: FloatArray, axes: Axes
+) -> tuple[int, float, float, float]:
+    """Status, Phi_F, Phi_A and the bound on their relative error at (X, mu)."""
+    status, place_X, place_mu, share = _place(X, mu, axes)
+    if status != OK:
+        return status, math.nan, math.nan, math.nan
+    force, area = value_2d(table, place_X, place_mu)
+    five, two = _rigid_integrals(X)
     phi_F = math.pi / 5.0 * mu * five * math.exp(force * share)
     phi_A = math.pi / 2.0 * two * math.exp(area * share)
-    return OK, phi_F, phi_A, _error_at(place_X, place_mu, errors, rate_X, rate_mu)
+    return OK, phi_F, phi_A, _error_at(place_X, place_mu, errors, axes[9], axes[10])
+
+
+@njit(cache=True, fastmath=_LOOSE, error_model="numpy")
+def universal_one(
+    which: int, X: float, mu: float, table: FloatArray, errors: FloatArray, axes: Axes
+) -> tuple[int, float, float]:
+    """Status, Phi_F (`which` = 0) or Phi_A (1) alone, and the bound on its relative error."""
+    status, place_X, place_mu, share = _place(X, mu, axes)
+    if status != OK:
+        return status, math.nan, math.nan
+    # the spline of both costs what one does: their coefficients lie in pairs
+    force, area = value_2d(table, place_X, place_mu)
+    piece, t, base, weight = _locate(X)
+    common = base * base * weight
+    if which == FORCE:
+        phi = math.pi / 5.0 * mu * _polynomial(_FIVE_HALVES[piece], t) * (math.sqrt(base) * common)
+        phi *= math.exp(force * share)
+    else:
+        phi = math.pi / 2.0 * _polynomial(_TWO[piece], t) * common * math.exp(area * share)
+    return OK, phi, _error_at(place_X, place_mu, errors, axes[9], axes[10])
 
 
 @njit(cache=True, error_model="numpy")
@@ -85,22 +129,15 @@ def universal_slopes(
     X: float, mu: float, table: FloatArray, errors: FloatArray, axes: Axes
 ) -> tuple[int, float, float, float, float, float, float, float]:
     """Status; Phi_F and d log Phi_F by X and by log(mu); the same of Phi_A; the bound on the relative error."""
-    X_low, X_high, offset, X_start, X_rate, mu_low, mu_high, mu_start, mu_rate, rate_X, rate_mu = axes
-    nan = math.nan
-    if not X_low <= X:
-        return X_BELOW, nan, nan, nan, nan, nan, nan, nan
-    if not X_high >= X:
-        return X_ABOVE, nan, nan, nan, nan, nan, nan, nan
-    if not mu <= mu_high:
-        return MU_ABOVE, nan, nan, nan, nan, nan, nan, nan
-    inside = max(mu, mu_low)
-    place_X = (math.log(X + offset) - X_start) * X_rate
-    place_mu = (math.log(inside) - mu_start) * mu_rate
+    status, place_X, place_mu, share = _place(X, mu, axes)
+    if status != OK:
+        nan = math.nan
+        return status, nan, nan, nan, nan, nan, nan, nan
+    offset, X_rate, mu_low, mu_rate = axes[2], axes[4], axes[5], axes[8]
     f, f_X, f_mu, g, g_X, g_mu = gradient_2d(table, place_X, place_mu)
-    share = mu / inside
     by_X = X_rate / (X + offset) * share
-    five, two = _rigid_integrals(-X)
-    three, one = _rigid_slopes(-X)
+    five, two = _rigid_integrals(X)
+    three, one = _rigid_slopes(X)
     # below the table the logarithm is proportional to mu
     F_mu = 1.0 + (f_mu * mu_rate if mu >= mu_low else f * share)
     A_mu = g_mu * mu_rate if mu >= mu_low else g * share
@@ -112,7 +149,7 @@ def universal_slopes(
         math.pi / 2.0 * two * math.exp(g * share),
         g_X * by_X + 2.0 * one / two,
         A_mu,
-        _error_at(place_X, place_mu, errors, rate_X, rate_mu),
+        _error_at(place_X, place_mu, errors, axes[9], axes[10]),
     )
 
 

@@ -12,6 +12,7 @@ and A/A0 likewise.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import get_model
-from mbma_tables.models.protocol import OUTSIDE
+from mbma_tables.models.protocol import AREA, BOTH, FORCE, OUTSIDE, QUANTITIES
 from mbma_tables.models.tabulated import UniversalModel
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
@@ -42,10 +43,10 @@ class Contact:
         d, between the rigid plane and the mid-plane [length].
     mean_separation : ndarray
         u = (h_max + d)/2 (50) [length].
-    force : ndarray
-        F/A0 in the unit of E_star; F/(A0 E*) where that is 1.
-    area : ndarray
-        A/A0. The model does not end at 1 under full compression, and this is not clamped.
+    force : ndarray or None
+        F/A0 in the unit of E_star; F/(A0 E*) where that is 1. None where not asked for.
+    area : ndarray or None
+        A/A0, None where not asked for. The model does not end at 1 under full compression, and this is not clamped.
     error : ndarray
         Bound on the relative error of both against the model that the tier stands for, of quadrature and islands
         together. For tier "rigid" that model is the undeformed sphere, which may be far from the elastic one.
@@ -78,6 +79,7 @@ def contact(
     rtol: float = 1e-8,
     outside: str = "raise",
     derivatives: bool = False,
+    quantities: Iterable[str] = QUANTITIES,
 ) -> Contact:
     """Force and real contact area of a surface at given separations (Eqs. 48, 49).
 
@@ -100,6 +102,8 @@ def contact(
         For surfaces with islands outside the table: an error, the exact solver, or NaN.
     derivatives : bool
         Whether `force_by` and `area_by` are asked for (tier "universal").
+    quantities : iterable of {"force", "area"}
+        What is wanted. One alone costs less; the other is then None, and `error` is of the one.
 
     Returns
     -------
@@ -112,6 +116,7 @@ def contact(
     ConvergenceError
         Where the accuracy was not reached; its `mask` says which entries.
     """
+    wanted = _wanted(quantities)
     if surface.labelled or hasattr(separation, "dims") or hasattr(E_star, "dims"):
         # xarray comes in with its own objects
         from mbma_tables.totals.labelled import contact_of_labelled
@@ -120,11 +125,19 @@ def contact(
         many = bool(getattr(separation, "size", 1) >= MANY_GAPS)
 
         def answer(block: Surface, gaps: Any, modulus: Any) -> Contact:
-            return _contact(block, gaps, tier, reading, modulus, rtol, outside, derivatives, many)
+            return _contact(block, gaps, tier, reading, modulus, rtol, outside, derivatives, wanted, many)
 
-        fields = contact_of_labelled(answer, surface, separation, E_star, derivatives)
+        fields = contact_of_labelled(answer, surface, separation, E_star, derivatives, wanted)
         return Contact(**fields, reading=get_reading(reading).name, tier=tier, islands=None)
-    return _contact(surface, separation, tier, reading, E_star, rtol, outside, derivatives)
+    return _contact(surface, separation, tier, reading, E_star, rtol, outside, derivatives, wanted)
+
+
+def _wanted(quantities: Iterable[str]) -> tuple[str, ...]:
+    """The quantities asked for, each once, in the order of `QUANTITIES`."""
+    asked = (quantities,) if isinstance(quantities, str) else tuple(quantities)
+    if not asked or not set(asked) <= set(QUANTITIES):
+        raise InputError(f"quantities must be some of {QUANTITIES}, got {quantities!r}")
+    return tuple(name for name in QUANTITIES if name in asked)
 
 
 def _contact(
@@ -136,6 +149,7 @@ def _contact(
     rtol: float,
     outside: str,
     derivatives: bool,
+    quantities: tuple[str, ...],
     many: bool | None = None,
 ) -> Contact:
     """`contact` of plain arrays; `many` says whether they are a block of many gaps."""
@@ -146,6 +160,7 @@ def _contact(
     if outside not in OUTSIDE:
         raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
     model = get_model(tier, rtol, rule)
+    which = BOTH if len(quantities) > 1 else QUANTITIES.index(quantities[0])
     shape = broadcast_shape(separation=gap, surface=surface.hurst, E_star=modulus)
     gap = np.broadcast_to(gap, shape)
     h_max = np.broadcast_to(np.asarray(surface.h_max), shape)
@@ -182,23 +197,23 @@ def _contact(
                 force, area, error = frozen
                 islands = None
             else:
-                force, area, error, islands = look_up(pairs, rule, model, rtol, outside, shape)
+                force, area, error, islands = look_up(pairs, rule, model, rtol, outside, shape, which)
         else:
-            force, area, error, islands = sum_islands(pairs, rule, model, 0.5 * rtol, outside)
+            force, area, error, islands = sum_islands(pairs, rule, model, 0.5 * rtol, outside, which)
     except ConvergenceError as fault:
         fault.mask = fault.mask.reshape(shape)
         raise
     return Contact(
         separation=gap[()],
         mean_separation=((h_max + gap) / 2)[()],
-        force=(force.reshape(shape) * stress)[()],
-        area=area.reshape(shape)[()],
+        force=(force.reshape(shape) * stress)[()] if which != AREA else None,
+        area=area.reshape(shape)[()] if which != FORCE else None,
         error=error.reshape(shape)[()],
         reading=rule.name,
         tier=model.name,
         islands=islands,
-        force_by=force_by,
-        area_by=area_by,
+        force_by=force_by if which != AREA else None,
+        area_by=area_by if which != FORCE else None,
     )
 
 

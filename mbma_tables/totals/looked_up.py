@@ -9,6 +9,7 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.islands.greenwood_tripp import TIGHTEST
 from mbma_tables.models import ExactModel
+from mbma_tables.models.protocol import BOTH
 from mbma_tables.models.tabulated import UniversalModel
 from mbma_tables.models.universal_kernel import OK, REASONS, UNRESOLVED
 from mbma_tables.surfaces.readings import Reading
@@ -40,12 +41,22 @@ def _refused(
 
 
 def look_up(
-    pairs: Pairs, reading: Reading, model: UniversalModel, rtol: float, outside: str, shape: tuple[int, ...]
+    pairs: Pairs,
+    reading: Reading,
+    model: UniversalModel,
+    rtol: float,
+    outside: str,
+    shape: tuple[int, ...],
+    which: int = BOTH,
 ) -> tuple[FloatArray, FloatArray, FloatArray, int]:
-    """F/(A0 E* q0 s), A/A0, the bound on their error and the islands evaluated, through the universal table."""
+    """F/(A0 E* q0 s), A/A0, the bound on their error and the islands evaluated, through the universal table.
+
+    Of the two, the one that `which` leaves out is not told.
+    """
     status = np.empty(pairs.reach.size, dtype=np.int64)
     out = np.empty((3, pairs.reach.size))
     islands = lookup.fill_totals(
+        which,
         pairs.hurst,
         pairs.zeta_1,
         pairs.reach,
@@ -60,7 +71,8 @@ def look_up(
     missing = _refused(status, pairs, model, outside, shape)
     if missing.size and outside == "exact":
         try:
-            *found, more = sum_islands(pairs.some(missing), reading, ExactModel(max(0.1 * rtol, TIGHTEST)), 0.5 * rtol)
+            solver = ExactModel(max(0.1 * rtol, TIGHTEST))
+            *found, more = sum_islands(pairs.some(missing), reading, solver, 0.5 * rtol, which=which)
         except ConvergenceError as fault:
             mask = np.zeros(status.size, dtype=bool)
             mask[missing[fault.mask]] = True

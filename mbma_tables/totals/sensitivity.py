@@ -15,18 +15,8 @@ from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.models.universal_kernel import OK, UNRESOLVED, Axes, universal_phi, universal_slopes
-from mbma_tables.totals.lookup import (
-    GAUSS,
-    KRONROD,
-    MOST_INTERVALS,
-    NODES,
-    SAFETY,
-    SMALL_WIDTH,
-    Constants,
-    island_node,
-    jacobian_below,
-    surface_constants,
-)
+from mbma_tables.totals.intervals import MOST_INTERVALS, approach_at, error_of, first_intervals, halve, rule_for
+from mbma_tables.totals.lookup import Constants, island_node, jacobian_below, surface_constants
 
 STEP = 1e-5  # of H and log(zeta_1): central differences err by its square, about 1e-10
 SHARE = 3e-4  # of the way to the floor of zeta_u, where eta rises like a sixth root
@@ -72,32 +62,29 @@ def _rule(
     errors: FloatArray,
     axes: Axes,
     sums: FloatArray,
-) -> tuple[int, float, float]:
-    """Kronrod sums of force, area and their four partial derivatives into `sums` (2, 5); status and errors."""
-    layer, room = surface[12], surface[2]
+) -> tuple[int, float, float, int]:
+    """Kronrod sums of force, area and their four partial derivatives into `sums` (2, 5); status, errors, nodes."""
+    scale, room = surface[12], surface[2]
+    nodes, kronrod, gauss = rule_for(low, high, floor_d)
     half, centre = 0.5 * (high - low), 0.5 * (high + low)
     gauss_force = gauss_area = doubt = 0.0
     sums[:] = 0.0
-    for k in range(31):
-        t = centre + half * NODES[k]
-        grown = math.exp(t)
-        shrunk = 1.0 / grown
-        rise = 0.5 * (grown - shrunk) if t > SMALL_WIDTH else math.sinh(t)
-        x = layer * rise * rise
+    for k in range(nodes.size):
+        x, stretch = approach_at(centre + half * nodes[k], floor_d, scale)
         X, mu, per_F, per_A, h_d, D_d, sigma_d = island_node(x, floor_d, floor_u, surface, flags[0], flags[1])
         status, phi_F, F_X, F_mu, phi_A, A_X, A_mu, error = universal_slopes(X, mu, table, errors, axes)
         if status != OK:
-            return status, math.nan, math.nan
+            return status, math.nan, math.nan, nodes.size
         doubt = max(doubt, error)
         above = top - (reach - x)
         height = (above * room - h_d) / sigma_d
         weight = D_d * math.exp(-0.5 * height * height) / (math.sqrt(2.0 * math.pi) * sigma_d)
-        weight *= room * layer * rise * (grown + shrunk) * half
+        weight *= room * stretch * half
         f, g = per_F * phi_F * weight, per_A * phi_A * weight
-        gauss_force += GAUSS[k] * f
-        gauss_area += GAUSS[k] * g
-        f *= KRONROD[k]
-        g *= KRONROD[k]
+        gauss_force += gauss[k] * f
+        gauss_area += gauss[k] * g
+        f *= kronrod[k]
+        g *= kronrod[k]
         sums[0, 0] += f
         sums[1, 0] += g
         tilt = height * room / sigma_d
@@ -118,9 +105,8 @@ def _rule(
     sums[0, 1 + BY_TOP] = -sums[0, 1 + BY_REACH]
     sums[1, 1 + BY_TOP] = -sums[1, 1 + BY_REACH]
     if not (sums[0, 0] > 0.0 and sums[1, 0] > 0.0):
-        return OK, 0.0, doubt
-    difference = max(abs(gauss_force / sums[0, 0] - 1.0), abs(gauss_area / sums[1, 0] - 1.0))
-    return OK, min(difference, (SAFETY * difference) ** 1.5), doubt
+        return OK, 0.0, doubt, nodes.size
+    return OK, error_of(sums[0, 0], gauss_force, sums[1, 0], gauss_area), doubt, nodes.size
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -138,39 +124,32 @@ def total_with_slopes(
     axes: Axes,
     out: FloatArray,
 ) -> tuple[int, float, int]:
-    """Status, error bound and rules; `out` (2, 5) receives force and area and their partial derivatives."""
+    """Status, error bound and islands; `out` (2, 5) receives force and area and their partial derivatives."""
     out[:] = 0.0
     if not reach > 0.0:
         return OK, 0.0, 0
-    layer, kink_d, kink_u = surface[12], surface[10], surface[11]
+    kink_d, kink_u = surface[10], surface[11]
     K1 = jacobian_below(surface, printed, flags[0])
     bounds = np.empty((MOST_INTERVALS, 2))
     parts = np.empty((MOST_INTERVALS, 2, 5))
     own = np.empty(MOST_INTERVALS)
     floors = np.empty((MOST_INTERVALS, 2), dtype=np.bool_)
     fresh = np.ones(MOST_INTERVALS, dtype=np.bool_)
-    edges = (0.0, min(kink_d, kink_u, reach), min(max(kink_d, kink_u), reach), reach)
-    count = rules = 0
+    count = first_intervals(reach, kink_d, kink_u, surface[12], bounds, floors)
+    islands = 0
     doubt = 0.0
-    for segment in range(3):
-        if edges[segment + 1] > edges[segment]:
-            middle = 0.5 * (edges[segment] + edges[segment + 1])
-            bounds[count, 0] = math.asinh(math.sqrt(edges[segment] / layer))
-            bounds[count, 1] = math.asinh(math.sqrt(edges[segment + 1] / layer))
-            floors[count, 0], floors[count, 1] = middle > kink_d, middle > kink_u
-            count += 1
     while True:
         out[:] = 0.0
         force_error = area_error = 0.0
         for k in range(count):
             if fresh[k]:
-                status, own[k], table_error = _rule(
+                status, own[k], table_error, nodes = _rule(
                     bounds[k, 0], bounds[k, 1], floors[k, 0], floors[k, 1],
                     reach, top, surface, near, rates, flags, table, errors, axes, parts[k],
                 )  # fmt: skip
-                rules += 1
+                islands += nodes
                 if status != OK:
-                    return status, math.nan, rules
+                    return status, math.nan, islands
                 if not floors[k, 0]:
                     parts[k] *= K1
                 doubt = max(doubt, table_error)
@@ -180,7 +159,7 @@ def total_with_slopes(
             area_error += own[k] * parts[k, 1, 0]
         force, area = out[0, 0], out[1, 0]
         if not (force > 0.0 and area > 0.0):
-            return OK, 0.0, rules
+            return OK, 0.0, islands
         if force_error <= rtol * force and area_error <= rtol * area:
             break
         present = count
@@ -188,17 +167,14 @@ def total_with_slopes(
             share = present * own[k]
             if parts[k, 0, 0] * share > rtol * force or parts[k, 1, 0] * share > rtol * area:
                 if count == MOST_INTERVALS:
-                    return UNRESOLVED, math.nan, rules
-                half = 0.5 * (bounds[k, 0] + bounds[k, 1])
-                bounds[count, 0], bounds[count, 1] = half, bounds[k, 1]
-                bounds[k, 1] = half
-                floors[count, 0], floors[count, 1] = floors[k, 0], floors[k, 1]
-                fresh[k] = fresh[count] = True
+                    return UNRESOLVED, math.nan, islands
+                halve(k, count, bounds, floors)
+                fresh[k] = True
                 count += 1
     # the upper limit moves with reach, the kink and K1 with H and zeta_1
     status, f, g = _integrand(reach, reach > kink_d, reach > kink_u, reach, top, surface, flags, table, errors, axes)
     if status != OK:
-        return status, math.nan, rules
+        return status, math.nan, islands
     edge = 1.0 if reach > kink_d else K1
     out[0, 1 + BY_REACH] += edge * f
     out[1, 1 + BY_REACH] += edge * g
@@ -207,7 +183,7 @@ def total_with_slopes(
         if kink_d < reach:
             status, f, g = _integrand(kink_d, True, kink_d > kink_u, reach, top, surface, flags, table, errors, axes)
             if status != OK:
-                return status, math.nan, rules
+                return status, math.nan, islands
             moved = (K1 - 1.0) * (up[10] - down[10]) * rates[number]
             out[0, 1 + number] += f * moved
             out[1, 1 + number] += g * moved
@@ -220,7 +196,7 @@ def total_with_slopes(
                 if not floors[k, 0]:
                     out[0, 1 + number] += change * parts[k, 0, 0]
                     out[1, 1 + number] += change * parts[k, 1, 0]
-    return OK, max(force_error / force, area_error / area) + doubt, rules
+    return OK, max(force_error / force, area_error / area) + doubt, islands
 
 
 @njit(cache=True, error_model="numpy")
@@ -261,8 +237,8 @@ def fill_totals_with_slopes(
         if k > 0 and (hurst[k] != hurst[k - 1] or zeta_1[k] != zeta_1[k - 1]):
             surface = surface_constants(hurst[k], zeta_1[k], reading)
             near, rates = neighbours(hurst[k], zeta_1[k], reading)
-        status[k], bound[k], rules = total_with_slopes(
+        status[k], bound[k], own = total_with_slopes(
             reach[k], top[k], rtol, surface, near, rates, printed, (reading[5], reading[6]), table, errors, axes, out[k]
         )
-        islands += 31 * rules
+        islands += own
     return islands

@@ -285,3 +285,22 @@ def test_bad_options(option, value):
 def test_shapes_that_do_not_broadcast():
     with pytest.raises(InputError, match="do not broadcast"):
         contact(Surface([0.5, 0.6], 0.2, 40.0, 1.0, 3.0), [0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize("tier", ["universal", "exact", "rigid", "island4d"])
+@pytest.mark.parametrize("wanted", ["force", "area"])
+def test_one_quantity_alone(tier, wanted):
+    surface = Surface([0.5, 0.8], 1.0, 100.0, 1.0, 3.0)
+    gaps = [1.0, -2.0]
+    both = contact_by_tier(surface, gaps, tier=tier)
+    alone = contact_by_tier(surface, gaps, tier=tier, quantities=[wanted])
+    other = "area" if wanted == "force" else "force"
+    assert getattr(alone, other) is None
+    np.testing.assert_allclose(getattr(alone, wanted), getattr(both, wanted), rtol=max(1e-8, 2 * both.error.max()))
+    assert alone.islands <= both.islands
+
+
+@pytest.mark.parametrize("wanted", [(), ["force", "stiffness"], "energy"])
+def test_unknown_quantities(wanted):
+    with pytest.raises(InputError, match="quantities must be some of"):
+        contact_by_tier(Surface(0.8, 1.0, 100.0, 1.0, 3.0), 1.0, quantities=wanted)

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from dask.callbacks import Callback
 
-from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law, island
+from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law, island, theories
 from mbma_tables.totals.contact import MANY_GAPS
 
 FIELDS = ("force", "area", "error")
@@ -223,3 +223,24 @@ def test_islands_of_labelled_surfaces_are_lazy_and_the_same():
     for name in ("zeta_d", "mu", "force", "area", "error"):
         found = getattr(lazy, name).transpose("sample", "depth").compute()
         np.testing.assert_array_equal(found, getattr(plain, name))
+
+
+def test_one_quantity_of_labelled_surfaces():
+    gaps = xr.DataArray([0.5, 1.0], dims="gap")
+    surface = Surface(0.8, 1.0, 100.0, 1.0, 3.0)
+    alone = contact(surface, gaps, quantities=["area"])
+    assert alone.force is None
+    np.testing.assert_array_equal(alone.area, contact(surface, gaps.values, quantities=["area"]).area)
+
+
+@pytest.mark.parametrize("method", ["full", "simplified"])
+def test_theories_of_labelled_surfaces(method):
+    h_rms = xr.DataArray(dask.array.from_array([1.0, 1.5, 2.0], chunks=2), dims="sample")
+    gaps = xr.DataArray([0.4, 1.0], dims="gap")
+    lazy = theories.persson_force(Surface(0.8, 1.0, 100.0, h_rms, 6.0), gaps, method=method)
+    assert lazy.dims == ("sample", "gap")
+    assert lazy.chunks is not None
+    plain = Surface(0.8, 1.0, 100.0, np.array([1.0, 1.5, 2.0])[:, None], 6.0)
+    np.testing.assert_array_equal(lazy.compute(), theories.persson_force(plain, gaps.values, method=method))
+    summits = theories.greenwood_williamson(Surface(0.8, 1.0, 100.0, h_rms, 6.0), gaps)
+    np.testing.assert_array_equal(summits.area.compute(), theories.greenwood_williamson(plain, gaps.values).area)

@@ -9,28 +9,30 @@ from numpy.polynomial import legendre
 
 from mbma_tables import ConvergenceError, OutOfRangeError, Surface, contact
 from mbma_tables.islands.island import geometry
+from mbma_tables.models.protocol import BOTH
 from mbma_tables.models.tabulated import universal_model
 from mbma_tables.surfaces.readings import PRINTED, REPORTED
-from mbma_tables.totals import lookup
+from mbma_tables.totals import intervals, lookup
 from mbma_tables.totals.pairs import kinks
 
 LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)
 
 
-def test_the_rule_by_its_degrees():
-    """31 Kronrod points are exact up to degree 46, 15 Gauss points up to 29, and not beyond."""
-    np.testing.assert_allclose(
-        lookup.NODES[1::2], legendre.leggauss(15)[0], rtol=0, atol=2e-16, err_msg="Gauss points of the rule"
-    )
-    np.testing.assert_allclose(lookup.GAUSS[1::2], legendre.leggauss(15)[1], rtol=1e-14)
-    assert (lookup.GAUSS[::2] == 0).all()
-    for degree in range(0, 50, 2):
+@pytest.mark.parametrize(("straight", "width", "points"), [(False, 1.0, 31), (True, 3.0, 31), (True, 1.0, 21)])
+def test_the_rules_by_their_degrees(straight, width, points):
+    """2 n + 1 Kronrod points are exact up to degree 3 n + 1, n Gauss points up to 2 n - 1, and not beyond."""
+    nodes, kronrod, gauss = intervals.rule_for(0.0, width, straight)
+    n = points // 2
+    assert nodes.size == points
+    np.testing.assert_allclose(nodes[1::2], legendre.leggauss(n)[0], rtol=0, atol=2e-16)
+    np.testing.assert_allclose(gauss[1::2], legendre.leggauss(n)[1], rtol=1e-14)
+    assert (gauss[::2] == 0).all()
+    for degree in range(0, 3 * n + 6, 2):
         integral = 2.0 if degree == 0 else 0.0
         # Legendre polynomials show every digit, powers do not
-        shape = legendre.legval(lookup.NODES, [0] * degree + [1])
-        kronrod, gauss = lookup.KRONROD @ shape, lookup.GAUSS @ shape
-        assert (abs(kronrod - integral) < 1e-14) == (degree <= 46)
-        assert (abs(gauss - integral) < 1e-14) == (degree <= 29)
+        shape = legendre.legval(nodes, [0] * degree + [1])
+        assert (abs(kronrod @ shape - integral) < 1e-14) == (degree <= 3 * n + 1)
+        assert (abs(gauss @ shape - integral) < 1e-14) == (degree <= 2 * n - 1)
 
 
 @pytest.mark.parametrize("reading", [REPORTED, PRINTED, LEVEL], ids=lambda reading: reading.name)
@@ -113,7 +115,9 @@ def totals(reach, **changed):
     model = universal_model()
     given = {"top": 3.0, "rtol": 1e-9, "jacobian": 5 / 9} | changed
     surface = lookup.surface_constants(0.8, 216.0, REPORTED.numbers)
-    return lookup.total(reach, given["top"], given["rtol"], surface, given["jacobian"], (True, True), *model.kernel)
+    return lookup.total(
+        BOTH, reach, given["top"], given["rtol"], surface, given["jacobian"], (True, True), *model.kernel
+    )
 
 
 def test_the_first_moment_of_the_jacobian():
