@@ -28,13 +28,14 @@ from matplotlib.figure import Figure
 
 from mbma_tables import Surface, contact_law
 from mbma_tables.materials import effective_modulus
+from mbma_tables.totals.conductance import conductance, mean_conductivity
 
 PICTURE = pathlib.Path(__file__).parents[1] / "docs" / "figures" / "example_conductance.png"
 # both faces' roughness in one, a ground steel face on aluminium
 JOINT = Surface(hurst=0.8, q0=2 * np.pi / 1e-3, q1=2 * np.pi / 2e-6, h_rms=1e-6, h_max=3.5e-6)
 E_STAR = float(effective_modulus(210e9, 0.3, 70e9, 0.33))  # Pa
 K_STEEL, K_ALUMINIUM = 16.0, 167.0  # W/(m K)
-K_MEAN = 2 * K_STEEL * K_ALUMINIUM / (K_STEEL + K_ALUMINIUM)
+K_MEAN = float(mean_conductivity(K_STEEL, K_ALUMINIUM))
 RANGE = (1e4, 5e7)  # Pa
 PRESSURES = (1e4, 1e5, 1e6, 1e7, 5e7)  # Pa
 
@@ -54,9 +55,9 @@ def conductance_curve(points: int = 200) -> Curve:
     law = contact_law(JOINT, E_star=E_STAR)
     pressure = np.geomspace(*RANGE, points)
     stiffness = law.stiffness_mean(law.separation(force=pressure))
-    conductance = K_MEAN / E_STAR * stiffness
-    slope = np.gradient(np.log(conductance), np.log(pressure))
-    return Curve(pressure, stiffness, conductance, slope)
+    h = conductance(stiffness, K_MEAN, E_STAR)
+    slope = np.gradient(np.log(h), np.log(pressure))
+    return Curve(pressure, stiffness, h, slope)
 
 
 def draw(curve: Curve) -> Figure:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from mbma_tables.islands.height_integrals import height_integral
     from mbma_tables.islands.island import Island, island
     from mbma_tables.models.tabulated import open_table
+    from mbma_tables.scenes.scene import Scene
     from mbma_tables.surfaces.readings import Reading
     from mbma_tables.surfaces.surface import Surface
     from mbma_tables.totals import theories
@@ -41,6 +42,7 @@ _HOMES = {
     "Reading": "mbma_tables.surfaces.readings",
     "Surface": "mbma_tables.surfaces.surface",
     "ContactLaw": "mbma_tables.totals.law",
+    "Scene": "mbma_tables.scenes.scene",
     "StaleTableWarning": "mbma_tables.errors",
     "TableFileError": "mbma_tables.errors",
     "contact": "mbma_tables.totals.contact",
@@ -64,6 +66,7 @@ __all__ = [
     "NotSelfAffineError",
     "OutOfRangeError",
     "Reading",
+    "Scene",
     "StaleTableWarning",
     "Surface",
     "TableFileError",

@@ -14,6 +14,8 @@ import click
 
 from mbma_tables import __version__
 from mbma_tables.cli.commands import contact_command, curve_command, island_command, surfaces_command
+from mbma_tables.cli.cost import cost_command
+from mbma_tables.cli.scene import plan_command, run_command
 from mbma_tables.cli.tables import tables_group
 from mbma_tables.errors import MbmaError
 
@@ -60,5 +62,14 @@ def main() -> None:
     """Contact of rough surfaces by the MBMA model: force and real contact area against gap."""
 
 
-for command in (contact_command, curve_command, island_command, surfaces_command, tables_group):
+for command in (
+    contact_command,
+    curve_command,
+    island_command,
+    surfaces_command,
+    tables_group,
+    plan_command,
+    run_command,
+    cost_command,
+):
     main.add_command(command)

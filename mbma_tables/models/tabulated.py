@@ -21,6 +21,7 @@ from mbma_tables.models.universal_kernel import Axes
 from mbma_tables.tablefiles.files import read_table
 from mbma_tables.tablefiles.interpolate import fill_2d
 from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL, TableContent, error_cell
+from mbma_tables.tablefiles.shipped import shipped_file
 
 __all__ = ["Island4dModel", "UniversalModel", "island4d_model", "open_table", "shipped", "universal_model"]
 
@@ -135,10 +136,8 @@ class UniversalModel(TwoNumberModel):
 
 
 def shipped(kind: str) -> pathlib.Path:
-    """Where the table of that kind stands: in the package, or in a checkout's `tables` folder."""
-    package = pathlib.Path(__file__).parents[1]
-    inside = package / "tables" / f"{kind}.nc"
-    return inside if inside.exists() else package.parent / "tables" / f"{kind}.nc"
+    """Where the table of that kind stands."""
+    return shipped_file(f"{kind}.nc")
 
 
 _OPENING = threading.Lock()

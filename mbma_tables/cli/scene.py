@@ -1,0 +1,128 @@
+"""`mbma plan` and `mbma run`: scenes from TOML files."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mbma_tables.cli.report import Column, Report, write_files
+from mbma_tables.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray
+
+SUFFIXES = (".nc", ".csv")
+scene_file = click.argument("file", type=click.Path(path_type=Path))
+
+
+@click.command("plan", short_help="How a scene would be computed, at what error and price.")
+@scene_file
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
+def plan_command(file: Path, as_json: bool) -> None:
+    """How the scene in FILE would be computed: steps, why each is there, predicted error and time.
+
+    Example: mbma plan examples/scene_joint.toml
+    """
+    from mbma_tables.scenes.scene import Scene
+
+    plan = Scene.from_toml(file).plan()
+    if not as_json:
+        click.echo(plan.text(), nl=False)
+        return
+    steps = [vars(step) for step in plan.steps]
+    content = {"rtol": plan.rtol, "error": plan.error, "seconds": plan.seconds, "steps": steps}
+    click.echo(json.dumps(content | {"left_out": plan.left_out}, indent=2))
+
+
+def _show(step: str, done: int, total: int) -> None:
+    """Progress on a terminal, on one line."""
+    end = "\n" if done >= total else ""
+    click.echo(f"\r{step}: {done} of {total}", err=True, nl=bool(end))
+
+
+@click.command("run", short_help="Compute a scene.")
+@scene_file
+@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write it to result.nc or result.csv.")
+@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw force and area to a PNG file.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
+def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) -> None:
+    """Compute the scene in FILE, and nothing that it does not ask for.
+
+    CSV and the table hold what is known at gaps; netCDF and JSON hold everything.
+
+    Example: mbma run examples/scene_joint.toml --out joint.nc
+    """
+    if out is not None and out.suffix not in SUFFIXES:
+        raise InputError(f"--out must end with one of {', '.join(SUFFIXES)}, got {out}")
+    if plot is not None and plot.suffix.lower() != ".png":
+        raise InputError(f"--plot writes PNG: the file's name must end with .png, got {plot}")
+    if out is not None and plot is not None and out == plot:
+        raise InputError(f"--out and --plot name the same file, {out}")
+    from mbma_tables.scenes.scene import Scene
+
+    scene = Scene.from_toml(file)
+    if plot is not None and not {"force", "area"} <= scene.outputs:
+        raise InputError("--plot draws force and area: ask for both in [effects] on")
+    found = scene.run(_show if sys.stderr.isatty() else None)
+    files: dict[Path, bytes] = {}
+    if plot is not None:
+        files[plot] = _picture(found)
+    if out is not None:
+        files[out] = _report(found).to_csv().encode() if out.suffix == ".csv" else _to_netcdf(found)
+    write_files(files)
+    if as_json:
+        click.echo(_to_json(found))
+    elif out is None:
+        click.echo(_report(found).to_table(), nl=False)
+
+
+def _report(found: xarray.Dataset) -> Report:
+    """What is known at gaps, or at islands where nothing is."""
+    lines = next((d for d in (("gap",), ("island", "node")) if any(v.dims == d for v in found.variables.values())), ())
+    columns = [
+        Column(str(name), field.attrs["units"], [None if x != x else x for x in field.values.ravel().tolist()])
+        for name, field in found.variables.items()
+        if field.dims == lines
+    ]
+    facts = found.attrs
+    notes = [f"reading {facts['reading']}, rtol {facts['rtol']:.3g}, error at most {facts['error']:.2g}"]
+    return Report("run", str(facts["title"]), notes, dict(facts), columns)
+
+
+def _to_json(found: xarray.Dataset) -> str:
+    def plain(values: Any) -> Any:
+        if isinstance(values, list):
+            return [plain(value) for value in values]
+        return values if math.isfinite(values) else None
+
+    variables = {
+        str(name): {
+            "dims": list(field.dims),
+            "units": field.attrs["units"],
+            "values": plain(field.values.tolist()),
+        }
+        for name, field in found.variables.items()
+    }
+    return json.dumps({"attributes": found.attrs, "variables": variables}, indent=2, allow_nan=False)
+
+
+def _to_netcdf(found: xarray.Dataset) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "scene.nc")
+        found.to_netcdf(path, engine="netcdf4")
+        return Path(path).read_bytes()
+
+
+def _picture(found: xarray.Dataset) -> bytes:
+    from mbma_tables.plots import Curve, draw_compression, to_png
+
+    gap = found["mean_separation"].values / found.attrs["surface_h_rms"]
+    curves: list[Any] = [Curve(f"MBMA, {found.attrs['reading']}", gap, found["force"].values, found["area"].values)]
+    return to_png(draw_compression(curves, str(found.attrs["title"]), f"force  F/A0 [{found['force'].attrs['units']}]"))

@@ -1,0 +1,158 @@
+"""Mistakes in scene files: one message each, that says what to write instead."""
+
+import json
+import pathlib
+
+import pytest
+
+import mbma_tables
+from mbma_tables.errors import InputError, MbmaError
+from mbma_tables.scenes.effects import EFFECTS, REFINEMENTS, THEORIES
+from mbma_tables.scenes.toml_file import read_scene, schema
+
+EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
+SURFACE = '[surface]\nname = "concrete"\n'
+ON = '[effects]\non = ["force"]\n'
+AT = "[prescribed]\nseparations = [0.5]\n"
+
+MISTAKES = {
+    "unknown table": (SURFACE + ON + AT + "[efects]\non = []\n", "did you mean 'effects'"),
+    "unknown key": ('[surface]\nnme = "concrete"\n' + ON + AT, "did you mean 'name'"),
+    "unknown key of prescribed": (SURFACE + ON + "[prescribed]\nseparation = 1\n", "did you mean 'separations'"),
+    "unknown key of accuracy": (SURFACE + ON + AT + "[accuracy]\nrtoll = 1e-3\n", "did you mean 'rtol'"),
+    "unknown key of material": (SURFACE + ON + AT + "[material]\nE = 3.0\n", "did you mean 'E[12]'"),
+    "unknown effect": (SURFACE + '[effects]\non = ["forse"]\n' + AT, "did you mean 'force'"),
+    "unknown refinement": (SURFACE + '[effects]\non = ["force"]\noff = ["subscale"]\n' + AT, "subscale_area"),
+    "unknown surface": ('[surface]\nname = "concret"\n' + ON + AT, "there are yang-persson"),
+    "unknown reading": ('reading = "printd"\n' + SURFACE + ON + AT, "did you mean 'printed'"),
+    "unknown theory": (
+        SURFACE + '[effects]\non = ["comparison"]\n' + AT + '[comparison]\ntheories = ["person"]\n',
+        "did you mean 'persson'",
+    ),
+    "no surface": (ON + AT, r"needs the table \[surface\]"),
+    "empty surface": ("[surface]\n" + ON + AT, "a surface needs hurst"),
+    "half a surface": ("[surface]\nhurst = 0.8\nq0 = 1.0\n" + ON + AT, "a surface needs hurst, q0, q1"),
+    "name and numbers": ('[surface]\nname = "concrete"\nhurst = 0.8\n' + ON + AT, "leave one of them out"),
+    "name and map": ('[surface]\nname = "concrete"\nmap = "a.nc"\n' + ON + AT, "one of name, map, psd or numbers"),
+    "missing map": ('[surface]\nmap = "none.nc"\n' + ON + AT, "is no file; paths are relative to the scene file"),
+    "missing psd": ('[surface]\npsd = "none.txt"\nh_max = 1.0\n' + ON + AT, "is no file"),
+    "convention without psd": ('[surface]\nname = "concrete"\nconvention = "paper"\n' + ON + AT, "give psd"),
+    "another length unit": ('[surface]\nname = "concrete"\nlength_unit = "m"\n' + ON + AT, "leave length_unit out"),
+    "hurst above one": (
+        "[surface]\nhurst = 1.8\nq0 = 1.0\nzeta_1 = 50\nh_rms = 0.1\nh_max = 0.3\n" + ON + AT,
+        r"hurst must be in \(0, 1\]",
+    ),
+    "no effects": (SURFACE + AT, r"needs the table \[effects\]"),
+    "empty effects": (SURFACE + "[effects]\non = []\n" + AT, "give at least one entry"),
+    "only refinements": (SURFACE + '[effects]\non = ["finite_height"]\n' + AT, "needs at least one of force"),
+    "on and off": (
+        SURFACE + '[effects]\non = ["area", "subscale_area"]\noff = ["subscale_area"]\n' + AT,
+        "leave it in one of the two lists",
+    ),
+    "off of an output": (SURFACE + '[effects]\non = ["force"]\noff = ["area"]\n' + AT, "did you mean|known are"),
+    "subscale without area": (SURFACE + '[effects]\non = ["force"]\noff = ["subscale_area"]\n' + AT, "ask for 'area'"),
+    "energy of no end": (
+        SURFACE + '[effects]\non = ["energy"]\noff = ["finite_height"]\n' + AT,
+        "leave finite_height on",
+    ),
+    "rigid profile": (
+        SURFACE
+        + '[effects]\non = ["pressure_profile"]\noff = ["sphere_deformation"]\n[pressure_profile]\ndeltas = [0.1]\n',
+        "leave sphere_deformation on",
+    ),
+    "effects as text": (SURFACE + '[effects]\non = "force"\n' + AT, r"effects.on must be a list in \[ \]"),
+    "nothing prescribed": (SURFACE + ON, "give one of separations"),
+    "empty prescribed": (SURFACE + ON + "[prescribed]\n", "give separations"),
+    "pressure and separation": (
+        SURFACE + ON + "[prescribed]\nseparations = [0.5]\nnominal_pressures = [0.1]\n",
+        "prescribe one of",
+    ),
+    "below the model's end": (SURFACE + ON + "[prescribed]\nseparations = [-2.0]\n", "at least -h_max"),
+    "negative mean separation": (SURFACE + ON + "[prescribed]\nmean_separations = [-0.1]\n", "at least 0"),
+    "negative pressure": (SURFACE + ON + "[prescribed]\nnominal_pressures = [-1.0]\n", "at least 0"),
+    "pressure over h_rms": (
+        SURFACE + ON + "[prescribed]\nnominal_pressures = [0.01]\nover_h_rms = true\n",
+        "leave it out",
+    ),
+    "pressure without an end": (
+        SURFACE + '[effects]\non = ["force"]\noff = ["finite_height"]\n[prescribed]\nnominal_pressures = [0.01]\n',
+        "leave finite_height on, or give separations",
+    ),
+    "text for a number": (SURFACE + ON + '[prescribed]\nseparations = ["a"]\n', r"separations\[0\] must be a number"),
+    "not finite": (SURFACE + ON + "[prescribed]\nseparations = [nan]\n", "must be finite"),
+    "impossible tolerance": (SURFACE + ON + AT + "[accuracy]\nrtol = 1e-14\n", r"must lie in \[1e-10, 0.1\]"),
+    "loose tolerance": (SURFACE + ON + AT + "[accuracy]\nrtol = 2.0\n", r"must lie in \[1e-10, 0.1\]"),
+    "tolerance and time": (SURFACE + ON + AT + "[accuracy]\nrtol = 1e-3\nseconds = 1.0\n", "one of them"),
+    "no time": (SURFACE + ON + AT + "[accuracy]\nseconds = 0.0\n", "must be positive"),
+    "half a material": (SURFACE + ON + AT + "[material]\nE1 = 3.0\n", "all of E1, nu1, E2, nu2"),
+    "negative modulus": (SURFACE + ON + AT + "[material]\nE_star = -3.0\n", "E_star must be positive"),
+    "conductance alone": (SURFACE + '[effects]\non = ["conductance"]\n' + AT, "needs conductivities"),
+    "conductance off": (SURFACE + ON + AT + "[conductance]\nk1 = 1.0\nk2 = 1.0\n", "add it to the effects"),
+    "profile alone": (SURFACE + '[effects]\non = ["pressure_profile"]\n', "needs deltas"),
+    "comparison alone": (SURFACE + '[effects]\non = ["comparison"]\n' + AT, "needs theories"),
+    "statistics off": (SURFACE + ON + AT + "[island_statistics]\npoints = 5\n", "add it to on"),
+    "table as text": ('surface = "concrete"\n' + ON + AT, r"surface must be a table.*write \[surface\]"),
+    "no toml": ("[surface\n", "is no TOML file"),
+}
+
+
+def write(folder, text):
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_there_are_forty_kinds_and_more():
+    assert len(MISTAKES) >= 40
+
+
+@pytest.mark.parametrize("kind", MISTAKES)
+def test_a_mistake_is_told_with_what_to_write_instead(kind, tmp_path):
+    text, words = MISTAKES[kind]
+    path = write(tmp_path, text)
+    with pytest.raises(InputError, match=words) as fault:
+        read_scene(path)
+    message = str(fault.value)
+    assert message.startswith(str(path))
+    assert "\n" not in message.strip() or kind == "no toml"
+
+
+PLANNED = {
+    "time too short": (SURFACE + ON + AT + "[accuracy]\nseconds = 1e-8\n", "the cheapest plan takes"),
+    "too tight for a law": (SURFACE + '[effects]\non = ["energy"]\n' + AT + "[accuracy]\nrtol = 1e-10\n", "at best"),
+    "unreachable pressure": (SURFACE + ON + "[prescribed]\nnominal_pressures = [1e6]\n", "where the branch ends"),
+}
+
+
+@pytest.mark.parametrize("kind", PLANNED)
+def test_what_only_a_plan_or_a_run_can_know(kind, tmp_path):
+    text, words = PLANNED[kind]
+    with pytest.raises(MbmaError, match=words):
+        read_scene(write(tmp_path, text)).run()
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(InputError, match="give the path of a scene file"):
+        read_scene(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("scene_*.toml")), ids=lambda path: path.stem)
+def test_examples_are_scenes(path):
+    scene = mbma_tables.Scene.from_toml(path)
+    assert "Scene" in scene.explain()
+
+
+def test_the_schema_names_what_the_code_knows():
+    tables = schema()["properties"]
+    assert set(tables["effects"]["properties"]["on"]["items"]["enum"]) == set(EFFECTS)
+    assert tuple(tables["effects"]["properties"]["off"]["items"]["enum"]) == REFINEMENTS
+    assert tuple(tables["comparison"]["properties"]["theories"]["items"]["enum"]) == THEORIES
+    json.dumps(schema(), allow_nan=False)
+
+
+def test_a_psd_file(tmp_path):
+    q = [1.05**k for k in range(100)]
+    lines = "\n".join(f"{a} {1e-3 * a**-3.6}" for a in q)
+    (tmp_path / "psd.txt").write_text(lines, encoding="utf-8")
+    path = write(tmp_path, '[surface]\npsd = "psd.txt"\nh_max = 0.3\n' + ON + AT.replace("0.5", "0.1"))
+    assert float(read_scene(path).surface.hurst) == pytest.approx(0.8, rel=0.02, abs=0)

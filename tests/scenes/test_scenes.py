@@ -1,0 +1,250 @@
+"""What scenes plan, compute and leave alone."""
+
+import itertools
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from mbma_tables import Scene, Surface, contact, contact_law, island
+from mbma_tables.errors import InputError
+from mbma_tables.scenes import islands, plan
+from mbma_tables.scenes.effects import EFFECTS, OUTPUTS
+
+CONCRETE = Surface.named("concrete")
+GAPS = (0.2, 0.5, 0.9)
+PARTS = {
+    "conductance": {"conductivities": (1.0, 3.0)},
+    "pressure_profile": {"deltas": [0.1]},
+    "comparison": {"theories": ("greenwood_williamson",)},
+}
+
+
+def scene_of(*effects, **more):
+    parts = {name: value for effect in effects for name, value in PARTS.get(effect, {}).items()}
+    if set(effects) != {"pressure_profile"} and not {"nominal_pressures", "mean_separations"} & set(more):
+        parts["separations"] = GAPS
+    return Scene(CONCRETE, effects=effects, **(parts | more))
+
+
+@pytest.mark.parametrize("rtol", [1e-1, 1e-3, 1e-5, 1e-7, 1e-9])
+def test_totals_are_within_the_tolerance(rtol):
+    found = scene_of("force", "area", rtol=rtol).run()
+    truth = contact(CONCRETE, GAPS, tier="exact", rtol=1e-10)
+    np.testing.assert_allclose(found["force"], truth.force, rtol=rtol)
+    np.testing.assert_allclose(found["area"], truth.area, rtol=rtol)
+    assert found.attrs["error"] <= rtol
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-5])
+def test_pressures_stiffness_and_energy(rtol):
+    exact = contact_law(CONCRETE, 1e-9, E_star=2.0)
+    pressures = exact.force(np.array(GAPS))
+    more = {"nominal_pressures": pressures, "E_star": 2.0, "rtol": rtol}
+    found = scene_of("force", "area", "stiffness", "energy", "conductance", **more).run()
+    np.testing.assert_allclose(found["area"], exact.area(np.array(GAPS)), rtol=rtol)
+    # central differences of fresh totals, with an error of h^2
+    h = 1e-4
+    ends = [contact(CONCRETE, np.array(GAPS) + s * h, E_star=2.0, rtol=1e-10).force for s in (1, -1)]
+    slope = (ends[1] - ends[0]) / (2 * h)
+    np.testing.assert_allclose(found["stiffness"], slope, rtol=rtol + 2e-6)
+    np.testing.assert_allclose(found["conductance"], 1.5 / 2 * 2 * slope, rtol=rtol + 2e-6)
+    for gap, energy in zip(GAPS, found["energy"].values, strict=True):
+        assert energy == pytest.approx(quad(exact.force, gap, exact.h_max, epsrel=1e-9)[0], rel=rtol + 1e-8, abs=0)
+
+
+def test_mean_separations_are_gaps():
+    average = (np.array(GAPS) + CONCRETE.h_max) / 2
+    found = scene_of("force", mean_separations=average).run()
+    np.testing.assert_allclose(found["separation"], GAPS, rtol=1e-13)
+
+
+def test_hertz_area_is_the_area_over_eta():
+    """Against scipy's quadrature of islands one by one, and above eta < 1 everywhere."""
+    found = scene_of("area", without=("subscale_area",), rtol=1e-6).run()
+    whole = scene_of("area", rtol=1e-6).run()
+    deltas = np.linspace(1e-3, 2.0, 40)
+    eta = island(CONCRETE, deltas).eta
+    ratio = whole["area"].values / found["area"].values
+    assert (ratio < eta.max()).all()
+    assert (ratio > eta.min()).all()
+
+
+def test_the_whole_gaussian_adds_force_and_reaches_beyond_h_max():
+    gaps = [0.3, 1.0, 1.3]
+    whole = scene_of("force", separations=gaps, without=("finite_height",), rtol=1e-5).run()
+    cut = scene_of("force", separations=gaps, rtol=1e-5).run()
+    assert (whole["force"] > cut["force"]).all()
+    assert cut["force"][2] == 0
+    # a higher top adds nothing any more
+    higher = Surface(CONCRETE.hurst, CONCRETE.q0, CONCRETE.q1, CONCRETE.h_rms, 4.0)
+    truth = contact(higher, gaps, tier="exact", rtol=1e-8)
+    np.testing.assert_allclose(whole["force"], truth.force, rtol=1e-5)
+
+
+def test_rigid_spheres_are_stiffer_and_their_bound_holds():
+    for gap in (1.09, 1.0, 0.5):
+        own = scene_of("force", separations=[gap])
+        rigid = contact(CONCRETE, gap, tier="rigid", rtol=1e-9).force
+        elastic = contact(CONCRETE, gap, rtol=1e-8).force
+        assert 0 <= 1 - elastic / rigid <= plan.rigid_error(own)
+
+
+def test_island_statistics_add_up():
+    """Force is the sum over islands of their loads; numbers are the sum of their density."""
+    found = scene_of("force", "island_statistics", points=4000).run()
+    delta = found["island_delta"].values
+    load = np.trapezoid(found["island_density"].values * found["island_force"].values, delta, axis=1)
+    np.testing.assert_allclose(load, found["force"], rtol=2e-3)
+    number = np.trapezoid(found["island_density"].values, delta, axis=1)
+    np.testing.assert_allclose(number, found["island_number"], rtol=2e-2)
+
+
+def test_profiles_carry_the_islands_load():
+    found = scene_of("pressure_profile", deltas=[0.1, 0.4], E_star=3.0, rtol=1e-8).run()
+    single = island(CONCRETE, [0.1, 0.4], E_star=3.0)
+    r, p = found["profile_radius"].values, found["profile_pressure"].values
+    load = 2 * np.pi * np.trapezoid(r * p, r, axis=1)
+    np.testing.assert_allclose(load, single.force, rtol=5e-2)
+
+
+@pytest.mark.parametrize("seconds", [3.0, 30.0])
+def test_a_time_budget_is_kept_by_the_prediction(seconds):
+    own = scene_of("force", rtol=None, seconds=seconds)
+    assert own.plan().seconds <= seconds
+
+
+def test_explain_says_what_was_left_out():
+    text = scene_of("force").explain()
+    assert "left out: area (nothing asked)" in text
+    assert "totals by" in text
+    assert text.splitlines()[0].startswith("Scene  (rtol=1.0e-06")
+
+
+def test_many_gaps_go_through_a_law():
+    few, many = (scene_of("force", separations=np.linspace(0, 1, n), rtol=1e-6).plan() for n in (3, 200_000))
+    assert few.step("law") is None
+    assert many.step("law") is not None
+
+
+def test_a_result_names_what_made_it():
+    found = scene_of("force", rtol=1e-8, reading="printed").run()
+    assert found.attrs["reading"] == "printed"
+    assert set(json.loads(found.attrs["table_hashes"])) <= set(json.loads(found.attrs["tiers"]).values())
+    assert found["force"].attrs["units"] == "1"
+    assert found["separation"].attrs["units"] == "length"
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"effects": "force", "separations": 0.5}, "list of names"),
+        ({"separations": [[0.5]]}, "one number or a list"),
+        ({"separations": 0.5, "rtol": 1.0}, "rtol must be"),
+        ({"separations": 0.5, "points": 1}, "points must be"),
+    ],
+)
+def test_python_mistakes(more, words):
+    with pytest.raises(InputError, match=words):
+        Scene(CONCRETE, **more)
+    with pytest.raises(InputError, match="not a batch"):
+        Scene(Surface([0.5, 0.7], 1.0, 50.0, 0.1, 0.3), separations=0.1)
+
+
+WATCHED = {
+    "mbma_tables.totals.law": {"stiffness", "energy", "conductance"},
+    "mbma_tables.totals.conductance": {"conductance"},
+    "mbma_tables.totals.theories": {"comparison"},
+    "mbma_tables.scenes.islands": {"island_statistics", "pressure_profile"},
+}
+COMBINATIONS = [(name,) for name in OUTPUTS] + list(itertools.combinations(OUTPUTS, 2))
+COUNTED = """
+import json, sys
+import numpy as np
+from mbma_tables import Scene, Surface
+import mbma_tables.models as models
+surface, arguments = Surface.named("concrete"), json.loads(sys.argv[1])
+before = set(sys.modules)
+Scene(surface, **arguments).run()
+print(json.dumps(sorted(set(sys.modules) - before)))
+"""
+
+
+def arguments_of(effects):
+    parts = {name: value for effect in effects for name, value in PARTS.get(effect, {}).items()}
+    gaps = {} if set(effects) == {"pressure_profile"} else {"separations": list(GAPS)}
+    return {"effects": list(effects), "rtol": 1e-6, **parts, **gaps}
+
+
+@pytest.mark.parametrize("name", OUTPUTS)
+def test_modules_of_an_effect_that_is_off_are_not_imported(name):
+    code = [sys.executable, "-W", "error", "-c", COUNTED, json.dumps(arguments_of([name]))]
+    done = subprocess.run(code, capture_output=True, text=True, check=True)
+    loaded = set(json.loads(done.stdout))
+    for module, effects in WATCHED.items():
+        assert (module in loaded) == (name in effects), module
+    totals = {"force", "area", "stiffness", "energy", "conductance"}
+    assert ("mbma_tables.totals.contact" in loaded) == (name in totals)
+
+
+@pytest.mark.parametrize("effects", COMBINATIONS, ids="+".join)
+def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
+    import mbma_tables.totals.contact as totals
+    import mbma_tables.totals.law as laws
+    import mbma_tables.totals.theories as theories
+
+    calls = {}
+
+    def count(module, name):
+        real = getattr(module, name)
+
+        def counted(*arguments, **more):
+            calls.setdefault(name, []).append(more)
+            return real(*arguments, **more)
+
+        monkeypatch.setattr(module, name, counted)
+
+    count(totals, "contact")
+    count(laws, "contact_law")
+    for name in ("island_statistics", "profiles", "hertz_area"):
+        count(islands, name)
+    count(theories, "greenwood_williamson")
+    count(theories, "persson_force")
+    Scene(CONCRETE, **arguments_of(effects)).run()
+    asked = set(effects)
+    of_law = bool(asked & {"stiffness", "energy", "conductance"})
+    expected = {
+        "contact": 0 if of_law else int(bool(asked & {"force", "area"})),
+        "contact_law": int(of_law),
+        "island_statistics": int("island_statistics" in asked),
+        "profiles": int("pressure_profile" in asked),
+        "greenwood_williamson": int("comparison" in asked),
+        "persson_force": 0,
+        "hertz_area": 0,
+    }
+    assert {name: len(calls.get(name, ())) for name in expected} == expected
+    if expected["contact"]:
+        assert calls["contact"][0]["quantities"] == tuple(name for name in ("force", "area") if name in asked)
+
+
+@pytest.mark.parametrize("name", ["comparison", "pressure_profile"])
+def test_tables_are_not_read_where_nothing_looks_up(name, monkeypatch):
+    from mbma_tables.models import tabulated
+
+    def refuse(*_):
+        raise AssertionError("a table was read")
+
+    monkeypatch.setattr(tabulated, "read_table", refuse)
+    tabulated._opened.cache_clear()
+    scene_of(name).run()
+    scene_of("force", "area", without=("sphere_deformation",)).run()
+
+
+def test_every_effect_says_its_equation_and_cost():
+    for effect in EFFECTS.values():
+        assert effect.meaning
+        assert effect.equation
+        assert effect.cost
