@@ -99,6 +99,24 @@ def make_table(configuration: Configuration, target: pathlib.Path, executor: Exe
     click.echo(f"{time.perf_counter() - started:.1f} s", err=True)
 
 
+def formula_file(out: pathlib.Path | None, what: str) -> pathlib.Path:
+    """Where the closed forms go."""
+    if out is None:
+        return TABLES / "formula.json"
+    return out / "formula.json" if what == "all" else out
+
+
+def make_formulas(target: pathlib.Path) -> None:
+    """Fit, certify and write the closed forms."""
+    from generate.formula import build
+
+    started = time.perf_counter()
+    for form in build(target).forms.values():
+        errors = ", ".join(f"{name} {form.largest_error(name):.2e}" for name in form.outputs)
+        click.echo(f"{target}: {form.name}; largest held-out error {errors}")
+    click.echo(f"{time.perf_counter() - started:.1f} s", err=True)
+
+
 class Generator(click.Command):
     """A command whose every known fault ends in one line and exit code 2."""
 
@@ -118,7 +136,7 @@ class Generator(click.Command):
 
 
 @click.command(cls=Generator, context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("what", type=click.Choice(["universal", "island4d", "all"]))
+@click.argument("what", type=click.Choice(["universal", "island4d", "formula", "all"]))
 @click.option(
     "--config", type=click.Path(path_type=pathlib.Path), help="TOML file that changes the shipped configuration."
 )
@@ -142,10 +160,14 @@ def main(
     scheduler: str | None,
     processes: bool,
 ) -> None:
-    """Make tables anew: universal, island4d, or all (with the coefficients of the height integrals)."""
-    if what == "all" and (config is not None or target is not None):
-        raise InputError("--config and --target belong to one table, not to all")
-    kinds = ("universal", "island4d") if what == "all" else (what,)
+    """Make anew the tables universal and island4d, the closed forms (formula), or all of it.
+
+    All begins with the coefficients of the height integrals. ``python -m generate cost --help`` tells of the study of
+    what accuracy costs.
+    """
+    if what in ("all", "formula") and (config is not None or target is not None):
+        raise InputError("--config and --target belong to one table, not to all, nor to formula")
+    kinds: tuple[str, ...] = {"all": ("universal", "island4d"), "formula": ()}.get(what, (what,))
     configurations = [load(kind, config, target) for kind in kinds]
     paths = [destination(what, configuration, out) for configuration in configurations]
     if what == "all":
@@ -154,7 +176,14 @@ def main(
         for configuration, path in zip(configurations, paths, strict=True):
             path.parent.mkdir(parents=True, exist_ok=True)
             make_table(configuration, path, executor, resume)
+    if what in ("all", "formula"):
+        make_formulas(formula_file(out, what))
 
 
 if __name__ == "__main__":
-    main()
+    if sys.argv[1:2] == ["cost"]:
+        from generate.cost import main as study
+
+        study(sys.argv[2:], prog_name="generate cost")
+    else:
+        main()

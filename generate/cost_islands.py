@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import importlib
 import math
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -22,6 +21,7 @@ from mbma_tables.islands.classical import iterate, ring_matrix
 from mbma_tables.islands.island import geometry
 from mbma_tables.islands.newton import extent_squared
 from mbma_tables.models import TIERS, get_model
+from mbma_tables.models.formula import FormulaModel
 from mbma_tables.models.four_numbers import Island4dModel
 from mbma_tables.models.protocol import IslandAnswer
 from mbma_tables.models.raw import Coordinates
@@ -215,13 +215,9 @@ def island4d_rows(quick: bool) -> Iterator[Row]:
 
 
 def formula_rows() -> Iterator[Row]:
-    """Each form of the formula file; nothing where there is none."""
-    try:
-        formula = importlib.import_module("mbma_tables.models.formula")
-    except ModuleNotFoundError:
-        return
+    """Each form of the formula file."""
     for name in FORMS:
-        error, cost = looked_up(formula.FormulaModel(name))
+        error, cost = looked_up(FormulaModel(name))
         yield Row("formula", f"island form={name}", "both", error, cost, 2)
 
 

@@ -77,7 +77,11 @@ model_options = _stack(
         help="Reading of the paper's equations.",
     ),
     click.option(
-        "--tier", default="universal", show_default=True, metavar="exact|universal|island4d|rigid", help="Island model."
+        "--tier",
+        default="universal",
+        show_default=True,
+        metavar="exact|universal|island4d|formula|rigid",
+        help="Island model.",
     ),
     click.option("--rtol", type=float, default=DEFAULT_RTOL, show_default=True, help="Relative error asked for."),
 )

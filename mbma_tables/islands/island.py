@@ -98,7 +98,7 @@ def island(
         One surface or a batch; it broadcasts against `delta`.
     delta : array_like
         Approach z_max - d of the island [length], positive.
-    tier : {"universal", "island4d", "exact", "rigid"}
+    tier : {"universal", "island4d", "exact", "formula", "rigid"}
         The island model.
     reading : {"reported", "printed"} or Reading
         Which reading of the paper's equations.

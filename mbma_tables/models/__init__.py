@@ -11,7 +11,7 @@ from mbma_tables.surfaces.readings import Reading
 
 __all__ = ["TIERS", "ExactModel", "IslandAnswer", "IslandModel", "RigidModel", "get_model"]
 
-TIERS = ("exact", "universal", "island4d", "rigid")
+TIERS = ("exact", "universal", "island4d", "formula", "rigid")
 LEAST_RTOL = 1e-11
 
 
@@ -30,6 +30,10 @@ def get_model(tier: str, rtol: float, reading: Reading) -> IslandModel:
         return RigidModel()
     if tier not in TIERS:
         raise InputError(f"tier must be one of {TIERS}, got {tier!r}")
+    if tier == "formula":
+        from mbma_tables.models.formula import FormulaModel
+
+        return FormulaModel()
     # netCDF comes in where a table is asked for
     from mbma_tables.models.tabulated import island4d_model, universal_model
 

@@ -90,7 +90,7 @@ def contact(
     separation : array_like
         d between the rigid plane and the mid-plane [length], at least -h_max (full compression). From h_max
         on there is no contact, and force and area are zero.
-    tier : {"universal", "island4d", "exact", "rigid"}
+    tier : {"universal", "island4d", "exact", "formula", "rigid"}
         The island model: a table, the full solver, or spheres that do not deform, in closed form.
     reading : {"reported", "printed"} or Reading
         Which reading of the paper's equations.
