@@ -1,0 +1,97 @@
+"""Many points for exported code, as a points' file: random islands, slopes, geometry and totals by the runtime."""
+
+from __future__ import annotations
+
+import functools
+import pathlib
+
+import numpy as np
+
+from mbma_tables.export.conformance import Replay, formula_rows, geometry_rows, phi_rows, status_rows, total_rows
+from mbma_tables.export.numbers import FORM
+from mbma_tables.formulas.file import get_form
+from mbma_tables.models.tabulated import universal_model
+from mbma_tables.surfaces.readings import get_reading
+
+POINTS = 10_000
+SURFACES = 60
+GAPS = (-0.9, 0.1, 0.6, 0.97)  # d/h_max
+# what agreement is asked of exported code
+VALUES, SLOPES, GEOMETRY, TOTALS = 1e-13, 1e-11, 1e-13, 1e-13
+
+
+def random_islands() -> tuple[np.ndarray, np.ndarray]:
+    """X and mu over the whole range: on both sides of the smallest mu, and at the ends."""
+    rng = np.random.default_rng(2008)
+    axis_X, axis_mu = universal_model().content.axes
+    X = rng.uniform(axis_X.low, axis_X.high, POINTS)
+    mu = np.exp(rng.uniform(np.log(1e-2 * axis_mu.low), np.log(axis_mu.high), POINTS))
+    X[:4], mu[:4] = (axis_X.low, axis_X.low, axis_X.high, axis_X.high), (axis_mu.low, axis_mu.high) * 2
+    return X, mu
+
+
+def random_formula_islands() -> tuple[np.ndarray, np.ndarray]:
+    """X and mu over the closed form's range, both ends and no roughness included."""
+    rng = np.random.default_rng(26)
+    (low, high), (_, most) = (get_form(FORM).range[name] for name in ("X", "mu"))
+    X, mu = rng.uniform(low, high, POINTS), np.exp(rng.uniform(np.log(1e-6), np.log(most), POINTS))
+    X[:2], mu[:2] = (low, high), most
+    return X, mu
+
+
+def random_approaches() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Approach, hurst and zeta_1; some with hurst = 1, where powers vanish."""
+    rng = np.random.default_rng(1973)
+    hurst = rng.uniform(0.1, 1.0, POINTS // 10)
+    hurst[:20] = 1.0
+    zeta_1 = np.exp(rng.uniform(np.log(4.0), np.log(1e6), hurst.size))
+    return np.exp(rng.uniform(np.log(1e-9), np.log(12.0), hurst.size)), hurst, zeta_1
+
+
+def random_surfaces() -> list[tuple[float, ...]]:
+    """Surfaces of any size: hurst, q0, q1, h_rms, h_max."""
+    rng = np.random.default_rng(48)
+    _, hurst, zeta_1 = random_approaches()
+    found = []
+    for H, most in zip(hurst[:SURFACES], zeta_1[:SURFACES], strict=True):
+        q0, h_rms = np.exp(rng.uniform(-8.0, 8.0, 2))
+        found.append(tuple(map(float, (H, q0, q0 * most, h_rms, h_rms * rng.uniform(2.0, 6.0)))))
+    return found
+
+
+@functools.cache
+def points_text(reading: str = "reported") -> str:
+    """The points' file, made once."""
+    model, rule = universal_model(), get_reading(reading)
+    lines = [*phi_rows(model, *random_islands()), *status_rows(model), *formula_rows(*random_formula_islands())]
+    lines += geometry_rows(*random_approaches(), rule)
+    for surface in random_surfaces():
+        lines += total_rows(surface, surface[4] * np.array(GAPS), rule)
+    return "\n".join(lines) + "\n"
+
+
+def write_points(folder: pathlib.Path, reading: str = "reported") -> pathlib.Path:
+    """The points' file in a folder."""
+    path = folder / "many_points.csv"
+    path.write_text(points_text(reading), encoding="utf-8")
+    return path
+
+
+def assert_equal_to_runtime(replay: Replay) -> None:
+    """Every row was replayed, and the answers agree as closely as is asked."""
+    assert replay.ran, replay.reason
+    assert replay.failed == 0, replay
+    assert replay.points == {
+        "phi": POINTS,
+        "slopes": POINTS,
+        "geometry": POINTS // 10,
+        "total": 4 * SURFACES,
+        "status": 10,
+        "formula": POINTS,
+    }
+    assert replay.largest["phi"] <= VALUES
+    assert replay.largest["slopes"] <= SLOPES
+    assert replay.largest["geometry"] <= GEOMETRY
+    assert replay.largest["total"] <= TOTALS
+    assert replay.largest["formula"] <= VALUES
+    assert replay.largest["status"] == 0
