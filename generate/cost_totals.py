@@ -14,13 +14,14 @@ import numpy as np
 
 from generate.fidelity import REFERENCES
 from generate.islands import log_ratio
-from mbma_tables import Surface, contact, contact_law, theories
+from mbma_tables import Scene, Surface, contact, contact_law, theories
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models import TIERS, get_model
 from mbma_tables.models.protocol import IslandAnswer, TwoNumberModel
 from mbma_tables.models.tabulated import Island4dModel, UniversalModel, shipped
 from mbma_tables.scenes.costs import GAPS, Row, gap_batch, held_out_surfaces, measure, measured_gaps, variant
+from mbma_tables.scenes.plan import rigid_error
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.files import read_table
 from mbma_tables.totals import island_sum
@@ -99,6 +100,17 @@ def single_quantities() -> dict[str, dict[str, Any]]:
     if "quantities" in inspect.signature(contact).parameters:
         found |= {name: {"quantities": (name,)} for name in ("force", "area")}
     return found
+
+
+def scene_rows() -> Iterator[Row]:
+    """What a scene takes besides its steps: planning, making the result, and the bound on rigid spheres."""
+    surface = held_out_surfaces()[0]
+    gap = 0.9 * float(surface.h_max)
+    loose, tight = (Scene(surface, effects=["force"], separations=gap, rtol=rtol) for rtol in (1e-2, 1e-4))
+    whole = measure(tight.run)[0]
+    step = measure(functools.partial(contact, surface, gap, rtol=1e-4, quantities=["force"]))[0]
+    yield Row("scene", "call", "both", None, max(whole - step, 0.0))
+    yield Row("scene", "bound", "both", None, measure(functools.partial(rigid_error, loose))[0])
 
 
 def gap_rows(quick: bool) -> Iterator[Row]:
@@ -237,6 +249,7 @@ def brute_force_rows(seconds: float) -> Iterator[Row]:
 def total_rows(quick: bool) -> list[Row]:
     """Everything that answers a gap."""
     return [
+        *scene_rows(),
         *gap_rows(quick),
         *order_rows(),
         *law_rows(quick),

@@ -24,7 +24,6 @@ MOST_RTOL = 0.1
 LEAST_ISLAND4D_HURST = 0.3
 OF_SLOPES = ("universal", "exact")  # nothing bounds the slopes of the others
 LEAST_RIGID_RTOL = 1e-3  # below it no rigid sphere is worth its bound
-OVERHEAD = 2e-3  # seconds of planning and of making the result, where they were measured
 SAMPLES = 96  # islands at which the rigid sphere's error is bounded
 
 
@@ -58,16 +57,17 @@ class Step:
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """Steps in the order in which they run, and what was left out."""
+    """Steps in the order in which they run, what was left out, and seconds that every scene takes."""
 
     steps: tuple[Step, ...]
     left_out: tuple[str, ...]
     rtol: float
+    overhead: float
 
     @property
     def seconds(self) -> float:
         """Predicted for all steps and what surrounds them."""
-        return OVERHEAD + sum(step.seconds for step in self.steps)
+        return self.overhead + sum(step.seconds for step in self.steps)
 
     @property
     def error(self) -> float:
@@ -186,7 +186,9 @@ def _plan_at(scene: Scene, rtol: float, costs: Costs) -> Plan:
         steps.append(Step(theory, "comparison", "another theory at the same gaps", None, None, count, exact, price))
     nobody = [f"{name} (nothing asked)" for name in OUTPUTS if name not in outputs]
     off = [f"{name} (switched off)" for name in REFINEMENTS if name in dropped]
-    return Plan(tuple(steps), tuple(nobody + off), rtol)
+    bounded = "rigid" in tiers and "sphere_deformation" not in dropped
+    overhead = costs.of("scene", "call") + bounded * costs.of("scene", "bound")
+    return Plan(tuple(steps), tuple(nobody + off), rtol, overhead)
 
 
 def _impossible(rtol: float, tiers: dict[str, float]) -> InputError:
