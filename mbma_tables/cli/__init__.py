@@ -15,6 +15,7 @@ import click
 from mbma_tables import __version__
 from mbma_tables.cli.commands import contact_command, curve_command, island_command, surfaces_command
 from mbma_tables.cli.cost import cost_command
+from mbma_tables.cli.export import export_command
 from mbma_tables.cli.scene import plan_command, run_command
 from mbma_tables.cli.tables import tables_group
 from mbma_tables.errors import MbmaError
@@ -71,5 +72,6 @@ for command in (
     plan_command,
     run_command,
     cost_command,
+    export_command,
 ):
     main.add_command(command)

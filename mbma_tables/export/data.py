@@ -1,0 +1,135 @@
+"""Contact laws as data: CSV, JSON, MATLAB, netCDF, HDF5, Parquet; each returns the bytes of a file."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import pathlib
+import tempfile
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from mbma_tables.errors import InputError
+from mbma_tables.export.description import LawTable
+
+READER = """function y = {name}(x)
+% {title}
+% Linear interpolation in {name}.mat; x and y in its units. Beyond the range: an error.
+  law = load('{name}.mat');
+  x0 = law.x(:); y0 = law.y(:);
+  if any(x(:) < x0(1)) || any(x(:) > x0(end))
+    error('{name}: x must be in [%g, %g]', x0(1), x0(end));
+  end
+  y = interp1(x0, y0, x);
+end
+"""
+
+
+def _header(law: LawTable) -> dict[str, Any]:
+    return {
+        "x": law.x_name,
+        "y": law.y_name,
+        "x_unit": law.x_unit,
+        "y_unit": law.y_unit,
+        "largest_error": law.largest_error,
+        "comments": list(law.comments),
+    }
+
+
+def to_csv(law: LawTable) -> bytes:
+    """Columns with a header of comments."""
+    head = "".join(f"# {line}\n" for line in law.comments)
+    rows = "".join(f"{x!r},{y!r}\n" for x, y in zip(law.x.tolist(), law.y.tolist(), strict=True))
+    return f"{head}{law.x_name} [{law.x_unit}],{law.y_name} [{law.y_unit}]\n{rows}".encode()
+
+
+def to_json(law: LawTable) -> bytes:
+    """One object: the header, and the columns by name."""
+    content = _header(law) | {"columns": {law.x_name: law.x.tolist(), law.y_name: law.y.tolist()}}
+    return (json.dumps(content, indent=1) + "\n").encode()
+
+
+def to_mat(law: LawTable) -> bytes:
+    """A MATLAB file of version 5: x, y, and the header as text."""
+    from scipy.io import savemat
+
+    stream = io.BytesIO()
+    text = {name: str(value) for name, value in _header(law).items() if name not in ("x", "y", "comments")}
+    comments = np.array(law.comments, dtype=object)
+    named = {"x": law.x[:, None], "y": law.y[:, None], "x_name": law.x_name, "y_name": law.y_name}
+    savemat(stream, named | text | {"comments": comments}, format="5", oned_as="column")
+    return stream.getvalue()
+
+
+def matlab_reader(law: LawTable, name: str) -> bytes:
+    """The function that looks up the MATLAB file of that name."""
+    return READER.format(name=name, title=law.comments[1]).encode()
+
+
+def _in_file(suffix: str, write: Callable[[str], None]) -> bytes:
+    """The bytes that a library writes to a path."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, f"law{suffix}")
+        write(path)
+        return pathlib.Path(path).read_bytes()
+
+
+def to_netcdf(law: LawTable) -> bytes:
+    """A netCDF-4 file with CF attributes."""
+    import xarray as xr
+
+    dataset = xr.Dataset(
+        {law.y_name: (law.x_name, law.y, {"units": law.y_unit, "long_name": law.y_name})},
+        coords={law.x_name: (law.x_name, law.x, {"units": law.x_unit, "long_name": law.x_name})},
+        attrs={
+            "Conventions": "CF-1.11",
+            "title": law.comments[0],
+            "comment": "\n".join(law.comments),
+            "largest_error": law.largest_error,
+            "interpolation": "linear",
+        },
+    )
+    return _in_file(".nc", lambda path: dataset.to_netcdf(path, engine="netcdf4"))
+
+
+def to_hdf5(law: LawTable) -> bytes:
+    """A plain HDF5 file: two datasets with units, the header as attributes."""
+    try:
+        import h5py
+    except ImportError:
+        raise InputError("HDF5 needs h5py: pip install 'mbma_tables[hdf5]'") from None
+    stream = io.BytesIO()
+    with h5py.File(stream, "w") as file:
+        for name, values, unit in ((law.x_name, law.x, law.x_unit), (law.y_name, law.y, law.y_unit)):
+            file[name] = values
+            file[name].attrs["units"] = unit
+        file.attrs["comments"] = "\n".join(law.comments)
+        file.attrs["largest_error"] = law.largest_error
+    return stream.getvalue()
+
+
+def to_parquet(law: LawTable) -> bytes:
+    """A Parquet file: two columns, the header as metadata of the schema."""
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError:
+        raise InputError("Parquet needs pyarrow: pip install 'mbma_tables[parquet]'") from None
+    table = pa.table({law.x_name: law.x, law.y_name: law.y})
+    table = table.replace_schema_metadata({name: json.dumps(value) for name, value in _header(law).items()})
+    stream = io.BytesIO()
+    parquet.write_table(table, stream)
+    return stream.getvalue()
+
+
+DATA: Mapping[str, tuple[Callable[[LawTable], bytes], str]] = {
+    "csv": (to_csv, ".csv"),
+    "json": (to_json, ".json"),
+    "matlab": (to_mat, ".mat"),
+    "netcdf": (to_netcdf, ".nc"),
+    "hdf5": (to_hdf5, ".h5"),
+    "parquet": (to_parquet, ".parquet"),
+}

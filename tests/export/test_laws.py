@@ -1,0 +1,197 @@
+"""Laws as rows: their error against the model, their spacing, their text in every target, and what is refused."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+
+from mbma_tables import InputError, Surface, contact
+from mbma_tables.export import solvers
+from mbma_tables.export.data import DATA, to_csv, to_json
+from mbma_tables.export.description import FLOOR, describe_law
+from mbma_tables.export.solvers import SOLVERS, calculix, exponential
+
+UNITS = {"length_unit": "mm", "stress_unit": "MPa"}
+CONCRETE = Surface.named("concrete")
+
+
+def law_of(surface=CONCRETE, **changed):
+    return describe_law(surface, 13.3, **(UNITS | {"rows": 40} | changed))
+
+
+@pytest.mark.parametrize("name", ["concrete", "asphalt", "challenge"])
+@pytest.mark.parametrize("rows", [20, 50, 200])
+def test_the_stated_error_and_better_than_even_rows(name, rows):
+    surface = Surface.named(name)
+    law = law_of(surface, rows=rows)
+    # points of our own, through the totals
+    x = np.random.default_rng(rows).uniform(0, law.x[-1], 2000)
+    model = contact(surface, np.maximum(surface.h_max - 2 * x, -surface.h_max), E_star=13.3, rtol=1e-9).force
+    kept = model > FLOOR * law.y[-1]
+    error = np.abs(np.interp(x, law.x, law.y) / model - 1)[kept].max()
+    assert error <= 1.02 * law.largest_error
+    assert error >= 0.5 * law.largest_error
+    assert law_of(surface, rows=rows, evenly=True).largest_error >= 5 * law.largest_error
+
+
+def test_fewest_rows():
+    law = law_of(rows=None, rtol=1e-2)
+    assert law.largest_error <= 1e-2
+    assert law_of(rows=law.x.size - 1).largest_error > 1e-2
+
+
+@pytest.mark.parametrize("surface", [CONCRETE, Surface(0.35, 1.0, 1e4, 0.1, 0.3)])
+def test_rows_rise_from_first_contact(surface):
+    law = law_of(surface)
+    assert law.x[0] == law.y[0] == 0
+    assert (np.diff(law.x) > 0).all()
+    assert (np.diff(law.y) >= 0).all()
+    turned = any("turns down" in line for line in law.comments)
+    assert turned == (surface is not CONCRETE)
+
+
+def test_conductance_against_pressure():
+    law = law_of(quantity="conductance", conductivity=50.0, conductivity_unit="mW/K", rows=100)
+    assert law.largest_error < 1e-3
+    assert (law.x_name, law.y_name, law.y_unit) == ("pressure", "conductance", "mW/K/mm")
+    text = calculix(law)
+    assert "*GAP CONDUCTANCE\n" in text
+    assert "*GAP CONDUCTANCE, PRESSURE\n" in solvers.abaqus(law)
+    first = [line for line in text.splitlines() if not line.startswith("*")][-1].split(", ")
+    assert [float(v) for v in first] == pytest.approx([law.y[-1], law.x[-1]], rel=1e-9, abs=0)
+
+
+def numbers(line):
+    return [float(word) for word in line.replace(",", " ").split()]
+
+
+def parse(target, text):
+    """Rows as the target's own reader takes them from the text."""
+    lines = text.splitlines()
+    if target in ("calculix", "abaqus"):
+        rows = [numbers(line) for line in lines if not line.startswith("*")]
+        return [(c, p) for p, c in rows]
+    if target == "lsdyna":
+        start = lines.index("*DEFINE_CURVE") + 2
+        return [(float(line[:20]), float(line[20:40])) for line in lines[start : lines.index("*END")]]
+    if target == "optistruct":
+        fields = [
+            line[8 + 16 * k : 24 + 16 * k].strip()
+            for line in lines
+            if line.startswith("*       ") and line.strip() != "*"
+            for k in range(4)
+        ]
+        values = [float(f) for f in fields[: fields.index("ENDT")]]
+        return list(zip(values[::2], values[1::2], strict=True))
+    if target == "modelica":
+        # the standard library's C reader: "#1" alone, then "double name(rows,columns)"
+        assert lines[0] == "#1"
+        head = next(k for k, line in enumerate(lines) if line.startswith("double "))
+        assert all(line.startswith("#") for line in lines[1:head])
+        size = lines[head].split("(")[1].split(")")[0].split(",")
+        rows = [numbers(line) for line in lines[head + 1 :]]
+        assert [len(rows), 2] == [int(v) for v in size]
+        return [tuple(row) for row in rows]
+    mark = {"comsol": "%", "moose": "#"}[target]
+    return [tuple(numbers(line)) for line in lines if not line.startswith(mark)]
+
+
+@pytest.mark.parametrize("target", SOLVERS)
+@pytest.mark.parametrize("rows", [20, 21, 50])
+def test_text_holds_the_rows(target, rows):
+    law = law_of(rows=rows)
+    text = SOLVERS[target][0](law)
+    np.testing.assert_allclose(parse(target, text), np.stack([law.x, law.y], 1), rtol=1e-9)
+    for word in ("reading 'reported'", "E* = 13.3", "[MPa]", "[mm]", "h_max - u", "largest error", "physics"):
+        assert word in text
+
+
+def test_calculix_writes_what_it_reads_rightly():
+    law = law_of()
+    assert "TYPE=NODE TO SURFACE" in calculix(law)
+    for pair in ("surface-to-surface", "mortar"):
+        with pytest.raises(InputError, match="without a message"):
+            calculix(law, pair=pair)
+    with pytest.raises(InputError, match="holds 200 rows"):
+        calculix(law_of(rows=201))
+
+
+def test_exponential_is_persson_for_light_loads():
+    from mbma_tables import theories
+
+    text = exponential(CONCRETE, 13.3, ["x"])
+    c0, p0 = numbers(text.splitlines()[-1])
+    for u in (0.5, 1.0):
+        p = p0 * np.exp((CONCRETE.h_max - u) / (c0 / np.log(100)))
+        assert p == pytest.approx(theories.persson_force(CONCRETE, u, 13.3, method="simplified"), rel=1e-8, abs=0)
+
+
+@pytest.mark.parametrize("target", DATA)
+def test_data_come_back(target, tmp_path):
+    law = law_of()
+    path = tmp_path / "law"
+    path.write_bytes(DATA[target][0](law))
+    if target == "csv":
+        rows = [line for line in to_csv(law).decode().splitlines() if not line.startswith("#")]
+        assert rows[0] == "overclosure [mm],pressure [MPa]"
+        found = np.array([numbers(line) for line in rows[1:]]).T
+    elif target == "json":
+        content = json.loads(to_json(law))
+        found = np.array(list(content["columns"].values()))
+        assert content["largest_error"] == law.largest_error
+    elif target == "matlab":
+        from scipy.io import loadmat
+
+        held = loadmat(path, appendmat=False)
+        found = np.stack([held["x"][:, 0], held["y"][:, 0]])
+        assert held["y_unit"].item() == "MPa"
+    elif target == "netcdf":
+        import xarray as xr
+
+        with xr.open_dataset(path, engine="netcdf4") as held:
+            found = np.stack([held.overclosure.values, held.pressure.values])
+            assert held.pressure.attrs["units"] == "MPa"
+    elif target == "hdf5":
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(path) as held:
+            found = np.stack([held["overclosure"][:], held["pressure"][:]])
+            assert held["pressure"].attrs["units"] == "MPa"
+    else:
+        parquet = pytest.importorskip("pyarrow.parquet")
+        held = parquet.read_table(io.BytesIO(path.read_bytes()))
+        found = np.stack([held["overclosure"].to_numpy(), held["pressure"].to_numpy()])
+        assert json.loads(held.schema.metadata[b"y_unit"]) == "MPa"
+    np.testing.assert_array_equal(found, np.stack([law.x, law.y]))
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"length_unit": ""}, "length_unit is missing"),
+        ({"stress_unit": ""}, "stress_unit is missing"),
+        ({"rows": 2}, "rows"),
+        ({"rows": 10**6}, "rows"),
+        ({"rows": 10, "rtol": 1e-3}, "both given"),
+        ({"rows": None, "rtol": 1e-9}, "rtol"),
+        ({"largest_overclosure": 2.0}, "largest_overclosure must be in"),
+        ({"largest_overclosure": 0.0}, "largest_overclosure must be in"),
+        ({"quantity": "stiffness"}, "quantity must be one of"),
+        ({"quantity": "conductance"}, "conductance needs"),
+        ({"reading": "other"}, "reading"),
+    ],
+)
+def test_refused(changed, said):
+    with pytest.raises(InputError, match=said):
+        law_of(**changed)
+
+
+def test_a_batch_is_refused():
+    with pytest.raises(InputError, match="not of a batch"):
+        law_of(Surface([0.5, 0.8], 1.0, 100.0, 1.0, 3.0))
+
+
+def test_rows_too_near_in_the_files_unit():
+    tiny = Surface(0.8, 1e9, 1e11, 1e-9, 3e-9)
+    with pytest.raises(InputError, match="nearer than 1e-10"):
+        law_of(tiny, length_unit="m")

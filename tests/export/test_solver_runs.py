@@ -1,0 +1,99 @@
+"""Laws tried in the program itself: CalculiX presses two blocks together, Octave looks up, ncdump reads."""
+
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from mbma_tables import Surface
+from mbma_tables.export.data import matlab_reader, to_mat, to_netcdf
+from mbma_tables.export.description import describe_law
+from mbma_tables.export.solvers import calculix
+
+SIDE = {"mm": 10.0, "m": 0.01}
+
+
+def needs(program):
+    return pytest.mark.skipif(shutil.which(program) is None, reason=f"{program} is not installed")
+
+
+def blocks(law, card, compressions, side, stiff):
+    """Two blocks of one element each, so stiff that they do not count, the upper one pressed down step by step."""
+    nodes = ""
+    for number, z in enumerate((0.0, side, side, 2 * side)):
+        for corner, (x, y) in enumerate(((0, 0), (side, 0), (side, side), (0, side))):
+            nodes += f"{4 * number + corner + 1}, {x!r}, {y!r}, {z!r}\n"
+    steps = "".join(
+        "*STEP\n*STATIC\n1., 1.\n*BOUNDARY\n1, 1, 3\n2, 1, 3\n3, 1, 3\n4, 1, 3\n"
+        + "".join(f"{node}, 1, 2\n{node}, 3, 3, {-c:.12e}\n" for node in (13, 14, 15, 16))
+        + "".join(f"{node}, 1, 2\n" for node in (5, 6, 7, 8, 9, 10, 11, 12))
+        + "*NODE PRINT, NSET=TOP, TOTALS=ONLY\nRF\n*END STEP\n"
+        for c in compressions
+    )
+    return (
+        f"*NODE, NSET=ALL\n{nodes}*NSET, NSET=TOP\n13, 14, 15, 16\n*NSET, NSET=SLAVE\n9, 10, 11, 12\n"
+        "*ELEMENT, TYPE=C3D8, ELSET=LOW\n1, 1, 2, 3, 4, 5, 6, 7, 8\n"
+        "*ELEMENT, TYPE=C3D8, ELSET=UP\n2, 9, 10, 11, 12, 13, 14, 15, 16\n"
+        f"*MATERIAL, NAME=STIFF\n*ELASTIC\n{stiff:.6e}, 0.\n"
+        "*SOLID SECTION, ELSET=LOW, MATERIAL=STIFF\n*SOLID SECTION, ELSET=UP, MATERIAL=STIFF\n"
+        "*SURFACE, NAME=MASTER, TYPE=ELEMENT\n1, S2\n*SURFACE, NAME=SLAVES, TYPE=ELEMENT\n2, S1\n"
+        f"{card}*CONTACT PAIR, INTERACTION=ROUGH, TYPE=NODE TO SURFACE\nSLAVES, MASTER\n{steps}"
+    )
+
+
+@needs("ccx")
+@pytest.mark.parametrize(
+    ("length", "stress", "unit", "E_star"), [("mm", "MPa", 1.0, 13.3), ("m", "Pa", 1e-3, 13.3e6)], ids=["mm", "SI"]
+)
+def test_calculix_feels_the_rows(tmp_path, length, stress, unit, E_star):
+    surface = Surface.named("concrete")
+    surface = Surface(surface.hurst, surface.q0 / unit, surface.q1 / unit, surface.h_rms * unit, surface.h_max * unit)
+    law = describe_law(surface, E_star, length_unit=length, stress_unit=stress, rows=50)
+    # from a hundredth of the largest pressure on, the last point inside the rows
+    least = float(np.interp(1e-2 * law.y[-1], law.y, law.x))
+    compressions = np.linspace(least, 0.98 * law.x[-1], 20)
+    side = SIDE[length]
+    deck = blocks(law, calculix(law), compressions, side, stiff=1e9 * E_star)
+    (tmp_path / "press.inp").write_text(deck)
+    said = subprocess.run(["ccx", "press"], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    found = [
+        abs(float(line.split()[2])) / side**2
+        for line in (tmp_path / "press.dat").read_text().splitlines()
+        if re.fullmatch(r"(\s+-?\d\.\d+E[+-]\d+){3}", line)
+    ]
+    assert len(found) == 20, said.stdout[-2000:]
+    expected = np.interp(compressions, law.x, law.y)
+    np.testing.assert_allclose(found, expected, rtol=2e-3)
+
+
+@needs("octave-cli")
+def test_octave_looks_up(tmp_path):
+    law = describe_law(Surface.named("asphalt"), 20.0, length_unit="mm", stress_unit="MPa", rows=60)
+    (tmp_path / "law.mat").write_bytes(to_mat(law))
+    (tmp_path / "law.m").write_bytes(matlab_reader(law, "law"))
+    x = np.random.default_rng(1).uniform(0, law.x[-1], 200)
+    np.savetxt(tmp_path / "x.txt", x, fmt="%.17g")
+    script = "x = load('x.txt'); printf('%.17g\\n', law(x)); s = load('law.mat'); printf('%.17g\\n', s.x, s.y);"
+    said = subprocess.run(
+        ["octave-cli", "--no-init-file", "--eval", script], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    numbers = np.array(said.stdout.split(), dtype=float)
+    np.testing.assert_allclose(numbers[:200], np.interp(x, law.x, law.y), rtol=1e-12)
+    np.testing.assert_array_equal(numbers[200:], np.concatenate([law.x, law.y]))
+    beyond = subprocess.run(
+        ["octave-cli", "--no-init-file", "--eval", "law(1e3)"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert beyond.returncode != 0
+    assert "x must be in" in beyond.stderr
+
+
+@needs("ncdump")
+def test_ncdump_reads(tmp_path):
+    law = describe_law(Surface.named("asphalt"), 20.0, length_unit="mm", stress_unit="MPa", rows=30)
+    (tmp_path / "law.nc").write_bytes(to_netcdf(law))
+    said = subprocess.run(["ncdump", "-p", "17", "law.nc"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    values = re.search(r"\n pressure = ([^;]*);", said.stdout).group(1)
+    np.testing.assert_array_equal([float(v) for v in values.split(",")], law.y)
+    assert 'pressure:units = "MPa"' in said.stdout
