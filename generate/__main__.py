@@ -163,7 +163,7 @@ def main(
     """Make anew the tables universal and island4d, the closed forms (formula), or all of it.
 
     All begins with the coefficients of the height integrals. ``python -m generate cost --help`` tells of the study of
-    what accuracy costs.
+    what accuracy costs, ``python -m generate atlas --help`` of the corners of parameter space.
     """
     if what in ("all", "formula") and (config is not None or target is not None):
         raise InputError("--config and --target belong to one table, not to all, nor to formula")
@@ -185,5 +185,9 @@ if __name__ == "__main__":
         from generate.cost import main as study
 
         study(sys.argv[2:], prog_name="generate cost")
+    elif sys.argv[1:2] == ["atlas"]:
+        from generate.atlas import main as atlas
+
+        atlas(sys.argv[2:], prog_name="generate atlas")
     else:
         main()

@@ -6,8 +6,8 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from exact_geometry import DIGITS, divisor, exact_island
 
+from generate.exact_geometry import DIGITS, divisor, exact_island
 from mbma_tables.islands.geometry import FIELDS
 from mbma_tables.islands.island import geometry
 from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED
