@@ -137,7 +137,9 @@ def _form(name: str, given: Any, path: object) -> Form:
         _require(not unknown, path, f"form {name!r}, step {target!r}: unknown names {sorted(unknown)}")
         known.add(target)
     _require(
-        isinstance(named, dict) and set(named) == set(outputs) and all(step in known for step in named.values()),
+        isinstance(named, dict)
+        and set(named) == set(outputs)
+        and all(isinstance(step, str) and step in known for step in named.values()),
         path,
         f"form {name!r}: outputs must name a step for each of {outputs}",
     )

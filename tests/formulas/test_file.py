@@ -110,6 +110,7 @@ BROKEN = {
     "twice": lambda d: d["forms"]["pocket"]["steps"].append(["X", "1"]),
     "call": lambda d: d["forms"]["pocket"]["steps"].append(["extra", "open(X)"]),
     "outputs": lambda d: d["forms"]["pocket"].update(outputs={"phi_F": "phi_F"}),
+    "unhashable": lambda d: d["forms"]["pocket"]["outputs"].update(phi_F={}),
     "range": lambda d: d["forms"]["pocket"].update(range={"X": [1, 0], "mu": [0, 1]}),
     "errors": lambda d: d["forms"]["pocket"].update(errors={}),
     "provenance": lambda d: d.update(provenance=3),
