@@ -130,9 +130,10 @@ Python, JavaScript, for spreadsheets, or in LaTeX.
 
 ## Totals
 
-Force over `E* q0 h_rms` and area, reading `reported`, with `\\tilde d = d/h_rms` and `\\tilde h = h_max/h_rms`. A
-largest error of 10% was wanted of 40 coefficients; see above what they reach. Where the last branch is chosen, the
-largest islands have left the floor of `zeta_d`.
+Force over `E* q0 h_rms` and area, reading `reported`, with `\\tilde d = d/h_rms` and `\\tilde h = h_max/h_rms`. The
+two branches meet where the largest islands reach the floor of `zeta_d`, at `l = k`; they do not join, but jump by up to
+a seventh there, so these forms are for estimates and not for slopes. The errors are of random surfaces, many on the
+edges of the range; a search for the worst surface finds a tenth more, at the least areas.
 
 {_equations(forms[3])}
 

@@ -2,7 +2,7 @@
 
 The branches meet where the largest islands reach the floor of zeta_d, at l = k with l = (h_max - d)/h_rms. Below it the
 end of the integral decides, F ~ l^(7/2) and A ~ l^(10/3) at first contact; above it hardly more than the gap does. The
-logarithms are sums of products of a few variables of order one: terms by backward elimination and exchange,
+logarithms are sums of products of a few variables of order one: terms by backward elimination and annealing,
 coefficients of least largest error. Force is over E* q0 h_rms, reading "reported".
 """
 
@@ -13,6 +13,7 @@ import itertools
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from generate.formula_heights import rounded
 from generate.formula_terms import least_largest
@@ -29,18 +30,23 @@ RANGE = {
     "hurst": (0.5, 1.0),
 }
 LEAST_AREA = 1e-6
-MARGIN = 0.5  # samples of the fit go down to this share of it
+MARGIN = 0.7  # samples of the fit go down to this share of it
 LEAST_REACH = 0.05  # l below which no surface of the range reaches LEAST_AREA
-OVERLAP = 0.05  # of k, by which the samples of the branches overlap
+OVERLAP = 0.02  # of k, by which the samples of the branches overlap
 DEGREE = 3
 # what a power of each variable counts towards DEGREE, by branch
 NEAR = {"t": 0.75, "b": 0.75, "q": 0.75, "c": 1.0, "z": 1.0, "h": 1.0}
-FAR = {"g": 0.5, "s": 0.5, "x": 1.0, "c": 1.0, "y": 1.0, "h": 1.0, "z": 1.0}
-TERMS = (20, 20)
-POINTS, HELD_OUT = 9000, 20_000
+FAR = {"g": 0.5, "s": 0.5, "y": 1.0, "h": 1.0, "z": 1.0}
+TERMS = {"force": (22, 18), "area": (23, 17)}  # of the near and the far branch
+POINTS, HELD_OUT = 12_000, 60_000
+EDGE = 0.3  # share of each property that lies on an end of its range, where the error is largest
 FIT_SEED, HELD_OUT_SEED = 41, 42
-DROPS, ADDITIONS = 8, 6  # exchanges tried a round
-ROUNDS = 30
+TRIALS = 3000  # exchanges tried by annealing, on every THIN-th sample
+THIN = 4
+HEAT = 0.04  # relative loss that a swap may cost at first
+CHOICES = 4.0  # how deep into the ranked columns a swap reaches
+TRIAL_ROUNDS = 15
+ANNEAL_SEED = 43
 SLACK = 1.01
 MOST_DIGITS = 15
 
@@ -59,28 +65,26 @@ VARIABLES = [
     ["h", "4*hurst - 3"],
     ["g", "(d_over_h_rms + 1)/3.7"],
     ["s", "(d_over_h_rms + 0.3)/sqrt((d_over_h_rms + 0.3)**2 + 1)"],
-    ["x", "exp(-2*(l - k))"],
 ]
 
 
 def arguments(count: int, seed: int) -> dict[str, FloatArray]:
-    """Random surfaces and gaps of the range; a share of them on each of its edges."""
+    """Random surfaces and gaps of the range; a share of each property on the ends of its range, corners included."""
     rng = np.random.default_rng(seed)
-    hurst = rng.uniform(*RANGE["hurst"], count)
-    least, most = np.log(RANGE["zeta_1"])
-    zeta_1 = np.exp(rng.uniform(least, most, count))
-    top = rng.uniform(*RANGE["h_max_over_h_rms"], count)
-    reach = np.exp(rng.uniform(np.log(LEAST_REACH), np.log(2 * top)))
-    share = count // 20
-    for number, (field, name) in enumerate(((hurst, "hurst"), (zeta_1, "zeta_1"), (top, "h_max_over_h_rms"))):
-        field[2 * number * share : (2 * number + 1) * share] = RANGE[name][0]
-        field[(2 * number + 1) * share : (2 * number + 2) * share] = RANGE[name][1]
-    reach = np.minimum(reach, 2 * top)
-    reach[6 * share : 7 * share] = 2 * top[6 * share : 7 * share]
-    # where the branches meet, which no random point hits
-    meet = slice(7 * share, 9 * share)
-    floor, end = 1.5 ** (-2 * hurst[meet]), zeta_1[meet] ** (-2 * hurst[meet])
-    reach[meet] = 2.25 * np.sqrt(floor - end) * rng.uniform(1 - OVERLAP, 1 + OVERLAP, 2 * share)
+
+    def drawn(low: float, high: float) -> FloatArray:
+        place = rng.uniform(-EDGE / 2, 1 + EDGE / 2, count)
+        return low + (high - low) * np.clip(place, 0.0, 1.0)
+
+    hurst = drawn(*RANGE["hurst"])
+    zeta_1 = np.clip(np.exp(drawn(*np.log(RANGE["zeta_1"]))), *RANGE["zeta_1"])
+    top = drawn(*RANGE["h_max_over_h_rms"])
+    reach = np.minimum(np.exp(rng.uniform(np.log(LEAST_REACH), np.log(2 * top))), 2 * top)
+    part = rng.uniform(size=count)
+    # full compression; evenly in d; and where the branches meet, which no random point hits
+    reach = np.where(part < 0.03, 2 * top, np.where(part < 0.35, rng.uniform(0.1, 1.0, count) * 2 * top, reach))
+    meet = 2.25 * np.sqrt(1.5 ** (-2 * hurst) - zeta_1 ** (-2 * hurst)) * rng.uniform(1 - OVERLAP, 1 + OVERLAP, count)
+    reach = np.where(part > 0.9, meet, reach)
     return {"d_over_h_rms": top - reach, "h_max_over_h_rms": top, "zeta_1": zeta_1, "hurst": hurst}
 
 
@@ -107,55 +111,88 @@ def matrix(powers: list[Powers], weights: dict[str, float], named: dict[str, Flo
     return np.stack([np.prod([named[v] ** n for v, n in zip(weights, p, strict=True)], axis=0) for p in powers], 1)
 
 
+def _lawson(M: FloatArray, target: FloatArray, weight: FloatArray, rounds: int) -> tuple[float, FloatArray]:
+    """Least largest error by few and quick rounds of reweighting (normal equations), and the weights found."""
+    best, kept_weight = np.inf, weight
+    for _ in range(rounds):
+        weighted = M * weight[:, None]
+        gram = weighted.T @ M
+        solved = np.linalg.solve(gram + 1e-12 * np.trace(gram) * np.eye(len(gram)), weighted.T @ target)
+        error = np.abs(M @ solved - target)
+        largest = float(error.max())
+        if largest < best:
+            best, kept_weight = largest, weight
+        grown = weight * (error / largest + 1e-3)
+        weight = np.maximum(grown / grown.mean(), 1e-5)
+    return best, kept_weight
+
+
 def eliminate(M: FloatArray, target: FloatArray, count: int) -> list[int]:
-    """Columns left when those that matter least have gone one after another."""
-    scaled = M / np.abs(M).max(axis=0)
-    gram, right = scaled.T @ scaled, scaled.T @ target
-    kept = list(range(M.shape[1]))
+    """Columns left when those that matter least to the largest error have gone one after another."""
+    kept, weight = list(range(M.shape[1])), np.ones(target.size)
     while len(kept) > count:
-        inverse = np.linalg.inv(gram[np.ix_(kept, kept)] + 1e-9 * target.size * np.eye(len(kept)))
-        harm = (inverse @ right[kept]) ** 2 / np.diag(inverse)
-        several = max(1, len(kept) // 20) if len(kept) > count + 12 else 1
+        own = M[:, kept]
+        root = np.sqrt(weight)
+        weight = _lawson(own, target, root / root.mean(), TRIAL_ROUNDS)[1]
+        harm = _harm(own, target, weight)
+        several = max(1, len(kept) // 15) if len(kept) > count + 10 else 1
         gone = set(np.argsort(harm)[:several].tolist())
         kept = [column for place, column in enumerate(kept) if place not in gone]
     return kept
 
 
-def exchange(M: FloatArray, target: FloatArray, kept: list[int]) -> list[int]:
-    """Swap a column for another for as long as the largest error falls."""
-    scaled = M / np.abs(M).max(axis=0)
-    best, found = least_largest(M[:, kept], target)
-    for _ in range(ROUNDS):
-        error = np.abs(M[:, kept] @ found - target)
-        # what is worst now counts most
-        root = np.sqrt((error / error.max()) ** 2 + 1e-2)[:, None]
-        weighted, right = scaled * root, target * root[:, 0]
-        own = weighted[:, kept]
-        inverse = np.linalg.pinv(own.T @ own)
-        order = np.argsort((inverse @ (own.T @ right)) ** 2 / np.diag(inverse))
-        for place in order[:DROPS]:
-            rest = [column for k, column in enumerate(kept) if k != place]
-            Q = np.linalg.qr(weighted[:, rest])[0]
-            left, free = right - Q @ (Q.T @ right), weighted - Q @ (Q.T @ weighted)
-            norm = np.linalg.norm(free, axis=0)
-            gain = np.where(norm > 1e-6, np.abs(free.T @ left) / np.maximum(norm, 1e-6), 0.0)
-            gain[kept] = 0.0
-            trials = [(*least_largest(M[:, [*rest, int(k)]], target), int(k)) for k in np.argsort(-gain)[:ADDITIONS]]
-            error_now, coefficients, column = min(trials, key=lambda trial: trial[0])
-            if error_now < 0.999 * best:
-                best, found, kept = error_now, coefficients, [*rest, column]
+def _harm(own: FloatArray, target: FloatArray, weight: FloatArray) -> FloatArray:
+    """How much worse the weighted fit becomes without each column."""
+    weighted = own * (weight + 0.03)[:, None]
+    gram = weighted.T @ own
+    inverse = np.linalg.inv(gram + 1e-12 * np.trace(gram) * np.eye(len(gram)))
+    harm: FloatArray = (inverse @ (weighted.T @ target)) ** 2 / np.diag(inverse)
+    return harm
+
+
+def anneal(M: FloatArray, target: FloatArray, kept: list[int]) -> list[int]:
+    """Swap columns, at first also for slightly worse ones, and keep the set of least largest error."""
+    rng = np.random.default_rng(ANNEAL_SEED)
+    now, weight = _lawson(M[:, kept], target, np.ones(target.size), 2 * TRIAL_ROUNDS)
+    best, found = now, kept
+    tried = 0
+    while tried < TRIALS:
+        root = np.sqrt(weight + 0.03)
+        weighted, right = M * root[:, None], target * root
+        norm = np.linalg.norm(weighted, axis=0)
+        drop = np.argsort(_harm(M[:, kept], target, weight))[min(int(rng.exponential(CHOICES)), len(kept) - 1)]
+        rest = [column for place, column in enumerate(kept) if place != drop]
+        Q = np.linalg.qr(weighted[:, rest])[0]
+        left, free = right - Q @ (Q.T @ right), weighted - Q @ (Q.T @ weighted)
+        size = np.linalg.norm(free, axis=0)
+        gain = np.where(size > 1e-4 * norm, np.abs(free.T @ left) / np.maximum(size, 1e-9), 0.0)
+        gain[kept] = 0.0
+        ranked = np.argsort(-gain)[: M.shape[1] - len(kept)]
+        for _ in range(3):
+            tried += 1
+            trial = [*rest, int(ranked[min(int(rng.exponential(CHOICES)), len(ranked) - 1)])]
+            start = np.sqrt(weight)
+            error, heavier = _lawson(M[:, trial], target, start / start.mean(), TRIAL_ROUNDS)
+            if error < now * (1 + HEAT * (1 - tried / TRIALS) * rng.exponential()):
+                now, weight, kept = error, heavier, trial
                 break
-        else:
-            return kept
-    return kept
-
-
-def base(name: str, named: dict[str, FloatArray], given: dict[str, FloatArray]) -> FloatArray:
-    """What the near branch starts from: the power of first contact, the layer, the Gaussian at the largest islands."""
-    end = given["h_max_over_h_rms"] - 4 / 9 * named["l"]
-    layer = named["l"] / (1 + named["l"] * given["zeta_1"] ** given["hurst"])
-    found: FloatArray = POWERS[name] * np.log(layer) - end**2 / 2
+        if now < best:
+            best, found = now, kept
     return found
+
+
+def base(name: str, far: bool, named: dict[str, FloatArray], given: dict[str, FloatArray]) -> FloatArray:
+    """What a branch starts from: `_start` as numbers."""
+    found: FloatArray = evaluate_steps([["start", _start(name, far)]], named | given, ("start",))["start"]
+    return found
+
+
+def _start(name: str, far: bool) -> str:
+    """The power of first contact, the layer and the Gaussian at the largest islands; beyond, the tail of heights."""
+    if far:
+        return "-((d_over_h_rms + sqrt(d_over_h_rms**2 + 2))**2)/8"
+    layer = f"{POWERS[name]:.10g}*log(l/(1 + l*zeta_1**hurst))"
+    return f"{layer} - (h_max_over_h_rms - 0.4444444444*l)**2/2"
 
 
 @functools.cache
@@ -166,13 +203,15 @@ def branch(name: str, far: bool, count: int) -> tuple[tuple[Powers, ...], tuple[
     place = named["l"] / named["k"]
     mine = place > 1 - OVERLAP if far else place < 1 + OVERLAP
     named, given = ({key: a[mine] for key, a in group.items()} for group in (named, given))
-    target = np.log(truth[name][mine])
-    if not far:
-        target = target - base(name, named, given)
+    target = np.log(truth[name][mine]) - base(name, far, named, given)
     weights = FAR if far else NEAR
     powers = products(weights)
     M = matrix(powers, weights, named)
-    kept = exchange(M, target, eliminate(M, target, count))
+    scaled = M / np.abs(M).max(axis=0)
+    few = slice(None, None, THIN)
+    # the search forks on the last digit of a sum, which must not depend on the number of threads
+    with threadpool_limits(1):
+        kept = anneal(scaled[few], target[few], eliminate(scaled[few], target[few], count))
     return tuple(powers[k] for k in kept), tuple(least_largest(M[:, kept], target)[1].tolist())
 
 
@@ -187,16 +226,13 @@ def _sum(name: str, far: bool, count: int, digits: int) -> str:
     return text
 
 
-def _steps(counts: tuple[int, int], digits: dict[str, int]) -> list[list[str]]:
+def _steps(counts: dict[str, tuple[int, int]], digits: dict[str, int]) -> list[list[str]]:
     steps = list(VARIABLES)
     for name in NAMES:
-        near, far = (_sum(name, side, counts[side], digits[name]) for side in (False, True))
-        start = f"{POWERS[name]:.10g}*log(l/(1 + l*zeta_1**hurst)) - (h_max_over_h_rms - 0.4444444444*l)**2/2"
-        steps += [
-            [f"near_{name}", f"{start} + {near}".replace("+ -", "- ")],
-            [f"far_{name}", far],
-            [name, f"exp(select(l - k, far_{name}, near_{name}))"],
-        ]
+        for far, side in ((False, "near"), (True, "far")):
+            text = f"{_start(name, far)} + {_sum(name, far, counts[name][far], digits[name])}"
+            steps.append([f"{side}_{name}", text.replace("+ -", "- ")])
+        steps.append([name, f"exp(select(l - k, far_{name}, near_{name}))"])
     return steps
 
 
@@ -206,18 +242,18 @@ def _errors(steps: list[list[str]], count: int, seed: int) -> dict[str, FloatArr
     return {name: np.abs(found[name] / truth[name] - 1) for name in NAMES}
 
 
-def totals_form(counts: tuple[int, int] = TERMS) -> Form:
+def totals_form() -> Form:
     """The closed totals with their certificate, in the shape of the formula file."""
 
     def largest(places: int) -> dict[str, float]:
-        steps = _steps(counts, dict.fromkeys(NAMES, places))
+        steps = _steps(TERMS, dict.fromkeys(NAMES, places))
         return {name: float(error.max()) for name, error in _errors(steps, POINTS, FIT_SEED).items()}
 
     best = largest(MOST_DIGITS)
     digits = {
         name: next(p for p in range(2, MOST_DIGITS + 1) if largest(p)[name] <= SLACK * best[name]) for name in NAMES
     }
-    steps = _steps(counts, digits)
+    steps = _steps(TERMS, digits)
     given, _ = samples(HELD_OUT, HELD_OUT_SEED)
     stated: Form = {"points": int(given["hurst"].size)}
     for name, error in _errors(steps, HELD_OUT, HELD_OUT_SEED).items():
@@ -233,15 +269,6 @@ def totals_form(counts: tuple[int, int] = TERMS) -> Form:
         "range": {name: list(ends) for name, ends in RANGE.items()} | {"area": [LEAST_AREA, 1.0]},
         "steps": steps,
         "outputs": {name: name for name in NAMES},
-        "coefficients": dict.fromkeys(NAMES, sum(counts)),
+        "coefficients": {name: sum(TERMS[name]) for name in NAMES},
         "errors": stated,
     }
-
-
-def front(sizes: tuple[int, ...] = (8, 12, 16, 20, 26)) -> list[dict[str, float]]:
-    """Coefficients of each function against its largest error on held-out surfaces."""
-    rows = []
-    for size in sizes:
-        errors = _errors(_steps((size, size), dict.fromkeys(NAMES, MOST_DIGITS)), HELD_OUT, HELD_OUT_SEED)
-        rows.append({"coefficients": 2 * size} | {f"error_{name}": float(e.max()) for name, e in errors.items()})
-    return rows
