@@ -26,6 +26,9 @@ from mbma_tables.tablefiles.shipped import shipped_file
 __all__ = ["Island4dModel", "UniversalModel", "island4d_model", "open_table", "shipped", "universal_model"]
 
 
+TINY = 1e-200  # stands for mu = 0 where a slope is asked for
+
+
 class UniversalModel(TwoNumberModel):
     """Phi_F and Phi_A from a universal table.
 
@@ -81,13 +84,13 @@ class UniversalModel(TwoNumberModel):
         """Answers, and their derivatives by X and by mu, in one pass; the errors are those of the answers."""
         flat_X, flat_mu, shape = self._inside(X, mu)
         out = np.empty((7, flat_X.size))
+        # slopes at mu = 0 are those a hair above it: the kernel's are by log(mu)
+        flat_mu = np.where(flat_mu == 0, TINY, flat_mu)
         universal_kernel.fill_slopes(flat_X, flat_mu, *self.kernel, np.empty(flat_X.size, dtype=np.int64), out)
         force, F_X, F_mu, area, A_X, A_mu, error = (row.reshape(shape)[()] for row in out)
-        # the kernel gives logarithmic slopes
-        with np.errstate(divide="ignore", invalid="ignore"):
-            by_mu = 1 / flat_mu.reshape(shape)[()]
+        by_mu = 1 / flat_mu.reshape(shape)[()]
         return (
-            IslandAnswer(force, area, error),
+            IslandAnswer(np.where(flat_mu.reshape(shape) == TINY, 0.0, force)[()], area, error),
             IslandAnswer(force * F_X, area * A_X, error),
             IslandAnswer(force * F_mu * by_mu, area * A_mu * by_mu, error),
         )

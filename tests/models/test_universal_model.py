@@ -194,3 +194,20 @@ def test_marks_have_the_shape_of_the_arguments(small, shape):
 def test_a_negative_mu_is_refused(small):
     with pytest.raises(OutOfRangeError):
         small.answer(np.zeros(2), np.array([1.0, -1e-9]))
+
+
+def test_slopes_at_mu_zero_are_the_rigid_spheres(small):
+    axis = small.content.axes[0]
+    X = np.linspace(axis.low, axis.high, 20)
+    value, by_X, by_mu = small.slopes(X, np.zeros(20))
+    rigid = greenwood_tripp.rigid_sphere(X, np.ones(20))
+    np.testing.assert_array_equal(value.phi_F, 0)
+    np.testing.assert_allclose(value.phi_A, rigid[1], rtol=1e-14)
+    np.testing.assert_allclose(by_mu.phi_F, rigid[0], rtol=1e-14)
+    # below the table the logarithm is proportional to mu
+    step = 1e-3 * small.content.axes[1].low
+    slope = small.log_ratio(X, np.full(20, step))[1] / step
+    np.testing.assert_allclose(by_mu.phi_A, slope * rigid[1], rtol=1e-12)
+    assert np.isfinite(by_X.phi_A).all()
+    assert (np.abs(by_X.phi_F) < 1e-150).all()
+    assert small.slopes(axis.low, 0.0)[0].phi_F == 0
