@@ -11,7 +11,9 @@ import numpy as np
 
 from generate import atlas_cases as cases
 from generate.atlas_cases import Tally
+from generate.pages import png
 from mbma_tables.arguments import FloatArray
+from mbma_tables.whole_files import write_files
 
 PAGE, FIGURE = pathlib.Path("stability.md"), pathlib.Path("figures") / "stability.png"
 LEAST, MOST = 1e-16, 1e0  # of the colour scale
@@ -41,9 +43,7 @@ def draw(geometry: dict[str, FloatArray], islands: dict[str, FloatArray], path: 
         panel.set_xticks(places[0][::4], [f"{mu:.0e}" for mu in cases.MU_CORNERS[::4]], rotation=45)
         panel.set_yticks(places[1][::4], [f"{X:.3g}" for X in cases.X_CORNERS[::4]])
     figure.colorbar(mesh, ax=axes, label="largest relative error")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-    pyplot.close(figure)
+    write_files({path: png(figure, dpi=110)}, make_folders=True)
 
 
 def _row(tally: Tally) -> str:
@@ -98,7 +98,7 @@ def main(out: pathlib.Path) -> None:
     total_tallies, worst = cases.totals()
     draw(geometry_maps, island_maps, out / FIGURE)
     tallies = [*island_tallies, *geometry_tallies, *total_tallies]
-    (out / PAGE).write_text(page(tallies, worst, list(cases.arguments())), encoding="utf-8")
+    write_files({out / PAGE: page(tallies, worst, list(cases.arguments())).encode()})
     for tally in tallies:
         click.echo(_row(tally))
     click.echo(f"{out / PAGE}; {time.perf_counter() - started:.0f} s")

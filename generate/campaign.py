@@ -15,7 +15,6 @@ import multiprocessing
 import os
 import pathlib
 import shutil
-import tempfile
 import threading
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
@@ -25,6 +24,7 @@ from tqdm import tqdm
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.tablefiles.provenance import digest_arrays, digest_json
+from mbma_tables.whole_files import reason, write_whole
 
 ATTEMPTS = 3  # a worker that dies costs its chunks; they are given out again until this often none was finished
 DIGEST_LENGTH = 64
@@ -65,32 +65,18 @@ def _load(folder: pathlib.Path, key: str) -> FloatArray | None:
     return loaded
 
 
-def _write(folder: pathlib.Path, key: str, content: bytes) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=folder, prefix=".chunk-")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        pathlib.Path(name).replace(folder / key)
-    except BaseException:
-        pathlib.Path(name).unlink(missing_ok=True)
-        raise
-
-
 def _store(folder: pathlib.Path, key: str, result: FloatArray) -> None:
     body = io.BytesIO()
     np.save(body, result, allow_pickle=False)
     content = _digest(key, body.getvalue()) + body.getvalue()
     try:
         try:
-            _write(folder, key, content)
+            write_whole({folder / key: content}, make_folders=True)
         except FileNotFoundError:
             # another run of the same table ended and took the folder with it
-            _write(folder, key, content)
+            write_whole({folder / key: content}, make_folders=True)
     except OSError as fault:
-        raise CampaignError(f"cannot keep finished chunks in {folder}: {fault.strerror or fault}") from None
+        raise CampaignError(f"cannot keep finished chunks in {folder}: {reason(fault)}") from None
 
 
 def _follow_parent() -> None:

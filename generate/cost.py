@@ -8,7 +8,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 import pathlib
 import platform
 import time
@@ -18,6 +17,7 @@ from importlib import metadata
 import click
 
 from mbma_tables.scenes.costs import COLUMNS, EVALUATIONS, UNIT, Row, measure, read_costs
+from mbma_tables.whole_files import write_files
 
 DATA = pathlib.Path(__file__).parents[1] / "tables" / "cost.csv"
 LIBRARIES = ("numpy", "scipy", "numba")
@@ -40,17 +40,6 @@ def to_csv(rows: Sequence[Row], quick: bool) -> str:
         numbers = ("" if number is None else f"{number:.4g}" for number in (row.error, row.cost, row.evaluations))
         writer.writerow((row.tier, row.variant, row.quantity, *numbers))
     return text.getvalue()
-
-
-def write(path: pathlib.Path, content: bytes) -> None:
-    """A file, whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        temporary.write_bytes(content)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def study(quick: bool) -> list[Row]:
@@ -80,10 +69,9 @@ def main(out: pathlib.Path, data: pathlib.Path, quick: bool, page_only: bool) ->
 
     started = time.perf_counter()
     if not page_only:
-        write(data, to_csv(study(quick), quick).encode())
+        write_files({data: to_csv(study(quick), quick).encode()}, make_folders=True)
     costs = read_costs(data)
-    write(out / "cost.md", page(costs).encode())
-    write(out / "figures" / "cost.png", draw(costs))
+    write_files({out / "cost.md": page(costs).encode(), out / "figures" / "cost.png": draw(costs)}, make_folders=True)
     click.echo(readme_table(costs))
     click.echo(f"wrote {data}, {out / 'cost.md'}; {time.perf_counter() - started:.0f} s", err=True)
 

@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from numba import njit
 from scipy.stats import qmc
 
 from generate.islands import log_ratio
 from generate.table_schemes import exact, own_grid
 from mbma_tables.arguments import FloatArray
+from mbma_tables.compiled import njit
 from mbma_tables.errors import ConvergenceError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.classical import iterate, ring_matrix

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
+from generate.pages import png
 from generate.table_page import markdown
 from mbma_tables.scenes.costs import GAPS, HELD_OUT, Costs, Row, pareto_front
 
@@ -211,7 +211,4 @@ def draw(costs: Costs) -> bytes:
     if others.size:
         panels[1].axvspan(others.min(), others.max(), color="0.85", zorder=0)
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=8)
-    data = io.BytesIO()
-    figure.savefig(data, format="png", metadata={"Software": None})
-    plt.close(figure)
-    return data.getvalue()
+    return png(figure)

@@ -7,8 +7,10 @@ from typing import Any
 
 import click
 
+from generate.pages import png
 from mbma_tables import Surface
 from mbma_tables.export.description import describe_law
+from mbma_tables.whole_files import write_files
 
 PAGE, FIGURE = pathlib.Path("export.md"), pathlib.Path("figures") / "export.png"
 NAMES = ("concrete", "asphalt", "yang-persson", "challenge")
@@ -59,9 +61,7 @@ def draw(path: pathlib.Path) -> None:
     axes.set(xlabel="overclosure [mm]", ylabel="pressure [MPa]", ylim=(1e-4, 5))
     axes.grid(True, alpha=0.3)
     axes.legend()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=130)
-    pyplot.close(figure)
+    write_files({path: png(figure, dpi=130)}, make_folders=True)
 
 
 def targets() -> str:
@@ -131,7 +131,7 @@ This page and its figure: `python -m generate.export_page --out docs`.
 def main(out: pathlib.Path) -> None:
     """Write the page and its figure."""
     draw(out / FIGURE)
-    (out / PAGE).write_text(page(), encoding="utf-8")
+    write_files({out / PAGE: page().encode()})
     click.echo(out / PAGE)
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from mbma_tables import Surface, contact, theories
 from mbma_tables.arguments import FloatArray
+from mbma_tables.whole_files import write_files
 
 DATA = pathlib.Path(__file__).parents[1] / "docs" / "data"
 COMMAND = "python -m generate.fidelity --out docs"
@@ -390,13 +391,11 @@ REFERENCE_CAPTION = (
 @click.option("--figures/--no-figures", default=True, show_default=True)
 def main(out: pathlib.Path, sets: Sequence[str], figures: bool) -> None:
     """Write OUT/fidelity.md and OUT/figures/*.png."""
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "fidelity.md").write_text(page(sets), encoding="utf-8")
+    write_files({out / "fidelity.md": page(sets).encode()}, make_folders=True)
     if figures:
         # imported as a module, this page's own functions stand behind the figures too
         from generate.fidelity_figures import draw
 
-        (out / "figures").mkdir(exist_ok=True)
         draw(out / "figures")
     click.echo(f"wrote {out / 'fidelity.md'}")
 

@@ -24,7 +24,9 @@ from generate.fidelity import (
     force_ratios,
     sample,
 )
+from generate.pages import png
 from mbma_tables import Surface, theories
+from mbma_tables.whole_files import write_files
 
 
 def draw(folder: pathlib.Path) -> None:
@@ -39,8 +41,7 @@ def draw(folder: pathlib.Path) -> None:
         return plt.subplots(rows, columns, figsize=(9, height), dpi=100, layout="constrained", **options)
 
     def save(figure: Any, name: str) -> None:
-        figure.savefig(folder / f"{name}.png", metadata={"Software": None}, pil_kwargs={"optimize": True})
-        plt.close(figure)
+        write_files({folder / f"{name}.png": png(figure)}, make_folders=True)
 
     def by_gap(ax: Any, surface: Surface, low: float, names: Iterable[str] = THEORIES, **style: Any) -> None:
         top = surface.h_max / surface.h_rms

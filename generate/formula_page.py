@@ -8,9 +8,10 @@ from typing import Any
 import click
 
 from generate import formula_alternatives, formula_islands
-from generate.cost import write
+from generate.pages import png
 from mbma_tables.formulas.file import ISLAND_FORMS, TOTALS, Form, get_form, shipped_formulas
 from mbma_tables.formulas.printers import latex_steps
+from mbma_tables.whole_files import write_files
 
 PAGE = pathlib.Path("formula.md")
 FIGURE = pathlib.Path("figures") / "formula.png"
@@ -31,9 +32,7 @@ def draw(front: list[dict[str, float]], path: pathlib.Path) -> None:
     axes.set(xlabel="fitted coefficients", ylabel="largest relative error on held-out points")
     axes.grid(True, which="both", alpha=0.3)
     axes.legend()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=130)
-    pyplot.close(figure)
+    write_files({path: png(figure, dpi=130)}, make_folders=True)
 
 
 def _table(head: list[str], rows: list[list[str]]) -> str:
@@ -166,7 +165,7 @@ def main(out: pathlib.Path) -> None:
     front = formula_islands.front()
     draw(front, out / FIGURE)
     text = page(front, formula_alternatives.islands(), formula_alternatives.totals())
-    write(out / PAGE, text.encode())
+    write_files({out / PAGE: text.encode()}, make_folders=True)
     click.echo(out / PAGE)
 
 

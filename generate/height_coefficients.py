@@ -12,6 +12,8 @@ from collections.abc import Callable, Sequence
 
 import mpmath
 
+from mbma_tables.whole_files import write_files
+
 TARGET = pathlib.Path(__file__).parents[1] / "mbma_tables" / "islands" / "_height_coefficients.py"
 DIGITS = 40
 TERMS = 19  # the hardest piece, [-2, 0], needs 19 for 2e-17
@@ -92,9 +94,7 @@ def main() -> None:
         '"""Made by `python -m generate.height_coefficients`; do not edit."""',
         "\n".join(_literal(f"TWICE_N_{k}", pieces(k)) for k in (1, 2, 3, 4, 5)),
     ]
-    temporary = TARGET.with_suffix(".tmp")
-    temporary.write_text("\n\n".join(blocks) + "\n", encoding="utf-8")
-    temporary.replace(TARGET)
+    write_files({TARGET: ("\n\n".join(blocks) + "\n").encode()})
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ import click
 import numpy as np
 
 from generate.configuration import load
+from generate.pages import png
 from generate.table_schemes import LARGEST_ZETA_D, POINTS, SIZES, Row, compare
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models.raw import hat_scales, to_axes
@@ -23,6 +24,7 @@ from mbma_tables.models.tabulated import shipped
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.files import read_table
 from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL, TableContent, error_cell
+from mbma_tables.whole_files import write_files
 
 PAGE = pathlib.Path(__file__).parents[1] / "docs" / "tables.md"
 MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -149,8 +151,7 @@ def draw(folder: pathlib.Path, rows: Sequence[Row]) -> None:
     from matplotlib import pyplot as plt
 
     def save(figure: Any, name: str) -> None:
-        figure.savefig(folder / f"{name}.png", metadata={"Software": None}, pil_kwargs={"optimize": True})
-        plt.close(figure)
+        write_files({folder / f"{name}.png": png(figure)}, make_folders=True)
 
     leasts = sorted({row.least for row in rows}, reverse=True)
     figure, panels = plt.subplots(
@@ -219,10 +220,8 @@ def main(out: pathlib.Path, figures: bool, largest: int) -> None:
             "comparison": lambda: comparison_text(compare(largest)),
         },
     )
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "tables.md").write_text(page, encoding="utf-8")
+    write_files({out / "tables.md": page.encode()}, make_folders=True)
     if figures:
-        (out / "figures").mkdir(exist_ok=True)
         draw(out / "figures", compare(largest))
     click.echo(f"wrote {out / 'tables.md'}")
 

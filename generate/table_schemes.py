@@ -135,7 +135,8 @@ def log_rigid_hats(raw: Raw) -> FloatArray:
 
 def spline_at(coefs: FloatArray, positions: Sequence[FloatArray], degree: int) -> FloatArray:
     """A tensor spline of any number of axes at positions in node units, last axis F, A."""
-    rule = (cubic if degree == 3 else quintic).py_func
+    compiled: Any = cubic if degree == 3 else quintic
+    rule = compiled.py_func
     parts = []
     for start in range(0, positions[0].size, BLOCK):
         index, weights = [], []

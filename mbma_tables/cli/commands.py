@@ -16,9 +16,10 @@ from mbma_tables.cli.options import (
     over_h_rms,
     surface_options,
 )
-from mbma_tables.cli.report import Report, write_files
+from mbma_tables.cli.report import Report
 from mbma_tables.cli.sources import Source, read_source
 from mbma_tables.errors import InputError
+from mbma_tables.whole_files import write_files
 
 LIGHTEST = 1e-3  # (h_max - d)/h_max of a curve's lightest contact
 EVEN_FROM = 0.2  # and where its points, geometric so far, become evenly spaced

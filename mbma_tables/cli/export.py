@@ -8,9 +8,9 @@ from typing import Any
 import click
 
 from mbma_tables.cli.options import surface_options
-from mbma_tables.cli.report import write_files
 from mbma_tables.cli.sources import read_source
 from mbma_tables.errors import InputError
+from mbma_tables.whole_files import write_files
 
 SOLVERS = ("calculix", "abaqus", "lsdyna", "optistruct", "comsol", "moose", "modelica")
 DATA = ("csv", "json", "matlab", "netcdf", "hdf5", "parquet")

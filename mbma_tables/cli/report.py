@@ -1,4 +1,4 @@
-"""What a command found, as a table, as JSON or as CSV; and files that are written whole or not at all."""
+"""What a command found, as a table, as JSON or as CSV."""
 
 from __future__ import annotations
 
@@ -6,13 +6,9 @@ import csv
 import dataclasses
 import io
 import json
-import os
-from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from mbma_tables import __version__
-from mbma_tables.errors import InputError
 
 DIGITS = 6  # significant digits of a table; JSON and CSV keep all
 
@@ -84,32 +80,3 @@ def _rounded(value: Any) -> str:
     if value is None:
         return "-"
     return f"{value:.{DIGITS}g}" if isinstance(value, float) else str(value)
-
-
-def write_files(files: Mapping[Path, bytes]) -> None:
-    """Write every file, or none of them: under temporary names beside them first, then renamed.
-
-    Raises
-    ------
-    InputError
-        Where one of them cannot be written; what stood there before still does.
-    """
-    targets = {path.resolve(): content for path, content in files.items()}
-    for target in targets:
-        # renaming would replace a device such as /dev/null by a plain file
-        if target.exists() and not target.is_file():
-            raise InputError(f"{target} cannot be written: it is not a plain file")
-    waiting: dict[Path, Path] = {}
-    try:
-        for target, content in targets.items():
-            temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-            with temporary.open("xb") as stream:
-                waiting[target] = temporary
-                stream.write(content)
-        for target, temporary in waiting.items():
-            temporary.replace(target)
-    except OSError as fault:
-        raise InputError(f"{target} cannot be written: {fault.strerror}") from None
-    finally:
-        for temporary in waiting.values():
-            temporary.unlink(missing_ok=True)

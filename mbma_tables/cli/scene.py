@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import sys
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from mbma_tables.cli.report import Column, Report, write_files
+from mbma_tables.cli.report import Column, Report
 from mbma_tables.errors import InputError
+from mbma_tables.whole_files import write_files, written_bytes
 
 if TYPE_CHECKING:
     import xarray
@@ -114,10 +113,7 @@ def _to_json(found: xarray.Dataset) -> str:
 
 
 def _to_netcdf(found: xarray.Dataset) -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "scene.nc")
-        found.to_netcdf(path, engine="netcdf4")
-        return Path(path).read_bytes()
+    return written_bytes("scene.nc", lambda path: found.to_netcdf(path, engine="netcdf4"))
 
 
 def _picture(found: xarray.Dataset) -> bytes:

@@ -7,12 +7,12 @@ import importlib
 import importlib.resources
 import os
 import pathlib
-import tempfile
 from typing import Any
 
 from mbma_tables.errors import InputError
 from mbma_tables.models.tabulated import UniversalModel, open_table
 from mbma_tables.surfaces.readings import Reading, get_reading
+from mbma_tables.whole_files import reason, write_whole
 
 TARGETS = ("c", "fortran", "javascript", "python")
 POINTS_FILE = "mbma_conformance.csv"
@@ -86,22 +86,14 @@ def sources(target: str, model: UniversalModel, reading: Reading) -> dict[str, s
 
 def _write(folder: pathlib.Path, texts: dict[str, str]) -> list[pathlib.Path]:
     """Write all files, or none."""
-    made = False
-    blocked = [name for name in texts if (folder / name).is_dir()]
-    if blocked:
-        raise InputError(f"cannot write {folder / blocked[0]}: it is a folder; choose another folder")
+    made = not folder.exists()
     try:
-        if not folder.exists():
+        if made:
             folder.mkdir()
-            made = True
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".mbma.") as draft:
-            for name, text in texts.items():
-                (pathlib.Path(draft) / name).write_text(text, encoding="utf-8", newline="\n")
-            for name in texts:
-                os.replace(pathlib.Path(draft) / name, folder / name)
+        write_whole({folder / name: text.encode() for name, text in texts.items()})
     except OSError as fault:
         if made:
             with contextlib.suppress(OSError):
                 folder.rmdir()
-        raise InputError(f"cannot write {folder}: {fault.strerror or fault}; choose another folder") from None
+        raise InputError(f"cannot write {fault.filename}: {reason(fault)}; choose another folder") from None
     return [folder / name for name in texts]

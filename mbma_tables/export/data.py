@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
-import pathlib
-import tempfile
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -14,6 +11,7 @@ import numpy as np
 
 from mbma_tables.errors import InputError
 from mbma_tables.export.description import LawTable
+from mbma_tables.whole_files import written_bytes
 
 READER = """function y = {name}(x)
 % {title}
@@ -61,20 +59,13 @@ def to_mat(law: LawTable) -> bytes:
     comments = np.array(law.comments, dtype=object)
     named = {"x": law.x[:, None], "y": law.y[:, None], "x_name": law.x_name, "y_name": law.y_name}
     savemat(stream, named | text | {"comments": comments}, format="5", oned_as="column")
-    return stream.getvalue()
+    # the first 116 bytes are free text, where scipy puts the time: the same law gives the same bytes
+    return b"MATLAB 5.0 MAT-file, mbma_tables".ljust(116) + stream.getvalue()[116:]
 
 
 def matlab_reader(law: LawTable, name: str) -> bytes:
     """The function that looks up the MATLAB file of that name."""
     return READER.format(name=name, title=law.comments[1]).encode()
-
-
-def _in_file(suffix: str, write: Callable[[str], None]) -> bytes:
-    """The bytes that a library writes to a path."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, f"law{suffix}")
-        write(path)
-        return pathlib.Path(path).read_bytes()
 
 
 def to_netcdf(law: LawTable) -> bytes:
@@ -92,7 +83,7 @@ def to_netcdf(law: LawTable) -> bytes:
             "interpolation": "linear",
         },
     )
-    return _in_file(".nc", lambda path: dataset.to_netcdf(path, engine="netcdf4"))
+    return written_bytes("law.nc", lambda path: dataset.to_netcdf(path, engine="netcdf4"))
 
 
 def to_hdf5(law: LawTable) -> bytes:

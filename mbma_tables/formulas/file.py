@@ -18,6 +18,7 @@ from mbma_tables.arguments import FloatArray, require
 from mbma_tables.errors import InputError, TableFileError
 from mbma_tables.formulas.expressions import FUNCTIONS, evaluate_steps, names_in, parse
 from mbma_tables.tablefiles.shipped import shipped_file
+from mbma_tables.whole_files import write_files
 
 FORMAT, FORMAT_VERSION = "mbma-formula", 1
 LARGEST = 1_000_000  # bytes
@@ -227,13 +228,7 @@ def write(path: os.PathLike[str] | str, forms: dict[str, Any], provenance: dict[
     }
     document["data_hash"] = data_hash(document)
     found = check(document)
-    file = pathlib.Path(path)
-    draft = file.with_name(f".{file.name}.{os.getpid()}")
-    try:
-        draft.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
-        os.replace(draft, file)
-    finally:
-        draft.unlink(missing_ok=True)
+    write_files({pathlib.Path(path): (json.dumps(document, indent=1) + "\n").encode()})
     return found
 
 

@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 import scipy.special
-from numba import njit
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.compiled import njit
 from mbma_tables.islands.height_integrals import f_one, f_three_halves
 from mbma_tables.islands.newton import extent_squared
 

@@ -12,9 +12,8 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from mbma_tables.arguments import FloatArray
+from mbma_tables.compiled import njit
 from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, alpha_of, m0_of, m4_of, summit_rate
 
 FIELDS = (

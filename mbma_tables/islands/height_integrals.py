@@ -12,10 +12,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, finite_array
+from mbma_tables.compiled import njit
 from mbma_tables.errors import InputError
 from mbma_tables.islands import _height_coefficients as coefficients
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.compiled import njit
 from mbma_tables.islands.height_integrals import (
     f_five_halves,
     f_half,

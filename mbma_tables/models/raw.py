@@ -7,9 +7,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.compiled import njit
 from mbma_tables.islands.geometry import summit_sigma
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.spectrum import RADIUS, alpha_of, m0_of, m4_of, summit_rate

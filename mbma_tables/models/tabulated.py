@@ -147,26 +147,36 @@ _OPENING = threading.Lock()
 
 
 @functools.lru_cache(maxsize=8)
-def _opened(kind: str, path: pathlib.Path) -> UniversalModel | Island4dModel:
+def _opened(kind: str, path: pathlib.Path, state: tuple[int, ...]) -> UniversalModel | Island4dModel:
     content = read_table(path, kind)
     return UniversalModel(content) if kind == UNIVERSAL else Island4dModel(content)
 
 
+def _identity(path: os.PathLike[str] | str) -> tuple[pathlib.Path, tuple[int, ...]]:
+    """Which file that is, and which of those that stood there one after the other."""
+    file = pathlib.Path(path).resolve()
+    try:
+        status = file.stat()
+    except OSError:
+        return file, ()  # reading says what is wrong
+    return file, (status.st_ino, status.st_size, status.st_mtime_ns)
+
+
 def _open_once(kind: str, path: os.PathLike[str] | str | None) -> UniversalModel | Island4dModel:
-    """A table of that kind, opened once whichever thread asks first."""
+    """A table of that kind, opened once whichever thread asks first; a file that was replaced, anew."""
     with _OPENING:
-        return _opened(kind, shipped(kind) if path is None else pathlib.Path(path))
+        return _opened(kind, shipped(kind), ()) if path is None else _opened(kind, *_identity(path))
 
 
 def universal_model(path: os.PathLike[str] | str | None = None) -> UniversalModel:
-    """The universal model of the shipped table, or of a file; opened once."""
+    """The universal model of the shipped table, or of a file; opened once while the file stays the same."""
     model = _open_once(UNIVERSAL, path)
     assert isinstance(model, UniversalModel)
     return model
 
 
 def island4d_model(path: os.PathLike[str] | str | None = None) -> Island4dModel:
-    """The four-parameter model of the shipped table, or of a file; opened once."""
+    """The four-parameter model of the shipped table, or of a file; opened once while the file stays the same."""
     model = _open_once(ISLAND4D, path)
     assert isinstance(model, Island4dModel)
     return model

@@ -8,10 +8,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.compiled import njit
 from mbma_tables.islands import height_integrals as heights
 from mbma_tables.models.protocol import FORCE
 from mbma_tables.tablefiles.interpolate import gradient_2d, value_2d

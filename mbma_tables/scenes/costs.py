@@ -12,7 +12,6 @@ import functools
 import hashlib
 import json
 import math
-import os
 import pathlib
 import statistics
 import time
@@ -24,6 +23,7 @@ import numpy as np
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError, TableFileError
 from mbma_tables.tablefiles.shipped import shipped_file
+from mbma_tables.whole_files import write_files
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.surface import Surface
@@ -350,13 +350,8 @@ def calibration_path() -> pathlib.Path:
 def write_calibration(calibration: Calibration, path: pathlib.Path | None = None) -> pathlib.Path:
     """Keep a calibration, written whole or not at all; returns where."""
     target = calibration_path() if path is None else path
-    target.parent.mkdir(parents=True, exist_ok=True)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}")
-    try:
-        temporary.write_text(json.dumps(dataclasses.asdict(calibration), indent=2) + "\n", encoding="utf-8")
-        os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
+    content = json.dumps(dataclasses.asdict(calibration), indent=2) + "\n"
+    write_files({target: content.encode()}, make_folders=True)
     return target
 
 

@@ -13,7 +13,6 @@ import os
 import pathlib
 import platform
 import stat
-import tempfile
 import threading
 import warnings
 from typing import Any
@@ -39,6 +38,7 @@ from mbma_tables.tablefiles.schema import (
     TableContent,
 )
 from mbma_tables.tablefiles.splines import padding
+from mbma_tables.whole_files import reason, write_whole, written_bytes
 
 SEAL = b"\nmbma-table sha256 "
 SEAL_LENGTH = len(SEAL) + 64 + 1
@@ -158,22 +158,18 @@ def write_table(path: os.PathLike[str] | str, content: TableContent) -> pathlib.
         "physics_modules": " ".join(MODULES[content.kind]),
         "versions": json.dumps(versions(), sort_keys=True),
     }
+
+    def write(path: str) -> None:
+        with ONE_AT_A_TIME, netCDF4.Dataset(path, "w", format="NETCDF4") as dataset:
+            _fill(dataset, content)
+            dataset.setncatts(attributes)
+            dataset.setncattr("attributes_sha256", _attributes_digest(dataset))
+
     try:
-        with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
-            draft = pathlib.Path(folder) / target.name
-            with ONE_AT_A_TIME, netCDF4.Dataset(draft, "w", format="NETCDF4") as dataset:
-                _fill(dataset, content)
-                dataset.setncatts(attributes)
-                dataset.setncattr("attributes_sha256", _attributes_digest(dataset))
-            body = draft.read_bytes()
-            with draft.open("ab") as file:
-                file.write(SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n")
-                file.flush()
-                os.fsync(file.fileno())
-            draft.replace(target)
-    # the HDF5 library reports a full disk as a RuntimeError
-    except (OSError, RuntimeError) as fault:
-        why = getattr(fault, "strerror", None) or fault
+        body = written_bytes(target.name, write)
+        write_whole({target: body + SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n"})
+    except OSError as fault:
+        why = reason(fault)
         raise TableFileError(f"cannot write {target}: {why}; nothing was changed, choose another folder") from None
     return target
 

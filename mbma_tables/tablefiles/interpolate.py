@@ -5,9 +5,10 @@ Positions are in node units, 0 ... n - 1. Nothing is shared or kept: any thread 
 
 from __future__ import annotations
 
-from numba import njit, prange
+from numba import prange
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.compiled import njit
 from mbma_tables.tablefiles.lanes import add_lanes, load_lanes
 
 Six = tuple[float, float, float, float, float, float]

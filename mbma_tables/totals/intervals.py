@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.compiled import njit
 from mbma_tables.totals.quadrature import GAUSS as GAUSS_21
 from mbma_tables.totals.quadrature import KRONROD as KRONROD_21
 from mbma_tables.totals.quadrature import NODES as NODES_21

@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.compiled import njit
 
 TERMS = 16
 FORCE, AREA, FORCE_SLOPE, AREA_SLOPE, ENERGY = range(5)

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.compiled import njit
 from mbma_tables.islands.geometry import floor_offset
 from mbma_tables.models.protocol import BOTH, FORCE
 from mbma_tables.models.universal_kernel import OK, UNRESOLVED, Axes, universal_one, universal_phi

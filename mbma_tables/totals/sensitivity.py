@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.compiled import njit
 from mbma_tables.models.universal_kernel import OK, UNRESOLVED, Axes, universal_phi, universal_slopes
 from mbma_tables.totals.intervals import MOST_INTERVALS, approach_at, error_of, first_intervals, halve, rule_for
 from mbma_tables.totals.lookup import Constants, island_node, jacobian_below, surface_constants

@@ -110,7 +110,7 @@ def test_bad_requests_leave_no_file(
 
 def test_a_folder_in_a_files_place_leaves_the_others_alone(tmp_path: pathlib.Path) -> None:
     (tmp_path / "mbma_table.h").mkdir()
-    with pytest.raises(InputError, match="it is a folder"):
+    with pytest.raises(InputError, match="not a plain file"):
         write_code("c", tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["mbma_table.h"]
 

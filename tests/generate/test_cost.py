@@ -8,6 +8,7 @@ from mbma_tables import contact
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models.tabulated import island4d_model
 from mbma_tables.scenes.costs import HELD_OUT, Row, cost_file, held_out_surfaces, read_costs
+from mbma_tables.whole_files import write_files
 
 
 def test_reference_agrees_with_the_exact_tier():
@@ -68,7 +69,7 @@ def test_rows_come_back_from_the_file(tmp_path):
         Row("exact", "gap rtol=1e-03", "force", 1.5e-6, 3.25, 71.0),
     ]
     path = tmp_path / "deep" / "cost.csv"
-    cost.write(path, cost.to_csv(rows, quick=True).encode())
+    write_files({path: cost.to_csv(rows, quick=True).encode()}, make_folders=True)
     assert list(read_costs(path).measured) == rows
     assert [p.name for p in path.parent.iterdir()] == ["cost.csv"]
 
