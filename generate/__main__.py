@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import os
 import pathlib
 import shutil
@@ -163,7 +164,8 @@ def main(
     """Make anew the tables universal and island4d, the closed forms (formula), or all of it.
 
     All begins with the coefficients of the height integrals. ``python -m generate cost --help`` tells of the study of
-    what accuracy costs, ``python -m generate atlas --help`` of the corners of parameter space.
+    what accuracy costs, ``python -m generate atlas --help`` of the corners of parameter space, ``python -m generate
+    gauntlet --help`` of the tests of hard input at their full size.
     """
     if what in ("all", "formula") and (config is not None or target is not None):
         raise InputError("--config and --target belong to one table, not to all, nor to formula")
@@ -180,14 +182,11 @@ def main(
         make_formulas(formula_file(out, what))
 
 
+STUDIES = ("atlas", "cost", "gauntlet")
+
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["cost"]:
-        from generate.cost import main as study
-
-        study(sys.argv[2:], prog_name="generate cost")
-    elif sys.argv[1:2] == ["atlas"]:
-        from generate.atlas import main as atlas
-
-        atlas(sys.argv[2:], prog_name="generate atlas")
+    if sys.argv[1:2] and sys.argv[1] in STUDIES:
+        study = importlib.import_module(f"generate.{sys.argv[1]}")
+        study.main(sys.argv[2:], prog_name=f"generate {sys.argv[1]}")
     else:
         main()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pathlib
 import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import click
@@ -11,11 +12,13 @@ import numpy as np
 
 from generate import atlas_cases as cases
 from generate.atlas_cases import Tally
-from generate.pages import png
+from generate.pages import fill, png
 from mbma_tables.arguments import FloatArray
 from mbma_tables.whole_files import write_files
 
-PAGE, FIGURE = pathlib.Path("stability.md"), pathlib.Path("figures") / "stability.png"
+DOCS = pathlib.Path(__file__).parents[1] / "docs"
+PAGE, FIGURE = DOCS / "stability.md", pathlib.Path("figures") / "stability.png"
+CORNERS, COUNTS = ("corners", "beyond", "arguments"), ("counts",)  # measured parts of the page: ours, and others'
 LEAST, MOST = 1e-16, 1e0  # of the colour scale
 
 
@@ -52,56 +55,48 @@ def _row(tally: Tally) -> str:
     return f"| {tally.name} | {' | '.join(map(str, counts))} | {largest} | {tally.bound_broken} |"
 
 
-def page(tallies: list[Tally], worst: list[dict[str, object]], kinds: list[tuple[str, bool]]) -> str:
-    """The text of the page."""
-    rows = "\n".join(_row(tally) for tally in tallies)
-    broken = "\n".join(f"- {case}" for case in worst[:20]) or "None."
-    listed = "\n".join(f"| {name} | {'same' if held else '**differs**'} |" for name, held in kinds)
-    return f"""# Stability
-
-`python -m generate atlas` evaluates the corners of parameter space and draws this page. White in the maps is a typed
-refusal in the lower row, and no number (NaN or an arithmetic error) in the upper one.
-
-![maps of relative error]({FIGURE.as_posix()})
-
-| corners | tried | refused | not finite | warnings | largest error of answers | answers beyond their own bound |
-| --- | --- | --- | --- | --- | --- | --- |
-{rows}
-
-- Islands: X from -40 to 1e4, mu from 0 and 1e-300 to 1e12, against mpmath at {cases.DIGITS} digits below
-  mu = {cases.RIGID_MU:g} and elsewhere against the solver at {cases.ISLAND_TRUTH:g}; where that is refused too, no
-  error is counted. The rigid tier is compared with the elastic truth, which it does not claim to meet.
-- Geometry: delta/h_rms from 1e-12 to 30, zeta_1 from 3.0000001 to 1e8, H from 0.05 to one ulp below 1 and 1, both
-  readings, against 60 digits; the maps are of H = {cases.MAP_HURST:g}. Of X, mu, eta, D_d, sigma_d and R_u the worst.
-- Totals: H from 0.05 to 1, zeta_1 from 3.0000001 to 1e8, h_max - d from 1e-12 h_rms to full compression, both readings,
-  at rtol 1e-8 against the exact tier at {cases.TOTAL_TRUTH:g}.
-
-Totals beyond their own bound:
-
-{broken}
-
-## Arguments
-
-| given | answer |
-| --- | --- |
-{listed}
-"""
+def corners(tallies: Sequence[Tally]) -> str:
+    """The table of what became of all corners."""
+    head = (
+        "corners | tried | refused | not finite | warnings | largest error of answers | answers beyond their own bound"
+    )
+    return "\n".join([f"| {head} |", "|" + " --- |" * 7, *map(_row, tallies)])
 
 
-@click.command()
-@click.option("--out", type=click.Path(path_type=pathlib.Path, file_okay=False), default="docs", show_default=True)
-def main(out: pathlib.Path) -> None:
-    """Evaluate the corners; write the page and its figure."""
-    started = time.perf_counter()
+def arguments(kinds: Iterable[tuple[str, bool]]) -> str:
+    """The table of kinds of arguments."""
+    rows = (f"| {name} | {'yes' if held else '**no**'} |" for name, held in kinds)
+    return "\n".join(["| given | so |", "| --- | --- |", *rows])
+
+
+def beyond(worst: Sequence[Mapping[str, object]]) -> str:
+    """The totals that are beyond their own bound."""
+    return "\n".join(f"- {case}" for case in worst[:20]) or "None."
+
+
+def parts(figure: pathlib.Path) -> dict[str, Callable[[], str]]:
+    """Evaluate the corners and draw them; the measured parts of the page."""
     island_tallies, island_maps = cases.islands()
     geometry_tallies, geometry_maps = cases.island_geometry()
     total_tallies, worst = cases.totals()
-    draw(geometry_maps, island_maps, out / FIGURE)
+    draw(geometry_maps, island_maps, figure)
     tallies = [*island_tallies, *geometry_tallies, *total_tallies]
-    write_files({out / PAGE: page(tallies, worst, list(cases.arguments())).encode()})
-    for tally in tallies:
-        click.echo(_row(tally))
-    click.echo(f"{out / PAGE}; {time.perf_counter() - started:.0f} s")
+    kinds = list(cases.arguments())
+    return {
+        "corners": lambda: corners(tallies),
+        "beyond": lambda: beyond(worst),
+        "arguments": lambda: arguments(kinds),
+    }
+
+
+@click.command()
+@click.option("--out", type=click.Path(path_type=pathlib.Path, file_okay=False), default=DOCS, help="Default docs.")
+def main(out: pathlib.Path) -> None:
+    """Evaluate the corners; write the page with these parts anew, and its figure."""
+    started = time.perf_counter()
+    page = fill(PAGE.read_text(encoding="utf-8"), parts(out / FIGURE), left=COUNTS)
+    write_files({out / PAGE.name: page.encode()}, make_folders=True)
+    click.echo(f"{out / PAGE.name}; {time.perf_counter() - started:.0f} s")
 
 
 if __name__ == "__main__":

@@ -5,18 +5,16 @@ Each measured part stands between two marks in the page; the rest of the page is
 
 from __future__ import annotations
 
-import json
 import math
 import pathlib
-import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import click
 import numpy as np
 
 from generate.configuration import load
-from generate.pages import png
+from generate.pages import fill, png
 from generate.table_schemes import LARGEST_ZETA_D, POINTS, SIZES, Row, compare
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models.raw import hat_scales, to_axes
@@ -27,7 +25,6 @@ from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL, TableConte
 from mbma_tables.whole_files import write_files
 
 PAGE = pathlib.Path(__file__).parents[1] / "docs" / "tables.md"
-MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 EXAMPLE = {UNIVERSAL: 40, ISLAND4D: 40}  # conformance points worked through
 
 
@@ -194,14 +191,6 @@ def comparison_text(rows: Sequence[Row]) -> str:
         f"zeta_d (1.5 to {LARGEST_ZETA_D:g}) and H, and over {POINTS // 2} islands of random surfaces (reading "
         f"{said.reading}).\n\n" + comparison_table(rows)
     )
-
-
-def fill(page: str, blocks: dict[str, Callable[[], str]]) -> str:
-    """The page with its measured parts made anew; every mark must be known, and every part have its mark."""
-    found = [match[2] for match in MARKED.finditer(page)]
-    if sorted(found) != sorted(blocks):
-        raise click.ClickException(f"docs/tables.md marks {json.dumps(found)}, not {json.dumps(sorted(blocks))}")
-    return MARKED.sub(lambda match: f"{match[1]}\n{blocks[match[2]]()}\n\n{match[3]}", page)
 
 
 @click.command()

@@ -11,12 +11,13 @@ import pytest
 from scipy.interpolate import make_interp_spline
 
 from generate import table_page, table_schemes
+from generate.pages import MARKED, fill
 from mbma_tables.models.tabulated import shipped
 from mbma_tables.tablefiles.schema import FORMAT_VERSION, ISLAND4D, KINDS, UNIVERSAL
 from mbma_tables.tablefiles.splines import coefficients
 
 PAGE = table_page.PAGE.read_text(encoding="utf-8")
-PARTS = {match[2]: match[0] for match in table_page.MARKED.finditer(PAGE)}
+PARTS = {match[2]: match[0] for match in MARKED.finditer(PAGE)}
 
 
 def rows(text):
@@ -115,14 +116,14 @@ def test_grid_goes_there_and_back(grid):
 
 def test_marks_that_do_not_fit_are_refused():
     with pytest.raises(click.ClickException, match="marks"):
-        table_page.fill("<!-- measured: nothing -->\n<!-- end -->", {"sizes": str})
+        fill("<!-- measured: nothing -->\n<!-- end -->", {"sizes": str})
 
 
 def test_filling_keeps_the_rest_and_is_idempotent():
     blocks = {name: lambda name=name: f"numbers of {name}" for name in PARTS}
-    once = table_page.fill(PAGE, blocks)
-    assert table_page.fill(once, blocks) == once
-    assert table_page.MARKED.sub("", once) == table_page.MARKED.sub("", PAGE)
+    once = fill(PAGE, blocks)
+    assert fill(once, blocks) == once
+    assert MARKED.sub("", once) == MARKED.sub("", PAGE)
 
 
 def test_figures_that_the_page_shows_exist():

@@ -1,77 +1,397 @@
-"""No jumps: force and area at pairs of inputs a relative 1e-9 apart, across every switch of the code."""
+"""No jumps: answers at pairs of inputs a relative 1e-9 apart, as functions of every input, across every switch.
+
+A pair may differ by what the slope between the two says, and by the errors stated. MBMA_GAUNTLET sets how many pairs.
+"""
+
+import dataclasses
+import math
+import os
 
 import numpy as np
 import pytest
 
-from mbma_tables import Surface, contact
+from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island
+from mbma_tables.islands import newton
+from mbma_tables.islands.height_integrals import ORDERS, f_half, height_integral
 from mbma_tables.islands.island import geometry
-from mbma_tables.models.tabulated import universal_model
-from mbma_tables.surfaces.readings import READINGS, get_reading
+from mbma_tables.models.formula import FormulaModel
+from mbma_tables.models.four_numbers import RAW
+from mbma_tables.models.raw import band_fields, from_axes, to_axes
+from mbma_tables.models.tabulated import island4d_model, universal_model
+from mbma_tables.surfaces.readings import READINGS, REPORTED, get_reading
+from mbma_tables.totals.intervals import NARROW
+from mbma_tables.totals.lookup import SMALL_POWER
 from mbma_tables.totals.pairs import kinks
 
+SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))
 STEP = 1e-9
-COUNT = 4000
+WIDE = 1e-6
+EPS = np.finfo(float).eps
+INPUTS = ("hurst", "q0", "q1", "h_rms", "h_max", "separation")
+SOLVER_RTOL = 1e-10
 
 
 def surfaces(rng, count):
-    hurst = rng.uniform(0.3, 1, count)
-    hurst[: count // 20] = 1 - STEP / 2
+    hurst = rng.uniform(0.1, 1, count)
+    # where differences of powers go over to expm1, and the end of the range
+    hurst[::10], hurst[5::10] = 1 - SMALL_POWER / 2, 1 - STEP / 2
     return hurst, 10 ** rng.uniform(0.5, 6, count), rng.uniform(2.5, 4.5, count)
 
 
+def reaches(rng, hurst, zeta_1, h_max, rule):
+    """(h_max - d)/h_rms: at random, next to first contact, and where segments appear or change their rule."""
+    kink_d, kink_u = kinks(hurst, zeta_1, rule)
+    reach = rng.uniform(1e-6, 2, hurst.size) * h_max
+    reach[1::6] = 10 ** rng.uniform(-6, 0, reach[1::6].size)
+    for start, switch in ((2, kink_d), (3, kink_u), (4, kink_d + NARROW), (5, kink_u + NARROW)):
+        reach[start::6] = switch[start::6]
+    return np.minimum(reach, 2 * h_max * (1 - 10 * STEP))
+
+
+def pressed(rng, count, rule):
+    """Numbers of surfaces and gaps, in any unit of length."""
+    hurst, zeta_1, h_max = surfaces(rng, count)
+    reach = reaches(rng, hurst, zeta_1, h_max, rule)
+    lengths = 10 ** rng.uniform(-9, 3, count)
+    heights = 0.01 * lengths
+    return {
+        "hurst": hurst,
+        "q0": 1 / lengths,
+        "q1": zeta_1 / lengths,
+        "h_rms": heights,
+        "h_max": heights * h_max,
+        "separation": heights * (h_max - reach),
+    }
+
+
+def moved_by(numbers, which, share):
+    """The numbers with one of them changed by a share of itself."""
+    own = numbers | {which: numbers[which] + share * np.abs(numbers[which])}
+    return own | {"hurst": np.minimum(own["hurst"], 1)}
+
+
+def totals_of(numbers, **options):
+    return contact(Surface(*(numbers[name] for name in INPUTS[:-1])), numbers["separation"], **options)
+
+
+def apart(a, b, moved):
+    """How far two answers are apart beyond what the slope between them moves them, relative."""
+    return np.abs(np.log(b / a) - moved)
+
+
 @pytest.mark.parametrize("reading", sorted(READINGS))
-@pytest.mark.parametrize("which", ["hurst", "zeta_1", "h_max", "separation"])
-def test_totals_do_not_jump(reading, which):
-    rng = np.random.default_rng([5, sorted(READINGS).index(reading), len(which)])
-    hurst, zeta_1, h_max = surfaces(rng, COUNT)
-    kink_d, kink_u = kinks(hurst, zeta_1, get_reading(reading))
-    # a third at random, a third at each kink, where a segment of the integral appears
-    reach = rng.uniform(1e-6, 2, COUNT) * h_max
-    third = COUNT // 3
-    reach[:third], reach[third : 2 * third] = kink_d[:third], kink_u[third : 2 * third]
-    reach = np.minimum(reach, 2 * h_max)
-    gap = h_max - reach
-    one = contact(Surface(hurst, 1.0, zeta_1, 1.0, h_max), np.maximum(gap, -h_max), reading=reading, outside="exact")
-    moved = {"hurst": hurst, "zeta_1": zeta_1, "h_max": h_max, "separation": gap}
-    step = STEP * np.maximum(np.abs(moved[which]), 1e-3)
-    moved[which] = moved[which] - step if which == "hurst" else moved[which] + step
-    gap = np.clip(moved["separation"], -moved["h_max"], None)
-    surface = Surface(moved["hurst"], 1.0, moved["zeta_1"], 1.0, moved["h_max"])
-    other = contact(surface, gap, reading=reading, outside="exact")
+@pytest.mark.parametrize("which", INPUTS)
+@pytest.mark.parametrize(
+    ("tier", "rtol", "count"), [("universal", 1e-8, 240), ("universal", 1e-10, 240), ("exact", 1e-9, 6)]
+)
+def test_totals_do_not_jump(reading, which, tier, rtol, count, record_property):
+    count *= SCALE
+    rng = np.random.default_rng([5, sorted(READINGS).index(reading), INPUTS.index(which), round(-math.log10(rtol))])
+    numbers = pressed(rng, count, get_reading(reading))
+    below, above = (moved_by(numbers, which, sign * STEP / 2) for sign in (-1, 1))
+    step = above[which] - below[which]
+    options = {"reading": reading, "outside": "nan"}
+    slopes = [totals_of(side, derivatives=True, **options) for side in (below, above)]
+    one, other = (totals_of(side, tier=tier, rtol=rtol, **options) for side in (below, above))
+    some = np.isfinite(slopes[0].force) & np.isfinite(slopes[1].force)
+    assert some.mean() > 0.6
+    rounded = 8 * EPS * numbers["h_max"] / (numbers["h_max"] - numbers["separation"])
     for name in ("force", "area"):
-        a, b = getattr(one, name), getattr(other, name)
-        some = (a > 0) & (b > 0)
-        # a steep function moves by itself: by up to 1e3 a unit of relative change but next to first contact
-        own = 1e3 * STEP + 8 * step / np.maximum(reach, 1e-300)
-        allowed = one.error + other.error + own
-        assert (np.abs(b / a - 1)[some] <= allowed[some]).all()
+        low, high = (getattr(s, f"{name}_by")[which] * step / getattr(s, name) for s in slopes)
+        off = apart(getattr(one, name), getattr(other, name), (low + high) / 2)
+        # slopes differ where K1 switches
+        assert (off <= one.error + other.error + np.abs(high - low) + rounded)[some].all()
+    record_property("pairs compared", int(some.sum()))
 
 
-def test_islands_do_not_jump_at_the_floors():
+def own_motion(answer, name):
+    """How far a tier's answer moves over a step by itself: by differences a thousand steps wide."""
+    centre = getattr(answer(0.0), name)
+    return np.max([np.abs(getattr(answer(end), name) / centre - 1) for end in (-WIDE, WIDE)], axis=0) * STEP / WIDE
+
+
+@pytest.mark.parametrize("which", INPUTS)
+@pytest.mark.parametrize("tier", ["rigid", "island4d", "formula"])
+def test_totals_of_other_tiers_do_not_jump(tier, which, record_property):
+    count = 18 * SCALE
+    numbers = pressed(np.random.default_rng([17, len(tier), INPUTS.index(which)]), count, REPORTED)
+    numbers["hurst"] = np.clip(numbers["hurst"], 0.31, 1 - 2 * WIDE)
+    depth = np.maximum(numbers["h_max"] - numbers["separation"], 1e-3 * numbers["h_max"])
+    numbers["separation"] = numbers["h_max"] - np.minimum(depth, 2 * numbers["h_max"] * (1 - 10 * WIDE))
+
+    def answer(share):
+        return totals_of(moved_by(numbers, which, share), tier=tier, rtol=1e-7, outside="exact")
+
+    one, other = answer(-STEP / 2), answer(STEP / 2)
+    for name in ("force", "area"):
+        off = np.abs(getattr(other, name) / getattr(one, name) - 1)
+        assert (off <= one.error + other.error + 2 * own_motion(answer, name)).all()
+    record_property("pairs compared", count)
+
+
+@pytest.mark.parametrize("tier", ["universal", "exact", "rigid"])
+def test_totals_are_straight_in_the_modulus(tier):
+    surface, modulus = Surface(0.7, 1.0, 60.0, 0.02, 0.06), 10 ** np.linspace(0, 12, 13)
+    one, other = (contact(surface, 0.03, tier=tier, E_star=modulus * (1 + sign * STEP)) for sign in (-0.5, 0.5))
+    np.testing.assert_allclose(other.force / one.force - 1, STEP, rtol=0, atol=4 * EPS)
+    np.testing.assert_array_equal(other.area, one.area)
+
+
+def test_totals_do_not_jump_where_the_solver_takes_over(record_property):
+    """Surfaces that leave the universal table as they are pressed: gaps on both sides of that, by bisection."""
+    count = 3 * SCALE
+    rng = np.random.default_rng(8)
+    shallow = dataclasses.replace(REPORTED, name="shallow", beta=0.01, phi=0.001)
+    compared = 0
+    for reading, hurst in ((REPORTED, rng.uniform(0.05, 0.08, count)), (shallow, rng.uniform(0.7, 1, count))):
+        surface = Surface(hurst, 1.0, 10 ** rng.uniform(7.5, 8, count), 1.0, 4.5)
+        inside, outside = np.full(count, 4.5 - 1e-9), np.full(count, -4.4)
+        for _ in range(60):
+            middle = (inside + outside) / 2
+            gone = np.isnan(contact(surface, middle, reading=reading, outside="nan").force)
+            inside, outside = np.where(gone, inside, middle), np.where(gone, middle, outside)
+        one, other = (contact(surface, gap, reading=reading, outside="exact") for gap in (inside, outside))
+        left = np.isnan(contact(surface, outside, reading=reading, outside="nan").force)
+        assert left.any()
+        own = 10 * np.abs(inside - outside) / (4.5 - inside)
+        for name in ("force", "area"):
+            off = apart(getattr(one, name), getattr(other, name), 0.0)
+            assert (off <= one.error + other.error + own)[left].all()
+        compared += int(left.sum())
+    record_property("pairs compared", compared)
+
+
+@pytest.mark.parametrize("which", ["delta", "hurst", "q0", "q1", "h_rms", "E_star"])
+@pytest.mark.parametrize(("tier", "rtol"), [("universal", 1e-8), ("exact", 1e-10), ("rigid", 1e-8), ("island4d", 1e-3)])
+def test_islands_do_not_jump(which, tier, rtol, record_property):
+    count = 90 * SCALE
+    rng = np.random.default_rng([9, len(which), len(tier)])
+    hurst, zeta_1, _ = surfaces(rng, count)
+    hurst = np.clip(hurst, 0.31, 1 - 2 * WIDE)
+    approach = 10 ** rng.uniform(-9, 0.5, count)
+    for start, kink in enumerate(kinks(hurst, zeta_1, REPORTED)):
+        approach[start::3] = kink[start::3]
+    numbers = {"hurst": hurst, "q0": np.full(count, 2.0), "q1": 2 * zeta_1, "h_rms": np.full(count, 0.3)}
+    # the four-parameter table ends a little above what surfaces visit
+    numbers |= {"delta": 0.3 * np.minimum(approach, 9.0), "E_star": np.full(count, 7.0)}
+
+    def answer(share):
+        own = moved_by(numbers, which, share)
+        surface = Surface(own["hurst"], own["q0"], own["q1"], own["h_rms"], 9.0)
+        return island(surface, own["delta"], tier=tier, rtol=rtol, E_star=own["E_star"])
+
+    one, other = answer(-STEP / 2), answer(STEP / 2)
+    for name in ("force", "area", "zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "eta", "X", "mu"):
+        stated = one.error + other.error if name in ("force", "area") else 1e-12
+        off = np.abs(getattr(other, name) / getattr(one, name) - 1)
+        assert (off <= stated + 2 * own_motion(answer, name)).all(), name
+    record_property("pairs compared", count)
+
+
+def test_geometry_does_not_jump_at_the_floors(record_property):
+    count = 500 * SCALE
     rng = np.random.default_rng(6)
-    hurst, zeta_1, _ = surfaces(rng, COUNT)
+    hurst, zeta_1, _ = surfaces(rng, count)
     for reading in READINGS.values():
         for kink in kinks(hurst, zeta_1, reading):
             below, above = (geometry(kink * (1 + side * STEP), hurst, zeta_1, reading) for side in (-1, 1))
             for name in ("X", "mu", "eta", "D_d", "sigma_d", "R_d", "R_u"):
                 assert np.abs(above[name] / below[name] - 1).max() < 1e3 * STEP, name
+    record_property("pairs compared", 4 * count)
 
 
-def test_the_table_joins_its_expansion():
-    model = universal_model()
-    rng = np.random.default_rng(7)
-    X = rng.uniform(model.content.axes[0].low, model.content.axes[0].high, COUNT)
-    edge = model.content.axes[1].low
-    below, above = (model.answer(X, np.full(COUNT, edge * (1 + side * STEP))) for side in (-1, 1))
-    np.testing.assert_allclose(above.phi_F / below.phi_F, 1 + 2 * STEP, rtol=1e-10)
-    np.testing.assert_allclose(above.phi_A, below.phi_A, rtol=1e-10)
+def level_changes(rng, count, rtol):
+    """X and mu where the solver goes over to more nodes: by X in the first half, by mu in the other."""
+    digits = -math.log10(rtol)
+    X, mu = rng.uniform(-5, 38, count), 10 ** rng.uniform(-12, 6, count)
+    level = rng.choice(greenwood_tripp.LEVELS[greenwood_tripp.LEVELS < 100], count)
+    softness = 1 + np.log10(np.maximum(mu, 1)) / 12
+    by_X = (level / (digits * softness)) ** 2 - 5
+    by_mu = 10 ** (12 * (level / (digits * np.sqrt(np.maximum(X, 0) + 5)) - 1))
+    half = np.arange(count) < count // 2
+    X[half], mu[~half] = by_X[half], by_mu[~half]
+    kept = (X > np.where(half, 0, -5)) & (X < 40) & (mu > np.where(half, 0, 1)) & (mu < 1e6)
+    return X[kept], mu[kept], half[kept]
 
 
-@pytest.mark.parametrize("X", [-8.0, -6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0, 8.0])
+def two_numbers(rng, count):
+    """X and mu at random, at the table's nodes, where the height integrals change their piece, and about 0 and 1."""
+    X_axis, mu_axis = universal_model().content.axes
+    X, mu = rng.uniform(X_axis.low + 1e-3, X_axis.high - 1e-3, count), 10 ** rng.uniform(-12, 6, count)
+    X[1::6] = rng.choice(X_axis.values[1:-1], X[1::6].size)
+    mu[2::6] = rng.choice(mu_axis.values[1:-1], mu[2::6].size)
+    X[3::6] = rng.choice([-4.0, -1.0, 2.0, 4.0, 6.0, 8.0], X[3::6].size)
+    mu[4::6] = mu_axis.low
+    mu[5::6] = 1.0
+    return X, mu
+
+
+def islands_apart(answer, X, mu, which, room=1e-4):
+    """Whether a model's answers at pairs in X or mu are apart by no more than slopes and errors say."""
+    shares = [(1 + sign * STEP / 2 * np.array([which == "X", which == "mu"])) for sign in (-1, 1)]
+    one, other = (answer(X * in_X, mu * in_mu) for in_X, in_mu in shares)
+    value, by_X, by_mu = universal_model().slopes(X, mu)
+    for name in ("phi_F", "phi_A"):
+        slope = getattr(by_X, name) * np.abs(X) if which == "X" else getattr(by_mu, name) * mu
+        moved = STEP * slope / getattr(value, name) * (np.sign(X) if which == "X" else 1)
+        a, b = getattr(one, name), getattr(other, name)
+        assert (apart(a, b, moved) <= one.error + other.error + room * np.abs(moved)).all(), name
+    return one, other
+
+
+@pytest.mark.parametrize("which", ["X", "mu"])
+def test_the_universal_table_does_not_jump(which, record_property):
+    X, mu = two_numbers(np.random.default_rng(7), 1500 * SCALE)
+    islands_apart(universal_model().answer, X, mu, which)
+    record_property("pairs compared", X.size)
+
+
+@pytest.mark.parametrize("which", ["X", "mu"])
+def test_the_solver_does_not_jump(which, record_property):
+    rng = np.random.default_rng(10)
+    X, mu = two_numbers(rng, 300 * SCALE)
+
+    def answer(X, mu):
+        return greenwood_tripp.solve(X, mu, rtol=SOLVER_RTOL)
+
+    islands_apart(answer, X, mu, which)
+    at_X, at_mu, by_X = level_changes(rng, 1200 * SCALE, SOLVER_RTOL)
+    chosen = by_X if which == "X" else ~by_X
+    one, other = islands_apart(answer, at_X[chosen], at_mu[chosen], which)
+    # the pairs are where they should be; an estimate that is not met sends both sides on
+    assert np.mean(one.nodes < other.nodes) > 0.5
+    record_property("pairs compared", X.size + int(chosen.sum()))
+
+
+def test_the_solver_joins_the_rigid_sphere(record_property):
+    """Where the deformation is left out altogether."""
+    X = np.random.default_rng(11).uniform(-20, 38, 200 * SCALE)
+    squared = np.array([newton.extent_squared(x, 0.0, 0.03 * SOLVER_RTOL) for x in X])
+    edge = newton.NEGLIGIBLE / (np.array([f_half(-x) for x in X]) * (1 + squared))
+    one, other = (greenwood_tripp.solve(X, edge * (1 + sign * STEP), rtol=SOLVER_RTOL) for sign in (-1, 1))
+    assert (one.iterations == 0).all()
+    assert (other.iterations > 0).all()
+    assert (apart(one.phi_F, other.phi_F, 2 * STEP) <= one.error + other.error).all()
+    assert (apart(one.phi_A, other.phi_A, 0) <= one.error + other.error).all()
+    record_property("pairs compared", X.size)
+
+
+@pytest.mark.parametrize("which", ["X", "mu"])
+@pytest.mark.parametrize("form", ["standard", "pocket", "long"])
+def test_the_closed_forms_do_not_jump(form, which, record_property):
+    """And where the solver takes over from them."""
+    model, rng = FormulaModel(form), np.random.default_rng(12)
+    count = 120 * SCALE
+    (X_low, X_high), (_, mu_high) = (model.form.range[name] for name in ("X", "mu"))
+    X, mu = rng.uniform(X_low, X_high, count), 10 ** rng.uniform(-9, math.log10(mu_high), count)
+    if which == "X":
+        X[::6], X[1::6] = max(X_low, 1e-3), X_high
+    else:
+        mu[::3] = mu_high
+    islands_apart(lambda X, mu: model.answer(X, mu, outside="exact"), X, mu, which, room=1)
+    record_property("pairs compared", count)
+
+
+@pytest.mark.parametrize("side", ["X low", "X high", "mu high"])
+def test_the_solver_takes_over_from_the_universal_table(side, record_property):
+    count, rng = 60 * SCALE, np.random.default_rng(13)
+    axes = dict(zip(("X", "mu"), universal_model().content.axes, strict=True))
+    numbers = {"X": rng.uniform(-5, 40, count), "mu": 10 ** rng.uniform(-10, 6, count)}
+    which, end = side.split()
+    at = getattr(axes[which], end)
+    inside, outside = (numbers | {which: np.full(count, at - sign * STEP * abs(at))} for sign in (1, -1))
+    if end == "low":
+        inside, outside = outside, inside
+    one, other = (universal_model().answer(**n, outside="exact") for n in (inside, outside))
+    value, by_X, by_mu = universal_model().slopes(**inside)
+    for name in ("phi_F", "phi_A"):
+        moved = (outside[which] - inside[which]) * getattr(by_X if which == "X" else by_mu, name) / getattr(value, name)
+        assert (apart(getattr(one, name), getattr(other, name), moved) <= one.error + other.error + 1e-13).all()
+    record_property("pairs compared", count)
+
+
+def raw_numbers(rng, count):
+    """The paper's four numbers of islands inside the four-parameter table, some at the ends of its axes."""
+    X_axis, _, _, hurst_axis = island4d_model().content.axes
+    hurst = rng.uniform(hurst_axis.low, hurst_axis.high - 1e-6, count)
+    hurst[::5] = rng.choice(hurst_axis.values[:-1], hurst[::5].size)
+    zeta_d = from_axes(rng.uniform(1e-6, 1, count), hurst)
+    zeta_d[1::5] = from_axes(1.0, hurst[1::5])
+    spread = 10 ** rng.uniform(-3, math.log10(2499), count)
+    X = rng.uniform(X_axis.low, X_axis.high, count)
+    X[2::5], X[3::5] = X_axis.low, X_axis.high
+    sigma = to_axes(np.ones(count), zeta_d, zeta_d * (1 + spread), hurst, REPORTED).sigma
+    return {
+        "delta_over_h_rms": (X * sigma + 1) * zeta_d**-hurst,
+        "zeta_d": zeta_d,
+        "zeta_u": zeta_d * (1 + spread),
+        "hurst": hurst,
+    }
+
+
+@pytest.mark.parametrize("which", RAW)
+def test_the_four_parameter_table_does_not_jump(which, record_property):
+    """And where the solver takes over from it, at the ends of its axes."""
+    count, model = 200 * SCALE, island4d_model()
+    raw = raw_numbers(np.random.default_rng(14), count)
+    below, above = (raw | {which: raw[which] * (1 + sign * STEP / 2)} for sign in (-1, 1))
+    one, other = (model.lookup(**side, outside="exact") for side in (below, above))
+    slopes = [model.lookup(**side, outside="nan", derivatives=True) for side in (below, above)]
+    place = to_axes(*raw.values(), REPORTED)
+    rounded = EPS * (1 / place.spread + 4 * (1 + place.X) / place.sigma)
+    for hat, by in (("F_hat", "F_by"), ("A_hat", "A_by")):
+        steps = [getattr(s, by)[which] / getattr(s, hat) * STEP * raw[which] for s in slopes]
+        moved = np.where(np.isnan(steps[0]), steps[1], steps[0])
+        assert np.isfinite(moved).all()
+        off = apart(getattr(one, hat), getattr(other, hat), moved)
+        assert (off <= one.error + other.error + rounded + 0.1 * np.abs(moved)).all()
+    crossed = np.isnan(slopes[0].F_hat) != np.isnan(slopes[1].F_hat)
+    assert crossed.any()
+    record_property("pairs compared", count)
+
+
+def test_the_four_parameter_table_joins_its_expansion(record_property):
+    count, model = 200 * SCALE, island4d_model()
+    rng = np.random.default_rng(15)
+    X_axis, spread_axis, _, hurst_axis = model.content.axes
+    hurst = rng.uniform(hurst_axis.low, hurst_axis.high, count)
+    zeta_d, X = from_axes(rng.uniform(0.01, 1, count), hurst) * (1 + 1e-9), rng.uniform(X_axis.low, X_axis.high, count)
+    found = []
+    for sign in (-1, 1):
+        spread = spread_axis.low * (1 + sign * STEP) * np.ones(count)
+        mu = band_fields(spread, (1.25 / zeta_d) ** (4 - 2 * hurst), hurst, REPORTED)[0]
+        fields = {"X": X, "width": np.log1p(spread), "zeta_d": zeta_d, "hurst": hurst, "mu": mu}
+        answer = model.of_islands(fields)
+        found.append((answer.phi_F / mu, answer.phi_A, answer.error))
+    (force, area, error), (next_force, next_area, next_error) = found
+    assert (np.abs(next_force / force - 1) <= error + next_error).all()
+    assert (np.abs(next_area / area - 1) <= error + next_error).all()
+    # of a first-order effect of mu = 1e-9, far less is left than the table's error elsewhere
+    assert np.abs(np.concatenate([next_force / force, next_area / area]) - 1).max() < 1e-9
+    record_property("pairs compared", count)
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-9])
+def test_laws_do_not_jump_at_their_breaks(rtol, record_property):
+    rng, compared = np.random.default_rng(16), 0
+    for _ in range(2 * SCALE):
+        reading = sorted(READINGS)[rng.integers(2)]
+        surface = Surface(rng.uniform(0.3, 1), 1.0, 10 ** rng.uniform(0.5, 4), 1.0, rng.uniform(2.5, 4.5))
+        law = contact_law(surface, rtol, reading=reading)
+        depth = law.layer * np.sinh(law.breaks[1:-1]) ** 2
+        gaps = law.h_max - depth
+        sides = [gaps - sign * STEP * depth for sign in (-0.5, 0.5)]
+        for value, slope in ((law.force, law.stiffness), (law.area, law.area_slope)):
+            a, b = (value(side) for side in sides)
+            own = np.abs([slope(side) for side in sides]).max(axis=0) * 2 * np.abs(sides[1] - sides[0]) / a
+            assert (np.abs(b / a - 1) <= 2 * law.error + own).all()
+        compared += depth.size
+    record_property("pairs compared", compared)
+
+
+@pytest.mark.parametrize("X", [-8.0, -6.0, -4.0, -2.0, -1.0, 0.0, 2.0, 4.0, 6.0, 8.0])
 def test_height_integrals_join(X):
     """The polynomial pieces of the rigid sphere meet where they switch."""
-    from mbma_tables.islands.height_integrals import ORDERS, height_integral
-
     for order in ORDERS:
         below, above = (float(height_integral(order, -X * (1 + side * 1e-12) - side * 1e-13)) for side in (-1, 1))
         assert above == pytest.approx(below, rel=1e-9, abs=0)
