@@ -19,15 +19,17 @@ ABANDONED = 3600.0  # seconds; the writer of a draft that old was killed
 
 def _remove_abandoned(target: pathlib.Path) -> None:
     """Remove drafts of this file whose writers were killed; others may still be written to."""
-    for other in target.parent.iterdir():
-        if other.name.startswith(f".{target.name}.") and other.name.endswith(DRAFT):
-            with contextlib.suppress(OSError):
-                if time.time() - other.stat().st_mtime > ABANDONED:
-                    other.unlink()
+    # a folder that cannot be listed may be writable all the same
+    with contextlib.suppress(OSError):
+        for other in target.parent.iterdir():
+            if other.name.startswith(f".{target.name}.") and other.name.endswith(DRAFT):
+                with contextlib.suppress(OSError):
+                    if time.time() - other.stat().st_mtime > ABANDONED:
+                        other.unlink()
 
 
 def _name_beside(target: pathlib.Path) -> pathlib.Path:
-    return target.with_name(f".{target.name}.{uuid.uuid4().hex}{DRAFT}")
+    return target.with_name(f".{target.name}.{uuid.uuid4().hex[:12]}{DRAFT}")
 
 
 def _write_draft(target: pathlib.Path, draft: pathlib.Path, content: bytes) -> None:

@@ -1,5 +1,6 @@
 """Tables that are replaced or cut while others read them, and folders that cannot keep what is compiled."""
 
+import concurrent.futures
 import dataclasses
 import os
 import pathlib
@@ -119,6 +120,21 @@ def test_a_replaced_table_is_opened_anew(tmp_path, monkeypatch):
         monkeypatch.chdir(folder)
         found.append(universal_model("table.nc").content.attributes["history"])
     assert found[0] == "another" != found[1]
+
+
+def test_threads_that_open_one_table_at_once(tmp_path):
+    path = tmp_path / "table.nc"
+    shutil.copy(shipped("universal"), path)
+    gate = threading.Barrier(16)
+
+    def opened(_):
+        gate.wait()
+        return universal_model(path), float(check_table(path)[0].log_ratio.sum())
+
+    with concurrent.futures.ThreadPoolExecutor(16) as threads:
+        found = list(threads.map(opened, range(16)))
+    assert len({id(model) for model, _ in found}) == 1
+    assert {total for _, total in found} == {float(universal_model().content.log_ratio.sum())}
 
 
 SMALL = "from mbma_tables.islands.height_integrals import height_integral as h; print(repr(float(h(1.5, 0.3))))"
