@@ -62,8 +62,8 @@ class FormulaModel(TwoNumberModel):
         wanted = ISLAND_OUTPUTS if which == BOTH else (ISLAND_OUTPUTS[which],)
         out = np.full((3, *shape), np.nan)
         for name, values in self.form.evaluate(flat, wanted).items():
-            out[ISLAND_OUTPUTS.index(name)][inside] = values
-        out[2][inside] = max(self.form.largest_error(name) for name in wanted)
+            out[ISLAND_OUTPUTS.index(name), inside] = values
+        out[2, inside] = max(self.form.largest_error(name) for name in wanted)
         if outside == "exact" and not inside.all():
             lost = {name: np.broadcast_to(array, shape)[~inside] for name, array in given.items()}
             solved = greenwood_tripp.solve(lost["X"], lost["mu"], rtol=EXACT_RTOL)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 # bounds on islands that the shipped tables' certificates give; each run checks its own
 CERTIFIED = {"rigid": 1e-14, "formula": 1e-2, "island4d": 1.75e-4, "universal": 6e-9, "exact": 0.0}
 LADDER = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
-SLOPE_SHARE = 1 / 30  # of the tolerance: a law's slope is that much worse than its values
+SLOPE_SHARE = 1 / 300  # of the tolerance: a law's slopes are rarely worse than its values by more
 LEAST_LAW_RTOL, LEAST_CONTACT_RTOL = 1e-9, 1e-11
 MOST_RTOL = 0.1
 LEAST_ISLAND4D_HURST = 0.3

@@ -11,15 +11,16 @@ import numpy as np
 import xarray as xr
 
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.scenes.plan import Plan, Step, note_opened, rigid_error, top_of
+from mbma_tables.scenes.plan import LEAST_LAW_RTOL, Plan, Step, note_opened, rigid_error, top_of
 
 if TYPE_CHECKING:
     from mbma_tables.scenes.scene import Progress, Scene
     from mbma_tables.surfaces.surface import Surface
+    from mbma_tables.totals.law import ContactLaw
 
 BLOCK = 64  # gaps between two reports of progress
 TABLES = {"universal", "island4d"}
-SLOPE_LOSS = 30.0  # error of a law's slope over that of its values
+SLOPE_OF_SLOPE = 3.0  # largest d log(stiffness)/d log(h_max - d), next to first contact 5/2
 
 
 @dataclasses.dataclass
@@ -28,6 +29,7 @@ class _State:
 
     scene: Scene
     surface: Surface
+    rtol: float
     found: dict[str, tuple[tuple[str, ...], Any, str, str]]
     progress: Progress | None
     gap: Any = None
@@ -62,7 +64,7 @@ def run_scene(scene: Scene, plan: Plan, progress: Progress | None = None) -> xr.
     surface = scene.surface
     if "finite_height" in scene.dropped:
         surface = dataclasses.replace(surface, h_max=top_of(scene, 0.1 * plan.rtol))
-    state = _State(scene, surface, {}, progress)
+    state = _State(scene, surface, plan.rtol, {}, progress)
     if scene.gaps is not None and scene.prescribed != "nominal_pressures":
         h_max = float(scene.surface.h_max)
         state.gap = scene.gaps if scene.prescribed == "separations" else 2 * scene.gaps - h_max
@@ -75,24 +77,40 @@ def run_scene(scene: Scene, plan: Plan, progress: Progress | None = None) -> xr.
     return _dataset(state, plan)
 
 
-def _law(state: _State, step: Step) -> None:
+def _make_law(state: _State, tier: str, rtol: float) -> tuple[ContactLaw, str]:
+    """The law, and the tier that made it: the exact one where a table does not reach."""
     from mbma_tables.totals.law import contact_law
 
     scene = state.scene
-    assert step.tier is not None
-    assert step.rtol is not None
-    tier = step.tier
     try:
-        law = contact_law(state.surface, step.rtol, tier, scene.reading, scene.E_star)
+        return contact_law(state.surface, rtol, tier, scene.reading, scene.E_star), tier
     except OutOfRangeError:
         if tier not in TABLES:
             raise
-        tier = "exact"
-        law = contact_law(state.surface, step.rtol, tier, scene.reading, scene.E_star)
-    if scene.prescribed == "nominal_pressures":
-        state.gap = law.separation(force=scene.gaps)
+    return contact_law(state.surface, rtol, "exact", scene.reading, scene.E_star), "exact"
+
+
+def _law(state: _State, step: Step) -> None:
+    scene = state.scene
+    assert step.tier is not None
+    assert step.rtol is not None
+    asked, by_pressure = step.rtol, scene.prescribed == "nominal_pressures"
+    while True:
+        law, tier = _make_law(state, step.tier, asked)
+        if by_pressure:
+            state.gap = law.separation(force=scene.gaps)
+        error = law.error
+        if scene.outputs & {"stiffness", "conductance"}:
+            error = _slope_error(law, state.gap, by_pressure)
+        elif by_pressure:
+            # the gap carries the error of the force
+            error *= 2
+        if error <= state.rtol or asked <= LEAST_LAW_RTOL:
+            break
+        asked = max(0.1 * asked, LEAST_LAW_RTOL)
+    if by_pressure:
         state.add("nominal_pressure", ("gap",), scene.gaps, state.stress, "F/A0 as prescribed")
-    gap, wanted, error = state.gap, scene.outputs, law.error
+    gap, wanted = state.gap, scene.outputs
     if "force" in wanted:
         state.add("force", ("gap",), law.force(gap), state.stress, "nominal pressure F/A0")
     if "area" in wanted and "subscale_area" not in scene.dropped:
@@ -111,12 +129,18 @@ def _law(state: _State, step: Step) -> None:
         k_s = mean_conductivity(*scene.conductivities)
         value = conductance(law.stiffness_mean(gap), k_s, scene.E_star)
         state.add("conductance", ("gap",), value, f"conductivity/{state.length}", "conductance per nominal area")
-    if wanted & {"stiffness", "conductance"}:
-        error *= SLOPE_LOSS
-    elif scene.prescribed == "nominal_pressures":
-        # the gap carries the error of the force
-        error *= 2
     state.close(step, error, tier)
+
+
+def _slope_error(law: ContactLaw, gap: Any, inverted: bool) -> float:
+    """Bound on the relative error of the stiffness at these gaps, and of force, area and energy."""
+    touching = gap[gap < law.h_max]
+    if touching.size == 0:
+        return law.error
+    # F/l over the stiffness: large only next to a turning point
+    share = law.force(touching) / ((law.h_max - touching) * np.abs(law.stiffness(touching)))
+    moved = SLOPE_OF_SLOPE * law.error if inverted else 0.0
+    return max(2 * law.error, float(((law.slope_error(touching) + moved) * share).max()))
 
 
 def _answer(state: _State, step: Step, wanted: tuple[str, ...]) -> dict[str, Any]:

@@ -44,6 +44,8 @@ class ContactLaw:
         Gap below which the model's force, or area, falls again, where it does (low H); inverses end there.
     reading, tier : str
         What made it.
+    breaks, pieces, layer, energies, errors : ndarray or float
+        The polynomials: ends of the pieces in tau, coefficients, unit of l, energy at the ends, bounds on their errors.
     """
 
     h_max: float
@@ -57,6 +59,7 @@ class ContactLaw:
     pieces: FloatArray
     layer: float
     energies: FloatArray
+    errors: FloatArray
 
     @functools.cached_property
     def _state(self) -> law_kernel.State:
@@ -130,6 +133,21 @@ class ContactLaw:
         out = np.empty(wanted.shape)
         law_kernel.invert(what, np.ascontiguousarray(wanted).reshape(-1), end, self._state, out.reshape(-1))
         return out[()]
+
+    def slope_error(self, separation: ArrayLike) -> Any:
+        """Bound on the error of `stiffness` over F/l, and of `area_slope` over A/l, where l = h_max - d.
+
+        By Markov's inequality in the piece where d is: a residue of degree TERMS has slopes up to TERMS^2 times itself.
+        """
+        d = finite_array("separation", separation)
+        require("separation", d, d >= -self.h_max, f"at least -h_max = {-self.h_max:.17g}, where the model ends")
+        tau = np.arcsinh(np.sqrt(np.maximum(self.h_max - d, 0.0) / self.layer))
+        # on a break, the worse of both pieces
+        sides = (np.searchsorted(self.breaks, tau, side) - 1 for side in ("left", "right"))
+        loss = TERMS**2 / np.diff(self.breaks)
+        worst = np.maximum(*((self.errors * loss)[np.clip(side, 0, loss.size - 1)] for side in sides))
+        # l dtau/dl = tanh(tau)/2
+        return np.where(d < self.h_max, worst * np.tanh(tau), 0.0)[()]
 
     def _branch_end(self, what: int) -> float:
         turn = self.turning_point if what == law_kernel.FORCE else self.area_turning_point
@@ -218,8 +236,7 @@ def contact_law(
     low, high = edges[:-1], edges[1:]
     points = chebyshev.chebpts1(TERMS)
     tests = np.cos(np.pi * (np.arange(SAMPLES) + 0.5) / SAMPLES)[::-1]
-    kept: list[tuple[float, float, FloatArray]] = []
-    achieved = 0.0
+    kept: list[tuple[float, float, FloatArray, float]] = []
     while low.size:
         if len(kept) + low.size > MOST_PIECES:
             raise ConvergenceError(f"the law needs more than {MOST_PIECES} pieces for {asked:.1e}", np.array(True))
@@ -227,20 +244,22 @@ def contact_law(
         fitted = _to_piece(residues(middle + half * points))
         truth = residues(middle + half * tests)
         powers = tests[:, None] ** np.arange(TERMS)
-        error = np.abs(np.einsum("sm,pmc->psc", powers, fitted) - truth).max(axis=(1, 2))
+        seen = np.abs(np.einsum("sm,pmc->psc", powers, fitted) - truth).max(axis=(1, 2))
+        # Ehlich and Zeller (1964): no polynomial of degree TERMS exceeds its values at the samples by more
+        error = np.expm1(seen / math.cos(math.pi * TERMS / (2 * SAMPLES)))
         good = error <= asked
-        achieved = max(achieved, float(error[good].max(initial=0.0)))
-        kept += [(float(a), float(b), c) for a, b, c in zip(low[good], high[good], fitted[good], strict=True)]
+        kept += zip(low[good].tolist(), high[good].tolist(), fitted[good], error[good].tolist(), strict=True)
         cut = (low[~good] + high[~good]) / 2
         low, high = np.concatenate([low[~good], cut]), np.concatenate([cut, high[~good]])
     kept.sort(key=lambda piece: piece[0])
     breaks = np.array([kept[0][0], *(piece[1] for piece in kept)])
     pieces = np.stack([piece[2] for piece in kept])
+    errors = np.array([piece[3] for piece in kept]) + worst
     state = (breaks, pieces, layer, h_max, modulus)
     return ContactLaw(
         h_max=h_max,
         E_star=modulus,
-        error=achieved + worst,
+        error=float(errors.max()),
         turning_point=law_kernel.turning_point(law_kernel.FORCE, state, SAMPLES),
         area_turning_point=law_kernel.turning_point(law_kernel.AREA, state, SAMPLES),
         reading=rule.name,
@@ -249,4 +268,5 @@ def contact_law(
         pieces=pieces,
         layer=layer,
         energies=law_kernel.energies(state),
+        errors=errors,
     )

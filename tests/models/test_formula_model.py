@@ -64,3 +64,12 @@ def test_bad_choices(bad):
 def test_no_number(X, mu):
     with pytest.raises(InputError):
         FormulaModel().answer(X, mu, outside="exact")
+
+
+def test_scalars_are_answered_as_arrays_are():
+    from mbma_tables import island
+
+    one, many = FormulaModel().answer(1.0, 1.0), FormulaModel().answer([1.0], [1.0])
+    assert (one.phi_F, one.phi_A, one.error) == (many.phi_F[0], many.phi_A[0], many.error[0])
+    surface = Surface(0.8, 1.0, 100.0, 1.0, 3.0)
+    assert island(surface, 0.5, tier="formula").force == island(surface, [0.5], tier="formula").force[0]

@@ -248,3 +248,27 @@ def test_every_effect_says_its_equation_and_cost():
         assert effect.meaning
         assert effect.equation
         assert effect.cost
+
+
+@pytest.mark.parametrize(
+    ("surface", "gap", "rtol"),
+    [
+        (Surface(0.48040426141842724, 1.0, 2063.122, 1.0, 3.0118), -1.4750136239699654, 3e-6),
+        (Surface(0.7, 1.0, 64.86, 1.0, 4.128), -1.4336437442709071, 1e-5),
+        (Surface(0.7, 1.0, 64.86, 1.0, 4.128), -1.4336437442709071, 1e-2),
+    ],
+)
+def test_stiffness_at_the_end_of_a_laws_piece(surface, gap, rtol):
+    found = Scene(surface, effects=("stiffness",), separations=[gap], rtol=rtol).run()
+    truth = -contact(surface, gap, rtol=1e-11, derivatives=True).force_by["separation"]
+    assert abs(float(found["stiffness"][0]) / truth - 1) <= found.attrs["error"] <= rtol
+
+
+def test_stiffness_beyond_a_law_is_refused():
+    with pytest.raises(InputError, match="too tight for stiffness"):
+        scene_of("stiffness", rtol=1e-7).run()
+
+
+def test_stiffness_of_bodies_apart_is_zero():
+    found = Scene(CONCRETE, effects=("stiffness",), separations=[2 * float(CONCRETE.h_max)], rtol=1e-4).run()
+    assert float(found["stiffness"][0]) == 0.0

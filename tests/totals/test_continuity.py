@@ -16,10 +16,12 @@ from mbma_tables.islands.height_integrals import ORDERS, f_half, height_integral
 from mbma_tables.islands.island import geometry
 from mbma_tables.models.formula import FormulaModel
 from mbma_tables.models.four_numbers import RAW
+from mbma_tables.models.protocol import BOTH
 from mbma_tables.models.raw import band_fields, from_axes, to_axes
 from mbma_tables.models.tabulated import island4d_model, universal_model
 from mbma_tables.surfaces.readings import READINGS, REPORTED, get_reading
-from mbma_tables.totals.intervals import NARROW
+from mbma_tables.totals import island_sum, lookup
+from mbma_tables.totals.intervals import NARROW, STRETCH
 from mbma_tables.totals.lookup import SMALL_POWER
 from mbma_tables.totals.pairs import kinks
 
@@ -129,6 +131,34 @@ def test_totals_of_other_tiers_do_not_jump(tier, which, record_property):
     record_property("pairs compared", count)
 
 
+@pytest.mark.parametrize("stretch", [STRETCH / 7, STRETCH * (1 + 1e-9), 4 * STRETCH])
+def test_totals_do_not_depend_on_the_map(stretch, monkeypatch, record_property):
+    """The integration variable's scale decides where nodes lie and what is halved, and no more."""
+    rng, count = np.random.default_rng(18), 60 * SCALE
+    numbers = pressed(rng, count, REPORTED)
+    numbers["hurst"] = np.maximum(numbers["hurst"], 0.31)
+    before = totals_of(numbers, tier="rigid", rtol=1e-9)
+    monkeypatch.setattr(island_sum, "STRETCH", stretch)
+    after = totals_of(numbers, tier="rigid", rtol=1e-9)
+    compiled = totals_of(numbers, rtol=1e-9)
+    for k in range(count):
+        surface = Surface(*(numbers[name][k] for name in INPUTS[:-1]))
+        constants = lookup.surface_constants(surface.hurst, surface.zeta_1, REPORTED.numbers)
+        moved = (*constants[:-1], constants[-1] * stretch / STRETCH)
+        reach, top = (surface.h_max - numbers["separation"][k]) / surface.h_rms, surface.h_max / surface.h_rms
+        status, force, area, error, _ = lookup.total(
+            BOTH, reach, top, 1e-9, moved, 5 / 9, (True, True), *universal_model().kernel
+        )
+        assert status == lookup.OK
+        assert abs(force * surface.q0 * surface.s / compiled.force[k] - 1) <= error + compiled.error[k]
+        assert abs(area / compiled.area[k] - 1) <= error + compiled.error[k]
+    for name in ("force", "area"):
+        off = np.abs(getattr(after, name) / getattr(before, name) - 1)
+        assert (off <= before.error + after.error).all()
+        assert off.max() > 0
+    record_property("pairs compared", 2 * count)
+
+
 @pytest.mark.parametrize("tier", ["universal", "exact", "rigid"])
 def test_totals_are_straight_in_the_modulus(tier):
     surface, modulus = Surface(0.7, 1.0, 60.0, 0.02, 0.06), 10 ** np.linspace(0, 12, 13)
@@ -210,7 +240,7 @@ def level_changes(rng, count, rtol):
     by_mu = 10 ** (12 * (level / (digits * np.sqrt(np.maximum(X, 0) + 5)) - 1))
     half = np.arange(count) < count // 2
     X[half], mu[~half] = by_X[half], by_mu[~half]
-    kept = (X > np.where(half, 0, -5)) & (X < 40) & (mu > np.where(half, 0, 1)) & (mu < 1e6)
+    kept = (np.where(half, 0, -5) < X) & (X < 40) & (mu > np.where(half, 0, 1)) & (mu < 1e6)
     return X[kept], mu[kept], half[kept]
 
 

@@ -258,7 +258,7 @@ def test_area_may_turn_too():
 
 
 @pytest.mark.parametrize("case", [case for case in CASES if case[0] >= 0.5])
-def test_no_turning_point_from_one_half_on(case):
+def test_no_turning_point_where_height_dominates(case):
     law = law_of(case)
     assert law.turning_point is None
     assert law.area_turning_point is None
@@ -460,3 +460,34 @@ def test_a_labelled_surface():
     assert contact_law(labelled).force(1.0) == law_of(CASES[0]).force(1.0)
     with pytest.raises(InputError, match="one surface, got a batch"):
         contact_law(Surface(xr.DataArray([0.7, 0.8], dims="s"), 0.3, 30.0, 0.7, 2.1))
+
+
+def test_the_error_bounds_what_samples_miss():
+    """Between its samples a polynomial errs by more than at them; both are next to their worst."""
+    surface = Surface(0.7981690190189619, 0.2, 0.2 * 3.6, 0.3, 0.3 * 3.2804122866615386)
+    law = contact_law(surface, 0.1)
+    truth = contact(surface, 0.0, rtol=1e-10).force
+    assert abs(law.force(0.0) / truth - 1) <= law.error
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-9])
+def test_slopes_are_within_their_bound(rtol):
+    rng = np.random.default_rng(11)
+    for _ in range(8):
+        top = rng.uniform(2.5, 4.5)
+        surface = Surface(rng.uniform(0.3, 1), 1.0, 10 ** rng.uniform(0.7, 5), 1.0, top)
+        law = contact_law(surface, rtol)
+        # next to the ends of pieces, where slopes are worst, and between
+        tau = np.concatenate([law.breaks[1:-1] * (1 + side) for side in (-1e-7, 1e-7)] + [rng.uniform(0, 1, 40)])
+        gap = top - law.layer * np.sinh(np.concatenate([tau, rng.uniform(0, law.breaks[-1], 40)])) ** 2
+        gap = gap[gap > -top]
+        truth = contact(surface, gap, rtol=1e-11, derivatives=True)
+        for slope, by, value in (
+            (law.stiffness(gap), truth.force_by, truth.force),
+            (law.area_slope(gap), truth.area_by, truth.area),
+        ):
+            error = np.abs(slope + by["separation"]) / (value / (top - gap))
+            assert (error <= law.slope_error(gap)).all()
+    assert law.slope_error(top) == 0.0
+    with pytest.raises(OutOfRangeError):
+        law.slope_error(-1.1 * top)
