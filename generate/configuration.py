@@ -6,11 +6,11 @@ import dataclasses
 import difflib
 import math
 import pathlib
-import tomllib
 from typing import Any
 
 from mbma_tables.arguments import whole_number_in
 from mbma_tables.errors import InputError
+from mbma_tables.scenes.toml_file import read_toml
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.provenance import digest_json
 from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, Axis
@@ -102,15 +102,6 @@ def _number(value: Any, name: str, where: str) -> float:
     return float(value)
 
 
-def _read(path: pathlib.Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as fault:
-        raise InputError(f"{path}: cannot be read ({fault.strerror or fault})") from None
-    except (ValueError, RecursionError) as fault:
-        raise InputError(f"{path}: is no TOML file ({fault})") from None
-
-
 def _merge(given: dict[str, Any], own: dict[str, Any], where: str) -> None:
     """Change the shipped configuration; axes that it no longer fits start from the fewest nodes."""
     _check_keys(own, KEYS, where)
@@ -164,10 +155,10 @@ def load(kind: str, path: pathlib.Path | None = None, target: float | None = Non
     """
     if kind not in KINDS:
         raise InputError(f"kind must be one of {KINDS}, got {kind!r}")
-    given = _read(HERE / f"{kind}.toml")
+    given = read_toml(HERE / f"{kind}.toml", "configuration")
     shipped = given["target"]
     where = f"{kind}.toml"
-    own = {} if path is None else _read(path)
+    own = {} if path is None else read_toml(path, "configuration")
     if path is not None:
         where = str(path)
     wanted = _number(own.get("target", shipped), "target", where)

@@ -29,9 +29,10 @@ KINDS = ("inputs fuzzed", "faults injected", "pairs compared", "properties' exam
 
 
 def bulk_tests() -> list[pathlib.Path]:
-    """The test files that take their size from the environment."""
-    found = ROOT.glob("tests/**/test_*.py")
-    return sorted(path for path in found if SIZE in path.read_text(encoding="utf-8"))
+    """The test files that take their size from the environment, by themselves or from a module beside them."""
+    scaled = {path for path in ROOT.glob("tests/**/*.py") if SIZE in path.read_text(encoding="utf-8")}
+    folders = {path.parent for path in scaled if not path.name.startswith("test_")}
+    return sorted(path for path in ROOT.glob("tests/**/test_*.py") if path in scaled or path.parent in folders)
 
 
 def run(files: Sequence[pathlib.Path], size: int, report: pathlib.Path) -> int:

@@ -6,7 +6,6 @@ import dataclasses
 import functools
 import hashlib
 import json
-import math
 import os
 import pathlib
 import re
@@ -22,6 +21,7 @@ from mbma_tables.whole_files import write_files
 
 FORMAT, FORMAT_VERSION = "mbma-formula", 1
 LARGEST = 1_000_000  # bytes
+LARGEST_NUMBER = 1e300
 MOST_STEPS = 200
 ISLAND_FORMS = ("pocket", "standard", "long")
 TOTALS = "totals"
@@ -100,7 +100,8 @@ def _numbers(values: Any, count: int) -> bool:
     return (
         isinstance(values, list)
         and len(values) == count
-        and all(type(v) in (int, float) and math.isfinite(v) for v in values)
+        # not isfinite: it overflows on a whole number of 400 digits
+        and all(type(v) in (int, float) and -LARGEST_NUMBER < v < LARGEST_NUMBER for v in values)
     )
 
 
@@ -209,10 +210,11 @@ def read(path: os.PathLike[str] | str) -> Formulas:
         If it cannot be read.
     """
     file = pathlib.Path(path)
-    size = file.stat().st_size
-    _require(size <= LARGEST, file, f"{size} bytes, at most {LARGEST} are read")
+    with file.open("rb") as stream:
+        content = stream.read(LARGEST + 1)
+    _require(len(content) <= LARGEST, file, f"more than {LARGEST} bytes: at most that many are read")
     try:
-        document = json.loads(file.read_text(encoding="utf-8"))
+        document = json.loads(content.decode("utf-8"))
     except (ValueError, RecursionError) as fault:
         raise TableFileError(f"{file}: no JSON: {fault}") from fault
     return check(document, file)

@@ -221,9 +221,12 @@ def read_costs(path: pathlib.Path) -> Costs:
     if len(data) > LARGEST_FILE:
         raise TableFileError(f"{path} is larger than {LARGEST_FILE} bytes: no cost data")
     reader = csv.DictReader(line for line in text.splitlines() if line and not line.startswith("#"))
-    if tuple(reader.fieldnames or ()) not in (COLUMNS, (*COLUMNS, EVALUATIONS)):
-        raise TableFileError(f"{path}: columns must be {', '.join(COLUMNS)}, got {reader.fieldnames}")
-    measured = tuple(_row(record, path) for record in reader)
+    try:
+        if tuple(reader.fieldnames or ()) not in (COLUMNS, (*COLUMNS, EVALUATIONS)):
+            raise TableFileError(f"{path}: columns must be {', '.join(COLUMNS)}, got {reader.fieldnames}")
+        measured = tuple(_row(record, path) for record in reader)
+    except csv.Error as fault:
+        raise TableFileError(f"{path} is no CSV: {fault}") from None
     seconds = [row.cost for row in measured if row.tier == UNIT]
     if len(seconds) != 1:
         raise TableFileError(f"{path} has no one row unit,seconds: make it anew with `python -m generate cost`")
@@ -363,7 +366,7 @@ def read_calibration(path: pathlib.Path | None = None) -> Calibration | None:
             held = json.loads(file.read(LARGEST_FILE))
         factors = {str(tier): float(factor) for tier, factor in held["factors"].items()}
         found = Calibration(float(held["seconds"]), factors, str(held["data_hash"]))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
         return None
     plausible = all(1 / LONGEST_FACTOR < factor < LONGEST_FACTOR for factor in factors.values())
     return found if plausible and math.isfinite(found.seconds) and found.seconds > 0 else None

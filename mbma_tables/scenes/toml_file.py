@@ -6,8 +6,10 @@ import functools
 import json
 import os
 import pathlib
+import re
 import tomllib
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from mbma_tables.errors import InputError
@@ -16,6 +18,11 @@ from mbma_tables.scenes.scene import Scene
 from mbma_tables.scenes.sources import Source, from_map, from_name, from_numbers, modulus
 
 LARGEST_FILE = 2**20
+LARGEST_SPECTRUM = 16 * 2**20
+WHOLE_NUMBER_BITS = 10_000
+LARGEST_NUMBER = 1e300
+# the time to parse a dotted key grows with the square of its parts
+LONG_KEY = re.compile(r"""(?<![^\s.,=\[\]{}#"'])(?:(?:"[^"\n]*"|'[^'\n]*'|[^\s.,=\[\]{}#"']+)[ \t]*\.[ \t]*){20}""")
 WORDS = {
     "string": "a text in quotes",
     "number": "a number",
@@ -34,20 +41,46 @@ def schema() -> dict[str, Any]:
     return content
 
 
+def _whole_numbers(node: Any) -> Iterator[int]:
+    """Every whole number in a document."""
+    if isinstance(node, int):
+        yield node
+    for child in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
+        yield from _whole_numbers(child)
+
+
+def read_toml(path: pathlib.Path, what: str) -> dict[str, Any]:
+    """The entries of a TOML file; `what` says of which kind.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be read, is too long, or is no TOML.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
+    except OSError as fault:
+        raise InputError(f"{path}: cannot be read ({fault.strerror}); give the path of a {what} file") from None
+    if len(content) > LARGEST_FILE:
+        raise InputError(f"{path} has more than {LARGEST_FILE} bytes: no {what} file is that long")
+    try:
+        text = content.decode("utf-8")
+        if LONG_KEY.search(text):
+            raise ValueError("a key of many parts")
+        entries = tomllib.loads(text)
+        # in hexadecimal one can be longer than Python shows in a message
+        if any(number.bit_length() > WHOLE_NUMBER_BITS for number in _whole_numbers(entries)):
+            raise ValueError(f"a whole number has more than {WHOLE_NUMBER_BITS} bits")
+    except (ValueError, RecursionError) as fault:
+        raise InputError(f"{path} is no TOML file: {fault}") from None
+    return entries
+
+
 def read_scene(path: os.PathLike[str] | str) -> Scene:
     """The scene of a file; every fault is told with the file's name."""
     own = pathlib.Path(path)
-    try:
-        with own.open("rb") as file:
-            content = file.read(LARGEST_FILE + 1)
-    except OSError as fault:
-        raise InputError(f"{own} cannot be read ({fault.strerror}): give the path of a scene file") from None
-    if len(content) > LARGEST_FILE:
-        raise InputError(f"{own} has more than {LARGEST_FILE} bytes: no scene file is that long")
-    try:
-        entries = tomllib.loads(content.decode("utf-8"))
-    except ValueError as fault:
-        raise InputError(f"{own} is no TOML file: {fault}") from None
+    entries = read_toml(own, "scene")
     try:
         return scene_of(entries, own.parent, own.stem)
     except InputError as fault:
@@ -121,6 +154,8 @@ def _check(value: Any, rule: Mapping[str, Any], where: str) -> None:
     if not _is(value, rule["type"]):
         hint = f": write [{where}]" if rule["type"] == "object" else ""
         raise InputError(f"{where} must be {WORDS[rule['type']]}, got {value!r}{hint}")
+    if rule["type"] == "number" and isinstance(value, int) and not -LARGEST_NUMBER < value < LARGEST_NUMBER:
+        raise InputError(f"{where} must be a finite number, got {value!r}")
     if "enum" in rule and value not in rule["enum"]:
         raise InputError(f"{where}: {value!r} is not known; {nearest(value, rule['enum'])}")
     low, high = rule.get("minimum"), rule.get("maximum")
@@ -191,9 +226,17 @@ def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str) -
 
     if set(numbers) != {"h_max"}:
         raise InputError(f"[surface]: beside psd stands h_max = ... and no other number, got {', '.join(numbers)}")
+    # not by its name: numpy would unpack .gz, .bz2 and .xz, whatever they grow to
+    with path.open("rb") as file:
+        content = file.read(LARGEST_SPECTRUM + 1)
+    if len(content) > LARGEST_SPECTRUM:
+        raise InputError(f"[surface]: {path.name} has more than {LARGEST_SPECTRUM} bytes: average it over wavenumbers")
     try:
-        columns = np.loadtxt(path, ndmin=2, delimiter="," if path.suffix == ".csv" else None)
-    except ValueError as fault:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # of nothing in it
+            lines = content.decode("utf-8").splitlines()
+            columns = np.loadtxt(lines, ndmin=2, delimiter="," if path.suffix == ".csv" else None)
+    except (ValueError, UserWarning) as fault:
         raise InputError(f"[surface]: {path.name} must hold two columns of numbers, q and C: {fault}") from None
     if columns.shape[1] != 2:
         raise InputError(f"[surface]: {path.name} must hold two columns, q and C, got {columns.shape[1]}")

@@ -247,7 +247,7 @@ def _grid_of(heights: Any, dx: Any, dy: Any, periodic: bool | None) -> tuple[Any
             f"a topography must have two-dimensional heights and two physical_sizes, got shape {np.shape(grid)} "
             f"and {sizes}; a line's spectrum goes to from_psd with convention='profile'"
         )
-    extent = finite_array("physical_sizes", np.asarray(sizes, dtype=float))
+    extent = finite_array("physical_sizes", sizes)
     require("physical_sizes", extent, (extent >= SMALLEST) & (extent <= LARGEST), "in [1e-30, 1e30]")
     own = bool(getattr(heights, "is_periodic", False)) if periodic is None else bool(periodic)
     step_x, step_y = (float(size) / max(count, 1) for size, count in zip(extent, np.shape(grid), strict=True))
@@ -261,6 +261,8 @@ def _without_holes(grid: Any) -> FloatArray:
         raise InputError(f"heights must be an array of numbers: {fault}") from None
     if values.ndim != 2:
         raise InputError(f"heights must be two-dimensional, got shape {values.shape}")
+    if values.dtype.kind not in "fiu":
+        raise InputError(f"heights must be real numbers: entries of type {values.dtype}")
     holes = np.ma.getmaskarray(values)
     if values.dtype.kind == "f":
         holes = holes | np.isnan(values.data)
@@ -397,7 +399,8 @@ def read_map(path: str | os.PathLike[str]) -> Any:
         if not os.path.isfile(path):
             raise InputError(f"there is no file {os.fspath(path)!r}")
         try:
-            with open_topography(os.fspath(path)) as reader:
+            # opened here: its readers leave open what they cannot read
+            with open(path, "rb") as stream, open_topography(stream) as reader:
                 return reader.topography()
         # its readers raise whatever their parsers raise
         except Exception as fault:

@@ -22,6 +22,8 @@ import numpy as np
 
 from mbma_tables.errors import StaleTableWarning, TableFileError
 from mbma_tables.tablefiles import provenance
+from mbma_tables.tablefiles.consistency import misfit
+from mbma_tables.tablefiles.contents import Contents, attributes_of, contents_of, foreign_contents
 from mbma_tables.tablefiles.schema import (
     ANSWERS,
     CONVENTIONS,
@@ -37,6 +39,7 @@ from mbma_tables.tablefiles.schema import (
     Axis,
     TableContent,
 )
+from mbma_tables.tablefiles.shipped import shipped_file
 from mbma_tables.tablefiles.splines import padding
 from mbma_tables.whole_files import reason, write_whole, written_bytes
 
@@ -74,20 +77,17 @@ def versions() -> dict[str, str]:
     }
 
 
-def _plain(value: Any) -> Any:
-    """An attribute as JSON holds it, the same before writing and after reading."""
-    if isinstance(value, np.ndarray):
-        return [_plain(item) for item in value.tolist()]
-    return value.item() if isinstance(value, np.generic) else value
+def _digest_of(attributes: dict[str, Any], variables: dict[str, tuple[tuple[str, ...], dict[str, Any]]]) -> str:
+    """SHA-256 of every attribute of a file but this hash itself, and of each variable's dimensions and attributes."""
+    content = {"": {name: value for name, value in attributes.items() if name != "attributes_sha256"}}
+    for name, (dimensions, own) in variables.items():
+        content[name] = own | {"dimensions": list(dimensions)}
+    return provenance.digest_json(content)
 
 
 def _attributes_digest(dataset: netCDF4.Dataset) -> str:
-    """SHA-256 of every attribute of a file but this hash itself."""
-    content = {"": {n: _plain(dataset.getncattr(n)) for n in dataset.ncattrs() if n != "attributes_sha256"}}
-    for name, variable in dataset.variables.items():
-        content[name] = {n: _plain(variable.getncattr(n)) for n in variable.ncattrs()}
-        content[name]["dimensions"] = list(variable.dimensions)
-    return provenance.digest_json(content)
+    variables = {name: (variable.dimensions, attributes_of(variable)) for name, variable in dataset.variables.items()}
+    return _digest_of(attributes_of(dataset), variables)
 
 
 def _fill(dataset: netCDF4.Dataset, content: TableContent) -> None:
@@ -197,33 +197,28 @@ def read_sealed(path: pathlib.Path) -> bytes:
     return body
 
 
-def _content(dataset: netCDF4.Dataset, kind: str) -> TableContent:
-    attributes = {name: _plain(dataset.getncattr(name)) for name in dataset.ncattrs()}
-    variables = dataset.variables
+def _content(contents: Contents, kind: str) -> TableContent:
+    variables = contents.variables
 
     def array(name: str) -> Any:
-        return np.ascontiguousarray(variables[name][...], dtype=np.float64)
+        return np.ascontiguousarray(variables[name].values, dtype=np.float64)
 
     names = variables["log_ratio_F"].dimensions
     axes = tuple(
         Axis(
             name=name,
-            long_name=variables[name].long_name,
-            transform=variables[name].transform,
-            offset=float(variables[name].offset),
-            low=float(variables[name].first),
-            high=float(variables[name].last),
-            nodes=variables[name].size,
+            long_name=own["long_name"],
+            transform=own["transform"],
+            offset=float(own["offset"]),
+            low=float(own["first"]),
+            high=float(own["last"]),
+            nodes=variables[name].values.size,
         )
-        for name in names
+        for name, own in ((name, variables[name].attributes) for name in names)
     )
     main = {f"{what}_{function}" for what in MEANING for function in FUNCTIONS} | set(names)
     auxiliary = {
-        name: (
-            variable.dimensions,
-            array(name),
-            {n: _plain(variable.getncattr(n)) for n in variable.ncattrs()},
-        )
+        name: (variable.dimensions, array(name), variable.attributes)
         for name, variable in variables.items()
         if name not in main and not name.startswith("conformance_")
     }
@@ -242,27 +237,31 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> TableContent:
         local_error=both("error"),
         auxiliary=auxiliary,
         conformance=conformance,
-        attributes=attributes,
+        attributes=contents.attributes,
     )
 
 
-def _checked(source: pathlib.Path, dataset: netCDF4.Dataset, kind: str | None) -> TableContent:
-    """The content of an open file whose kind, format, attributes and values are as they were written."""
-    # values as they are stored, for their hash
-    dataset.set_auto_maskandscale(False)
-    attributes = {name: _plain(dataset.getncattr(name)) for name in dataset.ncattrs()}
+def _checked(source: pathlib.Path, contents: Contents, kind: str | None) -> TableContent:
+    """The content of a file whose kind, format, attributes and values are as they were written."""
+    attributes, variables = contents.attributes, contents.variables
     found = attributes.get("mbma_kind")
     if found not in KINDS or (kind is not None and found != kind):
         raise _refuse(source, f"holds a table of kind {found!r}, not {kind or ' or '.join(KINDS)}", kind or "all")
     version = attributes.get("format_version")
     if version != FORMAT_VERSION:
         raise _refuse(source, f"has format {version!r}, this library reads {FORMAT_VERSION}", found)
-    if attributes.get("attributes_sha256") != _attributes_digest(dataset):
+    if attributes.get("attributes_sha256") != _digest_of(
+        attributes, {name: (variable.dimensions, variable.attributes) for name, variable in variables.items()}
+    ):
         raise _refuse(source, "has attributes that were edited", found)
     # the stored axes, not ones computed anew: another processor's logarithm may differ in the last bit
-    if provenance.digest_arrays({n: v[...] for n, v in dataset.variables.items()}) != attributes["values_sha256"]:
+    if provenance.digest_arrays({n: v.values for n, v in variables.items()}) != attributes["values_sha256"]:
         raise _refuse(source, "has values that do not match their hash", found)
-    return _content(dataset, found)
+    content = _content(contents, found)
+    why = misfit(content)
+    if why:
+        raise _refuse(source, why, found)
+    return content
 
 
 def check_table(path: os.PathLike[str] | str, kind: str | None = None) -> tuple[TableContent, str | None]:
@@ -277,8 +276,12 @@ def check_table(path: os.PathLike[str] | str, kind: str | None = None) -> tuple[
     source = pathlib.Path(path)
     body = read_sealed(source)
     try:
-        with ONE_AT_A_TIME, netCDF4.Dataset(source.name, memory=body) as dataset:
-            content = _checked(source, dataset, kind)
+        if source.resolve() == shipped_file(source.name).resolve():
+            with ONE_AT_A_TIME:
+                contents = contents_of(body)
+        else:
+            contents = foreign_contents(body)
+        content = _checked(source, contents, kind)
     except TableFileError:
         raise
     except (OSError, RuntimeError, KeyError, AttributeError, TypeError, ValueError, IndexError) as fault:

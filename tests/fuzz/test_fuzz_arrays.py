@@ -1,0 +1,220 @@
+"""Odd maps, spectra, map files and kept chunks of the generator's campaign."""
+
+import contextlib
+import io
+import types
+import warnings
+
+import numpy as np
+import pytest
+from fuzzing import SCALE, finite, spoilt
+
+from generate import campaign
+from mbma_tables import InputError, Surface
+from mbma_tables.surfaces.maps import read_map
+
+POINTS = 40
+NOISE = np.random.default_rng(0).standard_normal((POINTS, POINTS))
+Q = 2 * np.pi * np.hypot(np.fft.fftfreq(POINTS)[:, None], np.fft.rfftfreq(POINTS)[None, :])
+ROUGH = np.fft.irfft2(np.fft.rfft2(NOISE) / np.where(Q > 0, Q, np.inf) ** 1.8, s=NOISE.shape)
+DTYPES = [
+    "f2",
+    "f4",
+    ">f8",
+    "f8",
+    "f16",
+    "i1",
+    "i8",
+    "u8",
+    "?",
+    "c16",
+    "O",
+    "U3",
+    "S3",
+    "M8[s]",
+    "m8[s]",
+    "V4",
+    "f8,i4",
+]
+SPECIAL = [np.nan, np.inf, -np.inf, 0.0, -0.0, 5e-324, 1e-200, 1e154, 1e300, -1e308, 1e18]
+
+
+def odd_array(values, rng):
+    """An array like the given one in an odd type, shape, order or with odd entries."""
+    array = np.array(values)
+    for _ in range(rng.integers(1, 4)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of numpy, while it makes the input
+            match rng.integers(12):
+                case 0:
+                    try:
+                        array = array.astype(DTYPES[rng.integers(len(DTYPES))])
+                    except (TypeError, ValueError):
+                        continue
+                case 1 | 2 if array.dtype.kind == "f" and array.size:
+                    array = array.copy()
+                    at = rng.integers(0, array.size, rng.integers(1, 5))
+                    array.flat[at] = SPECIAL[rng.integers(len(SPECIAL))]
+                case 3 if array.ndim and array.dtype.kind == "f":
+                    array = array.copy()
+                    array[rng.integers(0, max(len(array), 1)) :] = SPECIAL[rng.integers(len(SPECIAL))]
+                case 4 if array.dtype.kind == "f":
+                    array = array * 10.0 ** rng.uniform(-310, 308)
+                case 5:
+                    array = array.reshape([(-1,), (*array.shape, 1), (1, *array.shape), array.shape][rng.integers(4)])
+                case 6 if array.ndim:
+                    array = array[tuple(slice(0, rng.integers(0, n + 1)) for n in array.shape)]
+                case 7:
+                    array = array.T
+                case 8 if array.ndim:
+                    array = array[:: -int(rng.integers(1, 3))]
+                case 9:
+                    array = np.asfortranarray(array)
+                case 10:
+                    array = np.ma.masked_array(array, rng.random(array.shape) < rng.choice([0.0, 0.01, 1.0]))
+                case 11 if array.ndim:
+                    array = np.broadcast_to(array[:1], array.shape)
+    return array
+
+
+def odd_number(rng):
+    """Something in place of a length."""
+    given = [
+        1.0,
+        1,
+        np.float32(2),
+        1e-30,
+        1e30,
+        1e300,
+        5e-324,
+        0,
+        -1,
+        np.nan,
+        np.inf,
+        10**400,
+        True,
+        "1",
+        None,
+        [1.0],
+        {},
+    ]
+    return given[rng.integers(len(given))] if rng.integers(3) == 0 else float(10 ** rng.uniform(-3, 3))
+
+
+def options(rng):
+    every = {
+        "periodic": rng.integers(2) == 0,
+        "detrend": [None, "mean", "plane", "quadratic", "cubic", 1][rng.integers(6)],
+        "h_max": odd_number(rng),
+        "band": [None, (0.3, 2.0), (2.0, 0.3), (1, 2, 3), (np.nan, 1.0), "ab", 5][rng.integers(7)],
+    }
+    return {key: value for key, value in every.items() if rng.integers(3) == 0}
+
+
+def surface_is_right(surface):
+    """A surface of five positive finite numbers; or none."""
+    numbers = () if surface is None else (surface.hurst, surface.q0, surface.q1, surface.h_rms, surface.h_max)
+    return finite(*numbers) and all(number > 0 for number in numbers)
+
+
+def test_map_arrays(tally):
+    rng = np.random.default_rng(11)
+    for _ in range(100 * SCALE):
+        heights = odd_array(ROUGH, rng)
+        before = np.asarray(heights).tobytes()
+        found = tally.read(lambda: Surface.from_map(heights, odd_number(rng), **options(rng)))  # noqa: B023
+        assert surface_is_right(found)
+        assert np.asarray(heights).tobytes() == before
+
+
+def test_topographies(tally):
+    rng = np.random.default_rng(12)
+    sizes = [
+        (1.0, 1.0),
+        (1.0,),
+        (1.0, -1.0),
+        (np.nan, 1.0),
+        ("a", "b"),
+        None,
+        3.0,
+        [[1, 2], [3, 4]],
+        (1e-320, 1.0),
+        (1, None),
+    ]
+    for _ in range(60 * SCALE):
+        grid = odd_array(ROUGH, rng)
+        given = types.SimpleNamespace(
+            heights=lambda grid=grid: grid,
+            physical_sizes=sizes[rng.integers(len(sizes)) if rng.integers(2) else 0],
+            is_periodic=[True, False, None][rng.integers(3)],
+            unit=["um", None, 5, ""][rng.integers(4)],
+        )
+        assert surface_is_right(tally.read(lambda: Surface.from_map(given, **options(rng))))  # noqa: B023
+
+
+def test_spectra(tally):
+    rng = np.random.default_rng(13)
+    q = np.geomspace(1.0, 100.0, 50)
+    for _ in range(50 * SCALE):
+        given = (odd_array(q, rng), q**-3.4) if rng.integers(2) else (q, odd_array(q**-3.4, rng))
+        own = {key: value for key, value in options(rng).items() if key == "band"}
+        own["convention"] = ["paper", "isotropic", "profile", "none", None][rng.integers(5)]
+        assert surface_is_right(tally.read(lambda: Surface.from_psd(*given, h_max=odd_number(rng), **own)))  # noqa: B023
+
+
+def as_npy(array):
+    stream = io.BytesIO()
+    np.save(stream, array)
+    return stream.getvalue()
+
+
+def as_npz(array):
+    stream = io.BytesIO()
+    np.savez_compressed(stream, array)
+    return stream.getvalue()
+
+
+def as_text(array):
+    stream = io.BytesIO()
+    np.savetxt(stream, array)
+    return b"# Width: 10 um\n# Height: 10 um\n# Value units: nm\n" + stream.getvalue()
+
+
+@pytest.mark.parametrize(("suffix", "written"), [("npy", as_npy), ("npz", as_npz), ("asc", as_text)])
+def test_map_files(suffix, written, tmp_path, tally):
+    pytest.importorskip("NuMPI")
+    rng = np.random.default_rng(14)
+    content = written(ROUGH[:8, :8])
+
+    def grid(path):
+        found = read_map(path)
+        return np.ma.filled(found.heights(), np.nan)
+
+    # what reading imports takes its time; numpy's own files do not say how large the map is
+    (tmp_path / f"good.{suffix}").write_bytes(content)
+    with contextlib.nullcontext() if suffix == "asc" else pytest.raises(InputError, match="physical_sizes"):
+        assert grid(tmp_path / f"good.{suffix}").shape == (8, 8)
+    for _ in range(12 * SCALE):
+        found = tally.read_file(tmp_path / f"map.{suffix}", spoilt(content, rng), grid)
+        assert found is None or (found.dtype.kind in "fiu" and found.size <= ROUGH.size)
+
+
+@pytest.mark.parametrize("by_structure", [False, True])
+def test_kept_chunks(by_structure, tmp_path, tally):
+    rng = np.random.default_rng(15)
+    result, key = ROUGH[:5], "0" * 64
+    campaign._store(tmp_path, key, result)
+    content = (tmp_path / key).read_bytes()
+    for _ in range(60 * SCALE):
+        if by_structure:
+            # a right checksum over a spoilt array, or over another one
+            body = spoilt(as_npy(result), rng) if rng.integers(2) else as_npy(odd_array(result, rng))
+            other = campaign._digest(key, body) + body
+        else:
+            other = spoilt(content, rng)
+        found = tally.read_file(tmp_path / key, other, lambda path: campaign._load(path.parent, path.name))
+        if found is None:
+            tally.refused += 1
+        else:
+            assert found.dtype == np.float64
+            assert by_structure or (found == result).all()

@@ -1,0 +1,179 @@
+"""Spoilt text files: formulas, scenes, surfaces, costs, calibrations and configurations of tables."""
+
+import contextlib
+import json
+import math
+import pathlib
+import tomllib
+
+import numpy as np
+import pytest
+from fuzzing import SCALE, changed, finite, spoilt, toml_text
+
+from generate import configuration
+from mbma_tables import InputError, Scene
+from mbma_tables.formulas import file as formula_file
+from mbma_tables.scenes.costs import CALIBRATED_TIERS, Calibration, read_calibration, read_costs, write_calibration
+from mbma_tables.tablefiles.schema import KINDS
+from mbma_tables.tablefiles.shipped import shipped_file
+
+EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
+SCENES = sorted(path.name for path in EXAMPLES.glob("scene_*.toml"))
+POINTS = {"X": np.array([1.0]), "mu": np.array([1.0])}
+
+
+def test_formula_bytes(tmp_path, tally):
+    rng = np.random.default_rng(1)
+    path, text = tmp_path / "formula.json", shipped_file("formula.json").read_bytes()
+    own = formula_file.check(json.loads(text))
+    for _ in range(100 * SCALE):
+        found = tally.read_file(path, spoilt(text, rng), formula_file.read)
+        # the hash notices every change of content
+        assert found in (None, own)
+
+
+def test_formula_structure(tmp_path, tally):
+    rng = np.random.default_rng(2)
+    document = json.loads(shipped_file("formula.json").read_bytes())
+    path = tmp_path / "formula.json"
+
+    def use(path):
+        found = formula_file.read(path)
+        return [*found.forms["pocket"].evaluate(POINTS).values()]
+
+    for _ in range(60 * SCALE):
+        other = changed(document, rng)
+        if isinstance(other, dict):
+            # with a NaN no hash can be right
+            with contextlib.suppress(ValueError):
+                other["data_hash"] = formula_file.data_hash(other)
+        found = tally.read_file(path, json.dumps(other).encode(), use)
+        assert found is None or finite(*found)
+
+
+def scene_numbers(path):
+    scene = Scene.from_toml(path)
+    surface = scene.surface
+    return [scene.E_star, scene.rtol or 1e-3, surface.hurst, surface.q0, surface.q1, surface.h_rms, surface.h_max]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_scene_bytes(name, tmp_path, tally):
+    rng = np.random.default_rng(3)
+    path, text = tmp_path / "scene.toml", (EXAMPLES / name).read_bytes()
+    for _ in range(60 * SCALE):
+        found = tally.read_file(path, spoilt(text, rng), scene_numbers)
+        assert found is None or finite(*found)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_scene_structure(name, tmp_path, tally):
+    rng = np.random.default_rng(4)
+    path, document = tmp_path / "scene.toml", tomllib.loads((EXAMPLES / name).read_text())
+    for _ in range(60 * SCALE):
+        found = tally.read_file(path, toml_text(changed(document, rng)), scene_numbers)
+        assert found is None or finite(*found)
+
+
+SPECTRUM = "# q [1/m], C [m^4]\n" + "".join(f"{q:.6e} {1e-20 * q**-3.4:.6e}\n" for q in np.geomspace(1e3, 1e6, 40))
+
+
+@pytest.mark.parametrize("name", ["psd.txt", "psd.csv", "psd.gz", "psd.bz2", "psd.xz"])
+def test_spectra_beside_scenes(name, tmp_path, tally):
+    rng = np.random.default_rng(5)
+    (tmp_path / "scene.toml").write_text(
+        f'[surface]\npsd = "{name}"\nh_max = 3e-6\n[effects]\non = ["force"]\n[prescribed]\nseparations = 1e-6\n'
+    )
+    text = SPECTRUM.replace(" ", ",") if name.endswith("csv") else SPECTRUM
+    for _ in range(30 * SCALE):
+        content = spoilt(text.encode(), rng)
+        found = tally.read_file(tmp_path / name, content, lambda _: scene_numbers(tmp_path / "scene.toml"))
+        assert found is None or finite(*found)
+
+
+def test_cost_bytes(tmp_path, tally):
+    rng = np.random.default_rng(7)
+    path, text = tmp_path / "cost.csv", shipped_file("cost.csv").read_bytes()
+    for _ in range(100 * SCALE):
+        found = tally.read_file(path, spoilt(text, rng), read_costs)
+        if found is not None:
+            assert found.seconds > 0
+            assert finite(found.seconds, *(found.units(tier, "gap", 1e-4) for tier in CALIBRATED_TIERS))
+
+
+def test_cost_fields(tmp_path, tally):
+    rng = np.random.default_rng(8)
+    path, lines = tmp_path / "cost.csv", shipped_file("cost.csv").read_text().splitlines()
+    fields = [
+        "",
+        "nan",
+        "-1",
+        "0",
+        "1e400",
+        "1e-400",
+        "x",
+        "1_0",
+        " 1",
+        '"1\n2"',
+        '"',
+        "unit",
+        "both",
+        "1e-3",
+        "9" * 200000,
+    ]
+    for _ in range(50 * SCALE):
+        other = list(lines)
+        for _ in range(rng.integers(1, 4)):
+            at = int(rng.integers(len(other)))
+            parts = other[at].split(",")
+            parts[rng.integers(len(parts))] = fields[rng.integers(len(fields))]
+            other[at] = ",".join(parts)
+        found = tally.read_file(path, "\n".join(other).encode(), read_costs)
+        if found is not None:
+            assert found.seconds > 0
+            assert finite(found.seconds, *(found.units(tier, "gap", 1e-4) for tier in CALIBRATED_TIERS))
+
+
+@pytest.mark.parametrize("by_structure", [False, True])
+def test_calibrations(by_structure, tmp_path, tally):
+    rng = np.random.default_rng(9)
+    path = write_calibration(Calibration(1e-3, {"exact": 1.5, "formula": 0.5}, "0" * 64), tmp_path / "cost.json")
+    text = path.read_bytes()
+    for _ in range(60 * SCALE):
+        content = json.dumps(changed(json.loads(text), rng)).encode() if by_structure else spoilt(text, rng)
+        found = tally.read_file(path, content, read_calibration)
+        if found is None:
+            tally.refused += 1
+        else:
+            assert 0 < found.seconds < math.inf
+            assert all(0 < factor < math.inf for factor in found.factors.values())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("by_structure", [False, True])
+def test_configurations(kind, by_structure, tmp_path, tally):
+    rng = np.random.default_rng(10)
+    path, text = tmp_path / "table.toml", (configuration.HERE / f"{kind}.toml").read_bytes()
+    document = tomllib.loads(text.decode())
+
+    def nodes(path):
+        found = configuration.load(kind, path)
+        assert len(found.digest()) == 64
+        return [
+            configuration.make_axis(
+                name, name, "log" if name in configuration.LOGARITHMIC else "linear", axis, 9
+            ).values
+            for name, axis in found.axes.items()
+        ]
+
+    for _ in range(50 * SCALE):
+        content = toml_text(changed(document, rng)) if by_structure else spoilt(text, rng)
+        found = tally.read_file(path, content, nodes)
+        assert found is None or all(finite(values) and (np.diff(values) > 0).all() for values in found)
+
+
+def test_a_configuration_that_is_too_long(tmp_path):
+    path = tmp_path / "table.toml"
+    path.write_bytes(b"#" * (2**20 + 1))
+    with pytest.raises(InputError, match="bytes"):
+        configuration.load("universal", path)
