@@ -232,23 +232,23 @@ class Island4dModel:
         self, place: Coordinates, inside: NDArray[np.bool_], raw: tuple[FloatArray, ...]
     ) -> dict[str, FloatArray]:
         """Derivatives of log F_hat and log A_hat by the raw numbers, each (2, entries); NaN outside."""
-        out = np.full((10, inside.size), np.nan)
-        some = np.empty((10, int(inside.sum())))
-        kept = _some(place, inside)
-        fill_gradient_4d(self.content.coefficients, self._positions(kept), some)
-        out[:, inside] = some * self._share(kept)
+        out = np.empty((10, int(inside.sum())))
+        kept, raw = _some(place, inside), tuple(number[inside] for number in raw)
+        fill_gradient_4d(self.content.coefficients, self._positions(kept), out)
+        out *= self._share(kept)
         rigid_slope = np.stack(
             [
-                2.5 * height_integral(1.5, -place.X) / height_integral(2.5, -place.X),
-                2.0 * height_integral(1.0, -place.X) / height_integral(2.0, -place.X),
+                2.5 * height_integral(1.5, -kept.X) / height_integral(2.5, -kept.X),
+                2.0 * height_integral(1.0, -kept.X) / height_integral(2.0, -kept.X),
             ]
         )
-        below = place.spread < self._spread.low
+        below = kept.spread < self._spread.low
         found = {}
         for number, name in enumerate(RAW):
             ends = []
-            # the spread and X follow the ends of a narrow band closely
-            step = STEP * raw[number] * (np.minimum(1.0, place.spread) if name in ("zeta_d", "zeta_u") else 1.0)
+            # the spread follows the ends of a narrow band closely, X the other two, down to their last bit
+            width = kept.spread if name in ("zeta_d", "zeta_u") else kept.sigma
+            step = np.maximum(STEP * raw[number] * np.minimum(1.0, width), np.spacing(raw[number]))
             for sign in (1.0, -1.0):
                 moved = list(raw)
                 moved[number] = raw[number] + sign * step
@@ -258,13 +258,15 @@ class Island4dModel:
                 places = self._positions(at)
                 # below the table only mu moves the logarithm
                 places[1] = np.where(below, 0.0, places[1])
-                ends.append((scales, at.X, places, np.log(at.mu)))
-            (s1, X1, p1, m1), (s0, X0, p0, m0) = ends
-            width = 2 * step
+                ends.append((scales, at.X, places, np.log(at.mu), moved[number]))
+            (s1, X1, p1, m1, r1), (s0, X0, p0, m0, r0) = ends
+            # as rounded
+            width = r1 - r0
             slope = (s1 - s0 + rigid_slope * (X1 - X0)) / width
             for function in range(2):
                 rows = out[5 * function : 5 * function + 5]
                 slope[function] += ((p1 - p0) * rows[1:]).sum(axis=0) / width
                 slope[function] += np.where(below, rows[0] * (m1 - m0) / width, 0.0)
-            found[name] = slope
+            found[name] = np.full((2, inside.size), np.nan)
+            found[name][:, inside] = slope
         return found
