@@ -1,0 +1,206 @@
+"""The programs that write pages: what they draw is what the library computes, and nothing else of a page changes."""
+
+from __future__ import annotations
+
+import pathlib
+import re
+import runpy
+import sys
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from generate import atlas, export_page, fidelity, fidelity_figures, height_coefficients, table_page, table_schemes
+from generate.pages import MARKED
+from generate.table_schemes import Row
+from mbma_tables import Surface, contact, theories
+from mbma_tables.export.description import describe_law
+
+ROOT = pathlib.Path(export_page.__file__).parent
+PNG = b"\x89PNG"
+PROGRAMS = ("atlas", "cost", "export_page", "fidelity", "formula_page", "gauntlet", "table_page")
+
+
+def run(command, *arguments):
+    done = CliRunner().invoke(command, list(map(str, arguments)), catch_exceptions=False)
+    assert done.exit_code == 0
+    return done.output
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_each_program_tells_of_itself(name, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", [f"{name}.py", "--help"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(ROOT / f"{name}.py"), run_name="__main__")
+    assert ended.value.code == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f"Usage: {name}.py [OPTIONS]")
+    assert "--out" in said
+
+
+@pytest.mark.parametrize("study", ["atlas", "cost", "gauntlet", ""])
+def test_a_study_is_reached_by_its_name(study, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["generate", *([study] if study else []), "--help"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(ROOT / "__main__.py"), run_name="__main__")
+    assert ended.value.code == 0
+    usage = f"Usage: generate {study} [OPTIONS]" if study else "[OPTIONS] {universal|island4d|formula|all}"
+    assert usage in capsys.readouterr().out
+
+
+def test_the_export_page(tmp_path, monkeypatch):
+    monkeypatch.setattr(export_page, "NAMES", ("asphalt",))
+    monkeypatch.setattr(export_page, "ROWS", (10, 40))
+    assert run(export_page.main, "--out", tmp_path) == f"{tmp_path / 'export.md'}\n"
+    text = (tmp_path / "export.md").read_text(encoding="utf-8")
+    found = re.findall(r"\| asphalt \| (\d+) \| (\S+) \| (\S+) \| (\S+) \|", text)
+    assert [int(count) for count, *_ in found] == [10, 40]
+    road = Surface.named("asphalt")
+    for count, *numbers in found:
+        own, even = (
+            describe_law(road, 13.3, length_unit="mm", stress_unit="MPa", rows=int(count), evenly=evenly).largest_error
+            for evenly in (False, True)
+        )
+        # two digits are printed
+        assert list(map(float, numbers)) == pytest.approx([own, even, even / own], rel=0.06, abs=0)
+    for row in export_page.TARGETS:
+        assert "| " + " | ".join(row) + " |" in text
+    assert (tmp_path / "figures" / "export.png").read_bytes().startswith(PNG)
+    assert f"]({export_page.FIGURE.as_posix()})" in text
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    """The fidelity figures by name, as matplotlib holds them."""
+    figures = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fidelity_figures, "png", figures.append)
+        written = {}
+        patch.setattr(fidelity_figures, "write_files", lambda files, make_folders: written.update(files))
+        fidelity_figures.draw(pathlib.Path("figures"))
+    yield dict(zip((path.stem for path in written), figures, strict=True))
+    from matplotlib import pyplot
+
+    pyplot.close("all")
+
+
+def curve(axes, label):
+    (line,) = (line for line in axes.lines if line.get_label() == label)
+    return line.get_xdata(), line.get_ydata()
+
+
+def test_every_figure_of_the_fidelity_page(drawn):
+    assert set(drawn) == {*fidelity.CAPTIONS, "reference"}
+
+
+def test_curves_are_the_librarys(drawn):
+    surface = Surface.named("concrete")
+    axes = drawn["fig13"].axes[0]
+    assert axes.get_title() == "concrete"
+    for reading in ("reported", "printed"):
+        ratio, force = curve(axes, f"MBMA {reading}")
+        gap = theories.separation(surface, ratio * surface.h_rms)
+        found = contact(surface, gap, reading=reading, rtol=1e-8).force
+        assert force == pytest.approx(found, rel=1e-5, abs=0)
+    ratio, force = curve(axes, "Persson simplified")
+    assert force == pytest.approx(theories.persson_force(surface, ratio * surface.h_rms, method="simplified"), rel=1e-9)
+    # area against force
+    force, area = curve(drawn["fig14"].axes[0], "Persson")
+    assert area == pytest.approx(theories.persson_area(surface, force), rel=1e-12, abs=0)
+
+
+def test_points_are_the_published_ones(drawn):
+    data, surface = fidelity.REFERENCES["challenge"], Surface.named("challenge")
+    place, force = curve(drawn["fig15"].axes[0], "boundary elements")
+    assert place == pytest.approx(data.column("mean_separation_over_h_rms"), rel=1e-15, abs=0)
+    assert force * data.gradient == pytest.approx(data.column("force") * surface.rms_gradient, rel=1e-14, abs=0)
+
+
+def test_ratios_to_the_references(drawn):
+    panels = drawn["reference"].axes
+    first = next(iter(fidelity.REFERENCES.values()))
+    area, ratio = curve(panels[0], "MBMA reported")
+    assert area == pytest.approx(first.column("area"), rel=1e-15, abs=0)
+    wanted = fidelity.area_ratios(first, first.surface())["MBMA reported"]
+    assert ratio == pytest.approx(wanted, rel=1e-12, abs=0, nan_ok=True)
+
+
+def test_the_fidelity_page_with_its_figures(tmp_path, monkeypatch):
+    monkeypatch.setattr(fidelity, "page", lambda sets: f"about {', '.join(sets)}")
+    monkeypatch.setattr(fidelity_figures, "draw", lambda folder: (tmp_path / "told").write_text(str(folder)))
+    run(fidelity.main, "--out", tmp_path, "--sets", "bem")
+    assert (tmp_path / "fidelity.md").read_text(encoding="utf-8") == "about bem"
+    assert (tmp_path / "told").read_text(encoding="utf-8") == str(tmp_path / "figures")
+
+
+ROWS = [
+    Row(least, shape, scheme, (3e-3 / shape[0], 2e-3 / shape[0], 1e-4, 2e-4))
+    for least in table_schemes.LEAST_SPREADS
+    for shape in ((8, 9, 10, 11), (16, 9, 10, 11))
+    for scheme in ("one", "another")
+]
+
+
+def test_the_page_on_tables_changes_only_where_it_is_marked(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(table_page, "compare", lambda largest: asked.append(largest) or ROWS)
+    assert run(table_page.main, "--out", tmp_path, "--largest", 30000) == f"wrote {tmp_path / 'tables.md'}\n"
+    assert set(asked) == {30000}
+    text, before = (tmp_path / "tables.md").read_text(encoding="utf-8"), table_page.PAGE.read_text(encoding="utf-8")
+    assert MARKED.sub("", text) == MARKED.sub("", before)
+    assert "| 0.001 | 7920 = 8 x 9 x 10 x 11 | one | 3.8e-04 | 2.5e-04 | 1.0e-04 | 2.0e-04 |" in text
+    for name in ("tables_comparison", "tables_universal_error"):
+        assert (tmp_path / "figures" / f"{name}.png").read_bytes().startswith(PNG)
+
+
+def test_schemes_are_compared_at_every_size_asked(monkeypatch):
+    seen = []
+
+    def rows_of(grid, names, least, total):
+        seen.append((least, total, grid.axes[1].low, tuple(names.values())))
+        return [Row(least, (total,), name, (0.0,) * 4) for name in names]
+
+    monkeypatch.setattr(table_schemes, "rows_of", rows_of)
+    found = table_schemes.compare.__wrapped__(286000)
+    narrow, wide = table_schemes.LEAST_SPREADS
+    sizes = {least: [total for own, total, *_ in seen[::2] if own == least] for least in (narrow, wide)}
+    assert sizes == {narrow: [12000, 30000, 95000, 286000], wide: [12000, 30000, 95000]}
+    # log F and the ratio on the trial's axes, the ratio alone on the library's
+    assert [holds for *_, holds in seen[:2]] == [(False, True), (True,)]
+    assert len(found) == 3 * 7
+    assert {row.shape for row in table_schemes.compare.__wrapped__(12000)} == {(12000,)}
+
+
+def test_the_atlas_changes_only_what_it_measured(tmp_path, monkeypatch):
+    made = {name: lambda name=name: f"of {name}" for name in atlas.CORNERS}
+    monkeypatch.setattr(atlas, "parts", lambda figure: (tmp_path / "told").write_text(str(figure)) and made)
+    run(atlas.main, "--out", tmp_path)
+    text, before = (tmp_path / "stability.md").read_text(encoding="utf-8"), atlas.PAGE.read_text(encoding="utf-8")
+    for match in MARKED.finditer(text):
+        assert (match[0] == f"{match[1]}\nof {match[2]}\n\n{match[3]}") == (match[2] in atlas.CORNERS)
+    assert MARKED.sub("", text) == MARKED.sub("", before)
+    assert (tmp_path / "told").read_text(encoding="utf-8") == str(tmp_path / atlas.FIGURE)
+
+
+def test_pieces_of_a_height_integral_are_the_shipped_ones(monkeypatch):
+    import mpmath
+
+    from mbma_tables.islands import _height_coefficients as shipped
+
+    with mpmath.workdps(height_coefficients.DIGITS):
+        found = [[float(value) for value in row] for row in height_coefficients.pieces(2)]
+    np.testing.assert_array_equal(found, shipped.TWICE_N_2)
+
+
+def test_the_module_of_coefficients_is_written_as_it_is(tmp_path, monkeypatch):
+    import mpmath
+
+    from mbma_tables.islands import _height_coefficients as shipped
+
+    target = tmp_path / "made.py"
+    monkeypatch.setattr(mpmath.mp, "dps", mpmath.mp.dps)
+    monkeypatch.setattr(height_coefficients, "TARGET", target)
+    monkeypatch.setattr(height_coefficients, "pieces", lambda twice: getattr(shipped, f"TWICE_N_{twice}"))
+    height_coefficients.main()
+    assert target.read_bytes() == pathlib.Path(shipped.__file__).read_bytes()

@@ -1,0 +1,143 @@
+"""The four-number table beyond its axes, its derivatives, and where islands lie; models asked for what they are not."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact, greenwood_tripp
+from mbma_tables.islands.island import geometry, scale_area, scale_force
+from mbma_tables.models.four_numbers import Island4dModel
+from mbma_tables.models.tabulated import island4d_model, open_table, universal_model
+from mbma_tables.surfaces.readings import REPORTED
+
+NAMES = ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")
+
+
+def islands(approach, hurst, zeta_1):
+    """The four numbers of islands of surfaces, and F_hat and A_hat by the solver."""
+    approach, hurst, zeta_1 = (np.array(a, dtype=float) for a in np.broadcast_arrays(approach, hurst, zeta_1))
+    g = geometry(approach, hurst, zeta_1, REPORTED)
+    solved = greenwood_tripp.solve(g["X"], g["mu"], rtol=1e-10)
+    raw = np.stack([g["X"] * g["sigma"] + g["zeta_d"] ** -hurst, g["zeta_d"], g["zeta_u"], hurst])
+    return raw, scale_force(g) * solved.phi_F, scale_area(g) * solved.phi_A / g["eta"]
+
+
+# inside; H and zeta_d beyond their axes; X beyond its own
+INSIDE = [True, False, True, False]
+RAW, FORCE, AREA = islands([1.0, 0.5, 3.0, 60.0], [0.8, 0.12, 0.5, 0.8], [30.0, 30.0, 500.0, 30.0])
+
+
+def test_outside_the_solver_answers_where_asked():
+    found = island4d_model().lookup(*RAW, outside="exact")
+    bound = np.where(INSIDE, 1e-3, 1e-8)
+    assert (np.abs(found.F_hat / FORCE - 1) < bound).all()
+    assert (np.abs(found.A_hat / AREA - 1) < bound).all()
+    assert (found.error <= bound).all()
+    assert (np.abs(found.F_hat / FORCE - 1) <= found.error + 1e-10).all()
+
+
+def test_outside_nothing_is_said_where_asked():
+    found = island4d_model().lookup(*RAW, outside="nan", derivatives=True)
+    for field in (found.F_hat, found.A_hat, found.error, *found.F_by.values(), *found.A_by.values()):
+        np.testing.assert_array_equal(np.isfinite(field), INSIDE)
+    inside = island4d_model().lookup(*RAW[:, INSIDE])
+    np.testing.assert_array_equal(found.F_hat[INSIDE], inside.F_hat)
+    everywhere = island4d_model().lookup(*RAW[:, [1, 3]], outside="nan")
+    assert np.isnan(everywhere.F_hat).all()
+
+
+def test_outside_is_an_error_otherwise():
+    with pytest.raises(OutOfRangeError, match="hurst must be in") as caught:
+        island4d_model().lookup(*RAW)
+    np.testing.assert_array_equal(caught.value.mask, [False, True, False, False])
+
+
+@pytest.mark.parametrize("model", [island4d_model, universal_model])
+def test_words_for_outside(model):
+    asked = model().lookup if model is island4d_model else model().answer
+    with pytest.raises(InputError, match="outside must be one of"):
+        asked(*(RAW if model is island4d_model else RAW[:2]), outside="clamp")
+
+
+def test_derivatives_come_from_the_table_alone():
+    with pytest.raises(InputError, match="derivatives come from the table"):
+        island4d_model().lookup(*RAW, outside="exact", derivatives=True)
+
+
+def test_where_islands_lie():
+    X, spread, sphere, hurst = island4d_model().status(*RAW)
+    assert hurst.tolist() == [0, -1, 0, 0]
+    assert X.tolist() == [0, 0, 0, 1]
+    narrow = RAW[:, 0].copy()
+    narrow[2] = narrow[1] * (1 + 1e-10)
+    assert [int(place) for place in island4d_model().status(*narrow)[1:]] == [-1, 0, 0]
+    assert {spread[0], sphere[0]} == {0}
+
+
+def test_a_hole_that_no_single_axis_tells_of(monkeypatch):
+    model = Island4dModel(island4d_model().content)
+    monkeypatch.setattr(model, "_covers", lambda place: np.array([False]))
+    with pytest.raises(OutOfRangeError, match="islands outside the table's axes") as caught:
+        model.lookup(*RAW[:, :1])
+    assert caught.value.mask.all()
+
+
+@pytest.mark.parametrize("number", range(4), ids=NAMES)
+def test_derivatives_are_those_of_the_lookup(number):
+    rng = np.random.default_rng(12)
+    count = 60
+    approach, zeta_1 = 10 ** rng.uniform(-2, 0.6, count), 10 ** rng.uniform(0.8, 3, count)
+    raw, _, _ = islands(approach, rng.uniform(0.4, 0.95, count), zeta_1)
+    found = island4d_model().lookup(*raw, outside="nan", derivatives=True)
+    # the ends of a narrow band move little against each other
+    step = 1e-5 * (np.minimum(raw[number], raw[2] - raw[1]) if number in (1, 2) else raw[number])
+    ends = []
+    for sign in (1, -1):
+        moved = raw.copy()
+        moved[number] += sign * step
+        ends.append(island4d_model().lookup(*moved, outside="nan"))
+    seen = np.isfinite(found.F_hat) & np.isfinite(ends[0].F_hat) & np.isfinite(ends[1].F_hat)
+    assert seen.sum() > count / 2
+    for name in ("F", "A"):
+        own = getattr(found, f"{name}_by")[NAMES[number]] * step / getattr(found, f"{name}_hat")
+        high, low = (np.log(getattr(end, f"{name}_hat")) for end in ends)
+        # a change of up to 1e-3 has third-order terms of a millionth of it
+        assert np.abs(own - (high - low) / 2)[seen].max() <= 1e-6 * np.abs(own[seen]).max()
+
+
+def test_a_missing_table_says_so(tmp_path):
+    with pytest.raises(TableFileError, match="missing"):
+        open_table(tmp_path / "missing.nc")
+
+
+def test_the_solver_gives_up_in_the_right_places(monkeypatch):
+    from mbma_tables import ConvergenceError
+    from mbma_tables.totals import looked_up
+
+    def gives_up(pairs, *_, **__):
+        raise ConvergenceError("no end", np.arange(pairs.reach.size) == 1)
+
+    monkeypatch.setattr(looked_up, "sum_islands", gives_up)
+    surface = Surface(0.8, 1.0, 200.0, 1.0, [3.0, 90.0, 3.0, 95.0])
+    with pytest.raises(ConvergenceError, match="no end") as caught:
+        contact(surface, [1.0, -89.0, 0.0, -94.0], outside="exact")
+    np.testing.assert_array_equal(caught.value.mask, [False, False, False, True])
+
+
+def test_many_gaps_of_a_surface_without_a_law(monkeypatch):
+    from mbma_tables.totals import law
+
+    surface = Surface(0.8, 1.0, 200.0, 1.0, 3.0)
+    gaps = np.linspace(1.0, 2.9, 5000)
+    frozen = contact(surface, gaps, rtol=1e-4)
+    assert frozen.islands is None
+
+    def refuse(*_, **__):
+        raise OutOfRangeError("islands outside", True)
+
+    monkeypatch.setattr(law, "contact_law", refuse)
+    summed = contact(surface, gaps, rtol=1e-4)
+    assert summed.islands > 5000
+    assert math.isclose(frozen.force[0], summed.force[0], rel_tol=1e-4)
+    assert (np.abs(frozen.force / summed.force - 1) <= frozen.error + summed.error).all()

@@ -1,0 +1,150 @@
+"""Ways through the library that a user seldom takes: what fails on them ends in a typed error or in nothing."""
+
+import json
+import os
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from mbma_tables import InputError, TableFileError, compiled, theories
+from mbma_tables.cli import Program
+from mbma_tables.cli.scene import _show
+from mbma_tables.errors import ConvergenceError
+from mbma_tables.formulas.file import check, get_form
+from mbma_tables.formulas.printers import latex
+from mbma_tables.surfaces.surface import Surface
+from mbma_tables.tablefiles import provenance
+from mbma_tables.tablefiles.shipped import shipped_file
+from mbma_tables.totals import theories as theories_module
+from mbma_tables.whole_files import write_files, written_bytes
+
+
+def ended(fault):
+    """Exit code and output of a command that ends so."""
+
+    @click.group(cls=Program)
+    def program():
+        """Nothing else."""
+
+    @program.command()
+    def fail():
+        raise fault
+
+    done = CliRunner().invoke(program, ["fail"])
+    return done.exit_code, done.output
+
+
+@pytest.mark.parametrize(
+    ("fault", "code", "said"),
+    [
+        (click.Abort(), 1, ""),
+        (FileNotFoundError(2, "No such file or directory", "a.txt"), 2, "mbma: a.txt: No such file or directory\n"),
+        (OSError(28, "No space left on device"), 2, "mbma: No space left on device\n"),
+        (OSError("odd\nfault"), 2, "mbma: odd fault\n"),
+        (click.ClickException("two\nlines"), 2, "mbma: two lines\n"),
+        (InputError("not so"), 2, "mbma: not so\n"),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_every_known_fault_is_one_line(fault, code, said):
+    assert ended(fault) == (code, said)
+
+
+def test_without_a_folder_for_compiled_code_it_is_compiled_anyway():
+    asked = []
+
+    def decorate(*signature, cache=False):
+        def wrap(function):
+            asked.append(cache)
+            if cache:
+                raise RuntimeError("cannot cache function: no locator available")
+            return function, signature
+
+        return wrap
+
+    assert compiled._kept(decorate, "f8(f8)", cache=True)(abs) == (abs, ("f8(f8)",))
+    assert asked == [True, False]
+
+
+def deep(levels):
+    document = "a"
+    for _ in range(levels):
+        document = [document]
+    return document
+
+
+@pytest.mark.parametrize(
+    ("provenance_of", "said"),
+    [({"a": float("nan")}, "not JSON compliant"), ({"a": deep(100_000)}, "recursion")],
+    ids=["NaN", "deep"],
+)
+def test_a_formula_file_without_a_hash_is_refused(provenance_of, said):
+    document = json.loads(shipped_file("formula.json").read_text(encoding="utf-8"))
+    with pytest.raises(TableFileError, match=said):
+        check(document | {"provenance": provenance_of})
+
+
+@pytest.mark.parametrize("name", ["pockets", 3, None])
+def test_no_form_of_that_name(name):
+    with pytest.raises(InputError, match="pocket"):
+        get_form(name)
+
+
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ("min(a, b)", r"\min\left(a, b\right)"),
+        ("select(a, b, c)", r"\begin{cases}b, & a > 0\\c & \text{else}\end{cases}"),
+        ("-a*(b + c)", r"\left(-a\right)\,\left(b + c\right)"),
+        ("a - (b - c)", r"a - \left(b - c\right)"),
+        ("sqrt(a)/exp(b)", r"\frac{\sqrt{a}}{\exp\left(b\right)}"),
+        ("(a + b)**2", r"\left(a + b\right)^{2}"),
+        ("2.5e-3*a", r"2.5\cdot 10^{-3}\,a"),
+    ],
+)
+def test_latex(text, written):
+    assert latex(text) == written
+
+
+def test_a_module_without_a_source_has_no_hash():
+    with pytest.raises(ModuleNotFoundError, match=r"mbma_tables\.nowhere"):
+        provenance._source("mbma_tables.nowhere")
+
+
+def test_a_theory_that_finds_no_load_says_where(monkeypatch):
+    monkeypatch.setattr(theories_module, "STEPS", 1)
+    with pytest.raises(ConvergenceError, match="no load found for 2 separations in 1 steps") as caught:
+        theories.persson_force(Surface.named("concrete"), [0.2, 0.5])
+    assert caught.value.mask.tolist() == [True, True]
+
+
+def test_a_file_is_put_back_when_its_fellow_cannot_be_written(tmp_path, monkeypatch):
+    first, second = tmp_path / "a", tmp_path / "b"
+    first.write_text("before")
+    replace = type(first).replace
+
+    def refuse(self, target):
+        if target.name == "b":
+            raise OSError(5, "Input/output error")
+        return replace(self, target)
+
+    monkeypatch.setattr(type(first), "replace", refuse)
+    with pytest.raises(InputError, match=r"b cannot be written: Input/output error"):
+        write_files({first: b"after", second: b"after"})
+    assert first.read_text() == "before"
+    assert os.listdir(tmp_path) == ["a"]
+
+
+def test_a_library_that_fails_for_another_reason_is_not_a_full_disk():
+    def fail(path):
+        raise RuntimeError("wrong\nshape")
+
+    with pytest.raises(OSError, match="wrong"):
+        written_bytes("law.nc", fail)
+
+
+def test_progress_stays_on_its_line_until_it_is_done(capsys):
+    _show("totals", 1, 2)
+    _show("totals", 2, 2)
+    assert capsys.readouterr().err == "\rtotals: 1 of 2\rtotals: 2 of 2\n"

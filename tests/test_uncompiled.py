@@ -1,0 +1,44 @@
+"""The compiled functions against themselves as plain Python, which neither reads past an end nor reorders a sum."""
+
+import functools
+import json
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+import plain_answers
+import pytest
+
+PROGRAM = pathlib.Path(plain_answers.__file__)
+# of rounding; derivatives by H and zeta_1 are differences of nearby surfaces, and promised to 1e-6
+ROUNDING, DIFFERENCED = 1e-11, 1e-6
+
+
+@functools.cache
+def plain():
+    done = subprocess.run([sys.executable, "-W", "error", str(PROGRAM)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("group", plain_answers.GROUPS, ids=lambda group: group.__name__)
+def test_the_same_uncompiled(group):
+    for name, value in group():
+        own, other = np.ravel(value).astype(float), np.array(plain()[name])
+        allowed = DIFFERENCED if name.startswith("totals by all numbers") else ROUNDING
+        np.testing.assert_allclose(own, other, rtol=allowed, atol=0, err_msg=name)
+
+
+def test_what_ends_without_an_answer():
+    """Held by number, for two that agree may both be wrong."""
+    from mbma_tables.models.universal_kernel import OK, UNRESOLVED, X_ABOVE
+
+    found = {name: tuple(value) for name, value in plain_answers.statuses()}
+    assert found == {
+        "unresolved": (UNRESOLVED,) * 3,
+        "nothing": (OK,) * 3,
+        "outside": (X_ABOVE,) * 3,
+        "at the table's end": (OK, OK, X_ABOVE),
+        "no contact": (OK,) * 3,
+    }

@@ -1,0 +1,215 @@
+"""Lines of `totals` that altered code got past the other tests with."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
+from mbma_tables.islands.island import geometry
+from mbma_tables.surfaces.readings import PRINTED, REPORTED
+from mbma_tables.totals import contact as contact_module
+from mbma_tables.totals import law_kernel, theories
+from mbma_tables.totals.conductance import conductance, mean_conductivity
+from mbma_tables.totals.pairs import kinks
+from mbma_tables.totals.quadrature import integrate
+
+
+def test_mean_conductivity_is_harmonic():
+    assert mean_conductivity(50.0, 200.0) == pytest.approx(80.0, rel=1e-15, abs=0)
+    assert mean_conductivity(3.0, 3.0) == pytest.approx(3.0, rel=1e-15, abs=0)
+    # a body that conducts without limit leaves twice the other
+    assert mean_conductivity(7.0, 1e300) == pytest.approx(14.0, rel=1e-15, abs=0)
+    assert mean_conductivity(1e300, 7.0) == pytest.approx(14.0, rel=1e-15, abs=0)
+    found = mean_conductivity([[1.0], [2.0]], [1.0, 4.0, 6.0])
+    np.testing.assert_allclose(found, [[1, 1.6, 12 / 7], [4 / 3, 8 / 3, 3]], rtol=1e-15)
+    assert np.shape(mean_conductivity(1.0, 2.0)) == ()
+
+
+def test_conductance_per_stiffness():
+    assert conductance(6.0, 5.0, 4.0) == pytest.approx(7.5, rel=1e-15, abs=0)
+    found = conductance([0.0, 1.0, 3.0], [[2.0], [8.0]], 4.0)
+    np.testing.assert_allclose(found, [[0, 0.5, 1.5], [0, 2, 6]], rtol=1e-15)
+    assert np.shape(conductance(6.0, 5.0, 4.0)) == ()
+
+
+@pytest.mark.parametrize("bad", [0.0, -2.0, math.nan, [1.0, 0.0], [1.0, -1e-300]])
+def test_conductivities_and_moduli_are_positive(bad):
+    for call, name in (
+        (lambda: mean_conductivity(bad, 1.0), "k1"),
+        (lambda: mean_conductivity(1.0, bad), "k2"),
+        (lambda: conductance(1.0, bad, 1.0), "k_s"),
+        (lambda: conductance(1.0, 1.0, bad), "E_star"),
+    ):
+        with pytest.raises(OutOfRangeError, match=f"^{name} must be") as caught:
+            call()
+        assert caught.value.mask.shape == np.shape(bad)
+        assert caught.value.mask.sum() == 1
+
+
+def test_conductivities_that_do_not_broadcast():
+    with pytest.raises(InputError, match="broadcast"):
+        mean_conductivity([1.0, 2.0], [1.0, 2.0, 3.0])
+    with pytest.raises(InputError, match="broadcast"):
+        conductance([1.0, 2.0], [1.0, 2.0, 3.0], 1.0)
+
+
+@pytest.fixture
+def few_are_many(monkeypatch):
+    monkeypatch.setattr(contact_module, "MANY_GAPS", MANY.size)
+
+
+SURFACE = Surface(0.8, 0.3, 60.0, 0.7, 2.1)
+MANY = np.append(np.linspace(-2.1, 2.1, 499), 3.0)  # more than what a law asks for at once
+OWN = dataclasses.replace(PRINTED, name="own", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)
+ROUGH = Surface(0.05, 0.2, 0.2e8, 1.0, 3.0)  # leaves the table where it is pressed
+
+
+@pytest.mark.usefixtures("few_are_many")
+def test_many_gaps_go_through_a_law_of_half_the_tolerance():
+    found = contact(SURFACE, MANY, rtol=1e-6, E_star=3.0)
+    law = contact_law(SURFACE, 0.5e-6)
+    assert found.islands is None
+    np.testing.assert_allclose(found.force, 3 * law.force(MANY), rtol=1e-15)
+    np.testing.assert_array_equal(found.area, law.area(MANY))
+    assert found.error.tolist() == [law.error] * 498 + [0, 0]
+    printed = contact(SURFACE, MANY, rtol=1e-6, reading="printed")
+    np.testing.assert_array_equal(printed.area, contact_law(SURFACE, 0.5e-6, reading="printed").area(MANY))
+    assert contact(SURFACE, MANY.reshape(250, 2), rtol=1e-6).force.shape == (250, 2)
+
+
+@pytest.mark.usefixtures("few_are_many")
+def test_where_a_law_does_not_serve():
+    """Fewer gaps, tighter than a law can be, several surfaces or moduli: each gap on its own, and its islands told."""
+    assert contact(SURFACE, MANY[1:], rtol=1e-6).islands > 0
+    assert contact(SURFACE, MANY, rtol=contact_module.FROZEN_RTOL).islands is None
+    tight = contact(SURFACE, MANY, rtol=math.nextafter(contact_module.FROZEN_RTOL, 0))
+    moduli = contact(SURFACE, MANY, rtol=1e-6, E_star=np.full(MANY.size, 2.0))
+    surfaces = contact(Surface(np.full(MANY.size, 0.8), 0.3, 60.0, 0.7, 2.1), MANY, rtol=1e-6)
+    for found in (tight, moduli, surfaces):
+        assert found.islands > 0
+    np.testing.assert_allclose(moduli.force, 2 * surfaces.force, rtol=1e-15)
+    # a law would need every gap down to -h_max, where the table ends
+    found = contact(ROUGH, np.linspace(2.9, 2.99, MANY.size), rtol=1e-6)
+    assert found.islands > 0
+    assert (found.force > 0).all()
+
+
+@pytest.mark.parametrize("tier", ["universal", "rigid"])
+def test_the_floor_of_zeta_u_itself_is_refused(tier):
+    with pytest.raises(OutOfRangeError, match=r"q1/q0 must be greater than 3\.5"):
+        contact(Surface(0.8, 1.0, 3.5, 1.0, 3.0), 1.0, tier=tier, reading=OWN)
+    assert contact(Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), 1.0, tier=tier, reading=OWN).force > 0
+
+
+LABELLED = Surface(xr.DataArray([0.5, 0.8], dims="s"), 0.3, 60.0, 0.7, 2.1)
+LABELLED_GAPS = xr.DataArray([-1.0, 0.4, 2.0], dims="d")
+
+
+@pytest.mark.parametrize("chunked", [False, True])
+def test_slopes_of_labelled_surfaces(chunked):
+    gaps = LABELLED_GAPS.chunk(d=2) if chunked else LABELLED_GAPS
+    found = contact(LABELLED, gaps, E_star=3.0, derivatives=True)
+    plain = contact(Surface([[0.5], [0.8]], 0.3, 60.0, 0.7, 2.1), LABELLED_GAPS.values, E_star=3.0, derivatives=True)
+    for own, true in ((found.force_by, plain.force_by), (found.area_by, plain.area_by)):
+        assert list(own) == list(true)
+        for name, slope in own.items():
+            np.testing.assert_array_equal(slope.transpose("s", "d"), true[name], err_msg=name)
+    np.testing.assert_array_equal(found.mean_separation, plain.mean_separation[0])
+    assert found.separation is gaps
+    assert found.force.attrs == {"long_name": "force over nominal area", "units": "unit of E_star"}
+
+
+@pytest.mark.parametrize(("wanted", "other"), [("force", "area"), ("area", "force")])
+def test_slopes_of_one_quantity_of_labelled_surfaces(wanted, other):
+    found = contact(LABELLED, LABELLED_GAPS, derivatives=True, quantities=[wanted])
+    both = contact(LABELLED, LABELLED_GAPS, derivatives=True)
+    for name, slope in getattr(both, f"{wanted}_by").items():
+        np.testing.assert_array_equal(getattr(found, f"{wanted}_by")[name], slope)
+    assert getattr(found, other) is getattr(found, f"{other}_by") is None
+    none = contact(LABELLED, LABELLED_GAPS)
+    assert none.force_by is none.area_by is None
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-6, 1e-9, 1e-11])
+def test_slopes_refine_as_totals_do(rtol):
+    """Two passes over the same integral: the same islands and the same bound."""
+    rng = np.random.default_rng(5)
+    hurst, top, share = rng.uniform(0.3, 1, 40), rng.uniform(2.5, 4.5, 40), rng.uniform(-1, 1, 40)
+    surfaces = Surface(hurst, 0.3, 0.3 * 10 ** rng.uniform(0.5, 4, 40), 0.7, 0.7 * top)
+    plain = contact(surfaces, share * surfaces.h_max, rtol=rtol)
+    slopes = contact(surfaces, share * surfaces.h_max, rtol=rtol, derivatives=True)
+    assert slopes.islands == plain.islands
+    np.testing.assert_allclose(slopes.error, plain.error, rtol=1e-6)
+    np.testing.assert_allclose(slopes.force, plain.force, rtol=1e-12)
+    np.testing.assert_allclose(slopes.area, plain.area, rtol=1e-12)
+
+
+ROUGH_GAPS = np.array([2.9999, 0.5, -2.0])  # the last two are outside
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7])
+def test_outside_the_table_the_solver_answers_at_any_tolerance(rtol):
+    found = contact(ROUGH, ROUGH_GAPS, outside="exact", rtol=rtol)
+    true = contact(ROUGH, ROUGH_GAPS[1:], tier="exact", rtol=rtol)
+    table = contact(ROUGH, ROUGH_GAPS[0], rtol=rtol)
+    for name in ("force", "area", "error"):
+        np.testing.assert_array_equal(getattr(found, name), [getattr(table, name), *getattr(true, name)])
+    assert found.islands > table.islands + true.islands
+
+
+def test_the_first_entry_outside_is_named():
+    with pytest.raises(OutOfRangeError, match=r"islands of 2 of 3 .* \(h_max - d\)/h_rms = 2\.5 \(mu above"):
+        contact(ROUGH, ROUGH_GAPS)
+
+
+@pytest.mark.parametrize(("which", "power"), [(0, 3.5), (1, 10 / 3)])
+def test_a_dip_inside_one_piece_is_a_turning_point(which, power):
+    """A piece that rises at both ends and falls between them."""
+    pieces = np.zeros((1, law_kernel.TERMS, 2))
+    pieces[0, [1, 3], which] = -20.0, 8.0
+    breaks, layer, h_max = np.array([0.0, 3.0]), 0.4, 50.0
+    state = (breaks, pieces, layer, h_max, 1.0)
+    tau = np.linspace(1e-3, 3, 200_001)
+    u = tau / 1.5 - 1
+    value = power * np.log(layer * np.sinh(tau) ** 2) - 20 * u + 8 * u**3
+    assert np.diff(value)[-1] > 0
+    first = np.argmax(np.diff(value) < 0)
+    turn = law_kernel.turning_point(which, state, 24)
+    assert h_max - layer * math.sinh(tau[first + 1]) ** 2 < turn < h_max - layer * math.sinh(tau[first - 1]) ** 2
+    assert law_kernel.turning_point(1 - which, state, 24) is None
+
+
+@pytest.mark.parametrize("reading", [REPORTED, OWN], ids=lambda reading: reading.name)
+def test_kinks_are_where_geometry_reaches_its_floors(reading):
+    rng = np.random.default_rng(6)
+    hurst, zeta_1 = rng.uniform(0.1, 1, 200), 3.51 * 10 ** rng.uniform(0, 7, 200)
+    for kink, name, floor in zip(
+        kinks(hurst, zeta_1, reading), ("zeta_d", "zeta_u"), (reading.floor_d, reading.floor_u), strict=True
+    ):
+        before, beyond = (geometry(kink * (1 + sign * 1e-9), hurst, zeta_1, reading)[name] for sign in (-1, 1))
+        assert (before > floor).all()
+        assert (beyond == floor).all()
+
+
+def test_the_estimate_is_of_the_kronrod_sum():
+    """Not of the Gauss sum, which is far worse: where that one alone misses the tolerance, nothing is halved."""
+    x, weights = np.polynomial.legendre.leggauss(10)
+    true, gauss = 4 + 0.4 * math.sin(5), weights @ (2 + np.cos(5 * x))
+    rtol = abs(gauss / true - 1) / 5
+    ends = np.array([-1.0]), np.array([1.0])
+    found = integrate(lambda _, points: 2 + np.cos(5 * points)[..., None], np.array([0]), *ends, 1, rtol)
+    assert found.evaluations == 21
+    assert abs(found.value[0, 0] / true - 1) <= found.error[0, 0] <= rtol
+
+
+@pytest.mark.parametrize("hurst", [0.2, 0.8, 1.0])
+def test_the_inverse_of_persson_takes_newton_steps(monkeypatch, hurst):
+    """Halving a bracket of 690 in the logarithm would take fifty."""
+    monkeypatch.setattr(theories, "STEPS", 15)
+    surface = Surface(hurst, 0.3, 60.0, 0.7, 2.1)
+    loads = np.append(10.0 ** np.arange(-290, 1, 10), [3.0, 6.0])
+    again = theories.persson_force(surface, theories.persson_separation(surface, loads))
+    np.testing.assert_allclose(again, loads, rtol=1e-9)
