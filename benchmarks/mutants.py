@@ -1,9 +1,10 @@
-"""Mutation testing of islands, height integrals and totals: which altered lines do the tests notice?
+"""Mutation testing of islands, height integrals and totals: what the tests notice of altered lines.
 
-Run with ``python benchmarks/mutants.py --out mutants.csv --sample 60 --seed 1 --jobs 2``; started again with the same
+Run with ``python benchmarks/mutants.py --out mutants.csv --sample 40 --seed 1 --jobs 2``; started again with the same
 arguments it goes on where it stopped. Mutants are cosmic-ray's, made and run in copies of the tree. Compiled code is
-kept between processes and would not notice a callee that changed: the altered module and all that import it run
-uncompiled, the rest as it is. So do the tests, each of which passes that way and within `SLOWEST` seconds.
+kept between processes and would not notice that something it calls was altered: the altered module and all that import
+it run uncompiled, the rest compiled. Of the tests, those count that pass that way on the unaltered module, each within
+`SLOWEST` seconds; ``--compiled`` tries the survivors with all tests and everything compiled.
 """
 
 from __future__ import annotations
@@ -11,18 +12,21 @@ from __future__ import annotations
 import ast
 import collections
 import concurrent.futures
+import contextlib
 import csv
 import dataclasses
-import difflib
+import functools
 import hashlib
 import importlib
 import json
+import math
 import multiprocessing
 import os
 import pathlib
 import random
 import re
 import shutil
+import signal
 import sys
 import tempfile
 import threading
@@ -33,8 +37,10 @@ from typing import Any
 import click
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-SLOWEST = 3.0  # seconds of one test
-PATIENCE = 30.0  # seconds, and five times what the unaltered module takes: longer is a mutant killed
+SLOWEST = 0.6  # seconds of one test
+PATIENCE = 15.0  # seconds of one test: longer is a mutant killed
+COMPILING = 300.0  # seconds, instead, where the code is compiled for each mutant
+PRELOADED = ["numba", "xarray", "dask.array", "scipy.integrate", "scipy.optimize", "hypothesis", "mpmath", "pytest"]
 KEPT_OUT = shutil.ignore_patterns(".git", ".venv", ".hypothesis", ".*_cache", "build", "dist")
 # bits and remainders of floats are type errors or wild; decorators say how to compile; `is` of floats is never meant
 OPERATORS = re.compile(
@@ -46,26 +52,23 @@ OPERATORS = re.compile(
 )
 MESSAGES = ("require", "InputError", "OutOfRangeError", "ConvergenceError")
 
-ISLAND = ("islands/test_island.py", "test_conventions.py", "totals/test_labelled.py", "totals/test_contact.py")
-HEIGHTS = ("islands/test_height_integrals.py", "totals/test_continuity.py")
-CONTACT = ("totals/test_contact.py", "totals/test_tiers.py", "totals/test_sensitivity.py", "totals/test_continuity.py")
-LOOKUP = ("totals/test_lookup.py", "totals/test_tiers.py", "totals/test_contact.py", "totals/test_sensitivity.py")
-LAW = ("totals/test_law.py", "totals/test_tiers.py")
-# held lines: tests that this program asked for
+LOOKUP = ("totals/test_lookup.py", "totals/test_sensitivity.py", "totals/test_tiers.py")
+CONTACT = ("totals/test_contact.py", "totals/test_sensitivity.py", "totals/test_tiers.py")
+# tests that this program asked for
 TOTALS_LINES, ISLAND_LINES = "totals/test_held_lines.py", "islands/test_held_lines_of_islands.py"
 SUITES = {
-    "islands/height_integrals.py": (*HEIGHTS, ISLAND_LINES),
-    "islands/island.py": (*ISLAND, ISLAND_LINES),
-    "totals/conductance.py": ("totals/test_law.py", "totals/test_theories.py", TOTALS_LINES),
+    "islands/height_integrals.py": ("islands/test_height_integrals.py", ISLAND_LINES),
+    "islands/island.py": ("islands/test_island.py", "totals/test_contact.py", "totals/test_labelled.py", ISLAND_LINES),
+    "totals/conductance.py": (TOTALS_LINES,),
     "totals/contact.py": (*CONTACT, "totals/test_labelled.py", TOTALS_LINES),
     "totals/intervals.py": (*LOOKUP, TOTALS_LINES),
     "totals/island_sum.py": ("totals/test_contact.py", "totals/test_tiers.py", TOTALS_LINES),
     "totals/labelled.py": ("totals/test_labelled.py", TOTALS_LINES),
-    "totals/law.py": (*LAW, TOTALS_LINES),
-    "totals/law_kernel.py": (*LAW, TOTALS_LINES),
+    "totals/law.py": ("totals/test_law.py", TOTALS_LINES),
+    "totals/law_kernel.py": ("totals/test_law.py", TOTALS_LINES),
     "totals/looked_up.py": (*LOOKUP, TOTALS_LINES),
     "totals/lookup.py": (*LOOKUP, TOTALS_LINES),
-    "totals/pairs.py": (*CONTACT, "totals/test_lookup.py", TOTALS_LINES),
+    "totals/pairs.py": ("totals/test_contact.py", "totals/test_lookup.py", "totals/test_sensitivity.py", TOTALS_LINES),
     "totals/quadrature.py": ("totals/test_quadrature.py", "totals/test_contact.py", TOTALS_LINES),
     "totals/sensitivity.py": ("totals/test_sensitivity.py", TOTALS_LINES),
     "totals/theories.py": ("totals/test_theories.py", TOTALS_LINES),
@@ -81,11 +84,12 @@ class Mutant:
     operator: str
     occurrence: int
     line: int
-    before: str
-    after: str
 
 
-FIELDS = (*(field.name for field in dataclasses.fields(Mutant)), "outcome", "killer", "seconds")
+FIELDS = (
+    *(field.name for field in dataclasses.fields(Mutant)),
+    *("before", "after", "outcome", "killer", "seconds"),
+)
 
 
 def _spared(text: str) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
@@ -123,10 +127,7 @@ def mutants_of(module: str) -> list[Mutant]:
         places = [place for node in ast_nodes(tree) for place in operator.mutation_positions(node)]
         for occurrence, (start, end) in enumerate(places):
             if not any(low <= start and end <= high for low, high in spared):
-                altered = altered_text(text, name, occurrence)
-                pair = [d for d in difflib.ndiff(text.splitlines(), altered.splitlines()) if d[0] in "-+"]
-                before, after = (" ".join(d[2:].strip() for d in pair if d[0] == sign) for sign in "-+")
-                found.append(Mutant(module, source, name.removeprefix("core/"), occurrence, start[0], before, after))
+                found.append(Mutant(module, source, name.removeprefix("core/"), occurrence, start[0]))
     return found
 
 
@@ -138,9 +139,10 @@ def altered_text(text: str, operator: str, occurrence: int) -> str:
     return altered
 
 
+@functools.cache
 def importers(module: str) -> set[str]:
     """Names of this module and of all modules of the library that import it, of whatever depth."""
-    names = {}
+    names: dict[str, set[str]] = {}
     for path in (ROOT / "mbma_tables").rglob("*.py"):
         parts = path.relative_to(ROOT).with_suffix("").parts
         name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
@@ -162,17 +164,23 @@ def copy_tree(place: pathlib.Path) -> None:
     path = place / "mbma_tables" / "compiled.py"
     text = path.read_text(encoding="utf-8")
     head = "    def wrap(function: Function) -> Function:\n"
-    test = "        if function.__module__ in __import__('os').environ['UNCOMPILED'].split():\n            return function\n"
+    test = "        if function.__module__ in __import__('os').environ['UNCOMPILED'].split():\n"
+    test += "            return function\n"
     if text.count(head) != 1:
         raise click.ClickException("mbma_tables/compiled.py is not what this program knows")
     path.write_text(text.replace(head, head + test), encoding="utf-8")
 
 
 class Recorder:
-    """A plugin of pytest: runs the wanted tests in the wanted order, and notes how each ended and when."""
+    """A plugin of pytest: runs the wanted tests in the wanted order, and notes how each ended and when.
 
-    def __init__(self, wanted: list[str] | None) -> None:
+    A test that takes too long fails; that of a mutant ends the process.
+    """
+
+    def __init__(self, wanted: list[str] | None, limit: float) -> None:
         self.wanted = wanted
+        self.limit = limit
+        signal.signal(signal.SIGALRM, self.stop)
         self.seconds: dict[str, float] = {}
         self.failed: list[str] = []
 
@@ -182,14 +190,25 @@ class Recorder:
             own = {item.nodeid: item for item in items}
             items[:] = [own[name] for name in self.wanted if name in own]
 
+    def pytest_runtest_setup(self) -> None:
+        """Start the clock."""
+        signal.setitimer(signal.ITIMER_REAL, self.limit)
+
+    def stop(self, *_: object) -> None:
+        """Time is over."""
+        if self.wanted is not None:
+            os.killpg(0, signal.SIGKILL)
+        raise TimeoutError
+
     def pytest_runtest_logreport(self, report: Any) -> None:
         """Note one phase of a test."""
+        signal.setitimer(signal.ITIMER_REAL, self.limit if report.when == "setup" else 0.0)
         self.seconds[report.nodeid] = self.seconds.get(report.nodeid, 0.0) + report.duration
         if report.failed:
             self.failed.append(report.nodeid)
 
 
-def run_tests(tree: str, module: str, wanted: list[str] | None, uncompiled: str, answer: str) -> None:
+def run_tests(tree: str, module: str, wanted: list[str] | None, uncompiled: str, limit: float, answer: str) -> None:
     """In a process of its own: the tests of a module in a tree; writes what came of it to the file `answer`."""
     os.setsid()
     sys.dont_write_bytecode = True
@@ -208,10 +227,13 @@ def run_tests(tree: str, module: str, wanted: list[str] | None, uncompiled: str,
         "mutants", deadline=None, derandomize=True, database=None, suppress_health_check=checks
     )
     hypothesis.settings.load_profile("mutants")
-    recorder = Recorder(wanted)
+    recorder = Recorder(wanted, limit)
     files = [f"tests/{name}" for name in SUITES[module] if pathlib.Path("tests", name).exists()]
-    options = ["-p", "no:cacheprovider", *(["-x"] if wanted is not None else [])]
-    code = int(pytest.main([*options, *files], plugins=[recorder]))
+    # hypothesis is there before pytest
+    options = ["-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning"]
+    if wanted is not None:
+        options.append("-x")
+    code = int(pytest.main(options + files, plugins=[recorder]))
     text = json.dumps({"code": code, "failed": recorder.failed, "seconds": recorder.seconds})
     pathlib.Path(answer).write_text(text, encoding="utf-8")
 
@@ -221,58 +243,77 @@ class Sweep:
 
     context = multiprocessing.get_context("forkserver")
 
-    def __init__(self, place: pathlib.Path) -> None:
+    def __init__(self, place: pathlib.Path, compiled: bool) -> None:
         self.tree = place / "tree"
+        self.compiled = compiled
         self.answer = place / "answer.json"
         place.mkdir()
         copy_tree(self.tree)
 
-    def run(self, module: str, wanted: list[str] | None, limit: float | None) -> dict[str, Any]:
+    def run(self, module: str, wanted: list[str] | None, limit: float | None = None) -> dict[str, Any]:
         """What `run_tests` found; nothing failed and no code where it took longer than `limit` or died."""
         self.answer.unlink(missing_ok=True)
-        arguments = (str(self.tree), module, wanted, " ".join(importers(module)), str(self.answer))
+        uncompiled = "" if self.compiled else " ".join(importers(module))
+        patience = COMPILING if self.compiled else PATIENCE
+        arguments = (str(self.tree), module, wanted, uncompiled, patience, str(self.answer))
         process = self.context.Process(target=run_tests, args=arguments)
         process.start()
         process.join(limit)
-        if process.is_alive():
-            os.killpg(process.pid or 0, 9)
-            process.join()
+        # with what tests started
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid or 0, signal.SIGKILL)
+        process.join()
         if not self.answer.exists():
             return {"code": None, "failed": [], "seconds": {}}
         answer: dict[str, Any] = json.loads(self.answer.read_text(encoding="utf-8"))
         return answer
 
-    def try_one(self, mutant: Mutant, wanted: list[str], limit: float) -> tuple[str, str, float]:
-        """Outcome, the test that noticed, seconds."""
+    def forget(self, module: str) -> None:
+        """Remove the compiled code that an alteration of this module reaches."""
+        if self.compiled:
+            for name in importers(module):
+                path = self.tree / name.replace(".", "/")
+                for kept in (path.parent / "__pycache__").glob(f"{path.name}.*.nb[ic]"):
+                    kept.unlink()
+
+    def try_one(self, mutant: Mutant, wanted: list[str], limit: float) -> dict[str, str]:
+        """The lines, the outcome, the test that noticed, seconds."""
         path = self.tree / "mbma_tables" / mutant.module
-        whole = ROOT / "mbma_tables" / mutant.module
-        text = whole.read_text(encoding="utf-8")
+        text, times = path.read_text(encoding="utf-8"), path.stat()
+        altered = altered_text(text, f"core/{mutant.operator}", mutant.occurrence)
+        before, after = (own.splitlines()[mutant.line - 1].strip() for own in (text, altered))
+        path.write_text(altered, encoding="utf-8")
+        self.forget(mutant.module)
         start = time.perf_counter()
-        try:
-            path.write_text(altered_text(text, f"core/{mutant.operator}", mutant.occurrence), encoding="utf-8")
-            found = self.run(mutant.module, wanted, limit)
-        finally:
-            shutil.copy2(whole, path)
+        found = self.run(mutant.module, wanted, limit)
         seconds = time.perf_counter() - start
-        if found["code"] is None:
-            return "killed", "time or death", seconds
-        killer = found["failed"][0] if found["failed"] else "" if found["code"] == 0 else "no import"
-        return "survived" if found["code"] == 0 else "killed", killer, seconds
+        self.forget(mutant.module)
+        path.write_text(text, encoding="utf-8")
+        # what is kept of a module goes by its time
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+        if found["code"] == 0:
+            outcome, killer = "survived", ""
+        else:
+            # a module that cannot be imported fails before any test
+            outcome, killer = "killed", next(iter(found["failed"]), "import" if found["code"] else "time or death")
+        return {"before": before, "after": after, "outcome": outcome, "killer": killer, "seconds": f"{seconds:.1f}"}
 
 
 class Tests:
     """The tests of a module that pass uncompiled, those that killed most first."""
 
     def __init__(self, sweep: Sweep, module: str) -> None:
-        found = sweep.run(module, None, None)
+        found = sweep.run(module, None)
+        limit = math.inf if sweep.compiled else SLOWEST
         self.seconds = {
-            name: own for name, own in found["seconds"].items() if own < SLOWEST and name not in found["failed"]
+            name: own for name, own in found["seconds"].items() if own < limit and name not in found["failed"]
         }
         if not self.seconds:
             raise click.ClickException(f"no test of {module} passes")
-        self.limit = PATIENCE + 5 * sum(self.seconds.values())
         self.kills: collections.Counter[str] = collections.Counter()
-        click.echo(f"{module}: {len(self.seconds)} of {len(found['seconds'])} tests, {sum(self.seconds.values()):.1f} s")
+        whole = sum(self.seconds.values())
+        self.limit = 10 * PATIENCE + 3 * whole + (COMPILING if sweep.compiled else 0.0)
+        click.echo(f"{module}: {len(self.seconds)} of {len(found['seconds'])} tests, {whole:.1f} s")
 
     def ordered(self) -> list[str]:
         """Names in the order to run them."""
@@ -284,10 +325,11 @@ def _read(out: pathlib.Path) -> dict[Mutant, dict[str, str]]:
         return {}
     with out.open(newline="", encoding="utf-8") as handle:
         rows = list(csv.DictReader(handle))
-    numbers = {"occurrence": int, "line": int}
-    names = [field.name for field in dataclasses.fields(Mutant)]
     # the last record of a mutant counts
-    return {Mutant(**{name: numbers.get(name, str)(row[name]) for name in names}): row for row in rows}
+    return {
+        Mutant(row["module"], row["source"], row["operator"], int(row["occurrence"]), int(row["line"])): row
+        for row in rows
+    }
 
 
 def report(records: dict[Mutant, dict[str, str]], possible: dict[str, int]) -> None:
@@ -302,20 +344,21 @@ def report(records: dict[Mutant, dict[str, str]], possible: dict[str, int]) -> N
     click.echo(f"{'all':32}{sum(possible.values()):9}{total[0]:7}{total[1]:8}{total[1] / max(total[0], 1):8.1%}\n")
     for mutant, row in sorted(records.items(), key=lambda pair: (pair[0].module, pair[0].line)):
         if row["outcome"] == "survived":
-            click.echo(f"{mutant.module}:{mutant.line} {mutant.operator}\n  - {mutant.before}\n  + {mutant.after}")
+            click.echo(f"{mutant.module}:{mutant.line} {mutant.operator}\n  - {row['before']}\n  + {row['after']}")
 
 
 @click.command()
 @click.option("--out", type=click.Path(path_type=pathlib.Path), required=True, help="CSV of what was tried.")
-@click.option("--sample", default=60, help="Mutants of each module, all where it has fewer.")
+@click.option("--sample", default=40, help="Mutants of each module, all where it has fewer.")
 @click.option("--seed", default=1, help="Of the sample.")
 @click.option("--jobs", default=2, help="Processes.")
 @click.option("--only", default="", help="A part of the names of the modules wanted.")
 @click.option("--again", is_flag=True, help="Try survivors once more, with the tests as they are now.")
-def main(out: pathlib.Path, sample: int, seed: int, jobs: int, only: str, again: bool) -> None:
+@click.option("--compiled", is_flag=True, help="Likewise, compiled: about a minute each, and no test is left out.")
+def main(out: pathlib.Path, sample: int, seed: int, jobs: int, only: str, again: bool, compiled: bool) -> None:
     """Try mutants, and tell which survived."""
     importlib.import_module("cosmic_ray.plugins")
-    Sweep.context.set_forkserver_preload(["numba", "xarray", "scipy.special", "hypothesis", "mpmath", "pytest"])
+    Sweep.context.set_forkserver_preload(PRELOADED)
     everything = {module: mutants_of(module) for module in SUITES if only in module}
     # ordered by chance, not cut by it: a larger sample holds the smaller one
     chosen = {module: random.Random(seed).sample(own, len(own))[:sample] for module, own in everything.items()}
@@ -324,17 +367,18 @@ def main(out: pathlib.Path, sample: int, seed: int, jobs: int, only: str, again:
         mutant
         for own in chosen.values()
         for mutant in own
-        if mutant not in known or (again and known[mutant]["outcome"] == "survived")
+        if mutant not in known or ((again or compiled) and known[mutant]["outcome"] == "survived")
     ]
+    left.sort(key=lambda mutant: mutant not in known)
     possible = {module: len(own) for module, own in everything.items()}
     click.echo(f"{sum(possible.values())} mutants possible, {len(left)} to try")
     lock = threading.Lock()
     suites: dict[str, Tests] = {}
     with tempfile.TemporaryDirectory() as folder, out.open("a", newline="", encoding="utf-8") as handle:
         writer = csv.DictWriter(handle, FIELDS)
-        if not known:
+        if handle.tell() == 0:
             writer.writeheader()
-        sweeps = [Sweep(pathlib.Path(folder, str(job))) for job in range(jobs)]
+        sweeps = [Sweep(pathlib.Path(folder, str(job)), compiled) for job in range(jobs)]
         queue = collections.deque(left)
 
         def work(sweep: Sweep) -> None:
@@ -346,10 +390,9 @@ def main(out: pathlib.Path, sample: int, seed: int, jobs: int, only: str, again:
                     if mutant.module not in suites:
                         suites[mutant.module] = Tests(sweep, mutant.module)
                     tests = suites[mutant.module]
-                outcome, killer, seconds = sweep.try_one(mutant, tests.ordered(), tests.limit)
+                row = sweep.try_one(mutant, tests.ordered(), tests.limit)
                 with lock:
-                    tests.kills[killer] += 1
-                    row = {"outcome": outcome, "killer": killer, "seconds": f"{seconds:.1f}"}
+                    tests.kills[row["killer"]] += 1
                     writer.writerow(dataclasses.asdict(mutant) | row)
                     handle.flush()
 
@@ -357,7 +400,7 @@ def main(out: pathlib.Path, sample: int, seed: int, jobs: int, only: str, again:
             for finished in [pool.submit(work, sweep) for sweep in sweeps]:
                 finished.result()
     records = _read(out)
-    report({m: records[m] for own in chosen.values() for m in own}, possible)
+    report({mutant: records[mutant] for own in chosen.values() for mutant in own}, possible)
 
 
 if __name__ == "__main__":
