@@ -79,7 +79,6 @@ def sum_islands(
     low, high = (to_grid(np.maximum(b, 0)) for b in (breaks[:-1], breaks[1:]))
     owner = np.broadcast_to(everyone, low.shape)
     filled = high > low
-    components = 2 if which == BOTH else 1
-    found = integrate(integrand, owner[filled], low[filled], high[filled], count, rtol, components)
+    found = integrate(integrand, owner[filled], low[filled], high[filled], count, rtol)
     error = found.error.max(axis=1) + worst_island
     return found.value[:, 0], found.value[:, -1], error, found.evaluations

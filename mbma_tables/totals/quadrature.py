@@ -94,7 +94,6 @@ def integrate(
     high: FloatArray,
     count: int,
     rtol: float,
-    components: int = 1,
 ) -> Integrals:
     """Integrate `count` positive integrands, each over the intervals that it owns.
 
@@ -110,8 +109,6 @@ def integrate(
         Number of integrals; one that owns no interval is 0.
     rtol : float
         Relative tolerance, met by the estimates of every component of every integral.
-    components : int
-        Components of the answer where there is no interval to tell.
 
     Returns
     -------
@@ -123,7 +120,8 @@ def integrate(
         Where `DEPTH` halvings did not suffice; `mask` says which integrals.
     """
     if owner.size == 0:
-        nothing = np.zeros((count, components))
+        # one component stands for all
+        nothing = np.zeros((count, 1))
         return Integrals(nothing, nothing, 0)
     value, error = _evaluate(integrand, owner, low, high)
     evaluations = owner.size * NODES.size

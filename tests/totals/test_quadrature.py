@@ -68,9 +68,9 @@ def test_several_intervals_of_one_owner_and_none():
 
 def test_no_interval_at_all():
     found = integrate(
-        lambda who, x: np.ones((*x.shape, 2)), np.zeros(0, dtype=int), np.zeros(0), np.zeros(0), 2, 1e-8, 2
+        lambda who, x: np.ones((*x.shape, 2)), np.zeros(0, dtype=int), np.zeros(0), np.zeros(0), 2, 1e-8
     )
-    assert found.value.tolist() == [[0.0, 0.0], [0.0, 0.0]]
+    assert found.value.tolist() == [[0.0], [0.0]]
 
 
 def test_more_intervals_than_a_batch():
