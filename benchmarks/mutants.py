@@ -66,7 +66,7 @@ SUITES = {
     "totals/labelled.py": ("totals/test_labelled.py", TOTALS_LINES),
     "totals/law.py": ("totals/test_law.py", TOTALS_LINES),
     "totals/law_kernel.py": ("totals/test_law.py", TOTALS_LINES),
-    "totals/looked_up.py": (*LOOKUP, TOTALS_LINES),
+    "totals/looked_up.py": (*LOOKUP, "models/test_model_limits.py", TOTALS_LINES),
     "totals/lookup.py": (*LOOKUP, TOTALS_LINES),
     "totals/pairs.py": ("totals/test_contact.py", "totals/test_lookup.py", "totals/test_sensitivity.py", TOTALS_LINES),
     "totals/quadrature.py": ("totals/test_quadrature.py", "totals/test_contact.py", TOTALS_LINES),
@@ -333,18 +333,22 @@ def _read(out: pathlib.Path) -> dict[Mutant, dict[str, str]]:
 
 
 def report(records: dict[Mutant, dict[str, str]], possible: dict[str, int]) -> None:
-    """Killed and tried by module, and the survivors."""
-    click.echo(f"\n{'module':32}{'possible':>9}{'tried':>7}{'killed':>8}{'share':>8}")
+    """Killed and tried by module, and the survivors, as tables of a page."""
+    click.echo("\n| module | possible | tried | killed | share |\n| --- |" + " ---: |" * 4)
     total = [0, 0]
+    rows = []
     for module, count in possible.items():
         own = [row["outcome"] for mutant, row in records.items() if mutant.module == module]
         killed = own.count("killed")
         total = [total[0] + len(own), total[1] + killed]
-        click.echo(f"{module:32}{count:9}{len(own):7}{killed:8}{killed / max(len(own), 1):8.1%}")
-    click.echo(f"{'all':32}{sum(possible.values()):9}{total[0]:7}{total[1]:8}{total[1] / max(total[0], 1):8.1%}\n")
+        rows.append((module, count, len(own), killed))
+    for module, count, tried, killed in (*rows, ("all", sum(possible.values()), *total)):
+        click.echo(f"| {module} | {count} | {tried} | {killed} | {killed / max(tried, 1):.0%} |")
+    click.echo("\n| where | line | altered |\n| --- | --- | --- |")
     for mutant, row in sorted(records.items(), key=lambda pair: (pair[0].module, pair[0].line)):
         if row["outcome"] == "survived":
-            click.echo(f"{mutant.module}:{mutant.line} {mutant.operator}\n  - {row['before']}\n  + {row['after']}")
+            lines = " | ".join("`" + row[name].replace("|", "\\|") + "`" for name in ("before", "after"))
+            click.echo(f"| {mutant.module}:{mutant.line} | {lines} |")
 
 
 @click.command()

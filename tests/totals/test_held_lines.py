@@ -147,6 +147,32 @@ def test_slopes_refine_as_totals_do(rtol):
     np.testing.assert_allclose(slopes.area, plain.area, rtol=1e-12)
 
 
+@pytest.mark.parametrize(("wanted", "other"), [("force", "area"), ("area", "force")])
+def test_one_quantity_alone(wanted, other):
+    gaps = np.linspace(-2.0, 2.0, 9)
+    alone, both = contact(SURFACE, gaps, quantities=[wanted]), contact(SURFACE, gaps)
+    np.testing.assert_allclose(getattr(alone, wanted), getattr(both, wanted), rtol=1e-8)
+    assert getattr(alone, other) is None
+
+
+@pytest.mark.parametrize(("offset", "summit_sigma"), [(True, False), (False, True), (False, False)])
+def test_slopes_of_readings_of_ones_own(offset, summit_sigma):
+    """Each of the two flags by itself, against differences of the totals."""
+    own = dataclasses.replace(OWN, offset=offset, summit_sigma=summit_sigma)
+    hurst, gap, step = 0.8, 0.4, 1e-4
+
+    def log_totals(hurst, gap):
+        found = contact(Surface(hurst, 0.3, 60.0, 0.7, 2.1), gap, reading=own, rtol=1e-10)
+        return np.log([found.force, found.area])
+
+    found = contact(SURFACE, gap, reading=own, rtol=1e-10, derivatives=True)
+    by_hurst = (log_totals(hurst + step, gap) - log_totals(hurst - step, gap)) / (2 * step)
+    by_gap = (log_totals(hurst, gap + step) - log_totals(hurst, gap - step)) / (2 * step)
+    for k, (value, by) in enumerate(((found.force, found.force_by), (found.area, found.area_by))):
+        assert by["hurst"] / value == pytest.approx(by_hurst[k], rel=1e-5, abs=0)
+        assert by["separation"] / value == pytest.approx(by_gap[k], rel=1e-5, abs=0)
+
+
 ROUGH_GAPS = np.array([2.9999, 0.5, -2.0])  # the last two are outside
 
 
@@ -165,15 +191,37 @@ def test_the_first_entry_outside_is_named():
         contact(ROUGH, ROUGH_GAPS)
 
 
+def test_slopes_outside_the_table_are_none():
+    with pytest.raises(OutOfRangeError, match="islands of 2 of 3") as caught:
+        contact(ROUGH, ROUGH_GAPS, derivatives=True)
+    assert caught.value.mask.tolist() == [False, True, True]
+    found = contact(ROUGH, ROUGH_GAPS, outside="nan", derivatives=True)
+    assert np.isnan(found.force_by["separation"]).tolist() == [False, True, True]
+
+
+def test_pieces_at_the_ends():
+    """What rounds beyond the last break belongs to the last piece."""
+    breaks = np.array([0.0, 0.5, 0.7, 2.0])
+    places = [0.0, 0.5, math.nextafter(0.5, 1), 0.7, 1.9, 2.0, math.nextafter(2.0, 3)]
+    assert [law_kernel._locate(place, breaks) for place in places] == [0, 0, 1, 1, 2, 2, 2]
+
+
+def test_slopes_of_a_law_are_sharp_at_first_contact():
+    law = contact_law(SURFACE, 1e-6)
+    near, deep = law.slope_error([2.1 * (1 - 1e-10), 0.0])
+    assert 0 < near < 1e-3 * deep
+
+
+@pytest.mark.parametrize("width", [3.0, 0.9])
 @pytest.mark.parametrize(("which", "power"), [(0, 3.5), (1, 10 / 3)])
-def test_a_dip_inside_one_piece_is_a_turning_point(which, power):
+def test_a_dip_inside_one_piece_is_a_turning_point(which, power, width):
     """A piece that rises at both ends and falls between them."""
     pieces = np.zeros((1, law_kernel.TERMS, 2))
     pieces[0, [1, 3], which] = -20.0, 8.0
-    breaks, layer, h_max = np.array([0.0, 3.0]), 0.4, 50.0
+    breaks, layer, h_max = np.array([0.0, width]), 0.4, 50.0
     state = (breaks, pieces, layer, h_max, 1.0)
-    tau = np.linspace(1e-3, 3, 200_001)
-    u = tau / 1.5 - 1
+    tau = np.linspace(1e-3, width, 200_001)
+    u = 2 * tau / width - 1
     value = power * np.log(layer * np.sinh(tau) ** 2) - 20 * u + 8 * u**3
     assert np.diff(value)[-1] > 0
     first = np.argmax(np.diff(value) < 0)

@@ -67,9 +67,7 @@ def test_several_intervals_of_one_owner_and_none():
 
 
 def test_no_interval_at_all():
-    found = integrate(
-        lambda who, x: np.ones((*x.shape, 2)), np.zeros(0, dtype=int), np.zeros(0), np.zeros(0), 2, 1e-8
-    )
+    found = integrate(lambda who, x: np.ones((*x.shape, 2)), np.zeros(0, dtype=int), np.zeros(0), np.zeros(0), 2, 1e-8)
     assert found.value.tolist() == [[0.0], [0.0]]
 
 
