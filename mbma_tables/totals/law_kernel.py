@@ -135,23 +135,48 @@ def energies(state: State) -> FloatArray:
 
 
 @njit(cache=True, error_model="numpy")
+def _slope_at(which: int, tau: float, state: State) -> float:
+    """d log F / d log l, or that of A, at tau."""
+    slope: float = _log_slope(which, state[2] * math.sinh(tau) ** 2, state)
+    return slope
+
+
+@njit(cache=True, error_model="numpy")
+def _least_slope(which: int, low: float, high: float, state: State) -> float:
+    """Where between two places with a lower slope between them the slope is least."""
+    for _ in range(INVERSE_STEPS):
+        third = (high - low) / 3.0
+        if _slope_at(which, low + third, state) < _slope_at(which, high - third, state):
+            high -= third
+        else:
+            low += third
+    return low
+
+
+@njit(cache=True, error_model="numpy")
 def turning_point(which: int, state: State, samples: int) -> float | None:
     """Gap at which force (which = 0) or area (1) first stops rising with compression; None where it never does."""
     breaks, _, layer, h_max, _ = state
-    previous = breaks[0]
+    before = previous = breaks[0]
+    slope_before = slope_previous = math.inf
     for piece in range(breaks.size - 1):
         for k in range(1, samples + 1):
             tau = breaks[piece] + (breaks[piece + 1] - breaks[piece]) * k / samples
-            if _log_slope(which, layer * math.sinh(tau) ** 2, state) <= 0.0:
-                low, high = previous, tau
+            slope = _slope_at(which, tau, state)
+            low, high = previous, tau
+            if slope > 0.0 and slope_previous < slope_before and slope_previous <= slope:
+                # a dip may be narrower than the samples are apart
+                low, high = before, _least_slope(which, before, tau, state)
+            if _slope_at(which, high, state) <= 0.0:
                 for _ in range(INVERSE_STEPS):
                     middle = 0.5 * (low + high)
-                    if _log_slope(which, layer * math.sinh(middle) ** 2, state) <= 0.0:
+                    if _slope_at(which, middle, state) <= 0.0:
                         high = middle
                     else:
                         low = middle
                 return h_max - layer * math.sinh(low) ** 2
-            previous = tau
+            before, previous = previous, tau
+            slope_before, slope_previous = slope_previous, slope
     return None
 
 

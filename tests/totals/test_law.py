@@ -241,6 +241,19 @@ def test_the_turning_point_at_low_hurst():
         law.separation(force=1.0001 * peak)
 
 
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+def test_a_turn_within_a_hundredth_of_the_range(rtol):
+    """Force falls by 4e-6 and rises again, between places that are further apart."""
+    surface = Surface(0.5, 0.2, 0.2 * 334390.7992055036, 0.3, 0.3 * 3.163258089330122)
+    law = contact_law(surface, rtol)
+    gaps = np.linspace(-0.53, -0.49, 4001)
+    falls = contact(surface, gaps, rtol=1e-9, derivatives=True).force_by["separation"] >= 0
+    assert 0 < falls.sum() < 1000
+    assert law.turning_point == pytest.approx(gaps[falls][-1], rel=1e-4, abs=0)
+    with pytest.raises(OutOfRangeError):
+        law.separation(force=law.force(-surface.h_max))
+
+
 def test_area_may_turn_too():
     surface = Surface(0.2, 0.3, 0.3e7, 0.7, 2.1)
     law = contact_law(surface, reading="printed")
