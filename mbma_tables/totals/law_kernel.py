@@ -143,40 +143,51 @@ def _slope_at(which: int, tau: float, state: State) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _least_slope(which: int, low: float, high: float, state: State) -> float:
-    """Where between two places with a lower slope between them the slope is least."""
+    """Where the slope is least between two places, of which none in between is higher than both."""
     for _ in range(INVERSE_STEPS):
         third = (high - low) / 3.0
         if _slope_at(which, low + third, state) < _slope_at(which, high - third, state):
             high -= third
         else:
             low += third
-    return low
+    return high
+
+
+@njit(cache=True, error_model="numpy")
+def _first_fall(which: int, low: float, high: float, state: State) -> float:
+    """Gap where a slope that is positive at `low` and not at `high` changes its sign."""
+    for _ in range(INVERSE_STEPS):
+        middle = 0.5 * (low + high)
+        if _slope_at(which, middle, state) <= 0.0:
+            high = middle
+        else:
+            low = middle
+    gap: float = state[3] - state[2] * math.sinh(low) ** 2
+    return gap
 
 
 @njit(cache=True, error_model="numpy")
 def turning_point(which: int, state: State, samples: int) -> float | None:
     """Gap at which force (which = 0) or area (1) first stops rising with compression; None where it never does."""
-    breaks, _, layer, h_max, _ = state
+    breaks = state[0]
     before = previous = breaks[0]
     slope_before = slope_previous = math.inf
     for piece in range(breaks.size - 1):
         for k in range(1, samples + 1):
             tau = breaks[piece] + (breaks[piece + 1] - breaks[piece]) * k / samples
             slope = _slope_at(which, tau, state)
-            low, high = previous, tau
-            if slope > 0.0 and slope_previous < slope_before and slope_previous <= slope:
-                # a dip may be narrower than the samples are apart
-                low, high = before, _least_slope(which, before, tau, state)
-            if _slope_at(which, high, state) <= 0.0:
-                for _ in range(INVERSE_STEPS):
-                    middle = 0.5 * (low + high)
-                    if _slope_at(which, middle, state) <= 0.0:
-                        high = middle
-                    else:
-                        low = middle
-                return h_max - layer * math.sinh(low) ** 2
+            if slope <= 0.0:
+                return _first_fall(which, previous, tau, state)
+            # a dip may be narrower than the samples are apart
+            if slope_previous < slope_before and slope_previous <= slope:
+                least = _least_slope(which, before, tau, state)
+                if _slope_at(which, least, state) <= 0.0:
+                    return _first_fall(which, before, least, state)
             before, previous = previous, tau
             slope_before, slope_previous = slope_previous, slope
+    least = _least_slope(which, before, previous, state)
+    if _slope_at(which, least, state) <= 0.0:
+        return _first_fall(which, before, least, state)
     return None
 
 

@@ -230,6 +230,23 @@ def test_a_dip_inside_one_piece_is_a_turning_point(which, power, width):
     assert law_kernel.turning_point(1 - which, state, 24) is None
 
 
+@pytest.mark.parametrize("at", np.linspace(-0.77, 0.99, 34))
+def test_a_dip_between_two_samples_is_a_turning_point(at):
+    """A slope that is 0 but for a millionth of itself: the dip is 100 times narrower than samples are apart."""
+    tau = np.linspace(0.02, 0.9, 2_000_001)
+    u = tau / 0.45 - 1
+    rest = 2 * 3.5 * 0.45 / np.tanh(tau) + 3e3 * (u - at) ** 2
+    steepest = rest.min() * (1 + 1e-6)
+    pieces = np.zeros((1, law_kernel.TERMS, 2))
+    # the integral of 3e3 (u - at)^2 - steepest
+    pieces[0, :4, 0] = 0, 3e3 * at**2 - steepest, -3e3 * at, 1e3
+    state = (np.array([0.0, 0.9]), pieces, 0.4, 50.0, 1.0)
+    falls = tau[rest < steepest]
+    assert 0 < np.ptp(falls) < 0.9 / 24 / 10
+    turn = law_kernel.turning_point(0, state, 24)
+    assert np.arcsinh(np.sqrt((50 - turn) / 0.4)) == pytest.approx(falls[0], rel=1e-5, abs=0)
+
+
 @pytest.mark.parametrize("reading", [REPORTED, OWN], ids=lambda reading: reading.name)
 def test_kinks_are_where_geometry_reaches_its_floors(reading):
     rng = np.random.default_rng(6)
