@@ -155,7 +155,8 @@ def laws():
     from mbma_tables import Surface, contact_law
 
     gaps = [5.0, 3.0, 2.9, 1.0, 0.0, -3.0]
-    for hurst, q1, h_max in ((0.2, 1e7, 3.0), (0.8, 30.0, 4.0)):
+    # turning, not turning, and turning for a hundredth of the range
+    for hurst, q1, h_max in ((0.2, 1e7, 3.0), (0.8, 30.0, 4.0), (0.5, 334390.7992055036, 3.163258089330122)):
         law = contact_law(Surface(hurst, 1.0, q1, 1.0, h_max), reading="printed", rtol=1e-3)
         for name in ("force", "area", "stiffness", "area_slope", "energy"):
             yield f"law at H = {hurst}, {name}", getattr(law, name)(gaps)
