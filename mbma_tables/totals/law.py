@@ -132,6 +132,8 @@ class ContactLaw:
         require(name, wanted, wanted <= most, f"at most {most:.6g}, at d = {end:.6g} where the branch ends")
         out = np.empty(wanted.shape)
         law_kernel.invert(what, np.ascontiguousarray(wanted).reshape(-1), end, self._state, out.reshape(-1))
+        if np.isnan(out).any():
+            raise ConvergenceError(f"no gap found for some of {name}", np.isnan(out))
         return out[()]
 
     def slope_error(self, separation: ArrayLike) -> Any:

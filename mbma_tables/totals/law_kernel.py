@@ -13,6 +13,7 @@ from mbma_tables.compiled import njit
 TERMS = 16
 FORCE, AREA, FORCE_SLOPE, AREA_SLOPE, ENERGY = range(5)
 INVERSE_STEPS = 100
+EXACT = 1e-15  # of the logarithm of a depth
 
 # breaks in tau, polynomial pieces (pieces, TERMS, 2), layer, h_max, E_star
 State = tuple[FloatArray, FloatArray, float, float, float]
@@ -193,7 +194,7 @@ def turning_point(which: int, state: State, samples: int) -> float | None:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def invert(which: int, wanted: FloatArray, end: float, state: State, out: FloatArray) -> None:
-    """Gaps at which force (which = 0) or area (1) takes the wanted values, between h_max and `end`."""
+    """Gaps at which force (which = 0) or area (1) takes the wanted values, down to `end`; NaN where not found."""
     h_max = state[3]
     most = h_max - end
     for k in range(wanted.size):
@@ -204,6 +205,8 @@ def invert(which: int, wanted: FloatArray, end: float, state: State, out: FloatA
         # the power law from the end as first guess
         full = _direct(which, most, state)
         depth = most * (wanted[k] / full) ** (2.0 / 7.0 if which == 0 else 0.3)
+        allowed = math.inf
+        out[k] = math.nan
         for _ in range(INVERSE_STEPS):
             value = _direct(which, depth, state)
             if value < wanted[k]:
@@ -212,13 +215,15 @@ def invert(which: int, wanted: FloatArray, end: float, state: State, out: FloatA
                 high = depth
             step = -math.log(value / wanted[k]) / _log_slope(which, depth, state)
             following = depth * math.exp(step)
-            if not low < following < high:
-                following = 0.5 * (low + high)
-            if abs(following - depth) <= 1e-15 * depth:
-                depth = following
-                break
+            # steps that do not halve may go to and fro for ever
+            if abs(step) > EXACT and not (low < following < high and abs(step) <= 0.5 * allowed):
+                following = math.sqrt(low) * math.sqrt(high) if low > 0.0 else 0.5 * high
+                step = math.log(following / depth)
             depth = following
-        out[k] = h_max - depth
+            if abs(step) <= EXACT:
+                out[k] = h_max - depth
+                break
+            allowed = abs(step)
 
 
 def bind(what: int, state: State, energy_sums: FloatArray) -> Any:

@@ -187,6 +187,23 @@ def test_round_trips(case):
     assert rising.sum() > 80
 
 
+@pytest.mark.parametrize(("name", "hurst", "ratio", "top"), [("area", 0.3, 4.477099447990553, 4.7)])
+def test_inverses_where_newton_goes_to_and_fro(name, hurst, ratio, top):
+    """Between two gaps, each of which it takes for the step from the other."""
+    law = contact_law(surface_of(hurst, ratio, top), rtol=1e-9)
+    gaps = np.linspace(-law.h_max, law.h_max, 4002)[1:-1]
+    wanted = getattr(law, name)(gaps)
+    np.testing.assert_allclose(getattr(law, name)(law.separation(**{name: wanted})), wanted, rtol=1e-12)
+
+
+def test_an_inverse_that_is_not_found(monkeypatch):
+    law = law_of(CASES[0])
+    monkeypatch.setattr(law_module.law_kernel, "invert", lambda what, wanted, end, state, out: out.fill(np.nan))
+    with pytest.raises(ConvergenceError, match="no gap found") as caught:
+        law.separation(force=law.force([1.0, 2.0]))
+    assert caught.value.mask.tolist() == [True, True]
+
+
 def test_inverses_at_the_ends():
     law = law_of(CASES[0])
     assert law.separation(force=0.0) == law.h_max
