@@ -2,6 +2,7 @@
 
 import functools
 import json
+import os
 import pathlib
 import subprocess
 import sys
@@ -17,7 +18,10 @@ ROUNDING, DIFFERENCED = 1e-11, 1e-6
 
 @functools.cache
 def plain():
-    done = subprocess.run([sys.executable, "-W", "error", str(PROGRAM)], capture_output=True, text=True, check=False)
+    path = os.pathsep.join(filter(None, [str(PROGRAM.parents[1]), os.environ.get("PYTHONPATH")]))
+    command = [sys.executable, "-W", "error", str(PROGRAM)]
+    env = os.environ | {"PYTHONPATH": path}
+    done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
