@@ -12,7 +12,6 @@ from mbma_tables.cli import Program
 from mbma_tables.cli.scene import _show
 from mbma_tables.errors import ConvergenceError
 from mbma_tables.formulas.file import check, get_form
-from mbma_tables.formulas.printers import latex
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.tablefiles import provenance
 from mbma_tables.tablefiles.shipped import shipped_file
@@ -89,22 +88,6 @@ def test_a_formula_file_without_a_hash_is_refused(provenance_of, said):
 def test_no_form_of_that_name(name):
     with pytest.raises(InputError, match="pocket"):
         get_form(name)
-
-
-@pytest.mark.parametrize(
-    ("text", "written"),
-    [
-        ("min(a, b)", r"\min\left(a, b\right)"),
-        ("select(a, b, c)", r"\begin{cases}b, & a > 0\\c & \text{else}\end{cases}"),
-        ("-a*(b + c)", r"\left(-a\right)\,\left(b + c\right)"),
-        ("a - (b - c)", r"a - \left(b - c\right)"),
-        ("sqrt(a)/exp(b)", r"\frac{\sqrt{a}}{\exp\left(b\right)}"),
-        ("(a + b)**2", r"\left(a + b\right)^{2}"),
-        ("2.5e-3*a", r"2.5\cdot 10^{-3}\,a"),
-    ],
-)
-def test_latex(text, written):
-    assert latex(text) == written
 
 
 def test_a_module_without_a_source_has_no_hash():

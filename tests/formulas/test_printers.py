@@ -148,6 +148,13 @@ def test_spreadsheets(text, printed):
         ("1e-5*u_F**2", r"1\cdot 10^{-5}\,u_{F}^{2}"),
         ("(X + 1)**(1/3)", r"\left(X + 1\right)^{\frac{1}{3}}"),
         ("mu*sqrt(X)", r"\mu\,\sqrt{X}"),
+        ("min(a, b)", r"\min\left(a, b\right)"),
+        ("select(a, b, c)", r"\begin{cases}b, & a > 0\\c & \text{else}\end{cases}"),
+        ("-a*(b + c)", r"\left(-a\right)\,\left(b + c\right)"),
+        ("a - (b - c)", r"a - \left(b - c\right)"),
+        ("sqrt(a)/exp(b)", r"\frac{\sqrt{a}}{\exp\left(b\right)}"),
+        ("(a + b)**2", r"\left(a + b\right)^{2}"),
+        ("2.5e-3*a", r"2.5\cdot 10^{-3}\,a"),
     ],
 )
 def test_latex(text, printed):
