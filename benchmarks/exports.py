@@ -26,10 +26,10 @@ from mbma_tables import Surface
 from mbma_tables.export.code import write_code
 from mbma_tables.models import universal_kernel
 from mbma_tables.models.protocol import BOTH
-from mbma_tables.models.tabulated import universal_model
+from mbma_tables.models.universal import universal_model
 from mbma_tables.surfaces.readings import get_reading
-from mbma_tables.totals import lookup
-from mbma_tables.totals.looked_up import QUADRATURE_SHARE
+from mbma_tables.totals import kernel as lookup
+from mbma_tables.totals.universal_sum import QUADRATURE_SHARE
 
 ROUNDS = 15
 POINTS = 20_000

@@ -14,9 +14,9 @@ from typing import Any
 
 import click
 
-from generate import height_coefficients
-from generate.campaign import Campaign, CampaignError, Executor, Workers
-from generate.configuration import FEWEST_SHIPPED, Configuration, load
+from generate.tables import height_coefficients
+from generate.tables.campaign import Campaign, CampaignError, Executor, Workers
+from generate.tables.configuration import FEWEST_SHIPPED, Configuration, load
 from mbma_tables.errors import InputError, MbmaError
 
 TABLES = pathlib.Path(__file__).parents[1] / "tables"
@@ -76,10 +76,10 @@ def destination(what: str, configuration: Configuration, out: pathlib.Path | Non
 
 def make_table(configuration: Configuration, target: pathlib.Path, executor: Executor | None, resume: bool) -> None:
     """Build, certify and write one table."""
-    from generate.build import Kind, UncertifiedError, build
-    from generate.island4d import Island4d
-    from generate.universal import Universal
-    from mbma_tables.tablefiles.files import write_table
+    from generate.tables.build import Kind, UncertifiedError, build
+    from generate.tables.island4d import Island4d
+    from generate.tables.universal import Universal
+    from mbma_tables.tablefiles.netcdf import write_table
     from mbma_tables.tablefiles.schema import UNIVERSAL
 
     started = time.perf_counter()
@@ -109,7 +109,7 @@ def formula_file(out: pathlib.Path | None, what: str) -> pathlib.Path:
 
 def make_formulas(target: pathlib.Path) -> None:
     """Fit, certify and write the closed forms."""
-    from generate.formula import build
+    from generate.formulas.fit import build
 
     started = time.perf_counter()
     for form in build(target).forms.values():
@@ -182,11 +182,11 @@ def main(
         make_formulas(formula_file(out, what))
 
 
-STUDIES = ("atlas", "cost", "gauntlet")
+STUDIES = {"atlas": "stability", "cost": "cost", "gauntlet": "gauntlet"}
 
 if __name__ == "__main__":
     if sys.argv[1:2] and sys.argv[1] in STUDIES:
-        study = importlib.import_module(f"generate.{sys.argv[1]}")
+        study = importlib.import_module(f"generate.pages.{STUDIES[sys.argv[1]]}")
         study.main(sys.argv[2:], prog_name=f"generate {sys.argv[1]}")
     else:
         main()

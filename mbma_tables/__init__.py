@@ -9,6 +9,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mbma_tables import theories
     from mbma_tables.errors import (
         ConvergenceError,
         InputError,
@@ -20,13 +21,12 @@ if TYPE_CHECKING:
     )
     from mbma_tables.islands import greenwood_tripp
     from mbma_tables.islands.height_integrals import height_integral
-    from mbma_tables.islands.island import Island, island
-    from mbma_tables.models.tabulated import open_table
+    from mbma_tables.models.universal import open_table
     from mbma_tables.scenes.scene import Scene
     from mbma_tables.surfaces.readings import Reading
     from mbma_tables.surfaces.surface import Surface
-    from mbma_tables.totals import theories
     from mbma_tables.totals.contact import Contact, contact
+    from mbma_tables.totals.island import Island, island
     from mbma_tables.totals.law import ContactLaw, contact_law
 
 __version__ = "0.1.0"
@@ -35,7 +35,7 @@ _HOMES = {
     "Contact": "mbma_tables.totals.contact",
     "ConvergenceError": "mbma_tables.errors",
     "InputError": "mbma_tables.errors",
-    "Island": "mbma_tables.islands.island",
+    "Island": "mbma_tables.totals.island",
     "MbmaError": "mbma_tables.errors",
     "NotSelfAffineError": "mbma_tables.errors",
     "OutOfRangeError": "mbma_tables.errors",
@@ -48,12 +48,12 @@ _HOMES = {
     "contact": "mbma_tables.totals.contact",
     "contact_law": "mbma_tables.totals.law",
     "height_integral": "mbma_tables.islands.height_integrals",
-    "island": "mbma_tables.islands.island",
-    "open_table": "mbma_tables.models.tabulated",
+    "island": "mbma_tables.totals.island",
+    "open_table": "mbma_tables.models.universal",
 }
 _MODULES = {
     "greenwood_tripp": "mbma_tables.islands.greenwood_tripp",
-    "theories": "mbma_tables.totals.theories",
+    "theories": "mbma_tables.theories",
 }
 
 __all__ = [

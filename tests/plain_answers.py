@@ -18,7 +18,8 @@ def leave_plain():
     numba.vectorize = lambda signatures, **options: lambda function: np.vectorize(function, otypes=[float])
 
     from mbma_tables.tablefiles import interpolate
-    from mbma_tables.totals import lookup, sensitivity
+    from mbma_tables.totals import kernel as lookup
+    from mbma_tables.totals import sensitivity
 
     # these two are made of instructions
     interpolate.load_lanes = lambda array, offset: tuple(array[offset : offset + 8])
@@ -58,11 +59,11 @@ def solver():
 
 
 def tables():
-    from generate.cost_islands import LinearModel
-    from mbma_tables.islands.island import geometry
-    from mbma_tables.models.tabulated import island4d_model, universal_model
+    from generate.pages.cost_islands import LinearModel
+    from mbma_tables.models.universal import island4d_model, universal_model
     from mbma_tables.surfaces.readings import REPORTED
     from mbma_tables.tablefiles.interpolate import fill_2d, fill_gradient_2d
+    from mbma_tables.totals.island import geometry
 
     model = universal_model()
     lowest, highest = model.content.axes[1].low, model.content.axes[1].high
@@ -91,9 +92,9 @@ def tables():
 
 
 def band():
-    from mbma_tables.islands.island import geometry
     from mbma_tables.surfaces.readings import PRINTED, REPORTED
     from mbma_tables.surfaces.spectrum import band_moment
+    from mbma_tables.totals.island import geometry
 
     approach, hurst = np.array([1e-9, 1e-3, 0.1, 2.0, 30.0]), np.array([0.8, 0.5, 1.0, 0.3, 0.8])
     plain = dataclasses.replace(REPORTED, name="plain", offset=False, summit_sigma=False)
@@ -127,9 +128,10 @@ def statuses():
     from scipy.optimize import brentq
 
     from mbma_tables.models.protocol import BOTH, FORCE
-    from mbma_tables.models.tabulated import universal_model
+    from mbma_tables.models.universal import universal_model
     from mbma_tables.surfaces.readings import REPORTED
-    from mbma_tables.totals import lookup, sensitivity
+    from mbma_tables.totals import kernel as lookup
+    from mbma_tables.totals import sensitivity
 
     kernel, flags = universal_model().kernel, (True, True)
     surface = lookup.surface_constants(0.8, 200.0, REPORTED.numbers)

@@ -13,9 +13,9 @@ from mbma_tables import Surface, contact, island, theories
 from mbma_tables.cli import main
 from mbma_tables.cli.commands import curve_gaps
 from mbma_tables.errors import InputError
+from mbma_tables.files import write_files
 from mbma_tables.materials import effective_modulus
 from mbma_tables.surfaces.cases import CASES
-from mbma_tables.whole_files import write_files
 
 YANG_PERSSON = {"hurst": 0.8, "q0": 60 * np.pi / 1040, "zeta_1": 216.0, "h_rms": 1.0, "h_max": 3.0}
 CONCRETE = {"hurst": 0.7, "m0": 0.071, "m2": 0.27, "m4": 62.0, "h_max": 1.1}

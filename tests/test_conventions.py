@@ -17,14 +17,14 @@ import pytest
 import xarray
 from independent_reader import Reader, height_integral, seal_matches
 
-from generate.build import build
-from generate.campaign import Campaign
-from generate.configuration import load
-from generate.island4d import Island4d
-from generate.universal import Universal
-from mbma_tables.islands.island import geometry
+from generate.tables.build import build
+from generate.tables.campaign import Campaign
+from generate.tables.configuration import load
+from generate.tables.island4d import Island4d
+from generate.tables.universal import Universal
 from mbma_tables.surfaces.readings import REPORTED
-from mbma_tables.tablefiles.files import write_table
+from mbma_tables.tablefiles.netcdf import write_table
+from mbma_tables.totals.island import geometry
 
 SHIPPED = pathlib.Path(__file__).parents[1] / "tables"
 KINDS = {"universal": Universal, "island4d": Island4d}

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_interp_spline
 
-from generate import table_page, table_schemes
-from generate.pages import MARKED, fill
-from mbma_tables.models.tabulated import shipped
+from generate.pages import tables as table_page
+from generate.pages.page import MARKED, fill
+from generate.tables import schemes as table_schemes
+from mbma_tables.models.universal import shipped
 from mbma_tables.tablefiles.schema import FORMAT_VERSION, ISLAND4D, KINDS, UNIVERSAL
 from mbma_tables.tablefiles.splines import coefficients
 
@@ -46,7 +47,7 @@ def test_measured_part_is_not_stale(part):
         "universal": table_page.example_universal,
         "island4d": table_page.example_island4d,
     }[part]()
-    assert fresh in PARTS[part], "python -m generate.table_page"
+    assert fresh in PARTS[part], "python -m generate.pages.tables"
 
 
 @pytest.mark.usefixtures("tables")

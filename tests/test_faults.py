@@ -23,17 +23,17 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from generate import campaign
-from mbma_tables import whole_files
+from generate.tables import campaign
+from mbma_tables import files as whole_files
 from mbma_tables.cli import main
 from mbma_tables.errors import InputError, MbmaError
 from mbma_tables.export.code import write_code
+from mbma_tables.files import ABANDONED, DRAFT, write_files
 from mbma_tables.formulas import file as formula_file
-from mbma_tables.models.tabulated import universal_model
+from mbma_tables.models.universal import universal_model
 from mbma_tables.scenes.costs import Calibration, write_calibration
-from mbma_tables.tablefiles.files import write_table
+from mbma_tables.tablefiles.netcdf import write_table
 from mbma_tables.tablefiles.shipped import shipped_file
-from mbma_tables.whole_files import ABANDONED, DRAFT, write_files
 
 SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))
 DRAWN = 6  # steps of a writer that are tried in the reduced set

@@ -8,15 +8,15 @@ import pytest
 from click.testing import CliRunner
 
 from mbma_tables import InputError, TableFileError, compiled, theories
+from mbma_tables import theories as theories_module
 from mbma_tables.cli import Program
 from mbma_tables.cli.scene import _show
 from mbma_tables.errors import ConvergenceError
+from mbma_tables.files import write_files, written_bytes
 from mbma_tables.formulas.file import check, get_form
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.tablefiles import provenance
 from mbma_tables.tablefiles.shipped import shipped_file
-from mbma_tables.totals import theories as theories_module
-from mbma_tables.whole_files import write_files, written_bytes
 
 
 def ended(fault):

@@ -14,11 +14,11 @@ import pytest
 
 import mbma_tables
 from mbma_tables.errors import InputError, TableFileError
+from mbma_tables.files import write_files
 from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.models.tabulated import shipped, universal_model
+from mbma_tables.models.universal import shipped, universal_model
 from mbma_tables.scenes.costs import Calibration, read_calibration, write_calibration
-from mbma_tables.tablefiles.files import check_table, write_table
-from mbma_tables.whole_files import write_files
+from mbma_tables.tablefiles.netcdf import check_table, write_table
 
 SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))
 

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import click
 
 from mbma_tables.cli.describe import SURFACE_NUMBERS, describe_answer, to_columns
+from mbma_tables.cli.format import Report
 from mbma_tables.cli.options import (
     model_options,
     numbers_option,
@@ -16,10 +17,9 @@ from mbma_tables.cli.options import (
     over_h_rms,
     surface_options,
 )
-from mbma_tables.cli.report import Report
 from mbma_tables.cli.sources import Source, read_source
 from mbma_tables.errors import InputError
-from mbma_tables.whole_files import write_files
+from mbma_tables.files import write_files
 
 LIGHTEST = 1e-3  # (h_max - d)/h_max of a curve's lightest contact
 EVEN_FROM = 0.2  # and where its points, geometric so far, become evenly spaced
@@ -82,8 +82,8 @@ def contact_command(**given: Any) -> None:
     if (given["separation"] is None) == (given["mean_separation"] is None):
         raise InputError("gaps are needed: either --separation or --mean-separation")
     from mbma_tables.arguments import require
+    from mbma_tables.theories import separation
     from mbma_tables.totals.contact import contact
-    from mbma_tables.totals.theories import separation
 
     source = read_source(given)
     if given["separation"] is not None:
@@ -114,7 +114,7 @@ def _other_theories(surface: Any, average: Any, gap: Any, modulus: float) -> dic
     """Force and area of the theories beside MBMA; NaN where Persson's full load is infinite, at u = 0."""
     import numpy as np
 
-    from mbma_tables.totals import theories
+    from mbma_tables import theories
 
     asperities = theories.greenwood_williamson(surface, gap, modulus)
     found = {"greenwood_williamson": (asperities.force, asperities.area)}
@@ -200,7 +200,7 @@ def island_command(**given: Any) -> None:
     """
     if given["delta"] is None:
         raise InputError("approaches are needed: --delta")
-    from mbma_tables.islands.island import island
+    from mbma_tables.totals.island import island
 
     source = read_source(given)
     answer = island(source.surface, _lengths("delta", source, given), **_model(given, source))

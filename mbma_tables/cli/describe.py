@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mbma_tables.cli.report import Column, Report
+from mbma_tables.cli.format import Column, Report
 from mbma_tables.cli.sources import Source
 
 SURFACE_NUMBERS = ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "m0", "m2", "m4", "alpha")

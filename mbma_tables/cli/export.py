@@ -10,7 +10,7 @@ import click
 from mbma_tables.cli.options import surface_options
 from mbma_tables.cli.sources import read_source
 from mbma_tables.errors import InputError
-from mbma_tables.whole_files import write_files
+from mbma_tables.files import write_files
 
 SOLVERS = ("calculix", "abaqus", "lsdyna", "optistruct", "comsol", "moose", "modelica")
 DATA = ("csv", "json", "matlab", "netcdf", "hdf5", "parquet")
@@ -75,7 +75,7 @@ def _export_code(target: str, folder: Path, reading: str, check: bool) -> None:
 def _law_files(target: str, out: Path, given: dict[str, Any]) -> dict[Path, bytes]:
     from mbma_tables.export.data import DATA as WRITERS
     from mbma_tables.export.data import matlab_reader
-    from mbma_tables.export.description import describe_law
+    from mbma_tables.export.law_rows import describe_law
     from mbma_tables.export.solvers import SOLVERS as PRINTERS
     from mbma_tables.export.solvers import exponential
 

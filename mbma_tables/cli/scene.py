@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mbma_tables.cli.report import Column, Report
+from mbma_tables.cli.format import Column, Report
 from mbma_tables.errors import InputError
-from mbma_tables.whole_files import write_files, written_bytes
+from mbma_tables.files import write_files, written_bytes
 
 if TYPE_CHECKING:
     import xarray

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def _path(name: str) -> Path:
     """A table by kind, or a file."""
-    from mbma_tables.models.tabulated import shipped
+    from mbma_tables.models.universal import shipped
     from mbma_tables.tablefiles.schema import KINDS
 
     return shipped(name) if name in KINDS else Path(name)
@@ -33,7 +33,7 @@ def _warn(stale: str | None) -> None:
 
 def _open(path: Path, kind: str | None = None) -> TableContent:
     """A checked table; one line on stderr where it is stale."""
-    from mbma_tables.tablefiles.files import check_table
+    from mbma_tables.tablefiles.netcdf import check_table
 
     content, stale = check_table(path, kind)
     _warn(stale)
@@ -107,8 +107,8 @@ def verify_command(tables: tuple[str, ...], resolve: int, as_json: bool) -> None
     """Check hashes and conformance points of TABLES (kinds or files; all shipped ones if none is named)."""
     import dataclasses
 
+    from mbma_tables.models.verify import verify
     from mbma_tables.tablefiles.schema import KINDS
-    from mbma_tables.tablefiles.verify import verify
 
     verdicts = [verify(_path(t), t if t in KINDS else None, resolve) for t in _names(tables)]
     if as_json:

@@ -10,9 +10,9 @@ import pathlib
 from typing import Any
 
 from mbma_tables.errors import InputError
-from mbma_tables.models.tabulated import UniversalModel, open_table
+from mbma_tables.files import reason, write_whole
+from mbma_tables.models.universal import UniversalModel, open_table
 from mbma_tables.surfaces.readings import Reading, get_reading
-from mbma_tables.whole_files import reason, write_whole
 
 TARGETS = ("c", "fortran", "javascript", "python")
 POINTS_FILE = "mbma_conformance.csv"

@@ -25,8 +25,8 @@ from mbma_tables.export.code import POINTS_FILE, TARGETS
 from mbma_tables.export.numbers import FORM
 from mbma_tables.islands.geometry import FIELDS, fill_islands
 from mbma_tables.models import universal_kernel
-from mbma_tables.models.formula import FormulaModel
-from mbma_tables.models.tabulated import UniversalModel
+from mbma_tables.models.closed_forms import FormulaModel
+from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.readings import Reading
 
 KINDS = {

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.errors import InputError
-from mbma_tables.export.description import LawTable
-from mbma_tables.whole_files import written_bytes
+from mbma_tables.export.law_rows import LawTable
+from mbma_tables.files import written_bytes
 
 READER = """function y = {name}(x)
 % {title}

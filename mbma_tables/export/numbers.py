@@ -12,12 +12,15 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.formulas.file import Form, get_form, shipped_formulas
 from mbma_tables.islands import height_integrals as heights
 from mbma_tables.models import universal_kernel
-from mbma_tables.models.tabulated import UniversalModel
+from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import LARGEST_ZETA_1, LEAST_ZETA_1
 from mbma_tables.tablefiles.schema import TableContent
-from mbma_tables.totals import intervals, looked_up, lookup, quadrature
+from mbma_tables.totals import gauss_kronrod as quadrature
+from mbma_tables.totals import intervals
+from mbma_tables.totals import kernel as lookup
+from mbma_tables.totals import universal_sum as looked_up
 
 WIDTH = 108  # of the comment block's text
 FORM = "standard"  # that of tier "formula"

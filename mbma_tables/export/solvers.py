@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterable
 
 from mbma_tables.errors import InputError
-from mbma_tables.export.description import DIGITS, LawTable
+from mbma_tables.export.law_rows import DIGITS, LawTable
 from mbma_tables.surfaces.surface import Surface
 
 MOST_CALCULIX_ROWS = 200
@@ -74,7 +74,7 @@ def abaqus(law: LawTable, name: str = "ROUGH") -> str:
 
 def exponential(surface: Surface, E_star: float, comments: Iterable[str], name: str = "ROUGH") -> str:
     """The card of an exponential law: Persson's for light loads, p = beta E* exp(-u/u0) (20), with c0 = u0 ln 100."""
-    from mbma_tables.totals.theories import persson_force
+    from mbma_tables.theories import persson_force
 
     h_rms = float(surface.h_rms)
     near, far = (float(persson_force(surface, u * h_rms, E_star, method="simplified")) for u in (1.0, 2.0))

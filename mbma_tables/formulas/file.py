@@ -15,9 +15,9 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray, require
 from mbma_tables.errors import InputError, TableFileError
+from mbma_tables.files import write_files
 from mbma_tables.formulas.expressions import FUNCTIONS, evaluate_steps, names_in, parse
 from mbma_tables.tablefiles.shipped import shipped_file
-from mbma_tables.whole_files import write_files
 
 FORMAT, FORMAT_VERSION = "mbma-formula", 1
 LARGEST = 1_000_000  # bytes

@@ -1,4 +1,4 @@
-"""Made by `python -m generate.height_coefficients`; do not edit."""
+"""Made by `python -m generate.tables.height_coefficients`; do not edit."""
 
 TWICE_N_1 = (
     (

@@ -5,8 +5,8 @@ from __future__ import annotations
 from mbma_tables.arguments import number_in
 from mbma_tables.errors import InputError
 from mbma_tables.islands.greenwood_tripp import TIGHTEST
+from mbma_tables.models.exact import ExactModel, RigidModel
 from mbma_tables.models.protocol import IslandAnswer, IslandModel
-from mbma_tables.models.solved import ExactModel, RigidModel
 from mbma_tables.surfaces.readings import Reading
 
 __all__ = ["TIERS", "ExactModel", "IslandAnswer", "IslandModel", "RigidModel", "get_model"]
@@ -31,11 +31,11 @@ def get_model(tier: str, rtol: float, reading: Reading) -> IslandModel:
     if tier not in TIERS:
         raise InputError(f"tier must be one of {TIERS}, got {tier!r}")
     if tier == "formula":
-        from mbma_tables.models.formula import FormulaModel
+        from mbma_tables.models.closed_forms import FormulaModel
 
         return FormulaModel()
     # netCDF comes in where a table is asked for
-    from mbma_tables.models.tabulated import island4d_model, universal_model
+    from mbma_tables.models.universal import island4d_model, universal_model
 
     if tier == "universal":
         return universal_model()

@@ -22,8 +22,8 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError, TableFileError
+from mbma_tables.files import write_files
 from mbma_tables.tablefiles.shipped import shipped_file
-from mbma_tables.whole_files import write_files
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.surface import Surface

@@ -205,7 +205,7 @@ def _start(tier: str, costs: Costs, before: Sequence[Step] = ()) -> float:
 
 
 def _opened(tier: str) -> bool:
-    tabulated = sys.modules.get("mbma_tables.models.tabulated")
+    tabulated = sys.modules.get("mbma_tables.models.universal")
     return tabulated is not None and (tier, tabulated.shipped(tier)) in _asked
 
 
@@ -214,7 +214,7 @@ _asked: set[tuple[str, Any]] = set()
 
 def note_opened(tier: str) -> None:
     """Remember that a table was opened: its start is paid for."""
-    tabulated = sys.modules.get("mbma_tables.models.tabulated")
+    tabulated = sys.modules.get("mbma_tables.models.universal")
     if tabulated is not None and tier in ("universal", "island4d"):
         _asked.add((tier, tabulated.shipped(tier)))
 
@@ -245,7 +245,7 @@ def rigid_error(scene: Scene) -> float:
     import numpy as np
 
     from mbma_tables.islands.height_integrals import height_integral
-    from mbma_tables.islands.island import geometry
+    from mbma_tables.totals.island import geometry
 
     surface = scene.surface
     gap = -float(surface.h_max)

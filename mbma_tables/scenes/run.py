@@ -184,7 +184,7 @@ def _totals(state: _State, step: Step) -> None:
 
 
 def _hertz_area(state: _State, step: Step) -> None:
-    from mbma_tables.scenes.islands import hertz_area
+    from mbma_tables.scenes.statistics import hertz_area
 
     assert step.tier is not None
     assert step.rtol is not None
@@ -195,7 +195,7 @@ def _hertz_area(state: _State, step: Step) -> None:
 
 
 def _statistics(state: _State, step: Step) -> None:
-    from mbma_tables.scenes.islands import island_statistics
+    from mbma_tables.scenes.statistics import island_statistics
 
     assert step.tier is not None
     assert step.rtol is not None
@@ -225,7 +225,7 @@ def _statistics(state: _State, step: Step) -> None:
 
 
 def _profiles(state: _State, step: Step) -> None:
-    from mbma_tables.scenes.islands import profiles
+    from mbma_tables.scenes.statistics import profiles
 
     assert step.rtol is not None
     scene = state.scene
@@ -242,7 +242,7 @@ def _profiles(state: _State, step: Step) -> None:
 
 
 def _theory(state: _State, step: Step) -> None:
-    from mbma_tables.totals import theories
+    from mbma_tables import theories
 
     scene, gap, name = state.scene, state.gap, step.name
     if name == "greenwood_williamson":
@@ -308,6 +308,6 @@ def _hashes(tiers: set[str]) -> dict[str, str]:
     """Hashes of the values of the tables that answered."""
     if not tiers & TABLES:
         return {}
-    from mbma_tables.models.tabulated import open_table
+    from mbma_tables.models.universal import open_table
 
     return {tier: str(open_table(tier).content.attributes["values_sha256"]) for tier in sorted(tiers & TABLES)}

@@ -43,7 +43,7 @@ def _are_in_the_table(content: TableContent) -> bool:
     if content.kind == UNIVERSAL:
         places = points["X"], points["mu"]
     else:
-        from mbma_tables.models.raw import to_axes
+        from mbma_tables.islands.four_numbers import to_axes
         from mbma_tables.surfaces.readings import get_reading
 
         delta, low, high, hurst = (points[name] for name in ISLANDS)

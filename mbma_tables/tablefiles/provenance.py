@@ -27,7 +27,7 @@ SOLVER = (
 GEOMETRY = (
     "mbma_tables.surfaces.spectrum",
     "mbma_tables.islands.geometry",
-    "mbma_tables.models.raw",
+    "mbma_tables.islands.four_numbers",
 )
 
 

@@ -22,12 +22,12 @@ from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, req
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import get_model
 from mbma_tables.models.protocol import AREA, BOTH, FORCE, OUTSIDE, QUANTITIES
-from mbma_tables.models.tabulated import UniversalModel
+from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.island_sum import sum_islands
-from mbma_tables.totals.looked_up import look_up, look_up_slopes
 from mbma_tables.totals.pairs import Pairs
+from mbma_tables.totals.universal_sum import look_up, look_up_slopes
 
 MANY_GAPS = 4096  # on one surface: about what making a law costs
 FROZEN_RTOL = 2e-9

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import njit
-from mbma_tables.totals.quadrature import GAUSS as GAUSS_21
-from mbma_tables.totals.quadrature import KRONROD as KRONROD_21
-from mbma_tables.totals.quadrature import NODES as NODES_21
+from mbma_tables.totals.gauss_kronrod import GAUSS as GAUSS_21
+from mbma_tables.totals.gauss_kronrod import KRONROD as KRONROD_21
+from mbma_tables.totals.gauss_kronrod import NODES as NODES_21
 
 # QUADPACK's 31-point Kronrod rule and its 15-point Gauss rule (Piessens et al. 1983), half of each
 _NODES = np.array(

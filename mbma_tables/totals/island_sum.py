@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError
-from mbma_tables.islands.island import geometry, scale_area, scale_force
 from mbma_tables.models import IslandModel
 from mbma_tables.models.protocol import AREA, BOTH, FORCE
 from mbma_tables.surfaces.readings import Reading
+from mbma_tables.totals.gauss_kronrod import integrate
 from mbma_tables.totals.intervals import STRETCH
+from mbma_tables.totals.island import geometry, scale_area, scale_force
 from mbma_tables.totals.pairs import Pairs, jacobian_of, kinks
-from mbma_tables.totals.quadrature import integrate
 
 
 def sum_islands(

@@ -16,7 +16,7 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import njit
 from mbma_tables.models.universal_kernel import OK, UNRESOLVED, Axes, universal_phi, universal_slopes
 from mbma_tables.totals.intervals import MOST_INTERVALS, approach_at, error_of, first_intervals, halve, rule_for
-from mbma_tables.totals.lookup import Constants, island_node, jacobian_below, surface_constants
+from mbma_tables.totals.kernel import Constants, island_node, jacobian_below, surface_constants
 
 STEP = 1e-5  # of H and log(zeta_1): central differences err by its square, about 1e-10
 SHARE = 3e-4  # of the way to the floor of zeta_u, where eta rises like a sixth root

@@ -10,7 +10,7 @@ import numpy as np
 from mbma_tables.export.conformance import Replay, formula_rows, geometry_rows, phi_rows, status_rows, total_rows
 from mbma_tables.export.numbers import FORM
 from mbma_tables.formulas.file import get_form
-from mbma_tables.models.tabulated import universal_model
+from mbma_tables.models.universal import universal_model
 from mbma_tables.surfaces.readings import get_reading
 
 POINTS = 10_000

@@ -12,7 +12,7 @@ from mbma_tables.errors import InputError, TableFileError
 from mbma_tables.export import conformance
 from mbma_tables.export.code import TARGETS, write_code
 from mbma_tables.export.conformance import check
-from mbma_tables.models.tabulated import shipped, universal_model
+from mbma_tables.models.universal import shipped, universal_model
 
 DAMAGE = {
     # a file, a number in it, and one near it

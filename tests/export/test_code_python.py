@@ -17,8 +17,8 @@ from mbma_tables.export.code import write_code
 from mbma_tables.export.conformance import check
 from mbma_tables.export.numbers import FORM
 from mbma_tables.islands.geometry import FIELDS, fill_islands
-from mbma_tables.models.formula import FormulaModel
-from mbma_tables.models.tabulated import universal_model
+from mbma_tables.models.closed_forms import FormulaModel
+from mbma_tables.models.universal import universal_model
 from mbma_tables.surfaces.readings import get_reading
 
 

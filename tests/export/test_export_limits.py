@@ -8,12 +8,13 @@ from click.testing import CliRunner
 
 from mbma_tables import InputError, Surface
 from mbma_tables.cli import main
-from mbma_tables.export import conformance, description
+from mbma_tables.export import conformance
+from mbma_tables.export import law_rows as description
 from mbma_tables.export.conformance import KINDS, Replay, check, read_report
 from mbma_tables.export.data import to_hdf5, to_parquet
-from mbma_tables.export.description import describe_law
+from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.solvers import calculix, optistruct
-from mbma_tables.models.tabulated import universal_model
+from mbma_tables.models.universal import universal_model
 from mbma_tables.surfaces.readings import Reading
 
 UNITS = {"length_unit": "mm", "stress_unit": "MPa"}

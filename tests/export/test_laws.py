@@ -9,7 +9,7 @@ import pytest
 from mbma_tables import InputError, Surface, contact
 from mbma_tables.export import solvers
 from mbma_tables.export.data import DATA, to_csv, to_json
-from mbma_tables.export.description import FLOOR, describe_law
+from mbma_tables.export.law_rows import FLOOR, describe_law
 from mbma_tables.export.solvers import SOLVERS, calculix, exponential
 
 UNITS = {"length_unit": "mm", "stress_unit": "MPa"}

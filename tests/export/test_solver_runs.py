@@ -9,7 +9,7 @@ import pytest
 
 from mbma_tables import Surface
 from mbma_tables.export.data import matlab_reader, to_mat, to_netcdf
-from mbma_tables.export.description import describe_law
+from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.solvers import calculix
 
 SIDE = {"mm": 10.0, "m": 0.01}

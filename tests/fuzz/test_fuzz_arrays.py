@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fuzzing import SCALE, finite, spoilt
 
-from generate import campaign
+from generate.tables import campaign
 from mbma_tables import InputError, Surface
 from mbma_tables.surfaces.maps import read_map
 

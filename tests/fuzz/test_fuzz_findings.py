@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small_tables import small_table
 
-from generate import campaign
+from generate.tables import campaign
 from mbma_tables import InputError, Scene, Surface, TableFileError
 from mbma_tables.formulas import file as formula_file
 from mbma_tables.scenes.costs import read_calibration

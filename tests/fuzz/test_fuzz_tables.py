@@ -8,12 +8,12 @@ import pytest
 from fuzzing import SCALE, finite, spoilt
 from small_tables import seal, small_table, unseal
 
-from mbma_tables.models.tabulated import Island4dModel, UniversalModel
+from mbma_tables.models.universal import Island4dModel, UniversalModel
+from mbma_tables.models.verify import verify
 from mbma_tables.tablefiles import contents, provenance
 from mbma_tables.tablefiles.contents import Contents, contents_of
-from mbma_tables.tablefiles.files import _digest_of, check_table, read_table, write_table
+from mbma_tables.tablefiles.netcdf import _digest_of, check_table, read_table, write_table
 from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL
-from mbma_tables.tablefiles.verify import verify
 
 SIGNATURES = (b"OHDR", b"OCHK", b"FRHP", b"FHDB", b"FHIB", b"BTHD", b"BTLF", b"TREE", b"GCOL")
 KINDS_OF_NUMBERS = ("f4", "f8", ">f8", "i1", "i4", "i8", "u2")

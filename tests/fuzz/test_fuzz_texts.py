@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fuzzing import SCALE, changed, finite, spoilt, toml_text
 
-from generate import configuration
+from generate.tables import configuration
 from mbma_tables import InputError, Scene
 from mbma_tables.formulas import file as formula_file
 from mbma_tables.scenes.costs import CALIBRATED_TIERS, Calibration, read_calibration, read_costs, write_calibration

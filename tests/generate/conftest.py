@@ -3,9 +3,9 @@
 import pytest
 from small_builds import KINDS, small
 
-from generate.build import build
-from generate.campaign import Campaign
-from generate.configuration import load
+from generate.tables.build import build
+from generate.tables.campaign import Campaign
+from generate.tables.configuration import load
 
 
 @pytest.fixture(scope="session", params=KINDS)

@@ -1,7 +1,7 @@
 """Small tables that build in about a second; no test here depends on a shipped table."""
 
-from generate.island4d import Island4d
-from generate.universal import Universal
+from generate.tables.island4d import Island4d
+from generate.tables.universal import Universal
 
 SMALL = {
     "universal": """

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from generate import atlas_cases as cases
-from generate.atlas import beyond, corners, draw
+from generate.pages import stability_cases as cases
+from generate.pages.stability import beyond, corners, draw
 
 
 def few(monkeypatch):

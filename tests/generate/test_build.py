@@ -9,14 +9,14 @@ import pytest
 from click.testing import CliRunner
 from small_builds import KINDS, SMALL, small
 
-from generate import build as build_module
 from generate.__main__ import main
-from generate.build import UncertifiedError, build, certify, evaluate, held_out, resolve
-from generate.campaign import Campaign
-from generate.configuration import load
-from generate.islands import log_ratio
+from generate.tables import build as build_module
+from generate.tables.build import UncertifiedError, build, certify, evaluate, held_out, resolve
+from generate.tables.campaign import Campaign
+from generate.tables.configuration import load
+from generate.tables.solves import log_ratio
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.tablefiles.files import read_table, write_table
+from mbma_tables.tablefiles.netcdf import read_table, write_table
 from mbma_tables.tablefiles.schema import error_cell
 
 FRESH = 4000

@@ -9,8 +9,8 @@ import signal
 import numpy as np
 import pytest
 
-from generate import campaign as campaign_module
-from generate.campaign import ATTEMPTS, Campaign, CampaignError, Workers, chunk_key, split
+from generate.tables import campaign as campaign_module
+from generate.tables.campaign import ATTEMPTS, Campaign, CampaignError, Workers, chunk_key, split
 
 COUNT = 7
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from generate import configuration
 from generate.__main__ import TABLES, main
-from generate.configuration import FEWEST_NODES, FEWEST_SHIPPED, LIMITS, load, make_axis
+from generate.tables import configuration
+from generate.tables.configuration import FEWEST_NODES, FEWEST_SHIPPED, LIMITS, load, make_axis
 from mbma_tables.errors import InputError
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models.raw import band_fields
+from mbma_tables.islands.four_numbers import band_fields
 from mbma_tables.surfaces.readings import READINGS
 
 LARGE = "1" + "0" * 400

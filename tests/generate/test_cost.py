@@ -3,12 +3,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generate import cost, cost_islands, cost_page, cost_totals
+from generate.pages import cost, cost_islands, cost_page, cost_totals
 from mbma_tables import contact
+from mbma_tables.files import write_files
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models.tabulated import island4d_model
+from mbma_tables.models.universal import island4d_model
 from mbma_tables.scenes.costs import HELD_OUT, Row, cost_file, held_out_surfaces, read_costs
-from mbma_tables.whole_files import write_files
 
 
 def test_reference_agrees_with_the_exact_tier():

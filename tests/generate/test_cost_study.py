@@ -8,7 +8,7 @@ import re
 import pytest
 from click.testing import CliRunner
 
-from generate import cost, cost_islands, cost_page, cost_totals
+from generate.pages import cost, cost_islands, cost_page, cost_totals
 from mbma_tables import ConvergenceError
 from mbma_tables.scenes.costs import Row, cost_file, read_costs
 

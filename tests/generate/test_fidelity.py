@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 from scipy.optimize import brentq
 
-from generate import fidelity
+from generate.pages import fidelity
 from mbma_tables import Surface, contact, theories
 
 DOCS = fidelity.DATA.parent

@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from generate import formula, formula_alternatives, formula_islands, formula_page, formula_terms, formula_totals
-from generate.formula_terms import AREA, FORCE, Samples, columns, limit_log_Q, variables
+from generate.formulas import alternatives as formula_alternatives
+from generate.formulas import fit as formula
+from generate.formulas import islands as formula_islands
+from generate.formulas import terms as formula_terms
+from generate.formulas import totals as formula_totals
+from generate.formulas.terms import AREA, FORCE, Samples, columns, limit_log_Q, variables
+from generate.pages import formula as formula_page
 from mbma_tables import contact
 from mbma_tables.formulas.file import TOTALS, get_form, read
 from mbma_tables.islands import greenwood_tripp

@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from generate.formula_heights import HIGH, LOW, height_error, height_steps
+from generate.formulas.heights import HIGH, LOW, height_error, height_steps
 from mbma_tables.formulas.expressions import evaluate_steps
 
 ORDERS = {"rigid_F": 2.5, "rigid_A": 2.0}

@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 from scipy.optimize import linprog
 
-from generate.formula_terms import least_largest
-from generate.formula_totals import LEAST_AREA, NAMES, RANGE, anneal, arguments, eliminate, samples
+from generate.formulas.terms import least_largest
+from generate.formulas.totals import LEAST_AREA, NAMES, RANGE, anneal, arguments, eliminate, samples
 from mbma_tables import Surface, contact
 from mbma_tables.formulas.file import TOTALS, get_form
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from click.testing import CliRunner
 
-from generate import atlas, gauntlet
+from generate.pages import gauntlet
+from generate.pages import stability as atlas
 
 BULK = """
 import os

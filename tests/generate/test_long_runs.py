@@ -15,7 +15,7 @@ import pytest
 from small_builds import SMALL
 
 from mbma_tables.errors import TableFileError
-from mbma_tables.tablefiles.files import read_table
+from mbma_tables.tablefiles.netcdf import read_table
 
 ROOT = pathlib.Path(__file__).parents[2]
 PATIENCE = 120.0

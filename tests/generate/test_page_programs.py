@@ -11,11 +11,16 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from generate import atlas, export_page, fidelity, fidelity_figures, height_coefficients, table_page, table_schemes
-from generate.pages import MARKED
-from generate.table_schemes import Row
+from generate.pages import export as export_page
+from generate.pages import fidelity, fidelity_figures
+from generate.pages import stability as atlas
+from generate.pages import tables as table_page
+from generate.pages.page import MARKED
+from generate.tables import height_coefficients
+from generate.tables import schemes as table_schemes
+from generate.tables.schemes import Row
 from mbma_tables import Surface, contact, theories
-from mbma_tables.export.description import describe_law
+from mbma_tables.export.law_rows import describe_law
 
 ROOT = pathlib.Path(export_page.__file__).parent
 PNG = b"\x89PNG"

@@ -15,12 +15,13 @@ from click.testing import CliRunner
 from small_builds import KINDS, small
 
 import generate.__main__ as command
-from generate import build as build_module
-from generate import campaign as campaign_module
-from generate import fidelity, island4d
-from generate.build import UncertifiedError, build
-from generate.campaign import Campaign, CampaignError, Workers, split
-from generate.configuration import load
+from generate.pages import fidelity
+from generate.tables import build as build_module
+from generate.tables import campaign as campaign_module
+from generate.tables import island4d
+from generate.tables.build import UncertifiedError, build
+from generate.tables.campaign import Campaign, CampaignError, Workers, split
+from generate.tables.configuration import load
 from mbma_tables import InputError
 
 
@@ -106,7 +107,7 @@ def test_what_is_made_and_where(what, tables, monkeypatch, tmp_path):
         made.append(target)
         return types.SimpleNamespace(forms={"pocket": Form()})
 
-    monkeypatch.setattr("generate.formula.build", formulas)
+    monkeypatch.setattr("generate.formulas.fit.build", formulas)
     done = CliRunner().invoke(command.main, [what, "--out", str(tmp_path / "here"), "--workers", "1"])
     assert done.exit_code == 0
     target = tmp_path / "here" / "formula.json" if what == "all" else tmp_path / "here"

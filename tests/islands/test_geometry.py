@@ -7,10 +7,10 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from generate.exact_geometry import DIGITS, divisor, exact_island
+from generate.tables.exact_geometry import DIGITS, divisor, exact_island
 from mbma_tables.islands.geometry import FIELDS
-from mbma_tables.islands.island import geometry
 from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED
+from mbma_tables.totals.island import geometry
 
 
 def one_geometry(approach, hurst, zeta_1, reading):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generate.exact_geometry import divisor, exact_island
+from generate.tables.exact_geometry import divisor, exact_island
 from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, height_integral, island
 
 LENGTHS = {"R_d": 1, "R_u": 1, "D": -2, "sigma": 1, "h_d": 1, "delta": 1}

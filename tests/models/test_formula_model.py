@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, greenwood_tripp
-from mbma_tables.models.formula import FormulaModel
+from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.protocol import AREA, FORCE
 
 

@@ -7,13 +7,13 @@ import pytest
 from small_tables import small_table
 
 from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, island
-from mbma_tables.islands.island import geometry
-from mbma_tables.models import tabulated
-from mbma_tables.models.raw import SPHERE_FLOOR, hat_scales, to_axes
-from mbma_tables.models.tabulated import Island4dModel, island4d_model
+from mbma_tables.islands.four_numbers import SPHERE_FLOOR, hat_scales, to_axes
+from mbma_tables.models import universal as tabulated
+from mbma_tables.models.universal import Island4dModel, island4d_model
 from mbma_tables.surfaces.readings import REPORTED
-from mbma_tables.tablefiles.files import read_table, write_table
+from mbma_tables.tablefiles.netcdf import read_table, write_table
 from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
+from mbma_tables.totals.island import geometry
 
 ignore_stale = pytest.mark.filterwarnings("ignore::mbma_tables.errors.StaleTableWarning")
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact, greenwood_tripp
-from mbma_tables.islands.island import geometry, scale_area, scale_force
-from mbma_tables.models.four_numbers import Island4dModel
-from mbma_tables.models.tabulated import island4d_model, open_table, universal_model
+from mbma_tables.models.island4d import Island4dModel
+from mbma_tables.models.universal import island4d_model, open_table, universal_model
 from mbma_tables.surfaces.readings import REPORTED
+from mbma_tables.totals.island import geometry, scale_area, scale_force
 
 NAMES = ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")
 
@@ -113,7 +113,7 @@ def test_a_missing_table_says_so(tmp_path):
 
 def test_the_solver_gives_up_in_the_right_places(monkeypatch):
     from mbma_tables import ConvergenceError
-    from mbma_tables.totals import looked_up
+    from mbma_tables.totals import universal_sum as looked_up
 
     def gives_up(pairs, *_, **__):
         raise ConvergenceError("no end", np.arange(pairs.reach.size) == 1)

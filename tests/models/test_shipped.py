@@ -4,12 +4,12 @@ import json
 
 import pytest
 
-from mbma_tables.models.tabulated import shipped
+from mbma_tables.models.universal import shipped
+from mbma_tables.models.verify import verify
 from mbma_tables.surfaces.readings import get_reading
-from mbma_tables.tablefiles.files import MODULES, check_table
+from mbma_tables.tablefiles.netcdf import MODULES, check_table
 from mbma_tables.tablefiles.provenance import digest_json, physics_digest
 from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL, is_finite_content
-from mbma_tables.tablefiles.verify import verify
 
 LARGEST_BYTES = {UNIVERSAL: 2e6, ISLAND4D: 16e6}
 LARGEST_ERROR = {UNIVERSAL: 1e-8, ISLAND4D: 1e-3}

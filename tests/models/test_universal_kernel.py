@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
-from mbma_tables.islands.island import geometry
 from mbma_tables.models import universal_kernel
-from mbma_tables.models.tabulated import island4d_model, universal_model
+from mbma_tables.models.universal import island4d_model, universal_model
 from mbma_tables.surfaces.readings import REPORTED
+from mbma_tables.totals.island import geometry
 
 
 def scattered(count, seed, low=None):

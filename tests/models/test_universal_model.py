@@ -7,9 +7,9 @@ import pytest
 from small_tables import small_table
 
 from mbma_tables import OutOfRangeError, greenwood_tripp
-from mbma_tables.models import tabulated
-from mbma_tables.models.tabulated import UniversalModel, universal_model
-from mbma_tables.tablefiles.files import read_table, write_table
+from mbma_tables.models import universal as tabulated
+from mbma_tables.models.universal import UniversalModel, universal_model
+from mbma_tables.tablefiles.netcdf import read_table, write_table
 from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL, error_cell
 
 # the shipped table answers rightly even where a line of the solver has changed since

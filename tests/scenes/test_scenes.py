@@ -11,7 +11,8 @@ from scipy.integrate import quad
 
 from mbma_tables import Scene, Surface, contact, contact_law, island
 from mbma_tables.errors import InputError
-from mbma_tables.scenes import islands, plan
+from mbma_tables.scenes import plan
+from mbma_tables.scenes import statistics as islands
 from mbma_tables.scenes.effects import EFFECTS, OUTPUTS
 
 CONCRETE = Surface.named("concrete")
@@ -157,8 +158,8 @@ def test_python_mistakes(more, words):
 WATCHED = {
     "mbma_tables.totals.law": {"stiffness", "energy", "conductance"},
     "mbma_tables.totals.conductance": {"conductance"},
-    "mbma_tables.totals.theories": {"comparison"},
-    "mbma_tables.scenes.islands": {"island_statistics", "pressure_profile"},
+    "mbma_tables.theories": {"comparison"},
+    "mbma_tables.scenes.statistics": {"island_statistics", "pressure_profile"},
 }
 COMBINATIONS = [(name,) for name in OUTPUTS] + list(itertools.combinations(OUTPUTS, 2))
 COUNTED = """
@@ -192,9 +193,9 @@ def test_modules_of_an_effect_that_is_off_are_not_imported(name):
 
 @pytest.mark.parametrize("effects", COMBINATIONS, ids="+".join)
 def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
+    import mbma_tables.theories as theories
     import mbma_tables.totals.contact as totals
     import mbma_tables.totals.law as laws
-    import mbma_tables.totals.theories as theories
 
     calls = {}
 
@@ -232,7 +233,7 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
 
 @pytest.mark.parametrize("name", ["comparison", "pressure_profile"])
 def test_tables_are_not_read_where_nothing_looks_up(name, monkeypatch):
-    from mbma_tables.models import tabulated
+    from mbma_tables.models import universal as tabulated
 
     def refuse(*_):
         raise AssertionError("a table was read")

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 
 from mbma_tables import greenwood_tripp
-from mbma_tables.models.raw import band_fields, from_axes, hat_scales, to_axes
+from mbma_tables.islands.four_numbers import band_fields, from_axes, hat_scales, to_axes
 from mbma_tables.surfaces.readings import REPORTED
-from mbma_tables.tablefiles.files import SEAL, SEAL_LENGTH
 from mbma_tables.tablefiles.interpolate import fill_2d, fill_4d
+from mbma_tables.tablefiles.netcdf import SEAL, SEAL_LENGTH
 from mbma_tables.tablefiles.schema import DEGREES, FUNCTIONS, ISLAND4D, UNIVERSAL, Axis, TableContent, grid_labels
 from mbma_tables.tablefiles.splines import coefficients
 

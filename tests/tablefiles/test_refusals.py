@@ -8,8 +8,8 @@ import pytest
 from small_tables import copied, edited, seal, small_table, unseal
 
 from mbma_tables.errors import StaleTableWarning, TableFileError
-from mbma_tables.tablefiles import files
-from mbma_tables.tablefiles.files import SEAL_LENGTH, read_table, write_table
+from mbma_tables.tablefiles import netcdf as files
+from mbma_tables.tablefiles.netcdf import SEAL_LENGTH, read_table, write_table
 from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL
 
 

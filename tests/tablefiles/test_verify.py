@@ -8,10 +8,10 @@ from small_tables import POINTS, small_table
 
 from mbma_tables.errors import TableFileError
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.tablefiles import files
-from mbma_tables.tablefiles.files import write_table
+from mbma_tables.models.verify import verify
+from mbma_tables.tablefiles import netcdf as files
+from mbma_tables.tablefiles.netcdf import write_table
 from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL
-from mbma_tables.tablefiles.verify import verify
 
 
 def with_points(kind, **changes):

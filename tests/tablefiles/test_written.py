@@ -15,8 +15,8 @@ import xarray
 from small_tables import small_table
 
 from mbma_tables.errors import TableFileError
-from mbma_tables.tablefiles import files
-from mbma_tables.tablefiles.files import MODULES, read_sealed, read_table, write_table
+from mbma_tables.tablefiles import netcdf as files
+from mbma_tables.tablefiles.netcdf import MODULES, read_sealed, read_table, write_table
 from mbma_tables.tablefiles.provenance import digest_arrays, physics_digest
 from mbma_tables.tablefiles.schema import DEGREES, FORMAT_VERSION, FUNCTIONS, KINDS, UNIVERSAL
 
@@ -78,7 +78,7 @@ def test_two_processes_write_the_same(tmp_path):
         "import sys\n"
         f"sys.path.insert(0, {os.path.dirname(__file__)!r})\n"
         "from small_tables import small_table\n"
-        "from mbma_tables.tablefiles.files import write_table\n"
+        "from mbma_tables.tablefiles.netcdf import write_table\n"
         "for kind in ('universal', 'island4d'):\n"
         "    write_table(f'{sys.argv[1]}/{kind}.nc', small_table(kind))\n"
     )

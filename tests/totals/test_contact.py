@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, greenwood_tripp
 from mbma_tables import contact as contact_by_tier
-from mbma_tables.islands.island import geometry
 from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED, get_reading
+from mbma_tables.totals.island import geometry
 from mbma_tables.totals.pairs import kinks
 
 contact = functools.partial(contact_by_tier, tier="exact")

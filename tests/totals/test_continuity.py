@@ -12,17 +12,18 @@ import pytest
 
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island
 from mbma_tables.islands import newton
+from mbma_tables.islands.four_numbers import band_fields, from_axes, to_axes
 from mbma_tables.islands.height_integrals import ORDERS, f_half, height_integral
-from mbma_tables.islands.island import geometry
-from mbma_tables.models.formula import FormulaModel
-from mbma_tables.models.four_numbers import RAW
+from mbma_tables.models.closed_forms import FormulaModel
+from mbma_tables.models.island4d import RAW
 from mbma_tables.models.protocol import BOTH
-from mbma_tables.models.raw import band_fields, from_axes, to_axes
-from mbma_tables.models.tabulated import island4d_model, universal_model
+from mbma_tables.models.universal import island4d_model, universal_model
 from mbma_tables.surfaces.readings import READINGS, REPORTED, get_reading
-from mbma_tables.totals import island_sum, lookup
+from mbma_tables.totals import island_sum
+from mbma_tables.totals import kernel as lookup
 from mbma_tables.totals.intervals import NARROW, STRETCH
-from mbma_tables.totals.lookup import SMALL_POWER
+from mbma_tables.totals.island import geometry
+from mbma_tables.totals.kernel import SMALL_POWER
 from mbma_tables.totals.pairs import kinks
 
 SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
-from mbma_tables.islands.island import geometry
+from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law, theories
 from mbma_tables.surfaces.readings import PRINTED, REPORTED
 from mbma_tables.totals import contact as contact_module
-from mbma_tables.totals import law_kernel, theories
+from mbma_tables.totals import law_kernel
 from mbma_tables.totals.conductance import conductance, mean_conductivity
+from mbma_tables.totals.gauss_kronrod import integrate
+from mbma_tables.totals.island import geometry
 from mbma_tables.totals.pairs import kinks
-from mbma_tables.totals.quadrature import integrate
 
 
 def test_mean_conductivity_is_harmonic():

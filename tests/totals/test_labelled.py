@@ -191,8 +191,8 @@ with dask.config.set(scheduler="threads", num_workers=8):
     lazy = contact(surface, gaps.chunk(gap=3)), contact(surface, gaps.chunk(gap=15), tier="island4d", rtol=1e-3)
     first, second = dask.compute(lazy[0].force, lazy[1].force)
 assert (abs(first - second) <= 0.01 * first).all()
-from mbma_tables.models.tabulated import shipped
-from mbma_tables.tablefiles.files import read_table
+from mbma_tables.models.universal import shipped
+from mbma_tables.tablefiles.netcdf import read_table
 barrier = Barrier(8)
 def read(kind):
     barrier.wait()

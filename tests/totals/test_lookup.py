@@ -8,11 +8,12 @@ import pytest
 from numpy.polynomial import legendre
 
 from mbma_tables import ConvergenceError, OutOfRangeError, Surface, contact
-from mbma_tables.islands.island import geometry
 from mbma_tables.models.protocol import BOTH
-from mbma_tables.models.tabulated import universal_model
+from mbma_tables.models.universal import universal_model
 from mbma_tables.surfaces.readings import PRINTED, REPORTED
-from mbma_tables.totals import intervals, lookup
+from mbma_tables.totals import intervals
+from mbma_tables.totals import kernel as lookup
+from mbma_tables.totals.island import geometry
 from mbma_tables.totals.pairs import kinks
 
 LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbma_tables import ConvergenceError
-from mbma_tables.totals import quadrature
-from mbma_tables.totals.quadrature import GAUSS, KRONROD, NODES, integrate
+from mbma_tables.totals import gauss_kronrod as quadrature
+from mbma_tables.totals.gauss_kronrod import GAUSS, KRONROD, NODES, integrate
 
 
 def run(function, low, high, rtol=1e-10, owner=None):

@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island
+from mbma_tables.islands.four_numbers import from_axes, to_axes
 from mbma_tables.islands.geometry import FIELDS
-from mbma_tables.islands.island import geometry
-from mbma_tables.models.four_numbers import RAW
-from mbma_tables.models.raw import from_axes, to_axes
-from mbma_tables.models.tabulated import island4d_model, universal_model
+from mbma_tables.models.island4d import RAW
+from mbma_tables.models.universal import island4d_model, universal_model
 from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED
 from mbma_tables.surfaces.spectrum import band_moment
 from mbma_tables.totals.intervals import NARROW
+from mbma_tables.totals.island import geometry
+from mbma_tables.totals.kernel import SMALL_POWER
 from mbma_tables.totals.law import TERMS
-from mbma_tables.totals.lookup import SMALL_POWER
 from mbma_tables.totals.pairs import kinks
 
 SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))

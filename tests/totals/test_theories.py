@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from mbma_tables import InputError, OutOfRangeError, Surface
-from mbma_tables.totals import theories
+from mbma_tables import InputError, OutOfRangeError, Surface, theories
 
 YANG_PERSSON = Surface.named("yang-persson")
 

@@ -1,0 +1,1 @@
+"""Closed forms: fitted to exact solves, certified, written."""

@@ -1,0 +1,1 @@
+"""Tables: built on workers, certified, written."""

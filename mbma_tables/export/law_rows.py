@@ -1,0 +1,272 @@
+"""One description of a contact law for other codes: what it is, in which units, and rows chosen by their error.
+
+Overclosure is c = h_max - u with the mean separation u = (h_max + d)/2 (50): zero at first contact, rising as bodies
+approach, so that -dp/du = dp/dc. A code that interpolates linearly between rows errs by about h^2 p''/8 over a step h;
+rows are spaced so that this is the same share of p everywhere above a floor, and moved by half of it, so that it falls
+on both sides.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from mbma_tables import __version__
+from mbma_tables.arguments import FloatArray, number_in, whole_number_in
+from mbma_tables.errors import InputError
+from mbma_tables.surfaces.readings import Reading
+from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.totals.conductance import conductance
+from mbma_tables.totals.law import ContactLaw, contact_law
+
+QUANTITIES = ("pressure", "conductance")
+FLOOR = 1e-3  # of the largest pressure: below it, errors are not relative to the pressure but to this
+FINE = 20_001  # points at which a choice of rows is judged
+FEWEST_ROWS, MOST_ROWS = 3, 5000
+ROUNDS = 40  # of evening errors out
+DIGITS = 10  # of the numbers in a file
+LAW_RTOL = 1e-8
+CLOSE = 1e-10  # rows nearer than this, in the file's unit, are spoilt by some readers
+
+
+@dataclasses.dataclass(frozen=True)
+class LawTable:
+    """Rows of a contact law, ready to be written.
+
+    Attributes
+    ----------
+    x, y : ndarray
+        Overclosure and pressure, or pressure and conductance; both start at zero and rise.
+    x_name, y_name, x_unit, y_unit : str
+    largest_error : float
+        Largest relative error of linear interpolation between the rows as written against the model, where y
+        is above `FLOOR` of its largest.
+    comments : tuple of str
+        What a reader of the file must know.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    x_name: str
+    y_name: str
+    x_unit: str
+    y_unit: str
+    largest_error: float
+    comments: tuple[str, ...]
+
+
+def rounded(values: FloatArray) -> FloatArray:
+    """Numbers as a file holds them."""
+    return np.array([float(f"{value:.{DIGITS}g}") for value in values])
+
+
+def spread(x: FloatArray, y: FloatArray, count: int) -> FloatArray:
+    """Places of `count` rows along x whose chords err alike, over max(y, floor): errors evened out step by step."""
+    scale = np.maximum(y, FLOOR * y[-1])
+    # logarithmic in y above the floor to begin with, linear below
+    filled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(y)) / scale[1:])]) + np.linspace(0, 3, x.size)
+    places = _cut(filled, x, count)
+    best, found = np.inf, places
+    for _ in range(ROUNDS):
+        own = np.interp(places, x, y)
+        step = np.clip(np.searchsorted(places, x, side="right") - 1, 0, count - 2)
+        error = np.zeros(count - 1)
+        np.maximum.at(error, step, np.abs(np.interp(x, places, own) - y) / scale)
+        if error.max() < best:
+            best, found = error.max(), places
+        # the error of a chord falls like the square of its length
+        share = np.sqrt(error + 1e-3 * error.max())
+        places = _cut(np.concatenate([[0.0], np.cumsum(share)]), places, count)
+    return found
+
+
+def _cut(filled: FloatArray, x: FloatArray, count: int) -> FloatArray:
+    """`count` places between which `filled` grows alike."""
+    places: FloatArray = np.interp(np.linspace(filled[0], filled[-1], count), filled, x)
+    places[0], places[-1] = x[0], x[-1]
+    return places
+
+
+def chord_error(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArray) -> float:
+    """Largest relative error of linear interpolation where y is above the floor."""
+    kept = fine_y > FLOOR * fine_y[-1]
+    return float(np.abs(np.interp(fine_x[kept], x, y) / fine_y[kept] - 1).max())
+
+
+def balanced(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArray) -> FloatArray:
+    """Rows moved by half of what the chords beside them overshoot: the largest error halves, the same both ways."""
+    scale = np.maximum(fine_y, FLOOR * fine_y[-1])
+    over = (np.interp(fine_x, x, y) - fine_y) / scale
+    step = np.clip(np.searchsorted(x, fine_x, side="right") - 1, 0, x.size - 2)
+    most, least = np.zeros(x.size - 1), np.zeros(x.size - 1)
+    np.maximum.at(most, step, over)
+    np.minimum.at(least, step, over)
+    middle = (most + least) / 2
+    beside = np.concatenate([[middle[0]], (middle[1:] + middle[:-1]) / 2, [middle[-1]]])
+    moved = np.maximum(y - beside * np.maximum(y, FLOOR * y[-1]), 0.0)
+    moved[0] = y[0]
+    # pressure rises; conductance may fall where the model's stiffness jumps
+    if (np.diff(fine_y) >= 0).all():
+        moved = np.maximum.accumulate(moved)
+    result: FloatArray = moved
+    return result
+
+
+@dataclasses.dataclass(frozen=True)
+class _Curve:
+    """The law on fine points."""
+
+    x: FloatArray
+    y: FloatArray
+
+
+def _curve(law: ContactLaw, quantity: str, deepest: float, k_s: float, E_star: float) -> _Curve:
+    # squares: fine where p is a high power of the overclosure
+    c = deepest * np.linspace(0, 1, FINE) ** 2
+    d = law.h_max - 2 * c
+    pressure, stiffness = np.asarray(law.force(d)), np.asarray(law.stiffness_mean(d))
+    pressure[0] = stiffness[0] = 0.0
+    if quantity == "pressure":
+        return _Curve(c, pressure)
+    h = np.asarray(conductance(stiffness, k_s, E_star))
+    some = np.concatenate([[True], np.diff(pressure) > 0])
+    return _Curve(pressure[some], h[some])
+
+
+def describe_law(
+    surface: Surface,
+    E_star: float,
+    *,
+    length_unit: str,
+    stress_unit: str,
+    quantity: str = "pressure",
+    rows: int | None = None,
+    rtol: float | None = None,
+    largest_overclosure: float | None = None,
+    conductivity: float | None = None,
+    conductivity_unit: str | None = None,
+    reading: str | Reading = "reported",
+    evenly: bool = False,
+) -> LawTable:
+    """A contact law as rows for a code that interpolates linearly.
+
+    Parameters
+    ----------
+    surface : Surface
+        One surface.
+    E_star : float
+        Effective modulus [stress]: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
+    length_unit, stress_unit : str
+        Names of the units that the numbers are in.
+    quantity : {"pressure", "conductance"}
+        Pressure against overclosure, or conductance against pressure.
+    rows : int, optional
+        How many; else as few as `rtol` needs, 1e-3 where neither is given.
+    rtol : float, optional
+        Largest relative error of the interpolation where the result is above a thousandth of its largest.
+    largest_overclosure : float, optional
+        Where the rows end [length]; else at full compression, or where the force turns down.
+    conductivity : float, optional
+        k_s = 2 k1 k2/(k1 + k2) for conductance, thermal or electrical, with its unit.
+    reading : str or Reading
+    evenly : bool
+        Equally spaced rows instead, for comparison.
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        For a batch of surfaces, missing units, a range beyond the law, and rows that cannot meet `rtol`.
+    """
+    for name, unit in (("length_unit", length_unit), ("stress_unit", stress_unit)):
+        if not unit or not unit.isprintable():
+            raise InputError(f"{name} is missing: a law without units is read wrongly sooner or later")
+    if surface.shape != ():
+        raise InputError("a contact law is of one surface, not of a batch")
+    if quantity not in QUANTITIES:
+        raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
+    modulus = number_in("E_star", E_star, 1e-300, 1e300)
+    if rows is not None and rtol is not None:
+        raise InputError("rows and rtol are both given: give one of them")
+    k_s = 1.0
+    if quantity == "conductance":
+        if conductivity is None or not conductivity_unit:
+            raise InputError("conductance needs conductivity, k_s = 2 k1 k2/(k1 + k2), and conductivity_unit")
+        k_s = number_in("conductivity", conductivity, 1e-300, 1e300)
+    law = contact_law(surface, LAW_RTOL, reading=reading, E_star=modulus)
+    turn = law.turning_point
+    end = law.h_max if turn is None else (law.h_max - turn) / 2
+    deepest = end if largest_overclosure is None else float(largest_overclosure)
+    if not 0 < deepest <= end:
+        why = "full compression" if turn is None else "where the force of this surface turns down"
+        raise InputError(f"largest_overclosure must be in (0, {end:g}], up to {why}, got {deepest:g}")
+    curve = _curve(law, quantity, deepest, k_s, modulus)
+
+    def table(count: int) -> tuple[FloatArray, FloatArray, float]:
+        places = np.linspace(0, curve.x[-1], count) if evenly else spread(curve.x, curve.y, count)
+        x = rounded(places)
+        y = np.interp(x, curve.x, curve.y)
+        y = rounded(y if evenly else balanced(x, y, curve.x, curve.y))
+        return x, y, chord_error(x, y, curve.x, curve.y)
+
+    if rows is not None:
+        x, y, error = table(whole_number_in("rows", rows, FEWEST_ROWS, MOST_ROWS))
+    else:
+        x, y, error = _fewest(table, number_in("rtol", 1e-3 if rtol is None else rtol, 1e-7, 0.5))
+    if (np.diff(x) <= (CLOSE if quantity == "pressure" else 0.0)).any():
+        raise InputError(
+            f"rows come nearer than {CLOSE:g} {length_unit}, which some readers cannot tell apart: "
+            "take fewer rows or a smaller unit of length"
+        )
+    names = {
+        "pressure": ("overclosure", "pressure", length_unit, stress_unit),
+        "conductance": ("pressure", "conductance", stress_unit, f"{conductivity_unit}/{length_unit}"),
+    }[quantity]
+    return LawTable(x, y, *names, error, _comments(surface, law, modulus, names, x, error, turn))
+
+
+def _fewest(table: Any, rtol: float) -> tuple[FloatArray, FloatArray, float]:
+    """The table of fewest rows that meets the tolerance."""
+    low, high = FEWEST_ROWS, 2 * FEWEST_ROWS
+    while (found := table(high))[2] > rtol:
+        if high >= MOST_ROWS:
+            raise InputError(f"rtol = {rtol:g} needs more than {MOST_ROWS} rows under linear interpolation")
+        low, high = high, min(2 * high, MOST_ROWS)
+    while high - low > 1:
+        middle = (low + high) // 2
+        trial = table(middle)
+        if trial[2] <= rtol:
+            high, found = middle, trial
+        else:
+            low = middle
+    result: tuple[FloatArray, FloatArray, float] = found
+    return result
+
+
+def _comments(
+    surface: Surface,
+    law: ContactLaw,
+    E_star: float,
+    names: tuple[str, str, str, str],
+    x: FloatArray,
+    error: float,
+    turn: float | None,
+) -> tuple[str, ...]:
+    from mbma_tables.models.universal import universal_model
+
+    attributes = universal_model().content.attributes
+    numbers = ", ".join(f"{name} = {float(getattr(surface, name)):.10g}" for name in PARAMETERS)
+    unit = names[2] if names[0] == "overclosure" else "the unit of length of the conductance"
+    end = "full compression" if turn is None else "where the force of this surface turns down; nothing is known beyond"
+    return (
+        f"Contact law of a rough surface, MBMA model, reading {law.reading!r}; mbma_tables {__version__}",
+        f"{names[1]} [{names[3]}] against {names[0]} [{names[2]}]",
+        f"surface: {numbers}; lengths in {unit}",
+        f"E* = {E_star:.10g}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; pressure is force over nominal area",
+        "overclosure c = h_max - u, u = (h_max + d)/2 the mean separation, d the separation from the mid-plane;",
+        "c = 0 is first contact: bodies meet where their mean planes are h_max apart",
+        f"range: {names[0]} from 0 to {x[-1]:.10g}, {end if names[0] == 'overclosure' else 'the same'}",
+        f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, above 1e-3 of the largest value",
+        f"table: data {str(attributes['values_sha256'])[:16]}, physics {str(attributes['physics_sha256'])[:16]}",
+    )

@@ -1,0 +1,272 @@
+"""The island model of the four-parameter table: the paper's numbers in, F_hat and A_hat out, from one file."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.errors import InputError, OutOfRangeError
+from mbma_tables.islands import greenwood_tripp
+from mbma_tables.islands.four_numbers import SPHERE_FLOOR, Coordinates, band_fields, hat_scales, to_axes
+from mbma_tables.islands.height_integrals import height_integral
+from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
+from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.tablefiles.interpolate import fill_4d, fill_4d_parallel, fill_gradient_4d
+from mbma_tables.tablefiles.schema import TableContent, error_cell
+
+RAW = ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")
+STEP = 1e-5  # relative, of a raw number or of the spread: central differences of closed forms err by its square
+
+
+def _some(place: Coordinates, chosen: NDArray[np.bool_]) -> Coordinates:
+    """The islands at these places."""
+    return Coordinates(*(getattr(place, field.name)[chosen] for field in dataclasses.fields(place)))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Lookup:
+    """F_hat = F^i q0/(E* s), A_hat = A^i q0^2/eta and the bound on their relative error, arrays of one shape.
+
+    `F_by` and `A_by` hold derivatives by the four raw numbers, where they were asked for. Unpacks to the first three.
+    """
+
+    F_hat: Any
+    A_hat: Any
+    error: Any
+    F_by: dict[str, Any] | None = None
+    A_by: dict[str, Any] | None = None
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter((self.F_hat, self.A_hat, self.error))
+
+
+class Island4dModel:
+    """F_hat and A_hat by the paper's four numbers, from a four-parameter table and nothing else.
+
+    Parameters
+    ----------
+    content : TableContent
+        A table of kind "island4d".
+    """
+
+    name = "island4d"
+
+    def __init__(self, content: TableContent) -> None:
+        self.content = content
+        self.reading = get_reading(content.attributes["reading"])
+        self._X, self._spread, self._sphere, self._hurst = content.axes
+
+    def lookup(
+        self,
+        delta_over_h_rms: ArrayLike,
+        zeta_d: ArrayLike,
+        zeta_u: ArrayLike,
+        hurst: ArrayLike,
+        outside: str = "raise",
+        derivatives: bool = False,
+        parallel: bool = False,
+    ) -> Lookup:
+        """F_hat and A_hat of islands given by the paper's four numbers.
+
+        Parameters
+        ----------
+        delta_over_h_rms : array_like
+            Approach of the island; h_rms read at zeta_1 without bound, Delta + zeta_d^(-H).
+        zeta_d, zeta_u : array_like
+            Magnifications of Eqs. (27) and (30), 1 < zeta_d < zeta_u.
+        hurst : array_like
+            Hurst exponent.
+        outside : {"raise", "exact", "nan"}
+            For islands that the table does not cover: an error, the exact solver, or NaN.
+        derivatives : bool
+            Whether derivatives by the four numbers are asked for; these come from the table alone.
+        parallel : bool
+            Whether to use all cores, for large batches.
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+        """
+        if outside not in OUTSIDE:
+            raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
+        if derivatives and outside == "exact":
+            raise InputError("derivatives come from the table: outside must be 'raise' or 'nan' with them")
+        values = (delta_over_h_rms, zeta_d, zeta_u, hurst)
+        given = {name: finite_array(name, value) for name, value in zip(RAW, values, strict=True)}
+        shape = broadcast_shape(**given)
+        raw = [np.ascontiguousarray(np.broadcast_to(array, shape)) for array in given.values()]
+        if outside != "raise":
+            require("hurst", raw[3], (raw[3] > 0) & (raw[3] <= 1), "in (0, 1]")
+            require("zeta_d", raw[1], raw[1] > 1, "above 1")
+        else:
+            self._refuse_ends(raw[3], raw[1])
+        require("zeta_u", raw[2], raw[2] > raw[1], "above zeta_d")
+        delta, low, high, H = (array.ravel() for array in raw)
+        place = to_axes(delta, low, high, H, self.reading)
+        inside = self._covers(place)
+        if outside == "raise":
+            self._refuse(place, inside, shape)
+        force, area = hat_scales(place.spread, low, H, place.sigma, self.reading)
+        phi, error = self._answer(place, inside, outside, parallel)
+        F_hat, A_hat = force * phi[0], area * phi[1]
+        by: tuple[dict[str, Any] | None, ...] = (None, None)
+        if derivatives:
+            slopes = self._log_slopes(place, inside, (delta, low, high, H))
+            by = tuple(
+                {name: (hat * slopes[name][number]).reshape(shape)[()] for name in RAW}
+                for number, hat in enumerate((F_hat, A_hat))
+            )
+        F_hat, A_hat, error = (a.reshape(shape)[()] for a in (F_hat, A_hat, error))
+        return Lookup(F_hat, A_hat, error, *by)
+
+    def status(
+        self, delta_over_h_rms: ArrayLike, zeta_d: ArrayLike, zeta_u: ArrayLike, hurst: ArrayLike
+    ) -> tuple[NDArray[np.int8], ...]:
+        """Where islands lie on the axes X, spread, sphere and hurst: -1 below, 0 inside, 1 above.
+
+        Below in spread is answered, to first order in mu; below in sphere there is nothing.
+        """
+        values = (delta_over_h_rms, zeta_d, zeta_u, hurst)
+        given = {name: finite_array(name, v) for name, v in zip(RAW, values, strict=True)}
+        shape = broadcast_shape(**given)
+        delta, low, high, H = (np.ascontiguousarray(np.broadcast_to(a, shape)).ravel() for a in given.values())
+        place = to_axes(delta, low, high, H, self.reading)
+        return tuple(
+            ((x > axis.high).astype(np.int8) - (x < axis.low).astype(np.int8)).reshape(shape)[()]
+            for axis, x in zip(self.content.axes, place.axes, strict=True)
+        )
+
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
+        """Phi_F and Phi_A of islands, through their band and not through mu; `outside` as in `lookup`."""
+        shape = np.shape(islands["X"])
+        X, width, zeta_d, hurst, mu = (
+            np.ascontiguousarray(islands[name], dtype=float).ravel() for name in ("X", "width", "zeta_d", "hurst", "mu")
+        )
+        sphere = (SPHERE_FLOOR / zeta_d) ** (4 - 2 * hurst)
+        place = Coordinates(X, np.expm1(width), sphere, hurst, mu, np.ones_like(X))
+        inside = self._covers(place)
+        if outside == "raise":
+            self._refuse_ends(islands["hurst"], islands["zeta_d"])
+            self._refuse(place, inside, shape)
+        phi, error = self._answer(place, inside, outside, parallel=False)
+        return IslandAnswer(phi[0].reshape(shape), phi[1].reshape(shape), error.reshape(shape))
+
+    def _covers(self, place: Coordinates) -> NDArray[np.bool_]:
+        inside = np.ones(place.X.shape, dtype=bool)
+        for axis, x in zip(self.content.axes, place.axes, strict=True):
+            # below the first spread the expansion about the rigid sphere answers
+            inside &= (x <= axis.high) & ((x >= axis.low) | (axis.name == "spread"))
+        return inside
+
+    def _refuse_ends(self, hurst: FloatArray, zeta_d: FloatArray) -> None:
+        """Refuse what the axes hurst and sphere do not cover."""
+        low, high = self._hurst.low, self._hurst.high
+        require("hurst", hurst, (hurst >= low) & (hurst <= high), f"in [{low:g}, {high:g}]")
+        least = SPHERE_FLOOR
+        require("zeta_d", zeta_d, zeta_d >= least, f"at least {least:g}")
+
+    def _refuse(self, place: Coordinates, inside: NDArray[np.bool_], shape: tuple[int, ...]) -> None:
+        """Name the first axis that an island leaves."""
+        if inside.all():
+            return
+        spread, X = place.spread.reshape(shape), place.X.reshape(shape)
+        require("zeta_u/zeta_d - 1", spread, spread <= self._spread.high, f"at most {self._spread.high:g}")
+        low, high = self._X.low, self._X.high
+        require("X", X, (low <= X) & (high >= X), f"in [{low:g}, {high:g}]")
+        raise OutOfRangeError("islands outside the table's axes", ~inside.reshape(shape))
+
+    def _answer(
+        self, place: Coordinates, inside: NDArray[np.bool_], outside: str, parallel: bool
+    ) -> tuple[FloatArray, FloatArray]:
+        """(Phi_F, Phi_A) and the bound on their error, outside the table by the rule that was asked for."""
+        if inside.all():
+            phi = greenwood_tripp.rigid_sphere(place.X, place.mu) * np.exp(self.log_ratio(place, parallel))
+            return phi, self.error(place)
+        phi, error = np.full((2, inside.size), np.nan), np.full(inside.size, np.nan)
+        if inside.any():
+            phi[:, inside], error[inside] = self._answer(_some(place, inside), inside[inside], outside, parallel)
+        if outside == "exact":
+            solved = greenwood_tripp.solve(place.X[~inside], place.mu[~inside], rtol=EXACT_RTOL)
+            phi[:, ~inside], error[~inside] = (solved.phi_F, solved.phi_A), solved.error
+        return phi, error
+
+    def _positions(self, place: Coordinates) -> FloatArray:
+        inside = (place.X, np.maximum(place.spread, self._spread.low), place.sphere, place.hurst)
+        return np.stack([axis.position(x) for axis, x in zip(self.content.axes, inside, strict=True)])
+
+    def _share(self, place: Coordinates) -> FloatArray:
+        """mu over mu at the least spread, below it; 1 elsewhere."""
+        lowest = np.maximum(place.spread, self._spread.low)
+        edge: FloatArray = band_fields(lowest, place.sphere, place.hurst, self.reading)[0]
+        return np.where(place.spread < self._spread.low, place.mu / edge, 1.0)
+
+    def log_ratio(self, place: Coordinates, parallel: bool = False) -> FloatArray:
+        """log(Phi/Phi_rigid) inside the table or below its spread, shape (2, entries)."""
+        out = np.empty((2, place.X.size))
+        (fill_4d_parallel if parallel else fill_4d)(self.content.coefficients, self._positions(place), out)
+        scaled: FloatArray = out * self._share(place)
+        return scaled
+
+    @functools.cached_property
+    def _error_field(self) -> FloatArray:
+        field: FloatArray = self.content.local_error.max(axis=-1)
+        return field
+
+    def error(self, place: Coordinates) -> FloatArray:
+        """Bound on the relative error of both functions."""
+        field = self._error_field
+        cells = (
+            error_cell(axis, count, p)
+            for axis, count, p in zip(self.content.axes, field.shape, self._positions(place), strict=True)
+        )
+        bound: FloatArray = field[tuple(cells)]
+        return bound
+
+    def _log_slopes(
+        self, place: Coordinates, inside: NDArray[np.bool_], raw: tuple[FloatArray, ...]
+    ) -> dict[str, FloatArray]:
+        """Derivatives of log F_hat and log A_hat by the raw numbers, each (2, entries); NaN outside."""
+        out = np.empty((10, int(inside.sum())))
+        kept, raw = _some(place, inside), tuple(number[inside] for number in raw)
+        fill_gradient_4d(self.content.coefficients, self._positions(kept), out)
+        out *= self._share(kept)
+        rigid_slope = np.stack(
+            [
+                2.5 * height_integral(1.5, -kept.X) / height_integral(2.5, -kept.X),
+                2.0 * height_integral(1.0, -kept.X) / height_integral(2.0, -kept.X),
+            ]
+        )
+        below = kept.spread < self._spread.low
+        found = {}
+        for number, name in enumerate(RAW):
+            ends = []
+            # the spread follows the ends of a narrow band closely, X the other two, down to their last bit
+            width = kept.spread if name in ("zeta_d", "zeta_u") else kept.sigma
+            step = np.maximum(STEP * raw[number] * np.minimum(1.0, width), np.spacing(raw[number]))
+            for sign in (1.0, -1.0):
+                moved = list(raw)
+                moved[number] = raw[number] + sign * step
+                at = to_axes(moved[0], moved[1], moved[2], moved[3], self.reading)
+                scales = np.log(hat_scales(at.spread, moved[1], at.hurst, at.sigma, self.reading))
+                scales[0] += np.log(at.mu)
+                places = self._positions(at)
+                # below the table only mu moves the logarithm
+                places[1] = np.where(below, 0.0, places[1])
+                ends.append((scales, at.X, places, np.log(at.mu), moved[number]))
+            (s1, X1, p1, m1, r1), (s0, X0, p0, m0, r0) = ends
+            # as rounded
+            width = r1 - r0
+            slope = (s1 - s0 + rigid_slope * (X1 - X0)) / width
+            for function in range(2):
+                rows = out[5 * function : 5 * function + 5]
+                slope[function] += ((p1 - p0) * rows[1:]).sum(axis=0) / width
+                slope[function] += np.where(below, rows[0] * (m1 - m0) / width, 0.0)
+            found[name] = np.full((2, inside.size), np.nan)
+            found[name][:, inside] = slope
+        return found

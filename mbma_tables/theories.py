@@ -1,0 +1,358 @@
+"""The theories beside MBMA: Greenwood-Williamson (11, 12), Persson (18-21), and how d and u relate (50).
+
+In units of s, 1/q0 and E* q0 s, with y = sqrt(m2) over [1, zeta] (so that w = 1/y) in place of q, (19) is
+
+    u = 2/sqrt(pi) integral_0^Y J(p0/y) / zeta(y) dy,   Y = sqrt(m2) over [1, zeta_1],
+    J(a) = integral_a^inf (gamma + 3 (1 - gamma) erf(x)^2) exp(-x^2)/x dx,
+
+where w is infinite at q0 in (19) and nothing is here; u0 and lambda of (21) are moments of 1/zeta(y). All take and
+return DataArrays too, dask-backed ones lazily.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import erf, exp1
+
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.errors import ConvergenceError, InputError
+from mbma_tables.islands.height_integrals import height_integral
+from mbma_tables.labels import takes_labelled
+from mbma_tables.surfaces import spectrum
+from mbma_tables.surfaces.surface import Surface
+from mbma_tables.totals.gauss_kronrod import integrate
+
+Method = Literal["full", "simplified"]
+
+GAMMA = 0.42  # Eq. (19)
+LAMBDA = 4.047  # Eq. (21b)
+RTOL = 1e-12  # asked of the quadratures
+DECAY = 45.0  # exp(-DECAY) of an integrand's largest value counts as nothing
+STEEPEST = 26.0  # p0/Y at which u is still a normal number, about exp(-676)
+LEAST_LOG_FORCE = -690.0  # log p0/(E* q0 s) of the lightest load that the inverse answers
+STEPS = 100  # of the safeguarded Newton iteration; it takes 5 to 15
+
+# exp(-t) over [0, DECAY]: 64 nodes leave 1e-15
+_T, _T_WEIGHTS = (
+    DECAY / 2 * (np.polynomial.legendre.leggauss(64)[0] + 1),
+    DECAY / 2 * np.polynomial.legendre.leggauss(64)[1],
+)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Asperities:
+    """Greenwood-Williamson force and area at given separations; arrays of the broadcast shape.
+
+    Attributes
+    ----------
+    separation : ndarray
+        d, between the rigid plane and the mid-plane [length].
+    mean_separation : ndarray
+        u = (h_max + d)/2 (50) [length].
+    force : ndarray
+        F/A0 in the unit of E_star; F/(A0 E*) where that is 1.
+    area : ndarray
+        A/A0.
+    """
+
+    separation: Any
+    mean_separation: Any
+    force: Any
+    area: Any
+
+
+@takes_labelled()
+def mean_separation(surface: Surface, separation: ArrayLike) -> Any:
+    """Average interfacial separation u = (h_max + d)/2 [length] at separations d [length], Eq. (50)."""
+    gap = finite_array("separation", separation)
+    broadcast_shape(separation=gap, surface=surface.hurst)
+    return (surface.h_max / 2 + gap / 2)[()]
+
+
+@takes_labelled()
+def separation(surface: Surface, mean_separation: ArrayLike) -> Any:
+    """Separation d = 2 u - h_max [length] at average interfacial separations u [length], Eq. (50)."""
+    average = finite_array("mean_separation", mean_separation)
+    broadcast_shape(mean_separation=average, surface=surface.hurst)
+    return (2 * average - surface.h_max)[()]
+
+
+@takes_labelled(Asperities)
+def greenwood_williamson(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1.0) -> Asperities:
+    """Force and area of equal spheres with Gaussian heights (Eqs. 11, 12), Nayak's summits (Eq. 2).
+
+    Parameters
+    ----------
+    surface : Surface
+        One surface or a batch; it broadcasts against `separation`.
+    separation : array_like
+        d between the rigid plane and the mid-plane [length]. The heights are the whole Gaussian: neither
+        h_max nor -h_max ends it.
+    E_star : array_like
+        Effective modulus; force is in its unit.
+
+    Returns
+    -------
+    Asperities
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+    """
+    gap = finite_array("separation", separation)
+    modulus = _modulus(E_star)
+    shape = broadcast_shape(separation=gap, surface=surface.hurst, E_star=modulus)
+    density, radius, sigma = surface.summit_density, surface.summit_radius, surface.summit_sigma
+    depth = np.broadcast_to(gap / sigma, shape)
+    force = 4 / 3 * density * np.sqrt(radius * sigma) * sigma * height_integral(1.5, depth)
+    area = math.pi * density * radius * sigma * height_integral(1.0, depth)
+    gap = np.broadcast_to(gap, shape)
+    return Asperities(gap[()], mean_separation(surface, gap), (modulus * force)[()], area)
+
+
+@takes_labelled()
+def persson_area(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1.0) -> Any:
+    """A/A0 = erf(p0/(2 sqrt(G))) at the largest magnification, G = E*^2 m2/4 (Eq. 18).
+
+    Parameters
+    ----------
+    surface : Surface
+        One surface or a batch; it broadcasts against `force`.
+    force : array_like
+        p0 = F/A0 in the unit of `E_star`, zero or positive.
+    E_star : array_like
+        Effective modulus.
+
+    Returns
+    -------
+    ndarray
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+    """
+    pressure = finite_array("force", force)
+    require("force", pressure, pressure >= 0, "zero or positive")
+    modulus = _modulus(E_star)
+    broadcast_shape(force=pressure, surface=surface.hurst, E_star=modulus)
+    return erf(pressure / modulus / np.sqrt(surface.m2))
+
+
+@takes_labelled()
+def persson_separation(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1.0, method: Method = "full") -> Any:
+    """Average interfacial separation u of Persson's theory (Eqs. 19-21).
+
+    Parameters
+    ----------
+    surface : Surface
+        One surface or a batch; it broadcasts against `force`.
+    force : array_like
+        p0 = F/A0 in the unit of `E_star`, positive.
+    E_star : array_like
+        Effective modulus.
+    method : {"full", "simplified"}
+        The double integral (19), to 1e-11, or its light-load form (20), which ends at u = 0, where
+        p0 = lambda E*.
+
+    Returns
+    -------
+    ndarray
+        u [length]; h_max does not enter. Where p0 is so large that u underflows, zero.
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+    """
+    pressure = finite_array("force", force)
+    require("force", pressure, pressure > 0, "positive: u is infinite at zero load")
+    modulus = _modulus(E_star)
+    shape = broadcast_shape(force=pressure, surface=surface.hurst, E_star=modulus)
+    bands = _Bands.of(surface, shape)
+    log_load = np.log(pressure) - np.log(modulus)
+    log_p = (np.broadcast_to(log_load, shape) - _log_stress(surface)).ravel()
+    if _is_full(method):
+        average = _full(bands, log_p)[0]
+    else:
+        u0, log_lambda = _simplified(bands)
+        beyond = (log_p > log_lambda).reshape(shape)
+        require(
+            "force",
+            np.broadcast_to(pressure, shape),
+            ~beyond,
+            "at most lambda E*, where the simplified form (20) reaches u = 0",
+        )
+        average = u0 * (log_lambda - log_p)
+    return (average.reshape(shape) * surface.s)[()]
+
+
+@takes_labelled()
+def persson_force(
+    surface: Surface, mean_separation: ArrayLike, E_star: ArrayLike = 1.0, method: Method = "full"
+) -> Any:
+    """The load at which Persson's theory has the average separation u: the inverse of `persson_separation`.
+
+    Parameters
+    ----------
+    surface : Surface
+        One surface or a batch; it broadcasts against `mean_separation`.
+    mean_separation : array_like
+        u [length]: positive for the full form, which needs an infinite load at u = 0; zero or positive for
+        the simplified one. Beyond h_max there still is a load: the theory's heights have no end.
+    E_star : array_like
+        Effective modulus.
+    method : {"full", "simplified"}
+        (19), its root found to 1e-10, or (20), solved in closed form.
+
+    Returns
+    -------
+    ndarray
+        p0 = F/A0 in the unit of `E_star`.
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        Also where u is so small or so large that the load of the full form is no normal number.
+    """
+    average = finite_array("mean_separation", mean_separation)
+    modulus = _modulus(E_star)
+    shape = broadcast_shape(mean_separation=average, surface=surface.hurst, E_star=modulus)
+    full = _is_full(method)
+    allowed = average > 0 if full else average >= 0
+    require("mean_separation", average, allowed, "positive" if full else "zero or positive")
+    bands = _Bands.of(surface, shape)
+    target = np.broadcast_to(average / surface.s, shape)
+    if full:
+        log_p = _invert(bands, target)
+    else:
+        u0, log_lambda = _simplified(bands)
+        log_p = log_lambda - target.ravel() / u0
+    return (modulus * np.exp(log_p.reshape(shape) + _log_stress(surface)))[()]
+
+
+def _modulus(E_star: ArrayLike) -> FloatArray:
+    modulus = finite_array("E_star", E_star)
+    require("E_star", modulus, modulus > 0, "positive")
+    return modulus
+
+
+def _is_full(method: str) -> bool:
+    if method not in ("full", "simplified"):
+        raise InputError(f"method must be 'full' or 'simplified', got {method!r}")
+    return method == "full"
+
+
+def _log_stress(surface: Surface) -> Any:
+    """Logarithm of the unit of stress over E*, q0 s."""
+    return np.log(surface.q0) + np.log(surface.s)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Bands:
+    """Flat (surface, load) pairs: Hurst exponent, log Y, and the log y below which nothing is left."""
+
+    hurst: FloatArray
+    log_top: FloatArray
+    log_bottom: FloatArray
+
+    @classmethod
+    def of(cls, surface: Surface, shape: tuple[int, ...]) -> _Bands:
+        hurst = np.broadcast_to(np.asarray(surface.hurst), shape).ravel()
+        zeta_1 = np.broadcast_to(np.asarray(surface.zeta_1), shape).ravel()
+        log_top = 0.5 * np.log(spectrum.band_moment(2, hurst, 1.0, zeta_1))
+        # 1/zeta is 1 below y = sqrt(H): what is left of it there is exp(-DECAY)
+        return cls(hurst, log_top, np.minimum(log_top, 0.5 * np.log(hurst)) - DECAY)
+
+
+def _weight(hurst: FloatArray, log_y: FloatArray) -> FloatArray:
+    """y/zeta(y), from y^2 = m2 = H (zeta^(2-2H) - 1)/(2 - 2H): 1/zeta(y) dy = this d(log y)."""
+    scaled = np.exp(2 * log_y) / hurst
+    x = (2 - 2 * hurst) * scaled
+    log_zeta = scaled * np.divide(np.log1p(x), x, out=np.ones_like(x), where=x > 0)
+    return np.exp(log_y - log_zeta)
+
+
+def _simplified(bands: _Bands) -> tuple[FloatArray, FloatArray]:
+    """u0/s and log(lambda/(q0 s)) of Eq. (21)."""
+    count = bands.hurst.size
+
+    def integrand(owner: NDArray[np.intp], log_y: FloatArray) -> FloatArray:
+        weight = _weight(bands.hurst[owner, None], log_y)
+        # log(Y/y), not log(1/y): a relative tolerance needs integrands of one sign
+        return np.stack([weight, weight * (bands.log_top[owner, None] - log_y)], axis=-1)
+
+    found = integrate(integrand, np.arange(count), bands.log_bottom, bands.log_top, count, RTOL).value
+    log_lambda = math.log(LAMBDA) + bands.log_top - found[:, 1] / found[:, 0]
+    return GAMMA * 2 / math.sqrt(math.pi) * found[:, 0], log_lambda
+
+
+def _inner(log_a: FloatArray) -> FloatArray:
+    """J(a) and -a J'(a), in the last axis; gamma/2 E1(a^2) and, by x^2 = a^2 + t, a smooth rest."""
+    # E1(a^2) = -Euler - log(a^2) to rounding below a = 1e-9, where a^2 may underflow
+    tiny = log_a < -20
+    a = np.exp(np.where(tiny, -20.0, log_a))
+    square = a * a
+    exponential = np.where(tiny, -np.euler_gamma - 2 * log_a, exp1(square))
+    x2 = square[..., None] + _T
+    rest = (erf(np.sqrt(x2)) ** 2 / x2 * np.exp(-_T)) @ _T_WEIGHTS
+    decay = np.exp(-square)
+    value = GAMMA / 2 * exponential + 1.5 * (1 - GAMMA) * decay * rest
+    return np.stack([value, (GAMMA + 3 * (1 - GAMMA) * erf(a) ** 2) * decay], axis=-1)
+
+
+def _full(bands: _Bands, log_p: FloatArray) -> FloatArray:
+    """u/s of Eq. (19) and -d(u/s)/d(log p0), shape (2, loads), at log of p0/(E* q0 s)."""
+    log_a = log_p - bands.log_top
+    some = np.flatnonzero(log_a < math.log(STEEPEST + 1))
+    if some.size == 0:
+        return np.zeros((2, log_p.size))
+    a_top = np.exp(log_a[some])
+    vanished = log_p[some] - 0.5 * np.log(a_top**2 + DECAY)
+    low = np.maximum(bands.log_bottom[some], vanished)
+
+    def integrand(owner: NDArray[np.intp], log_y: FloatArray) -> FloatArray:
+        weight = _weight(bands.hurst[owner, None], log_y)
+        return weight[..., None] * _inner(log_p[owner, None] - log_y)
+
+    found = integrate(integrand, some, low, bands.log_top[some], log_p.size, RTOL)
+    return np.asarray(2 / math.sqrt(math.pi) * found.value.T)
+
+
+def _invert(bands: _Bands, target: FloatArray) -> FloatArray:
+    """Log of p0/(E* q0 s) at which (19) gives u/s = `target`: Newton's method on log u, in a bracket."""
+    low = np.full(bands.hurst.size, LEAST_LOG_FORCE)
+    high = bands.log_top + math.log(STEEPEST)
+    wanted = target.ravel()
+    most, least = (_full(bands, end)[0] for end in (low, high))
+    inside = (wanted >= least) & (wanted <= most)
+    require(
+        "mean_separation/s",
+        target,
+        inside.reshape(target.shape),
+        f"within what normal numbers reach, {least.max():.3g} to {most.min():.6g}",
+    )
+    u0, log_lambda = _simplified(bands)
+    guess = np.clip(log_lambda - wanted / u0, low, high)
+    open_ = np.ones(guess.size, dtype=bool)
+    for _ in range(STEPS):
+        value, slope = np.zeros((2, guess.size))
+        own = _Bands(bands.hurst[open_], bands.log_top[open_], bands.log_bottom[open_])
+        value[open_], slope[open_] = _full(own, guess[open_])
+        low = np.where(open_ & (value >= wanted), guess, low)
+        high = np.where(open_ & (value <= wanted), guess, high)
+        step = np.zeros_like(guess)
+        step[open_] = np.log(value[open_] / wanted[open_]) * value[open_] / slope[open_]
+        following = guess + step
+        outside = open_ & ((following < low) | (following > high))
+        following[outside] = (low + high)[outside] / 2
+        # log p0 near -690 carries an error of 1e-13
+        open_ &= np.abs(following - guess) > 1e-12 * np.maximum(1, np.abs(guess))
+        guess = following
+        if not open_.any():
+            return guess
+    mask = open_.reshape(target.shape)
+    raise ConvergenceError(f"no load found for {int(mask.sum())} separations in {STEPS} steps", mask)
