@@ -24,7 +24,7 @@ from mbma_tables.export.law_rows import describe_law
 
 ROOT = pathlib.Path(export_page.__file__).parent
 PNG = b"\x89PNG"
-PROGRAMS = ("atlas", "cost", "export_page", "fidelity", "formula_page", "gauntlet", "table_page")
+PROGRAMS = ("stability", "cost", "export", "fidelity", "formula", "gauntlet", "tables")
 
 
 def run(command, *arguments):
@@ -48,7 +48,7 @@ def test_each_program_tells_of_itself(name, monkeypatch, capsys):
 def test_a_study_is_reached_by_its_name(study, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["generate", *([study] if study else []), "--help"])
     with pytest.raises(SystemExit) as ended:
-        runpy.run_path(str(ROOT / "__main__.py"), run_name="__main__")
+        runpy.run_path(str(ROOT.parent / "__main__.py"), run_name="__main__")
     assert ended.value.code == 0
     usage = f"Usage: generate {study} [OPTIONS]" if study else "[OPTIONS] {universal|island4d|formula|all}"
     assert usage in capsys.readouterr().out
