@@ -1,13 +1,14 @@
 """Compute the polynomial pieces behind `mbma_tables.islands.height_integrals` with mpmath.
 
-Run ``python -m generate.tables.height_coefficients`` to write
-``mbma_tables/islands/_height_coefficients.py`` anew; the output is the same on every machine.
+``python -m generate tables heights`` writes ``mbma_tables/islands/_height_coefficients.py`` again; the output is the
+same on every machine.
 """
 
 from __future__ import annotations
 
 import itertools
 import pathlib
+import textwrap
 from collections.abc import Callable, Sequence
 
 import mpmath
@@ -78,12 +79,15 @@ def pieces(twice_n: int) -> list[list[mpmath.mpf]]:
     return rows
 
 
+_WRAPPER = textwrap.TextWrapper(120, initial_indent=" " * 4, subsequent_indent=" " * 5, break_on_hyphens=False)
+
+
 def _literal(name: str, rows: Sequence[Sequence[mpmath.mpf]]) -> str:
+    """A tuple of tuples, each line as full as it can be."""
     lines = [f"{name} = ("]
     for row in rows:
-        lines.append("    (")
-        lines += [f"        {float(value)!r}," for value in row]
-        lines.append("    ),")
+        numbers = ", ".join(repr(float(value)) for value in row)
+        lines += _WRAPPER.wrap(f"({numbers}),")
     return "\n".join([*lines, ")"])
 
 
@@ -91,7 +95,7 @@ def main() -> None:
     """Write the coefficient module."""
     mpmath.mp.dps = DIGITS
     blocks = [
-        '"""Made by `python -m generate.tables.height_coefficients`; do not edit."""',
+        '"""Made by `python -m generate tables heights`; do not edit."""\n\n# fmt: off',
         "\n".join(_literal(f"TWICE_N_{k}", pieces(k)) for k in (1, 2, 3, 4, 5)),
     ]
     write_files({TARGET: ("\n\n".join(blocks) + "\n").encode()})
