@@ -6,6 +6,7 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
+from catalogue import random_surfaces
 
 from generate.tables.exact_geometry import DIGITS, divisor, exact_island
 from mbma_tables.islands.geometry import FIELDS
@@ -18,21 +19,12 @@ def one_geometry(approach, hurst, zeta_1, reading):
     return geometry(*(np.array(array) for array in arrays), reading)
 
 
-def scattered(count, seed):
-    rng = np.random.default_rng(seed)
-    approach = 10 ** rng.uniform(-12, 1, count)
-    hurst = rng.uniform(0.05, 1, count)
-    zeta_1 = 10 ** rng.uniform(math.log10(3.01), 8, count)
-    hurst[: count // 10] = 1
-    hurst[count // 10 : count // 8] = math.nextafter(1, 0)
-    hurst[count // 8 : count // 5] = 0.05
-    zeta_1[::7], zeta_1[::11] = 3.01, 1e8
-    return approach, hurst, zeta_1
-
-
 @pytest.mark.parametrize("name", READINGS)
 def test_against_sixty_digits(name):
-    approach, hurst, zeta_1 = scattered(700, seed=len(name))
+    surfaces = random_surfaces(700, seed=len(name), hurst=(0.05, 1))
+    hurst, zeta_1 = surfaces.hurst, surfaces.zeta_1
+    hurst = np.where(np.arange(700) % 23 == 5, math.nextafter(1, 0), hurst)
+    approach = 10 ** np.random.default_rng(len(name)).uniform(-12, 1, 700)
     found = one_geometry(approach, hurst, zeta_1, READINGS[name])
     worst = dict.fromkeys(FIELDS, 0.0)
     for k, arguments in enumerate(zip(approach, hurst, zeta_1, strict=True)):
