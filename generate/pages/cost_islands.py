@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from generate.tables.schemes import exact, own_grid
 from generate.tables.solves import log_ratio
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import njit
 from mbma_tables.errors import ConvergenceError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.classical import iterate, ring_matrix
-from mbma_tables.islands.four_numbers import Coordinates
+from mbma_tables.islands.four_numbers import Coordinates, band_fields
 from mbma_tables.islands.newton import extent_squared
 from mbma_tables.models import TIERS, get_model
 from mbma_tables.models.closed_forms import FormulaModel
@@ -44,7 +43,7 @@ FINEST_MESH = {1600: (1e-8,)}
 NEWTON_RTOLS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 NEWTON_NODES = (8, 12, 16, 24, 32, 48, 64, 96)
 UNIVERSAL_SHARES = (0.06, 0.12, 0.25, 0.5)  # of the shipped table's nodes along each axis
-ISLAND4D_SIZES = (10000, 30000)
+ISLAND4D_SHAPES = ((9, 16, 8, 8), (16, 27, 8, 8))
 
 FORMS = ("pocket", "standard", "long")
 
@@ -192,26 +191,24 @@ class LinearModel(Island4dModel):
         return scaled
 
 
+def _shape(content: TableContent) -> str:
+    return "x".join(str(axis.nodes) for axis in content.axes)
+
+
 def island4d_rows(quick: bool) -> Iterator[Row]:
     """The four-parameter table at several resolutions, read with splines and linearly."""
     content = read_table(shipped(ISLAND4D), ISLAND4D)
     error, cost = looked_up(LinearModel(content))
-    shape = "x".join(str(axis.nodes) for axis in content.axes)
-    yield Row("island4d", f"island linear nodes={shape}", "both", error, cost, 2)
-    grid = own_grid(content.axes[1].low)
-    for size in ISLAND4D_SIZES[: 1 if quick else None]:
-        axes = tuple(
-            dataclasses.replace(axis, nodes=small.nodes)
-            for axis, small in zip(content.axes, grid.sized(size), strict=True)
-        )
-        own = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
-        raw = tuple(np.ascontiguousarray(r).ravel() for r in np.broadcast_arrays(*grid.from_own(*own)))
-        shape = "x".join(str(axis.nodes) for axis in axes)
-        smaller = resized(content, exact(raw).reshape(*(axis.nodes for axis in axes), 2), axes, 3)
+    yield Row("island4d", f"island linear nodes={_shape(content)}", "both", error, cost, 2)
+    for shape in ISLAND4D_SHAPES[: 1 if quick else None]:
+        axes = tuple(dataclasses.replace(axis, nodes=n) for axis, n in zip(content.axes, shape, strict=True))
+        X, spread, sphere, hurst = (g.ravel() for g in np.meshgrid(*(axis.values for axis in axes), indexing="ij"))
+        mu = band_fields(spread, sphere, hurst, get_reading("reported"))[0]
+        smaller = resized(content, log_ratio(X, mu, 1e-8).reshape(*shape, 2), axes, 3)
         models: dict[str, Callable[[TableContent], Island4dModel]] = {"cubic": Island4dModel, "linear": LinearModel}
         for scheme, model in models.items():
             error, cost = looked_up(model(smaller))
-            yield Row("island4d", f"island {scheme} nodes={shape}", "both", error, cost, 2)
+            yield Row("island4d", f"island {scheme} nodes={_shape(smaller)}", "both", error, cost, 2)
 
 
 def formula_rows() -> Iterator[Row]:

@@ -38,7 +38,7 @@ def few_islands(monkeypatch):
         "FINEST_MESH": {100: (1e-5,)},
         "NEWTON_RTOLS": (1e-2, 1e-8),
         "NEWTON_NODES": (8, 24),
-        "ISLAND4D_SIZES": (5000, 10000),
+        "ISLAND4D_SHAPES": ((8, 12, 8, 8), (9, 16, 8, 8)),
         "measure": once,
     }
     for name, value in small.items():
