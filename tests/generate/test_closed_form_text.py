@@ -1,0 +1,74 @@
+"""The closed forms in Python, in C99 and as sympy expressions: one text, one value."""
+
+import ctypes
+import pathlib
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+import mbma_tables
+from generate.formulas.printing import c_text, module_text, read_functions
+from mbma_tables.models import closed_form_functions as shipped
+
+PACKAGE = pathlib.Path(mbma_tables.__file__).parent
+MODULE = (PACKAGE / "models" / "closed_form_functions.py").read_text()
+C_TEXT = PACKAGE / "export" / "templates" / "closed_forms.c"
+NAMES = [f"{form}_{result}" for form, results in shipped.FUNCTIONS.items() for result in results]
+
+
+def points(form):
+    rng = np.random.default_rng(5)
+    given = {name: rng.uniform(*ends, 400) for name, ends in shipped.RANGES[form].items() if name != "area"}
+    if form == "totals":
+        given["d_over_h_rms"] = given["h_max_over_h_rms"] - rng.uniform(0.1, 6, 400)
+    else:
+        given["mu"] = np.concatenate([[0.0], 10 ** rng.uniform(-9, np.log10(2e3), 399)])
+    return list(given.values())
+
+
+@pytest.fixture(scope="module")
+def functions():
+    return read_functions(MODULE)
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler is installed")
+    path = tmp_path_factory.mktemp("forms") / "forms.so"
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wmissing-prototypes", "-Werror"]
+    subprocess.run([compiler, *strict, "-O2", "-shared", "-fPIC", C_TEXT, "-o", path, "-lm"], check=True)
+    return ctypes.CDLL(str(path))
+
+
+def test_the_shipped_texts_are_what_the_generator_prints(functions):
+    assert module_text(functions.values(), shipped.RANGES, shipped.CERTIFICATES) == MODULE
+    assert c_text(functions.values()) == C_TEXT.read_text()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_c_agrees_with_numpy(library, name):
+    form, _, result = name.partition("_")
+    given = points(form)
+    function = getattr(library, f"mbma_{name}")
+    function.argtypes, function.restype = [ctypes.c_double] * len(given), ctypes.c_double
+    found = np.array([function(*map(float, point)) for point in zip(*given, strict=True)])
+    # the logarithm of a total is a sum of terms of up to 1e3, whose rounding is the total's relative error
+    rtol = 1e-12 if form == "totals" else 1e-13
+    np.testing.assert_allclose(found, shipped.FUNCTIONS[form][result](*given), rtol=rtol)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_numpy_agrees_with_sympy_in_30_digits(functions, name):
+    form, _, result = name.partition("_")
+    given = [values[:8] for values in points(form)]
+    function = functions[name]
+    found = shipped.FUNCTIONS[form][result](*given)
+    for number, point in enumerate(zip(*given, strict=True)):
+        values = dict(zip(function.arguments, map(float, point), strict=True))
+        for step, expression in function.steps:
+            values[step] = expression.evalf(30, subs=values)
+        assert found[number] == pytest.approx(float(values[result]), rel=1e-12, abs=0)
