@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all."""
+"""Files: where the shipped data are, reading with a size limit, and writing a file whole or not at all."""
 
 from __future__ import annotations
 
@@ -6,112 +6,81 @@ import contextlib
 import os
 import pathlib
 import shutil
+import stat
 import tempfile
-import time
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from mbma_tables.errors import InputError
 
-DRAFT = ".draft"
-ABANDONED = 3600.0  # seconds; the writer of a draft that old was killed
+
+def shipped_file(name: str) -> pathlib.Path:
+    """Path of a file of `tables`: in the installed package, or in a checkout's `tables` folder."""
+    package = pathlib.Path(__file__).parent
+    inside = package / "tables" / name
+    return inside if inside.exists() else package.parent / "tables" / name
 
 
-def _remove_abandoned(target: pathlib.Path) -> None:
-    """Remove drafts of this file whose writers were killed; others may still be written to."""
-    # a folder that cannot be listed may be writable all the same
-    with contextlib.suppress(OSError):
-        for other in target.parent.iterdir():
-            if other.name.startswith(f".{target.name}.") and other.name.endswith(DRAFT):
-                with contextlib.suppress(OSError):
-                    if time.time() - other.stat().st_mtime > ABANDONED:
-                        other.unlink()
-
-
-def _name_beside(target: pathlib.Path) -> pathlib.Path:
-    return target.with_name(f".{target.name}.{uuid.uuid4().hex[:12]}{DRAFT}")
-
-
-def _write_draft(target: pathlib.Path, draft: pathlib.Path, content: bytes) -> None:
-    with draft.open("xb") as stream:
-        stream.write(content)
-        stream.flush()
-        os.fsync(stream.fileno())
-    with contextlib.suppress(FileNotFoundError):
-        shutil.copymode(target, draft)
-
-
-def write_whole(files: Mapping[pathlib.Path, bytes], make_folders: bool = False) -> None:
-    """Write every file, or none of them: under temporary names beside them first, then renamed.
-
-    A process that is killed leaves each file as it was or as it shall be; a draft that it leaves behind is
-    removed by a later write of the same file.
-
-    Parameters
-    ----------
-    files : mapping of path to bytes
-        What to write where; links are followed.
-    make_folders : bool, optional
-        Whether to make the folders that are missing.
-
-    Raises
-    ------
-    OSError
-        Where one of them cannot be written; what stood there before still does.
-    """
-    targets = {path.resolve(): content for path, content in files.items()}
-    drafts: dict[pathlib.Path, pathlib.Path] = {}
-    kept: dict[pathlib.Path, pathlib.Path] = {}
-    replaced: list[pathlib.Path] = []
-    target = pathlib.Path()
-    try:
-        for target, content in targets.items():
-            # renaming would replace a device such as /dev/null by a plain file
-            if target.exists() and not target.is_file():
-                raise OSError("it is not a plain file")
-            if make_folders:
-                target.parent.mkdir(parents=True, exist_ok=True)
-            _remove_abandoned(target)
-            drafts[target] = _name_beside(target)
-            _write_draft(target, drafts[target], content)
-        if len(targets) > 1:
-            for target in targets:
-                if target.exists():
-                    kept[target] = _name_beside(target)
-                    shutil.copy2(target, kept[target])
-        for target, draft in drafts.items():
-            draft.replace(target)
-            replaced.append(target)
-    except BaseException as fault:
-        for done in replaced:
-            with contextlib.suppress(OSError):
-                kept[done].replace(done) if done in kept else done.unlink()
-        if isinstance(fault, OSError):
-            fault.filename = str(target)
-        raise
-    finally:
-        for draft in (*drafts.values(), *kept.values()):
-            with contextlib.suppress(OSError):
-                draft.unlink(missing_ok=True)
-
-
-def reason(fault: OSError) -> str:
-    """Why a file could not be written, in few words."""
-    return fault.strerror or str(fault.args[0])
-
-
-def write_files(files: Mapping[pathlib.Path, bytes], make_folders: bool = False) -> None:
-    """Write every file as `write_whole` does.
+def read_file(path: os.PathLike[str] | str, max_bytes: int) -> bytes:
+    """The content of a regular file of at most `max_bytes`; links are followed.
 
     Raises
     ------
     InputError
-        Where one of them cannot be written; what stood there before still does.
+        Where it cannot be read, is a folder, a device or a pipe, or is larger.
     """
     try:
-        write_whole(files, make_folders)
+        # a pipe would wait for a writer, a device may have no end
+        if not stat.S_ISREG(os.stat(path).st_mode):
+            raise InputError(f"{path} cannot be read: it is not a regular file")
+        with open(path, "rb") as stream:
+            content = stream.read(max_bytes + 1)
     except OSError as fault:
-        raise InputError(f"{fault.filename} cannot be written: {reason(fault)}") from None
+        raise InputError(f"{path} cannot be read: {fault.strerror or fault}") from None
+    if len(content) > max_bytes:
+        raise InputError(f"{path} has more than {max_bytes} bytes, which is too large for such a file")
+    return content
+
+
+def write_file(path: os.PathLike[str] | str, content: bytes, make_folders: bool = False) -> None:
+    """Write a file whole or not at all: under a temporary name beside it, which then replaces it.
+
+    Parameters
+    ----------
+    path : path
+        Where to write; links are followed.
+    content : bytes
+        What to write.
+    make_folders : bool, optional
+        Whether to make missing folders.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be written, or is a folder, a device or a pipe; what was there before is unchanged.
+    """
+    target = pathlib.Path(os.path.realpath(path))
+    draft = target.with_name(f".{target.name}.{uuid.uuid4().hex[:12]}.draft")
+    try:
+        if make_folders:
+            target.parent.mkdir(parents=True, exist_ok=True)
+        with contextlib.suppress(FileNotFoundError):
+            # replacing would turn a device such as /dev/null into a regular file; a link to itself ends here
+            if not stat.S_ISREG(os.stat(target).st_mode):
+                raise InputError(f"{path} cannot be written: it is not a regular file")
+        try:
+            with open(draft, "xb") as stream:
+                stream.write(content)
+                stream.flush()
+                os.fsync(stream.fileno())
+            with contextlib.suppress(FileNotFoundError):
+                shutil.copymode(target, draft)
+            os.replace(draft, target)
+        finally:
+            with contextlib.suppress(OSError):
+                draft.unlink()
+    except OSError as fault:
+        raise InputError(f"{path} cannot be written: {fault.strerror or fault}") from None
 
 
 def written_bytes(name: str, write: Callable[[str], object]) -> bytes:

@@ -20,12 +20,12 @@ import generate
 import mbma_tables
 from generate.tables import campaign, configuration
 from mbma_tables import InputError, MbmaError, Scene, TableFileError
+from mbma_tables.files import shipped_file
 from mbma_tables.formulas import file as formula_file
 from mbma_tables.scenes.costs import read_calibration, read_costs
 from mbma_tables.surfaces.maps import read_map
 from mbma_tables.tablefiles import contents
 from mbma_tables.tablefiles.netcdf import SEAL_LENGTH, check_table
-from mbma_tables.tablefiles.shipped import shipped_file
 
 FORBIDDEN = {"eval", "exec", "compile", "__import__"}
 UNSAFE_MODULES = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "shelve", "marshal", "yaml"}

@@ -1,7 +1,6 @@
 """Ways through the library that a user seldom takes: what fails on them ends in a typed error or in nothing."""
 
 import json
-import os
 
 import click
 import pytest
@@ -12,11 +11,9 @@ from mbma_tables import theories as theories_module
 from mbma_tables.cli import Program
 from mbma_tables.cli.scene import _show
 from mbma_tables.errors import ConvergenceError
-from mbma_tables.files import write_files, written_bytes
+from mbma_tables.files import shipped_file
 from mbma_tables.formulas.file import check, get_form
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.tablefiles import provenance
-from mbma_tables.tablefiles.shipped import shipped_file
 
 
 def ended(fault):
@@ -90,41 +87,11 @@ def test_no_form_of_that_name(name):
         get_form(name)
 
 
-def test_a_module_without_a_source_has_no_hash():
-    with pytest.raises(ModuleNotFoundError, match=r"mbma_tables\.nowhere"):
-        provenance._source("mbma_tables.nowhere")
-
-
 def test_a_theory_that_finds_no_load_says_where(monkeypatch):
     monkeypatch.setattr(theories_module, "STEPS", 1)
     with pytest.raises(ConvergenceError, match="no load found for 2 separations in 1 steps") as caught:
         theories.persson_force(Surface.named("concrete"), [0.2, 0.5])
     assert caught.value.mask.tolist() == [True, True]
-
-
-def test_a_file_is_put_back_when_its_fellow_cannot_be_written(tmp_path, monkeypatch):
-    first, second = tmp_path / "a", tmp_path / "b"
-    first.write_text("before")
-    replace = type(first).replace
-
-    def refuse(self, target):
-        if target.name == "b":
-            raise OSError(5, "Input/output error")
-        return replace(self, target)
-
-    monkeypatch.setattr(type(first), "replace", refuse)
-    with pytest.raises(InputError, match=r"b cannot be written: Input/output error"):
-        write_files({first: b"after", second: b"after"})
-    assert first.read_text() == "before"
-    assert os.listdir(tmp_path) == ["a"]
-
-
-def test_a_library_that_fails_for_another_reason_is_not_a_full_disk():
-    def fail(path):
-        raise RuntimeError("wrong\nshape")
-
-    with pytest.raises(OSError, match="wrong"):
-        written_bytes("law.nc", fail)
 
 
 def test_progress_stays_on_its_line_until_it_is_done(capsys):

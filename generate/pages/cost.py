@@ -17,7 +17,7 @@ from importlib import metadata
 
 import click
 
-from mbma_tables.files import write_files
+from mbma_tables.files import write_file
 from mbma_tables.scenes.costs import COLUMNS, EVALUATIONS, UNIT, Row, measure, read_costs
 
 DATA = pathlib.Path(__file__).parents[2] / "tables" / "cost.csv"
@@ -70,9 +70,10 @@ def main(out: pathlib.Path, data: pathlib.Path, quick: bool, page_only: bool) ->
 
     started = time.perf_counter()
     if not page_only:
-        write_files({data: to_csv(study(quick), quick).encode()}, make_folders=True)
+        write_file(data, to_csv(study(quick), quick).encode(), make_folders=True)
     costs = read_costs(data)
-    write_files({out / "cost.md": page(costs).encode(), out / "figures" / "cost.png": draw(costs)}, make_folders=True)
+    write_file(out / "cost.md", page(costs).encode(), make_folders=True)
+    write_file(out / "figures" / "cost.png", draw(costs), make_folders=True)
     click.echo(readme_table(costs))
     click.echo(f"wrote {data}, {out / 'cost.md'}; {time.perf_counter() - started:.0f} s", err=True)
 

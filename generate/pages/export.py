@@ -10,7 +10,7 @@ import click
 from generate.pages.page import png
 from mbma_tables import Surface
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.files import write_files
+from mbma_tables.files import write_file
 
 PAGE, FIGURE = pathlib.Path("export.md"), pathlib.Path("figures") / "export.png"
 NAMES = ("concrete", "asphalt", "yang-persson", "challenge")
@@ -61,7 +61,7 @@ def draw(path: pathlib.Path) -> None:
     axes.set(xlabel="overclosure [mm]", ylabel="pressure [MPa]", ylim=(1e-4, 5))
     axes.grid(True, alpha=0.3)
     axes.legend()
-    write_files({path: png(figure, dpi=130)}, make_folders=True)
+    write_file(path, png(figure, dpi=130), make_folders=True)
 
 
 def targets() -> str:
@@ -131,7 +131,7 @@ This page and its figure: `python -m generate.pages.export --out docs`.
 def main(out: pathlib.Path) -> None:
     """Write the page and its figure."""
     draw(out / FIGURE)
-    write_files({out / PAGE: page().encode()})
+    write_file(out / PAGE, page().encode())
     click.echo(out / PAGE)
 
 

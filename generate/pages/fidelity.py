@@ -18,7 +18,7 @@ import numpy as np
 
 from mbma_tables import Surface, contact, theories
 from mbma_tables.arguments import FloatArray
-from mbma_tables.files import write_files
+from mbma_tables.files import write_file
 
 DATA = pathlib.Path(__file__).parents[2] / "docs" / "data"
 COMMAND = "python -m generate.pages.fidelity --out docs"
@@ -391,7 +391,7 @@ REFERENCE_CAPTION = (
 @click.option("--figures/--no-figures", default=True, show_default=True)
 def main(out: pathlib.Path, sets: Sequence[str], figures: bool) -> None:
     """Write OUT/fidelity.md and OUT/figures/*.png."""
-    write_files({out / "fidelity.md": page(sets).encode()}, make_folders=True)
+    write_file(out / "fidelity.md", page(sets).encode(), make_folders=True)
     if figures:
         # imported as a module, this page's own functions stand behind the figures too
         from generate.pages.fidelity_figures import draw

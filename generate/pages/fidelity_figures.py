@@ -26,7 +26,7 @@ from generate.pages.fidelity import (
 )
 from generate.pages.page import png
 from mbma_tables import Surface, theories
-from mbma_tables.files import write_files
+from mbma_tables.files import write_file
 
 
 def draw(folder: pathlib.Path) -> None:
@@ -41,7 +41,7 @@ def draw(folder: pathlib.Path) -> None:
         return plt.subplots(rows, columns, figsize=(9, height), dpi=100, layout="constrained", **options)
 
     def save(figure: Any, name: str) -> None:
-        write_files({folder / f"{name}.png": png(figure)}, make_folders=True)
+        write_file(folder / f"{name}.png", png(figure), make_folders=True)
 
     def by_gap(ax: Any, surface: Surface, low: float, names: Iterable[str] = THEORIES, **style: Any) -> None:
         top = surface.h_max / surface.h_rms

@@ -10,7 +10,7 @@ import click
 from generate.formulas import alternatives as formula_alternatives
 from generate.formulas import islands as formula_islands
 from generate.pages.page import png
-from mbma_tables.files import write_files
+from mbma_tables.files import write_file
 from mbma_tables.formulas.file import ISLAND_FORMS, TOTALS, Form, get_form, shipped_formulas
 from mbma_tables.formulas.printers import latex_steps
 
@@ -33,7 +33,7 @@ def draw(front: list[dict[str, float]], path: pathlib.Path) -> None:
     axes.set(xlabel="fitted coefficients", ylabel="largest relative error on held-out points")
     axes.grid(True, which="both", alpha=0.3)
     axes.legend()
-    write_files({path: png(figure, dpi=130)}, make_folders=True)
+    write_file(path, png(figure, dpi=130), make_folders=True)
 
 
 def _table(head: list[str], rows: list[list[str]]) -> str:
@@ -166,7 +166,7 @@ def main(out: pathlib.Path) -> None:
     front = formula_islands.front()
     draw(front, out / FIGURE)
     text = page(front, formula_alternatives.islands(), formula_alternatives.totals())
-    write_files({out / PAGE: text.encode()}, make_folders=True)
+    write_file(out / PAGE, text.encode(), make_folders=True)
     click.echo(out / PAGE)
 
 

@@ -20,7 +20,7 @@ import click
 
 from generate.pages import stability as atlas
 from generate.pages.page import fill
-from mbma_tables.files import write_files
+from mbma_tables.files import write_file
 
 ROOT = pathlib.Path(__file__).parents[2]
 SIZE = "MBMA_GAUNTLET"
@@ -86,7 +86,7 @@ def main(out: pathlib.Path, size: int, no_atlas: bool) -> None:
     corners = {} if no_atlas else atlas.parts(out / atlas.FIGURE)
     left = atlas.CORNERS if no_atlas else ()
     page = fill(atlas.PAGE.read_text(encoding="utf-8"), {"counts": lambda: counts, **corners}, left)
-    write_files({out / atlas.PAGE.name: page.encode()}, make_folders=True)
+    write_file(out / atlas.PAGE.name, page.encode(), make_folders=True)
     click.echo(f"{out / atlas.PAGE.name}; {time.perf_counter() - started:.0f} s")
 
 

@@ -14,7 +14,7 @@ from generate.pages import stability_cases as cases
 from generate.pages.page import fill, png
 from generate.pages.stability_cases import Tally
 from mbma_tables.arguments import FloatArray
-from mbma_tables.files import write_files
+from mbma_tables.files import write_file
 
 DOCS = pathlib.Path(__file__).parents[2] / "docs"
 PAGE, FIGURE = DOCS / "stability.md", pathlib.Path("figures") / "stability.png"
@@ -46,7 +46,7 @@ def draw(geometry: dict[str, FloatArray], islands: dict[str, FloatArray], path: 
         panel.set_xticks(places[0][::4], [f"{mu:.0e}" for mu in cases.MU_CORNERS[::4]], rotation=45)
         panel.set_yticks(places[1][::4], [f"{X:.3g}" for X in cases.X_CORNERS[::4]])
     figure.colorbar(mesh, ax=axes, label="largest relative error")
-    write_files({path: png(figure, dpi=110)}, make_folders=True)
+    write_file(path, png(figure, dpi=110), make_folders=True)
 
 
 def _row(tally: Tally) -> str:
@@ -95,7 +95,7 @@ def main(out: pathlib.Path) -> None:
     """Evaluate the corners; write the page with these parts anew, and its figure."""
     started = time.perf_counter()
     page = fill(PAGE.read_text(encoding="utf-8"), parts(out / FIGURE), left=COUNTS)
-    write_files({out / PAGE.name: page.encode()}, make_folders=True)
+    write_file(out / PAGE.name, page.encode(), make_folders=True)
     click.echo(f"{out / PAGE.name}; {time.perf_counter() - started:.0f} s")
 
 

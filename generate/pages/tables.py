@@ -16,7 +16,7 @@ import numpy as np
 from generate.pages.page import fill, png
 from generate.tables.configuration import load
 from generate.tables.schemes import LARGEST_ZETA_D, POINTS, SIZES, Row, compare
-from mbma_tables.files import write_files
+from mbma_tables.files import write_file
 from mbma_tables.islands.four_numbers import hat_scales, to_axes
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models.universal import shipped
@@ -148,7 +148,7 @@ def draw(folder: pathlib.Path, rows: Sequence[Row]) -> None:
     from matplotlib import pyplot as plt
 
     def save(figure: Any, name: str) -> None:
-        write_files({folder / f"{name}.png": png(figure)}, make_folders=True)
+        write_file(folder / f"{name}.png", png(figure), make_folders=True)
 
     leasts = sorted({row.least for row in rows}, reverse=True)
     figure, panels = plt.subplots(
@@ -209,7 +209,7 @@ def main(out: pathlib.Path, figures: bool, largest: int) -> None:
             "comparison": lambda: comparison_text(compare(largest)),
         },
     )
-    write_files({out / "tables.md": page.encode()}, make_folders=True)
+    write_file(out / "tables.md", page.encode(), make_folders=True)
     if figures:
         draw(out / "figures", compare(largest))
     click.echo(f"wrote {out / 'tables.md'}")

@@ -25,7 +25,8 @@ import numpy as np
 from tqdm import tqdm
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.files import reason, write_whole
+from mbma_tables.errors import InputError
+from mbma_tables.files import write_file
 from mbma_tables.tablefiles.provenance import digest_arrays, digest_json
 
 ATTEMPTS = 3  # a worker that dies costs its chunks; they are given out again until this often none was finished
@@ -85,13 +86,9 @@ def _store(folder: pathlib.Path, key: str, result: FloatArray) -> None:
     np.save(body, result, allow_pickle=False)
     content = _digest(key, body.getvalue()) + body.getvalue()
     try:
-        try:
-            write_whole({folder / key: content}, make_folders=True)
-        except FileNotFoundError:
-            # another run of the same table ended and took the folder with it
-            write_whole({folder / key: content}, make_folders=True)
-    except OSError as fault:
-        raise CampaignError(f"cannot keep finished chunks in {folder}: {reason(fault)}") from None
+        write_file(folder / key, content, make_folders=True)
+    except InputError as fault:
+        raise CampaignError(f"cannot keep finished chunks: {fault}") from None
 
 
 def _follow_parent() -> None:

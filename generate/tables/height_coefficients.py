@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 
 import mpmath
 
-from mbma_tables.files import write_files
+from mbma_tables.files import write_file
 
 TARGET = pathlib.Path(__file__).parents[2] / "mbma_tables" / "islands" / "_height_coefficients.py"
 DIGITS = 40
@@ -98,7 +98,7 @@ def main() -> None:
         '"""Made by `python -m generate tables heights`; do not edit."""\n\n# fmt: off',
         "\n".join(_literal(f"TWICE_N_{k}", pieces(k)) for k in (1, 2, 3, 4, 5)),
     ]
-    write_files({TARGET: ("\n\n".join(blocks) + "\n").encode()})
+    write_file(TARGET, ("\n\n".join(blocks) + "\n").encode())
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from mbma_tables.cli.options import (
 )
 from mbma_tables.cli.sources import Source, read_source
 from mbma_tables.errors import InputError
-from mbma_tables.files import write_files
+from mbma_tables.files import write_file
 
 LIGHTEST = 1e-3  # (h_max - d)/h_max of a curve's lightest contact
 EVEN_FROM = 0.2  # and where its points, geometric so far, become evenly spaced
@@ -60,7 +60,8 @@ def _finish(report: Report, given: Mapping[str, Any], picture: bytes | None = No
         if given["out"] in files:
             raise InputError(f"--out and --plot name the same file, {given['out']}")
         files[given["out"]] = text.encode()
-    write_files(files)
+    for path, content in files.items():
+        write_file(path, content)
     if given["out"] is None:
         click.echo(text, nl=False)
 

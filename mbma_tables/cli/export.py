@@ -10,7 +10,7 @@ import click
 from mbma_tables.cli.options import surface_options
 from mbma_tables.cli.sources import read_source
 from mbma_tables.errors import InputError
-from mbma_tables.files import write_files
+from mbma_tables.files import write_file
 
 SOLVERS = ("calculix", "abaqus", "lsdyna", "optistruct", "comsol", "moose", "modelica")
 DATA = ("csv", "json", "matlab", "netcdf", "hdf5", "parquet")
@@ -51,8 +51,8 @@ def export_command(**given: Any) -> None:
     if given["check"]:
         raise InputError(f"--check replays points in source code; {target} has none to replay")
     files = _law_files(target, out, given)
-    write_files(files)
-    for path in files:
+    for path, content in files.items():
+        write_file(path, content)
         click.echo(path)
 
 

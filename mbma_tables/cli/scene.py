@@ -12,7 +12,7 @@ import click
 
 from mbma_tables.cli.format import Column, Report
 from mbma_tables.errors import InputError
-from mbma_tables.files import write_files, written_bytes
+from mbma_tables.files import write_file, written_bytes
 
 if TYPE_CHECKING:
     import xarray
@@ -75,7 +75,8 @@ def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) 
         files[plot] = _picture(found)
     if out is not None:
         files[out] = _report(found).to_csv().encode() if out.suffix == ".csv" else _to_netcdf(found)
-    write_files(files)
+    for path, content in files.items():
+        write_file(path, content)
     if as_json:
         click.echo(_to_json(found))
     elif out is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib
 import importlib.resources
 import os
@@ -10,7 +9,7 @@ import pathlib
 from typing import Any
 
 from mbma_tables.errors import InputError
-from mbma_tables.files import reason, write_whole
+from mbma_tables.files import write_file
 from mbma_tables.models.universal import UniversalModel, open_table
 from mbma_tables.surfaces.readings import Reading, get_reading
 
@@ -85,15 +84,7 @@ def sources(target: str, model: UniversalModel, reading: Reading) -> dict[str, s
 
 
 def _write(folder: pathlib.Path, texts: dict[str, str]) -> list[pathlib.Path]:
-    """Write all files, or none."""
-    made = not folder.exists()
-    try:
-        if made:
-            folder.mkdir()
-        write_whole({folder / name: text.encode() for name, text in texts.items()})
-    except OSError as fault:
-        if made:
-            with contextlib.suppress(OSError):
-                folder.rmdir()
-        raise InputError(f"cannot write {fault.filename}: {reason(fault)}; choose another folder") from None
+    """Write the files, each whole or not at all."""
+    for name, text in texts.items():
+        write_file(folder / name, text.encode(), make_folders=True)
     return [folder / name for name in texts]

@@ -15,9 +15,8 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray, require
 from mbma_tables.errors import InputError, TableFileError
-from mbma_tables.files import write_files
+from mbma_tables.files import shipped_file, write_file
 from mbma_tables.formulas.expressions import FUNCTIONS, evaluate_steps, names_in, parse
-from mbma_tables.tablefiles.shipped import shipped_file
 
 FORMAT, FORMAT_VERSION = "mbma-formula", 1
 LARGEST = 1_000_000  # bytes
@@ -230,7 +229,7 @@ def write(path: os.PathLike[str] | str, forms: dict[str, Any], provenance: dict[
     }
     document["data_hash"] = data_hash(document)
     found = check(document)
-    write_files({pathlib.Path(path): (json.dumps(document, indent=1) + "\n").encode()})
+    write_file(path, (json.dumps(document, indent=1) + "\n").encode())
     return found
 
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.errors import InputError
+from mbma_tables.files import shipped_file
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models import universal_kernel
 from mbma_tables.models.island4d import Island4dModel
@@ -21,7 +22,6 @@ from mbma_tables.models.universal_kernel import Axes
 from mbma_tables.tablefiles.interpolate import fill_2d
 from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL, TableContent, error_cell
-from mbma_tables.tablefiles.shipped import shipped_file
 
 __all__ = ["Island4dModel", "UniversalModel", "island4d_model", "open_table", "shipped", "universal_model"]
 

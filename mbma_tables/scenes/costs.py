@@ -22,8 +22,7 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError, TableFileError
-from mbma_tables.files import write_files
-from mbma_tables.tablefiles.shipped import shipped_file
+from mbma_tables.files import shipped_file, write_file
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.surface import Surface
@@ -354,7 +353,7 @@ def write_calibration(calibration: Calibration, path: pathlib.Path | None = None
     """Keep a calibration, written whole or not at all; returns where."""
     target = calibration_path() if path is None else path
     content = json.dumps(dataclasses.asdict(calibration), indent=2) + "\n"
-    write_files({target: content.encode()}, make_folders=True)
+    write_file(target, content.encode(), make_folders=True)
     return target
 
 

@@ -20,8 +20,8 @@ from typing import Any
 import netCDF4
 import numpy as np
 
-from mbma_tables.errors import StaleTableWarning, TableFileError
-from mbma_tables.files import reason, write_whole, written_bytes
+from mbma_tables.errors import InputError, StaleTableWarning, TableFileError
+from mbma_tables.files import shipped_file, write_file, written_bytes
 from mbma_tables.tablefiles import provenance
 from mbma_tables.tablefiles.consistency import misfit
 from mbma_tables.tablefiles.contents import Contents, attributes_of, contents_of, foreign_contents
@@ -40,7 +40,6 @@ from mbma_tables.tablefiles.schema import (
     Axis,
     TableContent,
 )
-from mbma_tables.tablefiles.shipped import shipped_file
 from mbma_tables.tablefiles.splines import padding
 
 SEAL = b"\nmbma-table sha256 "
@@ -167,10 +166,9 @@ def write_table(path: os.PathLike[str] | str, content: TableContent) -> pathlib.
 
     try:
         body = written_bytes(target.name, write)
-        write_whole({target: body + SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n"})
-    except OSError as fault:
-        why = reason(fault)
-        raise TableFileError(f"cannot write {target}: {why}; nothing was changed, choose another folder") from None
+        write_file(target, body + SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n")
+    except (InputError, OSError) as fault:
+        raise TableFileError(f"cannot write {target}: {fault}") from None
     return target
 
 

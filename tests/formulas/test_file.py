@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from mbma_tables import OutOfRangeError, TableFileError, contact, greenwood_tripp
+from mbma_tables.files import shipped_file
 from mbma_tables.formulas import file
 from mbma_tables.formulas.file import ISLAND_FORMS, TOTALS, check, get_form, read, write
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.tablefiles.shipped import shipped_file
 
 
 @pytest.fixture(scope="module")

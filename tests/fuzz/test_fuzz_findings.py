@@ -10,11 +10,11 @@ from small_tables import small_table
 
 from generate.tables import campaign
 from mbma_tables import InputError, Scene, Surface, TableFileError
+from mbma_tables.files import shipped_file
 from mbma_tables.formulas import file as formula_file
 from mbma_tables.scenes.costs import read_calibration
 from mbma_tables.tablefiles.consistency import misfit
 from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL
-from mbma_tables.tablefiles.shipped import shipped_file
 
 HUGE = 10**400
 SCENE = '[effects]\non = ["force"]\n[prescribed]\nseparations = [{}]\nover_h_rms = true\n[surface]\nname = "concrete"\n'

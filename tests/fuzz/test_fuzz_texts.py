@@ -12,10 +12,10 @@ from fuzzing import SCALE, changed, finite, spoilt, toml_text
 
 from generate.tables import configuration
 from mbma_tables import InputError, Scene
+from mbma_tables.files import shipped_file
 from mbma_tables.formulas import file as formula_file
 from mbma_tables.scenes.costs import CALIBRATED_TIERS, Calibration, read_calibration, read_costs, write_calibration
 from mbma_tables.tablefiles.schema import KINDS
-from mbma_tables.tablefiles.shipped import shipped_file
 
 EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
 SCENES = sorted(path.name for path in EXAMPLES.glob("scene_*.toml"))

@@ -1,7 +1,6 @@
 """Campaigns: results that do not depend on who computes them, checkpoints that are believed only when sound."""
 
 import concurrent.futures
-import errno
 import os
 import pathlib
 import signal
@@ -9,7 +8,6 @@ import signal
 import numpy as np
 import pytest
 
-from generate.tables import campaign as campaign_module
 from generate.tables.campaign import ATTEMPTS, Campaign, CampaignError, Workers, chunk_key, split
 
 COUNT = 7
@@ -170,37 +168,6 @@ def test_a_damaged_checkpoint_is_recomputed_and_mended(tmp_path, damage):
     assert victim.read_bytes() != before[victim]
     np.testing.assert_array_equal(run(Campaign(checkpoints=tmp_path)), first)
     assert {path: path.read_bytes() for path in files(tmp_path)} == before
-
-
-def test_a_full_disk_is_one_clear_message_and_leaves_no_part(tmp_path, monkeypatch):
-    def full(handle):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(campaign_module.os, "fsync", full)
-    with pytest.raises(CampaignError, match=rf"cannot keep finished chunks in {tmp_path}: No space left on device"):
-        run(Campaign(checkpoints=tmp_path))
-    assert files(tmp_path) == []
-
-
-def test_a_folder_that_cannot_be_is_one_clear_message(tmp_path):
-    taken = tmp_path / "taken"
-    taken.write_text("not a folder")
-    with pytest.raises(CampaignError, match=r"cannot keep finished chunks in .*taken"):
-        run(Campaign(checkpoints=taken))
-
-
-def test_a_folder_that_another_run_took_away_is_made_again(tmp_path):
-    folder = tmp_path / "kept"
-
-    def clearing(x, factor):
-        for path in list(folder.glob("*")):
-            path.unlink()
-        if folder.exists():
-            folder.rmdir()
-        return factor * x
-
-    np.testing.assert_array_equal(run(Campaign(checkpoints=folder), clearing), 2 * np.arange(10.0 * COUNT))
-    assert len(files(folder)) == 1
 
 
 def test_progress_is_silent_in_a_pipe(capfd):

@@ -5,7 +5,7 @@ import pytest
 
 from generate.pages import cost, cost_islands, cost_page, cost_totals
 from mbma_tables import contact
-from mbma_tables.files import write_files
+from mbma_tables.files import write_file
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models.universal import island4d_model
 from mbma_tables.scenes.costs import HELD_OUT, Row, cost_file, held_out_surfaces, read_costs
@@ -69,7 +69,7 @@ def test_rows_come_back_from_the_file(tmp_path):
         Row("exact", "gap rtol=1e-03", "force", 1.5e-6, 3.25, 71.0),
     ]
     path = tmp_path / "deep" / "cost.csv"
-    write_files({path: cost.to_csv(rows, quick=True).encode()}, make_folders=True)
+    write_file(path, cost.to_csv(rows, quick=True).encode(), make_folders=True)
     assert list(read_costs(path).measured) == rows
     assert [p.name for p in path.parent.iterdir()] == ["cost.csv"]
 

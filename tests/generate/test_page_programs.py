@@ -82,7 +82,9 @@ def drawn():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fidelity_figures, "png", figures.append)
         written = {}
-        patch.setattr(fidelity_figures, "write_files", lambda files, make_folders: written.update(files))
+        patch.setattr(
+            fidelity_figures, "write_file", lambda path, content, make_folders: written.update({path: content})
+        )
         fidelity_figures.draw(pathlib.Path("figures"))
     yield dict(zip((path.stem for path in written), figures, strict=True))
     from matplotlib import pyplot

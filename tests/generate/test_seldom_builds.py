@@ -170,23 +170,6 @@ def test_axes_that_no_surface_visits(tmp_path, monkeypatch):
         kind.manifold(10)
 
 
-def test_a_folder_that_another_run_took_along_is_made_again(tmp_path, monkeypatch):
-    calls = []
-    write = campaign_module.write_whole
-
-    def once(files, make_folders):
-        calls.append(make_folders)
-        if len(calls) == 1:
-            raise FileNotFoundError(2, "gone")
-        write(files, make_folders)
-
-    monkeypatch.setattr(campaign_module, "write_whole", once)
-    key = campaign_module.chunk_key("identity", np.arange(3.0))
-    campaign_module._store(tmp_path / "chunks", key, np.arange(3.0))
-    assert calls == [True, True]
-    assert [path.name for path in (tmp_path / "chunks").iterdir()] == [key]
-
-
 def test_the_first_process_follows_nobody():
     campaign_module._follow_parent()
     # a child would end here with code 1

@@ -148,7 +148,7 @@ def test_a_folder_that_is_missing_or_none(tmp_path):
     (tmp_path / "file").write_bytes(b"own")
     unwritten(tmp_path / "file" / "table.nc", tmp_path, content, "Not a directory")
     (tmp_path / "folder.nc").mkdir()
-    unwritten(tmp_path / "folder.nc", tmp_path, content, "not a plain file")
+    unwritten(tmp_path / "folder.nc", tmp_path, content, "not a regular file")
 
 
 def test_a_folder_that_may_not_be_written(tmp_path):

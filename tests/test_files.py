@@ -1,0 +1,197 @@
+"""Files are written whole or not at all, whatever fails; what is read is a regular file of a believable size."""
+
+import ast
+import concurrent.futures
+import errno
+import os
+import pathlib
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+
+import pytest
+from click.testing import CliRunner
+
+import mbma_tables
+from mbma_tables import files
+from mbma_tables.cli import main
+from mbma_tables.errors import InputError
+from mbma_tables.files import read_file, write_file, written_bytes
+from mbma_tables.islands.height_integrals import height_integral
+
+ROOT = pathlib.Path(mbma_tables.__file__).parents[1]
+
+
+@pytest.fixture
+def old(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_bytes(b"old")
+    path.chmod(0o640)
+    return path
+
+
+def unchanged(path):
+    return [p.name for p in path.parent.iterdir()] == [path.name] and path.read_bytes() == b"old"
+
+
+def test_a_file_is_replaced_and_keeps_its_mode(old):
+    write_file(old, b"new")
+    assert old.read_bytes() == b"new"
+    assert old.stat().st_mode & 0o777 == 0o640
+    write_file(old.parent / "b" / "c.txt", b"deep", make_folders=True)
+    assert (old.parent / "b" / "c.txt").read_bytes() == b"deep"
+
+
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS, errno.EIO])
+@pytest.mark.parametrize(("owner", "step"), [("os", "fsync"), ("shutil", "copymode"), ("os", "replace")])
+def test_a_step_that_fails_leaves_the_old_file(old, owner, step, code, monkeypatch):
+    def fail(*_):
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(getattr(files, owner), step, fail)
+    with pytest.raises(InputError, match=rf"a\.txt cannot be written: {os.strerror(code)}"):
+        write_file(old, b"new")
+    assert unchanged(old)
+
+
+def test_an_interruption_leaves_the_old_file(old, monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(files.os, "fsync", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        write_file(old, b"new")
+    assert unchanged(old)
+
+
+def test_a_process_killed_before_the_rename_leaves_the_old_file(old):
+    child = os.fork()
+    if child == 0:
+        files.os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
+        write_file(old, b"new")
+        os._exit(0)
+    assert os.WTERMSIG(os.waitpid(child, 0)[1]) == signal.SIGKILL
+    assert old.read_bytes() == b"old"
+    write_file(old, b"new")
+    assert old.read_bytes() == b"new"
+
+
+def test_a_full_disk_leaves_the_old_file(old):
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        with pytest.raises(InputError, match="File too large"):
+            write_file(old, bytes(2000))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert unchanged(old)
+
+
+def test_threads_that_write_one_file(tmp_path):
+    target = tmp_path / "a.txt"
+    contents = [bytes([65 + number]) * 100_000 for number in range(8)]
+    with concurrent.futures.ThreadPoolExecutor(8) as threads:
+        list(threads.map(lambda content: write_file(target, content), contents * 4))
+    assert target.read_bytes() in contents
+    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_links_are_followed(old):
+    link = old.parent / "link"
+    link.symlink_to(old)
+    write_file(link, b"new")
+    assert link.is_symlink()
+    assert old.read_bytes() == read_file(link, 3) == b"new"
+
+
+def unusual(folder):
+    """What is no place for a file, or none to read from."""
+    os.mkfifo(folder / "pipe")
+    (folder / "circle").symlink_to(folder / "circle")
+    (folder / "folder").mkdir()
+    (folder / "file").write_bytes(b"")
+    return {
+        "pipe": folder / "pipe",
+        "device": pathlib.Path("/dev/zero"),
+        "circle": folder / "circle",
+        "folder": folder / "folder",
+        "below a file": folder / "file" / "a.txt",
+        "in no folder": folder / "missing" / "a.txt",
+    }
+
+
+@pytest.mark.parametrize("what", ["pipe", "device", "circle", "folder", "below a file", "in no folder"])
+def test_only_regular_files_are_written_and_read(what, tmp_path):
+    path = unusual(tmp_path)[what]
+    with pytest.raises(InputError, match="cannot be written"):
+        write_file(path, b"new")
+    with pytest.raises(InputError, match="cannot be read"):
+        read_file(path, 100)
+    command = ["curve", "--surface", "concrete", "--points", "5", "--csv", "--out", str(path)]
+    result = CliRunner().invoke(main, command)
+    assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1)
+    assert result.stderr.startswith("mbma: ")
+
+
+def test_a_size_is_not_believed(tmp_path):
+    path = tmp_path / "sparse"
+    with path.open("wb") as file:
+        file.truncate(2**40)
+    with pytest.raises(InputError, match="has more than 1000 bytes"):
+        read_file(path, 1000)
+    path.write_bytes(bytes(1000))
+    assert read_file(path, 1000) == bytes(1000)
+
+
+def test_a_library_that_fails_is_an_error_of_the_file():
+    def fail(path):
+        raise RuntimeError("wrong\nshape")
+
+    with pytest.raises(OSError, match="wrong"):
+        written_bytes("law.nc", fail)
+
+
+# what may write by itself: into a stream, or into a temporary folder
+WRITERS = {
+    ("mbma_tables/files.py", "open"),
+    ("mbma_tables/plots.py", "savefig"),
+    ("generate/pages/page.py", "savefig"),
+    ("mbma_tables/cli/scene.py", "to_netcdf"),
+    ("mbma_tables/export/data.py", "to_netcdf"),
+}
+WRITING = {"write_text", "write_bytes", "savefig", "savetxt", "to_netcdf", "tofile", "mkstemp", "NamedTemporaryFile"}
+MODES = {first + rest for first in "wxa" for rest in ("", "b", "t", "b+", "+")}
+
+
+def test_all_files_are_written_by_write_file():
+    found = set()
+    for path in (*ROOT.glob("mbma_tables/**/*.py"), *ROOT.glob("generate/**/*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call):
+                name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+                given = (*node.args, *(keyword.value for keyword in node.keywords))
+                modes = {argument.value for argument in given if isinstance(argument, ast.Constant)}
+                if name in WRITING or (name == "open" and modes & MODES):
+                    found.add((str(path.relative_to(ROOT)), name))
+    assert found == WRITERS
+
+
+SMALL = "from mbma_tables.islands.height_integrals import height_integral as h; print(repr(float(h(1.5, 0.3))))"
+
+
+@pytest.mark.slow
+def test_nowhere_to_keep_what_is_compiled(tmp_path):
+    for name in ("mbma_tables", "tables"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    # files where folders are needed: nobody can write there, not even root
+    for folder in [p for p in (tmp_path / "mbma_tables").rglob("*") if p.is_dir()] + [tmp_path / "mbma_tables"]:
+        (folder / "__pycache__").write_bytes(b"")
+    (tmp_path / "file").write_bytes(b"")
+    places = {name: str(tmp_path / "file" / "x") for name in ("HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR")}
+    command = [sys.executable, "-W", "error", "-c", SMALL]
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)} | places
+    made = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=tmp_path)
+    assert (made.returncode, made.stderr) == (0, "")
+    assert float(made.stdout) == float(height_integral(1.5, 0.3))
