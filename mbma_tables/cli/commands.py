@@ -51,17 +51,16 @@ def _stress_units(source: Source) -> dict[str, str]:
 
 
 def _finish(report: Report, given: Mapping[str, Any], picture: bytes | None = None) -> None:
-    """Files first, so that one which cannot be written leaves nothing behind, then stdout."""
+    """Write the files, then stdout."""
     if given["as_json"] and given["as_csv"]:
         raise InputError("one of --json and --csv, not both")
     text = report.to_json() if given["as_json"] else report.to_csv() if given["as_csv"] else report.to_table()
-    files = {} if picture is None else {given["plot"]: picture}
     if given["out"] is not None:
-        if given["out"] in files:
+        if picture is not None and given["out"] == given["plot"]:
             raise InputError(f"--out and --plot name the same file, {given['out']}")
-        files[given["out"]] = text.encode()
-    for path, content in files.items():
-        write_file(path, content)
+        write_file(given["out"], text.encode())
+    if picture is not None:
+        write_file(given["plot"], picture)
     if given["out"] is None:
         click.echo(text, nl=False)
 
