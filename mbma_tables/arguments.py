@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,43 @@ def describe_entries(values: FloatArray, mask: NDArray[np.bool_]) -> str:
     return ", ".join(quoted) + (f" and {more} more" if more > 0 else "")
 
 
+def is_labelled(value: Any) -> bool:
+    """Whether `value` is an xarray DataArray, without importing xarray for the question."""
+    xarray = sys.modules.get("xarray")
+    return xarray is not None and isinstance(value, xarray.DataArray)
+
+
 def finite_array(name: str, value: ArrayLike) -> FloatArray:
-    """`value` as a float64 array; empty, complex, non-numeric, NaN or infinite input is refused."""
+    """`value` as a float64 array; empty, masked, complex, non-numeric, NaN or infinite input is refused.
+
+    Raises
+    ------
+    InputError
+        For what is not an array of real numbers. An array without hidden entries is taken though it is a masked one.
+    OutOfRangeError
+        For NaN and infinity.
+
+    Examples
+    --------
+    >>> from mbma_tables.arguments import finite_array
+    >>> finite_array("x", [1, 2])
+    array([1., 2.])
+    >>> finite_array("x", [1, float("nan")])
+    Traceback (most recent call last):
+        ...
+    mbma_tables.errors.OutOfRangeError: x must be finite, got nan at (1,)
+    """
+    # xarray's other containers, and HDF5's: an array with names that would be lost here
+    if hasattr(value, "dims") and not is_labelled(value):
+        raise InputError(
+            f"{name} must be numbers, an array or a DataArray: pass the array inside that {type(value).__name__}"
+        )
+    if np.ma.is_masked(value):
+        masked = np.ma.getmaskarray(np.ma.asanyarray(value))
+        raise InputError(
+            f"{name} has {masked.sum()} masked entries among {masked.size}: leave them out with .compressed(), or put "
+            "numbers in their place with .filled(number)"
+        )
     try:
         given = np.asarray(value)
         if given.dtype.kind not in "fiu":

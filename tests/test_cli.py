@@ -90,7 +90,7 @@ def test_force_says_what_it_is_without_a_modulus():
 
 def test_both_separations_meet():
     by_gap = json.loads(run("contact", "--surface", "challenge", "-d", "0.4", "--json"))
-    average = (0.4 + float(CASES["challenge"].surface.h_max)) / 2
+    average = (0.4 + float(Surface.named("challenge").h_max)) / 2
     by_average = json.loads(run("contact", "--surface", "challenge", "-u", repr(average), "--json"))
     assert by_average["columns"]["force"] == pytest.approx(by_gap["columns"]["force"], rel=1e-12)
     assert by_average["columns"]["mean_separation"] == pytest.approx([average], rel=1e-15)
@@ -239,7 +239,7 @@ def test_island_is_the_librarys_answer():
 def test_surfaces_lists_every_case():
     columns = json.loads(run("surfaces", "--json"))["columns"]
     assert columns["name"] == list(CASES)
-    assert columns["zeta_1"] == [float(case.surface.zeta_1) for case in CASES.values()]
+    assert columns["zeta_1"] == [float(Surface.named(name).zeta_1) for name in CASES]
     assert columns["length_unit"] == [case.length_unit for case in CASES.values()]
     rows = table_rows(run("surfaces"))
     assert [row[0] for row in rows[1:]] == list(CASES)

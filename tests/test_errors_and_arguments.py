@@ -2,10 +2,22 @@
 
 import math
 
+import h5py
 import numpy as np
 import pytest
+import xarray as xr
 
-from mbma_tables import ConvergenceError, InputError, MbmaError, NotSelfAffineError, OutOfRangeError
+from mbma_tables import (
+    ConvergenceError,
+    InputError,
+    MbmaError,
+    NotSelfAffineError,
+    OutOfRangeError,
+    Surface,
+    contact,
+    greenwood_tripp,
+    height_integral,
+)
 from mbma_tables.arguments import SHOWN, broadcast_shape, finite_array, require
 
 
@@ -58,6 +70,32 @@ def test_numbers_become_float64(value, shape):
 def test_what_is_no_number_is_named(value, message):
     with pytest.raises(InputError, match=message):
         finite_array("x", value)
+
+
+@pytest.mark.parametrize(
+    "take",
+    [
+        lambda x: finite_array("x", x),
+        lambda x: height_integral(1.5, x),
+        lambda x: Surface(0.8, 0.5, 100.0, x, 3.0),
+        lambda x: contact(Surface.named("concrete"), x),
+        lambda x: greenwood_tripp.solve(x, 1.0),
+    ],
+)
+def test_masked_entries_are_refused_not_uncovered(take):
+    with pytest.raises(InputError, match=r"has 1 masked entries among 3: leave them out with \.compressed\(\), or put"):
+        take(np.ma.masked_array([0.1, 0.2, 0.3], [False, True, False]))
+    take(np.ma.masked_array([0.1, 0.2, 0.3], False))
+
+
+def test_other_containers_of_xarray_and_hdf5_are_refused(tmp_path):
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        for value in (xr.Variable("t", [0.1]), xr.Dataset({"a": ("t", [0.1])}), file.create_dataset("x", data=[0.1])):
+            message = f"x must be numbers, .* inside that {type(value).__name__}"
+            with pytest.raises(InputError, match=message):
+                finite_array("x", value)
+            with pytest.raises(InputError, match="h_rms must be numbers"):
+                Surface(0.8, 0.5, 100.0, value, 3.0)
 
 
 def test_out_of_range_entries_are_quoted():

@@ -215,9 +215,10 @@ def island_command(**given: Any) -> None:
 def surfaces_command(**given: Any) -> None:
     """The paper's surfaces by name, with their numbers, each in its own unit of length."""
     from mbma_tables.surfaces.cases import CASES
+    from mbma_tables.surfaces.surface import Surface
 
-    cases = CASES.values()
+    cases, surfaces = CASES.values(), [Surface.named(name) for name in CASES]
     values: dict[str, Any] = {"name": list(CASES), "length_unit": [case.length_unit for case in cases]}
-    values |= {name: [getattr(case.surface, name) for case in cases] for name in SURFACE_NUMBERS}
+    values |= {name: [getattr(surface, name) for surface in surfaces] for name in SURFACE_NUMBERS}
     values["title"] = [case.title for case in cases]
     _finish(Report("surfaces", "the paper's cases", [], {}, to_columns(values, {})), given)

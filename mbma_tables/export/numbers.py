@@ -14,8 +14,8 @@ from mbma_tables.islands import height_integrals as heights
 from mbma_tables.models import universal_kernel
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces import spectrum
+from mbma_tables.surfaces.moments import MAX_ZETA_1, MIN_ZETA_1
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.surfaces.surface import LARGEST_ZETA_1, LEAST_ZETA_1
 from mbma_tables.tablefiles.schema import TableContent
 from mbma_tables.totals import gauss_kronrod as quadrature
 from mbma_tables.totals import intervals
@@ -90,8 +90,8 @@ def collect(model: UniversalModel, reading: Reading) -> Numbers:
             "PHI": phi,
             "FLOOR_D": floor_d,
             "FLOOR_U": floor_u,
-            "LEAST_ZETA_1": max(LEAST_ZETA_1, floor_u),
-            "LARGEST_ZETA_1": LARGEST_ZETA_1,
+            "LEAST_ZETA_1": max(MIN_ZETA_1, floor_u),
+            "LARGEST_ZETA_1": MAX_ZETA_1,
             "STRETCH": intervals.STRETCH,
             "SMALL_ANGLE": intervals.SMALL_ANGLE,
             "NARROW": intervals.NARROW,
@@ -144,7 +144,7 @@ def describe(content: TableContent, reading: Reading, title: str, usage: str) ->
         f"{'summits' if summits else 'all heights'}).",
         f"Table: data {found['values_sha256']}",
         f"physics {found['physics_sha256']}",
-        f"Range: {X.low:g} <= X <= {X.high:g}, 0 <= mu <= {mu.high:g}; H in (0, 1], zeta_1 up to {LARGEST_ZETA_1:g}.",
+        f"Range: {X.low:g} <= X <= {X.high:g}, 0 <= mu <= {mu.high:g}; H in (0, 1], zeta_1 up to {MAX_ZETA_1:g}.",
         f"Largest relative error of the table against the solved model: {worst:.2g} on {found['certificate_points']} "
         f"held-out points, {seen:.2g} at islands of random surfaces; each answer carries its own bound.",
         f"Closed form: {form.title}, data {shipped_formulas().data_hash}",

@@ -34,9 +34,10 @@ class Source:
 def from_name(name: str) -> Source:
     """A case of the paper."""
     from mbma_tables.surfaces.cases import get_case
+    from mbma_tables.surfaces.surface import Surface
 
     case = get_case(name)
-    return Source(case.surface, case.title, case.length_unit)
+    return Source(Surface.named(name), case.title, case.length_unit)
 
 
 def from_map(path: Path) -> Source:
@@ -57,7 +58,8 @@ def shown(path: Path) -> str:
 def from_numbers(given: Mapping[str, Any]) -> Surface:
     """The surface of one complete set of numbers."""
     from mbma_tables.arguments import require
-    from mbma_tables.surfaces.surface import LEAST_ZETA_1, Surface
+    from mbma_tables.surfaces.moments import MIN_ZETA_1
+    from mbma_tables.surfaces.surface import Surface
 
     if set(given) not in (set(BAND), set(MAGNIFICATION), set(MOMENTS)):
         raise InputError(
@@ -69,7 +71,7 @@ def from_numbers(given: Mapping[str, Any]) -> Surface:
         return Surface.from_moments(**numbers)
     if "zeta_1" in numbers:
         zeta_1 = numbers.pop("zeta_1")
-        require("zeta_1", zeta_1, zeta_1 > LEAST_ZETA_1, "greater than 3 (the model's floors need room)")
+        require("zeta_1", zeta_1, zeta_1 > MIN_ZETA_1, "greater than 3 (the model's floors need room)")
         numbers["q1"] = numbers["q0"] * zeta_1
     return Surface(**numbers)
 

@@ -4,75 +4,53 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 
 from mbma_tables.errors import InputError
-from mbma_tables.surfaces.surface import Surface
 
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A named surface, its length unit and where the paper uses it."""
+    """A named surface, its length unit and where the paper uses it.
+
+    `numbers` are arguments of `Surface`, or of `Surface.from_moments` where the paper gives moments.
+    """
 
     name: str
     title: str
     length_unit: str
-    surface: Surface
+    numbers: Mapping[str, float]
 
 
-def _moments(hurst: float, m0: float, m2: float, m4: float, h_max: float) -> Surface:
-    return Surface.from_moments(hurst=hurst, m0=m0, m2=m2, m4=m4, h_max=h_max)
+def _band(hurst: float, q0: float, zeta_1: float, h_rms: float, top: float) -> dict[str, float]:
+    return {"hurst": hurst, "q0": q0, "q1": q0 * zeta_1, "h_rms": h_rms, "h_max": top * h_rms}
 
 
-def _band(hurst: float, q0: float, zeta_1: float, h_rms: float, h_max: float) -> Surface:
-    return Surface(hurst, q0, q0 * zeta_1, h_rms, h_max * h_rms)
+def _moments(hurst: float, m0: float, m2: float, m4: float, h_max: float) -> dict[str, float]:
+    return {"hurst": hurst, "m0": m0, "m2": m2, "m4": m4, "h_max": h_max}
 
 
-def _build() -> dict[str, Case]:
-    cases = [
-        Case(
-            "yang-persson",
-            "Yang-Persson molecular dynamics (Fig. 11)",
-            "nm",
-            _band(0.8, 6 * math.pi / 1040 * 10, 216, 1.0, 3.0),
+_YANG_PERSSON = _band(0.8, 6 * math.pi / 1040 * 10, 216, 1.0, 3.0)
+_PAPANGELO = _band(0.8, 2 * math.pi / 100, 64, 5.0, 3.0)
+_CONCRETE = _moments(0.7, 0.071, 0.27, 62.0, 1.1)
+_ASPHALT = _moments(0.85, 0.091, 2.67, 21000.0, 1.37)
+_CHALLENGE = _band(0.8, 2 * math.pi / 20, 200, 0.762, 3.7)
+_RESOLUTIONS = {zeta_1: _band(0.7, 0.1, zeta_1, 1.0, 3.0) for zeta_1 in (125, 250, 500, 1000)}
+
+CASES = {
+    case.name: case
+    for case in (
+        Case("yang-persson", "Yang-Persson molecular dynamics (Fig. 11)", "nm", _YANG_PERSSON),
+        Case("papangelo", "Papangelo Green's function simulation (Fig. 12)", "um", _PAPANGELO),
+        Case("concrete", "concrete road of Lorenz (Figs. 13a, 14a)", "mm", _CONCRETE),
+        Case("asphalt", "asphalt road of Lorenz (Figs. 13b, 14b)", "mm", _ASPHALT),
+        Case("challenge", "contact-mechanics challenge (Fig. 15)", "um", _CHALLENGE),
+        *(
+            Case(f"resolution-{zeta_1}", f"resolution study, zeta_1 = {zeta_1} (Figs. 16, 17)", "h_rms", numbers)
+            for zeta_1, numbers in _RESOLUTIONS.items()
         ),
-        Case(
-            "papangelo",
-            "Papangelo Green's function simulation (Fig. 12)",
-            "um",
-            _band(0.8, 2 * math.pi / 100, 64, 5.0, 3.0),
-        ),
-        Case(
-            "concrete",
-            "concrete road of Lorenz (Figs. 13a, 14a)",
-            "mm",
-            _moments(0.7, 0.071, 0.27, 62.0, 1.1),
-        ),
-        Case(
-            "asphalt",
-            "asphalt road of Lorenz (Figs. 13b, 14b)",
-            "mm",
-            _moments(0.85, 0.091, 2.67, 21000.0, 1.37),
-        ),
-        Case(
-            "challenge",
-            "contact-mechanics challenge (Fig. 15)",
-            "um",
-            _band(0.8, 2 * math.pi / 20, 200, 0.762, 3.7),
-        ),
-    ]
-    cases += [
-        Case(
-            f"resolution-{zeta_1}",
-            f"resolution study, zeta_1 = {zeta_1} (Figs. 16, 17)",
-            "h_rms",
-            _band(0.7, 0.1, zeta_1, 1.0, 3.0),
-        )
-        for zeta_1 in (125, 250, 500, 1000)
-    ]
-    return {case.name: case for case in cases}
-
-
-CASES = _build()
+    )
+}
 
 
 def get_case(name: str) -> Case:

@@ -1,36 +1,37 @@
-"""The self-affine band of a power spectrum: a power law, with or without a roll-off and a cut, and how well it fits."""
+"""The self-affine surface that a power spectrum fits, and how well it does."""
 
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
-from collections.abc import Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import least_squares
-from scipy.special import beta, betaincc
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import beta
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import NotSelfAffineError
-from mbma_tables.surfaces.surface import LEAST_ZETA_1, Surface
+from mbma_tables.arguments import FloatArray, finite_array, require
+from mbma_tables.errors import InputError, NotSelfAffineError
+from mbma_tables.surfaces.moments import MIN_ZETA_1
+from mbma_tables.surfaces.power_law import (
+    HURST_TOLERANCE,
+    MIN_PIECE,
+    MIN_POINTS,
+    Bins,
+    PowerLaw,
+    band_of,
+    find_law,
+    log_bins,
+    with_end_of_profile,
+)
 
-BINS_PER_DECADE = 20  # 12% wide: a break is placed to that, a dense spectrum still averages many entries
-LEAST_POINTS = 6  # two make the line, four judge it
-LEAST_PIECE = 3  # bins in a roll-off or in what follows a cut; fewer would fit noise
-SCATTER = 0.1  # of ln C beyond counting statistics: what a real surface strays from a power law
-LARGEST_RESIDUAL = 0.2  # of log10 C, a factor 1.6: beyond it the law says little about any one scale
-LARGEST_HURST_ERROR = 0.1  # the model's answers at H and H +- 0.1 differ by tens of percent
-LARGEST_EXCESS = 10.0  # C over the law in a single bin; chance gives this less than once in 1e4
-LARGEST_PEAK = 100.0  # C over both its neighbourhoods; chance, in single samples, gives this twice in 1e4
-LEAST_SHARE = 0.1  # of the variance; a flat roll-off leaves 1/(1 + H) > 0.5, form or waviness leaves less
-HURST_TOLERANCE = 0.05  # bias of H on small windowed maps: up to here above 1 the surface holds H = 1
-MARGIN = 6.0  # of Bayesian information: beyond it the evidence is held to be strong
-EXACT = 1e-6  # mean misfit at which a spectrum counts as computed, not measured
-LEAST_RATIO = 0.8  # of largest wavenumber to a profile's q1: there the drop is 30%; with less, q1 would be guessed
-TYPICAL_SLOPE = 3.5  # C q^3.5 is nearly flat for every H, so that averages within a bin do not depend on its filling
+CONVENTIONS = ("paper", "isotropic", "profile")
+MIN_LENGTH, MAX_LENGTH = 1e-30, 1e30  # lengths in their unit: fourth powers of them, which C has, keep their digits
+MAX_RESIDUAL = 0.2  # of log10 C, a factor 1.6: beyond it the law says little about any one scale
+MAX_HURST_ERROR = 0.1  # the model's answers at H and H +- 0.1 differ by tens of percent
+MAX_EXCESS = 10.0  # C over the law in a single bin; chance gives this less than once in 1e4
+MAX_PEAK = 100.0  # C over both its neighbourhoods; chance, in single samples, gives this twice in 1e4
+MIN_VARIANCE_SHARE = 0.1  # of the variance; a flat roll-off leaves 1/(1 + H) > 0.5, form or waviness leaves less
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,180 +100,103 @@ class SpectrumFit:
         return f"SpectrumFit({', '.join(fields)})"
 
 
-@dataclasses.dataclass(frozen=True)
-class _Bins:
-    """Spectral points: wavenumber, spectrum, and the weight 1/variance of its logarithm."""
+class FittedSurface(NamedTuple):
+    """The five numbers of the fitted surface, and how well they fit."""
 
-    q: FloatArray
-    log_c: FloatArray
-    weight: FloatArray
-
-
-@dataclasses.dataclass(frozen=True)
-class _Law:
-    """ln C = log_k - slope ln(q/unit) + damp(q) over bins[start:stop]; `end` is where a profile's surface ends."""
-
-    start: int
-    stop: int
-    log_k: float
-    slope: float
-    slope_error: float
-    misfit: float
-    parameters: int
-    level: float | None = None
-    end: float = math.inf
-
-    def log_at(self, q: FloatArray, unit: float) -> FloatArray:
-        law: FloatArray = self.log_k - self.slope * np.log(q / unit)
-        return law + _profile_damping(q, self.slope, self.end)
+    hurst: float
+    q0: float
+    q1: float
+    h_rms: float
+    h_max: float
+    fit: SpectrumFit
 
 
-def _profile_damping(q: FloatArray, slope: float, end: float) -> FloatArray:
-    """How far ln C_1D lies below its power law as waves beyond `end` are missing; exact for Eq. (6)."""
-    with np.errstate(divide="ignore"):
-        damping: FloatArray = np.log(betaincc(slope / 2, 0.5, np.minimum(q / end, 1.0) ** 2))
-    return damping
+def check_band(band: Any, low: float, high: float) -> tuple[float, float] | None:
+    """A forced band as two numbers inside [low, high], the range that the measurement holds."""
+    if band is None:
+        return None
+    pair = finite_array("band", band)
+    if pair.shape != (2,) or not pair[0] < pair[1]:
+        raise InputError(f"band must be two wavenumbers (q_low, q_high) with q_low < q_high, got {band!r}")
+    good = (pair >= low * (1 - 1e-9)) & (pair <= high * (1 + 1e-9))
+    require("band", pair, good, f"within the measured range [{low:.6g}, {high:.6g}]")
+    return float(pair[0]), float(pair[1])
 
 
-def _log_bins(q: FloatArray, C: FloatArray, counts: FloatArray) -> _Bins:
-    # half a bin ahead, so that the first wavenumbers of a grid do not lie on an edge
-    place = np.floor(BINS_PER_DECADE * np.log10(q / q.min()) + 0.5).astype(int)
-    total = np.bincount(place, counts)
-    filled = total > 0
-    total = total[filled]
-    log_q = np.bincount(place, counts * np.log(q))[filled] / total
-    relative = q / np.exp(log_q)[np.cumsum(filled)[place] - 1]
-    mean = np.bincount(place, counts * C * relative**TYPICAL_SLOPE)[filled] / total
-    floor = np.finfo(float).tiny  # a gap in the spectrum: as a logarithm, far off any law
-    return _Bins(np.exp(log_q), np.log(np.maximum(mean, floor)), 1 / (1 / total + SCATTER**2))
+def check_height(h_max: Any) -> float:
+    """h_max as one positive number."""
+    height = finite_array("h_max", h_max)
+    if height.shape != ():
+        raise InputError(f"h_max must be one number, got shape {height.shape}")
+    require("h_max", height, height > 0, "positive")
+    return float(height)
 
 
-def _straight(x: FloatArray, bins: _Bins, start: int, stop: int) -> tuple[float, float, float, float]:
-    """Weighted line through bins[start:stop]: (intercept, slope, chi^2, weighted spread of x)."""
-    w, x, y = bins.weight[start:stop], x[start:stop], bins.log_c[start:stop]
-    x_mean, y_mean = np.average(x, weights=w), np.average(y, weights=w)
-    spread = float(w @ (x - x_mean) ** 2)
-    slope = float(w @ ((x - x_mean) * (y - y_mean))) / spread
-    intercept = float(y_mean - slope * x_mean)
-    return intercept, slope, float(w @ (y - intercept - slope * x) ** 2), spread
+def fit_psd(
+    q: ArrayLike, C: ArrayLike, h_max: float, convention: str, band: tuple[float, float] | None
+) -> FittedSurface:
+    """The self-affine surface fitted to a measured spectrum; see `Surface.from_psd`.
 
-
-def _roll_off(x: FloatArray, bins: _Bins, stop: int) -> tuple[float, int, float | None]:
-    """A flat or else a rising line through bins[:stop]: (chi^2, parameters with the break, level if flat)."""
-    if stop == 0:
-        return 0.0, 0, None
-    w, y = bins.weight[:stop], bins.log_c[:stop]
-    level = float(np.average(y, weights=w))
-    flat = float(w @ (y - level) ** 2)
-    _, slope, rising, _ = _straight(x, bins, 0, stop)
-    return (rising, 3, None) if slope > 0 and rising + math.log(len(x)) < flat else (flat, 2, level)
-
-
-def _criterion(pieces: Iterable[tuple[float, int]], parameters: int, floor: float = 1.0) -> float:
-    """Bayesian information of pieces (chi^2, bins); the floor, 1 for the scatter expected anyway, is not fitted."""
-    held = [(chi2, count) for chi2, count in pieces if count]
-    information = sum(count * math.log(floor + chi2 / count) for chi2, count in held)
-    return information + parameters * math.log(sum(count for _, count in held))
-
-
-def _find_law(bins: _Bins, unit: float, offset: float, breaks: bool) -> _Law:
-    """The best of: a power law, with or without a roll-off before it and a departure after it."""
-    x, count = np.log(bins.q / unit), len(bins.q)
-    starts, stops = [0], [count]
-    if breaks:
-        starts += range(LEAST_PIECE, count - LEAST_POINTS + 1)
-        stops += range(LEAST_POINTS, count - LEAST_PIECE + 1)
-    befores = {start: _roll_off(x, bins, start) for start in starts}
-    afters = {stop: _straight(x, bins, stop, count)[2] if stop < count else 0.0 for stop in stops}
-    laws = []
-    for start, stop in itertools.product(starts, stops):
-        if stop - start < LEAST_POINTS:
-            continue
-        log_k, slope, chi2, spread = _straight(x, bins, start, stop)
-        before, more, level = befores[start]
-        parameters = 2 + more + 3 * (stop < count)
-        misfit = before + chi2 + afters[stop]
-        error = math.sqrt(chi2 / (stop - start - 2) / spread)
-        laws.append(_Law(start, stop, log_k, -slope, error, misfit, parameters, level))
-
-    def criterion(law: _Law) -> float:
-        # each piece by its own scatter, or a tail that no line describes would hide what the law misses
-        pieces = (
-            (befores[law.start][0], law.start),
-            (law.misfit - befores[law.start][0] - afters[law.stop], law.stop - law.start),
-            (afters[law.stop], count - law.stop),
-        )
-        return _criterion(pieces, law.parameters)
-
-    best = min(laws, key=criterion)
-    # a roll-off and its law can also be described as a law and what follows its cut: only one is self-affine
-    likely = [
-        law
-        for law in laws
-        if 0 < (law.slope - offset) / 2 <= 1 + HURST_TOLERANCE
-        and bins.q[law.stop - 1] > LEAST_ZETA_1 * bins.q[law.start]
-    ]
-    chosen = min(likely, key=criterion, default=best)
-    return chosen if criterion(chosen) <= criterion(best) + MARGIN else best
-
-
-def _end_of_profile(bins: _Bins, unit: float, law: _Law) -> _Law:
-    """The law with the surface's end fitted to a profile's drop, where that describes it better."""
-    count = len(bins.q)
-    q, y = bins.q[law.start :], bins.log_c[law.start :]
-    root = np.sqrt(bins.weight[law.start :])
-
-    def deviation(p: FloatArray) -> FloatArray:
-        law: FloatArray = p[0] - p[1] * np.log(q / unit) + _profile_damping(q, p[1], q[-1] / p[2])
-        return root * (law - y)
-
-    slope = min(max(law.slope, 1.01), 5.0)
-    trials = [
-        least_squares(
-            deviation,
-            (law.log_k, slope, ratio),
-            bounds=((-np.inf, 0.5, 1e-3), (np.inf, 6.0, 1 - 1e-9)),
-            x_scale=(1.0, 1.0, 0.1),
-            xtol=1e-12,
-        )
-        for ratio in (0.3, 0.9, 0.99)
-    ]
-    best = min(trials, key=lambda trial: float(trial.cost))
-    before, more, _ = _roll_off(np.log(bins.q / unit), bins, law.start)
-    misfit, parameters = before + 2 * best.cost, 3 + more
-    # judged by the scatter of this very spectrum: the drop is no guess but what every end looks like
-    plain = _criterion([(law.misfit, count)], law.parameters, EXACT)
-    if _criterion([(misfit, count)], parameters, EXACT) >= plain:
-        return law
-    covariance = np.linalg.pinv(best.jac.T @ best.jac) * 2 * best.cost / max(len(q) - 3, 1)
-    return dataclasses.replace(
-        law,
-        stop=count,
-        log_k=float(best.x[0]),
-        slope=float(best.x[1]),
-        slope_error=float(math.sqrt(covariance[1, 1])),
-        misfit=misfit,
-        parameters=parameters,
-        end=float(q[-1] / best.x[2]),
+    Notes
+    -----
+    C_1D of Eq. (6) is 2 pi B(H + 1/2, 1/2) q C(q), exactly so where q1 is infinite; towards q1 it drops (by 7%
+    at q1/2, to zero at q1). Where that drop describes the spectrum better than a plain power law it is fitted
+    too; the surface's q1 is where it ends if that is within 1.25 of the largest wavenumber, which else is q1.
+    A profile mixes long waves with longer ones, so its roll-off is placed to a factor of 1.5 only.
+    """
+    if convention not in CONVENTIONS:
+        raise InputError(f"convention must be one of {', '.join(CONVENTIONS)}, got {convention!r}")
+    height = check_height(h_max)
+    wavenumber, spectrum = _positive_spectrum(q, C)
+    if convention == "isotropic":
+        spectrum = spectrum / (4 * math.pi**2)
+    # (4)-(6): h_rms^2 = 2 pi integral C q dq; of a profile, integral C dq / pi
+    density = spectrum / math.pi if convention == "profile" else 2 * math.pi * spectrum * wavenumber
+    steps = np.diff(wavenumber, prepend=wavenumber[0]) + np.diff(wavenumber, append=wavenumber[-1])
+    variances = density * steps / 2
+    ends = float(wavenumber[0]), float(wavenumber[-1])
+    return fit_spectrum(
+        wavenumber,
+        spectrum,
+        np.ones(len(wavenumber)),
+        variances,
+        h_max=height,
+        usable=ends,
+        band=check_band(band, *ends),
+        power=float(variances.sum()),
+        convention=convention,
+        h_rms_total=math.sqrt(variances.sum()),
     )
 
 
-def _edges(bins: _Bins, law: _Law, unit: float, ends: tuple[float, float]) -> tuple[float, float]:
-    """The band that the law holds in, within `ends`."""
-    q0, q1 = ends
-    q = bins.q
-    if law.start:
-        q0 = math.sqrt(q[law.start - 1] * q[law.start])
-        if law.level is not None:
-            crossing = unit * math.exp((law.log_k - law.level) / law.slope)
-            if q[law.start - 1] <= crossing <= q[law.start]:
-                q0 = crossing
-    if law.stop < len(q):
-        q1 = math.sqrt(q[law.stop - 1] * q[law.stop])
-    return q0, law.end if law.end <= q[-1] / LEAST_RATIO else q1
+def _positive_spectrum(q: ArrayLike, C: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Wavenumbers in rising order and positive C, without masked entries and without zeros at either end."""
+    if np.ma.isMaskedArray(q) or np.ma.isMaskedArray(C):
+        if np.shape(q) != np.shape(C):
+            raise InputError(f"q and C must be of one length, got shapes {np.shape(q)} and {np.shape(C)}")
+        shown = ~(np.ma.getmaskarray(np.ma.asanyarray(q)) | np.ma.getmaskarray(np.ma.asanyarray(C)))
+        q, C = np.asarray(q)[shown], np.asarray(C)[shown]
+    wavenumber, spectrum = finite_array("q", q), finite_array("C", C)
+    if wavenumber.ndim != 1 or wavenumber.shape != spectrum.shape:
+        raise InputError(
+            f"q and C must be one-dimensional and of one length, got {wavenumber.shape} and {spectrum.shape}"
+        )
+    require("q", wavenumber, wavenumber > 0, "positive (leave q = 0 out)")
+    require("q", wavenumber, (wavenumber >= MIN_LENGTH) & (wavenumber <= MAX_LENGTH), "in [1e-30, 1e30]")
+    require("C", spectrum, spectrum >= 0, "zero or positive")
+    order = np.argsort(wavenumber, kind="stable")
+    wavenumber, spectrum = wavenumber[order], spectrum[order]
+    positive = np.flatnonzero(spectrum > 0)
+    if positive.size == 0:
+        raise NotSelfAffineError("C is zero everywhere: the surface is flat")
+    inside = slice(positive[0], positive[-1] + 1)
+    wavenumber, spectrum = wavenumber[inside], spectrum[inside]
+    require("C", spectrum, spectrum > 0, "positive between its first and last positive entries")
+    require("C", spectrum, (spectrum >= 1e-200) & (spectrum <= 1e200), "in [1e-200, 1e200], its unit well chosen")
+    return wavenumber, spectrum
 
 
-def fit_surface(
+def fit_spectrum(
     q: FloatArray,
     C: FloatArray,
     counts: FloatArray,
@@ -284,8 +208,8 @@ def fit_surface(
     power: float,
     convention: str,
     **known: Any,
-) -> Surface:
-    """The surface whose band fits C, in the paper's convention or a profile's; the core of this module.
+) -> FittedSurface:
+    """The surface whose band fits C, in the paper's convention or a profile's; for spectra and maps alike.
 
     Parameters
     ----------
@@ -305,47 +229,24 @@ def fit_surface(
         Further fields of `SpectrumFit`.
     """
     profile = convention == "profile"
-    unit, offset = float(q.min()), 1.0 if profile else 2.0
-    low, high = band or usable
-    every = _log_bins(q, C, counts)
-    inside = (every.q >= low * (1 - 1e-9)) & (every.q <= high * (1 + 1e-9))
-    bins = _Bins(every.q[inside], every.log_c[inside], every.weight[inside])
-    if len(bins.q) < LEAST_POINTS:
-        raise NotSelfAffineError(
-            f"only {len(bins.q)} spectral points between q = {low:.6g} and {high:.6g}; "
-            f"a power law needs at least {LEAST_POINTS}"
-        )
+    unit = float(q.min())
+    every, bins = _binned(q, C, counts, band or usable)
     _refuse_peak(bins)
-    law = _find_law(bins, unit, offset, breaks=band is None)
-    if profile and band is None:
-        law = _end_of_profile(bins, unit, law)
-    hurst, error = (law.slope - offset) / 2, law.slope_error / 2
-    used = slice(law.start, law.stop)
-    if not 0 < hurst <= 1 + max(HURST_TOLERANCE, 2 * error):
-        raise NotSelfAffineError(
-            f"between q = {bins.q[used][0]:.4g} and {bins.q[used][-1]:.4g} the spectrum goes like "
-            f"q^{-law.slope:.3g}: a Hurst exponent of {hurst:.3g} +- {error:.2g}, "
-            + ("above 1 (a smooth surface)" if hurst > 0 else "not above 0 (white noise has -1)")
-        )
-    held = hurst > 1
-    if held:
-        law = dataclasses.replace(law, slope=2.0 + offset, log_k=0.0)
-        shift = bins.log_c[used] - law.log_at(bins.q[used], unit)
-        law = dataclasses.replace(law, log_k=float(np.average(shift, weights=bins.weight[used])))
-    deviation, weight = bins.log_c[used] - law.log_at(bins.q[used], unit), bins.weight[used]
-    residual = math.sqrt(np.average(deviation**2, weights=weight))
-    y_mean = np.average(bins.log_c[used], weights=weight)
-    spread = float(np.average((bins.log_c[used] - y_mean) ** 2, weights=weight))
+    law, hurst, error = _law_of(bins, unit, profile, breaks=band is None)
+    used = bins[law.start : law.stop]
+    residual = math.sqrt(np.average((used.log_c - law.log_at(used.q, unit)) ** 2, weights=used.weight))
+    y_mean = np.average(used.log_c, weights=used.weight)
+    spread = float(np.average((used.log_c - y_mean) ** 2, weights=used.weight))
     # a map without roll-off reaches to its own size, though its longest waves are too few to be fitted
-    q0, q1 = band or _edges(bins, law, unit, (unit, float(q.max())))
+    q0, q1 = band or band_of(bins, law, unit, (unit, float(q.max())))
     fit = SpectrumFit(
         hurst=hurst,
         hurst_error=error,
-        hurst_held=held,
+        hurst_held=hurst > 1,
         q0=q0,
         q1=q1,
-        q_low=float(bins.q[law.start]),
-        q_high=float(bins.q[law.stop - 1]),
+        q_low=float(used.q[0]),
+        q_high=float(used.q[-1]),
         points=law.stop - law.start,
         residual=residual / math.log(10),
         r_squared=1 - residual**2 / spread,
@@ -357,51 +258,85 @@ def fit_surface(
     )
     below = every.q <= fit.q_high
     _refuse_poor(fit, every, below, every.log_c - law.log_at(every.q, unit), forced=band is not None)
-    own = min(hurst, 1.0)
-    scale = math.exp(law.log_k) / (2 * math.pi * beta(own + 0.5, 0.5) * unit if profile else 1.0)
+    exponent = min(hurst, 1.0)
+    # C_1D is 2 pi B(H + 1/2, 1/2) q C(q), and h_rms^2 the integral of (6) between q0 and q1
+    scale = math.exp(law.log_k) / (2 * math.pi * beta(exponent + 0.5, 0.5) * unit if profile else 1.0)
     z0, z1 = q0 / unit, q1 / unit
-    growth = -math.expm1(-2 * own * math.log(z1 / z0)) * z0 ** (-2 * own)
-    return Surface(own, q0, q1, unit * math.sqrt(math.pi * scale * growth / own), h_max, fit=fit)
+    growth = -math.expm1(-2 * exponent * math.log(z1 / z0)) * z0 ** (-2 * exponent)
+    return FittedSurface(exponent, q0, q1, unit * math.sqrt(math.pi * scale * growth / exponent), h_max, fit)
 
 
-def _refuse_peak(bins: _Bins) -> None:
+def _law_of(bins: Bins, unit: float, profile: bool, breaks: bool) -> tuple[PowerLaw, float, float]:
+    """The law with 0 < H <= 1 that fits best, and the fitted H, which may lie above 1 by its error, with that error."""
+    offset = 1.0 if profile else 2.0
+    law = find_law(bins, unit, offset, breaks)
+    if profile and breaks:
+        law = with_end_of_profile(bins, unit, law)
+    hurst, error = (law.slope - offset) / 2, law.slope_error / 2
+    used = bins[law.start : law.stop]
+    if not 0 < hurst <= 1 + max(HURST_TOLERANCE, 2 * error):
+        raise NotSelfAffineError(
+            f"between q = {used.q[0]:.4g} and {used.q[-1]:.4g} the spectrum goes like "
+            f"q^{-law.slope:.3g}: a Hurst exponent of {hurst:.3g} +- {error:.2g}, "
+            + ("above 1 (a smooth surface)" if hurst > 0 else "not above 0 (white noise has -1)")
+        )
+    if hurst > 1:
+        law = dataclasses.replace(law, slope=2.0 + offset, log_k=0.0)
+        shift = used.log_c - law.log_at(used.q, unit)
+        law = dataclasses.replace(law, log_k=float(np.average(shift, weights=used.weight)))
+    return law, hurst, error
+
+
+def _binned(q: FloatArray, C: FloatArray, counts: FloatArray, usable: tuple[float, float]) -> tuple[Bins, Bins]:
+    """Every logarithmic bin, and those between the usable wavenumbers."""
+    low, high = usable
+    every = log_bins(q, C, counts)
+    bins = every[(every.q >= low * (1 - 1e-9)) & (every.q <= high * (1 + 1e-9))]
+    if len(bins.q) < MIN_POINTS:
+        raise NotSelfAffineError(
+            f"only {len(bins.q)} spectral points between q = {low:.6g} and {high:.6g}; "
+            f"a power law needs at least {MIN_POINTS}"
+        )
+    return every, bins
+
+
+def _refuse_peak(bins: Bins) -> None:
     """Refuse a wave so strong that the pieces would be laid around it."""
-    y, reach = bins.log_c, LEAST_PIECE
-    rise = y[reach:-reach] - np.maximum(y[: -2 * reach], y[2 * reach :])
-    if rise.size and rise.max() > math.log(LARGEST_PEAK):
+    y, side = bins.log_c, MIN_PIECE
+    rise = y[side:-side] - np.maximum(y[: -2 * side], y[2 * side :])
+    if rise.size and rise.max() > math.log(MAX_PEAK):
         worst = int(np.argmax(rise))
         raise NotSelfAffineError(
-            f"a wave stands out: at q = {bins.q[reach + worst]:.4g} the spectrum is {math.exp(rise[worst]):.3g} times "
-            f"what it is on either side, more than {LARGEST_PEAK:g}"
+            f"a wave stands out: at q = {bins.q[side + worst]:.4g} the spectrum is {math.exp(rise[worst]):.3g} times "
+            f"what it is on either side, more than {MAX_PEAK:g}"
         )
 
 
-def _refuse_poor(fit: SpectrumFit, every: _Bins, below: NDArray[np.bool_], excess: FloatArray, *, forced: bool) -> None:
+def _refuse_poor(fit: SpectrumFit, every: Bins, below: NDArray[np.bool_], excess: FloatArray, *, forced: bool) -> None:
     band = f"between q = {fit.q_low:.4g} and {fit.q_high:.4g}"
-    if not fit.q1 > LEAST_ZETA_1 * fit.q0:
+    if not fit.q1 > MIN_ZETA_1 * fit.q0:
         raise NotSelfAffineError(
             f"the band q0 = {fit.q0:.6g}, q1 = {fit.q1:.6g} is too narrow: q1/q0 = {fit.q1 / fit.q0:.4g}, "
             "and the model needs more than 3"
         )
-    if fit.residual > LARGEST_RESIDUAL:
+    if fit.residual > MAX_RESIDUAL:
         raise NotSelfAffineError(
-            f"no power law: log10 C scatters by {fit.residual:.3g} about the best one {band}, "
-            f"more than {LARGEST_RESIDUAL}"
+            f"no power law: log10 C scatters by {fit.residual:.3g} about the best one {band}, more than {MAX_RESIDUAL}"
         )
-    if fit.hurst_error > LARGEST_HURST_ERROR:
+    if fit.hurst_error > MAX_HURST_ERROR:
         raise NotSelfAffineError(
             f"the Hurst exponent {fit.hurst:.3g} +- {fit.hurst_error:.2g} is not determined to "
-            f"{LARGEST_HURST_ERROR} by {fit.points} points {band}"
+            f"{MAX_HURST_ERROR} by {fit.points} points {band}"
         )
-    strong = below & (excess > math.log(LARGEST_EXCESS))
+    strong = below & (excess > math.log(MAX_EXCESS))
     if strong.any():
         worst = int(np.argmax(np.where(strong, excess, -np.inf)))
         raise NotSelfAffineError(
             f"a wave stands out: at q = {every.q[worst]:.4g} the spectrum is {math.exp(excess[worst]):.3g} "
-            f"times the power law {band}, more than {LARGEST_EXCESS:g}"
+            f"times the power law {band}, more than {MAX_EXCESS:g}"
         )
-    if not forced and fit.variance_share < LEAST_SHARE:
+    if not forced and fit.variance_share < MIN_VARIANCE_SHARE:
         raise NotSelfAffineError(
             f"the self-affine band holds {fit.variance_share:.2%} of the variance of height, less than "
-            f"{LEAST_SHARE:.0%}: the rest is form or waviness; remove it, or choose the band yourself"
+            f"{MIN_VARIANCE_SHARE:.0%}: the rest is form or waviness; remove it, or choose the band yourself"
         )

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
+import functools
 import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import finite_array, require
-from mbma_tables.errors import InputError
-from mbma_tables.surfaces import spectrum
+from mbma_tables.arguments import broadcast_shape, finite_array, is_labelled, require
+from mbma_tables.surfaces import moments, spectrum
+from mbma_tables.surfaces.cases import get_case
 
 if TYPE_CHECKING:
-    from mbma_tables.surfaces.maps import SpectrumFit
+    from mbma_tables.surfaces.psd import SpectrumFit
 
 PARAMETERS = ("hurst", "q0", "q1", "h_rms", "h_max")
-LEAST_ZETA_1 = 3.0  # the floors 1.5 and 3 of (27) and (30) need room below zeta_1
-LARGEST_ZETA_1 = 1e8
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -44,7 +44,20 @@ class Surface:
     Raises
     ------
     InputError, OutOfRangeError
-        For NaN, infinite or empty input, and for numbers outside these ranges.
+        For NaN, infinite, masked or empty input, and for numbers outside these ranges.
+    TypeError
+        For an unknown argument; the message names the nearest known one.
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface
+    >>> surface = Surface(hurst=0.8, q0=0.5, q1=100.0, h_rms=0.2, h_max=0.6)
+    >>> surface
+    Surface(hurst=0.8, q0=0.5, q1=100.0, h_rms=0.2, h_max=0.6)
+    >>> print(f"{surface.zeta_1:g}, rms gradient {surface.rms_gradient:.4f}")
+    200, rms gradient 0.5414
+    >>> Surface(hurst=[0.5, 0.8], q0=0.5, q1=100.0, h_rms=0.2, h_max=0.6).alpha.round(1)
+    array([100.5, 387.8])
     """
 
     hurst: Any
@@ -62,18 +75,19 @@ class Surface:
         require("hurst", given["hurst"], (given["hurst"] > 0) & (given["hurst"] <= 1), "in (0, 1]")
         for name in ("q0", "q1", "h_rms", "h_max"):
             require(name, given[name], given[name] > 0, "positive")
-        try:
-            arrays = np.broadcast_arrays(*given.values())
-        except ValueError:
-            shapes = ", ".join(f"{name} {array.shape}" for name, array in given.items())
-            raise InputError(f"the surface's arguments do not broadcast: {shapes}") from None
-        for name, array in zip(given, arrays, strict=True):
-            own = np.array(array)
-            own.setflags(write=False)
-            object.__setattr__(self, name, own[()])
+        shape = broadcast_shape(**given)
+        for name, array in given.items():
+            kept = np.array(np.broadcast_to(array, shape))
+            kept.setflags(write=False)
+            object.__setattr__(self, name, kept[()])
         zeta_1 = np.asarray(self.zeta_1)
-        require("q1/q0", zeta_1, zeta_1 > LEAST_ZETA_1, "greater than 3 (the model's floors need room)")
-        require("q1/q0", zeta_1, zeta_1 <= LARGEST_ZETA_1, "at most 1e8")
+        require(
+            "q1/q0", zeta_1, zeta_1 > moments.MIN_ZETA_1, "greater than 3 (the floors of zeta_d and zeta_u lie below)"
+        )
+        require("q1/q0", zeta_1, zeta_1 <= moments.MAX_ZETA_1, "at most 1e8")
+
+    def __repr__(self) -> str:
+        return f"Surface({', '.join(f'{name}={_shown(getattr(self, name))}' for name in PARAMETERS)})"
 
     @classmethod
     def from_moments(
@@ -94,18 +108,38 @@ class Surface:
         -------
         Surface
             zeta_1 from alpha = m0 m4/m2^2, which rises with it, then q0 from m2/m0.
-        """
-        from mbma_tables.surfaces.moments import band_from_moments
 
-        q0, q1, h_rms = band_from_moments(hurst, m0, m2, m4)
-        return cls(hurst, q0, q1, h_rms, h_max)
+        Raises
+        ------
+        InputError, OutOfRangeError
+            Where no band with 3 < zeta_1 <= 1e8 has that alpha, and as `Surface` itself.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface
+        >>> road = Surface.from_moments(hurst=0.7, m0=0.071, m2=0.27, m4=62.0, h_max=1.1)
+        >>> print(f"zeta_1 = {road.zeta_1:.4f}, q0 = {road.q0:.6f}")
+        zeta_1 = 64.8598, q0 = 0.538132
+        """
+        return cls(hurst, *moments.band_from_moments(hurst, m0, m2, m4), h_max)
 
     @classmethod
     def named(cls, name: str) -> Surface:
-        """One of the paper's cases, see `mbma_tables.surfaces.cases.CASES`."""
-        from mbma_tables.surfaces.cases import get_case
+        """One of the paper's cases, in the length unit that `mbma_tables.surfaces.cases.CASES` gives for it.
 
-        return get_case(name).surface
+        Raises
+        ------
+        InputError
+            For an unknown name; the message lists those there are.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface
+        >>> float(Surface.named("challenge").h_rms)
+        0.762
+        """
+        numbers = get_case(name).numbers
+        return cls.from_moments(**numbers) if "m0" in numbers else cls(*(numbers[name] for name in PARAMETERS))
 
     @classmethod
     def from_psd(
@@ -117,25 +151,115 @@ class Surface:
         convention: str = "paper",
         band: tuple[float, float] | None = None,
     ) -> Surface:
-        """The self-affine surface fitted to a measured spectrum; see `mbma_tables.surfaces.maps.surface_from_psd`."""
-        from mbma_tables.surfaces.maps import surface_from_psd
+        """The self-affine surface fitted to a measured power spectrum.
 
-        return surface_from_psd(q, C, h_max=h_max, convention=convention, band=band)
+        Parameters
+        ----------
+        q : array_like, shape (n,)
+            Wavenumber, 1/length, positive; in any order and spacing.
+        C : array_like, shape (n,)
+            Spectrum [length^4; a profile's length^3], not negative. Zeros at either end say where it ends;
+            entries that a masked array hides are left out.
+        h_max : float
+            Height of the highest point above the mid-plane [length].
+        convention : {"paper", "isotropic", "profile"}, optional
+            h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), = integral C q dq / (2 pi), or = integral C dq / pi.
+        band : tuple of float, optional
+            (q0, q1) to fit and to take, as a plain power law; else a roll-off below and a departure above are found
+            and left out.
+
+        Returns
+        -------
+        Surface
+            With `fit`, a `SpectrumFit`. Its h_rms is that of the fitted law between q0 and q1.
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            For input that is no spectrum.
+        NotSelfAffineError
+            Where no power law with 0 < H <= 1 describes it; the message has the numbers.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from mbma_tables import Surface
+        >>> q = np.geomspace(1, 100, 40)
+        >>> surface = Surface.from_psd(q, 1e-3 * q**-3.4, h_max=0.3)
+        >>> print(f"H = {surface.hurst:.3f}, h_rms = {surface.h_rms:.4f}")
+        H = 0.700, h_rms = 0.0669
+        """
+        from mbma_tables.surfaces.psd import fit_psd
+
+        return cls(**fit_psd(q, C, h_max, convention, band)._asdict())
 
     @classmethod
-    def from_map(cls, heights: Any, dx: float | None = None, dy: float | None = None, **options: Any) -> Surface:
-        """The self-affine surface fitted to a measured map.
+    def from_map(
+        cls,
+        heights: Any,
+        dx: float | None = None,
+        dy: float | None = None,
+        *,
+        periodic: bool | None = None,
+        detrend: str | None = None,
+        h_max: float | None = None,
+        band: tuple[float, float] | None = None,
+    ) -> Surface:
+        """The self-affine surface fitted to a measured height map.
 
-        `options` are `periodic`, `detrend`, `h_max` and `band` of `mbma_tables.surfaces.maps.surface_from_map`.
+        Parameters
+        ----------
+        heights : array_like, shape (nx, ny), or topography
+            Heights [length], at least 32 x 32; or an object with SurfaceTopography's `heights()`, `physical_sizes`
+            and `is_periodic`, which is not imported for that.
+        dx, dy : float, optional
+            Sampling steps along the first and the second axis [length]; dy is dx if not given. A topography has its
+            own.
+        periodic : bool, optional
+            Whether the map continues periodically; else a Hann window is applied. A topography's own flag, False for
+            an array.
+        detrend : {"mean", "plane", "quadratic"}, optional
+            The least-squares polynomial to subtract; by default the mean of a periodic map, the plane of any other.
+        h_max : float, optional
+            Height of the highest point above the mid-plane [length]; by default the map's, after detrending.
+        band : tuple of float, optional
+            (q0, q1) to fit and to take; else a flat roll-off below and a departure above are found and left out.
+
+        Returns
+        -------
+        Surface
+            With `fit`, a `SpectrumFit`. h_rms is that of the fitted law between q0 and q1. Without a roll-off q0 is
+            the map's own lowest wavenumber, though under a window the line is fitted from twice that on; without a
+            cut q1 is the largest measured wavenumber, at most pi/max(dx, dy).
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            For input that is no map: holes, a missing or negative step, an unknown trend.
+        NotSelfAffineError
+            Where the map is no isotropic self-affine surface; the message has the reason and the numbers.
+
+        Examples
+        --------
+        A periodic map of side 1 with random phases and H = 0.8:
+
+        >>> import numpy as np
+        >>> from mbma_tables import Surface
+        >>> noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((128, 128)))
+        >>> q = np.hypot(np.fft.fftfreq(128)[:, None], np.fft.rfftfreq(128))
+        >>> q[0, 0] = np.inf
+        >>> surface = Surface.from_map(np.fft.irfft2(noise / abs(noise) * q**-1.8), dx=1 / 128, periodic=True)
+        >>> print(f"H = {surface.hurst:.2f}, q0 = {surface.q0:.3f}, fitted at {surface.fit.points} points")
+        H = 0.80, q0 = 6.283, fitted at 32 points
         """
-        from mbma_tables.surfaces.maps import surface_from_map
+        from mbma_tables.surfaces.maps import fit_map
 
-        return surface_from_map(heights, dx, dy, **options)
+        return cls(**fit_map(heights, dx, dy, periodic, detrend, h_max, band)._asdict())
 
     @property
     def labelled(self) -> bool:
         """Whether any parameter is an xarray DataArray."""
-        return any(hasattr(getattr(self, name), "dims") for name in PARAMETERS)
+        return any(is_labelled(getattr(self, name)) for name in PARAMETERS)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -199,3 +323,27 @@ class Surface:
         scale = self.hurst / math.pi * (self.s / self.q0) ** 2
         inside = (wavenumber >= self.q0) & (wavenumber <= self.q1)
         return np.where(inside, scale * (wavenumber / self.q0) ** (-2 - 2 * self.hurst), 0.0)[()]
+
+
+def _shown(value: Any) -> str:
+    """A number as Python prints it, a DataArray by its sizes."""
+    if is_labelled(value):
+        return f"<DataArray {dict(value.sizes)}>"
+    return repr(value.tolist()) if np.ndim(value) == 0 else repr(value)
+
+
+def _with_hint(init: Any) -> Any:
+    """`Surface.__init__` whose complaint about an unknown argument names the nearest known one."""
+
+    @functools.wraps(init)
+    def checked(self: Surface, *given: Any, **named: Any) -> None:
+        for name in named.keys() - {*PARAMETERS, "fit"}:
+            near = ["hurst"] if name == "H" else difflib.get_close_matches(name.lower(), PARAMETERS, 1)
+            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(PARAMETERS)}"
+            raise TypeError(f"Surface has no argument {name!r}: {hint}")
+        init(self, *given, **named)
+
+    return checked
+
+
+Surface.__init__ = _with_hint(Surface.__init__)  # type: ignore[method-assign]

@@ -15,7 +15,7 @@ from scipy.integrate import quad
 
 from mbma_tables import Surface
 from mbma_tables.errors import InputError, MbmaError, NotSelfAffineError, OutOfRangeError
-from mbma_tables.surfaces.maps import radial_spectrum, read_map, surface_from_map, surface_from_psd
+from mbma_tables.surfaces.maps import radial_spectrum, read_map
 
 SIDE = 2 * math.pi  # so that wavenumbers are whole numbers
 POINTS = 256
@@ -126,32 +126,32 @@ class TestKnownMaps:
 
     def test_form_is_removed_by_the_right_trend(self):
         bowl = CUT_OUT + 30 * (X**2 + Y**2)
-        plain = surface_from_map(CUT_OUT, STEP, detrend="quadratic")
-        found = surface_from_map(bowl, STEP, detrend="quadratic")
+        plain = Surface.from_map(CUT_OUT, STEP, detrend="quadratic")
+        found = Surface.from_map(bowl, STEP, detrend="quadratic")
         assert dataclasses.astuple(found.fit)[:3] == pytest.approx(dataclasses.astuple(plain.fit)[:3], rel=1e-6)
         assert found.h_max == pytest.approx(plain.h_max, rel=1e-9)
         with pytest.raises(NotSelfAffineError, match="a wave stands out"):
-            surface_from_map(bowl, STEP)
+            Surface.from_map(bowl, STEP)
 
     def test_a_forced_band_is_taken(self):
-        found = surface_from_map(BASE, STEP, periodic=True, band=(8, 60))
+        found = Surface.from_map(BASE, STEP, periodic=True, band=(8, 60))
         assert (found.q0, found.q1) == (8.0, 60.0)
         assert found.h_rms == pytest.approx(seen_in(ROUGH, 8, 60).h_rms, rel=0.05)
 
     def test_h_max_can_be_given(self):
-        assert surface_from_map(BASE, STEP, periodic=True, h_max=4.5).h_max == 4.5
+        assert Surface.from_map(BASE, STEP, periodic=True, h_max=4.5).h_max == 4.5
 
     def test_a_rectangle_with_oblong_steps(self):
         heights = synthetic(Surface(0.8, 4.0, 50.0, 1.0, 3.0), gaussian=True, seed=2)[:, ::2]
-        found = surface_from_map(heights, STEP, 2 * STEP, periodic=True)
-        turned = surface_from_map(heights.T, 2 * STEP, STEP, periodic=True)
+        found = Surface.from_map(heights, STEP, 2 * STEP, periodic=True)
+        turned = Surface.from_map(heights.T, 2 * STEP, STEP, periodic=True)
         assert found.hurst == pytest.approx(0.8, abs=0.06)
         assert found.q1 == pytest.approx(50, rel=1e-3)
         assert turned.h_rms == pytest.approx(found.h_rms, rel=1e-9)
 
     def test_the_map_is_left_alone(self):
         given_map = CUT_OUT.copy()
-        surface_from_map(given_map, STEP)
+        Surface.from_map(given_map, STEP)
         np.testing.assert_array_equal(given_map, CUT_OUT)
 
     def test_above_one_within_the_tolerance_holds_one(self):
@@ -159,7 +159,7 @@ class TestKnownMaps:
         waves = np.fft.fftfreq(POINTS, 1 / POINTS)
         q = np.hypot(waves[:, None], waves[None, :])
         steeper = np.fft.ifft2(np.fft.fft2(heights) * np.where(q > 0, q, 1) ** -0.23).real
-        found = surface_from_map(steeper, STEP, periodic=True)
+        found = Surface.from_map(steeper, STEP, periodic=True)
         assert found.hurst == 1.0
         assert found.fit.hurst_held
         assert found.fit.hurst == pytest.approx(1.03, abs=0.005)
@@ -172,8 +172,8 @@ class TestKnownMaps:
     lift=st.floats(-1e3, 1e3),
 )
 def test_units_do_not_matter(length, height, lift):
-    plain = surface_from_map(CUT_OUT, STEP)
-    scaled = surface_from_map(height * (CUT_OUT + lift), length * STEP)
+    plain = Surface.from_map(CUT_OUT, STEP)
+    scaled = Surface.from_map(height * (CUT_OUT + lift), length * STEP)
     assert scaled.hurst == pytest.approx(plain.hurst, rel=1e-7)
     assert scaled.q0 * length == pytest.approx(plain.q0, rel=1e-7)
     assert scaled.q1 * length == pytest.approx(plain.q1, rel=1e-7)
@@ -236,20 +236,20 @@ class TestTopography:
     def test_has_its_own_sizes(self):
         topography = topography_class()(BASE, (SIDE, SIDE), periodic=True)
         with pytest.raises(InputError, match="dx and dy belong to a plain array"):
-            surface_from_map(topography, 1.0)
+            Surface.from_map(topography, 1.0)
 
     def test_with_holes_is_refused(self):
         holed = np.ma.masked_where(BASE > 2.0, BASE)
         topography = topography_class()(holed, (SIDE, SIDE))
         with pytest.raises(InputError, match=f"has {holed.mask.sum()} holes among 65536 points: fill them first"):
-            surface_from_map(topography)
+            Surface.from_map(topography)
 
     def test_a_line_scan_is_refused(self):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             scans = pytest.importorskip("SurfaceTopography")
         with pytest.raises(InputError, match="from_psd with convention='profile'"):
-            surface_from_map(scans.UniformLineScan(BASE[0], SIDE))
+            Surface.from_map(scans.UniformLineScan(BASE[0], SIDE))
 
 
 def profile_spectrum(surface, q):
@@ -295,7 +295,7 @@ class TestSpectra:
         truth = Surface(0.7, 2.0, 150.0, 1.0, 3.0)
         q = np.geomspace(0.1, 200, 120)
         C = np.where(q <= truth.q1, truth.power_spectrum(np.clip(q, 2, 150)), 0)
-        found = surface_from_psd(q[::-1], C[::-1], h_max=3)
+        found = Surface.from_psd(q[::-1], C[::-1], h_max=3)
         assert found.fit.roll_off == found.q0 == pytest.approx(2, rel=0.01)
         assert found.q1 == q[q <= 150][-1]
         assert found.h_rms == pytest.approx(1, rel=0.01)
@@ -304,11 +304,11 @@ class TestSpectra:
         q = np.geomspace(1, 100, 40)
         C = np.ma.masked_array(q**-3.4, np.arange(40) % 7 == 3)
         C.data[C.mask] = np.nan
-        assert surface_from_psd(q, C, h_max=3).hurst == pytest.approx(0.7, rel=1e-9)
+        assert Surface.from_psd(q, C, h_max=3).hurst == pytest.approx(0.7, rel=1e-9)
 
     def test_fit_reads_well(self):
         q = np.geomspace(1, 100, 40)
-        text = repr(surface_from_psd(q, q**-3.4, h_max=3).fit)
+        text = repr(Surface.from_psd(q, q**-3.4, h_max=3).fit)
         assert text.startswith("SpectrumFit(hurst=0.7, hurst_error=")
         assert "convention='paper'" in text
 
@@ -342,7 +342,7 @@ class TestRefused:
     )
     def test_maps_that_are_not_self_affine(self, heights, options, reason):
         with pytest.raises(NotSelfAffineError, match=reason):
-            surface_from_map(heights, STEP, **options)
+            Surface.from_map(heights, STEP, **options)
 
     @pytest.mark.parametrize(
         ("C", "reason"),
@@ -358,7 +358,7 @@ class TestRefused:
     )
     def test_spectra_that_are_not_self_affine(self, C, reason):
         with pytest.raises(NotSelfAffineError, match=reason):
-            surface_from_psd(SLOPED, C, h_max=3)
+            Surface.from_psd(SLOPED, C, h_max=3)
 
     @pytest.mark.parametrize(
         ("change", "error", "message"),
@@ -387,7 +387,7 @@ class TestRefused:
     def test_bad_maps(self, change, error, message):
         arguments = {"heights": BASE, "dx": STEP} | change
         with pytest.raises(error, match=message):
-            surface_from_map(**arguments)
+            Surface.from_map(**arguments)
 
     @pytest.mark.parametrize(
         ("change", "error", "message"),
@@ -408,7 +408,7 @@ class TestRefused:
     def test_bad_spectra(self, change, error, message):
         arguments = {"q": SLOPED, "C": SLOPED**-3.4, "h_max": 3} | change
         with pytest.raises(error, match=message):
-            surface_from_psd(**arguments)
+            Surface.from_psd(**arguments)
 
 
 class TestFiles:
@@ -433,4 +433,4 @@ class TestFiles:
         if folder is None:
             pytest.skip("no reference maps: set MBMA_REFERENCE_MAPS to their folder")
         with pytest.raises(NotSelfAffineError, match=reason):
-            surface_from_map(read_map(folder / name))
+            Surface.from_map(read_map(folder / name))

@@ -1,11 +1,13 @@
 """`Surface`: its properties against the spectrum itself, units, batches, bad input."""
 
 import dataclasses
+import inspect
 import math
 
 import numpy as np
 import pytest
 import scipy.integrate
+import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -120,6 +122,27 @@ def test_a_surface_does_not_change():
         surface.h_rms[0] = 1.0
     with pytest.raises(dataclasses.FrozenInstanceError):
         surface.h_rms = 1.0
+
+
+def test_prints_plain_numbers():
+    assert repr(Surface(**GOOD)) == "Surface(hurst=0.8, q0=0.5, q1=100.0, h_rms=0.2, h_max=0.6)"
+    assert repr(Surface(**{**GOOD, "hurst": [0.5, 0.8]})).startswith("Surface(hurst=array([0.5, 0.8]), q0=array(")
+    labelled = Surface(**{**GOOD, "hurst": xr.DataArray([0.5, 0.8], dims="site")})
+    assert repr(labelled).startswith("Surface(hurst=<DataArray {'site': 2}>, q0=0.5,")
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [("H", "did you mean hurst"), ("hrms", "mean h_rms"), ("Q0", "mean q0"), ("rough", "there are hurst, q0, q1")],
+)
+def test_an_unknown_argument_gets_a_hint(name, hint):
+    with pytest.raises(TypeError, match=f"no argument '{name}': .*{hint}"):
+        Surface(q0=0.5, q1=100.0, h_rms=0.2, h_max=0.6, **{name: 0.8})
+
+
+def test_constructors_show_their_options():
+    assert {"periodic", "detrend", "h_max", "band"} <= set(inspect.signature(Surface.from_map).parameters)
+    assert list(inspect.signature(Surface).parameters) == [*GOOD, "fit"]
 
 
 @pytest.mark.parametrize("name", GOOD)
