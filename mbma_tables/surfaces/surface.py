@@ -329,7 +329,7 @@ def _shown(value: Any) -> str:
     """A number as Python prints it, a DataArray by its sizes."""
     if is_labelled(value):
         return f"<DataArray {dict(value.sizes)}>"
-    return repr(value.tolist()) if np.ndim(value) == 0 else repr(value)
+    return repr(np.asarray(value).item()) if np.ndim(value) == 0 else repr(value)
 
 
 def _with_hint(init: Any) -> Any:
