@@ -20,6 +20,15 @@ class OutOfRangeError(InputError):
     ----------
     mask : numpy.ndarray of bool
         True where the entry is out of range, in the shape of the broadcast arguments.
+
+    Examples
+    --------
+    >>> from mbma_tables import OutOfRangeError, Surface
+    >>> try:
+    ...     Surface(hurst=[0.5, 1.5], q0=0.5, q1=100.0, h_rms=0.2, h_max=0.6)
+    ... except OutOfRangeError as error:
+    ...     print(error, error.mask)
+    hurst must be in (0, 1], got 1.5 at (1,) [False  True]
     """
 
     def __init__(self, message: str, mask: Any = None) -> None:

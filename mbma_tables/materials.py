@@ -29,6 +29,14 @@ def effective_modulus(E1: ArrayLike, nu1: ArrayLike, E2: ArrayLike, nu2: ArrayLi
     ------
     InputError, OutOfRangeError
         For NaN, infinite or empty input, shapes that do not broadcast, and numbers outside these ranges.
+
+    Examples
+    --------
+    Steel on steel, in GPa:
+
+    >>> from mbma_tables.materials import effective_modulus
+    >>> round(float(effective_modulus(210.0, 0.3, 210.0, 0.3)), 2)
+    115.38
     """
     given = {name: finite_array(name, value) for name, value in {"E1": E1, "nu1": nu1, "E2": E2, "nu2": nu2}.items()}
     for name in ("E1", "E2"):

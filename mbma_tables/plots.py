@@ -26,7 +26,7 @@ class Curve:
     Attributes
     ----------
     label : str
-        Stands in the legend.
+        Its name in the legend.
     gap : ndarray
         Mean separation u/h_rms (50).
     force : ndarray
@@ -61,7 +61,7 @@ def draw_compression(curves: Sequence[Curve], title: str = "", force_label: str 
         At least one; each is one line in both panels, with its points as they are. Points without contact
         have no place on a logarithmic axis and are left out by it.
     title : str
-        Stands above both panels.
+        Printed above both panels.
     force_label : str
         What the force is, with its unit.
 
@@ -75,6 +75,13 @@ def draw_compression(curves: Sequence[Curve], title: str = "", force_label: str 
         For no curves.
     MbmaError
         Where matplotlib is missing.
+
+    Examples
+    --------
+    >>> from mbma_tables.plots import Curve, draw_compression
+    >>> figure = draw_compression([Curve("road", [2.0, 1.0], [1e-4, 1e-2], [2e-4, 2e-2])], "a title")
+    >>> len(figure.axes)
+    2
     """
     if not curves:
         raise InputError("no curves to draw: at least one is needed")

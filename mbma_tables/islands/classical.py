@@ -16,7 +16,8 @@ from mbma_tables.compiled import njit
 from mbma_tables.islands.height_integrals import f_one, f_three_halves
 from mbma_tables.islands.newton import extent_squared
 
-GIVEN_UP = 1e12  # a deformation this large is divergence
+MAX_DEFORMATION = 1e12  # one this large is divergence
+BLOCK = 1 << 26  # products of a ring and a ring between two looks for Ctrl-C, about 0.1 s
 
 
 def ring_matrix(rings: int) -> FloatArray:
@@ -32,6 +33,56 @@ def ring_matrix(rings: int) -> FloatArray:
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
+def _steps(
+    X: float,
+    mu: float,
+    a: float,
+    matrix: FloatArray,
+    damping: float,
+    tolerance: float,
+    most: int,
+    w: FloatArray,
+    p: FloatArray,
+) -> tuple[int, bool, bool]:
+    """At most `most` steps on from `w`; returns their number, whether w converged, and whether it diverged."""
+    n = w.size
+    for step in range(most):
+        for i in range(n):
+            rho = a * (i + 0.5) / n
+            p[i] = 0.5 * mu * f_three_halves(rho * rho - X + w[i])  # (36)
+        largest = 0.0
+        scale = 0.0
+        for i in range(n):
+            total = 0.0
+            for j in range(n):
+                total += matrix[i, j] * p[j]
+            change = damping * (a * total - w[i])
+            largest = max(largest, abs(change))
+            w[i] += change
+            scale = max(scale, abs(w[i]))
+        if not scale < MAX_DEFORMATION:
+            return step + 1, False, True
+        if largest <= tolerance * damping * scale:
+            return step + 1, True, False
+    return most, False, False
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _totals(X: float, mu: float, a: float, w: FloatArray, p: FloatArray) -> tuple[float, float]:
+    """Phi_F and Phi_A by the midpoint rule; fills the pressures `p`."""
+    n = w.size
+    force = 0.0
+    area = 0.0
+    for i in range(n):
+        rho = a * (i + 0.5) / n
+        gap = rho * rho - X + w[i]
+        p[i] = 0.5 * mu * f_three_halves(gap)
+        force += rho * p[i]
+        area += rho * f_one(gap)
+    width = 2.0 * math.pi * a / n
+    return width * force, width * area
+
+
 def iterate(
     X: float,
     mu: float,
@@ -44,38 +95,16 @@ def iterate(
     p: FloatArray,
 ) -> tuple[int, bool, float, float]:
     """Iterate from w = 0; returns iterations, whether it converged, Phi_F and Phi_A."""
-    n = w.size
     w[:] = 0.0
-    converged = False
     iterations = 0
-    while iterations < max_iterations and not converged:
-        iterations += 1
-        for i in range(n):
-            rho = a * (i + 0.5) / n
-            p[i] = 0.5 * mu * f_three_halves(rho * rho - X + w[i])
-        largest = 0.0
-        scale = 0.0
-        for i in range(n):
-            total = 0.0
-            for j in range(n):
-                total += matrix[i, j] * p[j]
-            change = damping * (a * total - w[i])
-            largest = max(largest, abs(change))
-            w[i] += change
-            scale = max(scale, abs(w[i]))
-        if not scale < GIVEN_UP:
-            break
-        converged = largest <= tolerance * damping * scale
-    force = 0.0
-    area = 0.0
-    for i in range(n):
-        rho = a * (i + 0.5) / n
-        gap = rho * rho - X + w[i]
-        p[i] = 0.5 * mu * f_three_halves(gap)
-        force += rho * p[i]
-        area += rho * f_one(gap)
-    width = 2.0 * math.pi * a / n
-    return iterations, converged, width * force, width * area
+    converged = diverged = False
+    # compiled code does not look for Ctrl-C: it gets a fraction of a second of work at a time
+    block = max(1, BLOCK // w.size**2)
+    while iterations < max_iterations and not (converged or diverged):
+        most = min(block, max_iterations - iterations)
+        used, converged, diverged = _steps(X, mu, a, matrix, damping, tolerance, most, w, p)
+        iterations += used
+    return iterations, converged, *_totals(X, mu, a, w, p)
 
 
 def solve_classical(

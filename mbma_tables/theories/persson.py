@@ -1,12 +1,11 @@
-"""The theories beside MBMA: Greenwood-Williamson (11, 12), Persson (18-21), and how d and u relate (50).
+"""Persson's theory of area and average separation (Eqs. 18-21).
 
 In units of s, 1/q0 and E* q0 s, with y = sqrt(m2) over [1, zeta] (so that w = 1/y) in place of q, (19) is
 
     u = 2/sqrt(pi) integral_0^Y J(p0/y) / zeta(y) dy,   Y = sqrt(m2) over [1, zeta_1],
     J(a) = integral_a^inf (gamma + 3 (1 - gamma) erf(x)^2) exp(-x^2)/x dx,
 
-where w is infinite at q0 in (19) and nothing is here; u0 and lambda of (21) are moments of 1/zeta(y). All take and
-return DataArrays too, dask-backed ones lazily.
+where w is infinite at q0 in (19) and nothing is here; u0 and lambda of (21) are moments of 1/zeta(y).
 """
 
 from __future__ import annotations
@@ -21,10 +20,10 @@ from scipy.special import erf, exp1
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.errors import ConvergenceError, InputError
-from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.labels import takes_labelled
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories.greenwood_williamson import positive_modulus
 from mbma_tables.totals.gauss_kronrod import integrate
 
 Method = Literal["full", "simplified"]
@@ -33,86 +32,15 @@ GAMMA = 0.42  # Eq. (19)
 LAMBDA = 4.047  # Eq. (21b)
 RTOL = 1e-12  # asked of the quadratures
 DECAY = 45.0  # exp(-DECAY) of an integrand's largest value counts as nothing
-STEEPEST = 26.0  # p0/Y at which u is still a normal number, about exp(-676)
-LEAST_LOG_FORCE = -690.0  # log p0/(E* q0 s) of the lightest load that the inverse answers
-STEPS = 100  # of the safeguarded Newton iteration; it takes 5 to 15
+MAX_RATIO = 26.0  # p0/Y at which u is still a normal number, about exp(-676)
+MIN_LOG_FORCE = -690.0  # log p0/(E* q0 s) of the lightest load that the inverse answers
+MAX_STEPS = 100  # of the safeguarded Newton iteration; it takes 5 to 15
 
 # exp(-t) over [0, DECAY]: 64 nodes leave 1e-15
 _T, _T_WEIGHTS = (
     DECAY / 2 * (np.polynomial.legendre.leggauss(64)[0] + 1),
     DECAY / 2 * np.polynomial.legendre.leggauss(64)[1],
 )
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Asperities:
-    """Greenwood-Williamson force and area at given separations; arrays of the broadcast shape.
-
-    Attributes
-    ----------
-    separation : ndarray
-        d, between the rigid plane and the mid-plane [length].
-    mean_separation : ndarray
-        u = (h_max + d)/2 (50) [length].
-    force : ndarray
-        F/A0 in the unit of E_star; F/(A0 E*) where that is 1.
-    area : ndarray
-        A/A0.
-    """
-
-    separation: Any
-    mean_separation: Any
-    force: Any
-    area: Any
-
-
-@takes_labelled()
-def mean_separation(surface: Surface, separation: ArrayLike) -> Any:
-    """Average interfacial separation u = (h_max + d)/2 [length] at separations d [length], Eq. (50)."""
-    gap = finite_array("separation", separation)
-    broadcast_shape(separation=gap, surface=surface.hurst)
-    return (surface.h_max / 2 + gap / 2)[()]
-
-
-@takes_labelled()
-def separation(surface: Surface, mean_separation: ArrayLike) -> Any:
-    """Separation d = 2 u - h_max [length] at average interfacial separations u [length], Eq. (50)."""
-    average = finite_array("mean_separation", mean_separation)
-    broadcast_shape(mean_separation=average, surface=surface.hurst)
-    return (2 * average - surface.h_max)[()]
-
-
-@takes_labelled(Asperities)
-def greenwood_williamson(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1.0) -> Asperities:
-    """Force and area of equal spheres with Gaussian heights (Eqs. 11, 12), Nayak's summits (Eq. 2).
-
-    Parameters
-    ----------
-    surface : Surface
-        One surface or a batch; it broadcasts against `separation`.
-    separation : array_like
-        d between the rigid plane and the mid-plane [length]. The heights are the whole Gaussian: neither
-        h_max nor -h_max ends it.
-    E_star : array_like
-        Effective modulus; force is in its unit.
-
-    Returns
-    -------
-    Asperities
-
-    Raises
-    ------
-    InputError, OutOfRangeError
-    """
-    gap = finite_array("separation", separation)
-    modulus = _modulus(E_star)
-    shape = broadcast_shape(separation=gap, surface=surface.hurst, E_star=modulus)
-    density, radius, sigma = surface.summit_density, surface.summit_radius, surface.summit_sigma
-    depth = np.broadcast_to(gap / sigma, shape)
-    force = 4 / 3 * density * np.sqrt(radius * sigma) * sigma * height_integral(1.5, depth)
-    area = math.pi * density * radius * sigma * height_integral(1.0, depth)
-    gap = np.broadcast_to(gap, shape)
-    return Asperities(gap[()], mean_separation(surface, gap), (modulus * force)[()], area)
 
 
 @takes_labelled()
@@ -135,10 +63,16 @@ def persson_area(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1.0) ->
     Raises
     ------
     InputError, OutOfRangeError
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, theories
+    >>> theories.persson_area(Surface.named("concrete"), [0.01, 0.1, 1.0]).round(4)
+    array([0.0217, 0.2145, 0.9935])
     """
     pressure = finite_array("force", force)
     require("force", pressure, pressure >= 0, "zero or positive")
-    modulus = _modulus(E_star)
+    modulus = positive_modulus(E_star)
     broadcast_shape(force=pressure, surface=surface.hurst, E_star=modulus)
     return erf(pressure / modulus / np.sqrt(surface.m2))
 
@@ -167,10 +101,16 @@ def persson_separation(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1
     Raises
     ------
     InputError, OutOfRangeError
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, theories
+    >>> theories.persson_separation(Surface.named("concrete"), [0.001, 0.01]).round(4)
+    array([0.6721, 0.3801])
     """
     pressure = finite_array("force", force)
     require("force", pressure, pressure > 0, "positive: u is infinite at zero load")
-    modulus = _modulus(E_star)
+    modulus = positive_modulus(E_star)
     shape = broadcast_shape(force=pressure, surface=surface.hurst, E_star=modulus)
     bands = _Bands.of(surface, shape)
     log_load = np.log(pressure) - np.log(modulus)
@@ -217,9 +157,15 @@ def persson_force(
     ------
     InputError, OutOfRangeError
         Also where u is so small or so large that the load of the full form is no normal number.
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, theories
+    >>> print(f"{theories.persson_force(Surface.named('concrete'), 0.6, E_star=10.0):.4f}")
+    0.0179
     """
     average = finite_array("mean_separation", mean_separation)
-    modulus = _modulus(E_star)
+    modulus = positive_modulus(E_star)
     shape = broadcast_shape(mean_separation=average, surface=surface.hurst, E_star=modulus)
     full = _is_full(method)
     allowed = average > 0 if full else average >= 0
@@ -232,12 +178,6 @@ def persson_force(
         u0, log_lambda = _simplified(bands)
         log_p = log_lambda - target.ravel() / u0
     return (modulus * np.exp(log_p.reshape(shape) + _log_stress(surface)))[()]
-
-
-def _modulus(E_star: ArrayLike) -> FloatArray:
-    modulus = finite_array("E_star", E_star)
-    require("E_star", modulus, modulus > 0, "positive")
-    return modulus
 
 
 def _is_full(method: str) -> bool:
@@ -307,7 +247,7 @@ def _inner(log_a: FloatArray) -> FloatArray:
 def _full(bands: _Bands, log_p: FloatArray) -> FloatArray:
     """u/s of Eq. (19) and -d(u/s)/d(log p0), shape (2, loads), at log of p0/(E* q0 s)."""
     log_a = log_p - bands.log_top
-    some = np.flatnonzero(log_a < math.log(STEEPEST + 1))
+    some = np.flatnonzero(log_a < math.log(MAX_RATIO + 1))
     if some.size == 0:
         return np.zeros((2, log_p.size))
     a_top = np.exp(log_a[some])
@@ -324,8 +264,8 @@ def _full(bands: _Bands, log_p: FloatArray) -> FloatArray:
 
 def _invert(bands: _Bands, target: FloatArray) -> FloatArray:
     """Log of p0/(E* q0 s) at which (19) gives u/s = `target`: Newton's method on log u, in a bracket."""
-    low = np.full(bands.hurst.size, LEAST_LOG_FORCE)
-    high = bands.log_top + math.log(STEEPEST)
+    low = np.full(bands.hurst.size, MIN_LOG_FORCE)
+    high = bands.log_top + math.log(MAX_RATIO)
     wanted = target.ravel()
     most, least = (_full(bands, end)[0] for end in (low, high))
     inside = (wanted >= least) & (wanted <= most)
@@ -337,22 +277,22 @@ def _invert(bands: _Bands, target: FloatArray) -> FloatArray:
     )
     u0, log_lambda = _simplified(bands)
     guess = np.clip(log_lambda - wanted / u0, low, high)
-    open_ = np.ones(guess.size, dtype=bool)
-    for _ in range(STEPS):
+    active = np.ones(guess.size, dtype=bool)
+    for _ in range(MAX_STEPS):
         value, slope = np.zeros((2, guess.size))
-        own = _Bands(bands.hurst[open_], bands.log_top[open_], bands.log_bottom[open_])
-        value[open_], slope[open_] = _full(own, guess[open_])
-        low = np.where(open_ & (value >= wanted), guess, low)
-        high = np.where(open_ & (value <= wanted), guess, high)
+        own = _Bands(bands.hurst[active], bands.log_top[active], bands.log_bottom[active])
+        value[active], slope[active] = _full(own, guess[active])
+        low = np.where(active & (value >= wanted), guess, low)
+        high = np.where(active & (value <= wanted), guess, high)
         step = np.zeros_like(guess)
-        step[open_] = np.log(value[open_] / wanted[open_]) * value[open_] / slope[open_]
+        step[active] = np.log(value[active] / wanted[active]) * value[active] / slope[active]
         following = guess + step
-        outside = open_ & ((following < low) | (following > high))
+        outside = active & ((following < low) | (following > high))
         following[outside] = (low + high)[outside] / 2
         # log p0 near -690 carries an error of 1e-13
-        open_ &= np.abs(following - guess) > 1e-12 * np.maximum(1, np.abs(guess))
+        active &= np.abs(following - guess) > 1e-12 * np.maximum(1, np.abs(guess))
         guess = following
-        if not open_.any():
+        if not active.any():
             return guess
-    mask = open_.reshape(target.shape)
-    raise ConvergenceError(f"no load found for {int(mask.sum())} separations in {STEPS} steps", mask)
+    mask = active.reshape(target.shape)
+    raise ConvergenceError(f"no load found for {int(mask.sum())} separations in {MAX_STEPS} steps", mask)

@@ -1,0 +1,114 @@
+"""The theory of Greenwood and Williamson (Eqs. 11, 12), and how the two separations relate (Eq. 50)."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.islands.height_integrals import height_integral
+from mbma_tables.labels import takes_labelled
+from mbma_tables.surfaces.surface import Surface
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Asperities:
+    """Greenwood-Williamson force and area at given separations; arrays of the broadcast shape.
+
+    Attributes
+    ----------
+    separation : ndarray
+        d, between the rigid plane and the mid-plane [length].
+    mean_separation : ndarray
+        u = (h_max + d)/2 (50) [length].
+    force : ndarray
+        F/A0 in the unit of E_star; F/(A0 E*) where that is 1.
+    area : ndarray
+        A/A0.
+    """
+
+    separation: Any
+    mean_separation: Any
+    force: Any
+    area: Any
+
+
+@takes_labelled()
+def mean_separation(surface: Surface, separation: ArrayLike) -> Any:
+    """Average interfacial separation u = (h_max + d)/2 [length] at separations d [length], Eq. (50).
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, theories
+    >>> float(theories.mean_separation(Surface.named("concrete"), 0.5))
+    0.8
+    """
+    gap = finite_array("separation", separation)
+    broadcast_shape(separation=gap, surface=surface.hurst)
+    return (surface.h_max / 2 + gap / 2)[()]
+
+
+@takes_labelled()
+def separation(surface: Surface, mean_separation: ArrayLike) -> Any:
+    """Separation d = 2 u - h_max [length] at average interfacial separations u [length], Eq. (50).
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, theories
+    >>> float(theories.separation(Surface.named("concrete"), 0.8))
+    0.5
+    """
+    average = finite_array("mean_separation", mean_separation)
+    broadcast_shape(mean_separation=average, surface=surface.hurst)
+    return (2 * average - surface.h_max)[()]
+
+
+@takes_labelled(Asperities)
+def greenwood_williamson(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1.0) -> Asperities:
+    """Force and area of equal spheres with Gaussian heights (Eqs. 11, 12), Nayak's summits (Eq. 2).
+
+    Parameters
+    ----------
+    surface : Surface
+        One surface or a batch; it broadcasts against `separation`.
+    separation : array_like
+        d between the rigid plane and the mid-plane [length]. The heights are the whole Gaussian: neither
+        h_max nor -h_max ends it.
+    E_star : array_like
+        Effective modulus; force is in its unit.
+
+    Returns
+    -------
+    Asperities
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, theories
+    >>> found = theories.greenwood_williamson(Surface.named("concrete"), [0.2, 0.5], E_star=10.0)
+    >>> found.area.round(4), found.force.round(4)
+    (array([0.064 , 0.0056]), array([0.4545, 0.0334]))
+    """
+    gap = finite_array("separation", separation)
+    modulus = positive_modulus(E_star)
+    shape = broadcast_shape(separation=gap, surface=surface.hurst, E_star=modulus)
+    density, radius, sigma = surface.summit_density, surface.summit_radius, surface.summit_sigma
+    depth = np.broadcast_to(gap / sigma, shape)
+    force = 4 / 3 * density * np.sqrt(radius * sigma) * sigma * height_integral(1.5, depth)
+    area = math.pi * density * radius * sigma * height_integral(1.0, depth)
+    gap = np.broadcast_to(gap, shape)
+    return Asperities(gap[()], mean_separation(surface, gap), (modulus * force)[()], area)
+
+
+def positive_modulus(E_star: ArrayLike) -> FloatArray:
+    """E* as an array of positive numbers."""
+    modulus = finite_array("E_star", E_star)
+    require("E_star", modulus, modulus > 0, "positive")
+    return modulus
