@@ -1,1 +1,1 @@
-"""Totals over islands, and the other theories of the paper."""
+"""Totals over islands."""

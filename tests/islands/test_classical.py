@@ -1,9 +1,12 @@
-"""The damped iteration of Greenwood and Tripp: agreement, mesh error, divergence."""
+"""The damped iteration of Greenwood and Tripp: agreement, mesh error, divergence, interruption."""
+
+import signal
 
 import numpy as np
 import pytest
 
 from mbma_tables import ConvergenceError, greenwood_tripp
+from mbma_tables.islands import classical
 
 CASES = [(5.0, 0.01), (5.0, 1.0), (2.0, 0.5), (5.0, 3.0), (0.0, 4.0)]
 
@@ -12,12 +15,12 @@ CASES = [(5.0, 0.01), (5.0, 1.0), (2.0, 0.5), (5.0, 3.0), (0.0, 4.0)]
 @pytest.mark.parametrize("rings", [50, 200])
 def test_agrees_with_newton_within_its_own_error(X, mu, rings):
     exact = greenwood_tripp.solve(X, mu, rtol=1e-12)
-    classical = greenwood_tripp.solve(X, mu, method="classical", nodes=rings)
-    assert abs(classical.phi_F / exact.phi_F - 1) <= classical.error
-    assert abs(classical.phi_A / exact.phi_A - 1) <= classical.error
-    assert classical.error < 5e-3
-    assert classical.nodes == rings
-    assert classical.method == "classical"
+    found = greenwood_tripp.solve(X, mu, method="classical", nodes=rings)
+    assert abs(found.phi_F / exact.phi_F - 1) <= found.error
+    assert abs(found.phi_A / exact.phi_A - 1) <= found.error
+    assert found.error < 5e-3
+    assert found.nodes == rings
+    assert found.method == "classical"
 
 
 @pytest.mark.parametrize(("X", "mu"), CASES)
@@ -31,13 +34,13 @@ def test_mesh_error_falls_like_the_square_of_the_ring_width(X, mu):
 
 
 def test_profiles():
-    classical = greenwood_tripp.solve([2.0, 5.0], 1.0, method="classical", nodes=200)
+    found = greenwood_tripp.solve([2.0, 5.0], 1.0, method="classical", nodes=200)
     newton = greenwood_tripp.solve([2.0, 5.0], 1.0)
-    assert classical.rho.shape == classical.pressure.shape == classical.gap.shape == (2, 200)
+    assert found.rho.shape == found.pressure.shape == found.gap.shape == (2, 200)
     for k in range(2):
-        there = np.interp(classical.rho[k], newton.rho[k], newton.pressure[k])
-        inside = classical.rho[k] < 0.7 * newton.rho[k].max()
-        assert np.abs(classical.pressure[k] - there)[inside].max() <= 0.01 * newton.pressure[k].max()
+        there = np.interp(found.rho[k], newton.rho[k], newton.pressure[k])
+        inside = found.rho[k] < 0.7 * newton.rho[k].max()
+        assert np.abs(found.pressure[k] - there)[inside].max() <= 0.01 * newton.pressure[k].max()
 
 
 def test_divergence_is_an_error_with_its_mask():
@@ -59,3 +62,29 @@ def test_smaller_damping_reaches_further():
 def test_too_few_iterations_is_an_error():
     with pytest.raises(ConvergenceError):
         greenwood_tripp.solve(2.0, 0.5, method="classical", nodes=60, max_iterations=5)
+
+
+def test_blocks_of_iterations_do_not_show(monkeypatch):
+    whole = classical.solve_classical(5.0, 1.0, 40, 0.3, 1e-10, 2000)
+    monkeypatch.setattr(classical, "BLOCK", 1)
+    for one, other in zip(classical.solve_classical(5.0, 1.0, 40, 0.3, 1e-10, 2000), whole, strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert whole[0] > 20
+
+
+def test_a_signal_is_heard_within_a_long_iteration():
+    class Rung(Exception):
+        pass
+
+    def ring(*_):
+        raise Rung
+
+    greenwood_tripp.solve(5.0, 1.0, method="classical", nodes=60)
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, 0.2)
+    try:
+        # hours, if it ran to its end
+        with pytest.raises(Rung):
+            greenwood_tripp.solve(5.0, 1.0, method="classical", damping=1e-6, max_iterations=10**9)
+    finally:
+        signal.signal(signal.SIGALRM, before)
