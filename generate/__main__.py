@@ -1,192 +1,71 @@
-"""`python -m generate`: make anew what the library ships."""
+"""``python -m generate``: remake what the library ships, and the pages of its documentation."""
 
 from __future__ import annotations
 
-import contextlib
 import importlib
-import os
 import pathlib
-import shutil
 import sys
-import time
-from collections.abc import Iterator
 from typing import Any
 
 import click
 
-from generate.tables import height_coefficients
-from generate.tables.campaign import Campaign, CampaignError, Executor, Workers
-from generate.tables.configuration import FEWEST_SHIPPED, Configuration, load
-from mbma_tables.errors import InputError, MbmaError
+from generate.pages.page import PAGES, ROOT, write
+from mbma_tables.errors import MbmaError
 
-TABLES = pathlib.Path(__file__).parents[1] / "tables"
-
-
-@contextlib.contextmanager
-def engine(workers: int, scheduler: str | None, processes: bool) -> Iterator[Executor | None]:
-    """Where chunks run: a dask scheduler, a local dask cluster where dask is installed, or plain processes."""
-    if scheduler is None and (processes or workers <= 1):
-        if workers <= 1:
-            yield None
-            return
-        with Workers(workers) as pool:
-            yield pool
-        return
-    try:
-        import distributed
-    except ImportError:
-        if scheduler is not None:
-            raise InputError("--scheduler needs dask: pip install 'mbma_tables[distributed]'") from None
-        with Workers(workers) as pool:
-            yield pool
-        return
-    with contextlib.ExitStack() as stack:
-        if scheduler is None:
-            cluster = distributed.LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
-            client = stack.enter_context(distributed.Client(stack.enter_context(cluster)))
-        else:
-            try:
-                client = stack.enter_context(distributed.Client(scheduler))
-            except (OSError, ValueError) as fault:
-                raise CampaignError(f"no dask scheduler at {scheduler}: {fault}") from None
-        try:
-            yield client.get_executor()
-        except (distributed.KilledWorker, ImportError, RuntimeError) as fault:
-            if isinstance(fault, CampaignError):
-                raise
-            raise CampaignError(
-                f"dask: {fault} (scheduler and workers need this checkout on their path); "
-                "--resume goes on from the chunks that are done"
-            ) from None
+# imported when asked for: each needs packages of the extra "generate"
+GROUPS = {"tables": "generate.tables.commands", "formulas": "generate.formulas.commands"}
 
 
-def destination(what: str, configuration: Configuration, out: pathlib.Path | None) -> pathlib.Path:
-    """Where a table goes; the folder that is shipped takes only what is certified on enough points."""
-    own = f"{configuration.kind}.nc"
-    path = TABLES / own if out is None else out / own if what == "all" else out
-    if path.resolve().parent == TABLES.resolve() and configuration.certificate_points < FEWEST_SHIPPED:
-        raise InputError(
-            f"certificate_points must be at least {FEWEST_SHIPPED} for a table in {TABLES}, "
-            f"got {configuration.certificate_points}; give another place with --out"
-        )
-    if path.is_dir():
-        raise InputError(f"--out must name a file for one table, {path} is a folder")
-    return path
+class Generator(click.Group):
+    """A group of which every known error ends in one line and exit code 2."""
 
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of the commands."""
+        return [*GROUPS, *super().list_commands(ctx)]
 
-def make_table(configuration: Configuration, target: pathlib.Path, executor: Executor | None, resume: bool) -> None:
-    """Build, certify and write one table."""
-    from generate.tables.build import Kind, UncertifiedError, build
-    from generate.tables.island4d import Island4d
-    from generate.tables.universal import Universal
-    from mbma_tables.tablefiles.netcdf import write_table
-    from mbma_tables.tablefiles.schema import UNIVERSAL
-
-    started = time.perf_counter()
-    checkpoints = target.parent / f".{target.name}.checkpoints"
-    kind: Kind = Universal(configuration) if configuration.kind == UNIVERSAL else Island4d(configuration)
-    try:
-        content = build(kind, configuration, Campaign(executor, checkpoints, resume))
-    except UncertifiedError:
-        # another resolution shares no chunks with this one
-        shutil.rmtree(checkpoints, ignore_errors=True)
-        raise
-    write_table(target, content)
-    shutil.rmtree(checkpoints, ignore_errors=True)
-    shape = " x ".join(f"{axis.nodes} {axis.name}" for axis in content.axes)
-    errors = ", ".join(f"{f} {content.attributes[f'largest_error_{f}']:.2e}" for f in ("F", "A"))
-    click.echo(f"{target}: {shape}; largest held-out error {errors}; {target.stat().st_size} bytes")
-    click.echo(f"errors by axis (F, A): {content.attributes['axis_errors']}", err=True)
-    click.echo(f"{time.perf_counter() - started:.1f} s", err=True)
-
-
-def formula_file(out: pathlib.Path | None, what: str) -> pathlib.Path:
-    """Where the closed forms go."""
-    if out is None:
-        return TABLES / "formula.json"
-    return out / "formula.json" if what == "all" else out
-
-
-def make_formulas(target: pathlib.Path) -> None:
-    """Fit, certify and write the closed forms."""
-    from generate.formulas.fit import build
-
-    started = time.perf_counter()
-    for form in build(target).forms.values():
-        errors = ", ".join(f"{name} {form.largest_error(name):.2e}" for name in form.outputs)
-        click.echo(f"{target}: {form.name}; largest held-out error {errors}")
-    click.echo(f"{time.perf_counter() - started:.1f} s", err=True)
-
-
-class Generator(click.Command):
-    """A command whose every known fault ends in one line and exit code 2."""
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command."""
+        if cmd_name in GROUPS:
+            command: click.Command = getattr(importlib.import_module(GROUPS[cmd_name]), cmd_name)
+            return command
+        return super().get_command(ctx, cmd_name)
 
     def main(self, *args: Any, **extra: Any) -> Any:
-        """Run, and exit with 0, or with 2 where no table came of it."""
+        """Run; exit with 0, with 1 where interrupted, or with 2 after an error."""
         extra["standalone_mode"] = False
         try:
-            super().main(*args, **extra)
+            code = super().main(*args, **extra)
         except click.Abort:
-            click.echo("generate: interrupted; --resume goes on from the chunks that are done", err=True)
+            click.echo("generate: interrupted; --resume continues from the chunks that are done", err=True)
             sys.exit(1)
-        except (click.ClickException, MbmaError, CampaignError, OSError) as fault:
+        except ModuleNotFoundError as fault:
+            click.echo(f"generate: {fault}; install the extra: pip install -e '.[generate]'", err=True)
+            sys.exit(2)
+        except (click.ClickException, MbmaError, OSError, RuntimeError) as fault:
             text = fault.format_message() if isinstance(fault, click.ClickException) else str(fault)
             click.echo(f"generate: {' '.join(text.split())}", err=True)
             sys.exit(2)
-        sys.exit(0)
+        sys.exit(code if isinstance(code, int) else 0)
 
 
-@click.command(cls=Generator, context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("what", type=click.Choice(["universal", "island4d", "formula", "all"]))
-@click.option(
-    "--config", type=click.Path(path_type=pathlib.Path), help="TOML file that changes the shipped configuration."
-)
-@click.option("--target", type=float, help="Largest relative error on held-out points.")
-@click.option(
-    "--out", type=click.Path(path_type=pathlib.Path), help="File to write (a folder for all); default tables/."
-)
-@click.option("--workers", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True, help="Processes.")
-@click.option("--resume", is_flag=True, help="Go on from the chunks that an earlier run finished.")
-@click.option(
-    "--scheduler", help="Address of a dask scheduler to run on; it and its workers need this checkout on their path."
-)
-@click.option("--processes", is_flag=True, help="Plain processes even where dask is installed.")
-def main(
-    what: str,
-    config: pathlib.Path | None,
-    target: float | None,
-    out: pathlib.Path | None,
-    workers: int,
-    resume: bool,
-    scheduler: str | None,
-    processes: bool,
-) -> None:
-    """Make anew the tables universal and island4d, the closed forms (formula), or all of it.
-
-    All begins with the coefficients of the height integrals. ``python -m generate cost --help`` tells of the study of
-    what accuracy costs, ``python -m generate atlas --help`` of the corners of parameter space, ``python -m generate
-    gauntlet --help`` of the tests of hard input at their full size.
-    """
-    if what in ("all", "formula") and (config is not None or target is not None):
-        raise InputError("--config and --target belong to one table, not to all, nor to formula")
-    kinds: tuple[str, ...] = {"all": ("universal", "island4d"), "formula": ()}.get(what, (what,))
-    configurations = [load(kind, config, target) for kind in kinds]
-    paths = [destination(what, configuration, out) for configuration in configurations]
-    if what == "all":
-        height_coefficients.main()
-    with engine(workers, scheduler, processes) as executor:
-        for configuration, path in zip(configurations, paths, strict=True):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            make_table(configuration, path, executor, resume)
-    if what in ("all", "formula"):
-        make_formulas(formula_file(out, what))
+@click.group(cls=Generator, context_settings={"help_option_names": ["-h", "--help"]})
+def main() -> None:
+    """Remake the tables, the closed forms and the pages of the documentation, in a checkout."""
 
 
-STUDIES = {"atlas": "stability", "cost": "cost", "gauntlet": "gauntlet"}
+@main.command()
+@click.argument("names", nargs=-1, required=True, type=click.Choice([*PAGES, "all"]))
+@click.option("--out", type=click.Path(path_type=pathlib.Path, file_okay=False), default=ROOT, help="The checkout.")
+def pages(names: tuple[str, ...], out: pathlib.Path) -> None:
+    """Measure what pages of the documentation say; write them with their figures."""
+    for name in PAGES if "all" in names else names:
+        page = importlib.import_module(f"generate.pages.{name}")
+        if not hasattr(page, "measure"):
+            page.main(["--out", str(out / "docs")], standalone_mode=False)
+            continue
+        for path in write(name, *page.measure(), out):
+            click.echo(path)
+
 
 if __name__ == "__main__":
-    if sys.argv[1:2] and sys.argv[1] in STUDIES:
-        study = importlib.import_module(f"generate.pages.{STUDIES[sys.argv[1]]}")
-        study.main(sys.argv[2:], prog_name=f"generate {sys.argv[1]}")
-    else:
-        main()
+    main()

@@ -1,126 +1,121 @@
-"""Figures of the fidelity page: the paper's Figures 11-17 and the ratios to brute force."""
+"""Figures of the page on fidelity: the paper's Figures 11-17 and the ratios to brute force."""
 
 from __future__ import annotations
 
 import functools
-import pathlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
-from generate.pages.fidelity import (
+from generate.pages.comparisons import (
     AREA_THEORIES,
-    COLOURS,
     GAPS,
     PERSSON,
     READINGS,
     REFERENCES,
-    RESOLUTIONS,
-    ROADS,
     THEORIES,
     area_ratios,
     force_at,
     force_ratios,
     sample,
 )
-from generate.pages.page import png
+from generate.pages.page import png, pyplot
 from mbma_tables import Surface, theories
-from mbma_tables.files import write_file
+
+COLOURS = dict(zip((*THEORIES, "Persson"), ("C0", "C1", "C2", "C3", "C4", "C3"), strict=True))
+ROADS = ("concrete", "asphalt")
+RESOLUTIONS = (125, 250, 500, 1000)
 
 
-def draw(folder: pathlib.Path) -> None:
-    """All figures, as PNG files of 900 pixels' width."""
-    import matplotlib as mpl
+def new(rows: int = 1, columns: int = 2, **options: Any) -> tuple[Any, Any]:
+    """A figure of 900 pixels' width and its axes."""
+    height = 3.4 if rows == 1 else 6.4
+    return pyplot().subplots(rows, columns, figsize=(9, height), dpi=100, layout="constrained", **options)
 
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt
 
-    def new(rows: int = 1, columns: int = 2, **options: Any) -> tuple[Any, Any]:
-        height = 3.4 if rows == 1 else 6.4
-        return plt.subplots(rows, columns, figsize=(9, height), dpi=100, layout="constrained", **options)
+def by_gap(ax: Any, surface: Surface, low: float, names: Iterable[str] = THEORIES, **style: Any) -> None:
+    """Force against mean separation."""
+    top = surface.h_max / surface.h_rms
+    for name in names:
+        if name in PERSSON:
+            ratio = np.linspace(0.005, 1.1 * top, GAPS)
+            force = force_at(surface, name, ratio)
+        else:
+            gap, force, _ = sample(surface, name)
+            ratio = theories.mean_separation(surface, gap) / surface.h_rms
+        ax.semilogy(ratio, force, color=COLOURS[name], **{"label": name, **style})
+    ax.set(xlabel=r"$u/h_{rms}$", ylabel=r"$F/(A_0 E^*)$", ylim=(low, None), xlim=(0, 1.1 * top))
 
-    def save(figure: Any, name: str) -> None:
-        write_file(folder / f"{name}.png", png(figure), make_folders=True)
 
-    def by_gap(ax: Any, surface: Surface, low: float, names: Iterable[str] = THEORIES, **style: Any) -> None:
-        top = surface.h_max / surface.h_rms
-        for name in names:
-            if name in PERSSON:
-                ratio = np.linspace(0.005, 1.1 * top, GAPS)
-                force = force_at(surface, name, ratio)
-            else:
-                gap, force, _ = sample(surface, name)
-                ratio = theories.mean_separation(surface, gap) / surface.h_rms
-            ax.semilogy(ratio, force, color=COLOURS[name], **{"label": name, **style})
-        ax.set(xlabel=r"$u/h_{rms}$", ylabel=r"$F/(A_0 E^*)$", ylim=(low, None), xlim=(0, 1.1 * top))
+def by_force(ax: Any, surface: Surface, ordinate: Callable[[Any, Any], Any], **style: Any) -> None:
+    """Something of force and area against force."""
+    for name in AREA_THEORIES:
+        if name == "Persson":
+            force = np.geomspace(1e-5, 3, GAPS) * np.sqrt(surface.m2)
+            area = theories.persson_area(surface, force)
+        else:
+            _, force, area = sample(surface, name)
+        shown = (area > 1e-5) & (area < 1.2)
+        ax.plot(force[shown], ordinate(force, area)[shown], color=COLOURS[name], **{"label": name, **style})
+    ax.set(xscale="log", xlabel=r"$F/(A_0 E^*)$")
 
-    def by_force(ax: Any, surface: Surface, ordinate: Callable[[Any, Any], Any], **style: Any) -> None:
-        for name in AREA_THEORIES:
-            force, area = (
-                (f := np.geomspace(1e-5, 3, GAPS) * np.sqrt(surface.m2), theories.persson_area(surface, f))
-                if name == "Persson"
-                else sample(surface, name)[1:]
-            )
-            shown = (area > 1e-5) & (area < 1.2)
-            ax.plot(force[shown], ordinate(force, area)[shown], color=COLOURS[name], **{"label": name, **style})
-        ax.set(xscale="log", xlabel=r"$F/(A_0 E^*)$")
 
-    def area_only(force: Any, area: Any) -> Any:
-        return area
+def area_only(force: Any, area: Any) -> Any:
+    """The area."""
+    return area
 
-    def slope(gradient: Any, force: Any, area: Any) -> Any:
-        return area / force * gradient
 
-    surface = Surface.named("yang-persson")
+def slope(gradient: Any, force: Any, area: Any) -> Any:
+    """Kappa, Eq. (51)."""
+    return area / force * gradient
+
+
+def simulations() -> Iterator[tuple[str, Any]]:
+    """Figures 11, 12 and 15."""
     figure, axes = new()
-    by_gap(axes[0], surface, 1e-7)
-    by_gap(axes[1], surface, 1e-6)
+    by_gap(axes[0], Surface.named("yang-persson"), 1e-7)
+    by_gap(axes[1], Surface.named("yang-persson"), 1e-6)
     axes[1].set(xlim=(1.8, 3.1), ylim=(1e-6, 1e-2))
     for ax in axes:
         ax.plot([2.0, 2.5], [2.9e-3, 2.2e-4], "kx")
         ax.plot([2.5, 3.0], [1e-3, 3.5e-4], "k+")
     axes[0].legend(fontsize="small")
-    save(figure, "fig11")
+    yield "fig11", figure
 
-    surface = Surface.named("papangelo")
-    bem = REFERENCES["bem"]
-    figure, ax = new(columns=1)
-    by_gap(ax, surface, 1e-6)
-    scaled = bem.column("force") * surface.rms_gradient / bem.gradient
-    ax.plot(bem.column("mean_separation_over_h_rms"), scaled, "k.", label="boundary elements")
-    ax.legend(fontsize="small")
-    save(figure, "fig12")
+    for name, key, title in (("papangelo", "bem", "fig12"), ("challenge", "challenge", "fig15")):
+        surface, data = Surface.named(name), REFERENCES[key]
+        figure, axes = new(columns=2 if key == "challenge" else 1, squeeze=False)
+        scaled = data.column("force") * surface.rms_gradient / data.gradient
+        by_gap(axes[0, 0], surface, 1e-6)
+        axes[0, 0].plot(data.column("mean_separation_over_h_rms"), scaled, "k.", label="boundary elements")
+        axes[0, 0].legend(fontsize="small")
+        for ax in axes[0, 1:]:
+            by_force(ax, surface, area_only)
+            ax.plot(scaled, data.column("area"), "k.")
+            ax.set(yscale="log", ylabel=r"$A/A_0$")
+        yield title, figure
 
-    figure, axes = new()
-    for ax, name in zip(axes, ROADS, strict=True):
-        by_gap(ax, Surface.named(name), 1e-6)
-        ax.set_title(name)
-    axes[0].legend(fontsize="small")
-    save(figure, "fig13")
 
-    figure, axes = new()
-    for ax, name in zip(axes, ROADS, strict=True):
+def roads() -> Iterator[tuple[str, Any]]:
+    """Figures 13 and 14."""
+    gap_figure, gap_axes = new()
+    area_figure, area_axes = new()
+    for gap_ax, ax, name in zip(gap_axes, area_axes, ROADS, strict=True):
         surface = Surface.named(name)
+        by_gap(gap_ax, surface, 1e-6)
+        gap_ax.set_title(name)
         by_force(ax, surface, area_only)
         force = np.geomspace(1e-5, 0.3, 2) * surface.rms_gradient
         ax.plot(force, 2 * force / surface.rms_gradient, "k:", label="kappa = 2")
         ax.set(yscale="log", ylabel=r"$A/A_0$", title=name)
-    axes[0].legend(fontsize="small")
-    save(figure, "fig14")
+    for figure, axes, title in ((gap_figure, gap_axes, "fig13"), (area_figure, area_axes, "fig14")):
+        axes[0].legend(fontsize="small")
+        yield title, figure
 
-    surface = Surface.named("challenge")
-    data = REFERENCES["challenge"]
-    scaled = data.column("force") * surface.rms_gradient / data.gradient
-    figure, axes = new()
-    by_gap(axes[0], surface, 1e-6)
-    axes[0].plot(data.column("mean_separation_over_h_rms"), scaled, "k.", label="boundary elements")
-    by_force(axes[1], surface, area_only)
-    axes[1].plot(scaled, data.column("area"), "k.")
-    axes[1].set(yscale="log", ylabel=r"$A/A_0$")
-    axes[0].legend(fontsize="small")
-    save(figure, "fig15")
 
+def resolution() -> Iterator[tuple[str, Any]]:
+    """Figures 16 and 17."""
     gap_figure, ax = new(columns=1)
     area_figure, pair = new()
     for zeta_1, style in zip(RESOLUTIONS, ("-", "--", "-.", ":"), strict=True):
@@ -133,10 +128,13 @@ def draw(folder: pathlib.Path) -> None:
             panel.plot([], [], "k", ls=style, label=f"zeta_1 = {zeta_1}")
     pair[0].set(yscale="log", ylabel=r"$A/A_0$")
     pair[1].set(ylabel=r"$\kappa = A\sqrt{2 m_2} E^*/F$", ylim=(0, 3))
-    for panel, figure, name in ((ax, gap_figure, "fig16"), (pair[0], area_figure, "fig17")):
+    for panel, figure, title in ((ax, gap_figure, "fig16"), (pair[0], area_figure, "fig17")):
         panel.legend(fontsize="small")
-        save(figure, name)
+        yield title, figure
 
+
+def brute_force() -> Iterator[tuple[str, Any]]:
+    """Ratios to the reference data."""
     figure, axes = new(2, len(REFERENCES), sharey="row")
     for column, reference in zip(axes.T, REFERENCES.values(), strict=True):
         surface = reference.surface()
@@ -148,10 +146,21 @@ def draw(folder: pathlib.Path) -> None:
                 ax.plot(reference.column(abscissa), values, ".-", color=COLOURS[name], label=name)
             ax.axhline(1, color="k", lw=0.5)
         column[0].set(xscale="log", xlabel=r"$A/A_0$ of the data", xlim=(1e-4, 1.5))
-        column[0].set_title(reference.title.split(",")[0], fontsize="small")
+        column[0].set_title(reference.title, fontsize="small")
         column[1].set(yscale="log", xlabel=r"$u/h_{rms}$", xlim=(0, 3.2))
     axes[0, 0].set_ylabel("area, model / data")
     axes[1, 0].set_ylabel("force, model / data")
     # below the panels, where it hides no curve
     figure.legend(*axes[1, 2].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
-    save(figure, "reference")
+    yield "reference", figure
+
+
+def drawn() -> Iterator[tuple[str, Any]]:
+    """All figures by name."""
+    for part in (simulations, roads, resolution, brute_force):
+        yield from part()
+
+
+def figures() -> Iterator[tuple[str, bytes]]:
+    """All figures as PNG files, by name."""
+    return ((name, png(figure)) for name, figure in drawn())

@@ -1,28 +1,61 @@
-"""What the pages of the docs share: figures as bytes, and measured parts between marks in written text."""
+"""What the pages of the documentation share.
+
+A page is Markdown in ``docs``, written by hand but for what stands between ``<!-- measured: NAME -->`` and
+``<!-- end -->``. A module of this folder with the page's name has a function ``measure`` that returns those parts by
+name, and other files (figures, data) by their path in the checkout. ``python -m generate pages NAME`` writes them.
+"""
 
 from __future__ import annotations
 
 import io
-import json
+import pathlib
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import click
 
+ROOT = pathlib.Path(__file__).parents[2]
+PAGES = ("cost", "export", "fidelity", "formula", "stability", "tables")
 MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
-def fill(text: str, blocks: Mapping[str, Callable[[], str]], left: Collection[str] = ()) -> str:
-    """A page's text with its measured parts made anew, but those `left`; marks and parts must be the same."""
-    found = [match[2] for match in MARKED.finditer(text) if match[2] not in left]
-    if sorted(found) != sorted(blocks):
-        raise click.ClickException(f"the page marks {json.dumps(found)}, not {json.dumps(sorted(blocks))}")
+def fill(text: str, parts: Mapping[str, str]) -> str:
+    """Put the measured parts into a page; marks and parts must be the same."""
+    found = [match[2] for match in MARKED.finditer(text)]
+    if sorted(found) != sorted(parts):
+        raise click.ClickException(f"the page marks {sorted(found)}, measured were {sorted(parts)}")
+    return MARKED.sub(lambda match: f"{match[1]}\n{parts[match[2]]}\n\n{match[3]}", text)
 
-    def made(match: re.Match[str]) -> str:
-        return match[0] if match[2] in left else f"{match[1]}\n{blocks[match[2]]()}\n\n{match[3]}"
 
-    return MARKED.sub(made, text)
+def write(name: str, parts: Mapping[str, str], files: Mapping[str, bytes], out: pathlib.Path) -> list[pathlib.Path]:
+    """Write a page and its files below a folder; returns their paths."""
+    page = f"docs/{name}.md"
+    text = fill((ROOT / page).read_text(encoding="utf-8"), parts)
+    written = []
+    for place, content in {page: text.encode(), **files}.items():
+        path = out / place
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+        written.append(path)
+    return written
+
+
+def table(header: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table."""
+    names = list(header)
+    lines = [names, ["---"] * len(names), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def pyplot() -> Any:
+    """Matplotlib's pyplot, drawing without a display."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+
+    return plt
 
 
 def png(figure: Any, **options: Any) -> bytes:

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import mpmath as mp
@@ -25,7 +26,6 @@ from mbma_tables.totals.island import geometry
 from mbma_tables.totals.pairs import kinks
 
 DIGITS = 40
-FORCE, AREA = 0, 1
 ULP = np.finfo(float).eps
 
 # islands
@@ -43,35 +43,56 @@ MAP_HURST = 0.8
 FIELDS = ("X", "mu", "eta", "D_d", "sigma_d", "R_u")
 
 # totals
-REACHES = (1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 3.0, 6.0)
+DEPTHS = (1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 3.0, 6.0)  # h_max - d
 TOTAL_BANDS = (3.0000001, 3.1, 10.0, 216.0, 1e4, 1e6, 1e8)
 TOTAL_HURSTS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1 - ULP / 2, 1.0)
 TOP = 3.0
 TOTAL_TRUTH = 1e-10
 
+Answer = tuple[Sequence[Any], float]  # values, and a bound on their relative error
 
-@dataclasses.dataclass(frozen=True)
+
+@dataclasses.dataclass
 class Tally:
-    """What became of some corners: answered with which largest error, refused, or worse."""
+    """The outcome at some corners: how many were refused or without a number, and the largest error of the rest."""
 
     name: str
-    tried: int
-    refused: int
-    not_finite: int
-    warned: int
-    largest: float
-    bound_broken: int
+    tried: int = 0
+    refused: int = 0
+    not_finite: int = 0
+    warned: int = 0
+    beyond: int = 0
+    largest: float = 0.0
+
+    def add(self, answer: Callable[[], Answer], truth: Sequence[Any] | None) -> float:
+        """Evaluate one corner; its error, NaN where it was refused, has no number, or its truth is not known."""
+        self.tried += 1
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                values, bound = answer()
+            except MbmaError:
+                self.refused += 1
+                return math.nan
+            except (ArithmeticError, ValueError):
+                values, bound = [math.nan], math.inf
+        self.warned += len(caught)
+        if not all(math.isfinite(value) for value in values):
+            self.not_finite += 1
+            return math.nan
+        if truth is None:
+            return math.nan
+        error = max(relative_error(value, exact) for value, exact in zip(values, truth, strict=True))
+        self.largest = max(self.largest, error)
+        self.beyond += error > bound
+        return error
 
 
-def quietly(answer: Any) -> tuple[Any, int]:
-    """A result, or None where it was refused with a typed error; and the number of warnings."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        try:
-            result = answer()
-        except MbmaError:
-            result = None
-    return result, len(caught)
+def relative_error(found: float, truth: Any) -> float:
+    """Relative error; zero where both underflow."""
+    if abs(float(truth)) < 1e-300:
+        return 0.0 if abs(found) < 1e-290 else math.inf
+    return abs(float(found / truth - 1))
 
 
 def rigid_truth(X: float) -> tuple[mp.mpf, mp.mpf]:
@@ -86,55 +107,40 @@ def rigid_truth(X: float) -> tuple[mp.mpf, mp.mpf]:
         return mp.pi / 5 * integral(mp.mpf(5) / 2), mp.pi / 2 * integral(mp.mpf(2))
 
 
-def _error(found: float, truth: Any) -> float:
-    """Relative error; zero where both underflow."""
-    exact = float(truth)
-    if not math.isfinite(found):
-        return math.nan
-    if exact == 0 or abs(exact) < 1e-300:
-        return 0.0 if abs(found) < 1e-290 else math.inf
-    return abs(float(found / truth - 1))
+def island_truth(X: float, mu: float) -> tuple[Any, Any] | None:
+    """Phi_F and Phi_A, or None where the solver refuses."""
+    if mu <= RIGID_MU:
+        force, area = rigid_truth(X)
+        return force * mp.mpf(float(mu)), area
+    try:
+        solved = greenwood_tripp.solve(X, mu, rtol=ISLAND_TRUTH)
+    except MbmaError:
+        return None
+    return solved.phi_F, solved.phi_A
 
 
 def islands() -> tuple[list[Tally], dict[str, FloatArray]]:
     """Every tier at every corner of (X, mu); maps of the larger error of both functions, NaN where refused."""
-    truth = np.full((X_CORNERS.size, MU_CORNERS.size, 2), np.nan)
-    for i, X in enumerate(X_CORNERS):
-        rigid = rigid_truth(X)
-        for j, mu in enumerate(MU_CORNERS):
-            if mu <= RIGID_MU:
-                truth[i, j] = float(rigid[FORCE] * mp.mpf(float(mu))), float(rigid[AREA])
-                continue
-            solved, _ = quietly(lambda X=X, mu=mu: greenwood_tripp.solve(X, mu, rtol=ISLAND_TRUTH))
-            if solved is not None:
-                truth[i, j] = solved.phi_F, solved.phi_A
-    maps: dict[str, FloatArray] = {}
-    tallies = []
-    for tier in TIERS:
-        model = get_model(tier, 10 * SOLVED, get_reading("reported"))
-        field = np.full(truth.shape[:2], np.nan)
-        refused = bad = warned = broken = 0
-        for (i, X), (j, mu) in ((a, b) for a in enumerate(X_CORNERS) for b in enumerate(MU_CORNERS)):
-            shaped = {"X": np.array([X]), "mu": np.array([mu])}
-            found, count = quietly(lambda model=model, shaped=shaped: model.of_islands(shaped))
-            warned += count
-            if found is None:
-                refused += 1
-                continue
-            error = max(_error(float(v[0]), t) for v, t in zip((found.phi_F, found.phi_A), truth[i, j], strict=True))
-            bad += not all(math.isfinite(float(v[0])) for v in (found.phi_F, found.phi_A))
-            field[i, j] = error
-            broken += bool(tier != "rigid" and error > float(found.error[0]) + ISLAND_TRUTH + 1e-14)
-        maps[tier] = field
-        # rigid spheres do not claim to be elastic ones
-        counted = tier != "rigid" and np.isfinite(field).any()
-        largest = float(np.nanmax(field)) if counted else math.nan
-        tallies.append(Tally(f"islands by {tier}", field.size, refused, bad, warned, largest, broken))
-    return tallies, maps
+    tallies = {tier: Tally(f"islands by {tier}") for tier in TIERS}
+    models = {tier: get_model(tier, 10 * SOLVED, get_reading("reported")) for tier in TIERS}
+    maps = {tier: np.full((X_CORNERS.size, MU_CORNERS.size), np.nan) for tier in TIERS}
+
+    def ask(model: Any, X: float, mu: float) -> Answer:
+        found = model.of_islands({"X": np.array([X]), "mu": np.array([mu])})
+        return (float(found.phi_F[0]), float(found.phi_A[0])), float(found.error[0]) + ISLAND_TRUTH + 1e-14
+
+    for (i, X), (j, mu) in itertools.product(enumerate(X_CORNERS), enumerate(MU_CORNERS)):
+        truth = island_truth(X, mu)
+        for tier, model in models.items():
+            # rigid spheres do not claim to be elastic ones
+            maps[tier][i, j] = tallies[tier].add(
+                functools.partial(ask, model, X, mu), None if tier == "rigid" else truth
+            )
+    return list(tallies.values()), maps
 
 
-def naive(approach: float, hurst: float, zeta_1: float, reading: str) -> dict[str, float]:
-    """The paper's formulas as they stand, in double precision; K as `exact_island`."""
+def direct_geometry(approach: float, hurst: float, zeta_1: float, reading: str) -> dict[str, float]:
+    """The paper's formulas as printed, in double precision; K_1 apart."""
     divide = {"printed": 6 * math.pi * math.sqrt(3), "reported": 6 * math.sqrt(3)}[reading]
     e = zeta_1 ** (-2 * hurst)
     s = 1 / math.sqrt(1 - e)
@@ -159,158 +165,58 @@ def naive(approach: float, hurst: float, zeta_1: float, reading: str) -> dict[st
     h_d, h_u = (math.sqrt(zeta ** (-2 * hurst) - e) for zeta in (zeta_d, zeta_u))
     D_top = summits(1.0, zeta_1)[0]
     eta = 0.75 * (math.pi * D_top) ** (1 / 3) * (1.5 * R_top) ** (2 / 3) * (20 * h_u / R_u) ** (1 / 3)
-    return {
-        "X": (approach / s - h_d) / sigma,
-        "mu": 8 / 3 * D * sigma * math.sqrt(2 * R_u * R_d),
-        "eta": eta,
-        "D_d": D_d,
-        "sigma_d": sigma_d,
-        "R_u": R_u,
-    }
+    X, mu = (approach / s - h_d) / sigma, 8 / 3 * D * sigma * math.sqrt(2 * R_u * R_d)
+    return {"X": X, "mu": mu, "eta": eta, "D_d": D_d, "sigma_d": sigma_d, "R_u": R_u}
 
 
-def _own(approach: float, hurst: float, zeta_1: float, rule: Reading) -> dict[str, float]:
-    """The library's geometry of one island."""
-    found = geometry(np.array([approach]), np.array([hurst]), np.array([zeta_1]), rule)
-    return {name: float(found[name][0]) for name in FIELDS}
-
-
-def _places(hurst: float, rule: Reading) -> Iterator[tuple[tuple[int, float], tuple[int, float]]]:
-    """Approaches and bands with their numbers; beyond those of the map, one ulp around the floors of zeta_d, zeta_u."""
-    for j, zeta_1 in enumerate(BANDS):
-        around = [float(kink) * (1 + side * ULP) for kink in kinks(hurst, zeta_1, rule) for side in (-1, 0, 1)]
-        for i, approach in enumerate((*APPROACHES, *around)):
-            yield (i, float(approach)), (j, float(zeta_1))
+def _approaches(hurst: float, zeta_1: float, reading: Reading) -> Iterator[float]:
+    """Values of delta/h_rms: those of the map, then one ulp around the floors of zeta_d and zeta_u."""
+    yield from map(float, APPROACHES)
+    yield from (float(kink) * (1 + side * ULP) for kink in kinks(hurst, zeta_1, reading) for side in (-1, 0, 1))
 
 
 def island_geometry() -> tuple[list[Tally], dict[str, FloatArray]]:
-    """Geometry by the library and by the paper's formulas as they stand, against 60 digits."""
+    """Geometry by the library and by the paper's formulas as printed, against 60 digits."""
     maps = {name: np.full((APPROACHES.size, BANDS.size), np.nan) for name in ("library", "direct")}
-    counts = {name: [0, 0, 0, 0.0] for name in maps}  # tried, not finite, warned, largest
-    for hurst in HURSTS:
-        for reading in ("reported", "printed"):
-            rule = get_reading(reading)
-            for (i, approach), (j, zeta_1) in _places(hurst, rule):
-                exact = exact_island(approach, hurst, zeta_1, divisor(reading))
+    tallies = {"library": Tally("geometry, library"), "direct": Tally("geometry, the paper's formulas as printed")}
 
-                ways = {
-                    "library": functools.partial(_own, approach, hurst, zeta_1, rule),
-                    "direct": functools.partial(naive, approach, hurst, zeta_1, reading),
-                }
-                for name, way in ways.items():
-                    try:
-                        found, count = quietly(way)
-                    except (ArithmeticError, ValueError):
-                        found, count = dict.fromkeys(FIELDS, math.nan), 0
-                    errors = [_error(found[field], exact[field]) for field in FIELDS]
-                    error = math.nan if any(map(math.isnan, errors)) else max(errors)
-                    counts[name][0] += 1
-                    counts[name][1] += math.isnan(error)
-                    counts[name][2] += count
-                    counts[name][3] = max(counts[name][3], 0.0 if math.isnan(error) else error)
-                    if hurst == MAP_HURST and reading == "reported" and i < APPROACHES.size:
-                        maps[name][i, j] = error
-    title = {"library": "geometry, library", "direct": "geometry, the paper's formulas as they stand"}
-    tallies = [
-        Tally(title[name], int(tried), 0, int(bad), int(warned), float(largest), 0)
-        for name, (tried, bad, warned, largest) in counts.items()
-    ]
-    return tallies, maps
+    def library(approach: float, hurst: float, zeta_1: float, reading: str) -> Answer:
+        found = geometry(np.array([approach]), np.array([hurst]), np.array([zeta_1]), get_reading(reading))
+        return [float(found[name][0]) for name in FIELDS], math.inf
 
+    def direct(approach: float, hurst: float, zeta_1: float, reading: str) -> Answer:
+        return list(direct_geometry(approach, hurst, zeta_1, reading).values()), math.inf
 
-def totals() -> tuple[list[Tally], list[dict[str, Any]]]:
-    """Totals of every tier at corners of surfaces and gaps, both readings, against the exact tier at 1e-10."""
-    corners = [
-        (hurst, zeta_1, reach, reading)
-        for reading in ("reported", "printed")
-        for hurst in TOTAL_HURSTS
-        for zeta_1 in TOTAL_BANDS
-        for reach in REACHES
-    ]
-    worst: list[dict[str, Any]] = []
-    counts: dict[str, list[Any]] = {tier: [0, 0, 0, 0, 0.0, 0] for tier in (*TIERS, "island4d")}
-    for hurst, zeta_1, reach, reading in corners:
-        surface = Surface(hurst, 1.0, zeta_1, 1.0, TOP)
-        gap = TOP - reach
-
-        def answer(tier: str, rtol: float, surface: Any = surface, gap: float = gap, reading: str = reading) -> Any:
-            return contact(surface, gap, tier=tier, reading=reading, rtol=rtol)
-
-        truth, _ = quietly(lambda answer=answer: answer("exact", TOTAL_TRUTH))
-        for tier, tally in counts.items():
-            if tier == "island4d" and reading != "reported":
-                continue
-            found, count = quietly(lambda answer=answer, tier=tier: answer(tier, 1e-8))
-            tally[0] += 1
-            tally[3] += count
-            if found is None:
-                tally[1] += 1
-                continue
-            finite = math.isfinite(found.force) and math.isfinite(found.area)
-            tally[2] += not finite
-            if truth is None or not finite or tier == "rigid":
-                continue
-            error = max(_error(float(found.force), truth.force), _error(float(found.area), truth.area))
-            tally[4] = max(tally[4], error)
-            if error > float(found.error) + TOTAL_TRUTH:
-                tally[5] += 1
-                worst.append(
-                    {"tier": tier, "hurst": hurst, "zeta_1": zeta_1, "reach": reach, "reading": reading, "error": error}
+    for hurst, reading, (j, zeta_1) in itertools.product(HURSTS, ("reported", "printed"), enumerate(map(float, BANDS))):
+        for i, approach in enumerate(_approaches(hurst, zeta_1, get_reading(reading))):
+            exact = exact_island(approach, hurst, zeta_1, divisor(reading))
+            for name, way in (("library", library), ("direct", direct)):
+                error = tallies[name].add(
+                    functools.partial(way, approach, hurst, zeta_1, reading), [exact[field] for field in FIELDS]
                 )
-    tallies = [
-        Tally(f"totals by {tier}", tried, refused, bad, warned, math.nan if tier == "rigid" else largest, broken)
-        for tier, (tried, refused, bad, warned, largest, broken) in counts.items()
-    ]
-    return tallies, worst
+                if hurst == MAP_HURST and reading == "reported" and i < APPROACHES.size:
+                    maps[name][i, j] = error
+    return list(tallies.values()), maps
 
 
-def arguments() -> Iterator[tuple[str, bool]]:
-    """Kinds of arrays, units and moduli: what was tried, and whether the answer was the same."""
-    gaps = np.linspace(-2.0, 2.9, 40)
-    base = contact(Surface(0.8, 1.0, 216.0, 1.0, 3.0), gaps)
+def totals() -> list[Tally]:
+    """Totals of every tier at corners of surfaces and gaps, both readings, against the exact tier at 1e-10."""
+    tallies = {tier: Tally(f"totals by {tier}") for tier in (*TIERS, "island4d")}
 
-    def same(found: Any, rtol: float = 0.0) -> bool:
-        pairs = ((found.force, base.force), (found.area, base.area))
-        return all(bool(np.all(np.abs(np.asarray(a).ravel() / b - 1) <= rtol)) for a, b in pairs)
+    def ask(surface: Surface, depth: float, tier: str, reading: str, rtol: float) -> Answer:
+        found = contact(surface, TOP - depth, tier=tier, reading=reading, rtol=rtol)
+        return (float(found.force), float(found.area)), float(found.error) + TOTAL_TRUTH
 
-    surface = Surface(0.8, 1.0, 216.0, 1.0, 3.0)
-    strided = np.repeat(gaps, 3)[::3]
-    frozen = gaps.copy()
-    frozen.flags.writeable = False
-    yield "every third of a longer array", same(contact(surface, strided))
-    yield "a read-only array", same(contact(surface, frozen))
-    yield "a reversed view", same(contact(surface, gaps[::-1][::-1]))
-    yield "Fortran order, two dimensions", same(contact(surface, np.asfortranarray(gaps.reshape(5, 8))))
-    yield "a list of floats", same(contact(surface, gaps.tolist()))
-    single = contact(surface, gaps.astype(np.float32))
-    widened = contact(surface, gaps.astype(np.float32).astype(float))
-    yield "float32, as the doubles they are", bool(np.array_equal(single.force, widened.force))
-    whole = contact(Surface(1, 1, 216, 1, 3), np.array([1, 2]))
-    yield (
-        "integers",
-        bool(np.array_equal(whole.force, contact(Surface(1.0, 1.0, 216.0, 1.0, 3.0), np.array([1.0, 2.0])).force)),
-    )
-    for unit in (1e-9, 1e-6, 1e-3, 1e3):
-        scaled = Surface(0.8, 1.0 / unit, 216.0 / unit, unit, 3.0 * unit)
-        yield f"length unit {unit:g}, to 1e-12", same(contact(scaled, gaps * unit), 1e-12)
-    for modulus in (1.0, 1e6, 1e12):
-        found = contact(surface, gaps, E_star=modulus)
-        yield f"E* = {modulus:g}, to 1e-15", bool(np.all(np.abs(found.force / modulus / base.force - 1) <= 1e-15))
-    many = np.tile(gaps, 25_000)
-    large = contact(surface, many)
-    yield "a million gaps, to 1e-8", bool(np.all(np.abs(large.force[:40] / base.force - 1) <= 1e-8))
-    beyond = contact(surface, np.array([3.0, 3.0 * (1 + ULP), 1e6]))
-    yield "d >= h_max is exactly zero", bool((beyond.force == 0).all() and (beyond.area == 0).all())
-    refusals: dict[str, Any] = {
-        "an empty array": lambda: contact(surface, np.empty(0)),
-        "NaN": lambda: contact(surface, math.nan),
-        "infinity": lambda: contact(surface, math.inf),
-        "d one ulp below -h_max": lambda: contact(surface, -3.0 * (1 + ULP)),
-        "H one ulp above 1": lambda: Surface(1 + ULP, 1.0, 216.0, 1.0, 3.0),
-        "zeta_1 = 3": lambda: contact(Surface(0.8, 1.0, 3.0, 1.0, 3.0), 1.0),
-        "mu one ulp below 0": lambda: greenwood_tripp.solve(1.0, -5e-324),
-        "complex numbers": lambda: contact(surface, 1j),
-        "text": lambda: contact(surface, "1.0"),
-    }
-    for name, answer in refusals.items():
-        yield f"{name}: refused by a typed error", quietly(answer)[0] is None
+    for reading, hurst, zeta_1, depth in itertools.product(("reported", "printed"), TOTAL_HURSTS, TOTAL_BANDS, DEPTHS):
+        surface = Surface(hurst, 1.0, zeta_1, 1.0, TOP)
+        try:
+            truth = ask(surface, depth, "exact", reading, TOTAL_TRUTH)[0]
+        except MbmaError:
+            truth = None
+        for tier, tally in tallies.items():
+            # the four-number table is of one reading
+            if tier != "island4d" or reading == "reported":
+                tally.add(
+                    functools.partial(ask, surface, depth, tier, reading, 1e-8), None if tier == "rigid" else truth
+                )
+    return list(tallies.values())

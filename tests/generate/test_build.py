@@ -174,7 +174,7 @@ def invoke(folder, text, kind="universal"):
     path = folder / "own.toml"
     path.write_text(text)
     out = folder / "table.nc"
-    result = CliRunner().invoke(main, [kind, "--config", str(path), "--out", str(out), "--workers", "1"])
+    result = CliRunner().invoke(main, ["tables", kind, "--config", str(path), "--out", str(out), "--workers", "1"])
     return result, sorted(p.name for p in folder.iterdir() if p != path)
 
 

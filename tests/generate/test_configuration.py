@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from generate.__main__ import TABLES, main
+from generate.__main__ import main
 from generate.tables import configuration
+from generate.tables.commands import TABLES
 from generate.tables.configuration import FEWEST_NODES, FEWEST_SHIPPED, LIMITS, load, make_axis
 from mbma_tables.errors import InputError
 from mbma_tables.islands import greenwood_tripp
@@ -21,7 +22,7 @@ HERE = configuration.HERE
 def refused(kind, folder, *arguments):
     """What a refusal says; it is one line and leaves the folder as it was."""
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    result = CliRunner().invoke(main, [kind, "--workers", "1", *arguments])
+    result = CliRunner().invoke(main, ["tables", kind, "--workers", "1", *arguments])
     assert result.exit_code == 2, result.output
     assert isinstance(result.exception, SystemExit)
     assert result.stdout == ""

@@ -14,10 +14,11 @@ import pytest
 from click.testing import CliRunner
 from small_builds import KINDS, small
 
-import generate.__main__ as command
+from generate.__main__ import main
 from generate.pages import fidelity
 from generate.tables import build as build_module
 from generate.tables import campaign as campaign_module
+from generate.tables import commands as command
 from generate.tables import island4d
 from generate.tables.build import UncertifiedError, build
 from generate.tables.campaign import Campaign, CampaignError, Workers, split
@@ -91,39 +92,21 @@ def test_a_campaigns_own_fault_stays_as_it_is(dask):
         raise CampaignError("the disk is full")
 
 
-@pytest.mark.parametrize(("what", "tables"), [("formula", []), ("all", ["universal", "island4d"])])
+@pytest.mark.parametrize(("what", "tables"), [("heights", []), ("all", ["universal", "island4d"])])
 def test_what_is_made_and_where(what, tables, monkeypatch, tmp_path):
     made = []
     monkeypatch.setattr(command.height_coefficients, "main", lambda: made.append("heights"))
     monkeypatch.setattr(command, "make_table", lambda c, path, *_: made.append((c.kind, path.name)))
-
-    class Form:
-        name, outputs = "pocket", ("phi_F",)
-
-        def largest_error(self, name):
-            return 0.0375
-
-    def formulas(target):
-        made.append(target)
-        return types.SimpleNamespace(forms={"pocket": Form()})
-
-    monkeypatch.setattr("generate.formulas.fit.build", formulas)
-    done = CliRunner().invoke(command.main, [what, "--out", str(tmp_path / "here"), "--workers", "1"])
+    done = CliRunner().invoke(main, ["tables", what, "--out", str(tmp_path / "here"), "--workers", "1"])
     assert done.exit_code == 0
-    target = tmp_path / "here" / "formula.json" if what == "all" else tmp_path / "here"
-    assert made == [*(["heights"] if tables else []), *((kind, f"{kind}.nc") for kind in tables), target]
-    assert f"{target}: pocket; largest held-out error phi_F 3.75e-02" in done.output
-
-
-def test_formulas_go_where_the_library_reads_them():
-    assert command.formula_file(None, "formula") == command.TABLES / "formula.json"
+    assert made == ["heights", *((kind, f"{kind}.nc") for kind in tables)]
 
 
 @pytest.mark.parametrize("option", ["--config", "--target"])
-def test_options_of_one_table(option, tmp_path):
-    done = CliRunner().invoke(command.main, ["formula", option, "1"])
+def test_options_of_one_table(option):
+    done = CliRunner().invoke(main, ["tables", "all", option, "1"])
     assert done.exit_code == 2
-    assert done.output == "generate: --config and --target belong to one table, not to all, nor to formula\n"
+    assert done.output == "generate: --config and --target belong to one table\n"
 
 
 def test_an_interrupted_run_says_how_to_go_on(monkeypatch, tmp_path):
@@ -131,9 +114,9 @@ def test_an_interrupted_run_says_how_to_go_on(monkeypatch, tmp_path):
         raise click.Abort
 
     monkeypatch.setattr(command, "make_table", interrupted)
-    done = CliRunner().invoke(command.main, ["universal", "--out", str(tmp_path / "a.nc"), "--workers", "1"])
+    done = CliRunner().invoke(main, ["tables", "universal", "--out", str(tmp_path / "a.nc"), "--workers", "1"])
     assert done.exit_code == 1
-    assert done.output == "generate: interrupted; --resume goes on from the chunks that are done\n"
+    assert done.output == "generate: interrupted; --resume continues from the chunks that are done\n"
 
 
 @pytest.fixture
