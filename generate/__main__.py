@@ -63,7 +63,8 @@ def pages(names: tuple[str, ...], out: pathlib.Path) -> None:
         if not hasattr(page, "measure"):
             page.main(["--out", str(out / "docs")], standalone_mode=False)
             continue
-        for path in write(name, *page.measure(), out):
+        parts, files = page.measure()
+        for path in write(name, parts, files, out):
             click.echo(path)
 
 

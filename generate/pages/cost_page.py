@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from generate.pages.page import png
-from generate.pages.tables import markdown
+from generate.pages.page import png, table
 from mbma_tables.scenes.costs import GAPS, HELD_OUT, Costs, Row, pareto_front
 
 BRUTE_FORCE = "boundary_elements"
@@ -77,7 +76,7 @@ def rows_table(rows: Iterable[Row], front: Sequence[Row] = ()) -> str:
         ]
         for row in rows
     ]
-    return markdown(["what", "asked", "largest error", "cost", "evaluations", ""], cells)
+    return table(["what", "asked", "largest error", "cost", "evaluations", ""], cells)
 
 
 def spans(rows: Sequence[Row]) -> str:
@@ -104,7 +103,7 @@ def single_table(costs: Costs) -> str:
     if not cells:
         return ""
     header = ["tier", "asked", "alone", "time over that of both", "islands a gap", "for both"]
-    return markdown([*header, "height integrals a gap", "for both"], cells)
+    return table([*header, "height integrals a gap", "for both"], cells)
 
 
 def readme_table(costs: Costs) -> str:
@@ -121,7 +120,7 @@ def readme_table(costs: Costs) -> str:
     for row in sorted(classical, key=lambda row: row.error or 0.0)[:1]:
         spent = f"{1e6 * row.cost * costs.seconds:.3g} us"
         cells.append(["an island", METHODS[row.tier], row.variant, f"{row.error:.0e}", number(row.cost), spent])
-    return markdown(["of", "what", "asked", "largest error", "cost", "that is"], cells)
+    return table(["of", "what", "asked", "largest error", "cost", "that is"], cells)
 
 
 def page(costs: Costs) -> str:

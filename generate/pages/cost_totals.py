@@ -12,7 +12,7 @@ from unittest import mock
 
 import numpy as np
 
-from generate.pages.fidelity import REFERENCES
+from generate.pages.comparisons import REFERENCES
 from generate.tables.solves import log_ratio
 from mbma_tables import Scene, Surface, contact, contact_law, theories
 from mbma_tables.arguments import FloatArray

@@ -31,7 +31,8 @@ RESOLUTIONS = (125, 250, 500, 1000)
 def new(rows: int = 1, columns: int = 2, **options: Any) -> tuple[Any, Any]:
     """A figure of 900 pixels' width and its axes."""
     height = 3.4 if rows == 1 else 6.4
-    return pyplot().subplots(rows, columns, figsize=(9, height), dpi=100, layout="constrained", **options)
+    figure, axes = pyplot().subplots(rows, columns, figsize=(9, height), dpi=100, layout="constrained", **options)
+    return figure, axes
 
 
 def by_gap(ax: Any, surface: Surface, low: float, names: Iterable[str] = THEORIES, **style: Any) -> None:

@@ -15,6 +15,8 @@ from typing import Any
 
 import click
 
+from mbma_tables.files import write_file
+
 ROOT = pathlib.Path(__file__).parents[2]
 PAGES = ("cost", "export", "fidelity", "formula", "stability", "tables")
 MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -35,8 +37,7 @@ def write(name: str, parts: Mapping[str, str], files: Mapping[str, bytes], out: 
     written = []
     for place, content in {page: text.encode(), **files}.items():
         path = out / place
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
+        write_file(path, content, make_folders=True)
         written.append(path)
     return written
 

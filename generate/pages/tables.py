@@ -1,22 +1,16 @@
-"""`python -m generate.pages.tables`: the measured parts of docs/tables.md, and its figures.
-
-Each measured part stands between two marks in the page; the rest of the page is written by hand and kept.
-"""
+"""The measured parts of docs/tables.md, and its figures."""
 
 from __future__ import annotations
 
 import math
 import pathlib
 from collections.abc import Iterable, Sequence
-from typing import Any
 
-import click
 import numpy as np
 
-from generate.pages.page import fill, png
+from generate.pages.page import png, pyplot, table
 from generate.tables.configuration import load
 from generate.tables.schemes import LARGEST_ZETA_D, POINTS, SIZES, Row, compare
-from mbma_tables.files import write_file
 from mbma_tables.islands.four_numbers import hat_scales, to_axes
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models.universal import shipped
@@ -26,12 +20,6 @@ from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL, TableConte
 
 PAGE = pathlib.Path(__file__).parents[2] / "docs" / "tables.md"
 EXAMPLE = {UNIVERSAL: 40, ISLAND4D: 40}  # conformance points worked through
-
-
-def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def sizes() -> str:
@@ -48,7 +36,7 @@ def sizes() -> str:
             size = f"{shipped(kind).stat().st_size / 1e6:.2f} MB"
             rows.append([kind, f"{nodes} = {total}", size, f, *errors])
     header = ["table", "nodes", "file", "of", "largest error", "99% below", "half below", "largest where surfaces go"]
-    return markdown(header, rows)
+    return table(header, rows)
 
 
 def axes() -> str:
@@ -59,7 +47,7 @@ def axes() -> str:
             shifted = f"{axis.name} + {axis.offset:g}" if axis.offset else axis.name
             t = f"log({shifted})" if axis.transform == "log" else shifted
             rows.append([kind, axis.name, axis.long_name, t, f"{axis.low:g}", f"{axis.high:g}", str(axis.nodes)])
-    return markdown(["table", "axis", "what it is", "equally spaced in", "first", "last", "nodes"], rows)
+    return table(["table", "axis", "what it is", "equally spaced in", "first", "last", "nodes"], rows)
 
 
 def _lookup_steps(content: TableContent, coordinates: Sequence[float], X: float, mu: float) -> list[list[str]]:
@@ -103,7 +91,7 @@ def example_universal() -> str:
     content, point = read_table(shipped(UNIVERSAL), UNIVERSAL), EXAMPLE[UNIVERSAL]
     X, mu = (float(content.conformance[name][point]) for name in ("X", "mu"))
     rows = [["X, mu", f"{X!r}, {mu!r}"], *_lookup_steps(content, (X, mu), X, mu), *_stored(content, point)]
-    return f"Conformance point {point} (counted from 0):\n\n" + markdown(["step", "number"], rows)
+    return f"Conformance point {point} (counted from 0):\n\n" + table(["step", "number"], rows)
 
 
 def example_island4d() -> str:
@@ -125,13 +113,13 @@ def example_island4d() -> str:
         ["A_hat/Phi_A = 2 pi D R_u R_d S^2", f"{scale_A:.12e}"],
         *_stored(content, point),
     ]
-    return f"Conformance point {point} (counted from 0):\n\n" + markdown(["step", "number"], rows)
+    return f"Conformance point {point} (counted from 0):\n\n" + table(["step", "number"], rows)
 
 
 def comparison_table(rows: Iterable[Row]) -> str:
     """Largest errors of the schemes at equal size."""
     header = ["spread from", "nodes", "held on", "cubic, box", "cubic, visited", "quintic, box", "quintic, visited"]
-    return markdown(
+    return table(
         header,
         [
             [f"{r.least:g}", f"{r.nodes} = {' x '.join(map(str, r.shape))}", r.scheme, *(f"{e:.1e}" for e in r.errors)]
@@ -140,15 +128,11 @@ def comparison_table(rows: Iterable[Row]) -> str:
     )
 
 
-def draw(folder: pathlib.Path, rows: Sequence[Row]) -> None:
+def draw(rows: Sequence[Row]) -> dict[str, bytes]:
     """The two figures of the page, as PNG files of 900 pixels' width."""
-    import matplotlib as mpl
+    from matplotlib import colors
 
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt
-
-    def save(figure: Any, name: str) -> None:
-        write_file(folder / f"{name}.png", png(figure), make_folders=True)
+    plt = pyplot()
 
     leasts = sorted({row.least for row in rows}, reverse=True)
     figure, panels = plt.subplots(
@@ -165,7 +149,7 @@ def draw(folder: pathlib.Path, rows: Sequence[Row]) -> None:
         panel.grid(alpha=0.3)
     panels[0][0].set_ylabel("largest relative error, held-out points")
     figure.legend(*panels[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
-    save(figure, "tables_comparison")
+    files = {"docs/figures/tables_comparison.png": png(figure)}
 
     content = read_table(shipped(UNIVERSAL), UNIVERSAL)
     edges = [
@@ -176,11 +160,11 @@ def draw(folder: pathlib.Path, rows: Sequence[Row]) -> None:
     low, high = content.local_error.min(), content.local_error.max()
     for panel, number, name in zip(panels, (0, 1), (r"$\Phi_F$", r"$\Phi_A$"), strict=True):
         field = content.local_error[..., number].T
-        image = panel.pcolormesh(edges[0], edges[1], field, norm=mpl.colors.LogNorm(low, high), rasterized=True)
+        image = panel.pcolormesh(edges[0], edges[1], field, norm=colors.LogNorm(low, high), rasterized=True)
         panel.set(yscale="log", xlabel="X", title=f"bound on the relative error of {name}")
     panels[0].set_ylabel(r"$\mu$")
     figure.colorbar(image, ax=panels)
-    save(figure, "tables_universal_error")
+    return files | {"docs/figures/tables_universal_error.png": png(figure)}
 
 
 def comparison_text(rows: Sequence[Row]) -> str:
@@ -193,27 +177,14 @@ def comparison_text(rows: Sequence[Row]) -> str:
     )
 
 
-@click.command()
-@click.option("--out", type=click.Path(path_type=pathlib.Path), default=PAGE.parent, help="Folder; default docs.")
-@click.option("--figures/--no-figures", default=True, show_default=True)
-@click.option("--largest", type=int, default=max(SIZES), show_default=True, help="Most nodes of a compared table.")
-def main(out: pathlib.Path, figures: bool, largest: int) -> None:
-    """Write OUT/tables.md, from the page in docs, with its measured parts anew, and OUT/figures/tables_*.png."""
-    page = fill(
-        PAGE.read_text(encoding="utf-8"),
-        {
-            "sizes": sizes,
-            "axes": axes,
-            "universal": example_universal,
-            "island4d": example_island4d,
-            "comparison": lambda: comparison_text(compare(largest)),
-        },
-    )
-    write_file(out / "tables.md", page.encode(), make_folders=True)
-    if figures:
-        draw(out / "figures", compare(largest))
-    click.echo(f"wrote {out / 'tables.md'}")
-
-
-if __name__ == "__main__":
-    main()
+def measure() -> tuple[dict[str, str], dict[str, bytes]]:
+    """The measured parts of the page, and its figures."""
+    rows = compare(max(SIZES))
+    parts = {
+        "sizes": sizes(),
+        "axes": axes(),
+        "universal": example_universal(),
+        "island4d": example_island4d(),
+        "comparison": comparison_text(rows),
+    }
+    return parts, draw(rows)

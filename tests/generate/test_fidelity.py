@@ -5,27 +5,27 @@ import re
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from scipy.optimize import brentq
 
-from generate.pages import fidelity
+from generate.pages import comparisons, fidelity
+from generate.pages.fidelity_figures import ROADS
+from generate.pages.page import MARKED, ROOT
 from mbma_tables import Surface, contact, theories
 
-DOCS = fidelity.DATA.parent
+PAGE = (ROOT / "docs" / "fidelity.md").read_text(encoding="utf-8")
+PARTS = {match[2]: match[0] for match in MARKED.finditer(PAGE)}
 PICKED = "challenge"
 LAST_DIGIT = 0.011  # three digits are printed, so one unit of the last is at most 1%
 
 
 def tables(text):
-    """All tables by heading, each a list of (header, rows)."""
-    found, heading, block = {}, "", []
+    """All tables of a text, each a header and its rows."""
+    found, block = [], []
     for line in [*text.splitlines(), ""]:
-        if line.startswith("#"):
-            heading = line.lstrip("# ")
         if line.startswith("|"):
             block.append([cell.strip() for cell in line.strip("|").split("|")])
         elif block:
-            found.setdefault(heading, []).append((block[0], block[2:]))
+            found.append((block[0], block[2:]))
             block = []
     return found
 
@@ -35,19 +35,16 @@ def number(cell):
 
 
 @pytest.fixture(scope="module")
-def fresh(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("docs")
-    arguments = ["--out", str(folder), "--sets", PICKED, "--no-figures"]
-    result = CliRunner().invoke(fidelity.main, arguments, catch_exceptions=False)
-    assert result.exit_code == 0
-    assert [path.name for path in folder.iterdir()] == ["fidelity.md"]
-    return tables((folder / "fidelity.md").read_text(encoding="utf-8"))
+def fresh():
+    """Measured parts, of one data set only."""
+    parts = {"quoted": fidelity.quoted_table()} | {name: fidelity.kappa_table(name) for name in ROADS}
+    parts[PICKED] = fidelity.reference_tables(comparisons.REFERENCES[PICKED])
+    return {name: tables(text) for name, text in parts.items()}
 
 
 def test_tables_are_rectangular_and_name_every_theory(fresh):
-    ((header, rows),) = fresh["What the paper quotes"]
-    assert header == ["case", "what", "paper", *fidelity.THEORIES]
-    assert {"concrete", "asphalt", *fresh}
+    ((header, rows),) = fresh["quoted"]
+    assert header == ["case", "what", "paper", *comparisons.THEORIES]
     for blocks in fresh.values():
         for names, lines in blocks:
             assert lines
@@ -64,7 +61,7 @@ def test_tables_are_rectangular_and_name_every_theory(fresh):
 
 
 def test_quoted_rows_equal_the_library(fresh):
-    ((header, rows),) = fresh["What the paper quotes"]
+    ((header, rows),) = fresh["quoted"]
     surface = Surface.named("yang-persson")
     cells = {(row[0], row[1]): dict(zip(header, row, strict=True)) for row in rows}
     row = cells["yang-persson", "F/(A0 E*), u = 2.5 h_rms: MBMA"]
@@ -78,8 +75,8 @@ def test_quoted_rows_equal_the_library(fresh):
 
 
 def test_areas_at_equal_force_equal_a_root_found_otherwise(fresh):
-    reference = fidelity.REFERENCES[PICKED]
-    header, rows = fresh[reference.title][0]
+    reference = comparisons.REFERENCES[PICKED]
+    header, rows = fresh[PICKED][0]
     surface = reference.surface()
     assert surface.rms_gradient == pytest.approx(reference.gradient, rel=1e-14)
     force, area = reference.column("force"), reference.column("area")
@@ -102,41 +99,37 @@ def test_areas_at_equal_force_equal_a_root_found_otherwise(fresh):
 def test_solutions_have_the_wanted_value(theory, kind):
     surface = Surface.named("yang-persson")
     wanted = np.array([3e-4, 2e-3, 9e-3])
-    force, area = fidelity.solve(surface, theory, kind, wanted)
+    force, area = comparisons.solve(surface, theory, kind, wanted)
     assert {"force": force, "area": area}[kind] == pytest.approx(wanted, rel=1e-6)
 
 
 def test_loads_beyond_a_theory_are_left_open():
     surface = Surface.named("yang-persson")
-    assert np.isnan(fidelity.solve(surface, "MBMA printed", "force", 1.0)).all()
-    assert np.isnan(fidelity.force_at(surface, "Persson full", 0.0))
-    assert fidelity.force_at(surface, "MBMA reported", 3.5) == 0
+    assert np.isnan(comparisons.solve(surface, "MBMA printed", "force", 1.0)).all()
+    assert np.isnan(comparisons.force_at(surface, "Persson full", 0.0))
+    assert comparisons.force_at(surface, "MBMA reported", 3.5) == 0
     expected = theories.persson_force(surface, 0.0, method="simplified")
-    assert fidelity.force_at(surface, "Persson simplified", 0.0) == expected
+    assert comparisons.force_at(surface, "Persson simplified", 0.0) == expected
 
 
 def test_committed_page_is_what_the_code_computes(fresh):
-    committed = tables((DOCS / "fidelity.md").read_text(encoding="utf-8"))
-    assert {reference.title for reference in fidelity.REFERENCES.values()} <= set(committed)
-    for heading, blocks in fresh.items():
-        assert len(committed[heading]) == len(blocks)
-        for (old_names, old_rows), (names, rows) in zip(committed[heading], blocks, strict=True):
+    assert set(PARTS) == {"quoted", *ROADS, *comparisons.REFERENCES}
+    for name, blocks in fresh.items():
+        for (old_names, old_rows), (names, rows) in zip(tables(PARTS[name]), blocks, strict=True):
             assert old_names == names
-            assert len(old_rows) == len(rows)
             for old, new in zip(old_rows, rows, strict=True):
                 for before, now in zip(old, new, strict=True):
                     if re.fullmatch(r"—|[\d.e+-]+( \(\S+\))?", now):
                         expected = pytest.approx(number(now), rel=LAST_DIGIT, nan_ok=True)
-                        assert number(before) == expected, (heading, old, new)
+                        assert number(before) == expected, (name, old, new)
                     else:
                         assert before == now
 
 
-def test_committed_figures_are_the_ones_that_the_page_shows():
-    page = (DOCS / "fidelity.md").read_text(encoding="utf-8")
-    shown = re.findall(r"\(figures/(\w+\.png)\)", page)
-    assert set(shown) == {f"{name}.png" for name in (*fidelity.CAPTIONS, "reference")}
+def test_committed_figures_are_there():
+    shown = re.findall(r"\((figures/\w+\.png)\)", PAGE)
+    assert len(shown) == 8
     for name in shown:
-        content = (DOCS / "figures" / name).read_bytes()
+        content = (ROOT / "docs" / name).read_bytes()
         assert content.startswith(b"\x89PNG")
         assert len(content) < 100_000

@@ -4,27 +4,23 @@ from __future__ import annotations
 
 import pathlib
 import re
-import runpy
-import sys
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from generate.__main__ import main
+from generate.pages import comparisons, fidelity_figures
 from generate.pages import export as export_page
-from generate.pages import fidelity, fidelity_figures
-from generate.pages import stability as atlas
 from generate.pages import tables as table_page
-from generate.pages.page import MARKED
+from generate.pages.page import MARKED, ROOT
 from generate.tables import height_coefficients
 from generate.tables import schemes as table_schemes
 from generate.tables.schemes import Row
-from mbma_tables import Surface, contact, theories
+from mbma_tables import InputError, Surface, contact, theories
 from mbma_tables.export.law_rows import describe_law
 
-ROOT = pathlib.Path(export_page.__file__).parent
 PNG = b"\x89PNG"
-PROGRAMS = ("stability", "cost", "export", "fidelity", "formula", "gauntlet", "tables")
 
 
 def run(command, *arguments):
@@ -33,25 +29,41 @@ def run(command, *arguments):
     return done.output
 
 
-@pytest.mark.parametrize("name", PROGRAMS)
-def test_each_program_tells_of_itself(name, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", [f"{name}.py", "--help"])
-    with pytest.raises(SystemExit) as ended:
-        runpy.run_path(str(ROOT / f"{name}.py"), run_name="__main__")
-    assert ended.value.code == 0
-    said = capsys.readouterr().out
-    assert said.startswith(f"Usage: {name}.py [OPTIONS]")
-    assert "--out" in said
+@pytest.mark.parametrize("what", [[], ["tables"], ["formulas"], ["pages"]])
+def test_every_command_has_help(what):
+    assert run(main, *what, "--help").startswith(f"Usage: main {' '.join(what)}".rstrip())
 
 
-@pytest.mark.parametrize("study", ["atlas", "cost", "gauntlet", ""])
-def test_a_study_is_reached_by_its_name(study, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["generate", *([study] if study else []), "--help"])
-    with pytest.raises(SystemExit) as ended:
-        runpy.run_path(str(ROOT.parent / "__main__.py"), run_name="__main__")
-    assert ended.value.code == 0
-    usage = f"Usage: generate {study} [OPTIONS]" if study else "[OPTIONS] {universal|island4d|formula|all}"
-    assert usage in capsys.readouterr().out
+def test_a_page_is_written_with_its_figures(tmp_path, monkeypatch):
+    monkeypatch.setattr("generate.pages.stability.measure", lambda: ({"corners": "of corners"}, {"docs/a/b.png": PNG}))
+    place = tmp_path / "docs"
+    assert run(main, "pages", "stability", "--out", tmp_path).split() == [
+        str(place / "stability.md"),
+        str(place / "a" / "b.png"),
+    ]
+    text = (place / "stability.md").read_text(encoding="utf-8")
+    (match,) = MARKED.finditer(text)
+    assert match[0] == f"{match[1]}\nof corners\n\n{match[3]}"
+    assert MARKED.sub("", text) == MARKED.sub("", (ROOT / "docs" / "stability.md").read_text(encoding="utf-8"))
+    assert (place / "a" / "b.png").read_bytes() == PNG
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        (ModuleNotFoundError("No module named 'mpmath'"), "No module named 'mpmath'; install the extra: pip install"),
+        (InputError("no such\nthing"), "no such thing"),
+    ],
+)
+def test_errors_are_one_line(fault, said, monkeypatch):
+    def fail():
+        raise fault
+
+    monkeypatch.setattr("generate.pages.stability.measure", fail)
+    done = CliRunner().invoke(main, ["pages", "stability"])
+    assert done.exit_code == 2
+    assert done.stderr.startswith(f"generate: {said}")
+    assert len(done.stderr.splitlines()) == 1
 
 
 def test_the_export_page(tmp_path, monkeypatch):
@@ -78,18 +90,8 @@ def test_the_export_page(tmp_path, monkeypatch):
 @pytest.fixture(scope="module")
 def drawn():
     """The fidelity figures by name, as matplotlib holds them."""
-    figures = []
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fidelity_figures, "png", figures.append)
-        written = {}
-        patch.setattr(
-            fidelity_figures, "write_file", lambda path, content, make_folders: written.update({path: content})
-        )
-        fidelity_figures.draw(pathlib.Path("figures"))
-    yield dict(zip((path.stem for path in written), figures, strict=True))
-    from matplotlib import pyplot
-
-    pyplot.close("all")
+    yield dict(fidelity_figures.drawn())
+    fidelity_figures.pyplot().close("all")
 
 
 def curve(axes, label):
@@ -98,7 +100,8 @@ def curve(axes, label):
 
 
 def test_every_figure_of_the_fidelity_page(drawn):
-    assert set(drawn) == {*fidelity.CAPTIONS, "reference"}
+    shown = re.findall(r"figures/(\w+)\.png", (ROOT / "docs" / "fidelity.md").read_text(encoding="utf-8"))
+    assert set(drawn) == set(shown)
 
 
 def test_curves_are_the_librarys(drawn):
@@ -118,7 +121,7 @@ def test_curves_are_the_librarys(drawn):
 
 
 def test_points_are_the_published_ones(drawn):
-    data, surface = fidelity.REFERENCES["challenge"], Surface.named("challenge")
+    data, surface = comparisons.REFERENCES["challenge"], Surface.named("challenge")
     place, force = curve(drawn["fig15"].axes[0], "boundary elements")
     assert place == pytest.approx(data.column("mean_separation_over_h_rms"), rel=1e-15, abs=0)
     assert force * data.gradient == pytest.approx(data.column("force") * surface.rms_gradient, rel=1e-14, abs=0)
@@ -126,19 +129,11 @@ def test_points_are_the_published_ones(drawn):
 
 def test_ratios_to_the_references(drawn):
     panels = drawn["reference"].axes
-    first = next(iter(fidelity.REFERENCES.values()))
+    first = next(iter(comparisons.REFERENCES.values()))
     area, ratio = curve(panels[0], "MBMA reported")
     assert area == pytest.approx(first.column("area"), rel=1e-15, abs=0)
-    wanted = fidelity.area_ratios(first, first.surface())["MBMA reported"]
+    wanted = comparisons.area_ratios(first, first.surface())["MBMA reported"]
     assert ratio == pytest.approx(wanted, rel=1e-12, abs=0, nan_ok=True)
-
-
-def test_the_fidelity_page_with_its_figures(tmp_path, monkeypatch):
-    monkeypatch.setattr(fidelity, "page", lambda sets: f"about {', '.join(sets)}")
-    monkeypatch.setattr(fidelity_figures, "draw", lambda folder: (tmp_path / "told").write_text(str(folder)))
-    run(fidelity.main, "--out", tmp_path, "--sets", "bem")
-    assert (tmp_path / "fidelity.md").read_text(encoding="utf-8") == "about bem"
-    assert (tmp_path / "told").read_text(encoding="utf-8") == str(tmp_path / "figures")
 
 
 ROWS = [
@@ -149,16 +144,12 @@ ROWS = [
 ]
 
 
-def test_the_page_on_tables_changes_only_where_it_is_marked(tmp_path, monkeypatch):
-    asked = []
-    monkeypatch.setattr(table_page, "compare", lambda largest: asked.append(largest) or ROWS)
-    assert run(table_page.main, "--out", tmp_path, "--largest", 30000) == f"wrote {tmp_path / 'tables.md'}\n"
-    assert set(asked) == {30000}
-    text, before = (tmp_path / "tables.md").read_text(encoding="utf-8"), table_page.PAGE.read_text(encoding="utf-8")
-    assert MARKED.sub("", text) == MARKED.sub("", before)
-    assert "| 0.001 | 7920 = 8 x 9 x 10 x 11 | one | 3.8e-04 | 2.5e-04 | 1.0e-04 | 2.0e-04 |" in text
-    for name in ("tables_comparison", "tables_universal_error"):
-        assert (tmp_path / "figures" / f"{name}.png").read_bytes().startswith(PNG)
+def test_the_page_on_tables(monkeypatch):
+    monkeypatch.setattr(table_page, "compare", lambda largest: ROWS)
+    parts, files = table_page.measure()
+    assert "| 0.001 | 7920 = 8 x 9 x 10 x 11 | one | 3.8e-04 | 2.5e-04 | 1.0e-04 | 2.0e-04 |" in parts["comparison"]
+    assert set(files) == {f"docs/figures/tables_{name}.png" for name in ("comparison", "universal_error")}
+    assert all(content.startswith(PNG) for content in files.values())
 
 
 def test_schemes_are_compared_at_every_size_asked(monkeypatch):
@@ -177,17 +168,6 @@ def test_schemes_are_compared_at_every_size_asked(monkeypatch):
     assert [holds for *_, holds in seen[:2]] == [(False, True), (True,)]
     assert len(found) == 3 * 7
     assert {row.shape for row in table_schemes.compare.__wrapped__(12000)} == {(12000,)}
-
-
-def test_the_atlas_changes_only_what_it_measured(tmp_path, monkeypatch):
-    made = {name: lambda name=name: f"of {name}" for name in atlas.CORNERS}
-    monkeypatch.setattr(atlas, "parts", lambda figure: (tmp_path / "told").write_text(str(figure)) and made)
-    run(atlas.main, "--out", tmp_path)
-    text, before = (tmp_path / "stability.md").read_text(encoding="utf-8"), atlas.PAGE.read_text(encoding="utf-8")
-    for match in MARKED.finditer(text):
-        assert (match[0] == f"{match[1]}\nof {match[2]}\n\n{match[3]}") == (match[2] in atlas.CORNERS)
-    assert MARKED.sub("", text) == MARKED.sub("", before)
-    assert (tmp_path / "told").read_text(encoding="utf-8") == str(tmp_path / atlas.FIGURE)
 
 
 def test_pieces_of_a_height_integral_are_the_shipped_ones(monkeypatch):
