@@ -1,4 +1,4 @@
-"""Exported C timed against the compiled Python kernel: islands and totals, both in this process.
+"""Exported C timed against the library: islands and totals, both in this process.
 
 Run with ``python benchmarks/exports.py``. One core; the C source is compiled into a shared library and called on the
 same arrays; every ratio is of two times taken in turn in this run, the median over the rounds, so that what else the
@@ -22,14 +22,9 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables import Surface
+from mbma_tables import Surface, contact
 from mbma_tables.export.code import write_code
-from mbma_tables.models import universal_kernel
-from mbma_tables.models.protocol import BOTH
 from mbma_tables.models.universal import universal_model
-from mbma_tables.surfaces.readings import get_reading
-from mbma_tables.totals import kernel as lookup
-from mbma_tables.totals.universal_sum import QUADRATURE_SHARE
 
 ROUNDS = 15
 POINTS = 20_000
@@ -74,30 +69,29 @@ def pointer(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
+def largest(found: np.ndarray, *known: np.ndarray) -> float:
+    """The largest relative difference of columns from what is known."""
+    return float(np.abs(found[:, : len(known)].T / np.stack(known) - 1).max())
+
+
 def report(what: str, count: int, names: list[str], taken: list[list[float]]) -> None:
     """Nanoseconds an entry, and the ratio of Python's time to C's."""
-    own = taken[0]
-    print(f"{what}: compiled Python kernel {statistics.median(own) / count * 1e9:.0f} ns")
+    library = taken[0]
+    print(f"{what}: library {statistics.median(library) / count * 1e9:.0f} ns")
     for name, times in zip(names, taken[1:], strict=True):
-        ratio = statistics.median(python / c for python, c in zip(own, times, strict=True))
+        ratio = statistics.median(python / c for python, c in zip(library, times, strict=True))
         print(f"  C {name}: {statistics.median(times) / count * 1e9:.0f} ns, {ratio:.2f} x as fast")
 
 
 def main() -> None:
     """Time islands at random (X, mu), and totals of one surface at many gaps."""
     rng = np.random.default_rng(SEED)
-    kernel = universal_model().kernel
+    model = universal_model()
     X, mu = rng.uniform(-5.0, 40.0, POINTS), np.exp(rng.uniform(np.log(1e-7), np.log(1e6), POINTS))
-    status, out = np.empty(POINTS, dtype=np.int64), np.empty((3, POINTS))
     answers = np.empty((POINTS, 3))
 
     surface = Surface.named("yang-persson")
     gaps = np.linspace(-0.5, 0.95, GAPS) * surface.h_max
-    reading = get_reading("reported")
-    many = [np.full(GAPS, value) for value in (surface.hurst, surface.zeta_1)]
-    reach, top = (surface.h_max - gaps) / surface.h_rms, np.full(GAPS, surface.h_max / surface.h_rms)
-    share = QUADRATURE_SHARE * RTOL
-    status_of, sums = np.empty(GAPS, dtype=np.int64), np.empty((3, GAPS))
     contacts = np.empty((GAPS, 3))
     given = CSurface(surface.hurst, surface.q0, surface.q1, surface.h_rms, surface.h_max)
 
@@ -116,16 +110,14 @@ def main() -> None:
                 ctypes.byref(given), count, pointer(gaps), one, rtol, pointer(contacts), None
             )
 
-        runs = [lambda: universal_kernel.fill_phi(X, mu, *kernel, status, out), *map(islands, libraries)]
+        runs = [lambda: model.answer(X, mu), *map(islands, libraries)]
         report(f"islands, {POINTS} random (X, mu)", POINTS, list(OPTIONS), in_turn(runs))
-        print(f"  largest relative difference {np.abs(answers[:, :2].T / out[:2] - 1).max():.1e}")
-        runs = [
-            lambda: lookup.fill_totals(BOTH, *many, reach, top, share, reading.numbers, True, *kernel, status_of, sums),
-            *map(totals, libraries),
-        ]
+        known = model.answer(X, mu)
+        print(f"  largest relative difference {largest(answers, known.phi_F, known.phi_A):.1e}")
+        runs = [lambda: contact(surface, gaps, rtol=RTOL), *map(totals, libraries)]
         report(f"totals, one surface at {GAPS} gaps", GAPS, list(OPTIONS), in_turn(runs))
-        scale = surface.q0 * surface.s
-        print(f"  largest relative difference {np.abs(contacts[:, :2].T / (sums[:2].T * [scale, 1]).T - 1).max():.1e}")
+        total = contact(surface, gaps, rtol=RTOL)
+        print(f"  largest relative difference {largest(contacts, total.force, total.area):.1e}")
 
 
 if __name__ == "__main__":
