@@ -10,11 +10,8 @@ import click
 from mbma_tables.cli.options import surface_options
 from mbma_tables.cli.sources import read_source
 from mbma_tables.errors import InputError
+from mbma_tables.export import CODE, DATA, SOLVERS
 from mbma_tables.files import write_file
-
-SOLVERS = ("calculix", "abaqus", "lsdyna", "optistruct", "comsol", "moose", "modelica")
-DATA = ("csv", "json", "matlab", "netcdf", "hdf5", "parquet")
-CODE = ("c", "fortran", "javascript", "python")
 
 
 @click.command("export", short_help="A contact law, or the whole model, for other codes.")
@@ -29,7 +26,7 @@ CODE = ("c", "fortran", "javascript", "python")
 @click.option("--length-unit", help="Unit of the surface's lengths and of the file, such as mm.")
 @click.option("--stress-unit", help="Unit of the modulus and of the file, such as MPa.")
 @click.option("--rows", type=int, help="How many rows; else as few as --rtol needs.")
-@click.option("--rtol", type=float, help="Largest relative error of linear interpolation; 1e-3 unless told.")
+@click.option("--rtol", type=float, help="Largest relative error of linear interpolation; 1e-3 by default.")
 @click.option("--largest-overclosure", type=float, help="Where the rows end; else at full compression.")
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure instead.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
@@ -40,7 +37,7 @@ CODE = ("c", "fortran", "javascript", "python")
 def export_command(**given: Any) -> None:
     """Write TARGET to a file.
 
-    Solvers and data take a surface, a modulus and units; c, fortran, javascript and python are the whole model as code.
+    Solvers and data take a surface, a modulus and units; c, fortran and javascript are the whole model as code.
 
     Example: mbma export calculix --surface concrete --E-star 13.3 --length-unit mm --stress-unit MPa --out law.inp
     """
@@ -57,27 +54,23 @@ def export_command(**given: Any) -> None:
 
 
 def _export_code(target: str, folder: Path, reading: str, check: bool) -> None:
-    from mbma_tables.export.code import write_code
-    from mbma_tables.export.conformance import check as replay
+    from mbma_tables.export import code
 
-    for path in write_code(target, folder, reading):
+    for path in code.write_code(target, folder, reading):
         click.echo(path)
     if check:
-        found = replay(target, folder)
+        found = code.check(target, folder)
         if not found.ran:
             raise InputError(f"not checked: {found.reason}")
         for kind, largest in found.largest.items():
             click.echo(f"{kind}: {found.points[kind]} points, largest relative difference {largest:.1e}")
-        if found.failed:
-            raise InputError(f"{found.failed} points failed: {found.reason}")
+        if found.reason:
+            raise InputError(f"the check failed: {found.reason}")
 
 
 def _law_files(target: str, out: Path, given: dict[str, Any]) -> dict[Path, bytes]:
-    from mbma_tables.export.data import DATA as WRITERS
-    from mbma_tables.export.data import matlab_reader
+    from mbma_tables.export import data, solvers
     from mbma_tables.export.law_rows import describe_law
-    from mbma_tables.export.solvers import SOLVERS as PRINTERS
-    from mbma_tables.export.solvers import exponential
 
     source = read_source(given)
     if source.E_star is None:
@@ -98,14 +91,12 @@ def _law_files(target: str, out: Path, given: dict[str, Any]) -> dict[Path, byte
     if given["exponential"]:
         if target not in ("calculix", "abaqus"):
             raise InputError(f"--exponential is a law of calculix and abaqus, not of {target}")
-        return {out: exponential(source.surface, source.E_star, law.comments).encode()}
-    if target == "calculix":
-        return {out: PRINTERS[target][0](law, pair=given["pair"]).encode()}
-    if target in PRINTERS:
-        return {out: PRINTERS[target][0](law).encode()}
-    files = {out: WRITERS[target][0](law)}
+        return {out: solvers.exponential(source.surface, source.E_star, law.comments).encode()}
+    if target in SOLVERS:
+        options = {"pair": given["pair"]} if target == "calculix" else {}
+        return {out: getattr(solvers, target)(law, **options).encode()}
     if target == "matlab":
-        if not out.stem.isidentifier() or out.suffix != ".mat":
-            raise InputError(f"--out of matlab must be NAME.mat with a name that MATLAB can call, got {out.name!r}")
-        files[out.with_suffix(".m")] = matlab_reader(law, out.stem)
-    return files
+        if out.suffix != ".mat":
+            raise InputError(f"--out of matlab must be NAME.mat, got {out.name!r}")
+        return {out.with_suffix(".m"): data.matlab_reader(law, out.stem), out: data.to_matlab(law)}
+    return {out: getattr(data, f"to_{target}")(law)}

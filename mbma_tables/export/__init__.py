@@ -1,1 +1,6 @@
-"""The model, its tables and its laws written for other programs: one module a target."""
+"""The model, its tables and its laws written for other programs."""
+
+# the targets, in the order in which help lists them
+SOLVERS = ("calculix", "abaqus", "lsdyna", "optistruct", "comsol", "moose", "modelica")  # functions of `solvers`
+DATA = ("csv", "json", "matlab", "netcdf", "hdf5", "parquet")  # functions of `data`, named to_csv and so on
+CODE = ("c", "fortran", "javascript")  # keys of `code.LANGUAGES`

@@ -1,20 +1,72 @@
-"""Write the whole model as source code: universal table with derivatives, island geometry, totals."""
+"""The whole model as source code: C99, and Fortran and JavaScript over the same C; written, built and replayed."""
 
 from __future__ import annotations
 
-import importlib
-import importlib.resources
+import base64
+import dataclasses
+import importlib.util
 import os
 import pathlib
-from typing import Any
+import shutil
+import subprocess
+import sys
+import tempfile
+from typing import NamedTuple
 
 from mbma_tables.errors import InputError
+from mbma_tables.export import CODE, c_code
+from mbma_tables.export.conformance import KINDS, POINTS_FILE, points_text
+from mbma_tables.export.text import block_comment, comment
 from mbma_tables.files import write_file
 from mbma_tables.models.universal import UniversalModel, open_table
 from mbma_tables.surfaces.readings import Reading, get_reading
 
-TARGETS = ("c", "fortran", "javascript", "python")
-POINTS_FILE = "mbma_conformance.csv"
+TIMEOUT = 300.0  # seconds, of a build or a replay
+WASM_FUNCTIONS = ("mbma_phi", "mbma_phi_slopes", "mbma_formula", "mbma_island_geometry", "mbma_total")
+ZIG = ("-m", "ziglang", "cc", "-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-O2", "-s")
+
+
+class Language(NamedTuple):
+    """A target's own files, each made from a template, with what each is; and how its self-test is built and run.
+
+    `{0}` in the commands is the folder of the sources; nothing is built where the first is empty.
+    """
+
+    titles: dict[str, str]
+    usage: str
+    build: tuple[str, ...]
+    run: tuple[str, ...]
+
+
+LANGUAGES = {
+    "c": Language(
+        {"mbma_selftest.c": "mbma_selftest.c: replays the conformance points of the MBMA model in C99."},
+        c_code.USAGE,
+        ("cc", "-std=c99", "-O2", "{0}/mbma.c", "{0}/mbma_selftest.c", "-lm", "-o", "selftest"),
+        ("./selftest",),
+    ),
+    "fortran": Language(
+        {
+            "mbma.f90": "mbma.f90: the MBMA model for Fortran 2008, an interface to mbma.c.",
+            "mbma_selftest.f90": "mbma_selftest.f90: replays the conformance points of the MBMA model in Fortran 2008.",
+        },
+        "Compile it with mbma.c, in this order: gfortran -O2 mbma.c mbma.f90 program.f90. Every procedure may be "
+        "called from any thread.",
+        ("gfortran", "-O2", "{0}/mbma.c", "{0}/mbma.f90", "{0}/mbma_selftest.f90", "-o", "selftest"),
+        ("./selftest",),
+    ),
+    "javascript": Language(
+        {
+            "mbma.mjs": "mbma.mjs: the MBMA model for JavaScript, mbma.c as WebAssembly.",
+            "mbma_selftest.mjs": "mbma_selftest.mjs: replays the conformance points of the MBMA model in JavaScript.",
+        },
+        "import { phi, phiSlopes, formula, islandGeometry, total } from './mbma.mjs', in any browser since 2021 and in "
+        "node: one file, no dependency, nothing to fetch. Answers are objects with a status, which is STATUS.OK where "
+        "they hold numbers; an argument that is not a number, or is NaN, throws a TypeError.",
+        (),
+        ("node", "{0}/mbma_selftest.mjs"),
+    ),
+}
 
 
 def write_code(
@@ -27,10 +79,11 @@ def write_code(
 
     Parameters
     ----------
-    target : {"c", "fortran", "javascript", "python"}
-        C99 (which C++ compiles too), a Fortran 2008 module, an ECMAScript module, or a reader in Python and numpy.
+    target : {"c", "fortran", "javascript"}
+        C99, which C++ compiles too; a Fortran 2008 module over that C; or an ECMAScript module with that C in it as
+        WebAssembly, which the package ziglang compiles.
     folder : path
-        Where the files go; it is made if its parent exists. Files of the same names are replaced.
+        Where the files go; it is made where it is missing. Files of the same names are replaced.
     reading : {"reported", "printed"} or Reading
         Which reading of the paper's equations the geometry and the totals have.
     table : path
@@ -44,47 +97,148 @@ def write_code(
     Raises
     ------
     InputError
-        For an unknown target or reading, a table that is no universal one, or a folder that cannot be written; no file
-        is left then.
+        For an unknown target or reading, a table that is not a universal one, a folder that cannot be written, and
+        JavaScript without ziglang.
     TableFileError
         Where the table cannot be read.
     """
-    if target not in TARGETS:
-        raise InputError(f"target must be one of {TARGETS}, got {target!r}")
+    if target not in CODE:
+        raise InputError(f"target must be one of {CODE}, got {target!r}")
     rule = get_reading(reading)
     model = open_table(table)
     if not isinstance(model, UniversalModel):
-        raise InputError(f"code is written from a universal table, and {os.fspath(table)} is none")
-    from mbma_tables.export.conformance import points_text
+        raise InputError(f"code is written from a universal table, and {os.fspath(table)} is not one")
+    texts = {**source_texts(target, model, rule), POINTS_FILE: points_text(model, rule)}
+    for name, text in texts.items():
+        write_file(pathlib.Path(folder, name), text.encode(), make_folders=True)
+    return [pathlib.Path(folder, name) for name in texts]
 
-    return _write(pathlib.Path(folder), {**sources(target, model, rule), POINTS_FILE: points_text(model, rule)})
 
-
-def sources(target: str, model: UniversalModel, reading: Reading) -> dict[str, str]:
+def source_texts(target: str, model: UniversalModel, reading: Reading) -> dict[str, str]:
     """Names and texts of a target's source files."""
-    from mbma_tables.export.numbers import collect, describe
-
-    language: Any = importlib.import_module(f"mbma_tables.export.{target}_source")
-    numbers = collect(model, reading)
-    parts = language.parts(numbers)
-    texts = {}
-    for name, title in language.TITLES.items():
-        header = describe(model.content, reading, title, language.USAGE)
-        if name in language.TEMPLATES:
-            text = (importlib.resources.files("mbma_tables.export") / "templates" / f"{name}.in").read_text(
-                encoding="utf-8"
-            )
-            text = text.replace("@HEADER@", language.comment(header))
-            for place, part in parts.items():
-                text = text.replace(f"@{place}@", part)
-        else:
-            text = language.numbers_text(numbers, header)
-        texts[name] = text
+    language = LANGUAGES[target]
+    c_texts = c_code.c_texts(model, reading)
+    texts = {} if target == "javascript" else dict(c_texts)
+    for name, title in language.titles.items():
+        lines = c_code.header(model, reading, title, language.usage)
+        opening = comment(lines, "!") if target == "fortran" else block_comment(lines)
+        parts = {"HEADER": opening.rstrip()}
+        if name == "mbma.mjs":
+            parts["WASM"] = base64.encodebytes(web_assembly(c_texts)).decode("ascii")
+        texts[name] = c_code.filled(name, **parts)
     return texts
 
 
-def _write(folder: pathlib.Path, texts: dict[str, str]) -> list[pathlib.Path]:
-    """Write the files, each whole or not at all."""
-    for name, text in texts.items():
-        write_file(folder / name, text.encode(), make_folders=True)
-    return [folder / name for name in texts]
+def web_assembly(c_texts: dict[str, str]) -> bytes:
+    """The C sources compiled to WebAssembly.
+
+    Raises
+    ------
+    InputError
+        Where the compiler is missing or fails.
+    """
+    if importlib.util.find_spec("ziglang") is None:
+        raise InputError(
+            "javascript is compiled from C by the package ziglang, which is not installed: "
+            "pip install 'mbma_tables[javascript]'"
+        )
+    with tempfile.TemporaryDirectory() as work:
+        for name, text in c_texts.items():
+            write_file(pathlib.Path(work, name), text.encode())
+        exports = [f"-Wl,--export={name}" for name in WASM_FUNCTIONS]
+        done = _run([sys.executable, *ZIG, *exports, "mbma.c", "-o", "mbma.wasm"], work)
+        if done.returncode:
+            raise InputError(f"ziglang did not compile mbma.c: {done.stderr.strip()[:500]}")
+        return pathlib.Path(work, "mbma.wasm").read_bytes()
+
+
+@dataclasses.dataclass(frozen=True)
+class Replay:
+    """What a replay in the target found.
+
+    Attributes
+    ----------
+    program : str
+    points : dict of int
+        Rows replayed, by kind.
+    largest : dict of float
+        Largest relative difference, by kind.
+    failed : int
+        Answers beyond their tolerance, and rows that were refused.
+    reason : str
+        Why it did not run or did not end well; empty where all is right.
+    ran : bool
+        False where the program is not installed.
+    """
+
+    program: str
+    points: dict[str, int]
+    largest: dict[str, float]
+    failed: int
+    reason: str
+    ran: bool = True
+
+
+def check(target: str, folder: os.PathLike[str] | str, points: os.PathLike[str] | str | None = None) -> Replay:
+    """Build exported code where its compiler is installed, and replay the points in it.
+
+    Parameters
+    ----------
+    target : {"c", "fortran", "javascript"}
+    folder : path
+        Where `write_code` wrote; nothing is written there.
+    points : path, optional
+        Another file of points than the one beside the code.
+
+    Returns
+    -------
+    Replay
+
+    Raises
+    ------
+    InputError
+        For an unknown target, or a folder without the code.
+    """
+    if target not in CODE:
+        raise InputError(f"target must be one of {CODE}, got {target!r}")
+    place = pathlib.Path(folder).absolute()
+    csv = place / POINTS_FILE if points is None else pathlib.Path(points).absolute()
+    if not csv.is_file():
+        raise InputError(f"{csv} does not exist; write_code({target!r}, {str(place)!r}) makes it")
+    language = LANGUAGES[target]
+    program = (language.build or language.run)[0]
+    if shutil.which(program) is None:
+        return Replay(program, {}, {}, 0, f"{program} is not installed", ran=False)
+    build, run = ([word.format(place) for word in command] for command in (language.build, language.run))
+    with tempfile.TemporaryDirectory() as work:
+        if build:
+            done = _run(build, work)
+            if done.returncode:
+                return Replay(program, {}, {}, 0, f"{program} did not compile it: {done.stderr.strip()[:500]}")
+        return read_report(program, _run([*run, str(csv)], work))
+
+
+def _run(command: list[str], folder: str) -> subprocess.CompletedProcess[str]:
+    try:
+        return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT, check=False)
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(command, 1, "", f"no end within {TIMEOUT:g} s")
+
+
+def read_report(program: str, done: subprocess.CompletedProcess[str]) -> Replay:
+    """What a self-test printed: kind, rows, largest difference; then how many failed."""
+    points: dict[str, int] = {}
+    largest: dict[str, float] = {}
+    failed = -1
+    for line in done.stdout.splitlines():
+        words = line.split()
+        if len(words) == 3 and words[0] in KINDS:
+            points[words[0]], largest[words[0]] = int(words[1]), float(words[2])
+        elif len(words) == 2 and words[0] == "failed":
+            failed = int(words[1])
+    reason = ""
+    if failed < 0:
+        reason = f"the self-test did not end: {done.stderr.strip()[:500]}"
+    elif failed or done.returncode:
+        reason = f"{failed} answers are beyond their tolerance or were refused"
+    return Replay(program, points, largest, max(failed, 0), reason)

@@ -1,4 +1,4 @@
-"""Conformance points beside exported code, and their replay by the exported code itself.
+"""Conformance points beside exported code, which its self-test replays.
 
 A row of the points' file is: kind, tolerance, arguments, then for each answer the answer and what its difference is
 taken relative to. Lines that begin with # say what the kinds are.
@@ -6,29 +6,21 @@ taken relative to. Lines that begin with # say what the kinds are.
 
 from __future__ import annotations
 
-import dataclasses
 import math
-import os
-import pathlib
-import shutil
-import subprocess
-import sys
-import tempfile
 from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import InputError
-from mbma_tables.export.code import POINTS_FILE, TARGETS
-from mbma_tables.export.numbers import FORM
+from mbma_tables.export.c_code import FORM
+from mbma_tables.export.text import comment
 from mbma_tables.islands.geometry import FIELDS, fill_islands
-from mbma_tables.models import universal_kernel
-from mbma_tables.models.closed_forms import FormulaModel
+from mbma_tables.models import closed_form_functions, universal_kernel
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.readings import Reading
 
+POINTS_FILE = "mbma_conformance.csv"
 KINDS = {
     "phi": "X, mu; phi_F, phi_A, the bound on their error",
     "slopes": "X, mu; phi_F by X, phi_A by X, phi_F by mu, phi_A by mu, relative to themselves or |phi/argument|",
@@ -47,55 +39,18 @@ SURFACES = (
 )
 DEPTHS = (0.05, 0.3, 0.8, 1.4)  # (h_max - d)/h_max
 RTOL = 1e-8
-LONGEST_RUN = 300.0  # seconds, of a build or a replay
-BUILDS: dict[str, tuple[str, tuple[str, ...], str]] = {
-    # program, how it builds, what is then run (with {folder} for where the sources are)
-    "c": ("cc", ("-std=c99", "-O2", "{folder}/mbma.c", "{folder}/mbma_selftest.c", "-lm", "-o", "selftest"), ""),
-    "fortran": (
-        "gfortran",
-        (
-            *("-std=f2008", "-O2", "{folder}/mbma_table.f90", "{folder}/mbma.f90", "{folder}/mbma_selftest.f90"),
-            *("-o", "selftest"),
-        ),
-        "",
-    ),
-    "javascript": ("node", (), "{folder}/mbma_selftest.mjs"),
-    "python": (sys.executable, (), "{folder}/mbma_reader.py"),
-}
 
 
-@dataclasses.dataclass(frozen=True)
-class Replay:
-    """What a replay in the target found.
-
-    Attributes
-    ----------
-    target, program : str
-    ran : bool
-        False where the program is not installed.
-    points : dict of int
-        Rows replayed, by kind.
-    largest : dict of float
-        Largest relative difference, by kind.
-    failed : int
-        Answers beyond their tolerance, and rows that were refused.
-    reason : str
-        Why it did not run or did not end well; empty where all is right.
-    """
-
-    target: str
-    program: str
-    ran: bool
-    points: dict[str, int]
-    largest: dict[str, float]
-    failed: int
-    reason: str
-
-
-def row(kind: str, arguments: Iterable[float], answers: Iterable[float], scales: Iterable[float]) -> str:
+def row(
+    kind: str,
+    arguments: Iterable[float],
+    answers: Iterable[float],
+    scales: Iterable[float],
+    tolerance: float = TOLERANCE,
+) -> str:
     """One line of the points' file."""
     pairs = (number for pair in zip(answers, scales, strict=True) for number in pair)
-    return ",".join((kind, *(repr(float(number)) for number in (TOLERANCE, *arguments, *pairs))))
+    return ",".join((kind, *(repr(float(number)) for number in (tolerance, *arguments, *pairs))))
 
 
 def phi_rows(model: UniversalModel, X: FloatArray, mu: FloatArray) -> Iterator[str]:
@@ -154,11 +109,12 @@ def status_rows(model: UniversalModel) -> Iterator[str]:
 
 def formula_rows(X: FloatArray, mu: FloatArray) -> Iterator[str]:
     """The closed form at those of some points that lie in its range."""
-    model = FormulaModel(FORM)
-    answer = model.answer(X, mu, outside="nan")
-    for k in np.flatnonzero(np.isfinite(answer.error)):
-        values = (answer.phi_F[k], answer.phi_A[k])
-        yield row("formula", (X[k], mu[k]), values, np.abs(values))
+    functions, form = closed_form_functions.FUNCTIONS[FORM], closed_form_functions.RANGES[FORM]
+    (X_low, X_high), (_, mu_high) = form["X"], form["mu"]
+    inside = (np.clip(X, X_low, X_high) == X) & (mu <= mu_high)
+    X, mu = X[inside], mu[inside]
+    for *place, phi_F, phi_A in zip(X, mu, functions["phi_F"](X, mu), functions["phi_A"](X, mu), strict=True):
+        yield row("formula", place, (phi_F, phi_A), (phi_F, phi_A))
 
 
 def table_rows(model: UniversalModel) -> Iterator[str]:
@@ -167,18 +123,19 @@ def table_rows(model: UniversalModel) -> Iterator[str]:
     bound = model.error(points["X"], points["mu"])
     for k in range(bound.size):
         answers = (points["table_F"][k], points["table_A"][k], bound[k])
-        line = row("phi", (points["X"][k], points["mu"][k]), answers, answers)
-        yield line.replace(repr(TOLERANCE), repr(float(points["tolerance"][k])), 1)
+        yield row("phi", (points["X"][k], points["mu"][k]), answers, answers, points["tolerance"][k])
 
 
 def points_text(model: UniversalModel, reading: Reading) -> str:
     """The points' file: the table's own, and the runtime's slopes, islands, totals and refusals."""
     points = model.content.conformance
-    digest = model.content.attributes["values_sha256"]
+    head = [
+        f"conformance points of the MBMA model, reading {reading.name}",
+        f"data {model.content.attributes['values_sha256']}",
+        "a row: kind, tolerance, arguments; then each answer and what its difference is taken relative to",
+        *(f"{kind}: {meaning}" for kind, meaning in KINDS.items()),
+    ]
     lines = [
-        f"# conformance points of the MBMA model, reading {reading.name}, data {digest}",
-        "# a row: kind, tolerance, arguments; then each answer and what its difference is taken relative to",
-        *(f"# {kind}: {meaning}" for kind, meaning in KINDS.items()),
         *table_rows(model),
         *(line for line in phi_rows(model, points["X"], points["mu"]) if line.startswith("slopes")),
         *status_rows(model),
@@ -191,70 +148,4 @@ def points_text(model: UniversalModel, reading: Reading) -> str:
         approach = np.geomspace(1e-3, 2 * surface[4] / surface[3], 8)
         lines += geometry_rows(approach, np.full(8, surface[0]), np.full(8, zeta_1), reading)
         lines += total_rows(surface, surface[4] * (1 - np.array(DEPTHS)), reading)
-    return "\n".join(lines) + "\n"
-
-
-def check(target: str, folder: os.PathLike[str] | str, points: os.PathLike[str] | str | None = None) -> Replay:
-    """Build exported code where its compiler is installed, and replay the points in it.
-
-    Parameters
-    ----------
-    target : {"c", "fortran", "javascript", "python"}
-    folder : path
-        Where `write_code` wrote; nothing is written there.
-    points : path, optional
-        Another file of points than the one beside the code.
-
-    Returns
-    -------
-    Replay
-
-    Raises
-    ------
-    InputError
-        For an unknown target, or a folder without the code.
-    """
-    if target not in TARGETS:
-        raise InputError(f"target must be one of {TARGETS}, got {target!r}")
-    place = pathlib.Path(folder).absolute()
-    csv = place / POINTS_FILE if points is None else pathlib.Path(points).absolute()
-    if not csv.is_file():
-        raise InputError(f"{csv} is not there; write_code({target!r}, {str(place)!r}) makes it")
-    name, options, script = BUILDS[target]
-    program = shutil.which(name)
-    if program is None:
-        return Replay(target, name, False, {}, {}, 0, f"{name} is not installed")
-    with tempfile.TemporaryDirectory() as work:
-        if options:
-            command = [program, *(option.format(folder=place) for option in options)]
-            done = _run(command, work)
-            if done.returncode:
-                return Replay(target, name, True, {}, {}, 0, f"{name} did not compile it: {done.stderr.strip()[:500]}")
-        start = [program, script.format(folder=place)] if script else [os.path.join(work, "selftest")]
-        return read_report(target, name, _run([*start, str(csv)], work))
-
-
-def _run(command: list[str], folder: str) -> subprocess.CompletedProcess[str]:
-    try:
-        return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=LONGEST_RUN, check=False)
-    except subprocess.TimeoutExpired:
-        return subprocess.CompletedProcess(command, 1, "", f"no end within {LONGEST_RUN:g} s")
-
-
-def read_report(target: str, program: str, done: subprocess.CompletedProcess[str]) -> Replay:
-    """What a self-test printed: kind, rows, largest difference; then how many failed."""
-    points: dict[str, int] = {}
-    largest: dict[str, float] = {}
-    failed = -1
-    for line in done.stdout.splitlines():
-        words = line.split()
-        if len(words) == 3 and words[0] in KINDS:
-            points[words[0]], largest[words[0]] = int(words[1]), float(words[2])
-        elif len(words) == 2 and words[0] == "failed":
-            failed = int(words[1])
-    reason = ""
-    if failed < 0:
-        reason = f"the self-test did not end: {done.stderr.strip()[:500]}"
-    elif failed or done.returncode:
-        reason = f"{failed} answers are beyond their tolerance or were refused"
-    return Replay(target, program, True, points, largest, max(failed, 0), reason)
+    return comment(head, "#") + "\n".join(lines) + "\n"

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import json
-from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from mbma_tables.errors import InputError
 from mbma_tables.export.law_rows import LawTable
+from mbma_tables.export.text import checked_name, comment, csv_cell
 from mbma_tables.files import written_bytes
 
+MAX_MATLAB_NAME = 63
 READER = """function y = {name}(x)
-% {title}
-% Linear interpolation in {name}.mat; x and y in its units. Beyond the range: an error.
+{title}% Linear interpolation in {name}.mat; x and y in its units. Beyond the range: an error.
   law = load('{name}.mat');
   x0 = law.x(:); y0 = law.y(:);
   if any(x(:) < x0(1)) || any(x(:) > x0(end))
@@ -39,9 +40,12 @@ def _header(law: LawTable) -> dict[str, Any]:
 
 def to_csv(law: LawTable) -> bytes:
     """Columns with a header of comments."""
-    head = "".join(f"# {line}\n" for line in law.comments)
-    rows = "".join(f"{x!r},{y!r}\n" for x, y in zip(law.x.tolist(), law.y.tolist(), strict=True))
-    return f"{head}{law.x_name} [{law.x_unit}],{law.y_name} [{law.y_unit}]\n{rows}".encode()
+    stream = io.StringIO()
+    stream.write(comment(law.comments, "#"))
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow([csv_cell(f"{law.x_name} [{law.x_unit}]"), csv_cell(f"{law.y_name} [{law.y_unit}]")])
+    writer.writerows(zip(law.x.tolist(), law.y.tolist(), strict=True))
+    return stream.getvalue().encode()
 
 
 def to_json(law: LawTable) -> bytes:
@@ -50,7 +54,7 @@ def to_json(law: LawTable) -> bytes:
     return (json.dumps(content, indent=1) + "\n").encode()
 
 
-def to_mat(law: LawTable) -> bytes:
+def to_matlab(law: LawTable) -> bytes:
     """A MATLAB file of version 5: x, y, and the header as text."""
     from scipy.io import savemat
 
@@ -64,8 +68,14 @@ def to_mat(law: LawTable) -> bytes:
 
 
 def matlab_reader(law: LawTable, name: str) -> bytes:
-    """The function that looks up the MATLAB file of that name."""
-    return READER.format(name=name, title=law.comments[1]).encode()
+    """The function NAME.m that looks up the MATLAB file NAME.mat.
+
+    Raises
+    ------
+    InputError
+        For a name that MATLAB cannot call.
+    """
+    return READER.format(name=checked_name(name, MAX_MATLAB_NAME), title=comment(law.comments[1:2], "%")).encode()
 
 
 def to_netcdf(law: LawTable) -> bytes:
@@ -114,13 +124,3 @@ def to_parquet(law: LawTable) -> bytes:
     stream = io.BytesIO()
     parquet.write_table(table, stream)
     return stream.getvalue()
-
-
-DATA: Mapping[str, tuple[Callable[[LawTable], bytes], str]] = {
-    "csv": (to_csv, ".csv"),
-    "json": (to_json, ".json"),
-    "matlab": (to_mat, ".mat"),
-    "netcdf": (to_netcdf, ".nc"),
-    "hdf5": (to_hdf5, ".h5"),
-    "parquet": (to_parquet, ".parquet"),
-}

@@ -9,13 +9,14 @@ on both sides.
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
 from mbma_tables import __version__
 from mbma_tables.arguments import FloatArray, number_in, whole_number_in
 from mbma_tables.errors import InputError
+from mbma_tables.export.text import number
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.totals.conductance import conductance
@@ -24,11 +25,10 @@ from mbma_tables.totals.law import ContactLaw, contact_law
 QUANTITIES = ("pressure", "conductance")
 FLOOR = 1e-3  # of the largest pressure: below it, errors are not relative to the pressure but to this
 FINE = 20_001  # points at which a choice of rows is judged
-FEWEST_ROWS, MOST_ROWS = 3, 5000
+MIN_ROWS, MAX_ROWS = 3, 5000
 ROUNDS = 40  # of evening errors out
-DIGITS = 10  # of the numbers in a file
 LAW_RTOL = 1e-8
-CLOSE = 1e-10  # rows nearer than this, in the file's unit, are spoilt by some readers
+MIN_STEP = 1e-10  # rows nearer than this, in the file's unit, are spoilt by some readers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,7 +59,7 @@ class LawTable:
 
 def rounded(values: FloatArray) -> FloatArray:
     """Numbers as a file holds them."""
-    return np.array([float(f"{value:.{DIGITS}g}") for value in values])
+    return np.array([float(number(value)) for value in values])
 
 
 def spread(x: FloatArray, y: FloatArray, count: int) -> FloatArray:
@@ -70,10 +70,10 @@ def spread(x: FloatArray, y: FloatArray, count: int) -> FloatArray:
     places = _cut(filled, x, count)
     best, found = np.inf, places
     for _ in range(ROUNDS):
-        own = np.interp(places, x, y)
+        chords = np.interp(places, x, y)
         step = np.clip(np.searchsorted(places, x, side="right") - 1, 0, count - 2)
         error = np.zeros(count - 1)
-        np.maximum.at(error, step, np.abs(np.interp(x, places, own) - y) / scale)
+        np.maximum.at(error, step, np.abs(np.interp(x, places, chords) - y) / scale)
         if error.max() < best:
             best, found = error.max(), places
         # the error of a chord falls like the square of its length
@@ -100,10 +100,10 @@ def balanced(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArra
     scale = np.maximum(fine_y, FLOOR * fine_y[-1])
     over = (np.interp(fine_x, x, y) - fine_y) / scale
     step = np.clip(np.searchsorted(x, fine_x, side="right") - 1, 0, x.size - 2)
-    most, least = np.zeros(x.size - 1), np.zeros(x.size - 1)
-    np.maximum.at(most, step, over)
-    np.minimum.at(least, step, over)
-    middle = (most + least) / 2
+    high, low = np.zeros(x.size - 1), np.zeros(x.size - 1)
+    np.maximum.at(high, step, over)
+    np.minimum.at(low, step, over)
+    middle = (high + low) / 2
     beside = np.concatenate([[middle[0]], (middle[1:] + middle[:-1]) / 2, [middle[-1]]])
     moved = np.maximum(y - beside * np.maximum(y, FLOOR * y[-1]), 0.0)
     moved[0] = y[0]
@@ -114,25 +114,19 @@ def balanced(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArra
     return result
 
 
-@dataclasses.dataclass(frozen=True)
-class _Curve:
+def _curve(
+    law: ContactLaw, quantity: str, max_overclosure: float, k_s: float, E_star: float
+) -> tuple[FloatArray, FloatArray]:
     """The law on fine points."""
-
-    x: FloatArray
-    y: FloatArray
-
-
-def _curve(law: ContactLaw, quantity: str, deepest: float, k_s: float, E_star: float) -> _Curve:
     # squares: fine where p is a high power of the overclosure
-    c = deepest * np.linspace(0, 1, FINE) ** 2
+    c = max_overclosure * np.linspace(0, 1, FINE) ** 2
     d = law.h_max - 2 * c
     pressure, stiffness = np.asarray(law.force(d)), np.asarray(law.stiffness_mean(d))
     pressure[0] = stiffness[0] = 0.0
     if quantity == "pressure":
-        return _Curve(c, pressure)
-    h = np.asarray(conductance(stiffness, k_s, E_star))
-    some = np.concatenate([[True], np.diff(pressure) > 0])
-    return _Curve(pressure[some], h[some])
+        return c, pressure
+    rises = np.concatenate([[True], np.diff(pressure) > 0])
+    return pressure[rises], np.asarray(conductance(stiffness, k_s, E_star))[rises]
 
 
 def describe_law(
@@ -179,9 +173,8 @@ def describe_law(
     InputError, OutOfRangeError
         For a batch of surfaces, missing units, a range beyond the law, and rows that cannot meet `rtol`.
     """
-    for name, unit in (("length_unit", length_unit), ("stress_unit", stress_unit)):
-        if not unit or not unit.isprintable():
-            raise InputError(f"{name} is missing: a law without units is read wrongly sooner or later")
+    _check_unit("length_unit", length_unit)
+    _check_unit("stress_unit", stress_unit)
     if surface.shape != ():
         raise InputError("a contact law is of one surface, not of a batch")
     if quantity not in QUANTITIES:
@@ -189,76 +182,82 @@ def describe_law(
     modulus = number_in("E_star", E_star, 1e-300, 1e300)
     if rows is not None and rtol is not None:
         raise InputError("rows and rtol are both given: give one of them")
-    k_s = 1.0
+    k_s, names = 1.0, ("overclosure", "pressure", length_unit, stress_unit)
     if quantity == "conductance":
         if conductivity is None or not conductivity_unit:
             raise InputError("conductance needs conductivity, k_s = 2 k1 k2/(k1 + k2), and conductivity_unit")
+        _check_unit("conductivity_unit", conductivity_unit)
         k_s = number_in("conductivity", conductivity, 1e-300, 1e300)
+        names = ("pressure", "conductance", stress_unit, f"{conductivity_unit}/{length_unit}")
     law = contact_law(surface, LAW_RTOL, reading=reading, E_star=modulus)
-    turn = law.turning_point
-    end = law.h_max if turn is None else (law.h_max - turn) / 2
-    deepest = end if largest_overclosure is None else float(largest_overclosure)
-    if not 0 < deepest <= end:
-        why = "full compression" if turn is None else "where the force of this surface turns down"
-        raise InputError(f"largest_overclosure must be in (0, {end:g}], up to {why}, got {deepest:g}")
-    curve = _curve(law, quantity, deepest, k_s, modulus)
+    fine_x, fine_y = _curve(law, quantity, _range_end(law, largest_overclosure), k_s, modulus)
 
-    def table(count: int) -> tuple[FloatArray, FloatArray, float]:
-        places = np.linspace(0, curve.x[-1], count) if evenly else spread(curve.x, curve.y, count)
+    def with_rows(count: int) -> tuple[FloatArray, FloatArray, float]:
+        places = np.linspace(0, fine_x[-1], count) if evenly else spread(fine_x, fine_y, count)
         x = rounded(places)
-        y = np.interp(x, curve.x, curve.y)
-        y = rounded(y if evenly else balanced(x, y, curve.x, curve.y))
-        return x, y, chord_error(x, y, curve.x, curve.y)
+        y = np.interp(x, fine_x, fine_y)
+        y = rounded(y if evenly else balanced(x, y, fine_x, fine_y))
+        return x, y, chord_error(x, y, fine_x, fine_y)
 
     if rows is not None:
-        x, y, error = table(whole_number_in("rows", rows, FEWEST_ROWS, MOST_ROWS))
+        x, y, error = with_rows(whole_number_in("rows", rows, MIN_ROWS, MAX_ROWS))
     else:
-        x, y, error = _fewest(table, number_in("rtol", 1e-3 if rtol is None else rtol, 1e-7, 0.5))
-    if (np.diff(x) <= (CLOSE if quantity == "pressure" else 0.0)).any():
+        x, y, error = _fewest(with_rows, number_in("rtol", 1e-3 if rtol is None else rtol, 1e-7, 0.5))
+    if (np.diff(x) <= (MIN_STEP if quantity == "pressure" else 0.0)).any():
         raise InputError(
-            f"rows come nearer than {CLOSE:g} {length_unit}, which some readers cannot tell apart: "
+            f"rows come nearer than {MIN_STEP:g} {length_unit}, which some readers cannot tell apart: "
             "take fewer rows or a smaller unit of length"
         )
-    names = {
-        "pressure": ("overclosure", "pressure", length_unit, stress_unit),
-        "conductance": ("pressure", "conductance", stress_unit, f"{conductivity_unit}/{length_unit}"),
-    }[quantity]
-    return LawTable(x, y, *names, error, _comments(surface, law, modulus, names, x, error, turn))
+    return LawTable(x, y, *names, error, _comments(surface, law, modulus, names, x, error))
 
 
-def _fewest(table: Any, rtol: float) -> tuple[FloatArray, FloatArray, float]:
-    """The table of fewest rows that meets the tolerance."""
-    low, high = FEWEST_ROWS, 2 * FEWEST_ROWS
-    while (found := table(high))[2] > rtol:
-        if high >= MOST_ROWS:
-            raise InputError(f"rtol = {rtol:g} needs more than {MOST_ROWS} rows under linear interpolation")
-        low, high = high, min(2 * high, MOST_ROWS)
+def _check_unit(name: str, unit: str) -> None:
+    if not unit or not unit.isprintable():
+        raise InputError(f"{name} is missing or not printable: a law without units is read wrongly sooner or later")
+
+
+def _range_end(law: ContactLaw, asked: float | None) -> float:
+    """The largest overclosure: as asked, or at full compression, or where the force turns down."""
+    turn = law.turning_point
+    end = law.h_max if turn is None else (law.h_max - turn) / 2
+    found = end if asked is None else float(asked)
+    if not 0 < found <= end:
+        why = "full compression" if turn is None else "where the force of this surface turns down"
+        raise InputError(f"largest_overclosure must be in (0, {end:g}], up to {why}, got {found:g}")
+    return found
+
+
+def _fewest(
+    with_rows: Callable[[int], tuple[FloatArray, FloatArray, float]], rtol: float
+) -> tuple[FloatArray, FloatArray, float]:
+    """The fewest rows that meet the tolerance."""
+    low, high = MIN_ROWS, 2 * MIN_ROWS
+    while (found := with_rows(high))[2] > rtol:
+        if high >= MAX_ROWS:
+            raise InputError(f"rtol = {rtol:g} needs more than {MAX_ROWS} rows under linear interpolation")
+        low, high = high, min(2 * high, MAX_ROWS)
     while high - low > 1:
         middle = (low + high) // 2
-        trial = table(middle)
+        trial = with_rows(middle)
         if trial[2] <= rtol:
             high, found = middle, trial
         else:
             low = middle
-    result: tuple[FloatArray, FloatArray, float] = found
-    return result
+    return found
 
 
 def _comments(
-    surface: Surface,
-    law: ContactLaw,
-    E_star: float,
-    names: tuple[str, str, str, str],
-    x: FloatArray,
-    error: float,
-    turn: float | None,
+    surface: Surface, law: ContactLaw, E_star: float, names: tuple[str, str, str, str], x: FloatArray, error: float
 ) -> tuple[str, ...]:
     from mbma_tables.models.universal import universal_model
 
     attributes = universal_model().content.attributes
     numbers = ", ".join(f"{name} = {float(getattr(surface, name)):.10g}" for name in PARAMETERS)
-    unit = names[2] if names[0] == "overclosure" else "the unit of length of the conductance"
-    end = "full compression" if turn is None else "where the force of this surface turns down; nothing is known beyond"
+    unit, end = "the unit of length of the conductance", "the same"
+    if names[0] == "overclosure":
+        unit, end = names[2], "full compression"
+        if law.turning_point is not None:
+            end = "where the force of this surface turns down; nothing is known beyond"
     return (
         f"Contact law of a rough surface, MBMA model, reading {law.reading!r}; mbma_tables {__version__}",
         f"{names[1]} [{names[3]}] against {names[0]} [{names[2]}]",
@@ -266,7 +265,7 @@ def _comments(
         f"E* = {E_star:.10g}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; pressure is force over nominal area",
         "overclosure c = h_max - u, u = (h_max + d)/2 the mean separation, d the separation from the mid-plane;",
         "c = 0 is first contact: bodies meet where their mean planes are h_max apart",
-        f"range: {names[0]} from 0 to {x[-1]:.10g}, {end if names[0] == 'overclosure' else 'the same'}",
+        f"range: {names[0]} from 0 to {x[-1]:.10g}, {end}",
         f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, above 1e-3 of the largest value",
         f"table: data {str(attributes['values_sha256'])[:16]}, physics {str(attributes['physics_sha256'])[:16]}",
     )

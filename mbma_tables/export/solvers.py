@@ -6,22 +6,16 @@ CalculiX 2.20 was run with what is written here; the others are written from the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from mbma_tables.errors import InputError
-from mbma_tables.export.law_rows import DIGITS, LawTable
+from mbma_tables.export.law_rows import LawTable
+from mbma_tables.export.text import DIGITS, checked_name, comment, number
 from mbma_tables.surfaces.surface import Surface
 
-MOST_CALCULIX_ROWS = 200
+MAX_CALCULIX_ROWS = 200
 PAIR_TYPES = ("node-to-surface", "surface-to-surface", "mortar")
-
-
-def _number(value: float) -> str:
-    return f"{value:.{DIGITS}g}"
-
-
-def _block(prefix: str, lines: Iterable[str]) -> str:
-    return "".join(f"{prefix}{line}\n" for line in lines)
+MAX_NAME = 80  # letters of a name in CalculiX and Abaqus
 
 
 def _is_pressure(law: LawTable, target: str) -> None:
@@ -29,13 +23,15 @@ def _is_pressure(law: LawTable, target: str) -> None:
         raise InputError(f"{target} takes pressure against overclosure here, got {law.y_name} against {law.x_name}")
 
 
-def _keyword(law: LawTable, name: str) -> str:
-    """The lines that CalculiX and Abaqus share."""
-    rows = "".join(f"{_number(y)}, {_number(x)}\n" for x, y in zip(law.x, law.y, strict=True))
-    if law.y_name == "conductance":
-        # conductance, pressure: the other way about
-        return f"*SURFACE INTERACTION, NAME={name}\n*GAP CONDUCTANCE{{}}\n{rows}"
-    return f"*SURFACE INTERACTION, NAME={name}\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR\n{rows}"
+def _interaction(name: str, card: str, rows: str) -> str:
+    return f"*SURFACE INTERACTION, NAME={checked_name(name, MAX_NAME)}\n{card}\n{rows}"
+
+
+def _tabular(law: LawTable, name: str, conductance: str) -> str:
+    """The cards that CalculiX and Abaqus share but for the one of conductance."""
+    card = "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR" if law.y_name == "pressure" else conductance
+    # the other way about than in the law: pressure, overclosure, or conductance, pressure
+    return _interaction(name, card, "".join(f"{number(y)}, {number(x)}\n" for x, y in zip(law.x, law.y, strict=True)))
 
 
 def calculix(law: LawTable, name: str = "ROUGH", pair: str = "node-to-surface") -> str:
@@ -54,8 +50,8 @@ def calculix(law: LawTable, name: str = "ROUGH", pair: str = "node-to-surface") 
             f"CalculiX 2.20 reads PRESSURE-OVERCLOSURE=TABULAR wrongly with {pair} contact, without a message: "
             "take pair='node-to-surface'"
         )
-    if law.x.size > MOST_CALCULIX_ROWS:
-        raise InputError(f"CalculiX holds {MOST_CALCULIX_ROWS} rows, this law has {law.x.size}: give fewer rows")
+    if law.x.size > MAX_CALCULIX_ROWS:
+        raise InputError(f"CalculiX holds {MAX_CALCULIX_ROWS} rows, this law has {law.x.size}: give fewer rows")
     notes = (
         *law.comments,
         "CalculiX keeps the pressure constant beyond the last row. Use this interaction with",
@@ -63,13 +59,13 @@ def calculix(law: LawTable, name: str = "ROUGH", pair: str = "node-to-surface") 
         "and no other type: 2.20 reads TABULAR wrongly with SURFACE TO SURFACE and MORTAR, without a message.",
         "Place the bodies so that their surfaces touch where the mean planes are h_max apart.",
     )
-    return _block("** ", notes) + _keyword(law, name).replace("{}", "")
+    return comment(notes, "**") + _tabular(law, name, "*GAP CONDUCTANCE")
 
 
 def abaqus(law: LawTable, name: str = "ROUGH") -> str:
     """A surface interaction for Abaqus, which continues the last slope beyond the last row."""
     notes = (*law.comments, "Abaqus goes on with the last slope beyond the last row: stay within the range.")
-    return _block("** ", notes) + _keyword(law, name).replace("{}", ", PRESSURE")
+    return comment(notes, "**") + _tabular(law, name, "*GAP CONDUCTANCE, PRESSURE")
 
 
 def exponential(surface: Surface, E_star: float, comments: Iterable[str], name: str = "ROUGH") -> str:
@@ -84,15 +80,15 @@ def exponential(surface: Surface, E_star: float, comments: Iterable[str], name: 
         *comments,
         "EXPONENTIAL is Persson's law for light loads, p = p0 exp(c/u0), not the MBMA model's: c0 = u0 ln 100",
     )
-    card = f"*SURFACE INTERACTION, NAME={name}\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n"
-    return _block("** ", notes) + card + f"{_number(u0 * math.log(100))}, {_number(p0)}\n"
+    row = f"{number(u0 * math.log(100))}, {number(p0)}\n"
+    return comment(notes, "**") + _interaction(name, "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL", row)
 
 
 def lsdyna(law: LawTable, curve: int = 1) -> str:
     """A *DEFINE_CURVE for LS-DYNA."""
     head = f"*DEFINE_CURVE\n{curve:10d}{0:10d}{1.0:10.1f}{1.0:10.1f}{0.0:10.1f}{0.0:10.1f}{0:10d}\n"
     rows = "".join(f"{x:20.{DIGITS - 1}E}{y:20.{DIGITS - 1}E}\n" for x, y in zip(law.x, law.y, strict=True))
-    return _block("$ ", law.comments) + head + rows + "*END\n"
+    return comment(law.comments, "$") + head + rows + "*END\n"
 
 
 def optistruct(law: LawTable, contact: int = 1, table: int = 2) -> str:
@@ -103,22 +99,22 @@ def optistruct(law: LawTable, contact: int = 1, table: int = 2) -> str:
     lines.append(f"{'*':<8}")
     fields = [*pairs, f"{'ENDT':<16}"]
     lines += [f"{'*':<8}{''.join(fields[start : start + 4])}".rstrip() for start in range(0, len(fields), 4)]
-    return _block("$ ", law.comments) + "\n".join(lines) + "\n"
+    return comment(law.comments, "$") + "\n".join(lines) + "\n"
 
 
 def _columns(law: LawTable) -> str:
-    return "".join(f"{_number(x)} {_number(y)}\n" for x, y in zip(law.x, law.y, strict=True))
+    return "".join(f"{number(x)} {number(y)}\n" for x, y in zip(law.x, law.y, strict=True))
 
 
 def comsol(law: LawTable) -> str:
     """A text file for COMSOL's interpolation function: spreadsheet columns with % comments."""
-    return _block("% ", (*law.comments, "Interpolation: linear; extrapolation: none.")) + _columns(law)
+    return comment((*law.comments, "Interpolation: linear; extrapolation: none."), "%") + _columns(law)
 
 
 def moose(law: LawTable) -> str:
     """A data file for MOOSE's PiecewiseLinear."""
     notes = (*law.comments, "[Functions/law] type = PiecewiseLinear, data_file = THIS, format = columns")
-    return _block("# ", notes) + _columns(law)
+    return comment(notes, "#") + _columns(law)
 
 
 def modelica(law: LawTable, name: str = "law") -> str:
@@ -127,15 +123,4 @@ def modelica(law: LawTable, name: str = "law") -> str:
     Its default is linear interpolation (smoothness LinearSegments), for which the rows were chosen.
     """
     notes = (*law.comments, "smoothness = Modelica.Blocks.Types.Smoothness.LinearSegments; no extrapolation")
-    return f"#1\n{_block('# ', notes)}double {name}({law.x.size},2) # {law.x_name}, {law.y_name}\n{_columns(law)}"
-
-
-SOLVERS: dict[str, tuple[Callable[..., str], str]] = {
-    "calculix": (calculix, ".inp"),
-    "abaqus": (abaqus, ".inp"),
-    "lsdyna": (lsdyna, ".k"),
-    "optistruct": (optistruct, ".fem"),
-    "comsol": (comsol, ".txt"),
-    "moose": (moose, ".csv"),
-    "modelica": (modelica, ".txt"),
-}
+    return f"#1\n{comment(notes, '#')}double {checked_name(name, MAX_NAME)}({law.x.size},2)\n{_columns(law)}"

@@ -1,13 +1,16 @@
 """`mbma export`: files written whole, or one line and no file."""
 
+import importlib.util
+import shutil
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from mbma_tables.cli import main
+from mbma_tables.export import SOLVERS, code
 
 LAW = ["--surface", "concrete", "--E-star", "13.3", "--length-unit", "mm", "--stress-unit", "MPa", "--rows", "20"]
-SOLVERS = ("calculix", "abaqus", "lsdyna", "optistruct", "comsol", "moose", "modelica")
 
 
 def run(*arguments):
@@ -28,10 +31,36 @@ def test_matlab_writes_its_reader_too(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["law.m", "law.mat"]
 
 
+@pytest.mark.skipif(shutil.which("cc") is None, reason="cc is not installed")
 def test_code_is_written_and_replayed(tmp_path):
-    result = run("python", "--out", tmp_path / "code", "--check")
+    result = run("c", "--out", tmp_path / "code", "--check")
     assert result.exit_code == 0, result.output
     assert "largest relative difference" in result.output
+
+
+@pytest.mark.parametrize(
+    ("replay", "said"),
+    [
+        (code.Replay("cc", {}, {}, 0, "cc is not installed", ran=False), "not checked: cc is not installed"),
+        (code.Replay("cc", {"phi": 7}, {"phi": 0.5}, 2, "2 answers are wrong"), "check failed: 2 answers are wrong"),
+        (code.Replay("cc", {}, {}, 0, "cc did not compile it"), "check failed: cc did not compile it"),
+    ],
+)
+def test_a_check_that_fails(replay, said, tmp_path, monkeypatch):
+    monkeypatch.setattr(code, "check", lambda target, folder: replay)
+    result = run("c", "--out", tmp_path, "--check")
+    assert result.exit_code == 2
+    assert said in result.output.splitlines()[-1]
+    assert run("c", "--out", tmp_path).exit_code == 0
+
+
+def test_javascript_without_its_compiler(tmp_path, monkeypatch):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    result = run("javascript", "--out", tmp_path / "code")
+    assert result.exit_code == 2
+    assert result.output.count("\n") == 1
+    assert "pip install 'mbma_tables[javascript]'" in result.output
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_exponential(tmp_path):
@@ -40,6 +69,7 @@ def test_exponential(tmp_path):
     assert np.all(np.array(last.split(", "), dtype=float) > 0)
 
 
+CONDUCTANCE = ["--conductivity", "50", "--conductivity-unit"]
 WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] != name] for name in LAW[::2]}
 
 
@@ -56,7 +86,12 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
         (["calculix", "--out", "no/such/folder/law", *LAW], "cannot be written"),
         (["csv", "--out", "law", *LAW, "--check"], "none to replay"),
         (["csv", "--out", "law", *LAW, "--exponential"], "law of calculix and abaqus"),
-        (["matlab", "--out", "1law.mat", *LAW], "must be NAME.mat"),
+        (["matlab", "--out", "1law.mat", *LAW], "a name must be a letter"),
+        (["matlab", "--out", "law.txt", *LAW], "must be NAME.mat"),
+        (
+            ["abaqus", "--out", "law", *LAW, *CONDUCTANCE, "W\n*INCLUDE, INPUT=evil"],
+            "conductivity_unit is missing or not",
+        ),
         (["cobol", "--out", "law", *LAW], "cobol"),
         (["c", "--out", "code", "--reading", "other"], "reading"),
     ],

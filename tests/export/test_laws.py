@@ -2,15 +2,15 @@
 
 import io
 import json
+import sys
 
 import numpy as np
 import pytest
 
 from mbma_tables import InputError, Surface, contact
-from mbma_tables.export import solvers
-from mbma_tables.export.data import DATA, to_csv, to_json
+from mbma_tables.export import DATA, SOLVERS, data, law_rows, solvers
 from mbma_tables.export.law_rows import FLOOR, describe_law
-from mbma_tables.export.solvers import SOLVERS, calculix, exponential
+from mbma_tables.export.solvers import calculix, exponential, optistruct
 
 UNITS = {"length_unit": "mm", "stress_unit": "MPa"}
 CONCRETE = Surface.named("concrete")
@@ -60,6 +60,8 @@ def test_conductance_against_pressure():
     assert "*GAP CONDUCTANCE, PRESSURE\n" in solvers.abaqus(law)
     first = [line for line in text.splitlines() if not line.startswith("*")][-1].split(", ")
     assert [float(v) for v in first] == pytest.approx([law.y[-1], law.x[-1]], rel=1e-9, abs=0)
+    with pytest.raises(InputError, match="takes pressure against overclosure here, got conductance against pressure"):
+        optistruct(law)
 
 
 def numbers(line):
@@ -101,7 +103,7 @@ def parse(target, text):
 @pytest.mark.parametrize("rows", [20, 21, 50])
 def test_text_holds_the_rows(target, rows):
     law = law_of(rows=rows)
-    text = SOLVERS[target][0](law)
+    text = getattr(solvers, target)(law)
     np.testing.assert_allclose(parse(target, text), np.stack([law.x, law.y], 1), rtol=1e-9)
     for word in ("reading 'reported'", "E* = 13.3", "[MPa]", "[mm]", "h_max - u", "largest error", "physics"):
         assert word in text
@@ -110,8 +112,8 @@ def test_text_holds_the_rows(target, rows):
 def test_calculix_writes_what_it_reads_rightly():
     law = law_of()
     assert "TYPE=NODE TO SURFACE" in calculix(law)
-    for pair in ("surface-to-surface", "mortar"):
-        with pytest.raises(InputError, match="without a message"):
+    for pair, said in (("surface-to-surface", "without a message"), ("mortar", "without a message"), ("x", "one of")):
+        with pytest.raises(InputError, match=said):
             calculix(law, pair=pair)
     with pytest.raises(InputError, match="holds 200 rows"):
         calculix(law_of(rows=201))
@@ -127,17 +129,24 @@ def test_exponential_is_persson_for_light_loads():
         assert p == pytest.approx(theories.persson_force(CONCRETE, u, 13.3, method="simplified"), rel=1e-8, abs=0)
 
 
+@pytest.mark.parametrize(("target", "package"), [("hdf5", "h5py"), ("parquet", "pyarrow")])
+def test_a_missing_package_is_named(target, package, monkeypatch):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(InputError, match=rf"mbma_tables\[{target}\]"):
+        getattr(data, f"to_{target}")(law_of())
+
+
 @pytest.mark.parametrize("target", DATA)
 def test_data_come_back(target, tmp_path):
     law = law_of()
     path = tmp_path / "law"
-    path.write_bytes(DATA[target][0](law))
+    path.write_bytes(getattr(data, f"to_{target}")(law))
     if target == "csv":
-        rows = [line for line in to_csv(law).decode().splitlines() if not line.startswith("#")]
+        rows = [line for line in path.read_text().splitlines() if not line.startswith("#")]
         assert rows[0] == "overclosure [mm],pressure [MPa]"
         found = np.array([numbers(line) for line in rows[1:]]).T
     elif target == "json":
-        content = json.loads(to_json(law))
+        content = json.loads(path.read_text())
         found = np.array(list(content["columns"].values()))
         assert content["largest_error"] == law.largest_error
     elif target == "matlab":
@@ -184,6 +193,13 @@ def test_data_come_back(target, tmp_path):
 def test_refused(changed, said):
     with pytest.raises(InputError, match=said):
         law_of(**changed)
+
+
+def test_a_tolerance_that_no_number_of_rows_meets(monkeypatch):
+    monkeypatch.setattr(law_rows, "MAX_ROWS", 30)
+    with pytest.raises(InputError, match="needs more than 30 rows under linear interpolation"):
+        law_of(rows=None, rtol=1e-6)
+    assert law_of(rows=None, rtol=0.2).x.size <= 30
 
 
 def test_a_batch_is_refused():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mbma_tables import Surface
-from mbma_tables.export.data import matlab_reader, to_mat, to_netcdf
+from mbma_tables.export.data import matlab_reader, to_matlab, to_netcdf
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.solvers import calculix
 
@@ -71,7 +71,7 @@ def test_calculix_feels_the_rows(tmp_path, length, stress, unit, E_star):
 @needs("octave-cli")
 def test_octave_looks_up(tmp_path):
     law = describe_law(Surface.named("asphalt"), 20.0, length_unit="mm", stress_unit="MPa", rows=60)
-    (tmp_path / "law.mat").write_bytes(to_mat(law))
+    (tmp_path / "law.mat").write_bytes(to_matlab(law))
     (tmp_path / "law.m").write_bytes(matlab_reader(law, "law"))
     x = np.random.default_rng(1).uniform(0, law.x[-1], 200)
     np.savetxt(tmp_path / "x.txt", x, fmt="%.17g")

@@ -1,0 +1,202 @@
+"""The model as C99: its numbers as a header file, the comment that opens each file, and the texts of the files.
+
+The table is text, in the shortest decimals that give back every bit, so that the files mean the same to any compiler on
+any machine; 120,000 numbers are 2.5 MB of text and a fraction of a second of compiling.
+"""
+
+from __future__ import annotations
+
+import importlib.resources
+import math
+import re
+import textwrap
+from collections.abc import Iterator
+
+import numpy as np
+
+from mbma_tables import __version__
+from mbma_tables.arguments import FloatArray
+from mbma_tables.export.text import block_comment
+from mbma_tables.islands import height_integrals as heights
+from mbma_tables.models import closed_form_functions, universal_kernel
+from mbma_tables.models.universal import UniversalModel
+from mbma_tables.surfaces import spectrum
+from mbma_tables.surfaces.moments import MAX_ZETA_1, MIN_ZETA_1
+from mbma_tables.surfaces.readings import Reading
+from mbma_tables.totals import gauss_kronrod, intervals, kernel, universal_sum
+
+COMMENT_WIDTH = 108
+FORM = "standard"  # that of tier "formula"
+MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # as `contact` allows
+NUMBERS_FILE = "mbma_table.h"
+USAGE = (
+    "Compile mbma.c, which includes mbma_table.h, and link the C mathematics library: cc -std=c99 -O2 -c mbma.c -lm. "
+    "Every function may be called from any thread; nothing is allocated and nothing is kept between calls."
+)
+TITLES = {
+    "mbma.h": "mbma.h: the MBMA model in C99, declarations.",
+    "mbma.c": "mbma.c: the MBMA model in C99.",
+    NUMBERS_FILE: "mbma_table.h: the numbers of the MBMA model in C99, for mbma.c alone.",
+}
+LICENCE = (
+    "SPDX-License-Identifier: BSD-3-Clause",
+    "Copyright (c) 2026, mbma_tables contributors",
+    "Redistribution and use in source and binary forms, with or without modification, are permitted as long as this "
+    "notice is kept. The software is provided as is, without any warranty.",
+)
+CONVENTIONS = (
+    "Conventions: force is per nominal area, F/A0, in the unit of E_star (F/(A0 E*) where that is 1), with 1/E* = "
+    "(1 - nu1^2)/E1 + (1 - nu2^2)/E2; area is A/A0. Any consistent unit of length. The gap is the separation d from "
+    "the mid-plane of the rough surface to the rigid plane, -h_max <= d; contact starts at d = h_max. The mean "
+    "separation is u = (h_max + d)/2. Geometry and X, mu are as the table's documentation has them: heights in "
+    "units of s = h_rms/sqrt(1 - zeta_1^(-2 H)), lengths in 1/q0, zeta_1 = q1/q0.",
+    "Outside the table there is no answer, only a status: nothing is clamped or extrapolated. Below the smallest mu "
+    "the logarithm of the ratio to a rigid sphere is proportional to mu, within the stated error.",
+)
+
+
+def c_texts(model: UniversalModel, reading: Reading) -> dict[str, str]:
+    """Names and texts of the C sources, the self-test apart."""
+    constants, arrays = numbers(model, reading)
+    texts = {}
+    for name, title in TITLES.items():
+        opening = block_comment(header(model, reading, title, USAGE))
+        if name == NUMBERS_FILE:
+            texts[name] = f"{opening}\n{numbers_text(constants, arrays)}"
+        else:
+            forms = template("closed_forms.c")
+            prototypes = "\n".join(line for line in forms.splitlines() if re.match("double .*;$", line))
+            texts[name] = filled(name, HEADER=opening, CLOSED_FORMS=forms, PROTOTYPES=prototypes)
+    return texts
+
+
+def template(name: str) -> str:
+    """The text of a file of `templates`."""
+    return (importlib.resources.files("mbma_tables.export") / "templates" / name).read_text(encoding="utf-8")
+
+
+def filled(name: str, **parts: str) -> str:
+    """A template with its places, such as @HEADER@, filled in."""
+    # in one pass: a header may hold such a name itself
+    return re.sub("@([A-Z_]+)@", lambda place: parts[place[1]], template(f"{name}.in"))
+
+
+def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | float], dict[str, FloatArray]]:
+    """Constants and arrays of the model by their names in C, from the modules that use them here."""
+    X, mu = model.content.axes
+    coefficients = model.content.coefficients
+    errors = model.content.local_error.max(axis=-1)
+    form, certificates = closed_form_functions.RANGES[FORM], closed_form_functions.CERTIFICATES[FORM]
+    constants: dict[str, int | float] = {
+        "ROWS": coefficients.shape[0],
+        "COLUMNS": coefficients.shape[1],
+        "ERROR_ROWS": errors.shape[0],
+        "ERROR_COLUMNS": errors.shape[1],
+        "OFFSET": int(reading.offset),
+        "SUMMITS": int(reading.summit_sigma),
+        "PRINTED_JACOBIAN": int(reading.jacobian == "printed"),
+        "MAX_INTERVALS": intervals.MOST_INTERVALS,
+        "PI": math.pi,
+        "X_LOW": X.low,
+        "X_HIGH": X.high,
+        "X_OFFSET": X.offset,
+        "X_START": X.start,
+        "X_RATE": 1 / X.step,
+        "MU_LOW": mu.low,
+        "MU_HIGH": mu.high,
+        "MU_START": mu.start,
+        "MU_RATE": 1 / mu.step,
+        "ERROR_CELLS_X": errors.shape[0] / (X.nodes - 1),
+        "ERROR_CELLS_MU": errors.shape[1] / (mu.nodes - 1),
+        "SECOND_ORDER": universal_kernel.SECOND_ORDER,
+        "RADIUS": spectrum.RADIUS,
+        "BROADENING": spectrum.BROADENING,
+        "DIVISOR": reading.density_divisor,
+        "BETA": reading.beta,
+        "PHI": reading.phi,
+        "FLOOR_D": reading.floor_d,
+        "FLOOR_U": reading.floor_u,
+        "MIN_ZETA_1": max(MIN_ZETA_1, reading.floor_u),
+        "MAX_ZETA_1": MAX_ZETA_1,
+        "STRETCH": intervals.STRETCH,
+        "SMALL_ANGLE": intervals.SMALL_ANGLE,
+        "NARROW": intervals.NARROW,
+        "SAFETY": intervals.SAFETY,
+        "SMALL_POWER": kernel.SMALL_POWER,
+        "SMALL_WIDTH": kernel.SMALL_WIDTH,
+        "QUADRATURE_SHARE": universal_sum.QUADRATURE_SHARE,
+        "FORMULA_X_LOW": form["X"][0],
+        "FORMULA_X_HIGH": form["X"][1],
+        "FORMULA_MU_HIGH": form["mu"][1],
+        "FORMULA_ERROR": max(certificate.largest for certificate in certificates.values()),
+        "MIN_RTOL": MIN_RTOL,
+        "MAX_RTOL": MAX_RTOL,
+    }
+    arrays = {
+        "NODES_21": gauss_kronrod.NODES,
+        "KRONROD_21": gauss_kronrod.KRONROD,
+        "GAUSS_21": gauss_kronrod.GAUSS,
+        "NODES_31": intervals.NODES_31,
+        "KRONROD_31": intervals.KRONROD_31,
+        "GAUSS_31": intervals.GAUSS_31,
+        # F_n: rows are the pieces, columns the powers
+        "F_ONE": heights._ONE,
+        "F_THREE_HALVES": heights._THREE_HALVES,
+        "F_TWO": heights._TWO,
+        "F_FIVE_HALVES": heights._FIVE_HALVES,
+        "ERRORS": errors,
+        # F and A side by side, mu before X
+        "COEFFICIENTS": np.ravel(coefficients),
+    }
+    return constants, arrays
+
+
+def numbers_text(constants: dict[str, int | float], arrays: dict[str, FloatArray]) -> str:
+    """The numbers as macros and constant arrays."""
+    lines = ["#ifndef MBMA_TABLE_H", "#define MBMA_TABLE_H", ""]
+    for name, value in constants.items():
+        lines.append(f"#define MBMA_{name} {value if isinstance(value, int) else f'({float(value)!r})'}")
+    for name, values in arrays.items():
+        shape = "".join(f"[{extent}]" for extent in values.shape)
+        lines += ["", f"static const double MBMA_{name}{shape} = {{", *_initializer(values, "  "), "};"]
+    return "\n".join([*lines, "", "#endif", ""])
+
+
+def _initializer(values: FloatArray, indent: str) -> Iterator[str]:
+    if values.ndim == 1:
+        text = ", ".join(map(repr, values.tolist()))
+        yield from textwrap.wrap(text, 120, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
+        return
+    for row in values:
+        yield f"{indent}{{"
+        yield from _initializer(row, indent + "  ")
+        yield f"{indent}}},"
+
+
+def header(model: UniversalModel, reading: Reading, title: str, usage: str) -> list[str]:
+    """Lines of a file's opening comment: what it is and what made it, range, error, conventions, licence."""
+    content = model.content
+    found, (X, mu) = content.attributes, content.axes
+    worst, visited = (
+        max(float(found[f"{which}largest_error_{name}"]) for name in ("F", "A")) for which in ("", "visited_")
+    )
+    form, certificates = closed_form_functions.RANGES[FORM], closed_form_functions.CERTIFICATES[FORM]
+    paragraphs = (
+        title,
+        f"Written by mbma_tables {__version__}. {usage}",
+        "MBMA model of rough contact (Guo, Ma and Zhu): Phi_F and Phi_A of a contact island over (X, mu) by a quintic "
+        "spline or a closed form, islands of a self-affine surface, and the surface's force and area at a gap.",
+        f"Reading: {reading.name} (density divisor {reading.density_divisor:.17g}, beta {reading.beta:.17g}, phi "
+        f"{reading.phi:g}, floors {reading.floor_d:g} and {reading.floor_u:g}, Jacobian {reading.jacobian}, offset "
+        f"{'on' if reading.offset else 'off'}, sigma of {'summits' if reading.summit_sigma else 'all heights'}).",
+        f"Table: data {found['values_sha256']}",
+        f"physics {found['physics_sha256']}",
+        f"Range: {X.low:g} <= X <= {X.high:g}, 0 <= mu <= {mu.high:g}; H in (0, 1], zeta_1 up to {MAX_ZETA_1:g}.",
+        f"Largest relative error of the table against the solved model: {worst:.2g} on {found['certificate_points']} "
+        f"held-out points, {visited:.2g} at islands of random surfaces; each answer carries its own bound.",
+        f"Closed form, {FORM}: for {form['X'][0]:g} <= X <= {form['X'][1]:g} and mu <= {form['mu'][1]:g}; largest "
+        f"relative error {certificates['phi_F'].largest:.2g} of Phi_F, {certificates['phi_A'].largest:.2g} of Phi_A.",
+        *CONVENTIONS,
+        *LICENCE,
+    )
+    return [line for text in paragraphs for line in textwrap.wrap(text, COMMENT_WIDTH, break_long_words=False)]

@@ -1,0 +1,73 @@
+"""How text and numbers are written into other codes: nothing that a user or a table says becomes code there."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from mbma_tables.errors import InputError
+
+DIGITS = 10  # of the numbers in a law's file
+_ASCII = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "\N{MIDDLE DOT}": ".", "²": "2"})
+# what ends or begins a comment in C, ends a script in a page, or is a trigraph
+_MARKS = re.compile(r"\*(?=/)|/(?=\*)|<(?=[/!])|\?(?=\?)")
+# what a spreadsheet would take for a formula
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+
+
+def printable(text: str) -> str:
+    r"""Text as printable ASCII on one line; other characters as escapes.
+
+    Examples
+    --------
+    >>> print(printable("W/(µm K)\n*INCLUDE"))
+    W/(um K)\n*INCLUDE
+    """
+    return "".join(
+        letter if " " <= letter <= "~" else letter.encode("unicode_escape").decode("ascii")
+        for letter in text.translate(_ASCII)
+    )
+
+
+def comment(lines: Iterable[str], mark: str) -> str:
+    """Lines as comments that reach from a mark to the end of the line."""
+    return "".join(f"{mark} {printable(line)}".rstrip() + "\n" for line in lines)
+
+
+def block_comment(lines: Iterable[str]) -> str:
+    """Lines as one comment of C and JavaScript.
+
+    Examples
+    --------
+    >>> print(block_comment(["text */ more"]))
+    /*
+     * text * / more
+     */
+    """
+    body = "".join(f" * {_MARKS.sub(lambda mark: mark[0] + ' ', printable(line))}".rstrip() + "\n" for line in lines)
+    return f"/*\n{body} */"
+
+
+def csv_cell(text: str) -> str:
+    """A header of a CSV column, which no spreadsheet takes for a formula; the csv module quotes it."""
+    return f"'{text}" if text.startswith(_FORMULA) else text
+
+
+def checked_name(name: str, max_length: int) -> str:
+    """A name that every target can use: an ASCII letter, then letters, digits and underscores.
+
+    Raises
+    ------
+    InputError
+        For any other text.
+    """
+    if not re.fullmatch(rf"[A-Za-z][A-Za-z0-9_]{{0,{max_length - 1}}}", name):
+        raise InputError(
+            f"a name must be a letter, then letters, digits and underscores, {max_length} at most, got {name!r}"
+        )
+    return name
+
+
+def number(value: float) -> str:
+    """A number of a law's file."""
+    return f"{value:.{DIGITS}g}"

@@ -1,0 +1,254 @@
+"""Exported C, Fortran and JavaScript answer as the runtime does; warnings are errors and sanitizers are on."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import ctypes
+import importlib.util
+import json
+import math
+import pathlib
+import shutil
+import subprocess
+
+import code_points
+import numpy as np
+import pytest
+
+from mbma_tables.export.code import Replay, check, read_report, write_code
+from mbma_tables.models import closed_form_functions
+
+WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
+SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+
+
+def needs(*programs: str) -> pytest.MarkDecorator:
+    missing = [name for name in programs if shutil.which(name) is None]
+    if "node" in programs and importlib.util.find_spec("ziglang") is None:
+        missing.append("ziglang")
+    return pytest.mark.skipif(bool(missing), reason=f"not installed: {', '.join(missing)}")
+
+
+@pytest.fixture(scope="module")
+def c_folder(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    folder = tmp_path_factory.mktemp("c")
+    write_code("c", folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def js_folder(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    folder = tmp_path_factory.mktemp("javascript")
+    write_code("javascript", folder)
+    return folder
+
+
+def build_and_replay(commands: list[list[str]], work: pathlib.Path, points: pathlib.Path) -> Replay:
+    """Build the file `selftest` in a folder without a word from the compiler, and replay the points."""
+    for command in (*commands, ["./selftest", str(points)]):
+        done = subprocess.run(command, cwd=work, capture_output=True, text=True, timeout=300, check=False)
+        assert done.stderr == ""
+    return read_report(commands[0][0], done)
+
+
+def c_command(compiler: str, options: tuple[str, ...], folder: pathlib.Path) -> list[str]:
+    return [compiler, *options, *WARNINGS, *(f"{folder}/{name}.c" for name in ("mbma", "mbma_selftest")), "-lm"]
+
+
+@needs("cc")
+def test_c_replays_its_points(c_folder: pathlib.Path) -> None:
+    found = check("c", c_folder)
+    assert found.reason == ""
+    fixed = {"phi": 64, "slopes": 64, "geometry": 24, "total": 12, "status": 10}
+    assert found.points == fixed | {"formula": found.points["formula"]}
+    assert found.points["formula"] > 5
+
+
+@needs("gcc")
+@pytest.mark.parametrize(
+    "options", [("-O1", *SANITIZERS), ("-O3", "-march=native", "-ffp-contract=fast")], ids=["sanitized", "fast"]
+)
+def test_c_equals_the_runtime(options: tuple[str, ...], c_folder: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    command = [*c_command("gcc", ("-std=c99", *options), c_folder), "-o", "selftest"]
+    found = build_and_replay([command], tmp_path, code_points.write_points(tmp_path))
+    code_points.assert_equal_to_runtime(found)
+
+
+@needs("g++")
+def test_cpp_compiles_it(c_folder: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    command = [*c_command("g++", ("-x", "c++", "-std=c++11", "-O1"), c_folder), "-o", "selftest"]
+    assert build_and_replay([command], tmp_path, c_folder / "mbma_conformance.csv").failed == 0
+
+
+@pytest.mark.slow
+@needs("gcc", "gfortran")
+def test_fortran_equals_the_runtime(tmp_path: pathlib.Path) -> None:
+    written = write_code("fortran", tmp_path)
+    assert max(len(line) for path in written if path.suffix == ".f90" for line in path.read_text().splitlines()) <= 132
+    (tmp_path / "message.f90").write_text(
+        "program message\n  use mbma\n  write (*, '(3a)') mbma_message(MBMA_OK), '|', mbma_message(-1)\nend program\n"
+    )
+    c = ["gcc", "-std=c99", *WARNINGS, "-O1", *SANITIZERS, "-c", "mbma.c"]
+    strict = ["gfortran", "-std=f2008", *WARNINGS, "-fcheck=all", *SANITIZERS, "-O1", "mbma.o", "mbma.f90"]
+    commands = [c, [*strict, "mbma_selftest.f90", "-o", "selftest"], [*strict, "message.f90", "-o", "message"]]
+    code_points.assert_equal_to_runtime(build_and_replay(commands, tmp_path, code_points.write_points(tmp_path)))
+    said = subprocess.run(["./message"], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True)
+    assert said.stdout == "no error|no such status\n"
+
+
+@pytest.mark.slow
+@needs("node")
+def test_javascript_equals_the_runtime(js_folder: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    code_points.assert_equal_to_runtime(check("javascript", js_folder, code_points.write_points(tmp_path)))
+
+
+@pytest.mark.slow
+@needs("cc")
+def test_the_printed_reading(tmp_path: pathlib.Path) -> None:
+    write_code("c", tmp_path, reading="printed")
+    found = check("c", tmp_path, code_points.write_points(tmp_path, "printed"))
+    code_points.assert_equal_to_runtime(found)
+    # and the points of one reading are refused by the code of another
+    assert check("c", tmp_path, code_points.write_points(tmp_path, "reported")).failed > code_points.SURFACES
+
+
+@needs("gcc", "nm")
+def test_nothing_is_allocated_or_kept(c_folder: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    subprocess.run(["gcc", "-std=c99", "-O0", "-c", f"{c_folder}/mbma.c", "-o", "mbma.o"], cwd=tmp_path, check=True)
+    listed = subprocess.run(["nm", "mbma.o"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    kinds = {line.split()[-1]: line.split()[-2] for line in listed.splitlines()}
+    outside = {name for name, kind in kinds.items() if kind == "U"} - {"_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}
+    # C's own mathematics and block copies
+    mathematics = {"asinh", "cbrt", "exp", "expm1", "log", "log1p", "pow", "sinh", "sqrt"}
+    assert outside <= {*mathematics, "memcpy", "memset"}
+    assert not [name for name, kind in kinds.items() if kind in "BbDdC"]
+
+
+class Surface(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_double) for name in ("hurst", "q0", "q1", "h_rms", "h_max")]
+
+
+@pytest.fixture(scope="module")
+def library(c_folder: pathlib.Path, tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc is not installed")
+    target = tmp_path_factory.mktemp("library") / "mbma.so"
+    options = ("-std=c99", "-O2", "-shared", "-fPIC")
+    subprocess.run(["gcc", *options, str(c_folder / "mbma.c"), "-lm", "-o", str(target)], check=True)
+    found = ctypes.CDLL(str(target))
+    found.mbma_message.restype = ctypes.c_char_p
+    return found
+
+
+def totals(
+    library: ctypes.CDLL, surface: tuple[float, ...], gaps: np.ndarray, E_star: float = 1.0, rtol: float = 1e-8
+) -> tuple:
+    answers, status = np.empty((gaps.size, 3)), np.empty(gaps.size, dtype=np.int32)
+    library.mbma_total_many(
+        ctypes.byref(Surface(*surface)),
+        ctypes.c_size_t(gaps.size),
+        gaps.ctypes.data_as(ctypes.c_void_p),
+        ctypes.c_double(E_star),
+        ctypes.c_double(rtol),
+        answers.ctypes.data_as(ctypes.c_void_p),
+        status.ctypes.data_as(ctypes.c_void_p),
+    )
+    return answers, status
+
+
+SOUND = (0.8, 1.0, 100.0, 1.0, 3.0)
+INVALID = b"an argument is not finite, or is outside what the model allows"
+
+
+@pytest.mark.parametrize(
+    ("surface", "gap", "E_star", "rtol", "message"),
+    [
+        ((math.nan, *SOUND[1:]), 1.0, 1.0, 1e-8, INVALID),
+        ((1.1, *SOUND[1:]), 1.0, 1.0, 1e-8, INVALID),
+        ((0.8, 0.0, *SOUND[2:]), 1.0, 1.0, 1e-8, INVALID),
+        ((0.8, 1.0, 3.0, 1.0, 3.0), 1.0, 1.0, 1e-8, INVALID),
+        ((0.8, 1.0, 1e9, 1.0, 3.0), 1.0, 1.0, 1e-8, INVALID),
+        ((*SOUND[:4], math.inf), 1.0, 1.0, 1e-8, INVALID),
+        (SOUND, math.nan, 1.0, 1e-8, INVALID),
+        (SOUND, math.inf, 1.0, 1e-8, INVALID),
+        (SOUND, -3.1, 1.0, 1e-8, INVALID),
+        (SOUND, 1.0, -1.0, 1e-8, INVALID),
+        (SOUND, 1.0, 1.0, 0.0, INVALID),
+        (SOUND, 1.0, 1.0, math.nan, INVALID),
+        ((0.5, 1.0, 1e6, 1.0, 30.0), -30.0, 1.0, 1e-8, b"X is above the range"),
+        ((0.1, 1.0, 1e7, 1.0, 3.0), -3.0, 1.0, 1e-8, b"mu is above the range"),
+    ],
+)
+def test_no_answer_has_a_status_and_nan(
+    library: ctypes.CDLL, surface: tuple[float, ...], gap: float, E_star: float, rtol: float, message: bytes
+) -> None:
+    answers, status = totals(library, surface, np.array([gap]), E_star, rtol)
+    assert library.mbma_message(int(status[0])) == message
+    assert np.isnan(answers).all()
+
+
+def test_no_contact_from_h_max_on(library: ctypes.CDLL) -> None:
+    answers, status = totals(library, SOUND, np.array([3.0, 3.5]))
+    assert not status.any()
+    assert not answers.any()
+
+
+def test_threads_answer_as_one_does(library: ctypes.CDLL) -> None:
+    surfaces = code_points.random_surfaces()[:16]
+
+    def answer(surface: tuple[float, ...]) -> np.ndarray:
+        return totals(library, surface, surface[4] * np.linspace(-0.9, 0.9, 50))[0]
+
+    alone = [answer(surface) for surface in surfaces]
+    with concurrent.futures.ThreadPoolExecutor(8) as pool:
+        together = list(pool.map(answer, surfaces))
+    assert np.array_equal(alone, together)
+
+
+@pytest.mark.parametrize(("form", "given"), [("totals", (1.5, 3.5, 100.0, 0.8)), ("pocket", (5.0, 2.0))])
+def test_the_other_closed_forms(form: str, given: tuple[float, ...], library: ctypes.CDLL) -> None:
+    for name, known in closed_form_functions.FUNCTIONS[form].items():
+        function = library[f"mbma_{form}_{name}"]
+        function.restype = ctypes.c_double
+        found = function(*map(ctypes.c_double, given))
+        assert found == pytest.approx(float(known(*map(np.array, given))), rel=1e-12, abs=0)
+
+
+ASK = """
+import { STATUS, formula, islandGeometry, phi, phiSlopes, total } from "./mbma.mjs";
+const surface = { hurst: 0.8, q0: 1, q1: 100, h_rms: 1, h_max: 3 };
+function outcome(ask) {
+  try {
+    const { status, ...numbers } = ask();
+    const nothing = Object.values(numbers).every(Number.isNaN);
+    return status === STATUS.INVALID && nothing ? "INVALID" : status === STATUS.OK && !nothing ? "OK" : "wrong";
+  } catch (fault) {
+    return fault.name;
+  }
+}
+console.log(JSON.stringify([ASKED].map(outcome)));
+"""
+TYPE_ERRORS = (
+    *("phi('3', '10')", "phi(3, '10')", "phi('a', 1)", "phi(NaN, 1)", "phi(1)", "phi(null, 1)", "phi([3], 1)"),
+    *("phi(3n, 1)", "phi(true, 1)", "formula('3', '10')", "phiSlopes(1, NaN)", "islandGeometry(1, 0.8, '100')"),
+    *("total(null, 1)", "total(surface, '1')", "total({ ...surface, hurst: '0.8' }, 1)", "total({}, 1)"),
+    "total(surface, 1, 1, null)",
+)
+INVALIDS = (
+    *("phi(1, -1)", "phiSlopes(1, -1)", "islandGeometry(0, 0.8, 100)", "total(surface, -3.1)", "total(surface, 1, 0)"),
+    *("total(surface, 1, 1, 1)", "total(surface, Infinity)", "total({ ...surface, hurst: 2 }, 1)", "formula(1, -1)"),
+)
+VALID = ("phi(3, 10)", "phiSlopes(3, 10)", "formula(3, 10)", "islandGeometry(1, 0.8, 100)", "total(surface, 1)")
+
+
+@pytest.mark.slow
+@needs("node")
+def test_javascript_checks_its_arguments(js_folder: pathlib.Path) -> None:
+    asked = (*TYPE_ERRORS, *INVALIDS, *VALID)
+    script = ASK.replace("ASKED", ", ".join(f"() => {ask}" for ask in asked))
+    (js_folder / "ask.mjs").write_text(script, encoding="utf-8")
+    done = subprocess.run(["node", "ask.mjs"], cwd=js_folder, capture_output=True, text=True, timeout=60, check=True)
+    found = dict(zip(asked, json.loads(done.stdout), strict=True))
+    assert {ask for ask, outcome in found.items() if outcome == "TypeError"} == set(TYPE_ERRORS)
+    assert {ask for ask, outcome in found.items() if outcome == "INVALID"} == set(INVALIDS)
+    assert {ask for ask, outcome in found.items() if outcome == "OK"} == set(VALID)
