@@ -6,12 +6,11 @@ import importlib.util
 import pathlib
 import re
 import shutil
-import subprocess
 import sys
 
 import pytest
 
-from mbma_tables import InputError, TableFileError, __version__
+from mbma_tables import InputError, __version__
 from mbma_tables.export import CODE, code, conformance
 from mbma_tables.export.code import Replay, check, read_report, write_code
 from mbma_tables.models.universal import universal_model
@@ -82,14 +81,6 @@ def test_check_names_what_is_missing(tmp_path: pathlib.Path, monkeypatch: pytest
     assert check("fortran", tmp_path) == Replay("gfortran", {}, {}, 0, "gfortran is not installed", ran=False)
 
 
-def test_javascript_without_its_compiler(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"pip install 'mbma_tables\[javascript\]'") as caught:
-        write_code("javascript", tmp_path / "code")
-    assert len(str(caught.value).splitlines()) == 1
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_compiler_that_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: True)
     monkeypatch.setattr(code, "ZIG", ("-c", "raise SystemExit('no space left')"))
@@ -118,13 +109,6 @@ def test_bad_requests_leave_no_file(
     assert (tmp_path / "a_file").read_text(encoding="utf-8") == "kept"
 
 
-def test_a_broken_table(tmp_path: pathlib.Path) -> None:
-    (tmp_path / "broken.nc").write_bytes(b"nothing")
-    with pytest.raises(TableFileError):
-        write_code("c", tmp_path / "code", table=tmp_path / "broken.nc")
-    assert not (tmp_path / "code").exists()
-
-
 def test_points_of_a_reading_with_high_floors() -> None:
     """A surface below a floor has no islands, and so no points."""
     each = len(conformance.DEPTHS)
@@ -140,9 +124,3 @@ def test_a_program_that_does_not_end_is_stopped(monkeypatch: pytest.MonkeyPatch,
     done = code._run([sys.executable, "-c", "import time; time.sleep(60)"], str(tmp_path))
     assert done.returncode == 1
     assert read_report("cc", done) == Replay("cc", {}, {}, 0, "the self-test did not end: no end within 0.2 s")
-
-
-def test_a_report_among_other_lines() -> None:
-    said = "hello\nphi 12 3.5e-12\nno row 1 2\nfailed 0\nfailed completely today\n"
-    found = read_report("cc", subprocess.CompletedProcess([], 0, said, ""))
-    assert found == Replay("cc", {"phi": 12}, {"phi": 3.5e-12}, 0, "")
