@@ -1,13 +1,15 @@
-"""The wheel, away from the checkout, does what the README shows."""
+"""The wheel, away from the checkout, does what the README shows; the source distribution is complete."""
 
 import os
 import pathlib
 import subprocess
 import sys
+import tarfile
 
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[1]
+pytestmark = pytest.mark.slow
 
 
 def run(*command, **options):
@@ -15,10 +17,15 @@ def run(*command, **options):
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("wheel")
-    source = folder / "source"
+def source(tmp_path_factory):
+    source = tmp_path_factory.mktemp("source") / "clone"
     run("git", "clone", "--quiet", str(ROOT), str(source))
+    return source
+
+
+@pytest.fixture(scope="module")
+def site(source, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wheel")
     pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
     run(*pip, "wheel", "--no-deps", "--no-build-isolation", "-w", str(folder), str(source))
     (wheel,) = folder.glob("*.whl")
@@ -30,19 +37,17 @@ def test_installed_wheel_runs_the_readme_command(site, tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(site)}
     where = run(sys.executable, "-c", "import mbma_tables; print(mbma_tables.__file__)", cwd=tmp_path, env=environment)
     assert pathlib.Path(where.stdout.strip()).is_relative_to(site)
-    shown = run(
-        sys.executable,
-        "-m",
-        "mbma_tables",
-        "curve",
-        "--surface",
-        "concrete",
-        "--points",
-        "5",
-        "--plot",
-        "concrete.png",
-        cwd=tmp_path,
-        env=environment,
-    )
+    curve = ("-m", "mbma_tables", "curve", "--surface", "concrete", "--points", "5", "--plot", "concrete.png")
+    shown = run(sys.executable, *curve, cwd=tmp_path, env=environment)
     assert "reading" in shown.stdout
     assert (tmp_path / "concrete.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_source_distribution_holds_what_the_checkout_holds(source, tmp_path):
+    program = f"from setuptools.build_meta import build_sdist; build_sdist({str(tmp_path)!r})"
+    run(sys.executable, "-c", program, cwd=source)
+    (archive,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(archive) as packed:
+        held = {name.partition("/")[2] for name in packed.getnames()}
+    tracked = run("git", "ls-files", cwd=source).stdout.splitlines()
+    assert [name for name in tracked if not name.startswith(".") and name not in held] == []
