@@ -1,4 +1,4 @@
-"""Tests that the documentation names are there."""
+"""Tests and modules that the documentation names are there."""
 
 import pathlib
 import re
@@ -13,6 +13,17 @@ PAGES = [*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md")]
 def test_every_named_test_exists(page):
     named = set(re.findall(r"`(tests/[a-z0-9_/]+(?:\.py)?)`", page.read_text(encoding="utf-8")))
     assert [name for name in sorted(named) if not (ROOT / name).exists()] == []
+
+
+def test_every_module_of_the_architecture_exists():
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"\b[a-z]+/[a-z_0-9]+\.py", text))
+    assert len(named) > 15
+    assert [name for name in sorted(named) if not (ROOT / "mbma_tables" / name).exists()] == []
+    path = re.findall(r"^\d\. `(\S+)`", text, re.MULTILINE)
+    lines = [len((ROOT / "mbma_tables" / name).read_text(encoding="utf-8").splitlines()) for name in path]
+    assert len(lines) == 7
+    assert 900 < sum(lines) < 1100
 
 
 def test_every_guarantee_names_its_test():
