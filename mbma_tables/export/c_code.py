@@ -82,7 +82,7 @@ def filled(name: str, **parts: str) -> str:
 
 
 def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | float], dict[str, FloatArray]]:
-    """Constants and arrays of the model by their names in C, from the modules that use them here."""
+    """Constants and arrays of the model by their names in C, from the modules that use them here, in one list."""
     X, mu = model.content.axes
     coefficients = model.content.coefficients
     errors = model.content.local_error.max(axis=-1)

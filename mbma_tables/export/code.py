@@ -29,7 +29,7 @@ ZIG = ("-m", "ziglang", "cc", "-target", "wasm32-wasi", "-mexec-model=reactor", 
 class Language(NamedTuple):
     """A target's own files, each made from a template, with what each is; and how its self-test is built and run.
 
-    `{0}` in the commands is the folder of the sources; nothing is built where the first is empty.
+    In the commands, `{0}` is the folder of the sources and `{1}` the one to build in; an empty one builds nothing.
     """
 
     titles: dict[str, str]
@@ -43,7 +43,7 @@ LANGUAGES = {
         {"mbma_selftest.c": "mbma_selftest.c: replays the conformance points of the MBMA model in C99."},
         c_code.USAGE,
         ("cc", "-std=c99", "-O2", "{0}/mbma.c", "{0}/mbma_selftest.c", "-lm", "-o", "selftest"),
-        ("./selftest",),
+        ("{1}/selftest",),
     ),
     "fortran": Language(
         {
@@ -53,7 +53,7 @@ LANGUAGES = {
         "Compile it with mbma.c, in this order: gfortran -O2 mbma.c mbma.f90 program.f90. Every procedure may be "
         "called from any thread.",
         ("gfortran", "-O2", "{0}/mbma.c", "{0}/mbma.f90", "{0}/mbma_selftest.f90", "-o", "selftest"),
-        ("./selftest",),
+        ("{1}/selftest",),
     ),
     "javascript": Language(
         {
@@ -101,6 +101,12 @@ def write_code(
         JavaScript without ziglang.
     TableFileError
         Where the table cannot be read.
+
+    Examples
+    --------
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     [path.name for path in write_code("c", folder)]
+    ['mbma.h', 'mbma.c', 'mbma_table.h', 'mbma_selftest.c', 'mbma_conformance.csv']
     """
     if target not in CODE:
         raise InputError(f"target must be one of {CODE}, got {target!r}")
@@ -209,8 +215,8 @@ def check(target: str, folder: os.PathLike[str] | str, points: os.PathLike[str] 
     program = (language.build or language.run)[0]
     if shutil.which(program) is None:
         return Replay(program, {}, {}, 0, f"{program} is not installed", ran=False)
-    build, run = ([word.format(place) for word in command] for command in (language.build, language.run))
     with tempfile.TemporaryDirectory() as work:
+        build, run = ([word.format(place, work) for word in command] for command in (language.build, language.run))
         if build:
             done = _run(build, work)
             if done.returncode:

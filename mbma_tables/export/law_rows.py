@@ -172,6 +172,13 @@ def describe_law(
     ------
     InputError, OutOfRangeError
         For a batch of surfaces, missing units, a range beyond the law, and rows that cannot meet `rtol`.
+
+    Examples
+    --------
+    >>> road = Surface.named("concrete")
+    >>> law = describe_law(road, 13.3, length_unit="mm", stress_unit="MPa", rows=20)
+    >>> law.y_name, law.y_unit, round(law.largest_error, 3)
+    ('pressure', 'MPa', 0.013)
     """
     _check_unit("length_unit", length_unit)
     _check_unit("stress_unit", stress_unit)
