@@ -76,7 +76,7 @@ def test_contact_json_is_the_librarys_answer_digit_for_digit():
     for name in ("separation", "mean_separation", "force", "area", "error"):
         assert found["columns"][name] == getattr(answer, name).tolist()
     assert (found["reading"], found["tier"], found["rtol"], found["E_star"]) == ("reported", "rigid", 1e-6, 7.5)
-    assert found["arguments"] == {"separation": [0.5, -0.2, -1.1], "name": "concrete", "E_star": 7.5}
+    assert found["arguments"] == {"separation": [0.5, -0.2, -1.1], "surface": "concrete", "E_star": 7.5}
     assert found["units"]["separation"] == "mm"
     assert found["units"]["force"] == "F/A0"
     assert found["surface"]["zeta_1"] == Surface.named("concrete").zeta_1
@@ -271,9 +271,9 @@ def test_out_holds_what_stdout_would(folder):
         (["--surface", "granite"], "no surface is named 'granite'; there are yang-persson"),
         ([], "one surface is needed"),
         (["--surface", "concrete", *options(CONCRETE)], "got --surface and numbers"),
-        (["--surface", "concrete", "--file", "s.toml"], "got --file and --surface"),
-        (["--file", "missing.toml"], "missing.toml: No such file"),
-        (["--file", "."], "Is a directory"),
+        (["--surface", "concrete", "--file", "s.toml"], "got --surface and --file"),
+        (["--file", "missing.toml"], "missing.toml cannot be read: No such file"),
+        (["--file", "."], "not a regular file"),
         (["--surface", "concrete", "--reading", "mine"], "reading must be one of"),
         (["--surface", "concrete", "--tier", "fast"], "tier must be"),
         (["--surface", "concrete", "--rtol", "0"], "rtol must be a number in"),
@@ -327,20 +327,20 @@ def test_bad_input_of_one_command(folder, arguments, message):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("[surface\n", "is no TOML file"),
+        ("[surface\n", "is not a TOML file"),
         ("[surfaces]\nname = 'concrete'\n", "unknown key 'surfaces'; did you mean 'surface'?"),
         ("[surface]\nhrust = 0.7\n", "unknown key 'hrust'; did you mean 'hurst'?"),
         ("[surface]\nname = 'concrete'\n[material]\nEstar = 1\n", "did you mean 'E_star'?"),
-        ("[surface]\nname = 'concrete'\nxyz = 1\n", "unknown key 'xyz'; known are hurst"),
-        ("surface = 3\n", "surface must be a table"),
-        ("", "one of name, map or numbers"),
-        ("[surface]\nname = 'concrete'\nhurst = 0.7\n", "one of name, map or numbers"),
-        ("[surface]\nname = 7\n", "name must be a text"),
+        ("[surface]\nname = 'concrete'\nxyz = 1\n", "unknown key 'xyz'; known are name, map"),
+        ("surface = 3\n", "3 is not of type 'object'; write [surface]"),
+        ("", "'surface' is a required property"),
+        ("[surface]\nname = 'concrete'\nhurst = 0.7\n", "leave one of them out"),
+        ("[surface]\nname = 7\n", "surface.name: 7 is not of type 'string'"),
         ("[surface]\nname = 'granite'\n", "no surface is named"),
         ("[surface]\nname = 'concrete'\nlength_unit = 'm'\n", "length_unit is 'm'"),
-        (toml(CONCRETE).replace("0.7", "'0.7'"), "hurst must be real numbers"),
-        (toml(CONCRETE).replace("0.7", "true"), "hurst must be real numbers"),
-        (toml(CONCRETE).replace("0.7", "[0.7, 0.8]"), "hurst must be one number"),
+        (toml(CONCRETE).replace("0.7", "'0.7'"), "surface.hurst: '0.7' is not of type 'number'"),
+        (toml(CONCRETE).replace("0.7", "true"), "surface.hurst: True is not of type 'number'"),
+        (toml(CONCRETE).replace("0.7", "[0.7, 0.8]"), "surface.hurst: [0.7, 0.8] is not of type 'number'"),
         (toml(CONCRETE).replace("0.7", "nan"), "hurst must be finite"),
         (toml(CONCRETE).replace("0.7", "1" + 400 * "0"), "hurst must be real numbers"),
         (toml(CONCRETE) + "[material]\nE1 = 1\n", "a material is E_star alone"),
@@ -413,7 +413,7 @@ def test_bad_maps(folder):
 
 def test_bytes_that_are_no_text(folder):
     (folder / "s.toml").write_bytes(b"\xff\xfe\x00")
-    assert "s.toml is no TOML file" in refused(folder, "contact", "--file", "s.toml", "-d", "0.1")
+    assert "s.toml is not a TOML file" in refused(folder, "contact", "--file", "s.toml", "-d", "0.1")
 
 
 def test_missing_matplotlib_leaves_nothing(folder, monkeypatch):

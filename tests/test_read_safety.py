@@ -22,7 +22,6 @@ from generate.tables import campaign, configuration
 from mbma_tables import InputError, MbmaError, Scene, TableFileError
 from mbma_tables.files import shipped_file
 from mbma_tables.formulas import file as formula_file
-from mbma_tables.scenes.costs import read_calibration, read_costs
 from mbma_tables.surfaces.maps import read_map
 from mbma_tables.tablefiles import contents
 from mbma_tables.tablefiles.netcdf import SEAL_LENGTH, check_table
@@ -322,10 +321,6 @@ CASES = {
         b"seed = 0x" + b"f" * 900_000,
     ),
     "configuration-long": (lambda path: configuration.load("universal", path), "own.toml", b"#" * 2_000_000),
-    "cost-line": (read_costs, "cost.csv", b"x" * 1_000_000),
-    "cost-field": (read_costs, "cost.csv", b"tier,variant,quantity,error,cost\nunit,seconds," + b"1" * 900_000),
-    "calibration-deep": (read_calibration, "cost.json", DEEP),
-    "calibration-digits": (read_calibration, "cost.json", b"9" * 900_000),
 }
 
 
@@ -383,13 +378,11 @@ def test_a_sparse_file_is_not_read(tmp_path):
         check_table,
         formula_file.read,
         Scene.from_toml,
-        read_costs,
         lambda path: configuration.load("universal", path),
     ):
         refused, peak = tried(read, path)
         assert refused
         assert peak < MOST_MEMORY
-    assert read_calibration(path) is None
 
 
 @pytest.mark.parametrize("key", ["map", "psd"])
@@ -400,7 +393,7 @@ def test_a_scene_reads_no_other_files_than_plain_ones(key, name, tmp_path):
     more = "h_max = 1.0\n" if key == "psd" else ""
     scene = tmp_path / "scene.toml"
     scene.write_text(f'[surface]\n{key} = "{name}"\n{more}[effects]\non = ["force"]\n[prescribed]\nseparations = 1.0\n')
-    with pytest.raises(InputError, match="is no file"):
+    with pytest.raises(InputError, match="is not a file"):
         Scene.from_toml(scene)
 
 

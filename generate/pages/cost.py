@@ -1,8 +1,4 @@
-"""Measure what accuracy costs: tables/cost.csv, docs/cost.md and its figure, and the table for the README.
-
-Run ``python -m generate.pages.cost --out docs``. Every number is measured in the run, as a ratio to one fixed piece of
-work.
-"""
+"""What accuracy costs: tables/cost.csv, docs/cost.md and its figure, every time a ratio to one fixed piece of work."""
 
 from __future__ import annotations
 
@@ -11,72 +7,55 @@ import io
 import json
 import pathlib
 import platform
-import time
+import tempfile
 from collections.abc import Sequence
 from importlib import metadata
 
-import click
+from generate.pages import timing
+from generate.pages.cost_islands import island_rows
+from generate.pages.cost_page import draw, parts_of
+from generate.pages.cost_totals import brute_force_rows, total_rows
+from mbma_tables.scenes.costs import COLUMNS, UNIT, Row, read_costs
 
-from mbma_tables.files import write_file
-from mbma_tables.scenes.costs import COLUMNS, EVALUATIONS, UNIT, Row, measure, read_costs
-
-DATA = pathlib.Path(__file__).parents[2] / "tables" / "cost.csv"
 LIBRARIES = ("numpy", "scipy", "numba")
 HEAD = """\
-# What accuracy costs, measured by python -m generate cost; docs/cost.md says how. Costs are times over that of a
+# What accuracy costs, measured by python -m generate pages cost; docs/cost.md says how. Costs are times over that of a
 # fixed piece of work in the same run; the row of tier unit has its seconds. Times of boundary_elements are of others'
 # machines.
 """
 
 
-def to_csv(rows: Sequence[Row], quick: bool) -> str:
+def to_csv(rows: Sequence[Row]) -> str:
     """The rows as text."""
     versions = {name: metadata.version(name) for name in LIBRARIES} | {"python": platform.python_version()}
     text = io.StringIO()
     text.write(HEAD)
-    text.write(f"# {json.dumps({'machine': platform.machine(), 'quick': quick} | versions)}\n")
+    text.write(f"# {json.dumps({'machine': platform.machine()} | versions)}\n")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow((*COLUMNS, EVALUATIONS))
+    writer.writerow(COLUMNS)
     for row in rows:
         numbers = ("" if number is None else f"{number:.4g}" for number in (row.error, row.cost, row.evaluations))
         writer.writerow((row.tier, row.variant, row.quantity, *numbers))
     return text.getvalue()
 
 
-def study(quick: bool) -> list[Row]:
-    """Every measurement."""
-    from generate.pages.cost_islands import island_rows
-    from generate.pages.cost_totals import brute_force_rows, total_rows
-
-    rows, seconds = [], []
-    for part in (island_rows, total_rows):
-        seconds.append(measure(lambda: None)[1])
-        rows += part(quick)
+def study() -> list[Row]:
+    """Every measurement, in a few minutes."""
+    seconds = [timing.measure(lambda: None)[1]]
+    rows = island_rows()
+    seconds.append(timing.measure(lambda: None)[1])
+    rows += total_rows()
     # the least: what else the machine does can only add
-    unit = min(*seconds, measure(lambda: None)[1])
+    unit = min(*seconds, timing.measure(lambda: None)[1])
     return [Row(UNIT, "seconds", "both", None, unit), *rows, *brute_force_rows(unit)]
 
 
-@click.command()
-@click.option(
-    "--out", type=click.Path(path_type=pathlib.Path), default=pathlib.Path("docs"), show_default=True, help="Folder."
-)
-@click.option("--data", type=click.Path(path_type=pathlib.Path), default=DATA, help="File; default tables/cost.csv.")
-@click.option("--quick", is_flag=True, help="Fewer tolerances and meshes.")
-@click.option("--page", "page_only", is_flag=True, help="Measure nothing: page and figure from the data as they are.")
-def main(out: pathlib.Path, data: pathlib.Path, quick: bool, page_only: bool) -> None:
-    """Write tables/cost.csv, OUT/cost.md and OUT/figures/cost.png; print the table for the README."""
-    from generate.pages.cost_page import draw, page, readme_table
-
-    started = time.perf_counter()
-    if not page_only:
-        write_file(data, to_csv(study(quick), quick).encode(), make_folders=True)
-    costs = read_costs(data)
-    write_file(out / "cost.md", page(costs).encode(), make_folders=True)
-    write_file(out / "figures" / "cost.png", draw(costs), make_folders=True)
-    click.echo(readme_table(costs))
-    click.echo(f"wrote {data}, {out / 'cost.md'}; {time.perf_counter() - started:.0f} s", err=True)
-
-
-if __name__ == "__main__":
-    main()
+def measure() -> tuple[dict[str, str], dict[str, bytes]]:
+    """The measured parts of the page, and its files."""
+    content = to_csv(study()).encode()
+    # the page shows what the file holds, rounded as it is there
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "cost.csv"
+        path.write_bytes(content)
+        costs = read_costs(path)
+    return parts_of(costs), {"tables/cost.csv": content, "docs/figures/cost.png": draw(costs)}

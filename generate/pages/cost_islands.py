@@ -5,29 +5,24 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from scipy.stats import qmc
 
+from generate.pages.timing import measure, variant
 from generate.tables.solves import log_ratio
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import njit
 from mbma_tables.errors import ConvergenceError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.classical import iterate, ring_matrix
-from mbma_tables.islands.four_numbers import Coordinates, band_fields
 from mbma_tables.islands.newton import extent_squared
 from mbma_tables.models import TIERS, get_model
 from mbma_tables.models.closed_forms import FormulaModel
-from mbma_tables.models.island4d import Island4dModel
-from mbma_tables.models.protocol import IslandAnswer
-from mbma_tables.models.universal import UniversalModel, shipped
-from mbma_tables.scenes.costs import Row, measure, variant
+from mbma_tables.models.universal import UniversalModel, open_table
+from mbma_tables.scenes.costs import Row
 from mbma_tables.surfaces.readings import get_reading
-from mbma_tables.tablefiles.netcdf import read_table
-from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL, TableContent
 from mbma_tables.tablefiles.splines import coefficients
 from mbma_tables.totals.island import geometry
 
@@ -37,24 +32,27 @@ PROFILES = 20
 REFERENCE_RTOL = 1e-12
 SEED = 2026
 RANGES = ((0.32, 0.7, -4.0), (0.98, 3.9, 0.9))  # H, log10 zeta_1, log10 delta/h_rms
-DAMPING, MOST_STEPS = 0.1, 5000
-MESHES = {25: (1e-2, 1e-4), 50: (1e-3,), 100: (1e-2, 1e-4, 1e-6), 200: (1e-5,), 400: (1e-6,), 800: (1e-7,)}
-FINEST_MESH = {1600: (1e-8,)}
+DAMPING, MAX_STEPS = 0.1, 5000
+MESHES = {
+    25: (1e-2, 1e-4),
+    50: (1e-3,),
+    100: (1e-2, 1e-4, 1e-6),
+    200: (1e-5,),
+    400: (1e-6,),
+    800: (1e-7,),
+    1600: (1e-8,),
+}
 NEWTON_RTOLS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 NEWTON_NODES = (8, 12, 16, 24, 32, 48, 64, 96)
 UNIVERSAL_SHARES = (0.06, 0.12, 0.25, 0.5)  # of the shipped table's nodes along each axis
-ISLAND4D_SHAPES = ((9, 16, 8, 8), (16, 27, 8, 8))
-
 FORMS = ("pocket", "standard", "long")
-
-Islands = dict[str, FloatArray]
 
 
 @dataclasses.dataclass(frozen=True)
 class HeldOut:
     """Islands of surfaces that made no table, and their Phi_F and Phi_A (2, islands) on twice the nodes."""
 
-    islands: Islands
+    islands: dict[str, FloatArray]
     truth: FloatArray
 
     def error(self, phi_F: FloatArray, phi_A: FloatArray, chosen: Any = slice(None)) -> float:
@@ -76,18 +74,18 @@ def classical(X: FloatArray, mu: FloatArray, matrix: FloatArray, tolerance: floa
     rings = len(matrix)
     w, p = np.empty(rings), np.empty(rings)
     rows = [
-        iterate(x, m, math.sqrt(extent_squared(x, m, 0.03 * tolerance)), matrix, DAMPING, tolerance, MOST_STEPS, w, p)
+        iterate(x, m, math.sqrt(extent_squared(x, m, 0.03 * tolerance)), matrix, DAMPING, tolerance, MAX_STEPS, w, p)
         for x, m in zip(X, mu, strict=True)
     ]
     return tuple(np.array(column) for column in zip(*rows, strict=True))
 
 
-def classical_rows(quick: bool) -> Iterator[Row]:
+def classical_rows() -> Iterator[Row]:
     """The damped iteration at several meshes and tolerances."""
     held = held_out()
     chosen = np.linspace(0, ISLANDS - 1, HARD).astype(int)
     X, mu = held.islands["X"][chosen], held.islands["mu"][chosen]
-    for rings, tolerances in (MESHES if quick else MESHES | FINEST_MESH).items():
+    for rings, tolerances in MESHES.items():
         matrix = ring_matrix(rings)
         for tolerance in tolerances:
             steps, converged, force, area = classical(X, mu, matrix, tolerance)
@@ -99,10 +97,10 @@ def classical_rows(quick: bool) -> Iterator[Row]:
             yield Row("classical", variant(f"rings={rings}", tolerance), "both", error, cost / HARD, pressures)
 
 
-def newton_rows(quick: bool) -> Iterator[Row]:
-    """Newton to several tolerances, and on several numbers of nodes."""
+def newton_rows() -> Iterator[Row]:
+    """Newton to several tolerances, on several numbers of nodes, and with p(r) kept."""
     held = held_out()
-    chosen = np.arange(0, ISLANDS, 10 if quick else 4)
+    chosen = np.arange(0, ISLANDS, 4)
     X, mu = held.islands["X"][chosen], held.islands["mu"][chosen]
     ways: list[tuple[str, dict[str, Any]]] = [
         (variant("island", rtol), {"rtol": max(0.1 * rtol, greenwood_tripp.TIGHTEST)}) for rtol in NEWTON_RTOLS
@@ -123,108 +121,36 @@ def _profiles(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
     return greenwood_tripp.solve(X, mu, rtol=rtol).pressure
 
 
-def looked_up(model: Any) -> tuple[float, float]:
-    """Error and cost of an island of any model, in one batch."""
+def model_rows() -> Iterator[Row]:
+    """Models that do not solve: the shipped ones, each closed form, and coarser universal tables."""
     held = held_out()
-    answer: IslandAnswer = model.of_islands(held.islands)
-    cost, _ = measure(lambda: model.of_islands(held.islands))
-    return held.error(answer.phi_F, answer.phi_A), cost / ISLANDS
+    models: list[tuple[str, str, Any]] = [
+        (tier, "island", get_model(tier, 1e-8, get_reading("reported"))) for tier in TIERS if tier != "exact"
+    ]
+    models += [("formula", f"island form={name}", FormulaModel(name)) for name in FORMS]
+    for share in UNIVERSAL_SHARES:
+        coarse = coarser_universal(share)
+        shape = "x".join(str(axis.nodes) for axis in coarse.content.axes)
+        models.append(("universal", f"island nodes={shape}", coarse))
+    for tier, name, model in models:
+        answer = model.of_islands(held.islands)
+        cost, _ = measure(functools.partial(model.of_islands, held.islands))
+        yield Row(tier, name, "both", held.error(answer.phi_F, answer.phi_A), cost / ISLANDS, 2)
 
 
-def tier_rows() -> Iterator[Row]:
-    """The shipped tiers."""
-    for tier in TIERS:
-        if tier != "exact":
-            error, cost = looked_up(get_model(tier, 1e-8, get_reading("reported")))
-            yield Row(tier, "island", "both", error, cost, 2)
-
-
-def resized(content: TableContent, ratio: FloatArray, axes: Any, degree: int) -> TableContent:
-    """A table of another resolution in memory, for timing and errors only: its error field says nothing."""
-    return dataclasses.replace(
-        content,
-        axes=axes,
-        log_ratio=ratio,
-        coefficients=coefficients(ratio, degree, len(axes)),
-        local_error=np.zeros((*(axis.nodes - 1 for axis in axes), 2)),
+def coarser_universal(share: float) -> UniversalModel:
+    """The universal table on that share of its nodes along each axis, in memory; its error field says nothing."""
+    content = open_table("universal").content
+    axes = tuple(dataclasses.replace(axis, nodes=round(share * axis.nodes)) for axis in content.axes)
+    X, mu = (g.ravel() for g in np.meshgrid(*(axis.values for axis in axes), indexing="ij"))
+    ratio = log_ratio(X, mu, 1e-11).reshape(*(axis.nodes for axis in axes), 2)
+    cells = np.zeros((*(axis.nodes - 1 for axis in axes), 2))
+    spline = coefficients(ratio, 5, len(axes))
+    return UniversalModel(
+        dataclasses.replace(content, axes=axes, log_ratio=ratio, coefficients=spline, local_error=cells)
     )
 
 
-def universal_rows(quick: bool) -> Iterator[Row]:
-    """The universal table at several resolutions; the shipped one is among the tiers."""
-    content = read_table(shipped(UNIVERSAL), UNIVERSAL)
-    for share in UNIVERSAL_SHARES[: 2 if quick else None]:
-        axes = tuple(dataclasses.replace(axis, nodes=round(share * axis.nodes)) for axis in content.axes)
-        X, mu = (g.ravel() for g in np.meshgrid(*(axis.values for axis in axes), indexing="ij"))
-        shape = tuple(axis.nodes for axis in axes)
-        ratio = log_ratio(X, mu, 1e-11).reshape(*shape, 2)
-        error, cost = looked_up(UniversalModel(resized(content, ratio, axes, 5)))
-        yield Row("universal", f"island nodes={shape[0]}x{shape[1]}", "both", error, cost, 2)
-
-
-@njit(cache=True, error_model="numpy")
-def _fill_linear(table: FloatArray, positions: FloatArray, out: FloatArray) -> None:
-    """Linear interpolation between the 16 nodes around each position."""
-    cell, share = np.empty(4, dtype=np.int64), np.empty((4, 2))
-    for k in range(positions.shape[1]):
-        for axis in range(4):
-            cell[axis] = min(int(positions[axis, k]), table.shape[axis] - 2)
-            share[axis, 1] = positions[axis, k] - cell[axis]
-            share[axis, 0] = 1.0 - share[axis, 1]
-        force = area = 0.0
-        for corner in range(16):
-            a, b, c, d = corner & 1, (corner >> 1) & 1, (corner >> 2) & 1, corner >> 3
-            weight = share[0, a] * share[1, b] * share[2, c] * share[3, d]
-            force += weight * table[cell[0] + a, cell[1] + b, cell[2] + c, cell[3] + d, 0]
-            area += weight * table[cell[0] + a, cell[1] + b, cell[2] + c, cell[3] + d, 1]
-        out[0, k], out[1, k] = force, area
-
-
-class LinearModel(Island4dModel):
-    """The four-parameter table read linearly between its nodes."""
-
-    def log_ratio(self, place: Coordinates, parallel: bool = False) -> FloatArray:
-        """log(Phi/Phi_rigid), shape (2, entries)."""
-        out = np.empty((2, place.X.size))
-        _fill_linear(self.content.log_ratio, self._positions(place), out)
-        scaled: FloatArray = out * self._share(place)
-        return scaled
-
-
-def _shape(content: TableContent) -> str:
-    return "x".join(str(axis.nodes) for axis in content.axes)
-
-
-def island4d_rows(quick: bool) -> Iterator[Row]:
-    """The four-parameter table at several resolutions, read with splines and linearly."""
-    content = read_table(shipped(ISLAND4D), ISLAND4D)
-    error, cost = looked_up(LinearModel(content))
-    yield Row("island4d", f"island linear nodes={_shape(content)}", "both", error, cost, 2)
-    for shape in ISLAND4D_SHAPES[: 1 if quick else None]:
-        axes = tuple(dataclasses.replace(axis, nodes=n) for axis, n in zip(content.axes, shape, strict=True))
-        X, spread, sphere, hurst = (g.ravel() for g in np.meshgrid(*(axis.values for axis in axes), indexing="ij"))
-        mu = band_fields(spread, sphere, hurst, get_reading("reported"))[0]
-        smaller = resized(content, log_ratio(X, mu, 1e-8).reshape(*shape, 2), axes, 3)
-        models: dict[str, Callable[[TableContent], Island4dModel]] = {"cubic": Island4dModel, "linear": LinearModel}
-        for scheme, model in models.items():
-            error, cost = looked_up(model(smaller))
-            yield Row("island4d", f"island {scheme} nodes={_shape(smaller)}", "both", error, cost, 2)
-
-
-def formula_rows() -> Iterator[Row]:
-    """Each form of the formula file."""
-    for name in FORMS:
-        error, cost = looked_up(FormulaModel(name))
-        yield Row("formula", f"island form={name}", "both", error, cost, 2)
-
-
-def island_rows(quick: bool) -> list[Row]:
+def island_rows() -> list[Row]:
     """Everything that answers an island."""
-    return [
-        *tier_rows(),
-        *formula_rows(),
-        *universal_rows(quick),
-        *island4d_rows(quick),
-        *newton_rows(quick),
-        *classical_rows(quick),
-    ]
+    return [*model_rows(), *newton_rows(), *classical_rows()]

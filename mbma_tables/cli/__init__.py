@@ -21,6 +21,7 @@ from mbma_tables.cli.tables import tables_group
 from mbma_tables.errors import MbmaError
 
 BAD_INPUT = 2
+INTERRUPTED = 130  # as shells report Ctrl-C
 
 
 def _describe(fault: Exception) -> str:
@@ -44,13 +45,13 @@ class Program(click.Group):
     """A group of commands whose every known fault ends in a short message."""
 
     def main(self, *args: Any, **extra: Any) -> Any:
-        """Run, and exit with 0, or with 2 for bad input."""
+        """Run, and exit with 0, with 2 for bad input, or with 130 where it was interrupted."""
         extra["standalone_mode"] = False
         warnings.showwarning = _show_warning
         try:
             code = super().main(*args, **extra)
         except click.Abort:
-            sys.exit(1)
+            sys.exit(INTERRUPTED)
         except (click.ClickException, MbmaError, OSError) as fault:
             click.echo(f"mbma: {_describe(fault)}", err=True)
             sys.exit(BAD_INPUT)

@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
-from mbma_tables.cli.options import surface_options
-from mbma_tables.cli.sources import read_source
+from mbma_tables.cli.options import optional_specimen_options, reading_option
 from mbma_tables.errors import InputError
 from mbma_tables.export import CODE, DATA, SOLVERS
 from mbma_tables.files import write_file
+from mbma_tables.scenes.specimen import Specimen
+
+if TYPE_CHECKING:
+    from mbma_tables.export.law_rows import LawTable
 
 
 @click.command("export", short_help="A contact law, or the whole model, for other codes.")
 @click.argument("target", type=click.Choice([*SOLVERS, *DATA, *CODE]))
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write; a folder for source code.")
-@surface_options
-@click.option("--E-star", "E_star", type=float, help="Effective modulus, in --stress-unit.")
-@click.option("--E1", "E1", type=float, help="Instead of --E-star: Young's modulus,")
-@click.option("--nu1", "nu1", type=float, help="and Poisson's ratio of one body,")
-@click.option("--E2", "E2", type=float, help="Young's modulus of the other,")
-@click.option("--nu2", "nu2", type=float, help="and its Poisson's ratio.")
+@optional_specimen_options
 @click.option("--length-unit", help="Unit of the surface's lengths and of the file, such as mm.")
 @click.option("--stress-unit", help="Unit of the modulus and of the file, such as MPa.")
 @click.option("--rows", type=int, help="How many rows; else as few as --rtol needs.")
@@ -32,25 +30,77 @@ from mbma_tables.files import write_file
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
 @click.option("--exponential", is_flag=True, help="For calculix and abaqus: Persson's exponential law instead of rows.")
 @click.option("--pair", default="node-to-surface", show_default=True, help="For calculix: the type of contact pair.")
-@click.option("--reading", default="reported", show_default=True, help="Reading of the paper's equations.")
+@reading_option
 @click.option("--check", is_flag=True, help="Of source code: build it and replay its conformance points.")
-def export_command(**given: Any) -> None:
+def export_command(
+    target: str,
+    out: Path,
+    specimen: Specimen | None,
+    length_unit: str | None,
+    stress_unit: str | None,
+    rows: int | None,
+    rtol: float | None,
+    largest_overclosure: float | None,
+    conductivity: float | None,
+    conductivity_unit: str | None,
+    exponential: bool,
+    pair: str,
+    reading: str,
+    check: bool,
+) -> None:
     """Write TARGET to a file.
 
     Solvers and data take a surface, a modulus and units; c, fortran and javascript are the whole model as code.
 
     Example: mbma export calculix --surface concrete --E-star 13.3 --length-unit mm --stress-unit MPa --out law.inp
     """
-    target, out = given["target"], given["out"]
     if target in CODE:
-        _export_code(target, out, given["reading"], given["check"])
+        _export_code(target, out, reading, check)
         return
-    if given["check"]:
+    if check:
         raise InputError(f"--check replays points in source code; {target} has none to replay")
-    files = _law_files(target, out, given)
+    if specimen is None:
+        raise InputError("one surface is needed: see the options --surface, --file, --map, --hurst")
+    if specimen.E_star is None:
+        raise InputError("a modulus is needed: --E-star, or --E1 --nu1 and, unless the other body is rigid, --E2 --nu2")
+    if exponential and target not in ("calculix", "abaqus"):
+        raise InputError(f"--exponential is a law of calculix and abaqus, not of {target}")
+    from mbma_tables.export import solvers
+    from mbma_tables.export.law_rows import describe_law
+
+    law = describe_law(
+        specimen.surface,
+        specimen.E_star,
+        length_unit=length_unit or "",
+        stress_unit=stress_unit or "",
+        quantity="pressure" if conductivity is None else "conductance",
+        rows=rows,
+        rtol=rtol,
+        largest_overclosure=largest_overclosure,
+        conductivity=conductivity,
+        conductivity_unit=conductivity_unit,
+        reading=reading,
+    )
+    if exponential:
+        files = {out: solvers.exponential(specimen.surface, specimen.E_star, law.comments).encode()}
+    elif target in SOLVERS:
+        options = {"pair": pair} if target == "calculix" else {}
+        files = {out: getattr(solvers, target)(law, **options).encode()}
+    else:
+        files = _data_files(target, out, law)
     for path, content in files.items():
         write_file(path, content)
         click.echo(path)
+
+
+def _data_files(target: str, out: Path, law: LawTable) -> dict[Path, bytes]:
+    from mbma_tables.export import data
+
+    if target == "matlab":
+        if out.suffix != ".mat":
+            raise InputError(f"--out of matlab must be NAME.mat, got {out.name!r}")
+        return {out.with_suffix(".m"): data.matlab_reader(law, out.stem), out: data.to_matlab(law)}
+    return {out: getattr(data, f"to_{target}")(law)}
 
 
 def _export_code(target: str, folder: Path, reading: str, check: bool) -> None:
@@ -66,37 +116,3 @@ def _export_code(target: str, folder: Path, reading: str, check: bool) -> None:
             click.echo(f"{kind}: {found.points[kind]} points, largest relative difference {largest:.1e}")
         if found.reason:
             raise InputError(f"the check failed: {found.reason}")
-
-
-def _law_files(target: str, out: Path, given: dict[str, Any]) -> dict[Path, bytes]:
-    from mbma_tables.export import data, solvers
-    from mbma_tables.export.law_rows import describe_law
-
-    source = read_source(given)
-    if source.E_star is None:
-        raise InputError("a modulus is needed: --E-star, or --E1 --nu1 and, unless the other body is rigid, --E2 --nu2")
-    law = describe_law(
-        source.surface,
-        source.E_star,
-        length_unit=given["length_unit"] or "",
-        stress_unit=given["stress_unit"] or "",
-        quantity="pressure" if given["conductivity"] is None else "conductance",
-        rows=given["rows"],
-        rtol=given["rtol"],
-        largest_overclosure=given["largest_overclosure"],
-        conductivity=given["conductivity"],
-        conductivity_unit=given["conductivity_unit"],
-        reading=given["reading"],
-    )
-    if given["exponential"]:
-        if target not in ("calculix", "abaqus"):
-            raise InputError(f"--exponential is a law of calculix and abaqus, not of {target}")
-        return {out: solvers.exponential(source.surface, source.E_star, law.comments).encode()}
-    if target in SOLVERS:
-        options = {"pair": given["pair"]} if target == "calculix" else {}
-        return {out: getattr(solvers, target)(law, **options).encode()}
-    if target == "matlab":
-        if out.suffix != ".mat":
-            raise InputError(f"--out of matlab must be NAME.mat, got {out.name!r}")
-        return {out.with_suffix(".m"): data.matlab_reader(law, out.stem), out: data.to_matlab(law)}
-    return {out: getattr(data, f"to_{target}")(law)}

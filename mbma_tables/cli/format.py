@@ -1,4 +1,4 @@
-"""What a command found, as a table, as JSON or as CSV."""
+"""What a command found, with its units and what it rests on, as a table, as JSON or as CSV."""
 
 from __future__ import annotations
 
@@ -6,11 +6,21 @@ import csv
 import dataclasses
 import io
 import json
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
+import click
+
 from mbma_tables import __version__
+from mbma_tables.cli.options import Model, Output
+from mbma_tables.files import write_file
+from mbma_tables.scenes.specimen import Specimen
 
 DIGITS = 6  # significant digits of a table; JSON and CSV keep all
+SURFACE_NUMBERS = ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "m0", "m2", "m4", "alpha")
+# options that say where the answer goes, or that the report names by themselves
+NOT_ARGUMENTS = ("as_json", "as_csv", "out", "plot", "reading", "tier", "rtol")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,9 +47,9 @@ class Report:
 
     def to_table(self) -> str:
         """Aligned columns under their names, and their units where they have any."""
-        united = any(c.unit != "-" for c in self.columns)
+        with_units = any(c.unit != "-" for c in self.columns)
         cells = [
-            [c.name, *([c.unit] if united else []), *(_rounded(value) for value in c.values)] for c in self.columns
+            [c.name, *([c.unit] if with_units else []), *(_rounded(value) for value in c.values)] for c in self.columns
         ]
         widths = [max(map(len, column)) for column in cells]
         texts = [any(isinstance(value, str) for value in c.values) for c in self.columns]
@@ -75,8 +85,97 @@ class Report:
         rows.writerows(zip(*(c.values for c in self.columns), strict=True))
         return content.getvalue()
 
+    def write(self, output: Output, plot: Path | None = None, picture: bytes = b"") -> None:
+        """To its file, with the picture after it, or to stdout once the picture is written."""
+        text = self.to_json() if output.as_json else self.to_csv() if output.as_csv else self.to_table()
+        if output.out is not None:
+            write_file(output.out, text.encode())
+        if plot is not None:
+            write_file(plot, picture)
+        if output.out is None:
+            click.echo(text, nl=False)
+
 
 def _rounded(value: Any) -> str:
     if value is None:
         return "-"
     return f"{value:.{DIGITS}g}" if isinstance(value, float) else str(value)
+
+
+def units_of(length: str | None) -> dict[str, str]:
+    """Unit of every named number that has one, for a unit of length."""
+    unit = length or "length"
+    lengths = ("separation", "mean_separation", "delta", "R_d", "R_u", "sigma", "h_d", "h_rms", "h_max")
+    return {
+        **dict.fromkeys(lengths, unit),
+        **dict.fromkeys(("q0", "q1"), f"1/{unit}"),
+        **dict.fromkeys(("D", "m4"), f"1/{unit}^2"),
+        "m0": f"{unit}^2",
+        "error": "relative",
+    }
+
+
+def to_columns(values: Mapping[str, Any], units: Mapping[str, str]) -> list[Column]:
+    """One column for each array, scalars being arrays of one entry; NaN says that there is no number."""
+    import numpy as np
+
+    columns = []
+    for name, array in values.items():
+        entries = np.atleast_1d(array).ravel().tolist()
+        columns.append(Column(name, units.get(name, "-"), [None if entry != entry else entry for entry in entries]))
+    return columns
+
+
+def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
+    """The surface's numbers for a program, and lines of them for a reader."""
+    surface, units = specimen.surface, units_of(specimen.length_unit)
+    numbers = {name: float(getattr(surface, name)) for name in SURFACE_NUMBERS}
+    facts: dict[str, Any] = {"length_unit": specimen.length_unit, **numbers}
+    shown = [f"{name} {value:.6g} {units.get(name, '')}".rstrip() for name, value in numbers.items()]
+    notes = ["surface: " + ", ".join(shown)]
+    if surface.fit is not None:
+        values = {field.name: getattr(surface.fit, field.name) for field in dataclasses.fields(surface.fit)}
+        facts["fit"] = {name: v.tolist() if hasattr(v, "tolist") else v for name, v in values.items()}
+        notes.append("fit: " + ", ".join(f"{name} {_rounded(v)}" for name, v in facts["fit"].items() if v is not None))
+    return facts, notes
+
+
+def report_answer(
+    command: str, specimen: Specimen, model: Model, answer: Any, values: Mapping[str, Any], units: Mapping[str, str]
+) -> Report:
+    """The report of a command that evaluated the model.
+
+    Parameters
+    ----------
+    command : str
+        Its name.
+    specimen : Specimen
+        The surface.
+    model : Model
+        What was asked for.
+    answer : Contact or Island
+        What says which reading and tier made it.
+    values, units : mapping
+        Arrays by column, and the units that `units_of` does not know.
+    """
+    surface, notes = _surface_facts(specimen)
+    scale = "forces are over E*, none was given" if specimen.E_star is None else f"E* is {specimen.E_star:.6g}"
+    notes += [
+        f"reading {answer.reading}, tier {answer.tier}, rtol {model.rtol:g}; {scale}",
+        "error bounds the relative error of force and area",
+    ]
+    facts = {
+        "arguments": {
+            key: str(value) if isinstance(value, Path) else value
+            for key, value in click.get_current_context().params.items()
+            if key not in NOT_ARGUMENTS and value is not None and value is not False
+        },
+        "reading": answer.reading,
+        "tier": answer.tier,
+        "rtol": model.rtol,
+        "E_star": specimen.E_star,
+        "surface": surface,
+    }
+    return Report(
+        command, specimen.title, notes, facts, to_columns(values, {**units_of(specimen.length_unit), **units})
+    )

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mbma_tables.cli.format import Column, Report
+from mbma_tables.cli.format import Report, to_columns
+from mbma_tables.cli.options import check_png, png_option
 from mbma_tables.errors import InputError
 from mbma_tables.files import write_file, written_bytes
 
@@ -25,7 +26,7 @@ scene_file = click.argument("file", type=click.Path(path_type=Path))
 @scene_file
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
 def plan_command(file: Path, as_json: bool) -> None:
-    """How the scene in FILE would be computed: steps, why each is there, predicted error and time.
+    """How the scene in FILE would be computed: steps, why each is there, certified error and measured cost.
 
     Example: mbma plan examples/scene_joint.toml
     """
@@ -35,9 +36,23 @@ def plan_command(file: Path, as_json: bool) -> None:
     if not as_json:
         click.echo(plan.text(), nl=False)
         return
-    steps = [vars(step) for step in plan.steps]
-    content = {"rtol": plan.rtol, "error": plan.error, "seconds": plan.seconds, "steps": steps}
-    click.echo(json.dumps(content | {"left_out": plan.left_out}, indent=2))
+
+    def plain(number: float) -> float | None:
+        return number if math.isfinite(number) else None
+
+    content = {
+        "rtol": plan.rtol,
+        "error": plain(plan.error),
+        "seconds": plain(plan.seconds),
+        "first_use_seconds": plan.first_use,
+        "steps": [
+            vars(step) | {"tier": step.tier_name, "error": plain(step.error), "seconds": plain(step.seconds)}
+            for step in plan.steps
+        ],
+        "left_out": plan.left_out,
+        "switched_off": plan.switched_off,
+    }
+    click.echo(json.dumps(content, indent=2))
 
 
 def _show(step: str, done: int, total: int) -> None:
@@ -49,7 +64,7 @@ def _show(step: str, done: int, total: int) -> None:
 @click.command("run", short_help="Compute a scene.")
 @scene_file
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write it to result.nc or result.csv.")
-@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw force and area to a PNG file.")
+@png_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
 def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) -> None:
     """Compute the scene in FILE, and nothing that it does not ask for.
@@ -60,10 +75,7 @@ def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) 
     """
     if out is not None and out.suffix not in SUFFIXES:
         raise InputError(f"--out must end with one of {', '.join(SUFFIXES)}, got {out}")
-    if plot is not None and plot.suffix.lower() != ".png":
-        raise InputError(f"--plot writes PNG: the file's name must end with .png, got {plot}")
-    if out is not None and plot is not None and out == plot:
-        raise InputError(f"--out and --plot name the same file, {out}")
+    check_png(plot, out)
     from mbma_tables.scenes.scene import Scene
 
     scene = Scene.from_toml(file)
@@ -86,11 +98,11 @@ def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) 
 def _report(found: xarray.Dataset) -> Report:
     """What is known at gaps, or at islands where nothing is."""
     lines = next((d for d in (("gap",), ("island", "node")) if any(v.dims == d for v in found.variables.values())), ())
-    columns = [
-        Column(str(name), field.attrs["units"], [None if x != x else x for x in field.values.ravel().tolist()])
-        for name, field in found.variables.items()
-        if field.dims == lines
-    ]
+    fields = {str(name): field for name, field in found.variables.items() if field.dims == lines}
+    columns = to_columns(
+        {name: field.values for name, field in fields.items()},
+        {name: field.attrs["units"] for name, field in fields.items()},
+    )
     facts = found.attrs
     notes = [f"reading {facts['reading']}, rtol {facts['rtol']:.3g}, error at most {facts['error']:.2g}"]
     return Report("run", str(facts["title"]), notes, dict(facts), columns)

@@ -1,30 +1,34 @@
-"""From effects and tolerance to steps: the cheapest tier whose certified error leaves room for the quadrature."""
+"""From effects and tolerance to steps.
+
+Nothing but the scene decides: the island model is the universal table where its certificate allows, else the exact
+solver, and many gaps go through a contact law. The tolerance is split in one way. A step whose results amplify the
+error of force and area by a factor (`AMPLIFICATION`) has the tolerance over that factor; one half of it is for the
+islands, the other for what is made of them, a quadrature or the polynomials of a law.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from mbma_tables.errors import InputError
 from mbma_tables.scenes.costs import Costs, shipped_costs
-from mbma_tables.scenes.effects import EFFECTS, OF_LAW, OUTPUTS, REFINEMENTS
+from mbma_tables.scenes.effects import OF_LAW, OUTPUTS, REFINEMENTS
+from mbma_tables.scenes.problem import Problem
 
 if TYPE_CHECKING:
-    from mbma_tables.scenes.scene import Scene
+    from mbma_tables.models.protocol import IslandModel
 
-# bounds on islands that the shipped tables' certificates give; each run checks its own
-CERTIFIED = {"rigid": 1e-14, "formula": 1e-2, "island4d": 1.75e-4, "universal": 6e-9, "exact": 0.0}
-LADDER = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
-SLOPE_SHARE = 1 / 300  # of the tolerance: a law's slopes are rarely worse than its values by more
-LEAST_LAW_RTOL, LEAST_CONTACT_RTOL = 1e-9, 1e-11
-MOST_RTOL = 0.1
-LEAST_ISLAND4D_HURST = 0.3
-OF_SLOPES = ("universal", "exact")  # nothing bounds the slopes of the others
-LEAST_RIGID_RTOL = 1e-3  # below it no rigid sphere is worth its bound
-SAMPLES = 96  # islands at which the rigid sphere's error is bounded
+ISLAND_SHARE = 0.5  # of a step's tolerance; the rest is asked of its quadrature or law
+# inverting a law adds the gap's error to that of the values; slopes of a law are rarely worse by more than 300;
+# p(r) at a point converges later than its integrals
+AMPLIFICATION = {"inverse": 2.0, "slopes": 300.0, "profile": 10.0}
+# gaps from which making a law costs less than the totals, by the measured costs
+MIN_LAW_GAPS = {"universal": 2000}
+MIN_LAW_GAPS_OF_OTHERS = 300
+LADDER = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,298 +39,229 @@ class Step:
     ----------
     name, why, what : str
         What it is called, which effects asked for it, what it evaluates.
-    tier : str or None
+    tier : str, IslandModel or None
         Island model.
     rtol : float or None
         Asked of the totals, the law or the solver.
     count : int
         Gaps, islands or points evaluated.
-    error, seconds : float
-        Predicted.
+    error : float
+        Certified beforehand; NaN where only the answers can say.
+    seconds : float
+        By the measured costs, without first use; NaN where nothing was measured.
     """
 
     name: str
     why: str
     what: str
-    tier: str | None
+    tier: str | IslandModel | None
     rtol: float | None
     count: int
     error: float
     seconds: float
 
+    @property
+    def tier_name(self) -> str | None:
+        """The island model's name."""
+        return self.tier if self.tier is None or isinstance(self.tier, str) else self.tier.name
+
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """Steps in the order in which they run, what was left out, and seconds that every scene takes."""
+    """Steps in the order in which they run.
+
+    Attributes
+    ----------
+    steps : tuple of Step
+        What is computed.
+    left_out, switched_off : tuple of str
+        Effects that were not asked for, and refinements of the model that are off.
+    rtol : float
+        Tolerance of the whole.
+    overhead : float
+        Seconds that every scene takes.
+    first_use : float
+        Seconds that the first scene of a process takes besides, for imports and tables; no choice depends on it.
+    """
 
     steps: tuple[Step, ...]
     left_out: tuple[str, ...]
+    switched_off: tuple[str, ...]
     rtol: float
     overhead: float
+    first_use: float
 
     @property
     def seconds(self) -> float:
-        """Predicted for all steps and what surrounds them."""
+        """For all steps and what surrounds them, without first use."""
         return self.overhead + sum(step.seconds for step in self.steps)
 
     @property
     def error(self) -> float:
-        """Largest predicted error of a step of this model; other theories state their own."""
+        """Largest error of a step of this model; other theories state their own."""
         return max((step.error for step in self.steps if step.tier is not None), default=0.0)
 
     def step(self, name: str) -> Step | None:
-        """The step of that name."""
+        """The step with that name."""
         return next((step for step in self.steps if step.name == name), None)
 
     def text(self) -> str:
         """As a database prints a query plan."""
-        head = f"Scene  (rtol={self.rtol:.1e}, predicted error={self.error:.1e}, time={_shown(self.seconds)})"
-        lines = [head]
+        times = f"time={_duration(self.seconds)}, first use in a process {_duration(self.first_use)} more"
+        lines = [f"Scene  (rtol={self.rtol:.1e}, error={self.error:.1e}, {times})"]
         for step in self.steps:
-            by = "" if step.tier is None else f" by {step.tier}"
+            by = "" if step.tier is None else f" by {step.tier_name}"
             asked = "" if step.rtol is None else f", rtol={step.rtol:.1e}"
-            numbers = f"(count={step.count}{asked}, error={step.error:.1e}, time={_shown(step.seconds)})"
+            numbers = f"(count={step.count}{asked}, error={step.error:.1e}, time={_duration(step.seconds)})"
             lines += [f"  -> {step.name}{by}  {numbers}", f"       {step.what}", f"       for: {step.why}"]
-        lines.append(f"  left out: {'; '.join(self.left_out) or 'nothing'}")
+        lines.append(f"  left out: {', '.join(self.left_out) or 'nothing'}")
+        if self.switched_off:
+            lines.append(f"  switched off: {', '.join(self.switched_off)}")
         return "\n".join(lines) + "\n"
 
 
-def _shown(seconds: float) -> str:
-    for unit, size in (("s", 1.0), ("ms", 1e-3)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds / 1e-6:.3g} us"
+def _duration(seconds: float) -> str:
+    if math.isnan(seconds):
+        return "not measured"
+    unit, size = next(((u, s) for u, s in (("s", 1.0), ("ms", 1e-3)) if seconds >= s), ("us", 1e-6))
+    return f"{seconds / size:.3g} {unit}"
 
 
-def make_plan(scene: Scene, costs: Costs | None = None) -> Plan:
-    """The cheapest plan that meets the scene's tolerance, or the most accurate one within its time.
+def make_plan(problem: Problem, costs: Costs | None = None) -> Plan:
+    """The steps that meet the tolerance, or the tightest tolerance of `LADDER` whose steps fit the time budget.
 
     Raises
     ------
     InputError
-        Where no tier meets the tolerance, or no plan the time budget.
+        Where the tolerance is too tight for a law that the effects need, or no plan fits the time budget.
     """
-    own = shipped_costs() if costs is None else costs
-    if scene.rtol is not None:
-        return _plan_at(scene, scene.rtol, own)
-    seconds = scene.seconds
-    assert seconds is not None
-    best: Plan | None = None
-    cheapest = math.inf
+    measured = shipped_costs() if costs is None else costs
+    if problem.rtol is not None:
+        return _Planner(problem, problem.rtol, measured).plan()
+    assert problem.seconds is not None
+    least = math.nan
     for rtol in LADDER:
         try:
-            plan = _plan_at(scene, rtol, own)
+            plan = _Planner(problem, rtol, measured).plan()
         except InputError:
-            break
-        cheapest = min(cheapest, plan.seconds)
-        if plan.seconds <= seconds:
-            best = plan
-    if best is None:
-        raise InputError(f"seconds = {seconds:g} is too little: the cheapest plan takes about {cheapest:.3g} s")
-    return best
+            continue  # too tight for a law
+        if plan.seconds <= problem.seconds:
+            return plan
+        least = plan.seconds
+    raise InputError(f"seconds = {problem.seconds:g} is too little: the cheapest plan takes about {least:.3g} s")
 
 
-def _plan_at(scene: Scene, rtol: float, costs: Costs) -> Plan:
-    steps: list[Step] = []
-    outputs, dropped = scene.outputs, scene.dropped
-    count = 0 if scene.gaps is None else int(scene.gaps.size)
-    pressures = scene.prescribed == "nominal_pressures"
-    slopes = outputs & {"stiffness", "conductance"}
-    of_law = sorted(outputs & set(OF_LAW)) + (["nominal pressures prescribed"] if pressures else [])
-    apart = "area" in outputs and "subscale_area" in dropped
-    totals: list[str] = [name for name in ("force", "area") if name in outputs and not (name == "area" and apart)]
-    tiers = candidates(scene, rtol) if (of_law or totals or apart or "island_statistics" in outputs) else {}
-    smooth = {tier: bound for tier, bound in tiers.items() if tier in OF_SLOPES or "sphere_deformation" in dropped}
-    law = None
-    if of_law or totals:
-        share = SLOPE_SHARE if slopes else 0.5 if (of_law or pressures) else 1.0
-        law = _law_step(scene, rtol, share, count, smooth if slopes else tiers, costs, of_law or totals)
-        if not of_law:
-            direct = _totals_step(rtol, count, tiers, costs, totals)
-            if direct is None and law is None:
-                raise _impossible(rtol, tiers)
-            law_pays = law is not None and (direct is None or law.seconds < direct.seconds)
-            if not law_pays or "finite_height" in dropped:
-                law = None
-                if direct is None:
-                    raise _impossible(rtol, tiers)
-                steps.append(direct)
-        if of_law and law is None:
-            raise InputError(
-                f"rtol = {rtol:g} is too tight for {', '.join(of_law)}: a law meets "
-                f"{2 * LEAST_LAW_RTOL / share:.0e} at best"
-            )
-        if law is not None:
-            steps.append(law)
-    if apart:
-        step = _totals_step(rtol, count, tiers, costs, ["area"], steps, "island4d")
-        if step is None:
-            raise _impossible(rtol, tiers)
-        what = "adaptive sum over islands with eta = 1, the Hertz area"
-        steps.append(dataclasses.replace(step, name="hertz area", why="area without subscale_area", what=what))
-    if "island_statistics" in outputs:
-        # the integral takes the geometry of a gap, the distribution some lookups
-        step = _totals_step(rtol, count, tiers, costs, ["island_statistics"], steps, "rigid")
-        if step is None:
-            raise _impossible(rtol, tiers)
-        what = f"number of islands at {count} gaps, {scene.points} islands of the distribution (Eq. 42)"
-        steps.append(dataclasses.replace(step, name="island statistics", why="island_statistics", what=what))
-    if "pressure_profile" in outputs:
+def certified_error(tier: str | IslandModel, asked: float) -> float:
+    """Bound on the relative error of a tier's islands, for results at `asked`; NaN where only the answers can say."""
+    if tier == "universal":
+        from mbma_tables.models.universal import open_table
+
+        certificate = open_table(tier).content.attributes
+        return max(float(certificate["largest_error_F"]), float(certificate["largest_error_A"]))
+    # the exact solver works to a tenth of what is asked
+    return {"exact": 0.1 * asked, "rigid": 0.0}.get(tier, math.nan) if isinstance(tier, str) else math.nan
+
+
+@dataclasses.dataclass(frozen=True)
+class _Planner:
+    """The plan of one problem at one tolerance."""
+
+    problem: Problem
+    rtol: float
+    costs: Costs
+
+    @property
+    def count(self) -> int:
+        return 0 if self.problem.gaps is None else int(self.problem.gaps.size)
+
+    def tier(self, tolerance: float) -> str | IslandModel:
+        """The island model for a step with that tolerance."""
+        if self.problem.tier is not None:
+            return self.problem.tier
+        if "sphere_deformation" in self.problem.dropped:
+            return "rigid"
+        share = ISLAND_SHARE * tolerance
+        return "universal" if certified_error("universal", share) <= share else "exact"
+
+    def plan(self) -> Plan:
+        outputs, dropped = self.problem.outputs, self.problem.dropped
+        hertz = "area" in outputs and "subscale_area" in dropped
+        totals = [name for name in ("force", "area") if name in outputs and not (name == "area" and hertz)]
+        by_pressure = self.problem.prescribed == "nominal_pressures"
+        of_law = sorted(outputs & set(OF_LAW)) + (["nominal pressures prescribed"] if by_pressure else [])
+        steps = []
+        if of_law:
+            steps.append(self.law(of_law))
+        elif totals:
+            steps.append(self.law(totals) if self.many_gaps() else self.totals(totals))
+        if hertz:
+            what = "adaptive sum over islands with eta = 1, the Hertz area"
+            steps.append(self.summed("hertz area", "area without subscale_area", what, "island4d"))
+        if "island_statistics" in outputs:
+            what = f"number of islands at {self.count} gaps, {self.problem.points} islands of the distribution (Eq. 42)"
+            steps.append(self.summed("island statistics", "island_statistics", what, "rigid"))
+        if "pressure_profile" in outputs:
+            steps.append(self.profiles())
+        steps += [self.other_theory(name) for name in self.problem.theories]
+        left_out = tuple(name for name in OUTPUTS if name not in outputs)
+        switched_off = tuple(name for name in REFINEMENTS if name in dropped)
+        tiers = {step.tier for step in steps if isinstance(step.tier, str)}
+        first_use = max((self.costs.of(tier, "import") for tier in tiers), default=0.0)
+        return Plan(tuple(steps), left_out, switched_off, self.rtol, self.costs.of("scene", "call"), first_use)
+
+    def many_gaps(self) -> bool:
+        """Whether totals at the prescribed gaps cost more than a law, where there is one."""
+        fewest = MIN_LAW_GAPS.get(_name(self.tier(self.rtol)), MIN_LAW_GAPS_OF_OTHERS)
+        if self.count < fewest or "finite_height" in self.problem.dropped:
+            return False
+        from mbma_tables.totals.law import LEAST_RTOL
+
+        return (1 - ISLAND_SHARE) * self.rtol >= LEAST_RTOL
+
+    def law(self, why: Sequence[str]) -> Step:
+        from mbma_tables.totals.law import LEAST_RTOL
+
+        inverse = self.problem.prescribed == "nominal_pressures"
+        slopes = self.problem.outputs & {"stiffness", "conductance"}
+        factor = AMPLIFICATION["slopes"] if slopes else AMPLIFICATION["inverse"] if inverse else 1.0
+        tolerance = self.rtol / factor
+        asked = (1 - ISLAND_SHARE) * tolerance
+        if asked < LEAST_RTOL:
+            best = factor * LEAST_RTOL / (1 - ISLAND_SHARE)
+            raise InputError(f"rtol = {self.rtol:g} is too tight for {', '.join(why)}: a law meets {best:.0e} at best")
+        tier = self.tier(tolerance)
+        each = self.costs.of("law", "lookup") + (self.costs.of("law", "invert", quantity="force") if inverse else 0.0)
+        seconds = self.costs.of(_name(tier), "law", asked) + self.count * each
+        error = factor * (asked + certified_error(tier, asked))
+        what = "the surface's force and area as piecewise polynomials of the gap, evaluated at every gap"
+        return Step("law", ", ".join(why), what, tier, asked, self.count, error, seconds)
+
+    def totals(self, why: Sequence[str]) -> Step:
+        what = f"sum over islands at {self.count} gaps (Eqs. 48, 49)"
+        return self.summed("totals", ", ".join(why), what, None, why[0] if len(why) == 1 else "both")
+
+    def summed(self, name: str, why: str, what: str, priced_as: str | None, quantity: str = "both") -> Step:
+        """A sum over islands at every gap; `priced_as` is a tier whose totals cost about the same."""
+        tier = self.tier(self.rtol)
+        asked = (1 - ISLAND_SHARE) * self.rtol
+        priced = priced_as or _name(tier)
+        seconds = self.costs.of(priced, "call") + self.count * self.costs.of(priced, "gap", asked, quantity)
+        return Step(name, why, what, tier, asked, self.count, asked + certified_error(tier, asked), seconds)
+
+    def profiles(self) -> Step:
         import numpy as np
 
-        islands = int(np.size(scene.deltas))
-        asked = max(0.1 * rtol, 1e-12)
-        price = islands * costs.of("exact", "profile", rtol) + _start("exact", costs, steps)
-        what = "the island problem solved anew, with p(r) and d(r)"
-        steps.append(Step("profiles", "pressure_profile", what, "exact", asked, islands, asked, price))
-    for theory in scene.theories:
-        key = "greenwood_williamson" if theory == "greenwood_williamson" else "persson"
-        price = count * costs.of(key, "gap")
-        exact = 1e-14 if key == "greenwood_williamson" else 1e-9
-        steps.append(Step(theory, "comparison", "another theory at the same gaps", None, None, count, exact, price))
-    nobody = [f"{name} (nothing asked)" for name in OUTPUTS if name not in outputs]
-    off = [f"{name} (switched off)" for name in REFINEMENTS if name in dropped]
-    bounded = "rigid" in tiers and "sphere_deformation" not in dropped
-    overhead = costs.of("scene", "call") + bounded * costs.of("scene", "bound")
-    return Plan(tuple(steps), tuple(nobody + off), rtol, overhead)
+        islands, asked = int(np.size(self.problem.deltas)), ISLAND_SHARE * self.rtol / AMPLIFICATION["profile"]
+        seconds = islands * self.costs.of("exact", "profile", asked)
+        what = "the island problem solved with p(r) and d(r)"
+        return Step("profiles", "pressure_profile", what, "exact", asked, islands, asked, seconds)
+
+    def other_theory(self, name: str) -> Step:
+        closed = name == "greenwood_williamson"
+        seconds = self.count * self.costs.of(name if closed else "persson", "gap")
+        what = "another theory at the same gaps"
+        return Step(name, "comparison", what, None, None, self.count, 1e-14 if closed else 1e-9, seconds)
 
 
-def _impossible(rtol: float, tiers: dict[str, float]) -> InputError:
-    return InputError(f"rtol = {rtol:g} is met by none of {', '.join(tiers)} here: give a larger rtol, 1e-8 say")
-
-
-def _start(tier: str, costs: Costs, before: Sequence[Step] = ()) -> float:
-    """First use of a tier, where it is still to come; what is loaded costs nothing again."""
-    tiers = {step.tier for step in before if step.tier is not None}
-    if tier in tiers or _opened(tier):
-        return 0.0
-    warm = bool(tiers) or "mbma_tables.totals.contact" in sys.modules
-    return costs.of(tier, "open" if warm else "import")
-
-
-def _opened(tier: str) -> bool:
-    tabulated = sys.modules.get("mbma_tables.models.universal")
-    return tabulated is not None and (tier, tabulated.shipped(tier)) in _asked
-
-
-_asked: set[tuple[str, Any]] = set()
-
-
-def note_opened(tier: str) -> None:
-    """Remember that a table was opened: its start is paid for."""
-    tabulated = sys.modules.get("mbma_tables.models.universal")
-    if tabulated is not None and tier in ("universal", "island4d"):
-        _asked.add((tier, tabulated.shipped(tier)))
-
-
-def candidates(scene: Scene, rtol: float) -> dict[str, float]:
-    """Tiers that may answer, each with the bound on its islands' relative error."""
-    from mbma_tables.models import TIERS
-
-    if "sphere_deformation" in scene.dropped:
-        return {"rigid": CERTIFIED["rigid"]}
-    found = {tier: bound for tier, bound in CERTIFIED.items() if tier in TIERS and tier != "rigid"}
-    if (
-        scene.rule.name != "reported"
-        or float(scene.surface.hurst) < LEAST_ISLAND4D_HURST
-        or "finite_height" in scene.dropped
-    ):
-        found.pop("island4d", None)
-    worth = rtol >= LEAST_RIGID_RTOL
-    return ({"rigid": rigid_error(scene)} if worth else {}) | found
-
-
-def rigid_error(scene: Scene) -> float:
-    """Bound on the error of rigid spheres over the islands of a scene, at most 1.
-
-    p <= p_rigid, so w <= w_rigid <= w_rigid(0) = mu integral of F_{3/2}(t^2 - X) dt, and lifting the sphere by that
-    everywhere gives too little: Phi_rigid(X - w) <= Phi(X) <= Phi_rigid(X). Islands are sampled.
-    """
-    import numpy as np
-
-    from mbma_tables.islands.height_integrals import height_integral
-    from mbma_tables.totals.island import geometry
-
-    surface = scene.surface
-    gap = -float(surface.h_max)
-    if scene.gaps is not None and scene.prescribed == "separations":
-        gap = float(scene.gaps.min())
-    elif scene.gaps is not None and scene.prescribed == "mean_separations":
-        gap = 2 * float(scene.gaps.min()) - float(surface.h_max)
-    reach = (top_of(scene, 1e-2) - gap) / float(surface.h_rms)
-    if reach <= 0:
-        return 0.0
-    approach = reach * np.geomspace(1e-6, 1.0, SAMPLES)
-    g = geometry(approach, np.full(SAMPLES, surface.hurst), np.full(SAMPLES, surface.zeta_1), scene.rule)
-    X, mu = g["X"], g["mu"]
-    half = np.sqrt(np.maximum(X, 0) + 8) / 2
-    nodes, weights = np.polynomial.legendre.leggauss(32)
-    t = half[:, None] * (nodes + 1)
-    w = mu * half * (height_integral(1.5, t**2 - X[:, None]) @ weights)
-    shares = [height_integral(n, w - X) / height_integral(n, -X) for n in (2.5, 2.0)]
-    return float(1 - min(share.min() for share in shares))
-
-
-def top_of(scene: Scene, rtol: float) -> float:
-    """Highest point above the mid-plane: h_max, or where the rest of the Gaussian adds less than rtol."""
-    surface = scene.surface
-    if "finite_height" not in scene.dropped or scene.gaps is None:
-        return float(surface.h_max)
-    least = scene.gaps.max() if scene.prescribed == "separations" else 2 * scene.gaps.max() - float(surface.h_max)
-    # exp(-(d + t)^2/2) <= exp(-d^2/2) exp(-t^2/2); ten more for the powers before it, one s for h_d
-    tail = math.sqrt(2 * (10 - math.log(rtol))) + 1
-    return max(float(least), 0.0) + tail * float(surface.s)
-
-
-def _law_step(
-    scene: Scene, rtol: float, share: float, count: int, tiers: dict[str, float], costs: Costs, why: list[str]
-) -> Step | None:
-    """The cheapest law within the tolerance; None where there is none."""
-    found = []
-    for tier, bound in tiers.items():
-        asked = min(0.5 * (share * rtol - bound), MOST_RTOL)
-        if asked < LEAST_LAW_RTOL or not (costs.knows(tier, "law") or tier == "exact"):
-            continue
-        each = costs.of("law", "lookup", None, "force") + costs.of("law", "lookup", None, "area")
-        if scene.prescribed == "nominal_pressures":
-            each += costs.of("law", "invert", None, "force")
-        if tier == "exact" and not costs.knows("exact", "law"):
-            # about 300 totals at a tenth of the tolerance
-            price = 300 * costs.of("exact", "gap", max(0.1 * asked, LEAST_CONTACT_RTOL))
-        else:
-            price = costs.of(tier, "law", asked)
-        seconds = _start(tier, costs) + price + count * each
-        error = (2 * asked + bound) / share
-        what = "the surface frozen into F(d), A(d), then asked at every gap"
-        found.append(Step("law", ", ".join(why), what, tier, asked, count, error, seconds))
-    return min(found, key=lambda step: step.seconds, default=None)
-
-
-def _totals_step(
-    rtol: float,
-    count: int,
-    tiers: dict[str, float],
-    costs: Costs,
-    why: list[str],
-    before: Sequence[Step] = (),
-    compiled_as: str | None = None,
-) -> Step | None:
-    """The cheapest totals, gap by gap, within the tolerance; None where there is none.
-
-    `compiled_as` is the tier at whose price the compiled kernel's tier sums here, where that kernel does not serve.
-    """
-    quantity = why[0] if len(why) == 1 and why[0] in EFFECTS else "both"
-    found = []
-    for tier, bound in tiers.items():
-        # the exact solver works to a tenth of what is asked
-        asked = min((rtol - bound) / (1.1 if tier == "exact" else 1.0), MOST_RTOL)
-        if asked < LEAST_CONTACT_RTOL:
-            continue
-        if not costs.knows(tier, "gap"):
-            continue
-        priced = compiled_as if compiled_as is not None and tier in ("universal", compiled_as) else tier
-        each = costs.of(priced, "gap", asked, quantity)
-        seconds = _start(tier, costs, before) + costs.of(tier, "call", None) + count * each
-        what = f"sum over islands at {count} gaps (Eqs. 48, 49)"
-        found.append(Step("totals", ", ".join(why), what, tier, asked, count, bound + asked, seconds))
-    return min(found, key=lambda step: step.seconds, default=None)
+def _name(tier: Any) -> str:
+    return tier if isinstance(tier, str) else "an island model of one's own"

@@ -3,133 +3,126 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
-from typing import TYPE_CHECKING, Any
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import xarray as xr
 
+from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.scenes.plan import LEAST_LAW_RTOL, Plan, Step, note_opened, rigid_error, top_of
+from mbma_tables.scenes.plan import Plan, Step
+from mbma_tables.scenes.problem import Problem
+from mbma_tables.surfaces.readings import get_reading
 
 if TYPE_CHECKING:
-    from mbma_tables.scenes.scene import Progress, Scene
     from mbma_tables.surfaces.surface import Surface
     from mbma_tables.totals.law import ContactLaw
 
-BLOCK = 64  # gaps between two reports of progress
-TABLES = {"universal", "island4d"}
-SLOPE_OF_SLOPE = 3.0  # largest d log(stiffness)/d log(h_max - d), next to first contact 5/2
+Progress = Callable[[str, int, int], None]
+BLOCK = 64  # gaps between two reports of progress, where a gap is slow
+TABLES = ("universal", "island4d")
+MAX_SLOPE_OF_STIFFNESS = 3.0  # of log(stiffness) by log(h_max - d); 5/2 next to first contact
 
 
 @dataclasses.dataclass
-class _State:
-    """What steps hand on."""
+class Run:
+    """A plan on its way: what steps hand on, and what they found."""
 
-    scene: Scene
+    problem: Problem
     surface: Surface
     rtol: float
-    found: dict[str, tuple[tuple[str, ...], Any, str, str]]
-    progress: Progress | None
+    progress: Progress
     gap: Any = None
-    law: Any = None
+    found: dict[str, tuple[tuple[str, ...], Any]] = dataclasses.field(default_factory=dict)
     errors: dict[str, float] = dataclasses.field(default_factory=dict)
     tiers: dict[str, str] = dataclasses.field(default_factory=dict)
 
-    def add(self, name: str, dims: tuple[str, ...], values: Any, units: str, meaning: str) -> None:
-        self.found[name] = (dims, np.asarray(values), units, meaning)
-
-    @property
-    def length(self) -> str:
-        return self.scene.length_unit or "length"
-
-    @property
-    def stress(self) -> str:
-        return self.scene.stress_unit or ("stress" if self.scene.E_star != 1.0 else "1")
-
-    def close(self, step: Step, error: float, tier: str) -> None:
-        """The bound reached; rigid spheres stand in for elastic ones at the price of theirs."""
-        if tier == "rigid" and "sphere_deformation" not in self.scene.dropped:
-            error += rigid_error(self.scene)
-        self.errors[step.name], self.tiers[step.name] = error, tier
-
-    def report(self, step: Step, done: int, total: int) -> None:
-        if self.progress is not None:
-            self.progress(step.name, done, total)
+    def close(self, step: Step, error: float, tier: str | None) -> None:
+        """Note the error bound that a step reached, and its island model."""
+        self.errors[step.name], self.tiers[step.name] = error, str(tier)
 
 
-def run_scene(scene: Scene, plan: Plan, progress: Progress | None = None) -> xr.Dataset:
-    """The scene's quantities, each with its unit; what made them in the attributes."""
-    surface = scene.surface
-    if "finite_height" in scene.dropped:
-        surface = dataclasses.replace(surface, h_max=top_of(scene, 0.1 * plan.rtol))
-    state = _State(scene, surface, plan.rtol, {}, progress)
-    if scene.gaps is not None and scene.prescribed != "nominal_pressures":
-        h_max = float(scene.surface.h_max)
-        state.gap = scene.gaps if scene.prescribed == "separations" else 2 * scene.gaps - h_max
+def run_plan(problem: Problem, plan: Plan, progress: Progress | None = None) -> xr.Dataset:
+    """The quantities of a problem, each with its unit; what made them in the attributes.
+
+    Raises
+    ------
+    InputError, OutOfRangeError, ConvergenceError
+        The last also where a step's error bound exceeds the tolerance.
+    """
+    surface, h_max = problem.surface, float(problem.surface.h_max)
+    if "finite_height" in problem.dropped:
+        surface = dataclasses.replace(surface, h_max=height_without_end(problem, 0.1 * plan.rtol))
+    run = Run(problem, surface, plan.rtol, progress or (lambda *_: None))
+    if problem.gaps is not None and problem.prescribed != "nominal_pressures":
+        run.gap = problem.gaps if problem.prescribed == "separations" else 2 * problem.gaps - h_max
     for step in plan.steps:
-        state.report(step, 0, step.count)
-        _STEPS.get(step.name, _theory)(state, step)
-        if step.tier is not None:
-            note_opened(step.tier)
-        state.report(step, step.count, step.count)
-    return _dataset(state, plan)
+        run.progress(step.name, 0, step.count)
+        _STEPS.get(step.name, _comparison)(run, step)
+        run.progress(step.name, step.count, step.count)
+    error = max(run.errors.values(), default=0.0)
+    if error > plan.rtol:
+        raise ConvergenceError(
+            f"the error bound reached is {error:.2e}, above rtol = {plan.rtol:.2e}: give a larger rtol"
+        )
+    if run.gap is not None:
+        run.found |= {"separation": (("gap",), run.gap), "mean_separation": (("gap",), (h_max + run.gap) / 2)}
+    return _dataset(run, plan)
 
 
-def _make_law(state: _State, tier: str, rtol: float) -> tuple[ContactLaw, str]:
-    """The law, and the tier that made it: the exact one where a table does not reach."""
-    from mbma_tables.totals.law import contact_law
-
-    scene = state.scene
-    try:
-        return contact_law(state.surface, rtol, tier, scene.reading, scene.E_star), tier
-    except OutOfRangeError:
-        if tier not in TABLES:
-            raise
-    return contact_law(state.surface, rtol, "exact", scene.reading, scene.E_star), "exact"
+def height_without_end(problem: Problem, rtol: float) -> float:
+    """Height [length] beyond which the whole Gaussian adds less than `rtol` at the largest gap."""
+    h_max = float(problem.surface.h_max)
+    gap = problem.gaps.max() if problem.prescribed == "separations" else 2 * problem.gaps.max() - h_max
+    # exp(-(d + t)^2/2) <= exp(-d^2/2) exp(-t^2/2); ten more for the powers before it, one s for h_d
+    tail = math.sqrt(2 * (10 - math.log(rtol))) + 1
+    return max(float(gap), 0.0) + tail * float(problem.surface.s)
 
 
-def _law(state: _State, step: Step) -> None:
-    scene = state.scene
-    assert step.tier is not None
+def _law(run: Run, step: Step) -> None:
+    from mbma_tables.totals.law import LEAST_RTOL, contact_law
+
+    problem, wanted = run.problem, run.problem.outputs
     assert step.rtol is not None
-    asked, by_pressure = step.rtol, scene.prescribed == "nominal_pressures"
+    by_pressure = problem.prescribed == "nominal_pressures"
+    tier, asked = step.tier, step.rtol
     while True:
-        law, tier = _make_law(state, step.tier, asked)
+        try:
+            law = contact_law(run.surface, asked, tier, problem.reading, problem.E_star)  # type: ignore[arg-type]
+        except OutOfRangeError:
+            if tier not in TABLES:
+                raise
+            tier = "exact"
+            continue
         if by_pressure:
-            state.gap = law.separation(force=scene.gaps)
-        error = law.error
-        if scene.outputs & {"stiffness", "conductance"}:
-            error = _slope_error(law, state.gap, by_pressure)
-        elif by_pressure:
-            # the gap carries the error of the force
-            error *= 2
-        if error <= state.rtol or asked <= LEAST_LAW_RTOL:
+            run.gap = law.separation(force=problem.gaps)
+        # a gap found by force carries the error of the force
+        error = 2 * law.error if by_pressure else law.error
+        if wanted & {"stiffness", "conductance"}:
+            error = _slope_error(law, run.gap, by_pressure)
+        if error <= run.rtol or asked <= LEAST_RTOL:
             break
-        asked = max(0.1 * asked, LEAST_LAW_RTOL)
-    if by_pressure:
-        state.add("nominal_pressure", ("gap",), scene.gaps, state.stress, "F/A0 as prescribed")
-    gap, wanted = state.gap, scene.outputs
+        asked = max(0.1 * asked, LEAST_RTOL)
+    values = {"nominal_pressure": problem.gaps} if by_pressure else {}
     if "force" in wanted:
-        state.add("force", ("gap",), law.force(gap), state.stress, "nominal pressure F/A0")
-    if "area" in wanted and "subscale_area" not in scene.dropped:
-        state.add("area", ("gap",), law.area(gap), "1", "real contact area A/A0")
+        values["force"] = law.force(run.gap)
+    if "area" in wanted and "subscale_area" not in problem.dropped:
+        values["area"] = law.area(run.gap)
     if "stiffness" in wanted:
-        unit = f"{state.stress}/{state.length}" if state.stress != "1" else f"1/{state.length}"
-        state.add("stiffness", ("gap",), law.stiffness(gap), unit, "-dF/dd per nominal area")
-        state.add("stiffness_mean", ("gap",), law.stiffness_mean(gap), unit, "-dF/du per nominal area")
+        values |= {"stiffness": law.stiffness(run.gap), "stiffness_mean": law.stiffness_mean(run.gap)}
     if "energy" in wanted:
-        unit = f"{state.stress} {state.length}" if state.stress != "1" else state.length
-        state.add("energy", ("gap",), law.energy(gap), unit, "elastic energy per nominal area")
+        values["energy"] = law.energy(run.gap)
     if "conductance" in wanted:
         from mbma_tables.totals.conductance import conductance, mean_conductivity
 
-        assert scene.conductivities is not None
-        k_s = mean_conductivity(*scene.conductivities)
-        value = conductance(law.stiffness_mean(gap), k_s, scene.E_star)
-        state.add("conductance", ("gap",), value, f"conductivity/{state.length}", "conductance per nominal area")
-    state.close(step, error, tier)
+        assert problem.conductivities is not None
+        k_s = mean_conductivity(*problem.conductivities)
+        values["conductance"] = conductance(law.stiffness_mean(run.gap), k_s, problem.E_star)
+    run.found |= {name: (("gap",), array) for name, array in values.items()}
+    run.close(step, error, dataclasses.replace(step, tier=tier).tier_name)
 
 
 def _slope_error(law: ContactLaw, gap: Any, inverted: bool) -> float:
@@ -138,128 +131,95 @@ def _slope_error(law: ContactLaw, gap: Any, inverted: bool) -> float:
     if touching.size == 0:
         return law.error
     # F/l over the stiffness: large only next to a turning point
-    share = law.force(touching) / ((law.h_max - touching) * np.abs(law.stiffness(touching)))
-    moved = SLOPE_OF_SLOPE * law.error if inverted else 0.0
-    return max(2 * law.error, float(((law.slope_error(touching) + moved) * share).max()))
+    ratio = law.force(touching) / ((law.h_max - touching) * np.abs(law.stiffness(touching)))
+    moved = MAX_SLOPE_OF_STIFFNESS * law.error if inverted else 0.0
+    return max(2 * law.error, float(((law.slope_error(touching) + moved) * ratio).max()))
 
 
-def _answer(state: _State, step: Step, wanted: tuple[str, ...]) -> dict[str, Any]:
-    """Force and area gap by gap, in blocks; by the exact solver where a table does not reach."""
+def _totals(run: Run, step: Step) -> None:
     from mbma_tables.totals.contact import contact
 
-    scene, gap = state.scene, state.gap
-    assert step.tier is not None
-    assert step.rtol is not None
-    block = gap.size if step.tier in ("universal", "rigid") or state.progress is None else BLOCK
-    parts = []
-    for first in range(0, gap.size, block):
-        own = gap[first : first + block]
-        asked = functools.partial(
-            contact, state.surface, own, step.tier, scene.reading, scene.E_star, step.rtol, quantities=wanted
-        )
-        try:
-            answer = asked()
-        except OutOfRangeError:
-            if step.tier not in TABLES:
-                raise
-            answer = asked(outside="exact")
-        parts.append(answer)
-        state.report(step, min(first + block, gap.size), gap.size)
-    names = (*wanted, "error")
-    return {name: np.concatenate([np.atleast_1d(getattr(part, name)) for part in parts]) for name in names}
-
-
-def _totals(state: _State, step: Step) -> None:
-    scene = state.scene
-    wanted = tuple(name for name in ("force", "area") if name in scene.outputs)
-    if "subscale_area" in scene.dropped:
+    problem = run.problem
+    wanted = tuple(name for name in ("force", "area") if name in problem.outputs)
+    if "subscale_area" in problem.dropped:
         wanted = tuple(name for name in wanted if name != "area")
-    answer = _answer(state, step, wanted)
-    if "force" in wanted:
-        state.add("force", ("gap",), answer["force"], state.stress, "nominal pressure F/A0")
-    if "area" in wanted:
-        state.add("area", ("gap",), answer["area"], "1", "real contact area A/A0")
-    assert step.tier is not None
-    state.close(step, float(answer["error"].max()), step.tier)
+    block = run.gap.size if step.tier in ("universal", "rigid") else BLOCK
+    answers = []
+    for first in range(0, run.gap.size, block):
+        answer = contact(
+            run.surface,
+            run.gap[first : first + block],
+            tier=step.tier,  # type: ignore[arg-type]
+            reading=problem.reading,
+            E_star=problem.E_star,
+            rtol=step.rtol,  # type: ignore[arg-type]
+            outside="exact" if step.tier in TABLES else "raise",
+            quantities=wanted,
+        )
+        answers.append(answer)
+        run.progress(step.name, min(first + block, run.gap.size), run.gap.size)
+    for name in wanted:
+        run.found[name] = (("gap",), np.concatenate([getattr(answer, name) for answer in answers]))
+    run.close(step, max(float(answer.error.max()) for answer in answers), step.tier_name)
 
 
-def _hertz_area(state: _State, step: Step) -> None:
+def _hertz_area(run: Run, step: Step) -> None:
     from mbma_tables.scenes.statistics import hertz_area
 
-    assert step.tier is not None
     assert step.rtol is not None
-    area, error = hertz_area(state.surface, state.gap, step.tier, state.scene.rule, step.rtol)
-    meaning = "Hertz area of the summits over A0 (eta = 1)"
-    state.add("area", ("gap",), area, "1", meaning)
-    state.close(step, error, step.tier)
+    area, error = hertz_area(run.surface, run.gap, step.tier, get_reading(run.problem.reading), step.rtol)
+    run.found["area"] = (("gap",), area)
+    run.close(step, error, step.tier_name)
 
 
-def _statistics(state: _State, step: Step) -> None:
+def _statistics(run: Run, step: Step) -> None:
     from mbma_tables.scenes.statistics import island_statistics
 
-    assert step.tier is not None
+    problem = run.problem
     assert step.rtol is not None
-    scene = state.scene
     fields, error = island_statistics(
-        state.surface,
-        state.gap,
+        run.surface,
+        run.gap,
         step.tier,
-        scene.rule,
+        get_reading(problem.reading),
         step.rtol,
-        scene.E_star,
-        scene.points,
-        "subscale_area" not in scene.dropped,
+        problem.E_star,
+        problem.points,
+        "subscale_area" not in problem.dropped,
     )
-    square = f"{state.length}^2"
-    load = square if state.stress == "1" else f"{state.stress} {square}"
-    units = {
-        "island_number": (f"1/{square}", "islands in contact per nominal area (Eq. 42)"),
-        "island_delta": (state.length, "approach of an island"),
-        "island_force": (load, "load of an island at that approach"),
-        "island_area": (square, "contact area of an island at that approach"),
-        "island_density": (f"1/{state.length}^3", "islands per nominal area and approach"),
-    }
-    for name, (dims, values) in fields.items():
-        state.add(name, dims, values, *units[name])
-    state.close(step, error, step.tier)
+    run.found |= fields
+    run.close(step, error, step.tier_name)
 
 
-def _profiles(state: _State, step: Step) -> None:
+def _profiles(run: Run, step: Step) -> None:
     from mbma_tables.scenes.statistics import profiles
 
+    problem = run.problem
     assert step.rtol is not None
-    scene = state.scene
-    fields, error = profiles(scene.surface, scene.deltas, scene.rule, step.rtol, scene.E_star)
-    units = {
-        "profile_delta": (state.length, "approach of the island"),
-        "profile_radius": (state.length, "radius r in the island"),
-        "profile_pressure": (state.stress, "pressure p(r) (Eq. 36)"),
-        "profile_gap": (state.length, "d(r), deformed sphere to mid-plane of the summits (Eq. 34)"),
-    }
-    for name, (dims, values) in fields.items():
-        state.add(name, dims, values, *units[name])
-    state.close(step, error, "exact")
+    fields, error = profiles(problem.surface, problem.deltas, get_reading(problem.reading), step.rtol, problem.E_star)
+    run.found |= fields
+    run.close(step, error, "exact")
 
 
-def _theory(state: _State, step: Step) -> None:
+def other_theory(name: str, surface: Surface, gap: FloatArray, E_star: float) -> tuple[FloatArray, FloatArray]:
+    """Force and area by another theory, one of `effects.THEORIES`; NaN where it needs an infinite load, at u = 0."""
     from mbma_tables import theories
 
-    scene, gap, name = state.scene, state.gap, step.name
     if name == "greenwood_williamson":
-        found = theories.greenwood_williamson(scene.surface, gap, scene.E_star)
-        force, area = found.force, found.area
-    else:
-        average = theories.mean_separation(scene.surface, gap)
-        full = name == "persson"
-        force, area = np.full((2, gap.size), np.nan)
-        # the full form needs an infinite load at u = 0
-        apart = average > 0 if full else average >= 0
-        force[apart] = theories.persson_force(
-            scene.surface, average[apart], scene.E_star, method="full" if full else "simplified"
-        )
-        area[apart] = theories.persson_area(scene.surface, force[apart], scene.E_star)
-    state.add(f"{name}_force", ("gap",), force, state.stress, f"F/A0 by {name}")
-    state.add(f"{name}_area", ("gap",), area, "1", f"A/A0 by {name}")
+        found = theories.greenwood_williamson(surface, gap, E_star)
+        return found.force, found.area
+    average = theories.mean_separation(surface, gap)
+    finite = average > 0 if name == "persson" else average >= 0
+    method: Literal["full", "simplified"] = "full" if name == "persson" else "simplified"
+    force, area = np.full((2, gap.size), np.nan)
+    force[finite] = theories.persson_force(surface, average[finite], E_star, method=method)
+    area[finite] = theories.persson_area(surface, force[finite], E_star)
+    return force, area
+
+
+def _comparison(run: Run, step: Step) -> None:
+    force, area = other_theory(step.name, run.problem.surface, run.gap, run.problem.E_star)
+    run.found |= {f"{step.name}_force": (("gap",), force), f"{step.name}_area": (("gap",), area)}
 
 
 _STEPS = {
@@ -271,43 +231,69 @@ _STEPS = {
 }
 
 
-def _dataset(state: _State, plan: Plan) -> xr.Dataset:
-    scene = state.scene
-    error = max(state.errors.values(), default=0.0)
-    if error > plan.rtol:
-        raise ConvergenceError(f"the error bound reached is {error:.2e}, above rtol = {plan.rtol:.2e}; ask for more")
-    if state.gap is not None:
-        h_max = float(scene.surface.h_max)
-        state.add("separation", ("gap",), state.gap, state.length, "d, rigid plane to mid-plane")
-        state.add("mean_separation", ("gap",), (h_max + state.gap) / 2, state.length, "u = (h_max + d)/2 (Eq. 50)")
+def _units(problem: Problem) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of every quantity that a scene can hold."""
+    length = problem.length_unit or "length"
+    stress = problem.stress_unit or ("stress" if problem.E_star != 1.0 else "1")
+
+    def of_stress(unit: str) -> str:
+        return unit if stress == "1" else f"{stress} {unit}"
+
+    hertz = "subscale_area" in problem.dropped
+    units = {
+        "separation": (length, "d, rigid plane to mid-plane"),
+        "mean_separation": (length, "u = (h_max + d)/2 (Eq. 50)"),
+        "nominal_pressure": (stress, "F/A0 as prescribed"),
+        "force": (stress, "nominal pressure F/A0"),
+        "area": ("1", "Hertz area of the summits over A0 (eta = 1)" if hertz else "real contact area A/A0"),
+        "stiffness": (f"{stress}/{length}", "-dF/dd per nominal area"),
+        "stiffness_mean": (f"{stress}/{length}", "-dF/du per nominal area"),
+        "energy": (of_stress(length), "elastic energy per nominal area"),
+        "conductance": (f"conductivity/{length}", "conductance per nominal area"),
+        "island_number": (f"1/{length}^2", "islands in contact per nominal area (Eq. 42)"),
+        "island_delta": (length, "approach of an island"),
+        "island_force": (of_stress(f"{length}^2"), "load of an island at that approach"),
+        "island_area": (f"{length}^2", "contact area of an island at that approach"),
+        "island_density": (f"1/{length}^3", "islands per nominal area and approach"),
+        "profile_delta": (length, "approach of the island"),
+        "profile_radius": (length, "radius r in the island"),
+        "profile_pressure": (stress, "pressure p(r) (Eq. 36)"),
+        "profile_gap": (length, "d(r), deformed sphere to mid-plane of the summits (Eq. 34)"),
+    }
+    for name in problem.theories:
+        units |= {f"{name}_force": (stress, f"F/A0 by {name}"), f"{name}_area": ("1", f"A/A0 by {name}")}
+    return units
+
+
+def _dataset(run: Run, plan: Plan) -> xr.Dataset:
+    problem, units = run.problem, _units(run.problem)
     variables = {
-        name: xr.Variable(dims, values, {"units": units, "long_name": meaning})
-        for name, (dims, values, units, meaning) in state.found.items()
+        name: xr.Variable(dims, values, {"units": units[name][0], "long_name": units[name][1]})
+        for name, (dims, values) in run.found.items()
     }
     named = ("separation", "mean_separation", "nominal_pressure", "profile_delta", "island_delta")
-    places = [name for name in named if name in variables]
     facts: dict[str, Any] = {
-        "title": scene.title,
+        "title": problem.title,
         "plan": plan.text(),
         "rtol": plan.rtol,
-        "error": error,
-        "errors": json.dumps(state.errors),
-        "reading": scene.rule.name,
-        "tiers": json.dumps(state.tiers),
-        "switched_off": " ".join(sorted(scene.dropped)),
-        "E_star": float(scene.E_star),
-        "table_hashes": json.dumps(_hashes(set(state.tiers.values()))),
+        "error": max(run.errors.values(), default=0.0),
+        "errors": json.dumps(run.errors),
+        "reading": get_reading(problem.reading).name,
+        "tiers": json.dumps(run.tiers),
+        "switched_off": " ".join(sorted(problem.dropped)),
+        "E_star": float(problem.E_star),
+        "table_hashes": json.dumps(_hashes(set(run.tiers.values()))),
     }
-    facts |= {
-        f"surface_{name}": float(getattr(scene.surface, name)) for name in ("hurst", "q0", "q1", "h_rms", "h_max")
-    }
-    return xr.Dataset(variables, attrs=facts).set_coords(places)
+    numbers = ("hurst", "q0", "q1", "h_rms", "h_max")
+    facts |= {f"surface_{name}": float(getattr(problem.surface, name)) for name in numbers}
+    return xr.Dataset(variables, attrs=facts).set_coords([name for name in named if name in variables])
 
 
 def _hashes(tiers: set[str]) -> dict[str, str]:
     """Hashes of the values of the tables that answered."""
-    if not tiers & TABLES:
+    used = sorted(tiers & set(TABLES))
+    if not used:
         return {}
     from mbma_tables.models.universal import open_table
 
-    return {tier: str(open_table(tier).content.attributes["values_sha256"]) for tier in sorted(tiers & TABLES)}
+    return {tier: str(open_table(tier).content.attributes["values_sha256"]) for tier in used}

@@ -1,4 +1,4 @@
-"""What scenes ask of single islands: statistics, profiles, and the area without finer roughness."""
+"""Statistics and profiles of islands, and the area without finer roughness."""
 
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ from mbma_tables.totals.island_sum import sum_islands
 from mbma_tables.totals.pairs import Pairs, jacobian_of, kinks
 
 Fields = dict[str, tuple[tuple[str, ...], Any]]
-QUADRATURE_SHARE = 0.5  # of the tolerance asked for, as in `contact`
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,11 +53,11 @@ def pairs_of(surface: Surface, gap: FloatArray) -> Pairs:
     )
 
 
-def hertz_area(surface: Surface, gap: FloatArray, tier: str, reading: Reading, rtol: float) -> tuple[FloatArray, float]:
+def hertz_area(surface: Surface, gap: FloatArray, tier: Any, reading: Reading, rtol: float) -> tuple[FloatArray, float]:
     """A/A0 with eta = 1, and the bound on its relative error."""
     model = HertzArea(get_model(tier, rtol, reading))
     outside = "exact" if tier in ("universal", "island4d") else "raise"
-    _, area, error, _ = sum_islands(pairs_of(surface, gap), reading, model, QUADRATURE_SHARE * rtol, outside, AREA)
+    _, area, error, _ = sum_islands(pairs_of(surface, gap), reading, model, rtol, outside, AREA)
     return area, float(error.max())
 
 
@@ -74,7 +73,7 @@ def _density(pairs: Pairs, owner: Any, approach: FloatArray, g: Mapping[str, Flo
 def island_statistics(
     surface: Surface,
     gap: FloatArray,
-    tier: str,
+    tier: Any,
     reading: Reading,
     rtol: float,
     E_star: float,
@@ -143,7 +142,7 @@ def island_statistics(
 
 
 def profiles(surface: Surface, deltas: Any, reading: Reading, rtol: float, E_star: float) -> tuple[Fields, float]:
-    """p(r) and d(r) of the islands at these approaches, solved anew (Eqs. 34, 36, 37)."""
+    """p(r) and d(r) of the islands at these approaches, solved exactly (Eqs. 34, 36, 37)."""
     delta = np.atleast_1d(np.asarray(deltas, dtype=float)).ravel()
     hurst, zeta_1 = np.full(delta.size, float(surface.hurst)), np.full(delta.size, float(surface.zeta_1))
     g = geometry(delta / float(surface.h_rms), hurst, zeta_1, reading)

@@ -21,7 +21,7 @@ def test_plan_as_text_and_json():
     text = invoke("plan", JOINT)
     assert text.exit_code == 0
     assert "-> law by" in text.output
-    assert "left out: force (nothing asked)" in text.output
+    assert "left out: force, energy" in text.output
     content = json.loads(invoke("plan", JOINT, "--json").output)
     assert [step["name"] for step in content["steps"]] == ["law"]
 

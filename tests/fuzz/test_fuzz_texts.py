@@ -1,8 +1,7 @@
-"""Spoilt text files: formulas, scenes, surfaces, costs, calibrations and configurations of tables."""
+"""Damaged text files: formulas, scenes, surfaces and configurations of tables."""
 
 import contextlib
 import json
-import math
 import pathlib
 import tomllib
 
@@ -14,7 +13,6 @@ from generate.tables import configuration
 from mbma_tables import InputError, Scene
 from mbma_tables.files import shipped_file
 from mbma_tables.formulas import file as formula_file
-from mbma_tables.scenes.costs import CALIBRATED_TIERS, Calibration, read_calibration, read_costs, write_calibration
 from mbma_tables.tablefiles.schema import KINDS
 
 EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
@@ -89,64 +87,6 @@ def test_spectra_beside_scenes(name, tmp_path, tally):
         content = spoilt(text.encode(), rng)
         found = tally.read_file(tmp_path / name, content, lambda _: scene_numbers(tmp_path / "scene.toml"))
         assert found is None or finite(*found)
-
-
-def test_cost_bytes(tmp_path, tally):
-    rng = np.random.default_rng(7)
-    path, text = tmp_path / "cost.csv", shipped_file("cost.csv").read_bytes()
-    for _ in range(100 * SCALE):
-        found = tally.read_file(path, spoilt(text, rng), read_costs)
-        if found is not None:
-            assert found.seconds > 0
-            assert finite(found.seconds, *(found.units(tier, "gap", 1e-4) for tier in CALIBRATED_TIERS))
-
-
-def test_cost_fields(tmp_path, tally):
-    rng = np.random.default_rng(8)
-    path, lines = tmp_path / "cost.csv", shipped_file("cost.csv").read_text().splitlines()
-    fields = [
-        "",
-        "nan",
-        "-1",
-        "0",
-        "1e400",
-        "1e-400",
-        "x",
-        "1_0",
-        " 1",
-        '"1\n2"',
-        '"',
-        "unit",
-        "both",
-        "1e-3",
-        "9" * 200000,
-    ]
-    for _ in range(50 * SCALE):
-        other = list(lines)
-        for _ in range(rng.integers(1, 4)):
-            at = int(rng.integers(len(other)))
-            parts = other[at].split(",")
-            parts[rng.integers(len(parts))] = fields[rng.integers(len(fields))]
-            other[at] = ",".join(parts)
-        found = tally.read_file(path, "\n".join(other).encode(), read_costs)
-        if found is not None:
-            assert found.seconds > 0
-            assert finite(found.seconds, *(found.units(tier, "gap", 1e-4) for tier in CALIBRATED_TIERS))
-
-
-@pytest.mark.parametrize("by_structure", [False, True])
-def test_calibrations(by_structure, tmp_path, tally):
-    rng = np.random.default_rng(9)
-    path = write_calibration(Calibration(1e-3, {"exact": 1.5, "formula": 0.5}, "0" * 64), tmp_path / "cost.json")
-    text = path.read_bytes()
-    for _ in range(60 * SCALE):
-        content = json.dumps(changed(json.loads(text), rng)).encode() if by_structure else spoilt(text, rng)
-        found = tally.read_file(path, content, read_calibration)
-        if found is None:
-            tally.refused += 1
-        else:
-            assert 0 < found.seconds < math.inf
-            assert all(0 < factor < math.inf for factor in found.factors.values())
 
 
 @pytest.mark.parametrize("kind", KINDS)

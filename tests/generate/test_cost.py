@@ -1,99 +1,227 @@
+"""The study of costs on few islands and surfaces, its clock replaced: errors, counts, and what goes into the page."""
+
 from __future__ import annotations
+
+import dataclasses
+import itertools
 
 import numpy as np
 import pytest
 
-from generate.pages import cost, cost_islands, cost_page, cost_totals
-from mbma_tables import contact
-from mbma_tables.files import write_file
+from generate.pages import cost, cost_islands, cost_page, cost_totals, page, timing
+from mbma_tables import ConvergenceError, contact
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models.universal import island4d_model
-from mbma_tables.scenes.costs import HELD_OUT, Row, cost_file, held_out_surfaces, read_costs
+from mbma_tables.islands.classical import ring_matrix
+from mbma_tables.scenes.costs import Row, read_costs, shipped_costs
+
+COST, SECONDS = 2.0, 1e-3
 
 
-def test_reference_agrees_with_the_exact_tier():
+def once(run, budget=0.5):
+    """In place of `measure`: the call is made, its cost made up."""
+    del budget
+    run()
+    return COST, SECONDS
+
+
+def by_variant(rows):
+    return {(row.tier, row.variant, row.quantity): row for row in rows}
+
+
+def test_measure_counts_the_fixed_work_itself_as_one(monkeypatch):
+    clock = [0.0]
+
+    def work(seconds):
+        clock[0] += seconds
+
+    monkeypatch.setattr(timing.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(timing, "fixed_work", lambda: work(1e-3))
+    calls = []
+    cost, seconds = timing.measure(lambda: (calls.append(1), work(5e-3)))
+    assert cost == pytest.approx(5, rel=1e-9, abs=0)
+    assert seconds == pytest.approx(1e-3, rel=1e-9, abs=0)
+    assert len(calls) == 2 + timing.ROUNDS[1]
+
+
+def test_fixed_work_is_the_integral_of_erfcx_over_its_step():
+    mpmath = pytest.importorskip("mpmath")
+    integral = mpmath.quad(lambda x: mpmath.exp(x * x) * mpmath.erfc(x), [-5, -4, -2, 0, 2, 5])
+    ends = mpmath.exp(25) * (mpmath.erfc(5) + mpmath.erfc(-5)) / 2
+    step = mpmath.mpf(10) / (timing.WORK_SIZE - 1)
+    # the trapezoidal rule errs by step^2/12 (f'(5) - f'(-5)), 8e-8 of the sum
+    assert timing.fixed_work() == pytest.approx(float(integral / step + ends), rel=1e-6, abs=0)
+
+
+def test_references_agree_with_the_solver():
     found = cost_totals.reference()
-    assert len(found) == len(HELD_OUT)
+    assert len(found) == len(timing.HELD_OUT)
     surface, gap, truth = found[3]
     answer = contact(surface, gap, tier="exact", rtol=1e-10)
-    assert np.stack([answer.force, answer.area]) == pytest.approx(truth, rel=1e-10, abs=0)
-
-
-def test_held_out_islands_agree_with_the_solver():
+    assert answer.force == pytest.approx(truth["force"], rel=1e-10, abs=0)
+    assert answer.area == pytest.approx(truth["area"], rel=1e-10, abs=0)
+    answers = [truth for _, _, truth in found]
+    assert cost_totals.largest_error(answers) == 0
+    answers[2] = {"area": answers[2]["area"] * 1.001}
+    assert cost_totals.largest_error(answers) == pytest.approx(1e-3, rel=1e-9, abs=0)
     held = cost_islands.held_out(40)
     solved = greenwood_tripp.solve(held.islands["X"], held.islands["mu"], rtol=1e-11)
     assert held.error(solved.phi_F, solved.phi_A) < 1e-11
     assert held.error(1.01 * solved.phi_F, solved.phi_A) == pytest.approx(0.01, rel=1e-6, abs=0)
 
 
-def test_linear_reading_meets_the_nodes_and_lies_between_them():
-    content = island4d_model().content
-    places = np.array([[3.0, 3.5, 4.0], [20.0, 20.0, 20.0], [2.0, 2.0, 2.0], [5.0, 5.0, 5.0]])
-    out = np.empty((2, 3))
-    cost_islands._fill_linear(content.log_ratio, places, out)
-    left, right = content.log_ratio[3, 20, 2, 5], content.log_ratio[4, 20, 2, 5]
-    assert out[:, 0] == pytest.approx(left, rel=1e-13, abs=0)
-    assert out[:, 1] == pytest.approx((left + right) / 2, rel=1e-13, abs=0)
-    assert out[:, 2] == pytest.approx(right, rel=1e-13, abs=0)
-
-
-def test_classical_meets_newton_within_its_mesh():
+def test_the_classical_iteration_converges_to_newton_with_its_mesh():
     X, mu = np.array([1.5, 3.0]), np.array([0.5, 2.0])
     exact = greenwood_tripp.solve(X, mu)
     errors = []
     for rings in (50, 100):
-        _, converged, force, _ = cost_islands.classical(X, mu, cost_islands.ring_matrix(rings), 1e-9)
+        _, converged, force, _ = cost_islands.classical(X, mu, ring_matrix(rings), 1e-9)
         assert converged.all()
         errors.append(np.abs(force / exact.phi_F - 1).max())
     # the meshes are of second order
     assert errors[0] / errors[1] == pytest.approx(4, rel=0.3, abs=0)
 
 
-def test_single_surface_has_no_error_against_itself():
-    answers = [truth for _, _, truth in cost_totals.reference()]
-    assert cost_totals.largest_error(answers) == 0
-    answers[2] = answers[2] * [[1.0], [1.001]]
-    assert cost_totals.largest_error(answers) == pytest.approx(1e-3, rel=1e-9, abs=0)
-    assert cost_totals.largest_error([a[:1] for a in answers], slice(0, 1)) == 0
+@pytest.fixture
+def few_islands(monkeypatch):
+    held = cost_islands.held_out(40)
+    small = {
+        "held_out": lambda: held,
+        "ISLANDS": 40,
+        "HARD": 4,
+        "PROFILES": 2,
+        "MESHES": {25: (1e-2,), 50: (1e-4,)},
+        "NEWTON_RTOLS": (1e-2, 1e-8),
+        "NEWTON_NODES": (8, 24),
+        "UNIVERSAL_SHARES": (0.06, 0.12),
+        "measure": once,
+    }
+    for name, value in small.items():
+        monkeypatch.setattr(cost_islands, name, value)
 
 
-def test_brute_force_times_are_those_of_the_data():
-    rows = list(cost_totals.brute_force_rows(0.5))
-    assert [row.variant for row in rows[:2]] == ["load force=0.0001", "load force=0.0003"]
-    assert rows[0].cost == pytest.approx(0.89 / 0.5, rel=1e-12, abs=0)
+@pytest.mark.slow
+def test_islands(few_islands):
+    rows = by_variant(cost_islands.island_rows())
+    assert {tier for tier, _, _ in rows} == {"universal", "island4d", "formula", "rigid", "exact", "classical"}
+    for rtol in ("1e-02", "1e-08"):
+        assert rows["exact", f"island rtol={rtol}", "both"].error < float(rtol)
+        assert rows["exact", f"island rtol={rtol}", "both"].cost == COST / 10
+    coarse, fine = (rows["exact", f"nodes={nodes}", "both"] for nodes in (8, 24))
+    assert fine.error < coarse.error
+    assert fine.evaluations > coarse.evaluations
+    assert rows["exact", "profile rtol=1e-04", "both"].cost == COST / 2
+    # the finer the nodes of a table, the smaller the error
+    nodes = [row.error for (tier, _, _), row in rows.items() if tier == "universal"]
+    assert sorted(nodes) == [nodes[0], nodes[2], nodes[1]]
+    assert nodes[0] < 1e-8
+    assert rows["island4d", "island", "both"].error < 1e-3
+    forms = [rows["formula", f"island form={name}", "both"].error for name in cost_islands.FORMS]
+    assert forms == sorted(forms, reverse=True)
+    meshes = {name: row for (tier, name, _), row in rows.items() if tier == "classical"}
+    assert meshes["rings=50 rtol=1e-04"].error < meshes["rings=25 rtol=1e-02"].error
+    assert meshes["rings=50 rtol=1e-04"].cost == COST / 4
+
+
+def test_a_classical_iteration_that_does_not_converge_is_an_error(few_islands, monkeypatch):
+    monkeypatch.setattr(cost_islands, "MAX_STEPS", 3)
+    with pytest.raises(ConvergenceError, match="on 25 rings did not converge") as caught:
+        list(cost_islands.classical_rows())
+    assert caught.value.mask.any()
+
+
+@pytest.fixture
+def few_totals(monkeypatch):
+    small = {
+        "TIERS": ("universal", "rigid"),
+        "RTOLS": (1e-1, 1e-2, 1e-4),
+        "LAW_RTOLS": (1e-2,),
+        "SLOW_LAW_RTOLS": (1e-1,),
+        "measure": once,
+    }
+    for name, value in small.items():
+        monkeypatch.setattr(cost_totals, name, value)
+
+
+def test_totals(few_totals):
+    rows = by_variant(cost_totals.gap_rows())
+    asked = {float(name.split("=")[1]) for _, name, what in rows if "rtol" in name and what == "both"}
+    assert asked == {1e-1, 1e-2, 1e-4}
+    for what in ("both", "force", "area"):
+        row = rows["universal", "gap rtol=1e-02", what]
+        assert row.error < 1e-2
+        # a call's cost is taken off, down to next to nothing, and the rest is shared by the gaps
+        assert row.cost == pytest.approx(1e-9 / 50, rel=1e-12, abs=0)
+        assert row.evaluations > 20
+        assert rows["universal", "call", what].cost == pytest.approx(COST / 6, rel=1e-12, abs=0)
+        # spheres that do not deform are not the model
+        assert rows["rigid", "gap rtol=1e-02", what].error > 1
+
+
+def test_laws_theories_and_scenes(few_totals, monkeypatch):
+    rows = by_variant(cost_totals.law_rows())
+    assert [tier for tier, name, _ in rows if name.startswith("law rtol")] == ["universal", "rigid"]
+    assert rows["universal", "law rtol=1e-02", "both"].error < 1e-2
+    assert rows["law", "lookup", "both"].cost == COST / 10_000
+    assert {name for tier, name, _ in rows if tier == "law"} == {"lookup", "invert"}
+    assert {(row.tier, row.cost) for row in cost_totals.theory_rows()} == {
+        ("greenwood_williamson", COST / 20),
+        ("persson", COST / 20),
+    }
+    costs = itertools.count(5.0, -3.0)
+    monkeypatch.setattr(cost_totals, "measure", lambda run: (run(), (next(costs), SECONDS))[1])
+    # 5 for the run, 2 for its step
+    assert [row.cost for row in cost_totals.scene_rows()] == [3.0]
+
+
+def test_first_use_is_that_of_the_second_process(few_totals, monkeypatch):
+    monkeypatch.setattr(cost_totals, "TIERS", ("rigid",))
+    monkeypatch.setattr(cost_totals, "FIRST_USE", "print({{'rigid': 0.25}}[{tier!r}])")
+    (row,) = cost_totals.first_use_rows()
+    assert (row.tier, row.variant) == ("rigid", "import")
+    assert row.cost == pytest.approx(0.25 / SECONDS, rel=1e-12, abs=0)
+
+
+def test_a_study_becomes_data_page_and_figure(tmp_path, monkeypatch):
+    shipped = shipped_costs()
+    own = [row for row in shipped.rows if row.tier not in ("unit", cost_page.BRUTE_FORCE)]
+    monkeypatch.setattr(cost, "island_rows", lambda: own[:20])
+    monkeypatch.setattr(cost, "total_rows", lambda: own[20:])
+    seconds = iter([3.0, shipped.seconds, 2.0])
+    monkeypatch.setattr(timing, "measure", lambda run: (1.0, next(seconds)))
+    parts, files = cost.measure()
+    (tmp_path / "cost.csv").write_bytes(files["tables/cost.csv"])
+    # others' seconds are divided by the fastest fixed work seen, which the file rounds
+    for row, expected in zip(read_costs(tmp_path / "cost.csv").rows, shipped.rows, strict=True):
+        assert dataclasses.replace(row, cost=expected.cost) == expected
+        assert row.cost == pytest.approx(expected.cost, rel=1.5e-3, abs=0)
+    text = (page.ROOT / "docs" / "cost.md").read_text(encoding="utf-8")
+    assert page.fill(text, parts).count("|") == text.count("|")
+    assert page.fill(text, cost_page.parts_of(shipped)) == text
+    assert files["docs/figures/cost.png"].startswith(b"\x89PNG\r\n\x1a\n")
 
 
 def test_rows_come_back_from_the_file(tmp_path):
-    rows = [
-        Row("unit", "seconds", "both", None, 2.5e-4),
-        Row("exact", "gap rtol=1e-03", "force", 1.5e-6, 3.25, 71.0),
-    ]
-    path = tmp_path / "deep" / "cost.csv"
-    write_file(path, cost.to_csv(rows, quick=True).encode(), make_folders=True)
-    assert list(read_costs(path).measured) == rows
-    assert [p.name for p in path.parent.iterdir()] == ["cost.csv"]
+    rows = (Row("unit", "seconds", "both", None, 2.5e-4), Row("exact", "gap rtol=1e-03", "force", 1.5e-6, 3.25, 71.0))
+    (tmp_path / "cost.csv").write_text(cost.to_csv(rows), encoding="utf-8")
+    assert read_costs(tmp_path / "cost.csv").rows == rows
 
 
-def test_page_figure_and_readme_come_from_the_data_alone():
-    costs = read_costs(cost_file())
-    text = cost_page.page(costs)
-    for row in costs.measured:
-        if row.tier != "unit" and row.quantity == "both":
-            assert f"| {cost_page.METHODS.get(row.tier, row.tier)} | " in text
-    assert "(figures/cost.png)" in text
-    assert cost_page.draw(costs)[:8] == b"\x89PNG\r\n\x1a\n"
-    assert cost_page.readme_table(costs) in cost_page.readme_table(read_costs(cost_file()))
+def test_the_pareto_front_is_what_nothing_dominates():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        places = rng.integers(1, 6, (12, 2))
+        rows = [Row("exact", str(k), "both", float(error), float(time)) for k, (time, error) in enumerate(places)]
+        front = cost_page.pareto_front(rows)
+
+        def dominated(row, by):
+            return by.cost <= row.cost and by.error <= row.error and (by.cost, by.error) != (row.cost, row.error)
+
+        assert not any(dominated(row, by) for row in front for by in rows)
+        assert all(any(by.cost <= row.cost and by.error <= row.error for by in front) for row in rows)
 
 
-def test_figure_spans_five_decades_of_time_and_eight_of_error():
-    rows = [row for row in read_costs(cost_file()).measured if cost_page.is_island(row)]
-    cheapest = min(row.cost for row in rows)
+def test_the_figure_spans_five_decades_of_time_and_eight_of_error():
+    rows = cost_page.islands_of(shipped_costs())
     classical = max(row.cost for row in rows if row.tier == "classical")
-    assert classical / cheapest > 1e5
+    assert classical / min(row.cost for row in rows) > 1e5
     assert max(row.error for row in rows) / min(row.error for row in rows) > 1e8
-
-
-def test_surfaces_are_inside_what_every_tier_covers():
-    for surface in held_out_surfaces():
-        for tier in ("universal", "island4d"):
-            assert contact(surface, -0.5 * float(surface.h_max), tier=tier).force > 0

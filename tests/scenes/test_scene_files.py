@@ -5,10 +5,10 @@ import pathlib
 
 import pytest
 
-import mbma_tables
+from mbma_tables import Scene
 from mbma_tables.errors import InputError, MbmaError
 from mbma_tables.scenes.effects import EFFECTS, REFINEMENTS, THEORIES
-from mbma_tables.scenes.toml_file import read_scene, schema
+from mbma_tables.scenes.toml_file import schema
 
 EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
 SURFACE = '[surface]\nname = "concrete"\n'
@@ -29,21 +29,21 @@ MISTAKES = {
         SURFACE + '[effects]\non = ["comparison"]\n' + AT + '[comparison]\ntheories = ["person"]\n',
         "did you mean 'persson'",
     ),
-    "no surface": (ON + AT, r"needs the table \[surface\]"),
+    "no surface": (ON + AT, "'surface' is a required property"),
     "empty surface": ("[surface]\n" + ON + AT, "a surface needs hurst"),
     "half a surface": ("[surface]\nhurst = 0.8\nq0 = 1.0\n" + ON + AT, "a surface needs hurst, q0, q1"),
     "name and numbers": ('[surface]\nname = "concrete"\nhurst = 0.8\n' + ON + AT, "leave one of them out"),
     "name and map": ('[surface]\nname = "concrete"\nmap = "a.nc"\n' + ON + AT, "one of name, map, psd or numbers"),
-    "missing map": ('[surface]\nmap = "none.nc"\n' + ON + AT, "is no file; paths are relative to the scene file"),
-    "missing psd": ('[surface]\npsd = "none.txt"\nh_max = 1.0\n' + ON + AT, "is no file"),
+    "missing map": ('[surface]\nmap = "none.nc"\n' + ON + AT, "is not a file; paths are relative"),
+    "missing psd": ('[surface]\npsd = "none.txt"\nh_max = 1.0\n' + ON + AT, "is not a file"),
     "convention without psd": ('[surface]\nname = "concrete"\nconvention = "paper"\n' + ON + AT, "give psd"),
     "another length unit": ('[surface]\nname = "concrete"\nlength_unit = "m"\n' + ON + AT, "leave length_unit out"),
     "hurst above one": (
         "[surface]\nhurst = 1.8\nq0 = 1.0\nzeta_1 = 50\nh_rms = 0.1\nh_max = 0.3\n" + ON + AT,
         r"hurst must be in \(0, 1\]",
     ),
-    "no effects": (SURFACE + AT, r"needs the table \[effects\]"),
-    "empty effects": (SURFACE + "[effects]\non = []\n" + AT, "give at least one entry"),
+    "no effects": (SURFACE + AT, "'effects' is a required property"),
+    "empty effects": (SURFACE + "[effects]\non = []\n" + AT, "effects.on: .* should be non-empty"),
     "only refinements": (SURFACE + '[effects]\non = ["finite_height"]\n' + AT, "needs at least one of force"),
     "on and off": (
         SURFACE + '[effects]\non = ["area", "subscale_area"]\noff = ["subscale_area"]\n' + AT,
@@ -60,7 +60,7 @@ MISTAKES = {
         + '[effects]\non = ["pressure_profile"]\noff = ["sphere_deformation"]\n[pressure_profile]\ndeltas = [0.1]\n',
         "leave sphere_deformation on",
     ),
-    "effects as text": (SURFACE + '[effects]\non = "force"\n' + AT, r"effects.on must be a list in \[ \]"),
+    "effects as text": (SURFACE + '[effects]\non = "force"\n' + AT, "effects.on: 'force' is not of type 'array'"),
     "nothing prescribed": (SURFACE + ON, "give one of separations"),
     "empty prescribed": (SURFACE + ON + "[prescribed]\n", "give separations"),
     "pressure and separation": (
@@ -78,12 +78,18 @@ MISTAKES = {
         SURFACE + '[effects]\non = ["force"]\noff = ["finite_height"]\n[prescribed]\nnominal_pressures = [0.01]\n',
         "leave finite_height on, or give separations",
     ),
-    "text for a number": (SURFACE + ON + '[prescribed]\nseparations = ["a"]\n', r"separations\[0\] must be a number"),
+    "text for a number": (
+        SURFACE + ON + '[prescribed]\nseparations = ["a"]\n',
+        r"separations\[0\]: 'a' is not of type 'number'",
+    ),
     "not finite": (SURFACE + ON + "[prescribed]\nseparations = [nan]\n", "must be finite"),
-    "impossible tolerance": (SURFACE + ON + AT + "[accuracy]\nrtol = 1e-14\n", r"must lie in \[1e-10, 0.1\]"),
-    "loose tolerance": (SURFACE + ON + AT + "[accuracy]\nrtol = 2.0\n", r"must lie in \[1e-10, 0.1\]"),
+    "impossible tolerance": (
+        SURFACE + ON + AT + "[accuracy]\nrtol = 1e-14\n",
+        "accuracy.rtol: 1e-14 is less than the minimum of 1e-10",
+    ),
+    "loose tolerance": (SURFACE + ON + AT + "[accuracy]\nrtol = 2.0\n", "2.0 is greater than the maximum of 0.1"),
     "tolerance and time": (SURFACE + ON + AT + "[accuracy]\nrtol = 1e-3\nseconds = 1.0\n", "one of them"),
-    "no time": (SURFACE + ON + AT + "[accuracy]\nseconds = 0.0\n", "must be positive"),
+    "no time": (SURFACE + ON + AT + "[accuracy]\nseconds = 0.0\n", "0.0 is less than or equal to the minimum of 0"),
     "half a material": (SURFACE + ON + AT + "[material]\nE1 = 3.0\n", "all of E1, nu1, E2, nu2"),
     "negative modulus": (SURFACE + ON + AT + "[material]\nE_star = -3.0\n", "E_star must be positive"),
     "conductance alone": (SURFACE + '[effects]\non = ["conductance"]\n' + AT, "needs conductivities"),
@@ -91,8 +97,11 @@ MISTAKES = {
     "profile alone": (SURFACE + '[effects]\non = ["pressure_profile"]\n', "needs deltas"),
     "comparison alone": (SURFACE + '[effects]\non = ["comparison"]\n' + AT, "needs theories"),
     "statistics off": (SURFACE + ON + AT + "[island_statistics]\npoints = 5\n", "add it to on"),
-    "table as text": ('surface = "concrete"\n' + ON + AT, r"surface must be a table.*write \[surface\]"),
-    "no toml": ("[surface\n", "is no TOML file"),
+    "table as text": (
+        'surface = "concrete"\n' + ON + AT,
+        r"surface: 'concrete' is not of type 'object'; write \[surface\]",
+    ),
+    "no toml": ("[surface\n", "is not a TOML file"),
 }
 
 
@@ -102,16 +111,12 @@ def write(folder, text):
     return path
 
 
-def test_there_are_forty_kinds_and_more():
-    assert len(MISTAKES) >= 40
-
-
 @pytest.mark.parametrize("kind", MISTAKES)
 def test_a_mistake_is_told_with_what_to_write_instead(kind, tmp_path):
     text, words = MISTAKES[kind]
     path = write(tmp_path, text)
     with pytest.raises(InputError, match=words) as fault:
-        read_scene(path)
+        Scene.from_toml(path)
     message = str(fault.value)
     assert message.startswith(str(path))
     assert "\n" not in message.strip() or kind == "no toml"
@@ -128,17 +133,17 @@ PLANNED = {
 def test_what_only_a_plan_or_a_run_can_know(kind, tmp_path):
     text, words = PLANNED[kind]
     with pytest.raises(MbmaError, match=words):
-        read_scene(write(tmp_path, text)).run()
+        Scene.from_toml(write(tmp_path, text)).run()
 
 
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(InputError, match="give the path of a scene file"):
-        read_scene(tmp_path / "none.toml")
+        Scene.from_toml(tmp_path / "none.toml")
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("scene_*.toml")), ids=lambda path: path.stem)
 def test_examples_are_scenes(path):
-    scene = mbma_tables.Scene.from_toml(path)
+    scene = Scene.from_toml(path)
     assert "Scene" in scene.explain()
 
 
@@ -155,4 +160,4 @@ def test_a_psd_file(tmp_path):
     lines = "\n".join(f"{a} {1e-3 * a**-3.6}" for a in q)
     (tmp_path / "psd.txt").write_text(lines, encoding="utf-8")
     path = write(tmp_path, '[surface]\npsd = "psd.txt"\nh_max = 0.3\n' + ON + AT.replace("0.5", "0.1"))
-    assert float(read_scene(path).surface.hurst) == pytest.approx(0.8, rel=0.02, abs=0)
+    assert float(Scene.from_toml(path).surface.hurst) == pytest.approx(0.8, rel=0.02, abs=0)

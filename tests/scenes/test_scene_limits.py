@@ -1,4 +1,4 @@
-"""Scenes whose tables do not reach, whose gaps do not touch, whose units are named; and contradictions told."""
+"""Scenes beyond tables, without contact, with units; contradictions between arguments."""
 
 import dataclasses
 import math
@@ -6,13 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from mbma_tables import ConvergenceError, OutOfRangeError, Scene, Surface, TableFileError, contact, contact_law
+from mbma_tables import ConvergenceError, OutOfRangeError, Scene, Surface, contact, contact_law
 from mbma_tables.errors import InputError
-from mbma_tables.scenes import costs as costs_module
-from mbma_tables.scenes import plan as plan_module
-from mbma_tables.scenes.costs import shipped_costs
-from mbma_tables.scenes.plan import make_plan
-from mbma_tables.scenes.run import run_scene
+from mbma_tables.scenes.run import height_without_end, run_plan
 
 CONCRETE = Surface.named("concrete")
 # its islands at full compression lie beyond X = 41, where the tables end
@@ -35,7 +31,7 @@ def test_beyond_a_table_totals_are_solved(tier):
     scene = scene_of(DEEP, separations=(-44.0, 44.0), rtol=1e-3)
     with pytest.raises(OutOfRangeError):
         contact(DEEP, -44.0, tier)
-    found = run_scene(scene, tiered(scene, tier))
+    found = run_plan(scene, tiered(scene, tier))
     truth = contact(DEEP, [-44.0, 44.0], tier="exact", rtol=1e-6).force
     np.testing.assert_allclose(found["force"], truth, rtol=1e-3, atol=0)
 
@@ -52,7 +48,7 @@ def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
 
     monkeypatch.setattr("mbma_tables.totals.law.contact_law", law)
     scene = scene_of(effects=("energy",), rtol=1e-2)
-    found = run_scene(scene, tiered(scene, "universal"))
+    found = run_plan(scene, tiered(scene, "universal"))
     assert made == ["universal", "exact"]
     assert found.attrs["tiers"] == '{"law": "exact"}'
     np.testing.assert_allclose(found["energy"], contact_law(CONCRETE).energy([0.2, 0.5]), rtol=1e-2, atol=0)
@@ -67,13 +63,7 @@ def test_what_no_solver_answers_stays_an_error(effects, monkeypatch):
     monkeypatch.setattr("mbma_tables.totals.contact.contact", refuse)
     scene = scene_of(effects=effects, rtol=1e-3)
     with pytest.raises(OutOfRangeError, match="islands outside"):
-        run_scene(scene, tiered(scene, "exact"))
-
-
-def test_a_bound_that_was_not_reached_is_an_error():
-    scene = scene_of(rtol=1e-3)
-    with pytest.raises(ConvergenceError, match=r"above rtol = 1\.00e-03; ask for more"):
-        run_scene(scene, tiered(scene, "rigid"))
+        run_plan(scene, tiered(scene, "exact"))
 
 
 def test_gaps_that_do_not_touch_hold_no_islands():
@@ -86,7 +76,7 @@ def test_progress_in_blocks():
     told = []
     gaps = np.linspace(0.2, 1.0, 130)
     scene = scene_of(separations=gaps, rtol=1e-2)
-    run_scene(scene, tiered(scene, "exact"), lambda *step: told.append(step))
+    run_plan(scene, tiered(scene, "exact"), lambda *step: told.append(step))
     assert told == [("totals", done, 130) for done in (0, 64, 128, 130, 130)]
 
 
@@ -103,29 +93,12 @@ def test_units(given, units):
     assert tuple(found[name].attrs["units"] for name in ("force", "stiffness", "energy")) == units
 
 
-def test_rigid_spheres_pay_for_what_they_are_not():
-    scene = scene_of(separations=(1.095,), rtol=0.1)
-    found = run_scene(scene, dataclasses.replace(tiered(scene, "rigid"), rtol=0.5))
-    error = plan_module.rigid_error(scene)
-    assert 0 < error < found.attrs["error"] < 0.2
-    truth = contact(CONCRETE, [1.095], rtol=1e-8).force
-    np.testing.assert_allclose(found["force"], truth, rtol=found.attrs["error"], atol=0)
-
-
-def test_no_contact_needs_no_elasticity():
-    assert plan_module.rigid_error(scene_of(separations=(2.0,))) == 0.0
-    average = (CONCRETE.h_max + 0.5) / 2
-    own = scene_of(separations=None, mean_separations=(average,))
-    same = plan_module.rigid_error(scene_of(separations=(0.5,)))
-    assert plan_module.rigid_error(own) == pytest.approx(same, rel=1e-9, abs=0)
-
-
 def test_the_top_of_a_whole_gaussian_by_mean_separations():
     own = scene_of(separations=(0.5,), without=("finite_height",))
     average = scene_of(separations=None, mean_separations=((CONCRETE.h_max + 0.5) / 2,), without=("finite_height",))
-    assert plan_module.top_of(average, 1e-6) == pytest.approx(plan_module.top_of(own, 1e-6), rel=1e-14, abs=0)
+    assert height_without_end(average, 1e-6) == pytest.approx(height_without_end(own, 1e-6), rel=1e-14, abs=0)
     tail = (math.sqrt(2 * (10 - math.log(1e-6))) + 1) * float(CONCRETE.s)
-    assert plan_module.top_of(own, 1e-6) == pytest.approx(0.5 + tail, rel=1e-14, abs=0)
+    assert height_without_end(own, 1e-6) == pytest.approx(0.5 + tail, rel=1e-14, abs=0)
 
 
 @pytest.mark.parametrize(
@@ -159,9 +132,12 @@ def test_the_top_of_a_whole_gaussian_by_mean_separations():
         ({"effects": ("conductance",), "conductivities": (1.0, -2.0)}, "positive"),
         ({"effects": ("comparison",), "theories": ("person",)}, "did you mean 'persson'"),
         ({"effects": ("comparison",)}, "needs theories"),
-        ({"effects": ("pressure_profile",), "deltas": (0.1,)}, "serve nothing that is asked for"),
+        ({"effects": ("pressure_profile",), "deltas": (0.1,)}, "are not needed by any effect"),
         ({"separations": None}, "nothing is prescribed"),
         ({"mean_separations": (1.0,)}, "prescribe one of"),
+        ({"tier": "exakt"}, "did you mean 'exact'"),
+        ({"tier": "exact", "without": ("sphere_deformation",)}, "leave tier out"),
+        ({"tier": object(), "seconds": 1.0}, "give rtol instead of seconds"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
@@ -170,75 +146,21 @@ def test_contradictions(given, said):
         scene_of(**given)
 
 
-def costs_of(tiers):
-    """The shipped data without the totals, laws and profiles of other tiers."""
-    own = shipped_costs()
-    kept = {key: rows for key, rows in own.rows.items() if key[1] not in ("gap", "law") or key[0] in tiers}
-    return dataclasses.replace(own, rows=kept)
-
-
-def test_tiers_without_a_measured_cost_are_not_planned():
-    scene = scene_of(rtol=1e-3)
-    for tier in ("island4d", "universal", "exact"):
-        assert make_plan(scene, costs_of((tier, "exact"))).step("totals").tier == tier
-
-
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"effects": ("area",), "without": ("subscale_area",)},
-        {"effects": ("island_statistics",)},
-        {"without": ("finite_height",)},
-    ],
-    ids=["hertz area", "island statistics", "whole gaussian"],
-)
-def test_what_no_tier_answers_is_told(given):
-    with pytest.raises(InputError, match="is met by none of"):
-        make_plan(scene_of(rtol=1e-3, **given), costs_of(()))
-
-
-def test_a_law_of_unmeasured_cost_is_made_of_300_totals():
-    scene = scene_of(effects=("energy",), rtol=1e-3)
-    costs = costs_of(("exact",))
-    without = dataclasses.replace(costs, rows={key: rows for key, rows in costs.rows.items() if key[1] != "law"})
-    (step,) = make_plan(scene, without).steps
-    assert (step.name, step.tier) == ("law", "exact")
-    least = 300 * without.of("exact", "gap", 0.1 * step.rtol)
-    assert least <= step.seconds <= 1.5 * least + without.of("exact", "import")
-
-
 def test_a_law_cannot_be_that_tight():
-    with pytest.raises(InputError, match="is too tight for energy: a law meets"):
+    with pytest.raises(InputError, match="is too tight for energy: a law meets 2e-09 at best"):
         scene_of(effects=("energy",), rtol=1e-9).plan()
 
 
-def test_more_time_buys_more_accuracy_to_where_no_plan_is_left():
-    plans = [scene_of(effects=("energy",), rtol=None, seconds=seconds).plan() for seconds in (10.0, 1e6)]
-    assert plans[1].rtol <= plans[0].rtol
-    assert plans[1].rtol > 1e-9
+def test_a_budget_below_every_plan_is_refused():
     with pytest.raises(InputError, match="is too little: the cheapest plan takes about"):
         scene_of(rtol=None, seconds=1e-7).plan()
 
 
-def test_another_reading_takes_no_four_number_table():
-    found = plan_module.candidates(scene_of(reading="printed"), 1e-3)
-    assert "island4d" not in found
-    assert "universal" in found
-    assert plan_module.candidates(scene_of(without=("sphere_deformation",)), 1e-3).keys() == {"rigid"}
-
-
-def test_measuring_ends_after_its_rounds(monkeypatch):
-    clock = iter(np.arange(0.0, 1e3, 1e-4))
-    monkeypatch.setattr(costs_module.time, "perf_counter", lambda: next(clock))
-    monkeypatch.setattr(costs_module, "_work_seconds", lambda: 1e-4)
-    calls = []
-    cost, seconds = costs_module.measure(lambda: calls.append(1), budget=math.inf)
-    # each repetition is 20 calls in one tick of the clock
-    assert len(calls) == 2 + 20 * costs_module.ROUNDS[1]
-    assert cost == pytest.approx(1 / 20, rel=1e-9, abs=0)
-    assert seconds == 1e-4
-
-
-def test_nothing_to_calibrate_by():
-    with pytest.raises(TableFileError, match="nothing to calibrate by"):
-        costs_module.calibrate(costs_of(()))
+def test_a_tier_of_choice():
+    """Given by name it is taken as it is, and a bound above the tolerance is an error."""
+    found = scene_of(tier="island4d", rtol=1e-3).run()
+    assert found.attrs["tiers"] == '{"totals": "island4d"}'
+    alone = contact(CONCRETE, [0.2, 0.5], tier="island4d", rtol=5e-4, quantities=["force"])
+    np.testing.assert_array_equal(found["force"], alone.force)
+    with pytest.raises(ConvergenceError, match=r"above rtol = 1\.00e-06: give a larger rtol"):
+        scene_of(tier="formula", rtol=1e-6).run()

@@ -1,0 +1,154 @@
+"""The problem that a scene states, checked when it is made; how it is solved is in `plan` and `run`."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from mbma_tables.errors import InputError
+from mbma_tables.scenes.effects import THEORIES, chosen, nearest
+
+if TYPE_CHECKING:
+    from mbma_tables.models.protocol import IslandModel
+    from mbma_tables.surfaces.readings import Reading
+    from mbma_tables.surfaces.surface import Surface
+
+PRESCRIBED = ("separations", "mean_separations", "nominal_pressures")
+MIN_RTOL, MAX_RTOL = 1e-10, 0.1
+DEFAULT_RTOL = 1e-6
+MAX_SECONDS = 1e6
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Problem:
+    """The parameters of `Scene`, with the derived fields `outputs`, `dropped` and `gaps`."""
+
+    surface: Surface
+    effects: Sequence[str] = ("force", "area")
+    without: Sequence[str] = ()
+    separations: Any = None
+    mean_separations: Any = None
+    nominal_pressures: Any = None
+    E_star: float = 1.0
+    rtol: float | None = None
+    seconds: float | None = None
+    reading: str | Reading = "reported"
+    tier: str | IslandModel | None = None
+    conductivities: tuple[float, float] | None = None
+    deltas: Any = None
+    theories: Sequence[str] = ()
+    points: int = 64
+    length_unit: str | None = None
+    stress_unit: str | None = None
+    title: str = "scene"
+    outputs: frozenset[str] = dataclasses.field(init=False)
+    dropped: frozenset[str] = dataclasses.field(init=False)
+    gaps: Any = dataclasses.field(init=False)
+
+    def __post_init__(self) -> None:
+        from mbma_tables.arguments import number_in, whole_number_in
+        from mbma_tables.surfaces.readings import get_reading
+
+        for name in ("effects", "without", "theories"):
+            if isinstance(getattr(self, name), str):
+                raise InputError(f"{name} must be a list of names: write [{getattr(self, name)!r}]")
+        outputs, dropped = chosen(self.effects, self.without)
+        if self.surface.labelled or self.surface.shape != ():
+            raise InputError("a scene has one surface, not a batch: make a scene for each")
+        if self.rtol is not None and self.seconds is not None:
+            raise InputError("rtol and seconds are both given: give the accuracy or the time budget, one of them")
+        number_in("E_star", self.E_star, 1e-300, 1e300)
+        rtol: float | None = DEFAULT_RTOL
+        if self.rtol is not None:
+            rtol = number_in("rtol", self.rtol, MIN_RTOL, MAX_RTOL)
+        if self.seconds is not None:
+            number_in("seconds", self.seconds, 1e-9, MAX_SECONDS)
+            rtol = None
+        whole_number_in("points", self.points, 2, 10_000)
+        derived = {
+            "rtol": rtol,
+            "reading": get_reading(self.reading),
+            "outputs": outputs,
+            "dropped": dropped,
+            "theories": tuple(self.theories),
+        }
+        for name, value in derived.items():
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "gaps", self._checked_gaps(outputs - {"pressure_profile"}))
+        self._check_parameters_of_effects()
+        self._check_tier()
+
+    def _checked_gaps(self, at_gaps: frozenset[str]) -> Any:
+        """The prescribed numbers; None where nothing asks for gaps."""
+        import numpy as np
+
+        from mbma_tables.arguments import finite_array, require
+
+        given = [name for name in PRESCRIBED if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise InputError(f"{' and '.join(given)} are given: prescribe one of {', '.join(PRESCRIBED)}")
+        if not at_gaps:
+            if given:
+                raise InputError(f"{given[0]} are not needed by any effect: leave them out, or ask for 'force'")
+            return None
+        if not given:
+            raise InputError(f"nothing is prescribed: give one of {', '.join(PRESCRIBED)}")
+        numbers = finite_array(given[0], getattr(self, given[0]))
+        if numbers.ndim > 1:
+            raise InputError(f"{given[0]} must be one number or a list, got shape {numbers.shape}")
+        h_max = float(self.surface.h_max)
+        if given[0] == "separations":
+            require(given[0], numbers, numbers >= -h_max, f"at least -h_max = {-h_max:.6g}, where the model ends")
+        elif given[0] == "mean_separations":
+            require(given[0], numbers, numbers >= 0, "at least 0, where the model ends (d = -h_max)")
+        else:
+            require(given[0], numbers, numbers >= 0, "at least 0: there is no adhesion in the model")
+            if "finite_height" in self.dropped:
+                raise InputError(
+                    "nominal_pressures need a law, which ends at h_max: leave finite_height on, or give separations"
+                )
+        return np.atleast_1d(numbers).astype(float)
+
+    def _check_parameters_of_effects(self) -> None:
+        """Parameters that one effect needs and no other uses."""
+        from mbma_tables.arguments import finite_array, require
+
+        needs = (
+            ("conductance", "conductivities", self.conductivities is not None, "k1 and k2 of the two bodies"),
+            ("pressure_profile", "deltas", self.deltas is not None, "the approaches of the islands"),
+            ("comparison", "theories", bool(self.theories), f"one or more of {', '.join(THEORIES)}"),
+        )
+        for effect, name, given, meaning in needs:
+            if effect in self.outputs and not given:
+                raise InputError(f"effect {effect!r} needs {name}: {meaning}")
+            if effect not in self.outputs and given:
+                raise InputError(f"{name} are given and effect {effect!r} is off: add it to the effects, or leave them")
+        if self.conductivities is not None:
+            pair = finite_array("conductivities", self.conductivities)
+            if pair.shape != (2,):
+                raise InputError(f"conductivities are two numbers, k1 and k2, got shape {pair.shape}")
+            require("conductivities", pair, pair > 0, "positive")
+        if self.deltas is not None:
+            deltas = finite_array("deltas", self.deltas)
+            require("deltas", deltas, deltas > 0, "positive")
+        for name in self.theories:
+            if name not in THEORIES:
+                raise InputError(f"no theory is named {name!r}; {nearest(str(name), THEORIES)}")
+
+    def _check_tier(self) -> None:
+        if self.tier is None:
+            return
+        from mbma_tables.models import TIERS
+
+        if "sphere_deformation" in self.dropped:
+            raise InputError("sphere_deformation is off, which is the rigid sphere: leave tier out")
+        if isinstance(self.tier, str) and self.tier not in TIERS:
+            raise InputError(f"no tier is named {self.tier!r}; {nearest(self.tier, TIERS)}")
+        if self.seconds is not None and not isinstance(self.tier, str):
+            raise InputError("the cost of your own island model is not known: give rtol instead of seconds")
+
+    @property
+    def prescribed(self) -> str | None:
+        """Which of `PRESCRIBED` was given."""
+        return next((name for name in PRESCRIBED if getattr(self, name) is not None), None)

@@ -1,0 +1,184 @@
+"""Specimens: a surface with its units and its material, from a name, numbers, a measured map or a TOML file."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import pathlib
+import warnings
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from mbma_tables.errors import InputError
+from mbma_tables.files import read_file
+from mbma_tables.scenes.toml_file import check, read_toml, schema
+
+if TYPE_CHECKING:
+    from mbma_tables.surfaces.surface import Surface
+
+BAND = ("hurst", "q0", "q1", "h_rms", "h_max")
+MAGNIFICATION = ("hurst", "q0", "zeta_1", "h_rms", "h_max")
+MOMENTS = ("hurst", "m0", "m2", "m4", "h_max")
+NUMBERS = tuple(dict.fromkeys(BAND + MAGNIFICATION + MOMENTS))
+MATERIAL = ("E_star", "E1", "nu1", "E2", "nu2")
+MAX_SPECTRUM_BYTES = 16 * 2**20
+
+
+@dataclasses.dataclass(frozen=True)
+class Specimen:
+    """A surface, and what is known about it besides its five numbers."""
+
+    surface: Surface
+    title: str
+    length_unit: str | None = None
+    E_star: float | None = None
+
+
+def from_name(name: str) -> Specimen:
+    """A case of the paper."""
+    from mbma_tables.surfaces.cases import get_case
+    from mbma_tables.surfaces.surface import Surface
+
+    case = get_case(name)
+    return Specimen(Surface.named(name), case.title, case.length_unit)
+
+
+def from_map(path: pathlib.Path) -> Specimen:
+    """The surface fitted to a measured map."""
+    from mbma_tables.surfaces.maps import read_map
+    from mbma_tables.surfaces.surface import Surface
+
+    surface = Surface.from_map(read_map(path))
+    unit = None if surface.fit is None else surface.fit.length_unit
+    return Specimen(surface, f"fitted to the map {_printable(path)}", unit)
+
+
+def _printable(path: pathlib.Path) -> str:
+    """The file's name, bytes that are no text replaced."""
+    return os.fsencode(path.name).decode("utf-8", "replace")
+
+
+def from_numbers(given: Mapping[str, Any], title: str = "surface given by numbers") -> Specimen:
+    """The surface with one complete set of numbers."""
+    from mbma_tables.arguments import require
+    from mbma_tables.surfaces.moments import MIN_ZETA_1
+    from mbma_tables.surfaces.surface import Surface
+
+    if set(given) not in (set(BAND), set(MAGNIFICATION), set(MOMENTS)):
+        raise InputError(
+            f"a surface needs {', '.join(BAND)} (or zeta_1 for q1), or {', '.join(MOMENTS)}; got "
+            f"{', '.join(given) or 'none of them'}"
+        )
+    numbers = {key: _one_number(key, value) for key, value in given.items()}
+    if "m0" in numbers:
+        return Specimen(Surface.from_moments(**numbers), title)
+    if "zeta_1" in numbers:
+        zeta_1 = numbers.pop("zeta_1")
+        require("zeta_1", zeta_1, zeta_1 > MIN_ZETA_1, "greater than 3, so that the smallest island has a band")
+        numbers["q1"] = numbers["q0"] * zeta_1
+    return Specimen(Surface(**numbers), title)
+
+
+def _one_number(name: str, value: Any) -> Any:
+    from mbma_tables.arguments import finite_array
+
+    array = finite_array(name, value)
+    if array.ndim:
+        raise InputError(f"{name} must be one number, got {array.size}")
+    return array
+
+
+def effective_modulus_of(given: Mapping[str, Any]) -> float | None:
+    """E* from a material's numbers; None if there are none."""
+    from mbma_tables.arguments import require
+    from mbma_tables.materials import effective_modulus
+
+    if not given:
+        return None
+    numbers = {key: _one_number(key, value) for key, value in given.items()}
+    if set(numbers) == {"E_star"}:
+        require("E_star", numbers["E_star"], numbers["E_star"] > 0, "positive")
+        return float(numbers["E_star"])
+    if set(numbers) != set(MATERIAL[1:]):
+        raise InputError(f"a material is E_star alone, or all of E1, nu1, E2, nu2; got {', '.join(given)}")
+    return float(effective_modulus(**numbers))
+
+
+def read_specimen(path: pathlib.Path) -> Specimen:
+    """The specimen of a TOML file with the tables [surface] and [material] of a scene.
+
+    Raises
+    ------
+    InputError
+        For mistakes in the file: one message that starts with its path.
+    """
+    entries = read_toml(path, "surface")
+    tables = {name: schema()["properties"][name] for name in ("surface", "material")}
+    try:
+        check(entries, {"type": "object", "required": ["surface"], "additionalProperties": False, "properties": tables})
+        material = dict(entries.get("material", {}))
+        if "stress_unit" in material:
+            raise InputError("[material]: stress_unit belongs in scenes; leave it out")
+        own = f"surface of {_printable(path)}"
+        return dataclasses.replace(
+            from_tables(entries["surface"], path.parent, own), E_star=effective_modulus_of(material)
+        )
+    except InputError as fault:
+        raise InputError(f"{path}: {fault}") from None
+
+
+def from_tables(surface: Mapping[str, Any], folder: pathlib.Path, title: str) -> Specimen:
+    """The specimen of a table [surface]; files that it names are relative to `folder`."""
+    numbers = dict(surface)
+    texts = {name: numbers.pop(name, None) for name in ("name", "map", "psd", "convention", "length_unit")}
+    given = [name for name in ("name", "map", "psd") if texts[name] is not None]
+    if len(given) > 1:
+        raise InputError(f"[surface]: {' and '.join(given)} are given: one of name, map, psd or numbers")
+    if given in (["name"], ["map"]) and numbers:
+        raise InputError(f"[surface]: {given[0]} and numbers ({', '.join(numbers)}) are given: leave one of them out")
+    if texts["convention"] is not None and given != ["psd"]:
+        raise InputError("[surface]: convention belongs to a psd: give psd = ..., or leave it out")
+    if given == ["name"]:
+        found = from_name(str(texts["name"]))
+    elif given == ["map"]:
+        found = from_map(_file(folder, str(texts["map"]), "map"))
+    elif given == ["psd"]:
+        found = _from_psd(_file(folder, str(texts["psd"]), "psd"), numbers, texts["convention"] or "paper")
+    else:
+        found = from_numbers(numbers, title)
+    unit = texts["length_unit"]
+    if unit is not None and found.length_unit not in (None, unit):
+        raise InputError(
+            f"[surface]: length_unit is {unit!r}, the surface's own {found.length_unit!r}: leave length_unit out"
+        )
+    return dataclasses.replace(found, length_unit=unit or found.length_unit)
+
+
+def _file(folder: pathlib.Path, name: str, key: str) -> pathlib.Path:
+    path = folder / name
+    if not path.is_file():
+        raise InputError(f"[surface]: {key} = {name!r} is not a file; paths are relative to the file that names them")
+    return path
+
+
+def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str) -> Specimen:
+    """The surface fitted to two columns of text, q and C."""
+    import numpy as np
+
+    from mbma_tables.surfaces.surface import Surface
+
+    if set(numbers) != {"h_max"}:
+        raise InputError(f"[surface]: a psd needs h_max = ... and no other number, got {', '.join(numbers) or 'none'}")
+    # not by its name: numpy would unpack .gz, .bz2 and .xz, whatever they grow to
+    content = read_file(path, MAX_SPECTRUM_BYTES)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # for a file without numbers
+            lines = content.decode("utf-8").splitlines()
+            columns = np.loadtxt(lines, ndmin=2, delimiter="," if path.suffix == ".csv" else None)
+    except (ValueError, UserWarning) as fault:
+        raise InputError(f"[surface]: {path.name} must hold two columns of numbers, q and C: {fault}") from None
+    if columns.shape[1] != 2:
+        raise InputError(f"[surface]: {path.name} must hold two columns, q and C, got {columns.shape[1]}")
+    surface = Surface.from_psd(columns[:, 0], columns[:, 1], h_max=numbers["h_max"], convention=convention)
+    return Specimen(surface, f"fitted to {path.name}")
