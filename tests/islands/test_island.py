@@ -1,5 +1,6 @@
 """`island`: units, scales, shapes, tiers and bad input."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 
 from generate.tables.exact_geometry import divisor, exact_island
 from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, height_integral, island
+from mbma_tables.surfaces.readings import PRINTED
 
 LENGTHS = {"R_d": 1, "R_u": 1, "D": -2, "sigma": 1, "h_d": 1, "delta": 1}
 NUMBERS = ("zeta_d", "zeta_u", "eta", "X", "mu")
@@ -128,6 +130,13 @@ def test_no_number(surface, delta):
 def test_bad_options(surface, option, value):
     with pytest.raises(InputError, match=option):
         island(surface, 1.0, **{option: value})
+
+
+def test_a_band_that_ends_at_the_floor_of_zeta_u_is_refused():
+    own = dataclasses.replace(PRINTED, name="own", floor_u=3.5)
+    with pytest.raises(OutOfRangeError, match=r"q1/q0 must be above floor_u = 3\.5"):
+        island(Surface(0.8, 1.0, 3.5, 1.0, 3.0), 1.0, reading=own)
+    assert island(Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), 1.0, reading=own).force > 0
 
 
 def test_E_star_broadcasts(surface):

@@ -1,0 +1,79 @@
+"""The measured part of docs/islands.md: the island solver beside `GreenwoodTripp` of the package ContactMechanics.
+
+Both solve (34), (36), (37). Theirs takes the gap in the middle, d(0), instead of X, and counts pressure in
+E* sqrt(sigma/8B), which is half of E* sigma/L.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import Any
+
+import numpy as np
+from scipy.integrate import simpson
+from scipy.interpolate import BarycentricInterpolator
+
+from generate.pages.page import png, pyplot, table
+from mbma_tables import greenwood_tripp
+from mbma_tables.arguments import FloatArray
+from mbma_tables.islands.greenwood_tripp import IslandSolution
+
+CASES = ((2.0, 0.1), (0.0, 1.0), (5.0, 1.0), (8.0, 0.3), (5.0, 4.0))
+POINTS = (26, 51, 101, 201)  # each with half the step of the one before
+BEYOND = 1.02  # of our outer radius, beyond which both pressures vanish
+TOLERANCE, MAX_ITERATIONS = 1e-9, 10_000
+
+
+def theirs(solution: IslandSolution, points: int) -> tuple[FloatArray, FloatArray, float]:
+    """Radii over L, pressure over E* sigma/L and Phi_F that ContactMechanics finds with so many points."""
+    with warnings.catch_warnings():
+        # of its own optional parts
+        warnings.simplefilter("ignore")
+        from ContactMechanics.ReferenceSolutions.GreenwoodTripp import GreenwoodTripp
+
+    # profiles are polynomials of rho^2 through the Gauss nodes
+    middle = float(BarycentricInterpolator(solution.rho**2, solution.gap)(0.0))
+    mix = 0.1 if solution.mu < 2 else 0.02  # its iteration diverges with more
+    end = BEYOND * solution.rho[-1]
+    _, pressure, rho = GreenwoodTripp(middle, solution.mu, end, points, tol=TOLERANCE, mix=mix, maxiter=MAX_ITERATIONS)
+    return rho, pressure / 2, math.pi * float(simpson(rho * pressure, x=rho))
+
+
+def draw(profiles: list[tuple[IslandSolution, FloatArray, FloatArray]], differences: FloatArray) -> bytes:
+    """Pressure of both solvers, and the difference of their forces against the other's number of points."""
+    figure, (left, right) = pyplot().subplots(1, 2, figsize=(10, 4), layout="constrained")
+    for (solution, rho, pressure), row in zip(profiles, differences, strict=True):
+        name = f"X = {solution.X:g}, mu = {solution.mu:g}"
+        (line,) = left.plot(solution.rho, solution.pressure / pressure[0], label=name)
+        left.plot(rho[::3], pressure[::3] / pressure[0], ".", color=line.get_color())
+        right.loglog(POINTS, np.abs(row), ".-", color=line.get_color())
+    right.loglog(POINTS, np.abs(differences).max() * (POINTS[0] / np.array(POINTS)) ** 3, "k:", label="third order")
+    left.set(xlabel="radius  rho/L", ylabel="pressure  p/p(0)", title="lines: this library; dots: ContactMechanics")
+    right.set(xlabel="points of ContactMechanics", ylabel="relative difference of force")
+    left.legend()
+    right.legend()
+    return png(figure, dpi=110)
+
+
+def measure() -> tuple[dict[str, str], dict[str, bytes]]:
+    """The measured part of the page, and its figure."""
+    rows: list[list[str]] = []
+    profiles: list[Any] = []
+    differences = np.empty((len(CASES), len(POINTS)))
+    for k, (X, mu) in enumerate(CASES):
+        solution = greenwood_tripp.solve(X, mu)
+        found = [theirs(solution, points) for points in POINTS]
+        forces = np.array([force for _, _, force in found])
+        differences[k] = forces / solution.phi_F - 1
+        # what is left of an error of third order
+        extrapolated = abs((8 * forces[-1] - forces[-2]) / 7 / solution.phi_F - 1)
+        profiles.append((solution, *found[1][:2]))
+        rows.append(
+            [f"{X:g}", f"{mu:g}", f"{solution.phi_F:.10f}", f"{solution.error:.1e}"]
+            + [f"{difference:.1e}" for difference in differences[k]]
+            + [f"{extrapolated:.1e}"]
+        )
+    header = ["X", "mu", "Phi_F", "its error", *(f"{points} points" for points in POINTS), "extrapolated"]
+    parts = {"comparison": table(header, rows)}
+    return parts, {"docs/figures/islands.png": draw(profiles, differences)}
