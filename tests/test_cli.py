@@ -82,12 +82,6 @@ def test_contact_json_is_the_librarys_answer_digit_for_digit():
     assert found["surface"]["zeta_1"] == Surface.named("concrete").zeta_1
 
 
-def test_force_says_what_it_is_without_a_modulus():
-    found = json.loads(run("contact", "--surface", "concrete", "-d", "0", "--json"))
-    assert found["units"]["force"] == "F/(A0 E*)"
-    assert found["E_star"] is None
-
-
 def test_both_separations_meet():
     by_gap = json.loads(run("contact", "--surface", "challenge", "-d", "0.4", "--json"))
     average = (0.4 + float(Surface.named("challenge").h_max)) / 2
@@ -148,9 +142,6 @@ def test_material_from_options_and_from_a_file(folder):
         assert found["columns"]["force"] == pytest.approx([expected], rel=1e-12)
     other = json.loads(run("contact", "--file", "s.toml", "--E-star", "2", "-d", "0.3", "--json"))
     assert other["E_star"] == 2.0
-
-
-def test_the_example_file_runs():
     example = os.path.join(os.path.dirname(__file__), os.pardir, "examples", "concrete.toml")
     found = json.loads(run("contact", "--file", example, "-d", "0.3", "--json"))
     assert found["surface"]["length_unit"] == "mm"
@@ -411,9 +402,38 @@ def test_bad_maps(folder):
             assert message in refused(folder, *command, "--map", name)
 
 
-def test_bytes_that_are_no_text(folder):
-    (folder / "s.toml").write_bytes(b"\xff\xfe\x00")
-    assert "s.toml is not a TOML file" in refused(folder, "contact", "--file", "s.toml", "-d", "0.1")
+@pytest.mark.parametrize("command", [["contact", "-d", "0.1", "--file"], ["plan"], ["run"]])
+def test_files_that_are_no_toml_are_refused(folder, command):
+    os.mkfifo(folder / "pipe")
+    (folder / "deep.toml").write_text("a = " + "[" * 100_000)
+    (folder / "bytes.toml").write_bytes(b"\xff\xfe\x00")
+    for path, message in {
+        "/dev/zero": "not a regular file",
+        "pipe": "not a regular file",
+        "deep.toml": "is not a TOML file: maximum recursion depth exceeded",
+        "bytes.toml": "is not a TOML file: 'utf-8' codec can't decode",
+    }.items():
+        result = CliRunner().invoke(main, [*command, path])
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert message in result.stderr
+        assert len(result.stderr.splitlines()) == 1
+
+
+def test_a_link_to_itself_is_no_output_file(folder):
+    (folder / "loop").symlink_to("loop")
+    result = CliRunner().invoke(main, ["surfaces", "--out", "loop"])
+    assert result.exit_code == 2
+    assert "loop cannot be written" in result.stderr
+
+
+def test_an_interrupt_ends_with_130(folder, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mbma_tables.totals.contact.contact", interrupted)
+    result = CliRunner().invoke(main, ["contact", "--surface", "concrete", "-d", "0.1"])
+    assert (result.exit_code, result.stdout) == (130, "")
+    assert result.stderr.strip() == "mbma: interrupted"
 
 
 def test_missing_matplotlib_leaves_nothing(folder, monkeypatch):

@@ -6,6 +6,7 @@ import functools
 import math
 import statistics
 import time
+import timeit
 from collections.abc import Callable
 from typing import Any
 
@@ -39,16 +40,6 @@ def fixed_work() -> float:
     return float(erfcx(_work_points()).sum())
 
 
-def _work_seconds() -> float:
-    """The least of three times: what else the machine does can only add."""
-    taken = []
-    for _ in range(3):
-        before = time.perf_counter()
-        fixed_work()
-        taken.append(time.perf_counter() - before)
-    return min(taken)
-
-
 def measure(run: Callable[[], Any], budget: float = 0.5) -> tuple[float, float]:
     """Cost of one call and the seconds of the fixed work.
 
@@ -62,24 +53,24 @@ def measure(run: Callable[[], Any], budget: float = 0.5) -> tuple[float, float]:
     budget : float
         Seconds after which no further round begins, but for the second.
     """
+
+    def seconds_of(function: Callable[[], Any], calls: int = 1) -> float:
+        return timeit.timeit(function, timer=time.perf_counter, number=calls) / calls
+
+    def work() -> float:
+        # what else the machine does can only add
+        return min(seconds_of(fixed_work) for _ in range(3))
+
     run()
     fixed_work()
-    clock = time.perf_counter
-    started = clock()
-    run()
     # short runs are repeated until the clock and its calls no longer count
-    calls = max(1, math.ceil(2e-3 / max(clock() - started, 1e-7)))
-    works, ratios = [_work_seconds()], []
-    started = clock()
-    for number in range(ROUNDS[1]):
-        before = clock()
-        for _ in range(calls):
-            run()
-        spent = (clock() - before) / calls
-        works.append(_work_seconds())
+    calls = max(1, math.ceil(2e-3 / max(seconds_of(run), 1e-7)))
+    works, ratios = [work()], list[float]()
+    started = time.perf_counter()
+    while len(ratios) < ROUNDS[1] and (len(ratios) < ROUNDS[0] or time.perf_counter() - started <= budget):
+        spent = seconds_of(run, calls)
+        works.append(work())
         ratios.append(2 * spent / (works[-2] + works[-1]))
-        if number + 1 >= ROUNDS[0] and clock() - started > budget:
-            break
     return statistics.median(ratios), min(works)
 
 

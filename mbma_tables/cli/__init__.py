@@ -51,6 +51,7 @@ class Program(click.Group):
         try:
             code = super().main(*args, **extra)
         except click.Abort:
+            click.echo("mbma: interrupted", err=True)
             sys.exit(INTERRUPTED)
         except (click.ClickException, MbmaError, OSError) as fault:
             click.echo(f"mbma: {_describe(fault)}", err=True)
