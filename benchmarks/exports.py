@@ -24,7 +24,7 @@ import numpy as np
 
 from mbma_tables import Surface, contact
 from mbma_tables.export.code import write_code
-from mbma_tables.models.universal import universal_model
+from mbma_tables.models.tables import universal_model
 
 ROUNDS = 15
 POINTS = 20_000

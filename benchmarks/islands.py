@@ -27,9 +27,9 @@ from mbma_tables import Surface, greenwood_tripp
 from mbma_tables.islands.classical import iterate, ring_matrix
 from mbma_tables.islands.newton import extent_squared
 from mbma_tables.surfaces.readings import READINGS
-from mbma_tables.totals.contact import kinks
-from mbma_tables.totals.gauss_kronrod import NODES
+from mbma_tables.totals.gauss_kronrod import NODES_21 as NODES
 from mbma_tables.totals.island import geometry
+from mbma_tables.totals.island_sum import kinks
 
 SPLITS = 8  # intervals between two kinks, each with the quadrature's 21 nodes
 RINGS = (25, 50, 100, 200, 400, 800, 1600)

@@ -114,7 +114,7 @@ def island_tables(rng: np.random.Generator) -> None:
     columns = np.ascontiguousarray(at_four.T)
     X, mu = (axis.coordinate(place) for axis, place in zip(two.axes, at_two.T, strict=True))
     values, slopes = np.empty((2, POINTS)), np.empty((10, POINTS))
-    flat, phi, phi_slopes = np.empty((2, POINTS)), np.empty((3, POINTS)), np.empty((7, POINTS))
+    flat, phi, phi_slopes = np.empty((2, POINTS)), np.empty((POINTS, 3)), np.empty((POINTS, 7))
     status = np.empty(POINTS, dtype=np.int64)
     places = [np.ascontiguousarray(row) for row in at_two.T]
     taken = rounds(
@@ -125,8 +125,8 @@ def island_tables(rng: np.random.Generator) -> None:
             "island4d": lambda: fill_4d(four.coefficients, columns, values),
             "island4d slopes": lambda: fill_gradient_4d(four.coefficients, columns, slopes),
             "spline 2-D": lambda: fill_2d(two.coefficients, *places, flat),
-            "universal": lambda: universal_kernel.fill_phi(X, mu, *universal.kernel, status, phi),
-            "universal slopes": lambda: universal_kernel.fill_slopes(X, mu, *universal.kernel, status, phi_slopes),
+            "universal": lambda: universal_kernel.fill_phi(X, mu, universal.kernel, status, phi),
+            "universal slopes": lambda: universal_kernel.fill_slopes(X, mu, universal.kernel, status, phi_slopes),
         }
     )
     one = at_four[0]
@@ -276,8 +276,8 @@ def threads(rng: np.random.Generator) -> None:
             out = np.empty((2, chunk))
             fill_4d(raw.coefficients, np.roll(at_four, turn, axis=1), out)
         elif number % 3 == 1:
-            out = np.empty((3, chunk))
-            universal_kernel.fill_phi(np.roll(X, turn), np.roll(mu, turn), *universal.kernel, status, out)
+            out = np.empty((chunk, 3))
+            universal_kernel.fill_phi(np.roll(X, turn), np.roll(mu, turn), universal.kernel, status, out)
         else:
             out = law.force(np.roll(gaps, turn))
         return hashlib.blake2b(out.tobytes()).digest()

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     )
     from mbma_tables.islands import greenwood_tripp
     from mbma_tables.islands.height_integrals import height_integral
-    from mbma_tables.models.universal import open_table
+    from mbma_tables.models.tables import open_table
     from mbma_tables.scenes.scene import Scene
     from mbma_tables.surfaces.readings import Reading
     from mbma_tables.surfaces.surface import Surface
@@ -49,7 +49,7 @@ _HOMES = {
     "contact_law": "mbma_tables.totals.law",
     "height_integral": "mbma_tables.islands.height_integrals",
     "island": "mbma_tables.totals.island",
-    "open_table": "mbma_tables.models.universal",
+    "open_table": "mbma_tables.models.tables",
 }
 _MODULES = {
     "greenwood_tripp": "mbma_tables.islands.greenwood_tripp",

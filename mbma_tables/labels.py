@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from mbma_tables.arguments import is_labelled
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 
@@ -24,8 +25,17 @@ def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
     # xarray comes in with its own objects
     import xarray as xr
 
+    whole = all(np.size(argument) for argument in arguments)
+
+    def block(*fields: Any) -> Any:
+        if whole and not all(np.size(field) for field in fields):
+            # a chunk of a dask array may be empty, an array may not
+            empty = np.empty(np.broadcast_shapes(*(np.shape(field) for field in fields)))
+            return empty if outputs == 1 else (empty,) * outputs
+        return function(*fields)
+
     return xr.apply_ufunc(
-        function,
+        block,
         *arguments,
         input_core_dims=[[]] * len(arguments),
         output_core_dims=[[]] * outputs,
@@ -36,11 +46,19 @@ def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
     )
 
 
-def refuse_unnamed(arguments: Mapping[str, Any]) -> None:
-    """Refuse plain arrays beside DataArrays: their axes have no names to broadcast by."""
+def apply_to_surface(answer: Any, surface: Surface, arrays: Mapping[str, Any], outputs: int) -> Any:
+    """``answer(surface, *arrays)``, a tuple of `outputs` arrays, of DataArrays; plain arrays among them are refused."""
+    arguments = {name: getattr(surface, name) for name in PARAMETERS} | dict(arrays)
     for name, given in arguments.items():
-        if not hasattr(given, "dims") and np.ndim(given):
+        if not is_labelled(given) and np.ndim(given):
             raise InputError(f"beside DataArrays, {name} must be one or a scalar, got shape {np.shape(given)}")
+
+    def block(*numbers: Any) -> Any:
+        found = answer(Surface(*numbers[: len(PARAMETERS)]), *numbers[len(PARAMETERS) :])
+        return found[0] if outputs == 1 else found
+
+    found = apply(block, tuple(arguments.values()), outputs)
+    return (found,) if outputs == 1 else found
 
 
 def takes_labelled(result: type | None = None) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -57,18 +75,15 @@ def takes_labelled(result: type | None = None) -> Callable[[Callable[..., Any]],
             surface = bound.arguments["surface"]
             options = {name: bound.arguments[name] for name in OPTIONS if name in bound.arguments}
             arrays = {name: it for name, it in bound.arguments.items() if name not in ("surface", *OPTIONS)}
-            if not (surface.labelled or any(hasattr(it, "dims") for it in arrays.values())):
+            if not (surface.labelled or any(map(is_labelled, arrays.values()))):
                 return function(*given, **named)
-            arrays = {name: getattr(surface, name) for name in PARAMETERS} | arrays
-            refuse_unnamed(arrays)
 
-            def block(*numbers: Any) -> Any:
-                rest = dict(zip(list(arrays)[len(PARAMETERS) :], numbers[len(PARAMETERS) :], strict=True))
-                found = function(Surface(*numbers[: len(PARAMETERS)]), **rest, **options)
-                return found if result is None else tuple(getattr(found, name) for name in fields)
+            def block(own: Surface, *numbers: Any) -> tuple[Any, ...]:
+                found = function(own, **dict(zip(arrays, numbers, strict=True)), **options)
+                return (found,) if result is None else tuple(getattr(found, name) for name in fields)
 
-            found = apply(block, tuple(arrays.values()), max(len(fields), 1))
-            return found if result is None else result(*found)
+            answers = apply_to_surface(block, surface, arrays, max(len(fields), 1))
+            return answers[0] if result is None else result(*answers)
 
         return answer
 

@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 
-MOST_INTERVALS = 8
+MAX_INTERVALS = 8
 
 
 def leave_plain():
@@ -18,8 +18,7 @@ def leave_plain():
     numba.vectorize = lambda signatures, **options: lambda function: np.vectorize(function, otypes=[float])
 
     from mbma_tables.tablefiles import interpolate
-    from mbma_tables.totals import kernel as lookup
-    from mbma_tables.totals import sensitivity
+    from mbma_tables.totals import intervals
 
     # these two are made of instructions
     interpolate.load_lanes = lambda array, offset: tuple(array[offset : offset + 8])
@@ -27,7 +26,7 @@ def leave_plain():
         a + weight * b for a, b in zip(total, lanes, strict=True)
     )
     # giving up takes long uncompiled
-    lookup.MOST_INTERVALS = sensitivity.MOST_INTERVALS = MOST_INTERVALS
+    intervals.MAX_INTERVALS = MAX_INTERVALS
 
 
 def solver():
@@ -59,7 +58,7 @@ def solver():
 
 
 def tables():
-    from mbma_tables.models.universal import island4d_model, universal_model
+    from mbma_tables.models.tables import island4d_model, universal_model
     from mbma_tables.surfaces.readings import REPORTED
     from mbma_tables.tablefiles.interpolate import fill_2d, fill_gradient_2d
     from mbma_tables.totals.island import geometry
@@ -126,28 +125,26 @@ def statuses():
     from scipy.optimize import brentq
 
     from mbma_tables.models.protocol import BOTH, FORCE
-    from mbma_tables.models.universal import universal_model
+    from mbma_tables.models.tables import universal_model
     from mbma_tables.surfaces.readings import REPORTED
-    from mbma_tables.totals import kernel as lookup
-    from mbma_tables.totals import sensitivity
+    from mbma_tables.totals import kernel, sensitivity
 
-    kernel, flags = universal_model().kernel, (True, True)
-    surface = lookup.surface_constants(0.8, 200.0, REPORTED.numbers)
-    X_high = kernel[2][1]
+    table = universal_model().kernel
+    surface = kernel.surface_constants(0.8, 200.0, REPORTED.numbers, True, 200.0)
+    near = sensitivity.neighbours(0.8, 200.0, REPORTED.numbers, True)
     # the deepest island is just outside, the last node of the quadrature inside
-    last = brentq(lambda x: lookup.island_node(x, True, True, surface, *flags)[0] - (1 + 1e-9) * X_high, 2.0, 100.0)
-    for name, zeta_1, reach, top, rtol in (
-        ("unresolved", 200.0, 3.0, 4.0, 1e-30),
-        ("nothing", 200.0, 1e-3, 60.0, 1e-3),
-        ("outside", 200.0, 100.0, 100.0, 1e-3),
-        ("at the table's end", 200.0, last, 40.0, 1e-3),
-        ("no contact", 200.0, 0.0, 3.0, 1e-3),
+    outside = (1 + 1e-9) * table.axes.X_high
+    last = brentq(lambda x: kernel.island_node(x, True, True, surface).X - outside, 2.0, 100.0)
+    for name, compression, peak, rtol in (
+        ("unresolved", 3.0, 4.0, 1e-30),
+        ("nothing", 1e-3, 60.0, 1e-3),
+        ("outside", 100.0, 100.0, 1e-3),
+        ("at the table's end", last, 40.0, 1e-3),
+        ("no contact", 0.0, 3.0, 1e-3),
     ):
-        surface = lookup.surface_constants(0.8, zeta_1, REPORTED.numbers)
-        near, rates = sensitivity.neighbours(0.8, zeta_1, REPORTED.numbers)
-        jacobian, out = lookup.jacobian_below(surface, True, True), np.empty((2, 5))
-        found = [lookup.total(which, reach, top, rtol, surface, jacobian, flags, *kernel)[0] for which in (BOTH, FORCE)]
-        slopes = sensitivity.total_with_slopes(reach, top, rtol, surface, near, rates, True, flags, *kernel, out)
+        out = np.empty((2, sensitivity.COLUMNS))
+        found = [kernel.total(which, compression, peak, rtol, surface, table)[0] for which in (BOTH, FORCE)]
+        slopes = sensitivity.total_with_slopes(compression, peak, rtol, surface, near, table, out)
         yield name, (*found, slopes[0])
 
 

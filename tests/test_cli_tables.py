@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from mbma_tables import greenwood_tripp
 from mbma_tables.cli import main
-from mbma_tables.models import universal as tabulated
+from mbma_tables.models import tables as tabulated
 from mbma_tables.tablefiles import netcdf as files
 from mbma_tables.tablefiles.netcdf import FORMAT_VERSION, read_table, write_table
 from mbma_tables.tablefiles.schema import KINDS

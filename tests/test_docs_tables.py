@@ -13,7 +13,7 @@ from scipy.interpolate import make_interp_spline
 from generate.pages import tables as table_page
 from generate.pages.page import MARKED, ROOT, fill
 from generate.tables import schemes as table_schemes
-from mbma_tables.models.universal import shipped
+from mbma_tables.models.tables import shipped
 from mbma_tables.tablefiles.schema import FORMAT_VERSION, ISLAND4D, KINDS, UNIVERSAL
 from mbma_tables.tablefiles.splines import coefficients
 

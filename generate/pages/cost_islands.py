@@ -18,9 +18,10 @@ from mbma_tables.errors import ConvergenceError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.classical import iterate, ring_matrix
 from mbma_tables.islands.newton import extent_squared
-from mbma_tables.models import TIERS, get_model
+from mbma_tables.models import TIERS, answer_islands, get_model
 from mbma_tables.models.closed_forms import FormulaModel
-from mbma_tables.models.universal import UniversalModel, open_table
+from mbma_tables.models.tables import open_table
+from mbma_tables.models.universal import UniversalModel
 from mbma_tables.scenes.costs import Row
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.splines import coefficients
@@ -133,8 +134,8 @@ def model_rows() -> Iterator[Row]:
         shape = "x".join(str(axis.nodes) for axis in coarse.content.axes)
         models.append(("universal", f"island nodes={shape}", coarse))
     for tier, name, model in models:
-        answer = model.of_islands(held.islands)
-        cost, _ = measure(functools.partial(model.of_islands, held.islands))
+        answer = answer_islands(model, held.islands)
+        cost, _ = measure(functools.partial(answer_islands, model, held.islands))
         yield Row(tier, name, "both", held.error(answer.phi_F, answer.phi_A), cost / ISLANDS, 2)
 
 

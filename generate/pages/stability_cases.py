@@ -20,10 +20,10 @@ from generate.tables.exact_geometry import divisor, exact_island
 from mbma_tables import Surface, contact, greenwood_tripp
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import MbmaError
-from mbma_tables.models import get_model
+from mbma_tables.models import answer_islands, get_model
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.totals.island import geometry
-from mbma_tables.totals.pairs import kinks
+from mbma_tables.totals.island_sum import kinks
 
 DIGITS = 40
 ULP = np.finfo(float).eps
@@ -126,7 +126,7 @@ def islands() -> tuple[list[Tally], dict[str, FloatArray]]:
     maps = {tier: np.full((X_CORNERS.size, MU_CORNERS.size), np.nan) for tier in TIERS}
 
     def ask(model: Any, X: float, mu: float) -> Answer:
-        found = model.of_islands({"X": np.array([X]), "mu": np.array([mu])})
+        found = answer_islands(model, {"X": np.array([X]), "mu": np.array([mu])})
         return (float(found.phi_F[0]), float(found.phi_A[0])), float(found.error[0]) + ISLAND_TRUTH + 1e-14
 
     for (i, X), (j, mu) in itertools.product(enumerate(X_CORNERS), enumerate(MU_CORNERS)):

@@ -13,7 +13,7 @@ from generate.tables.configuration import load
 from generate.tables.schemes import LARGEST_ZETA_D, POINTS, SIZES, Row, compare
 from mbma_tables.islands.four_numbers import hat_scales, to_axes
 from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.models.universal import shipped
+from mbma_tables.models.tables import shipped
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL, TableContent, error_cell

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def _path(name: str) -> Path:
     """A table by kind, or a file."""
-    from mbma_tables.models.universal import shipped
+    from mbma_tables.models.tables import shipped
     from mbma_tables.tablefiles.schema import KINDS
 
     return shipped(name) if name in KINDS else Path(name)

@@ -18,7 +18,8 @@ from mbma_tables.export import CODE, c_code
 from mbma_tables.export.conformance import KINDS, POINTS_FILE, points_text
 from mbma_tables.export.text import block_comment, comment
 from mbma_tables.files import write_file
-from mbma_tables.models.universal import UniversalModel, open_table
+from mbma_tables.models.tables import open_table
+from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.readings import Reading, get_reading
 
 TIMEOUT = 300.0  # seconds, of a build or a replay

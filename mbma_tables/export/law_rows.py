@@ -256,7 +256,7 @@ def _fewest(
 def _comments(
     surface: Surface, law: ContactLaw, E_star: float, names: tuple[str, str, str, str], x: FloatArray, error: float
 ) -> tuple[str, ...]:
-    from mbma_tables.models.universal import universal_model
+    from mbma_tables.models.tables import universal_model
 
     attributes = universal_model().content.attributes
     numbers = ", ".join(f"{name} = {float(getattr(surface, name)):.10g}" for name in PARAMETERS)

@@ -11,10 +11,10 @@ from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, req
 from mbma_tables.errors import InputError
 from mbma_tables.formulas.file import ISLAND_FORMS, ISLAND_OUTPUTS, get_form
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer, TwoNumberModel
+from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
 
 
-class FormulaModel(TwoNumberModel):
+class FormulaModel:
     """Phi_F and Phi_A by a closed form; exact as mu goes to 0 but for its rigid sphere's own approximation.
 
     Parameters

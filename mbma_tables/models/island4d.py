@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import os
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -11,17 +12,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, Coordinates, band_fields, hat_scales, to_axes
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
 from mbma_tables.surfaces.readings import get_reading
-from mbma_tables.tablefiles.interpolate import fill_4d, fill_4d_parallel, fill_gradient_4d
+from mbma_tables.tablefiles.interpolate import fill_4d, fill_gradient_4d
 from mbma_tables.tablefiles.schema import TableContent, error_cell
 
 RAW = ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")
 STEP = 1e-5  # relative, of a raw number or of the spread: central differences of closed forms err by its square
+BLOCK = 1 << 15  # islands between two looks for Ctrl-C
 
 
 def _some(place: Coordinates, chosen: NDArray[np.bool_]) -> Coordinates:
@@ -209,7 +212,14 @@ class Island4dModel:
     def log_ratio(self, place: Coordinates, parallel: bool = False) -> FloatArray:
         """log(Phi/Phi_rigid) inside the table or below its spread, shape (2, entries)."""
         out = np.empty((2, place.X.size))
-        (fill_4d_parallel if parallel else fill_4d)(self.content.coefficients, self._positions(place), out)
+        places = self._positions(place)
+
+        def fill(block: slice) -> None:
+            found = np.empty((2, block.stop - block.start))
+            fill_4d(self.content.coefficients, np.ascontiguousarray(places[:, block]), found)
+            out[:, block] = found
+
+        in_blocks(fill, place.X.size, BLOCK, (os.cpu_count() or 1) if parallel else 1)
         scaled: FloatArray = out * self._share(place)
         return scaled
 

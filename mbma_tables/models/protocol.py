@@ -1,22 +1,23 @@
-"""What an island model is: anything that answers (X, mu) with force and area."""
+"""What an island model is: anything that answers (X, mu) with force, area and a bound on its own error."""
 
 from __future__ import annotations
 
-import abc
-import dataclasses
 from collections.abc import Mapping
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.errors import InputError, OutOfRangeError
 
 OUTSIDE = ("raise", "exact", "nan")  # what to do about islands that a table does not cover
 QUANTITIES = ("force", "area")
 FORCE, AREA, BOTH = 0, 1, 2  # which of them is asked for
-EXACT_RTOL = 1e-10  # of the exact solver, where it stands in for a table
+MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # that totals and islands may be asked for
+EXACT_RTOL = 1e-10  # of the exact solver, where it replaces a table
 
 
-@dataclasses.dataclass(frozen=True)
-class IslandAnswer:
+class IslandAnswer(NamedTuple):
     """Phi_F and Phi_A of islands, with a bound on their relative error; arrays of one shape.
 
     Where a model was asked for one of the two and the other would have cost more, the other is NaN.
@@ -27,27 +28,59 @@ class IslandAnswer:
     error: FloatArray
 
 
+@runtime_checkable
 class IslandModel(Protocol):
-    """What the layers above need of an island model."""
+    """An island model: `contact`, `contact_law`, `island` and `Scene` take any such object as their `tier`."""
 
     @property
     def name(self) -> str:
-        """The tier that selects it."""
+        """What results call it."""
+
+    def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
+        """Phi_F, Phi_A and a bound on their relative error at finite X and mu >= 0, arrays of one shape."""
+
+
+@runtime_checkable
+class GeometryModel(Protocol):
+    """An island model that needs more of an island than X and mu, or has cheaper ways to answer one quantity."""
+
+    @property
+    def name(self) -> str:
+        """What results call it."""
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
         """Phi_F and Phi_A of islands, given as `islands.geometry.FIELDS` and hurst, arrays of one shape.
 
-        `outside` is one of `OUTSIDE`; `which` is FORCE, AREA or BOTH.
+        `outside` is one of `OUTSIDE`; `which` is FORCE, AREA or BOTH. Used in place of `answer` where both exist.
         """
 
 
-class TwoNumberModel(abc.ABC):
-    """A model that needs X and mu of an island and nothing else."""
+AnyModel = IslandModel | GeometryModel
 
-    @abc.abstractmethod
-    def answer(self, X: FloatArray, mu: FloatArray, *, outside: str = "raise") -> IslandAnswer:
-        """Phi_F and Phi_A at finite X and mu >= 0."""
 
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
-        """Phi_F and Phi_A of islands, both: a model whose halves cost apart has its own."""
-        return self.answer(islands["X"], islands["mu"], outside=outside)
+def answer_islands(
+    model: AnyModel, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH
+) -> IslandAnswer:
+    """Phi_F and Phi_A of islands by any model; what a model of two numbers answers is checked.
+
+    Raises
+    ------
+    InputError
+        Where an answer is not of the arguments' shape.
+    OutOfRangeError
+        Where it is not finite and `outside` is not "nan".
+    """
+    if isinstance(model, GeometryModel):
+        return model.of_islands(islands, outside, which)
+    shape = islands["X"].shape
+    given: Any = model.answer(islands["X"], islands["mu"])
+    try:
+        phi_F, phi_A, error = (np.broadcast_to(np.asarray(part, dtype=float), shape) for part in given)
+    except (TypeError, ValueError) as fault:
+        raise InputError(
+            f"island model {model.name!r} must answer Phi_F, Phi_A and error of shape {shape}: {fault}"
+        ) from None
+    bad = ~(np.isfinite(phi_F) & np.isfinite(phi_A) & (error >= 0))
+    if outside != "nan" and bad.any():
+        raise OutOfRangeError(f"island model {model.name!r} has no answer for {int(bad.sum())} islands", bad)
+    return IslandAnswer(phi_F, phi_A, error)

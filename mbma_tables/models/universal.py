@@ -1,41 +1,46 @@
-"""Island models that look up a table: over (X, mu), and over the paper's four numbers."""
+"""The island model of the universal table: Phi_F and Phi_A over (X, mu)."""
 
 from __future__ import annotations
 
 import functools
 import os
-import pathlib
-import threading
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import InputError
-from mbma_tables.files import shipped_file
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models import universal_kernel
-from mbma_tables.models.island4d import Island4dModel
-from mbma_tables.models.protocol import EXACT_RTOL, OUTSIDE, IslandAnswer, TwoNumberModel
-from mbma_tables.models.universal_kernel import Axes
+from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
+from mbma_tables.models.universal_kernel import Axes, Table
 from mbma_tables.tablefiles.interpolate import fill_2d
-from mbma_tables.tablefiles.netcdf import read_table
-from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL, TableContent, error_cell
+from mbma_tables.tablefiles.schema import TableContent, error_cell
 
-__all__ = ["Island4dModel", "UniversalModel", "island4d_model", "open_table", "shipped", "universal_model"]
-
-
-TINY = 1e-200  # stands for mu = 0 where a slope is asked for
+TINY = 1e-200  # replaces mu = 0 where a slope is asked for
+BLOCK = 1 << 16  # islands between two looks for Ctrl-C
 
 
-class UniversalModel(TwoNumberModel):
+class UniversalModel:
     """Phi_F and Phi_A from a universal table.
 
     Parameters
     ----------
     content : TableContent
-        A table of kind "universal".
+        A table of kind "universal"; `open_table` reads one.
+
+    Examples
+    --------
+    >>> from mbma_tables import open_table
+    >>> table = open_table("universal")
+    >>> round(float(table.answer(2.0, [0.1, 10.0]).phi_F[1]), 4)
+    1.9747
+    >>> value, by_X, by_mu = table.slopes(2.0, 0.1)
+    >>> round(float(by_X.phi_A), 4)
+    3.6226
     """
 
     name = "universal"
@@ -52,7 +57,7 @@ class UniversalModel(TwoNumberModel):
         return out * (np.minimum(mu, self._mu.low) / self._mu.low)
 
     def answer(self, X: ArrayLike, mu: ArrayLike, parallel: bool = False, *, outside: str = "raise") -> IslandAnswer:
-        """Phi_F and Phi_A with the bound that the table's certificate gives.
+        """Phi_F and Phi_A with the error bound that the table states.
 
         Parameters
         ----------
@@ -70,24 +75,36 @@ class UniversalModel(TwoNumberModel):
         if outside not in OUTSIDE:
             raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
         flat_X, flat_mu, shape = self._inside(X, mu, outside == "raise")
-        out = np.empty((3, flat_X.size))
+        out = np.empty((flat_X.size, 3))
         status = np.empty(flat_X.size, dtype=np.int64)
-        fill = universal_kernel.fill_phi_parallel if parallel else universal_kernel.fill_phi
-        fill(flat_X, flat_mu, *self.kernel, status, out)
+
+        def fill(block: slice) -> None:
+            universal_kernel.fill_phi(flat_X[block], flat_mu[block], self.kernel, status[block], out[block])
+
+        in_blocks(fill, flat_X.size, BLOCK, (os.cpu_count() or 1) if parallel else 1)
         missing = status != universal_kernel.OK
         if outside == "exact" and missing.any():
             solved = greenwood_tripp.solve(flat_X[missing], flat_mu[missing], rtol=EXACT_RTOL)
-            out[:, missing] = solved.phi_F, solved.phi_A, solved.error
-        return IslandAnswer(*(row.reshape(shape)[()] for row in out))
+            out[missing] = np.stack([solved.phi_F, solved.phi_A, solved.error], axis=-1)
+        return IslandAnswer(*(column.reshape(shape)[()] for column in out.T))
+
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
+        """Phi_F and Phi_A of islands, both: one costs what both do."""
+        return self.answer(islands["X"], islands["mu"], outside=outside)
 
     def slopes(self, X: ArrayLike, mu: ArrayLike) -> tuple[IslandAnswer, IslandAnswer, IslandAnswer]:
         """Answers, and their derivatives by X and by mu, in one pass; the errors are those of the answers."""
         flat_X, flat_mu, shape = self._inside(X, mu)
-        out = np.empty((7, flat_X.size))
-        # slopes at mu = 0 are those a hair above it: the kernel's are by log(mu)
+        out = np.empty((flat_X.size, 7))
+        status = np.empty(flat_X.size, dtype=np.int64)
+        # the kernel's slopes are by log(mu): at mu = 0, those just above it
         flat_mu = np.where(flat_mu == 0, TINY, flat_mu)
-        universal_kernel.fill_slopes(flat_X, flat_mu, *self.kernel, np.empty(flat_X.size, dtype=np.int64), out)
-        force, F_X, F_mu, area, A_X, A_mu, error = (row.reshape(shape)[()] for row in out)
+
+        def fill(block: slice) -> None:
+            universal_kernel.fill_slopes(flat_X[block], flat_mu[block], self.kernel, status[block], out[block])
+
+        in_blocks(fill, flat_X.size, BLOCK)
+        force, F_X, F_mu, area, A_X, A_mu, error = (column.reshape(shape)[()] for column in out.T)
         by_mu = 1 / flat_mu.reshape(shape)[()]
         return (
             IslandAnswer(np.where(flat_mu.reshape(shape) == TINY, 0.0, force)[()], area, error),
@@ -118,17 +135,17 @@ class UniversalModel(TwoNumberModel):
         return flat_X, flat_mu, shape
 
     @functools.cached_property
-    def kernel(self) -> tuple[FloatArray, FloatArray, Axes]:
-        """Coefficients, error field and axes as the compiled totals take them."""
+    def kernel(self) -> Table:
+        """The table as compiled code takes it."""
         X, mu = self._X, self._mu
         field = np.ascontiguousarray(self.content.local_error.max(axis=-1))
         cells = (field.shape[0] / (X.nodes - 1), field.shape[1] / (mu.nodes - 1))
-        axes = (X.low, X.high, X.offset, X.start, 1 / X.step, mu.low, mu.high, mu.start, 1 / mu.step, *cells)
-        return self.content.coefficients, field, axes
+        axes = Axes(X.low, X.high, X.offset, X.start, 1 / X.step, mu.low, mu.high, mu.start, 1 / mu.step, *cells)
+        return Table(self.content.coefficients, field, axes)
 
     def error(self, X: FloatArray, mu: FloatArray) -> FloatArray:
         """Bound on the relative error of both functions at flat arguments."""
-        field = self.kernel[1]
+        field = self.kernel.errors
         lowest = np.maximum(mu, self._mu.low)
         places = (
             error_cell(axis, cells, axis.position(x))
@@ -136,63 +153,3 @@ class UniversalModel(TwoNumberModel):
         )
         bound: FloatArray = field[tuple(places)] + universal_kernel.SECOND_ORDER
         return bound
-
-
-def shipped(kind: str) -> pathlib.Path:
-    """Where the table of that kind stands."""
-    return shipped_file(f"{kind}.nc")
-
-
-_OPENING = threading.Lock()
-
-
-@functools.lru_cache(maxsize=8)
-def _opened(kind: str, path: pathlib.Path, state: tuple[int, ...]) -> UniversalModel | Island4dModel:
-    content = read_table(path, kind)
-    return UniversalModel(content) if kind == UNIVERSAL else Island4dModel(content)
-
-
-def _identity(path: os.PathLike[str] | str) -> tuple[pathlib.Path, tuple[int, ...]]:
-    """Which file that is, and which of those that stood there one after the other."""
-    file = pathlib.Path(path).resolve()
-    try:
-        status = file.stat()
-    except OSError:
-        return file, ()  # reading says what is wrong
-    return file, (status.st_ino, status.st_size, status.st_mtime_ns)
-
-
-def _open_once(kind: str, path: os.PathLike[str] | str | None) -> UniversalModel | Island4dModel:
-    """A table of that kind, opened once whichever thread asks first; a file that was replaced, anew."""
-    with _OPENING:
-        return _opened(kind, shipped(kind), ()) if path is None else _opened(kind, *_identity(path))
-
-
-def universal_model(path: os.PathLike[str] | str | None = None) -> UniversalModel:
-    """The universal model of the shipped table, or of a file; opened once while the file stays the same."""
-    model = _open_once(UNIVERSAL, path)
-    assert isinstance(model, UniversalModel)
-    return model
-
-
-def island4d_model(path: os.PathLike[str] | str | None = None) -> Island4dModel:
-    """The four-parameter model of the shipped table, or of a file; opened once while the file stays the same."""
-    model = _open_once(ISLAND4D, path)
-    assert isinstance(model, Island4dModel)
-    return model
-
-
-def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Island4dModel:
-    """A table by kind ("universal", "island4d": the shipped ones, opened once) or from a file.
-
-    Raises
-    ------
-    TableFileError
-        Where the file cannot be used; the message says why and what to do.
-    """
-    if table == UNIVERSAL:
-        return universal_model()
-    if table == ISLAND4D:
-        return island4d_model()
-    content = read_table(table)
-    return UniversalModel(content) if content.kind == UNIVERSAL else Island4dModel(content)

@@ -1,4 +1,4 @@
-"""Compiled lookups in the universal table: (X, mu) to Phi_F, Phi_A, their slopes, a status and a bound on the error.
+"""Compiled interpolation in the universal table: (X, mu) to Phi_F, Phi_A, derivatives, status and error bound.
 
 Nothing is shared or kept between calls; any thread may call any of these.
 """
@@ -6,26 +6,46 @@ Nothing is shared or kept between calls; any thread may call any of these.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import njit
+from mbma_tables.compiled import REORDER, njit
 from mbma_tables.islands import height_integrals as heights
 from mbma_tables.models.protocol import FORCE
 from mbma_tables.tablefiles.interpolate import gradient_2d, value_2d
 
-# low, high, offset, first t and 1/step of X; low, high, first t and 1/step of mu; error cells per node of both
-Axes = tuple[float, float, float, float, float, float, float, float, float, float, float]
 OK, X_BELOW, X_ABOVE, MU_ABOVE, UNRESOLVED = 0, 1, 2, 3, 4
 REASONS = {X_BELOW: "X below", X_ABOVE: "X above", MU_ABOVE: "mu above"}
 SECOND_ORDER = 1e-12  # what the expansion about the rigid sphere leaves below mu = 1e-8
-_LOOSE = {"contract", "reassoc", "arcp"}
-
 
 _ONE, _THREE_HALVES, _TWO, _FIVE_HALVES = heights._ONE, heights._THREE_HALVES, heights._TWO, heights._FIVE_HALVES
+
+
+class Axes(NamedTuple):
+    """Both axes: range, first node and 1/step of log(X + X_offset) and log(mu), error cells per node."""
+
+    X_low: float
+    X_high: float
+    X_offset: float
+    X_start: float
+    X_rate: float
+    mu_low: float
+    mu_high: float
+    mu_start: float
+    mu_rate: float
+    X_cells: float
+    mu_cells: float
+
+
+class Table(NamedTuple):
+    """The universal table as compiled code takes it."""
+
+    coefficients: FloatArray
+    errors: FloatArray
+    axes: Axes
 
 
 @njit(cache=True, error_model="numpy")
@@ -37,7 +57,7 @@ def _locate(X: float) -> tuple[int, float, float, float]:
     return heights._locate(-X)
 
 
-@njit(cache=True, fastmath=_LOOSE, error_model="numpy")
+@njit(cache=True, fastmath=REORDER, error_model="numpy")
 def _polynomial(row: FloatArray, t: float) -> float:
     """`height_integrals._horner` in four chains that run side by side."""
     t2 = t * t
@@ -67,10 +87,11 @@ def _rigid_slopes(X: float) -> tuple[float, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def _error_at(place_X: float, place_mu: float, errors: FloatArray, rate_X: float, rate_mu: float) -> float:
+def _error_at(place_X: float, place_mu: float, table: Table) -> float:
     """Bound on the error in the cell of a position."""
-    row = max(min(int(place_X * rate_X), errors.shape[0] - 1), 0)
-    column = max(min(int(place_mu * rate_mu), errors.shape[1] - 1), 0)
+    errors, axes = table.errors, table.axes
+    row = max(min(int(place_X * axes.X_cells), errors.shape[0] - 1), 0)
+    column = max(min(int(place_mu * axes.mu_cells), errors.shape[1] - 1), 0)
     bound: float = errors[row, column] + SECOND_ORDER
     return bound
 
@@ -78,43 +99,39 @@ def _error_at(place_X: float, place_mu: float, errors: FloatArray, rate_X: float
 @njit(cache=True, error_model="numpy", inline="always")
 def _place(X: float, mu: float, axes: Axes) -> tuple[int, float, float, float]:
     """Status, position on both axes in node units, and mu over the nearest mu that the table holds."""
-    X_low, X_high, offset, X_start, X_rate, mu_low, mu_high, mu_start, mu_rate, _, _ = axes
-    if not X_low <= X:
+    if not axes.X_low <= X:
         return X_BELOW, math.nan, math.nan, math.nan
-    if not X_high >= X:
+    if not axes.X_high >= X:
         return X_ABOVE, math.nan, math.nan, math.nan
-    if not mu <= mu_high:
+    if not mu <= axes.mu_high:
         return MU_ABOVE, math.nan, math.nan, math.nan
-    inside = max(mu, mu_low)
+    inside = max(mu, axes.mu_low)
+    place_X = (math.log(X + axes.X_offset) - axes.X_start) * axes.X_rate
     # first order about the rigid sphere below the table
-    return OK, (math.log(X + offset) - X_start) * X_rate, (math.log(inside) - mu_start) * mu_rate, mu / inside
+    return OK, place_X, (math.log(inside) - axes.mu_start) * axes.mu_rate, mu / inside
 
 
-@njit(cache=True, fastmath=_LOOSE, error_model="numpy")
-def universal_phi(
-    X: float, mu: float, table: FloatArray, errors: FloatArray, axes: Axes
-) -> tuple[int, float, float, float]:
+@njit(cache=True, fastmath=REORDER, error_model="numpy")
+def universal_phi(X: float, mu: float, table: Table) -> tuple[int, float, float, float]:
     """Status, Phi_F, Phi_A and the bound on their relative error at (X, mu)."""
-    status, place_X, place_mu, share = _place(X, mu, axes)
+    status, place_X, place_mu, share = _place(X, mu, table.axes)
     if status != OK:
         return status, math.nan, math.nan, math.nan
-    force, area = value_2d(table, place_X, place_mu)
+    force, area = value_2d(table.coefficients, place_X, place_mu)
     five, two = _rigid_integrals(X)
     phi_F = math.pi / 5.0 * mu * five * math.exp(force * share)
     phi_A = math.pi / 2.0 * two * math.exp(area * share)
-    return OK, phi_F, phi_A, _error_at(place_X, place_mu, errors, axes[9], axes[10])
+    return OK, phi_F, phi_A, _error_at(place_X, place_mu, table)
 
 
-@njit(cache=True, fastmath=_LOOSE, error_model="numpy")
-def universal_one(
-    which: int, X: float, mu: float, table: FloatArray, errors: FloatArray, axes: Axes
-) -> tuple[int, float, float]:
+@njit(cache=True, fastmath=REORDER, error_model="numpy")
+def universal_one(which: int, X: float, mu: float, table: Table) -> tuple[int, float, float]:
     """Status, Phi_F (`which` = 0) or Phi_A (1) alone, and the bound on its relative error."""
-    status, place_X, place_mu, share = _place(X, mu, axes)
+    status, place_X, place_mu, share = _place(X, mu, table.axes)
     if status != OK:
         return status, math.nan, math.nan
     # the spline of both costs what one does: their coefficients lie in pairs
-    force, area = value_2d(table, place_X, place_mu)
+    force, area = value_2d(table.coefficients, place_X, place_mu)
     piece, t, base, weight = _locate(X)
     common = base * base * weight
     if which == FORCE:
@@ -122,80 +139,61 @@ def universal_one(
         phi *= math.exp(force * share)
     else:
         phi = math.pi / 2.0 * _polynomial(_TWO[piece], t) * common * math.exp(area * share)
-    return OK, phi, _error_at(place_X, place_mu, errors, axes[9], axes[10])
+    return OK, phi, _error_at(place_X, place_mu, table)
+
+
+class Slopes(NamedTuple):
+    """Phi_F and Phi_A with their logarithmic derivatives by X and by log(mu)."""
+
+    status: int
+    phi_F: float
+    F_by_X: float
+    F_by_mu: float
+    phi_A: float
+    A_by_X: float
+    A_by_mu: float
+    error: float
 
 
 @njit(cache=True, error_model="numpy")
-def universal_slopes(
-    X: float, mu: float, table: FloatArray, errors: FloatArray, axes: Axes
-) -> tuple[int, float, float, float, float, float, float, float]:
-    """Status; Phi_F and d log Phi_F by X and by log(mu); the same of Phi_A; the bound on the relative error."""
+def universal_slopes(X: float, mu: float, table: Table) -> Slopes:
+    """Phi_F and d log Phi_F by X and by log(mu), the same of Phi_A, and the bound on the relative error."""
+    axes = table.axes
     status, place_X, place_mu, share = _place(X, mu, axes)
     if status != OK:
         nan = math.nan
-        return status, nan, nan, nan, nan, nan, nan, nan
-    offset, X_rate, mu_low, mu_rate = axes[2], axes[4], axes[5], axes[8]
-    f, f_X, f_mu, g, g_X, g_mu = gradient_2d(table, place_X, place_mu)
-    by_X = X_rate / (X + offset) * share
+        return Slopes(status, nan, nan, nan, nan, nan, nan, nan)
+    f, f_X, f_mu, g, g_X, g_mu = gradient_2d(table.coefficients, place_X, place_mu)
+    by_X = axes.X_rate / (X + axes.X_offset) * share
     five, two = _rigid_integrals(X)
     three, one = _rigid_slopes(X)
-    # below the table the logarithm is proportional to mu
-    F_mu = 1.0 + (f_mu * mu_rate if mu >= mu_low else f * share)
-    A_mu = g_mu * mu_rate if mu >= mu_low else g * share
-    return (
+    inside = mu >= axes.mu_low
+    return Slopes(
         OK,
         math.pi / 5.0 * mu * five * math.exp(f * share),
         f_X * by_X + 2.5 * three / five,
-        F_mu,
+        # below the table the logarithm is proportional to mu
+        1.0 + (f_mu * axes.mu_rate if inside else f * share),
         math.pi / 2.0 * two * math.exp(g * share),
         g_X * by_X + 2.0 * one / two,
-        A_mu,
-        _error_at(place_X, place_mu, errors, axes[9], axes[10]),
+        g_mu * axes.mu_rate if inside else g * share,
+        _error_at(place_X, place_mu, table),
     )
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def fill_phi(
-    X: FloatArray,
-    mu: FloatArray,
-    table: FloatArray,
-    errors: FloatArray,
-    axes: Axes,
-    status: NDArray[np.int64],
-    out: FloatArray,
-) -> None:
-    """`universal_phi` of each entry: status, and Phi_F, Phi_A, error into the columns of `out` (3, entries)."""
+def fill_phi(X: FloatArray, mu: FloatArray, table: Table, status: NDArray[np.int64], out: FloatArray) -> None:
+    """`universal_phi` of each entry: status, and Phi_F, Phi_A, error into the rows of `out` (entries, 3)."""
     for k in range(X.size):
-        status[k], out[0, k], out[1, k], out[2, k] = universal_phi(X[k], mu[k], table, errors, axes)
-
-
-@njit(cache=True, error_model="numpy", parallel=True)
-def fill_phi_parallel(
-    X: FloatArray,
-    mu: FloatArray,
-    table: FloatArray,
-    errors: FloatArray,
-    axes: Axes,
-    status: NDArray[np.int64],
-    out: FloatArray,
-) -> None:
-    """`fill_phi` on all cores, for large batches."""
-    for k in prange(X.size):
-        status[k], out[0, k], out[1, k], out[2, k] = universal_phi(X[k], mu[k], table, errors, axes)
+        status[k], out[k, 0], out[k, 1], out[k, 2] = universal_phi(X[k], mu[k], table)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def fill_slopes(
-    X: FloatArray,
-    mu: FloatArray,
-    table: FloatArray,
-    errors: FloatArray,
-    axes: Axes,
-    status: NDArray[np.int64],
-    out: FloatArray,
-) -> None:
-    """`universal_slopes` of each entry: status, and the other seven into the columns of `out` (7, entries)."""
+def fill_slopes(X: FloatArray, mu: FloatArray, table: Table, status: NDArray[np.int64], out: FloatArray) -> None:
+    """`universal_slopes` of each entry: status, and the other seven into the rows of `out` (entries, 7)."""
     for k in range(X.size):
-        status[k], out[0, k], out[1, k], out[2, k], out[3, k], out[4, k], out[5, k], out[6, k] = universal_slopes(
-            X[k], mu[k], table, errors, axes
-        )
+        found = universal_slopes(X[k], mu[k], table)
+        status[k] = found.status
+        out[k, 0], out[k, 1], out[k, 2] = found.phi_F, found.F_by_X, found.F_by_mu
+        out[k, 3], out[k, 4], out[k, 5] = found.phi_A, found.A_by_X, found.A_by_mu
+        out[k, 6] = found.error

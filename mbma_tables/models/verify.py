@@ -58,7 +58,8 @@ class _Replay:
 
 
 def _replay(content: TableContent) -> _Replay:
-    from mbma_tables.models.universal import Island4dModel, UniversalModel
+    from mbma_tables.models.island4d import Island4dModel
+    from mbma_tables.models.universal import UniversalModel
 
     points = content.conformance
     if content.kind == UNIVERSAL:

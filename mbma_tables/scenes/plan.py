@@ -154,7 +154,7 @@ def make_plan(problem: Problem, costs: Costs | None = None) -> Plan:
 def certified_error(tier: str | IslandModel, asked: float) -> float:
     """Bound on the relative error of a tier's islands, for results at `asked`; NaN where only the answers can say."""
     if tier == "universal":
-        from mbma_tables.models.universal import open_table
+        from mbma_tables.models.tables import open_table
 
         certificate = open_table(tier).content.attributes
         return max(float(certificate["largest_error_F"]), float(certificate["largest_error_A"]))

@@ -294,6 +294,6 @@ def _hashes(tiers: set[str]) -> dict[str, str]:
     used = sorted(tiers & set(TABLES))
     if not used:
         return {}
-    from mbma_tables.models.universal import open_table
+    from mbma_tables.models.tables import open_table
 
     return {tier: str(open_table(tier).content.attributes["values_sha256"]) for tier in used}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,14 +11,13 @@ from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models import IslandAnswer, IslandModel, get_model
+from mbma_tables.models import AnyModel, IslandAnswer, answer_islands, get_model
 from mbma_tables.models.protocol import AREA, BOTH
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.gauss_kronrod import integrate
 from mbma_tables.totals.island import geometry, scale_area, scale_force
-from mbma_tables.totals.island_sum import sum_islands
-from mbma_tables.totals.pairs import Pairs, jacobian_of, kinks
+from mbma_tables.totals.island_sum import Pairs, density_of, kinks, sum_islands
 
 Fields = dict[str, tuple[tuple[str, ...], Any]]
 
@@ -28,46 +26,21 @@ Fields = dict[str, tuple[tuple[str, ...], Any]]
 class HertzArea:
     """An island model whose summits touch on their whole Hertz area: eta = 1 in Eq. 38 (C.1)."""
 
-    model: IslandModel
+    model: AnyModel
     name: str = "hertz area"
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
         """Phi_F and Phi_A/eta of islands."""
-        found = self.model.of_islands(islands, outside, which)
-        return dataclasses.replace(found, phi_A=found.phi_A / islands["eta"])
-
-
-def pairs_of(surface: Surface, gap: FloatArray) -> Pairs:
-    """One surface at flat gaps."""
-
-    def flat(number: Any) -> FloatArray:
-        return np.full(gap.shape, float(number))
-
-    return Pairs(
-        hurst=flat(surface.hurst),
-        zeta_1=flat(surface.zeta_1),
-        room=flat(surface.h_rms / surface.s),
-        reach=(surface.h_max - gap) / surface.h_rms,
-        top=flat(surface.h_max / surface.h_rms),
-        layer=flat(math.exp(-float(surface.hurst) * math.log(float(surface.zeta_1)))),
-    )
+        found = answer_islands(self.model, islands, outside, which)
+        return found._replace(phi_A=found.phi_A / islands["eta"])
 
 
 def hertz_area(surface: Surface, gap: FloatArray, tier: Any, reading: Reading, rtol: float) -> tuple[FloatArray, float]:
     """A/A0 with eta = 1, and the bound on its relative error."""
     model = HertzArea(get_model(tier, rtol, reading))
     outside = "exact" if tier in ("universal", "island4d") else "raise"
-    _, area, error, _ = sum_islands(pairs_of(surface, gap), reading, model, rtol, outside, AREA)
-    return area, float(error.max())
-
-
-def _density(pairs: Pairs, owner: Any, approach: FloatArray, g: Mapping[str, FloatArray], reading: Reading) -> Any:
-    """Islands per nominal area and delta/s, in q0^2 (Eqs. 42, 46)."""
-    room = pairs.room[owner, None]
-    kink = kinks(pairs.hurst[owner, None], pairs.zeta_1[owner, None], reading)[0]
-    height = (pairs.top[owner, None] - pairs.reach[owner, None] + approach) * room - g["h_d"]
-    weight = g["D_d"] * np.exp(-0.5 * (height / g["sigma_d"]) ** 2) / (math.sqrt(2 * math.pi) * g["sigma_d"])
-    return weight * jacobian_of(reading, room, approach < kink)
+    found = sum_islands(Pairs.of(surface, surface.h_max - gap), reading, model, rtol, outside, AREA)
+    return found.area, float(found.error.max())
 
 
 def island_statistics(
@@ -90,7 +63,7 @@ def island_statistics(
     float
         Bound on the relative error.
     """
-    pairs = pairs_of(surface, gap)
+    pairs = Pairs.of(surface, surface.h_max - gap)
     kink_d, kink_u = kinks(pairs.hurst, pairs.zeta_1, reading)
 
     def to_grid(approach: FloatArray) -> FloatArray:
@@ -101,18 +74,21 @@ def island_statistics(
         approach = layer * np.sinh(t) ** 2
         hurst, zeta_1 = (np.broadcast_to(field[owner, None], t.shape).copy() for field in (pairs.hurst, pairs.zeta_1))
         g = geometry(approach, hurst, zeta_1, reading)
-        weight = _density(pairs, owner, approach, g, reading)
-        return np.asarray(weight * pairs.room[owner, None] * layer * np.sinh(2 * t))[..., None]
+        weight = density_of(pairs, owner, approach, g, reading)
+        return np.asarray(weight * pairs.rms_over_s[owner, None] * layer * np.sinh(2 * t))[..., None]
 
     count = gap.size
-    reach = np.maximum(pairs.reach, 0)
-    breaks = np.sort(np.stack([np.zeros(count), np.minimum(kink_d, reach), np.minimum(kink_u, reach), reach]), axis=0)
+    compression = np.maximum(pairs.compression, 0)
+    breaks = np.sort(
+        np.stack([np.zeros(count), np.minimum(kink_d, compression), np.minimum(kink_u, compression), compression]),
+        axis=0,
+    )
     low, high = to_grid(breaks[:-1]), to_grid(breaks[1:])
     owner = np.broadcast_to(np.arange(count), low.shape)
     filled = high > low
     found = integrate(integrand, owner[filled], low[filled], high[filled], count, rtol)
     s, q0 = float(surface.s), float(surface.q0)
-    most = float(reach.max()) if count else 0.0
+    most = float(compression.max()) if count else 0.0
     grid = float(pairs.layer[0]) * np.sinh(np.linspace(0, 1, points + 1)[1:] * to_grid(np.full(count, most))[0]) ** 2
     error = float(found.error.max(initial=0.0))
     if most == 0.0:
@@ -123,13 +99,13 @@ def island_statistics(
         hurst, zeta_1 = np.full(points, float(surface.hurst)), np.full(points, float(surface.zeta_1))
         g = geometry(grid, hurst, zeta_1, reading)
         model = get_model(tier, rtol, reading)
-        phi = model.of_islands(g | {"hurst": hurst}, "exact" if tier in ("universal", "island4d") else "raise")
+        phi = answer_islands(model, g | {"hurst": hurst}, "exact" if tier in ("universal", "island4d") else "raise")
         force = E_star * s / q0 * scale_force(g) * phi.phi_F
         area = scale_area(g) * phi.phi_A / (1.0 if subscale else g["eta"]) / q0**2
         every = np.arange(count)
         wide = np.broadcast_to(grid, (count, points))
-        spread = _density(pairs, every, wide, {name: field[None] for name, field in g.items()}, reading)
-        density = np.where(wide <= reach[:, None], spread, 0.0) * q0**2 / s
+        spread = density_of(pairs, every, wide, {name: field[None] for name, field in g.items()}, reading)
+        density = np.where(wide <= compression[:, None], spread, 0.0) * q0**2 / s
         error = max(error, float(np.max(phi.error)))
     fields: Fields = {
         "island_number": (("gap",), found.value[:, 0] * q0**2),

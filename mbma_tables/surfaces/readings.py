@@ -8,10 +8,22 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces.spectrum import NAYAK
+
+
+class ReadingNumbers(NamedTuple):
+    """The numbers of a `Reading`, for compiled code."""
+
+    density_divisor: float
+    beta: float
+    phi: float
+    floor_d: float
+    floor_u: float
+    offset: bool
+    summit_sigma: bool
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,9 +73,9 @@ class Reading:
                 raise InputError(f"reading {self.name!r}: {rule}")
 
     @property
-    def numbers(self) -> tuple[float, float, float, float, float, bool, bool]:
-        """What compiled code needs: density divisor, beta, phi, floors, offset, summit_sigma."""
-        return (
+    def numbers(self) -> ReadingNumbers:
+        """What compiled code needs; the Jacobian goes beside it."""
+        return ReadingNumbers(
             float(self.density_divisor),
             float(self.beta),
             float(self.phi),

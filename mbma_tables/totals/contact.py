@@ -18,19 +18,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, is_labelled, require
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
-from mbma_tables.models import get_model
+from mbma_tables.models import AnyModel, get_model, tier_name
 from mbma_tables.models.protocol import AREA, BOTH, FORCE, OUTSIDE, QUANTITIES
-from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.readings import Reading, get_reading
-from mbma_tables.surfaces.surface import Surface
-from mbma_tables.totals.island_sum import sum_islands
-from mbma_tables.totals.pairs import Pairs
-from mbma_tables.totals.universal_sum import look_up, look_up_slopes
+from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.totals.island_sum import Pairs, slopes_of, totals_of
 
-MANY_GAPS = 4096  # on one surface: about what making a law costs
-FROZEN_RTOL = 2e-9
+ATTRIBUTES = {
+    "force": {"long_name": "force over nominal area", "units": "unit of E_star"},
+    "area": {"long_name": "real over nominal contact area", "units": "1"},
+    "error": {"long_name": "bound on the relative error of force and area", "units": "1"},
+}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class Contact:
     reading, tier : str
         What made them.
     islands : int or None
-        Islands evaluated; None where that is left to dask or to a law.
+        Islands evaluated; None where that is left to dask.
     force_by, area_by : dict of ndarray, or None
         Partial derivatives by "separation", "hurst", "q0", "q1", "h_rms" and "h_max", the others held.
     """
@@ -73,7 +73,7 @@ class Contact:
 def contact(
     surface: Surface,
     separation: ArrayLike,
-    tier: str = "universal",
+    tier: str | AnyModel = "universal",
     reading: str | Reading = "reported",
     E_star: ArrayLike = 1.0,
     rtol: float = 1e-8,
@@ -90,8 +90,9 @@ def contact(
     separation : array_like
         d between the rigid plane and the mid-plane [length], at least -h_max (full compression). From h_max
         on there is no contact, and force and area are zero.
-    tier : {"universal", "island4d", "exact", "formula", "rigid"}
-        The island model: a table, the full solver, or spheres that do not deform, in closed form.
+    tier : {"universal", "island4d", "exact", "formula", "rigid"} or island model
+        The island model: a table, the full solver, a closed form, or spheres that do not deform; or an object: a
+        table from `open_table`, or a model of one's own with a `name` and ``answer(X, mu)``.
     reading : {"reported", "printed"} or Reading
         Which reading of the paper's equations.
     E_star : array_like
@@ -115,21 +116,32 @@ def contact(
         For NaN, infinite or empty input, separations below -h_max, islands that no table covers.
     ConvergenceError
         Where the accuracy was not reached; its `mask` says which entries.
+
+    See Also
+    --------
+    contact_law : for many gaps on one surface.
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, contact
+    >>> surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)  # um
+    >>> found = contact(surface, [1.0, 0.5], E_star=100e3)  # MPa
+    >>> [f"{force:.4g} MPa on {area:.3%}" for force, area in zip(found.force, found.area)]
+    ['3.404 MPa on 0.210%', '16.51 MPa on 0.925%']
+    >>> bool((found.error < 1e-8).all())
+    True
     """
-    wanted = _wanted(quantities)
-    if surface.labelled or hasattr(separation, "dims") or hasattr(E_star, "dims"):
-        # xarray comes in with its own objects
-        from mbma_tables.totals.labelled import contact_of_labelled
-
-        # of all gaps: answers do not depend on how they are cut into blocks
-        many = bool(getattr(separation, "size", 1) >= MANY_GAPS)
-
-        def answer(block: Surface, gaps: Any, modulus: Any) -> Contact:
-            return _contact(block, gaps, tier, reading, modulus, rtol, outside, derivatives, wanted, many)
-
-        fields = contact_of_labelled(answer, surface, separation, E_star, derivatives, wanted)
-        return Contact(**fields, reading=get_reading(reading).name, tier=tier, islands=None)
-    return _contact(surface, separation, tier, reading, E_star, rtol, outside, derivatives, wanted)
+    options: dict[str, Any] = {
+        "tier": tier,
+        "reading": get_reading(reading),
+        "rtol": rtol,
+        "outside": outside,
+        "derivatives": derivatives,
+        "quantities": _wanted(quantities),
+    }
+    if surface.labelled or is_labelled(separation) or is_labelled(E_star):
+        return _of_labelled(surface, separation, E_star, options)
+    return _contact(surface, separation, E_star, **options)
 
 
 def _wanted(quantities: Iterable[str]) -> tuple[str, ...]:
@@ -143,65 +155,44 @@ def _wanted(quantities: Iterable[str]) -> tuple[str, ...]:
 def _contact(
     surface: Surface,
     separation: ArrayLike,
-    tier: str,
-    reading: str | Reading,
     E_star: ArrayLike,
+    *,
+    tier: str | AnyModel,
+    reading: Reading,
     rtol: float,
     outside: str,
     derivatives: bool,
     quantities: tuple[str, ...],
-    many: bool | None = None,
 ) -> Contact:
-    """`contact` of plain arrays; `many` says whether they are a block of many gaps."""
+    """`contact` of plain arrays."""
     gap = finite_array("separation", separation)
     modulus = finite_array("E_star", E_star)
     require("E_star", modulus, modulus > 0, "positive")
-    rule = get_reading(reading)
     if outside not in OUTSIDE:
         raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
-    model = get_model(tier, rtol, rule)
+    model = get_model(tier, rtol, reading)
     which = BOTH if len(quantities) > 1 else QUANTITIES.index(quantities[0])
     shape = broadcast_shape(separation=gap, surface=surface.hurst, E_star=modulus)
     gap = np.broadcast_to(gap, shape)
     h_max = np.broadcast_to(np.asarray(surface.h_max), shape)
     require("separation", gap, gap >= -h_max, "at least -h_max, where the model ends")
-
-    def flat(field: Any) -> FloatArray:
-        return np.broadcast_to(np.asarray(field, dtype=float), shape).ravel()
-
-    room = flat(surface.h_rms / surface.s)
-    most = np.broadcast_to(np.asarray(surface.zeta_1), shape)
-    require("q1/q0", most, most > rule.floor_u, f"greater than {rule.floor_u:g}, the reading's floor of zeta_u")
-    zeta_1, hurst = flat(most), flat(surface.hurst)
-    pairs = Pairs(
-        hurst=hurst,
-        zeta_1=zeta_1,
-        room=room,
-        reach=((h_max - gap) / surface.h_rms).ravel(),
-        top=flat(surface.h_max / surface.h_rms),
-        layer=np.exp(-hurst * np.log(zeta_1)),
+    zeta_1 = np.asarray(surface.zeta_1)
+    require(
+        "q1/q0", zeta_1, zeta_1 > reading.floor_u, f"greater than {reading.floor_u:g}, the reading's floor of zeta_u"
     )
+    pairs = Pairs.of(surface, np.asarray(h_max - gap))
     stress = modulus * surface.q0 * surface.s
     force_by = area_by = None
     try:
         if derivatives:
-            if not isinstance(model, UniversalModel):
-                raise InputError("derivatives come from tier 'universal'")
-            sums, error, islands = look_up_slopes(pairs, rule, model, rtol, outside, shape)
+            sums, error, islands = slopes_of(model, pairs, reading, rtol, outside)
             force, area = sums[:, 0, 0], sums[:, 1, 0]
-            force_by, area_by = _by_parameter(surface, sums.reshape((*shape, 2, 5)), pairs, stress)
-        elif isinstance(model, UniversalModel):
-            own = gap.size >= MANY_GAPS if many is None else many
-            frozen = _through_law(surface, gap, modulus, rule, rtol) if own else None
-            if frozen is not None:
-                force, area, error = frozen
-                islands = None
-            else:
-                force, area, error, islands = look_up(pairs, rule, model, rtol, outside, shape, which)
+            force_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
         else:
-            force, area, error, islands = sum_islands(pairs, rule, model, 0.5 * rtol, outside, which)
-    except ConvergenceError as fault:
-        fault.mask = fault.mask.reshape(shape)
+            force, area, error, islands = totals_of(model, pairs, reading, rtol, outside, which)
+    except (ConvergenceError, OutOfRangeError) as fault:
+        if fault.mask is not None:
+            fault.mask = fault.mask.reshape(shape)
         raise
     return Contact(
         separation=gap[()],
@@ -209,7 +200,7 @@ def _contact(
         force=(force.reshape(shape) * stress)[()] if which != AREA else None,
         area=area.reshape(shape)[()] if which != FORCE else None,
         error=error.reshape(shape)[()],
-        reading=rule.name,
+        reading=reading.name,
         tier=model.name,
         islands=islands,
         force_by=force_by if which != AREA else None,
@@ -217,54 +208,65 @@ def _contact(
     )
 
 
-def _through_law(
-    surface: Surface, gap: FloatArray, modulus: FloatArray, reading: Reading, rtol: float
-) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """F/(A0 E* q0 s), A/A0 and their error through a law of half the tolerance, where one surface has many gaps."""
-    if surface.shape != () or modulus.ndim or rtol < FROZEN_RTOL:
-        return None
-    # laws are made of totals
-    from mbma_tables.totals.law import contact_law
+def _of_labelled(surface: Surface, separation: Any, E_star: Any, options: dict[str, Any]) -> Contact:
+    """`contact` of DataArrays, lazily where they are."""
+    # xarray comes in with its own objects
+    from mbma_tables.labels import apply_to_surface
 
-    try:
-        law = contact_law(surface, 0.5 * rtol, reading=reading)
-    except (OutOfRangeError, ConvergenceError):
-        # a law needs every gap down to -h_max, these may do without
-        return None
-    flat = gap.ravel()
-    force = law.force(flat) / float(surface.q0 * surface.s)
-    return force, law.area(flat), np.where(flat < law.h_max, law.error, 0.0)
+    wanted = options["quantities"]
+    by = [(kind, name) for kind in wanted for name in ("separation", *PARAMETERS)] if options["derivatives"] else []
+    names = (*wanted, "error")
+
+    def answer(block: Surface, gaps: Any, modulus: Any) -> tuple[Any, ...]:
+        found = _contact(block, gaps, modulus, **options)
+        slopes = (getattr(found, f"{kind}_by")[name] for kind, name in by)
+        return (*(getattr(found, name) for name in names), *slopes)
+
+    arrays = {"separation": separation, "E_star": E_star}
+    outputs = apply_to_surface(answer, surface, arrays, len(names) + len(by))
+    fields: dict[str, Any] = {"force": None, "area": None}
+    for found, name in zip(outputs, names, strict=False):
+        fields[name] = found.rename(name).assign_attrs(ATTRIBUTES[name])
+    slopes = dict(zip(by, outputs[len(names) :], strict=True))
+    for kind in QUANTITIES:
+        fields[f"{kind}_by"] = {name: value for (own, name), value in slopes.items() if own == kind} or None
+    return Contact(
+        separation=separation,
+        mean_separation=(surface.h_max + separation) / 2,
+        reading=options["reading"].name,
+        tier=tier_name(options["tier"]),
+        islands=None,
+        **fields,
+    )
 
 
 def _by_parameter(
     surface: Surface, sums: FloatArray, pairs: Pairs, stress: FloatArray
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Chain rule from H, log(zeta_1), reach and top to the gap and the surface's own parameters."""
+    """Chain rule from H, log(zeta_1), compression and peak to the gap and the surface's own parameters."""
     shape = sums.shape[:-2]
-    reach, top, room, hurst, zeta_1 = (
-        getattr(pairs, name).reshape(shape) for name in ("reach", "top", "room", "hurst", "zeta_1")
-    )
+    hurst, zeta_1, rms_over_s, compression, peak, _ = (field.reshape(shape) for field in pairs)
     h_rms, q0, q1 = surface.h_rms, surface.q0, surface.q1
-    # log(1/room) by H and by log(zeta_1): room^2 = 1 - zeta_1^(-2H)
-    lift = -(1 - room**2) / room**2
+    # log(s/h_rms) by H and by log(zeta_1): (h_rms/s)^2 = 1 - zeta_1^(-2H)
+    lift = -(1 - rms_over_s**2) / rms_over_s**2
     answers = []
     for number in range(2):
-        value, by_H, by_zeta, by_reach, by_top = np.moveaxis(sums[..., number, :], -1, 0)
+        value, by_H, by_zeta, by_compression, by_peak, _ = np.moveaxis(sums[..., number, :], -1, 0)
         scale: Any = 1.0
         own = np.zeros_like(value)
         if number == 0:
-            # force carries q0 s = q0 h_rms/room
+            # force carries q0 s
             scale = stress
             by_H = by_H + value * lift * np.log(zeta_1)
             by_zeta = by_zeta + value * lift * hurst
             own = value
         found = {
-            "separation": -by_reach / h_rms,
+            "separation": -by_compression / h_rms,
             "hurst": by_H,
             "q0": (own - by_zeta) / q0,
             "q1": by_zeta / q1,
-            "h_rms": (own - reach * by_reach - top * by_top) / h_rms,
-            "h_max": (by_reach + by_top) / h_rms,
+            "h_rms": (own - compression * by_compression - peak * by_peak) / h_rms,
+            "h_max": (by_compression + by_peak) / h_rms,
         }
         answers.append({name: (scale * slope)[()] for name, slope in found.items()})
     return answers[0], answers[1]

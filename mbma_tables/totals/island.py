@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, is_labelled, require
 from mbma_tables.islands.geometry import FIELDS, fill_islands
-from mbma_tables.models import get_model
+from mbma_tables.models import AnyModel, answer_islands, get_model, tier_name
 from mbma_tables.surfaces.readings import Reading, get_reading
-from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.surfaces.surface import Surface
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ def scale_area(g: dict[str, FloatArray]) -> FloatArray:
 def island(
     surface: Surface,
     delta: ArrayLike,
-    tier: str = "universal",
+    tier: str | AnyModel = "universal",
     reading: str | Reading = "reported",
     E_star: ArrayLike = 1.0,
     rtol: float = 1e-9,
@@ -98,8 +98,8 @@ def island(
         One surface or a batch; it broadcasts against `delta`.
     delta : array_like
         Approach z_max - d of the island [length], positive.
-    tier : {"universal", "island4d", "exact", "formula", "rigid"}
-        The island model.
+    tier : {"universal", "island4d", "exact", "formula", "rigid"} or island model
+        The island model, by name or an object, as for `contact`.
     reading : {"reported", "printed"} or Reading
         Which reading of the paper's equations.
     E_star : array_like
@@ -114,8 +114,15 @@ def island(
     Raises
     ------
     InputError, OutOfRangeError, ConvergenceError
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, island
+    >>> found = island(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0), [0.5, 2.0])  # um
+    >>> [f"{number:.4g}" for number in (found.zeta_d[0], found.X[0], found.mu[0])]
+    ['6.471', '3.001', '0.06064']
     """
-    if surface.labelled or hasattr(delta, "dims") or hasattr(E_star, "dims"):
+    if surface.labelled or is_labelled(delta) or is_labelled(E_star):
         return _of_labelled(surface, delta, tier, reading, E_star, rtol)
     approach = finite_array("delta", delta)
     require("delta", approach, approach > 0, "positive")
@@ -130,7 +137,7 @@ def island(
         np.broadcast_to(array, shape) for array in (approach / surface.h_rms, surface.hurst, surface.zeta_1)
     )
     g = geometry(approach, hurst, zeta_1, rule)
-    phi = model.of_islands(g | {"hurst": hurst})
+    phi = answer_islands(model, g | {"hurst": hurst})
     s, q0 = surface.s, surface.q0
     units = {
         "R_d": 1 / (s * q0**2),
@@ -151,20 +158,19 @@ def island(
     )
 
 
-def _of_labelled(surface: Surface, delta: Any, tier: str, reading: str | Reading, E_star: Any, rtol: float) -> Island:
+def _of_labelled(
+    surface: Surface, delta: Any, tier: str | AnyModel, reading: str | Reading, E_star: Any, rtol: float
+) -> Island:
     """`island` of DataArrays, lazily where they are."""
     # xarray comes in with its own objects
-    from mbma_tables.labels import apply, refuse_unnamed
+    from mbma_tables.labels import apply_to_surface
 
     names = (*GEOMETRY, "force", "area", "error")
 
-    def block(*fields: Any) -> tuple[Any, ...]:
-        *numbers, own, modulus = fields
-        found = island(Surface(*numbers), own, tier, reading, modulus, rtol)
+    def answer(block: Surface, own: Any, modulus: Any) -> tuple[Any, ...]:
+        found = island(block, own, tier, reading, modulus, rtol)
         return tuple(np.broadcast_to(getattr(found, name), np.shape(found.force)) for name in names)
 
-    arguments = {name: getattr(surface, name) for name in PARAMETERS} | {"delta": delta, "E_star": E_star}
-    refuse_unnamed(arguments)
-    outputs = apply(block, tuple(arguments.values()), len(names))
+    outputs = apply_to_surface(answer, surface, {"delta": delta, "E_star": E_star}, len(names))
     values = {name: found.rename(name) for name, found in zip(names, outputs, strict=True)}
-    return Island(delta=delta, reading=get_reading(reading).name, tier=tier, **values)
+    return Island(delta=delta, reading=get_reading(reading).name, tier=tier_name(tier), **values)

@@ -1,31 +1,111 @@
-"""The sum over islands for any model: adaptive quadrature of a batch of pairs (Eqs. 44-49)."""
+"""The sum over islands (Eqs. 44-49): for any island model in numpy, for the universal table in one compiled pass."""
 
 from __future__ import annotations
 
-import math
+import functools
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import ConvergenceError
-from mbma_tables.models import IslandModel
+from mbma_tables.compiled import in_blocks
+from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
+from mbma_tables.islands.geometry import floor_offset
+from mbma_tables.models import AnyModel, answer_islands, exact_model
 from mbma_tables.models.protocol import AREA, BOTH, FORCE
+from mbma_tables.models.universal import UniversalModel
+from mbma_tables.models.universal_kernel import OK, REASONS, UNRESOLVED
 from mbma_tables.surfaces.readings import Reading
+from mbma_tables.surfaces.surface import Surface
+from mbma_tables.totals import kernel
 from mbma_tables.totals.gauss_kronrod import integrate
 from mbma_tables.totals.intervals import STRETCH
 from mbma_tables.totals.island import geometry, scale_area, scale_force
-from mbma_tables.totals.pairs import Pairs, jacobian_of, kinks
+
+QUADRATURE_SHARE = 0.9  # of the tolerance asked for; a table's own error comes on top
+SUM_SHARE = 0.5  # where islands are solved to a share of it
+BLOCK, SLOPES_BLOCK = 2048, 256  # pairs between two looks for Ctrl-C
+
+
+class Pairs(NamedTuple):
+    """Flat (surface, gap) pairs in units of h_rms and 1/q0."""
+
+    hurst: FloatArray
+    zeta_1: FloatArray
+    rms_over_s: FloatArray  # h_rms/s = sqrt(1 - zeta_1^(-2H))
+    compression: FloatArray  # (h_max - d)/h_rms
+    peak: FloatArray  # h_max/h_rms
+    layer: FloatArray  # approach at which zeta_d leaves zeta_1, zeta_1^(-H)
+
+    @classmethod
+    def of(cls, surface: Surface, depth: FloatArray) -> Pairs:
+        """Of a surface, or a batch, at h_max - d = `depth` [length], of the shape that both broadcast to."""
+
+        def flat(field: Any) -> FloatArray:
+            return np.broadcast_to(np.asarray(field, dtype=float), depth.shape).ravel()
+
+        hurst, zeta_1 = flat(surface.hurst), flat(surface.zeta_1)
+        return cls(
+            hurst=hurst,
+            zeta_1=zeta_1,
+            rms_over_s=flat(surface.h_rms / surface.s),
+            compression=flat(depth / surface.h_rms),
+            peak=flat(surface.h_max / surface.h_rms),
+            layer=np.exp(-hurst * np.log(zeta_1)),
+        )
+
+    def some(self, chosen: Any) -> Pairs:
+        """The pairs at these places."""
+        return Pairs(*(field[chosen] for field in self))
+
+
+class Totals(NamedTuple):
+    """F/(A0 E* q0 s) and A/A0 of pairs, the bound on their relative error, and the islands evaluated.
+
+    Of the two, one that was not asked for holds the other, or NaN.
+    """
+
+    force: FloatArray
+    area: FloatArray
+    error: FloatArray
+    islands: int
+
+
+def kinks(hurst: Any, zeta_1: Any, reading: Reading) -> tuple[Any, Any]:
+    """delta/h_rms at which zeta_d (27) and zeta_u (30) reach their floors; arrays of one shape."""
+    h, z = np.broadcast_arrays(np.asarray(hurst, dtype=float), np.asarray(zeta_1, dtype=float))
+    at_d, at_u = np.empty(h.shape), np.empty(h.shape)
+    for place in np.ndindex(h.shape):
+        at_d[place] = floor_offset(float(h[place]), float(z[place]), reading.floor_d)
+        at_u[place] = floor_offset(float(h[place]), float(z[place]), reading.floor_u)
+    rms_over_s = np.sqrt(-np.expm1(-2 * h * np.log(z)))
+    slope_u = reading.phi / (1 + reading.phi) * rms_over_s
+    return (np.sqrt(at_d) / (4 / 3 * reading.beta))[()], (np.sqrt(at_u) / slope_u)[()]
+
+
+def jacobian_of(reading: Reading, rms_over_s: FloatArray, below_kink: NDArray[np.bool_]) -> FloatArray:
+    """K1 (47), or what (46) gives."""
+    below = kernel.jacobian_below(rms_over_s, reading.beta, reading.jacobian == "printed", reading.offset)
+    return np.where(below_kink, below, 1.0)
+
+
+def density_of(
+    pairs: Pairs, owner: Any, approach: FloatArray, g: dict[str, FloatArray], reading: Reading
+) -> FloatArray:
+    """Islands of the pairs `owner` per nominal area and delta/s (42, 46), in q0^2, at `approach` (owners, points)."""
+    compression, peak, rms_over_s = (f[owner, None] for f in (pairs.compression, pairs.peak, pairs.rms_over_s))
+    kink = kinks(pairs.hurst[owner], pairs.zeta_1[owner], reading)[0]
+    height = kernel.island_height(approach, g["h_d"], g["sigma_d"], compression, peak, rms_over_s)
+    density: FloatArray = kernel.island_density(height, g["D_d"], g["sigma_d"])
+    return density * jacobian_of(reading, rms_over_s, approach < np.asarray(kink)[:, None])
 
 
 def sum_islands(
-    pairs: Pairs, reading: Reading, model: IslandModel, rtol: float, outside: str = "raise", which: int = BOTH
-) -> tuple[FloatArray, FloatArray, FloatArray, int]:
-    """F/(A0 E* q0 s), A/A0, the bound on their relative error, and the islands evaluated.
-
-    Of the two, the one that `which` leaves out is not told.
-    """
-    count = pairs.reach.size
+    pairs: Pairs, reading: Reading, model: AnyModel, rtol: float, outside: str = "raise", which: int = BOTH
+) -> Totals:
+    """Totals by any island model: adaptive quadrature of a batch of pairs to `rtol`."""
+    count = pairs.compression.size
     kink_d, kink_u = kinks(pairs.hurst, pairs.zeta_1, reading)
     worst_island = np.zeros(count)
 
@@ -39,33 +119,27 @@ def sum_islands(
         return grid
 
     def integrand(owner: NDArray[np.intp], t: FloatArray) -> FloatArray:
-        own_scale, own_turn, own_kink, room, hurst, zeta_1 = (
+        own_scale, own_turn, own_kink, rms_over_s, compression, peak, hurst, zeta_1 = (
             np.broadcast_to(field[owner, None], t.shape)
-            for field in (scale, turn, kink_d, pairs.room, pairs.hurst, pairs.zeta_1)
-        )
+            for field in (
+                scale, turn, kink_d, pairs.rms_over_s, pairs.compression, pairs.peak, pairs.hurst, pairs.zeta_1,
+            )
+        )  # fmt: skip
         curved = np.minimum(t, own_turn)
         approach = np.where(t < own_turn, own_scale * np.sinh(curved) ** 2, own_kink + (t - own_turn))
         stretch = np.where(t < own_turn, own_scale * np.sinh(2 * curved), 1.0)
         g = geometry(approach, hurst, zeta_1, reading)
         try:
-            phi = model.of_islands(g | {"hurst": hurst}, outside, which)
-        except ConvergenceError as fault:
+            phi = answer_islands(model, g | {"hurst": hurst}, outside, which)
+        except (ConvergenceError, OutOfRangeError) as fault:
             failed = np.zeros(count, dtype=bool)
-            failed[owner[fault.mask.any(axis=1)]] = True
-            raise ConvergenceError(f"an island failed: {fault}", failed) from fault
+            failed[owner if fault.mask is None else owner[fault.mask.any(axis=1)]] = True
+            raise type(fault)(f"an island failed: {fault}", failed) from fault
         with np.errstate(invalid="ignore"):
             np.maximum.at(worst_island, owner, phi.error.max(axis=1))
-        # z_max/s counted down from h_max, where nothing cancels near first contact
-        below_top = pairs.reach[owner, None] - approach
-        height = (pairs.top[owner, None] - below_top) * room - g["h_d"]
-        weight = (
-            g["D_d"]
-            * np.exp(-0.5 * (height / g["sigma_d"]) ** 2)
-            / (math.sqrt(2 * math.pi) * g["sigma_d"])
-            * jacobian_of(reading, room, approach < own_kink)
-            * room
-            * stretch
-        )
+        height = kernel.island_height(approach, g["h_d"], g["sigma_d"], compression, peak, rms_over_s)
+        weight = kernel.island_density(height, g["D_d"], g["sigma_d"]) * rms_over_s * stretch
+        weight *= jacobian_of(reading, rms_over_s, approach < own_kink)
         parts = []
         if which != AREA:
             parts.append(scale_force(g) * phi.phi_F * weight)
@@ -73,12 +147,98 @@ def sum_islands(
             parts.append(scale_area(g) * phi.phi_A * weight)
         return np.stack(parts, axis=-1)
 
-    everyone = np.arange(count)
-    edges = [np.minimum(k, pairs.reach) for k in (kink_d, kink_u)]
-    breaks = np.sort(np.stack([np.zeros(count), *edges, np.maximum(pairs.reach, 0)]), axis=0)
-    low, high = (to_grid(np.maximum(b, 0)) for b in (breaks[:-1], breaks[1:]))
-    owner = np.broadcast_to(everyone, low.shape)
+    compression = np.maximum(pairs.compression, 0)
+    edges = [np.minimum(k, compression) for k in (kink_d, kink_u)]
+    breaks = np.sort(np.stack([np.zeros(count), *edges, compression]), axis=0)
+    low, high = (to_grid(b) for b in (breaks[:-1], breaks[1:]))
+    owner = np.broadcast_to(np.arange(count), low.shape)
     filled = high > low
     found = integrate(integrand, owner[filled], low[filled], high[filled], count, rtol)
     error = found.error.max(axis=1) + worst_island
-    return found.value[:, 0], found.value[:, -1], error, found.evaluations
+    return Totals(found.value[:, 0], found.value[:, -1], error, found.evaluations)
+
+
+@functools.singledispatch
+def totals_of(
+    model: Any, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", which: int = BOTH
+) -> Totals:
+    """Totals by an island model, in the way that suits its class; errors carry a mask of the pairs."""
+    return sum_islands(pairs, reading, model, SUM_SHARE * rtol, outside, which)
+
+
+@totals_of.register
+def _(
+    model: UniversalModel, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", which: int = BOTH
+) -> Totals:
+    status = np.empty(pairs.compression.size, dtype=np.int64)
+    out = np.empty((pairs.compression.size, 3))
+
+    def fill(block: slice) -> int:
+        hurst, zeta_1, _, compression, peak, _ = pairs.some(block)
+        return kernel.fill_totals(
+            which, hurst, zeta_1, compression, peak, QUADRATURE_SHARE * rtol, reading.numbers,
+            reading.jacobian == "printed", model.kernel, status[block], out[block],
+        )  # fmt: skip
+
+    islands = sum(in_blocks(fill, status.size, BLOCK))
+    missing = _uncovered(status, pairs, model, outside)
+    if missing.size and outside == "exact":
+        try:
+            found = sum_islands(pairs.some(missing), reading, exact_model(rtol), SUM_SHARE * rtol, which=which)
+        except ConvergenceError as fault:
+            mask = np.zeros(status.size, dtype=bool)
+            mask[missing[fault.mask]] = True
+            raise ConvergenceError(str(fault), mask) from fault
+        out[missing] = np.stack(found[:3], axis=-1)
+        islands += found.islands
+    return Totals(out[:, 0], out[:, 1], out[:, 2], islands)
+
+
+@functools.singledispatch
+def slopes_of(
+    model: Any, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise"
+) -> tuple[FloatArray, FloatArray, int]:
+    """Totals with their derivatives (pairs, 2, columns of `sensitivity`), the bound on their error, islands."""
+    raise InputError(f"derivatives come from tier 'universal', {model.name!r} has none")
+
+
+@slopes_of.register
+def _(
+    model: UniversalModel, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise"
+) -> tuple[FloatArray, FloatArray, int]:
+    from mbma_tables.totals import sensitivity
+
+    if outside == "exact":
+        raise InputError("derivatives come from the universal table: outside must be 'raise' or 'nan' with them")
+    count = pairs.compression.size
+    status, bound = np.empty(count, dtype=np.int64), np.empty(count)
+    out = np.empty((count, 2, sensitivity.COLUMNS))
+
+    def fill(block: slice) -> int:
+        hurst, zeta_1, _, compression, peak, _ = pairs.some(block)
+        return sensitivity.fill_totals_with_slopes(
+            hurst, zeta_1, compression, peak, QUADRATURE_SHARE * rtol, reading.numbers,
+            reading.jacobian == "printed", model.kernel, status[block], out[block], bound[block],
+        )  # fmt: skip
+
+    islands = sum(in_blocks(fill, count, SLOPES_BLOCK))
+    out[_uncovered(status, pairs, model, outside)] = np.nan
+    return out, bound, islands
+
+
+def _uncovered(status: NDArray[np.int64], pairs: Pairs, model: UniversalModel, outside: str) -> NDArray[np.intp]:
+    """Pairs that the table does not cover, or an error about them."""
+    if (status == UNRESOLVED).any():
+        raise ConvergenceError("quadrature did not reach its tolerance", status == UNRESOLVED)
+    missing = np.flatnonzero(status != OK)
+    if missing.size and outside == "raise":
+        first = int(missing[0])
+        X, mu = model.content.axes
+        raise OutOfRangeError(
+            f"islands of {missing.size} of {status.size} entries lie outside the universal table "
+            f"({X.low:g} <= X <= {X.high:g}, mu <= {mu.high:g}), the first at hurst = {pairs.hurst[first]:g}, "
+            f"zeta_1 = {pairs.zeta_1[first]:g}, (h_max - d)/h_rms = {pairs.compression[first]:g} "
+            f"({REASONS[status[first]]}); outside='exact' solves these",
+            status != OK,
+        )
+    return missing

@@ -1,100 +1,138 @@
-"""One surface, one gap, in one compiled pass: islands by lookup, Gauss-Kronrod over delta (Eqs. 44-50).
+"""One surface, one gap, in one compiled pass: islands from the universal table, Gauss-Kronrod over delta (Eqs. 44-50).
 
-The same integral as in `contact`, for the universal table. An island costs a few logarithms and exponentials
-instead of a solution; what depends on the surface alone is computed once per surface. No work space is shared.
+An island costs a few logarithms and exponentials instead of a solution; what depends on the surface alone is computed
+once per surface. No work space is shared.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import njit
+from mbma_tables.compiled import REORDER, jitable, njit
 from mbma_tables.islands.geometry import floor_offset
 from mbma_tables.models.protocol import BOTH, FORCE
-from mbma_tables.models.universal_kernel import OK, UNRESOLVED, Axes, universal_one, universal_phi
+from mbma_tables.models.universal_kernel import OK, Table, universal_one, universal_phi
+from mbma_tables.surfaces.readings import ReadingNumbers
 from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, m4_of, summit_rate
-from mbma_tables.totals.intervals import (
-    MOST_INTERVALS,
-    STRETCH,
-    approach_at,
-    error_of,
-    first_intervals,
-    halve,
-    rule_for,
-)
+from mbma_tables.totals.intervals import STRETCH, approach_at, error_of, refine, rule_for
 
 SMALL_POWER = 0.01  # below these, differences of exponentials go through expm1
 SMALL_WIDTH = 0.01
 
-Constants = tuple[float, float, float, float, float, float, float, float, float, float, float, float, float]
-Node = tuple[float, float, float, float, float, float, float]
+
+class SurfaceConstants(NamedTuple):
+    """What islands need of their surface, in units of h_rms, s and 1/q0; a and b are zeta^(-2H) - zeta_1^(-2H)."""
+
+    hurst: float
+    e: float  # zeta_1^(-2H)
+    rms_over_s: float  # h_rms/s = sqrt(1 - e)
+    slope_d: float  # sqrt(a) per x = delta/h_rms below the floor of zeta_d (27)
+    slope_u: float  # sqrt(b) per x below the floor of zeta_u (30)
+    root_floor_d: float  # sqrt(a) at the floor of zeta_d
+    root_floor_u: float  # sqrt(b) at the floor of zeta_u
+    offset_floor_u: float  # b there
+    log_floor_d: float
+    density_divisor: float
+    eta_factor: float
+    kink_d: float  # x at which zeta_d reaches its floor
+    kink_u: float  # x at which zeta_u reaches its floor
+    map_scale: float
+    jacobian: float  # K1 (47) below kink_d
+    offset: bool
+    summit_sigma: bool
 
 
-_LOOSE = {"contract", "reassoc", "arcp"}
+class Node(NamedTuple):
+    """An island at a node of the quadrature."""
+
+    X: float
+    mu: float
+    force: float  # F^i per Phi_F
+    area: float  # A^i per Phi_A
+    h_d: float
+    D_d: float
+    sigma_d: float
+
+
+@jitable
+def island_height(x: Any, h_d: Any, sigma_d: Any, compression: Any, peak: Any, rms_over_s: Any) -> Any:
+    """z'/sigma_d (41) at x = delta/h_rms; z_max is counted down from h_max, so nothing cancels at first contact."""
+    return ((peak - (compression - x)) * rms_over_s - h_d) / sigma_d
+
+
+@jitable
+def island_density(height: Any, D_d: Any, sigma_d: Any) -> Any:
+    """Islands per nominal area and delta/s (42, 43), without K1; of numbers or arrays."""
+    return D_d * np.exp(-0.5 * height * height) / (math.sqrt(2.0 * math.pi) * sigma_d)
+
+
+@jitable
+def jacobian_below(rms_over_s: Any, beta: float, printed: bool, offset: bool) -> Any:
+    """K1 (47) below the kink, or what (46) gives."""
+    return 1.0 - 4.0 / 3.0 * beta / (1.0 if printed else rms_over_s) if printed or offset else 1.0
 
 
 @njit(cache=True, error_model="numpy")
 def surface_constants(
-    hurst: float, zeta_1: float, reading: tuple[float, float, float, float, float, bool, bool]
-) -> Constants:
-    """What an island needs of its surface: powers, floors, eta's factor, and where the floors are reached."""
-    divisor, beta, phi, floor_d, floor_u, _, _ = reading
+    hurst: float, zeta_1: float, reading: ReadingNumbers, printed: bool, zeta_eta: float
+) -> SurfaceConstants:
+    """The constants of a surface; `printed` is of the reading's Jacobian.
+
+    At the floor of zeta_u, eta rises with the root of b of a surface with `zeta_eta`: another number than zeta_1 is
+    for derivatives, which take that root apart.
+    """
+    phi = reading.phi
     log_zeta_1 = math.log(zeta_1)
-    e = math.exp(-2.0 * hurst * log_zeta_1)
-    room = math.sqrt(-math.expm1(-2.0 * hurst * log_zeta_1))
-    share_a = 4.0 / 3.0 * beta
-    share_b = phi / (1.0 + phi) * room
-    root_top_a = math.sqrt(floor_offset(hurst, zeta_1, floor_d))
-    root_top_b = math.sqrt(floor_offset(hurst, zeta_1, floor_u))
-    m4_all = m4_of(hurst, 0.0, log_zeta_1)
-    D_top = summit_rate(hurst, 0.0, log_zeta_1) / divisor
-    R_top = RADIUS / math.sqrt(m4_all)
-    eta = 0.75 * (math.pi * D_top) ** (1.0 / 3.0) * (1.5 * R_top) ** (2.0 / 3.0) * phi ** (-1.0 / 3.0)
-    return (
+    rms_over_s = math.sqrt(-math.expm1(-2.0 * hurst * log_zeta_1))
+    slope_d = 4.0 / 3.0 * reading.beta
+    slope_u = phi / (1.0 + phi) * rms_over_s
+    root_floor_d = math.sqrt(floor_offset(hurst, zeta_1, reading.floor_d))
+    root_floor_u = math.sqrt(floor_offset(hurst, zeta_eta, reading.floor_u))
+    D_top = summit_rate(hurst, 0.0, log_zeta_1) / reading.density_divisor
+    R_top = RADIUS / math.sqrt(m4_of(hurst, 0.0, log_zeta_1))
+    return SurfaceConstants(
         hurst,
-        e,
-        room,
-        share_a,
-        share_b,
-        root_top_a,
-        root_top_b,
-        math.log(floor_d),
-        divisor,
-        eta,
-        root_top_a / share_a,
-        root_top_b / share_b,
+        math.exp(-2.0 * hurst * log_zeta_1),
+        rms_over_s,
+        slope_d,
+        slope_u,
+        root_floor_d,
+        root_floor_u,
+        floor_offset(hurst, zeta_1, reading.floor_u),
+        math.log(reading.floor_d),
+        reading.density_divisor,
+        0.75 * (math.pi * D_top) ** (1.0 / 3.0) * (1.5 * R_top) ** (2.0 / 3.0) * phi ** (-1.0 / 3.0),
+        root_floor_d / slope_d,
+        root_floor_u / slope_u,
         STRETCH * math.exp(-hurst * log_zeta_1),
+        jacobian_below(rms_over_s, reading.beta, printed, reading.offset),
+        reading.offset,
+        reading.summit_sigma,
     )
 
 
-@njit(cache=True, error_model="numpy")
-def jacobian_below(surface: Constants, printed: bool, offset: bool) -> float:
-    """K1 (47) below the kink."""
-    return 1.0 - surface[3] / (1.0 if printed else surface[2]) if printed or offset else 1.0
+@njit(cache=True, fastmath=REORDER, error_model="numpy", forceinline=True)
+def island_node(x: float, floor_d: bool, floor_u: bool, surface: SurfaceConstants, which: int = BOTH) -> Node:
+    """The island at delta = x h_rms; `floor_d`, `floor_u`: whether zeta_d (27), zeta_u (30) are at their floors.
 
-
-@njit(cache=True, fastmath=_LOOSE, error_model="numpy")
-def island_node(
-    x: float, floor_d: bool, floor_u: bool, surface: Constants, offset: bool, summits: bool, which: int = BOTH
-) -> Node:
-    """(X, mu, F_hat per Phi_F, A^i per Phi_A with eta, h_d, D_d, sigma_d) at delta = x h_rms.
-
-    `floor_d` and `floor_u` say whether zeta_d (27) and zeta_u (30) stand at their floors. The arithmetic of
-    `islands.geometry`, rearranged: one logarithm and one exponential for each end of the band. The area's factor is
-    NaN where `which` is FORCE.
+    The arithmetic of `islands.geometry`, rearranged: one logarithm and one exponential for each end of the band. The
+    area's factor is NaN where `which` is FORCE.
     """
-    H, e, room, share_a, share_b, top_a, top_b, log_fd, divisor, eta_factor, _, _, _ = surface
+    H, e = surface.hurst, surface.e
     p2, p4, over_2H = 2.0 - 2.0 * H, 4.0 - 2.0 * H, 0.5 / H
-    root_a = top_a if floor_d else share_a * x
-    root_b = top_b if floor_u else share_b * x
-    a, b = root_a * root_a, root_b * root_b
-    m0 = (root_a - root_b) * (root_a + root_b)
+    root_a = surface.root_floor_d if floor_d else surface.slope_d * x
+    root_b = surface.root_floor_u if floor_u else surface.slope_u * x
+    a = root_a * root_a
+    b = surface.offset_floor_u if floor_u else root_b * root_b
+    # both shrink with x below the floors, where the difference of squares would cancel
+    m0 = a - b if floor_u else (root_a - root_b) * (root_a + root_b)
     # only the width needs its relative digits
-    log_d = log_fd if floor_d else -math.log(e + a) * over_2H
+    log_d = surface.log_floor_d if floor_d else -math.log(e + a) * over_2H
     width = math.log1p(m0 / (e + b)) * over_2H
     # p (zeta^p - 1)/p over [1, zeta_d] and over the band, for p = 4 - 2H and p = 2 - 2H; zeta_d^(-2H) = e + a
     square = math.exp(2.0 * log_d)
@@ -114,129 +152,81 @@ def island_node(
         band4 = top4 * math.expm1(p4 * width)
     # m2 = H below2, m4 = (3 H/4 p4) below4, alpha = m0 m4/m2^2
     rate = 0.75 / p4
-    tilt = BROADENING * H / rate if summits else 0.0
-    D = rate / divisor * (band4 / band2)
-    D_d = rate / divisor * (below4 / below2)
+    tilt = BROADENING * H / rate if surface.summit_sigma else 0.0
+    D = rate / surface.density_divisor * (band4 / band2)
+    D_d = rate / surface.density_divisor * (below4 / below2)
     sigma = math.sqrt(m0 - tilt * band2 * band2 / band4)
     sigma_d = math.sqrt(1.0 - (e + a) - tilt * below2 * below2 / below4)
     radius = RADIUS / math.sqrt(rate * H)
     R_d = radius / math.sqrt(below4)
     R_u = radius / math.sqrt(below4 + band4)
-    h_d = root_a if offset else 0.0
+    h_d = root_a if surface.offset else 0.0
     both = R_u * R_d
     force = sigma * math.sqrt(2.0 * R_d * sigma)
     mu = 8.0 / 3.0 * D * sigma * math.sqrt(2.0 * both)
     area = math.nan
     if which != FORCE:
-        area = 2.0 * math.pi * eta_factor * np.cbrt(root_b / R_u) * D * both * sigma * sigma
-    return (room * x - h_d) / sigma, mu, force, area, h_d, D_d, sigma_d
+        area = 2.0 * math.pi * surface.eta_factor * np.cbrt(root_b / R_u) * D * both * sigma * sigma
+    return Node((surface.rms_over_s * x - h_d) / sigma, mu, force, area, h_d, D_d, sigma_d)
 
 
-@njit(cache=True, fastmath=_LOOSE, error_model="numpy")
+@njit(cache=True, fastmath=REORDER, error_model="numpy")
 def _rule(
     which: int,
     low: float,
     high: float,
     floor_d: bool,
     floor_u: bool,
-    reach: float,
-    top: float,
-    surface: Constants,
-    flags: tuple[bool, bool],
-    table: FloatArray,
-    errors: FloatArray,
-    axes: Axes,
-) -> tuple[int, float, float, float, float, int]:
-    """One Kronrod rule over an interval: status, force, area, their relative error, the table's, and its nodes.
-
-    Where `which` is FORCE or AREA, that one stands in the place of both.
-    """
-    scale, room = surface[12], surface[2]
+    compression: float,
+    peak: float,
+    surface: SurfaceConstants,
+    near: None,
+    table: Table,
+    part: FloatArray,
+) -> tuple[int, float, float, int]:
+    """One Kronrod rule over an interval, see `refine`. Where `which` is FORCE or AREA, that one is both rows."""
     nodes, kronrod, gauss = rule_for(low, high, floor_d)
     half, centre = 0.5 * (high - low), 0.5 * (high + low)
-    force = area = gauss_force = gauss_area = doubt = 0.0
+    rms_over_s = surface.rms_over_s
+    force = area = gauss_force = gauss_area = table_error = 0.0
     for k in range(nodes.size):
-        x, stretch = approach_at(centre + half * nodes[k], floor_d, scale)
-        X, mu, per_F, per_A, h_d, D_d, sigma_d = island_node(x, floor_d, floor_u, surface, flags[0], flags[1], which)
-        height = ((top - (reach - x)) * room - h_d) / sigma_d
-        # d(delta/s) = room dx
-        weight = D_d * math.exp(-0.5 * height * height) / (math.sqrt(2.0 * math.pi) * sigma_d) * room * stretch * half
+        x, stretch = approach_at(centre + half * nodes[k], floor_d, surface.map_scale)
+        node = island_node(x, floor_d, floor_u, surface, which)
+        height = island_height(x, node.h_d, node.sigma_d, compression, peak, rms_over_s)
+        # d(delta/s) = rms_over_s dx
+        weight = island_density(height, node.D_d, node.sigma_d) * rms_over_s * stretch * half
         if which == BOTH:
-            status, phi_F, phi_A, error = universal_phi(X, mu, table, errors, axes)
-            f, g = per_F * phi_F * weight, per_A * phi_A * weight
+            status, phi_F, phi_A, error = universal_phi(node.X, node.mu, table)
+            f, g = node.force * phi_F * weight, node.area * phi_A * weight
         else:
-            status, phi, error = universal_one(which, X, mu, table, errors, axes)
-            f = g = (per_F if which == FORCE else per_A) * phi * weight
+            status, phi, error = universal_one(which, node.X, node.mu, table)
+            f = g = (node.force if which == FORCE else node.area) * phi * weight
         if status != OK:
-            return status, math.nan, math.nan, math.nan, math.nan, nodes.size
+            return status, math.nan, math.nan, nodes.size
         force += kronrod[k] * f
         area += kronrod[k] * g
         gauss_force += gauss[k] * f
         gauss_area += gauss[k] * g
-        doubt = max(doubt, error)
+        table_error = max(table_error, error)
+    part[0, 0], part[1, 0] = force, area
     if not (force > 0.0 and area > 0.0):
-        return OK, force, area, 0.0, doubt, nodes.size
-    return OK, force, area, error_of(force, gauss_force, area, gauss_area), doubt, nodes.size
+        return OK, 0.0, table_error, nodes.size
+    return OK, error_of(force, gauss_force, area, gauss_area), table_error, nodes.size
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def total(
-    which: int,
-    reach: float,
-    top: float,
-    rtol: float,
-    surface: Constants,
-    jacobian: float,
-    flags: tuple[bool, bool],
-    table: FloatArray,
-    errors: FloatArray,
-    axes: Axes,
+    which: int, compression: float, peak: float, rtol: float, surface: SurfaceConstants, table: Table
 ) -> tuple[int, float, float, float, int]:
     """Status, F/(A0 E* q0 s), A/A0, the bound on their relative error, and the islands evaluated.
 
-    The gap is (h_max - d)/h_rms = reach. Where `which` is FORCE or AREA, that one stands in the place of both.
+    `compression` is (h_max - d)/h_rms, `peak` h_max/h_rms. Where `which` is FORCE or AREA, that one is given as both.
     """
-    if not reach > 0.0:
+    if not compression > 0.0:
         return OK, 0.0, 0.0, 0.0, 0
-    islands = 0
-    bounds = np.empty((MOST_INTERVALS, 2))
-    parts = np.empty((MOST_INTERVALS, 3))
-    floors = np.empty((MOST_INTERVALS, 2), dtype=np.bool_)
-    fresh = np.ones(MOST_INTERVALS, dtype=np.bool_)
-    count = first_intervals(reach, surface[10], surface[11], surface[12], bounds, floors)
-    doubt = 0.0
-    while True:
-        force = area = force_error = area_error = 0.0
-        for k in range(count):
-            if fresh[k]:
-                status, f, g, error, own, nodes = _rule(
-                    which, bounds[k, 0], bounds[k, 1], floors[k, 0], floors[k, 1],
-                    reach, top, surface, flags, table, errors, axes,
-                )  # fmt: skip
-                islands += nodes
-                if status != OK:
-                    return status, math.nan, math.nan, math.nan, islands
-                K1 = 1.0 if floors[k, 0] else jacobian
-                parts[k, 0], parts[k, 1], parts[k, 2] = K1 * f, K1 * g, error
-                fresh[k] = False
-                doubt = max(doubt, own)
-            force += parts[k, 0]
-            area += parts[k, 1]
-            force_error += parts[k, 0] * parts[k, 2]
-            area_error += parts[k, 1] * parts[k, 2]
-        if not (force > 0.0 and area > 0.0):
-            return OK, force, area, 0.0, islands
-        if force_error <= rtol * force and area_error <= rtol * area:
-            return OK, force, area, max(force_error / force, area_error / area) + doubt, islands
-        present = count
-        for k in range(present):
-            share = present * parts[k, 2]
-            if parts[k, 0] * share > rtol * force or parts[k, 1] * share > rtol * area:
-                if count == MOST_INTERVALS:
-                    return UNRESOLVED, force, area, math.nan, islands
-                halve(k, count, bounds, floors)
-                fresh[k] = True
-                count += 1
+    out = np.full((2, 1), math.nan)
+    status, error, islands = refine(_rule, which, compression, peak, rtol, surface, None, table, out)
+    return status, out[0, 0], out[1, 0], error, islands
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -244,26 +234,21 @@ def fill_totals(
     which: int,
     hurst: FloatArray,
     zeta_1: FloatArray,
-    reach: FloatArray,
-    top: FloatArray,
+    compression: FloatArray,
+    peak: FloatArray,
     rtol: float,
-    reading: tuple[float, float, float, float, float, bool, bool],
+    reading: ReadingNumbers,
     printed: bool,
-    table: FloatArray,
-    errors: FloatArray,
-    axes: Axes,
+    table: Table,
     status: NDArray[np.int64],
     out: FloatArray,
 ) -> int:
-    """`total` of each pair into the columns of `out` (3, pairs); returns the islands evaluated."""
+    """`total` of each pair into the rows of `out` (pairs, 3); returns the islands evaluated."""
     islands = 0
-    surface = surface_constants(hurst[0], zeta_1[0], reading)
-    for k in range(reach.size):
+    surface = surface_constants(hurst[0], zeta_1[0], reading, printed, zeta_1[0])
+    for k in range(compression.size):
         if k > 0 and (hurst[k] != hurst[k - 1] or zeta_1[k] != zeta_1[k - 1]):
-            surface = surface_constants(hurst[k], zeta_1[k], reading)
-        jacobian = jacobian_below(surface, printed, reading[5])
-        status[k], out[0, k], out[1, k], out[2, k], own = total(
-            which, reach[k], top[k], rtol, surface, jacobian, (reading[5], reading[6]), table, errors, axes
-        )
-        islands += own
+            surface = surface_constants(hurst[k], zeta_1[k], reading, printed, zeta_1[k])
+        status[k], out[k, 0], out[k, 1], out[k, 2], count = total(which, compression[k], peak[k], rtol, surface, table)
+        islands += count
     return islands

@@ -16,18 +16,29 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, finite_array, number_in, require
-from mbma_tables.errors import ConvergenceError, InputError
+from mbma_tables.arguments import FloatArray, finite_array, is_labelled, number_in, require
+from mbma_tables.compiled import in_blocks
+from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
+from mbma_tables.models import AnyModel, get_model
+from mbma_tables.models.protocol import MAX_RTOL, MIN_RTOL
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.totals import law_kernel
-from mbma_tables.totals.contact import contact
-from mbma_tables.totals.pairs import kinks
+from mbma_tables.totals.island_sum import Pairs, kinks, totals_of
 
 TERMS = law_kernel.TERMS
-MOST_PIECES = 400
-SAMPLES = 24  # places a piece where the polynomial is held against fresh totals, and its slope looked at
-LEAST_RTOL = 1e-9
+MAX_PIECES = 400
+SAMPLES = 24  # places a piece where the polynomial is compared with fresh totals, and its slope looked at
+MIN_LAW_RTOL = 1e-9
+RESOLVED = 1e-3  # a polynomial this close is one whose error the samples see
+BLOCK = 1 << 16  # gaps between two looks for Ctrl-C
+QUANTITIES = {
+    "force": law_kernel.FORCE,
+    "area": law_kernel.AREA,
+    "stiffness": law_kernel.FORCE_SLOPE,
+    "area_slope": law_kernel.AREA_SLOPE,
+    "energy": law_kernel.ENERGY,
+}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -46,6 +57,15 @@ class ContactLaw:
         What made it.
     breaks, pieces, layer, energies, errors : ndarray or float
         The polynomials: ends of the pieces in tau, coefficients, unit of l, energy at the ends, bounds on their errors.
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, contact_law
+    >>> law = contact_law(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0), E_star=100e3)  # um, MPa
+    >>> round(float(law.force(1.0)), 4), round(float(law.separation(force=7.9825)), 4)
+    (7.9825, 1.0)
+    >>> round(float(law.stiffness_mean(1.0)), 3)  # -dF/du [MPa/um]
+    31.809
     """
 
     h_max: float
@@ -62,21 +82,29 @@ class ContactLaw:
     errors: FloatArray
 
     @functools.cached_property
-    def _state(self) -> law_kernel.State:
-        return self.breaks, self.pieces, self.layer, self.h_max, self.E_star
+    def _law(self) -> law_kernel.Law:
+        return law_kernel.Law(self.breaks, self.pieces, self.energies, self.layer, self.h_max, self.E_star)
+
+    @functools.cached_property
+    def _plain(self) -> tuple[Any, ...]:
+        return tuple(self._law)
+
+    def _gaps(self, separation: ArrayLike) -> FloatArray:
+        d = finite_array("separation", separation)
+        require("separation", d, d >= -self.h_max, f"at least -h_max = {-self.h_max:.17g}, where the model ends")
+        return d
 
     def _map(self, what: int, gap: Any) -> Any:
         if type(gap) is float and -self.h_max <= gap < math.inf:
-            return law_kernel.evaluate(what, gap, self._state, self.energies)
-        if hasattr(gap, "dims"):
+            return law_kernel.evaluate(what, gap, self._plain)
+        if is_labelled(gap):
             from mbma_tables.labels import apply
 
             return apply(lambda block: self._map(what, block), (gap,), 1)
-        d = finite_array("separation", gap)
-        require("separation", d, d >= -self.h_max, f"at least -h_max = {-self.h_max:.17g}, where the model ends")
-        out = np.empty(d.shape)
-        law_kernel.fill(what, np.ascontiguousarray(d).reshape(-1), self._state, self.energies, out.reshape(-1))
-        return out[()]
+        d = self._gaps(gap)
+        flat, out = np.ascontiguousarray(d).reshape(-1), np.empty(d.size)
+        in_blocks(lambda block: law_kernel.fill(what, flat[block], self._plain, out[block]), d.size, BLOCK)
+        return out.reshape(d.shape)[()]
 
     def __call__(self, separation: ArrayLike) -> Any:
         """The same as `force`."""
@@ -114,59 +142,62 @@ class ContactLaw:
         OutOfRangeError
             Where the branch does not reach the value; the message says how far it goes.
         """
-        given = area if force is None else force
-        if (force is None or area is None) and hasattr(given, "dims"):
+        if (force is None) == (area is None):
+            raise InputError("give force or area, one of them")
+        name = "area" if force is None else "force"
+        given: Any = area if force is None else force
+        if is_labelled(given):
             from mbma_tables.labels import apply
 
-            kind = "area" if force is None else "force"
-            return apply(lambda block: self.separation(**{kind: block}), (given,), 1)
-        if force is not None and area is None:
-            what, name, wanted = law_kernel.FORCE, "force", finite_array("force", force)
-        elif area is not None and force is None:
-            what, name, wanted = law_kernel.AREA, "area", finite_array("area", area)
-        else:
-            raise InputError("give force or area, one of them")
+            return apply(lambda block: self.separation(**{name: block}), (given,), 1)
+        what, wanted = QUANTITIES[name], finite_array(name, given)
         end = self._branch_end(what)
-        most = float(self._map(what, end))
+        largest = float(self._map(what, end))
         require(name, wanted, wanted >= 0, "at least 0")
-        require(name, wanted, wanted <= most, f"at most {most:.6g}, at d = {end:.6g} where the branch ends")
-        out = np.empty(wanted.shape)
-        law_kernel.invert(what, np.ascontiguousarray(wanted).reshape(-1), end, self._state, out.reshape(-1))
-        if np.isnan(out).any():
-            raise ConvergenceError(f"no gap found for some of {name}", np.isnan(out))
-        return out[()]
+        require(name, wanted, wanted <= largest, f"at most {largest:.6g}, at d = {end:.6g} where the branch ends")
+        flat, out = np.ascontiguousarray(wanted).reshape(-1), np.empty(wanted.size)
+        in_blocks(lambda block: law_kernel.invert(what, flat[block], end, self._law, out[block]), out.size, BLOCK)
+        gap = out.reshape(wanted.shape)
+        if np.isnan(gap).any():
+            raise ConvergenceError(f"no gap found for some of {name}", np.isnan(gap))
+        return gap[()]
 
     def slope_error(self, separation: ArrayLike) -> Any:
         """Bound on the error of `stiffness` over F/l, and of `area_slope` over A/l, where l = h_max - d.
 
-        By Markov's inequality in the piece where d is: a residue of degree TERMS has slopes up to TERMS^2 times itself.
+        Of the value's own error, and of the logarithm's slope by Markov's inequality in the piece where d is: a
+        residue of degree TERMS has slopes up to TERMS^2 times itself.
         """
-        d = finite_array("separation", separation)
-        require("separation", d, d >= -self.h_max, f"at least -h_max = {-self.h_max:.17g}, where the model ends")
+        d = self._gaps(separation)
         tau = np.arcsinh(np.sqrt(np.maximum(self.h_max - d, 0.0) / self.layer))
         # on a break, the worse of both pieces
-        sides = (np.searchsorted(self.breaks, tau, side) - 1 for side in ("left", "right"))
-        loss = TERMS**2 / np.diff(self.breaks)
-        worst = np.maximum(*((self.errors * loss)[np.clip(side, 0, loss.size - 1)] for side in sides))
+        sides = [np.searchsorted(self.breaks, tau, side) - 1 for side in ("left", "right")]
+        pieces = [np.clip(side, 0, self.errors.size - 1) for side in sides]
+        value, slope = (
+            np.maximum(*(errors[piece] for piece in pieces))
+            for errors in (self.errors, self.errors * TERMS**2 / np.diff(self.breaks))
+        )
+        steepest = np.maximum(
+            *(np.abs(self._map(what, d)) for what in (law_kernel.FORCE_LOG_SLOPE, law_kernel.AREA_LOG_SLOPE))
+        )
         # l dtau/dl = tanh(tau)/2
-        return np.where(d < self.h_max, worst * np.tanh(tau), 0.0)[()]
+        return np.where(d < self.h_max, value * steepest + (1 + value) * slope * np.tanh(tau), 0.0)[()]
 
     def _branch_end(self, what: int) -> float:
         turn = self.turning_point if what == law_kernel.FORCE else self.area_turning_point
         return -self.h_max if turn is None else turn
 
     def compiled(self, name: str = "force") -> Any:
-        """A numba-compiled function of one float, for use in other compiled code: "force", "area", "stiffness"."""
-        codes = {
-            "force": law_kernel.FORCE,
-            "area": law_kernel.AREA,
-            "stiffness": law_kernel.FORCE_SLOPE,
-            "area_slope": law_kernel.AREA_SLOPE,
-            "energy": law_kernel.ENERGY,
-        }
-        if name not in codes:
-            raise InputError(f"name must be one of {tuple(codes)}, got {name!r}")
-        return law_kernel.bind(codes[name], self._state, self.energies)
+        """A numba-compiled function of one float, for use in other compiled code: "force", "area", "stiffness"...
+
+        It is compiled on the first call, and stays in memory, about 3 MB, until the process ends.
+        """
+        if name not in QUANTITIES:
+            raise InputError(f"name must be one of {tuple(QUANTITIES)}, got {name!r}")
+        made = self.__dict__.setdefault("_compiled", {})
+        if name not in made:
+            made[name] = law_kernel.bind(QUANTITIES[name], self._law)
+        return made[name]
 
     def __getstate__(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
@@ -185,11 +216,11 @@ def _to_piece(values: FloatArray) -> FloatArray:
 def contact_law(
     surface: Surface,
     rtol: float = 1e-8,
-    tier: str = "universal",
+    tier: str | AnyModel = "universal",
     reading: str | Reading = "reported",
     E_star: float = 1.0,
 ) -> ContactLaw:
-    """Freeze a surface into F(d) and A(d).
+    """Force and area of one surface as functions of its gap: the way to answer many gaps, and to invert.
 
     Parameters
     ----------
@@ -198,7 +229,7 @@ def contact_law(
     rtol : float
         Relative error asked of the polynomials against the tier's totals, in [1e-9, 0.1].
     tier, reading, E_star
-        As for `contact`.
+        As for `contact`; `tier` may be an island model of one's own.
 
     Returns
     -------
@@ -207,41 +238,78 @@ def contact_law(
     Raises
     ------
     InputError, OutOfRangeError, ConvergenceError
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, contact_law
+    >>> law = contact_law(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0), rtol=1e-6)
+    >>> f"{law.force(1.0):.4g}"
+    '7.982e-05'
+    >>> law.error < 2e-6
+    True
     """
     if surface.labelled:
         surface = Surface(*(np.asarray(getattr(surface, name)) for name in PARAMETERS))
     if surface.shape != ():
         raise InputError(f"a law is of one surface, got a batch of shape {surface.shape}")
-    asked = number_in("rtol", rtol, LEAST_RTOL, 0.1)
+    asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
     modulus = number_in("E_star", E_star, np.finfo(float).tiny, np.finfo(float).max)
-    rule = get_reading(reading)
+    choice = get_reading(reading)
+    if not surface.zeta_1 > choice.floor_u:
+        raise OutOfRangeError(f"q1/q0 must be greater than {choice.floor_u:g}, the reading's floor of zeta_u")
+    inner = max(0.1 * asked, MIN_RTOL)
+    model = get_model(tier, inner, choice)
     h_rms, h_max = float(surface.h_rms), float(surface.h_max)
     layer = h_rms * float(surface.zeta_1) ** -float(surface.hurst)
     # totals are asked for at E* = 1: the modulus scales what comes out
-    inner = max(0.1 * asked, 1e-11)
+    log_stress = math.log(float(surface.q0)) + math.log(float(surface.s))
     worst = 0.0
 
     def residues(tau: FloatArray) -> FloatArray:
         nonlocal worst
         depth = layer * np.sinh(tau) ** 2
-        answer = contact(surface, h_max - depth, tier=tier, reading=rule, rtol=inner)
-        worst = max(worst, float(np.max(answer.error)))
-        # the gap as it was rounded is what the totals are of
-        own = h_max - answer.separation
-        return np.stack([np.log(answer.force / own**3.5), np.log(answer.area / own ** (10 / 3))], axis=-1)
+        found = totals_of(model, Pairs.of(surface, depth), choice, inner)
+        worst = max(worst, float(np.max(found.error)))
+        force, area = found.force.reshape(tau.shape), found.area.reshape(tau.shape)
+        if not (force.all() and area.all()):
+            raise OutOfRangeError(f"h_max is {h_max / h_rms:g} h_rms, so high that force or area underflow")
+        log_depth = np.log(depth)
+        return np.stack([np.log(force) + log_stress - 3.5 * log_depth, np.log(area) - 10 / 3 * log_depth], axis=-1)
 
     def to_tau(depth: Any) -> Any:
         return np.arcsinh(np.sqrt(np.asarray(depth) / layer))
 
-    ends = [k * h_rms for k in kinks(surface.hurst, surface.zeta_1, rule)]
+    ends = [k * h_rms for k in kinks(surface.hurst, surface.zeta_1, choice)]
     edges = to_tau(sorted({0.0, *(e for e in ends if e < 2 * h_max), 2 * h_max}))
+    breaks, pieces, errors = _fit(residues, edges, min(asked, RESOLVED))
+    errors += worst
+    law = law_kernel.Law(breaks, pieces, np.empty(breaks.size), layer, h_max, modulus)
+    law_kernel.fill_energies(law)
+    return ContactLaw(
+        h_max=h_max,
+        E_star=modulus,
+        error=float(errors.max()),
+        turning_point=law_kernel.turning_point(law_kernel.FORCE, law, SAMPLES),
+        area_turning_point=law_kernel.turning_point(law_kernel.AREA, law, SAMPLES),
+        reading=choice.name,
+        tier=model.name,
+        breaks=breaks,
+        pieces=pieces,
+        layer=layer,
+        energies=law.energies,
+        errors=errors,
+    )
+
+
+def _fit(residues: Any, edges: FloatArray, rtol: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Breaks, pieces and bounds on their errors: polynomials of `residues` between `edges`, halved until they fit."""
     low, high = edges[:-1], edges[1:]
     points = chebyshev.chebpts1(TERMS)
     tests = np.cos(np.pi * (np.arange(SAMPLES) + 0.5) / SAMPLES)[::-1]
     kept: list[tuple[float, float, FloatArray, float]] = []
     while low.size:
-        if len(kept) + low.size > MOST_PIECES:
-            raise ConvergenceError(f"the law needs more than {MOST_PIECES} pieces for {asked:.1e}", np.array(True))
+        if len(kept) + low.size > MAX_PIECES:
+            raise ConvergenceError(f"the law needs more than {MAX_PIECES} pieces for {rtol:.1e}", np.array(True))
         middle, half = (low + high)[:, None] / 2, (high - low)[:, None] / 2
         fitted = _to_piece(residues(middle + half * points))
         truth = residues(middle + half * tests)
@@ -249,26 +317,10 @@ def contact_law(
         seen = np.abs(np.einsum("sm,pmc->psc", powers, fitted) - truth).max(axis=(1, 2))
         # Ehlich and Zeller (1964): no polynomial of degree TERMS exceeds its values at the samples by more
         error = np.expm1(seen / math.cos(math.pi * TERMS / (2 * SAMPLES)))
-        good = error <= asked
+        good = error <= rtol
         kept += zip(low[good].tolist(), high[good].tolist(), fitted[good], error[good].tolist(), strict=True)
         cut = (low[~good] + high[~good]) / 2
         low, high = np.concatenate([low[~good], cut]), np.concatenate([cut, high[~good]])
     kept.sort(key=lambda piece: piece[0])
     breaks = np.array([kept[0][0], *(piece[1] for piece in kept)])
-    pieces = np.stack([piece[2] for piece in kept])
-    errors = np.array([piece[3] for piece in kept]) + worst
-    state = (breaks, pieces, layer, h_max, modulus)
-    return ContactLaw(
-        h_max=h_max,
-        E_star=modulus,
-        error=float(errors.max()),
-        turning_point=law_kernel.turning_point(law_kernel.FORCE, state, SAMPLES),
-        area_turning_point=law_kernel.turning_point(law_kernel.AREA, state, SAMPLES),
-        reading=rule.name,
-        tier=tier,
-        breaks=breaks,
-        pieces=pieces,
-        layer=layer,
-        energies=law_kernel.energies(state),
-        errors=errors,
-    )
+    return breaks, np.stack([piece[2] for piece in kept]), np.array([piece[3] for piece in kept])

@@ -1,244 +1,214 @@
 """Totals through the universal table with their derivatives in the gap and in the surface, in one compiled pass.
 
-F/(A0 E* q0 s) and A/A0 are functions of four numbers: H, log(zeta_1), reach = (h_max - d)/h_rms and top = h_max/h_rms.
-The last two enter through the Gaussian and the upper limit, in closed form. H and zeta_1 enter through an island's
-geometry, differenced centrally where it is cheap, and through the table's own slopes in X and mu.
+F/(A0 E* q0 s) and A/A0 are functions of four numbers: H, log(zeta_1), (h_max - d)/h_rms and h_max/h_rms. The last two
+enter through the Gaussian and the upper limit, in closed form. H and zeta_1 enter through an island's geometry,
+differenced centrally where it is cheap, and through the table's own slopes in X and mu.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import njit
-from mbma_tables.models.universal_kernel import OK, UNRESOLVED, Axes, universal_phi, universal_slopes
-from mbma_tables.totals.intervals import MOST_INTERVALS, approach_at, error_of, first_intervals, halve, rule_for
-from mbma_tables.totals.kernel import Constants, island_node, jacobian_below, surface_constants
+from mbma_tables.models.protocol import BOTH
+from mbma_tables.models.universal_kernel import OK, Table, universal_phi, universal_slopes
+from mbma_tables.surfaces.readings import ReadingNumbers
+from mbma_tables.totals.intervals import approach_at, error_of, refine, rule_for
+from mbma_tables.totals.kernel import (
+    SurfaceConstants,
+    island_density,
+    island_height,
+    island_node,
+    surface_constants,
+)
 
 STEP = 1e-5  # of H and log(zeta_1): central differences err by its square, about 1e-10
-SHARE = 3e-4  # of the way to the floor of zeta_u, where eta rises like a sixth root
-BY_HURST, BY_LOG_ZETA, BY_REACH, BY_TOP = range(4)
-Numbers = tuple[float, float, float, float, float, bool, bool]
-Four = tuple[Constants, Constants, Constants, Constants]
+SHARE_D, SHARE_U = 0.1, 0.03  # at most, of the way of log(zeta_1) to the floors; to that of zeta_u in narrow steps
+FAR = 1000.0  # in changes of b: an island whose a is larger does not notice how near the floor of zeta_u is
+# columns of force and area: the total, its derivatives, and what of it lies below the floor of zeta_d
+BY_HURST, BY_LOG_ZETA, BY_COMPRESSION, BY_PEAK, BELOW_KINK = range(1, 6)
+COLUMNS = 6
+
+
+class Neighbours(NamedTuple):
+    """The surfaces a step of H, of log(zeta_1), and a narrow step of log(zeta_1) up and down.
+
+    At the floor of zeta_u, eta rises like the sixth root of b = floor^(-2H) - zeta_1^(-2H), too steeply to be
+    differenced near zeta_1 = floor: neighbours in zeta_1 keep the root of their surface, whose slope has a closed form.
+    """
+
+    up: tuple[SurfaceConstants, SurfaceConstants, SurfaceConstants]
+    down: tuple[SurfaceConstants, SurfaceConstants, SurfaceConstants]
+    rate: tuple[float, float, float]  # 1 over twice the step
+    log_eta: tuple[float, float]  # what the difference of log(eta) leaves out at the floor of zeta_u
+    narrow_below: float  # delta/h_rms up to which islands at the floor of zeta_u take narrow steps
+
+
+@njit(cache=True, error_model="numpy")
+def neighbours(hurst: float, zeta_1: float, reading: ReadingNumbers, printed: bool) -> Neighbours:
+    """The neighbours of a surface."""
+    step = min(STEP, SHARE_D * math.log(zeta_1 / reading.floor_d))
+    narrow = min(step, SHARE_U * math.log1p((zeta_1 - reading.floor_u) / reading.floor_u))
+    high, low = zeta_1 * math.exp(step), zeta_1 / math.exp(step)
+    near_high, near_low = zeta_1 * math.exp(narrow), zeta_1 / math.exp(narrow)
+    own = surface_constants(hurst, zeta_1, reading, printed, zeta_1)
+    above = surface_constants(hurst, high, reading, printed, zeta_1)
+    return Neighbours(
+        (
+            surface_constants(hurst + STEP, zeta_1, reading, printed, zeta_1),
+            above,
+            surface_constants(hurst, near_high, reading, printed, zeta_1),
+        ),
+        (
+            surface_constants(hurst - STEP, zeta_1, reading, printed, zeta_1),
+            surface_constants(hurst, low, reading, printed, zeta_1),
+            surface_constants(hurst, near_low, reading, printed, zeta_1),
+        ),
+        (0.5 / STEP, 1.0 / math.log(high / low), 1.0 / math.log(near_high / near_low)),
+        (0.0, hurst * own.e / (3.0 * own.offset_floor_u)),
+        math.sqrt(FAR * (above.offset_floor_u - own.offset_floor_u)) / own.slope_d,
+    )
 
 
 @njit(cache=True, error_model="numpy")
 def _integrand(
-    x: float,
-    floor_d: bool,
-    floor_u: bool,
-    reach: float,
-    top: float,
-    surface: Constants,
-    flags: tuple[bool, bool],
-    table: FloatArray,
-    errors: FloatArray,
-    axes: Axes,
+    x: float, compression: float, peak: float, surface: SurfaceConstants, table: Table
 ) -> tuple[int, float, float]:
-    """Status and the integrands of force and area over x = delta/h_rms, without K1."""
-    X, mu, per_F, per_A, h_d, D_d, sigma_d = island_node(x, floor_d, floor_u, surface, flags[0], flags[1])
-    status, phi_F, phi_A, _ = universal_phi(X, mu, table, errors, axes)
-    height = ((top - (reach - x)) * surface[2] - h_d) / sigma_d
-    weight = D_d * math.exp(-0.5 * height * height) / (math.sqrt(2.0 * math.pi) * sigma_d) * surface[2]
-    return status, per_F * phi_F * weight, per_A * phi_A * weight
+    """Status and the integrands of force and area over x = delta/h_rms, at the floor of zeta_d or next to it."""
+    floor_d = x >= surface.kink_d
+    node = island_node(x, floor_d, x > surface.kink_u, surface)
+    status, phi_F, phi_A, _ = universal_phi(node.X, node.mu, table)
+    height = island_height(x, node.h_d, node.sigma_d, compression, peak, surface.rms_over_s)
+    weight = island_density(height, node.D_d, node.sigma_d) * surface.rms_over_s
+    return status, node.force * phi_F * weight, node.area * phi_A * weight
 
 
 @njit(cache=True, error_model="numpy")
 def _rule(
+    which: int,
     low: float,
     high: float,
     floor_d: bool,
     floor_u: bool,
-    reach: float,
-    top: float,
-    surface: Constants,
-    near: Four,
-    rates: tuple[float, float],
-    flags: tuple[bool, bool],
-    table: FloatArray,
-    errors: FloatArray,
-    axes: Axes,
-    sums: FloatArray,
+    compression: float,
+    peak: float,
+    surface: SurfaceConstants,
+    near: Neighbours,
+    table: Table,
+    part: FloatArray,
 ) -> tuple[int, float, float, int]:
-    """Kronrod sums of force, area and their four partial derivatives into `sums` (2, 5); status, errors, nodes."""
-    scale, room = surface[12], surface[2]
+    """Kronrod sums of force, area and their derivatives over an interval, see `refine`."""
     nodes, kronrod, gauss = rule_for(low, high, floor_d)
     half, centre = 0.5 * (high - low), 0.5 * (high + low)
-    gauss_force = gauss_area = doubt = 0.0
-    sums[:] = 0.0
+    rms_over_s = surface.rms_over_s
+    gauss_force = gauss_area = table_error = 0.0
+    part[:] = 0.0
     for k in range(nodes.size):
-        x, stretch = approach_at(centre + half * nodes[k], floor_d, scale)
-        X, mu, per_F, per_A, h_d, D_d, sigma_d = island_node(x, floor_d, floor_u, surface, flags[0], flags[1])
-        status, phi_F, F_X, F_mu, phi_A, A_X, A_mu, error = universal_slopes(X, mu, table, errors, axes)
-        if status != OK:
-            return status, math.nan, math.nan, nodes.size
-        doubt = max(doubt, error)
-        above = top - (reach - x)
-        height = (above * room - h_d) / sigma_d
-        weight = D_d * math.exp(-0.5 * height * height) / (math.sqrt(2.0 * math.pi) * sigma_d)
-        weight *= room * stretch * half
-        f, g = per_F * phi_F * weight, per_A * phi_A * weight
+        x, stretch = approach_at(centre + half * nodes[k], floor_d, surface.map_scale)
+        node = island_node(x, floor_d, floor_u, surface)
+        phi = universal_slopes(node.X, node.mu, table)
+        if phi.status != OK:
+            return phi.status, math.nan, math.nan, nodes.size
+        table_error = max(table_error, phi.error)
+        height = island_height(x, node.h_d, node.sigma_d, compression, peak, rms_over_s)
+        weight = island_density(height, node.D_d, node.sigma_d) * rms_over_s * stretch * half
+        f, g = node.force * phi.phi_F * weight, node.area * phi.phi_A * weight
         gauss_force += gauss[k] * f
         gauss_area += gauss[k] * g
         f *= kronrod[k]
         g *= kronrod[k]
-        sums[0, 0] += f
-        sums[1, 0] += g
-        tilt = height * room / sigma_d
-        sums[0, 1 + BY_REACH] += tilt * f
-        sums[1, 1 + BY_REACH] += tilt * g
+        part[0, 0] += f
+        part[1, 0] += g
+        tilt = height * rms_over_s / node.sigma_d
+        part[0, BY_COMPRESSION] += tilt * f
+        part[1, BY_COMPRESSION] += tilt * g
         for number in range(2):
-            up, down = near[2 * number], near[2 * number + 1]
-            X_p, mu_p, F_p, A_p, h_p, D_p, s_p = island_node(x, floor_d, floor_u, up, flags[0], flags[1])
-            X_m, mu_m, F_m, A_m, h_m, D_m, s_m = island_node(x, floor_d, floor_u, down, flags[0], flags[1])
-            height_p, height_m = (above * up[2] - h_p) / s_p, (above * down[2] - h_m) / s_m
-            # x is held, so the density is per h_rms: room (h_rms/s) is part of it
-            common = math.log(D_p * up[2] * s_m / (D_m * down[2] * s_p)) - 0.5 * (height_p - height_m) * (
-                height_p + height_m
-            )
-            by_X, by_mu = X_p - X_m, math.log(mu_p / mu_m)
-            sums[0, 1 + number] += f * (math.log(F_p / F_m) + common + F_X * by_X + F_mu * by_mu) * rates[number]
-            sums[1, 1 + number] += g * (math.log(A_p / A_m) + common + A_X * by_X + A_mu * by_mu) * rates[number]
-    sums[0, 1 + BY_TOP] = -sums[0, 1 + BY_REACH]
-    sums[1, 1 + BY_TOP] = -sums[1, 1 + BY_REACH]
-    if not (sums[0, 0] > 0.0 and sums[1, 0] > 0.0):
-        return OK, 0.0, doubt, nodes.size
-    return OK, error_of(sums[0, 0], gauss_force, sums[1, 0], gauss_area), doubt, nodes.size
+            place = 2 if number == 1 and floor_u and x < near.narrow_below else number
+            up, down, rate = near.up[place], near.down[place], near.rate[place]
+            above, below = island_node(x, floor_d, floor_u, up), island_node(x, floor_d, floor_u, down)
+            height_up = island_height(x, above.h_d, above.sigma_d, compression, peak, up.rms_over_s)
+            height_down = island_height(x, below.h_d, below.sigma_d, compression, peak, down.rms_over_s)
+            # x is held, so the density is per h_rms: h_rms/s is part of it
+            common = math.log(above.D_d * up.rms_over_s * below.sigma_d / (below.D_d * down.rms_over_s * above.sigma_d))
+            common -= 0.5 * (height_up - height_down) * (height_up + height_down)
+            by_X, by_mu = above.X - below.X, math.log(above.mu / below.mu)
+            by_F = math.log(above.force / below.force) + common + phi.F_by_X * by_X + phi.F_by_mu * by_mu
+            by_A = math.log(above.area / below.area) + common + phi.A_by_X * by_X + phi.A_by_mu * by_mu
+            part[0, BY_HURST + number] += f * by_F * rate
+            part[1, BY_HURST + number] += g * (by_A * rate + (near.log_eta[number] if floor_u else 0.0))
+    part[:, BY_PEAK] = -part[:, BY_COMPRESSION]
+    if not floor_d:
+        part[:, BELOW_KINK] = part[:, 0]
+    if not (part[0, 0] > 0.0 and part[1, 0] > 0.0):
+        return OK, 0.0, table_error, nodes.size
+    return OK, error_of(part[0, 0], gauss_force, part[1, 0], gauss_area), table_error, nodes.size
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def total_with_slopes(
-    reach: float,
-    top: float,
+    compression: float,
+    peak: float,
     rtol: float,
-    surface: Constants,
-    near: Four,
-    rates: tuple[float, float],
-    printed: bool,
-    flags: tuple[bool, bool],
-    table: FloatArray,
-    errors: FloatArray,
-    axes: Axes,
+    surface: SurfaceConstants,
+    near: Neighbours,
+    table: Table,
     out: FloatArray,
 ) -> tuple[int, float, int]:
-    """Status, error bound and islands; `out` (2, 5) receives force and area and their partial derivatives."""
+    """Status, error bound and islands; `out` (2, COLUMNS) receives force and area and their derivatives."""
     out[:] = 0.0
-    if not reach > 0.0:
+    if not compression > 0.0:
         return OK, 0.0, 0
-    kink_d, kink_u = surface[10], surface[11]
-    K1 = jacobian_below(surface, printed, flags[0])
-    bounds = np.empty((MOST_INTERVALS, 2))
-    parts = np.empty((MOST_INTERVALS, 2, 5))
-    own = np.empty(MOST_INTERVALS)
-    floors = np.empty((MOST_INTERVALS, 2), dtype=np.bool_)
-    fresh = np.ones(MOST_INTERVALS, dtype=np.bool_)
-    count = first_intervals(reach, kink_d, kink_u, surface[12], bounds, floors)
-    islands = 0
-    doubt = 0.0
-    while True:
-        out[:] = 0.0
-        force_error = area_error = 0.0
-        for k in range(count):
-            if fresh[k]:
-                status, own[k], table_error, nodes = _rule(
-                    bounds[k, 0], bounds[k, 1], floors[k, 0], floors[k, 1],
-                    reach, top, surface, near, rates, flags, table, errors, axes, parts[k],
-                )  # fmt: skip
-                islands += nodes
-                if status != OK:
-                    return status, math.nan, islands
-                if not floors[k, 0]:
-                    parts[k] *= K1
-                doubt = max(doubt, table_error)
-                fresh[k] = False
-            out += parts[k]
-            force_error += own[k] * parts[k, 0, 0]
-            area_error += own[k] * parts[k, 1, 0]
-        force, area = out[0, 0], out[1, 0]
-        if not (force > 0.0 and area > 0.0):
-            return OK, 0.0, islands
-        if force_error <= rtol * force and area_error <= rtol * area:
-            break
-        present = count
-        for k in range(present):
-            share = present * own[k]
-            if parts[k, 0, 0] * share > rtol * force or parts[k, 1, 0] * share > rtol * area:
-                if count == MOST_INTERVALS:
-                    return UNRESOLVED, math.nan, islands
-                halve(k, count, bounds, floors)
-                fresh[k] = True
-                count += 1
-    # the upper limit moves with reach, the kink and K1 with H and zeta_1
-    status, f, g = _integrand(reach, reach > kink_d, reach > kink_u, reach, top, surface, flags, table, errors, axes)
+    status, error, islands = refine(_rule, BOTH, compression, peak, rtol, surface, near, table, out)
+    if status != OK or not (out[0, 0] > 0.0 and out[1, 0] > 0.0):
+        return status, error, islands
+    # the upper limit moves with the compression, the kink and K1 with H and zeta_1
+    status, f, g = _integrand(compression, compression, peak, surface, table)
     if status != OK:
         return status, math.nan, islands
-    edge = 1.0 if reach > kink_d else K1
-    out[0, 1 + BY_REACH] += edge * f
-    out[1, 1 + BY_REACH] += edge * g
+    edge = 1.0 if compression > surface.kink_d else surface.jacobian
+    out[0, BY_COMPRESSION] += edge * f
+    out[1, BY_COMPRESSION] += edge * g
+    f = g = 0.0
+    if surface.kink_d < compression:
+        status, f, g = _integrand(surface.kink_d, compression, peak, surface, table)
+        if status != OK:
+            return status, math.nan, islands
     for number in range(2):
-        up, down = near[2 * number], near[2 * number + 1]
-        if kink_d < reach:
-            status, f, g = _integrand(kink_d, True, kink_d > kink_u, reach, top, surface, flags, table, errors, axes)
-            if status != OK:
-                return status, math.nan, islands
-            moved = (K1 - 1.0) * (up[10] - down[10]) * rates[number]
-            out[0, 1 + number] += f * moved
-            out[1, 1 + number] += g * moved
-        if not printed:
-            change = (
-                math.log(jacobian_below(up, printed, flags[0]) / jacobian_below(down, printed, flags[0]))
-                * rates[number]
-            )
-            for k in range(count):
-                if not floors[k, 0]:
-                    out[0, 1 + number] += change * parts[k, 0, 0]
-                    out[1, 1 + number] += change * parts[k, 1, 0]
-    return OK, max(force_error / force, area_error / area) + doubt, islands
-
-
-@njit(cache=True, error_model="numpy")
-def neighbours(hurst: float, zeta_1: float, reading: Numbers) -> tuple[Four, tuple[float, float]]:
-    """Constants of the surfaces a step of H and of log(zeta_1) up and down, and 1 over twice the steps."""
-    step = min(STEP, SHARE * math.log(zeta_1 / reading[4]))
-    factor = math.exp(step)
-    around = (
-        surface_constants(hurst + STEP, zeta_1, reading),
-        surface_constants(hurst - STEP, zeta_1, reading),
-        surface_constants(hurst, zeta_1 * factor, reading),
-        surface_constants(hurst, zeta_1 / factor, reading),
-    )
-    return around, (0.5 / STEP, 1.0 / math.log(zeta_1 * factor / (zeta_1 / factor)))
+        up, down, rate = near.up[number], near.down[number], near.rate[number]
+        moved = (surface.jacobian - 1.0) * (up.kink_d - down.kink_d) * rate
+        change = math.log(up.jacobian / down.jacobian) * rate
+        out[0, BY_HURST + number] += f * moved + change * out[0, BELOW_KINK]
+        out[1, BY_HURST + number] += g * moved + change * out[1, BELOW_KINK]
+    return OK, error, islands
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def fill_totals_with_slopes(
     hurst: FloatArray,
     zeta_1: FloatArray,
-    reach: FloatArray,
-    top: FloatArray,
+    compression: FloatArray,
+    peak: FloatArray,
     rtol: float,
-    reading: Numbers,
+    reading: ReadingNumbers,
     printed: bool,
-    table: FloatArray,
-    errors: FloatArray,
-    axes: Axes,
+    table: Table,
     status: NDArray[np.int64],
     out: FloatArray,
     bound: FloatArray,
 ) -> int:
-    """`total_with_slopes` of each pair into `out` (pairs, 2, 5) and `bound`; returns the islands evaluated."""
+    """`total_with_slopes` of each pair into `out` (pairs, 2, COLUMNS) and `bound`; returns the islands evaluated."""
     islands = 0
-    surface = surface_constants(hurst[0], zeta_1[0], reading)
-    near, rates = neighbours(hurst[0], zeta_1[0], reading)
-    for k in range(reach.size):
+    surface = surface_constants(hurst[0], zeta_1[0], reading, printed, zeta_1[0])
+    near = neighbours(hurst[0], zeta_1[0], reading, printed)
+    for k in range(compression.size):
         if k > 0 and (hurst[k] != hurst[k - 1] or zeta_1[k] != zeta_1[k - 1]):
-            surface = surface_constants(hurst[k], zeta_1[k], reading)
-            near, rates = neighbours(hurst[k], zeta_1[k], reading)
-        status[k], bound[k], own = total_with_slopes(
-            reach[k], top[k], rtol, surface, near, rates, printed, (reading[5], reading[6]), table, errors, axes, out[k]
-        )
-        islands += own
+            surface = surface_constants(hurst[k], zeta_1[k], reading, printed, zeta_1[k])
+            near = neighbours(hurst[k], zeta_1[k], reading, printed)
+        status[k], bound[k], count = total_with_slopes(compression[k], peak[k], rtol, surface, near, table, out[k])
+        islands += count
     return islands

@@ -11,7 +11,7 @@ from mbma_tables.export.c_code import FORM
 from mbma_tables.export.code import Replay
 from mbma_tables.export.conformance import formula_rows, geometry_rows, phi_rows, status_rows, total_rows
 from mbma_tables.models import closed_form_functions
-from mbma_tables.models.universal import universal_model
+from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.readings import get_reading
 
 POINTS = 10_000

@@ -13,7 +13,7 @@ import pytest
 from mbma_tables import InputError, __version__
 from mbma_tables.export import CODE, code, conformance
 from mbma_tables.export.code import Replay, check, read_report, write_code
-from mbma_tables.models.universal import universal_model
+from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.readings import Reading
 
 

@@ -14,7 +14,8 @@ from mbma_tables import InputError, Surface
 from mbma_tables.export import CODE, SOLVERS, code, conformance, data, solvers
 from mbma_tables.export.law_rows import LawTable, describe_law
 from mbma_tables.export.text import checked_name
-from mbma_tables.models.universal import UniversalModel, universal_model
+from mbma_tables.models.tables import universal_model
+from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.readings import get_reading
 
 HOSTILE = (

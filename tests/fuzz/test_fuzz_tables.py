@@ -8,7 +8,8 @@ import pytest
 from fuzzing import SCALE, finite, spoilt
 from small_tables import seal, small_table, unseal
 
-from mbma_tables.models.universal import Island4dModel, UniversalModel
+from mbma_tables.models.island4d import Island4dModel
+from mbma_tables.models.universal import UniversalModel
 from mbma_tables.models.verify import verify
 from mbma_tables.tablefiles import contents, provenance
 from mbma_tables.tablefiles.contents import Contents, contents_of

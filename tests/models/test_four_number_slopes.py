@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mbma_tables.islands.four_numbers import to_axes
-from mbma_tables.models.universal import island4d_model, universal_model
+from mbma_tables.models.tables import island4d_model, universal_model
 from mbma_tables.surfaces.readings import REPORTED
 
 ZETA_D, HURST, X = 3.7, 0.8, 3.0

@@ -8,11 +8,11 @@ from small_tables import small_table
 
 from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, island
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, hat_scales, to_axes
-from mbma_tables.models import universal as tabulated
-from mbma_tables.models.universal import Island4dModel, island4d_model
+from mbma_tables.models import tables as tabulated
+from mbma_tables.models.island4d import Island4dModel
 from mbma_tables.surfaces.readings import REPORTED
-from mbma_tables.tablefiles.netcdf import read_table, write_table
-from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
+from mbma_tables.tablefiles.netcdf import read_table
+from mbma_tables.tablefiles.schema import ISLAND4D
 from mbma_tables.totals.island import geometry
 
 ignore_stale = pytest.mark.filterwarnings("ignore::mbma_tables.errors.StaleTableWarning")
@@ -230,15 +230,6 @@ def test_below_the_least_spread_to_first_order(small):
     X_change = place.X / 4 - 1
     assert np.abs(X_change).max() < 1e-6
     np.testing.assert_allclose(ratio / place.mu, (ratio / place.mu)[:, :1] * np.ones(3), rtol=1e-4)
-
-
-def test_opened_once_and_only_of_its_kind(tmp_path):
-    path = write_table(tmp_path / "island4d.nc", small_table(ISLAND4D))
-    assert island4d_model(path) is island4d_model(path)
-    assert island4d_model(path).reading is REPORTED
-    write_table(tmp_path / "other.nc", small_table(UNIVERSAL))
-    with pytest.raises(OSError, match="holds a table of kind 'universal', not island4d"):
-        island4d_model(tmp_path / "other.nc")
 
 
 def test_marks_have_the_shape_of_the_arguments(small):

@@ -1,13 +1,11 @@
 """The four-number table beyond its axes, its derivatives, and where islands lie; models asked for what they are not."""
 
-import math
-
 import numpy as np
 import pytest
 
 from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact, greenwood_tripp
 from mbma_tables.models.island4d import Island4dModel
-from mbma_tables.models.universal import island4d_model, open_table, universal_model
+from mbma_tables.models.tables import island4d_model, open_table, universal_model
 from mbma_tables.surfaces.readings import REPORTED
 from mbma_tables.totals.island import geometry, scale_area, scale_force
 
@@ -113,31 +111,13 @@ def test_a_missing_table_says_so(tmp_path):
 
 def test_the_solver_gives_up_in_the_right_places(monkeypatch):
     from mbma_tables import ConvergenceError
-    from mbma_tables.totals import universal_sum as looked_up
+    from mbma_tables.totals import island_sum
 
     def gives_up(pairs, *_, **__):
-        raise ConvergenceError("no end", np.arange(pairs.reach.size) == 1)
+        raise ConvergenceError("no end", np.arange(pairs.compression.size) == 1)
 
-    monkeypatch.setattr(looked_up, "sum_islands", gives_up)
+    monkeypatch.setattr(island_sum, "sum_islands", gives_up)
     surface = Surface(0.8, 1.0, 200.0, 1.0, [3.0, 90.0, 3.0, 95.0])
     with pytest.raises(ConvergenceError, match="no end") as caught:
         contact(surface, [1.0, -89.0, 0.0, -94.0], outside="exact")
     np.testing.assert_array_equal(caught.value.mask, [False, False, False, True])
-
-
-def test_many_gaps_of_a_surface_without_a_law(monkeypatch):
-    from mbma_tables.totals import law
-
-    surface = Surface(0.8, 1.0, 200.0, 1.0, 3.0)
-    gaps = np.linspace(1.0, 2.9, 5000)
-    frozen = contact(surface, gaps, rtol=1e-4)
-    assert frozen.islands is None
-
-    def refuse(*_, **__):
-        raise OutOfRangeError("islands outside", True)
-
-    monkeypatch.setattr(law, "contact_law", refuse)
-    summed = contact(surface, gaps, rtol=1e-4)
-    assert summed.islands > 5000
-    assert math.isclose(frozen.force[0], summed.force[0], rel_tol=1e-4)
-    assert (np.abs(frozen.force / summed.force - 1) <= frozen.error + summed.error).all()

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from mbma_tables.models.universal import shipped
+from mbma_tables.models.tables import shipped
 from mbma_tables.models.verify import verify
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.netcdf import MODULES, check_table

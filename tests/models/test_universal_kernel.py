@@ -8,7 +8,7 @@ import pytest
 
 from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
 from mbma_tables.models import universal_kernel
-from mbma_tables.models.universal import island4d_model, universal_model
+from mbma_tables.models.tables import island4d_model, universal_model
 from mbma_tables.surfaces.readings import REPORTED
 from mbma_tables.totals.island import geometry
 
@@ -154,14 +154,13 @@ def test_codes_of_the_kernel():
     X, mu, expected = (np.array(column) for column in zip(*cases, strict=True))
     for fill, rows in (
         (universal_kernel.fill_phi, 3),
-        (universal_kernel.fill_phi_parallel, 3),
         (universal_kernel.fill_slopes, 7),
     ):
-        status, out = np.empty(X.size, dtype=np.int64), np.empty((rows, X.size))
-        fill(X, mu, *model.kernel, status, out)
+        status, out = np.empty(X.size, dtype=np.int64), np.empty((X.size, rows))
+        fill(X, mu, model.kernel, status, out)
         np.testing.assert_array_equal(status, expected)
-        assert np.isnan(out[:, expected != universal_kernel.OK]).all()
-        assert np.isfinite(out[:, expected == universal_kernel.OK]).all()
+        assert np.isnan(out[expected != universal_kernel.OK]).all()
+        assert np.isfinite(out[expected == universal_kernel.OK]).all()
 
 
 def test_where_arguments_lie():

@@ -7,8 +7,9 @@ import pytest
 from small_tables import small_table
 
 from mbma_tables import OutOfRangeError, greenwood_tripp
-from mbma_tables.models import universal as tabulated
-from mbma_tables.models.universal import UniversalModel, universal_model
+from mbma_tables.models import tables as tabulated
+from mbma_tables.models.tables import open_table, universal_model
+from mbma_tables.models.universal import UniversalModel
 from mbma_tables.tablefiles.netcdf import read_table, write_table
 from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL, error_cell
 
@@ -155,13 +156,10 @@ def test_the_error_is_that_of_the_cell(small):
             assert found == pytest.approx(field[i, j].max(), rel=1e-10, abs=2e-12)
 
 
-def test_opened_once_and_only_of_its_kind(tmp_path):
-    path = write_table(tmp_path / "universal.nc", small_table(UNIVERSAL))
-    assert universal_model(path) is universal_model(path)
-    assert universal_model(path).name == "universal"
-    write_table(tmp_path / "other.nc", small_table(ISLAND4D))
-    with pytest.raises(OSError, match="holds a table of kind 'island4d', not universal"):
-        universal_model(tmp_path / "other.nc")
+def test_shipped_tables_are_opened_once_and_files_by_their_kind(tmp_path):
+    assert open_table("universal") is universal_model() is open_table()
+    path = write_table(tmp_path / "other.nc", small_table(ISLAND4D))
+    assert open_table(path).name == "island4d"
 
 
 def test_threads_share_a_model(small):

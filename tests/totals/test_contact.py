@@ -13,7 +13,7 @@ from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, 
 from mbma_tables import contact as contact_by_tier
 from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED, get_reading
 from mbma_tables.totals.island import geometry
-from mbma_tables.totals.pairs import kinks
+from mbma_tables.totals.island_sum import kinks
 
 contact = functools.partial(contact_by_tier, tier="exact")
 

@@ -14,17 +14,18 @@ from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island
 from mbma_tables.islands import newton
 from mbma_tables.islands.four_numbers import band_fields, from_axes, to_axes
 from mbma_tables.islands.height_integrals import ORDERS, f_half, height_integral
+from mbma_tables.models import answer_islands
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.island4d import RAW
 from mbma_tables.models.protocol import BOTH
-from mbma_tables.models.universal import island4d_model, universal_model
+from mbma_tables.models.tables import island4d_model, universal_model
 from mbma_tables.surfaces.readings import READINGS, REPORTED, get_reading
 from mbma_tables.totals import island_sum
 from mbma_tables.totals import kernel as lookup
 from mbma_tables.totals.intervals import NARROW, STRETCH
 from mbma_tables.totals.island import geometry
+from mbma_tables.totals.island_sum import kinks
 from mbma_tables.totals.kernel import SMALL_POWER
-from mbma_tables.totals.pairs import kinks
 
 SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))
 STEP = 1e-9
@@ -144,12 +145,10 @@ def test_totals_do_not_depend_on_the_map(stretch, monkeypatch, record_property):
     compiled = totals_of(numbers, rtol=1e-9)
     for k in range(count):
         surface = Surface(*(numbers[name][k] for name in INPUTS[:-1]))
-        constants = lookup.surface_constants(surface.hurst, surface.zeta_1, REPORTED.numbers)
-        moved = (*constants[:-1], constants[-1] * stretch / STRETCH)
-        reach, top = (surface.h_max - numbers["separation"][k]) / surface.h_rms, surface.h_max / surface.h_rms
-        status, force, area, error, _ = lookup.total(
-            BOTH, reach, top, 1e-9, moved, 5 / 9, (True, True), *universal_model().kernel
-        )
+        constants = lookup.surface_constants(surface.hurst, surface.zeta_1, REPORTED.numbers, True, surface.zeta_1)
+        moved = constants._replace(map_scale=constants.map_scale * stretch / STRETCH)
+        compression, peak = (surface.h_max - numbers["separation"][k]) / surface.h_rms, surface.h_max / surface.h_rms
+        status, force, area, error, _ = lookup.total(BOTH, compression, peak, 1e-9, moved, universal_model().kernel)
         assert status == lookup.OK
         assert abs(force * surface.q0 * surface.s / compiled.force[k] - 1) <= error + compiled.error[k]
         assert abs(area / compiled.area[k] - 1) <= error + compiled.error[k]
@@ -392,7 +391,7 @@ def test_the_four_parameter_table_joins_its_expansion(record_property):
         spread = spread_axis.low * (1 + sign * STEP) * np.ones(count)
         mu = band_fields(spread, (1.25 / zeta_d) ** (4 - 2 * hurst), hurst, REPORTED)[0]
         fields = {"X": X, "width": np.log1p(spread), "zeta_d": zeta_d, "hurst": hurst, "mu": mu}
-        answer = model.of_islands(fields)
+        answer = answer_islands(model, fields)
         found.append((answer.phi_F / mu, answer.phi_A, answer.error))
     (force, area, error), (next_force, next_area, next_error) = found
     assert (np.abs(next_force / force - 1) <= error + next_error).all()

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law, theories
+from mbma_tables import InputError, OutOfRangeError, Surface, contact
 from mbma_tables.surfaces.readings import PRINTED, REPORTED
-from mbma_tables.totals import contact as contact_module
 from mbma_tables.totals import law_kernel
 from mbma_tables.totals.conductance import conductance, mean_conductivity
 from mbma_tables.totals.gauss_kronrod import integrate
 from mbma_tables.totals.island import geometry
-from mbma_tables.totals.pairs import kinks
+from mbma_tables.totals.island_sum import kinks
 
 
 def test_mean_conductivity_is_harmonic():
@@ -56,45 +55,9 @@ def test_conductivities_that_do_not_broadcast():
         conductance([1.0, 2.0], [1.0, 2.0, 3.0], 1.0)
 
 
-@pytest.fixture
-def few_are_many(monkeypatch):
-    monkeypatch.setattr(contact_module, "MANY_GAPS", MANY.size)
-
-
 SURFACE = Surface(0.8, 0.3, 60.0, 0.7, 2.1)
-MANY = np.append(np.linspace(-2.1, 2.1, 499), 3.0)  # more than what a law asks for at once
 OWN = dataclasses.replace(PRINTED, name="own", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)
 ROUGH = Surface(0.05, 0.2, 0.2e8, 1.0, 3.0)  # leaves the table where it is pressed
-
-
-@pytest.mark.usefixtures("few_are_many")
-def test_many_gaps_go_through_a_law_of_half_the_tolerance():
-    found = contact(SURFACE, MANY, rtol=1e-6, E_star=3.0)
-    law = contact_law(SURFACE, 0.5e-6)
-    assert found.islands is None
-    np.testing.assert_allclose(found.force, 3 * law.force(MANY), rtol=1e-15)
-    np.testing.assert_array_equal(found.area, law.area(MANY))
-    assert found.error.tolist() == [law.error] * 498 + [0, 0]
-    printed = contact(SURFACE, MANY, rtol=1e-6, reading="printed")
-    np.testing.assert_array_equal(printed.area, contact_law(SURFACE, 0.5e-6, reading="printed").area(MANY))
-    assert contact(SURFACE, MANY.reshape(250, 2), rtol=1e-6).force.shape == (250, 2)
-
-
-@pytest.mark.usefixtures("few_are_many")
-def test_where_a_law_does_not_serve():
-    """Fewer gaps, tighter than a law can be, several surfaces or moduli: each gap on its own, and its islands told."""
-    assert contact(SURFACE, MANY[1:], rtol=1e-6).islands > 0
-    assert contact(SURFACE, MANY, rtol=contact_module.FROZEN_RTOL).islands is None
-    tight = contact(SURFACE, MANY, rtol=math.nextafter(contact_module.FROZEN_RTOL, 0))
-    moduli = contact(SURFACE, MANY, rtol=1e-6, E_star=np.full(MANY.size, 2.0))
-    surfaces = contact(Surface(np.full(MANY.size, 0.8), 0.3, 60.0, 0.7, 2.1), MANY, rtol=1e-6)
-    for found in (tight, moduli, surfaces):
-        assert found.islands > 0
-    np.testing.assert_allclose(moduli.force, 2 * surfaces.force, rtol=1e-15)
-    # a law would need every gap down to -h_max, where the table ends
-    found = contact(ROUGH, np.linspace(2.9, 2.99, MANY.size), rtol=1e-6)
-    assert found.islands > 0
-    assert (found.force > 0).all()
 
 
 @pytest.mark.parametrize("tier", ["universal", "rigid"])
@@ -206,12 +169,6 @@ def test_pieces_at_the_ends():
     assert [law_kernel._locate(place, breaks) for place in places] == [0, 0, 1, 1, 2, 2, 2]
 
 
-def test_slopes_of_a_law_are_sharp_at_first_contact():
-    law = contact_law(SURFACE, 1e-6)
-    near, deep = law.slope_error([2.1 * (1 - 1e-10), 0.0])
-    assert 0 < near < 1e-3 * deep
-
-
 @pytest.mark.parametrize("width", [3.0, 0.9])
 @pytest.mark.parametrize(("which", "power"), [(0, 3.5), (1, 10 / 3)])
 def test_a_dip_inside_one_piece_is_a_turning_point(which, power, width):
@@ -219,15 +176,15 @@ def test_a_dip_inside_one_piece_is_a_turning_point(which, power, width):
     pieces = np.zeros((1, law_kernel.TERMS, 2))
     pieces[0, [1, 3], which] = -20.0, 8.0
     breaks, layer, h_max = np.array([0.0, width]), 0.4, 50.0
-    state = (breaks, pieces, layer, h_max, 1.0)
+    law = law_kernel.Law(breaks, pieces, breaks, layer, h_max, 1.0)
     tau = np.linspace(1e-3, width, 200_001)
     u = 2 * tau / width - 1
     value = power * np.log(layer * np.sinh(tau) ** 2) - 20 * u + 8 * u**3
     assert np.diff(value)[-1] > 0
     first = np.argmax(np.diff(value) < 0)
-    turn = law_kernel.turning_point(which, state, 24)
+    turn = law_kernel.turning_point(which, law, 24)
     assert h_max - layer * math.sinh(tau[first + 1]) ** 2 < turn < h_max - layer * math.sinh(tau[first - 1]) ** 2
-    assert law_kernel.turning_point(1 - which, state, 24) is None
+    assert law_kernel.turning_point(1 - which, law, 24) is None
 
 
 @pytest.mark.parametrize("at", np.linspace(-0.77, 0.99, 34))
@@ -240,10 +197,11 @@ def test_a_dip_between_two_samples_is_a_turning_point(at):
     pieces = np.zeros((1, law_kernel.TERMS, 2))
     # the integral of 3e3 (u - at)^2 - steepest
     pieces[0, :4, 0] = 0, 3e3 * at**2 - steepest, -3e3 * at, 1e3
-    state = (np.array([0.0, 0.9]), pieces, 0.4, 50.0, 1.0)
+    breaks = np.array([0.0, 0.9])
+    law = law_kernel.Law(breaks, pieces, breaks, 0.4, 50.0, 1.0)
     falls = tau[rest < steepest]
     assert 0 < np.ptp(falls) < 0.9 / 24 / 10
-    turn = law_kernel.turning_point(0, state, 24)
+    turn = law_kernel.turning_point(0, law, 24)
     assert np.arcsinh(np.sqrt((50 - turn) / 0.4)) == pytest.approx(falls[0], rel=1e-5, abs=0)
 
 
@@ -268,13 +226,3 @@ def test_the_estimate_is_of_the_kronrod_sum():
     found = integrate(lambda _, points: 2 + np.cos(5 * points)[..., None], np.array([0]), *ends, 1, rtol)
     assert found.evaluations == 21
     assert abs(found.value[0, 0] / true - 1) <= found.error[0, 0] <= rtol
-
-
-@pytest.mark.parametrize("hurst", [0.2, 0.8, 1.0])
-def test_the_inverse_of_persson_takes_newton_steps(monkeypatch, hurst):
-    """Halving a bracket of 690 in the logarithm would take fifty."""
-    monkeypatch.setattr(theories, "STEPS", 15)
-    surface = Surface(hurst, 0.3, 60.0, 0.7, 2.1)
-    loads = np.append(10.0 ** np.arange(-290, 1, 10), [3.0, 6.0])
-    again = theories.persson_force(surface, theories.persson_separation(surface, loads))
-    np.testing.assert_allclose(again, loads, rtol=1e-9)

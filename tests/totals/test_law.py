@@ -15,7 +15,7 @@ from numba import njit
 from mbma_tables import ContactLaw, ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.totals import law as law_module
-from mbma_tables.totals.pairs import kinks
+from mbma_tables.totals.island_sum import kinks
 
 # hurst, zeta_1, h_max/h_rms, reading
 CASES = [
@@ -461,7 +461,7 @@ def test_bad_laws(monkeypatch):
         contact_law(surface, reading="guessed")
     with pytest.raises(OutOfRangeError, match="outside the universal table"):
         contact_law(Surface(0.05, 0.2, 0.2e8, 1.0, 3.0))
-    monkeypatch.setattr(law_module, "MOST_PIECES", 3)
+    monkeypatch.setattr(law_module, "MAX_PIECES", 3)
     with pytest.raises(ConvergenceError, match="more than 3 pieces") as caught:
         contact_law(surface)
     assert caught.value.mask

@@ -9,12 +9,13 @@ from numpy.polynomial import legendre
 
 from mbma_tables import ConvergenceError, OutOfRangeError, Surface, contact
 from mbma_tables.models.protocol import BOTH
-from mbma_tables.models.universal import universal_model
+from mbma_tables.models.tables import universal_model
+from mbma_tables.models.universal_kernel import UNRESOLVED
 from mbma_tables.surfaces.readings import PRINTED, REPORTED
 from mbma_tables.totals import intervals
 from mbma_tables.totals import kernel as lookup
 from mbma_tables.totals.island import geometry
-from mbma_tables.totals.pairs import kinks
+from mbma_tables.totals.island_sum import kinks
 
 LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)
 
@@ -52,9 +53,7 @@ def test_islands_are_those_of_geometry(reading):
                 x[k],
                 x[k] > at_d[k],
                 x[k] > at_u[k],
-                lookup.surface_constants(hurst[k], zeta_1[k], reading.numbers),
-                reading.offset,
-                reading.summit_sigma,
+                lookup.surface_constants(hurst[k], zeta_1[k], reading.numbers, True, zeta_1[k]),
             )
             for k in range(x.size)
         ]
@@ -111,14 +110,10 @@ def test_next_to_first_contact_and_beyond():
     assert found.islands % 31 == 0
 
 
-def totals(reach, **changed):
-    """`lookup.total` of one surface, with numbers of its own in place of some."""
-    model = universal_model()
-    given = {"top": 3.0, "rtol": 1e-9, "jacobian": 5 / 9} | changed
-    surface = lookup.surface_constants(0.8, 216.0, REPORTED.numbers)
-    return lookup.total(
-        BOTH, reach, given["top"], given["rtol"], surface, given["jacobian"], (True, True), *model.kernel
-    )
+def totals(compression, rtol=1e-9, jacobian=5 / 9):
+    """`kernel.total` of one surface."""
+    surface = lookup.surface_constants(0.8, 216.0, REPORTED.numbers, True, 216.0)._replace(jacobian=jacobian)
+    return lookup.total(BOTH, compression, 3.0, rtol, surface, universal_model().kernel)
 
 
 def test_the_first_moment_of_the_jacobian():
@@ -133,14 +128,14 @@ def test_what_cannot_be_resolved_is_said(monkeypatch):
     """A tolerance below rounding ends in a status, never in a number that looks right."""
     assert totals(4.0, rtol=1e-9)[0] == lookup.OK
     status, _, _, error, _ = totals(4.0, rtol=1e-30)
-    assert status == lookup.UNRESOLVED
+    assert status == UNRESOLVED
     assert math.isnan(error)
     surface = Surface([[0.5], [0.8]], 0.2, 40.0, 1.0, 3.0)
 
     def unresolved(*given):
         *_, status, out = given
         status[:] = lookup.OK
-        status[3] = lookup.UNRESOLVED
+        status[3] = UNRESOLVED
         out[:] = 1.0
         return 31
 

@@ -9,7 +9,7 @@ import pytest
 
 from mbma_tables import Surface, contact
 from mbma_tables.surfaces.readings import PRINTED, REPORTED, get_reading
-from mbma_tables.totals.pairs import kinks
+from mbma_tables.totals.island_sum import kinks
 
 OWN = dataclasses.replace(PRINTED, name="own", jacobian="exact", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)
 LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)

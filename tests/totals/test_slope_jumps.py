@@ -15,14 +15,14 @@ from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island
 from mbma_tables.islands.four_numbers import from_axes, to_axes
 from mbma_tables.islands.geometry import FIELDS
 from mbma_tables.models.island4d import RAW
-from mbma_tables.models.universal import island4d_model, universal_model
+from mbma_tables.models.tables import island4d_model, universal_model
 from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED
 from mbma_tables.surfaces.spectrum import band_moment
 from mbma_tables.totals.intervals import NARROW
 from mbma_tables.totals.island import geometry
+from mbma_tables.totals.island_sum import kinks
 from mbma_tables.totals.kernel import SMALL_POWER
 from mbma_tables.totals.law import TERMS
-from mbma_tables.totals.pairs import kinks
 
 SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))
 OWN = dataclasses.replace(PRINTED, name="own", jacobian="exact", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)
