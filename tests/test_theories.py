@@ -305,13 +305,3 @@ def test_extreme_loads_stay_numbers():
     loads = np.array([1e-290, 1e-100, 1e-10, 1.0, 10.0])
     again = theories.persson_force(YANG_PERSSON, theories.persson_separation(YANG_PERSSON, loads))
     assert relative(again, loads) < 1e-9
-
-
-@pytest.mark.parametrize("hurst", [0.2, 0.8, 1.0])
-def test_the_inverse_of_persson_takes_newton_steps(monkeypatch, hurst):
-    """Halving a bracket of 690 in the logarithm would take fifty."""
-    monkeypatch.setattr("mbma_tables.theories.persson.STEPS", 15)
-    surface = Surface(hurst, 0.3, 60.0, 0.7, 2.1)
-    loads = np.append(10.0 ** np.arange(-290, 1, 10), [3.0, 6.0])
-    again = theories.persson_force(surface, theories.persson_separation(surface, loads))
-    np.testing.assert_allclose(again, loads, rtol=1e-9)

@@ -23,7 +23,7 @@ from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.moments import MAX_ZETA_1, MIN_ZETA_1
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.totals import gauss_kronrod, intervals, kernel, universal_sum
+from mbma_tables.totals import gauss_kronrod, intervals, island_sum, kernel
 
 COMMENT_WIDTH = 108
 FORM = "standard"  # that of tier "formula"
@@ -95,7 +95,7 @@ def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | fl
         "OFFSET": int(reading.offset),
         "SUMMITS": int(reading.summit_sigma),
         "PRINTED_JACOBIAN": int(reading.jacobian == "printed"),
-        "MAX_INTERVALS": intervals.MOST_INTERVALS,
+        "MAX_INTERVALS": intervals.MAX_INTERVALS,
         "PI": math.pi,
         "X_LOW": X.low,
         "X_HIGH": X.high,
@@ -124,7 +124,7 @@ def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | fl
         "SAFETY": intervals.SAFETY,
         "SMALL_POWER": kernel.SMALL_POWER,
         "SMALL_WIDTH": kernel.SMALL_WIDTH,
-        "QUADRATURE_SHARE": universal_sum.QUADRATURE_SHARE,
+        "QUADRATURE_SHARE": island_sum.QUADRATURE_SHARE,
         "FORMULA_X_LOW": form["X"][0],
         "FORMULA_X_HIGH": form["X"][1],
         "FORMULA_MU_HIGH": form["mu"][1],
@@ -133,12 +133,12 @@ def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | fl
         "MAX_RTOL": MAX_RTOL,
     }
     arrays = {
-        "NODES_21": gauss_kronrod.NODES,
-        "KRONROD_21": gauss_kronrod.KRONROD,
-        "GAUSS_21": gauss_kronrod.GAUSS,
-        "NODES_31": intervals.NODES_31,
-        "KRONROD_31": intervals.KRONROD_31,
-        "GAUSS_31": intervals.GAUSS_31,
+        "NODES_21": gauss_kronrod.NODES_21,
+        "KRONROD_21": gauss_kronrod.KRONROD_21,
+        "GAUSS_21": gauss_kronrod.GAUSS_21,
+        "NODES_31": gauss_kronrod.NODES_31,
+        "KRONROD_31": gauss_kronrod.KRONROD_31,
+        "GAUSS_31": gauss_kronrod.GAUSS_31,
         # F_n: rows are the pieces, columns the powers
         "F_ONE": heights._ONE,
         "F_THREE_HALVES": heights._THREE_HALVES,
