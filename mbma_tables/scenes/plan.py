@@ -214,20 +214,20 @@ class _Planner:
         fewest = MIN_LAW_GAPS.get(_name(self.tier(self.rtol)), MIN_LAW_GAPS_OF_OTHERS)
         if self.count < fewest or "finite_height" in self.problem.dropped:
             return False
-        from mbma_tables.totals.law import LEAST_RTOL
+        from mbma_tables.totals.law import MIN_LAW_RTOL
 
-        return (1 - ISLAND_SHARE) * self.rtol >= LEAST_RTOL
+        return (1 - ISLAND_SHARE) * self.rtol >= MIN_LAW_RTOL
 
     def law(self, why: Sequence[str]) -> Step:
-        from mbma_tables.totals.law import LEAST_RTOL
+        from mbma_tables.totals.law import MIN_LAW_RTOL
 
         inverse = self.problem.prescribed == "nominal_pressures"
         slopes = self.problem.outputs & {"stiffness", "conductance"}
         factor = AMPLIFICATION["slopes"] if slopes else AMPLIFICATION["inverse"] if inverse else 1.0
         tolerance = self.rtol / factor
         asked = (1 - ISLAND_SHARE) * tolerance
-        if asked < LEAST_RTOL:
-            best = factor * LEAST_RTOL / (1 - ISLAND_SHARE)
+        if asked < MIN_LAW_RTOL:
+            best = factor * MIN_LAW_RTOL / (1 - ISLAND_SHARE)
             raise InputError(f"rtol = {self.rtol:g} is too tight for {', '.join(why)}: a law meets {best:.0e} at best")
         tier = self.tier(tolerance)
         each = self.costs.of("law", "lookup") + (self.costs.of("law", "invert", quantity="force") if inverse else 0.0)

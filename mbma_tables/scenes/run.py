@@ -83,7 +83,7 @@ def height_without_end(problem: Problem, rtol: float) -> float:
 
 
 def _law(run: Run, step: Step) -> None:
-    from mbma_tables.totals.law import LEAST_RTOL, contact_law
+    from mbma_tables.totals.law import MIN_LAW_RTOL, contact_law
 
     problem, wanted = run.problem, run.problem.outputs
     assert step.rtol is not None
@@ -103,9 +103,9 @@ def _law(run: Run, step: Step) -> None:
         error = 2 * law.error if by_pressure else law.error
         if wanted & {"stiffness", "conductance"}:
             error = _slope_error(law, run.gap, by_pressure)
-        if error <= run.rtol or asked <= LEAST_RTOL:
+        if error <= run.rtol or asked <= MIN_LAW_RTOL:
             break
-        asked = max(0.1 * asked, LEAST_RTOL)
+        asked = max(0.1 * asked, MIN_LAW_RTOL)
     values = {"nominal_pressure": problem.gaps} if by_pressure else {}
     if "force" in wanted:
         values["force"] = law.force(run.gap)
