@@ -2,21 +2,18 @@
 
 import importlib.util
 import pathlib
-import re
 import runpy
 import sys
-import warnings
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from mbma_tables import StaleTableWarning, Surface, contact
+from mbma_tables import Surface, contact
 
 pytest.importorskip("matplotlib")
 
 EXAMPLES = pathlib.Path(__file__).parents[1] / "examples"
-PAGE = EXAMPLES.parent / "docs" / "lookup.md"
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -192,20 +189,6 @@ def test_conductance_of_one_smooth_circular_spot_gives_the_constant(conductance)
     holm = 4 * np.sqrt(radius * delta) / (1 / module.K_STEEL + 1 / module.K_ALUMINIUM)
     ratio = curve.conductance / curve.stiffness
     np.testing.assert_allclose(ratio, holm / stiffness, rtol=1e-13)
-
-
-def test_the_page_on_lookups_runs():
-    pytest.importorskip("dask")
-    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    assert len(blocks) >= 5
-    names = {}
-    with warnings.catch_warnings():
-        # a stale table is another test's matter
-        warnings.simplefilter("ignore", StaleTableWarning)
-        for block in blocks:
-            exec(block, names)
-    assert names["law"].stiffness_mean(0.5) == 2 * names["law"].stiffness(0.5)
-    assert names["lazy"].dims == ("sample", "gap")
 
 
 @pytest.mark.parametrize("name", ["seal", "conductance"])

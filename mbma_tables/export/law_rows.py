@@ -1,9 +1,9 @@
-"""One description of a contact law for other codes: what it is, in which units, and rows chosen by their error.
+"""A contact law as rows for other codes: what it is, in which units, and rows chosen by their error.
 
 Overclosure is c = h_max - u with the mean separation u = (h_max + d)/2 (50): zero at first contact, rising as bodies
-approach, so that -dp/du = dp/dc. A code that interpolates linearly between rows errs by about h^2 p''/8 over a step h;
-rows are spaced so that this is the same share of p everywhere above a floor, and moved by half of it, so that it falls
-on both sides.
+approach, so that -dp/du = dp/dc. Linear interpolation over a step h has an error of about h^2 p''/8. Rows are spaced so
+that this is the same fraction of p everywhere above a floor, and are then moved by half of it, so that the error has
+both signs.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from mbma_tables.totals.conductance import conductance
 from mbma_tables.totals.law import ContactLaw, contact_law
 
 QUANTITIES = ("pressure", "conductance")
-FLOOR = 1e-3  # of the largest pressure: below it, errors are not relative to the pressure but to this
-FINE = 20_001  # points at which a choice of rows is judged
+FLOOR = 1e-3  # of the largest pressure: below it, errors are relative to this and not to the pressure
+FINE = 20_001  # points at which the error of a choice of rows is measured
 MIN_ROWS, MAX_ROWS = 3, 5000
-ROUNDS = 40  # of evening errors out
+ROUNDS = 40  # of making the errors of chords equal
 LAW_RTOL = 1e-8
-MIN_STEP = 1e-10  # rows nearer than this, in the file's unit, are spoilt by some readers
+MIN_STEP = 1e-10  # some readers change rows that are closer than this in the file's unit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,7 +63,7 @@ def rounded(values: FloatArray) -> FloatArray:
 
 
 def spread(x: FloatArray, y: FloatArray, count: int) -> FloatArray:
-    """Places of `count` rows along x whose chords err alike, over max(y, floor): errors evened out step by step."""
+    """Places of `count` rows along x whose chords have equal errors relative to max(y, floor), by iteration."""
     scale = np.maximum(y, FLOOR * y[-1])
     # logarithmic in y above the floor to begin with, linear below
     filled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(y)) / scale[1:])]) + np.linspace(0, 3, x.size)
@@ -77,13 +77,13 @@ def spread(x: FloatArray, y: FloatArray, count: int) -> FloatArray:
         if error.max() < best:
             best, found = error.max(), places
         # the error of a chord falls like the square of its length
-        share = np.sqrt(error + 1e-3 * error.max())
-        places = _cut(np.concatenate([[0.0], np.cumsum(share)]), places, count)
+        root = np.sqrt(error + 1e-3 * error.max())
+        places = _cut(np.concatenate([[0.0], np.cumsum(root)]), places, count)
     return found
 
 
 def _cut(filled: FloatArray, x: FloatArray, count: int) -> FloatArray:
-    """`count` places between which `filled` grows alike."""
+    """`count` places between which `filled` grows by equal amounts."""
     places: FloatArray = np.interp(np.linspace(filled[0], filled[-1], count), filled, x)
     places[0], places[-1] = x[0], x[-1]
     return places
@@ -96,7 +96,7 @@ def chord_error(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatA
 
 
 def balanced(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArray) -> FloatArray:
-    """Rows moved by half of what the chords beside them overshoot: the largest error halves, the same both ways."""
+    """Rows moved by half of the error of the chords beside them, which halves the largest error."""
     scale = np.maximum(fine_y, FLOOR * fine_y[-1])
     over = (np.interp(fine_x, x, y) - fine_y) / scale
     step = np.clip(np.searchsorted(x, fine_x, side="right") - 1, 0, x.size - 2)
@@ -212,7 +212,7 @@ def describe_law(
         x, y, error = _fewest(with_rows, number_in("rtol", 1e-3 if rtol is None else rtol, 1e-7, 0.5))
     if (np.diff(x) <= (MIN_STEP if quantity == "pressure" else 0.0)).any():
         raise InputError(
-            f"rows come nearer than {MIN_STEP:g} {length_unit}, which some readers cannot tell apart: "
+            f"rows are closer than {MIN_STEP:g} {length_unit}, which some readers cannot tell apart: "
             "take fewer rows or a smaller unit of length"
         )
     return LawTable(x, y, *names, error, _comments(surface, law, modulus, names, x, error))

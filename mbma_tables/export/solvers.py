@@ -64,7 +64,7 @@ def calculix(law: LawTable, name: str = "ROUGH", pair: str = "node-to-surface") 
 
 def abaqus(law: LawTable, name: str = "ROUGH") -> str:
     """A surface interaction for Abaqus, which continues the last slope beyond the last row."""
-    notes = (*law.comments, "Abaqus goes on with the last slope beyond the last row: stay within the range.")
+    notes = (*law.comments, "Abaqus continues the last slope beyond the last row: stay within the range.")
     return comment(notes, "**") + _tabular(law, name, "*GAP CONDUCTANCE, PRESSURE")
 
 
@@ -95,7 +95,7 @@ def optistruct(law: LawTable, contact: int = 1, table: int = 2) -> str:
     """PCONT and TABLES1 for OptiStruct, in long fields of 16 columns."""
     _is_pressure(law, "OptiStruct")
     pairs = [f"{value:<16.9E}" for row in zip(law.x, law.y, strict=True) for value in row]
-    lines = [f"PCONT,{contact},,,STFTAB,{table}", f"{'TABLES1*':<8}{table:<16d}{'':<16}{'':<16}{'':<16}*"]
+    lines = [f"PCONT,{contact:d},,,STFTAB,{table:d}", f"{'TABLES1*':<8}{table:<16d}{'':<16}{'':<16}{'':<16}*"]
     lines.append(f"{'*':<8}")
     fields = [*pairs, f"{'ENDT':<16}"]
     lines += [f"{'*':<8}{''.join(fields[start : start + 4])}".rstrip() for start in range(0, len(fields), 4)]

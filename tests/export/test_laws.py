@@ -209,5 +209,5 @@ def test_a_batch_is_refused():
 
 def test_rows_too_near_in_the_files_unit():
     tiny = Surface(0.8, 1e9, 1e11, 1e-9, 3e-9)
-    with pytest.raises(InputError, match="nearer than 1e-10"):
+    with pytest.raises(InputError, match="closer than 1e-10"):
         law_of(tiny, length_unit="m")
