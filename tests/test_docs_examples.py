@@ -10,6 +10,7 @@ PAGES = {path.name: path.read_text(encoding="utf-8") for path in (ROOT / "README
 BLOCKS = {name: re.findall(r"```python\n(.*?)```", text, re.DOTALL) for name, text in PAGES.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", [name for name, blocks in BLOCKS.items() if blocks])
 def test_code_of_a_page_runs(page, monkeypatch):
     pytest.importorskip("dask")

@@ -62,6 +62,7 @@ def test_worked_example_meets_the_stored_answers(kind):
         assert found * scale == pytest.approx(wanted, rel=3e-12, abs=0)
 
 
+@pytest.mark.slow
 def test_comparison_is_what_the_code_measures():
     least, total = table_schemes.LEAST_SPREADS[0], table_schemes.SIZES[0]
     shown = {(r[0], r[1], r[2]): r[3:] for r in rows(PARTS["comparison"])}

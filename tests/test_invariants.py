@@ -6,6 +6,7 @@ import os
 
 import dask
 import numpy as np
+import pytest
 import scipy.integrate
 import xarray as xr
 from hypothesis import Phase, given, settings
@@ -133,6 +134,7 @@ def test_laws_in_any_unit(surface, share, power, stress):
 
 
 @invariant(4, surface=surfaces, share=st.floats(0.05, 0.9), power=st.floats(-12, 12), stress=st.floats(-12, 12))
+@pytest.mark.slow
 def test_scenes_in_any_unit(surface, share, power, stress):
     unit, modulus, gap = 10**power, 10**stress, float(gaps_of(surface, share))
     effects = ("force", "area", "stiffness", "energy", "conductance", "island_statistics")

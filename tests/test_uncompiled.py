@@ -26,6 +26,7 @@ def plain():
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("group", plain_answers.GROUPS, ids=lambda group: group.__name__)
 def test_the_same_uncompiled(group):
     for name, value in group():

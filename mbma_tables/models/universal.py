@@ -37,10 +37,10 @@ class UniversalModel:
     >>> from mbma_tables import open_table
     >>> table = open_table("universal")
     >>> round(float(table.answer(2.0, [0.1, 10.0]).phi_F[1]), 4)
-    1.9747
+    4.5589
     >>> value, by_X, by_mu = table.slopes(2.0, 0.1)
     >>> round(float(by_X.phi_A), 4)
-    3.6226
+    5.1162
     """
 
     name = "universal"

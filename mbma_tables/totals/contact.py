@@ -127,7 +127,7 @@ def contact(
     >>> surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)  # um
     >>> found = contact(surface, [1.0, 0.5], E_star=100e3)  # MPa
     >>> [f"{force:.4g} MPa on {area:.3%}" for force, area in zip(found.force, found.area)]
-    ['3.404 MPa on 0.210%', '16.51 MPa on 0.925%']
+    ['7.982 MPa on 0.287%', '20.28 MPa on 0.735%']
     >>> bool((found.error < 1e-8).all())
     True
     """

@@ -120,7 +120,7 @@ def island(
     >>> from mbma_tables import Surface, island
     >>> found = island(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0), [0.5, 2.0])  # um
     >>> [f"{number:.4g}" for number in (found.zeta_d[0], found.X[0], found.mu[0])]
-    ['6.471', '3.001', '0.06064']
+    ['6.537', '1.322', '3.352']
     """
     if surface.labelled or is_labelled(delta) or is_labelled(E_star):
         return _of_labelled(surface, delta, tier, reading, E_star, rtol)

@@ -66,6 +66,7 @@ def test_errors_are_one_line(fault, said, monkeypatch):
     assert len(done.stderr.splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_the_export_page(monkeypatch):
     monkeypatch.setattr(export_page, "NAMES", ("asphalt",))
     monkeypatch.setattr(export_page, "ROWS", (10, 40))
@@ -96,11 +97,13 @@ def curve(axes, label):
     return line.get_xdata(), line.get_ydata()
 
 
+@pytest.mark.slow
 def test_every_figure_of_the_fidelity_page(drawn):
     shown = re.findall(r"figures/(\w+)\.png", (ROOT / "docs" / "fidelity.md").read_text(encoding="utf-8"))
     assert set(drawn) == set(shown)
 
 
+@pytest.mark.slow
 def test_curves_are_the_librarys(drawn):
     surface = Surface.named("concrete")
     axes = drawn["fig13"].axes[0]
@@ -117,6 +120,7 @@ def test_curves_are_the_librarys(drawn):
     assert area == pytest.approx(theories.persson_area(surface, force), rel=1e-12, abs=0)
 
 
+@pytest.mark.slow
 def test_points_are_the_published_ones(drawn):
     data, surface = comparisons.REFERENCES["challenge"], Surface.named("challenge")
     place, force = curve(drawn["fig15"].axes[0], "boundary elements")
@@ -124,6 +128,7 @@ def test_points_are_the_published_ones(drawn):
     assert force * data.gradient == pytest.approx(data.column("force") * surface.rms_gradient, rel=1e-14, abs=0)
 
 
+@pytest.mark.slow
 def test_ratios_to_the_references(drawn):
     panels = drawn["reference"].axes
     first = next(iter(comparisons.REFERENCES.values()))
@@ -141,6 +146,7 @@ ROWS = [
 ]
 
 
+@pytest.mark.slow
 def test_the_page_on_tables(monkeypatch):
     monkeypatch.setattr(table_page, "compare", lambda largest: ROWS)
     parts, files = table_page.measure()

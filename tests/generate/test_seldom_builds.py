@@ -184,6 +184,7 @@ def test_chunks_that_were_not_taken_are_given_out_again():
     assert executor.asked == 5
 
 
+@pytest.mark.slow
 def test_a_band_of_areas_without_data_has_no_span():
     reference = dataclasses.replace(REFERENCES["challenge"], band=(1e-9, 2e-9))
     for own, dashes in ((reference, True), (REFERENCES["challenge"], False)):
