@@ -33,9 +33,8 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 @dataclasses.dataclass(frozen=True)
 class Spread:
-    """Samples, forces, their quantiles and what these err by, one standard error."""
+    """Forces, their quantiles and the standard errors of these."""
 
-    surfaces: Surface  # computed
     force: np.ndarray
     quantiles: np.ndarray
     standard_errors: np.ndarray
@@ -62,20 +61,14 @@ def sample_surfaces(count: int) -> Surface:
     return Surface(hurst, Q0, q1, h_rms, CREST * h_rms)
 
 
-def spread_of_force(count: int, keep_samples: bool = False) -> Spread:
+def spread_of_force(count: int) -> Spread:
     """Forces of the samples at GAP and their quantiles."""
-    lazy = sample_surfaces(count)
-    force = contact(lazy, GAP, rtol=1e-6).force.compute(scheduler="threads").values
+    force = contact(sample_surfaces(count), GAP, rtol=1e-6).force.compute(scheduler="threads").values
     levels = np.array(QUANTILES)
     # the rank of a quantile is binomial
     rank = np.sqrt(levels * (1 - levels) / count)
     low, high = (np.quantile(force, np.clip(levels + sign * rank, 0, 1)) for sign in (-1, 1))
-    fields = [getattr(lazy, name) for name in ("hurst", "q1", "h_rms")]
-    surfaces = lazy
-    if keep_samples:
-        hurst, q1, h_rms = (field.compute().values for field in fields)
-        surfaces = Surface(hurst, Q0, q1, h_rms, CREST * h_rms)
-    return Spread(surfaces, force, np.quantile(force, levels), (high - low) / 2)
+    return Spread(force, np.quantile(force, levels), (high - low) / 2)
 
 
 def draw(spread: Spread, nominal: float) -> Figure:
@@ -93,16 +86,16 @@ def draw(spread: Spread, nominal: float) -> Figure:
     return figure
 
 
-def main(out: pathlib.Path = PICTURE, samples: int = 200_000, keep_samples: bool = False) -> Spread:
+def main(out: pathlib.Path = PICTURE, samples: int = 200_000) -> Spread:
     """Sample, print and draw."""
-    spread = spread_of_force(samples, keep_samples)
+    spread = spread_of_force(samples)
     middle = np.exp(LOG_H_RMS[0])
     nominal = contact(Surface(HURST[0], Q0, np.exp(LOG_Q1[0]), middle, CREST * middle), GAP).force
     mean, error = spread.force.mean(), spread.force.std(ddof=1) / np.sqrt(samples)
     click.echo(f"{samples} samples at d = {GAP} um, F/(A0 E*); the nominal surface gives {nominal:.4e}")
     click.echo(f"mean {mean:.4e} +- {error:.1e}")
-    for level, value, own in zip(QUANTILES, spread.quantiles, spread.standard_errors, strict=True):
-        click.echo(f"{level:4.0%} below {value:.4e} +- {own:.1e}")
+    for level, value, error in zip(QUANTILES, spread.quantiles, spread.standard_errors, strict=True):
+        click.echo(f"{level:4.0%} below {value:.4e} +- {error:.1e}")
     draw(spread, nominal).savefig(out, dpi=120)
     return spread
 
