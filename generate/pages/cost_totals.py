@@ -19,8 +19,6 @@ from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models import TIERS
 from mbma_tables.models.protocol import IslandAnswer
 from mbma_tables.scenes.costs import Row
-from mbma_tables.surfaces.readings import get_reading
-from mbma_tables.totals.island_sum import Pairs, sum_islands
 
 EVERY = 5  # of the timed gaps, one is compared with the reference
 REFERENCE_RTOL, REFERENCE_ISLANDS = 1e-11, 1e-12
@@ -60,9 +58,8 @@ def reference() -> tuple[tuple[Surface, FloatArray, dict[str, FloatArray]], ...]
     rows = []
     for surface in held_out_surfaces():
         gap = measured_gaps(surface)[::EVERY]
-        pairs = Pairs.of(surface, surface.h_max - gap)
-        force, area, _, _ = sum_islands(pairs, get_reading("reported"), Doubled(), REFERENCE_RTOL)
-        rows.append((surface, gap, {"force": force * float(surface.q0 * surface.s), "area": area}))
+        found = contact(surface, gap, tier=Doubled(), rtol=REFERENCE_RTOL)
+        rows.append((surface, gap, {"force": found.force, "area": found.area}))
     return tuple(rows)
 
 

@@ -19,7 +19,7 @@ from mbma_tables.scenes.effects import OF_LAW, OUTPUTS, REFINEMENTS
 from mbma_tables.scenes.problem import Problem
 
 if TYPE_CHECKING:
-    from mbma_tables.models.protocol import IslandModel
+    from mbma_tables.models.protocol import AnyModel
 
 ISLAND_SHARE = 0.5  # of a step's tolerance; the rest is asked of its quadrature or law
 # inverting a law adds the gap's error to that of the values; slopes of a law are rarely worse by more than 300;
@@ -39,7 +39,7 @@ class Step:
     ----------
     name, why, what : str
         What it is called, which effects asked for it, what it evaluates.
-    tier : str, IslandModel or None
+    tier : str, AnyModel or None
         Island model.
     rtol : float or None
         Asked of the totals, the law or the solver.
@@ -54,7 +54,7 @@ class Step:
     name: str
     why: str
     what: str
-    tier: str | IslandModel | None
+    tier: str | AnyModel | None
     rtol: float | None
     count: int
     error: float
@@ -108,16 +108,20 @@ class Plan:
     def text(self) -> str:
         """As a database prints a query plan."""
         times = f"time={_duration(self.seconds)}, first use in a process {_duration(self.first_use)} more"
-        lines = [f"Scene  (rtol={self.rtol:.1e}, error={self.error:.1e}, {times})"]
+        lines = [f"Scene  (rtol={self.rtol:.1e}, {_bound(self.error)}, {times})"]
         for step in self.steps:
             by = "" if step.tier is None else f" by {step.tier_name}"
             asked = "" if step.rtol is None else f", rtol={step.rtol:.1e}"
-            numbers = f"(count={step.count}{asked}, error={step.error:.1e}, time={_duration(step.seconds)})"
+            numbers = f"(count={step.count}{asked}, {_bound(step.error)}, time={_duration(step.seconds)})"
             lines += [f"  -> {step.name}{by}  {numbers}", f"       {step.what}", f"       for: {step.why}"]
         lines.append(f"  left out: {', '.join(self.left_out) or 'nothing'}")
         if self.switched_off:
             lines.append(f"  switched off: {', '.join(self.switched_off)}")
         return "\n".join(lines) + "\n"
+
+
+def _bound(error: float) -> str:
+    return "error not certified" if math.isnan(error) else f"error={error:.1e}"
 
 
 def _duration(seconds: float) -> str:
@@ -151,7 +155,7 @@ def make_plan(problem: Problem, costs: Costs | None = None) -> Plan:
     raise InputError(f"seconds = {problem.seconds:g} is too little: the cheapest plan takes about {least:.3g} s")
 
 
-def certified_error(tier: str | IslandModel, asked: float) -> float:
+def certified_error(tier: str | AnyModel, asked: float) -> float:
     """Bound on the relative error of a tier's islands, for results at `asked`; NaN where only the answers can say."""
     if tier == "universal":
         from mbma_tables.models.tables import open_table
@@ -174,7 +178,7 @@ class _Planner:
     def count(self) -> int:
         return 0 if self.problem.gaps is None else int(self.problem.gaps.size)
 
-    def tier(self, tolerance: float) -> str | IslandModel:
+    def tier(self, tolerance: float) -> str | AnyModel:
         """The island model for a step with that tolerance."""
         if self.problem.tier is not None:
             return self.problem.tier
@@ -264,4 +268,5 @@ class _Planner:
 
 
 def _name(tier: Any) -> str:
-    return tier if isinstance(tier, str) else "an island model of one's own"
+    """What measured costs call a tier; they know no model of one's own."""
+    return tier if isinstance(tier, str) else ""

@@ -10,7 +10,7 @@ from mbma_tables.errors import InputError
 from mbma_tables.scenes.effects import THEORIES, chosen, nearest
 
 if TYPE_CHECKING:
-    from mbma_tables.models.protocol import IslandModel
+    from mbma_tables.models.protocol import AnyModel
     from mbma_tables.surfaces.readings import Reading
     from mbma_tables.surfaces.surface import Surface
 
@@ -34,7 +34,7 @@ class Problem:
     rtol: float | None = None
     seconds: float | None = None
     reading: str | Reading = "reported"
-    tier: str | IslandModel | None = None
+    tier: str | AnyModel | None = None
     conductivities: tuple[float, float] | None = None
     deltas: Any = None
     theories: Sequence[str] = ()

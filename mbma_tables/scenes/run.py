@@ -87,13 +87,14 @@ def _law(run: Run, step: Step) -> None:
 
     problem, wanted = run.problem, run.problem.outputs
     assert step.rtol is not None
+    assert step.tier is not None
     by_pressure = problem.prescribed == "nominal_pressures"
     tier, asked = step.tier, step.rtol
     while True:
         try:
-            law = contact_law(run.surface, asked, tier, problem.reading, problem.E_star)  # type: ignore[arg-type]
+            law = contact_law(run.surface, asked, tier, problem.reading, problem.E_star)
         except OutOfRangeError:
-            if tier not in TABLES:
+            if not isinstance(tier, str) or tier not in TABLES:
                 raise
             tier = "exact"
             continue
@@ -140,20 +141,22 @@ def _totals(run: Run, step: Step) -> None:
     from mbma_tables.totals.contact import contact
 
     problem = run.problem
+    assert step.rtol is not None
+    assert step.tier is not None
     wanted = tuple(name for name in ("force", "area") if name in problem.outputs)
     if "subscale_area" in problem.dropped:
         wanted = tuple(name for name in wanted if name != "area")
-    block = run.gap.size if step.tier in ("universal", "rigid") else BLOCK
+    block = run.gap.size if step.tier_name in ("universal", "rigid") else BLOCK
     answers = []
     for first in range(0, run.gap.size, block):
         answer = contact(
             run.surface,
             run.gap[first : first + block],
-            tier=step.tier,  # type: ignore[arg-type]
+            tier=step.tier,
             reading=problem.reading,
             E_star=problem.E_star,
-            rtol=step.rtol,  # type: ignore[arg-type]
-            outside="exact" if step.tier in TABLES else "raise",
+            rtol=step.rtol,
+            outside="exact" if step.tier_name in TABLES else "raise",
             quantities=wanted,
         )
         answers.append(answer)
@@ -167,6 +170,7 @@ def _hertz_area(run: Run, step: Step) -> None:
     from mbma_tables.scenes.statistics import hertz_area
 
     assert step.rtol is not None
+    assert step.tier is not None
     area, error = hertz_area(run.surface, run.gap, step.tier, get_reading(run.problem.reading), step.rtol)
     run.found["area"] = (("gap",), area)
     run.close(step, error, step.tier_name)
@@ -177,6 +181,7 @@ def _statistics(run: Run, step: Step) -> None:
 
     problem = run.problem
     assert step.rtol is not None
+    assert step.tier is not None
     fields, error = island_statistics(
         run.surface,
         run.gap,
@@ -282,18 +287,21 @@ def _dataset(run: Run, plan: Plan) -> xr.Dataset:
         "tiers": json.dumps(run.tiers),
         "switched_off": " ".join(sorted(problem.dropped)),
         "E_star": float(problem.E_star),
-        "table_hashes": json.dumps(_hashes(set(run.tiers.values()))),
+        "table_hashes": json.dumps(_hashes(problem, set(run.tiers.values()))),
     }
     numbers = ("hurst", "q0", "q1", "h_rms", "h_max")
     facts |= {f"surface_{name}": float(getattr(problem.surface, name)) for name in numbers}
     return xr.Dataset(variables, attrs=facts).set_coords([name for name in named if name in variables])
 
 
-def _hashes(tiers: set[str]) -> dict[str, str]:
+def _hashes(problem: Problem, tiers: set[str]) -> dict[str, str]:
     """Hashes of the values of the tables that answered."""
     used = sorted(tiers & set(TABLES))
     if not used:
         return {}
     from mbma_tables.models.tables import open_table
 
-    return {tier: str(open_table(tier).content.attributes["values_sha256"]) for tier in used}
+    tables: dict[str, Any] = {name: open_table(name) for name in used}
+    if not isinstance(problem.tier, str | None):
+        tables[problem.tier.name] = problem.tier
+    return {name: str(table.content.attributes["values_sha256"]) for name, table in tables.items() if name in used}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models import AnyModel, IslandAnswer, answer_islands, get_model
+from mbma_tables.models import AnyModel, IslandAnswer, answer_islands, get_model, tier_name
 from mbma_tables.models.protocol import AREA, BOTH
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import Surface
@@ -35,18 +35,24 @@ class HertzArea:
         return found._replace(phi_A=found.phi_A / islands["eta"])
 
 
-def hertz_area(surface: Surface, gap: FloatArray, tier: Any, reading: Reading, rtol: float) -> tuple[FloatArray, float]:
+def _outside(tier: str | AnyModel) -> str:
+    """What to do about islands outside a table: solve them."""
+    return "exact" if tier_name(tier) in ("universal", "island4d") else "raise"
+
+
+def hertz_area(
+    surface: Surface, gap: FloatArray, tier: str | AnyModel, reading: Reading, rtol: float
+) -> tuple[FloatArray, float]:
     """A/A0 with eta = 1, and the bound on its relative error."""
     model = HertzArea(get_model(tier, rtol, reading))
-    outside = "exact" if tier in ("universal", "island4d") else "raise"
-    found = sum_islands(Pairs.of(surface, surface.h_max - gap), reading, model, rtol, outside, AREA)
+    found = sum_islands(Pairs.of(surface, surface.h_max - gap), reading, model, rtol, _outside(tier), AREA)
     return found.area, float(found.error.max())
 
 
 def island_statistics(
     surface: Surface,
     gap: FloatArray,
-    tier: Any,
+    tier: str | AnyModel,
     reading: Reading,
     rtol: float,
     E_star: float,
@@ -99,7 +105,7 @@ def island_statistics(
         hurst, zeta_1 = np.full(points, float(surface.hurst)), np.full(points, float(surface.zeta_1))
         g = geometry(grid, hurst, zeta_1, reading)
         model = get_model(tier, rtol, reading)
-        phi = answer_islands(model, g | {"hurst": hurst}, "exact" if tier in ("universal", "island4d") else "raise")
+        phi = answer_islands(model, g | {"hurst": hurst}, _outside(tier))
         force = E_star * s / q0 * scale_force(g) * phi.phi_F
         area = scale_area(g) * phi.phi_A / (1.0 if subscale else g["eta"]) / q0**2
         every = np.arange(count)

@@ -6,8 +6,18 @@ import math
 import numpy as np
 import pytest
 
-from mbma_tables import ConvergenceError, OutOfRangeError, Scene, Surface, contact, contact_law
+from mbma_tables import (
+    ConvergenceError,
+    OutOfRangeError,
+    Scene,
+    Surface,
+    contact,
+    contact_law,
+    greenwood_tripp,
+    open_table,
+)
 from mbma_tables.errors import InputError
+from mbma_tables.models import IslandAnswer
 from mbma_tables.scenes.run import height_without_end, run_plan
 
 CONCRETE = Surface.named("concrete")
@@ -164,3 +174,33 @@ def test_a_tier_of_choice():
     np.testing.assert_array_equal(found["force"], alone.force)
     with pytest.raises(ConvergenceError, match=r"above rtol = 1\.00e-06: give a larger rtol"):
         scene_of(tier="formula", rtol=1e-6).run()
+
+
+class Hertzian:
+    """An island model of one's own: the exact solver, and a bound ten times its."""
+
+    name = "hertzian"
+
+    def answer(self, X, mu):
+        solved = greenwood_tripp.solve(X.ravel(), mu.ravel(), rtol=1e-9)
+        return IslandAnswer(*(part.reshape(X.shape) for part in (solved.phi_F, solved.phi_A, 10 * solved.error)))
+
+
+def test_island_models_as_objects():
+    effects = ("force", "area", "island_statistics")
+    scene = scene_of(effects=effects, tier=Hertzian(), rtol=1e-5)
+    assert "by hertzian  (count=2, rtol=5.0e-06, error not certified, time=not measured)" in scene.explain()
+    found, truth = scene.run(), scene_of(effects=effects, tier="exact", rtol=1e-8).run()
+    for name in ("force", "area", "island_number", "island_force"):
+        np.testing.assert_allclose(found[name], truth[name], rtol=1e-5)
+    assert found.attrs["tiers"] == '{"totals": "hertzian", "island statistics": "hertzian"}'
+    assert found.attrs["table_hashes"] == "{}"
+    law = scene_of(effects=("energy",), tier=Hertzian(), rtol=1e-2).run()
+    np.testing.assert_allclose(law["energy"], contact_law(CONCRETE).energy([0.2, 0.5]), rtol=1e-2)
+
+
+def test_a_table_as_an_object_is_the_tier_with_its_name():
+    table = open_table("universal")
+    found, same = scene_of(tier=table).run(), scene_of(tier="universal").run()
+    np.testing.assert_array_equal(found["force"], same["force"])
+    assert found.attrs["table_hashes"] == same.attrs["table_hashes"]
