@@ -1,20 +1,25 @@
-"""`python -m generate formulas`: fit and certify the closed forms."""
+"""`python -m generate formulas`: fit the closed forms, certify them, and write them as Python and as C."""
 
 from __future__ import annotations
 
-import pathlib
-
 import click
 
-from generate.formulas.fit import build
-
-FILE = pathlib.Path(__file__).parents[2] / "tables" / "formula.json"
+from generate.formulas.printing import C_TEXT, MODULE, write_forms
 
 
 @click.command()
-@click.option("--out", type=click.Path(path_type=pathlib.Path), default=FILE, help="File; default tables/formula.json.")
-def formulas(out: pathlib.Path) -> None:
-    """Fit, certify and write the closed forms."""
-    for form in build(out).forms.values():
-        errors = ", ".join(f"{name} {form.largest_error(name):.2e}" for name in form.outputs)
-        click.echo(f"{out}: {form.name}; largest held-out error {errors}")
+def formulas() -> None:
+    """Fit and certify the closed forms; write their Python module and their C text (about three minutes)."""
+    from generate.formulas.islands import SIZES, island_form
+    from generate.formulas.totals import totals_form
+
+    forms = [*map(island_form, SIZES), totals_form()]
+    write_forms(forms)
+    for form in forms:
+        errors = ", ".join(f"{name} {found.largest:.2e}" for name, found in form.certificates.items())
+        click.echo(f"{form.name}: largest held-out error {errors}")
+    click.echo(f"{MODULE}\n{C_TEXT}")
+
+
+if __name__ == "__main__":
+    formulas()

@@ -1,38 +1,76 @@
-"""Fit the closed forms and write tables/formula.json (``python -m generate formula``)."""
+"""What the fits of islands and of totals share: rounding, the least largest error, and the certificate.
+
+Terms are selected by comparing sums over thousands of samples, whose last digits depend on the processor. The same
+terms come out on all of them because samples are rounded to `DATA_DIGITS` first, the systems that are solved on the way
+are well conditioned, and scores are compared after rounding to `SCORE_DIGITS`; the first in a fixed order wins a tie.
+"""
 
 from __future__ import annotations
 
-import pathlib
-import platform
-from typing import Any
+import itertools
+import math
+from collections.abc import Callable, Mapping
 
 import numpy as np
-import scipy
-import sklearn
 
-from generate.formulas import islands as formula_islands
-from generate.formulas import totals as formula_totals
-from mbma_tables import __version__
-from mbma_tables.formulas.file import TOTALS, Formulas, write
-from mbma_tables.tablefiles.netcdf import MODULES
-from mbma_tables.tablefiles.provenance import physics_digest
-from mbma_tables.tablefiles.schema import UNIVERSAL
+from mbma_tables.arguments import FloatArray
+from mbma_tables.models.closed_form_functions import Certificate
+
+DATA_DIGITS = 10
+SCORE_DIGITS = 6
+MIN_DIGITS, MAX_DIGITS = 2, 15  # of a printed constant
+LAWSON_ROUNDS = 80
 
 
-def build(target: pathlib.Path) -> Formulas:
-    """Fit, certify and write the forms."""
-    forms: dict[str, Any] = formula_islands.island_forms()
-    forms[TOTALS] = formula_totals.totals_form()
-    return write(target, forms, provenance())
+def rounded(values: FloatArray, digits: int) -> FloatArray:
+    """Values with that many significant digits."""
+    flat = [float(f"{value:.{digits}g}") for value in np.ravel(values).tolist()]
+    return np.array(flat).reshape(np.shape(values))
 
 
-def provenance() -> dict[str, Any]:
-    """What made the forms."""
-    return {
-        "physics_hash": physics_digest(MODULES[UNIVERSAL]),
-        "mbma_tables": __version__,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "scikit-learn": sklearn.__version__,
-    }
+def score(error: float) -> float:
+    """An error as it is compared with others."""
+    return float(f"{error:.{SCORE_DIGITS}g}")
+
+
+def least_largest(A: FloatArray, target: FloatArray, rounds: int = LAWSON_ROUNDS) -> tuple[float, FloatArray]:
+    """Coefficients whose largest error ``|A c - target|`` is least, by Lawson's reweighting; that error and they.
+
+    Examples
+    --------
+    >>> error, (mean,) = least_largest(np.ones((3, 1)), np.array([0.0, 1.0, 4.0]), 500)
+    >>> round(error, 2), round(float(mean), 2)
+    (2.0, 2.0)
+    """
+    weight: FloatArray = np.ones_like(target)
+    best = math.inf
+    found = np.zeros(A.shape[1])
+    for _ in range(rounds):
+        root = np.sqrt(weight)
+        trial = np.linalg.lstsq(A * root[:, None], target * root, rcond=1e-13)[0]
+        error = np.abs(A @ trial - target)
+        largest = float(error.max())
+        if largest < best:
+            best, found = largest, trial
+        grown = weight * (error / largest + 1e-3)
+        weight = np.maximum(grown / grown.mean(), 1e-6)
+    return best, found
+
+
+def fewest_digits(largest: Callable[[int], float], slack: float) -> int:
+    """Digits that constants need for an error of at most `slack` times that of constants in full."""
+    allowed = slack * largest(MAX_DIGITS)
+    return next(digits for digits in itertools.count(MIN_DIGITS) if largest(digits) <= allowed)
+
+
+def certificate(coefficients: int, error: FloatArray, given: Mapping[str, FloatArray]) -> Certificate:
+    """What held-out relative errors say; the largest is rounded up."""
+    worst = int(error.argmax())
+    unit = 10.0 ** (math.floor(math.log10(error[worst])) - 2)
+    return Certificate(
+        coefficients,
+        largest=float(f"{math.ceil(error[worst] / unit) * unit:.3g}"),
+        median=float(f"{np.median(error):.3g}"),
+        points=error.size,
+        worst_at={name: float(f"{values[worst]:.4g}") for name, values in given.items()},
+    )

@@ -1,7 +1,11 @@
 """Closed forms of Phi_F(X, mu) and Phi_A(X, mu) in three sizes, fitted to exact solves and certified on others.
 
-The fit is `formula_terms`, the rigid sphere `formula_heights`; here are the samples, the text and the certificate,
-which is measured on the text itself: what is printed is what is certified.
+The rigid sphere, (pi/5) F_{5/2}(-X) and (pi/2) F_2(-X), is approximated with powers and exp alone,
+
+    F_n(-X) = (X + 3)^n exp(a_1 w + a_2 w^2 + ...),   w = 1/(X + 3),
+
+which tends to X^n as X grows, as it must; the exponent is smooth where X + 3 is positive. What the rigid sphere is
+divided by is fitted in `terms`.
 """
 
 from __future__ import annotations
@@ -9,196 +13,194 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import Any
 
 import numpy as np
+import sympy
 
-from generate.formulas import heights as formula_heights
-from generate.formulas.terms import AREA, FORCE, HERTZ, Fit, Samples, Term, fit
+from generate.formulas.fit import DATA_DIGITS, MAX_DIGITS, certificate, fewest_digits, least_largest, rounded
+from generate.formulas.printing import Form, Function, Step, evaluate, needed
+from generate.formulas.terms import FORCE, Fit, Samples, fit
 from mbma_tables.arguments import FloatArray
-from mbma_tables.formulas.expressions import evaluate_steps
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.islands.height_integrals import height_integral
 
 SOLVED = 1e-10
-LEAST_MU, MOST_MU = 1e-6, 2e3
-HIGHEST_X = 25.0
+MIN_MU, MAX_MU = 1e-6, 2e3
+MAX_X = 25.0
 POINTS, HELD_OUT = 3000, 20_000
 FIT_SEED, HELD_OUT_SEED = 31, 32
 GRID = 300  # a side, of the check that both rise with X
 SLACK = 1.02  # what rounding may add to the largest error
-MOST_DIGITS = 15
 TRIES = ((9, 6), (24, 1))  # shapes that move freely, up to that many terms
 NAMES = ("phi_F", "phi_A")
-LETTERS = "FA"
+X, MU = sympy.symbols("X mu")
 
-Form = dict[str, Any]
+RIGID_ORDERS = (sympy.Rational(5, 2), sympy.Integer(2))
+RIGID_FACTORS = (sympy.pi / 5, sympy.pi / 2)
+RIGID_SHIFT = 3
+RIGID_RANGE = (-0.5, 60.0)  # X
+RIGID_POINTS = 3000
 
 
 @dataclasses.dataclass(frozen=True)
 class Size:
-    """What a form is made with: terms of both functions, range of X, accuracy of the rigid sphere."""
+    """What a form is made with: terms of both functions, least X, accuracy of the rigid sphere."""
 
-    title: str
     terms: tuple[int, int]
-    lowest_X: float
-    heights: float
+    min_X: float
+    rigid: float
 
 
 SIZES = {
-    "pocket": Size("islands, pocket form", (6, 7), 0.8, 3e-3),
-    "standard": Size("islands, standard form", (20, 20), 0.0, 1e-3),
-    "long": Size("islands, long form", (40, 50), 0.0, 1e-4),
+    "pocket": Size((6, 7), 0.8, 3e-3),
+    "standard": Size((20, 20), 0.0, 1e-3),
+    "long": Size((40, 50), 0.0, 1e-4),
 }
 
 
-def points(count: int, lowest_X: float, seed: int) -> tuple[FloatArray, FloatArray]:
+@functools.cache
+def rigid_polynomial(which: int, accuracy: float) -> tuple[tuple[float, ...], float]:
+    """Coefficients of w, w^2, ... as few and as short as `accuracy` needs, and their largest held-out error."""
+    order = float(RIGID_ORDERS[which])
+
+    def samples(count: int) -> tuple[FloatArray, FloatArray]:
+        low, high = RIGID_RANGE
+        w = np.linspace(1 / (low + RIGID_SHIFT), 1 / (high + RIGID_SHIFT), count)
+        return w[:, None], np.log(height_integral(order, RIGID_SHIFT - 1 / w)) + order * np.log(w)
+
+    (w, target), (other, truth) = samples(RIGID_POINTS), samples(3 * RIGID_POINTS + 1)
+    for degree in range(2, 16):
+        powers = np.arange(1, degree + 1)
+        error, found = least_largest(w**powers, rounded(target, DATA_DIGITS))
+        if error > accuracy:
+            continue
+        for digits in range(3, MAX_DIGITS):
+            short = rounded(found, digits)
+            remaining = float(np.abs(other**powers @ short - truth).max())
+            if remaining <= accuracy:
+                return tuple(short.tolist()), math.expm1(remaining)
+    raise ValueError(f"no polynomial reaches {accuracy:g}")
+
+
+def rigid_steps(which: int, accuracy: float) -> list[Step]:
+    """Steps of rigid_F or rigid_A for X in [-0.5, 60]."""
+    w = sympy.Symbol("w")
+    exponent: sympy.Expr = sympy.Integer(0)
+    for value in reversed(rigid_polynomial(which, accuracy)[0]):
+        exponent = (sympy.Float(value) + exponent) * w
+    base = X + RIGID_SHIFT
+    return [("w", 1 / base), (_rigid(which), RIGID_FACTORS[which] * base ** RIGID_ORDERS[which] * sympy.exp(exponent))]
+
+
+def _rigid(which: int) -> str:
+    return f"rigid_{'FA'[which]}"
+
+
+def points(count: int, min_X: float, seed: int) -> tuple[FloatArray, FloatArray]:
     """Random X and mu of the range, a twelfth of them on each of its edges but mu -> 0, and its corners."""
     rng = np.random.default_rng(seed)
-    X = (lowest_X + 2) * ((HIGHEST_X + 2) / (lowest_X + 2)) ** rng.uniform(size=count) - 2
-    mu = np.exp(rng.uniform(math.log(LEAST_MU), math.log(MOST_MU), count))
+    x = (min_X + 2) * ((MAX_X + 2) / (min_X + 2)) ** rng.uniform(size=count) - 2
+    mu = np.exp(rng.uniform(math.log(MIN_MU), math.log(MAX_MU), count))
     share = count // 12
-    X[:share], X[share : 2 * share], mu[2 * share : 3 * share] = lowest_X, HIGHEST_X, MOST_MU
+    x[:share], x[share : 2 * share], mu[2 * share : 3 * share] = min_X, MAX_X, MAX_MU
     # corners, where fits are worst
-    X[-4:], mu[-4:] = [lowest_X, HIGHEST_X] * 2, [LEAST_MU] * 2 + [MOST_MU] * 2
-    return np.clip(X, lowest_X, HIGHEST_X), mu
+    x[-4:], mu[-4:] = [min_X, MAX_X] * 2, [MIN_MU] * 2 + [MAX_MU] * 2
+    return rounded(np.clip(x, min_X, MAX_X), DATA_DIGITS), rounded(mu, DATA_DIGITS)
 
 
 @functools.cache
-def solved(count: int, lowest_X: float, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def solved(count: int, min_X: float, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """X, mu and log(Phi/Phi_rigid), (2, points), of exact solves."""
-    X, mu = points(count, lowest_X, seed)
-    found = greenwood_tripp.solve(X, mu, rtol=SOLVED)
-    return X, mu, np.log(np.stack([found.phi_F, found.phi_A]) / greenwood_tripp.rigid_sphere(X, mu))
+    x, mu = points(count, min_X, seed)
+    found = greenwood_tripp.solve(x, mu, rtol=SOLVED)
+    log_ratio = np.log(np.stack([found.phi_F, found.phi_A]) / greenwood_tripp.rigid_sphere(x, mu))
+    return x, mu, rounded(log_ratio, DATA_DIGITS)
 
 
 @functools.cache
-def fitted(which: int, count: int, lowest_X: float) -> Fit:
+def fitted(which: int, count: int, min_X: float) -> Fit:
     """The fit of `count` terms."""
-    X, mu, log_ratio = solved(POINTS, lowest_X, FIT_SEED)
-    return fit(Samples.of(which, X, mu, log_ratio[which]), count, next((n for most, n in TRIES if count <= most), 0))
+    x, mu, log_ratio = solved(POINTS, min_X, FIT_SEED)
+    tries = next((n for most, n in TRIES if count <= most), 0)
+    return fit(Samples.of(which, x, mu, log_ratio[which]), count, tries)
 
 
-def _product(term: Term, letter: str) -> str:
-    """A term as text, "1" for none."""
-    power, name, j = term
-    factors = [f"u_{letter}" if power == 1 else f"u_{letter}**{power}"] if power else []
-    if j:
-        factors.append(f"{name}_{letter}" if j == 1 else f"{name}_{letter}**{j}")
-    return "*".join(factors) or "1"
-
-
-def _text(found: Fit, digits: int) -> list[list[str]]:
-    """Steps that define log_Q of a fit, coefficients with that many digits."""
-    letter = LETTERS[found.which]
-    c, b, g = found.shape
-    used = {name for _, name, j in found.terms if j}
-    steps = [[f"u_{letter}", f"1/(X + {c!r})"]]
-    if used & {"t", "z"}:
-        steps.append([f"y_{letter}", f"{b!r}*mu*(X + {c!r})"])
-    if "t" in used:
-        steps.append([f"t_{letter}", f"log(1 + y_{letter})"])
-    if "z" in used:
-        steps.append([f"z_{letter}", f"1/(1 + sqrt(y_{letter}))"])
-    if "v" in used:
-        steps.append([f"v_{letter}", f"log(1 + {g!r}*mu*sqrt(u_{letter}))"])
-    total = ""
-    for term, value in zip(found.terms, formula_heights.rounded(found.coefficients, digits).tolist(), strict=True):
-        sign = (" - " if value < 0 else " + ") if total else ("-" if value < 0 else "")
-        total += f"{sign}{abs(value)!r}*{_product(term, letter)}"
+def function_steps(found: Fit, rigid: float, digits: int) -> tuple[Step, ...]:
+    """Steps of one function, its coefficients with that many digits."""
+    letter = "FA"[found.which]
+    u, y, t, z, v, log_Q = (sympy.Symbol(f"{name}_{letter}") for name in ("u", "y", "t", "z", "v", "log_Q"))
+    named = {"t": t, "z": z, "v": v}
+    c, b, g = map(sympy.Float, found.shape)
+    total = sympy.Add(
+        *(
+            sympy.Float(value) * u**i * named[name] ** j
+            for (i, name, j), value in zip(found.terms, rounded(found.coefficients, digits).tolist(), strict=True)
+        )
+    )
+    rigid_sphere = sympy.Symbol(_rigid(found.which))
     if found.which == FORCE:
-        limit = f"{HERTZ[FORCE]:.10g}*(X + 1)"
+        top, limit = MU * rigid_sphere, 3 * sympy.sqrt(2) * sympy.pi / 20 * (X + 1)
     else:
-        limit = f"{HERTZ[AREA]:.10g}*(X + 1)/(1 + mu*(X + 1))**(1/3)"
-    steps.append([f"log_Q_{letter}", total])
-    top = "mu*rigid_F" if found.which == FORCE else "rigid_A"
-    steps.append([NAMES[found.which], f"{top}/(1 + mu*{limit}*exp(log_Q_{letter}))"])
-    return steps
-
-
-def _errors(steps: list[list[str]], X: FloatArray, mu: FloatArray, log_ratio: FloatArray) -> FloatArray:
-    """Relative errors of both functions as the text gives them, (2, points)."""
-    found = evaluate_steps(steps, {"X": X, "mu": mu}, NAMES)
-    exact = np.exp(log_ratio) * greenwood_tripp.rigid_sphere(X, mu)
-    errors: FloatArray = np.stack([found[name] for name in NAMES]) / exact - 1
-    return errors
-
-
-def _shortest(name: str) -> list[list[str]]:
-    """The steps of a form, constants as short as they may be."""
-    size = SIZES[name]
-    sample = solved(POINTS, size.lowest_X, FIT_SEED)
-    both = [fitted(which, size.terms[which], size.lowest_X) for which in (FORCE, AREA)]
-    heights = formula_heights.height_steps(size.heights)
-
-    def largest(digits: tuple[int, int]) -> FloatArray:
-        steps = heights + [step for found, places in zip(both, digits, strict=True) for step in _text(found, places)]
-        errors: FloatArray = np.abs(_errors(steps, *sample)).max(axis=1)
-        return errors
-
-    best = largest((MOST_DIGITS, MOST_DIGITS))
-    digits = [
-        next(places for places in range(2, MOST_DIGITS + 1) if largest((places, places))[which] <= SLACK * best[which])
-        for which in (FORCE, AREA)
+        top, limit = rigid_sphere, sympy.cbrt(2 * sympy.pi**2) / 3 * (X + 1) / sympy.cbrt(1 + MU * (X + 1))
+    steps = [
+        *rigid_steps(found.which, rigid),
+        (u.name, 1 / (X + c)),
+        (y.name, b * MU * (X + c)),
+        (t.name, sympy.log(1 + y)),
+        (z.name, 1 / (1 + sympy.sqrt(y))),
+        (v.name, sympy.log(1 + g * MU * sympy.sqrt(u))),
+        (log_Q.name, total),
+        (NAMES[found.which], top / (1 + MU * limit * sympy.exp(log_Q))),
     ]
-    return heights + [step for found, places in zip(both, digits, strict=True) for step in _text(found, places)]
+    return needed(steps)
 
 
-def rises(steps: list[list[str]], lowest_X: float) -> bool:
-    """Whether both functions are positive and rise with X, on a grid of the range."""
-    X = np.linspace(lowest_X, HIGHEST_X, GRID)[:, None]
-    mu = np.geomspace(LEAST_MU, MOST_MU, GRID)
-    X, mu = (np.ascontiguousarray(a) for a in np.broadcast_arrays(X, mu))
-    found = evaluate_steps(steps, {"X": X.ravel(), "mu": mu.ravel()}, NAMES)
-    fields = [found[name].reshape(GRID, GRID) for name in NAMES]
-    return all((field > 0).all() and (np.diff(field, axis=0) > 0).all() for field in fields)
+def relative_error(steps: tuple[Step, ...], which: int, count: int, min_X: float, seed: int) -> FloatArray:
+    """Relative error of one function at solved points, (count,)."""
+    x, mu, log_ratio = solved(count, min_X, seed)
+    exact = np.exp(log_ratio[which]) * greenwood_tripp.rigid_sphere(x, mu)[which]
+    error: FloatArray = np.abs(evaluate(steps, {"X": x, "mu": mu})[NAMES[which]] / exact - 1)
+    return error
+
+
+def rises(steps: tuple[Step, ...], result: str, min_X: float) -> bool:
+    """Whether a function is positive and rises with X, on a grid of the range."""
+    x, mu = np.meshgrid(np.linspace(min_X, MAX_X, GRID), np.geomspace(MIN_MU, MAX_MU, GRID), indexing="ij")
+    field = evaluate(steps, {"X": x, "mu": mu})[result]
+    return bool((field > 0).all() and (np.diff(field, axis=0) > 0).all())
 
 
 def island_form(name: str) -> Form:
-    """One form with its certificate, in the shape of the formula file."""
+    """One form with its certificates."""
     size = SIZES[name]
-    steps = _shortest(name)
-    if not rises(steps, size.lowest_X):
-        raise RuntimeError(f"the {name} form does not rise with X everywhere")
-    X, mu, log_ratio = solved(HELD_OUT, size.lowest_X, HELD_OUT_SEED)
-    errors = np.abs(_errors(steps, X, mu, log_ratio))
-    stated: Form = {"points": HELD_OUT}
-    for which, function in enumerate(NAMES):
-        worst = int(errors[which].argmax())
-        stated[function] = {
-            "largest": float(f"{errors[which].max():.3g}"),
-            "median": float(f"{np.median(errors[which]):.3g}"),
-            "worst_at": {"X": float(f"{X[worst]:.4g}"), "mu": float(f"{mu[worst]:.4g}")},
-        }
-    return {
-        "title": size.title,
-        "arguments": ["X", "mu"],
-        "range": {"X": [size.lowest_X, HIGHEST_X], "mu": [0.0, MOST_MU]},
-        "steps": steps,
-        "outputs": {name: name for name in NAMES},
-        "coefficients": {
-            NAMES[which]: fitted(which, size.terms[which], size.lowest_X).length for which in (FORCE, AREA)
-        },
-        "heights": {
-            name: float(f"{formula_heights.height_error(name, size.heights):.3g}") for name in ("rigid_F", "rigid_A")
-        },
-        "errors": stated,
-    }
+    functions, certificates = [], {}
+    for which, result in enumerate(NAMES):
+        found = fitted(which, size.terms[which], size.min_X)
 
+        def largest(digits: int, found: Fit = found) -> float:
+            steps = function_steps(found, size.rigid, digits)
+            return float(relative_error(steps, found.which, POINTS, size.min_X, FIT_SEED).max())
 
-def island_forms() -> dict[str, Form]:
-    """All three forms."""
-    return {name: island_form(name) for name in SIZES}
+        steps = function_steps(found, size.rigid, fewest_digits(largest, SLACK))
+        if not rises(steps, result, size.min_X):
+            raise RuntimeError(f"{result} of the {name} form does not rise with X everywhere")
+        error = relative_error(steps, which, HELD_OUT, size.min_X, HELD_OUT_SEED)
+        x, mu, _ = solved(HELD_OUT, size.min_X, HELD_OUT_SEED)
+        certificates[result] = certificate(found.length, error, {"X": x, "mu": mu})
+        title = f"{result.capitalize()}, {name} form: within {certificates[result].largest:g}."
+        functions.append(Function(name, result, ("X", "mu"), title, steps))
+    return Form(name, {"X": (size.min_X, MAX_X), "mu": (0.0, MAX_MU)}, tuple(functions), certificates)
 
 
 def front(sizes: tuple[int, ...] = (4, 6, 8, 12, 16, 20, 28, 36, 48)) -> list[dict[str, float]]:
-    """Coefficients of a function against its largest error on held-out points, X from 0.8 on, heights exact."""
-    X, mu, log_ratio = solved(HELD_OUT, 0.8, HELD_OUT_SEED)
+    """Coefficients of a function against its largest error on held-out points, X from 0.8 on, rigid sphere exact."""
+    x, mu, log_ratio = solved(HELD_OUT, 0.8, HELD_OUT_SEED)
     rows = []
     for count in sizes:
         row: dict[str, float] = {"terms": count}
         for which, name in enumerate(NAMES):
             found = fitted(which, count, 0.8)
-            held_out = Samples.of(which, X, mu, log_ratio[which])
+            held_out = Samples.of(which, x, mu, log_ratio[which])
             error = held_out.columns(found.terms, found.shape) @ found.coefficients - held_out.residual
             row[f"coefficients_{name}"] = found.length
             row[f"error_{name}"] = math.expm1(float(np.abs(error).max()))

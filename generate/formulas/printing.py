@@ -1,17 +1,18 @@
-"""Closed forms as steps of sympy expressions: written as numpy functions and C99, read back, shown in LaTeX.
+"""Closed forms as steps of sympy expressions: evaluated, written as numpy functions and C99, read back, shown in LaTeX.
 
 `models/closed_form_functions.py` is the one place where the forms are kept. The C text and the equations of
-docs/formula.md are printed from its functions, so what is certified is what is printed.
+docs/formula.md are printed from its functions, and `evaluate` runs the same text: what is certified is what is shipped.
 """
 
 from __future__ import annotations
 
 import ast
 import dataclasses
+import pathlib
 import subprocess
 import sys
 import textwrap
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -21,17 +22,24 @@ from sympy.printing.c import C99CodePrinter
 from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.precedence import PRECEDENCE
 
+import mbma_tables
 from mbma_tables.arguments import FloatArray
+from mbma_tables.models.closed_form_functions import Certificate
 
+PACKAGE = pathlib.Path(mbma_tables.__file__).parent
+MODULE = PACKAGE / "models" / "closed_form_functions.py"
+C_TEXT = PACKAGE / "export" / "templates" / "closed_forms.c"
 MAX_PRODUCT = 8  # whole powers up to this are written as products: faster than pow, and rounded alike everywhere
 WIDTH = 120
 MADE_BY = "Made by `python -m generate formulas`; do not edit."
+NUMPY_NAMES = ("exp", "log", "pi", "sqrt", "where")
 
 Step = tuple[str, sympy.Expr]
+Ranges = dict[str, tuple[float, float]]
 
-_HEAD = '''"""Closed forms of the island functions and of total force and area, with their certificates.
+_HEAD = f'''"""Closed forms of the island functions and of total force and area, with their certificates.
 
-{made_by}
+{MADE_BY}
 """
 
 # numpy's ufuncs return Any
@@ -42,7 +50,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from numpy import exp, log, pi, sqrt, where
+from numpy import {", ".join(NUMPY_NAMES)}
 
 from mbma_tables.arguments import FloatArray
 
@@ -56,37 +64,34 @@ class Certificate(NamedTuple):
     points: int
     worst_at: dict[str, float]
 
+
 '''
 
 
 @dataclasses.dataclass(frozen=True)
 class Function:
-    """One closed form of one quantity: each step uses the arguments and earlier steps, the last is the value.
+    """One closed form of one result: each step uses the arguments and earlier steps, the last is the value."""
 
-    Examples
-    --------
-    >>> import numpy as np, sympy
-    >>> Function("form_twice", ("X",), "", [("twice", 2 * sympy.Symbol("X"))])(np.array([1.5]))
-    array([3.])
-    """
-
-    name: str
+    form: str
+    result: str
     arguments: tuple[str, ...]
     title: str
-    steps: list[Step]
+    steps: tuple[Step, ...]
 
     @property
-    def result(self) -> str:
-        """The name of what it returns, phi_F of pocket_phi_F."""
-        return self.name.partition("_")[2]
+    def name(self) -> str:
+        """Its name in Python, and in C after ``mbma_``."""
+        return f"{self.form}_{self.result}"
 
-    def __call__(self, *values: FloatArray) -> FloatArray:
-        """Evaluate the text of the numpy function, which is what is shipped."""
-        names: dict[str, Any] = {name: getattr(np, name) for name in ("exp", "log", "pi", "sqrt", "where")}
-        exec(python_text(self), names | {"FloatArray": object}, names)
-        with np.errstate(all="ignore"):
-            found: FloatArray = names[self.name](*values)
-        return found
+
+@dataclasses.dataclass(frozen=True)
+class Form:
+    """Fitted functions of one form with their range and certificates."""
+
+    name: str
+    ranges: Ranges
+    functions: tuple[Function, ...]
+    certificates: dict[str, Certificate]
 
 
 class _Numpy(NumPyPrinter):  # type: ignore[misc]
@@ -113,7 +118,7 @@ class _Numpy(NumPyPrinter):  # type: ignore[misc]
 
 
 class _C99(C99CodePrinter):  # type: ignore[misc]
-    """ISO C99 has no M_PI."""
+    """Literals in shortest decimals, and no M_PI, which ISO C99 has not."""
 
     def __init__(self) -> None:
         super().__init__({"math_macros": {}})
@@ -128,74 +133,142 @@ class _C99(C99CodePrinter):  # type: ignore[misc]
 _expand_powers = create_expand_pow_optimization(MAX_PRODUCT)
 
 
-def _wrapped(text: str, indent: str) -> str:
-    return textwrap.fill(
-        text, WIDTH, initial_indent=indent, subsequent_indent=indent + "    ", break_long_words=False,
-        break_on_hyphens=False,
-    )  # fmt: skip
+def _python(value: sympy.Expr) -> str:
+    text: str = _Numpy().doprint(_expand_powers(value))
+    return text
 
 
-def python_text(function: Function) -> str:
-    """The function in Python."""
+def _c(value: sympy.Expr) -> str:
+    text: str = _C99().doprint(_expand_powers(value))
+    return text
+
+
+def evaluate(steps: Iterable[Step], given: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Values of all steps, by the text of the numpy functions.
+
+    Examples
+    --------
+    >>> evaluate([("w", 1 / (sympy.Symbol("X") + 3))], {"X": np.array([1.0, 2.0])})["w"]
+    array([0.25, 0.2 ])
+    """
+    names: dict[str, Any] = {name: getattr(np, name) for name in NUMPY_NAMES} | dict(given)
+    with np.errstate(all="ignore"):
+        for name, value in steps:
+            names[name] = eval(_python(value), names)
+    return names
+
+
+def _python_function(function: Function) -> str:
     given = ", ".join(f"{name}: FloatArray" for name in function.arguments)
     lines = [f"def {function.name}({given}) -> FloatArray:", f'    """{function.title}"""']
     for name, value in function.steps:
         left = "return" if name == function.result else f"{name} ="
-        lines.append(f"    {left} {_Numpy().doprint(_expand_powers(value))}")
-    return "\n".join([*lines, ""])
+        lines.append(f"    {left} {_python(value)}")
+    return "\n".join([*lines, "", ""])
 
 
-def c_text(functions: Iterable[Function]) -> str:
-    """The functions in C99: doubles in, a double out; <math.h> alone, no global data."""
-    functions = list(functions)
-    heads = {f.name: f"double mbma_{f.name}({', '.join(f'double {name}' for name in f.arguments)})" for f in functions}
-    parts = [
-        "\n".join(_wrapped(line, " * ") for line in ("Closed forms of the MBMA model.", MADE_BY)),
-        " */\n#include <math.h>\n",
-        "\n".join(f"{head};" for head in heads.values()),
-    ]
-    text = "/*\n" + "\n".join(parts) + "\n"
-    for function in functions:
-        lines = [f"/* {function.title} */", f"{heads[function.name]} {{"]
-        for name, value in function.steps:
-            left = "return" if name == function.result else f"const double {name} ="
-            lines.append(_wrapped(f"{left} {_C99().doprint(_expand_powers(value))};", "    "))
-        text += "\n" + "\n".join([*lines, "}", ""])
-    return text
-
-
-def module_text(
-    functions: Iterable[Function],
-    ranges: dict[str, dict[str, tuple[float, float]]],
-    certificates: dict[str, dict[str, Any]],
-) -> str:
+def module_text(functions: Iterable[Function], ranges: dict[str, Ranges], certificates: dict[str, Any]) -> str:
     """The module of closed forms; `ranges` and `certificates` by form, the latter by result too."""
-    text = _HEAD.format(made_by=MADE_BY)
-    text += "\n\n".join(python_text(function) for function in functions)
-    by_form = ", ".join(
-        f"{form!r}: {{{', '.join(f'{result!r}: {form}_{result}' for result in results)}}}"
-        for form, results in certificates.items()
-    )
-    text += f"\n\nFUNCTIONS: dict[str, dict[str, Callable[..., FloatArray]]] = {{{by_form}}}\n"
+    functions = list(functions)
+    by_form = {form: {f.result: f.name for f in functions if f.form == form} for form in ranges}
+    text = _HEAD + "\n".join(map(_python_function, functions))
+    # names of functions, not their text
+    text += f"\nFUNCTIONS: dict[str, dict[str, Callable[..., FloatArray]]] = {by_form!r}\n"
+    for function in functions:
+        text = text.replace(f": '{function.name}'", f": {function.name}")
     text += f"RANGES: dict[str, dict[str, tuple[float, float]]] = {ranges!r}\n"
     text += f"CERTIFICATES: dict[str, dict[str, Certificate]] = {certificates!r}\n"
     command = [sys.executable, "-m", "ruff", "format", "--line-length", str(WIDTH), "-"]
     return subprocess.run(command, input=text, capture_output=True, text=True, check=True).stdout
 
 
+def _wrapped(text: str) -> str:
+    indents = {"initial_indent": "    ", "subsequent_indent": "        "}
+    return "\n".join(textwrap.wrap(text, WIDTH, break_long_words=False, break_on_hyphens=False, **indents))
+
+
+def c_text(functions: Iterable[Function]) -> str:
+    """The functions in C99: doubles in, a double out; <math.h> alone, no global data."""
+    functions = list(functions)
+    heads = {f.name: f"double mbma_{f.name}({', '.join(f'double {name}' for name in f.arguments)})" for f in functions}
+    lines = ["/*", " * Closed forms of the MBMA model.", f" * {MADE_BY}", " */", "#include <math.h>", ""]
+    lines += [f"{head};" for head in heads.values()]
+    for function in functions:
+        lines += ["", f"/* {function.title} */", f"{heads[function.name]} {{"]
+        for name, value in function.steps:
+            left = "return" if name == function.result else f"const double {name} ="
+            lines.append(_wrapped(f"{left} {_c(value)};"))
+        lines.append("}")
+    return "\n".join([*lines, ""])
+
+
+def _otherwise(condition: sympy.Expr, value: sympy.Expr, other: sympy.Expr) -> sympy.Expr:
+    return sympy.Piecewise((value, condition), (other, True))
+
+
+def steps_of(assignments: Iterable[tuple[str, str]], arguments: Iterable[str]) -> tuple[Step, ...]:
+    """Steps from their text; a name means an argument or an earlier step."""
+    known: dict[str, Any] = {name: sympy.Symbol(name) for name in arguments} | {"where": _otherwise}
+    steps = []
+    for name, text in assignments:
+        steps.append((name, sympy.sympify(text, locals=known)))
+        known[name] = sympy.Symbol(name)
+    return tuple(steps)
+
+
+def needed(steps: list[Step]) -> tuple[Step, ...]:
+    """The steps that the last one needs, in their order."""
+    wanted = {steps[-1][0]}
+    kept: list[Step] = []
+    for name, value in reversed(steps):
+        if name in wanted:
+            kept.insert(0, (name, value))
+            wanted |= {symbol.name for symbol in value.free_symbols}
+    return tuple(kept)
+
+
 def read_functions(module: str) -> dict[str, Function]:
-    """The functions of a module's text, their right-hand sides as sympy expressions."""
-    where: Callable[..., sympy.Expr] = lambda test, yes, no: sympy.Piecewise((yes, test), (no, True))  # noqa: E731
+    """The functions of a module's text by name, their right-hand sides as sympy expressions."""
     found = {}
     for node in ast.parse(module).body:
         if isinstance(node, ast.FunctionDef):
+            form, _, result = node.name.partition("_")
             arguments = tuple(argument.arg for argument in node.args.args)
-            known: dict[str, Any] = {name: sympy.Symbol(name) for name in arguments} | {"where": where}
-            steps = []
-            for line in node.body:
-                if isinstance(line, ast.Assign | ast.Return) and line.value:
-                    name = ast.unparse(line.targets[0]) if isinstance(line, ast.Assign) else node.name.partition("_")[2]
-                    steps.append((name, sympy.sympify(ast.unparse(line.value), locals=known)))
-                    known[name] = sympy.Symbol(name)
-            found[node.name] = Function(node.name, arguments, ast.get_docstring(node) or "", steps)
+            assignments = [
+                (ast.unparse(line.targets[0]) if isinstance(line, ast.Assign) else result, ast.unparse(line.value))
+                for line in node.body
+                if isinstance(line, ast.Assign | ast.Return) and line.value
+            ]
+            steps = steps_of(assignments, arguments)
+            found[node.name] = Function(form, result, arguments, ast.get_docstring(node) or "", steps)
     return found
+
+
+_LATEX = {"log_Q_F": r"\ln Q_F", "log_Q_A": r"\ln Q_A", "rigid_F": "R_F", "rigid_A": "R_A", "hurst": "H"} | {
+    "phi_F": r"\Phi_F",
+    "phi_A": r"\Phi_A",
+    "d_over_h_rms": r"\tilde d",
+    "h_max_over_h_rms": r"\tilde h",
+    **{name: rf"\mathrm{{{name}}}" for name in ("near", "far", "force", "area")},
+}
+
+
+def latex_steps(function: Function) -> list[str]:
+    """One equation a step, in the order in which they are evaluated."""
+    names = {sympy.Symbol(name): text for name, text in _LATEX.items()}
+    return [
+        f"{names.get(sympy.Symbol(name), name)} = {sympy.latex(value, symbol_names=names, ln_notation=True)}"
+        for name, value in function.steps
+    ]
+
+
+def write_forms(forms: Iterable[Form]) -> None:
+    """Write the module and its C text."""
+    forms = list(forms)
+    text = module_text(
+        [function for form in forms for function in form.functions],
+        {form.name: form.ranges for form in forms},
+        {form.name: form.certificates for form in forms},
+    )
+    MODULE.write_text(text, encoding="utf-8")
+    C_TEXT.write_text(c_text(read_functions(text).values()), encoding="utf-8")

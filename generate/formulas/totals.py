@@ -1,7 +1,7 @@
 """Closed forms of total force and area over the range of practice, in two branches, certified on other surfaces.
 
-The branches meet where the largest islands reach the floor of zeta_d, at l = k with l = (h_max - d)/h_rms. Below it the
-end of the integral decides, F ~ l^(7/2) and A ~ l^(10/3) at first contact; above it hardly more than the gap does. The
+The branches meet where the largest islands reach the floor of zeta_d, at r = k with r = (h_max - d)/h_rms. Below it the
+end of the integral decides, F ~ r^(7/2) and A ~ r^(10/3) at first contact; above it hardly more than the gap does. The
 logarithms are sums of products of a few variables of order one: terms by backward elimination and annealing,
 coefficients of least largest error. Force is over E* q0 h_rms, reading "reported".
 """
@@ -10,62 +10,72 @@ from __future__ import annotations
 
 import functools
 import itertools
-from typing import Any
 
 import numpy as np
+import sympy
 from threadpoolctl import threadpool_limits
 
-from generate.formulas.heights import rounded
-from generate.formulas.terms import least_largest
+from generate.formulas.fit import DATA_DIGITS, certificate, fewest_digits, least_largest, rounded, score
+from generate.formulas.printing import Form, Function, Step, evaluate, needed, steps_of
 from mbma_tables import Surface, contact
 from mbma_tables.arguments import FloatArray
-from mbma_tables.formulas.expressions import evaluate_steps
 
 NAMES = ("force", "area")
-POWERS = {"force": 3.5, "area": 10 / 3}
-RANGE = {
+RANGES = {
     "d_over_h_rms": (-4.5, 4.5),
     "h_max_over_h_rms": (3.0, 4.5),
     "zeta_1": (10.0, 1000.0),
     "hurst": (0.5, 1.0),
 }
-LEAST_AREA = 1e-6
+MIN_AREA = 1e-6
 MARGIN = 0.7  # samples of the fit go down to this share of it
-LEAST_REACH = 0.05  # l below which no surface of the range reaches LEAST_AREA
+MIN_PENETRATION = 0.05  # r below which no surface of the range reaches MIN_AREA
 OVERLAP = 0.02  # of k, by which the samples of the branches overlap
 DEGREE = 3
 # what a power of each variable counts towards DEGREE, by branch
 NEAR = {"t": 0.75, "b": 0.75, "q": 0.75, "c": 1.0, "z": 1.0, "h": 1.0}
 FAR = {"g": 0.5, "s": 0.5, "y": 1.0, "h": 1.0, "z": 1.0}
 TERMS = {"force": (22, 18), "area": (23, 17)}  # of the near and the far branch
-POINTS, HELD_OUT = 12_000, 60_000
+POINTS, HELD_OUT = 40_000, 60_000
 EDGE = 0.3  # share of each property that lies on an end of its range, where the error is largest
 FIT_SEED, HELD_OUT_SEED = 41, 42
-TRIALS = 3000  # exchanges tried by annealing, on every THIN-th sample
-THIN = 4
+TRIALS = 6000  # exchanges tried by annealing, on every THIN-th sample
+THIN = 12
 HEAT = 0.04  # relative loss that a swap may cost at first
 CHOICES = 4.0  # how deep into the ranked columns a swap reaches
 TRIAL_ROUNDS = 15
-ANNEAL_SEED = 43
+# share of the trace added to normal equations: with 1e-12 the search takes another turn when samples change by 1e-15,
+# with 1e-9 when they change by 1e-13, with 1e-7 not even when they change by 1e-11
+RIDGE = 1e-7
+ANNEAL_SEEDS = (43, 44, 45, 46)  # the best of as many searches
 SLACK = 1.01
-MOST_DIGITS = 15
 
-Form = dict[str, Any]
 Powers = tuple[int, ...]
 
-VARIABLES = [
-    ["l", "h_max_over_h_rms - d_over_h_rms"],
-    ["k", "2.25*sqrt(1.5**(-2*hurst) - zeta_1**(-2*hurst))"],
-    ["t", "log(1 + l*zeta_1**hurst)/3 - 1"],
-    ["q", "1/(1 + l*zeta_1**hurst)"],
-    ["b", "l - 1"],
-    ["c", "(h_max_over_h_rms - 3.75)/0.75"],
-    ["z", "log(zeta_1)/2.3 - 2"],
-    ["y", "2/sqrt(zeta_1) - 0.4"],
-    ["h", "4*hurst - 3"],
-    ["g", "(d_over_h_rms + 1)/3.7"],
-    ["s", "(d_over_h_rms + 0.3)/sqrt((d_over_h_rms + 0.3)**2 + 1)"],
-]
+VARIABLES = steps_of(
+    [
+        ("r", "h_max_over_h_rms - d_over_h_rms"),
+        ("k", "9/4*sqrt((3/2)**(-2*hurst) - zeta_1**(-2*hurst))"),
+        ("t", "log(1 + r*zeta_1**hurst)/3 - 1"),
+        ("q", "1/(1 + r*zeta_1**hurst)"),
+        ("b", "r - 1"),
+        ("c", "4*h_max_over_h_rms/3 - 5"),
+        ("z", "log(zeta_1)/log(10) - 2"),
+        ("y", "2/sqrt(zeta_1) - 2/5"),
+        ("h", "4*hurst - 3"),
+        ("g", "(d_over_h_rms + 1)/4"),
+        ("s", "(d_over_h_rms + 0.3)/sqrt((d_over_h_rms + 0.3)**2 + 1)"),
+    ],
+    RANGES,
+)
+# what a branch starts from: the power of first contact, the layer and the Gaussian at the largest islands; beyond, the
+# tail of heights
+STARTS = {
+    ("force", False): "7/2*log(r/(1 + r*zeta_1**hurst)) - (h_max_over_h_rms - 4*r/9)**2/2",
+    ("area", False): "10/3*log(r/(1 + r*zeta_1**hurst)) - (h_max_over_h_rms - 4*r/9)**2/2",
+    ("force", True): "-(d_over_h_rms + sqrt(d_over_h_rms**2 + 2))**2/8",
+    ("area", True): "-(d_over_h_rms + sqrt(d_over_h_rms**2 + 2))**2/8",
+}
 
 
 def arguments(count: int, seed: int) -> dict[str, FloatArray]:
@@ -76,27 +86,29 @@ def arguments(count: int, seed: int) -> dict[str, FloatArray]:
         place = rng.uniform(-EDGE / 2, 1 + EDGE / 2, count)
         return low + (high - low) * np.clip(place, 0.0, 1.0)
 
-    hurst = drawn(*RANGE["hurst"])
-    zeta_1 = np.clip(np.exp(drawn(*np.log(RANGE["zeta_1"]))), *RANGE["zeta_1"])
-    top = drawn(*RANGE["h_max_over_h_rms"])
-    reach = np.minimum(np.exp(rng.uniform(np.log(LEAST_REACH), np.log(2 * top))), 2 * top)
+    hurst = drawn(*RANGES["hurst"])
+    zeta_1 = np.clip(np.exp(drawn(*np.log(RANGES["zeta_1"]))), *RANGES["zeta_1"])
+    top = drawn(*RANGES["h_max_over_h_rms"])
+    r = np.minimum(np.exp(rng.uniform(np.log(MIN_PENETRATION), np.log(2 * top))), 2 * top)
     part = rng.uniform(size=count)
     # full compression; evenly in d; and where the branches meet, which no random point hits
-    reach = np.where(part < 0.03, 2 * top, np.where(part < 0.35, rng.uniform(0.1, 1.0, count) * 2 * top, reach))
+    r = np.where(part < 0.03, 2 * top, np.where(part < 0.35, rng.uniform(0.1, 1.0, count) * 2 * top, r))
     meet = 2.25 * np.sqrt(1.5 ** (-2 * hurst) - zeta_1 ** (-2 * hurst)) * rng.uniform(1 - OVERLAP, 1 + OVERLAP, count)
-    reach = np.where(part > 0.9, meet, reach)
-    return {"d_over_h_rms": top - reach, "h_max_over_h_rms": top, "zeta_1": zeta_1, "hurst": hurst}
+    r = np.where(part > 0.9, meet, r)
+    drawn_values = {"h_max_over_h_rms": top, "zeta_1": zeta_1, "hurst": hurst}
+    # full compression stays within -h_max as top is rounded before r is taken off it
+    given = {name: rounded(values, DATA_DIGITS) for name, values in drawn_values.items()}
+    gap = np.maximum(rounded(given["h_max_over_h_rms"] - r, DATA_DIGITS), -given["h_max_over_h_rms"])
+    return {"d_over_h_rms": gap, **given}
 
 
 @functools.cache
-def samples(
-    count: int, seed: int, least_area: float = LEAST_AREA
-) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-    """Arguments, and force and area by the universal table (error 1e-8), where contact is above `least_area`."""
+def samples(count: int, seed: int, min_area: float = MIN_AREA) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Arguments, and force and area by the universal table (error 1e-8), where contact is above `min_area`."""
     given = arguments(count, seed)
     surface = Surface(given["hurst"], 1.0, given["zeta_1"], 1.0, given["h_max_over_h_rms"])
     found = contact(surface, given["d_over_h_rms"])
-    kept = found.area > least_area
+    kept = found.area > min_area
     return {name: a[kept] for name, a in given.items()}, {name: getattr(found, name)[kept] for name in NAMES}
 
 
@@ -111,68 +123,78 @@ def matrix(powers: list[Powers], weights: dict[str, float], named: dict[str, Flo
     return np.stack([np.prod([named[v] ** n for v, n in zip(weights, p, strict=True)], axis=0) for p in powers], 1)
 
 
-def _lawson(M: FloatArray, target: FloatArray, weight: FloatArray, rounds: int) -> tuple[float, FloatArray]:
-    """Least largest error by few and quick rounds of reweighting (normal equations), and the weights found."""
+def _normal(M: FloatArray, target: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Normal equations of a weighted fit, ridge included, and their right-hand side."""
+    weighted = M * weight[:, None]
+    gram = weighted.T @ M
+    return gram + RIDGE * np.trace(gram) * np.eye(len(gram)), weighted.T @ target
+
+
+def _reweighted(M: FloatArray, target: FloatArray, weight: FloatArray, rounds: int) -> tuple[float, FloatArray]:
+    """Least largest error by few and quick rounds of reweighting, and the weights found."""
     best, kept_weight = np.inf, weight
     for _ in range(rounds):
-        weighted = M * weight[:, None]
-        gram = weighted.T @ M
-        solved = np.linalg.solve(gram + 1e-12 * np.trace(gram) * np.eye(len(gram)), weighted.T @ target)
-        error = np.abs(M @ solved - target)
+        error = np.abs(M @ np.linalg.solve(*_normal(M, target, weight)) - target)
         largest = float(error.max())
         if largest < best:
             best, kept_weight = largest, weight
         grown = weight * (error / largest + 1e-3)
         weight = np.maximum(grown / grown.mean(), 1e-5)
-    return best, kept_weight
+    return score(best), kept_weight
+
+
+def _harm(M: FloatArray, target: FloatArray, weight: FloatArray) -> FloatArray:
+    """How much worse the weighted fit becomes without each column."""
+    gram, right = _normal(M, target, weight + 0.03)
+    inverse = np.linalg.inv(gram)
+    return rounded((inverse @ right) ** 2 / np.diag(inverse), 6)
+
+
+def _root(weight: FloatArray) -> FloatArray:
+    root: FloatArray = np.sqrt(weight) / np.sqrt(weight).mean()
+    return root
 
 
 def eliminate(M: FloatArray, target: FloatArray, count: int) -> list[int]:
     """Columns left when those that matter least to the largest error have gone one after another."""
     kept, weight = list(range(M.shape[1])), np.ones(target.size)
     while len(kept) > count:
-        own = M[:, kept]
-        root = np.sqrt(weight)
-        weight = _lawson(own, target, root / root.mean(), TRIAL_ROUNDS)[1]
-        harm = _harm(own, target, weight)
+        weight = _reweighted(M[:, kept], target, _root(weight), TRIAL_ROUNDS)[1]
         several = max(1, len(kept) // 15) if len(kept) > count + 10 else 1
-        gone = set(np.argsort(harm)[:several].tolist())
+        gone = set(np.argsort(_harm(M[:, kept], target, weight), kind="stable")[:several].tolist())
         kept = [column for place, column in enumerate(kept) if place not in gone]
     return kept
 
 
-def _harm(own: FloatArray, target: FloatArray, weight: FloatArray) -> FloatArray:
-    """How much worse the weighted fit becomes without each column."""
-    weighted = own * (weight + 0.03)[:, None]
-    gram = weighted.T @ own
-    inverse = np.linalg.inv(gram + 1e-12 * np.trace(gram) * np.eye(len(gram)))
-    harm: FloatArray = (inverse @ (weighted.T @ target)) ** 2 / np.diag(inverse)
-    return harm
+def _ranked(M: FloatArray, target: FloatArray, weight: FloatArray, rest: list[int]) -> list[int]:
+    """Columns in the order in which they would help a weighted fit of the columns `rest`."""
+    root = np.sqrt(weight + 0.03)
+    weighted = M * root[:, None]
+    Q = np.linalg.qr(weighted[:, rest])[0]
+    right = target * root
+    missing, free = right - Q @ (Q.T @ right), weighted - Q @ (Q.T @ weighted)
+    size = np.linalg.norm(free, axis=0)
+    new = size > 1e-4 * np.linalg.norm(weighted, axis=0)
+    gain = np.where(new, np.abs(free.T @ missing) / np.maximum(size, 1e-9), 0.0)
+    order: list[int] = np.argsort(-rounded(gain, 6), kind="stable").tolist()
+    return order
 
 
-def anneal(M: FloatArray, target: FloatArray, kept: list[int]) -> list[int]:
+def anneal(M: FloatArray, target: FloatArray, kept: list[int], seed: int) -> list[int]:
     """Swap columns, at first also for slightly worse ones, and keep the set of least largest error."""
-    rng = np.random.default_rng(ANNEAL_SEED)
-    now, weight = _lawson(M[:, kept], target, np.ones(target.size), 2 * TRIAL_ROUNDS)
+    rng = np.random.default_rng(seed)
+    now, weight = _reweighted(M[:, kept], target, np.ones(target.size), 2 * TRIAL_ROUNDS)
     best, found = now, kept
     tried = 0
     while tried < TRIALS:
-        root = np.sqrt(weight + 0.03)
-        weighted, right = M * root[:, None], target * root
-        norm = np.linalg.norm(weighted, axis=0)
-        drop = np.argsort(_harm(M[:, kept], target, weight))[min(int(rng.exponential(CHOICES)), len(kept) - 1)]
+        harm = np.argsort(_harm(M[:, kept], target, weight), kind="stable")
+        drop = harm[min(int(rng.exponential(CHOICES)), len(kept) - 1)]
         rest = [column for place, column in enumerate(kept) if place != drop]
-        Q = np.linalg.qr(weighted[:, rest])[0]
-        left, free = right - Q @ (Q.T @ right), weighted - Q @ (Q.T @ weighted)
-        size = np.linalg.norm(free, axis=0)
-        gain = np.where(size > 1e-4 * norm, np.abs(free.T @ left) / np.maximum(size, 1e-9), 0.0)
-        gain[kept] = 0.0
-        ranked = np.argsort(-gain)[: M.shape[1] - len(kept)]
+        ranked = [column for column in _ranked(M, target, weight, rest) if column not in kept]
         for _ in range(3):
             tried += 1
-            trial = [*rest, int(ranked[min(int(rng.exponential(CHOICES)), len(ranked) - 1)])]
-            start = np.sqrt(weight)
-            error, heavier = _lawson(M[:, trial], target, start / start.mean(), TRIAL_ROUNDS)
+            trial = [*rest, ranked[min(int(rng.exponential(CHOICES)), len(ranked) - 1)]]
+            error, heavier = _reweighted(M[:, trial], target, _root(weight), TRIAL_ROUNDS)
             if error < now * (1 + HEAT * (1 - tried / TRIALS) * rng.exponential()):
                 now, weight, kept = error, heavier, trial
                 break
@@ -181,94 +203,57 @@ def anneal(M: FloatArray, target: FloatArray, kept: list[int]) -> list[int]:
     return found
 
 
-def base(name: str, far: bool, named: dict[str, FloatArray], given: dict[str, FloatArray]) -> FloatArray:
-    """What a branch starts from: `_start` as numbers."""
-    found: FloatArray = evaluate_steps([["start", _start(name, far)]], named | given, ("start",))["start"]
-    return found
-
-
-def _start(name: str, far: bool) -> str:
-    """The power of first contact, the layer and the Gaussian at the largest islands; beyond, the tail of heights."""
-    if far:
-        return "-((d_over_h_rms + sqrt(d_over_h_rms**2 + 2))**2)/8"
-    layer = f"{POWERS[name]:.10g}*log(l/(1 + l*zeta_1**hurst))"
-    return f"{layer} - (h_max_over_h_rms - 0.4444444444*l)**2/2"
-
-
 @functools.cache
 def branch(name: str, far: bool, count: int) -> tuple[tuple[Powers, ...], tuple[float, ...]]:
     """Products and coefficients of one branch of log(force) or log(area)."""
-    given, truth = samples(POINTS, FIT_SEED, MARGIN * LEAST_AREA)
-    named = evaluate_steps(VARIABLES, given, [step[0] for step in VARIABLES])
-    place = named["l"] / named["k"]
+    given, truth = samples(POINTS, FIT_SEED, MARGIN * MIN_AREA)
+    start = steps_of([("start", STARTS[name, far])], [*RANGES, "r"])
+    named = evaluate([*VARIABLES, *start], given)
+    place = named["r"] / named["k"]
     mine = place > 1 - OVERLAP if far else place < 1 + OVERLAP
-    named, given = ({key: a[mine] for key, a in group.items()} for group in (named, given))
-    target = np.log(truth[name][mine]) - base(name, far, named, given)
     weights = FAR if far else NEAR
+    target = rounded((np.log(truth[name]) - named["start"])[mine], DATA_DIGITS)
     powers = products(weights)
-    M = matrix(powers, weights, named)
+    M = matrix(powers, weights, {v: rounded(named[v][mine], DATA_DIGITS) for v in weights})
     scaled = M / np.abs(M).max(axis=0)
     few = slice(None, None, THIN)
-    # the search forks on the last digit of a sum, which must not depend on the number of threads
+    # the order of a sum must not depend on the number of threads
     with threadpool_limits(1):
-        kept = anneal(scaled[few], target[few], eliminate(scaled[few], target[few], count))
-    return tuple(powers[k] for k in kept), tuple(least_largest(M[:, kept], target)[1].tolist())
+        first = eliminate(scaled[few], target[few], count)
+        found = [sorted(anneal(scaled[few], target[few], first, seed)) for seed in ANNEAL_SEEDS]
+        fits = [least_largest(M[:, kept], target) for kept in found]
+    best = min(range(len(fits)), key=lambda place: score(fits[place][0]))
+    return tuple(powers[k] for k in found[best]), tuple(fits[best][1].tolist())
 
 
-def _sum(name: str, far: bool, count: int, digits: int) -> str:
-    weights = FAR if far else NEAR
-    powers, coefficients = branch(name, far, count)
-    text = ""
-    for p, value in zip(powers, rounded(np.array(coefficients), digits).tolist(), strict=True):
-        factors = [v if n == 1 else f"{v}**{n}" for v, n in zip(weights, p, strict=True) if n]
-        sign = (" - " if value < 0 else " + ") if text else ("-" if value < 0 else "")
-        text += sign + "*".join([repr(abs(value)), *factors])
-    return text
-
-
-def _steps(counts: dict[str, tuple[int, int]], digits: dict[str, int]) -> list[list[str]]:
-    steps = list(VARIABLES)
-    for name in NAMES:
-        for far, side in ((False, "near"), (True, "far")):
-            text = f"{_start(name, far)} + {_sum(name, far, counts[name][far], digits[name])}"
-            steps.append([f"{side}_{name}", text.replace("+ -", "- ")])
-        steps.append([name, f"exp(select(l - k, far_{name}, near_{name}))"])
-    return steps
-
-
-def _errors(steps: list[list[str]], count: int, seed: int) -> dict[str, FloatArray]:
-    given, truth = samples(count, seed)
-    found = evaluate_steps(steps, given, NAMES)
-    return {name: np.abs(found[name] / truth[name] - 1) for name in NAMES}
+def function_steps(name: str, digits: int) -> tuple[Step, ...]:
+    """Steps of force or area, coefficients with that many digits."""
+    logs = {}
+    for far, side in ((False, "near"), (True, "far")):
+        total = steps_of([(side, STARTS[name, far])], [*RANGES, "r"])[0][1]
+        powers, coefficients = branch(name, far, TERMS[name][far])
+        for p, value in zip(powers, rounded(np.array(coefficients), digits).tolist(), strict=True):
+            named = map(sympy.Symbol, FAR if far else NEAR)
+            total += sympy.Float(value) * sympy.Mul(*(v**n for v, n in zip(named, p, strict=True)))
+        logs[side] = total
+    total = steps_of([(name, "exp(where(r > k, far, near))")], ["r", "k", "far", "near"])
+    return needed([*VARIABLES, *logs.items(), *total])
 
 
 def totals_form() -> Form:
-    """The closed totals with their certificate, in the shape of the formula file."""
+    """The closed totals with their certificates."""
+    functions, certificates = [], {}
+    for name in NAMES:
 
-    def largest(places: int) -> dict[str, float]:
-        steps = _steps(TERMS, dict.fromkeys(NAMES, places))
-        return {name: float(error.max()) for name, error in _errors(steps, POINTS, FIT_SEED).items()}
+        def errors(digits: int, count: int = POINTS, seed: int = FIT_SEED, name: str = name) -> FloatArray:
+            given, truth = samples(count, seed)
+            error: FloatArray = np.abs(evaluate(function_steps(name, digits), given)[name] / truth[name] - 1)
+            return error
 
-    best = largest(MOST_DIGITS)
-    digits = {
-        name: next(p for p in range(2, MOST_DIGITS + 1) if largest(p)[name] <= SLACK * best[name]) for name in NAMES
-    }
-    steps = _steps(TERMS, digits)
-    given, _ = samples(HELD_OUT, HELD_OUT_SEED)
-    stated: Form = {"points": int(given["hurst"].size)}
-    for name, error in _errors(steps, HELD_OUT, HELD_OUT_SEED).items():
-        worst = int(error.argmax())
-        stated[name] = {
-            "largest": float(f"{error.max():.3g}"),
-            "median": float(f"{np.median(error):.3g}"),
-            "worst_at": {key: float(f"{a[worst]:.4g}") for key, a in given.items()},
-        }
-    return {
-        "title": "totals: force over E* q0 h_rms, and area",
-        "arguments": list(RANGE),
-        "range": {name: list(ends) for name, ends in RANGE.items()} | {"area": [LEAST_AREA, 1.0]},
-        "steps": steps,
-        "outputs": {name: name for name in NAMES},
-        "coefficients": {name: sum(TERMS[name]) for name in NAMES},
-        "errors": stated,
-    }
+        digits = fewest_digits(lambda digits, errors=errors: float(errors(digits).max()), SLACK)  # type: ignore[misc]
+        given, _ = samples(HELD_OUT, HELD_OUT_SEED)
+        certificates[name] = certificate(sum(TERMS[name]), errors(digits, HELD_OUT, HELD_OUT_SEED), given)
+        quantity = {"force": "Force over E* q0 h_rms", "area": "A/A0"}[name]
+        title = f"{quantity}, closed totals: within {certificates[name].largest:g}."
+        functions.append(Function("totals", name, tuple(RANGES), title, function_steps(name, digits)))
+    return Form("totals", RANGES | {"area": (MIN_AREA, 1.0)}, tuple(functions), certificates)
