@@ -4,7 +4,6 @@ import ast
 import bz2
 import gzip
 import io
-import json
 import os
 import pathlib
 import subprocess
@@ -21,7 +20,6 @@ import mbma_tables
 from generate.tables import campaign, configuration
 from mbma_tables import InputError, MbmaError, Scene, TableFileError
 from mbma_tables.files import shipped_file
-from mbma_tables.formulas import file as formula_file
 from mbma_tables.surfaces.maps import read_map
 from mbma_tables.tablefiles import contents
 from mbma_tables.tablefiles.netcdf import SEAL_LENGTH, check_table
@@ -305,9 +303,6 @@ CASES = {
     # name: what is read by what
     "chunk": (lambda path: campaign._load(path.parent, KEY), KEY, campaign._digest(KEY, npy_claim()) + npy_claim()),
     "map-npy": (read_map, "map.npy", npy_claim()),
-    "formula-deep": (formula_file.read, "formula.json", DEEP),
-    "formula-digits": (formula_file.read, "formula.json", b"9" * 900_000),
-    "formula-long": (formula_file.read, "formula.json", b" " * 2_000_000),
     "scene-deep": (Scene.from_toml, "scene.toml", scene_with(DEEP)),
     "scene-tables": (Scene.from_toml, "scene.toml", scene_with(b"{a=" * 100_000)),
     "scene-dotted": (Scene.from_toml, "scene.toml", b"a." * 100_000 + b"a = 1"),
@@ -376,7 +371,6 @@ def test_a_sparse_file_is_not_read(tmp_path):
         file.truncate(CLAIM)
     for read in (
         check_table,
-        formula_file.read,
         Scene.from_toml,
         lambda path: configuration.load("universal", path),
     ):
@@ -395,12 +389,3 @@ def test_a_scene_reads_no_other_files_than_plain_ones(key, name, tmp_path):
     scene.write_text(f'[surface]\n{key} = "{name}"\n{more}[effects]\non = ["force"]\n[prescribed]\nseparations = 1.0\n')
     with pytest.raises(InputError, match="is not a file"):
         Scene.from_toml(scene)
-
-
-def test_a_path_in_the_other_files_is_only_a_text(tmp_path):
-    document = json.loads(shipped_file("formula.json").read_bytes())
-    document["provenance"] = {"file": "/etc/hostname"}
-    document["data_hash"] = formula_file.data_hash(document)
-    path = tmp_path / "formula.json"
-    path.write_text(json.dumps(document))
-    assert formula_file.read(path).provenance == {"file": "/etc/hostname"}

@@ -1,18 +1,14 @@
 """Ways through the library that a user seldom takes: what fails on them ends in a typed error or in nothing."""
 
-import json
-
 import click
 import pytest
 from click.testing import CliRunner
 
-from mbma_tables import InputError, TableFileError, compiled, theories
+from mbma_tables import InputError, compiled, theories
 from mbma_tables import theories as theories_module
 from mbma_tables.cli import Program
 from mbma_tables.cli.scene import _show
 from mbma_tables.errors import ConvergenceError
-from mbma_tables.files import shipped_file
-from mbma_tables.formulas.file import check, get_form
 from mbma_tables.surfaces.surface import Surface
 
 
@@ -61,30 +57,6 @@ def test_without_a_folder_for_compiled_code_it_is_compiled_anyway():
 
     assert compiled._kept(decorate, "f8(f8)", cache=True)(abs) == (abs, ("f8(f8)",))
     assert asked == [True, False]
-
-
-def deep(levels):
-    document = "a"
-    for _ in range(levels):
-        document = [document]
-    return document
-
-
-@pytest.mark.parametrize(
-    ("provenance_of", "said"),
-    [({"a": float("nan")}, "not JSON compliant"), ({"a": deep(100_000)}, "recursion")],
-    ids=["NaN", "deep"],
-)
-def test_a_formula_file_without_a_hash_is_refused(provenance_of, said):
-    document = json.loads(shipped_file("formula.json").read_text(encoding="utf-8"))
-    with pytest.raises(TableFileError, match=said):
-        check(document | {"provenance": provenance_of})
-
-
-@pytest.mark.parametrize("name", ["pockets", 3, None])
-def test_no_form_of_that_name(name):
-    with pytest.raises(InputError, match="pocket"):
-        get_form(name)
 
 
 def test_a_theory_that_finds_no_load_says_where(monkeypatch):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,7 @@ def least_largest(A: FloatArray, target: FloatArray, rounds: int = LAWSON_ROUNDS
     >>> round(error, 2), round(float(mean), 2)
     (2.0, 2.0)
     """
-    weight: FloatArray = np.ones_like(target)
+    weight: Any = np.ones(target.size)
     best = math.inf
     found = np.zeros(A.shape[1])
     for _ in range(rounds):

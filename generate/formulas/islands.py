@@ -84,16 +84,14 @@ def rigid_polynomial(which: int, accuracy: float) -> tuple[tuple[float, ...], fl
 
 def rigid_steps(which: int, accuracy: float) -> list[Step]:
     """Steps of rigid_F or rigid_A for X in [-0.5, 60]."""
-    w = sympy.Symbol("w")
+    letter = "FA"[which]
+    w, p = sympy.symbols(f"w p_{letter}")
     exponent: sympy.Expr = sympy.Integer(0)
     for value in reversed(rigid_polynomial(which, accuracy)[0]):
         exponent = (sympy.Float(value) + exponent) * w
     base = X + RIGID_SHIFT
-    return [("w", 1 / base), (_rigid(which), RIGID_FACTORS[which] * base ** RIGID_ORDERS[which] * sympy.exp(exponent))]
-
-
-def _rigid(which: int) -> str:
-    return f"rigid_{'FA'[which]}"
+    sphere = RIGID_FACTORS[which] * base ** RIGID_ORDERS[which] * sympy.exp(p)
+    return [(w.name, 1 / base), (p.name, exponent), (f"rigid_{letter}", sphere)]
 
 
 def points(count: int, min_X: float, seed: int) -> tuple[FloatArray, FloatArray]:
@@ -137,7 +135,7 @@ def function_steps(found: Fit, rigid: float, digits: int) -> tuple[Step, ...]:
             for (i, name, j), value in zip(found.terms, rounded(found.coefficients, digits).tolist(), strict=True)
         )
     )
-    rigid_sphere = sympy.Symbol(_rigid(found.which))
+    rigid_sphere = sympy.Symbol(f"rigid_{letter}")
     if found.which == FORCE:
         top, limit = MU * rigid_sphere, 3 * sympy.sqrt(2) * sympy.pi / 20 * (X + 1)
     else:
@@ -187,7 +185,7 @@ def island_form(name: str) -> Form:
         error = relative_error(steps, which, HELD_OUT, size.min_X, HELD_OUT_SEED)
         x, mu, _ = solved(HELD_OUT, size.min_X, HELD_OUT_SEED)
         certificates[result] = certificate(found.length, error, {"X": x, "mu": mu})
-        title = f"{result.capitalize()}, {name} form: within {certificates[result].largest:g}."
+        title = f"{result.replace('phi', 'Phi')}, {name} form: within {certificates[result].largest:g}."
         functions.append(Function(name, result, ("X", "mu"), title, steps))
     return Form(name, {"X": (size.min_X, MAX_X), "mu": (0.0, MAX_MU)}, tuple(functions), certificates)
 

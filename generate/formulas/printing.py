@@ -24,6 +24,7 @@ from sympy.printing.precedence import PRECEDENCE
 
 import mbma_tables
 from mbma_tables.arguments import FloatArray
+from mbma_tables.files import write_file
 from mbma_tables.models.closed_form_functions import Certificate
 
 PACKAGE = pathlib.Path(mbma_tables.__file__).parent
@@ -183,8 +184,8 @@ def module_text(functions: Iterable[Function], ranges: dict[str, Ranges], certif
 
 
 def _wrapped(text: str) -> str:
-    indents = {"initial_indent": "    ", "subsequent_indent": "        "}
-    return "\n".join(textwrap.wrap(text, WIDTH, break_long_words=False, break_on_hyphens=False, **indents))
+    wrapper = textwrap.TextWrapper(WIDTH, "    ", "        ", break_long_words=False, break_on_hyphens=False)
+    return wrapper.fill(text)
 
 
 def c_text(functions: Iterable[Function]) -> str:
@@ -247,6 +248,7 @@ def read_functions(module: str) -> dict[str, Function]:
 _LATEX = {"log_Q_F": r"\ln Q_F", "log_Q_A": r"\ln Q_A", "rigid_F": "R_F", "rigid_A": "R_A", "hurst": "H"} | {
     "phi_F": r"\Phi_F",
     "phi_A": r"\Phi_A",
+    "log_total": r"\ln T",
     "d_over_h_rms": r"\tilde d",
     "h_max_over_h_rms": r"\tilde h",
     **{name: rf"\mathrm{{{name}}}" for name in ("near", "far", "force", "area")},
@@ -254,12 +256,14 @@ _LATEX = {"log_Q_F": r"\ln Q_F", "log_Q_A": r"\ln Q_A", "rigid_F": "R_F", "rigid
 
 
 def latex_steps(function: Function) -> list[str]:
-    """One equation a step, in the order in which they are evaluated."""
+    """One equation a step, in the order in which they are evaluated; polynomials without Horner's brackets."""
     names = {sympy.Symbol(name): text for name, text in _LATEX.items()}
-    return [
-        f"{names.get(sympy.Symbol(name), name)} = {sympy.latex(value, symbol_names=names, ln_notation=True)}"
-        for name, value in function.steps
-    ]
+    style = {"symbol_names": names, "ln_notation": True, "fold_frac_powers": True}
+    lines = []
+    for name, value in function.steps:
+        shown = value.expand() if len(value.free_symbols) == 1 and value.is_polynomial() else value
+        lines.append(f"{sympy.latex(sympy.Symbol(name), **style)} = {sympy.latex(shown, **style)}")
+    return lines
 
 
 def write_forms(forms: Iterable[Form]) -> None:
@@ -270,5 +274,5 @@ def write_forms(forms: Iterable[Form]) -> None:
         {form.name: form.ranges for form in forms},
         {form.name: form.certificates for form in forms},
     )
-    MODULE.write_text(text, encoding="utf-8")
-    C_TEXT.write_text(c_text(read_functions(text).values()), encoding="utf-8")
+    write_file(MODULE, text.encode())
+    write_file(C_TEXT, c_text(read_functions(text).values()).encode())

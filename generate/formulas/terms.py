@@ -127,7 +127,8 @@ def fit(samples: Samples, count: int, tries: int = 0) -> Fit:
         return score(float(np.abs(predicted - samples.residual).max()))
 
     found = []
-    for shape in sorted(itertools.product(*SHAPES.values()), key=cross_validated)[: max(tries, 1)]:
+    shapes = [(c, b, g) for c, b, g in itertools.product(*SHAPES.values())]
+    for shape in sorted(shapes, key=cross_validated)[: max(tries, 1)]:
         chosen = pursuit.fit(samples.columns(every, shape), samples.residual)[-1].coef_
         terms = [every[k] for k in np.flatnonzero(chosen)]
         moved = _polished(samples, terms, shape) if tries else shape

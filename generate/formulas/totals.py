@@ -45,7 +45,7 @@ HEAT = 0.04  # relative loss that a swap may cost at first
 CHOICES = 4.0  # how deep into the ranked columns a swap reaches
 TRIAL_ROUNDS = 15
 # share of the trace added to normal equations: with 1e-12 the search takes another turn when samples change by 1e-15,
-# with 1e-9 when they change by 1e-13, with 1e-7 not even when they change by 1e-11
+# with 1e-9 when they change by 1e-13, with 1e-7 not when they change by 1e-13
 RIDGE = 1e-7
 ANNEAL_SEEDS = (43, 44, 45, 46)  # the best of as many searches
 SLACK = 1.01
@@ -236,8 +236,8 @@ def function_steps(name: str, digits: int) -> tuple[Step, ...]:
             named = map(sympy.Symbol, FAR if far else NEAR)
             total += sympy.Float(value) * sympy.Mul(*(v**n for v, n in zip(named, p, strict=True)))
         logs[side] = total
-    total = steps_of([(name, "exp(where(r > k, far, near))")], ["r", "k", "far", "near"])
-    return needed([*VARIABLES, *logs.items(), *total])
+    ends = steps_of([("log_total", "where(r > k, far, near)"), (name, "exp(log_total)")], ["r", "k", "far", "near"])
+    return needed([*VARIABLES, *logs.items(), *ends])
 
 
 def totals_form() -> Form:

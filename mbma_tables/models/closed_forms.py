@@ -1,26 +1,48 @@
-"""The island model in closed form: Phi_F and Phi_A from a form of tables/formula.json."""
+"""Closed forms: the island model of tier "formula", and total force and area without a sum over islands.
+
+The functions themselves are in `closed_form_functions`, which the generator writes; docs/formula.md shows them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.errors import InputError
-from mbma_tables.formulas.file import ISLAND_FORMS, ISLAND_OUTPUTS, get_form
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.models.closed_form_functions import CERTIFICATES, FUNCTIONS, RANGES
 from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
+from mbma_tables.surfaces.surface import Surface
+
+ISLAND_FORMS = ("pocket", "standard", "long")
+TOTALS = "totals"
+RESULTS = ("phi_F", "phi_A")
 
 
 class FormulaModel:
-    """Phi_F and Phi_A by a closed form; exact as mu goes to 0 but for its rigid sphere's own approximation.
+    """Phi_F and Phi_A by a closed form; exact as mu goes to 0 but for the approximation of the rigid sphere.
 
     Parameters
     ----------
     form : {"standard", "pocket", "long"}
         Which of the forms.
+
+    Raises
+    ------
+    InputError
+        For an unknown form.
+
+    Examples
+    --------
+    >>> answer = FormulaModel().answer([1.0, 5.0], 2.0)
+    >>> answer.phi_F.round(2)
+    array([1.39, 9.48])
+    >>> float(answer.error.max()) < 0.01
+    True
     """
 
     name = "formula"
@@ -28,7 +50,7 @@ class FormulaModel:
     def __init__(self, form: str = "standard") -> None:
         if form not in ISLAND_FORMS:
             raise InputError(f"form must be one of {ISLAND_FORMS}, got {form!r}")
-        self.form = get_form(form)
+        self.form = form
 
     def answer(self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise", which: int = BOTH) -> IslandAnswer:
         """Phi_F and Phi_A with the largest error that the form's certificate states.
@@ -53,23 +75,83 @@ class FormulaModel:
         shape = broadcast_shape(**given)
         inside = np.ones(shape, dtype=bool)
         for name, array in given.items():
-            low, high = self.form.range[name]
+            low, high = RANGES[self.form][name]
             covered = (array >= low) & (array <= high)
             if outside == "raise":
-                require(name, array, covered, f"in [{low:g}, {high:g}], where the {self.form.name} form holds")
+                require(name, array, covered, f"in [{low:g}, {high:g}], where the {self.form} form holds")
             inside &= covered
-        flat = {name: np.broadcast_to(array, shape)[inside] for name, array in given.items()}
-        wanted = ISLAND_OUTPUTS if which == BOTH else (ISLAND_OUTPUTS[which],)
+        every_X, every_mu = (np.broadcast_to(array, shape) for array in given.values())
+        wanted = RESULTS if which == BOTH else (RESULTS[which],)
         out = np.full((3, *shape), np.nan)
-        for name, values in self.form.evaluate(flat, wanted).items():
-            out[ISLAND_OUTPUTS.index(name), inside] = values
-        out[2, inside] = max(self.form.largest_error(name) for name in wanted)
+        for name in wanted:
+            out[RESULTS.index(name), inside] = FUNCTIONS[self.form][name](every_X[inside], every_mu[inside])
+        out[2, inside] = max(CERTIFICATES[self.form][name].largest for name in wanted)
         if outside == "exact" and not inside.all():
-            lost = {name: np.broadcast_to(array, shape)[~inside] for name, array in given.items()}
-            solved = greenwood_tripp.solve(lost["X"], lost["mu"], rtol=EXACT_RTOL)
+            solved = greenwood_tripp.solve(every_X[~inside], every_mu[~inside], rtol=EXACT_RTOL)
             out[:, ~inside] = solved.phi_F, solved.phi_A, solved.error
         return IslandAnswer(*(row[()] for row in out))
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
         """Phi_F and Phi_A of islands, or the one asked for."""
         return self.answer(islands["X"], islands["mu"], outside=outside, which=which)
+
+
+class ClosedTotals(NamedTuple):
+    """Force over nominal area [unit of `E_star`], A/A0, and the largest relative error of either as certified."""
+
+    force: FloatArray
+    area: FloatArray
+    error: float
+
+
+def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1.0) -> ClosedTotals:
+    """Total force and area by the closed totals, reading "reported".
+
+    Parameters
+    ----------
+    surface : Surface
+        One surface or a batch; it broadcasts against `separation`.
+    separation : array_like
+        d between the rigid plane and the mid-plane [length].
+    E_star : array_like
+        Effective modulus; force is in its unit.
+
+    Returns
+    -------
+    ClosedTotals
+        Force and area in the broadcast shape.
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        For surfaces and separations outside the range of the form, and for less contact than it describes.
+
+    Examples
+    --------
+    >>> force, area, error = closed_totals(Surface(0.8, 1.0, 200.0, 1.0, 3.0), [-2.0, 0.0])
+    >>> area.round(2)
+    array([0.2 , 0.02])
+    >>> error < 0.1
+    True
+    """
+    gap, modulus = finite_array("separation", separation), finite_array("E_star", E_star)
+    require("E_star", modulus, modulus > 0, "positive")
+    shape = broadcast_shape(separation=gap, surface=surface.hurst, E_star=modulus)
+    fields = {
+        "d_over_h_rms": gap / surface.h_rms,
+        "h_max_over_h_rms": surface.h_max / surface.h_rms,
+        "zeta_1": surface.zeta_1,
+        "hurst": surface.hurst,
+    }
+    given = {name: np.broadcast_to(np.asarray(field), shape) for name, field in fields.items()}
+    for name, field in given.items():
+        low, high = RANGES[TOTALS][name]
+        require(name, field, (field >= low) & (field <= high), f"in [{low:g}, {high:g}], where the closed totals hold")
+    gap, h_max = np.broadcast_to(gap, shape), np.broadcast_to(np.asarray(surface.h_max), shape)
+    require("separation", gap, gap >= -h_max, "at least -h_max, where the model ends")
+    require("separation", gap, gap < h_max, "below h_max: there is no contact from there on")
+    force, area = (FUNCTIONS[TOTALS][name](*given.values()) for name in ("force", "area"))
+    low, _ = RANGES[TOTALS]["area"]
+    require("area", np.asarray(area), area >= low, f"at least {low:g}, where the closed totals hold")
+    scale = modulus * surface.q0 * surface.h_rms
+    return ClosedTotals(force * scale, area, max(found.largest for found in CERTIFICATES[TOTALS].values()))

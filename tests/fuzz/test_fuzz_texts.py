@@ -1,7 +1,5 @@
-"""Damaged text files: formulas, scenes, surfaces and configurations of tables."""
+"""Damaged text files: scenes, surfaces and configurations of tables."""
 
-import contextlib
-import json
 import pathlib
 import tomllib
 
@@ -11,42 +9,10 @@ from fuzzing import SCALE, changed, finite, spoilt, toml_text
 
 from generate.tables import configuration
 from mbma_tables import InputError, Scene
-from mbma_tables.files import shipped_file
-from mbma_tables.formulas import file as formula_file
 from mbma_tables.tablefiles.schema import KINDS
 
 EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
 SCENES = sorted(path.name for path in EXAMPLES.glob("scene_*.toml"))
-POINTS = {"X": np.array([1.0]), "mu": np.array([1.0])}
-
-
-def test_formula_bytes(tmp_path, tally):
-    rng = np.random.default_rng(1)
-    path, text = tmp_path / "formula.json", shipped_file("formula.json").read_bytes()
-    own = formula_file.check(json.loads(text))
-    for _ in range(100 * SCALE):
-        found = tally.read_file(path, spoilt(text, rng), formula_file.read)
-        # the hash notices every change of content
-        assert found in (None, own)
-
-
-def test_formula_structure(tmp_path, tally):
-    rng = np.random.default_rng(2)
-    document = json.loads(shipped_file("formula.json").read_bytes())
-    path = tmp_path / "formula.json"
-
-    def use(path):
-        found = formula_file.read(path)
-        return [*found.forms["pocket"].evaluate(POINTS).values()]
-
-    for _ in range(60 * SCALE):
-        other = changed(document, rng)
-        if isinstance(other, dict):
-            # with a NaN no hash can be right
-            with contextlib.suppress(ValueError):
-                other["data_hash"] = formula_file.data_hash(other)
-        found = tally.read_file(path, json.dumps(other).encode(), use)
-        assert found is None or finite(*found)
 
 
 def scene_numbers(path):

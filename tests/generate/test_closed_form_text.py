@@ -64,7 +64,7 @@ def test_c_agrees_with_numpy(library, name):
 @pytest.mark.parametrize("name", NAMES)
 def test_numpy_agrees_with_sympy_in_30_digits(functions, name):
     form, _, result = name.partition("_")
-    given = [values[:8] for values in points(form)]
+    given = [values[:2] for values in points(form)]
     function = functions[name]
     found = shipped.FUNCTIONS[form][result](*given)
     for number, point in enumerate(zip(*given, strict=True)):

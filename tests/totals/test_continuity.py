@@ -15,6 +15,7 @@ from mbma_tables.islands import newton
 from mbma_tables.islands.four_numbers import band_fields, from_axes, to_axes
 from mbma_tables.islands.height_integrals import ORDERS, f_half, height_integral
 from mbma_tables.models import answer_islands
+from mbma_tables.models.closed_form_functions import RANGES
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.island4d import RAW
 from mbma_tables.models.protocol import BOTH
@@ -312,7 +313,7 @@ def test_the_closed_forms_do_not_jump(form, which, record_property):
     """And where the solver takes over from them."""
     model, rng = FormulaModel(form), np.random.default_rng(12)
     count = 120 * SCALE
-    (X_low, X_high), (_, mu_high) = (model.form.range[name] for name in ("X", "mu"))
+    (X_low, X_high), (_, mu_high) = (RANGES[form][name] for name in ("X", "mu"))
     X, mu = rng.uniform(X_low, X_high, count), 10 ** rng.uniform(-9, math.log10(mu_high), count)
     if which == "X":
         X[::6], X[1::6] = max(X_low, 1e-3), X_high
