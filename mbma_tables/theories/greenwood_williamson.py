@@ -13,6 +13,11 @@ from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, req
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.labels import takes_labelled
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories.protocol import Theory, TheoryAnswer
+
+EPSILON = 1e-13  # accuracy of the height integrals
+MAX_DEPTH = 37.0  # of d over the summits' standard deviation, where force is still a normal number
+MAX_AREA = 0.1  # A/A0 up to which asperities may pass for independent
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -112,3 +117,28 @@ def positive_modulus(E_star: ArrayLike) -> FloatArray:
     modulus = finite_array("E_star", E_star)
     require("E_star", modulus, modulus > 0, "positive")
     return modulus
+
+
+class GreenwoodWilliamson(Theory):
+    """Greenwood and Williamson's theory, its separations related by Eq. (50)."""
+
+    name = "greenwood_williamson"
+    ends_at_h_max = False
+
+    def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
+        """Force, area and stiffness at mean separations u [length]."""
+        gap = 2 * mean_separation - np.asarray(surface.h_max)
+        density, radius, sigma = surface.summit_density, surface.summit_radius, surface.summit_sigma
+        found = greenwood_williamson(surface, gap)
+        # d(F_3/2)/dx = -3/2 F_1/2, and du = dd/2
+        slope = 4 * density * np.sqrt(radius * sigma) * height_integral(0.5, gap / sigma)
+        return TheoryAnswer(found.force, found.area, slope, np.full(np.shape(gap), EPSILON))
+
+    def interval(self, surface: Surface) -> tuple[FloatArray, FloatArray]:
+        """Mean separations [length] from u = 0 to where force underflows."""
+        high = np.asarray((surface.h_max + MAX_DEPTH * surface.summit_sigma) / 2, dtype=float)
+        return np.zeros_like(high), high
+
+    def concerns(self, surface: Surface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+        """Reasons for which answers lie outside what the theory was made for."""
+        return {f"asperities are taken as independent, A/A0 is above {MAX_AREA:g}": answer.area > MAX_AREA}

@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import erf, exp1
+from scipy.special import erf, erfinv, exp1
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.errors import ConvergenceError, InputError
@@ -24,6 +24,7 @@ from mbma_tables.labels import takes_labelled
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.greenwood_williamson import positive_modulus
+from mbma_tables.theories.protocol import Theory, TheoryAnswer, select
 from mbma_tables.totals.gauss_kronrod import integrate
 
 Method = Literal["full", "simplified"]
@@ -34,6 +35,7 @@ RTOL = 1e-12  # asked of the quadratures
 DECAY = 45.0  # exp(-DECAY) of an integrand's largest value counts as nothing
 MAX_RATIO = 26.0  # p0/Y at which u is still a normal number, about exp(-676)
 MIN_LOG_FORCE = -690.0  # log p0/(E* q0 s) of the lightest load that the inverse answers
+INVERSE_RTOL = 1e-10  # of a load found from its separation
 MAX_STEPS = 100  # of the safeguarded Newton iteration; it takes 5 to 15
 
 # exp(-t) over [0, DECAY]: 64 nodes leave 1e-15
@@ -296,3 +298,51 @@ def _invert(bands: _Bands, target: FloatArray) -> FloatArray:
             return guess
     mask = active.reshape(target.shape)
     raise ConvergenceError(f"no load found for {int(mask.sum())} separations in {MAX_STEPS} steps", mask)
+
+
+class Persson(Theory):
+    """Persson's theory, its separation by the full integral (19) or by the light-load form (20)."""
+
+    name = "persson"
+    ends_at_h_max = False
+
+    def __init__(self, method: Method = "full") -> None:
+        self.method: Method = method
+
+    def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
+        """Force, area and stiffness at mean separations u > 0 [length]."""
+        force = np.asarray(persson_force(surface, mean_separation, method=self.method))
+        error = np.full(force.shape, INVERSE_RTOL)
+        return TheoryAnswer(force, persson_area(surface, force), force / self._decay(surface, force), error)
+
+    def interval(self, surface: Surface) -> tuple[FloatArray, FloatArray]:
+        """Mean separations [length] of the theory, whose heights have no end."""
+        low = np.zeros(surface.shape)
+        return low, np.full_like(low, np.inf)
+
+    def mean_separation_at(self, surface: Surface, quantity: str, wanted: FloatArray) -> FloatArray:
+        """Mean separation u [length] at a force over A0 E* (19, 20) or an area (18)."""
+        if quantity == "area":
+            require("area", wanted, wanted < 1, "below 1, which Persson's theory reaches at infinite load")
+            wanted = erfinv(wanted) * np.sqrt(surface.m2)
+        return np.asarray(persson_separation(surface, wanted, method=self.method))
+
+    def energy(self, surface: Surface, mean_separation: FloatArray) -> FloatArray:
+        """Elastic energy over A0 E* [length], from dU = -F du = F (-du/dlog F) dlog F."""
+        force = np.asarray(persson_force(surface, mean_separation, method=self.method))
+        lighter = force[..., None] * np.exp(-_T)
+        batch = select(surface, force.shape, np.arange(force.size).reshape(*force.shape, 1))
+        return np.asarray((lighter * self._decay(batch, lighter)) @ _T_WEIGHTS)
+
+    def concerns(self, surface: Surface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+        """Where heights' end, which the theory does not know, decides."""
+        beyond = mean_separation > np.asarray(surface.h_max)
+        return {"u is above h_max, where the surface has no contact and the theory's heights have no end": beyond}
+
+    def _decay(self, surface: Surface, force: FloatArray) -> FloatArray:
+        """-du/dlog F [length] at a load."""
+        bands = _Bands.of(surface, force.shape)
+        if not _is_full(self.method):
+            return np.asarray(_simplified(bands)[0].reshape(force.shape) * surface.s)
+        log_p = (np.log(force) - _log_stress(surface)).ravel()
+        return np.asarray(_full(bands, log_p)[1].reshape(force.shape) * surface.s)

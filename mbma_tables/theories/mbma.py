@@ -1,0 +1,91 @@
+"""The MBMA model as a theory: totals of its islands at separations d = 2 u - h_max (50), and where they end."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mbma_tables.arguments import FloatArray
+from mbma_tables.models import IslandModel as AnyModel
+from mbma_tables.surfaces.readings import Reading, get_reading
+from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories.greenwood_williamson import separation
+from mbma_tables.theories.protocol import SCAN, Theory, TheoryAnswer, select
+from mbma_tables.totals.contact import Contact, contact
+
+MAX_AREA = 0.1  # above it islands begin to lie on one another (docs/fidelity.md)
+
+
+class Mbma(Theory):
+    """The MBMA model of one tier and reading.
+
+    Parameters
+    ----------
+    tier, reading, rtol, outside
+        As for `mbma_tables.contact`.
+    """
+
+    name = "mbma"
+
+    def __init__(
+        self,
+        tier: str | AnyModel = "universal",
+        reading: str | Reading = "reported",
+        rtol: float = 1e-8,
+        outside: str = "raise",
+    ) -> None:
+        self.tier, self.reading, self.rtol, self.outside = tier, get_reading(reading), rtol, outside
+
+    def totals(self, surface: Surface, mean_separation: FloatArray, derivatives: bool = False) -> Contact:
+        """`contact` at u [length], in units of E*."""
+        gap = separation(surface, mean_separation)
+        return contact(
+            surface, gap, self.tier, self.reading, rtol=self.rtol, outside=self.outside, derivatives=derivatives
+        )
+
+    def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
+        """Force, area and stiffness at mean separations u [length] from 0 to h_max."""
+        found = self.totals(surface, mean_separation, derivatives=True)
+        assert found.force_by is not None
+        # du = dd/2
+        return TheoryAnswer(found.force, found.area, -2 * found.force_by["separation"], found.error)
+
+    def interval(self, surface: Surface) -> tuple[FloatArray, FloatArray]:
+        """Mean separations [length] from the largest force, or full compression, to first contact."""
+        return self._maximum(surface, "force", np.zeros(surface.shape)), np.asarray(surface.h_max, dtype=float)
+
+    def softening(self, surface: Surface) -> FloatArray:
+        """Mean separation [length] below which stiffness falls with compression; NaN where it rises to u = 0."""
+        return self._maximum(surface, "stiffness", np.full(surface.shape, np.nan))
+
+    def concerns(self, surface: Surface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+        """Where the paper's own assumptions fail."""
+        return {
+            f"areas of islands are added, A/A0 is above {MAX_AREA:g}": answer.area > MAX_AREA,
+            "stiffness falls with compression here, which no simulation shows": mean_separation
+            < self.softening(surface),
+        }
+
+    def _maximum(self, surface: Surface, quantity: str, otherwise: FloatArray) -> FloatArray:
+        """Mean separation of the first local maximum of a quantity under compression, or `otherwise`."""
+        from scipy.optimize.elementwise import find_minimum
+
+        depth = np.arange(1, SCAN + 1) / SCAN
+        h_max = np.asarray(surface.h_max, dtype=float)
+        batch = select(surface, surface.shape, np.arange(h_max.size).reshape(*surface.shape, 1))
+        values = np.reshape(getattr(self.answer(batch, h_max[..., None] * (1 - depth)), quantity), (-1, SCAN))
+        falls = np.diff(values, axis=-1) < 0
+        turns = np.flatnonzero(falls.any(axis=-1))
+        result = np.array(otherwise, dtype=float).reshape(-1)
+        if turns.size:
+            peak = falls[turns].argmax(axis=-1)
+
+            def negative(x: FloatArray, place: FloatArray) -> FloatArray:
+                chosen = select(surface, surface.shape, place)
+                return -np.asarray(getattr(self.answer(chosen, h_max.ravel()[place.astype(int)] * (1 - x)), quantity))
+
+            bracket = (np.maximum(peak, 0.5) / SCAN, (peak + 1) / SCAN, (peak + 2) / SCAN)
+            found = find_minimum(negative, bracket, args=(turns.astype(float),), tolerances={"xrtol": 1e-6})
+            result[turns] = h_max.ravel()[turns] * (1 - found.x)
+        return result.reshape(surface.shape)

@@ -1,0 +1,176 @@
+"""What a theory is: anything that answers a surface and a mean separation with force, area and stiffness.
+
+MBMA, Persson's theory, Greenwood and Williamson's and the law calibrated on boundary elements are theories, and so is a
+user's own object with a `name` and an ``answer(surface, mean_separation)``. What a theory does not know in closed form
+(stiffness, energy, the separation at a given load) follows from its forces here.
+"""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbma_tables.arguments import FloatArray, describe_entries
+from mbma_tables.errors import ConvergenceError, OutOfRangeError
+from mbma_tables.surfaces.surface import PARAMETERS, Surface
+
+ROOT_RTOL = 1e-12  # of forces and areas at which a separation is asked
+ENERGY_RTOL = 1e-9
+SCAN = 49  # compressions at which a law is looked at for a turning point
+
+
+class TheoryAnswer(NamedTuple):
+    """Arrays of the shape that surface and mean separation broadcast to."""
+
+    force: FloatArray  # F/(A0 E*)
+    area: FloatArray  # A/A0
+    stiffness: FloatArray  # -d(F/(A0 E*))/du [1/length]
+    error: FloatArray  # bound on the relative numerical error of force and area, against the theory itself
+
+
+@runtime_checkable
+class UserTheory(Protocol):
+    """The least that `contact` needs of a theory."""
+
+    @property
+    def name(self) -> str:
+        """What results call it."""
+
+    def answer(self, surface: Surface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """F/(A0 E*) and A/A0 at mean separations u [length] of the surface's broadcast shape."""
+
+
+class Theory(abc.ABC):
+    """A theory, and what follows from its forces."""
+
+    name: str
+    ends_at_h_max = True  # whether force vanishes at u = h_max; else its Gaussian heights have no end
+
+    @abc.abstractmethod
+    def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
+        """Force, area and stiffness at mean separations u [length]."""
+
+    def interval(self, surface: Surface) -> tuple[FloatArray, FloatArray]:
+        """Mean separations [length] between which force falls monotonically: full compression and last contact."""
+        high = np.asarray(surface.h_max, dtype=float)
+        return np.zeros_like(high), high
+
+    def concerns(self, surface: Surface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
+        """Reasons for which answers lie outside what the theory was tested for, each with a mask."""
+        return {}
+
+    def energy(self, surface: Surface, mean_separation: FloatArray) -> FloatArray:
+        """Elastic energy over A0 E* [length], the integral of F/(A0 E*) from u to last contact."""
+        from scipy.integrate import tanhsinh
+
+        u = np.asarray(mean_separation, dtype=float)
+        low = np.minimum(u, self.interval(surface)[1])
+        found = tanhsinh(
+            lambda x, place: self.answer(select(surface, u.shape, place), x).force,
+            *np.broadcast_arrays(low, np.broadcast_to(self.interval(surface)[1], u.shape)),
+            args=(_places(u.shape),),
+            rtol=ENERGY_RTOL,
+        )
+        _refuse_unfinished(found.success, "the elastic energy")
+        return np.asarray(found.integral)
+
+    def mean_separation_at(self, surface: Surface, quantity: str, wanted: FloatArray) -> FloatArray:
+        """Mean separation u [length] at which "force" (over A0 E*) or "area" has a wanted positive value.
+
+        Raises
+        ------
+        OutOfRangeError
+            Where the branch of first contact does not reach it.
+        """
+        from scipy.optimize.elementwise import find_root
+
+        shape = np.broadcast_shapes(np.shape(wanted), surface.shape)
+        target = np.broadcast_to(np.asarray(wanted, dtype=float), shape)
+        low, high = (np.broadcast_to(end, shape) for end in self.interval(surface))
+        largest = getattr(self.answer(surface, low), quantity)
+        out = target > largest
+        if out.any():
+            raise OutOfRangeError(
+                f"{quantity} must be at most what theory {self.name!r} reaches on this surface "
+                f"({describe_entries(largest, out)}), got {describe_entries(target, out)}",
+                out,
+            )
+        to_u, first, last = self._coordinate(low, high)
+
+        def excess(x: FloatArray, place: FloatArray) -> FloatArray:
+            # log of the value: loads range over many decades
+            place = place.astype(np.intp)
+            u = to_u(x, place)
+            value = getattr(self.answer(select(surface, shape, place), u), quantity)
+            with np.errstate(divide="ignore"):
+                return np.asarray(np.log(value) - np.log(target.ravel()[place]))
+
+        found = find_root(
+            excess, (first, last), args=(_places(shape),), tolerances={"xrtol": 1e-15, "fatol": ROOT_RTOL}
+        )
+        at_end = target == largest
+        _refuse_unfinished(found.success | at_end, f"the separation at this {quantity}")
+        u = to_u(np.where(at_end, first, found.x), _places(shape).astype(np.intp))
+        return np.where(at_end, low, u)
+
+    def _coordinate(
+        self, low: FloatArray, high: FloatArray
+    ) -> tuple[Callable[[FloatArray, NDArray[np.intp]], FloatArray], FloatArray, FloatArray]:
+        """Map of an unknown x to u, and the ends of x: u itself, or minus the logarithm of the depth below h_max."""
+        if not self.ends_at_h_max:
+            return lambda x, place: x, low, high
+        flat_low, flat_high = low.ravel(), high.ravel()
+        span = high - low
+
+        def to_u(x: FloatArray, place: NDArray[np.intp]) -> FloatArray:
+            return np.asarray(np.maximum(flat_high[place] - np.exp(-x), flat_low[place]))
+
+        # the lightest load that rounding of h_max - u leaves distinct
+        return to_u, -np.log(span), -np.log(4 * np.finfo(float).eps * np.maximum(span, high))
+
+
+def _places(shape: tuple[int, ...]) -> FloatArray:
+    """Flat indices, as floats: scipy's elementwise functions pass arguments of one type."""
+    return np.arange(int(np.prod(shape)), dtype=float).reshape(shape)
+
+
+def select(surface: Surface, shape: tuple[int, ...], place: Any) -> Surface:
+    """The surfaces of a batch, broadcast to `shape`, at flat places."""
+    if surface.shape == ():
+        return surface
+    chosen = np.asarray(place).astype(np.intp)
+    return Surface(*(np.broadcast_to(getattr(surface, name), shape).ravel()[chosen] for name in PARAMETERS))
+
+
+def _refuse_unfinished(success: Any, what: str) -> None:
+    failed = ~np.asarray(success)
+    if failed.any():
+        raise ConvergenceError(f"{what} was not found for {int(failed.sum())} entries", failed)
+
+
+class Wrapped(Theory):
+    """A user's theory, its stiffness by numerical differentiation."""
+
+    def __init__(self, theory: UserTheory) -> None:
+        self.name = theory.name
+        self._theory = theory
+
+    def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
+        """Force, area and stiffness at mean separations u [length]; the error is not known."""
+        from scipy.differentiate import derivative
+
+        u = np.asarray(mean_separation, dtype=float)
+        force, area = (
+            np.broadcast_to(np.asarray(part, dtype=float), u.shape) for part in self._theory.answer(surface, u)
+        )
+
+        def force_at(x: FloatArray, place: FloatArray) -> FloatArray:
+            return np.asarray(self._theory.answer(select(surface, u.shape, place), x)[0], dtype=float)
+
+        step = 0.01 * np.broadcast_to(np.asarray(surface.h_rms), u.shape)
+        slope = derivative(force_at, u, args=(_places(u.shape),), initial_step=step)
+        return TheoryAnswer(force, area, -slope.df, np.full(u.shape, np.nan))
