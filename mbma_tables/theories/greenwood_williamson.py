@@ -134,7 +134,7 @@ class GreenwoodWilliamson(Theory):
         slope = 4 * density * np.sqrt(radius * sigma) * height_integral(0.5, gap / sigma)
         return TheoryAnswer(found.force, found.area, slope, np.full(np.shape(gap), EPSILON))
 
-    def interval(self, surface: Surface) -> tuple[FloatArray, FloatArray]:
+    def interval(self, surface: Surface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] from u = 0 to where force underflows."""
         high = np.asarray((surface.h_max + MAX_DEPTH * surface.summit_sigma) / 2, dtype=float)
         return np.zeros_like(high), high

@@ -51,9 +51,9 @@ class Mbma(Theory):
         # du = dd/2
         return TheoryAnswer(found.force, found.area, -2 * found.force_by["separation"], found.error)
 
-    def interval(self, surface: Surface) -> tuple[FloatArray, FloatArray]:
-        """Mean separations [length] from the largest force, or full compression, to first contact."""
-        return self._maximum(surface, "force", np.zeros(surface.shape)), np.asarray(surface.h_max, dtype=float)
+    def interval(self, surface: Surface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+        """Mean separations [length] from where force or area is largest to first contact."""
+        return self._maximum(surface, quantity, np.zeros(surface.shape)), np.asarray(surface.h_max, dtype=float)
 
     def softening(self, surface: Surface) -> FloatArray:
         """Mean separation [length] below which stiffness falls with compression; NaN where it rises to u = 0."""

@@ -315,7 +315,7 @@ class Persson(Theory):
         error = np.full(force.shape, INVERSE_RTOL)
         return TheoryAnswer(force, persson_area(surface, force), force / self._decay(surface, force), error)
 
-    def interval(self, surface: Surface) -> tuple[FloatArray, FloatArray]:
+    def interval(self, surface: Surface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] of the theory, whose heights have no end."""
         low = np.zeros(surface.shape)
         return low, np.full_like(low, np.inf)

@@ -54,8 +54,8 @@ class Theory(abc.ABC):
     def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]."""
 
-    def interval(self, surface: Surface) -> tuple[FloatArray, FloatArray]:
-        """Mean separations [length] between which force falls monotonically: full compression and last contact."""
+    def interval(self, surface: Surface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+        """Mean separations [length] between which "force" or "area" falls: full compression and last contact."""
         high = np.asarray(surface.h_max, dtype=float)
         return np.zeros_like(high), high
 
@@ -90,7 +90,7 @@ class Theory(abc.ABC):
 
         shape = np.broadcast_shapes(np.shape(wanted), surface.shape)
         target = np.broadcast_to(np.asarray(wanted, dtype=float), shape)
-        low, high = (np.broadcast_to(end, shape) for end in self.interval(surface))
+        low, high = (np.broadcast_to(end, shape) for end in self.interval(surface, quantity))
         largest = getattr(self.answer(surface, low), quantity)
         out = target > largest
         if out.any():
@@ -114,19 +114,19 @@ class Theory(abc.ABC):
         )
         at_end = target == largest
         _refuse_unfinished(found.success | at_end, f"the separation at this {quantity}")
-        u = to_u(np.where(at_end, first, found.x), _places(shape).astype(np.intp))
+        u = to_u(np.where(at_end, first, found.x), np.asarray(_places(shape), dtype=np.intp))
         return np.where(at_end, low, u)
 
     def _coordinate(
         self, low: FloatArray, high: FloatArray
-    ) -> tuple[Callable[[FloatArray, NDArray[np.intp]], FloatArray], FloatArray, FloatArray]:
+    ) -> tuple[Callable[[FloatArray, NDArray[Any]], FloatArray], FloatArray, FloatArray]:
         """Map of an unknown x to u, and the ends of x: u itself, or minus the logarithm of the depth below h_max."""
         if not self.ends_at_h_max:
             return lambda x, place: x, low, high
         flat_low, flat_high = low.ravel(), high.ravel()
         span = high - low
 
-        def to_u(x: FloatArray, place: NDArray[np.intp]) -> FloatArray:
+        def to_u(x: FloatArray, place: NDArray[Any]) -> FloatArray:
             return np.asarray(np.maximum(flat_high[place] - np.exp(-x), flat_low[place]))
 
         # the lightest load that rounding of h_max - u leaves distinct
@@ -164,9 +164,8 @@ class Wrapped(Theory):
         from scipy.differentiate import derivative
 
         u = np.asarray(mean_separation, dtype=float)
-        force, area = (
-            np.broadcast_to(np.asarray(part, dtype=float), u.shape) for part in self._theory.answer(surface, u)
-        )
+        given = self._theory.answer(surface, u)
+        force, area = (np.array(np.broadcast_to(part, u.shape), dtype=float) for part in given)
 
         def force_at(x: FloatArray, place: FloatArray) -> FloatArray:
             return np.asarray(self._theory.answer(select(surface, u.shape, place), x)[0], dtype=float)

@@ -1,0 +1,113 @@
+"""Theories behind one protocol: stiffness, energy and inverses against other ways to the same numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from mbma_tables import InputError, OutOfRangeError, Surface, contact_law, theories
+from mbma_tables.theories import GreenwoodWilliamson, Mbma, Persson, Theory, get_theory
+
+SURFACE = Surface(hurst=0.8, q0=0.2, q1=20.0, h_rms=1.5, h_max=4.8)
+BATCH = Surface(hurst=[0.3, 0.7, 0.9], q0=1.0, q1=[1000.0, 60.0, 216.0], h_rms=1.0, h_max=[3.0, 3.0, 3.5])
+SHARES = np.array([0.3, 0.5, 0.8])  # of u over h_max
+ALL = [Mbma(), Persson(), Persson("simplified"), GreenwoodWilliamson()]
+each = pytest.mark.parametrize("theory", ALL, ids=lambda t: f"{t.name}-{getattr(t, 'method', '')}")
+
+
+@each
+def test_stiffness_is_the_slope_of_force(theory):
+    u = SHARES * SURFACE.h_max
+    step = 1e-4 * u
+    # Richardson's two central differences: error of order step^4
+    coarse, fine = (
+        (theory.answer(SURFACE, u - h).force - theory.answer(SURFACE, u + h).force) / (2 * h) for h in (step, step / 2)
+    )
+    assert theory.answer(SURFACE, u).stiffness == pytest.approx((4 * fine - coarse) / 3, rel=1e-5)
+
+
+@each
+def test_energy_is_the_work_of_force(theory):
+    u = 0.6 * SURFACE.h_max
+    high = min(float(theory.interval(SURFACE)[1]), 60 * SURFACE.h_rms)
+    work = quad(lambda x: float(theory.answer(SURFACE, np.array(x)).force), u, high, epsrel=1e-9, limit=400)[0]
+    assert theory.energy(SURFACE, np.array(u)) == pytest.approx(work, rel=1e-7)
+
+
+@each
+@pytest.mark.parametrize("quantity", ["force", "area"])
+def test_separation_at_a_quantity_gives_that_quantity(theory, quantity):
+    u = SHARES[:, None] * BATCH.h_max
+    u = np.maximum(u, theory.interval(BATCH, quantity)[0])
+    wanted = getattr(theory.answer(BATCH, u), quantity)
+    found = theory.mean_separation_at(BATCH, quantity, wanted)
+    assert getattr(theory.answer(BATCH, found), quantity) == pytest.approx(wanted, rel=1e-9)
+    assert found == pytest.approx(u, rel=1e-6)
+
+
+def test_mbma_inverts_and_integrates_as_its_law_does():
+    law, theory = contact_law(SURFACE), Mbma()
+    d = 2 * SHARES * SURFACE.h_max - SURFACE.h_max
+    u = SHARES * SURFACE.h_max
+    assert theory.answer(SURFACE, u).stiffness == pytest.approx(law.stiffness_mean(d), rel=1e-5)
+    assert theory.energy(SURFACE, u) == pytest.approx(law.energy(d) / 2, rel=1e-7)
+    loads = law.force(d)
+    assert theory.mean_separation_at(SURFACE, "force", loads) == pytest.approx(u, rel=1e-7)
+
+
+def test_mbma_ends_where_its_force_turns():
+    low = Mbma().interval(BATCH)[0]
+    law = contact_law(Surface(0.3, 1.0, 1000.0, 1.0, 3.0))
+    assert law.turning_point is not None
+    assert low[0] == pytest.approx((3.0 + law.turning_point) / 2, abs=1e-5)
+    assert (low[1:] == 0).all()
+
+
+def test_softening_is_the_maximum_of_stiffness():
+    found = Mbma().softening(BATCH)
+    fine = np.linspace(0.01, 0.999, 1500)[:, None]
+    stiffness = Mbma().answer(BATCH, fine * BATCH.h_max).stiffness
+    # the first maximum from first contact on
+    rising = np.diff(stiffness[::-1], axis=0) > 0
+    first = 1500 - 1 - np.argmin(rising, axis=0)
+    assert found == pytest.approx(fine[first, 0] * BATCH.h_max, abs=3e-3)
+
+
+def test_a_load_beyond_the_branch_is_refused():
+    with pytest.raises(OutOfRangeError, match="'mbma' reaches"):
+        Mbma().mean_separation_at(SURFACE, "force", np.array(1.0))
+    with pytest.raises(OutOfRangeError, match="below 1"):
+        Persson().mean_separation_at(SURFACE, "area", np.array(1.0))
+
+
+class Springs:
+    """A user's theory: an exponential force, its area proportional to it."""
+
+    name = "springs"
+
+    def answer(self, surface, mean_separation):
+        force = np.exp(-3 * mean_separation / surface.h_rms)
+        return force, 0.1 * force
+
+
+def test_a_users_own_object_is_a_theory():
+    theory = get_theory(Springs())
+    u = np.array([0.5, 2.0])
+    found = theory.answer(SURFACE, u)
+    assert found.stiffness == pytest.approx(3 / SURFACE.h_rms * found.force, rel=1e-8)
+    assert theory.mean_separation_at(SURFACE, "force", found.force) == pytest.approx(u, rel=1e-10)
+    work = (found.force - np.exp(-3 * SURFACE.h_max / SURFACE.h_rms)) * SURFACE.h_rms / 3
+    assert theory.energy(SURFACE, u) == pytest.approx(work, rel=1e-8)
+
+
+@pytest.mark.parametrize("wrong", ["perssons", 3, None, Springs, object()])
+def test_what_is_no_theory_is_refused(wrong):
+    with pytest.raises(InputError, match="theory must be one of"):
+        get_theory(wrong)
+
+
+@pytest.mark.parametrize("name", theories.THEORIES)
+def test_theories_have_names(name):
+    assert isinstance(get_theory(name), Theory)
+    assert get_theory(name).name == name
