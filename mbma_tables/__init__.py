@@ -25,14 +25,14 @@ if TYPE_CHECKING:
     from mbma_tables.scenes.scene import Scene
     from mbma_tables.surfaces.readings import Reading
     from mbma_tables.surfaces.surface import Surface
-    from mbma_tables.totals.contact import Contact, contact
+    from mbma_tables.theories.contact import Contact, contact
     from mbma_tables.totals.island import Island, island
     from mbma_tables.totals.law import ContactLaw, contact_law
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "Contact": "mbma_tables.totals.contact",
+    "Contact": "mbma_tables.theories.contact",
     "ConvergenceError": "mbma_tables.errors",
     "InputError": "mbma_tables.errors",
     "Island": "mbma_tables.totals.island",
@@ -45,7 +45,7 @@ _HOMES = {
     "Scene": "mbma_tables.scenes.scene",
     "StaleTableWarning": "mbma_tables.errors",
     "TableFileError": "mbma_tables.errors",
-    "contact": "mbma_tables.totals.contact",
+    "contact": "mbma_tables.theories.contact",
     "contact_law": "mbma_tables.totals.law",
     "height_integral": "mbma_tables.islands.height_integrals",
     "island": "mbma_tables.totals.island",

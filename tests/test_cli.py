@@ -430,7 +430,7 @@ def test_an_interrupt_ends_with_130(folder, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("mbma_tables.totals.contact.contact", interrupted)
+    monkeypatch.setattr("mbma_tables.theories.contact.contact", interrupted)
     result = CliRunner().invoke(main, ["contact", "--surface", "concrete", "-d", "0.1"])
     assert (result.exit_code, result.stdout) == (130, "")
     assert result.stderr.strip() == "mbma: interrupted"

@@ -74,7 +74,7 @@ def contact_command(
     """
     from mbma_tables.arguments import require
     from mbma_tables.theories import separation as separation_of
-    from mbma_tables.totals.contact import contact
+    from mbma_tables.theories.contact import contact
 
     if separation is not None and mean_separation is None:
         gap = _lengths("separation", separation, specimen, over_h_rms)
@@ -119,7 +119,7 @@ def curve_command(
     Example: mbma curve --surface concrete --plot concrete.png
     """
     check_png(plot, output.out)
-    from mbma_tables.totals.contact import contact
+    from mbma_tables.theories.contact import contact
 
     gap = curve_gaps(float(specimen.surface.h_max), points)
     asked = _asked(model, specimen)

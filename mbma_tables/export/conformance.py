@@ -80,7 +80,7 @@ def geometry_rows(approach: FloatArray, hurst: FloatArray, zeta_1: FloatArray, r
 def total_rows(surface: tuple[float, ...], separations: Any, reading: Reading, rtol: float = RTOL) -> Iterator[str]:
     """Totals of one surface by the compiled runtime."""
     from mbma_tables.surfaces.surface import Surface
-    from mbma_tables.totals.contact import contact
+    from mbma_tables.theories.contact import contact
 
     found = contact(Surface(*surface), separations, reading=reading, rtol=rtol)
     for separation, force, area in zip(found.separation, found.force, found.area, strict=True):

@@ -138,7 +138,7 @@ def _slope_error(law: ContactLaw, gap: Any, inverted: bool) -> float:
 
 
 def _totals(run: Run, step: Step) -> None:
-    from mbma_tables.totals.contact import contact
+    from mbma_tables.theories.contact import contact
 
     problem = run.problem
     assert step.rtol is not None

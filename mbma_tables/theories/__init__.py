@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from mbma_tables.errors import InputError
 from mbma_tables.theories.greenwood_williamson import (
     Asperities,
     GreenwoodWilliamson,
@@ -12,7 +11,8 @@ from mbma_tables.theories.greenwood_williamson import (
 )
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.persson import Method, Persson, persson_area, persson_force, persson_separation
-from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory, Wrapped
+from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
+from mbma_tables.theories.registry import THEORIES, get_theory
 
 __all__ = [
     "THEORIES",
@@ -32,32 +32,3 @@ __all__ = [
     "persson_separation",
     "separation",
 ]
-
-THEORIES = ("mbma", "persson", "greenwood_williamson")
-
-
-def get_theory(theory: str | Theory | UserTheory) -> Theory:
-    """A theory by name, or as an object: one of this package's, or any with a `name` and an `answer`.
-
-    Raises
-    ------
-    InputError
-        For an unknown name, or an object that is no theory.
-
-    Examples
-    --------
-    >>> from mbma_tables.theories import get_theory
-    >>> get_theory("persson").name
-    'persson'
-    """
-    if isinstance(theory, Theory):
-        return theory
-    if isinstance(theory, str):
-        known: dict[str, type[Theory]] = {t.name: t for t in (Mbma, Persson, GreenwoodWilliamson)}
-        if theory in known:
-            return known[theory]()
-    elif isinstance(theory, UserTheory) and not isinstance(theory, type):
-        return Wrapped(theory)
-    raise InputError(
-        f"theory must be one of {THEORIES} or an object with a name and answer(surface, u), got {theory!r}"
-    )

@@ -5,14 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.models import IslandModel as AnyModel
+from mbma_tables.models import AnyModel, tier_name
+from mbma_tables.models.protocol import QUANTITIES
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.greenwood_williamson import separation
 from mbma_tables.theories.protocol import SCAN, Theory, TheoryAnswer, select
-from mbma_tables.totals.contact import Contact, contact
+from mbma_tables.totals.contact import Totals, totals_at
 
 MAX_AREA = 0.1  # above it islands begin to lie on one another (docs/fidelity.md)
 
@@ -37,16 +39,27 @@ class Mbma(Theory):
     ) -> None:
         self.tier, self.reading, self.rtol, self.outside = tier, get_reading(reading), rtol, outside
 
-    def totals(self, surface: Surface, mean_separation: FloatArray, derivatives: bool = False) -> Contact:
-        """`contact` at u [length], in units of E*."""
-        gap = separation(surface, mean_separation)
-        return contact(
-            surface, gap, self.tier, self.reading, rtol=self.rtol, outside=self.outside, derivatives=derivatives
+    @property
+    def tier_name(self) -> str:
+        """What results call the tier."""
+        return tier_name(self.tier)
+
+    def totals(
+        self,
+        surface: Surface,
+        separation: FloatArray,
+        E_star: ArrayLike = 1.0,
+        derivatives: bool = False,
+        quantities: tuple[str, ...] = QUANTITIES,
+    ) -> Totals:
+        """Force and area at separations d [length]."""
+        return totals_at(
+            surface, separation, self.tier, self.reading, E_star, self.rtol, self.outside, derivatives, quantities
         )
 
     def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length] from 0 to h_max."""
-        found = self.totals(surface, mean_separation, derivatives=True)
+        found = self.totals(surface, separation(surface, mean_separation), derivatives=True)
         assert found.force_by is not None
         # du = dd/2
         return TheoryAnswer(found.force, found.area, -2 * found.force_by["separation"], found.error)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.arguments import FloatArray, describe_entries
+from mbma_tables.arguments import FloatArray, describe_entries, require
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 
@@ -79,7 +79,7 @@ class Theory(abc.ABC):
         return np.asarray(found.integral)
 
     def mean_separation_at(self, surface: Surface, quantity: str, wanted: FloatArray) -> FloatArray:
-        """Mean separation u [length] at which "force" (over A0 E*) or "area" has a wanted positive value.
+        """Mean separation u [length] at which "force" (over A0 E*) or "area" has a wanted value; h_max at zero.
 
         Raises
         ------
@@ -89,9 +89,13 @@ class Theory(abc.ABC):
         from scipy.optimize.elementwise import find_root
 
         shape = np.broadcast_shapes(np.shape(wanted), surface.shape)
-        target = np.broadcast_to(np.asarray(wanted, dtype=float), shape)
+        given = np.broadcast_to(np.asarray(wanted, dtype=float), shape)
+        free = given == 0
+        if not self.ends_at_h_max:
+            require(quantity, given, ~free, f"positive: contact has no end in theory {self.name!r}")
         low, high = (np.broadcast_to(end, shape) for end in self.interval(surface, quantity))
         largest = getattr(self.answer(surface, low), quantity)
+        target = np.where(free, largest, given)
         out = target > largest
         if out.any():
             raise OutOfRangeError(
@@ -115,7 +119,7 @@ class Theory(abc.ABC):
         at_end = target == largest
         _refuse_unfinished(found.success | at_end, f"the separation at this {quantity}")
         u = to_u(np.where(at_end, first, found.x), np.asarray(_places(shape), dtype=np.intp))
-        return np.where(at_end, low, u)
+        return np.where(free, high, np.where(at_end, low, u))
 
     def _coordinate(
         self, low: FloatArray, high: FloatArray

@@ -18,24 +18,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, is_labelled, require
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
-from mbma_tables.models import AnyModel, get_model, tier_name
+from mbma_tables.models import AnyModel, get_model
 from mbma_tables.models.protocol import AREA, BOTH, FORCE, OUTSIDE, QUANTITIES
 from mbma_tables.surfaces.readings import Reading, get_reading
-from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.island_sum import Pairs, slopes_of, totals_of
-
-ATTRIBUTES = {
-    "force": {"long_name": "force over nominal area", "units": "unit of E_star"},
-    "area": {"long_name": "real over nominal contact area", "units": "1"},
-    "error": {"long_name": "bound on the relative error of force and area", "units": "1"},
-}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Contact:
-    """Force and area at given separations; arrays of the broadcast shape.
+class Totals:
+    """Force and area of the MBMA model at given separations; arrays of the broadcast shape.
 
     Attributes
     ----------
@@ -70,7 +64,15 @@ class Contact:
     area_by: dict[str, Any] | None = None
 
 
-def contact(
+def wanted_quantities(quantities: Iterable[str]) -> tuple[str, ...]:
+    """The quantities asked for, each once, in the order of `QUANTITIES`."""
+    asked = (quantities,) if isinstance(quantities, str) else tuple(quantities)
+    if not asked or not set(asked) <= set(QUANTITIES):
+        raise InputError(f"quantities must be some of {QUANTITIES}, got {quantities!r}")
+    return tuple(name for name in QUANTITIES if name in asked)
+
+
+def totals_at(
     surface: Surface,
     separation: ArrayLike,
     tier: str | AnyModel = "universal",
@@ -80,91 +82,9 @@ def contact(
     outside: str = "raise",
     derivatives: bool = False,
     quantities: Iterable[str] = QUANTITIES,
-) -> Contact:
-    """Force and real contact area of a surface at given separations (Eqs. 48, 49).
-
-    Parameters
-    ----------
-    surface : Surface
-        One surface or a batch; it broadcasts against `separation`.
-    separation : array_like
-        d between the rigid plane and the mid-plane [length], at least -h_max (full compression). From h_max
-        on there is no contact, and force and area are zero.
-    tier : {"universal", "island4d", "exact", "formula", "rigid"} or island model
-        The island model: a table, the full solver, a closed form, or spheres that do not deform; or an object: a
-        table from `open_table`, or a model of one's own with a `name` and ``answer(X, mu)``.
-    reading : {"reported", "printed"} or Reading
-        Which reading of the paper's equations.
-    E_star : array_like
-        Effective modulus, (1 - nu1^2)/E1 + (1 - nu2^2)/E2 inverted; force is in its unit.
-    rtol : float
-        Relative error asked of force and area, in [1e-11, 0.1]. A table adds its own error; `error` holds both.
-    outside : {"raise", "exact", "nan"}
-        For surfaces with islands outside the table: an error, the exact solver, or NaN.
-    derivatives : bool
-        Whether `force_by` and `area_by` are asked for (tier "universal").
-    quantities : iterable of {"force", "area"}
-        What is wanted. One alone costs less; the other is then None, and `error` is of the one.
-
-    Returns
-    -------
-    Contact
-
-    Raises
-    ------
-    InputError, OutOfRangeError
-        For NaN, infinite or empty input, separations below -h_max, islands that no table covers.
-    ConvergenceError
-        Where the accuracy was not reached; its `mask` says which entries.
-
-    See Also
-    --------
-    contact_law : for many gaps on one surface.
-
-    Examples
-    --------
-    >>> from mbma_tables import Surface, contact
-    >>> surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)  # um
-    >>> found = contact(surface, [1.0, 0.5], E_star=100e3)  # MPa
-    >>> [f"{force:.4g} MPa on {area:.3%}" for force, area in zip(found.force, found.area)]
-    ['7.982 MPa on 0.287%', '20.28 MPa on 0.735%']
-    >>> bool((found.error < 1e-8).all())
-    True
-    """
-    options: dict[str, Any] = {
-        "tier": tier,
-        "reading": get_reading(reading),
-        "rtol": rtol,
-        "outside": outside,
-        "derivatives": derivatives,
-        "quantities": _wanted(quantities),
-    }
-    if surface.labelled or is_labelled(separation) or is_labelled(E_star):
-        return _of_labelled(surface, separation, E_star, options)
-    return _contact(surface, separation, E_star, **options)
-
-
-def _wanted(quantities: Iterable[str]) -> tuple[str, ...]:
-    """The quantities asked for, each once, in the order of `QUANTITIES`."""
-    asked = (quantities,) if isinstance(quantities, str) else tuple(quantities)
-    if not asked or not set(asked) <= set(QUANTITIES):
-        raise InputError(f"quantities must be some of {QUANTITIES}, got {quantities!r}")
-    return tuple(name for name in QUANTITIES if name in asked)
-
-
-def _contact(
-    surface: Surface,
-    separation: ArrayLike,
-    E_star: ArrayLike,
-    *,
-    tier: str | AnyModel,
-    reading: Reading,
-    rtol: float,
-    outside: str,
-    derivatives: bool,
-    quantities: tuple[str, ...],
-) -> Contact:
-    """`contact` of plain arrays."""
+) -> Totals:
+    """Force and area of the MBMA model at separations d; what `mbma_tables.contact` says of them holds."""
+    quantities, reading = wanted_quantities(quantities), get_reading(reading)
     gap = finite_array("separation", separation)
     modulus = finite_array("E_star", E_star)
     require("E_star", modulus, modulus > 0, "positive")
@@ -194,7 +114,7 @@ def _contact(
         if fault.mask is not None:
             fault.mask = fault.mask.reshape(shape)
         raise
-    return Contact(
+    return Totals(
         separation=gap[()],
         mean_separation=((h_max + gap) / 2)[()],
         force=(force.reshape(shape) * stress)[()] if which != AREA else None,
@@ -205,38 +125,6 @@ def _contact(
         islands=islands,
         force_by=force_by if which != AREA else None,
         area_by=area_by if which != FORCE else None,
-    )
-
-
-def _of_labelled(surface: Surface, separation: Any, E_star: Any, options: dict[str, Any]) -> Contact:
-    """`contact` of DataArrays, lazily where they are."""
-    # xarray comes in with its own objects
-    from mbma_tables.labels import apply_to_surface
-
-    wanted = options["quantities"]
-    by = [(kind, name) for kind in wanted for name in ("separation", *PARAMETERS)] if options["derivatives"] else []
-    names = (*wanted, "error")
-
-    def answer(block: Surface, gaps: Any, modulus: Any) -> tuple[Any, ...]:
-        found = _contact(block, gaps, modulus, **options)
-        slopes = (getattr(found, f"{kind}_by")[name] for kind, name in by)
-        return (*(getattr(found, name) for name in names), *slopes)
-
-    arrays = {"separation": separation, "E_star": E_star}
-    outputs = apply_to_surface(answer, surface, arrays, len(names) + len(by))
-    fields: dict[str, Any] = {"force": None, "area": None}
-    for found, name in zip(outputs, names, strict=False):
-        fields[name] = found.rename(name).assign_attrs(ATTRIBUTES[name])
-    slopes = dict(zip(by, outputs[len(names) :], strict=True))
-    for kind in QUANTITIES:
-        fields[f"{kind}_by"] = {name: value for (own, name), value in slopes.items() if own == kind} or None
-    return Contact(
-        separation=separation,
-        mean_separation=(surface.h_max + separation) / 2,
-        reading=options["reading"].name,
-        tier=tier_name(options["tier"]),
-        islands=None,
-        **fields,
     )
 
 

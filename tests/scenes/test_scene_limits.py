@@ -70,7 +70,7 @@ def test_what_no_solver_answers_stays_an_error(effects, monkeypatch):
         raise OutOfRangeError("islands outside", True)
 
     monkeypatch.setattr("mbma_tables.totals.law.contact_law", refuse)
-    monkeypatch.setattr("mbma_tables.totals.contact.contact", refuse)
+    monkeypatch.setattr("mbma_tables.theories.contact.contact", refuse)
     scene = scene_of(effects=effects, rtol=1e-3)
     with pytest.raises(OutOfRangeError, match="islands outside"):
         run_plan(scene, tiered(scene, "exact"))

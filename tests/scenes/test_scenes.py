@@ -250,13 +250,13 @@ def test_modules_of_an_effect_that_is_off_are_not_imported(name):
     for module, effects in WATCHED.items():
         assert (module in loaded) == (name in effects), module
     totals = {"force", "area", "stiffness", "energy", "conductance"}
-    assert ("mbma_tables.totals.contact" in loaded) == (name in totals)
+    assert ("mbma_tables.theories.contact" in loaded) == (name in totals)
 
 
 @pytest.mark.parametrize("effects", COMBINATIONS, ids="+".join)
 def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
     import mbma_tables.theories as theories
-    import mbma_tables.totals.contact as totals
+    import mbma_tables.theories.contact as totals
     import mbma_tables.totals.law as laws
 
     calls = {}

@@ -1,0 +1,332 @@
+"""`contact`: force, area and stiffness of a surface by any theory, asked by what is known of the contact."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, is_labelled, require
+from mbma_tables.errors import InputError
+from mbma_tables.labels import apply_to_surface
+from mbma_tables.models import AnyModel
+from mbma_tables.models.protocol import QUANTITIES
+from mbma_tables.surfaces.readings import Reading
+from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.theories.greenwood_williamson import positive_modulus
+from mbma_tables.theories.mbma import Mbma
+from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
+from mbma_tables.theories.registry import get_theory
+from mbma_tables.totals.contact import Totals, wanted_quantities
+
+KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by
+MAX_GRADIENT = 1.0
+ATTRIBUTES = {
+    "separation": {"long_name": "separation from the mid-plane", "units": "unit of h_rms"},
+    "mean_separation": {"long_name": "mean separation", "units": "unit of h_rms"},
+    "force": {"long_name": "force over nominal area", "units": "unit of E_star"},
+    "area": {"long_name": "real over nominal contact area", "units": "1"},
+    "error": {"long_name": "bound on the relative error of force and area", "units": "1"},
+}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Contact:
+    """A contact: force, area and what follows from them; arrays of the broadcast shape, or DataArrays.
+
+    Attributes
+    ----------
+    separation : ndarray
+        d, between the rigid plane and the mid-plane [length].
+    mean_separation : ndarray
+        u = (h_max + d)/2 (50) [length].
+    force : ndarray or None
+        F/A0 in the unit of E_star; F/(A0 E*) where that is 1. None where not asked for.
+    area : ndarray or None
+        A/A0, None where not asked for. MBMA does not end at 1 under full compression, and this is not clamped.
+    error : ndarray
+        Bound on the relative numerical error of both against the theory (for "mbma" against what the tier stands
+        for), NaN where not known. The theory's own distance from simulation is another number, `scatter`.
+    theory, reading, tier : str
+        What made them; reading and tier are empty where the theory is not MBMA.
+    islands : int or None
+        Islands evaluated; None where that is left to dask, or where there are none.
+    force_by, area_by, separation_by : dict of ndarray, or None
+        Partial derivatives by "separation", "hurst", "q0", "q1", "h_rms" and "h_max", the others held. Asked by
+        pressure or area, that is held in place of the separation, whose own derivatives are `separation_by`, and
+        "pressure" or "area" stands for "separation".
+    """
+
+    separation: Any
+    mean_separation: Any
+    force: Any
+    area: Any
+    error: Any
+    theory: str
+    reading: str
+    tier: str
+    islands: int | None
+    force_by: dict[str, Any] | None = None
+    area_by: dict[str, Any] | None = None
+    separation_by: dict[str, Any] | None = None
+    _source: _Source | None = dataclasses.field(default=None, repr=False)
+
+    @functools.cached_property
+    def stiffness(self) -> Any:
+        """-d(F/A0)/du [stress/length], against the mean separation; computed when first read."""
+        return self._source_of().map(lambda s, u, E: E * self._source_of().theory.answer(s, u).stiffness, self)
+
+    @functools.cached_property
+    def energy(self) -> Any:
+        """Elastic energy per nominal area [stress length], the integral of F/A0 over u; computed when first read."""
+        return self._source_of().map(lambda s, u, E: E * self._source_of().theory.energy(s, u), self)
+
+    @property
+    def mean_pressure(self) -> Any:
+        """Mean pressure in the contact, F/A [stress]; NaN where there is none."""
+        with np.errstate(invalid="ignore"):
+            return self.force / self.area
+
+    @functools.cached_property
+    def valid(self) -> Any:
+        """Whether the theory was tested for contacts such as these; `reasons` says where and why not."""
+
+        def none(s: Surface, u: FloatArray, E: FloatArray) -> FloatArray:
+            masks = list(self._source_of().concerns(s, u).values())
+            return np.asarray(~np.logical_or.reduce(masks), dtype=float)
+
+        return self._source_of().map(none, self).astype(bool)
+
+    @functools.cached_property
+    def reasons(self) -> dict[str, Any]:
+        """Reasons for which entries are not `valid`, each with a mask; of plain arrays."""
+        u = np.asarray(self.mean_separation)
+        surface = self._source_of().surface
+        plain = Surface(*(np.asarray(getattr(surface, name)) for name in PARAMETERS)) if surface.labelled else surface
+        return {reason: mask for reason, mask in self._source_of().concerns(plain, u).items() if mask.any()}
+
+    def _source_of(self) -> _Source:
+        if self._source is None:
+            raise InputError("this Contact was not made by mbma_tables.contact")
+        return self._source
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Source:
+    """What a `Contact` is of, for quantities that are computed when they are read."""
+
+    theory: Theory
+    surface: Surface
+    E_star: Any
+
+    def map(self, function: Callable[[Surface, FloatArray, FloatArray], FloatArray], found: Contact) -> Any:
+        """``function(surface, u, E_star)`` of the contact's entries."""
+        u = found.mean_separation
+        if self.surface.labelled or is_labelled(u) or is_labelled(self.E_star):
+            arrays = {"mean_separation": u, "E_star": self.E_star}
+            return apply_to_surface(lambda *given: (function(*given),), self.surface, arrays, 1)[0]
+        return function(self.surface, np.asarray(u), np.asarray(self.E_star))[()]
+
+    def concerns(self, surface: Surface, u: FloatArray) -> dict[str, Any]:
+        """Every reason against the entries, with its mask."""
+        answer: TheoryAnswer = self.theory.answer(surface, u)
+        steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.force))
+        text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"
+        return {text: steep, **self.theory.concerns(surface, answer, u)}
+
+
+def contact(
+    surface: Surface,
+    separation: ArrayLike | None = None,
+    tier: str | AnyModel = "universal",
+    reading: str | Reading = "reported",
+    E_star: ArrayLike = 1.0,
+    rtol: float = 1e-8,
+    outside: str = "raise",
+    derivatives: bool = False,
+    quantities: Iterable[str] = QUANTITIES,
+    *,
+    mean_separation: ArrayLike | None = None,
+    pressure: ArrayLike | None = None,
+    area: ArrayLike | None = None,
+    theory: str | Theory | UserTheory = "mbma",
+) -> Contact:
+    """Force, real contact area and stiffness of a surface, by what is known: separation, pressure or area.
+
+    Parameters
+    ----------
+    surface : Surface
+        One surface or a batch; it broadcasts against what is known.
+    separation : array_like
+        d between the rigid plane and the mid-plane [length], at least -h_max (full compression). From h_max
+        on there is no contact, and force and area are zero. Exactly one of the four is given.
+    mean_separation : array_like
+        u = (h_max + d)/2 (50) [length].
+    pressure : array_like
+        F/A0 in the unit of `E_star`; the answer is on the branch of first contact.
+    area : array_like
+        A/A0, likewise.
+    theory : {"mbma", "persson", "greenwood_williamson"} or theory
+        By name, or an object: one of `mbma_tables.theories`, or any with a `name` and ``answer(surface, u)``.
+    tier : {"universal", "island4d", "exact", "formula", "rigid"} or island model
+        MBMA's island model: a table, the full solver, a closed form, or spheres that do not deform; or an object: a
+        table from `open_table`, or a model of one's own with a `name` and ``answer(X, mu)``.
+    reading : {"reported", "printed"} or Reading
+        Which reading of the paper's equations MBMA takes.
+    E_star : array_like
+        Effective modulus, (1 - nu1^2)/E1 + (1 - nu2^2)/E2 inverted; force is in its unit.
+    rtol : float
+        Relative error asked of MBMA's force and area, in [1e-11, 0.1]. A table adds its own error; `error` holds both.
+    outside : {"raise", "exact", "nan"}
+        For surfaces with islands outside MBMA's table: an error, the exact solver, or NaN.
+    derivatives : bool
+        Whether `force_by`, `area_by` and `separation_by` are asked for (MBMA).
+    quantities : iterable of {"force", "area"}
+        What is wanted of MBMA. One alone costs less; the other is then None, and `error` is of the one.
+
+    Returns
+    -------
+    Contact
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        For NaN, infinite or empty input, separations below -h_max, islands that no table covers, pressures and areas
+        that the branch of first contact does not reach.
+    ConvergenceError
+        Where the accuracy was not reached; its `mask` says which entries.
+
+    See Also
+    --------
+    contact_law : for many gaps on one surface.
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, contact
+    >>> surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)  # um
+    >>> found = contact(surface, [1.0, 0.5], E_star=100e3)  # MPa
+    >>> [f"{force:.4g} MPa on {area:.3%}" for force, area in zip(found.force, found.area)]
+    ['7.982 MPa on 0.287%', '20.28 MPa on 0.735%']
+    >>> bool((found.error < 1e-8).all())
+    True
+    >>> joint = contact(surface, pressure=10.0, E_star=100e3)
+    >>> f"{joint.mean_separation:.3f} um, {joint.stiffness:.1f} MPa/um"
+    '1.942 um, 38.5 MPa/um'
+    >>> f"{contact(surface, pressure=10.0, E_star=100e3, theory='persson').area:.3%}"
+    '0.295%'
+    """
+    by, value = _known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
+    chosen = get_theory(theory)
+    of_tier = {"tier": tier != "universal", "reading": reading != "reported", "rtol": rtol != 1e-8}
+    of_tier["outside"] = outside != "raise"
+    if theory == Mbma.name:
+        chosen = Mbma(tier, reading, rtol, outside)
+    elif any(of_tier.values()):
+        raise InputError(f"{', '.join(k for k, given in of_tier.items() if given)}: options of theory 'mbma', by name")
+    if derivatives and not isinstance(chosen, Mbma):
+        raise InputError(f"derivatives in the surface's parameters come from theory 'mbma', not from {chosen.name!r}")
+    options: dict[str, Any] = {
+        "by": by,
+        "theory": chosen,
+        "derivatives": derivatives,
+        "quantities": wanted_quantities(quantities),
+    }
+    if surface.labelled or is_labelled(value) or is_labelled(E_star):
+        found = _of_labelled(surface, value, E_star, options)
+    else:
+        found = _contact(surface, value, E_star, **options)
+    return dataclasses.replace(found, _source=_Source(chosen, surface, E_star))
+
+
+def _known(**given: Any) -> tuple[str, Any]:
+    """The one of `KNOWN` that is given."""
+    known = {name: value for name, value in given.items() if value is not None}
+    if len(known) != 1:
+        raise InputError(f"give exactly one of {', '.join(KNOWN)}; got {' and '.join(known) or 'none'}")
+    return next(iter(known.items()))
+
+
+def _contact(
+    surface: Surface,
+    value: ArrayLike,
+    E_star: ArrayLike,
+    *,
+    by: str,
+    theory: Theory,
+    derivatives: bool,
+    quantities: tuple[str, ...],
+) -> Contact:
+    """`contact` of plain arrays."""
+    asked, modulus = finite_array(by, value), positive_modulus(E_star)
+    shape = broadcast_shape(**{by: asked, "surface": surface.hurst, "E_star": modulus})
+    asked, modulus = np.broadcast_to(asked, shape), np.broadcast_to(modulus, shape)
+    h_max = np.asarray(surface.h_max)
+    if by == "separation":
+        gap = asked
+    elif by == "mean_separation":
+        gap = 2 * asked - h_max
+    else:
+        require(by, asked, asked >= 0, "at least 0")
+        quantity, wanted = ("force", asked / modulus) if by == "pressure" else ("area", asked)
+        gap = 2 * theory.mean_separation_at(surface, quantity, wanted) - h_max
+    average = asked if by == "mean_separation" else (h_max + gap) / 2
+    places: dict[str, Any] = {
+        "separation": np.broadcast_to(gap, shape)[()],
+        "mean_separation": np.broadcast_to(average, shape)[()],
+    }
+    if not isinstance(theory, Mbma):
+        found = theory.answer(surface, np.asarray(places["mean_separation"]))
+        both = {"force": (modulus * found.force)[()], "area": np.asarray(found.area)[()]}
+        places |= {name: value if name in quantities else None for name, value in both.items()}
+        error = np.broadcast_to(found.error, shape)[()]
+        return Contact(**places, error=error, theory=theory.name, reading="", tier="", islands=None)
+    totals = theory.totals(surface, gap, modulus, derivatives, QUANTITIES if derivatives else quantities)
+    fields = {field.name: getattr(totals, field.name) for field in dataclasses.fields(Totals)} | places
+    if derivatives and by in ("pressure", "area"):
+        held = "force" if by == "pressure" else "area"
+        fields |= _at_fixed(held, by, {"force": totals.force_by, "area": totals.area_by}, totals.force / modulus)
+    for name in set(QUANTITIES) - set(quantities):
+        fields |= {name: None, f"{name}_by": None}
+    return Contact(theory=theory.name, **fields)
+
+
+def _at_fixed(held: str, by: str, slopes: dict[str, Any], per_modulus: Any) -> dict[str, Any]:
+    """Derivatives where force or area is held: of the separation, and of the quantity that is not held."""
+    other = "area" if held == "force" else "force"
+    steep, follows = slopes[held]["separation"], slopes[other]["separation"]
+    gap = {by: 1 / steep} | {name: -slopes[held][name] / steep for name in PARAMETERS}
+    free = {by: follows / steep} | {name: slopes[other][name] + follows * gap[name] for name in PARAMETERS}
+    if held == "force":
+        gap["E_star"] = -per_modulus / steep
+        free["E_star"] = follows * gap["E_star"]
+    return {"separation_by": gap, f"{other}_by": free, f"{held}_by": None}
+
+
+def _of_labelled(surface: Surface, value: Any, E_star: Any, options: dict[str, Any]) -> Contact:
+    """`contact` of DataArrays, lazily where they are."""
+    by, theory, wanted = options["by"], options["theory"], options["quantities"]
+    names = ("separation", "mean_separation", *wanted, "error")
+    slopes: list[tuple[str, str]] = []
+    if options["derivatives"]:
+        held = {"pressure": "force", "area": "area"}.get(by)
+        kinds = [f"{kind}_by" for kind in wanted if kind != held] + (["separation_by"] if held else [])
+        free = (by if held else "separation", *PARAMETERS, *(("E_star",) if held == "force" else ()))
+        slopes = [(kind, name) for kind in kinds for name in free]
+
+    def answer(block: Surface, asked: Any, modulus: Any) -> tuple[Any, ...]:
+        found = _contact(block, asked, modulus, **options)
+        return (*(getattr(found, name) for name in names), *(getattr(found, kind)[name] for kind, name in slopes))
+
+    outputs = apply_to_surface(answer, surface, {by: value, "E_star": E_star}, len(names) + len(slopes))
+    fields: dict[str, Any] = {"force": None, "area": None}
+    for found, name in zip(outputs, names, strict=False):
+        fields[name] = found.rename(name).assign_attrs(ATTRIBUTES[name])
+    for (kind, name), found in zip(slopes, outputs[len(names) :], strict=True):
+        fields.setdefault(kind, {})[name] = found
+    mbma = isinstance(theory, Mbma)
+    labels = {"reading": theory.reading.name, "tier": theory.tier_name} if mbma else {"reading": "", "tier": ""}
+    return Contact(theory=theory.name, islands=None, **labels, **fields)

@@ -1,0 +1,133 @@
+"""`contact` asked by separation, mean separation, pressure or area, of any theory."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
+from mbma_tables.surfaces.surface import PARAMETERS
+from mbma_tables.theories import THEORIES, Mbma
+
+SURFACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
+BATCH = Surface(hurst=[0.7, 0.9], q0=0.01, q1=[1.0, 2.0], h_rms=1.0, h_max=[3.0, 3.4])
+MODULUS = 100e3
+each = pytest.mark.parametrize("theory", THEORIES)
+
+
+@each
+@pytest.mark.parametrize("surface", [SURFACE, BATCH], ids=["one", "batch"])
+def test_the_four_ways_to_ask_give_one_contact(surface, theory):
+    u = np.array([[1.2], [1.9], [2.4]])
+    first = contact(surface, mean_separation=u, E_star=MODULUS, theory=theory)
+    assert first.separation == pytest.approx(2 * u - surface.h_max)
+    for known in ("separation", "force", "area"):
+        asked = {"pressure" if known == "force" else known: getattr(first, known)}
+        again = contact(surface, **asked, E_star=MODULUS, theory=theory)
+        for name in ("mean_separation", "separation", "force", "area", "stiffness", "mean_pressure", "energy"):
+            assert getattr(again, name) == pytest.approx(getattr(first, name), rel=1e-8), (known, name)
+
+
+def test_stiffness_and_energy_are_those_of_the_law():
+    law = contact_law(SURFACE, E_star=MODULUS)
+    found = contact(SURFACE, pressure=[1e-3, 1.0, 30.0], E_star=MODULUS)
+    assert law.force(found.separation) == pytest.approx([1e-3, 1.0, 30.0], rel=1e-7)
+    assert found.stiffness == pytest.approx(law.stiffness_mean(found.separation), rel=1e-5)
+    assert found.energy == pytest.approx(law.energy(found.separation) / 2, rel=1e-7)
+    assert found.mean_pressure == pytest.approx(found.force / found.area, rel=1e-15)
+
+
+def test_no_load_is_first_contact():
+    found = contact(SURFACE, pressure=[0.0, 1e-9])
+    assert found.separation[0] == 3.0
+    assert found.force[0] == found.area[0] == found.stiffness[0] == 0
+    with pytest.raises(OutOfRangeError, match="positive"):
+        contact(SURFACE, pressure=0.0, theory="persson")
+
+
+@pytest.mark.parametrize("held", ["pressure", "area"])
+def test_derivatives_at_a_held_quantity(held):
+    asked = {held: 10.0 if held == "pressure" else 0.004}
+    found = contact(SURFACE, **asked, E_star=MODULUS, derivatives=True)
+    free = "area" if held == "pressure" else "force"
+    step = 1e-5
+    for name in (*PARAMETERS, held, *(("E_star",) if held == "pressure" else ())):
+        sides, scale = [], 1.0
+        for sign in (1, -1):
+            numbers = {p: float(getattr(SURFACE, p)) for p in PARAMETERS} | asked | {"E_star": MODULUS}
+            scale = numbers[name]
+            numbers[name] *= 1 + sign * step
+            given = {key: numbers[key] for key in (held, "E_star")}
+            sides.append(contact(Surface(*(numbers[p] for p in PARAMETERS)), **given, rtol=1e-10))
+        for kind in ("separation", free):
+            slope = (getattr(sides[0], kind) - getattr(sides[1], kind)) / (2 * step * scale)
+            own = getattr(found, f"{kind}_by")[name]
+            # h_max hardly moves anything here: what it moves is compared with the quantity itself
+            assert own == pytest.approx(slope, rel=1e-6, abs=1e-6 * abs(getattr(found, kind)) / scale), (kind, name)
+    assert getattr(found, "force_by" if held == "pressure" else "area_by") is None
+
+
+@each
+def test_labelled_arrays_keep_their_names(theory):
+    pressure = xr.DataArray([1.0, 10.0], dims="load", coords={"load": [1.0, 10.0]})
+    surface = Surface(hurst=xr.DataArray([0.7, 0.8], dims="hurst"), q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
+    found = contact(surface, pressure=pressure, E_star=MODULUS, theory=theory)
+    plain = contact(Surface([[0.7], [0.8]], 0.01, 2.0, 1.0, 3.0), pressure=[1.0, 10.0], E_star=MODULUS, theory=theory)
+    for name in ("separation", "mean_separation", "area", "stiffness", "mean_pressure", "valid"):
+        labelled = getattr(found, name)
+        assert set(labelled.dims) == {"load", "hurst"}
+        assert labelled.transpose("hurst", "load").values == pytest.approx(getattr(plain, name), rel=1e-13), name
+    assert found.area.attrs["units"] == "1"
+
+
+def test_labelled_derivatives_at_held_pressure():
+    pressure = xr.DataArray([1.0, 10.0], dims="load")
+    found = contact(SURFACE, pressure=pressure, E_star=MODULUS, derivatives=True)
+    plain = contact(SURFACE, pressure=[1.0, 10.0], E_star=MODULUS, derivatives=True)
+    for kind in ("separation_by", "area_by"):
+        for name, slope in getattr(plain, kind).items():
+            assert getattr(found, kind)[name].values == pytest.approx(slope, rel=1e-13)
+
+
+def test_mbma_says_where_it_is_not_to_be_trusted():
+    found = contact(SURFACE, mean_separation=[2.5, 0.3])
+    assert found.valid.tolist() == [True, False]
+    reasons = found.reasons
+    assert len(reasons) == 2
+    assert all(mask.tolist() == [False, True] for mask in reasons.values())
+    assert any("stiffness falls" in reason for reason in reasons)
+
+
+@each
+def test_units_that_do_not_fit_are_noticed(theory):
+    # heights in um, wavenumbers in 1/mm
+    found = contact(Surface(0.8, 10.0, 2000.0, 1.0, 3.0), mean_separation=2.0, theory=theory)
+    assert not found.valid
+    assert any("one unit?" in reason for reason in found.reasons)
+
+
+@pytest.mark.parametrize(
+    ("asked", "match"),
+    [
+        ({}, "exactly one of separation, mean_separation, pressure, area; got none"),
+        ({"separation": 1.0, "pressure": 1.0}, "got separation and pressure"),
+        ({"pressure": 1.0, "theory": "hertz"}, "theory must be one of"),
+        ({"pressure": 1.0, "theory": "persson", "tier": "exact"}, "tier: options of theory 'mbma'"),
+        ({"pressure": 1e-4, "theory": "persson", "derivatives": True}, "derivatives .* not from 'persson'"),
+        ({"separation": 1.0, "theory": Mbma(), "reading": "printed"}, "reading: options of theory 'mbma', by name"),
+        ({"pressure": np.nan}, "pressure must be finite"),
+        ({"pressure": -1.0}, "pressure must be at least 0"),
+        ({"area": 0.9}, "area must be at most what theory 'mbma' reaches"),
+    ],
+)
+def test_what_cannot_be_asked(asked, match):
+    with pytest.raises(InputError, match=match):
+        contact(SURFACE, **asked)
+
+
+def test_a_theory_object_with_its_own_options():
+    by_object = contact(SURFACE, 1.0, theory=Mbma("rigid", "printed"))
+    by_name = contact(SURFACE, 1.0, tier="rigid", reading="printed")
+    assert by_object.force == by_name.force
+    assert (by_object.tier, by_object.reading, by_object.theory) == ("rigid", "printed", "mbma")
