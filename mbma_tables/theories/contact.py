@@ -309,7 +309,10 @@ def _at_fixed(held: str, by: str, slopes: dict[str, Any], per_modulus: Any) -> d
 def _of_labelled(surface: Surface, value: Any, E_star: Any, options: dict[str, Any]) -> Contact:
     """`contact` of DataArrays, lazily where they are."""
     by, theory, wanted = options["by"], options["theory"], options["quantities"]
-    names = ("separation", "mean_separation", *wanted, "error")
+    names: tuple[str, ...] = (*wanted, "error")
+    fields: dict[str, Any] = {"force": None, "area": None}
+    if by not in ("separation", "mean_separation"):
+        names = ("separation", "mean_separation", *names)
     slopes: list[tuple[str, str]] = []
     if options["derivatives"]:
         held = {"pressure": "force", "area": "area"}.get(by)
@@ -322,11 +325,15 @@ def _of_labelled(surface: Surface, value: Any, E_star: Any, options: dict[str, A
         return (*(getattr(found, name) for name in names), *(getattr(found, kind)[name] for kind, name in slopes))
 
     outputs = apply_to_surface(answer, surface, {by: value, "E_star": E_star}, len(names) + len(slopes))
-    fields: dict[str, Any] = {"force": None, "area": None}
     for found, name in zip(outputs, names, strict=False):
         fields[name] = found.rename(name).assign_attrs(ATTRIBUTES[name])
     for (kind, name), found in zip(slopes, outputs[len(names) :], strict=True):
         fields.setdefault(kind, {})[name] = found
+    # what was given is kept, with its name and attributes
+    if by == "separation":
+        fields |= {by: value, "mean_separation": (surface.h_max + value) / 2}
+    elif by == "mean_separation":
+        fields |= {by: value, "separation": 2 * value - surface.h_max}
     mbma = isinstance(theory, Mbma)
     labels = {"reading": theory.reading.name, "tier": theory.tier_name} if mbma else {"reading": "", "tier": ""}
     return Contact(theory=theory.name, islands=None, **labels, **fields)
