@@ -16,7 +16,6 @@ if TYPE_CHECKING:
         MbmaError,
         NotSelfAffineError,
         OutOfRangeError,
-        StaleTableWarning,
         TableFileError,
     )
     from mbma_tables.islands import greenwood_tripp
@@ -43,7 +42,6 @@ _HOMES = {
     "Surface": "mbma_tables.surfaces.surface",
     "ContactLaw": "mbma_tables.totals.law",
     "Scene": "mbma_tables.scenes.scene",
-    "StaleTableWarning": "mbma_tables.errors",
     "TableFileError": "mbma_tables.errors",
     "contact": "mbma_tables.theories.contact",
     "contact_law": "mbma_tables.totals.law",
@@ -67,7 +65,6 @@ __all__ = [
     "OutOfRangeError",
     "Reading",
     "Scene",
-    "StaleTableWarning",
     "Surface",
     "TableFileError",
     "contact",

@@ -59,7 +59,3 @@ class NotSelfAffineError(MbmaError, ValueError):
 
 class TableFileError(MbmaError, OSError):
     """A table file that cannot be used: unreadable, damaged, edited, of another format or kind."""
-
-
-class StaleTableWarning(UserWarning):
-    """A table made by another version of the solver than the one installed."""

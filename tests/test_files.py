@@ -66,6 +66,7 @@ def test_an_interruption_leaves_the_old_file(old, monkeypatch):
     assert unchanged(old)
 
 
+@pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")
 def test_a_process_killed_before_the_rename_leaves_the_old_file(old):
     child = os.fork()
     if child == 0:
@@ -158,6 +159,7 @@ WRITERS = {
     ("mbma_tables/files.py", "open"),
     ("mbma_tables/plots.py", "savefig"),
     ("generate/pages/page.py", "savefig"),
+    ("generate/pages/cost.py", "write_bytes"),
     ("mbma_tables/cli/scene.py", "to_netcdf"),
     ("mbma_tables/export/data.py", "to_netcdf"),
 }

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from generate.pages.timing import measure, variant
-from generate.tables.solves import log_ratio
+from generate.tables.chunks import log_ratio
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError
 from mbma_tables.islands import greenwood_tripp

@@ -12,7 +12,7 @@ import numpy as np
 
 from generate.pages.comparisons import REFERENCES
 from generate.pages.timing import GAPS, held_out_surfaces, measure, measured_gaps, variant
-from generate.tables.solves import log_ratio
+from generate.tables.chunks import log_ratio
 from mbma_tables import Scene, Surface, contact, contact_law, theories
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp

@@ -11,14 +11,15 @@ from typing import Any, Protocol
 import numpy as np
 import scipy.ndimage
 from scipy.stats import qmc
+from threadpoolctl import threadpool_limits
 
-from generate.tables.campaign import Campaign
+from generate.tables.chunks import ChunkedSolver
 from generate.tables.configuration import Configuration
-from generate.tables.solves import solve_all
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import MbmaError
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.tablefiles.interpolate import fill_2d, fill_4d
+from mbma_tables.tablefiles.checks import check_content
+from mbma_tables.tablefiles.interpolate import cubic, fill_2d, fill_4d, quintic
 from mbma_tables.tablefiles.schema import (
     DEGREES,
     FUNCTIONS,
@@ -26,10 +27,10 @@ from mbma_tables.tablefiles.schema import (
     TableContent,
     error_cell,
     error_cells,
-    is_finite_content,
 )
 from mbma_tables.tablefiles.splines import coefficients
 
+BLAS_THREADS = 2  # as when the shipped tables were made
 LINES = 24  # sample lines along an axis that decide its resolution
 TESTS = 2  # points between two nodes of a sample line
 GROWTH = 1.05  # least factor by which an axis is refined
@@ -120,7 +121,7 @@ def _between(axis: Axis) -> FloatArray:
 
 
 def line_errors(
-    kind: Kind, axes: tuple[Axis, ...], number: int, campaign: Campaign, configuration: Configuration
+    kind: Kind, axes: tuple[Axis, ...], number: int, solver: ChunkedSolver, configuration: Configuration
 ) -> FloatArray:
     """Largest error of F and A when interpolating along axis `number` alone, over sample lines."""
     degree, seed = DEGREES[configuration.kind], configuration.seed
@@ -135,7 +136,7 @@ def line_errors(
     coordinates = [np.broadcast_to(f[:, None], (LINES, along.size)) for f in fixed]
     coordinates.insert(number, np.broadcast_to(along, (LINES, along.size)))
     X, mu = kind.arguments(*coordinates)
-    values = solve_all(campaign, f"{axes[number].name} x {axes[number].nodes}", X, mu, rtol=rtol_for(configuration))
+    values = solver.log_ratio(f"{axes[number].name} x {axes[number].nodes}", X, mu, rtol=rtol_for(configuration))
     nodes = axes[number].nodes
     coefs = coefficients(np.moveaxis(values[:, :nodes], 1, 0), degree, 1)
     fitted = _evaluate_1d(coefs, tests, degree)
@@ -144,8 +145,6 @@ def line_errors(
 
 
 def _evaluate_1d(coefs: FloatArray, positions: FloatArray, degree: int) -> FloatArray:
-    from mbma_tables.tablefiles.interpolate import cubic, quintic
-
     nodes = coefs.shape[0] - degree + 1
     first = np.minimum(positions.astype(int), nodes - 2)
     rule = cubic if degree == 3 else quintic
@@ -164,7 +163,7 @@ class Resolution:
 
 
 def resolve(
-    kind: Kind, configuration: Configuration, campaign: Campaign, aim: float, start: dict[str, int]
+    kind: Kind, configuration: Configuration, solver: ChunkedSolver, aim: float, start: dict[str, int]
 ) -> Resolution:
     """Refine each axis until its sample lines meet `aim`."""
     nodes = dict(start)
@@ -173,17 +172,17 @@ def resolve(
         fixed = configuration.axes[name].nodes
         while True:
             axes = kind.axes(nodes)
-            errors[name] = line_errors(kind, axes, number, campaign, configuration)
+            errors[name] = line_errors(kind, axes, number, solver, configuration)
             worst = errors[name].max()
             if fixed is not None or worst <= aim:
                 break
             # the error is of order h^(degree + 1)
             predicted = nodes[name] * (worst / aim) ** (1 / (DEGREES[configuration.kind] + 1))
             nodes[name] = int(max(nodes[name] * GROWTH, min(predicted, nodes[name] * 2))) + 1
-            if np.prod([float(n) for n in nodes.values()]) > configuration.most_nodes:
+            if np.prod([float(n) for n in nodes.values()]) > configuration.max_nodes:
                 raise UncertifiedError(
                     f"{configuration.kind}: an error of {aim:.1e} along {name} needs more than the "
-                    f"{configuration.most_nodes} nodes allowed; raise most_nodes or the target"
+                    f"{configuration.max_nodes} nodes allowed; raise max_nodes or the target"
                 )
     return Resolution(nodes, errors)
 
@@ -197,7 +196,7 @@ def held_out(kind: Kind, axes: tuple[Axis, ...], count: int, seed: int) -> list[
 
 
 def certify(
-    kind: Kind, axes: tuple[Axis, ...], coefs: FloatArray, campaign: Campaign, configuration: Configuration
+    kind: Kind, axes: tuple[Axis, ...], coefs: FloatArray, solver: ChunkedSolver, configuration: Configuration
 ) -> dict[str, Any]:
     """Errors on held-out points, solved on twice the nodes that made the table."""
     places = held_out(kind, axes, configuration.certificate_points, configuration.seed + 101)
@@ -205,7 +204,7 @@ def certify(
     if any((p == np.round(p)).any() for p in positions):
         raise UncertifiedError(f"{configuration.kind}: a held-out point stands on a node")
     X, mu = kind.arguments(*places)
-    truth = solve_all(campaign, "certificate", X, mu, rtol=rtol_for(configuration), refinement=2)
+    truth = solver.log_ratio("certificate", X, mu, rtol=rtol_for(configuration), refinement=2)
     errors = np.abs(np.expm1(evaluate(coefs, positions) - truth))
     on_manifold = errors[configuration.certificate_points // 2 :]
     result: dict[str, Any] = {"certificate_points": configuration.certificate_points}
@@ -224,7 +223,7 @@ def certify(
 
 
 def local_errors(
-    kind: Kind, axes: tuple[Axis, ...], coefs: FloatArray, campaign: Campaign, configuration: Configuration
+    kind: Kind, axes: tuple[Axis, ...], coefs: FloatArray, solver: ChunkedSolver, configuration: Configuration
 ) -> FloatArray:
     """Bounds on the error over a coarser grid, from the middle of every cell of the table."""
     cells = tuple(error_cells(axis) for axis in axes)
@@ -234,7 +233,7 @@ def local_errors(
     positions = list((corners + 0.5).T)
     places = [axis.coordinate(p) for axis, p in zip(axes, positions, strict=True)]
     rtol = max(0.1 * rtol_for(configuration), greenwood_tripp.TIGHTEST)
-    truth = solve_all(campaign, "local error", *kind.arguments(*places), rtol=rtol)
+    truth = solver.log_ratio("local error", *kind.arguments(*places), rtol=rtol)
     error = np.abs(np.expm1(evaluate(coefs, positions) - truth))
     where = tuple(error_cell(a, c, p) for a, c, p in zip(axes, cells, positions, strict=True))
     np.maximum.at(field, where, error)
@@ -244,21 +243,21 @@ def local_errors(
     return bound
 
 
-def build(kind: Kind, configuration: Configuration, campaign: Campaign) -> TableContent:
+# the spline's factors are rounded differently on another number of BLAS threads
+@threadpool_limits.wrap(limits=BLAS_THREADS)
+def build(kind: Kind, configuration: Configuration, solver: ChunkedSolver) -> TableContent:
     """Make a table that meets its target, or raise UncertifiedError."""
     degree = DEGREES[configuration.kind]
     start = {name: given.nodes or given.start for name, given in configuration.axes.items()}
     aim = AXIS_SHARE * configuration.target
     history = []
     for _ in range(ROUNDS):
-        resolution = resolve(kind, configuration, campaign, aim, start)
+        resolution = resolve(kind, configuration, solver, aim, start)
         axes = kind.axes(resolution.nodes)
         grid = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
-        values = solve_all(
-            campaign, f"{configuration.kind} table", *kind.arguments(*grid), rtol=rtol_for(configuration)
-        )
+        values = solver.log_ratio(f"{configuration.kind} table", *kind.arguments(*grid), rtol=rtol_for(configuration))
         coefs = coefficients(values, degree, len(axes))
-        certificate = certify(kind, axes, coefs, campaign, configuration)
+        certificate = certify(kind, axes, coefs, solver, configuration)
         worst = max(certificate["largest_error_F"], certificate["largest_error_A"])
         history.append({"nodes": resolution.nodes, "aim": aim, "largest_error": worst})
         if worst <= configuration.target:
@@ -280,7 +279,7 @@ def build(kind: Kind, configuration: Configuration, campaign: Campaign) -> Table
         axes=axes,
         log_ratio=values,
         coefficients=coefs,
-        local_error=local_errors(kind, axes, coefs, campaign, configuration),
+        local_error=local_errors(kind, axes, coefs, solver, configuration),
         auxiliary=kind.auxiliary(axes),
         conformance=_conformance(kind, axes, coefs, configuration),
         attributes={
@@ -295,8 +294,10 @@ def build(kind: Kind, configuration: Configuration, campaign: Campaign) -> Table
             "refinement": json.dumps(history),
         },
     )
-    if not is_finite_content(content):
-        raise UncertifiedError(f"{configuration.kind}: the table holds numbers that are not finite")
+    try:
+        check_content(content)
+    except ValueError as fault:
+        raise UncertifiedError(f"{configuration.kind}: the table {fault}") from None
     kind.check(content)
     return content
 

@@ -1,69 +1,62 @@
-"""`python -m generate tables`: remake the tables and the coefficients of the height integrals."""
+"""`python -m generate tables`: make the tables and the coefficients of the height integrals."""
 
 from __future__ import annotations
 
+import concurrent.futures
 import contextlib
+import multiprocessing
 import os
 import pathlib
 import shutil
-import time
 from collections.abc import Iterator
 
 import click
 
 from generate.tables import height_coefficients
-from generate.tables.campaign import Campaign, CampaignError, Executor, Workers
-from generate.tables.configuration import FEWEST_SHIPPED, Configuration, load
+from generate.tables.build import UncertifiedError, build
+from generate.tables.chunks import ChunkedSolver, WorkerError
+from generate.tables.configuration import MIN_SHIPPED_POINTS, Configuration, load
+from generate.tables.island4d import Island4d
+from generate.tables.universal import Universal
 from mbma_tables.errors import InputError
+from mbma_tables.tablefiles.netcdf import write_table
+from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL
 
 TABLES = pathlib.Path(__file__).parents[2] / "tables"
 
 
+Pool = concurrent.futures.Executor | None
+
+
 @contextlib.contextmanager
-def engine(workers: int, scheduler: str | None, processes: bool) -> Iterator[Executor | None]:
-    """Where chunks run: a dask scheduler, a local dask cluster where dask is installed, or plain processes."""
-    if scheduler is None and (processes or workers <= 1):
-        if workers <= 1:
-            yield None
-            return
-        with Workers(workers) as pool:
-            yield pool
-        return
-    try:
-        import distributed
-    except ImportError:
-        if scheduler is not None:
-            raise InputError("--scheduler needs dask: pip install 'mbma_tables[distributed]'") from None
-        with Workers(workers) as pool:
-            yield pool
-        return
-    with contextlib.ExitStack() as stack:
-        if scheduler is None:
-            cluster = distributed.LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
-            client = stack.enter_context(distributed.Client(stack.enter_context(cluster)))
-        else:
-            try:
-                client = stack.enter_context(distributed.Client(scheduler))
-            except (OSError, ValueError) as fault:
-                raise CampaignError(f"no dask scheduler at {scheduler}: {fault}") from None
+def executor(workers: int, scheduler: str | None) -> Iterator[Pool]:
+    """Where chunks run: here, in processes of this machine, or on a dask scheduler."""
+    if scheduler is not None:
         try:
+            from distributed import Client
+
+            client = Client(scheduler)
+        except ImportError:
+            raise InputError("--scheduler needs dask: pip install 'mbma_tables[distributed]'") from None
+        except (OSError, ValueError) as fault:
+            raise WorkerError(f"no dask scheduler at {scheduler}: {fault}") from None
+        with client:
             yield client.get_executor()
-        except (distributed.KilledWorker, ImportError, RuntimeError) as fault:
-            if isinstance(fault, CampaignError):
-                raise
-            raise CampaignError(
-                f"dask: {fault} (scheduler and workers need this checkout on their path); "
-                "--resume goes on from the chunks that are done"
-            ) from None
+    elif workers == 1:
+        yield None
+    else:
+        # started afresh: threads and forks do not mix
+        with concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+            yield pool
 
 
 def destination(what: str, configuration: Configuration, out: pathlib.Path | None) -> pathlib.Path:
-    """Where a table goes; the folder that is shipped takes only what is certified on enough points."""
+    """Where a table goes; the shipped folder takes only what is certified on enough points."""
     own = f"{configuration.kind}.nc"
     path = TABLES / own if out is None else out / own if what == "all" else out
-    if path.resolve().parent == TABLES.resolve() and configuration.certificate_points < FEWEST_SHIPPED:
+    if path.resolve().parent == TABLES.resolve() and configuration.certificate_points < MIN_SHIPPED_POINTS:
         raise InputError(
-            f"certificate_points must be at least {FEWEST_SHIPPED} for a table in {TABLES}, "
+            f"certificate_points must be at least {MIN_SHIPPED_POINTS} for a table in {TABLES}, "
             f"got {configuration.certificate_points}; give another place with --out"
         )
     if path.is_dir():
@@ -71,47 +64,34 @@ def destination(what: str, configuration: Configuration, out: pathlib.Path | Non
     return path
 
 
-def make_table(configuration: Configuration, target: pathlib.Path, executor: Executor | None, resume: bool) -> None:
-    """Build, certify and write one table."""
-    from generate.tables.build import Kind, UncertifiedError, build
-    from generate.tables.island4d import Island4d
-    from generate.tables.universal import Universal
-    from mbma_tables.tablefiles.netcdf import write_table
-    from mbma_tables.tablefiles.schema import UNIVERSAL
-
-    started = time.perf_counter()
-    checkpoints = target.parent / f".{target.name}.checkpoints"
-    kind: Kind = Universal(configuration) if configuration.kind == UNIVERSAL else Island4d(configuration)
+def make_table(configuration: Configuration, target: pathlib.Path, pool: Pool) -> None:
+    """Build, certify and write one table; finished chunks are kept beside it until then."""
+    chunks = target.parent / f".{target.name}.chunks"
+    kind = Universal(configuration) if configuration.kind == UNIVERSAL else Island4d(configuration)
     try:
-        content = build(kind, configuration, Campaign(executor, checkpoints, resume))
+        content = build(kind, configuration, ChunkedSolver(pool, chunks))
     except UncertifiedError:
         # another resolution shares no chunks with this one
-        shutil.rmtree(checkpoints, ignore_errors=True)
+        shutil.rmtree(chunks, ignore_errors=True)
         raise
     write_table(target, content)
-    shutil.rmtree(checkpoints, ignore_errors=True)
+    shutil.rmtree(chunks, ignore_errors=True)
     shape = " x ".join(f"{axis.nodes} {axis.name}" for axis in content.axes)
     errors = ", ".join(f"{f} {content.attributes[f'largest_error_{f}']:.2e}" for f in ("F", "A"))
     click.echo(f"{target}: {shape}; largest held-out error {errors}; {target.stat().st_size} bytes")
     click.echo(f"errors by axis (F, A): {content.attributes['axis_errors']}", err=True)
-    click.echo(f"{time.perf_counter() - started:.1f} s", err=True)
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
-@click.argument("what", type=click.Choice(["universal", "island4d", "heights", "all"]))
+@click.argument("what", type=click.Choice([*KINDS, "heights", "all"]))
 @click.option(
     "--config", type=click.Path(path_type=pathlib.Path), help="TOML file that changes the shipped configuration."
 )
 @click.option("--target", type=float, help="Largest relative error on held-out points.")
-@click.option(
-    "--out", type=click.Path(path_type=pathlib.Path), help="File to write (a folder for all); default tables/."
-)
+@click.option("--out", type=click.Path(path_type=pathlib.Path), help="File (for all: folder); default tables/.")
 @click.option("--workers", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True, help="Processes.")
-@click.option("--resume", is_flag=True, help="Go on from the chunks that an earlier run finished.")
-@click.option(
-    "--scheduler", help="Address of a dask scheduler to run on; it and its workers need this checkout on their path."
-)
-@click.option("--processes", is_flag=True, help="Plain processes even where dask is installed.")
+@click.option("--resume", is_flag=True, help="Continue from the chunks that an earlier run finished.")
+@click.option("--scheduler", help="Address of a dask scheduler whose workers have this checkout on their path.")
 def tables(
     what: str,
     config: pathlib.Path | None,
@@ -120,17 +100,19 @@ def tables(
     workers: int,
     resume: bool,
     scheduler: str | None,
-    processes: bool,
 ) -> None:
-    """Remake the table universal or island4d, the coefficients of the height integrals (heights), or all of it."""
+    """Make a table, the coefficients of the height integrals (heights), or all of them in order."""
     if what in ("all", "heights") and (config is not None or target is not None):
         raise InputError("--config and --target belong to one table")
-    kinds: tuple[str, ...] = {"all": ("universal", "island4d"), "heights": ()}.get(what, (what,))
-    configurations = [load(kind, config, target) for kind in kinds]
+    configurations = [load(kind, config, target) for kind in KINDS if what in (kind, "all")]
     paths = [destination(what, configuration, out) for configuration in configurations]
     if what in ("all", "heights"):
         height_coefficients.main()
-    with engine(workers, scheduler, processes) as executor:
+    if not configurations:
+        return
+    with executor(workers, scheduler) as pool:
         for configuration, path in zip(configurations, paths, strict=True):
             path.parent.mkdir(parents=True, exist_ok=True)
-            make_table(configuration, path, executor, resume)
+            if not resume:
+                shutil.rmtree(path.parent / f".{path.name}.chunks", ignore_errors=True)
+            make_table(configuration, path, pool)

@@ -99,7 +99,3 @@ def main() -> None:
         "\n".join(_literal(f"TWICE_N_{k}", pieces(k)) for k in (1, 2, 3, 4, 5)),
     ]
     write_file(TARGET, ("\n\n".join(blocks) + "\n").encode())
-
-
-if __name__ == "__main__":
-    main()

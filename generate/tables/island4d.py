@@ -144,7 +144,7 @@ class Island4d:
         }
 
     def attributes(self) -> dict[str, Any]:
-        """What the file says of itself."""
+        """Attributes of the file."""
         numbers = {
             "floor": SPHERE_FLOOR,
             "divisor": self.reading.density_divisor,
@@ -152,7 +152,7 @@ class Island4d:
         }
         return {
             "title": "Contact islands of the MBMA model of rough contact over its four parameters",
-            "history": "made by python -m generate island4d",
+            "history": "made by python -m generate tables island4d",
             "source": "numerical solution of the integral equation by mbma_tables",
             "references": (
                 "Guo, Ma, Zhu: A magnification-based multi-asperity (MBMA) model of rough contact, Eqs. 26-40"

@@ -80,10 +80,10 @@ class Universal:
         return grid_labels(axes, DEGREES[UNIVERSAL])
 
     def attributes(self) -> dict[str, Any]:
-        """What the file says of itself."""
+        """Attributes of the file."""
         return {
             "title": "Island problem of the MBMA model of rough contact (Greenwood and Tripp 1967)",
-            "history": "made by python -m generate universal",
+            "history": "made by python -m generate tables universal",
             "source": "numerical solution of the integral equation by mbma_tables",
             "references": (
                 "Guo, Ma, Zhu: A magnification-based multi-asperity (MBMA) model of rough contact, Eqs. 34-40; "
@@ -128,7 +128,7 @@ class Universal:
             "force increasing in X": (force_slope > 0).all(),
             "area increasing in X": (area_slope > 0).all(),
             "force increasing in mu": (1 + out[2] * by_mu > 0).all(),
-            "rigid limit: log ratio proportional to mu at the smallest mu (a lower axes.mu.low mends it)": (
+            "rigid limit: log ratio proportional to mu at the smallest mu (try a lower axes.mu.low)": (
                 np.abs(out[2][lowest] * by_mu - out[0][lowest]) <= self.configuration.target
             ).all(),
         }

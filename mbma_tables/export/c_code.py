@@ -190,7 +190,6 @@ def header(model: UniversalModel, reading: Reading, title: str, usage: str) -> l
         f"{reading.phi:g}, floors {reading.floor_d:g} and {reading.floor_u:g}, Jacobian {reading.jacobian}, offset "
         f"{'on' if reading.offset else 'off'}, sigma of {'summits' if reading.summit_sigma else 'all heights'}).",
         f"Table: data {found['values_sha256']}",
-        f"physics {found['physics_sha256']}",
         f"Range: {X.low:g} <= X <= {X.high:g}, 0 <= mu <= {mu.high:g}; H in (0, 1], zeta_1 up to {MAX_ZETA_1:g}.",
         f"Largest relative error of the table against the solved model: {worst:.2g} on {found['certificate_points']} "
         f"held-out points, {visited:.2g} at islands of random surfaces; each answer carries its own bound.",

@@ -274,5 +274,5 @@ def _comments(
         "c = 0 is first contact: bodies meet where their mean planes are h_max apart",
         f"range: {names[0]} from 0 to {x[-1]:.10g}, {end}",
         f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, above 1e-3 of the largest value",
-        f"table: data {str(attributes['values_sha256'])[:16]}, physics {str(attributes['physics_sha256'])[:16]}",
+        f"table: data {str(attributes['values_sha256'])[:16]}",
     )

@@ -2,7 +2,7 @@
 
 phi is the standard normal density; n = 1/2, 1, 3/2, 2, 5/2. Eqs. (36) and (38) of the paper are F_{3/2}
 and F_1; F_{5/2} and F_2 are their integrals over a rigid sphere. Each F_n is a handful of polynomial
-pieces (`generate/height_coefficients.py`), accurate to 1e-13 relative for x <= 10 and to 5e-13 up to 37,
+pieces (`generate/tables/height_coefficients.py`), accurate to 1e-13 relative for x <= 10 and to 5e-13 up to 37,
 where parabolic cylinder functions from scipy lose digits and end in NaN.
 """
 

@@ -5,15 +5,12 @@ from __future__ import annotations
 import functools
 import os
 import pathlib
-import threading
 
 from mbma_tables.files import shipped_file
 from mbma_tables.models.island4d import Island4dModel
 from mbma_tables.models.universal import UniversalModel
-from mbma_tables.tablefiles.netcdf import read_table
+from mbma_tables.tablefiles.netcdf import HDF5_LOCK, read_table
 from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
-
-_OPENING = threading.Lock()
 
 
 def shipped(kind: str) -> pathlib.Path:
@@ -51,7 +48,7 @@ def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Is
     True
     """
     if table in (UNIVERSAL, ISLAND4D):
-        with _OPENING:
+        with HDF5_LOCK:
             return _opened(str(table))
     content = read_table(table)
     return UniversalModel(content) if content.kind == UNIVERSAL else Island4dModel(content)

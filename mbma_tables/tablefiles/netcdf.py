@@ -1,8 +1,8 @@
 """Write, open and check table files (netCDF-4).
 
-A file ends in a line with the SHA-256 of all bytes before it. It is read whole, checked, and only then shown to
-the HDF5 library, which may crash on damaged bytes. HDF5 ignores what follows its own end of file, so every netCDF
-reader opens the file as it is.
+A file ends in a line with the SHA-256 of all bytes before it. The file is read whole and checked against that line,
+and only then opened by the HDF5 library, which may crash on damaged bytes. HDF5 ignores what follows its own end of
+file, so every netCDF reader opens the file as it is.
 """
 
 from __future__ import annotations
@@ -11,20 +11,16 @@ import hashlib
 import json
 import os
 import pathlib
-import platform
-import stat
 import threading
-import warnings
 from typing import Any
 
 import netCDF4
 import numpy as np
 
-from mbma_tables.errors import InputError, StaleTableWarning, TableFileError
-from mbma_tables.files import shipped_file, write_file, written_bytes
-from mbma_tables.tablefiles import provenance
-from mbma_tables.tablefiles.consistency import misfit
-from mbma_tables.tablefiles.contents import Contents, attributes_of, contents_of, foreign_contents
+from mbma_tables.errors import InputError, TableFileError
+from mbma_tables.files import read_file, write_file, written_bytes
+from mbma_tables.tablefiles.checks import REQUIRED, check_attribute, check_content
+from mbma_tables.tablefiles.provenance import MODULES, digest_arrays, digest_json, source_digest, versions
 from mbma_tables.tablefiles.schema import (
     ANSWERS,
     CONVENTIONS,
@@ -33,7 +29,6 @@ from mbma_tables.tablefiles.schema import (
     FORMAT_VERSION,
     FUNCTIONS,
     HEIGHT_INTEGRALS,
-    ISLAND4D,
     KINDS,
     OUT_OF_RANGE,
     WEIGHTS,
@@ -44,9 +39,7 @@ from mbma_tables.tablefiles.splines import padding
 
 SEAL = b"\nmbma-table sha256 "
 SEAL_LENGTH = len(SEAL) + 64 + 1
-ONE_AT_A_TIME = threading.Lock()  # the HDF5 library crashes where threads enter it together
-LARGEST_FILE = 256 * 2**20
-MODULES = {kind: provenance.SOLVER + (provenance.GEOMETRY if kind == ISLAND4D else ()) for kind in KINDS}
+MAX_BYTES = 256 * 2**20  # of a file, and of its values
 MEANING = {
     "log_ratio": "natural logarithm of Phi_{f} over its value for a rigid sphere, at the nodes",
     "spline": "coefficients of cardinal B-splines that interpolate log_ratio_{f}",
@@ -58,35 +51,25 @@ CONFORMANCE = {
     "tolerance": "largest relative difference to allow at the conformance points",
 }
 
-
-def versions() -> dict[str, str]:
-    """Versions of what computes."""
-    import numba
-    import scipy
-
-    from mbma_tables import __version__
-
-    return {
-        "mbma_tables": __version__,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "numba": numba.__version__,
-        "netCDF4": netCDF4.__version__,
-    }
+# the HDF5 library crashes where threads enter it together, and a child must not be forked while one is in it
+HDF5_LOCK = threading.RLock()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(before=HDF5_LOCK.acquire, after_in_parent=HDF5_LOCK.release, after_in_child=HDF5_LOCK.release)
 
 
-def _digest_of(attributes: dict[str, Any], variables: dict[str, tuple[tuple[str, ...], dict[str, Any]]]) -> str:
+def _attributes_of(owner: Any) -> dict[str, Any]:
+    """The attributes of a file or a variable as plain Python values, lists where they are arrays."""
+    values = {name: owner.getncattr(name) for name in owner.ncattrs()}
+    return {name: v.tolist() if isinstance(v, np.ndarray | np.generic) else v for name, v in values.items()}
+
+
+def attributes_digest(dataset: netCDF4.Dataset) -> str:
     """SHA-256 of every attribute of a file but this hash itself, and of each variable's dimensions and attributes."""
-    content = {"": {name: value for name, value in attributes.items() if name != "attributes_sha256"}}
-    for name, (dimensions, own) in variables.items():
-        content[name] = own | {"dimensions": list(dimensions)}
-    return provenance.digest_json(content)
-
-
-def _attributes_digest(dataset: netCDF4.Dataset) -> str:
-    variables = {name: (variable.dimensions, attributes_of(variable)) for name, variable in dataset.variables.items()}
-    return _digest_of(attributes_of(dataset), variables)
+    own = _attributes_of(dataset)
+    content = {"": {name: value for name, value in own.items() if name != "attributes_sha256"}}
+    for name, variable in dataset.variables.items():
+        content[name] = _attributes_of(variable) | {"dimensions": list(variable.dimensions)}
+    return digest_json(content)
 
 
 def _fill(dataset: netCDF4.Dataset, content: TableContent) -> None:
@@ -114,12 +97,7 @@ def _fill(dataset: netCDF4.Dataset, content: TableContent) -> None:
             meaning = {"long_name": MEANING[what].format(f=function), "units": "1"}
             if what == "log_ratio" and beside:
                 meaning["coordinates"] = beside
-            add(
-                f"{what}_{function}",
-                tuple(name + suffix for name in names),
-                array[..., number],
-                meaning,
-            )
+            add(f"{what}_{function}", tuple(name + suffix for name in names), array[..., number], meaning)
     for name, (dimensions, values, attributes) in content.auxiliary.items():
         add(name, dimensions, values, attributes)
     points = next(iter(content.conformance.values())).size
@@ -137,13 +115,20 @@ def write_table(path: os.PathLike[str] | str, content: TableContent) -> pathlib.
     Raises
     ------
     TableFileError
-        Where the folder cannot be written or the disk is full; nothing is left behind.
+        Where the file cannot be written; what was there before is unchanged.
+    ValueError
+        Where the parts of the table do not fit one another.
     """
     target = pathlib.Path(path)
-    digest = provenance.digest_arrays(content.arrays())
+    check_content(content)
+    digest = digest_arrays(content.arrays())
     attributes = {
         "Conventions": CONVENTIONS,
-        **content.attributes,
+        # where the values came from, unless the table was read from a file that says so
+        "source_sha256": source_digest(MODULES[content.kind]),
+        "source_modules": " ".join(MODULES[content.kind]),
+        "versions": json.dumps(versions(), sort_keys=True),
+        **{name: value for name, value in content.attributes.items() if name != "attributes_sha256"},
         "mbma_kind": content.kind,
         "format_version": FORMAT_VERSION,
         "data_version": digest[:12],
@@ -153,16 +138,13 @@ def write_table(path: os.PathLike[str] | str, content: TableContent) -> pathlib.
         "out_of_range": OUT_OF_RANGE[content.kind],
         **DOCUMENTATION,
         "values_sha256": digest,
-        "physics_sha256": provenance.physics_digest(MODULES[content.kind]),
-        "physics_modules": " ".join(MODULES[content.kind]),
-        "versions": json.dumps(versions(), sort_keys=True),
     }
 
     def write(path: str) -> None:
-        with ONE_AT_A_TIME, netCDF4.Dataset(path, "w", format="NETCDF4") as dataset:
+        with HDF5_LOCK, netCDF4.Dataset(path, "w", format="NETCDF4") as dataset:
             _fill(dataset, content)
             dataset.setncatts(attributes)
-            dataset.setncattr("attributes_sha256", _attributes_digest(dataset))
+            dataset.setncattr("attributes_sha256", attributes_digest(dataset))
 
     try:
         body = written_bytes(target.name, write)
@@ -173,118 +155,68 @@ def write_table(path: os.PathLike[str] | str, content: TableContent) -> pathlib.
 
 
 def _refuse(path: pathlib.Path, why: str, kind: str = "all") -> TableFileError:
-    return TableFileError(f"{path}: {why}; make it anew with `python -m generate {kind}` or reinstall mbma_tables")
+    return TableFileError(f"{path}: {why}; rebuild it with `python -m generate tables {kind}` or reinstall mbma_tables")
 
 
 def read_sealed(path: pathlib.Path) -> bytes:
-    """The netCDF bytes of a table file, checked against its seal."""
+    """The netCDF bytes of a table file, checked against its checksum."""
     try:
-        status = path.stat()
-        size = status.st_size
-        content = path.read_bytes() if stat.S_ISREG(status.st_mode) and size <= LARGEST_FILE else None
-    except OSError as fault:
-        raise _refuse(path, f"cannot be read ({fault.strerror or fault})") from None
-    if content is None:
-        why = f"{size} bytes are more than any table has" if size > LARGEST_FILE else "is no regular file"
-        raise _refuse(path, why)
+        content = read_file(path, MAX_BYTES)
+    except InputError as fault:
+        raise _refuse(path, str(fault).removeprefix(f"{path} ")) from None
     body, seal = content[:-SEAL_LENGTH], content[-SEAL_LENGTH:]
     if not seal.startswith(SEAL) or not seal.endswith(b"\n"):
-        raise _refuse(path, "is no table file, or is cut short (no checksum at its end)")
+        raise _refuse(path, "is not a table file, or is cut short (no checksum at its end)")
     if seal[len(SEAL) : -1] != hashlib.sha256(body).hexdigest().encode():
         raise _refuse(path, "is damaged (its checksum does not match)")
     return body
 
 
-def _content(contents: Contents, kind: str) -> TableContent:
-    variables = contents.variables
-
-    def array(name: str) -> Any:
-        return np.ascontiguousarray(variables[name].values, dtype=np.float64)
-
-    names = variables["log_ratio_F"].dimensions
+def _content(dataset: netCDF4.Dataset, kind: str) -> TableContent:
+    """The table in an open file whose kind and format are known."""
+    # values as they are stored, for their hash
+    dataset.set_auto_maskandscale(False)
+    own = _attributes_of(dataset)
+    described = {name: _attributes_of(variable) for name, variable in dataset.variables.items()}
+    for owner, attributes in {"": own, **described}.items():
+        for name, value in attributes.items():
+            check_attribute(owner, name, value)
+    for name, variable in dataset.variables.items():
+        if variable.dtype != np.dtype("<f8"):
+            raise ValueError(f"holds variable {name}, which must hold little-endian doubles, not {variable.dtype}")
+    missing = [name for name in REQUIRED if name not in own]
+    if missing or own.get("attributes_sha256") != attributes_digest(dataset):
+        raise ValueError(f"lacks attribute {missing[0]}" if missing else "has attributes that were edited")
+    if dataset.groups or sum(variable.size for variable in dataset.variables.values()) * 8 > MAX_BYTES:
+        raise ValueError(f"has groups, or more than {MAX_BYTES} bytes of values")
+    values = {name: np.ascontiguousarray(variable[...]) for name, variable in dataset.variables.items()}
+    # the stored axes, not recomputed ones: another processor's logarithm may differ in the last bit
+    if digest_arrays(values) != own["values_sha256"]:
+        raise ValueError("has values that do not match their hash")
+    names = dataset["log_ratio_F"].dimensions
     axes = tuple(
-        Axis(
-            name=name,
-            long_name=own["long_name"],
-            transform=own["transform"],
-            offset=float(own["offset"]),
-            low=float(own["first"]),
-            high=float(own["last"]),
-            nodes=variables[name].values.size,
-        )
-        for name, own in ((name, variables[name].attributes) for name in names)
+        Axis(name, text["long_name"], text["transform"], text["offset"], text["first"], text["last"], values[name].size)
+        for name, text in ((name, described[name]) for name in names)
+    )
+    log_ratio, coefficients, local_error = (
+        np.stack([values[f"{what}_{function}"] for function in FUNCTIONS], axis=-1) for what in MEANING
     )
     main = {f"{what}_{function}" for what in MEANING for function in FUNCTIONS} | set(names)
-    auxiliary = {
-        name: (variable.dimensions, array(name), variable.attributes)
-        for name, variable in variables.items()
-        if name not in main and not name.startswith("conformance_")
-    }
-    conformance = {
-        name.removeprefix("conformance_"): array(name) for name in variables if name.startswith("conformance_")
-    }
-
-    def both(what: str) -> Any:
-        return np.stack([array(f"{what}_{function}") for function in FUNCTIONS], axis=-1)
-
+    beside = [name for name in values if name not in main and not name.startswith("conformance_")]
     return TableContent(
         kind=kind,
         axes=axes,
-        log_ratio=both("log_ratio"),
-        coefficients=both("spline"),
-        local_error=both("error"),
-        auxiliary=auxiliary,
-        conformance=conformance,
-        attributes=contents.attributes,
+        log_ratio=log_ratio,
+        coefficients=coefficients,
+        local_error=local_error,
+        auxiliary={name: (dataset[name].dimensions, values[name], described[name]) for name in beside},
+        conformance={
+            name.removeprefix("conformance_"): array
+            for name, array in values.items()
+            if name.startswith("conformance_")
+        },
+        attributes=own,
     )
-
-
-def _checked(source: pathlib.Path, contents: Contents, kind: str | None) -> TableContent:
-    """The content of a file whose kind, format, attributes and values are as they were written."""
-    attributes, variables = contents.attributes, contents.variables
-    found = attributes.get("mbma_kind")
-    if found not in KINDS or (kind is not None and found != kind):
-        raise _refuse(source, f"holds a table of kind {found!r}, not {kind or ' or '.join(KINDS)}", kind or "all")
-    version = attributes.get("format_version")
-    if version != FORMAT_VERSION:
-        raise _refuse(source, f"has format {version!r}, this library reads {FORMAT_VERSION}", found)
-    if attributes.get("attributes_sha256") != _digest_of(
-        attributes, {name: (variable.dimensions, variable.attributes) for name, variable in variables.items()}
-    ):
-        raise _refuse(source, "has attributes that were edited", found)
-    # the stored axes, not ones computed anew: another processor's logarithm may differ in the last bit
-    if provenance.digest_arrays({n: v.values for n, v in variables.items()}) != attributes["values_sha256"]:
-        raise _refuse(source, "has values that do not match their hash", found)
-    content = _content(contents, found)
-    why = misfit(content)
-    if why:
-        raise _refuse(source, why, found)
-    return content
-
-
-def check_table(path: os.PathLike[str] | str, kind: str | None = None) -> tuple[TableContent, str | None]:
-    """Open and check a table file as `read_table` does, without its warning.
-
-    Returns
-    -------
-    content : TableContent
-    stale : str or None
-        Why the table is stale, if it is.
-    """
-    source = pathlib.Path(path)
-    body = read_sealed(source)
-    try:
-        if source.resolve() == shipped_file(source.name).resolve():
-            with ONE_AT_A_TIME:
-                contents = contents_of(body)
-        else:
-            contents = foreign_contents(body)
-        content = _checked(source, contents, kind)
-    except TableFileError:
-        raise
-    except (OSError, RuntimeError, KeyError, AttributeError, TypeError, ValueError, IndexError) as fault:
-        raise _refuse(source, f"is no table file ({fault})") from None
-    return content, None
 
 
 def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> TableContent:
@@ -301,13 +233,22 @@ def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> TableCo
     ------
     TableFileError
         Where it is unreadable, damaged, edited, of another format or of another kind.
-
-    Warns
-    -----
-    StaleTableWarning
-        Where the solver has changed since the table was made.
     """
-    content, stale = check_table(path, kind)
-    if stale is not None:
-        warnings.warn(stale, StaleTableWarning, stacklevel=2)
+    source = pathlib.Path(path)
+    body = read_sealed(source)
+    try:
+        with HDF5_LOCK, netCDF4.Dataset(source.name, memory=body) as dataset:
+            found = getattr(dataset, "mbma_kind", None)
+            if found not in KINDS or (kind is not None and found != kind):
+                raise ValueError(f"holds a table of kind {found!r}, not {kind or ' or '.join(KINDS)}")
+            version = getattr(dataset, "format_version", None)
+            if version != FORMAT_VERSION:
+                raise ValueError(f"has format {version}, this library reads {FORMAT_VERSION}")
+            content = _content(dataset, found)
+        check_content(content)
+    except ValueError as fault:
+        raise _refuse(source, str(fault), kind or "all") from None
+    # what netCDF4 raises on bytes that are no netCDF file, or that lack a variable
+    except (OSError, RuntimeError, LookupError) as fault:
+        raise _refuse(source, f"is not a table file ({fault})", kind or "all") from None
     return content

@@ -1,22 +1,18 @@
-"""Hashes: of values, of a configuration, and of the physics, that is the code and constants that solve.
-
-The physics hash is taken from the syntax trees of the solver's modules, without docstrings, comments, annotations
-and imports, so that it changes when an expression or a constant does and not when a line is broken elsewhere.
-"""
+"""Hashes of values and attributes, and where values came from: versions, processor, source files."""
 
 from __future__ import annotations
 
-import ast
-import functools
 import hashlib
 import importlib.util
 import json
 import pathlib
+import platform
 from typing import Any
 
 import numpy as np
 
-# what decides Phi_F and Phi_A; island4d adds what its axes mean (its reading's numbers are configuration)
+from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
+
 SOLVER = (
     "mbma_tables.islands._height_coefficients",
     "mbma_tables.islands.height_integrals",
@@ -24,58 +20,8 @@ SOLVER = (
     "mbma_tables.islands.newton",
     "mbma_tables.islands.greenwood_tripp",
 )
-GEOMETRY = (
-    "mbma_tables.surfaces.spectrum",
-    "mbma_tables.islands.geometry",
-    "mbma_tables.islands.four_numbers",
-)
-
-
-def _source(module: str) -> str:
-    """Source text of a module, found without importing it."""
-    spec = importlib.util.find_spec(module)
-    if spec is None or spec.origin is None:
-        raise ModuleNotFoundError(module)
-    return pathlib.Path(spec.origin).read_text(encoding="utf-8")
-
-
-def _is_silent(node: Any) -> bool:
-    """Whether a statement computes nothing: an import, a docstring, an annotation without a value."""
-    if isinstance(node, ast.Expr):
-        return isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
-    return isinstance(node, ast.Import | ast.ImportFrom) or (isinstance(node, ast.AnnAssign) and node.value is None)
-
-
-def normal_form(node: Any) -> Any:
-    """A syntax tree as nested lists that do not depend on the Python version or on formatting."""
-    if isinstance(node, ast.AnnAssign) and node.value is not None:
-        return normal_form(ast.Assign(targets=[node.target], value=node.value))
-    if isinstance(node, ast.AST):
-        kept = []
-        for name, value in sorted(ast.iter_fields(node)):
-            # fields that are empty, or that say nothing of what is computed
-            if name in ("annotation", "returns", "ctx", "kind", "type_comment", "type_params"):
-                continue
-            shown = normal_form(value)
-            if shown not in (None, []):
-                kept.append([name, shown])
-        return [type(node).__name__, kept]
-    if isinstance(node, list):
-        return [normal_form(item) for item in node if not _is_silent(item)]
-    if node is None or isinstance(node, str):
-        return node
-    return f"{type(node).__name__}:{node!r}"
-
-
-def code_digest(source: str) -> str:
-    """SHA-256 of a source text's normal form."""
-    return digest_json(normal_form(ast.parse(source)))
-
-
-@functools.cache
-def physics_digest(modules: tuple[str, ...]) -> str:
-    """SHA-256 of the physics in these modules as installed now."""
-    return digest_json([[name, code_digest(_source(name))] for name in modules])
+GEOMETRY = ("mbma_tables.surfaces.spectrum", "mbma_tables.islands.geometry", "mbma_tables.islands.four_numbers")
+MODULES = {UNIVERSAL: SOLVER, ISLAND4D: SOLVER + GEOMETRY}
 
 
 def digest_json(content: Any) -> str:
@@ -93,3 +39,43 @@ def digest_arrays(arrays: dict[str, Any]) -> str:
         digest.update(f"{name}:{plain.dtype.str}:{plain.shape};".encode())
         digest.update(plain.tobytes())
     return digest.hexdigest()
+
+
+def source_digest(modules: tuple[str, ...]) -> str:
+    """SHA-256 of the source files of modules, as bytes: a record of what ran, which nothing is compared with."""
+    digest = hashlib.sha256()
+    for module in modules:
+        spec = importlib.util.find_spec(module)
+        if spec is None or spec.origin is None:
+            raise ModuleNotFoundError(module)
+        digest.update(pathlib.Path(spec.origin).read_bytes())
+    return digest.hexdigest()
+
+
+def processor() -> tuple[str, str]:
+    """Name and features of the processor that numba compiles for; they decide the last bits of values."""
+    from llvmlite import binding
+    from numba.core import config
+
+    # set by the environment where code is compiled for another processor
+    name, features = (getattr(config, f"CPU_{what}") for what in ("NAME", "FEATURES"))
+    return name or binding.get_host_cpu_name(), features or binding.get_host_cpu_features().flatten()
+
+
+def versions() -> dict[str, str]:
+    """The processor, and the versions of what computes."""
+    import netCDF4
+    import numba
+    import scipy
+
+    from mbma_tables import __version__
+
+    return {
+        "processor": processor()[0],
+        "mbma_tables": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "numba": numba.__version__,
+        "netCDF4": netCDF4.__version__,
+    }

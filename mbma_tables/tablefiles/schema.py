@@ -1,14 +1,13 @@
 """What a table file holds: every name of the format in one place.
 
 A file holds, for functions F and A over some axes, the logarithm of the ratio to the rigid sphere at the nodes, the
-spline coefficients that interpolate it, a field of local error, conformance points, and attributes that tell
+spline coefficients that interpolate it, a field of local error, conformance points, and attributes that say
 where all of it came from. `docs/tables.md` describes the format for readers in other languages.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Sequence
 from typing import Any, Literal
 
@@ -56,7 +55,7 @@ SYMBOLS = (
     "of its summits (band [zeta_d, zeta_u]); eta share of a summit's contact that is real; E* contact modulus; "
     "q0 smallest wave number; zeta_1 largest magnification"
 )
-# what every file says of its parts
+# what every file says about its parts
 DOCUMENTATION = {
     "certificate": (
         "largest_error, p99_error and median_error are relative errors of the table on certificate_points held-out "
@@ -77,12 +76,13 @@ DOCUMENTATION = {
         "then its values as little-endian doubles, last dimension fastest. attributes_sha256: the JSON text of "
         "{variable: {attribute: value}}, with 'dimensions' as a further attribute of each, '' for the global ones "
         "without attributes_sha256; keys sorted, no spaces, non-ASCII escaped, shortest floats. configuration_sha256: "
-        "the same form of the list of configuration and reading_numbers. physics_sha256: the syntax trees of "
-        "physics_modules. data_version: the first 12 digits of values_sha256"
+        "the same form of the list of configuration and reading_numbers. data_version: the first 12 digits of "
+        "values_sha256. source_sha256: the bytes of the files of source_modules, one after the other, when the table "
+        "was made; a record only"
     ),
     "seal": (
-        "after the netCDF bytes stands one line: a newline, 'mbma-table sha256 ', the SHA-256 of all bytes before that "
-        "newline in 64 hexadecimal digits, a newline; netCDF readers ignore it"
+        "the netCDF bytes are followed by one line: a newline, 'mbma-table sha256 ', the SHA-256 of all bytes before "
+        "that newline in 64 hexadecimal digits, a newline; netCDF readers ignore it"
     ),
 }
 
@@ -154,7 +154,7 @@ class Axis:
         return f"position = ({t} {'-' if self.start >= 0 else '+'} {abs(self.start)!r}) / {self.step!r}"
 
     def attributes(self) -> dict[str, Any]:
-        """What the file says of this axis."""
+        """Attributes of the axis in the file."""
         return {
             "long_name": self.long_name,
             "units": "1",
@@ -250,10 +250,3 @@ def error_cell(axis: Axis, cells: int, position: Any) -> Any:
     """Which cell of the error field a position lies in."""
     scaled = np.asarray(position) * (cells / (axis.nodes - 1))
     return np.clip(np.floor(scaled).astype(np.intp), 0, cells - 1)
-
-
-def is_finite_content(content: TableContent) -> bool:
-    """Whether every number of the table is finite."""
-    return all(np.isfinite(values).all() for values in content.arrays().values()) and not any(
-        isinstance(value, float) and not math.isfinite(value) for value in content.attributes.values()
-    )

@@ -105,7 +105,7 @@ def test_text_holds_the_rows(target, rows):
     law = law_of(rows=rows)
     text = getattr(solvers, target)(law)
     np.testing.assert_allclose(parse(target, text), np.stack([law.x, law.y], 1), rtol=1e-9)
-    for word in ("reading 'reported'", "E* = 13.3", "[MPa]", "[mm]", "h_max - u", "largest error", "physics"):
+    for word in ("reading 'reported'", "E* = 13.3", "[MPa]", "[mm]", "h_max - u", "largest error", "table: data"):
         assert word in text
 
 

@@ -1,4 +1,4 @@
-"""Odd maps, spectra, map files and kept chunks of the generator's campaign."""
+"""Odd maps, spectra, and map files."""
 
 import contextlib
 import io
@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from fuzzing import SCALE, finite, spoilt
 
-from generate.tables import campaign
 from mbma_tables import InputError, Surface
 from mbma_tables.surfaces.maps import read_map
 
@@ -197,24 +196,3 @@ def test_map_files(suffix, written, tmp_path, tally):
     for _ in range(12 * SCALE):
         found = tally.read_file(tmp_path / f"map.{suffix}", spoilt(content, rng), grid)
         assert found is None or (found.dtype.kind in "fiu" and found.size <= ROUGH.size)
-
-
-@pytest.mark.parametrize("by_structure", [False, True])
-def test_kept_chunks(by_structure, tmp_path, tally):
-    rng = np.random.default_rng(15)
-    result, key = ROUGH[:5], "0" * 64
-    campaign._store(tmp_path, key, result)
-    content = (tmp_path / key).read_bytes()
-    for _ in range(60 * SCALE):
-        if by_structure:
-            # a right checksum over a spoilt array, or over another one
-            body = spoilt(as_npy(result), rng) if rng.integers(2) else as_npy(odd_array(result, rng))
-            other = campaign._digest(key, body) + body
-        else:
-            other = spoilt(content, rng)
-        found = tally.read_file(tmp_path / key, other, lambda path: campaign._load(path.parent, path.name))
-        if found is None:
-            tally.refused += 1
-        else:
-            assert found.dtype == np.float64
-            assert by_structure or (found == result).all()

@@ -66,9 +66,7 @@ def test_configurations(kind, by_structure, tmp_path, tally):
         found = configuration.load(kind, path)
         assert len(found.digest()) == 64
         return [
-            configuration.make_axis(
-                name, name, "log" if name in configuration.LOGARITHMIC else "linear", axis, 9
-            ).values
+            configuration.make_axis(name, name, dict(configuration.AXES[kind])[name], axis, 9).values
             for name, axis in found.axes.items()
         ]
 

@@ -4,7 +4,7 @@ import pytest
 from small_builds import KINDS, small
 
 from generate.tables.build import build
-from generate.tables.campaign import Campaign
+from generate.tables.chunks import ChunkedSolver
 from generate.tables.configuration import load
 
 
@@ -14,4 +14,4 @@ def built(request, tmp_path_factory):
     path = small(tmp_path_factory.mktemp("built"), request.param)
     configuration = load(request.param, path)
     kind = KINDS[request.param](configuration)
-    return kind, build(kind, configuration, Campaign())
+    return kind, build(kind, configuration, ChunkedSolver())

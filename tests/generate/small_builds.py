@@ -7,7 +7,7 @@ SMALL = {
     "universal": """
 target = 1e-4
 certificate_points = 400
-most_nodes = 5000
+max_nodes = 5000
 [axes.X]
 low = 0.5
 high = 6.0
@@ -18,7 +18,7 @@ high = 10.0
     "island4d": """
 target = 1e-3
 certificate_points = 200
-most_nodes = 50000
+max_nodes = 50000
 [axes.X]
 low = 0.6
 high = 6.0

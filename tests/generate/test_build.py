@@ -11,10 +11,10 @@ from small_builds import KINDS, SMALL, small
 
 from generate.__main__ import main
 from generate.tables import build as build_module
+from generate.tables import commands, island4d
 from generate.tables.build import UncertifiedError, build, certify, evaluate, held_out, resolve
-from generate.tables.campaign import Campaign
+from generate.tables.chunks import ChunkedSolver, log_ratio
 from generate.tables.configuration import load
-from generate.tables.solves import log_ratio
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.tablefiles.netcdf import read_table, write_table
 from mbma_tables.tablefiles.schema import error_cell
@@ -77,19 +77,19 @@ def test_a_held_out_point_on_a_node_is_refused(built, monkeypatch):
     places[0][3] = content.axes[0].low
     monkeypatch.setattr(build_module, "held_out", lambda *_: places)
     with pytest.raises(UncertifiedError, match="a held-out point stands on a node"):
-        certify(kind, content.axes, content.coefficients, Campaign(), kind.configuration)
+        certify(kind, content.axes, content.coefficients, ChunkedSolver(), kind.configuration)
 
 
 def test_the_certificate_is_solved_on_twice_the_nodes(built, monkeypatch):
     kind, content = built
     asked = []
 
-    def note(campaign, label, X, mu, rtol, refinement=1):
-        asked.append((label, refinement))
-        return log_ratio(X, mu, rtol, refinement)
+    class Noting(ChunkedSolver):
+        def log_ratio(self, label, X, mu, rtol, refinement=1):
+            asked.append((label, refinement))
+            return super().log_ratio(label, X, mu, rtol, refinement)
 
-    monkeypatch.setattr(build_module, "solve_all", note)
-    certify(kind, content.axes, content.coefficients, Campaign(), kind.configuration)
+    certify(kind, content.axes, content.coefficients, Noting(), kind.configuration)
     assert asked == [("certificate", 2)]
     X, mu = np.array([0.7, 4.0]), np.array([1e-2, 3.0])
     counts = []
@@ -151,7 +151,7 @@ def test_a_tighter_target_takes_more_nodes_and_is_met(tmp_path):
         # so far down that the first order in mu is within the tightest target
         path.write_text(SMALL["universal"].replace("1e-4", str(target)).replace("1e-3\nhigh", "1e-6\nhigh"))
         configuration = load("universal", path)
-        content = build(KINDS["universal"](configuration), configuration, Campaign())
+        content = build(KINDS["universal"](configuration), configuration, ChunkedSolver())
         assert max(content.attributes[f"largest_error_{f}"] for f in "FA") <= target
         nodes.append([axis.nodes for axis in content.axes])
     assert nodes[0] <= nodes[1] < nodes[2]
@@ -163,9 +163,9 @@ def test_refinement_stops_at_the_target_not_far_beyond(tmp_path):
     configuration = load("universal", small(tmp_path, "universal"))
     kind = KINDS["universal"](configuration)
     aim = 1e-7
-    found = resolve(kind, configuration, Campaign(), aim, {"X": 8, "mu": 8})
+    found = resolve(kind, configuration, ChunkedSolver(), aim, {"X": 8, "mu": 8})
     fewer = {name: int(count / 1.25) for name, count in found.nodes.items()}
-    coarser = resolve(kind, configuration, Campaign(), 1.0, fewer)
+    coarser = resolve(kind, configuration, ChunkedSolver(), 1.0, fewer)
     for name in fewer:
         assert found.errors[name].max() <= aim < coarser.errors[name].max()
 
@@ -178,37 +178,32 @@ def invoke(folder, text, kind="universal"):
     return result, sorted(p.name for p in folder.iterdir() if p != path)
 
 
-def test_too_few_nodes_allowed_is_one_message_and_nothing_written(tmp_path):
-    text = SMALL["universal"].replace("most_nodes = 5000", "most_nodes = 100")
-    result, left = invoke(tmp_path, text)
+REFUSED = {
+    "too few nodes allowed": (
+        lambda text: text.replace("max_nodes = 5000", "max_nodes = 100"),
+        "needs more than the 100 nodes allowed; raise max_nodes or the target",
+    ),
+    "fixed axes that miss the target": (
+        lambda text: text.replace("= 0.5\n", "= 0.5\nnodes = 8\n").replace("= 1e-3\n", "= 1e-3\nnodes = 8\n"),
+        "the target 1.00e-04; the configuration fixes every axis",
+    ),
+    "a range that no surface visits": (
+        lambda text: text.replace("6.0", "100.0").replace("low = 0.5", "low = 90.0"),
+        "hardly a surface visits these axes",
+    ),
+    # at mu of order one the answer below the table is no longer first order in mu
+    "a broken check": (
+        lambda text: text.replace("1e-3", "0.5"),
+        "universal: between its nodes the table breaks: rigid limit",
+    ),
+}
+
+
+@pytest.mark.parametrize(("change", "message"), REFUSED.values(), ids=REFUSED)
+def test_what_makes_no_table_is_one_message_and_nothing_written(change, message, tmp_path):
+    result, left = invoke(tmp_path, change(SMALL["universal"]))
     assert result.exit_code == 2
-    assert "needs more than the 100 nodes allowed; raise most_nodes or the target" in result.stderr
-    assert len(result.stderr.splitlines()) == 1
-    assert left == []
-
-
-def test_fixed_axes_that_miss_the_target_are_one_message_and_nothing_written(tmp_path):
-    text = SMALL["universal"].replace("= 0.5\n", "= 0.5\nnodes = 8\n").replace("= 1e-3\n", "= 1e-3\nnodes = 8\n")
-    result, left = invoke(tmp_path, text)
-    assert result.exit_code == 2
-    assert "the target 1.00e-04; the configuration fixes every axis" in result.stderr
-    assert len(result.stderr.splitlines()) == 1
-    assert left == []
-
-
-def test_a_range_that_no_surface_visits_is_one_message(tmp_path):
-    text = SMALL["universal"].replace("6.0", "100.0").replace("low = 0.5", "low = 90.0")
-    result, left = invoke(tmp_path, text)
-    assert result.exit_code == 2
-    assert "hardly a surface visits these axes" in result.stderr
-    assert left == []
-
-
-def test_a_table_that_breaks_a_check_is_not_written(tmp_path):
-    """At mu of order one the answer below the table is no longer first order in mu."""
-    result, left = invoke(tmp_path, SMALL["universal"].replace("1e-3", "0.5"))
-    assert result.exit_code == 2
-    assert "universal: between its nodes the table breaks: rigid limit" in result.stderr
+    assert message in result.stderr
     assert len(result.stderr.splitlines()) == 1
     assert left == []
 
@@ -282,3 +277,46 @@ def test_island4d_says_when_it_covers_a_part_only(tmp_path):
     assert narrow.attributes()["covers"].startswith("the islands within the axes, of those that the model visits")
     assert "0.6 <= H <= 0.9" in narrow.attributes()["covers"]
     assert shipped.attributes()["covers"].startswith("every island that the model visits for 0.3 <= H <= 1,")
+
+
+@pytest.mark.parametrize(("what", "kinds"), [("heights", []), ("all", ["universal", "island4d"])])
+def test_what_is_made_and_where(what, kinds, monkeypatch, tmp_path):
+    made = []
+    monkeypatch.setattr(commands.height_coefficients, "main", lambda: made.append("heights"))
+    monkeypatch.setattr(commands, "make_table", lambda c, path, *_: made.append((c.kind, path.name)))
+    done = CliRunner().invoke(main, ["tables", what, "--out", str(tmp_path / "here"), "--workers", "1"])
+    assert done.exit_code == 0
+    assert made == ["heights", *((kind, f"{kind}.nc") for kind in kinds)]
+
+
+@pytest.fixture
+def universal(tmp_path):
+    configuration = load("universal", small(tmp_path, "universal"))
+    return KINDS["universal"](configuration), configuration
+
+
+def test_a_target_out_of_reach_ends_the_refinement(universal, monkeypatch):
+    kind, configuration = universal
+    aims = []
+    monkeypatch.setattr(build_module, "ROUNDS", 2)
+    monkeypatch.setattr(build_module, "resolve", lambda *given: aims.append(given[3]) or resolve(*given))
+    certificate = {"largest_error_F": 2 * configuration.target, "largest_error_A": 0.0}
+    monkeypatch.setattr(build_module, "certify", lambda *_: certificate)
+    with pytest.raises(UncertifiedError, match=r"is still 2\.00e-04 after 2 refinements, the target 1\.00e-04"):
+        build(kind, configuration, ChunkedSolver())
+    # twice too much asks for less than half
+    assert aims[1] == pytest.approx(0.4 * aims[0], rel=1e-12, abs=0)
+
+
+def test_a_table_that_is_not_finite_is_not_written(universal, monkeypatch):
+    monkeypatch.setattr(build_module, "local_errors", lambda *_: np.full((8, 8, 2), np.nan))
+    with pytest.raises(UncertifiedError, match=r"error_F, which is not finite|not over its axes"):
+        build(*universal, ChunkedSolver())
+
+
+def test_axes_that_no_surface_visits(tmp_path, monkeypatch):
+    monkeypatch.setattr(island4d, "RAREST", 8)
+    kind = KINDS["island4d"](load("island4d", small(tmp_path, "island4d")))
+    monkeypatch.setattr(kind, "_visited", lambda draw: ([np.zeros(draw)] * 4, np.zeros(draw, dtype=bool)))
+    with pytest.raises(UncertifiedError, match="hardly a surface visits these axes"):
+        kind.manifold(10)

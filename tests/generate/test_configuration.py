@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from generate.__main__ import main
 from generate.tables import configuration
 from generate.tables.commands import TABLES
-from generate.tables.configuration import FEWEST_NODES, FEWEST_SHIPPED, LIMITS, load, make_axis
+from generate.tables.configuration import LIMITS, MIN_NODES, MIN_SHIPPED_POINTS, load, make_axis
 from mbma_tables.errors import InputError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import band_fields
@@ -41,99 +41,68 @@ def refused_file(kind, folder, text):
     return message
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("targt = 1e-4", "unknown key 'targt'; did you mean 'target'?"),
-        ("zzz = 1", "unknown key 'zzz'; known are axes, certificate_points"),
-        ("[axes.Y]\nlow = 1", "unknown key 'Y'; known are X, mu"),
-        ("[axes.mu]\nlwo = 1e-3", "[axes.mu]: unknown key 'lwo'; did you mean 'low'?"),
-        ("axes = 3", "[axes]: must be a table of X, mu, got 3"),
-        ("axes = 'X'", "[axes]: must be a table of X, mu, got 'X'"),
-        ("[axes]\nX = [1, 2]", "[axes.X]: must be a table of high, low, nodes, offset, start, got [1, 2]"),
-        ("kind = 'island4d'", "kind must be 'universal', got 'island4d'"),
-        ("kind = 3", "kind must be 'universal', got 3"),
-        ("target = '1e-4'", "target must be a finite number, got '1e-4'"),
-        ("target = true", "target must be a finite number, got True"),
-        ("target = [1e-4]", "target must be a finite number, got [0.0001]"),
-        ("target = nan", "target must be a finite number, got nan"),
-        ("target = inf", "target must be a finite number, got inf"),
-        ("target = 0.0", "target must lie in [1e-11, 0.1], got 0.0"),
-        ("target = -1e-4", "target must lie in [1e-11, 0.1]"),
-        ("target = 1e-12", "target must lie in [1e-11, 0.1]"),
-        (f"target = {LARGE}", "target must be a finite number"),
-        ("most_nodes = 1e5", "most_nodes must be a whole number in"),
-        ("most_nodes = true", "most_nodes must be a whole number in"),
-        ("most_nodes = 0", "most_nodes must be a whole number in"),
-        ("most_nodes = inf", "most_nodes must be a whole number in"),
-        ("most_nodes = 63", "nodes to begin with, most_nodes allows 63"),
-        ("certificate_points = inf", "certificate_points must be a whole number in [100, "),
-        ("certificate_points = 99", "certificate_points must be a whole number in [100, "),
-        ("certificate_points = '5000'", "certificate_points must be a whole number in [100, "),
-        ("seed = -1", "seed must be a whole number in [0, "),
-        ("seed = 1.5", "seed must be a whole number in [0, "),
-        ("seed = nan", "seed must be a whole number in [0, "),
-        ("reading = 'rubbed'", "reading must be one of ['printed', 'reported']"),
-        ("reading = 3", "reading must be one of ['printed', 'reported']"),
-        ("reading = ['reported']", "reading must be one of ['printed', 'reported']"),
-        ("[axes.mu]\nlow = 0.0", "axes.mu must have 1e-30 <= low < high <= 1e+10, got low 0.0"),
-        ("[axes.mu]\nlow = -1.0", "axes.mu must have 1e-30 <= low < high <= 1e+10, got low -1.0"),
-        ("[axes.mu]\nhigh = 1e11", "axes.mu must have 1e-30 <= low < high <= 1e+10"),
-        ("[axes.mu]\nlow = nan", "axes.mu.low must be a finite number, got nan"),
-        ("[axes.mu]\nlow = -inf", "axes.mu.low must be a finite number, got -inf"),
-        ("[axes.mu]\nlow = 5.0\nhigh = 5.0", "got low 5.0 and high 5.0"),
-        ("[axes.mu]\noffset = 1.0", "axes.mu takes no offset, only axes.X does"),
-        ("[axes.X]\nlow = 5.0\nhigh = 2.0", "axes.X must have -30 <= low < high <= 200, got low 5.0 and high 2.0"),
-        ("[axes.X]\nlow = -31.0\noffset = 40.0", "axes.X must have -30 <= low < high <= 200"),
-        ("[axes.X]\nhigh = 201.0", "axes.X must have -30 <= low < high <= 200"),
-        ("[axes.X]\noffset = 6.25", "axes.X is logarithmic and needs low + offset > 0, got -6.25 and 6.25"),
-        ("[axes.X]\noffset = -1.0", "axes.X is logarithmic and needs low + offset > 0"),
-        ("[axes.X]\noffset = 1e12", "axes.X is too narrow for its nodes to differ"),
-        ("[axes.X]\nhigh = false", "axes.X.high must be a finite number, got False"),
-        ("[axes.X]\nnodes = 7", "axes.X.nodes must be a whole number in [8, "),
-        ("[axes.X]\nnodes = 20.0", "axes.X.nodes must be a whole number in [8, "),
-        ("[axes.X]\nstart = true", "axes.X.start must be a whole number in [8, "),
-        ("[axes.X]\nstart = 'many'", "axes.X.start must be a whole number in [8, "),
-        ("[axes.X]\nnodes = 50000", "nodes to begin with, most_nodes allows 120000"),
-        ("target = ", "is no TOML file"),
-        ("target = 1\ntarget = 2", "is no TOML file"),
-        (b"reading = '\xff'", "is no TOML file"),
-        ("a = " + "[" * 5000, "is no TOML file"),
-    ],
-)
-def test_a_bad_universal_configuration_is_refused(tmp_path, text, said):
-    assert said in refused_file("universal", tmp_path, text)
+UNIVERSAL = [
+    ("targt = 1e-4", "unknown key 'targt'; did you mean 'target'?"),
+    ("zzz = 1", "unknown key 'zzz'; known are "),
+    ("[axes.Y]\nlow = 1", "unknown key 'Y'; known are X, mu"),
+    ("[axes.mu]\nlwo = 1e-3", "[axes.mu]: unknown key 'lwo'; did you mean 'low'?"),
+    ("axes = 3", "[axes] must be a table of X, mu, got 3"),
+    ("[axes]\nX = [1, 2]", "[axes.X] must be a table of low, high, offset, start, nodes, got [1, 2]"),
+    ("kind = 'island4d'", "kind must be 'universal', got 'island4d'"),
+    ("target = '1e-4'", "target must be real numbers"),
+    ("target = true", "target must be real numbers"),
+    ("target = nan", "target must be finite, got nan"),
+    ("target = 1e-12", "target must be a number in [1e-11, 0.1], got 1e-12"),
+    (f"target = {LARGE}", "target must be real numbers"),
+    ("max_nodes = 1e5", "max_nodes must be a whole number in"),
+    ("max_nodes = true", "max_nodes must be a whole number in"),
+    ("max_nodes = 63", "nodes to begin with, max_nodes allows 63"),
+    ("certificate_points = 99", "certificate_points must be a whole number in [100, "),
+    ("seed = -1", "seed must be a whole number in [0, "),
+    ("reading = 'rubbed'", "reading must be one of ['printed', 'reported']"),
+    ("reading = ['reported']", "reading must be one of ['printed', 'reported']"),
+    ("[axes.mu]\nlow = 0.0", "axes.mu.low must be a number in [1e-30, 1e+10], got 0.0"),
+    ("[axes.mu]\nlow = nan", "axes.mu.low must be finite, got nan"),
+    ("[axes.mu]\nlow = 5.0\nhigh = 5.0", "axes.mu must have low < high"),
+    ("[axes.mu]\noffset = 1.0", "axes.mu takes no offset, only axes.X does"),
+    ("[axes.X]\nlow = 5.0\nhigh = 2.0", "axes.X must have low < high"),
+    ("[axes.X]\nlow = -31.0\noffset = 40.0", "axes.X.low must be a number in [-30, 200]"),
+    ("[axes.X]\noffset = 6.25", "axes.X is logarithmic and needs low + offset > 0, got -6.25 and 6.25"),
+    ("[axes.X]\noffset = 1e12", "axes.X must have low < high, far enough apart for its nodes to differ"),
+    ("[axes.X]\nnodes = 7", "axes.X.nodes must be a whole number in [8, "),
+    ("[axes.X]\nstart = 'many'", "axes.X.start must be a whole number in [8, "),
+    ("[axes.X]\nnodes = 50000", "nodes to begin with, max_nodes allows 120000"),
+    ("target = ", "is not a TOML file"),
+    (b"reading = '\xff'", "is not a TOML file"),
+    ("a = " + "[" * 5000, "is not a TOML file"),
+    ("#" * 100_000, "has more than 65536 bytes"),
+]
+ISLAND4D = [
+    ("[axes.hurst]\nhigh = 1.1", "axes.hurst.high must be a number in [0.01, 1], got 1.1"),
+    ("[axes.sphere]\nlow = -0.1", "axes.sphere.low must be a number in [0, 1]"),
+    ("[axes.hurst]\noffset = 1.0", "axes.hurst takes no offset"),
+    ("[axes.mu]\nlow = 1e-3", "unknown key 'mu'; known are X, spread, sphere, hurst"),
+]
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("[axes.hurst]\nlow = 0.0", "axes.hurst must have 0.01 <= low < high <= 1, got low 0.0"),
-        ("[axes.hurst]\nhigh = 1.1", "axes.hurst must have 0.01 <= low < high <= 1"),
-        ("[axes.sphere]\nlow = -0.1", "axes.sphere must have 0 <= low < high <= 1"),
-        ("[axes.sphere]\nhigh = 1.01", "axes.sphere must have 0 <= low < high <= 1"),
-        ("[axes.spread]\nlow = 0.0", "axes.spread must have 1e-12 <= low < high <= 1e+06"),
-        ("[axes.hurst]\noffset = 1.0", "axes.hurst takes no offset"),
-        ("[axes.mu]\nlow = 1e-3", "unknown key 'mu'; known are X, hurst, sphere, spread"),
-        ("kind = 'universal'", "kind must be 'island4d'"),
-    ],
+    ("kind", "text", "message"),
+    [("universal", *row) for row in UNIVERSAL] + [("island4d", *row) for row in ISLAND4D],
 )
-def test_a_bad_island4d_configuration_is_refused(tmp_path, text, said):
-    assert said in refused_file("island4d", tmp_path, text)
+def test_a_bad_configuration_is_refused(kind, text, message, tmp_path):
+    assert message in refused_file(kind, tmp_path, text)
 
 
 def test_a_file_that_cannot_be_read_is_refused(tmp_path):
     missing = str(tmp_path / "missing.toml")
-    assert f"{missing}: cannot be read (No such file or directory)" in refused(
-        "universal", tmp_path, "--config", missing
-    )
-    assert "cannot be read (Is a directory)" in refused("universal", tmp_path, "--config", str(tmp_path))
+    message = refused("universal", tmp_path, "--config", missing)
+    assert f"{missing} cannot be read: No such file or directory" in message
+    assert "not a regular file" in refused("universal", tmp_path, "--config", str(tmp_path))
 
 
-@pytest.mark.parametrize("target", ["nan", "inf", "0", "-1e-6", "1e-300", "tight"])
+@pytest.mark.parametrize("target", ["nan", "0", "-1e-6", "1e-300", "tight"])
 def test_a_bad_target_is_refused_by_its_name(tmp_path, target):
-    out = str(tmp_path / "table.nc")
-    assert "--target" in refused("universal", tmp_path, "--target", target, "--out", out)
+    assert "target" in refused("universal", tmp_path, "--target", target, "--out", str(tmp_path / "table.nc"))
 
 
 def test_misuse_of_the_command_line_is_refused(tmp_path):
@@ -146,13 +115,13 @@ def test_misuse_of_the_command_line_is_refused(tmp_path):
 
 def test_few_certificate_points_are_for_tables_that_are_not_shipped(tmp_path):
     path = tmp_path / "few.toml"
-    path.write_text(f"certificate_points = {FEWEST_SHIPPED - 1}")
+    path.write_text(f"certificate_points = {MIN_SHIPPED_POINTS - 1}")
     for out in ((), ("--out", str(TABLES / "other.nc"))):
         message = refused("universal", tmp_path, "--config", str(path), *out)
-        assert f"certificate_points must be at least {FEWEST_SHIPPED} for a table in" in message
+        assert f"certificate_points must be at least {MIN_SHIPPED_POINTS} for a table in" in message
     assert not (TABLES / "other.nc").exists()
     for kind in LIMITS_OF:
-        assert load(kind).certificate_points >= FEWEST_SHIPPED
+        assert load(kind).certificate_points >= MIN_SHIPPED_POINTS
 
 
 LIMITS_OF = {"universal": ("X", "mu"), "island4d": ("X", "spread", "sphere", "hurst")}
@@ -175,7 +144,7 @@ def test_a_target_alone_is_a_configuration(kind):
     shipped = load(kind)
     loose, tight = load(kind, target=1e-3), load(kind, target=shipped.target / 3)
     assert loose.target == 1e-3
-    assert {axis.start for axis in loose.axes.values()} == {FEWEST_NODES}
+    assert {axis.start for axis in loose.axes.values()} == {MIN_NODES}
     assert tight.axes == shipped.axes
     assert load(kind, target=1e-6).target == 1e-6
     assert len({made.digest() for made in (shipped, loose, tight)}) == 3
@@ -186,21 +155,10 @@ def test_an_axis_of_another_range_starts_from_the_fewest_nodes(tmp_path):
     path.write_text("[axes.mu]\nhigh = 10.0")
     found, shipped = load("universal", path), load("universal")
     assert (found.axes["mu"].high, found.axes["mu"].low) == (10.0, shipped.axes["mu"].low)
-    assert found.axes["mu"].start == FEWEST_NODES
+    assert found.axes["mu"].start == MIN_NODES
     assert found.axes["X"] == shipped.axes["X"]
     path.write_text("[axes.mu]\nhigh = 10.0\nstart = 17")
     assert load("universal", path).axes["mu"].start == 17
-
-
-def test_the_digest_follows_every_number_that_matters(tmp_path):
-    texts = ["", "seed = 1", "reading = 'printed'", "most_nodes = 399999", "[axes.X]\nnodes = 31"]
-    digests = set()
-    for number, text in enumerate(texts):
-        path = tmp_path / f"{number}.toml"
-        path.write_text(text)
-        digests.add(load("island4d", path).digest())
-    assert len(digests) == len(texts)
-    assert load("island4d").digest() in digests
 
 
 def test_axes_span_what_is_configured():

@@ -1,5 +1,6 @@
 """The fidelity page: its tables parse, say what the code computes, and are not stale."""
 
+import dataclasses
 import math
 import re
 
@@ -133,3 +134,9 @@ def test_committed_figures_are_there():
         content = (ROOT / "docs" / name).read_bytes()
         assert content.startswith(b"\x89PNG")
         assert len(content) < 100_000
+
+
+def test_a_band_of_areas_without_data_has_no_span():
+    reference = dataclasses.replace(comparisons.REFERENCES["challenge"], band=(1e-9, 2e-9))
+    for own, dashes in ((reference, True), (comparisons.REFERENCES["challenge"], False)):
+        assert ("| — | — | — | — |" in fidelity.reference_tables(own)) == dashes

@@ -15,8 +15,6 @@ from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import ISLAND4D
 from mbma_tables.totals.island import geometry
 
-ignore_stale = pytest.mark.filterwarnings("ignore::mbma_tables.errors.StaleTableWarning")
-
 
 @pytest.fixture(scope="module")
 def small():
@@ -40,7 +38,6 @@ def visited(count, seed):
     return (delta, g["zeta_d"], g["zeta_u"], hurst), force, area
 
 
-@ignore_stale
 def test_the_shipped_table_over_what_surfaces_visit():
     raw, force, area = visited(4000, 30)
     found_F, found_A, bound = shipped_model().lookup(*raw)
@@ -55,7 +52,6 @@ def test_the_shipped_table_over_what_surfaces_visit():
     assert (place.spread[error > bound] < 1e-9).all()
 
 
-@ignore_stale
 def test_the_shipped_table_over_the_whole_box():
     model = shipped_model()
     rng = np.random.default_rng(31)
@@ -78,7 +74,6 @@ def test_the_shipped_table_over_the_whole_box():
     assert np.mean(np.maximum(error_F, error_A) <= bound) > 0.995
 
 
-@ignore_stale
 def test_an_island_of_a_surface_in_its_own_units():
     surface = Surface(hurst=0.8, q0=2.0, q1=2000.0, h_rms=0.3, h_max=1.0)
     delta = np.array([0.01, 0.2, 1.3])

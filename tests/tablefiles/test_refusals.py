@@ -1,5 +1,6 @@
-"""Every damaged, edited or foreign file is refused on open, by a message that names it and the remedy."""
+"""Every damaged, edited or foreign file is refused on open, by a message that names it and says what to do."""
 
+import dataclasses
 import os
 
 import netCDF4
@@ -7,10 +8,10 @@ import numpy as np
 import pytest
 from small_tables import copied, edited, seal, small_table, unseal
 
-from mbma_tables.errors import StaleTableWarning, TableFileError
-from mbma_tables.tablefiles import netcdf as files
-from mbma_tables.tablefiles.netcdf import SEAL_LENGTH, read_table, write_table
-from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL
+from mbma_tables.errors import TableFileError
+from mbma_tables.tablefiles.checks import check_content
+from mbma_tables.tablefiles.netcdf import MAX_BYTES, SEAL_LENGTH, attributes_digest, read_table, write_table
+from mbma_tables.tablefiles.schema import FORMAT_VERSION, ISLAND4D, KINDS, UNIVERSAL
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +26,7 @@ def refused(path, kind=None):
         read_table(path, kind)
     message = str(caught.value)
     assert message.count(str(path)) == 1
-    assert message.count("`python -m generate ") == 1
+    assert message.count("`python -m generate tables ") == 1
     assert "\n" not in message
     return message
 
@@ -59,7 +60,7 @@ def _put(content, place, piece):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_thousand_ways_to_damage_the_bytes(kind, sources, tmp_path):
+def test_damaged_bytes_never_reach_the_library(kind, sources, tmp_path):
     content = sources[kind]
     path = tmp_path / f"{kind}.nc"
     done = 0
@@ -73,7 +74,7 @@ def test_a_thousand_ways_to_damage_the_bytes(kind, sources, tmp_path):
             raise AssertionError(f"{what}: {fault}") from fault
         assert "damaged" in message or "cut short" in message, what
         done += 1
-        if done == 1000:
+        if done == 300:
             break
 
 
@@ -137,9 +138,8 @@ def edits(content):
     yield "kind of the other", lambda d: d.setncattr("mbma_kind", UNIVERSAL if d.mbma_kind == ISLAND4D else ISLAND4D)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_edits_under_a_right_checksum(kind, sources, tmp_path):
-    done = 0
+def test_edits_under_a_right_checksum(sources, tmp_path):
+    kind, done = UNIVERSAL, 0
     for what, edit in edits(sources[kind]):
         path = edited(tmp_path / f"{kind}.nc", sources[kind], edit)
         try:
@@ -147,12 +147,11 @@ def test_edits_under_a_right_checksum(kind, sources, tmp_path):
         except BaseException as fault:
             raise AssertionError(f"{what}: {fault}") from fault
         done += 1
-    assert done > 200
+    assert done > 150
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_variables_left_out_or_in_another_type(kind, sources, tmp_path):
-    path = tmp_path / f"{kind}.nc"
+def test_variables_left_out_or_in_another_type(sources, tmp_path):
+    kind, path = UNIVERSAL, tmp_path / "universal.nc"
     # as it is, the copy opens: what is refused below is the change
     assert read_table(copied(path, sources[kind]), kind).kind == kind
     with netCDF4.Dataset("table", memory=unseal(sources[kind])) as dataset:
@@ -160,8 +159,6 @@ def test_variables_left_out_or_in_another_type(kind, sources, tmp_path):
     for number, name in enumerate(names):
         refused(copied(path, sources[kind], leave_out=name), kind)
         refused(copied(path, sources[kind], change_type=(name, ("f4", "i4")[number % 2])), kind)
-    # the same numbers in the other byte order are the same table
-    assert read_table(copied(path, sources[kind], change_type=("log_ratio_F", ">f8")), kind).kind == kind
 
 
 def test_an_empty_edit_is_no_edit(sources, tmp_path):
@@ -176,7 +173,7 @@ def test_the_wrong_kind_under_a_right_name(sources, tmp_path):
         path.write_bytes(sources[other])
         message = refused(path, kind)
         assert f"holds a table of kind '{other}', not {kind}" in message
-        assert f"`python -m generate {kind}`" in message
+        assert f"`python -m generate tables {kind}`" in message
         assert read_table(path).kind == other
 
 
@@ -184,21 +181,20 @@ def test_the_wrong_kind_under_a_right_name(sources, tmp_path):
 def test_another_format(version, sources, tmp_path):
     path = edited(tmp_path / "a.nc", sources[UNIVERSAL], lambda d: d.setncattr("format_version", version))
     message = refused(path)
-    assert f"has format {version!r}, this library reads {files.FORMAT_VERSION}" in message
-    assert "`python -m generate universal`" in message
+    assert f"has format {version}, this library reads {FORMAT_VERSION}" in message
 
 
 def test_no_table_at_all(tmp_path):
     assert "No such file" in refused(tmp_path / "missing.nc")
     assert "No such file" in refused(tmp_path / "no" / "folder.nc")
-    assert "is no regular file" in refused(tmp_path)
+    assert "not a regular file" in refused(tmp_path)
     for name, content in (("empty.nc", b""), ("text.nc", b"X,mu,phi_F\n1,2,3\n" * 50), ("zeros.nc", bytes(5000))):
         (tmp_path / name).write_bytes(content)
-        assert "is no table file" in refused(tmp_path / name)
+        assert "is not a table file" in refused(tmp_path / name)
     (tmp_path / "under_a_file").write_bytes(b"")
     assert "cannot be read" in refused(tmp_path / "under_a_file" / "table.nc")
     os.mkfifo(tmp_path / "pipe")
-    assert "is no regular file" in refused(tmp_path / "pipe")
+    assert "not a regular file" in refused(tmp_path / "pipe")
 
 
 @pytest.mark.parametrize("format", ["NETCDF4", "NETCDF3_CLASSIC"])
@@ -222,8 +218,8 @@ def test_a_right_checksum_over_anything(body, tmp_path):
 def test_a_file_larger_than_any_table(tmp_path):
     path = tmp_path / "large.nc"
     with path.open("wb") as file:
-        file.truncate(files.LARGEST_FILE + 1)
-    assert f"{files.LARGEST_FILE + 1} bytes are more than any table has" in refused(path)
+        file.truncate(MAX_BYTES + 1)
+    assert f"has more than {MAX_BYTES} bytes" in refused(path)
 
 
 def test_a_file_that_may_not_be_read(sources, tmp_path):
@@ -235,21 +231,101 @@ def test_a_file_that_may_not_be_read(sources, tmp_path):
     if own == 0:
         os.seteuid(65534)
     try:
-        assert "cannot be read (Permission denied)" in refused(path)
+        assert "cannot be read: Permission denied" in refused(path)
     finally:
         if own == 0:
             os.seteuid(own)
 
 
-def test_another_solver_is_a_warning(sources, tmp_path, monkeypatch):
-    for kind in KINDS:
-        path = tmp_path / f"{kind}.nc"
-        path.write_bytes(sources[kind])
-        assert read_table(path, kind).kind == kind
-    monkeypatch.setattr(files.provenance, "physics_digest", lambda modules: "0" * 64)
-    for kind in KINDS:
-        with pytest.warns(StaleTableWarning, match=f"{kind}.nc was made by .*`python -m generate {kind}`") as caught:
-            content = read_table(tmp_path / f"{kind}.nc", kind)
-        assert len(caught) == 1
-        assert caught[0].filename == __file__
-        np.testing.assert_array_equal(content.log_ratio, small_table(kind).log_ratio)
+def rehashed(path, source, edit):
+    """At `path` the table file `source` after `edit(dataset)`, with right hashes and checksum."""
+
+    def both(dataset):
+        edit(dataset)
+        dataset.setncattr("attributes_sha256", attributes_digest(dataset))
+
+    return edited(path, source, both)
+
+
+INJECTION = "5 */ int main(void) { system(0); } /*"
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "value"),
+    [
+        ("", "certificate_points", INJECTION),
+        ("", "certificate_points", 5000.0),
+        ("", "certificate_points", 0),
+        ("", "source_sha256", INJECTION),
+        ("", "values_sha256", "0" * 63 + "g"),
+        ("", "data_version", INJECTION),
+        ("", "reading", INJECTION),
+        ("", "reading", "reported\nEND"),
+        ("", "title", "one\ntwo"),
+        ("", "title", 3),
+        ("", "title", [1.5, 2.5]),
+        ("", "largest_error_F", "1e-9"),
+        ("", "largest_error_A", np.nan),
+        ("", "largest_error_A", -1.0),
+        ("", "another", 1.5),
+        ("X", "offset", "10"),
+        ("X", "first", np.inf),
+        ("X", "transform", "log; rm"),
+        ("spline_F", "units", 1),
+    ],
+)
+def test_an_attribute_of_another_type_is_refused_by_its_name(owner, name, value, sources, tmp_path):
+    def edit(dataset):
+        (dataset[owner] if owner else dataset).setncattr(name, value)
+
+    path = rehashed(tmp_path / "table.nc", sources[UNIVERSAL], edit)
+    assert f"has attribute {owner + ':' if owner else ''}{name} = " in refused(path)
+
+
+@pytest.mark.parametrize("name", ["reading", "source_sha256", "certificate_points", "largest_error_F"])
+def test_an_attribute_that_is_missing_is_refused_by_its_name(name, sources, tmp_path):
+    path = rehashed(tmp_path / "table.nc", sources[UNIVERSAL], lambda dataset: dataset.delncattr(name))
+    assert f"lacks attribute {name}" in refused(path)
+
+
+def with_axis(content, number, **changes):
+    axes = list(content.axes)
+    axes[number] = dataclasses.replace(axes[number], **changes)
+    return dataclasses.replace(content, axes=tuple(axes))
+
+
+def with_points(content, **points):
+    return dataclasses.replace(content, conformance=content.conformance | points)
+
+
+def changed(content, name, values):
+    return dataclasses.replace(content, **{name: values(getattr(content, name))})
+
+
+CHANGES = {
+    "axes": (KINDS, lambda c: with_axis(c, 0, name="Y"), "has axes"),
+    "order of axes": (KINDS, lambda c: dataclasses.replace(c, axes=c.axes[::-1]), "has axes"),
+    "transform": (KINDS, lambda c: with_axis(c, 0, transform="linear"), "has axes"),
+    "falling": (KINDS, lambda c: with_axis(c, 0, low=c.axes[0].high), "axis X from"),
+    "no logarithm": (KINDS, lambda c: with_axis(c, 1, low=-1.0), "axis (mu|spread) from"),
+    "infinite": (KINDS, lambda c: with_axis(c, 0, high=np.inf), "axis X"),
+    "offset": (KINDS, lambda c: with_axis(c, 1, offset=1.0), "offset 1"),
+    "no Hurst exponent": ([ISLAND4D], lambda c: with_axis(c, 3, high=1.1), "axis hurst"),
+    "nodes": (KINDS, lambda c: with_axis(c, 0, nodes=c.axes[0].nodes + 1), "not over its axes"),
+    "coefficients": (KINDS, lambda c: changed(c, "coefficients", lambda v: v[1:]), "not over its axes"),
+    "errors": (KINDS, lambda c: changed(c, "local_error", lambda v: v[:0]), "error bounds that are not over"),
+    "negative error": (KINDS, lambda c: changed(c, "local_error", np.negative), "error bound below 0"),
+    "no points": (KINDS, lambda c: dataclasses.replace(c, conformance={}), "incomplete"),
+    "fewer points": (KINDS, lambda c: with_points(c, tolerance=np.ones(3)), "incomplete"),
+    "negative answer": (KINDS, lambda c: with_points(c, table_F=0 * c.conformance["table_F"]), "not positive"),
+    "not a ratio": (KINDS, lambda c: changed(c, "log_ratio", lambda v: v + 200), "not logarithms"),
+    "NaN": (KINDS, lambda c: changed(c, "coefficients", lambda v: v * np.nan), "spline_F, which is not finite"),
+}
+
+
+@pytest.mark.parametrize(("kinds", "change", "message"), CHANGES.values(), ids=CHANGES)
+def test_parts_that_do_not_fit(kinds, change, message):
+    for kind in kinds:
+        check_content(small_table(kind))
+        with pytest.raises(ValueError, match=message):
+            check_content(change(small_table(kind)))

@@ -2,7 +2,9 @@
 
 import concurrent.futures
 import dataclasses
+import os
 import shutil
+import signal
 import threading
 
 import pytest
@@ -96,3 +98,18 @@ def test_threads_that_open_one_table_at_once():
     with concurrent.futures.ThreadPoolExecutor(16) as threads:
         found = list(threads.map(opened, range(16)))
     assert len({id(model) for model in found}) == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")
+def test_a_process_forked_while_a_thread_reads_can_read_too(path):
+    def forked():
+        for _ in range(8):
+            child = os.fork()
+            if child == 0:
+                # ended by the signal where a lock of the other thread never opens
+                signal.alarm(20)
+                os._exit(0 if read_table(path).kind == "universal" else 1)
+            assert os.waitpid(child, 0)[1] == 0
+
+    beside(forked, lambda: read_table(path))

@@ -1,0 +1,114 @@
+"""The exact islands that tables are made of, solved in chunks by worker processes, one file a finished chunk.
+
+A chunk's file is named by the hash of all that decides its values to the last bit: the solver's source, versions and
+processor, tolerance and arguments. So a resumed run computes what is missing, and never mixes processors or versions.
+"""
+
+from __future__ import annotations
+
+import concurrent.futures
+import hashlib
+import pathlib
+from collections.abc import Iterator
+
+import numpy as np
+from tqdm import tqdm
+
+from mbma_tables.arguments import FloatArray
+from mbma_tables.errors import MbmaError
+from mbma_tables.files import write_file
+from mbma_tables.islands import greenwood_tripp
+from mbma_tables.tablefiles.provenance import SOLVER, digest_arrays, digest_json, processor, source_digest, versions
+
+CHUNK = 2000
+DIGEST_LENGTH = 64
+Chunk = tuple[FloatArray, FloatArray, float, int]  # the arguments of `log_ratio`
+CODE = (*SOLVER, "generate.tables.chunks")
+
+
+class WorkerError(MbmaError, RuntimeError):
+    """Worker processes that died, or that a scheduler lost."""
+
+
+def log_ratio(X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
+    """log(Phi/Phi_rigid) at flat (X, mu), shape (entries, 2), on `refinement` times the nodes that `rtol` asks."""
+    solved = greenwood_tripp.solve(X, mu, rtol=rtol)
+    phi = np.stack([solved.phi_F, solved.phi_A], axis=-1)
+    if refinement > 1:
+        for nodes in np.unique(solved.nodes):
+            same = solved.nodes == nodes
+            finer = greenwood_tripp.solve(X[same], mu[same], rtol=rtol, nodes=refinement * int(nodes))
+            phi[same] = np.stack([finer.phi_F, finer.phi_A], axis=-1)
+    ratio: FloatArray = np.log(phi / greenwood_tripp.rigid_sphere(X, mu).T)
+    return ratio
+
+
+def chunk_key(X: FloatArray, mu: FloatArray, rtol: float, refinement: int) -> str:
+    """Name of a chunk's file."""
+    made_by = [source_digest(CODE), versions(), processor(), rtol, refinement]
+    return digest_json([made_by, digest_arrays({"X": X, "mu": mu})])
+
+
+class ChunkedSolver:
+    """Solves islands on an executor and keeps what is finished.
+
+    Parameters
+    ----------
+    executor : concurrent.futures.Executor or None
+        Where chunks run, dask's `Client.get_executor()` included; None runs them here.
+    folder : path, optional
+        Folder of the finished chunks; without it nothing is kept.
+    """
+
+    def __init__(self, executor: concurrent.futures.Executor | None = None, folder: pathlib.Path | None = None) -> None:
+        self.executor = executor
+        self.folder = folder
+
+    def log_ratio(self, label: str, X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
+        """`log_ratio` of arrays of any one shape, shape (..., 2); `label` stands beside the progress bar.
+
+        Raises
+        ------
+        WorkerError
+            Where a worker died; finished chunks are kept.
+        """
+        flat = [np.ascontiguousarray(array, dtype=float).ravel() for array in (X, mu)]
+        chunks: list[Chunk] = [
+            (flat[0][k : k + CHUNK], flat[1][k : k + CHUNK], rtol, refinement) for k in range(0, flat[0].size, CHUNK)
+        ]
+        keys = [chunk_key(*chunk) for chunk in chunks]
+        results = {number: found for number, key in enumerate(keys) if (found := self._load(key)) is not None}
+        missing = {number: chunk for number, chunk in enumerate(chunks) if number not in results}
+        # silent where stderr is not a terminal
+        with tqdm(total=len(chunks), initial=len(results), desc=label, unit="chunk", disable=None) as bar:
+            for number, result in self._computed(missing):
+                if self.folder is not None:
+                    body = result.tobytes()
+                    digest = hashlib.sha256(keys[number].encode() + body).hexdigest().encode()
+                    write_file(self.folder / keys[number], digest + body, make_folders=True)
+                results[number] = result
+                bar.update()
+        return np.concatenate([results[number] for number in range(len(chunks))]).reshape((*np.shape(X), 2))
+
+    def _load(self, key: str) -> FloatArray | None:
+        """A kept chunk; None where there is none, or where it is damaged."""
+        try:
+            content = (self.folder / key).read_bytes() if self.folder is not None else b""
+        except OSError:
+            return None
+        digest, body = content[:DIGEST_LENGTH], content[DIGEST_LENGTH:]
+        if digest != hashlib.sha256(key.encode() + body).hexdigest().encode():
+            return None
+        return np.frombuffer(body).reshape(-1, 2)
+
+    def _computed(self, missing: dict[int, Chunk]) -> Iterator[tuple[int, FloatArray]]:
+        """Numbers and results of chunks, as they finish."""
+        if self.executor is None:
+            yield from ((number, log_ratio(*chunk)) for number, chunk in missing.items())
+            return
+        try:
+            waiting = {self.executor.submit(log_ratio, *chunk): number for number, chunk in missing.items()}
+            for future in concurrent.futures.as_completed(waiting):
+                yield waiting[future], future.result()
+        except (concurrent.futures.BrokenExecutor, concurrent.futures.CancelledError) as fault:
+            raise WorkerError(f"a worker process died ({fault}); --resume continues from the finished chunks") from None

@@ -1,0 +1,200 @@
+"""Islands solved in chunks: the same bits whoever computes them, and kept chunks that are believed only when sound."""
+
+import concurrent.futures
+import json
+import os
+import pathlib
+import platform
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from small_builds import SMALL
+
+from generate.__main__ import main
+from generate.tables import chunks, commands
+from generate.tables.chunks import ChunkedSolver, WorkerError, log_ratio
+from mbma_tables.models.tables import shipped
+from mbma_tables.tablefiles.netcdf import read_table
+from mbma_tables.tablefiles.provenance import versions
+
+ROOT = pathlib.Path(chunks.__file__).parents[2]
+COUNT = 4
+X = np.linspace(0.0, 5.0, 40)
+MU = np.geomspace(1e-3, 10.0, 40)
+# on any processor with AVX2, the code of the one that made the shipped tables
+HASWELL = {
+    "NUMBA_CPU_NAME": "haswell",
+    "NUMBA_CPU_FEATURES": "+avx,+avx2,+fma,+bmi,+bmi2,+sse4.2,+popcnt,+f16c",
+    "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR",
+    "OPENBLAS_CORETYPE": "Haswell",
+}
+
+
+@pytest.fixture(autouse=True)
+def small_chunks(monkeypatch):
+    monkeypatch.setattr(chunks, "CHUNK", 10)
+
+
+def run(solver):
+    return solver.log_ratio("test", X, MU, 1e-6)
+
+
+@pytest.fixture(scope="module")
+def expected():
+    return log_ratio(X, MU, 1e-6)
+
+
+def files(folder):
+    return {path: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+def unasked(monkeypatch):
+    def refuse(*_):
+        raise AssertionError("computed again what was kept")
+
+    monkeypatch.setattr(chunks, "log_ratio", refuse)
+
+
+def test_any_executor_gives_the_same_bits(expected):
+    np.testing.assert_array_equal(run(ChunkedSolver()), expected)
+    with concurrent.futures.ThreadPoolExecutor(3) as threads:
+        np.testing.assert_array_equal(run(ChunkedSolver(threads)), expected)
+    square = ChunkedSolver().log_ratio("test", X.reshape(8, 5), MU.reshape(8, 5), 1e-6)
+    np.testing.assert_array_equal(square, expected.reshape(8, 5, 2))
+
+
+def test_finished_chunks_are_not_computed_again(expected, tmp_path, monkeypatch):
+    run(ChunkedSolver(folder=tmp_path))
+    assert len(files(tmp_path)) == COUNT
+    unasked(monkeypatch)
+    np.testing.assert_array_equal(run(ChunkedSolver(folder=tmp_path)), expected)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda patch: patch.setattr(chunks, "processor", lambda: ("haswell", "+avx2")),
+        lambda patch: patch.setattr(chunks, "versions", lambda: {**versions(), "numpy": "1.0"}),
+        lambda patch: patch.setattr(chunks, "source_digest", lambda modules: "0" * 64),
+    ],
+    ids=["processor", "version", "source"],
+)
+def test_chunks_of_another_processor_version_or_source_are_not_mixed_in(change, expected, tmp_path, monkeypatch):
+    run(ChunkedSolver(folder=tmp_path))
+    before = files(tmp_path)
+    change(monkeypatch)
+    np.testing.assert_array_equal(run(ChunkedSolver(folder=tmp_path)), expected)
+    assert len(files(tmp_path)) == 2 * len(before)
+
+
+@pytest.mark.parametrize("damage", [lambda b, o: b[:-9], lambda b, o: b"", lambda b, o: b[:-1] + b"!", lambda b, o: o])
+def test_a_damaged_chunk_is_computed_again(damage, expected, tmp_path):
+    run(ChunkedSolver(folder=tmp_path))
+    before = files(tmp_path)
+    victim, other = list(before)[:2]
+    victim.write_bytes(damage(before[victim], before[other]))
+    np.testing.assert_array_equal(run(ChunkedSolver(folder=tmp_path)), expected)
+    assert files(tmp_path) == before
+
+
+def test_a_dead_worker_ends_the_run_with_the_others_kept(tmp_path):
+    class Dying(concurrent.futures.Executor):
+        def submit(self, work, /, *arguments):
+            future = concurrent.futures.Future()
+            if arguments[0][0] > 3:
+                future.set_exception(concurrent.futures.BrokenExecutor("killed"))
+            else:
+                future.set_result(work(*arguments))
+            return future
+
+    with pytest.raises(WorkerError, match=r"a worker process died .*--resume continues"):
+        run(ChunkedSolver(Dying(), tmp_path))
+
+
+def test_progress_is_silent_in_a_pipe(capfd):
+    run(ChunkedSolver())
+    assert tuple(capfd.readouterr()) == ("", "")
+
+
+def command(config, out, *arguments):
+    name = [sys.executable, "-m", "generate", "tables", "universal"]
+    return [*name, "--config", str(config), "--out", str(out), *arguments]
+
+
+@pytest.mark.slow
+def test_a_killed_run_is_resumed_to_the_same_bytes(tmp_path):
+    config, out, whole = (tmp_path / name for name in ("own.toml", "table.nc", "whole.nc"))
+    # some twenty chunks
+    config.write_text(SMALL["universal"].replace("1e-4", "1e-5").replace("= 1e-3", "= 1e-5").replace("400", "30000"))
+    subprocess.run(command(config, whole, "--workers", "1"), cwd=ROOT, check=True, capture_output=True)
+    folder = tmp_path / ".table.nc.chunks"
+    with subprocess.Popen(
+        command(config, out, "--workers", "2"),
+        cwd=ROOT,
+        start_new_session=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    ) as process:
+        while not (folder.exists() and len(list(folder.glob("[0-9a-f]*"))) >= 3):
+            assert process.poll() is None
+            time.sleep(0.001)
+        os.killpg(process.pid, signal.SIGKILL)
+    assert len(list(folder.glob("[0-9a-f]*"))) >= 3
+    assert not out.exists()
+    subprocess.run(command(config, out, "--workers", "2", "--resume"), cwd=ROOT, check=True, capture_output=True)
+    assert out.read_bytes() == whole.read_bytes()
+    assert not folder.exists()
+
+
+def test_a_dask_scheduler_is_an_executor_too(expected):
+    distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    with (
+        distributed.LocalCluster(n_workers=1, processes=False, dashboard_address=None) as cluster,
+        distributed.Client(cluster),
+        commands.executor(2, cluster.scheduler_address) as pool,
+    ):
+        np.testing.assert_array_equal(run(ChunkedSolver(pool)), expected)
+
+
+def test_executors(monkeypatch):
+    with commands.executor(1, None) as pool:
+        assert pool is None
+    with commands.executor(2, None) as pool:
+        assert isinstance(pool, concurrent.futures.ProcessPoolExecutor)
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    done = CliRunner().invoke(main, ["tables", "universal", "--scheduler", "tcp://127.0.0.1:1", "--out", "no.nc"])
+    assert (done.exit_code, done.stderr.splitlines()) == (
+        2,
+        ["generate: --scheduler needs dask: pip install 'mbma_tables[distributed]'"],
+    )
+
+
+def features():
+    from numpy._core._multiarray_umath import __cpu_features__
+
+    return {name for name, present in __cpu_features__.items() if present}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["universal", "island4d"])
+def test_the_shipped_tables_rebuild_to_the_last_bit(kind, tmp_path):
+    """With the code of their processor type and their versions, as docs/tables.md says."""
+    said = json.loads(read_table(shipped(kind)).attributes["versions"])
+    if said | {"processor": ""} != versions() | {"processor": ""}:
+        pytest.skip("other versions than those of the shipped tables")
+    if platform.machine() not in ("x86_64", "AMD64") or not {"AVX2", "FMA3"} <= features():
+        pytest.skip("a processor without AVX2")
+    assert said["processor"] == HASWELL["NUMBA_CPU_NAME"]
+    out = tmp_path / f"{kind}.nc"
+    name = [sys.executable, "-m", "generate", "tables", kind, "--out", str(out), "--workers", "2"]
+    environment = os.environ | HASWELL | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    subprocess.run(name, cwd=ROOT, env=environment, check=True, capture_output=True)
+    old, new = (read_table(path).attributes for path in (shipped(kind), out))
+    differing = {key for key in old if old[key] != new[key]}
+    # the record of the source follows every edit of it
+    assert differing <= {"source_sha256", "attributes_sha256"}
