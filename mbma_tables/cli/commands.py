@@ -72,19 +72,14 @@ def contact_command(
 
     Example: mbma contact --surface yang-persson -d 2,1.5 --over-h-rms
     """
-    from mbma_tables.arguments import require
-    from mbma_tables.theories import separation as separation_of
+    known = {"separation": separation, "mean_separation": mean_separation}
+    given = {name: numbers for name, numbers in known.items() if numbers is not None}
+    if len(given) != 1:
+        raise InputError("gaps are needed: either --separation or --mean-separation")
     from mbma_tables.theories.contact import contact
 
-    if separation is not None and mean_separation is None:
-        gap = _lengths("separation", separation, specimen, over_h_rms)
-    elif mean_separation is not None and separation is None:
-        average = _lengths("mean_separation", mean_separation, specimen, over_h_rms)
-        require("mean_separation", average, average >= 0, "at least 0, where the model ends")
-        gap = separation_of(specimen.surface, average)
-    else:
-        raise InputError("gaps are needed: either --separation or --mean-separation")
-    answer = contact(specimen.surface, gap, **_asked(model, specimen))
+    gaps = {name: _lengths(name, numbers, specimen, over_h_rms) for name, numbers in given.items()}
+    answer = contact(specimen.surface, **gaps, **_asked(model, specimen))
     values = {name: getattr(answer, name) for name in COLUMNS}
     report_answer("contact", specimen, model, answer, values, _stress_units(specimen)).write(output)
 

@@ -143,21 +143,7 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
 def report_answer(
     command: str, specimen: Specimen, model: Model, answer: Any, values: Mapping[str, Any], units: Mapping[str, str]
 ) -> Report:
-    """The report of a command that evaluated the model.
-
-    Parameters
-    ----------
-    command : str
-        Its name.
-    specimen : Specimen
-        The surface.
-    model : Model
-        What was asked for.
-    answer : Contact or Island
-        What says which reading and tier made it.
-    values, units : mapping
-        Arrays by column, and the units that `units_of` does not know.
-    """
+    """The report of a command that evaluated the model; `units` are those that `units_of` does not know."""
     surface, notes = _surface_facts(specimen)
     scale = "forces are over E*, none was given" if specimen.E_star is None else f"E* is {specimen.E_star:.6g}"
     notes += [

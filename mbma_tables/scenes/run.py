@@ -166,44 +166,17 @@ def _totals(run: Run, step: Step) -> None:
     run.close(step, max(float(answer.error.max()) for answer in answers), step.tier_name)
 
 
-def _hertz_area(run: Run, step: Step) -> None:
-    from mbma_tables.scenes.statistics import hertz_area
+def _islands(run: Run, step: Step) -> None:
+    from mbma_tables.scenes import statistics
 
-    assert step.rtol is not None
-    assert step.tier is not None
-    area, error = hertz_area(run.surface, run.gap, step.tier, get_reading(run.problem.reading), step.rtol)
-    run.found["area"] = (("gap",), area)
-    run.close(step, error, step.tier_name)
-
-
-def _statistics(run: Run, step: Step) -> None:
-    from mbma_tables.scenes.statistics import island_statistics
-
-    problem = run.problem
-    assert step.rtol is not None
-    assert step.tier is not None
-    fields, error = island_statistics(
-        run.surface,
-        run.gap,
-        step.tier,
-        get_reading(problem.reading),
-        step.rtol,
-        problem.E_star,
-        problem.points,
-        "subscale_area" not in problem.dropped,
-    )
+    functions = {
+        "hertz area": statistics.hertz_area,
+        "island statistics": statistics.island_statistics,
+        "profiles": statistics.profiles,
+    }
+    fields, error = functions[step.name](run.problem, run.surface, run.gap, step)
     run.found |= fields
     run.close(step, error, step.tier_name)
-
-
-def _profiles(run: Run, step: Step) -> None:
-    from mbma_tables.scenes.statistics import profiles
-
-    problem = run.problem
-    assert step.rtol is not None
-    fields, error = profiles(problem.surface, problem.deltas, get_reading(problem.reading), step.rtol, problem.E_star)
-    run.found |= fields
-    run.close(step, error, "exact")
 
 
 def other_theory(name: str, surface: Surface, gap: FloatArray, E_star: float) -> tuple[FloatArray, FloatArray]:
@@ -230,9 +203,9 @@ def _comparison(run: Run, step: Step) -> None:
 _STEPS = {
     "law": _law,
     "totals": _totals,
-    "hertz area": _hertz_area,
-    "island statistics": _statistics,
-    "profiles": _profiles,
+    "hertz area": _islands,
+    "island statistics": _islands,
+    "profiles": _islands,
 }
 
 

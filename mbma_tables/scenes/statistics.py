@@ -13,7 +13,9 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models import AnyModel, IslandAnswer, answer_islands, get_model, tier_name
 from mbma_tables.models.protocol import AREA, BOTH
-from mbma_tables.surfaces.readings import Reading
+from mbma_tables.scenes.plan import Step
+from mbma_tables.scenes.problem import Problem
+from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.gauss_kronrod import integrate
 from mbma_tables.totals.island import geometry, scale_area, scale_force
@@ -35,30 +37,27 @@ class HertzArea:
         return found._replace(phi_A=found.phi_A / islands["eta"])
 
 
+def _asked(problem: Problem, step: Step) -> tuple[Reading, float, str | AnyModel]:
+    """Reading, tolerance and island model of a step."""
+    assert step.rtol is not None
+    assert step.tier is not None
+    return get_reading(problem.reading), step.rtol, step.tier
+
+
 def _outside(tier: str | AnyModel) -> str:
     """What to do about islands outside a table: solve them."""
     return "exact" if tier_name(tier) in ("universal", "island4d") else "raise"
 
 
-def hertz_area(
-    surface: Surface, gap: FloatArray, tier: str | AnyModel, reading: Reading, rtol: float
-) -> tuple[FloatArray, float]:
+def hertz_area(problem: Problem, surface: Surface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
     """A/A0 with eta = 1, and the bound on its relative error."""
+    reading, rtol, tier = _asked(problem, step)
     model = HertzArea(get_model(tier, rtol, reading))
     found = sum_islands(Pairs.of(surface, surface.h_max - gap), reading, model, rtol, _outside(tier), AREA)
-    return found.area, float(found.error.max())
+    return {"area": (("gap",), found.area)}, float(found.error.max())
 
 
-def island_statistics(
-    surface: Surface,
-    gap: FloatArray,
-    tier: str | AnyModel,
-    reading: Reading,
-    rtol: float,
-    E_star: float,
-    points: int,
-    subscale: bool,
-) -> tuple[Fields, float]:
+def island_statistics(problem: Problem, surface: Surface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
     """Number of islands at every gap; load, area and density of islands along their approach (Eqs. 40, 42).
 
     Returns
@@ -69,6 +68,8 @@ def island_statistics(
     float
         Bound on the relative error.
     """
+    reading, rtol, tier = _asked(problem, step)
+    points = problem.points
     pairs = Pairs.of(surface, surface.h_max - gap)
     kink_d, kink_u = kinks(pairs.hurst, pairs.zeta_1, reading)
 
@@ -106,8 +107,9 @@ def island_statistics(
         g = geometry(grid, hurst, zeta_1, reading)
         model = get_model(tier, rtol, reading)
         phi = answer_islands(model, g | {"hurst": hurst}, _outside(tier))
-        force = E_star * s / q0 * scale_force(g) * phi.phi_F
-        area = scale_area(g) * phi.phi_A / (1.0 if subscale else g["eta"]) / q0**2
+        force = problem.E_star * s / q0 * scale_force(g) * phi.phi_F
+        share = g["eta"] if "subscale_area" in problem.dropped else 1.0
+        area = scale_area(g) * phi.phi_A / share / q0**2
         every = np.arange(count)
         wide = np.broadcast_to(grid, (count, points))
         spread = density_of(pairs, every, wide, {name: field[None] for name, field in g.items()}, reading)
@@ -123,9 +125,10 @@ def island_statistics(
     return fields, error
 
 
-def profiles(surface: Surface, deltas: Any, reading: Reading, rtol: float, E_star: float) -> tuple[Fields, float]:
+def profiles(problem: Problem, surface: Surface, gap: Any, step: Step) -> tuple[Fields, float]:
     """p(r) and d(r) of the islands at these approaches, solved exactly (Eqs. 34, 36, 37)."""
-    delta = np.atleast_1d(np.asarray(deltas, dtype=float)).ravel()
+    reading, rtol, _ = _asked(problem, step)
+    delta = np.atleast_1d(np.asarray(problem.deltas, dtype=float)).ravel()
     hurst, zeta_1 = np.full(delta.size, float(surface.hurst)), np.full(delta.size, float(surface.zeta_1))
     g = geometry(delta / float(surface.h_rms), hurst, zeta_1, reading)
     solved = greenwood_tripp.solve(g["X"], g["mu"], rtol=rtol)
@@ -135,7 +138,7 @@ def profiles(surface: Surface, deltas: Any, reading: Reading, rtol: float, E_sta
     fields: Fields = {
         "profile_delta": (("island",), delta),
         "profile_radius": (dims, solved.rho * radius[:, None] / q0),
-        "profile_pressure": (dims, E_star * q0 * s * (g["sigma"] / radius)[:, None] * solved.pressure),
+        "profile_pressure": (dims, problem.E_star * q0 * s * (g["sigma"] / radius)[:, None] * solved.pressure),
         "profile_gap": (dims, solved.gap * g["sigma"][:, None] * s),
     }
     return fields, float(np.max(solved.error))
