@@ -76,9 +76,13 @@ def contact_command(
     given = {name: numbers for name, numbers in known.items() if numbers is not None}
     if len(given) != 1:
         raise InputError("gaps are needed: either --separation or --mean-separation")
+    from mbma_tables.arguments import require
     from mbma_tables.theories.contact import contact
 
     gaps = {name: _lengths(name, numbers, specimen, over_h_rms) for name, numbers in given.items()}
+    if mean_separation is not None:
+        average = gaps["mean_separation"]
+        require("mean_separation", average, average >= 0, "at least 0, where the model ends")
     answer = contact(specimen.surface, **gaps, **_asked(model, specimen))
     values = {name: getattr(answer, name) for name in COLUMNS}
     report_answer("contact", specimen, model, answer, values, _stress_units(specimen)).write(output)
