@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import itertools
 import pathlib
-import subprocess
-import sys
 import textwrap
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -43,6 +42,7 @@ _HEAD = f'''"""Closed forms of the island functions and of total force and area,
 {MADE_BY}
 """
 
+# fmt: off
 # numpy's ufuncs return Any
 # mypy: disable-error-code="no-any-return"
 
@@ -159,33 +159,39 @@ def evaluate(steps: Iterable[Step], given: Mapping[str, FloatArray]) -> dict[str
     return names
 
 
+def _wrapped(text: str, first: str = "    ", rest: str = "        ") -> str:
+    wrapper = textwrap.TextWrapper(WIDTH, first, rest, break_long_words=False, break_on_hyphens=False)
+    return wrapper.fill(text)
+
+
 def _python_function(function: Function) -> str:
     given = ", ".join(f"{name}: FloatArray" for name in function.arguments)
+    if len(given) > WIDTH - 40:
+        given = f"\n    {given}\n"
     lines = [f"def {function.name}({given}) -> FloatArray:", f'    """{function.title}"""']
     for name, value in function.steps:
-        left = "return" if name == function.result else f"{name} ="
-        lines.append(f"    {left} {_python(value)}")
+        left, right = "return" if name == function.result else f"{name} =", _python(value)
+        if len(left) + len(right) > WIDTH - 5:
+            right = f"(\n{_wrapped(right, first='        ')}\n    )"
+        lines.append(f"    {left} {right}")
     return "\n".join([*lines, "", ""])
+
+
+def _dictionary(head: str, rows: Mapping[str, str]) -> str:
+    lines = [_wrapped(f"{key!r}: {text},").replace("'", '"') for key, text in rows.items()]
+    return "\n".join([f"{head} = {{", *lines, "}", ""])
 
 
 def module_text(functions: Iterable[Function], ranges: dict[str, Ranges], certificates: dict[str, Any]) -> str:
     """The module of closed forms; `ranges` and `certificates` by form, the latter by result too."""
     functions = list(functions)
-    by_form = {form: {f.result: f.name for f in functions if f.form == form} for form in ranges}
-    text = _HEAD + "\n".join(map(_python_function, functions))
-    # names of functions, not their text
-    text += f"\nFUNCTIONS: dict[str, dict[str, Callable[..., FloatArray]]] = {by_form!r}\n"
-    for function in functions:
-        text = text.replace(f": '{function.name}'", f": {function.name}")
-    text += f"RANGES: dict[str, dict[str, tuple[float, float]]] = {ranges!r}\n"
-    text += f"CERTIFICATES: dict[str, dict[str, Certificate]] = {certificates!r}\n"
-    command = [sys.executable, "-m", "ruff", "format", "--line-length", str(WIDTH), "-"]
-    return subprocess.run(command, input=text, capture_output=True, text=True, check=True).stdout
-
-
-def _wrapped(text: str) -> str:
-    wrapper = textwrap.TextWrapper(WIDTH, "    ", "        ", break_long_words=False, break_on_hyphens=False)
-    return wrapper.fill(text)
+    own = {form: ", ".join(f"{f.result!r}: {f.name}" for f in functions if f.form == form) for form in ranges}
+    data = {
+        "FUNCTIONS: dict[str, dict[str, Callable[..., FloatArray]]]": {f: f"{{{text}}}" for f, text in own.items()},
+        "RANGES: dict[str, dict[str, tuple[float, float]]]": {f: repr(row) for f, row in ranges.items()},
+        "CERTIFICATES: dict[str, dict[str, Certificate]]": {f: repr(row) for f, row in certificates.items()},
+    }
+    return _HEAD + "\n".join([*map(_python_function, functions), *itertools.starmap(_dictionary, data.items())])
 
 
 def c_text(functions: Iterable[Function]) -> str:

@@ -3,6 +3,7 @@
 Made by `python -m generate formulas`; do not edit.
 """
 
+# fmt: off
 # numpy's ufuncs return Any
 # mypy: disable-error-code="no-any-return"
 
@@ -28,261 +29,141 @@ class Certificate(NamedTuple):
 
 def pocket_phi_F(X: FloatArray, mu: FloatArray) -> FloatArray:
     """Phi_F, pocket form: within 0.0371."""
-    w = 1 / (X + 3)
-    p_F = w * (w * (w * (w * (404.3 - 406.9 * w) - 101.9) - 1.906) - 7.687)
-    rigid_F = (1 / 5) * pi * (X + 3) ** (5 / 2) * exp(p_F)
-    u_F = 1 / (X + 1.67)
-    y_F = 0.0166 * mu * (X + 1.67)
+    w = 1/(X + 3)
+    p_F = w*(w*(w*(w*(404.3 - 406.9*w) - 101.9) - 1.906) - 7.687)
+    rigid_F = (1/5)*pi*(X + 3)**(5/2)*exp(p_F)
+    u_F = 1/(X + 1.67)
+    y_F = 0.0166*mu*(X + 1.67)
     t_F = log(y_F + 1)
-    z_F = 1 / (sqrt(y_F) + 1)
+    z_F = 1/(sqrt(y_F) + 1)
     log_Q_F = (
-        3.29 * u_F * z_F
-        - 4.92 * u_F
-        - 7.14e-05 * u_F * t_F * t_F * t_F * t_F * t_F
-        + 0.25 * z_F
-        + 0.189 * (z_F * z_F * z_F)
-        + 23.0 * (u_F * u_F * u_F * u_F * u_F * u_F)
+        3.29*u_F*z_F - 4.92*u_F - 7.14e-05*u_F*t_F*t_F*t_F*t_F*t_F + 0.25*z_F + 0.189*(z_F*z_F*z_F) +
+        23.0*(u_F*u_F*u_F*u_F*u_F*u_F)
     )
-    return mu * rigid_F / ((3 / 20) * sqrt(2) * pi * mu * (X + 1) * exp(log_Q_F) + 1)
+    return mu*rigid_F/((3/20)*sqrt(2)*pi*mu*(X + 1)*exp(log_Q_F) + 1)
 
 
 def pocket_phi_A(X: FloatArray, mu: FloatArray) -> FloatArray:
     """Phi_A, pocket form: within 0.0317."""
-    w = 1 / (X + 3)
-    p_A = w * (w * (w * (w * (379.0 - 338.47 * w) - 115.67) + 1.7768) - 6.2766)
-    rigid_A = (1 / 2) * pi * (X + 3) ** 2 * exp(p_A)
-    u_A = 1 / (X + 4.24)
-    y_A = 0.0311 * mu * (X + 4.24)
-    z_A = 1 / (sqrt(y_A) + 1)
-    v_A = log(0.979 * mu * sqrt(u_A) + 1)
+    w = 1/(X + 3)
+    p_A = w*(w*(w*(w*(379.0 - 338.47*w) - 115.67) + 1.7768) - 6.2766)
+    rigid_A = (1/2)*pi*(X + 3)**2*exp(p_A)
+    u_A = 1/(X + 4.24)
+    y_A = 0.0311*mu*(X + 4.24)
+    z_A = 1/(sqrt(y_A) + 1)
+    v_A = log(0.979*mu*sqrt(u_A) + 1)
     log_Q_A = (
-        -0.0001849 * u_A * v_A * v_A * v_A * v_A
-        + 0.2543 * v_A
-        + 47.27 * z_A * (u_A * u_A)
-        - 38.91 * u_A * u_A
-        - 0.3145 * z_A * z_A
-        - 4219.0 * u_A * u_A * u_A * u_A * u_A * z_A * z_A * z_A
-        + 13.91 * (u_A * u_A * u_A * u_A * u_A * u_A)
+        -0.0001849*u_A*v_A*v_A*v_A*v_A + 0.2543*v_A + 47.27*z_A*(u_A*u_A) - 38.91*u_A*u_A - 0.3145*z_A*z_A -
+        4219.0*u_A*u_A*u_A*u_A*u_A*z_A*z_A*z_A + 13.91*(u_A*u_A*u_A*u_A*u_A*u_A)
     )
-    return rigid_A / (
-        (1 / 3) * 2 ** (1 / 3) * pi ** (2 / 3) * mu * (X + 1) * exp(log_Q_A) / (mu * (X + 1) + 1) ** (1 / 3) + 1
-    )
+    return rigid_A/((1/3)*2**(1/3)*pi**(2/3)*mu*(X + 1)*exp(log_Q_A)/(mu*(X + 1) + 1)**(1/3) + 1)
 
 
 def standard_phi_F(X: FloatArray, mu: FloatArray) -> FloatArray:
     """Phi_F, standard form: within 0.00164."""
-    w = 1 / (X + 3)
-    p_F = w * (w * (w * (w * (w * (w * (6264.7 * w - 8610.2) + 4223.7) - 822.91) + 63.132) - 12.175) - 7.4721)
-    rigid_F = (1 / 5) * pi * (X + 3) ** (5 / 2) * exp(p_F)
-    u_F = 1 / (X + 5.02)
-    y_F = 0.234 * mu * (X + 5.02)
+    w = 1/(X + 3)
+    p_F = w*(w*(w*(w*(w*(w*(6264.7*w - 8610.2) + 4223.7) - 822.91) + 63.132) - 12.175) - 7.4721)
+    rigid_F = (1/5)*pi*(X + 3)**(5/2)*exp(p_F)
+    u_F = 1/(X + 5.02)
+    y_F = 0.234*mu*(X + 5.02)
     t_F = log(y_F + 1)
-    z_F = 1 / (sqrt(y_F) + 1)
-    v_F = log(1.25 * mu * sqrt(u_F) + 1)
+    z_F = 1/(sqrt(y_F) + 1)
+    v_F = log(1.25*mu*sqrt(u_F) + 1)
     log_Q_F = (
-        -0.93573 * u_F * v_F
-        + 0.21852 * u_F * z_F
-        - 1.6649 * u_F
-        + 0.0045288 * u_F * (t_F * t_F * t_F)
-        - 1.0907 * u_F * z_F * z_F * z_F
-        + 0.00024878 * u_F * (v_F * v_F * v_F * v_F)
-        - 2.5226e-05 * u_F * t_F * t_F * t_F * t_F * t_F
-        + 0.24817 * z_F
-        + 182.17 * z_F * (u_F * u_F * u_F * u_F)
-        - 0.33617 * u_F * u_F
-        - 0.1832 * u_F * u_F * v_F * v_F
-        + 70.644 * (u_F * u_F) * (z_F * z_F)
-        - 69.621 * u_F * u_F * z_F * z_F * z_F
-        + 0.5966 * (z_F * z_F)
-        - 0.33826 * z_F * z_F * z_F
-        - 1142.9 * u_F * u_F * u_F * u_F
-        + 0.016675 * (t_F * t_F * t_F * t_F * t_F) * (u_F * u_F * u_F * u_F * u_F * u_F)
-        - 12691.0 * u_F * u_F * u_F * u_F * u_F * z_F * z_F
-        + 11081.0 * (u_F * u_F * u_F * u_F * u_F) * (z_F * z_F * z_F)
-        + 21274.0 * (u_F * u_F * u_F * u_F * u_F * u_F)
+        -0.93573*u_F*v_F + 0.21852*u_F*z_F - 1.6649*u_F + 0.0045288*u_F*(t_F*t_F*t_F) - 1.0907*u_F*z_F*z_F*z_F +
+        0.00024878*u_F*(v_F*v_F*v_F*v_F) - 2.5226e-05*u_F*t_F*t_F*t_F*t_F*t_F + 0.24817*z_F +
+        182.17*z_F*(u_F*u_F*u_F*u_F) - 0.33617*u_F*u_F - 0.1832*u_F*u_F*v_F*v_F + 70.644*(u_F*u_F)*(z_F*z_F) -
+        69.621*u_F*u_F*z_F*z_F*z_F + 0.5966*(z_F*z_F) - 0.33826*z_F*z_F*z_F - 1142.9*u_F*u_F*u_F*u_F +
+        0.016675*(t_F*t_F*t_F*t_F*t_F)*(u_F*u_F*u_F*u_F*u_F*u_F) - 12691.0*u_F*u_F*u_F*u_F*u_F*z_F*z_F +
+        11081.0*(u_F*u_F*u_F*u_F*u_F)*(z_F*z_F*z_F) + 21274.0*(u_F*u_F*u_F*u_F*u_F*u_F)
     )
-    return mu * rigid_F / ((3 / 20) * sqrt(2) * pi * mu * (X + 1) * exp(log_Q_F) + 1)
+    return mu*rigid_F/((3/20)*sqrt(2)*pi*mu*(X + 1)*exp(log_Q_F) + 1)
 
 
 def standard_phi_A(X: FloatArray, mu: FloatArray) -> FloatArray:
     """Phi_A, standard form: within 0.00768."""
-    w = 1 / (X + 3)
-    p_A = w * (w * (w * (w * (w * (w * (6056.0 * w - 9136.5) + 5056.8) - 1192.8) + 117.26) - 14.285) - 5.8993)
-    rigid_A = (1 / 2) * pi * (X + 3) ** 2 * exp(p_A)
-    u_A = 1 / (X + 3.22)
-    y_A = 0.589 * mu * (X + 3.22)
+    w = 1/(X + 3)
+    p_A = w*(w*(w*(w*(w*(w*(6056.0*w - 9136.5) + 5056.8) - 1192.8) + 117.26) - 14.285) - 5.8993)
+    rigid_A = (1/2)*pi*(X + 3)**2*exp(p_A)
+    u_A = 1/(X + 3.22)
+    y_A = 0.589*mu*(X + 3.22)
     t_A = log(y_A + 1)
-    z_A = 1 / (sqrt(y_A) + 1)
-    v_A = log(1.51 * mu * sqrt(u_A) + 1)
+    z_A = 1/(sqrt(y_A) + 1)
+    v_A = log(1.51*mu*sqrt(u_A) + 1)
     log_Q_A = (
-        16.02 * u_A * z_A
-        - 1.743 * u_A
-        - 28.84 * u_A * z_A * z_A
-        - 0.003347 * u_A * t_A * t_A * t_A
-        + 0.2406 * v_A
-        - 0.5935 * z_A
-        + 7.182 * z_A * (u_A * u_A)
-        - 558.5 * z_A * u_A * u_A * u_A * u_A * u_A
-        - 16.9 * u_A * u_A
-        + 78.03 * (u_A * u_A) * (z_A * z_A * z_A)
-        + 0.001228 * (v_A * v_A)
-        - 0.05628 * z_A * z_A
-        + 1.166 * (z_A * z_A * z_A)
-        - 7.966 * u_A * u_A * u_A * u_A
-        + 7.555e-05 * (v_A * v_A * v_A * v_A)
-        + 1.13e-05 * (t_A * t_A * t_A * t_A * t_A) * (u_A * u_A)
-        - 9.138e-05 * t_A * t_A * t_A * t_A * t_A * u_A * u_A * u_A * u_A * u_A
-        + 930.1 * (u_A * u_A * u_A * u_A * u_A) * (z_A * z_A)
-        - 1747.0 * u_A * u_A * u_A * u_A * u_A * z_A * z_A * z_A
-        + 591.1 * (u_A * u_A * u_A * u_A * u_A * u_A)
+        16.02*u_A*z_A - 1.743*u_A - 28.84*u_A*z_A*z_A - 0.003347*u_A*t_A*t_A*t_A + 0.2406*v_A - 0.5935*z_A +
+        7.182*z_A*(u_A*u_A) - 558.5*z_A*u_A*u_A*u_A*u_A*u_A - 16.9*u_A*u_A + 78.03*(u_A*u_A)*(z_A*z_A*z_A) +
+        0.001228*(v_A*v_A) - 0.05628*z_A*z_A + 1.166*(z_A*z_A*z_A) - 7.966*u_A*u_A*u_A*u_A + 7.555e-05*(v_A*v_A*v_A*v_A)
+        + 1.13e-05*(t_A*t_A*t_A*t_A*t_A)*(u_A*u_A) - 9.138e-05*t_A*t_A*t_A*t_A*t_A*u_A*u_A*u_A*u_A*u_A +
+        930.1*(u_A*u_A*u_A*u_A*u_A)*(z_A*z_A) - 1747.0*u_A*u_A*u_A*u_A*u_A*z_A*z_A*z_A + 591.1*(u_A*u_A*u_A*u_A*u_A*u_A)
     )
-    return rigid_A / (
-        (1 / 3) * 2 ** (1 / 3) * pi ** (2 / 3) * mu * (X + 1) * exp(log_Q_A) / (mu * (X + 1) + 1) ** (1 / 3) + 1
-    )
+    return rigid_A/((1/3)*2**(1/3)*pi**(2/3)*mu*(X + 1)*exp(log_Q_A)/(mu*(X + 1) + 1)**(1/3) + 1)
 
 
 def long_phi_F(X: FloatArray, mu: FloatArray) -> FloatArray:
     """Phi_F, long form: within 0.00054."""
-    w = 1 / (X + 3)
-    p_F = w * (
-        w
-        * (
-            w
-            * (
-                w * (w * (w * (w * (w * (202680.3 - 116676.09 * w) - 139391.11) + 47261.94) - 8071.9332) + 724.69922)
-                - 40.764531
-            )
-            - 9.090187
-        )
-        - 7.4943273
+    w = 1/(X + 3)
+    p_F = (
+        w*(w*(w*(w*(w*(w*(w*(w*(202680.3 - 116676.09*w) - 139391.11) + 47261.94) - 8071.9332) + 724.69922) - 40.764531)
+        - 9.090187) - 7.4943273)
     )
-    rigid_F = (1 / 5) * pi * (X + 3) ** (5 / 2) * exp(p_F)
-    u_F = 1 / (X + 2.0)
-    y_F = 1.0 * mu * (X + 2.0)
+    rigid_F = (1/5)*pi*(X + 3)**(5/2)*exp(p_F)
+    u_F = 1/(X + 2.0)
+    y_F = 1.0*mu*(X + 2.0)
     t_F = log(y_F + 1)
-    z_F = 1 / (sqrt(y_F) + 1)
-    v_F = log(3.0 * mu * sqrt(u_F) + 1)
+    z_F = 1/(sqrt(y_F) + 1)
+    v_F = log(3.0*mu*sqrt(u_F) + 1)
     log_Q_F = (
-        -0.118296 * t_F * u_F
-        - 3.01064 * t_F * u_F * u_F * u_F * u_F * u_F
-        - 0.263905 * u_F * v_F
-        + 3.80004 * u_F * z_F
-        - 0.836377 * u_F
-        - 0.0619324 * u_F * v_F * v_F
-        - 20.2772 * u_F * z_F * z_F
-        - 3.85487e-05 * u_F * t_F * t_F * t_F
-        + 0.00635397 * u_F * (v_F * v_F * v_F)
-        + 19.8987 * u_F * (z_F * z_F * z_F)
-        - 0.000379636 * u_F * v_F * v_F * v_F * v_F
-        + 3.9305e-06 * u_F * (t_F * t_F * t_F * t_F * t_F)
-        + 1.53774 * v_F * (u_F * u_F)
-        + 0.484979 * z_F
-        + 50.6236 * z_F * (u_F * u_F)
-        - 225.267 * z_F * u_F * u_F * u_F
-        + 411.195 * z_F * (u_F * u_F * u_F * u_F)
-        - 325.948 * z_F * u_F * u_F * u_F * u_F * u_F
-        - 10.7045 * u_F * u_F
-        + 33.8306 * (u_F * u_F) * (z_F * z_F)
-        - 0.0163792 * u_F * u_F * v_F * v_F * v_F
-        - 102.576 * u_F * u_F * z_F * z_F * z_F
-        + 0.925984 * (z_F * z_F)
-        + 0.0154324 * (t_F * t_F * t_F) * (u_F * u_F * u_F * u_F * u_F * u_F)
-        - 22.121 * u_F * u_F * u_F
-        + 310.16 * (u_F * u_F * u_F) * (z_F * z_F * z_F)
-        + 0.00050287 * (u_F * u_F * u_F) * (v_F * v_F * v_F * v_F)
-        - 1.16559 * z_F * z_F * z_F
-        + 0.00155839 * (t_F * t_F * t_F * t_F) * (u_F * u_F)
-        + 0.00513046 * (t_F * t_F * t_F * t_F) * (u_F * u_F * u_F * u_F * u_F)
-        + 166.302 * (u_F * u_F * u_F * u_F)
-        - 162.134 * u_F * u_F * u_F * u_F * z_F * z_F
-        - 429.543 * u_F * u_F * u_F * u_F * z_F * z_F * z_F
-        - 3.19737e-05 * t_F * t_F * t_F * t_F * t_F * u_F * u_F
-        - 0.000104206 * t_F * t_F * t_F * t_F * t_F * u_F * u_F * u_F * u_F
-        - 0.000601264 * t_F * t_F * t_F * t_F * t_F * u_F * u_F * u_F * u_F * u_F * u_F
-        - 279.441 * u_F * u_F * u_F * u_F * u_F
-        + 277.261 * (u_F * u_F * u_F * u_F * u_F) * (z_F * z_F)
-        + 180.761 * (u_F * u_F * u_F * u_F * u_F) * (z_F * z_F * z_F)
-        + 174.525 * (u_F * u_F * u_F * u_F * u_F * u_F)
+        -0.118296*t_F*u_F - 3.01064*t_F*u_F*u_F*u_F*u_F*u_F - 0.263905*u_F*v_F + 3.80004*u_F*z_F - 0.836377*u_F -
+        0.0619324*u_F*v_F*v_F - 20.2772*u_F*z_F*z_F - 3.85487e-05*u_F*t_F*t_F*t_F + 0.00635397*u_F*(v_F*v_F*v_F) +
+        19.8987*u_F*(z_F*z_F*z_F) - 0.000379636*u_F*v_F*v_F*v_F*v_F + 3.9305e-06*u_F*(t_F*t_F*t_F*t_F*t_F) +
+        1.53774*v_F*(u_F*u_F) + 0.484979*z_F + 50.6236*z_F*(u_F*u_F) - 225.267*z_F*u_F*u_F*u_F +
+        411.195*z_F*(u_F*u_F*u_F*u_F) - 325.948*z_F*u_F*u_F*u_F*u_F*u_F - 10.7045*u_F*u_F + 33.8306*(u_F*u_F)*(z_F*z_F)
+        - 0.0163792*u_F*u_F*v_F*v_F*v_F - 102.576*u_F*u_F*z_F*z_F*z_F + 0.925984*(z_F*z_F) +
+        0.0154324*(t_F*t_F*t_F)*(u_F*u_F*u_F*u_F*u_F*u_F) - 22.121*u_F*u_F*u_F + 310.16*(u_F*u_F*u_F)*(z_F*z_F*z_F) +
+        0.00050287*(u_F*u_F*u_F)*(v_F*v_F*v_F*v_F) - 1.16559*z_F*z_F*z_F + 0.00155839*(t_F*t_F*t_F*t_F)*(u_F*u_F) +
+        0.00513046*(t_F*t_F*t_F*t_F)*(u_F*u_F*u_F*u_F*u_F) + 166.302*(u_F*u_F*u_F*u_F) - 162.134*u_F*u_F*u_F*u_F*z_F*z_F
+        - 429.543*u_F*u_F*u_F*u_F*z_F*z_F*z_F - 3.19737e-05*t_F*t_F*t_F*t_F*t_F*u_F*u_F -
+        0.000104206*t_F*t_F*t_F*t_F*t_F*u_F*u_F*u_F*u_F - 0.000601264*t_F*t_F*t_F*t_F*t_F*u_F*u_F*u_F*u_F*u_F*u_F -
+        279.441*u_F*u_F*u_F*u_F*u_F + 277.261*(u_F*u_F*u_F*u_F*u_F)*(z_F*z_F) +
+        180.761*(u_F*u_F*u_F*u_F*u_F)*(z_F*z_F*z_F) + 174.525*(u_F*u_F*u_F*u_F*u_F*u_F)
     )
-    return mu * rigid_F / ((3 / 20) * sqrt(2) * pi * mu * (X + 1) * exp(log_Q_F) + 1)
+    return mu*rigid_F/((3/20)*sqrt(2)*pi*mu*(X + 1)*exp(log_Q_F) + 1)
 
 
 def long_phi_A(X: FloatArray, mu: FloatArray) -> FloatArray:
     """Phi_A, long form: within 0.000718."""
-    w = 1 / (X + 3)
-    p_A = w * (
-        w
-        * (
-            w
-            * (
-                w * (w * (w * (w * (w * (283024.13 - 151141.2 * w) - 214699.54) + 83691.155) - 17683.969) + 2076.1419)
-                - 145.64022
-            )
-            - 3.8642267
-        )
-        - 6.0454312
+    w = 1/(X + 3)
+    p_A = (
+        w*(w*(w*(w*(w*(w*(w*(w*(283024.13 - 151141.2*w) - 214699.54) + 83691.155) - 17683.969) + 2076.1419) - 145.64022)
+        - 3.8642267) - 6.0454312)
     )
-    rigid_A = (1 / 2) * pi * (X + 3) ** 2 * exp(p_A)
-    u_A = 1 / (X + 3.0)
-    y_A = 0.5 * mu * (X + 3.0)
+    rigid_A = (1/2)*pi*(X + 3)**2*exp(p_A)
+    u_A = 1/(X + 3.0)
+    y_A = 0.5*mu*(X + 3.0)
     t_A = log(y_A + 1)
-    z_A = 1 / (sqrt(y_A) + 1)
-    v_A = log(3.0 * mu * sqrt(u_A) + 1)
+    z_A = 1/(sqrt(y_A) + 1)
+    v_A = log(3.0*mu*sqrt(u_A) + 1)
     log_Q_A = (
-        2.702999 * t_A * u_A
-        - 63.31776 * t_A * u_A * u_A * u_A
-        + 268.1615 * t_A * (u_A * u_A * u_A * u_A * u_A * u_A)
-        + 3.809611 * u_A * v_A
-        + 15.52818 * u_A * z_A
-        - 7.687747 * u_A
-        - 0.5328182 * u_A * t_A * t_A
-        - 0.7197839 * u_A * v_A * v_A
-        - 11.14794 * u_A * z_A * z_A
-        - 0.0263022 * u_A * t_A * t_A * t_A
-        + 0.08046351 * u_A * (v_A * v_A * v_A)
-        + 9.137597 * u_A * (z_A * z_A * z_A)
-        + 0.008110612 * u_A * (t_A * t_A * t_A * t_A)
-        - 0.01113995 * u_A * v_A * v_A * v_A * v_A
-        - 0.0002514788 * u_A * t_A * t_A * t_A * t_A * t_A
-        + 0.1158525 * v_A
-        - 4.095103 * v_A * u_A * u_A
-        - 0.2289378 * z_A
-        + 233.3311 * z_A * (u_A * u_A)
-        - 1411.913 * z_A * u_A * u_A * u_A
-        + 4693.561 * z_A * (u_A * u_A * u_A * u_A * u_A)
-        - 4.698431 * t_A * t_A * u_A * u_A * u_A
-        + 7.863849 * (t_A * t_A) * (u_A * u_A * u_A * u_A * u_A)
-        + 32.86004 * (t_A * t_A) * (u_A * u_A * u_A * u_A * u_A * u_A)
-        - 88.83575 * u_A * u_A
-        + 4.020746 * (u_A * u_A) * (v_A * v_A)
-        - 235.4572 * u_A * u_A * z_A * z_A
-        - 28.28981 * u_A * u_A * z_A * z_A * z_A
-        - 0.03251855 * u_A * u_A * v_A * v_A * v_A * v_A
-        + 0.03479262 * (v_A * v_A)
-        - 0.3867149 * z_A * z_A
-        + 605.9977 * (u_A * u_A * u_A)
-        + 2166.446 * (u_A * u_A * u_A) * (z_A * z_A)
-        - 570.3672 * u_A * u_A * u_A * z_A * z_A * z_A
-        - 0.00513524 * v_A * v_A * v_A
-        + 0.3401002 * (z_A * z_A * z_A)
-        + 0.5740654 * (t_A * t_A * t_A * t_A) * (u_A * u_A * u_A * u_A)
-        - 2.593164 * t_A * t_A * t_A * t_A * u_A * u_A * u_A * u_A * u_A * u_A
-        - 1270.736 * u_A * u_A * u_A * u_A
-        - 3979.136 * u_A * u_A * u_A * u_A * z_A * z_A
-        + 2330.272 * (u_A * u_A * u_A * u_A) * (z_A * z_A * z_A)
-        + 0.0002993666 * (v_A * v_A * v_A * v_A)
-        + 0.00288502 * (t_A * t_A * t_A * t_A * t_A) * (u_A * u_A)
-        - 0.01963705 * t_A * t_A * t_A * t_A * t_A * u_A * u_A * u_A * u_A
-        - 0.09416472 * t_A * t_A * t_A * t_A * t_A * u_A * u_A * u_A * u_A * u_A
-        + 0.3054986 * (t_A * t_A * t_A * t_A * t_A) * (u_A * u_A * u_A * u_A * u_A * u_A)
-        + 2873.193 * (u_A * u_A * u_A * u_A * u_A)
-        + 96.5359 * (u_A * u_A * u_A * u_A * u_A) * (z_A * z_A)
-        - 1849.622 * u_A * u_A * u_A * u_A * u_A * z_A * z_A * z_A
-        - 4654.55 * u_A * u_A * u_A * u_A * u_A * u_A
+        2.702999*t_A*u_A - 63.31776*t_A*u_A*u_A*u_A + 268.1615*t_A*(u_A*u_A*u_A*u_A*u_A*u_A) + 3.809611*u_A*v_A +
+        15.52818*u_A*z_A - 7.687747*u_A - 0.5328182*u_A*t_A*t_A - 0.7197839*u_A*v_A*v_A - 11.14794*u_A*z_A*z_A -
+        0.0263022*u_A*t_A*t_A*t_A + 0.08046351*u_A*(v_A*v_A*v_A) + 9.137597*u_A*(z_A*z_A*z_A) +
+        0.008110612*u_A*(t_A*t_A*t_A*t_A) - 0.01113995*u_A*v_A*v_A*v_A*v_A - 0.0002514788*u_A*t_A*t_A*t_A*t_A*t_A +
+        0.1158525*v_A - 4.095103*v_A*u_A*u_A - 0.2289378*z_A + 233.3311*z_A*(u_A*u_A) - 1411.913*z_A*u_A*u_A*u_A +
+        4693.561*z_A*(u_A*u_A*u_A*u_A*u_A) - 4.698431*t_A*t_A*u_A*u_A*u_A + 7.863849*(t_A*t_A)*(u_A*u_A*u_A*u_A*u_A) +
+        32.86004*(t_A*t_A)*(u_A*u_A*u_A*u_A*u_A*u_A) - 88.83575*u_A*u_A + 4.020746*(u_A*u_A)*(v_A*v_A) -
+        235.4572*u_A*u_A*z_A*z_A - 28.28981*u_A*u_A*z_A*z_A*z_A - 0.03251855*u_A*u_A*v_A*v_A*v_A*v_A +
+        0.03479262*(v_A*v_A) - 0.3867149*z_A*z_A + 605.9977*(u_A*u_A*u_A) + 2166.446*(u_A*u_A*u_A)*(z_A*z_A) -
+        570.3672*u_A*u_A*u_A*z_A*z_A*z_A - 0.00513524*v_A*v_A*v_A + 0.3401002*(z_A*z_A*z_A) +
+        0.5740654*(t_A*t_A*t_A*t_A)*(u_A*u_A*u_A*u_A) - 2.593164*t_A*t_A*t_A*t_A*u_A*u_A*u_A*u_A*u_A*u_A -
+        1270.736*u_A*u_A*u_A*u_A - 3979.136*u_A*u_A*u_A*u_A*z_A*z_A + 2330.272*(u_A*u_A*u_A*u_A)*(z_A*z_A*z_A) +
+        0.0002993666*(v_A*v_A*v_A*v_A) + 0.00288502*(t_A*t_A*t_A*t_A*t_A)*(u_A*u_A) -
+        0.01963705*t_A*t_A*t_A*t_A*t_A*u_A*u_A*u_A*u_A - 0.09416472*t_A*t_A*t_A*t_A*t_A*u_A*u_A*u_A*u_A*u_A +
+        0.3054986*(t_A*t_A*t_A*t_A*t_A)*(u_A*u_A*u_A*u_A*u_A*u_A) + 2873.193*(u_A*u_A*u_A*u_A*u_A) +
+        96.5359*(u_A*u_A*u_A*u_A*u_A)*(z_A*z_A) - 1849.622*u_A*u_A*u_A*u_A*u_A*z_A*z_A*z_A -
+        4654.55*u_A*u_A*u_A*u_A*u_A*u_A
     )
-    return rigid_A / (
-        (1 / 3) * 2 ** (1 / 3) * pi ** (2 / 3) * mu * (X + 1) * exp(log_Q_A) / (mu * (X + 1) + 1) ** (1 / 3) + 1
-    )
+    return rigid_A/((1/3)*2**(1/3)*pi**(2/3)*mu*(X + 1)*exp(log_Q_A)/(mu*(X + 1) + 1)**(1/3) + 1)
 
 
 def totals_force(
@@ -290,62 +171,26 @@ def totals_force(
 ) -> FloatArray:
     """Force over E* q0 h_rms, closed totals: within 0.0914."""
     r = -d_over_h_rms + h_max_over_h_rms
-    k = (9 / 4) * sqrt(-(zeta_1 ** (-2 * hurst)) + (3 / 2) ** (-2 * hurst))
-    t = (1 / 3) * log(r * zeta_1**hurst + 1) - 1
-    q = 1 / (r * zeta_1**hurst + 1)
+    k = (9/4)*sqrt(-zeta_1**(-2*hurst) + (3/2)**(-2*hurst))
+    t = (1/3)*log(r*zeta_1**hurst + 1) - 1
+    q = 1/(r*zeta_1**hurst + 1)
     b = r - 1
-    c = (4 / 3) * h_max_over_h_rms - 5
-    z = log(zeta_1) / log(10) - 2
-    y = -2 / 5 + 2 / sqrt(zeta_1)
-    h = 4 * hurst - 3
-    g = (1 / 4) * d_over_h_rms + 1 / 4
-    s = (d_over_h_rms + 0.3) / sqrt((d_over_h_rms + 0.3) ** 2 + 1)
+    c = (4/3)*h_max_over_h_rms - 5
+    z = log(zeta_1)/log(10) - 2
+    y = -2/5 + 2/sqrt(zeta_1)
+    h = 4*hurst - 3
+    g = (1/4)*d_over_h_rms + 1/4
+    s = (d_over_h_rms + 0.3)/sqrt((d_over_h_rms + 0.3)**2 + 1)
     near = (
-        0.3105 * b * c
-        + 0.2403 * b * h
-        + 3.627 * b * q * z
-        + 0.1749 * b * t
-        + 0.08666 * b * (c * c)
-        - 0.1915 * c * t
-        + 0.4031 * c * z
-        - 0.03842 * c * h * h
-        - 0.1778 * c * z * z
-        + 0.9723 * h * z
-        + 0.8637 * h
-        - 4.545 * q * t * z
-        - 4.687 * q
-        + 0.7681 * q * (b * b)
-        - 0.6165 * t * z
-        + 4.767 * t
-        - 0.2005 * t * b * b
-        + 4.603 * z
-        - 0.03224 * z * h * h
-        - 1 / 2 * (h_max_over_h_rms - 4 / 9 * r) ** 2
-        + (7 / 2) * log(r / (r * zeta_1**hurst + 1))
-        + 7.483
-        + 0.5735 * (b * b)
-        - 0.1559 * b * b * b
+        0.3105*b*c + 0.2403*b*h + 3.627*b*q*z + 0.1749*b*t + 0.08666*b*(c*c) - 0.1915*c*t + 0.4031*c*z - 0.03842*c*h*h -
+        0.1778*c*z*z + 0.9723*h*z + 0.8637*h - 4.545*q*t*z - 4.687*q + 0.7681*q*(b*b) - 0.6165*t*z + 4.767*t -
+        0.2005*t*b*b + 4.603*z - 0.03224*z*h*h - 1/2*(h_max_over_h_rms - 4/9*r)**2 + (7/2)*log(r/(r*zeta_1**hurst + 1))
+        + 7.483 + 0.5735*(b*b) - 0.1559*b*b*b
     )
     far = (
-        -0.2615 * g * h
-        - 2.778 * g * s * y
-        - 0.3851 * g * y * z
-        - 3.345 * g * y
-        - 2.445 * g
-        - 0.302 * h * s * z
-        - 0.3773 * h * z
-        - 0.4177 * h
-        - 0.2307 * h * s * s
-        - 0.2341 * h * s * s * s
-        - 1.221 * s
-        - 0.03253 * s * h * h
-        - 1.21 * y
-        + 0.684 * y * (s * s * s * s)
-        + 0.06386 * z * (h * h)
-        - 2.246
-        - 1 / 8 * (d_over_h_rms + sqrt(2 + d_over_h_rms * d_over_h_rms)) ** 2
-        - 0.603 * g * g * s * s
-        - 0.5746 * s * s * s * s * s * s
+        -0.2615*g*h - 2.778*g*s*y - 0.3851*g*y*z - 3.345*g*y - 2.445*g - 0.302*h*s*z - 0.3773*h*z - 0.4177*h -
+        0.2307*h*s*s - 0.2341*h*s*s*s - 1.221*s - 0.03253*s*h*h - 1.21*y + 0.684*y*(s*s*s*s) + 0.06386*z*(h*h) - 2.246 -
+        1/8*(d_over_h_rms + sqrt(2 + d_over_h_rms*d_over_h_rms))**2 - 0.603*g*g*s*s - 0.5746*s*s*s*s*s*s
     )
     log_total = where(k < r, far, near)
     return exp(log_total)
@@ -356,62 +201,26 @@ def totals_area(
 ) -> FloatArray:
     """A/A0, closed totals: within 0.0854."""
     r = -d_over_h_rms + h_max_over_h_rms
-    k = (9 / 4) * sqrt(-(zeta_1 ** (-2 * hurst)) + (3 / 2) ** (-2 * hurst))
-    t = (1 / 3) * log(r * zeta_1**hurst + 1) - 1
-    q = 1 / (r * zeta_1**hurst + 1)
+    k = (9/4)*sqrt(-zeta_1**(-2*hurst) + (3/2)**(-2*hurst))
+    t = (1/3)*log(r*zeta_1**hurst + 1) - 1
+    q = 1/(r*zeta_1**hurst + 1)
     b = r - 1
-    c = (4 / 3) * h_max_over_h_rms - 5
-    z = log(zeta_1) / log(10) - 2
-    y = -2 / 5 + 2 / sqrt(zeta_1)
-    h = 4 * hurst - 3
-    g = (1 / 4) * d_over_h_rms + 1 / 4
-    s = (d_over_h_rms + 0.3) / sqrt((d_over_h_rms + 0.3) ** 2 + 1)
+    c = (4/3)*h_max_over_h_rms - 5
+    z = log(zeta_1)/log(10) - 2
+    y = -2/5 + 2/sqrt(zeta_1)
+    h = 4*hurst - 3
+    g = (1/4)*d_over_h_rms + 1/4
+    s = (d_over_h_rms + 0.3)/sqrt((d_over_h_rms + 0.3)**2 + 1)
     near = (
-        0.3139 * b * c
-        + 0.3248 * b * h
-        + 4.948 * b * q * z
-        + 3.606 * b * q
-        + 0.09241 * b * t
-        + 0.0866 * b * (c * c)
-        - 0.08916 * c * h * t
-        - 0.1146 * c * t
-        + 0.3602 * c * z
-        - 0.007266 * c * h * h
-        + 1.634 * c * (q * q)
-        - 0.2085 * c * z * z
-        - 0.3741 * h * t
-        + 1.394 * h * z
-        + 1.481 * h
-        + 5.389 * q * z
-        + 2.055 * q * (b * b)
-        - 0.4094 * t * z
-        + 4.907 * t
-        + 3.501 * z
-        - 1 / 2 * (h_max_over_h_rms - 4 / 9 * r) ** 2
-        + (10 / 3) * log(r / (r * zeta_1**hurst + 1))
-        + 5.794
-        + 0.4585 * (b * b)
-        - 0.1734 * b * b * b
+        0.3139*b*c + 0.3248*b*h + 4.948*b*q*z + 3.606*b*q + 0.09241*b*t + 0.0866*b*(c*c) - 0.08916*c*h*t - 0.1146*c*t +
+        0.3602*c*z - 0.007266*c*h*h + 1.634*c*(q*q) - 0.2085*c*z*z - 0.3741*h*t + 1.394*h*z + 1.481*h + 5.389*q*z +
+        2.055*q*(b*b) - 0.4094*t*z + 4.907*t + 3.501*z - 1/2*(h_max_over_h_rms - 4/9*r)**2 +
+        (10/3)*log(r/(r*zeta_1**hurst + 1)) + 5.794 + 0.4585*(b*b) - 0.1734*b*b*b
     )
     far = (
-        0.88 * g * h
-        - 0.9555 * g * h * s * s
-        - 2.065 * g * s * y
-        - 2.627 * g * y
-        - 2.005 * g * s * s * s * s
-        - 0.2458 * h * s * z
-        - 0.3497 * h * s
-        - 0.1499 * h * y * z
-        + 0.04071 * h * z
-        - 0.1306 * h * s * s
-        + 0.05202 * s * z
-        - 1.942 * s
-        - 0.7223 * y
-        - 0.4359 * z
-        - 3.532
-        - 1 / 8 * (d_over_h_rms + sqrt(2 + d_over_h_rms * d_over_h_rms)) ** 2
-        - 0.1686 * g * g * h * h
-        - 0.4793 * g * g * s * s * s * s
+        0.88*g*h - 0.9555*g*h*s*s - 2.065*g*s*y - 2.627*g*y - 2.005*g*s*s*s*s - 0.2458*h*s*z - 0.3497*h*s - 0.1499*h*y*z
+        + 0.04071*h*z - 0.1306*h*s*s + 0.05202*s*z - 1.942*s - 0.7223*y - 0.4359*z - 3.532 - 1/8*(d_over_h_rms + sqrt(2
+        + d_over_h_rms*d_over_h_rms))**2 - 0.1686*g*g*h*h - 0.4793*g*g*s*s*s*s
     )
     log_total = where(k < r, far, near)
     return exp(log_total)
@@ -423,57 +232,27 @@ FUNCTIONS: dict[str, dict[str, Callable[..., FloatArray]]] = {
     "long": {"phi_F": long_phi_F, "phi_A": long_phi_A},
     "totals": {"force": totals_force, "area": totals_area},
 }
+
 RANGES: dict[str, dict[str, tuple[float, float]]] = {
     "pocket": {"X": (0.8, 25.0), "mu": (0.0, 2000.0)},
     "standard": {"X": (0.0, 25.0), "mu": (0.0, 2000.0)},
     "long": {"X": (0.0, 25.0), "mu": (0.0, 2000.0)},
-    "totals": {
-        "d_over_h_rms": (-4.5, 4.5),
-        "h_max_over_h_rms": (3.0, 4.5),
-        "zeta_1": (10.0, 1000.0),
-        "hurst": (0.5, 1.0),
-        "area": (1e-06, 1.0),
-    },
+    "totals": {"d_over_h_rms": (-4.5, 4.5), "h_max_over_h_rms": (3.0, 4.5), "zeta_1": (10.0, 1000.0), "hurst": (0.5,
+        1.0), "area": (1e-06, 1.0)},
 }
+
 CERTIFICATES: dict[str, dict[str, Certificate]] = {
-    "pocket": {
-        "phi_F": Certificate(
-            coefficients=8, largest=0.0371, median=0.00521, points=20000, worst_at={"X": 8.571, "mu": 30.85}
-        ),
-        "phi_A": Certificate(
-            coefficients=10, largest=0.0317, median=0.00305, points=20000, worst_at={"X": 0.8, "mu": 2000.0}
-        ),
-    },
-    "standard": {
-        "phi_F": Certificate(
-            coefficients=23, largest=0.00164, median=0.000384, points=20000, worst_at={"X": 0.0, "mu": 0.6372}
-        ),
-        "phi_A": Certificate(
-            coefficients=23, largest=0.00768, median=0.00201, points=20000, worst_at={"X": 6.16, "mu": 0.06695}
-        ),
-    },
-    "long": {
-        "phi_F": Certificate(
-            coefficients=43, largest=0.00054, median=0.000138, points=20000, worst_at={"X": 0.3042, "mu": 0.5951}
-        ),
-        "phi_A": Certificate(
-            coefficients=53, largest=0.000718, median=0.000205, points=20000, worst_at={"X": 8.683, "mu": 26.31}
-        ),
-    },
-    "totals": {
-        "force": Certificate(
-            coefficients=40,
-            largest=0.0914,
-            median=0.027,
-            points=48034,
-            worst_at={"d_over_h_rms": 3.109, "h_max_over_h_rms": 3.876, "zeta_1": 478.8, "hurst": 0.9911},
-        ),
-        "area": Certificate(
-            coefficients=40,
-            largest=0.0854,
-            median=0.0276,
-            points=48034,
-            worst_at={"d_over_h_rms": 3.358, "h_max_over_h_rms": 3.495, "zeta_1": 519.0, "hurst": 0.5},
-        ),
-    },
+    "pocket": {"phi_F": Certificate(coefficients=8, largest=0.0371, median=0.00521, points=20000, worst_at={"X": 8.571,
+        "mu": 30.85}), "phi_A": Certificate(coefficients=10, largest=0.0317, median=0.00305, points=20000,
+        worst_at={"X": 0.8, "mu": 2000.0})},
+    "standard": {"phi_F": Certificate(coefficients=23, largest=0.00164, median=0.000384, points=20000, worst_at={"X":
+        0.0, "mu": 0.6372}), "phi_A": Certificate(coefficients=23, largest=0.00768, median=0.00201, points=20000,
+        worst_at={"X": 6.16, "mu": 0.06695})},
+    "long": {"phi_F": Certificate(coefficients=43, largest=0.00054, median=0.000138, points=20000, worst_at={"X":
+        0.3042, "mu": 0.5951}), "phi_A": Certificate(coefficients=53, largest=0.000718, median=0.000205, points=20000,
+        worst_at={"X": 8.683, "mu": 26.31})},
+    "totals": {"force": Certificate(coefficients=40, largest=0.0914, median=0.027, points=48034,
+        worst_at={"d_over_h_rms": 3.109, "h_max_over_h_rms": 3.876, "zeta_1": 478.8, "hurst": 0.9911}), "area":
+        Certificate(coefficients=40, largest=0.0854, median=0.0276, points=48034, worst_at={"d_over_h_rms": 3.358,
+        "h_max_over_h_rms": 3.495, "zeta_1": 519.0, "hurst": 0.5})},
 }
