@@ -36,7 +36,7 @@ TESTS = 2  # points between two nodes of a sample line
 GROWTH = 1.05  # least factor by which an axis is refined
 ROUNDS = 4  # certificates tried before giving up
 AXIS_SHARE = 0.4  # of the target, for one axis alone; the errors of axes add up in part
-# least bound, of the islands' own accuracy: the middle of a four-dimensional cell tells less of the cell
+# smallest bound, in units of the islands' tolerance: the middle of a four-dimensional cell represents it less well
 LOCAL_FLOOR = {"universal": 0.3, "island4d": 0.8}
 LOCAL_FACTOR = 2.5  # bound over the largest error at the middles of the cells nearby
 CONFORMANCE_POINTS = 64
@@ -202,7 +202,7 @@ def certify(
     places = held_out(kind, axes, configuration.certificate_points, configuration.seed + 101)
     positions = [axis.position(x) for axis, x in zip(axes, places, strict=True)]
     if any((p == np.round(p)).any() for p in positions):
-        raise UncertifiedError(f"{configuration.kind}: a held-out point stands on a node")
+        raise UncertifiedError(f"{configuration.kind}: a held-out point lies on a node")
     X, mu = kind.arguments(*places)
     truth = solver.log_ratio("certificate", X, mu, rtol=rtol_for(configuration), refinement=2)
     errors = np.abs(np.expm1(evaluate(coefs, positions) - truth))

@@ -65,7 +65,7 @@ class ChunkedSolver:
         self.folder = folder
 
     def log_ratio(self, label: str, X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
-        """`log_ratio` of arrays of any one shape, shape (..., 2); `label` stands beside the progress bar.
+        """`log_ratio` of arrays of any one shape, shape (..., 2); `label` names the progress bar.
 
         Raises
         ------

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from generate.tables.build import ConformancePoints, UncertifiedError, evaluate
 from generate.tables.configuration import Configuration, make_axis
-from generate.tables.universal import RAREST, visited_surfaces
+from generate.tables.universal import MAX_DRAWS, visited_surfaces
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, band_fields, from_axes, hat_scales, to_axes
 from mbma_tables.islands.height_integrals import height_integral
@@ -82,7 +82,7 @@ class Island4d:
         kept = [np.empty(0)] * 4
         draw = 2 * count
         while kept[0].size < count:
-            if draw > RAREST * count:
+            if draw > MAX_DRAWS * count:
                 raise UncertifiedError("island4d: hardly a surface visits these axes, so there is nothing to certify")
             places, inside = self._visited(draw)
             kept = [place[inside] for place in places]

@@ -27,7 +27,7 @@ LOOKUP = (
     "error_F and error_A, as error_field says, bound the relative error of Phi_F and Phi_A",
 )
 VISITED = {"hurst": (0.05, 1.0), "log10_zeta_1": (0.4786, 8.0), "log10_approach": (-7.0, 1.0)}
-RAREST = 400  # islands drawn for each that a narrow table covers
+MAX_DRAWS = 400  # islands drawn for each that a narrow table covers
 
 
 def visited_surfaces(count: int, seed: int, ranges: dict[str, tuple[float, float]]) -> list[FloatArray]:
@@ -64,7 +64,7 @@ class Universal:
         X = mu = np.empty(0)
         draw = 4 * count
         while X.size < count:
-            if draw > RAREST * count:
+            if draw > MAX_DRAWS * count:
                 raise UncertifiedError("universal: hardly a surface visits these axes, so there is nothing to certify")
             hurst, zeta_1, approach = visited_surfaces(draw, self.configuration.seed + 7, VISITED)
             fields = [geometry(approach, hurst, zeta_1, reading) for reading in READINGS.values()]

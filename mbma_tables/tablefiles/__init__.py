@@ -1,1 +1,1 @@
-"""Table files: what stands in one, how it is written, opened and checked, and how it is interpolated."""
+"""Table files: what one holds, how it is written, opened, checked and interpolated."""

@@ -76,7 +76,7 @@ def test_a_held_out_point_on_a_node_is_refused(built, monkeypatch):
     places = held_out(kind, content.axes, 100, 11)
     places[0][3] = content.axes[0].low
     monkeypatch.setattr(build_module, "held_out", lambda *_: places)
-    with pytest.raises(UncertifiedError, match="a held-out point stands on a node"):
+    with pytest.raises(UncertifiedError, match="a held-out point lies on a node"):
         certify(kind, content.axes, content.coefficients, ChunkedSolver(), kind.configuration)
 
 
@@ -315,7 +315,7 @@ def test_a_table_that_is_not_finite_is_not_written(universal, monkeypatch):
 
 
 def test_axes_that_no_surface_visits(tmp_path, monkeypatch):
-    monkeypatch.setattr(island4d, "RAREST", 8)
+    monkeypatch.setattr(island4d, "MAX_DRAWS", 8)
     kind = KINDS["island4d"](load("island4d", small(tmp_path, "island4d")))
     monkeypatch.setattr(kind, "_visited", lambda draw: ([np.zeros(draw)] * 4, np.zeros(draw, dtype=bool)))
     with pytest.raises(UncertifiedError, match="hardly a surface visits these axes"):
