@@ -45,12 +45,11 @@ def solver():
     yield "profiles", (found.pressure, found.gap)
     coarse = basis(12)
     fine = basis(24)
-    parts = coarse.v, coarse.root_weights, coarse.modes, coarse.operator
     w, p = np.zeros(12), np.zeros(12)
-    steps, left = newton.newton_steps(1.0, 0.5, 16.0, parts[0], parts[1], parts[3], -1.0, w, p)
+    steps, left = newton.newton_steps(1.0, 0.5, 16.0, coarse, -1.0, w, p)
     yield "never content", (steps, math.isnan(left), *w, *p)
     start = np.ones(24)
-    steps = newton.coarse_start(1.0, 0.5, 16.0, parts, fine.modes, start)
+    steps = newton.coarse_start(1.0, 0.5, 16.0, coarse, fine.modes, start)
     yield "first guess", (steps, *start)
     for most, damping, stiffness in ((100, 0.3, 0.5), (3, 0.3, 0.5), (200, 0.9, 1e14)):
         used, converged, *phi = greenwood_tripp.solve_classical(5.0, stiffness, 12, damping, 1e-4, most)[:4]

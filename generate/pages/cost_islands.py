@@ -104,7 +104,7 @@ def newton_rows() -> Iterator[Row]:
     chosen = np.arange(0, ISLANDS, 4)
     X, mu = held.islands["X"][chosen], held.islands["mu"][chosen]
     ways: list[tuple[str, dict[str, Any]]] = [
-        (variant("island", rtol), {"rtol": max(0.1 * rtol, greenwood_tripp.TIGHTEST)}) for rtol in NEWTON_RTOLS
+        (variant("island", rtol), {"rtol": max(0.1 * rtol, greenwood_tripp.MIN_SOLVER_RTOL)}) for rtol in NEWTON_RTOLS
     ]
     ways += [(f"nodes={nodes}", {"rtol": 1e-11, "nodes": nodes}) for nodes in NEWTON_NODES]
     for name, options in ways:

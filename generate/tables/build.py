@@ -46,7 +46,7 @@ SOLVER_SHARE = 0.01
 
 def rtol_for(configuration: Configuration) -> float:
     """Accuracy of the islands that a table is made of: far below its target."""
-    return max(SOLVER_SHARE * configuration.target, greenwood_tripp.TIGHTEST)
+    return max(SOLVER_SHARE * configuration.target, greenwood_tripp.MIN_SOLVER_RTOL)
 
 
 class UncertifiedError(MbmaError):
@@ -232,7 +232,7 @@ def local_errors(
     corners = corners.reshape(-1, len(axes))
     positions = list((corners + 0.5).T)
     places = [axis.coordinate(p) for axis, p in zip(axes, positions, strict=True)]
-    rtol = max(0.1 * rtol_for(configuration), greenwood_tripp.TIGHTEST)
+    rtol = max(0.1 * rtol_for(configuration), greenwood_tripp.MIN_SOLVER_RTOL)
     truth = solver.log_ratio("local error", *kind.arguments(*places), rtol=rtol)
     error = np.abs(np.expm1(evaluate(coefs, positions) - truth))
     where = tuple(error_cell(a, c, p) for a, c, p in zip(axes, cells, positions, strict=True))
@@ -308,7 +308,7 @@ def _conformance(
     """Points to replay: arguments, the table's answers, the exact ones, and tolerances for both."""
     points = kind.conformance(held_out(kind, axes, CONFORMANCE_POINTS, configuration.seed + 303))
     positions = [axis.position(x) for axis, x in zip(axes, points.places, strict=True)]
-    solved = greenwood_tripp.solve(points.X, points.mu, rtol=greenwood_tripp.TIGHTEST)
+    solved = greenwood_tripp.solve(points.X, points.mu, rtol=greenwood_tripp.MIN_SOLVER_RTOL)
     table = points.scales * np.exp(evaluate(coefs, positions).T) * greenwood_tripp.rigid_sphere(points.X, points.mu)
     exact = points.scales * np.stack([solved.phi_F, solved.phi_A])
     stored = dict(points.arguments)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,8 +27,10 @@ from mbma_tables.islands.spectral import basis
 Method = Literal["newton", "classical"]
 
 LEVELS = np.array([*range(12, 64, 4), *range(64, 128, 8), *range(128, 256, 32), *range(256, 513, 64)])
-TIGHTEST = 1e-13
+MIN_SOLVER_RTOL = 1e-13
+MAX_NODES = {"newton": 1024, "classical": 2048}  # a few seconds for an island
 CLASSICAL_RINGS = 200
+BLOCK = 1 << 22  # islands times nodes^2 in one compiled call, well under a second, which no signal interrupts
 COARSE_NODES = 12  # of the first guess
 
 
@@ -91,8 +93,7 @@ class IslandSolution:
         return self._profiles[2]
 
 
-@dataclasses.dataclass
-class _Batch:
+class _Batch(NamedTuple):
     phi: FloatArray
     steps: NDArray[np.int64]
     rho: FloatArray
@@ -102,20 +103,25 @@ class _Batch:
 
 def _newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int, profiles: bool) -> _Batch:
     """All entries on one basis; profiles are empty unless asked for."""
-    b, c = basis(nodes), basis(COARSE_NODES)
-    coarse = (c.v, c.root_weights, c.modes, c.operator)
+    b = basis(nodes)
     phi = np.empty((X.size, 3))
     squared = np.empty(X.size)
     steps = np.empty(X.size, dtype=np.int64)
     w = np.empty((X.size if profiles else 1, nodes))
     p = np.empty_like(w)
-    solve_islands(X, mu, rtol, b.v, b.root_weights, b.modes, b.operator, coarse, phi, squared, steps, w, p)
+    block = max(1, BLOCK // nodes**2)
+    for start in range(0, X.size, block):
+        part = slice(start, start + block)
+        kept = part if profiles else slice(None)
+        solve_islands(
+            X[part], mu[part], rtol, b, basis(COARSE_NODES), phi[part], squared[part], steps[part], w[kept], p[kept]
+        )
     phi[:, 0] *= mu
     if not profiles:
         return _Batch(phi, steps, *(np.empty((0, nodes)),) * 3)
-    reach = squared[:, None] * b.v
-    gap = reach - X[:, None] + w / b.root_weights
-    return _Batch(phi, steps, np.sqrt(reach), mu[:, None] * p / b.root_weights, gap)
+    rho_squared = squared[:, None] * b.v
+    gap = rho_squared - X[:, None] + w / b.root_weights
+    return _Batch(phi, steps, np.sqrt(rho_squared), mu[:, None] * p / b.root_weights, gap)
 
 
 def rigid_sphere(X: FloatArray, mu: FloatArray) -> FloatArray:
@@ -199,7 +205,7 @@ def solve(
     rtol : float
         Relative error asked of phi_F and phi_A, at least 1e-13; it sets the node count.
     nodes : int, optional
-        Use this many Gauss nodes (or rings) instead; then `error` tells what they gave.
+        Use this many Gauss nodes (8 to 1024) or rings (to 2048) instead; then `error` says what accuracy they gave.
     method : {"newton", "classical"}
         Newton on the spectral discretisation, or the damped iteration of Greenwood and Tripp (1967) on
         `nodes` rings (200 if not given), whose mesh error `error` states and `rtol` does not control.
@@ -213,14 +219,25 @@ def solve(
     Raises
     ------
     InputError
-        NaN, infinite or empty input, a negative `mu`, an `rtol` outside [1e-13, 0.1].
+        NaN, infinite, masked or empty input, a negative `mu`, an `rtol` outside [1e-13, 0.1].
     ConvergenceError
         Where the accuracy was not reached; its `mask` says which entries, its `result` holds the rest.
+
+    Examples
+    --------
+    >>> from mbma_tables import greenwood_tripp
+    >>> found = greenwood_tripp.solve([2.0, 5.0], mu=1.0)
+    >>> found.phi_F.round(6), found.phi_A.round(6)
+    (array([2.079306, 7.917221]), array([ 3.675097, 12.208736]))
+    >>> bool((found.error < 1e-10).all())
+    True
     """
     approach, stiffness = finite_array("X", X), finite_array("mu", mu)
     require("mu", stiffness, stiffness >= 0, "at least 0")
-    rtol = number_in("rtol", rtol, TIGHTEST, 0.1)
-    nodes = None if nodes is None else whole_number_in("nodes", nodes, 8, 4096)
+    rtol = number_in("rtol", rtol, MIN_SOLVER_RTOL, 0.1)
+    if method not in MAX_NODES:
+        raise InputError(f"method must be 'newton' or 'classical', got {method!r}")
+    nodes = None if nodes is None else whole_number_in("nodes", nodes, 8, MAX_NODES[method])
     damping = number_in("damping", damping, 1e-6, 1.0)
     max_iterations = whole_number_in("max_iterations", max_iterations, 1, 10**9)
     shape = broadcast_shape(X=approach, mu=stiffness)
@@ -228,11 +245,8 @@ def solve(
     flat_mu = np.broadcast_to(stiffness, shape).ravel()
     if method == "newton":
         found = _solve_newton(flat_X, flat_mu, rtol, nodes)
-    elif method == "classical":
-        rings = nodes or CLASSICAL_RINGS
-        found = _solve_classical(flat_X, flat_mu, rtol, rings, damping, max_iterations)
     else:
-        raise InputError(f"method must be 'newton' or 'classical', got {method!r}")
+        found = _solve_classical(flat_X, flat_mu, rtol, nodes or CLASSICAL_RINGS, damping, max_iterations)
     result = IslandSolution(
         X=flat_X.reshape(shape),
         mu=flat_mu.reshape(shape),

@@ -1,9 +1,11 @@
 """Height integrals of Gaussian summits, F_n(x) = integral_x^inf (z - x)^n phi(z) dz.
 
 phi is the standard normal density; n = 1/2, 1, 3/2, 2, 5/2. Eqs. (36) and (38) of the paper are F_{3/2}
-and F_1; F_{5/2} and F_2 are their integrals over a rigid sphere. Each F_n is a handful of polynomial
-pieces (`generate/tables/height_coefficients.py`), accurate to 1e-13 relative for x <= 10 and to 5e-13 up to 37,
-where parabolic cylinder functions from scipy lose digits and end in NaN.
+and F_1; F_{5/2} and F_2 are their integrals over a rigid sphere.
+
+Each F_n is eight polynomial pieces (`generate/tables/height_coefficients.py`), accurate to 1e-13 relative for x <= 10
+and to 5e-13 up to 37. They are made here because scipy's parabolic cylinder functions lose five digits near x = -6 and
+seven near 6 and answer NaN at -100, and because compiled code calls them.
 """
 
 from __future__ import annotations
@@ -140,6 +142,12 @@ def height_integral(n: float, x: ArrayLike) -> Any:
     ------
     InputError
         If `n` is not one of `ORDERS` or `x` holds NaN or infinity.
+
+    Examples
+    --------
+    >>> from mbma_tables import height_integral
+    >>> height_integral(1.5, [-1.0, 0.0, 1.0]).round(6)
+    array([1.404597, 0.43002 , 0.075668])
     """
     if n not in ORDERS:
         raise InputError(f"n must be one of {ORDERS}, got {n!r}")

@@ -22,16 +22,17 @@ from mbma_tables.islands.height_integrals import (
     f_two,
     pressure_integrals,
 )
+from mbma_tables.islands.spectral import Basis
 
 MAX_STEPS = 200
 COARSE_TOLERANCE = 1e-4
-COARSE_GAIN = 1.5  # a rough solution first, where the basis is larger than its by this factor
+MIN_COARSE_RATIO = 1.5  # a rough solution first, where the basis is larger than its by this factor
 ROUNDING = 1e-14
 TINY = 1e-300
 NEGLIGIBLE = 1e-17  # a relative effect of the deformation below which the sphere is rigid
-WINDOW = 4  # neighbouring modes looked at together, for single ones may vanish
+MODES_TOGETHER = 4  # neighbouring modes of which the largest counts, for single ones may vanish
 
-_LOOSE = {"contract", "reassoc"}  # lets sums use vector instructions; order of summation only
+_VECTOR_SUMS = {"contract", "reassoc"}  # fastmath flags that change the order of summation only
 
 
 @njit(cache=True, error_model="numpy")
@@ -55,7 +56,7 @@ def extent_squared(X: float, mu: float, share: float) -> float:
     return high + X
 
 
-@njit(cache=True, fastmath=_LOOSE, error_model="numpy")
+@njit(cache=True, fastmath=_VECTOR_SUMS, error_model="numpy")
 def _dot(matrix: FloatArray, row: int, vector: FloatArray) -> float:
     total = 0.0
     for k in range(vector.size):
@@ -72,10 +73,10 @@ def _sum(values: FloatArray, root_weights: FloatArray) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _loudest(modes: FloatArray, vector: FloatArray, first: int) -> float:
-    """Largest of `WINDOW` Legendre coefficients from number `first` on."""
+def _largest_mode(modes: FloatArray, vector: FloatArray, first: int) -> float:
+    """Largest of `MODES_TOGETHER` Legendre coefficients from number `first` on."""
     largest = 0.0
-    for k in range(first, first + WINDOW):
+    for k in range(first, first + MODES_TOGETHER):
         largest = max(largest, abs(_dot(modes, k, vector)))
     return largest
 
@@ -84,12 +85,12 @@ def _loudest(modes: FloatArray, vector: FloatArray, first: int) -> float:
 def _unresolved(modes: FloatArray, vector: FloatArray, integral: float) -> float:
     """Relative error of a profile's Gauss sum: its modes beyond 2n, extrapolated from n/2 and n."""
     n = vector.size
-    last = _loudest(modes, vector, n - WINDOW)
-    middle = _loudest(modes, vector, n // 2 - WINDOW // 2)
+    last = _largest_mode(modes, vector, n - MODES_TOGETHER)
+    middle = _largest_mode(modes, vector, n // 2 - MODES_TOGETHER // 2)
     return last * min(1.0, (last / max(middle, TINY)) ** 2) / integral
 
 
-@njit(cache=True, fastmath=_LOOSE, error_model="numpy")
+@njit(cache=True, fastmath=_VECTOR_SUMS, error_model="numpy")
 def _cholesky_solve(matrix: FloatArray, vector: FloatArray) -> None:
     """Overwrite `vector` with the solution and the lower triangle of `matrix` with its factor."""
     n = vector.size
@@ -121,9 +122,7 @@ def newton_steps(
     X: float,
     mu: float,
     squared: float,
-    v: FloatArray,
-    root_weights: FloatArray,
-    operator: FloatArray,
+    basis: Basis,
     tolerance: float,
     w: FloatArray,
     p: FloatArray,
@@ -133,6 +132,7 @@ def newton_steps(
     `p` receives pressure/mu times root_weights. Returns the number of steps and the error that the last
     step leaves, the square of its relative change of pressure; NaN where `MAX_STEPS` did not suffice.
     """
+    v, root_weights, operator = basis.v, basis.root_weights, basis.operator
     n = v.size
     a = math.sqrt(squared)
     matrix = np.empty((n, n))
@@ -178,20 +178,19 @@ def coarse_start(
     X: float,
     mu: float,
     squared: float,
-    coarse: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    coarse: Basis,
     modes: FloatArray,
     w: FloatArray,
 ) -> int:
     """Fill `w` with a rough solution on few nodes, carried over by its Legendre modes; returns its steps."""
-    v, root_weights, coarse_modes, operator = coarse
-    few = v.size
+    few = coarse.v.size
     rough = np.zeros(few)
     pressure = np.zeros(few)
-    used, left = newton_steps(X, mu, squared, v, root_weights, operator, COARSE_TOLERANCE, rough, pressure)
+    used, left = newton_steps(X, mu, squared, coarse, COARSE_TOLERANCE, rough, pressure)
     w[:] = 0.0
     if left <= COARSE_TOLERANCE:
         for k in range(few):
-            mode = _dot(coarse_modes, k, rough)
+            mode = _dot(coarse.modes, k, rough)
             for i in range(w.size):
                 w[i] += mode * modes[k, i]
     return used
@@ -202,11 +201,8 @@ def solve_islands(
     X: FloatArray,
     mu: FloatArray,
     rtol: float,
-    v: FloatArray,
-    root_weights: FloatArray,
-    modes: FloatArray,
-    operator: FloatArray,
-    coarse: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    basis: Basis,
+    coarse: Basis,
     phi: FloatArray,
     extent: FloatArray,
     steps: NDArray[np.int64],
@@ -217,8 +213,10 @@ def solve_islands(
 
     `phi` (entries, 3) receives Phi_F/mu, Phi_A and an estimate of their relative error, NaN where Newton
     failed; `coarse` is the small basis of the first guess, `extent` receives the squared radius a^2. `w` and
-    `p` (entries or 1, nodes) receive the last profiles, times root_weights.
+    `p` (entries or 1, nodes) receive the last profiles, times root_weights. Begins with the rigid sphere, whose
+    Phi_F/mu = pi F_{5/2}(-X)/5 and Phi_A = pi F_2(-X)/2 are the limits as mu goes to 0.
     """
+    v, root_weights, modes = basis.v, basis.root_weights, basis.modes
     n = v.size
     covered = np.empty(n)
     for entry in range(X.size):
@@ -237,10 +235,10 @@ def solve_islands(
             for i in range(n):
                 pi[i] = 0.5 * f_three_halves(squared * v[i] - X[entry]) * root_weights[i]
             continue
-        if n >= COARSE_GAIN * coarse[0].size:
+        if n >= MIN_COARSE_RATIO * coarse.v.size:
             steps[entry] += coarse_start(X[entry], mu[entry], squared, coarse, modes, wi)
         while True:
-            used, left = newton_steps(X[entry], mu[entry], squared, v, root_weights, operator, 0.01 * rtol, wi, pi)
+            used, left = newton_steps(X[entry], mu[entry], squared, basis, 0.01 * rtol, wi, pi)
             steps[entry] += used
             for i in range(n):
                 gap = squared * v[i] - X[entry] + wi[i] / root_weights[i]

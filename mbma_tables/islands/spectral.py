@@ -10,8 +10,8 @@ is therefore rational, symmetric and positive definite:
 
 from __future__ import annotations
 
-import dataclasses
 import functools
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -19,8 +19,7 @@ from numpy.polynomial import legendre
 from mbma_tables.arguments import FloatArray
 
 
-@dataclasses.dataclass(frozen=True)
-class Basis:
+class Basis(NamedTuple):
     """Gauss nodes on [0, 1] and the half-space operator in them, for one node count.
 
     Attributes
@@ -44,8 +43,9 @@ class Basis:
 def gauss_legendre(n: int) -> tuple[FloatArray, FloatArray]:
     """Gauss nodes and weights on [0, 1], relative accuracy of a few n eps at the ends too.
 
-    The usual libraries form 1 - x^2 from a rounded x and lose up to five digits of the end weights.
-    Here t = 1 - x is the unknown and the recurrence runs over differences of Legendre polynomials.
+    Made here because numpy and scipy form 1 - x^2 from a rounded x and lose up to five digits of the end weights,
+    which the pressure at an island's edge needs. Here t = 1 - x is the unknown and the recurrence runs over differences
+    of Legendre polynomials.
     """
     theta = np.pi * (4 * np.arange(1, (n + 1) // 2 + 1) - 1) / (4 * n + 2)
     t = 2 * np.sin(theta / 2) ** 2
@@ -85,6 +85,6 @@ def basis(nodes: int) -> Basis:
     half = np.einsum("ki,kl->il", modes, galerkin)
     operator = np.einsum("il,lj->ij", half, modes)
     made = Basis(v, root_weights, modes, (operator + operator.T) / 2)
-    for array in (made.v, made.root_weights, made.modes, made.operator):
+    for array in made:
         array.setflags(write=False)
     return made

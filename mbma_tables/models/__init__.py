@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mbma_tables.arguments import number_in
 from mbma_tables.errors import InputError
-from mbma_tables.islands.greenwood_tripp import TIGHTEST
+from mbma_tables.islands.greenwood_tripp import MIN_SOLVER_RTOL
 from mbma_tables.models.exact import ExactModel, RigidModel
 from mbma_tables.models.protocol import (
     MAX_RTOL,
@@ -36,7 +36,7 @@ TIERS = ("exact", "universal", "island4d", "formula", "rigid")
 
 def exact_model(rtol: float) -> ExactModel:
     """The exact solver, accurate enough for totals at `rtol`."""
-    return ExactModel(max(0.1 * rtol, TIGHTEST))
+    return ExactModel(max(0.1 * rtol, MIN_SOLVER_RTOL))
 
 
 def tier_name(tier: str | AnyModel) -> str:

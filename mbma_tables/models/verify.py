@@ -58,7 +58,7 @@ def _replay(content: TableContent) -> tuple[FloatArray, FloatArray]:
         X, mu = place.X, place.mu
         scales = np.stack(hat_scales(place.spread, zeta_d, hurst, place.sigma, model.reading))
         table = np.stack([found.F_hat, found.A_hat])
-    solved = greenwood_tripp.solve(X, mu, rtol=greenwood_tripp.TIGHTEST)
+    solved = greenwood_tripp.solve(X, mu, rtol=greenwood_tripp.MIN_SOLVER_RTOL)
     return table, scales * np.stack([solved.phi_F, solved.phi_A])
 
 

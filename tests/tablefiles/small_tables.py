@@ -77,7 +77,7 @@ def _conformance(kind, axes, coefs):
         scales = np.stack(hat_scales(found.spread, zeta_d, hurst, found.sigma, REPORTED))
         tolerance = 1e-11 + 1e-15 * (1 + X) / found.sigma
     positions = [axis.position(x) for axis, x in zip(axes, places, strict=True)]
-    exact = greenwood_tripp.solve(X, mu, rtol=greenwood_tripp.TIGHTEST)
+    exact = greenwood_tripp.solve(X, mu, rtol=greenwood_tripp.MIN_SOLVER_RTOL)
     own = scales * np.exp(at_positions(coefs, positions)) * greenwood_tripp.rigid_sphere(X, mu)
     given |= dict(zip([f"table_{f}" for f in FUNCTIONS], own, strict=True))
     given |= dict(zip([f"exact_{f}" for f in FUNCTIONS], scales * [exact.phi_F, exact.phi_A], strict=True))
