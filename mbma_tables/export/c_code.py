@@ -21,8 +21,8 @@ from mbma_tables.islands import height_integrals as heights
 from mbma_tables.models import closed_form_functions, universal_kernel
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces import spectrum
-from mbma_tables.surfaces.moments import MAX_ZETA_1, MIN_ZETA_1
 from mbma_tables.surfaces.readings import Reading
+from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
 from mbma_tables.totals import gauss_kronrod, intervals, island_sum, kernel
 
 COMMENT_WIDTH = 108

@@ -11,27 +11,34 @@ their digits when both ends run into zeta_1, that is when delta goes to 0.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import njit
+from mbma_tables.surfaces.readings import ReadingNumbers
 from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, alpha_of, m0_of, m4_of, summit_rate
 
-FIELDS = (
-    "zeta_d",
-    "zeta_u",
-    "R_d",
-    "R_u",
-    "D",
-    "sigma",
-    "h_d",
-    "h_u",
-    "eta",
-    "X",
-    "mu",
-    "D_d",
-    "sigma_d",
-    "width",
-)
+
+class IslandGeometry(NamedTuple):
+    """One island in units of s and 1/q0, with the equation of each number."""
+
+    zeta_d: float  # (27)
+    zeta_u: float  # (30)
+    R_d: float  # (26)
+    R_u: float  # (29)
+    D: float  # (32)
+    sigma: float  # (32)
+    h_d: float  # (B.3)
+    h_u: float  # (B.12)
+    eta: float  # (39)
+    X: float  # (h_rms/s delta/h_rms - h_d)/sigma
+    mu: float  # 8/3 D sigma sqrt(2 R_u R_d)
+    D_d: float  # (43)
+    sigma_d: float  # (43)
+    width: float  # log(zeta_u/zeta_d)
+
+
+FIELDS = IslandGeometry._fields
 
 
 @njit(cache=True, error_model="numpy")
@@ -58,20 +65,15 @@ def island_fields(
     approach: float,
     hurst: float,
     zeta_1: float,
-    reading: tuple[float, float, float, float, float, bool, bool],
-) -> tuple[float, float, float, float, float, float, float, float, float, float, float, float, float, float]:
-    """`FIELDS` of the island at delta = approach * h_rms, in units of s and 1/q0.
-
-    `reading` is `Reading.numbers`. Equations: zeta_d (27), zeta_u (30), R_d (26), R_u (29), D and sigma (32),
-    h_d (B.3), h_u (B.12), eta (39), D_d and sigma_d (43); width is log(zeta_u/zeta_d).
-    """
+    reading: ReadingNumbers,
+) -> IslandGeometry:
+    """The island at delta = approach * h_rms."""
     divisor, beta, phi, floor_d, floor_u, offset, summits = reading
     log_zeta_1 = math.log(zeta_1)
     e = math.exp(-2.0 * hurst * log_zeta_1)
-    # delta/s = approach * sqrt(1 - e)
-    room = math.sqrt(-math.expm1(-2.0 * hurst * log_zeta_1))
+    h_rms = math.sqrt(-math.expm1(-2.0 * hurst * log_zeta_1))  # over s, sqrt(1 - e)
     root_a = 4.0 / 3.0 * beta * approach
-    root_b = phi / (1.0 + phi) * room * approach
+    root_b = phi / (1.0 + phi) * h_rms * approach
     a = root_a * root_a
     b = root_b * root_b
     top_a = floor_offset(hurst, zeta_1, floor_d)
@@ -107,9 +109,9 @@ def island_fields(
     R_top = RADIUS / math.sqrt(m4_all)
     eta = 0.75 * (math.pi * D_top) ** (1.0 / 3.0) * (1.5 * R_top) ** (2.0 / 3.0) * (root_b / (phi * R_u)) ** (1.0 / 3.0)
     h_d = root_a if offset else 0.0
-    X = (room * approach - h_d) / sigma
+    X = (h_rms * approach - h_d) / sigma
     mu = 8.0 / 3.0 * D * sigma * math.sqrt(2.0 * R_u * R_d)
-    return zeta_d, zeta_u, R_d, R_u, D, sigma, h_d, root_b, eta, X, mu, D_d, sigma_d, width
+    return IslandGeometry(zeta_d, zeta_u, R_d, R_u, D, sigma, h_d, root_b, eta, X, mu, D_d, sigma_d, width)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -117,11 +119,11 @@ def fill_islands(
     approach: FloatArray,
     hurst: FloatArray,
     zeta_1: FloatArray,
-    reading: tuple[float, float, float, float, float, bool, bool],
+    reading: ReadingNumbers,
     out: FloatArray,
 ) -> None:
-    """`island_fields` of each entry into the columns of `out` (14, entries)."""
+    """`island_fields` of each entry into the columns of `out` (fields, entries)."""
     for k in range(approach.size):
         fields = island_fields(approach[k], hurst[k], zeta_1[k], reading)
-        for column in range(14):
+        for column in range(len(fields)):
             out[column, k] = fields[column]

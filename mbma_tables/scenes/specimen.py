@@ -61,7 +61,7 @@ def _printable(path: pathlib.Path) -> str:
 def from_numbers(given: Mapping[str, Any], title: str = "surface given by numbers") -> Specimen:
     """The surface with one complete set of numbers."""
     from mbma_tables.arguments import require
-    from mbma_tables.surfaces.moments import MIN_ZETA_1
+    from mbma_tables.surfaces.spectrum import MIN_ZETA_1
     from mbma_tables.surfaces.surface import Surface
 
     if set(given) not in (set(BAND), set(MAGNIFICATION), set(MOMENTS)):

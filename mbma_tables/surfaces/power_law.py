@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from scipy.special import betaincc
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.surfaces.moments import MIN_ZETA_1
+from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 
 BINS_PER_DECADE = 20  # 12% wide: a break is placed to that, a dense spectrum still averages many entries
 MIN_POINTS = 6  # two make the line, four judge it

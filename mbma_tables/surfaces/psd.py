@@ -12,7 +12,6 @@ from scipy.special import beta
 
 from mbma_tables.arguments import FloatArray, finite_array, require
 from mbma_tables.errors import InputError, NotSelfAffineError
-from mbma_tables.surfaces.moments import MIN_ZETA_1
 from mbma_tables.surfaces.power_law import (
     HURST_TOLERANCE,
     MIN_PIECE,
@@ -24,6 +23,7 @@ from mbma_tables.surfaces.power_law import (
     log_bins,
     with_end_of_profile,
 )
+from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 
 CONVENTIONS = ("paper", "isotropic", "profile")
 MIN_LENGTH, MAX_LENGTH = 1e-30, 1e30  # lengths in their unit: fourth powers of them, which C has, keep their digits

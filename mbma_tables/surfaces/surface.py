@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import broadcast_shape, finite_array, is_labelled, require
-from mbma_tables.surfaces import moments, spectrum
+from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.cases import get_case
 
 if TYPE_CHECKING:
@@ -82,9 +82,9 @@ class Surface:
             object.__setattr__(self, name, kept[()])
         zeta_1 = np.asarray(self.zeta_1)
         require(
-            "q1/q0", zeta_1, zeta_1 > moments.MIN_ZETA_1, "greater than 3 (the floors of zeta_d and zeta_u lie below)"
+            "q1/q0", zeta_1, zeta_1 > spectrum.MIN_ZETA_1, "greater than 3 (the floors of zeta_d and zeta_u lie below)"
         )
-        require("q1/q0", zeta_1, zeta_1 <= moments.MAX_ZETA_1, "at most 1e8")
+        require("q1/q0", zeta_1, zeta_1 <= spectrum.MAX_ZETA_1, "at most 1e8")
 
     def __repr__(self) -> str:
         return f"Surface({', '.join(f'{name}={_shown(getattr(self, name))}' for name in PARAMETERS)})"
@@ -121,7 +121,7 @@ class Surface:
         >>> print(f"zeta_1 = {road.zeta_1:.4f}, q0 = {road.q0:.6f}")
         zeta_1 = 64.8598, q0 = 0.538132
         """
-        return cls(hurst, *moments.band_from_moments(hurst, m0, m2, m4), h_max)
+        return cls(hurst, *spectrum.band_from_moments(hurst, m0, m2, m4), h_max)
 
     @classmethod
     def named(cls, name: str) -> Surface:
