@@ -36,7 +36,7 @@ RINGS = (25, 50, 100, 200, 400, 800, 1600)
 TARGETS = (1e-3, 1e-4, 1e-5, 1e-6)
 SAMPLES = 12  # islands on which the two methods are compared
 DAMPING = 0.3
-MOST_MU = 1e6  # beyond what the model visits at H >= 0.1 and zeta_1 <= 1e6
+MAX_MU = 1e6  # beyond what the model visits at H >= 0.1 and zeta_1 <= 1e6
 
 
 def seconds(run: Callable[[], Any], repeats: int = 5) -> float:
@@ -147,7 +147,7 @@ def divergence() -> None:
     for X in (0.0, 2.0, 5.0, 10.0, 20.0):
         row = []
         for damping in dampings:
-            low, high = math.log(1e-4), math.log(MOST_MU)
+            low, high = math.log(1e-4), math.log(MAX_MU)
             while high - low > 0.01:
                 middle = (low + high) / 2
                 good = classical_run(
@@ -159,7 +159,7 @@ def divergence() -> None:
                     round(100 / damping),
                 )[0][0]
                 low, high = (middle, high) if good else (low, middle)
-            row.append(f"{math.exp(low):.2g}" if high < math.log(MOST_MU) else f"over {MOST_MU:.0e}")
+            row.append(f"{math.exp(low):.2g}" if high < math.log(MAX_MU) else f"over {MAX_MU:.0e}")
         print(f"  {X:5g} " + "".join(f"  {value:>13}" for value in row))
 
 

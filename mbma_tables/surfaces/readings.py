@@ -33,7 +33,7 @@ class Reading:
     Attributes
     ----------
     name : str
-        Stands in every result that it made.
+        Every result says by it which reading made it.
     density_divisor : float
         Summit density is m4/(density_divisor m2), wherever one enters (Eqs. 2, 32, 39, 43a).
     jacobian : {"printed", "exact"}
@@ -47,7 +47,21 @@ class Reading:
     phi : float
         Roughness over Hertz deformation below which roughness does not matter (28).
     floor_d, floor_u : float
-        Least zeta_d (27a) and zeta_u (30a).
+        Smallest zeta_d (27a) and zeta_u (30a).
+
+    Raises
+    ------
+    InputError
+        For numbers without meaning in the model.
+
+    Examples
+    --------
+    >>> import dataclasses
+    >>> from mbma_tables import Surface, contact
+    >>> from mbma_tables.surfaces.readings import PRINTED
+    >>> flat = dataclasses.replace(PRINTED, name="no offset", offset=False)
+    >>> contact(Surface.named("concrete"), 0.6, reading=flat).reading
+    'no offset'
     """
 
     name: str
