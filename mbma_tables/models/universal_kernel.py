@@ -86,7 +86,7 @@ def _rigid_slopes(X: float) -> tuple[float, float]:
     return _polynomial(_THREE_HALVES[piece], t) * (math.sqrt(base) * common), _polynomial(_ONE[piece], t) * common
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _error_at(place_X: float, place_mu: float, table: Table) -> float:
     """Bound on the error in the cell of a position."""
     errors, axes = table.errors, table.axes
@@ -111,7 +111,7 @@ def _place(X: float, mu: float, axes: Axes) -> tuple[int, float, float, float]:
     return OK, place_X, (math.log(inside) - axes.mu_start) * axes.mu_rate, mu / inside
 
 
-@njit(cache=True, fastmath=REORDER, error_model="numpy")
+@njit(cache=True, fastmath=REORDER, error_model="numpy", forceinline=True)
 def universal_phi(X: float, mu: float, table: Table) -> tuple[int, float, float, float]:
     """Status, Phi_F, Phi_A and the bound on their relative error at (X, mu)."""
     status, place_X, place_mu, share = _place(X, mu, table.axes)
@@ -124,7 +124,7 @@ def universal_phi(X: float, mu: float, table: Table) -> tuple[int, float, float,
     return OK, phi_F, phi_A, _error_at(place_X, place_mu, table)
 
 
-@njit(cache=True, fastmath=REORDER, error_model="numpy")
+@njit(cache=True, fastmath=REORDER, error_model="numpy", forceinline=True)
 def universal_one(which: int, X: float, mu: float, table: Table) -> tuple[int, float, float]:
     """Status, Phi_F (`which` = 0) or Phi_A (1) alone, and the bound on its relative error."""
     status, place_X, place_mu, share = _place(X, mu, table.axes)
@@ -155,7 +155,7 @@ class Slopes(NamedTuple):
     error: float
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def universal_slopes(X: float, mu: float, table: Table) -> Slopes:
     """Phi_F and d log Phi_F by X and by log(mu), the same of Phi_A, and the bound on the relative error."""
     axes = table.axes

@@ -104,8 +104,8 @@ def refine(
     """Integrate over [0, compression] to `rtol`; status, bound on the relative error, islands evaluated.
 
     ``rule(which, low, high, floor_d, floor_u, compression, peak, surface, near, table, part)`` puts its Kronrod sums
-    into `part`, shaped like `out`: a row for force and one for area, whose first column is the integral. It returns
-    a status, the relative error of the sums, that of the table, and the nodes.
+    into `part`, shaped like `out`: a row for force and one for area, whose first column is the integral with K1. It
+    returns a status, the relative error of the sums, that of the table, and the nodes.
     """
     islands = 0
     bounds = np.empty((MAX_INTERVALS, 2))
@@ -126,8 +126,6 @@ def refine(
                 islands += nodes
                 if status != OK:
                     return status, math.nan, islands
-                if not floors[k, 0]:
-                    parts[k] *= surface.jacobian
                 table_error = max(table_error, own_error)
                 fresh[k] = False
             force += parts[k, 0, 0]
@@ -146,9 +144,12 @@ def refine(
                 halve(k, count, bounds, floors)
                 fresh[k] = True
                 count += 1
-    out[:] = 0.0
-    for k in range(count):
-        out += parts[k]
+    for row in range(2):
+        for column in range(out.shape[1]):
+            total = 0.0
+            for k in range(count):
+                total += parts[k, row, column]
+            out[row, column] = total
     if empty:
         return OK, 0.0, islands
     return OK, max(force_error / force, area_error / area) + table_error, islands

@@ -208,7 +208,8 @@ def _rule(
         gauss_force += gauss[k] * f
         gauss_area += gauss[k] * g
         table_error = max(table_error, error)
-    part[0, 0], part[1, 0] = force, area
+    K1 = 1.0 if floor_d else surface.jacobian
+    part[0, 0], part[1, 0] = K1 * force, K1 * area
     if not (force > 0.0 and area > 0.0):
         return OK, 0.0, table_error, nodes.size
     return OK, error_of(force, gauss_force, area, gauss_area), table_error, nodes.size

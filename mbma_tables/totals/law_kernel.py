@@ -75,7 +75,7 @@ def _residue(which: int, depth: float, law: Law) -> float:
     return _value(law.pieces, piece, which, (2.0 * tau - a - b) / (b - a))
 
 
-@njit(cache=True, fastmath=CONTRACT, error_model="numpy")
+@njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
 def _direct(which: int, depth: float, law: Law) -> float:
     """Force or area at depth > 0."""
     value = _lead(which, depth) * math.exp(_residue(which, depth, law))
@@ -129,7 +129,10 @@ def _evaluate(what: int, d: float, law: Law) -> float:
 @njit(cache=True, error_model="numpy")
 def evaluate(what: int, d: float, law: Any) -> float:
     """`_evaluate` of a law as a plain tuple."""
-    return _evaluate(what, d, Law(*law))
+    own = Law(*law)
+    if what == FORCE and d < own.h_max:
+        return _direct(FORCE, own.h_max - d, own)
+    return _evaluate(what, d, own)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -210,28 +213,34 @@ def turning_point(which: int, law: Law, samples: int) -> float | None:
     return None
 
 
+@njit(cache=True, error_model="numpy")
+def _log_value(which: int, depth: float, law: Law) -> float:
+    """Logarithm of force or area, which may be too small for a number."""
+    lead = 3.5 * math.log(depth) + math.log(law.E_star) if which == 0 else 10.0 / 3.0 * math.log(depth)
+    return lead + _residue(which, depth, law)
+
+
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _log_ratio(which: int, depth: float, wanted: float, law: Law) -> float:
-    """log of force or area over the wanted value, where either may be next to nothing."""
+    """log of force or area over the wanted value."""
     value = _direct(which, depth, law)
     if value > SMALL and wanted > SMALL:
         return math.log(value / wanted)
-    lead = 3.5 * math.log(depth) + math.log(law.E_star) if which == 0 else 10.0 / 3.0 * math.log(depth)
-    return lead + _residue(which, depth, law) - math.log(wanted)
+    return _log_value(which, depth, law) - math.log(wanted)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def invert(which: int, wanted: FloatArray, end: float, law: Law, out: FloatArray) -> None:
     """Gaps at which force (which = 0) or area (1) takes the wanted values, down to `end`; NaN where not found."""
     deepest = law.h_max - end
+    log_deepest = _log_value(which, deepest, law)
     for k in range(wanted.size):
         if wanted[k] == 0.0:
             out[k] = law.h_max
             continue
         low, high = 0.0, deepest
         # the power law from the end as first guess
-        power = 2.0 / 7.0 if which == 0 else 0.3
-        depth = deepest * math.exp(-power * _log_ratio(which, deepest, wanted[k], law))
+        depth = deepest * math.exp((math.log(wanted[k]) - log_deepest) * (2.0 / 7.0 if which == 0 else 0.3))
         allowed = math.inf
         out[k] = math.nan
         for _ in range(INVERSE_STEPS):

@@ -142,11 +142,13 @@ def _rule(
             part[0, BY_HURST + number] += f * by_F * rate
             part[1, BY_HURST + number] += g * (by_A * rate + (near.log_eta[number] if floor_u else 0.0))
     part[:, BY_PEAK] = -part[:, BY_COMPRESSION]
+    error = 0.0
+    if part[0, 0] > 0.0 and part[1, 0] > 0.0:
+        error = error_of(part[0, 0], gauss_force, part[1, 0], gauss_area)
     if not floor_d:
+        part *= surface.jacobian
         part[:, BELOW_KINK] = part[:, 0]
-    if not (part[0, 0] > 0.0 and part[1, 0] > 0.0):
-        return OK, 0.0, table_error, nodes.size
-    return OK, error_of(part[0, 0], gauss_force, part[1, 0], gauss_area), table_error, nodes.size
+    return OK, error, table_error, nodes.size
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
