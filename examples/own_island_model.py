@@ -8,6 +8,7 @@ from __future__ import annotations
 import pathlib
 import sys
 
+import click
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,11 +49,12 @@ def main(table_file: pathlib.Path) -> None:
         found = contact(surface, gaps, tier=model, rtol=1e-6)
         law = contact_law(surface, tier=model, rtol=1e-6)
         one = island(surface, 0.01, tier=model)
-        print(f"{name}, which results call {found.tier!r}")
-        print("  F/F_exact - 1 of totals:", " ".join(f"{ratio:.1e}" for ratio in found.force / exact.force - 1))
-        print("  the bounds that it states:", " ".join(f"{bound:.1e}" for bound in found.error))
-        print(f"  its law's force over the total's at {gaps[0]} um: {law.force(gaps[0]) / found.force[0]:.6f}")
-        print(f"  force of an island pressed by 0.01 um: {one.force:.4g} E* um^2")
+        off = ", ".join(f"{ratio:.1e}" for ratio in found.force / exact.force - 1)
+        bounds = ", ".join(f"{bound:.1e}" for bound in found.error)
+        click.echo(f"{name}, which results call {found.tier!r}")
+        click.echo(f"  F/F_exact - 1 of totals {off}, where the model states {bounds}")
+        click.echo(f"  force by its law over force by its total: {law.force(gaps[0]) / found.force[0]:.6f}")
+        click.echo(f"  force of an island pressed by 0.01 um: {one.force:.4g} E* um^2")
 
 
 if __name__ == "__main__":

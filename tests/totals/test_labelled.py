@@ -230,12 +230,19 @@ def test_islands_of_labelled_surfaces_are_lazy_and_the_same():
         np.testing.assert_array_equal(found, getattr(plain, name))
 
 
-def test_one_quantity_of_labelled_surfaces():
-    gaps = xr.DataArray([0.5, 1.0], dims="gap")
-    surface = Surface(0.8, 1.0, 100.0, 1.0, 3.0)
-    alone = contact(surface, gaps, quantities=["area"])
-    assert alone.force is None
-    np.testing.assert_array_equal(alone.area, contact(surface, gaps.values, quantities=["area"]).area)
+LABELLED = Surface(xr.DataArray([0.5, 0.8], dims="s"), 0.3, 60.0, 0.7, 2.1)
+LABELLED_GAPS = xr.DataArray([-1.0, 0.4, 2.0], dims="d")
+
+
+@pytest.mark.parametrize(("wanted", "other"), [("force", "area"), ("area", "force")])
+def test_slopes_of_one_quantity_of_labelled_surfaces(wanted, other):
+    found = contact(LABELLED, LABELLED_GAPS, derivatives=True, quantities=[wanted])
+    both = contact(LABELLED, LABELLED_GAPS, derivatives=True)
+    for name, slope in getattr(both, f"{wanted}_by").items():
+        np.testing.assert_array_equal(getattr(found, f"{wanted}_by")[name], slope)
+    assert getattr(found, other) is getattr(found, f"{other}_by") is None
+    none = contact(LABELLED, LABELLED_GAPS)
+    assert none.force_by is none.area_by is None
 
 
 @pytest.mark.parametrize("method", ["full", "simplified"])

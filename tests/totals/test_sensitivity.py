@@ -2,12 +2,16 @@
 
 import dataclasses
 import functools
+import itertools
 import math
 
+import mpmath
 import numpy as np
 import pytest
 
+from generate.tables.exact_geometry import divisor, exact_island
 from mbma_tables import Surface, contact
+from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.readings import PRINTED, REPORTED, get_reading
 from mbma_tables.totals.island_sum import kinks
 
@@ -142,21 +146,64 @@ def test_values_are_those_without_derivatives():
     assert (np.abs(more.area / tight.area - 1) <= more.error + tight.error).all()
 
 
-def test_next_to_the_floor_of_zeta_u():
-    """Down to zeta_1 = 3, where the step must shrink: area goes with the sixth root of what is left."""
-    left = 10.0 ** np.arange(-9, -2)
-    found = contact(Surface(0.7, 0.3, 0.9 * (1 + left), 0.7, 2.4), 1.0, derivatives=True)
-    for by in (found.force_by, found.area_by):
-        assert all(np.isfinite(slope).all() for slope in by.values())
-    # the numbers themselves: an input of zeta_1 has eps/left of its own
-    power = left * found.area_by["q1"] * 0.9 / found.area
-    np.testing.assert_allclose(power[1:4], 1 / 6, rtol=1e-4)
-    # where 1e-3 is left, against differences that stay well inside
-    step = 0.02 * left[-2]
-    near = contact(Surface(0.7, 0.3, 0.9 * (1 + left[-2] + step * np.arange(-3.0, 4)), 0.7, 2.4), 1.0, rtol=1e-11)
-    for by, values in ((found.force_by, near.force), (found.area_by, near.area)):
-        slope = weights(np.arange(-3.0, 4)) @ values / (0.9 * step)
-        assert abs(by["q1"][-2] - slope) <= 1e-6 * max(abs(slope), values[3] / 0.9)
+def by_zeta_1(hurst, zeta_1, h_max, depth):
+    """dF/dq1 and dA/dq1 at h_rms = q0 = 1, islands by their formulas at 60 digits, Phi and its slopes by the table."""
+    near = [zeta_1 + sign * 1e-4 * (zeta_1 - 3) for sign in (-1, 1)]
+    kink_d, kink_u = (float(kink) for kink in kinks(hurst, zeta_1, REPORTED))
+    assert depth < kink_d
+    edges = sorted({0.0, depth, *(kink_u * 3.0**k for k in range(40) if kink_u * 3.0**k < depth)})
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    sums = np.zeros(2)
+
+    def logarithms(island, zeta):
+        s = 1 / mpmath.sqrt(1 - mpmath.mpf(zeta) ** (-2 * mpmath.mpf(hurst)))
+        height = ((mpmath.mpf(h_max) - (mpmath.mpf(depth) - mpmath.mpf(x))) / s - island["h_d"]) / island["sigma_d"]
+        density = mpmath.log(island["D_d"] / island["sigma_d"]) - height**2 / 2 - mpmath.log(2 * mpmath.pi) / 2
+        # force per nominal area is in units of q0 s, and d(delta) of s
+        force = density + mpmath.log(island["sigma"]) + mpmath.log(2 * island["R_d"] * island["sigma"]) / 2
+        area = density - mpmath.log(s) + mpmath.log(island["eta"] * island["D"] * island["R_u"] * island["R_d"])
+        area += mpmath.log(2 * mpmath.pi) + 2 * mpmath.log(island["sigma"])
+        return [force, area, island["X"], mpmath.log(island["mu"])]
+
+    for low, high in itertools.pairwise(edges):
+        power = 6 if low == 0 else 1  # force and area rise like powers of x
+        for u, weight in zip((nodes + 1) / 2, weights / 2, strict=True):
+            x = float(low + (high - low) * u**power)
+            with mpmath.workdps(60):
+                ends = [logarithms(exact_island(x, hurst, zeta, divisor("reported")), zeta) for zeta in near]
+                slopes = [float((b - a) / (mpmath.mpf(near[1]) - near[0])) for a, b in zip(*ends, strict=True)]
+                middle = logarithms(exact_island(x, hurst, zeta_1, divisor("reported")), zeta_1)
+            X, mu = float(middle[2]), math.exp(middle[3])
+            value, by_X, by_mu = universal_model().slopes(X, mu)
+            for k, name in enumerate(("phi_F", "phi_A")):
+                phi = getattr(value, name)
+                log_slope = slopes[k] + (getattr(by_X, name) * slopes[2] + getattr(by_mu, name) * mu * slopes[3]) / phi
+                sums[k] += (high - low) * power * u ** (power - 1) * weight * phi * math.exp(middle[k]) * log_slope
+    # K1 of the printed Jacobian, 1 - 4/9
+    return 5 / 9 * sums
+
+
+@pytest.mark.parametrize(
+    ("hurst", "left", "h_max", "depth"),
+    [
+        (0.961145541398031, 1.6217016267e-05, 1.859847391862941, 0.8),
+        (0.7, 3e-3, 3.4, 0.3),
+        (0.7, 1e-5, 3.4, 0.3),
+        (0.7, 1e-7, 3.4, 0.3),
+        (0.4, 1e-7, 3.4, 1e-3),
+        (1.0, 1e-7, 2.5, 0.03),
+    ],
+)
+def test_next_to_the_floor_of_zeta_u(hurst, left, h_max, depth):
+    """Down to zeta_1 = 3.0000001, where area goes with the sixth root of what is left."""
+    surface = Surface(hurst, 1.0, 3.0 + left, 1.0, h_max)
+    found = contact(surface, h_max - depth, derivatives=True)
+    true = by_zeta_1(hurst, surface.zeta_1, h_max, float(h_max - found.separation))
+    for by, value, slope in zip((found.force_by, found.area_by), (found.force, found.area), true, strict=True):
+        assert abs(by["q1"] - slope) <= 1e-6 * max(abs(slope), value / 3)
+        # the lengths' identity holds q0 to it
+        terms = [surface.h_rms * by["h_rms"], h_max * by["h_max"], found.separation * by["separation"]]
+        assert abs(by["q0"] + surface.q1 * by["q1"] - sum(terms)) <= 1e-12 * abs(surface.q1 * by["q1"])
 
 
 def test_units_shapes_and_no_contact():
@@ -184,3 +231,35 @@ def test_a_gradient_descends():
         found = contact(Surface(0.8, 0.3, 60.0, h_rms, 2.0), 1.2, derivatives=True)
         h_rms *= math.exp(-math.log(found.force / wanted) * found.force / (h_rms * found.force_by["h_rms"]))
     assert contact(Surface(0.8, 0.3, 60.0, h_rms, 2.0), 1.2).force == pytest.approx(wanted, rel=1e-12, abs=0)
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-6, 1e-9, 1e-11])
+def test_slopes_refine_as_totals_do(rtol):
+    """Two passes over the same integral: the same islands and the same bound."""
+    rng = np.random.default_rng(5)
+    hurst, top, share = rng.uniform(0.3, 1, 40), rng.uniform(2.5, 4.5, 40), rng.uniform(-1, 1, 40)
+    surfaces = Surface(hurst, 0.3, 0.3 * 10 ** rng.uniform(0.5, 4, 40), 0.7, 0.7 * top)
+    plain = contact(surfaces, share * surfaces.h_max, rtol=rtol)
+    slopes = contact(surfaces, share * surfaces.h_max, rtol=rtol, derivatives=True)
+    assert slopes.islands == plain.islands
+    np.testing.assert_allclose(slopes.error, plain.error, rtol=1e-6)
+    np.testing.assert_allclose(slopes.force, plain.force, rtol=1e-12)
+    np.testing.assert_allclose(slopes.area, plain.area, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("offset", "summit_sigma"), [(True, False), (False, True), (False, False)])
+def test_slopes_of_readings_of_ones_own(offset, summit_sigma):
+    """Each of the two flags by itself, against differences of the totals."""
+    own = dataclasses.replace(OWN, offset=offset, summit_sigma=summit_sigma)
+    hurst, gap, step = 0.8, 0.4, 1e-4
+
+    def log_totals(hurst, gap):
+        found = contact(Surface(hurst, 0.3, 60.0, 0.7, 2.1), gap, reading=own, rtol=1e-10)
+        return np.log([found.force, found.area])
+
+    found = contact(Surface(hurst, 0.3, 60.0, 0.7, 2.1), gap, reading=own, rtol=1e-10, derivatives=True)
+    by_hurst = (log_totals(hurst + step, gap) - log_totals(hurst - step, gap)) / (2 * step)
+    by_gap = (log_totals(hurst, gap + step) - log_totals(hurst, gap - step)) / (2 * step)
+    for k, (value, by) in enumerate(((found.force, found.force_by), (found.area, found.area_by))):
+        assert by["hurst"] / value == pytest.approx(by_hurst[k], rel=1e-5, abs=0)
+        assert by["separation"] / value == pytest.approx(by_gap[k], rel=1e-5, abs=0)

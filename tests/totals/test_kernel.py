@@ -17,6 +17,7 @@ from mbma_tables.totals import kernel as lookup
 from mbma_tables.totals.island import geometry
 from mbma_tables.totals.island_sum import kinks
 
+OWN = dataclasses.replace(PRINTED, name="own", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)
 LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)
 
 
@@ -149,3 +150,15 @@ def test_an_empty_surface_of_the_table_is_refused_before_the_pass():
     with pytest.raises(OutOfRangeError) as caught:
         contact(Surface([0.5, 0.8], 0.2, 40.0, 1.0, 3.0), [[0.0], [-4.0]])
     assert caught.value.mask.tolist() == [[False, False], [True, True]]
+
+
+@pytest.mark.parametrize("reading", [REPORTED, OWN], ids=lambda reading: reading.name)
+def test_kinks_are_where_geometry_reaches_its_floors(reading):
+    rng = np.random.default_rng(6)
+    hurst, zeta_1 = rng.uniform(0.1, 1, 200), 3.51 * 10 ** rng.uniform(0, 7, 200)
+    for kink, name, floor in zip(
+        kinks(hurst, zeta_1, reading), ("zeta_d", "zeta_u"), (reading.floor_d, reading.floor_u), strict=True
+    ):
+        before, beyond = (geometry(kink * (1 + sign * 1e-9), hurst, zeta_1, reading)[name] for sign in (-1, 1))
+        assert (before > floor).all()
+        assert (beyond == floor).all()

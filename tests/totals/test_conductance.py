@@ -1,0 +1,48 @@
+"""Conductivities and conductance: closed values and refusals."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mbma_tables import InputError, OutOfRangeError
+from mbma_tables.totals.conductance import conductance, mean_conductivity
+
+
+def test_mean_conductivity_is_harmonic():
+    assert mean_conductivity(50.0, 200.0) == pytest.approx(80.0, rel=1e-15, abs=0)
+    assert mean_conductivity(3.0, 3.0) == pytest.approx(3.0, rel=1e-15, abs=0)
+    # a body that conducts without limit leaves twice the other
+    assert mean_conductivity(7.0, 1e300) == pytest.approx(14.0, rel=1e-15, abs=0)
+    assert mean_conductivity(1e300, 7.0) == pytest.approx(14.0, rel=1e-15, abs=0)
+    found = mean_conductivity([[1.0], [2.0]], [1.0, 4.0, 6.0])
+    np.testing.assert_allclose(found, [[1, 1.6, 12 / 7], [4 / 3, 8 / 3, 3]], rtol=1e-15)
+    assert np.shape(mean_conductivity(1.0, 2.0)) == ()
+
+
+def test_conductance_per_stiffness():
+    assert conductance(6.0, 5.0, 4.0) == pytest.approx(7.5, rel=1e-15, abs=0)
+    found = conductance([0.0, 1.0, 3.0], [[2.0], [8.0]], 4.0)
+    np.testing.assert_allclose(found, [[0, 0.5, 1.5], [0, 2, 6]], rtol=1e-15)
+    assert np.shape(conductance(6.0, 5.0, 4.0)) == ()
+
+
+@pytest.mark.parametrize("bad", [0.0, -2.0, math.nan, [1.0, 0.0], [1.0, -1e-300]])
+def test_conductivities_and_moduli_are_positive(bad):
+    for call, name in (
+        (lambda: mean_conductivity(bad, 1.0), "k1"),
+        (lambda: mean_conductivity(1.0, bad), "k2"),
+        (lambda: conductance(1.0, bad, 1.0), "k_s"),
+        (lambda: conductance(1.0, 1.0, bad), "E_star"),
+    ):
+        with pytest.raises(OutOfRangeError, match=f"^{name} must be") as caught:
+            call()
+        assert caught.value.mask.shape == np.shape(bad)
+        assert caught.value.mask.sum() == 1
+
+
+def test_conductivities_that_do_not_broadcast():
+    with pytest.raises(InputError, match="broadcast"):
+        mean_conductivity([1.0, 2.0], [1.0, 2.0, 3.0])
+    with pytest.raises(InputError, match="broadcast"):
+        conductance([1.0, 2.0], [1.0, 2.0, 3.0], 1.0)

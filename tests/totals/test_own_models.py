@@ -1,0 +1,101 @@
+"""Island models of one's own: what the library asks of them, and that totals, laws, islands and scenes take them."""
+
+import pathlib
+import runpy
+
+import numpy as np
+import pytest
+
+from mbma_tables import InputError, OutOfRangeError, Scene, Surface, contact, contact_law, greenwood_tripp, island
+from mbma_tables.models import GeometryModel, IslandModel, get_model
+from mbma_tables.models.tables import island4d_model, open_table, shipped
+from mbma_tables.surfaces.readings import REPORTED
+
+ROOT = pathlib.Path(__file__).parents[2]
+SURFACE = Surface(0.8, 0.3, 60.0, 0.7, 2.1)
+GAPS = np.array([2.09, 1.0, -1.5, 2.5])
+
+
+class Own:
+    """The least that the library asks for."""
+
+    name = "own"
+
+    def __init__(self, change=lambda *answer: answer):
+        self.change = change
+
+    def answer(self, X, mu):
+        return self.change(*greenwood_tripp.rigid_sphere(X, mu), np.full(X.shape, 1e-14))
+
+
+def test_totals_laws_islands_and_scenes():
+    for found, known in (
+        (contact(SURFACE, GAPS, tier=Own()), contact(SURFACE, GAPS, tier="rigid")),
+        (island(SURFACE, [0.1, 1.0], tier=Own()), island(SURFACE, [0.1, 1.0], tier="rigid")),
+    ):
+        assert found.tier == "own"
+        for name in ("force", "area", "error"):
+            np.testing.assert_allclose(getattr(found, name), getattr(known, name), rtol=1e-13)
+    law, known = (contact_law(SURFACE, 1e-4, tier=tier) for tier in (Own(), "rigid"))
+    assert law.tier == "own"
+    np.testing.assert_allclose(law.force(GAPS), known.force(GAPS), rtol=1e-12)
+    scene = Scene(SURFACE, effects=("force",), separations=[1.0], rtol=1e-4, tier=Own()).run()
+    assert float(scene["force"][0]) == pytest.approx(contact(SURFACE, 1.0, tier="rigid").force, rel=1e-4, abs=0)
+
+
+def test_a_table_from_a_file_is_the_shipped_one(tmp_path):
+    table = open_table(shipped("universal"))
+    for derivatives in (False, True):
+        found, known = (contact(SURFACE, GAPS, tier=tier, derivatives=derivatives) for tier in (table, "universal"))
+        np.testing.assert_array_equal(found.force, known.force)
+    np.testing.assert_array_equal(found.force_by["hurst"], known.force_by["hurst"])
+    assert contact_law(SURFACE, tier=table).force(1.0) == contact_law(SURFACE).force(1.0)
+
+
+@pytest.mark.parametrize("bad", [None, 3, Own, object(), "unknown", type("Nameless", (), {"answer": 1})()])
+def test_what_is_no_island_model(bad):
+    with pytest.raises(InputError, match="tier must be one of"):
+        contact(SURFACE, 1.0, tier=bad)
+    with pytest.raises(InputError, match="tier must be one of"):
+        contact_law(SURFACE, tier=bad)
+    with pytest.raises(InputError, match="tier must be one of"):
+        island(SURFACE, 1.0, tier=bad)
+
+
+def test_answers_are_checked():
+    with pytest.raises(InputError, match=r"'own' must answer Phi_F, Phi_A and error of shape"):
+        contact(SURFACE, 1.0, tier=Own(lambda F, A, error: (F[0, :3], A, error)))
+    with pytest.raises(InputError, match=r"'own' must answer"):
+        contact(SURFACE, 1.0, tier=Own(lambda F, A, error: F))
+    silent = Own(lambda F, A, error: (np.where(np.median(F) < F, np.nan, F), A, error))
+    with pytest.raises(OutOfRangeError, match="'own' has no answer for") as caught:
+        contact(SURFACE, [2.5, 1.0], tier=silent)
+    assert caught.value.mask.tolist() == [False, True]
+    assert np.isnan(contact(SURFACE, [2.5, 1.0], tier=silent, outside="nan").force).tolist() == [False, True]
+    # one number for all islands is enough
+    one = contact(SURFACE, 1.0, tier=Own(lambda F, A, error: (F, A, 1e-3)))
+    assert 1e-3 <= one.error < 1.1e-3
+
+
+def test_derivatives_and_readings_that_a_model_does_not_have():
+    with pytest.raises(InputError, match="derivatives come from tier 'universal', 'own' has none"):
+        contact(SURFACE, 1.0, tier=Own(), derivatives=True)
+    with pytest.raises(InputError, match="made for the reading 'reported', not for 'printed'"):
+        contact(SURFACE, 1.0, tier=island4d_model(), reading="printed")
+
+
+def test_shipped_models_keep_the_protocol():
+    for tier, protocol in {"exact": IslandModel, "universal": IslandModel, "island4d": GeometryModel}.items():
+        model = get_model(tier, 1e-6, REPORTED)
+        assert isinstance(model, protocol)
+        assert get_model(model, 1e-6, REPORTED) is model
+
+
+@pytest.mark.slow
+def test_the_example_prints_what_its_page_shows(capsys):
+    runpy.run_path(str(ROOT / "examples" / "own_island_model.py"), run_name="__main__")
+    shown = capsys.readouterr().out.splitlines()
+    page = (ROOT / "docs" / "models.md").read_text(encoding="utf-8")
+    assert len(shown) == 8
+    # bounds in the last digit apart, as from one machine to another
+    assert all(f"    {line}" in page for line in shown if "states" not in line)
