@@ -17,7 +17,7 @@ from mbma_tables.scenes.plan import Step
 from mbma_tables.scenes.problem import Problem
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.totals.gauss_kronrod import integrate
+from mbma_tables.totals.gauss_kronrod import Integrals, integrate
 from mbma_tables.totals.island import geometry, scale_area, scale_force
 from mbma_tables.totals.island_sum import Pairs, density_of, kinks, sum_islands
 
@@ -57,6 +57,31 @@ def hertz_area(problem: Problem, surface: Surface, gap: FloatArray, step: Step) 
     return {"area": (("gap",), found.area)}, float(found.error.max())
 
 
+def _to_angle(approach: FloatArray, layer: FloatArray) -> FloatArray:
+    """The integration variable: approach = layer sinh(t)^2."""
+    return np.arcsinh(np.sqrt(approach / layer))
+
+
+def _number_of_islands(pairs: Pairs, reading: Reading, rtol: float) -> Integrals:
+    """Islands in contact per nominal area of every pair, over q0^2 (Eq. 42)."""
+
+    def integrand(owner: NDArray[np.intp], t: FloatArray) -> FloatArray:
+        layer = pairs.layer[owner, None]
+        approach = layer * np.sinh(t) ** 2
+        hurst, zeta_1 = (np.broadcast_to(field[owner, None], t.shape).copy() for field in (pairs.hurst, pairs.zeta_1))
+        g = geometry(approach, hurst, zeta_1, reading)
+        weight = density_of(pairs, owner, approach, g, reading)
+        return np.asarray(weight * pairs.rms_over_s[owner, None] * layer * np.sinh(2 * t))[..., None]
+
+    end = np.maximum(pairs.compression, 0)
+    floors = (np.minimum(kink, end) for kink in kinks(pairs.hurst, pairs.zeta_1, reading))
+    breaks = np.sort(np.stack([np.zeros(end.size), *floors, end]), axis=0)
+    low, high = _to_angle(breaks[:-1], pairs.layer), _to_angle(breaks[1:], pairs.layer)
+    owner = np.broadcast_to(np.arange(end.size), low.shape)
+    touching = high > low
+    return integrate(integrand, owner[touching], low[touching], high[touching], end.size, rtol)
+
+
 def island_statistics(problem: Problem, surface: Surface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
     """Number of islands at every gap; load, area and density of islands along their approach (Eqs. 40, 42).
 
@@ -69,54 +94,28 @@ def island_statistics(problem: Problem, surface: Surface, gap: FloatArray, step:
         Bound on the relative error.
     """
     reading, rtol, tier = _asked(problem, step)
-    points = problem.points
     pairs = Pairs.of(surface, surface.h_max - gap)
-    kink_d, kink_u = kinks(pairs.hurst, pairs.zeta_1, reading)
-
-    def to_grid(approach: FloatArray) -> FloatArray:
-        return np.arcsinh(np.sqrt(approach / pairs.layer))
-
-    def integrand(owner: NDArray[np.intp], t: FloatArray) -> FloatArray:
-        layer = pairs.layer[owner, None]
-        approach = layer * np.sinh(t) ** 2
-        hurst, zeta_1 = (np.broadcast_to(field[owner, None], t.shape).copy() for field in (pairs.hurst, pairs.zeta_1))
-        g = geometry(approach, hurst, zeta_1, reading)
-        weight = density_of(pairs, owner, approach, g, reading)
-        return np.asarray(weight * pairs.rms_over_s[owner, None] * layer * np.sinh(2 * t))[..., None]
-
-    count = gap.size
-    compression = np.maximum(pairs.compression, 0)
-    breaks = np.sort(
-        np.stack([np.zeros(count), np.minimum(kink_d, compression), np.minimum(kink_u, compression), compression]),
-        axis=0,
-    )
-    low, high = to_grid(breaks[:-1]), to_grid(breaks[1:])
-    owner = np.broadcast_to(np.arange(count), low.shape)
-    filled = high > low
-    found = integrate(integrand, owner[filled], low[filled], high[filled], count, rtol)
     s, q0 = float(surface.s), float(surface.q0)
-    most = float(compression.max()) if count else 0.0
-    grid = float(pairs.layer[0]) * np.sinh(np.linspace(0, 1, points + 1)[1:] * to_grid(np.full(count, most))[0]) ** 2
-    error = float(found.error.max(initial=0.0))
-    if most == 0.0:
-        # no gap touches: there is no distribution
-        grid = np.zeros(points)
-        force, area, density = np.zeros(points), np.zeros(points), np.zeros((count, points))
-    else:
-        hurst, zeta_1 = np.full(points, float(surface.hurst)), np.full(points, float(surface.zeta_1))
+    number = _number_of_islands(pairs, reading, rtol)
+    error = float(number.error.max(initial=0.0))
+    deepest = np.maximum(pairs.compression.max(), 0)
+    t = np.linspace(0, 1, problem.points + 1)[1:] * _to_angle(deepest, pairs.layer[0])
+    grid = pairs.layer[0] * np.sinh(t) ** 2
+    # where no gap touches there is no distribution
+    force, area, density = np.zeros(grid.size), np.zeros(grid.size), np.zeros((gap.size, grid.size))
+    if deepest > 0:
+        hurst, zeta_1 = np.full(grid.size, float(surface.hurst)), np.full(grid.size, float(surface.zeta_1))
         g = geometry(grid, hurst, zeta_1, reading)
-        model = get_model(tier, rtol, reading)
-        phi = answer_islands(model, g | {"hurst": hurst}, _outside(tier))
+        phi = answer_islands(get_model(tier, rtol, reading), g | {"hurst": hurst}, _outside(tier))
         force = problem.E_star * s / q0 * scale_force(g) * phi.phi_F
         share = g["eta"] if "subscale_area" in problem.dropped else 1.0
         area = scale_area(g) * phi.phi_A / share / q0**2
-        every = np.arange(count)
-        wide = np.broadcast_to(grid, (count, points))
-        spread = density_of(pairs, every, wide, {name: field[None] for name, field in g.items()}, reading)
-        density = np.where(wide <= compression[:, None], spread, 0.0) * q0**2 / s
+        approach = np.broadcast_to(grid, density.shape)
+        spread = density_of(pairs, np.arange(gap.size), approach, {k: field[None] for k, field in g.items()}, reading)
+        density = np.where(approach <= pairs.compression[:, None], spread, 0.0) * q0**2 / s
         error = max(error, float(np.max(phi.error)))
     fields: Fields = {
-        "island_number": (("gap",), found.value[:, 0] * q0**2),
+        "island_number": (("gap",), number.value[:, 0] * q0**2),
         "island_delta": (("approach",), grid * float(surface.h_rms)),
         "island_force": (("approach",), force),
         "island_area": (("approach",), area),
