@@ -60,9 +60,6 @@ def pages(names: tuple[str, ...], out: pathlib.Path) -> None:
     """Measure what pages of the documentation say; write them with their figures."""
     for name in PAGES if "all" in names else names:
         page = importlib.import_module(f"generate.pages.{name}")
-        if not hasattr(page, "measure"):
-            page.main(["--out", str(out / "docs")], standalone_mode=False)
-            continue
         parts, files = page.measure()
         for path in write(name, parts, files, out):
             click.echo(path)

@@ -83,11 +83,11 @@ def test_gaps_that_do_not_touch_hold_no_islands():
 
 
 def test_progress_in_blocks():
-    told = []
+    calls = []
     gaps = np.linspace(0.2, 1.0, 130)
     scene = scene_of(separations=gaps, rtol=1e-2)
-    run_plan(scene, tiered(scene, "exact"), lambda *step: told.append(step))
-    assert told == [("totals", done, 130) for done in (0, 64, 128, 130, 130)]
+    run_plan(scene, tiered(scene, "exact"), lambda *step: calls.append(step))
+    assert calls == [("totals", done, 130) for done in (0, 64, 128, 130, 130)]
 
 
 @pytest.mark.parametrize(

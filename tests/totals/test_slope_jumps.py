@@ -1,6 +1,6 @@
 """Slopes jump where the model's own do, by what the model says, and nowhere else.
 
-The model's kinks are `ISLAND_KINKS` and `TOTAL_KINKS`. Slopes are told by one-sided differences of values, and by the
+The model's kinks are `ISLAND_KINKS` and `TOTAL_KINKS`. Slopes are found by one-sided differences of values, and by the
 derivatives that the library gives just either side. MBMA_GAUNTLET sets how many places are looked at.
 """
 
