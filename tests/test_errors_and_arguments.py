@@ -1,5 +1,6 @@
 """Typed errors, and the messages of the argument checks."""
 
+import functools
 import math
 
 import h5py
@@ -17,8 +18,10 @@ from mbma_tables import (
     contact,
     greenwood_tripp,
     height_integral,
+    island,
 )
 from mbma_tables.arguments import SHOWN, broadcast_shape, finite_array, require
+from mbma_tables.materials import effective_modulus
 
 
 def test_one_base_and_the_builtin_kinds():
@@ -96,6 +99,35 @@ def test_other_containers_of_xarray_and_hdf5_are_refused(tmp_path):
                 finite_array("x", value)
             with pytest.raises(InputError, match="h_rms must be numbers"):
                 Surface(0.8, 0.5, 100.0, value, 3.0)
+
+
+ROUGH = Surface(0.8, 0.5, 100.0, 0.2, 0.6)
+CALLS = {
+    "Surface": (Surface, {"hurst": 0.8, "q0": 0.5, "q1": 100.0, "h_rms": 0.2, "h_max": 0.6}),
+    "from_moments": (Surface.from_moments, {"hurst": 0.7, "m0": 0.071, "m2": 0.27, "m4": 62.0, "h_max": 1.1}),
+    "power_spectrum": (ROUGH.power_spectrum, {"q": 1.0}),
+    "height_integral": (functools.partial(height_integral, 1.5), {"x": 1.0}),
+    "greenwood_tripp": (greenwood_tripp.solve, {"X": 1.0, "mu": 1.0}),
+    "island": (functools.partial(island, ROUGH), {"delta": 0.1, "E_star": 1.0}),
+    "effective_modulus": (effective_modulus, {"E1": 1.0, "nu1": 0.3, "E2": 2.0, "nu2": 0.3}),
+}
+
+
+@pytest.mark.parametrize(("call", "name"), [(call, name) for call, (_, good) in CALLS.items() for name in good])
+def test_every_argument_is_refused_by_name(call, name):
+    function, good = CALLS[call]
+    for bad in (math.nan, math.inf, [0.5, -math.inf], [], "rough", None, [None], 1j, True):
+        with pytest.raises(InputError, match=f"^{name} "):
+            function(**{**good, name: bad})
+
+
+@pytest.mark.parametrize("call", [call for call, (_, good) in CALLS.items() if len(good) > 1])
+def test_shapes_that_do_not_broadcast_are_listed(call):
+    function, good = CALLS[call]
+    first, second = list(good)[:2]
+    shapes = {first: [good[first]] * 2, second: [good[second]] * 3}
+    with pytest.raises(InputError, match=rf"do not broadcast: .*{first} \(2,\).*{second} \(3,\)"):
+        function(**(good | shapes))
 
 
 def test_out_of_range_entries_are_quoted():

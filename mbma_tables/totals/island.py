@@ -132,6 +132,7 @@ def island(
     largest = np.asarray(surface.zeta_1)
     require("q1/q0", largest, largest > rule.floor_u, f"above floor_u = {rule.floor_u:g} of the reading {rule.name!r}")
     model = get_model(tier, rtol, rule)
+    broadcast_shape(delta=approach, surface=surface.hurst, E_star=modulus)
     shape = broadcast_shape(delta=approach, surface=surface.hurst)
     approach, hurst, zeta_1 = (
         np.broadcast_to(array, shape) for array in (approach / surface.h_rms, surface.hurst, surface.zeta_1)
