@@ -27,7 +27,7 @@ from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.splines import coefficients
 from mbma_tables.totals.island import geometry
 
-ISLANDS = 1000  # looked up in a batch
+ISLANDS = 1000  # evaluated in a batch
 HARD = 12  # of them, for the classical iteration
 PROFILES = 20
 REFERENCE_RTOL = 1e-12

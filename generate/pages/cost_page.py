@@ -113,9 +113,9 @@ def draw(costs: Costs) -> bytes:
     handles: dict[str, Any] = {}
     for panel, (title, rows) in zip(panels, groups.items(), strict=True):
         for name in names:
-            own = [row for row in rows if family(row) == name]
-            if own:
-                x, y = [row.cost for row in own], [row.error for row in own]
+            chosen = [row for row in rows if family(row) == name]
+            if chosen:
+                x, y = [row.cost for row in chosen], [row.error for row in chosen]
                 (handles[name],) = panel.loglog(x, y, ls="none", ms=5, **styles[name])
         front = pareto_front(rows)
         x, y = [row.cost for row in front], [row.error for row in front]

@@ -75,8 +75,8 @@ def _group(
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(function)
         def grouped(**given: Any) -> Any:
-            own = {name: given.pop(name) for name in names}
-            return function(**given, **{argument: build(own)})
+            values = {name: given.pop(name) for name in names}
+            return function(**given, **{argument: build(values)})
 
         result: Callable[..., Any] = grouped
         for option in reversed(options):

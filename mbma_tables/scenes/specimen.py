@@ -119,9 +119,9 @@ def read_specimen(path: pathlib.Path) -> Specimen:
         material = dict(entries.get("material", {}))
         if "stress_unit" in material:
             raise InputError("[material]: stress_unit belongs in scenes; leave it out")
-        own = f"surface of {_printable(path)}"
+        title = f"surface of {_printable(path)}"
         return dataclasses.replace(
-            from_tables(entries["surface"], path.parent, own), E_star=effective_modulus_of(material)
+            from_tables(entries["surface"], path.parent, title), E_star=effective_modulus_of(material)
         )
     except InputError as fault:
         raise InputError(f"{path}: {fault}") from None

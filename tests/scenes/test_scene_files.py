@@ -112,7 +112,7 @@ def write(folder, text):
 
 
 @pytest.mark.parametrize("kind", MISTAKES)
-def test_a_mistake_is_told_with_what_to_write_instead(kind, tmp_path):
+def test_each_mistake_has_a_message_that_says_what_to_write_instead(kind, tmp_path):
     text, words = MISTAKES[kind]
     path = write(tmp_path, text)
     with pytest.raises(InputError, match=words) as fault:
