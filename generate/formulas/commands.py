@@ -9,7 +9,7 @@ from generate.formulas.printing import C_TEXT, MODULE, write_forms
 
 @click.command()
 def formulas() -> None:
-    """Fit and certify the closed forms; write their Python module and their C text (about three minutes)."""
+    """Fit and certify the closed forms; write their Python module and their C text (about ten minutes)."""
     from generate.formulas.islands import SIZES, island_form
     from generate.formulas.totals import totals_form
 

@@ -29,7 +29,7 @@ RANGES = {
 }
 MIN_AREA = 1e-6
 MARGIN = 0.7  # samples of the fit go down to this share of it
-MIN_PENETRATION = 0.05  # r below which no surface of the range reaches MIN_AREA
+MIN_PENETRATION = 0.03  # r below which no surface of the range reaches MARGIN*MIN_AREA
 OVERLAP = 0.02  # of k, by which the samples of the branches overlap
 DEGREE = 3
 # what a power of each variable counts towards DEGREE, by branch

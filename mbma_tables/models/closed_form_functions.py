@@ -169,7 +169,7 @@ def long_phi_A(X: FloatArray, mu: FloatArray) -> FloatArray:
 def totals_force(
     d_over_h_rms: FloatArray, h_max_over_h_rms: FloatArray, zeta_1: FloatArray, hurst: FloatArray
 ) -> FloatArray:
-    """Force over E* q0 h_rms, closed totals: within 0.0914."""
+    """Force over E* q0 h_rms, closed totals: within 0.0906."""
     r = -d_over_h_rms + h_max_over_h_rms
     k = (9/4)*sqrt(-zeta_1**(-2*hurst) + (3/2)**(-2*hurst))
     t = (1/3)*log(r*zeta_1**hurst + 1) - 1
@@ -182,15 +182,15 @@ def totals_force(
     g = (1/4)*d_over_h_rms + 1/4
     s = (d_over_h_rms + 0.3)/sqrt((d_over_h_rms + 0.3)**2 + 1)
     near = (
-        0.3105*b*c + 0.2403*b*h + 3.627*b*q*z + 0.1749*b*t + 0.08666*b*(c*c) - 0.1915*c*t + 0.4031*c*z - 0.03842*c*h*h -
-        0.1778*c*z*z + 0.9723*h*z + 0.8637*h - 4.545*q*t*z - 4.687*q + 0.7681*q*(b*b) - 0.6165*t*z + 4.767*t -
-        0.2005*t*b*b + 4.603*z - 0.03224*z*h*h - 1/2*(h_max_over_h_rms - 4/9*r)**2 + (7/2)*log(r/(r*zeta_1**hurst + 1))
-        + 7.483 + 0.5735*(b*b) - 0.1559*b*b*b
+        0.3167*b*c + 0.3111*b*h + 1.672*b*q*z + 0.2061*b*z + 0.1205*b*(c*c) - 0.1783*c*t + 0.4069*c*z - 0.03422*c*h*h -
+        0.1913*c*z*z + 0.9973*h*z + 0.8729*h + 0.09798*h*(z*z) - 5.555*q + 2.255*q*(b*b) - 0.8067*t*z + 4.663*t +
+        4.567*z + 3.404*z*(q*q) - 1/2*(h_max_over_h_rms - 4/9*r)**2 + (7/2)*log(r/(r*zeta_1**hurst + 1)) + 7.558 +
+        0.5068*(b*b) - 0.177*b*b*b + 0.1134*(z*z*z)
     )
     far = (
-        -0.2615*g*h - 2.778*g*s*y - 0.3851*g*y*z - 3.345*g*y - 2.445*g - 0.302*h*s*z - 0.3773*h*z - 0.4177*h -
-        0.2307*h*s*s - 0.2341*h*s*s*s - 1.221*s - 0.03253*s*h*h - 1.21*y + 0.684*y*(s*s*s*s) + 0.06386*z*(h*h) - 2.246 -
-        1/8*(d_over_h_rms + sqrt(2 + d_over_h_rms*d_over_h_rms))**2 - 0.603*g*g*s*s - 0.5746*s*s*s*s*s*s
+        -0.09048*g*h*z - 0.2673*g*h - 0.07731*g*s*h*h - 2.691*g*y - 2.489*g - 1.026*g*s*s*s - 0.2339*h*s*z - 0.3641*h*z
+        - 0.4084*h - 0.2491*h*s*s - 0.2267*h*s*s*s + 0.1932*s*z - 1.067*s - 1.388*y - 1.691*y*g*g*s*s - 0.221*y*h*h +
+        0.1644*z*(s*s*s*s) - 2.241 - 1/8*(d_over_h_rms + sqrt(2 + d_over_h_rms*d_over_h_rms))**2
     )
     log_total = where(k < r, far, near)
     return exp(log_total)
@@ -199,7 +199,7 @@ def totals_force(
 def totals_area(
     d_over_h_rms: FloatArray, h_max_over_h_rms: FloatArray, zeta_1: FloatArray, hurst: FloatArray
 ) -> FloatArray:
-    """A/A0, closed totals: within 0.0854."""
+    """A/A0, closed totals: within 0.0968."""
     r = -d_over_h_rms + h_max_over_h_rms
     k = (9/4)*sqrt(-zeta_1**(-2*hurst) + (3/2)**(-2*hurst))
     t = (1/3)*log(r*zeta_1**hurst + 1) - 1
@@ -212,15 +212,15 @@ def totals_area(
     g = (1/4)*d_over_h_rms + 1/4
     s = (d_over_h_rms + 0.3)/sqrt((d_over_h_rms + 0.3)**2 + 1)
     near = (
-        0.3139*b*c + 0.3248*b*h + 4.948*b*q*z + 3.606*b*q + 0.09241*b*t + 0.0866*b*(c*c) - 0.08916*c*h*t - 0.1146*c*t +
-        0.3602*c*z - 0.007266*c*h*h + 1.634*c*(q*q) - 0.2085*c*z*z - 0.3741*h*t + 1.394*h*z + 1.481*h + 5.389*q*z +
-        2.055*q*(b*b) - 0.4094*t*z + 4.907*t + 3.501*z - 1/2*(h_max_over_h_rms - 4/9*r)**2 +
-        (10/3)*log(r/(r*zeta_1**hurst + 1)) + 5.794 + 0.4585*(b*b) - 0.1734*b*b*b
+        0.305*b*c + 0.399*b*h + 4.98*b*q*z + 4.18*b*q + 0.114*b*z + 0.101*b*(c*c) - 0.0546*c*h*t + 0.0935*c*t*z -
+        0.188*c*t + 0.364*c*z - 0.219*c*z*z - 0.377*h*t + 1.41*h*z + 1.5*h + 5.31*q*z + 2.42*q*(b*b) - 0.416*t*z +
+        4.84*t + 3.53*z - 1/2*(h_max_over_h_rms - 4/9*r)**2 + (10/3)*log(r/(r*zeta_1**hurst + 1)) + 5.79 + 0.542*(b*b) -
+        0.215*b*b*b - 4.94*q*q*q*q
     )
     far = (
-        0.88*g*h - 0.9555*g*h*s*s - 2.065*g*s*y - 2.627*g*y - 2.005*g*s*s*s*s - 0.2458*h*s*z - 0.3497*h*s - 0.1499*h*y*z
-        + 0.04071*h*z - 0.1306*h*s*s + 0.05202*s*z - 1.942*s - 0.7223*y - 0.4359*z - 3.532 - 1/8*(d_over_h_rms + sqrt(2
-        + d_over_h_rms*d_over_h_rms))**2 - 0.1686*g*g*h*h - 0.4793*g*g*s*s*s*s
+        -0.281*g*h*s*s - 2.58*g - 0.56*g*s*s*s*s*s - 0.231*h*s*z - 0.138*h*s + 0.106*h - 0.234*h*s*s + 0.989*h*(y*y) -
+        1.2*s*y - 1.69*s*y*g*g - 1.17*s - 0.0654*z + 0.558*z*(g*g)*(s*s) - 2.81 - 1/8*(d_over_h_rms + sqrt(2 +
+        d_over_h_rms*d_over_h_rms))**2 - 2.28*g*g*y*y - 0.106*h*h*s*s - 0.238*z*z
     )
     log_total = where(k < r, far, near)
     return exp(log_total)
@@ -251,8 +251,8 @@ CERTIFICATES: dict[str, dict[str, Certificate]] = {
     "long": {"phi_F": Certificate(coefficients=43, largest=0.00054, median=0.000138, points=20000, worst_at={"X":
         0.3042, "mu": 0.5951}), "phi_A": Certificate(coefficients=53, largest=0.000718, median=0.000205, points=20000,
         worst_at={"X": 8.683, "mu": 26.31})},
-    "totals": {"force": Certificate(coefficients=40, largest=0.0914, median=0.027, points=48034,
-        worst_at={"d_over_h_rms": 3.109, "h_max_over_h_rms": 3.876, "zeta_1": 478.8, "hurst": 0.9911}), "area":
-        Certificate(coefficients=40, largest=0.0854, median=0.0276, points=48034, worst_at={"d_over_h_rms": 3.358,
-        "h_max_over_h_rms": 3.495, "zeta_1": 519.0, "hurst": 0.5})},
+    "totals": {"force": Certificate(coefficients=40, largest=0.0906, median=0.0272, points=46081,
+        worst_at={"d_over_h_rms": 3.328, "h_max_over_h_rms": 3.718, "zeta_1": 1000.0, "hurst": 0.5917}), "area":
+        Certificate(coefficients=40, largest=0.0968, median=0.0329, points=46081, worst_at={"d_over_h_rms": 2.999,
+        "h_max_over_h_rms": 4.5, "zeta_1": 615.1, "hurst": 1.0})},
 }
