@@ -25,8 +25,9 @@ if TYPE_CHECKING:
     from mbma_tables.surfaces.readings import Reading
     from mbma_tables.surfaces.surface import Surface
     from mbma_tables.theories.contact import Contact, contact
+    from mbma_tables.theories.law import contact_law
     from mbma_tables.totals.island import Island, island
-    from mbma_tables.totals.law import ContactLaw, contact_law
+    from mbma_tables.totals.law_protocol import ContactLaw
 
 __version__ = "0.1.0"
 
@@ -40,11 +41,11 @@ _HOMES = {
     "OutOfRangeError": "mbma_tables.errors",
     "Reading": "mbma_tables.surfaces.readings",
     "Surface": "mbma_tables.surfaces.surface",
-    "ContactLaw": "mbma_tables.totals.law",
+    "ContactLaw": "mbma_tables.totals.law_protocol",
     "Scene": "mbma_tables.scenes.scene",
     "TableFileError": "mbma_tables.errors",
     "contact": "mbma_tables.theories.contact",
-    "contact_law": "mbma_tables.totals.law",
+    "contact_law": "mbma_tables.theories.law",
     "height_integral": "mbma_tables.islands.height_integrals",
     "island": "mbma_tables.totals.island",
     "open_table": "mbma_tables.models.tables",

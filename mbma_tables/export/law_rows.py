@@ -19,8 +19,9 @@ from mbma_tables.errors import InputError
 from mbma_tables.export.text import number
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.theories.law import contact_law
 from mbma_tables.totals.conductance import conductance
-from mbma_tables.totals.law import ContactLaw, contact_law
+from mbma_tables.totals.law_protocol import ContactLaw
 
 QUANTITIES = ("pressure", "conductance")
 FLOOR = 1e-3  # of the largest pressure: below it, errors are relative to this and not to the pressure

@@ -19,7 +19,7 @@ from mbma_tables.surfaces.readings import get_reading
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.surface import Surface
-    from mbma_tables.totals.law import ContactLaw
+    from mbma_tables.totals.law import MbmaLaw
 
 Progress = Callable[[str, int, int], None]
 BLOCK = 64  # gaps between two reports of progress, where a gap is slow
@@ -83,7 +83,7 @@ def height_without_end(problem: Problem, rtol: float) -> float:
 
 
 def _law(run: Run, step: Step) -> None:
-    from mbma_tables.totals.law import MIN_LAW_RTOL, contact_law
+    from mbma_tables.totals.law import MIN_LAW_RTOL, mbma_law
 
     problem, wanted = run.problem, run.problem.outputs
     assert step.rtol is not None
@@ -92,7 +92,7 @@ def _law(run: Run, step: Step) -> None:
     tier, asked = step.tier, step.rtol
     while True:
         try:
-            law = contact_law(run.surface, asked, tier, problem.reading, problem.E_star)
+            law = mbma_law(run.surface, asked, tier, problem.reading, problem.E_star)
         except OutOfRangeError:
             if not isinstance(tier, str) or tier not in TABLES:
                 raise
@@ -126,7 +126,7 @@ def _law(run: Run, step: Step) -> None:
     run.close(step, error, dataclasses.replace(step, tier=tier).tier_name)
 
 
-def _slope_error(law: ContactLaw, gap: Any, inverted: bool) -> float:
+def _slope_error(law: MbmaLaw, gap: Any, inverted: bool) -> float:
     """Bound on the relative error of the stiffness at these gaps, and of force, area and energy."""
     touching = gap[gap < law.h_max]
     if touching.size == 0:

@@ -20,7 +20,7 @@ from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.theories.greenwood_williamson import positive_modulus
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
-from mbma_tables.theories.registry import get_theory
+from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma
 from mbma_tables.totals.contact import Totals, wanted_quantities
 
 KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by
@@ -90,6 +90,20 @@ class Contact:
         """Mean pressure in the contact, F/A [stress]; NaN where there is none."""
         with np.errstate(invalid="ignore"):
             return self.force / self.area
+
+    @functools.cached_property
+    def scatter(self) -> Any:
+        """Standard deviation of ln F at this mean separation from simulation to simulation; NaN where not known."""
+        return self._source_of().map(lambda s, u, E: self._scatter(s, u)[0], self)
+
+    @functools.cached_property
+    def area_scatter(self) -> Any:
+        """Standard deviation of ln A at this force, likewise."""
+        return self._source_of().map(lambda s, u, E: self._scatter(s, u)[1], self)
+
+    def _scatter(self, surface: Surface, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        theory = self._source_of().theory
+        return theory.scatter(surface, theory.answer(surface, u).area)
 
     @functools.cached_property
     def valid(self) -> Any:
@@ -221,12 +235,12 @@ def contact(
     """
     by, value = _known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
     chosen = get_theory(theory)
-    of_tier = {"tier": tier != "universal", "reading": reading != "reported", "rtol": rtol != 1e-8}
-    of_tier["outside"] = outside != "raise"
     if theory == Mbma.name:
         chosen = Mbma(tier, reading, rtol, outside)
-    elif any(of_tier.values()):
-        raise InputError(f"{', '.join(k for k, given in of_tier.items() if given)}: options of theory 'mbma', by name")
+    else:
+        refuse_options_of_mbma(
+            tier=tier != "universal", reading=reading != "reported", rtol=rtol != 1e-8, outside=outside != "raise"
+        )
     if derivatives and not isinstance(chosen, Mbma):
         raise InputError(f"derivatives in the surface's parameters come from theory 'mbma', not from {chosen.name!r}")
     options: dict[str, Any] = {

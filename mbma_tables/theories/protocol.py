@@ -63,6 +63,14 @@ class Theory(abc.ABC):
         """Reasons for which answers lie outside what the theory was tested for, each with a mask."""
         return {}
 
+    def scatter(self, surface: Surface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Standard deviations of ln F at given u and of ln A at given F against simulations, at A/A0 = `area`.
+
+        NaN where they are not known: theories without data to compare with.
+        """
+        unknown = np.full(np.shape(area), np.nan)
+        return unknown, unknown
+
     def energy(self, surface: Surface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], the integral of F/(A0 E*) from u to last contact."""
         from scipy.integrate import tanhsinh

@@ -36,3 +36,9 @@ def get_theory(theory: str | Theory | UserTheory) -> Theory:
     raise InputError(
         f"theory must be one of {THEORIES} or an object with a name and answer(surface, u), got {theory!r}"
     )
+
+
+def refuse_options_of_mbma(**given: bool) -> None:
+    """Refuse MBMA's own options where the theory is another, or an object that has its own."""
+    if any(given.values()):
+        raise InputError(f"{', '.join(name for name, it in given.items() if it)}: options of theory 'mbma', by name")

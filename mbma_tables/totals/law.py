@@ -16,8 +16,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, finite_array, is_labelled, number_in, require
-from mbma_tables.compiled import in_blocks
+from mbma_tables.arguments import FloatArray, number_in
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import AnyModel, get_model
 from mbma_tables.models.protocol import MAX_RTOL, MIN_RTOL
@@ -25,13 +24,13 @@ from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.totals import law_kernel
 from mbma_tables.totals.island_sum import Pairs, kinks, totals_of
+from mbma_tables.totals.law_protocol import ContactLaw
 
 TERMS = law_kernel.TERMS
 MAX_PIECES = 400
 SAMPLES = 24  # places a piece where the polynomial is compared with fresh totals, and its slope looked at
 MIN_LAW_RTOL = 1e-9
 RESOLVED = 1e-3  # a polynomial this close is one whose error the samples see
-BLOCK = 1 << 16  # gaps between two looks for Ctrl-C
 QUANTITIES = {
     "force": law_kernel.FORCE,
     "area": law_kernel.AREA,
@@ -42,30 +41,13 @@ QUANTITIES = {
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class ContactLaw:
-    """Force and area of one surface against its gap; made by `contact_law`, picklable, a few kB.
+class MbmaLaw(ContactLaw):
+    """A law of the MBMA model, which covers -h_max <= d and answers zero from h_max on.
 
     Attributes
     ----------
-    h_max : float
-        Gap of first contact [length]; a law covers -h_max <= d, and answers zero from h_max on.
-    error : float
-        Bound on the relative error of force and area, of the polynomials and of the totals together.
-    turning_point, area_turning_point : float or None
-        Gap below which the model's force, or area, falls again, where it does (low H); inverses end there.
-    reading, tier : str
-        What made it.
     breaks, pieces, layer, energies, errors : ndarray or float
         The polynomials: ends of the pieces in tau, coefficients, unit of l, energy at the ends, bounds on their errors.
-
-    Examples
-    --------
-    >>> from mbma_tables import Surface, contact_law
-    >>> law = contact_law(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0), E_star=100e3)  # um, MPa
-    >>> round(float(law.force(1.0)), 4), round(float(law.separation(force=7.9825)), 4)
-    (7.9825, 1.0)
-    >>> round(float(law.stiffness_mean(1.0)), 3)  # -dF/du [MPa/um]
-    31.809
     """
 
     h_max: float
@@ -80,6 +62,17 @@ class ContactLaw:
     layer: float
     energies: FloatArray
     errors: FloatArray
+    theory: str = "mbma"
+
+    @property
+    def lowest(self) -> float:
+        """-h_max, full compression."""
+        return -self.h_max
+
+    @property
+    def highest(self) -> float:
+        """Infinite: from h_max on the answer is zero."""
+        return math.inf
 
     @functools.cached_property
     def _law(self) -> law_kernel.Law:
@@ -89,78 +82,16 @@ class ContactLaw:
     def _plain(self) -> tuple[Any, ...]:
         return tuple(self._law)
 
-    def _gaps(self, separation: ArrayLike) -> FloatArray:
-        d = finite_array("separation", separation)
-        require("separation", d, d >= -self.h_max, f"at least -h_max = {-self.h_max:.17g}, where the model ends")
-        return d
+    def _map(self, what: int, separation: Any, u: Any = None) -> Any:
+        if type(separation) is float and u is None and -self.h_max <= separation < math.inf:
+            return law_kernel.evaluate(what, separation, self._plain)
+        return super()._map(what, separation, u)
 
-    def _map(self, what: int, gap: Any) -> Any:
-        if type(gap) is float and -self.h_max <= gap < math.inf:
-            return law_kernel.evaluate(what, gap, self._plain)
-        if is_labelled(gap):
-            from mbma_tables.labels import apply
+    def _fill(self, what: int, gap: FloatArray, out: FloatArray) -> None:
+        law_kernel.fill(what, gap, self._plain, out)
 
-            return apply(lambda block: self._map(what, block), (gap,), 1)
-        d = self._gaps(gap)
-        flat, out = np.ascontiguousarray(d).reshape(-1), np.empty(d.size)
-        in_blocks(lambda block: law_kernel.fill(what, flat[block], self._plain, out[block]), d.size, BLOCK)
-        return out.reshape(d.shape)[()]
-
-    def __call__(self, separation: ArrayLike) -> Any:
-        """The same as `force`."""
-        return self._map(law_kernel.FORCE, separation)
-
-    def force(self, separation: ArrayLike) -> Any:
-        """F/A0 in the unit of E_star at d; zero from h_max on."""
-        return self._map(law_kernel.FORCE, separation)
-
-    def area(self, separation: ArrayLike) -> Any:
-        """A/A0 at d; zero from h_max on."""
-        return self._map(law_kernel.AREA, separation)
-
-    def stiffness(self, separation: ArrayLike) -> Any:
-        """-dF/dd per nominal area; it jumps where zeta_d reaches its floor, and belongs to the larger gap there."""
-        return self._map(law_kernel.FORCE_SLOPE, separation)
-
-    def stiffness_mean(self, separation: ArrayLike) -> Any:
-        """-dF/du per nominal area, against the mean separation u = (h_max + d)/2: twice `stiffness`."""
-        return 2 * self.stiffness(separation)
-
-    def area_slope(self, separation: ArrayLike) -> Any:
-        """-d(A/A0)/dd."""
-        return self._map(law_kernel.AREA_SLOPE, separation)
-
-    def energy(self, separation: ArrayLike) -> Any:
-        """Elastic energy per nominal area, the integral of force from d to h_max."""
-        return self._map(law_kernel.ENERGY, separation)
-
-    def separation(self, *, force: ArrayLike | None = None, area: ArrayLike | None = None) -> Any:
-        """Gap d at a given force or area, on the branch of first contact; h_max at zero.
-
-        Raises
-        ------
-        OutOfRangeError
-            Where the branch does not reach the value; the message says how far it goes.
-        """
-        if (force is None) == (area is None):
-            raise InputError("give force or area, one of them")
-        name = "area" if force is None else "force"
-        given: Any = area if force is None else force
-        if is_labelled(given):
-            from mbma_tables.labels import apply
-
-            return apply(lambda block: self.separation(**{name: block}), (given,), 1)
-        what, wanted = QUANTITIES[name], finite_array(name, given)
-        end = self._branch_end(what)
-        largest = float(self._map(what, end))
-        require(name, wanted, wanted >= 0, "at least 0")
-        require(name, wanted, wanted <= largest, f"at most {largest:.6g}, at d = {end:.6g} where the branch ends")
-        flat, out = np.ascontiguousarray(wanted).reshape(-1), np.empty(wanted.size)
-        in_blocks(lambda block: law_kernel.invert(what, flat[block], end, self._law, out[block]), out.size, BLOCK)
-        gap = out.reshape(wanted.shape)
-        if np.isnan(gap).any():
-            raise ConvergenceError(f"no gap found for some of {name}", np.isnan(gap))
-        return gap[()]
+    def _invert(self, what: int, wanted: FloatArray, end: float, out: FloatArray) -> None:
+        law_kernel.invert(what, wanted, end, self._law, out)
 
     def slope_error(self, separation: ArrayLike) -> Any:
         """Bound on the error of `stiffness` over F/l, and of `area_slope` over A/l, where l = h_max - d.
@@ -168,7 +99,7 @@ class ContactLaw:
         Of the value's own error, and of the logarithm's slope by Markov's inequality in the piece where d is: a
         residue of degree TERMS has slopes up to TERMS^2 times itself.
         """
-        d = self._gaps(separation)
+        d = self._gaps(separation, None)
         tau = np.arcsinh(np.sqrt(np.maximum(self.h_max - d, 0.0) / self.layer))
         # on a break, the worse of both pieces
         sides = [np.searchsorted(self.breaks, tau, side) - 1 for side in ("left", "right")]
@@ -182,10 +113,6 @@ class ContactLaw:
         )
         # l dtau/dl = tanh(tau)/2
         return np.where(d < self.h_max, value * steepest + (1 + value) * slope * np.tanh(tau), 0.0)[()]
-
-    def _branch_end(self, what: int) -> float:
-        turn = self.turning_point if what == law_kernel.FORCE else self.area_turning_point
-        return -self.h_max if turn is None else turn
 
     def compiled(self, name: str = "force") -> Any:
         """A numba-compiled function of one float, for use in other compiled code: "force", "area", "stiffness"...
@@ -213,45 +140,35 @@ def _to_piece(values: FloatArray) -> FloatArray:
     return pieces
 
 
-def contact_law(
-    surface: Surface,
-    rtol: float = 1e-8,
-    tier: str | AnyModel = "universal",
-    reading: str | Reading = "reported",
-    E_star: float = 1.0,
-) -> ContactLaw:
-    """Force and area of one surface as functions of its gap: the way to answer many gaps, and to invert.
-
-    Parameters
-    ----------
-    surface : Surface
-        One surface, not a batch.
-    rtol : float
-        Relative error asked of the polynomials against the tier's totals, in [1e-9, 0.1].
-    tier, reading, E_star
-        As for `contact`; `tier` may be an island model of one's own.
-
-    Returns
-    -------
-    ContactLaw
+def one_surface(surface: Surface) -> Surface:
+    """A surface of plain numbers.
 
     Raises
     ------
-    InputError, OutOfRangeError, ConvergenceError
-
-    Examples
-    --------
-    >>> from mbma_tables import Surface, contact_law
-    >>> law = contact_law(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0), rtol=1e-6)
-    >>> f"{law.force(1.0):.4g}"
-    '7.982e-05'
-    >>> law.error < 2e-6
-    True
+    InputError
+        For a batch.
     """
     if surface.labelled:
         surface = Surface(*(np.asarray(getattr(surface, name)) for name in PARAMETERS))
     if surface.shape != ():
         raise InputError(f"a law is of one surface, got a batch of shape {surface.shape}")
+    return surface
+
+
+def mbma_law(
+    surface: Surface,
+    rtol: float = 1e-8,
+    tier: str | AnyModel = "universal",
+    reading: str | Reading = "reported",
+    E_star: float = 1.0,
+) -> MbmaLaw:
+    """The law of the MBMA model for one surface; arguments as for `mbma_tables.contact_law`.
+
+    Raises
+    ------
+    InputError, OutOfRangeError, ConvergenceError
+    """
+    surface = one_surface(surface)
     asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
     modulus = number_in("E_star", E_star, np.finfo(float).tiny, np.finfo(float).max)
     choice = get_reading(reading)
@@ -281,11 +198,11 @@ def contact_law(
 
     ends = [k * h_rms for k in kinks(surface.hurst, surface.zeta_1, choice)]
     edges = to_tau(sorted({0.0, *(e for e in ends if e < 2 * h_max), 2 * h_max}))
-    breaks, pieces, errors = _fit(residues, edges, min(asked, RESOLVED))
+    breaks, pieces, errors = fit_pieces(residues, edges, min(asked, RESOLVED))
     errors += worst
     law = law_kernel.Law(breaks, pieces, np.empty(breaks.size), layer, h_max, modulus)
     law_kernel.fill_energies(law)
-    return ContactLaw(
+    return MbmaLaw(
         h_max=h_max,
         E_star=modulus,
         error=float(errors.max()),
@@ -301,7 +218,7 @@ def contact_law(
     )
 
 
-def _fit(residues: Any, edges: FloatArray, rtol: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def fit_pieces(residues: Any, edges: FloatArray, rtol: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Breaks, pieces and bounds on their errors: polynomials of `residues` between `edges`, halved until they fit."""
     low, high = edges[:-1], edges[1:]
     points = chebyshev.chebpts1(TERMS)

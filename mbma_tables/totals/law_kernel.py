@@ -31,7 +31,7 @@ class Law(NamedTuple):
 
 
 @njit(cache=True, fastmath=CONTRACT, error_model="numpy")
-def _locate(tau: float, breaks: FloatArray) -> int:
+def locate(tau: float, breaks: FloatArray) -> int:
     """Piece that holds tau; a break belongs to the piece of the larger gap."""
     low, high = 0, breaks.size - 1
     while high - low > 1:
@@ -44,7 +44,8 @@ def _locate(tau: float, breaks: FloatArray) -> int:
 
 
 @njit(cache=True, fastmath=CONTRACT, error_model="numpy")
-def _value(pieces: FloatArray, piece: int, which: int, u: float) -> float:
+def value_in(pieces: FloatArray, piece: int, which: int, u: float) -> float:
+    """A piece's polynomial at u in [-1, 1]."""
     value: float = pieces[piece, TERMS - 1, which]
     for k in range(TERMS - 2, -1, -1):
         value = value * u + pieces[piece, k, which]
@@ -52,7 +53,8 @@ def _value(pieces: FloatArray, piece: int, which: int, u: float) -> float:
 
 
 @njit(cache=True, fastmath=CONTRACT, error_model="numpy")
-def _slope(pieces: FloatArray, piece: int, which: int, u: float) -> float:
+def slope_in(pieces: FloatArray, piece: int, which: int, u: float) -> float:
+    """Its derivative by u."""
     slope: float = (TERMS - 1) * pieces[piece, TERMS - 1, which]
     for k in range(TERMS - 2, 0, -1):
         slope = slope * u + k * pieces[piece, k, which]
@@ -70,9 +72,9 @@ def _lead(which: int, depth: float) -> float:
 def _residue(which: int, depth: float, law: Law) -> float:
     """What is left of the logarithm of force or area without `_lead`."""
     tau = math.asinh(math.sqrt(depth / law.layer))
-    piece = _locate(tau, law.breaks)
+    piece = locate(tau, law.breaks)
     a, b = law.breaks[piece], law.breaks[piece + 1]
-    return _value(law.pieces, piece, which, (2.0 * tau - a - b) / (b - a))
+    return value_in(law.pieces, piece, which, (2.0 * tau - a - b) / (b - a))
 
 
 @njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
@@ -87,9 +89,9 @@ def _log_slope(which: int, depth: float, law: Law) -> float:
     """d log(force or area)/d log(depth)."""
     root = math.sqrt(depth / law.layer)
     tau = math.asinh(root)
-    piece = _locate(tau, law.breaks)
+    piece = locate(tau, law.breaks)
     a, b = law.breaks[piece], law.breaks[piece + 1]
-    slope: float = _slope(law.pieces, piece, which, (2.0 * tau - a - b) / (b - a)) * 2.0 / (b - a)
+    slope: float = slope_in(law.pieces, piece, which, (2.0 * tau - a - b) / (b - a)) * 2.0 / (b - a)
     # l dtau/dl
     inner = 0.5 * root / math.sqrt(1.0 + root * root)
     return (3.5 if which == 0 else 10.0 / 3.0) + slope * inner
@@ -117,7 +119,7 @@ def _evaluate(what: int, d: float, law: Law) -> float:
         return _direct(what, depth, law)
     if what == ENERGY:
         tau = math.asinh(math.sqrt(depth / law.layer))
-        piece = _locate(tau, law.breaks)
+        piece = locate(tau, law.breaks)
         below: float = law.energies[piece]
         return below + _work(law.breaks[piece], tau, law)
     if what in (FORCE_LOG_SLOPE, AREA_LOG_SLOPE):

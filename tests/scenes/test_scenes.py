@@ -270,7 +270,7 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
         monkeypatch.setattr(module, name, counted)
 
     count(totals, "contact")
-    count(laws, "contact_law")
+    count(laws, "mbma_law")
     for name in ("island_statistics", "profiles", "hertz_area"):
         count(islands, name)
     count(theories, "greenwood_williamson")
@@ -280,7 +280,7 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
     of_law = bool(asked & {"stiffness", "energy", "conductance"})
     expected = {
         "contact": 0 if of_law else int(bool(asked & {"force", "area"})),
-        "contact_law": int(of_law),
+        "mbma_law": int(of_law),
         "island_statistics": int("island_statistics" in asked),
         "profiles": int("pressure_profile" in asked),
         "greenwood_williamson": int("comparison" in asked),

@@ -524,7 +524,7 @@ def test_pieces_at_the_ends():
     """What rounds beyond the last break belongs to the last piece."""
     breaks = np.array([0.0, 0.5, 0.7, 2.0])
     places = [0.0, 0.5, math.nextafter(0.5, 1), 0.7, 1.9, 2.0, math.nextafter(2.0, 3)]
-    assert [law_kernel._locate(place, breaks) for place in places] == [0, 0, 1, 1, 2, 2, 2]
+    assert [law_kernel.locate(place, breaks) for place in places] == [0, 0, 1, 1, 2, 2, 2]
 
 
 @pytest.mark.parametrize("width", [3.0, 0.9])
