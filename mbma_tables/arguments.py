@@ -84,6 +84,13 @@ def require(name: str, value: FloatArray, good: Any, allowed: str) -> None:
         raise OutOfRangeError(f"{name} must be {allowed}, got {describe_entries(value, bad)}", bad)
 
 
+def positive_modulus(E_star: ArrayLike) -> FloatArray:
+    """E* as an array of positive numbers."""
+    modulus = finite_array("E_star", E_star)
+    require("E_star", modulus, modulus > 0, "positive")
+    return modulus
+
+
 def number_in(name: str, value: Any, low: float, high: float) -> float:
     """`value` as a float within [low, high]."""
     number = finite_array(name, value)

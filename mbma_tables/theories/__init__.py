@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from mbma_tables.theories.greenwood_williamson import (
-    Asperities,
-    GreenwoodWilliamson,
-    greenwood_williamson,
-    mean_separation,
-    separation,
-)
-from mbma_tables.theories.mbma import Mbma
-from mbma_tables.theories.persson import Method, Persson, persson_area, persson_force, persson_separation
-from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from mbma_tables.theories.registry import THEORIES, get_theory
+
+if TYPE_CHECKING:
+    from mbma_tables.theories.asperities import (
+        Asperities,
+        GreenwoodWilliamson,
+        greenwood_williamson,
+        mean_separation,
+        separation,
+    )
+    from mbma_tables.theories.mbma import Mbma
+    from mbma_tables.theories.persson import Method, Persson, persson_area, persson_force, persson_separation
+    from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
 
 __all__ = [
     "THEORIES",
@@ -32,3 +37,18 @@ __all__ = [
     "persson_separation",
     "separation",
 ]
+
+# a theory's module is imported when it is first asked for
+_MODULES = {
+    "asperities": ("Asperities", "GreenwoodWilliamson", "greenwood_williamson", "mean_separation", "separation"),
+    "mbma": ("Mbma",),
+    "persson": ("Method", "Persson", "persson_area", "persson_force", "persson_separation"),
+    "protocol": ("Theory", "TheoryAnswer", "UserTheory"),
+}
+_HOMES = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, is_labelled, require
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, is_labelled, positive_modulus, require
 from mbma_tables.errors import InputError
 from mbma_tables.labels import apply_to_surface
 from mbma_tables.models import AnyModel
 from mbma_tables.models.protocol import QUANTITIES
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
-from mbma_tables.theories.greenwood_williamson import positive_modulus
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
 from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma

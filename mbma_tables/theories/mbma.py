@@ -12,7 +12,6 @@ from mbma_tables.models import AnyModel, tier_name
 from mbma_tables.models.protocol import QUANTITIES
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.theories.greenwood_williamson import separation
 from mbma_tables.theories.protocol import SCAN, Theory, TheoryAnswer, select
 from mbma_tables.totals.contact import Totals, totals_at
 
@@ -59,7 +58,7 @@ class Mbma(Theory):
 
     def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length] from 0 to h_max."""
-        found = self.totals(surface, separation(surface, mean_separation), derivatives=True)
+        found = self.totals(surface, 2 * mean_separation - np.asarray(surface.h_max), derivatives=True)
         assert found.force_by is not None
         # du = dd/2
         return TheoryAnswer(found.force, found.area, -2 * found.force_by["separation"], found.error)

@@ -18,12 +18,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import erf, erfinv, exp1
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, positive_modulus, require
 from mbma_tables.errors import ConvergenceError, InputError
 from mbma_tables.labels import takes_labelled
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.theories.greenwood_williamson import positive_modulus
 from mbma_tables.theories.protocol import Theory, TheoryAnswer, select
 from mbma_tables.totals.gauss_kronrod import integrate
 

@@ -1,14 +1,21 @@
-"""Theories by name."""
+"""Theories by name; each theory's module is imported when it is asked for."""
 
 from __future__ import annotations
 
-from mbma_tables.errors import InputError
-from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
-from mbma_tables.theories.mbma import Mbma
-from mbma_tables.theories.persson import Persson
-from mbma_tables.theories.protocol import Theory, UserTheory, Wrapped
+import importlib
+from typing import TYPE_CHECKING, Any
 
-THEORIES = ("mbma", "persson", "greenwood_williamson")
+from mbma_tables.errors import InputError
+
+if TYPE_CHECKING:
+    from mbma_tables.theories.protocol import Theory, UserTheory
+
+_HOMES = {
+    "mbma": ("mbma", "Mbma"),
+    "persson": ("persson", "Persson"),
+    "greenwood_williamson": ("asperities", "GreenwoodWilliamson"),
+}
+THEORIES = tuple(_HOMES)
 
 
 def get_theory(theory: str | Theory | UserTheory) -> Theory:
@@ -25,12 +32,16 @@ def get_theory(theory: str | Theory | UserTheory) -> Theory:
     >>> get_theory("persson").name
     'persson'
     """
+    from mbma_tables.theories.protocol import Theory, UserTheory, Wrapped
+
     if isinstance(theory, Theory):
         return theory
     if isinstance(theory, str):
-        known: dict[str, type[Theory]] = {t.name: t for t in (Mbma, Persson, GreenwoodWilliamson)}
-        if theory in known:
-            return known[theory]()
+        if theory in _HOMES:
+            module, name = _HOMES[theory]
+            made: Any = getattr(importlib.import_module(f"mbma_tables.theories.{module}"), name)()
+            assert isinstance(made, Theory)
+            return made
     elif isinstance(theory, UserTheory) and not isinstance(theory, type):
         return Wrapped(theory)
     raise InputError(

@@ -220,7 +220,8 @@ WATCHED = {
     "mbma_tables.theories.contact": {"force", "area"},
     "mbma_tables.totals.law": {"stiffness", "energy", "conductance"},
     "mbma_tables.totals.conductance": {"conductance"},
-    "mbma_tables.theories": {"comparison", "force", "area"},
+    "mbma_tables.theories.asperities": {"comparison"},
+    "mbma_tables.theories.persson": set(),
     "mbma_tables.scenes.statistics": {"island_statistics", "pressure_profile"},
 }
 COMBINATIONS = [(name,) for name in OUTPUTS] + list(itertools.combinations(OUTPUTS, 2))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, positive_modulus
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.labels import takes_labelled
 from mbma_tables.surfaces.surface import Surface
@@ -110,13 +110,6 @@ def greenwood_williamson(surface: Surface, separation: ArrayLike, E_star: ArrayL
     area = math.pi * density * radius * sigma * height_integral(1.0, depth)
     gap = np.broadcast_to(gap, shape)
     return Asperities(gap[()], mean_separation(surface, gap), (modulus * force)[()], area)
-
-
-def positive_modulus(E_star: ArrayLike) -> FloatArray:
-    """E* as an array of positive numbers."""
-    modulus = finite_array("E_star", E_star)
-    require("E_star", modulus, modulus > 0, "positive")
-    return modulus
 
 
 class GreenwoodWilliamson(Theory):
