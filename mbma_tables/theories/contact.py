@@ -20,7 +20,7 @@ from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
 from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma
-from mbma_tables.totals.contact import Totals, wanted_quantities
+from mbma_tables.totals.contact import wanted_quantities
 
 KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by
 MAX_GRADIENT = 1.0
@@ -244,15 +244,13 @@ def contact(
         raise InputError(f"derivatives in the surface's parameters come from theory 'mbma', not from {chosen.name!r}")
     options: dict[str, Any] = {
         "by": by,
-        "theory": chosen,
+        "source": _Source(chosen, surface, E_star),
         "derivatives": derivatives,
         "quantities": wanted_quantities(quantities),
     }
     if surface.labelled or is_labelled(value) or is_labelled(E_star):
-        found = _of_labelled(surface, value, E_star, options)
-    else:
-        found = _contact(surface, value, E_star, **options)
-    return dataclasses.replace(found, _source=_Source(chosen, surface, E_star))
+        return _of_labelled(surface, value, E_star, options)
+    return _contact(surface, value, E_star, **options)
 
 
 def _known(**given: Any) -> tuple[str, Any]:
@@ -265,15 +263,41 @@ def _known(**given: Any) -> tuple[str, Any]:
 
 def _contact(
     surface: Surface,
-    value: ArrayLike,
-    E_star: ArrayLike,
+    value: Any,
+    E_star: Any,
     *,
     by: str,
-    theory: Theory,
+    source: _Source,
     derivatives: bool,
     quantities: tuple[str, ...],
 ) -> Contact:
     """`contact` of plain arrays."""
+    theory = source.theory
+    places: dict[str, Any] = {}
+    if by != "separation" or not isinstance(theory, Mbma):
+        value, E_star, places = _places(surface, value, E_star, by, theory)
+    if isinstance(theory, Mbma):
+        wanted = QUANTITIES if derivatives else quantities
+        totals = theory.totals(surface, places.get("separation", value), E_star, derivatives, wanted)
+        fields = vars(totals) | places
+        if derivatives and by in ("pressure", "area"):
+            held = "force" if by == "pressure" else "area"
+            fields |= _at_fixed(held, by, {"force": totals.force_by, "area": totals.area_by}, totals.force / E_star)
+    else:
+        found = theory.answer(surface, np.asarray(places["mean_separation"]))
+        error = np.broadcast_to(found.error, np.shape(found.force))[()]
+        fields = {"force": (E_star * found.force)[()], "area": found.area[()], "error": error} | places
+        fields |= {"reading": "", "tier": "", "islands": None}
+    for name in QUANTITIES:
+        if name not in quantities:
+            fields |= {name: None, f"{name}_by": None}
+    return Contact(theory=theory.name, _source=source, **fields)
+
+
+def _places(
+    surface: Surface, value: ArrayLike, E_star: ArrayLike, by: str, theory: Theory
+) -> tuple[FloatArray, FloatArray, dict[str, Any]]:
+    """What is known, the modulus, and both separations, all of the broadcast shape."""
     asked, modulus = finite_array(by, value), positive_modulus(E_star)
     shape = broadcast_shape(**{by: asked, "surface": surface.hurst, "E_star": modulus})
     asked, modulus = np.broadcast_to(asked, shape), np.broadcast_to(modulus, shape)
@@ -287,24 +311,8 @@ def _contact(
         quantity, wanted = ("force", asked / modulus) if by == "pressure" else ("area", asked)
         gap = 2 * theory.mean_separation_at(surface, quantity, wanted) - h_max
     average = asked if by == "mean_separation" else (h_max + gap) / 2
-    places: dict[str, Any] = {
-        "separation": np.broadcast_to(gap, shape)[()],
-        "mean_separation": np.broadcast_to(average, shape)[()],
-    }
-    if not isinstance(theory, Mbma):
-        found = theory.answer(surface, np.asarray(places["mean_separation"]))
-        both = {"force": (modulus * found.force)[()], "area": np.asarray(found.area)[()]}
-        places |= {name: value if name in quantities else None for name, value in both.items()}
-        error = np.broadcast_to(found.error, shape)[()]
-        return Contact(**places, error=error, theory=theory.name, reading="", tier="", islands=None)
-    totals = theory.totals(surface, gap, modulus, derivatives, QUANTITIES if derivatives else quantities)
-    fields = {field.name: getattr(totals, field.name) for field in dataclasses.fields(Totals)} | places
-    if derivatives and by in ("pressure", "area"):
-        held = "force" if by == "pressure" else "area"
-        fields |= _at_fixed(held, by, {"force": totals.force_by, "area": totals.area_by}, totals.force / modulus)
-    for name in set(QUANTITIES) - set(quantities):
-        fields |= {name: None, f"{name}_by": None}
-    return Contact(theory=theory.name, **fields)
+    both = {"separation": gap, "mean_separation": average}
+    return asked, modulus, {name: np.broadcast_to(place, shape)[()] for name, place in both.items()}
 
 
 def _at_fixed(held: str, by: str, slopes: dict[str, Any], per_modulus: Any) -> dict[str, Any]:
@@ -321,7 +329,7 @@ def _at_fixed(held: str, by: str, slopes: dict[str, Any], per_modulus: Any) -> d
 
 def _of_labelled(surface: Surface, value: Any, E_star: Any, options: dict[str, Any]) -> Contact:
     """`contact` of DataArrays, lazily where they are."""
-    by, theory, wanted = options["by"], options["theory"], options["quantities"]
+    by, theory, wanted = options["by"], options["source"].theory, options["quantities"]
     names: tuple[str, ...] = (*wanted, "error")
     fields: dict[str, Any] = {"force": None, "area": None}
     if by not in ("separation", "mean_separation"):
@@ -349,4 +357,4 @@ def _of_labelled(surface: Surface, value: Any, E_star: Any, options: dict[str, A
         fields |= {by: value, "separation": 2 * value - surface.h_max}
     mbma = isinstance(theory, Mbma)
     labels = {"reading": theory.reading.name, "tier": theory.tier_name} if mbma else {"reading": "", "tier": ""}
-    return Contact(theory=theory.name, islands=None, **labels, **fields)
+    return Contact(theory=theory.name, islands=None, _source=options["source"], **labels, **fields)
