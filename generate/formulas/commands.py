@@ -1,15 +1,15 @@
-"""`python -m generate formulas`: fit the closed forms, certify them, and write them as Python and as C."""
+"""`python -m generate formulas`: fit the closed forms, certify them, and write them as Python."""
 
 from __future__ import annotations
 
 import click
 
-from generate.formulas.printing import C_TEXT, MODULE, write_forms
+from generate.formulas.printing import MODULE, write_forms
 
 
 @click.command()
 def formulas() -> None:
-    """Fit and certify the closed forms; write their Python module and their C text (about ten minutes)."""
+    """Fit and certify the closed forms; write their Python module (about ten minutes)."""
     from generate.formulas.islands import SIZES, island_form
     from generate.formulas.totals import totals_form
 
@@ -18,7 +18,7 @@ def formulas() -> None:
     for form in forms:
         errors = ", ".join(f"{name} {found.largest:.2e}" for name, found in form.certificates.items())
         click.echo(f"{form.name}: largest held-out error {errors}")
-    click.echo(f"{MODULE}\n{C_TEXT}")
+    click.echo(MODULE)
 
 
 if __name__ == "__main__":

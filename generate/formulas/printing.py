@@ -1,7 +1,7 @@
-"""Closed forms as steps of sympy expressions: evaluated, written as numpy functions and C99, read back, shown in LaTeX.
+"""Closed forms as steps of sympy expressions: evaluated, written as numpy functions, read back, shown in LaTeX.
 
-`models/closed_form_functions.py` is the one place where the forms are kept. The C text and the equations of
-docs/formula.md are printed from its functions, and `evaluate` runs the same text: what is certified is what is shipped.
+`models/closed_form_functions.py` is the one place where the forms are kept. The exported C and the equations of
+docs/formula.md are made from its functions, and `evaluate` runs the same text: what is certified is what is shipped.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 import sympy
 from sympy.codegen.rewriting import create_expand_pow_optimization
-from sympy.printing.c import C99CodePrinter
 from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.precedence import PRECEDENCE
 
@@ -28,7 +27,6 @@ from mbma_tables.models.closed_form_functions import Certificate
 
 PACKAGE = pathlib.Path(mbma_tables.__file__).parent
 MODULE = PACKAGE / "models" / "closed_form_functions.py"
-C_TEXT = PACKAGE / "export" / "templates" / "closed_forms.c"
 MAX_PRODUCT = 8  # whole powers up to this are written as products: faster than pow, and rounded alike everywhere
 WIDTH = 120
 MADE_BY = "Made by `python -m generate formulas`; do not edit."
@@ -118,29 +116,11 @@ class _Numpy(NumPyPrinter):  # type: ignore[misc]
         return f"{self._print(relation.lhs)} {relation.rel_op} {self._print(relation.rhs)}"
 
 
-class _C99(C99CodePrinter):  # type: ignore[misc]
-    """Literals in shortest decimals, and no M_PI, which ISO C99 has not."""
-
-    def __init__(self) -> None:
-        super().__init__({"math_macros": {}})
-
-    def _print_Float(self, number: sympy.Float) -> str:
-        return repr(float(number))
-
-    def _print_NumberSymbol(self, number: sympy.NumberSymbol) -> str:
-        return repr(float(number))
-
-
 _expand_powers = create_expand_pow_optimization(MAX_PRODUCT)
 
 
 def _python(value: sympy.Expr) -> str:
     text: str = _Numpy().doprint(_expand_powers(value))
-    return text
-
-
-def _c(value: sympy.Expr) -> str:
-    text: str = _C99().doprint(_expand_powers(value))
     return text
 
 
@@ -192,21 +172,6 @@ def module_text(functions: Iterable[Function], ranges: dict[str, Ranges], certif
         "CERTIFICATES: dict[str, dict[str, Certificate]]": {f: repr(row) for f, row in certificates.items()},
     }
     return _HEAD + "\n".join([*map(_python_function, functions), *itertools.starmap(_dictionary, data.items())])
-
-
-def c_text(functions: Iterable[Function]) -> str:
-    """The functions in C99: doubles in, a double out; <math.h> alone, no global data."""
-    functions = list(functions)
-    heads = {f.name: f"double mbma_{f.name}({', '.join(f'double {name}' for name in f.arguments)})" for f in functions}
-    lines = ["/*", " * Closed forms of the MBMA model.", f" * {MADE_BY}", " */", "#include <math.h>", ""]
-    lines += [f"{head};" for head in heads.values()]
-    for function in functions:
-        lines += ["", f"/* {function.title} */", f"{heads[function.name]} {{"]
-        for name, value in function.steps:
-            left = "return" if name == function.result else f"const double {name} ="
-            lines.append(_wrapped(f"{left} {_c(value)};"))
-        lines.append("}")
-    return "\n".join([*lines, ""])
 
 
 def _otherwise(condition: sympy.Expr, value: sympy.Expr, other: sympy.Expr) -> sympy.Expr:
@@ -273,7 +238,7 @@ def latex_steps(function: Function) -> list[str]:
 
 
 def write_forms(forms: Iterable[Form]) -> None:
-    """Write the module and its C text."""
+    """Write the module."""
     forms = list(forms)
     text = module_text(
         [function for form in forms for function in form.functions],
@@ -281,4 +246,3 @@ def write_forms(forms: Iterable[Form]) -> None:
         {form.name: form.certificates for form in forms},
     )
     write_file(MODULE, text.encode())
-    write_file(C_TEXT, c_text(read_functions(text).values()).encode())

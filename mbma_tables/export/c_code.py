@@ -6,7 +6,9 @@ any machine; 120,000 numbers are 2.5 MB of text and a fraction of a second of co
 
 from __future__ import annotations
 
+import ast
 import importlib.resources
+import inspect
 import math
 import re
 import textwrap
@@ -64,21 +66,45 @@ def c_texts(model: UniversalModel, reading: Reading) -> dict[str, str]:
         if name == NUMBERS_FILE:
             texts[name] = f"{opening}\n{numbers_text(constants, arrays)}"
         else:
-            forms = template("closed_forms.c")
-            prototypes = "\n".join(line for line in forms.splitlines() if re.match("double .*;$", line))
+            prototypes, forms = closed_forms()
             texts[name] = filled(name, HEADER=opening, CLOSED_FORMS=forms, PROTOTYPES=prototypes)
     return texts
 
 
-def template(name: str) -> str:
-    """The text of a file of `templates`."""
-    return (importlib.resources.files("mbma_tables.export") / "templates" / name).read_text(encoding="utf-8")
+class _InC(ast.NodeTransformer):
+    """Arithmetic that Python and C read alike: doubles for whole numbers, pow for **."""
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        return ast.Call(ast.Name("pow"), [node.left, node.right], []) if isinstance(node.op, ast.Pow) else node
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        return ast.Constant(float(ast.unparse(node)))
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        return ast.Constant(math.pi) if node.id == "pi" else node
+
+
+def closed_forms() -> tuple[str, str]:
+    """Prototypes and definitions of the closed forms, from the text of the Python functions."""
+    heads, definitions = [], []
+    for node in ast.parse(inspect.getsource(closed_form_functions)).body:
+        if isinstance(node, ast.FunctionDef):
+            heads.append(f"double mbma_{node.name}({', '.join(f'double {given.arg}' for given in node.args.args)})")
+            lines = [f"/* {ast.get_docstring(node)} */", f"{heads[-1]} {{"]
+            for step in node.body[1:]:
+                text = ast.unparse(_InC().visit(step)).replace("\n", " ")
+                text = f"{'' if isinstance(step, ast.Return) else 'const double '}{text};"
+                lines += textwrap.wrap(text, 120, initial_indent="    ", subsequent_indent="        ")
+            definitions.append("\n".join([*lines, "}\n"]))
+    return "".join(f"{head};\n" for head in heads), "\n".join(definitions)
 
 
 def filled(name: str, **parts: str) -> str:
     """A template with its places, such as @HEADER@, filled in."""
+    text = (importlib.resources.files("mbma_tables.export") / "templates" / f"{name}.in").read_text(encoding="utf-8")
     # in one pass: a header may hold such a name itself
-    return re.sub("@([A-Z_]+)@", lambda place: parts[place[1]], template(f"{name}.in"))
+    return re.sub("@([A-Z_]+)@", lambda place: parts[place[1]], text)
 
 
 def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | float], dict[str, FloatArray]]:

@@ -39,9 +39,10 @@ class Language(NamedTuple):
     run: tuple[str, ...]
 
 
+C_SELFTEST = {"mbma_selftest.c": "mbma_selftest.c: replays the conformance points of the MBMA model."}
 LANGUAGES = {
     "c": Language(
-        {"mbma_selftest.c": "mbma_selftest.c: replays the conformance points of the MBMA model in C99."},
+        C_SELFTEST,
         c_code.USAGE,
         ("cc", "-std=c99", "-O2", "{0}/mbma.c", "{0}/mbma_selftest.c", "-lm", "-o", "selftest"),
         ("{1}/selftest",),
@@ -49,11 +50,15 @@ LANGUAGES = {
     "fortran": Language(
         {
             "mbma.f90": "mbma.f90: the MBMA model for Fortran 2008, an interface to mbma.c.",
-            "mbma_selftest.f90": "mbma_selftest.f90: replays the conformance points of the MBMA model in Fortran 2008.",
-        },
+            "mbma_selftest.f90": "mbma_selftest.f90: what mbma_selftest.c replays, in Fortran 2008.",
+        }
+        | C_SELFTEST,
         "Compile it with mbma.c, in this order: gfortran -O2 mbma.c mbma.f90 program.f90. Every procedure may be "
         "called from any thread.",
-        ("gfortran", "-O2", "{0}/mbma.c", "{0}/mbma.f90", "{0}/mbma_selftest.f90", "-o", "selftest"),
+        (
+            *("gfortran", "-O2", "-DMBMA_OTHER_REPLAY", "{0}/mbma.c", "{0}/mbma_selftest.c", "{0}/mbma.f90"),
+            *("{0}/mbma_selftest.f90", "-o", "selftest"),
+        ),
         ("{1}/selftest",),
     ),
     "javascript": Language(
@@ -128,7 +133,7 @@ def source_texts(target: str, model: UniversalModel, reading: Reading) -> dict[s
     texts = {} if target == "javascript" else dict(c_texts)
     for name, title in language.titles.items():
         lines = c_code.header(model, reading, title, language.usage)
-        opening = comment(lines, "!") if target == "fortran" else block_comment(lines)
+        opening = comment(lines, "!") if name.endswith(".f90") else block_comment(lines)
         parts = {"HEADER": opening.rstrip()}
         if name == "mbma.mjs":
             parts["WASM"] = base64.encodebytes(web_assembly(c_texts)).decode("ascii")

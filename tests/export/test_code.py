@@ -91,9 +91,10 @@ def test_fortran_equals_the_runtime(tmp_path: pathlib.Path) -> None:
     (tmp_path / "message.f90").write_text(
         "program message\n  use mbma\n  write (*, '(3a)') mbma_message(MBMA_OK), '|', mbma_message(-1)\nend program\n"
     )
-    c = ["gcc", "-std=c99", *WARNINGS, "-O1", *SANITIZERS, "-c", "mbma.c"]
+    c = ["gcc", "-std=c99", *WARNINGS, "-O1", *SANITIZERS, "-c", "-DMBMA_OTHER_REPLAY", "mbma.c", "mbma_selftest.c"]
     strict = ["gfortran", "-std=f2008", *WARNINGS, "-fcheck=all", *SANITIZERS, "-O1", "mbma.o", "mbma.f90"]
-    commands = [c, [*strict, "mbma_selftest.f90", "-o", "selftest"], [*strict, "message.f90", "-o", "message"]]
+    selftest = [*strict, "mbma_selftest.o", "mbma_selftest.f90", "-o", "selftest"]
+    commands = [c, selftest, [*strict, "message.f90", "-o", "message"]]
     code_points.assert_equal_to_runtime(build_and_replay(commands, tmp_path, code_points.write_points(tmp_path)))
     said = subprocess.run(["./message"], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True)
     assert said.stdout == "no error|no such status\n"
