@@ -1,4 +1,4 @@
-"""Pictures of compression: force against gap, and real contact area against force.
+"""Pictures of compression: force against gap, and real contact area against force, with the scatter of theories.
 
 Figures are drawn without pyplot, so nothing of the caller's matplotlib state is read or changed.
 """
@@ -10,13 +10,29 @@ import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from mbma_tables.arguments import FloatArray, finite_array
 from mbma_tables.errors import InputError, MbmaError
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 FORCE_LABEL = "force  F/(A0 E*)"
+LABELS = {"mbma": "MBMA", "greenwood_williamson": "Greenwood-Williamson", "persson_simplified": "Persson, simplified"}
+
+
+def theory_label(name: str) -> str:
+    """A theory's name in a legend.
+
+    Examples
+    --------
+    >>> from mbma_tables.plots import theory_label
+    >>> theory_label("mbma"), theory_label("persson")
+    ('MBMA', 'Persson')
+    """
+    return LABELS.get(name, name.replace("_", " ").capitalize())
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,12 +49,16 @@ class Curve:
         F/A0, or F/(A0 E*).
     area : ndarray
         A/A0.
+    scatter, area_scatter : ndarray or None
+        Standard deviations of ln F at the gap and of ln A at the force, drawn as bands; NaN where not known.
     """
 
     label: str
     gap: FloatArray
     force: FloatArray
     area: FloatArray
+    scatter: FloatArray | None = None
+    area_scatter: FloatArray | None = None
 
     def __post_init__(self) -> None:
         shapes = set()
@@ -46,6 +66,7 @@ class Curve:
             array = finite_array(f"{name} of {self.label!r}", getattr(self, name))
             shapes.add(array.shape)
             object.__setattr__(self, name, array)
+        shapes |= {np.shape(band) for band in (self.scatter, self.area_scatter) if band is not None}
         if len(shapes) > 1 or self.gap.ndim != 1:
             raise InputError(f"{self.label!r}: gap, force and area must be 1-D and of one length")
         if not ((self.force > 0) & (self.area > 0)).any():
@@ -95,6 +116,8 @@ def draw_compression(curves: Sequence[Curve], title: str = "", force_label: str 
         marker = "." if curve is curves[0] else ""
         by_gap.plot(curve.gap, curve.force, marker=marker, label=curve.label)
         by_force.plot(curve.force, curve.area, marker=marker, label=curve.label)
+        _band(by_gap, curve.gap, curve.force, curve.scatter)
+        _band(by_force, curve.force, curve.area, curve.area_scatter)
     by_gap.set_yscale("log", nonpositive="mask")
     by_force.set_xscale("log", nonpositive="mask")
     by_force.set_yscale("log", nonpositive="mask")
@@ -107,6 +130,15 @@ def draw_compression(curves: Sequence[Curve], title: str = "", force_label: str 
     by_gap.legend()
     figure.suptitle(title)
     return figure
+
+
+def _band(axes: Axes, x: FloatArray, y: FloatArray, scatter: FloatArray | None) -> None:
+    """One standard deviation of ln y about a line, in its colour, where it is known."""
+    if scatter is None or not np.isfinite(scatter).any():
+        return
+    factor = np.exp(np.where(np.isfinite(scatter), scatter, 0.0))
+    colour = axes.lines[-1].get_color()
+    axes.fill_between(x, y / factor, y * factor, where=np.isfinite(scatter).tolist(), alpha=0.25, color=colour, lw=0)
 
 
 def to_png(figure: Figure) -> bytes:

@@ -13,7 +13,10 @@ from mbma_tables import Surface, contact, island, theories
 from mbma_tables.cli import main
 from mbma_tables.cli.commands import curve_gaps
 from mbma_tables.materials import effective_modulus
+from mbma_tables.plots import theory_label
+from mbma_tables.scenes.effects import COMPARED
 from mbma_tables.surfaces.cases import CASES
+from mbma_tables.theories import THEORIES
 
 YANG_PERSSON = {"hurst": 0.8, "q0": 60 * np.pi / 1040, "zeta_1": 216.0, "h_rms": 1.0, "h_max": 3.0}
 CONCRETE = {"hurst": 0.7, "m0": 0.071, "m2": 0.27, "m4": 62.0, "h_max": 1.1}
@@ -88,6 +91,68 @@ def test_both_separations_meet():
     by_average = json.loads(run("contact", "--surface", "challenge", "-u", repr(average), "--json"))
     assert by_average["columns"]["force"] == pytest.approx(by_gap["columns"]["force"], rel=1e-12)
     assert by_average["columns"]["mean_separation"] == pytest.approx([average], rel=1e-15)
+
+
+@pytest.mark.parametrize("theory", THEORIES)
+def test_contact_by_pressure_and_by_area(theory):
+    def asked(*known):
+        return json.loads(run("contact", "--surface", "concrete", "--theory", theory, *known, "--json"))
+
+    surface = Surface.named("concrete")
+    by_pressure = asked("-p", "1e-3,0.002", "--E-star", "5")
+    answer = contact(surface, pressure=[1e-3, 2e-3], E_star=5.0, theory=theory)
+    for name in ("separation", "mean_separation", "force", "area", "stiffness"):
+        assert by_pressure["columns"][name] == pytest.approx(getattr(answer, name).tolist(), rel=1e-12)
+    assert (by_pressure["theory"], by_pressure["valid"], by_pressure["reasons"]) == (theory, [True, True], {})
+    assert len(by_pressure["scatter"]) == len(by_pressure["area_scatter"]) == 2
+    by_area = asked("--area", repr(by_pressure["columns"]["area"][1]))
+    assert by_area["columns"]["force"] == pytest.approx([2e-3 / 5], rel=1e-7)
+
+
+def test_where_an_answer_is_not_valid_is_said_in_one_line():
+    arguments = ("contact", "--surface", "concrete", "-u", "0.8,0.01")
+    lines = [line for line in run(*arguments).splitlines() if line.startswith("not valid")]
+    assert lines == [
+        "not valid at 1 of 2: areas of islands are added, A/A0 is above 0.1 (1); "
+        "stiffness falls with compression here, which no simulation shows (1)"
+    ]
+    found = json.loads(run(*arguments, "--json"))
+    assert found["valid"] == [True, False]
+    assert list(found["reasons"].values()) == [[1], [1]]
+    assert found["scatter"] == [None, None]
+    assert any(line.startswith("# not valid") for line in run(*arguments, "--csv").splitlines())
+    assert "not valid" not in run("contact", "--surface", "concrete", "-u", "0.8")
+
+
+def test_scatter_is_said_where_it_is_known(folder, monkeypatch):
+    """Of a theory that states it, in the table, as JSON, and as a band in the picture beside MBMA."""
+    import mbma_tables.plots
+    from mbma_tables.theories.persson import Persson
+
+    monkeypatch.setattr(Persson, "scatter", lambda self, surface, area: (0.3 + area, 0.02 + 0 * area))
+    text = run("contact", "--surface", "concrete", "--theory", "persson", "-a", "0.01,0.1")
+    assert "scatter against simulations: ln force 0.31 to 0.4 at a separation, ln area 0.02 to 0.02 at a force" in text
+    drawn = []
+    original = mbma_tables.plots.draw_compression
+    monkeypatch.setattr(mbma_tables.plots, "draw_compression", lambda *given: drawn.append(given) or original(*given))
+    run("curve", "--surface", "concrete", "--points", "9", "--plot", "c.png")
+    line = next(curve for curve in drawn[0][0] if curve.label == "Persson")
+    assert line.scatter == pytest.approx(0.3 + line.area)
+    assert line.area_scatter == pytest.approx(np.full(line.gap.size, 0.02))
+
+
+@pytest.mark.parametrize("theory", THEORIES)
+def test_curve_of_any_theory(folder, theory):
+    arguments = ("curve", "--surface", "concrete", "--theory", theory, "--points", "9", "--plot", "c.png", "--json")
+    found = json.loads(run(*arguments))
+    columns = found["columns"]
+    # Persson's theory has no finite force at u = 0
+    assert len(columns["force"]) == len(found["valid"]) == (8 if theory == "persson" else 9)
+    answer = contact(Surface.named("concrete"), columns["separation"], theory=theory)
+    assert columns["force"] == answer.force.tolist()
+    assert columns["area"] == answer.area.tolist()
+    assert found["theory"] == theory
+    assert (found["reading"] is None) == (theory != "mbma")
 
 
 def test_csv_holds_every_digit():
@@ -176,8 +241,8 @@ def test_curve_beside_other_theories(folder):
     surface = Surface.named("concrete")
     average, gap = np.array(found["mean_separation"]), np.array(found["separation"])
     asperities = theories.greenwood_williamson(surface, gap, 3.0)
-    assert found["greenwood_williamson_force"] == asperities.force.tolist()
-    assert found["greenwood_williamson_area"] == asperities.area.tolist()
+    np.testing.assert_allclose(found["greenwood_williamson_force"], asperities.force, rtol=1e-13)
+    np.testing.assert_allclose(found["greenwood_williamson_area"], asperities.area, rtol=1e-13)
     assert found["persson_force"][-1] is None
     assert found["persson_area"][-1] is None
     full = theories.persson_force(surface, average[:-1], 3.0)
@@ -186,7 +251,8 @@ def test_curve_beside_other_theories(folder):
     simplified = theories.persson_force(surface, average, 3.0, method="simplified")
     np.testing.assert_allclose(found["persson_simplified_force"], simplified, rtol=1e-12)
     assert (folder / "c.png").is_file()
-    assert table_rows(run("curve", *arguments))[-1][-4:-2] == ["-", "-"]
+    names, *_, last = table_rows(run("curve", *arguments))
+    assert last[names.index("persson_force")] == last[names.index("persson_area")] == "-"
 
 
 def test_the_picture_holds_the_table(monkeypatch):
@@ -198,14 +264,11 @@ def test_the_picture_holds_the_table(monkeypatch):
     arguments = ("--surface", "concrete", "--points", "9", "--compare", "--plot", "c.png")
     columns = json.loads(run("curve", *arguments, "--json"))["columns"]
     curves, title, force_label = drawn[0]
-    assert [curve.label for curve in curves] == [
-        "MBMA, reported",
-        "Greenwood-Williamson",
-        "Persson",
-        "Persson, simplified",
-    ]
+    others = [name for name in COMPARED if name != "mbma"]
+    assert [curve.label for curve in curves] == ["MBMA, reported", *map(theory_label, others)]
+    assert {"Greenwood-Williamson", "Persson", "Persson, simplified"} < {curve.label for curve in curves}
     h_rms = Surface.named("concrete").h_rms
-    for curve, name in zip(curves, ("", "greenwood_williamson_", "persson_", "persson_simplified_"), strict=True):
+    for curve, name in zip(curves, ("", *(f"{name}_" for name in others)), strict=True):
         force = [value for value in columns[f"{name}force"] if value is not None]
         assert curve.force.tolist() == force
         assert curve.area.tolist() == [value for value in columns[f"{name}area"] if value is not None]
@@ -299,8 +362,14 @@ def test_bad_input_of_every_command(folder, arguments, message):
         (["contact", "-d", ""], "separation is empty"),
         (["contact", "-d", "1;2"], "'1;2' is not a number"),
         (["contact", "-u", "-0.1"], "mean_separation must be at least 0"),
-        (["contact"], "either --separation or --mean-separation"),
-        (["contact", "-d", "1", "-u", "1"], "either --separation or --mean-separation"),
+        (["contact", "-p", "-1"], "pressure must be at least 0"),
+        (["contact", "-p", "9"], "force must be at most what theory 'mbma' reaches"),
+        (["contact", "-a", "0.01", "--over-h-rms"], "--over-h-rms is about lengths"),
+        (["contact", "-d", "1", "--theory", "person"], "theory must be one of ('mbma', "),
+        (["contact", "-d", "1", "--theory", "persson", "--tier", "exact"], "tier: options of theory 'mbma'"),
+        (["curve", "--theory", "persson", "--reading", "printed"], "reading: options of theory 'mbma'"),
+        (["contact"], "one of --separation, --mean-separation, --pressure and --area"),
+        (["contact", "-d", "1", "-u", "1"], "one of --separation, --mean-separation, --pressure and --area"),
         (["curve", "--points", "4"], "--points"),
         (["curve", "--plot", "c.pdf"], ".png"),
         (["curve", "--plot", "c.png", "--out", "c.png"], "same file"),

@@ -23,6 +23,22 @@ def test_lines_hold_the_arrays_as_given():
         np.testing.assert_array_equal(right.get_xydata(), np.stack([curve.force, curve.area], axis=1))
 
 
+def test_scatter_is_a_band_of_one_standard_deviation():
+    scatter = np.array([np.nan, 0.7, 0.3, 0.1])
+    figure = draw_compression([Curve("law", GAP, FORCE, AREA, scatter, 0.1 * scatter), *two_curves()])
+    for axes, x, y, spread in ((figure.axes[0], GAP, FORCE, scatter), (figure.axes[1], FORCE, AREA, 0.1 * scatter)):
+        (band,) = axes.collections
+        corners = band.get_paths()[0].vertices
+        for k in (1, 2, 3):
+            for side in (1, -1):
+                assert np.isclose(corners, [x[k], y[k] * np.exp(side * spread[k])], rtol=1e-12).all(axis=1).any()
+        assert corners[:, 0].min() >= x[1:].min()
+    unknown = draw_compression([Curve("law", GAP, FORCE, AREA, np.full(4, np.nan))])
+    assert not unknown.axes[0].collections
+    with pytest.raises(InputError, match="one length"):
+        Curve("law", GAP, FORCE, AREA, scatter[:2])
+
+
 def test_axes_say_what_they_show():
     figure = draw_compression(two_curves(), "a title", "force  F/A0 [MPa]")
     by_gap, by_force = figure.axes

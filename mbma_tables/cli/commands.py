@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,18 +19,19 @@ from mbma_tables.cli.options import (
     over_h_rms,
     png_option,
     specimen_options,
+    theory_options,
 )
 from mbma_tables.errors import InputError
 from mbma_tables.scenes.specimen import Specimen
 
+if TYPE_CHECKING:
+    from mbma_tables.scenes.run import OtherTheory
+    from mbma_tables.theories.contact import Contact
+
 MIN_DEPTH = 1e-3  # (h_max - d)/h_max at a curve's second point
 EVEN_FROM = 0.2  # and where its points, geometric so far, become evenly spaced
 MIN_POINTS = 5
-LABELS = {
-    "greenwood_williamson": "Greenwood-Williamson",
-    "persson": "Persson",
-    "persson_simplified": "Persson, simplified",
-}
+DRAWN = ("calibrated", "persson")  # theories beside the chosen one in a picture, where they are there
 COLUMNS = ("separation", "mean_separation", "force", "area", "error")
 ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
 
@@ -43,48 +44,56 @@ def _lengths(name: str, numbers: list[float], specimen: Specimen, over_h_rms: bo
 
 
 def _asked(model: Model, specimen: Specimen) -> dict[str, Any]:
-    """Keywords for `contact` and `island`."""
+    """Keywords for `contact`."""
     return {**vars(model), "E_star": 1.0 if specimen.E_star is None else specimen.E_star}
 
 
 def _stress_units(specimen: Specimen) -> dict[str, str]:
-    return {"force": "F/(A0 E*)" if specimen.E_star is None else "F/A0", "area": "A/A0"}
+    unit = "F/(A0 E*)" if specimen.E_star is None else "F/A0"
+    return {"force": unit, "area": "A/A0", "stiffness": f"{unit} per {specimen.length_unit or 'length'}"}
 
 
-@click.command("contact", short_help="Force and area at given gaps.")
+@click.command("contact", short_help="Force and area at given gaps, pressures or areas.")
 @numbers_option("--separation", "-d", help="Gap d from the mid-plane [length]; may be repeated.")
 @numbers_option("--mean-separation", "-u", help="Instead: mean separation u = (h_max + d)/2 [length].")
+@numbers_option("--pressure", "-p", help="Instead: force over nominal area, over E* where none is given.")
+@numbers_option("--area", "-a", help="Instead: real over nominal contact area.")
 @over_h_rms
 @specimen_options
-@model_options
+@theory_options
 @output_options
 def contact_command(
     separation: list[float] | None,
     mean_separation: list[float] | None,
+    pressure: list[float] | None,
+    area: list[float] | None,
     over_h_rms: bool,
     specimen: Specimen,
     model: Model,
     output: Output,
 ) -> None:
-    """Force and real contact area at given gaps.
+    """Force, real contact area and stiffness -dF/du at given gaps, pressures or areas.
 
     Lengths are in the surface's own unit. Force is F/(A0 E*), or F/A0 where a modulus is given; area is A/A0.
 
     Example: mbma contact --surface yang-persson -d 2,1.5 --over-h-rms
     """
-    known = {"separation": separation, "mean_separation": mean_separation}
+    lengths = {"separation": separation, "mean_separation": mean_separation}
+    known = lengths | {"pressure": pressure, "area": area}
     given = {name: numbers for name, numbers in known.items() if numbers is not None}
     if len(given) != 1:
-        raise InputError("gaps are needed: either --separation or --mean-separation")
+        raise InputError("one of --separation, --mean-separation, --pressure and --area is needed")
+    (name, numbers), *_ = given.items()
+    if over_h_rms and name not in lengths:
+        raise InputError(f"--over-h-rms is about lengths: leave it out with --{name}")
     from mbma_tables.arguments import require
     from mbma_tables.theories.contact import contact
 
-    gaps = {name: _lengths(name, numbers, specimen, over_h_rms) for name, numbers in given.items()}
-    if mean_separation is not None:
-        average = gaps["mean_separation"]
-        require("mean_separation", average, average >= 0, "at least 0, where the model ends")
-    answer = contact(specimen.surface, **gaps, **_asked(model, specimen))
-    values = {name: getattr(answer, name) for name in COLUMNS}
+    asked = _lengths(name, numbers, specimen, over_h_rms)
+    if name == "mean_separation":
+        require(name, asked, asked >= 0, "at least 0, where the model ends")
+    answer = contact(specimen.surface, **{name: asked}, **_asked(model, specimen))
+    values = {column: getattr(answer, column) for column in (*COLUMNS[:-1], "stiffness", COLUMNS[-1])}
     report_answer("contact", specimen, model, answer, values, _stress_units(specimen)).write(output)
 
 
@@ -102,10 +111,10 @@ def curve_gaps(h_max: float, points: int) -> Any:
 
 @click.command("curve", short_help="Force and area from first contact to full compression.")
 @click.option("--points", type=click.IntRange(min=MIN_POINTS), default=41, show_default=True, help="How many gaps.")
-@click.option("--compare", is_flag=True, help="Add Greenwood-Williamson and Persson (full and simplified).")
+@click.option("--compare", is_flag=True, help="Add all other theories, and Persson's simplified form.")
 @png_option
 @specimen_options
-@model_options
+@theory_options
 @output_options
 def curve_command(
     points: int, compare: bool, plot: Path | None, specimen: Specimen, model: Model, output: Output
@@ -113,42 +122,50 @@ def curve_command(
     """Force and area from first contact (d = h_max) to full compression (d = -h_max).
 
     Half of the points are geometric in (h_max - d)/h_max, from 0.001 to 0.2, since the force falls like its
-    power 7/2 at light contact; the rest are even, up to 2.
+    power 7/2 at light contact; the rest are even, up to 2. Gaps where a theory has no finite force are left out.
+
+    The picture has Persson's theory beside the chosen one, and the calibrated law with its scatter as a band.
 
     Example: mbma curve --surface concrete --plot concrete.png
     """
     check_png(plot, output.out)
+    import numpy as np
+
+    from mbma_tables.scenes.effects import COMPARED
+    from mbma_tables.scenes.run import other_theory
     from mbma_tables.theories.contact import contact
 
-    gap = curve_gaps(float(specimen.surface.h_max), points)
-    asked = _asked(model, specimen)
-    answer = contact(specimen.surface, gap, **asked)
+    surface, asked = specimen.surface, _asked(model, specimen)
+    gap = curve_gaps(float(surface.h_max), points)
+    if model.theory != "mbma":
+        gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).force)]
+    answer = contact(surface, gap, **asked)
     values = {name: getattr(answer, name) for name in COLUMNS}
     units = _stress_units(specimen)
-    lines = {"mbma": (answer.force, answer.area)}
-    if compare:
-        from mbma_tables.scenes.run import other_theory
-
-        for theory in LABELS:
-            lines[theory] = other_theory(theory, specimen.surface, gap, asked["E_star"])
-            for quantity, array in zip(("force", "area"), lines[theory], strict=True):
-                values[f"{theory}_{quantity}"] = array
-                units[f"{theory}_{quantity}"] = units[quantity]
-    picture = b"" if plot is None else _draw(specimen, answer, lines)
+    others = {
+        name: other_theory(name, surface, gap, asked["E_star"])
+        for name in COMPARED
+        if name != model.theory and (compare or (plot is not None and name in DRAWN))
+    }
+    for theory, line in others.items() if compare else ():
+        for quantity in ("force", "area"):
+            values[f"{theory}_{quantity}"] = getattr(line, quantity)
+            units[f"{theory}_{quantity}"] = units[quantity]
+    picture = b"" if plot is None else _draw(specimen, answer, others)
     report_answer("curve", specimen, model, answer, values, units).write(output, plot, picture)
 
 
-def _draw(specimen: Specimen, answer: Any, lines: Mapping[str, tuple[Any, Any]]) -> bytes:
+def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory]) -> bytes:
     import numpy as np
 
-    from mbma_tables.plots import Curve, draw_compression, to_png
+    from mbma_tables.plots import Curve, draw_compression, theory_label, to_png
 
     gap = answer.mean_separation / specimen.surface.h_rms
-    curves = []
-    for name, (force, area) in lines.items():
-        known = np.isfinite(force)
-        label = f"MBMA, {answer.reading}" if name == "mbma" else LABELS[name]
-        curves.append(Curve(label, gap[known], force[known], area[known]))
+    label = theory_label(answer.theory) + (f", {answer.reading}" if answer.reading else "")
+    curves = [Curve(label, gap, answer.force, answer.area, answer.scatter, answer.area_scatter)]
+    for name, line in others.items():
+        known = np.isfinite(line.force)
+        curves.append(Curve(theory_label(name), gap[known], *(field[known] for field in line)))
     return to_png(draw_compression(curves, specimen.title, f"force  {_stress_units(specimen)['force']}"))
 
 
@@ -171,7 +188,9 @@ def island_command(
         raise InputError("approaches are needed: --delta")
     from mbma_tables.totals.island import island
 
-    answer = island(specimen.surface, _lengths("delta", delta, specimen, over_h_rms), **_asked(model, specimen))
+    asked = _asked(model, specimen)
+    del asked["theory"]
+    answer = island(specimen.surface, _lengths("delta", delta, specimen, over_h_rms), **asked)
     values = {name: getattr(answer, name) for name in ("delta", *ISLAND_FIELDS, "force", "area", "error")}
     square = f"{specimen.length_unit or 'length'}^2"
     units = {"force": square if specimen.E_star is None else f"[E*] {square}", "area": square}

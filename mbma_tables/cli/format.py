@@ -8,7 +8,7 @@ import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -17,10 +17,13 @@ from mbma_tables.cli.options import Model, Output
 from mbma_tables.files import write_file
 from mbma_tables.scenes.specimen import Specimen
 
+if TYPE_CHECKING:
+    from mbma_tables.theories.contact import Contact
+
 DIGITS = 6  # significant digits of a table; JSON and CSV keep all
 SURFACE_NUMBERS = ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "m0", "m2", "m4", "alpha")
 # options that say where the answer goes, or that the report names by themselves
-NOT_ARGUMENTS = ("as_json", "as_csv", "out", "plot", "reading", "tier", "rtol")
+NOT_ARGUMENTS = ("as_json", "as_csv", "out", "plot", "theory", "reading", "tier", "rtol")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -140,28 +143,55 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     return facts, notes
 
 
+def _validity(answer: Contact) -> tuple[list[str], dict[str, Any]]:
+    """Where a contact's theory is tested, and its scatter: lines for a reader, and facts for a program."""
+    import numpy as np
+
+    valid = np.atleast_1d(answer.valid)
+    reasons = {reason: np.atleast_1d(mask) for reason, mask in answer.reasons.items()}
+    notes = []
+    if reasons:
+        listed = "; ".join(f"{reason} ({int(mask.sum())})" for reason, mask in reasons.items())
+        notes.append(f"not valid at {int((~valid).sum())} of {valid.size}: {listed}")
+    scatter = {"scatter": np.atleast_1d(answer.scatter), "area_scatter": np.atleast_1d(answer.area_scatter)}
+    known = {name: values[np.isfinite(values)] for name, values in scatter.items()}
+    if all(values.size for values in known.values()):
+        force, area = (f"{values.min():.2g} to {values.max():.2g}" for values in known.values())
+        notes.append(f"scatter against simulations: ln force {force} at a separation, ln area {area} at a force")
+    facts: dict[str, Any] = {
+        "valid": valid.tolist(),
+        "reasons": {reason: np.flatnonzero(mask).tolist() for reason, mask in reasons.items()},
+    }
+    for name, values in scatter.items():
+        facts[name] = [number if np.isfinite(number) else None for number in values.tolist()]
+    return notes, facts
+
+
 def report_answer(
     command: str, specimen: Specimen, model: Model, answer: Any, values: Mapping[str, Any], units: Mapping[str, str]
 ) -> Report:
     """The report of a command that evaluated the model; `units` are those that `units_of` does not know."""
     surface, notes = _surface_facts(specimen)
     scale = "forces are over E*, none was given" if specimen.E_star is None else f"E* is {specimen.E_star:.6g}"
-    notes += [
-        f"reading {answer.reading}, tier {answer.tier}, rtol {model.rtol:g}; {scale}",
-        "error bounds the relative error of force and area",
-    ]
+    made = f"reading {answer.reading}, tier {answer.tier}, rtol {model.rtol:g}" if answer.reading else ""
+    notes += [f"{made or f'theory {model.theory}'}; {scale}", "error bounds the relative error of force and area"]
     facts = {
         "arguments": {
             key: str(value) if isinstance(value, Path) else value
             for key, value in click.get_current_context().params.items()
             if key not in NOT_ARGUMENTS and value is not None and value is not False
         },
-        "reading": answer.reading,
-        "tier": answer.tier,
+        "theory": model.theory,
+        "reading": answer.reading or None,
+        "tier": answer.tier or None,
         "rtol": model.rtol,
         "E_star": specimen.E_star,
         "surface": surface,
     }
+    if command != "island":
+        lines, known = _validity(answer)
+        notes += lines
+        facts |= known
     return Report(
         command, specimen.title, notes, facts, to_columns(values, {**units_of(specimen.length_unit), **units})
     )

@@ -21,6 +21,7 @@ from mbma_tables.scenes.specimen import (
     from_numbers,
     read_specimen,
 )
+from mbma_tables.theories.registry import THEORIES
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -34,6 +35,7 @@ class Model:
     tier: str
     reading: str
     rtol: float
+    theory: str = "mbma"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,10 +149,7 @@ reading_option = click.option(
     help="Reading of the paper's equations.",
 )
 
-model_options = _group(
-    "model",
-    ("tier", "reading", "rtol"),
-    lambda given: Model(**given),
+_MODEL_OPTIONS = (
     reading_option,
     click.option(
         "--tier",
@@ -160,6 +159,14 @@ model_options = _group(
         help="Island model.",
     ),
     click.option("--rtol", type=float, default=DEFAULT_RTOL, show_default=True, help="Relative error asked for."),
+)
+theory_option = click.option(
+    "--theory", default="mbma", show_default=True, metavar="|".join(THEORIES), help="Theory; the others have no tier."
+)
+# of islands, which MBMA alone has
+model_options = _group("model", ("tier", "reading", "rtol"), lambda given: Model(**given), *_MODEL_OPTIONS)
+theory_options = _group(
+    "model", ("theory", "tier", "reading", "rtol"), lambda given: Model(**given), theory_option, *_MODEL_OPTIONS
 )
 
 output_options = _group(

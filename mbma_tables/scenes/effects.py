@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Iterable
 
 from mbma_tables.errors import InputError
+from mbma_tables.theories.registry import THEORIES
 
 OUTPUTS = (
     "force",
@@ -21,7 +22,7 @@ OUTPUTS = (
 REFINEMENTS = ("subscale_area", "sphere_deformation", "finite_height")
 EFFECTS = (*OUTPUTS, *REFINEMENTS)
 OF_LAW = ("stiffness", "energy", "conductance")
-THEORIES = ("greenwood_williamson", "persson", "persson_simplified")
+COMPARED = (*THEORIES, "persson_simplified")
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from mbma_tables.errors import InputError
-from mbma_tables.scenes.effects import THEORIES, chosen, nearest
+from mbma_tables.scenes.effects import COMPARED, chosen, nearest
 
 if TYPE_CHECKING:
     from mbma_tables.models.protocol import AnyModel
@@ -117,7 +117,7 @@ class Problem:
         needs = (
             ("conductance", "conductivities", self.conductivities is not None, "k1 and k2 of the two bodies"),
             ("pressure_profile", "deltas", self.deltas is not None, "the approaches of the islands"),
-            ("comparison", "theories", bool(self.theories), f"one or more of {', '.join(THEORIES)}"),
+            ("comparison", "theories", bool(self.theories), f"one or more of {', '.join(COMPARED)}"),
         )
         for effect, name, given, meaning in needs:
             if effect in self.outputs and not given:
@@ -133,8 +133,8 @@ class Problem:
             deltas = finite_array("deltas", self.deltas)
             require("deltas", deltas, deltas > 0, "positive")
         for name in self.theories:
-            if name not in THEORIES:
-                raise InputError(f"no theory is named {name!r}; {nearest(str(name), THEORIES)}")
+            if name not in COMPARED:
+                raise InputError(f"no theory is named {name!r}; {nearest(str(name), COMPARED)}")
 
     def _check_tier(self) -> None:
         if self.tier is None:

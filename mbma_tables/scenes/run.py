@@ -6,7 +6,7 @@ import dataclasses
 import json
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -19,6 +19,7 @@ from mbma_tables.surfaces.readings import get_reading
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.surface import Surface
+    from mbma_tables.theories.protocol import Theory
     from mbma_tables.totals.law import MbmaLaw
 
 Progress = Callable[[str, int, int], None]
@@ -179,25 +180,33 @@ def _islands(run: Run, step: Step) -> None:
     run.close(step, error, step.tier_name)
 
 
-def other_theory(name: str, surface: Surface, gap: FloatArray, E_star: float) -> tuple[FloatArray, FloatArray]:
-    """Force and area by another theory, one of `effects.THEORIES`; NaN where it needs an infinite load, at u = 0."""
-    from mbma_tables import theories
+class OtherTheory(NamedTuple):
+    """Force and area by a theory, and standard deviations of their logarithms; NaN where there is no answer."""
 
-    if name == "greenwood_williamson":
-        found = theories.greenwood_williamson(surface, gap, E_star)
-        return found.force, found.area
-    average = theories.mean_separation(surface, gap)
-    finite = average > 0 if name == "persson" else average >= 0
-    method: Literal["full", "simplified"] = "full" if name == "persson" else "simplified"
-    force, area = np.full((2, gap.size), np.nan)
-    force[finite] = theories.persson_force(surface, average[finite], E_star, method=method)
-    area[finite] = theories.persson_area(surface, force[finite], E_star)
-    return force, area
+    force: FloatArray
+    area: FloatArray
+    scatter: FloatArray
+    area_scatter: FloatArray
+
+
+def other_theory(name: str, surface: Surface, gap: FloatArray, E_star: float) -> OtherTheory:
+    """A theory, one of `effects.COMPARED`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
+    from mbma_tables.theories.protocol import answer_where_finite
+    from mbma_tables.theories.registry import get_theory
+
+    if name == "persson_simplified":
+        from mbma_tables.theories.persson import Persson
+
+        theory: Theory = Persson("simplified")
+    else:
+        theory = get_theory(name)
+    found = answer_where_finite(theory, surface, (float(surface.h_max) + gap) / 2)
+    return OtherTheory(E_star * found.force, found.area, *theory.scatter(surface, found.area))
 
 
 def _comparison(run: Run, step: Step) -> None:
-    force, area = other_theory(step.name, run.problem.surface, run.gap, run.problem.E_star)
-    run.found |= {f"{step.name}_force": (("gap",), force), f"{step.name}_area": (("gap",), area)}
+    found = other_theory(step.name, run.problem.surface, run.gap, run.problem.E_star)
+    run.found |= {f"{step.name}_force": (("gap",), found.force), f"{step.name}_area": (("gap",), found.area)}
 
 
 _STEPS = {

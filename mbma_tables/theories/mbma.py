@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.models import AnyModel, tier_name
+from mbma_tables.models import TIERS, AnyModel, tier_name
 from mbma_tables.models.protocol import QUANTITIES
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
@@ -56,20 +56,54 @@ class Mbma(Theory):
             surface, separation, self.tier, self.reading, E_star, self.rtol, self.outside, derivatives, quantities
         )
 
+    @property
+    def _has_slopes(self) -> bool:
+        return self.tier_name == "universal" and self.outside != "exact"
+
     def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length] from 0 to h_max."""
-        found = self.totals(surface, 2 * mean_separation - np.asarray(surface.h_max), derivatives=True)
-        assert found.force_by is not None
+        u = np.asarray(mean_separation, dtype=float)
+        found = self.totals(surface, 2 * u - np.asarray(surface.h_max), derivatives=self._has_slopes)
+        if found.force_by is None:
+            return TheoryAnswer(found.force, found.area, self._differences(surface, u), found.error)
         # du = dd/2
         return TheoryAnswer(found.force, found.area, -2 * found.force_by["separation"], found.error)
+
+    def _differences(self, surface: Surface, u: FloatArray) -> FloatArray:
+        """-dF/du by numerical differentiation, for tiers without derivatives."""
+        from scipy.differentiate import derivative
+
+        shape = np.broadcast_shapes(u.shape, surface.shape)
+        u, h_max = np.broadcast_to(u, shape), np.broadcast_to(np.asarray(surface.h_max), shape)
+
+        def force_at(x: FloatArray, place: FloatArray) -> FloatArray:
+            chosen = select(surface, shape, place)
+            gap = np.maximum(2 * x - np.asarray(chosen.h_max), -np.asarray(chosen.h_max))
+            return np.asarray(self.totals(chosen, gap, quantities=("force",)).force)
+
+        step = 0.1 * (h_max - u)
+        touching = step > 0
+        slope = derivative(
+            force_at,
+            u,
+            args=(np.arange(u.size, dtype=float).reshape(shape),),
+            initial_step=np.where(touching, step, 1.0),
+            step_direction=np.where(u < step, 1, 0),  # not beyond full compression
+            tolerances={"rtol": 10 * self.rtol},
+        )
+        return np.where(touching, -slope.df, 0.0)
 
     def interval(self, surface: Surface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] from where force or area is largest to first contact."""
         return self._maximum(surface, quantity, np.zeros(surface.shape)), np.asarray(surface.h_max, dtype=float)
 
     def softening(self, surface: Surface) -> FloatArray:
-        """Mean separation [length] below which stiffness falls with compression; NaN where it rises to u = 0."""
-        return self._maximum(surface, "stiffness", np.full(surface.shape, np.nan))
+        """Mean separation [length] below which stiffness falls with compression; NaN where it does not."""
+        unknown = np.full(surface.shape, np.nan)
+        if self._has_slopes or self.tier_name not in TIERS or self.tier_name == "rigid":
+            return self._maximum(surface, "stiffness", unknown)
+        # of the same islands by the table, whose derivatives are at hand
+        return Mbma("universal", self.reading, outside="nan")._maximum(surface, "stiffness", unknown)
 
     def concerns(self, surface: Surface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Where the paper's own assumptions fail."""

@@ -164,6 +164,25 @@ def _refuse_unfinished(success: Any, what: str) -> None:
         raise ConvergenceError(f"{what} was not found for {int(failed.sum())} entries", failed)
 
 
+def answer_where_finite(theory: Theory, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
+    """A theory's answers at mean separations u, shape (n,), on one surface; NaN where it has no finite force."""
+    u = np.asarray(mean_separation, dtype=float)
+    places = np.arange(u.size)
+    fields = np.full((4, u.size), np.nan)
+    while places.size:
+        try:
+            with np.errstate(all="ignore"):
+                found = theory.answer(surface, u[places])
+        except OutOfRangeError as fault:
+            if fault.mask is None or np.shape(fault.mask) != places.shape or not np.any(fault.mask):
+                raise
+            places = places[~np.asarray(fault.mask)]
+        else:
+            fields[:, places] = np.where(np.isfinite(found.force), found, np.nan)
+            break
+    return TheoryAnswer(*fields)
+
+
 class Wrapped(Theory):
     """A user's theory, its stiffness by numerical differentiation."""
 

@@ -56,7 +56,7 @@ def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
         # as good, and quicker
         return contact_law(surface, rtol, "universal", *rest)
 
-    monkeypatch.setattr("mbma_tables.totals.law.contact_law", law)
+    monkeypatch.setattr("mbma_tables.totals.law.mbma_law", law)
     scene = scene_of(effects=("energy",), rtol=1e-2)
     found = run_plan(scene, tiered(scene, "universal"))
     assert made == ["universal", "exact"]
@@ -69,7 +69,7 @@ def test_what_no_solver_answers_stays_an_error(effects, monkeypatch):
     def refuse(*_, **__):
         raise OutOfRangeError("islands outside", True)
 
-    monkeypatch.setattr("mbma_tables.totals.law.contact_law", refuse)
+    monkeypatch.setattr("mbma_tables.totals.law.mbma_law", refuse)
     monkeypatch.setattr("mbma_tables.theories.contact.contact", refuse)
     scene = scene_of(effects=effects, rtol=1e-3)
     with pytest.raises(OutOfRangeError, match="islands outside"):
