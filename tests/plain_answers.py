@@ -126,7 +126,7 @@ def statuses():
     from mbma_tables.models.protocol import BOTH, FORCE
     from mbma_tables.models.tables import universal_model
     from mbma_tables.surfaces.readings import REPORTED
-    from mbma_tables.totals import kernel, sensitivity
+    from mbma_tables.totals import intervals, kernel, sensitivity
 
     table = universal_model().kernel
     surface = kernel.surface_constants(0.8, 200.0, REPORTED.numbers, True, 200.0)
@@ -141,9 +141,9 @@ def statuses():
         ("at the table's end", last, 40.0, 1e-3),
         ("no contact", 0.0, 3.0, 1e-3),
     ):
-        out = np.empty((2, sensitivity.COLUMNS))
-        found = [kernel.total(which, compression, peak, rtol, surface, table)[0] for which in (BOTH, FORCE)]
-        slopes = sensitivity.total_with_slopes(compression, peak, rtol, surface, near, table, out)
+        gap, out = intervals.Gap(compression, peak), np.empty((2, sensitivity.COLUMNS))
+        found = [kernel.total(which, gap, rtol, surface, table)[0] for which in (BOTH, FORCE)]
+        slopes = sensitivity.total_with_slopes(gap, rtol, surface, near, table, out)
         yield name, (*found, slopes[0])
 
 

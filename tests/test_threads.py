@@ -1,5 +1,8 @@
 """Sixteen threads on one model, one law and one surface: the bits of one thread."""
 
+import os
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
 
@@ -102,3 +105,27 @@ def test_laws_made_by_many_threads_are_one_law():
         np.testing.assert_array_equal(law.breaks, alone[thread % 4].breaks)
         np.testing.assert_array_equal(law.pieces, alone[thread % 4].pieces)
         np.testing.assert_array_equal(law.energies, alone[thread % 4].energies)
+
+
+FORK = """
+import os
+import numpy as np
+from mbma_tables import open_table
+X, mu = np.linspace(-5, 40, 400_000), np.full(400_000, 0.1)
+table, four = open_table("universal"), open_table("island4d")
+numbers = np.linspace(1.0, 2.0, 100_000), 3.0, 20.0, 0.8
+known = table.answer(X, mu, parallel=True).phi_F, four.lookup(*numbers, parallel=True).F_hat
+child = os.fork()
+found = table.answer(X, mu, parallel=True).phi_F, four.lookup(*numbers, parallel=True).F_hat
+same = all((a == b).all() for a, b in zip(found, known))
+if child == 0:
+    os._exit(0 if same else 1)
+print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), same)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_a_fork_after_parallel_answers_goes_on():
+    done = subprocess.run([sys.executable, "-c", FORK], capture_output=True, text=True, check=True)
+    assert done.stdout == "0 True\n"

@@ -11,10 +11,12 @@ their digits when both ends run into zeta_1, that is when delta goes to 0.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import njit
+from mbma_tables.compiled import jitable, njit
 from mbma_tables.surfaces.readings import ReadingNumbers
 from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, alpha_of, m0_of, m4_of, summit_rate
 
@@ -41,11 +43,11 @@ class IslandGeometry(NamedTuple):
 FIELDS = IslandGeometry._fields
 
 
-@njit(cache=True, error_model="numpy")
-def floor_offset(hurst: float, zeta_1: float, floor: float) -> float:
-    """floor^(-2H) - zeta_1^(-2H) without cancellation: the largest a (or b) above a floor."""
-    e = math.exp(-2.0 * hurst * math.log(zeta_1))
-    return e * math.expm1(2.0 * hurst * math.log1p((zeta_1 - floor) / floor))
+@jitable
+def floor_offset(hurst: Any, zeta_1: Any, floor: float) -> Any:
+    """floor^(-2H) - zeta_1^(-2H) without cancellation: the largest a (or b) above a floor; of numbers or arrays."""
+    e = np.exp(-2.0 * hurst * np.log(zeta_1))
+    return e * np.expm1(2.0 * hurst * np.log1p((zeta_1 - floor) / floor))
 
 
 @njit(cache=True, error_model="numpy")

@@ -55,7 +55,14 @@ class Island4dModel:
     Parameters
     ----------
     content : TableContent
-        A table of kind "island4d".
+        A table of kind "island4d"; `open_table` reads one.
+
+    Examples
+    --------
+    >>> from mbma_tables import open_table
+    >>> F_hat, A_hat, error = open_table("island4d").lookup(1.0, 3.0, 20.0, 0.8)
+    >>> f"{F_hat:.3f}"
+    '0.353'
     """
 
     name = "island4d"

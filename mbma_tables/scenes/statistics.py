@@ -19,7 +19,8 @@ from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.gauss_kronrod import Integrals, integrate
 from mbma_tables.totals.island import geometry, scale_area, scale_force
-from mbma_tables.totals.island_sum import Pairs, density_of, kinks, sum_islands
+from mbma_tables.totals.island_sum import density_of, kinks, sum_islands
+from mbma_tables.totals.kernel import Pairs
 
 Fields = dict[str, tuple[tuple[str, ...], Any]]
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite import ir
-from numba import prange, types
+from numba import types
 from numba.core.imputils import impl_ret_untracked
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
@@ -280,13 +280,6 @@ def fill_gradient_2d(c: FloatArray, x: FloatArray, y: FloatArray, out: FloatArra
 def fill_4d(c: FloatArray, places: FloatArray, out: FloatArray) -> None:
     """`value_4d` of each column of `places` (4, entries) into the columns of `out` (2, entries)."""
     for k in range(places.shape[1]):
-        out[0, k], out[1, k] = value_4d(c, places[0, k], places[1, k], places[2, k], places[3, k])
-
-
-@njit(cache=True, parallel=True)
-def fill_4d_parallel(c: FloatArray, places: FloatArray, out: FloatArray) -> None:
-    """`fill_4d` on all cores, for large batches."""
-    for k in prange(places.shape[1]):
         out[0, k], out[1, k] = value_4d(c, places[0, k], places[1, k], places[2, k], places[3, k])
 
 

@@ -42,6 +42,13 @@ def conductance(stiffness_mean: ArrayLike, k_s: ArrayLike, E_star: ArrayLike) ->
     Raises
     ------
     InputError, OutOfRangeError
+
+    Examples
+    --------
+    >>> from mbma_tables.totals.conductance import conductance, mean_conductivity
+    >>> k_s = mean_conductivity(50.0, 200.0)  # W/(m K)
+    >>> float(conductance(1e14, k_s, 1e11))  # Pa/m and Pa give W/(m^2 K)
+    80000.0
     """
     slope, mean, modulus = (
         finite_array(name, value)

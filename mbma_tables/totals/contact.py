@@ -24,7 +24,8 @@ from mbma_tables.models import AnyModel, get_model
 from mbma_tables.models.protocol import AREA, BOTH, FORCE, OUTSIDE, QUANTITIES
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.totals.island_sum import Pairs, slopes_of, totals_of
+from mbma_tables.totals.island_sum import slopes_of, totals_of
+from mbma_tables.totals.kernel import Pairs
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

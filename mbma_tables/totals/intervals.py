@@ -7,7 +7,7 @@ layer; above it the integrand is little more than a Gaussian of x, and x itself 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,22 @@ NARROW = 2.5  # in h_rms: above the floor of zeta_d, the smaller rule resolves a
 SAFETY = 4.0  # a Kronrod sum errs by at most 3 (difference to Gauss)^1.5, seen over random surfaces: 4^1.5 = 8
 
 Bools = NDArray[np.bool_]
+
+
+class Gap(NamedTuple):
+    """A gap of a surface in units of h_rms."""
+
+    compression: float  # (h_max - d)/h_rms
+    peak: float  # h_max/h_rms
+
+
+class Interval(NamedTuple):
+    """An interval of the mapped approach, and whether zeta_d and zeta_u are at their floors in it."""
+
+    low: float
+    high: float
+    floor_d: bool
+    floor_u: bool
 
 
 @njit(cache=True, error_model="numpy")
@@ -61,9 +77,9 @@ def halve(interval: int, count: int, bounds: FloatArray, floors: Bools) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def rule_for(low: float, high: float, straight: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
+def rule_for(interval: Interval) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Nodes, Kronrod weights and Gauss weights on [-1, 1] for an interval."""
-    if straight and high - low < NARROW:
+    if interval.floor_d and interval.high - interval.low < NARROW:
         return NODES_21, KRONROD_21, GAUSS_21
     return NODES_31, KRONROD_31, GAUSS_31
 
@@ -91,21 +107,13 @@ def error_of(force: float, gauss_force: float, area: float, gauss_area: float) -
 # compiled as part of its callers: `rule` is one of their functions
 @njit(inline="always", error_model="numpy")
 def refine(
-    rule: Any,
-    which: int,
-    compression: float,
-    peak: float,
-    rtol: float,
-    surface: Any,
-    near: Any,
-    table: Any,
-    out: FloatArray,
+    rule: Any, which: int, gap: Gap, rtol: float, surface: Any, near: Any, table: Any, out: FloatArray
 ) -> tuple[int, float, int]:
-    """Integrate over [0, compression] to `rtol`; status, bound on the relative error, islands evaluated.
+    """Integrate over the approaches at a gap to `rtol`; status, bound on the relative error, islands evaluated.
 
-    ``rule(which, low, high, floor_d, floor_u, compression, peak, surface, near, table, part)`` puts its Kronrod sums
-    into `part`, shaped like `out`: a row for force and one for area, whose first column is the integral with K1. It
-    returns a status, the relative error of the sums, that of the table, and the nodes.
+    ``rule(which, interval, gap, surface, near, table, part)`` puts its Kronrod sums into `part`, shaped like `out`: a
+    row for force and one for area, whose first column is the integral with K1. It returns a status, the relative
+    error of the sums, that of the table, and the nodes.
     """
     islands = 0
     bounds = np.empty((MAX_INTERVALS, 2))
@@ -113,16 +121,14 @@ def refine(
     errors = np.empty(MAX_INTERVALS)
     floors = np.empty((MAX_INTERVALS, 2), dtype=np.bool_)
     fresh = np.ones(MAX_INTERVALS, dtype=np.bool_)
-    count = first_intervals(compression, surface.kink_d, surface.kink_u, surface.map_scale, bounds, floors)
+    count = first_intervals(gap.compression, surface.kink_d, surface.kink_u, surface.map_scale, bounds, floors)
     table_error = 0.0
     while True:
         force = area = force_error = area_error = 0.0
         for k in range(count):
             if fresh[k]:
-                status, errors[k], own_error, nodes = rule(
-                    which, bounds[k, 0], bounds[k, 1], floors[k, 0], floors[k, 1],
-                    compression, peak, surface, near, table, parts[k],
-                )  # fmt: skip
+                interval = Interval(bounds[k, 0], bounds[k, 1], floors[k, 0], floors[k, 1])
+                status, errors[k], own_error, nodes = rule(which, interval, gap, surface, near, table, parts[k])
                 islands += nodes
                 if status != OK:
                     return status, math.nan, islands

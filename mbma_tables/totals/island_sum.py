@@ -17,47 +17,15 @@ from mbma_tables.models.protocol import AREA, BOTH, FORCE
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.models.universal_kernel import OK, REASONS, UNRESOLVED
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals import kernel
 from mbma_tables.totals.gauss_kronrod import integrate
 from mbma_tables.totals.intervals import STRETCH
 from mbma_tables.totals.island import geometry, scale_area, scale_force
+from mbma_tables.totals.kernel import Pairs
 
 QUADRATURE_SHARE = 0.9  # of the tolerance asked for; a table's own error comes on top
 SUM_SHARE = 0.5  # where islands are solved to a share of it
 BLOCK, SLOPES_BLOCK = 2048, 256  # pairs between two looks for Ctrl-C
-
-
-class Pairs(NamedTuple):
-    """Flat (surface, gap) pairs in units of h_rms and 1/q0."""
-
-    hurst: FloatArray
-    zeta_1: FloatArray
-    rms_over_s: FloatArray  # h_rms/s = sqrt(1 - zeta_1^(-2H))
-    compression: FloatArray  # (h_max - d)/h_rms
-    peak: FloatArray  # h_max/h_rms
-    layer: FloatArray  # approach at which zeta_d leaves zeta_1, zeta_1^(-H)
-
-    @classmethod
-    def of(cls, surface: Surface, depth: FloatArray) -> Pairs:
-        """Of a surface, or a batch, at h_max - d = `depth` [length], of the shape that both broadcast to."""
-
-        def flat(field: Any) -> FloatArray:
-            return np.broadcast_to(np.asarray(field, dtype=float), depth.shape).ravel()
-
-        hurst, zeta_1 = flat(surface.hurst), flat(surface.zeta_1)
-        return cls(
-            hurst=hurst,
-            zeta_1=zeta_1,
-            rms_over_s=flat(surface.h_rms / surface.s),
-            compression=flat(depth / surface.h_rms),
-            peak=flat(surface.h_max / surface.h_rms),
-            layer=np.exp(-hurst * np.log(zeta_1)),
-        )
-
-    def some(self, chosen: Any) -> Pairs:
-        """The pairs at these places."""
-        return Pairs(*(field[chosen] for field in self))
 
 
 class Totals(NamedTuple):
@@ -75,13 +43,10 @@ class Totals(NamedTuple):
 def kinks(hurst: Any, zeta_1: Any, reading: Reading) -> tuple[Any, Any]:
     """delta/h_rms at which zeta_d (27) and zeta_u (30) reach their floors; arrays of one shape."""
     h, z = np.broadcast_arrays(np.asarray(hurst, dtype=float), np.asarray(zeta_1, dtype=float))
-    at_d, at_u = np.empty(h.shape), np.empty(h.shape)
-    for place in np.ndindex(h.shape):
-        at_d[place] = floor_offset(float(h[place]), float(z[place]), reading.floor_d)
-        at_u[place] = floor_offset(float(h[place]), float(z[place]), reading.floor_u)
     rms_over_s = np.sqrt(-np.expm1(-2 * h * np.log(z)))
-    slope_u = reading.phi / (1 + reading.phi) * rms_over_s
-    return (np.sqrt(at_d) / (4 / 3 * reading.beta))[()], (np.sqrt(at_u) / slope_u)[()]
+    slope_d, slope_u = 4 / 3 * reading.beta, reading.phi / (1 + reading.phi) * rms_over_s
+    at_d, at_u = (np.sqrt(floor_offset(h, z, floor)) for floor in (reading.floor_d, reading.floor_u))
+    return (at_d / slope_d)[()], (at_u / slope_u)[()]
 
 
 def jacobian_of(reading: Reading, rms_over_s: FloatArray, below_kink: NDArray[np.bool_]) -> FloatArray:
@@ -94,11 +59,10 @@ def density_of(
     pairs: Pairs, owner: Any, approach: FloatArray, g: dict[str, FloatArray], reading: Reading
 ) -> FloatArray:
     """Islands of the pairs `owner` per nominal area and delta/s (42, 46), in q0^2, at `approach` (owners, points)."""
-    compression, peak, rms_over_s = (f[owner, None] for f in (pairs.compression, pairs.peak, pairs.rms_over_s))
-    kink = kinks(pairs.hurst[owner], pairs.zeta_1[owner], reading)[0]
-    height = kernel.island_height(approach, g["h_d"], g["sigma_d"], compression, peak, rms_over_s)
+    own = pairs.some((owner, None))
+    height = kernel.island_height(approach, g["h_d"], g["sigma_d"], own, own.rms_over_s)
     density: FloatArray = kernel.island_density(height, g["D_d"], g["sigma_d"])
-    return density * jacobian_of(reading, rms_over_s, approach < np.asarray(kink)[:, None])
+    return density * jacobian_of(reading, own.rms_over_s, approach < kinks(own.hurst, own.zeta_1, reading)[0])
 
 
 def sum_islands(
@@ -119,12 +83,9 @@ def sum_islands(
         return grid
 
     def integrand(owner: NDArray[np.intp], t: FloatArray) -> FloatArray:
-        own_scale, own_turn, own_kink, rms_over_s, compression, peak, hurst, zeta_1 = (
-            np.broadcast_to(field[owner, None], t.shape)
-            for field in (
-                scale, turn, kink_d, pairs.rms_over_s, pairs.compression, pairs.peak, pairs.hurst, pairs.zeta_1,
-            )
-        )  # fmt: skip
+        own = pairs.some((owner, None))
+        own_scale, own_turn, own_kink = (field[owner, None] for field in (scale, turn, kink_d))
+        hurst, zeta_1 = (np.broadcast_to(field, t.shape) for field in (own.hurst, own.zeta_1))
         curved = np.minimum(t, own_turn)
         approach = np.where(t < own_turn, own_scale * np.sinh(curved) ** 2, own_kink + (t - own_turn))
         stretch = np.where(t < own_turn, own_scale * np.sinh(2 * curved), 1.0)
@@ -137,9 +98,9 @@ def sum_islands(
             raise type(fault)(f"an island failed: {fault}", failed) from fault
         with np.errstate(invalid="ignore"):
             np.maximum.at(worst_island, owner, phi.error.max(axis=1))
-        height = kernel.island_height(approach, g["h_d"], g["sigma_d"], compression, peak, rms_over_s)
-        weight = kernel.island_density(height, g["D_d"], g["sigma_d"]) * rms_over_s * stretch
-        weight *= jacobian_of(reading, rms_over_s, approach < own_kink)
+        height = kernel.island_height(approach, g["h_d"], g["sigma_d"], own, own.rms_over_s)
+        weight = kernel.island_density(height, g["D_d"], g["sigma_d"]) * own.rms_over_s * stretch
+        weight *= jacobian_of(reading, own.rms_over_s, approach < own_kink)
         parts = []
         if which != AREA:
             parts.append(scale_force(g) * phi.phi_F * weight)
@@ -174,10 +135,9 @@ def _(
     out = np.empty((pairs.compression.size, 3))
 
     def fill(block: slice) -> int:
-        hurst, zeta_1, _, compression, peak, _ = pairs.some(block)
         return kernel.fill_totals(
-            which, hurst, zeta_1, compression, peak, QUADRATURE_SHARE * rtol, reading.numbers,
-            reading.jacobian == "printed", model.kernel, status[block], out[block],
+            which, tuple(pairs.some(block)), QUADRATURE_SHARE * rtol, reading.numbers, reading.jacobian == "printed",
+            model.kernel, status[block], out[block],
         )  # fmt: skip
 
     islands = sum(in_blocks(fill, status.size, BLOCK))
@@ -215,10 +175,9 @@ def _(
     out = np.empty((count, 2, sensitivity.COLUMNS))
 
     def fill(block: slice) -> int:
-        hurst, zeta_1, _, compression, peak, _ = pairs.some(block)
         return sensitivity.fill_totals_with_slopes(
-            hurst, zeta_1, compression, peak, QUADRATURE_SHARE * rtol, reading.numbers,
-            reading.jacobian == "printed", model.kernel, status[block], out[block], bound[block],
+            tuple(pairs.some(block)), QUADRATURE_SHARE * rtol, reading.numbers, reading.jacobian == "printed",
+            model.kernel, status[block], out[block], bound[block],
         )  # fmt: skip
 
     islands = sum(in_blocks(fill, count, SLOPES_BLOCK))

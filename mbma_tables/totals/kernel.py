@@ -19,10 +19,45 @@ from mbma_tables.models.protocol import BOTH, FORCE
 from mbma_tables.models.universal_kernel import OK, Table, universal_one, universal_phi
 from mbma_tables.surfaces.readings import ReadingNumbers
 from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, m4_of, summit_rate
-from mbma_tables.totals.intervals import STRETCH, approach_at, error_of, refine, rule_for
+from mbma_tables.surfaces.surface import Surface
+from mbma_tables.totals.intervals import STRETCH, Gap, Interval, approach_at, error_of, refine, rule_for
 
 SMALL_POWER = 0.01  # below these, differences of exponentials go through expm1
 SMALL_WIDTH = 0.01
+
+
+class Pairs(NamedTuple):
+    """Flat (surface, gap) pairs in units of h_rms and 1/q0."""
+
+    hurst: FloatArray
+    zeta_1: FloatArray
+    rms_over_s: FloatArray  # h_rms/s = sqrt(1 - zeta_1^(-2H))
+    compression: FloatArray  # (h_max - d)/h_rms
+    peak: FloatArray  # h_max/h_rms
+    layer: FloatArray  # approach at which zeta_d leaves zeta_1, zeta_1^(-H)
+
+    @classmethod
+    def of(cls, surface: Surface, depth: FloatArray) -> Pairs:
+        """Of a surface, or a batch, at h_max - d = `depth` [length], of the shape that both broadcast to."""
+
+        def flat(field: Any) -> FloatArray:
+            array = np.asarray(field, dtype=float)
+            # copies, since numba compiles again for arrays that cannot be written
+            return np.full(depth.size, array) if array.ndim == 0 else np.broadcast_to(array, depth.shape).flatten()
+
+        hurst, zeta_1 = flat(surface.hurst), flat(surface.zeta_1)
+        return cls(
+            hurst=hurst,
+            zeta_1=zeta_1,
+            rms_over_s=flat(surface.h_rms / surface.s),
+            compression=flat(depth / surface.h_rms),
+            peak=flat(surface.h_max / surface.h_rms),
+            layer=np.exp(-hurst * np.log(zeta_1)),
+        )
+
+    def some(self, chosen: Any) -> Pairs:
+        """The pairs at these places."""
+        return Pairs(*(field[chosen] for field in self))
 
 
 class SurfaceConstants(NamedTuple):
@@ -60,9 +95,9 @@ class Node(NamedTuple):
 
 
 @jitable
-def island_height(x: Any, h_d: Any, sigma_d: Any, compression: Any, peak: Any, rms_over_s: Any) -> Any:
+def island_height(x: Any, h_d: Any, sigma_d: Any, gap: Any, rms_over_s: Any) -> Any:
     """z'/sigma_d (41) at x = delta/h_rms; z_max is counted down from h_max, so nothing cancels at first contact."""
-    return ((peak - (compression - x)) * rms_over_s - h_d) / sigma_d
+    return ((gap.peak - (gap.compression - x)) * rms_over_s - h_d) / sigma_d
 
 
 @jitable
@@ -172,27 +207,18 @@ def island_node(x: float, floor_d: bool, floor_u: bool, surface: SurfaceConstant
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy")
 def _rule(
-    which: int,
-    low: float,
-    high: float,
-    floor_d: bool,
-    floor_u: bool,
-    compression: float,
-    peak: float,
-    surface: SurfaceConstants,
-    near: None,
-    table: Table,
-    part: FloatArray,
+    which: int, interval: Interval, gap: Gap, surface: SurfaceConstants, near: None, table: Table, part: FloatArray
 ) -> tuple[int, float, float, int]:
     """One Kronrod rule over an interval, see `refine`. Where `which` is FORCE or AREA, that one is both rows."""
-    nodes, kronrod, gauss = rule_for(low, high, floor_d)
+    low, high, floor_d, floor_u = interval
+    nodes, kronrod, gauss = rule_for(interval)
     half, centre = 0.5 * (high - low), 0.5 * (high + low)
     rms_over_s = surface.rms_over_s
     force = area = gauss_force = gauss_area = table_error = 0.0
     for k in range(nodes.size):
         x, stretch = approach_at(centre + half * nodes[k], floor_d, surface.map_scale)
         node = island_node(x, floor_d, floor_u, surface, which)
-        height = island_height(x, node.h_d, node.sigma_d, compression, peak, rms_over_s)
+        height = island_height(x, node.h_d, node.sigma_d, gap, rms_over_s)
         # d(delta/s) = rms_over_s dx
         weight = island_density(height, node.D_d, node.sigma_d) * rms_over_s * stretch * half
         if which == BOTH:
@@ -217,26 +243,23 @@ def _rule(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def total(
-    which: int, compression: float, peak: float, rtol: float, surface: SurfaceConstants, table: Table
+    which: int, gap: Gap, rtol: float, surface: SurfaceConstants, table: Table
 ) -> tuple[int, float, float, float, int]:
     """Status, F/(A0 E* q0 s), A/A0, the bound on their relative error, and the islands evaluated.
 
-    `compression` is (h_max - d)/h_rms, `peak` h_max/h_rms. Where `which` is FORCE or AREA, that one is given as both.
+    Where `which` is FORCE or AREA, that one is given as both.
     """
-    if not compression > 0.0:
+    if not gap.compression > 0.0:
         return OK, 0.0, 0.0, 0.0, 0
     out = np.full((2, 1), math.nan)
-    status, error, islands = refine(_rule, which, compression, peak, rtol, surface, None, table, out)
+    status, error, islands = refine(_rule, which, gap, rtol, surface, None, table, out)
     return status, out[0, 0], out[1, 0], error, islands
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def fill_totals(
     which: int,
-    hurst: FloatArray,
-    zeta_1: FloatArray,
-    compression: FloatArray,
-    peak: FloatArray,
+    given: Any,
     rtol: float,
     reading: ReadingNumbers,
     printed: bool,
@@ -244,12 +267,16 @@ def fill_totals(
     status: NDArray[np.int64],
     out: FloatArray,
 ) -> int:
-    """`total` of each pair into the rows of `out` (pairs, 3); returns the islands evaluated."""
+    """`total` of each of the `Pairs` given into the rows of `out` (pairs, 3); returns the islands evaluated."""
     islands = 0
+    # a plain tuple, which a call from Python passes on faster
+    pairs = Pairs(*given)
+    hurst, zeta_1 = pairs.hurst, pairs.zeta_1
     surface = surface_constants(hurst[0], zeta_1[0], reading, printed, zeta_1[0])
-    for k in range(compression.size):
+    for k in range(hurst.size):
         if k > 0 and (hurst[k] != hurst[k - 1] or zeta_1[k] != zeta_1[k - 1]):
             surface = surface_constants(hurst[k], zeta_1[k], reading, printed, zeta_1[k])
-        status[k], out[k, 0], out[k, 1], out[k, 2], count = total(which, compression[k], peak[k], rtol, surface, table)
+        gap = Gap(pairs.compression[k], pairs.peak[k])
+        status[k], out[k, 0], out[k, 1], out[k, 2], count = total(which, gap, rtol, surface, table)
         islands += count
     return islands

@@ -23,7 +23,8 @@ from mbma_tables.models.protocol import MAX_RTOL, MIN_RTOL
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.totals import law_kernel
-from mbma_tables.totals.island_sum import Pairs, kinks, totals_of
+from mbma_tables.totals.island_sum import kinks, totals_of
+from mbma_tables.totals.kernel import Pairs
 from mbma_tables.totals.law_protocol import ContactLaw
 
 TERMS = law_kernel.TERMS

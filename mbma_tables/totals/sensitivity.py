@@ -8,7 +8,7 @@ differenced centrally where it is cheap, and through the table's own slopes in X
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,9 @@ from mbma_tables.compiled import njit
 from mbma_tables.models.protocol import BOTH
 from mbma_tables.models.universal_kernel import OK, Table, universal_phi, universal_slopes
 from mbma_tables.surfaces.readings import ReadingNumbers
-from mbma_tables.totals.intervals import approach_at, error_of, refine, rule_for
+from mbma_tables.totals.intervals import Gap, Interval, approach_at, error_of, refine, rule_for
 from mbma_tables.totals.kernel import (
+    Pairs,
     SurfaceConstants,
     island_density,
     island_height,
@@ -76,14 +77,12 @@ def neighbours(hurst: float, zeta_1: float, reading: ReadingNumbers, printed: bo
 
 
 @njit(cache=True, error_model="numpy")
-def _integrand(
-    x: float, compression: float, peak: float, surface: SurfaceConstants, table: Table
-) -> tuple[int, float, float]:
+def _integrand(x: float, gap: Gap, surface: SurfaceConstants, table: Table) -> tuple[int, float, float]:
     """Status and the integrands of force and area over x = delta/h_rms, at the floor of zeta_d or next to it."""
     floor_d = x >= surface.kink_d
     node = island_node(x, floor_d, x > surface.kink_u, surface)
     status, phi_F, phi_A, _ = universal_phi(node.X, node.mu, table)
-    height = island_height(x, node.h_d, node.sigma_d, compression, peak, surface.rms_over_s)
+    height = island_height(x, node.h_d, node.sigma_d, gap, surface.rms_over_s)
     weight = island_density(height, node.D_d, node.sigma_d) * surface.rms_over_s
     return status, node.force * phi_F * weight, node.area * phi_A * weight
 
@@ -91,19 +90,16 @@ def _integrand(
 @njit(cache=True, error_model="numpy")
 def _rule(
     which: int,
-    low: float,
-    high: float,
-    floor_d: bool,
-    floor_u: bool,
-    compression: float,
-    peak: float,
+    interval: Interval,
+    gap: Gap,
     surface: SurfaceConstants,
     near: Neighbours,
     table: Table,
     part: FloatArray,
 ) -> tuple[int, float, float, int]:
     """Kronrod sums of force, area and their derivatives over an interval, see `refine`."""
-    nodes, kronrod, gauss = rule_for(low, high, floor_d)
+    low, high, floor_d, floor_u = interval
+    nodes, kronrod, gauss = rule_for(interval)
     half, centre = 0.5 * (high - low), 0.5 * (high + low)
     rms_over_s = surface.rms_over_s
     gauss_force = gauss_area = table_error = 0.0
@@ -115,7 +111,7 @@ def _rule(
         if phi.status != OK:
             return phi.status, math.nan, math.nan, nodes.size
         table_error = max(table_error, phi.error)
-        height = island_height(x, node.h_d, node.sigma_d, compression, peak, rms_over_s)
+        height = island_height(x, node.h_d, node.sigma_d, gap, rms_over_s)
         weight = island_density(height, node.D_d, node.sigma_d) * rms_over_s * stretch * half
         f, g = node.force * phi.phi_F * weight, node.area * phi.phi_A * weight
         gauss_force += gauss[k] * f
@@ -131,8 +127,8 @@ def _rule(
             place = 2 if number == 1 and floor_u and x < near.narrow_below else number
             up, down, rate = near.up[place], near.down[place], near.rate[place]
             above, below = island_node(x, floor_d, floor_u, up), island_node(x, floor_d, floor_u, down)
-            height_up = island_height(x, above.h_d, above.sigma_d, compression, peak, up.rms_over_s)
-            height_down = island_height(x, below.h_d, below.sigma_d, compression, peak, down.rms_over_s)
+            height_up = island_height(x, above.h_d, above.sigma_d, gap, up.rms_over_s)
+            height_down = island_height(x, below.h_d, below.sigma_d, gap, down.rms_over_s)
             # x is held, so the density is per h_rms: h_rms/s is part of it
             common = math.log(above.D_d * up.rms_over_s * below.sigma_d / (below.D_d * down.rms_over_s * above.sigma_d))
             common -= 0.5 * (height_up - height_down) * (height_up + height_down)
@@ -153,23 +149,18 @@ def _rule(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def total_with_slopes(
-    compression: float,
-    peak: float,
-    rtol: float,
-    surface: SurfaceConstants,
-    near: Neighbours,
-    table: Table,
-    out: FloatArray,
+    gap: Gap, rtol: float, surface: SurfaceConstants, near: Neighbours, table: Table, out: FloatArray
 ) -> tuple[int, float, int]:
     """Status, error bound and islands; `out` (2, COLUMNS) receives force and area and their derivatives."""
     out[:] = 0.0
+    compression = gap.compression
     if not compression > 0.0:
         return OK, 0.0, 0
-    status, error, islands = refine(_rule, BOTH, compression, peak, rtol, surface, near, table, out)
+    status, error, islands = refine(_rule, BOTH, gap, rtol, surface, near, table, out)
     if status != OK or not (out[0, 0] > 0.0 and out[1, 0] > 0.0):
         return status, error, islands
     # the upper limit moves with the compression, the kink and K1 with H and zeta_1
-    status, f, g = _integrand(compression, compression, peak, surface, table)
+    status, f, g = _integrand(compression, gap, surface, table)
     if status != OK:
         return status, math.nan, islands
     edge = 1.0 if compression > surface.kink_d else surface.jacobian
@@ -177,7 +168,7 @@ def total_with_slopes(
     out[1, BY_COMPRESSION] += edge * g
     f = g = 0.0
     if surface.kink_d < compression:
-        status, f, g = _integrand(surface.kink_d, compression, peak, surface, table)
+        status, f, g = _integrand(surface.kink_d, gap, surface, table)
         if status != OK:
             return status, math.nan, islands
     for number in range(2):
@@ -191,10 +182,7 @@ def total_with_slopes(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def fill_totals_with_slopes(
-    hurst: FloatArray,
-    zeta_1: FloatArray,
-    compression: FloatArray,
-    peak: FloatArray,
+    given: Any,
     rtol: float,
     reading: ReadingNumbers,
     printed: bool,
@@ -203,14 +191,18 @@ def fill_totals_with_slopes(
     out: FloatArray,
     bound: FloatArray,
 ) -> int:
-    """`total_with_slopes` of each pair into `out` (pairs, 2, COLUMNS) and `bound`; returns the islands evaluated."""
+    """`total_with_slopes` of the `Pairs` given into `out` (pairs, 2, COLUMNS) and `bound`; returns the islands."""
     islands = 0
+    # a plain tuple, which a call from Python passes on faster
+    pairs = Pairs(*given)
+    hurst, zeta_1 = pairs.hurst, pairs.zeta_1
     surface = surface_constants(hurst[0], zeta_1[0], reading, printed, zeta_1[0])
     near = neighbours(hurst[0], zeta_1[0], reading, printed)
-    for k in range(compression.size):
+    for k in range(hurst.size):
         if k > 0 and (hurst[k] != hurst[k - 1] or zeta_1[k] != zeta_1[k - 1]):
             surface = surface_constants(hurst[k], zeta_1[k], reading, printed, zeta_1[k])
             near = neighbours(hurst[k], zeta_1[k], reading, printed)
-        status[k], bound[k], count = total_with_slopes(compression[k], peak[k], rtol, surface, near, table, out[k])
+        gap = Gap(pairs.compression[k], pairs.peak[k])
+        status[k], bound[k], count = total_with_slopes(gap, rtol, surface, near, table, out[k])
         islands += count
     return islands

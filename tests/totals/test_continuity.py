@@ -23,7 +23,7 @@ from mbma_tables.models.tables import island4d_model, universal_model
 from mbma_tables.surfaces.readings import READINGS, REPORTED, get_reading
 from mbma_tables.totals import island_sum
 from mbma_tables.totals import kernel as lookup
-from mbma_tables.totals.intervals import NARROW, STRETCH
+from mbma_tables.totals.intervals import NARROW, STRETCH, Gap
 from mbma_tables.totals.island import geometry
 from mbma_tables.totals.island_sum import kinks
 from mbma_tables.totals.kernel import SMALL_POWER
@@ -148,8 +148,8 @@ def test_totals_do_not_depend_on_the_map(stretch, monkeypatch, record_property):
         surface = Surface(*(numbers[name][k] for name in INPUTS[:-1]))
         constants = lookup.surface_constants(surface.hurst, surface.zeta_1, REPORTED.numbers, True, surface.zeta_1)
         moved = constants._replace(map_scale=constants.map_scale * stretch / STRETCH)
-        compression, peak = (surface.h_max - numbers["separation"][k]) / surface.h_rms, surface.h_max / surface.h_rms
-        status, force, area, error, _ = lookup.total(BOTH, compression, peak, 1e-9, moved, universal_model().kernel)
+        gap = Gap((surface.h_max - numbers["separation"][k]) / surface.h_rms, surface.h_max / surface.h_rms)
+        status, force, area, error, _ = lookup.total(BOTH, gap, 1e-9, moved, universal_model().kernel)
         assert status == lookup.OK
         assert abs(force * surface.q0 * surface.s / compiled.force[k] - 1) <= error + compiled.error[k]
         assert abs(area / compiled.area[k] - 1) <= error + compiled.error[k]

@@ -24,7 +24,7 @@ LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=Fal
 @pytest.mark.parametrize(("straight", "width", "points"), [(False, 1.0, 31), (True, 3.0, 31), (True, 1.0, 21)])
 def test_the_rules_by_their_degrees(straight, width, points):
     """2 n + 1 Kronrod points are exact up to degree 3 n + 1, n Gauss points up to 2 n - 1, and not beyond."""
-    nodes, kronrod, gauss = intervals.rule_for(0.0, width, straight)
+    nodes, kronrod, gauss = intervals.rule_for(intervals.Interval(0.0, width, straight, straight))
     n = points // 2
     assert nodes.size == points
     np.testing.assert_allclose(nodes[1::2], legendre.leggauss(n)[0], rtol=0, atol=2e-16)
@@ -114,7 +114,7 @@ def test_next_to_first_contact_and_beyond():
 def totals(compression, rtol=1e-9, jacobian=5 / 9):
     """`kernel.total` of one surface."""
     surface = lookup.surface_constants(0.8, 216.0, REPORTED.numbers, True, 216.0)._replace(jacobian=jacobian)
-    return lookup.total(BOTH, compression, 3.0, rtol, surface, universal_model().kernel)
+    return lookup.total(BOTH, intervals.Gap(compression, 3.0), rtol, surface, universal_model().kernel)
 
 
 def test_the_first_moment_of_the_jacobian():
