@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure instead.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
 @click.option("--exponential", is_flag=True, help="For calculix and abaqus: Persson's exponential law instead of rows.")
-@click.option("--pair", default="node-to-surface", show_default=True, help="For calculix: the type of contact pair.")
 @reading_option
 @click.option("--check", is_flag=True, help="Of source code: build it and replay its conformance points.")
 def export_command(
@@ -44,7 +43,6 @@ def export_command(
     conductivity: float | None,
     conductivity_unit: str | None,
     exponential: bool,
-    pair: str,
     reading: str,
     check: bool,
 ) -> None:
@@ -84,8 +82,7 @@ def export_command(
     if exponential:
         files = {out: solvers.exponential(specimen.surface, specimen.E_star, law.comments).encode()}
     elif target in SOLVERS:
-        options = {"pair": pair} if target == "calculix" else {}
-        files = {out: getattr(solvers, target)(law, **options).encode()}
+        files = {out: getattr(solvers, target)(law).encode()}
     else:
         files = _data_files(target, out, law)
     for path, content in files.items():

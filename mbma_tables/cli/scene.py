@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,35 +22,14 @@ scene_file = click.argument("file", type=click.Path(path_type=Path))
 
 @click.command("plan", short_help="How a scene would be computed, at what error and price.")
 @scene_file
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
-def plan_command(file: Path, as_json: bool) -> None:
+def plan_command(file: Path) -> None:
     """How the scene in FILE would be computed: steps, why each is there, certified error and measured cost.
 
     Example: mbma plan examples/scene_joint.toml
     """
     from mbma_tables.scenes.scene import Scene
 
-    plan = Scene.from_toml(file).plan()
-    if not as_json:
-        click.echo(plan.text(), nl=False)
-        return
-
-    def plain(number: float) -> float | None:
-        return number if math.isfinite(number) else None
-
-    content = {
-        "rtol": plan.rtol,
-        "error": plain(plan.error),
-        "seconds": plain(plan.seconds),
-        "first_use_seconds": plan.first_use,
-        "steps": [
-            vars(step) | {"tier": step.tier_name, "error": plain(step.error), "seconds": plain(step.seconds)}
-            for step in plan.steps
-        ],
-        "left_out": plan.left_out,
-        "switched_off": plan.switched_off,
-    }
-    click.echo(json.dumps(content, indent=2))
+    click.echo(Scene.from_toml(file).explain(), nl=False)
 
 
 def _show(step: str, done: int, total: int) -> None:
@@ -65,11 +42,10 @@ def _show(step: str, done: int, total: int) -> None:
 @scene_file
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write it to result.nc or result.csv.")
 @png_option
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
-def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) -> None:
+def run_command(file: Path, out: Path | None, plot: Path | None) -> None:
     """Compute the scene in FILE, and nothing that it does not ask for.
 
-    CSV and the table hold what is known at gaps; netCDF and JSON hold everything.
+    CSV and the table hold what is known at gaps; netCDF holds everything.
 
     Example: mbma run examples/scene_joint.toml --out joint.nc
     """
@@ -89,9 +65,7 @@ def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) 
         files[out] = _report(found).to_csv().encode() if out.suffix == ".csv" else _to_netcdf(found)
     for path, content in files.items():
         write_file(path, content)
-    if as_json:
-        click.echo(_to_json(found))
-    elif out is None:
+    if out is None:
         click.echo(_report(found).to_table(), nl=False)
 
 
@@ -106,23 +80,6 @@ def _report(found: xarray.Dataset) -> Report:
     facts = found.attrs
     notes = [f"reading {facts['reading']}, rtol {facts['rtol']:.3g}, error at most {facts['error']:.2g}"]
     return Report("run", str(facts["title"]), notes, dict(facts), columns)
-
-
-def _to_json(found: xarray.Dataset) -> str:
-    def plain(values: Any) -> Any:
-        if isinstance(values, list):
-            return [plain(value) for value in values]
-        return values if math.isfinite(values) else None
-
-    variables = {
-        str(name): {
-            "dims": list(field.dims),
-            "units": field.attrs["units"],
-            "values": plain(field.values.tolist()),
-        }
-        for name, field in found.variables.items()
-    }
-    return json.dumps({"attributes": found.attrs, "variables": variables}, indent=2, allow_nan=False)
 
 
 def _to_netcdf(found: xarray.Dataset) -> bytes:

@@ -14,7 +14,6 @@ from mbma_tables.export.text import DIGITS, checked_name, comment, number
 from mbma_tables.surfaces.surface import Surface
 
 MAX_CALCULIX_ROWS = 200
-PAIR_TYPES = ("node-to-surface", "surface-to-surface", "mortar")
 MAX_NAME = 80  # letters of a name in CalculiX and Abaqus
 
 
@@ -34,22 +33,14 @@ def _tabular(law: LawTable, name: str, conductance: str) -> str:
     return _interaction(name, card, "".join(f"{number(y)}, {number(x)}\n" for x, y in zip(law.x, law.y, strict=True)))
 
 
-def calculix(law: LawTable, name: str = "ROUGH", pair: str = "node-to-surface") -> str:
+def calculix(law: LawTable, name: str = "ROUGH") -> str:
     """A surface interaction for CalculiX, with the contact pair that reads it rightly.
 
     Raises
     ------
     InputError
-        For more than 200 rows, which its arrays do not hold, and for pair types that read TABULAR wrongly: with
-        SURFACE TO SURFACE version 2.20 gives zero force without a message or crashes, MORTAR gives a wrong one.
+        For more than 200 rows, which its arrays do not hold.
     """
-    if pair not in PAIR_TYPES:
-        raise InputError(f"pair must be one of {PAIR_TYPES}, got {pair!r}")
-    if pair != "node-to-surface":
-        raise InputError(
-            f"CalculiX 2.20 reads PRESSURE-OVERCLOSURE=TABULAR wrongly with {pair} contact, without a message: "
-            "take pair='node-to-surface'"
-        )
     if law.x.size > MAX_CALCULIX_ROWS:
         raise InputError(f"CalculiX holds {MAX_CALCULIX_ROWS} rows, this law has {law.x.size}: give fewer rows")
     notes = (

@@ -59,10 +59,6 @@ def chosen(on: Iterable[str], off: Iterable[str]) -> tuple[frozenset[str], froze
     if "finite_height" in dropped and outputs & set(OF_LAW):
         name = sorted(outputs & set(OF_LAW))[0]
         raise InputError(f"{name!r} comes from a law, which ends at h_max: leave finite_height on, or {name!r} out")
-    if "subscale_area" in dropped and not outputs & {"area", "island_statistics"}:
-        raise InputError("subscale_area changes areas alone: ask for 'area' too, or leave it out of off")
-    if outputs == {"comparison"} and dropped:
-        raise InputError(f"{sorted(dropped)[0]!r} does not touch other theories: leave it out of off")
     if outputs == {"pressure_profile"} and "finite_height" in dropped:
         raise InputError("finite_height does not touch single islands: leave it out of off")
     if "pressure_profile" in outputs and "sphere_deformation" in dropped:

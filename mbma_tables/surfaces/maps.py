@@ -206,7 +206,6 @@ def fit_map(
         band=check_band(band, float(q[0]), float(q[-1])),
         power=float(np.mean(windowed**2)) * scale**2,
         convention="paper",
-        h_rms_total=float(np.std(flat / scale)) * scale,
         windowed=not periodic,
         detrend=trend,
         length_unit=unit,

@@ -51,15 +51,11 @@ class SpectrumFit:
     points : int
         How many spectral points (logarithmic bins) those are.
     residual : float
-        Root-mean-square deviation of log10 C from the law.
-    r_squared : float
-        Coefficient of determination of log C; like `residual`, with bins weighted by what they average.
+        Root-mean-square deviation of log10 C from the law, bins weighted by what they average.
     roll_off, cut_off : float or None
         Where the spectrum turns flat below the law, and where it leaves the law above; None where it does not.
     variance_share : float
         Share of the measured variance of height inside [q0, q1].
-    h_rms_total : float
-        Root-mean-square height of the whole measurement.
     convention : str
         Of the spectrum given; 'paper' for a map.
     windowed : bool
@@ -81,11 +77,9 @@ class SpectrumFit:
     q_high: float
     points: int
     residual: float
-    r_squared: float
     roll_off: float | None
     cut_off: float | None
     variance_share: float
-    h_rms_total: float
     convention: str
     windowed: bool = False
     detrend: str | None = None
@@ -165,7 +159,6 @@ def fit_psd(
         band=check_band(band, *ends),
         power=float(variances.sum()),
         convention=convention,
-        h_rms_total=math.sqrt(variances.sum()),
     )
 
 
@@ -235,8 +228,6 @@ def fit_spectrum(
     law, hurst, error = _law_of(bins, unit, profile, breaks=band is None)
     used = bins[law.start : law.stop]
     residual = math.sqrt(np.average((used.log_c - law.log_at(used.q, unit)) ** 2, weights=used.weight))
-    y_mean = np.average(used.log_c, weights=used.weight)
-    spread = float(np.average((used.log_c - y_mean) ** 2, weights=used.weight))
     # a map without roll-off reaches to its own size, though its longest waves are too few to be fitted
     q0, q1 = band or band_of(bins, law, unit, (unit, float(q.max())))
     fit = SpectrumFit(
@@ -249,7 +240,6 @@ def fit_spectrum(
         q_high=float(used.q[-1]),
         points=law.stop - law.start,
         residual=residual / math.log(10),
-        r_squared=1 - residual**2 / spread,
         roll_off=q0 if law.start else None,
         cut_off=q1 if law.stop < len(bins.q) else None,
         variance_share=float(variances[(q >= q0) & (q <= q1)].sum() / power),

@@ -80,7 +80,6 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
         (["calculix", "--out", "law", *WITHOUT["--stress-unit"]], "stress_unit is missing"),
         (["calculix", "--out", "law", *WITHOUT["--E-star"]], "a modulus is needed"),
         (["calculix", "--out", "law", *WITHOUT["--surface"]], "one surface is needed"),
-        (["calculix", "--out", "law", *LAW, "--pair", "mortar"], "wrongly with mortar"),
         (["calculix", "--out", "law", *WITHOUT["--rows"], "--rows", "300"], "holds 200 rows"),
         (["calculix", "--out", "law", *LAW, "--largest-overclosure", "5"], "largest_overclosure must be in"),
         (["calculix", "--out", "no/such/folder/law", *LAW], "cannot be written"),

@@ -50,7 +50,6 @@ MISTAKES = {
         "leave it in one of the two lists",
     ),
     "off of an output": (SURFACE + '[effects]\non = ["force"]\noff = ["area"]\n' + AT, "did you mean|known are"),
-    "subscale without area": (SURFACE + '[effects]\non = ["force"]\noff = ["subscale_area"]\n' + AT, "ask for 'area'"),
     "energy of no end": (
         SURFACE + '[effects]\non = ["energy"]\noff = ["finite_height"]\n' + AT,
         "leave finite_height on",

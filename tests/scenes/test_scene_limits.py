@@ -116,13 +116,8 @@ def test_the_top_of_a_whole_gaussian_by_mean_separations():
     [
         ({"without": ("force",)}, "is both on and off"),
         ({"without": ("energy",)}, "'energy' is off unless it is asked for"),
-        ({"without": ("subscale_area",)}, "subscale_area changes areas alone"),
         ({"effects": ("finite_height",)}, "no effect is asked for"),
         ({"effects": ("energy",), "without": ("finite_height",)}, "comes from a law"),
-        (
-            {"effects": ("comparison",), "theories": ("persson",), "without": ("finite_height",)},
-            "does not touch other theories",
-        ),
         (
             {"effects": ("pressure_profile",), "separations": None, "deltas": (0.1,), "without": ("finite_height",)},
             "does not touch single islands",
