@@ -188,19 +188,3 @@ def island_form(name: str) -> Form:
         title = f"{result.replace('phi', 'Phi')}, {name} form: within {certificates[result].largest:g}."
         functions.append(Function(name, result, ("X", "mu"), title, steps))
     return Form(name, {"X": (size.min_X, MAX_X), "mu": (0.0, MAX_MU)}, tuple(functions), certificates)
-
-
-def front(sizes: tuple[int, ...] = (4, 6, 8, 12, 16, 20, 28, 36, 48)) -> list[dict[str, float]]:
-    """Coefficients of a function against its largest error on held-out points, X from 0.8 on, rigid sphere exact."""
-    x, mu, log_ratio = solved(HELD_OUT, 0.8, HELD_OUT_SEED)
-    rows = []
-    for count in sizes:
-        row: dict[str, float] = {"terms": count}
-        for which, name in enumerate(NAMES):
-            found = fitted(which, count, 0.8)
-            held_out = Samples.of(which, x, mu, log_ratio[which])
-            error = held_out.columns(found.terms, found.shape) @ found.coefficients - held_out.residual
-            row[f"coefficients_{name}"] = found.length
-            row[f"error_{name}"] = math.expm1(float(np.abs(error).max()))
-        rows.append(row)
-    return rows

@@ -8,18 +8,23 @@ import pathlib
 from typing import Any
 
 import numpy as np
+from scipy.special import erfinv
 
-from mbma_tables import Surface, contact, theories
+from mbma_tables import Surface, theories
 from mbma_tables.arguments import FloatArray
+from mbma_tables.errors import OutOfRangeError
 
 DATA = pathlib.Path(__file__).parents[2] / "docs" / "data"
 READINGS = {"MBMA reported": "reported", "MBMA printed": "printed"}
 PERSSON: dict[str, theories.Method] = {"Persson full": "full", "Persson simplified": "simplified"}
-THEORIES = (*READINGS, "G-W", *PERSSON)
+SEPARATIONS: dict[str, theories.Theory] = {
+    **{name: theories.Mbma(reading=reading) for name, reading in READINGS.items()},
+    "G-W": theories.GreenwoodWilliamson(),
+    **{name: theories.Persson(method) for name, method in PERSSON.items()},
+}
+THEORIES = tuple(SEPARATIONS)
 AREA_THEORIES = (*READINGS, "G-W", "Persson")  # (18) is Persson's area in full and simplified alike
 GAPS = 60  # a curve
-RTOL = 1e-6  # of each of its points
-CORRECTIONS = 3  # after which a solution no longer depends on the interpolation
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,73 +59,44 @@ REFERENCES = {
 }
 
 
-def evaluate(surface: Surface, theory: str, gap: Any) -> tuple[Any, Any]:
-    """F/(A0 E*) and A/A0 of a theory that answers at a separation d."""
-    if theory in READINGS:
-        found = contact(surface, gap, tier="exact", reading=READINGS[theory], rtol=RTOL)
-        return found.force, found.area
-    summits = theories.greenwood_williamson(surface, gap)
-    return summits.force, summits.area
-
-
-def start(surface: Surface, theory: str) -> Any:
-    """Separation d at which contact starts; G-W's Gaussian has no end, and three more h_rms are sampled."""
-    return surface.h_max + (0.0 if theory in READINGS else 3 * surface.h_rms)
-
-
 @functools.cache
 def sample(surface: Surface, theory: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Separation, force and area from first contact to full compression, geometrically spaced."""
-    first = start(surface, theory)
-    gap = first - (first + surface.h_max) * np.geomspace(0.005, 1, GAPS)
-    gap[-1] = -surface.h_max
-    return gap, *evaluate(surface, theory, gap)
+    """Mean separation, force and area from first contact to full compression, geometrically spaced."""
+    # G-W's Gaussian has no end, and three more h_rms are sampled
+    first = surface.h_max + (0.0 if theory in READINGS else 1.5 * surface.h_rms)
+    u = first * (1 - np.geomspace(0.005, 1, GAPS))
+    found = SEPARATIONS[theory].answer(surface, u)
+    return u, found.force, found.area
 
 
 def solve(surface: Surface, theory: str, kind: str, wanted: Any) -> tuple[FloatArray, FloatArray]:
     """Force and area where the force (or the area) is as wanted; NaN where the theory does not reach it."""
-    from scipy.interpolate import CubicSpline
-    from scipy.special import erfinv
-
     targets = np.atleast_1d(np.asarray(wanted, dtype=float))
-    which = ("force", "area").index(kind)
     if theory == "Persson":
-        if kind == "force":
-            return targets, theories.persson_area(surface, targets)
-        return np.sqrt(surface.m2) * erfinv(targets), targets
-    gap, *columns = sample(surface, theory)
-    first = start(surface, theory)
-    falls = np.flatnonzero(np.diff(columns[which]) <= 0)
-    branch = slice(None, falls[0] + 1 if falls.size else None)  # the branch of first contact
-    known = columns[which][branch]
-    reached = (targets >= known[0]) & (targets <= known[-1])
+        force = targets if kind == "force" else np.sqrt(surface.m2) * erfinv(targets)
+        return force, theories.persson_area(surface, force)
     result = np.full((2, targets.size), np.nan)
-    if reached.any():
-        log_depth = CubicSpline(np.log(known), np.log(first - gap[branch]))
-        goal = np.log(targets[reached])
-        x = log_depth(goal)
-        smallest = gap[branch][-1]
-        for _ in range(CORRECTIONS):
-            pair = evaluate(surface, theory, np.maximum(first - np.exp(x), smallest))
-            x = x + (goal - np.log(pair[which])) * log_depth(goal, 1)
-        result[:, reached] = evaluate(surface, theory, np.maximum(first - np.exp(x), smallest))
+    reached = np.ones(targets.size, dtype=bool)
+    try:
+        u = SEPARATIONS[theory].mean_separation_at(surface, kind, targets)
+    except OutOfRangeError as fault:
+        reached = ~fault.mask
+        if not reached.any():
+            return result[0], result[1]
+        u = SEPARATIONS[theory].mean_separation_at(surface, kind, targets[reached])
+    found = SEPARATIONS[theory].answer(surface, u)
+    result[:, reached] = found.force, found.area
     return result[0], result[1]
 
 
 def force_at(surface: Surface, theory: str, ratio: Any) -> Any:
     """F/(A0 E*) at mean separations u = ratio * h_rms; NaN where the theory has none."""
     u = np.asarray(ratio, dtype=float) * surface.h_rms
-    if theory == "G-W":
-        return np.asarray(evaluate(surface, theory, theories.separation(surface, u))[0])
-    if theory in READINGS:
-        result, some = np.zeros(u.shape), u < surface.h_max
-        if some.any():
-            result[some] = evaluate(surface, theory, theories.separation(surface, u[some]))[0]
-        return result
     # at u = 0 the full form needs an infinite load
-    result, some = np.full(u.shape, np.nan), (u > 0) | (PERSSON[theory] == "simplified")
+    some = (u > 0) | (theory != "Persson full")
+    result = np.full(u.shape, np.nan)
     if some.any():
-        result[some] = theories.persson_force(surface, u[some], method=PERSSON[theory])
+        result[some] = SEPARATIONS[theory].answer(surface, u[some]).force
     return result
 
 

@@ -5,18 +5,24 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import pathlib
 import platform
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib import metadata
+from typing import Any
+
+import numpy as np
 
 from generate.pages import timing
 from generate.pages.cost_islands import island_rows
-from generate.pages.cost_page import draw, parts_of
 from generate.pages.cost_totals import brute_force_rows, total_rows
-from mbma_tables.scenes.costs import COLUMNS, UNIT, Row, read_costs
+from generate.pages.page import png, table
+from mbma_tables.scenes.costs import COLUMNS, UNIT, Costs, Row, read_costs
 
+BRUTE_FORCE = "boundary_elements"
+METHODS = {"classical": "classical iteration", "exact": "Newton (exact)"}
 LIBRARIES = ("numpy", "scipy", "numba")
 HEAD = """\
 # What accuracy costs, measured by python -m generate pages cost; docs/cost.md says how. Costs are times over that of a
@@ -48,6 +54,121 @@ def study() -> list[Row]:
     # the least: what else the machine does can only add
     unit = min(*seconds, timing.measure(lambda: None)[1])
     return [Row(UNIT, "seconds", "both", None, unit), *rows, *brute_force_rows(unit)]
+
+
+def pareto_front(rows: Sequence[Row]) -> list[Row]:
+    """The rows that none is better than in both cost and error, cheapest first."""
+    front: list[Row] = []
+    for row in sorted(rows, key=lambda row: (row.cost, row.error or 0.0)):
+        if not front or (row.error or 0.0) < (front[-1].error or 0.0):
+            front.append(row)
+    return front
+
+
+def islands_of(costs: Costs) -> list[Row]:
+    """Rows of one island, with an error to go with the cost."""
+    return [row for row in costs.rows if row.error is not None and row.what.startswith(("island", "nodes=", "rings="))]
+
+
+def totals_of(costs: Costs) -> list[Row]:
+    """Rows of one gap; a law's errors go with the price of evaluating it."""
+    rows = [row for row in costs.rows if row.quantity == "both" and row.what == "gap" and row.error is not None]
+    lookup = costs.of("law", "lookup") / costs.seconds
+    laws = [row for row in costs.rows if row.tier == "universal" and row.what == "law"]
+    return rows + [Row("law", row.variant.replace("law", "lookup"), "both", row.error, lookup, 0) for row in laws]
+
+
+def family(row: Row) -> str:
+    """The series that a point belongs to."""
+    name = METHODS.get(row.tier, row.tier)
+    return f"{name}, by nodes" if row.tier == "exact" and row.what.startswith("nodes=") else name
+
+
+def number(value: float | None) -> str:
+    """A number of a table."""
+    return "" if value is None else f"{value:.3g}"
+
+
+def rows_table(rows: Iterable[Row], front: Sequence[Row] = ()) -> str:
+    """Rows with their errors, costs and counts; those of the front are marked."""
+    cells = [
+        [
+            METHODS.get(row.tier, row.tier),
+            row.variant,
+            "" if row.error is None else f"{row.error:.1e}",
+            number(row.cost),
+            number(row.evaluations),
+            "front" if row in front else "",
+        ]
+        for row in rows
+    ]
+    return table(["what", "asked", "largest error", "cost", "evaluations", ""], cells)
+
+
+def spans(rows: Sequence[Row]) -> str:
+    """Decades between the smallest and the largest cost and error."""
+    costs, errors = ([getattr(row, name) for row in rows] for name in ("cost", "error"))
+    time, error = (math.log10(max(v) / min(v)) for v in (costs, errors))
+    return f"{time:.1f} decades of time and {error:.1f} of error"
+
+
+def single_table(costs: Costs) -> str:
+    """Force or area alone against both, by tier and tolerance."""
+    both = {(row.tier, row.variant): row for row in costs.rows if row.quantity == "both"}
+    cells = []
+    for row in costs.rows:
+        if row.quantity != "both" and row.what == "gap":
+            beside = both[row.tier, row.variant]
+            counts = [number(row.evaluations), number(beside.evaluations)]
+            cells.append([row.tier, row.variant, row.quantity, f"{row.cost / beside.cost:.2f}", *counts])
+    return table(["tier", "asked", "alone", "time over that of both", "islands a gap", "for both"], cells)
+
+
+def parts_of(costs: Costs) -> dict[str, str]:
+    """The measured parts of the page."""
+    islands, totals = islands_of(costs), totals_of(costs)
+    names = ("import", "call", "law", "profile", "lookup")
+    once = [row for row in costs.rows if (row.what in names and row.quantity == "both") or row.what == "invert"]
+    once += [row for row in costs.rows if row.tier in ("greenwood_williamson", "persson")]
+    return {
+        "unit": f"Here the fixed work took {1e6 * costs.seconds:.0f} us, on one core.",
+        "islands": f"They span {spans(islands)}.\n\n{rows_table(islands, pareto_front(islands))}",
+        "totals": f"They span {spans(totals)}.\n\n{rows_table(totals, pareto_front(totals))}",
+        "once": rows_table(once),
+        "alone": single_table(costs),
+        "brute_force": rows_table(row for row in costs.rows if row.tier == BRUTE_FORCE),
+    }
+
+
+def draw(costs: Costs) -> bytes:
+    """The figure: error against cost, islands and totals, as a PNG file."""
+    from matplotlib.figure import Figure
+
+    groups = {"one island": islands_of(costs), "one gap of a surface": totals_of(costs)}
+    names = list(dict.fromkeys(family(row) for rows in groups.values() for row in rows))
+    styles: dict[str, Any] = {
+        name: {"color": f"C{k % 10}", "marker": "osD^vP*Xh<>d"[k % 12]} for k, name in enumerate(names)
+    }
+    figure = Figure(figsize=(9, 4.8), dpi=100, layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    handles: dict[str, Any] = {}
+    for panel, (title, rows) in zip(panels, groups.items(), strict=True):
+        for name in names:
+            chosen = [row for row in rows if family(row) == name]
+            if chosen:
+                x, y = [row.cost for row in chosen], [row.error for row in chosen]
+                (handles[name],) = panel.loglog(x, y, ls="none", ms=5, **styles[name])
+        front = pareto_front(rows)
+        x, y = [row.cost for row in front], [row.error for row in front]
+        (handles["Pareto front"],) = panel.step(x, y, "k-", lw=1, where="post", zorder=0)
+        panel.set(xlabel="time / fixed piece of work", title=title)
+        panel.grid(alpha=0.3)
+    panels[0].set_ylabel("largest relative error")
+    others = np.array([row.cost for row in costs.rows if row.tier == BRUTE_FORCE])
+    if others.size:
+        panels[1].axvspan(others.min(), others.max(), color="0.85", zorder=0)
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=8)
+    return png(figure)
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:

@@ -43,8 +43,8 @@ def by_gap(ax: Any, surface: Surface, low: float, names: Iterable[str] = THEORIE
             ratio = np.linspace(0.005, 1.1 * top, GAPS)
             force = force_at(surface, name, ratio)
         else:
-            gap, force, _ = sample(surface, name)
-            ratio = theories.mean_separation(surface, gap) / surface.h_rms
+            u, force, _ = sample(surface, name)
+            ratio = u / surface.h_rms
         ax.semilogy(ratio, force, color=COLOURS[name], **{"label": name, **style})
     ax.set(xlabel=r"$u/h_{rms}$", ylabel=r"$F/(A_0 E^*)$", ylim=(low, None), xlim=(0, 1.1 * top))
 

@@ -1,15 +1,13 @@
-"""The measured parts of docs/formula.md: closed forms with their certificates, and accuracy against length."""
+"""The measured parts of docs/formula.md: closed forms with their certificates."""
 
 from __future__ import annotations
 
-from generate.formulas import islands
 from generate.formulas.printing import MODULE, latex_steps, read_functions
-from generate.pages.page import png, pyplot, table
+from generate.pages.page import table
 from mbma_tables.models.closed_form_functions import CERTIFICATES, RANGES
 
 SHOWN = ("pocket", "standard", "totals")
 HEADER = ("form", "function", "coefficients", "largest error", "median", "worst at")
-LABELS = {"phi_F": "force", "phi_A": "area"}
 
 
 def certificates() -> str:
@@ -37,32 +35,6 @@ def equations(form: str) -> str:
     return "\n\n".join(f"$${line}$$" for line in dict.fromkeys(lines))
 
 
-def lengths(front: list[dict[str, float]]) -> str:
-    """Error against number of coefficients."""
-    return table(
-        ["terms", "coefficients of force", "its largest error", "coefficients of area", "its largest error"],
-        [
-            [f"{row['terms']:g}"]
-            + [text for name in LABELS for text in (f"{row[f'coefficients_{name}']:g}", f"{row[f'error_{name}']:.2g}")]
-            for row in front
-        ],
-    )
-
-
-def draw(front: list[dict[str, float]]) -> bytes:
-    """Error against number of coefficients."""
-    figure, axes = pyplot().subplots(figsize=(6, 4), layout="constrained")
-    for (name, label), mark in zip(LABELS.items(), ("o-", "s-"), strict=True):
-        x, y = ([row[f"{kind}_{name}"] for row in front] for kind in ("coefficients", "error"))
-        axes.loglog(x, y, mark, label=label)
-    axes.set(xlabel="fitted coefficients", ylabel="largest relative error on held-out points")
-    axes.grid(True, which="both", alpha=0.3)
-    axes.legend()
-    return png(figure, dpi=130)
-
-
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
-    """The measured parts of the page, and its figure."""
-    front = islands.front()
-    parts = {"certificates": certificates(), "ranges": ranges(), "lengths": lengths(front)}
-    return parts | {form: equations(form) for form in SHOWN}, {"docs/figures/formula.png": draw(front)}
+    """The measured parts of the page."""
+    return {"certificates": certificates(), "ranges": ranges()} | {form: equations(form) for form in SHOWN}, {}

@@ -1,21 +1,24 @@
 """Compute the polynomial pieces behind `mbma_tables.islands.height_integrals` with mpmath.
 
-``python -m generate tables heights`` writes ``mbma_tables/islands/_height_coefficients.py`` again; the output is the
-same on every machine.
+``python -m generate tables heights`` writes ``tables/height_coefficients.csv`` again; the output is the same on every
+machine.
 """
 
 from __future__ import annotations
 
 import itertools
 import pathlib
-import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import mpmath
 
 from mbma_tables.files import write_file
 
-TARGET = pathlib.Path(__file__).parents[2] / "mbma_tables" / "islands" / "_height_coefficients.py"
+TARGET = pathlib.Path(__file__).parents[2] / "tables" / "height_coefficients.csv"
+HEAD = (
+    "# F_n for n = 1/2, 1, 3/2, 2, 5/2: eight rows of polynomial coefficients each. "
+    "Made by python -m generate tables heights"
+)
 DIGITS = 40
 TERMS = 19  # the hardest piece, [-2, 0], needs 19 for 2e-17
 SAMPLES = 48
@@ -79,23 +82,8 @@ def pieces(twice_n: int) -> list[list[mpmath.mpf]]:
     return rows
 
 
-_WRAPPER = textwrap.TextWrapper(120, initial_indent=" " * 4, subsequent_indent=" " * 5, break_on_hyphens=False)
-
-
-def _literal(name: str, rows: Sequence[Sequence[mpmath.mpf]]) -> str:
-    """A tuple of tuples, each line as full as it can be."""
-    lines = [f"{name} = ("]
-    for row in rows:
-        numbers = ", ".join(repr(float(value)) for value in row)
-        lines += _WRAPPER.wrap(f"({numbers}),")
-    return "\n".join([*lines, ")"])
-
-
 def main() -> None:
-    """Write the coefficient module."""
-    mpmath.mp.dps = DIGITS
-    blocks = [
-        '"""Made by `python -m generate tables heights`; do not edit."""\n\n# fmt: off',
-        "\n".join(_literal(f"TWICE_N_{k}", pieces(k)) for k in (1, 2, 3, 4, 5)),
-    ]
-    write_file(TARGET, ("\n\n".join(blocks) + "\n").encode())
+    """Write the coefficients."""
+    with mpmath.workdps(DIGITS):
+        rows = [",".join(repr(float(value)) for value in row) for k in (1, 2, 3, 4, 5) for row in pieces(k)]
+    write_file(TARGET, "\n".join([HEAD, *rows, ""]).encode())

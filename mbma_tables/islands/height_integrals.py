@@ -19,15 +19,13 @@ from numpy.typing import ArrayLike
 from mbma_tables.arguments import FloatArray, finite_array
 from mbma_tables.compiled import njit
 from mbma_tables.errors import InputError
-from mbma_tables.islands import _height_coefficients as coefficients
+from mbma_tables.files import shipped_file
 
 ORDERS = (0.5, 1.0, 1.5, 2.0, 2.5)
 
-_HALF = np.array(coefficients.TWICE_N_1)
-_ONE = np.array(coefficients.TWICE_N_2)
-_THREE_HALVES = np.array(coefficients.TWICE_N_3)
-_TWO = np.array(coefficients.TWICE_N_4)
-_FIVE_HALVES = np.array(coefficients.TWICE_N_5)
+_HALF, _ONE, _THREE_HALVES, _TWO, _FIVE_HALVES = np.loadtxt(
+    shipped_file("height_coefficients.csv"), delimiter=","
+).reshape(len(ORDERS), 8, 19)
 
 
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")

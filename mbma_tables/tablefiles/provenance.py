@@ -14,7 +14,6 @@ import numpy as np
 from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
 
 SOLVER = (
-    "mbma_tables.islands._height_coefficients",
     "mbma_tables.islands.height_integrals",
     "mbma_tables.islands.spectral",
     "mbma_tables.islands.newton",

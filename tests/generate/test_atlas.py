@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from generate.pages import stability_cases as cases
-from generate.pages.stability import corners, draw
+from generate.pages import stability as cases
 from mbma_tables import InputError
 
 
@@ -33,9 +32,9 @@ def test_corners(monkeypatch):
     # the comparison would show it if the formulas as printed were fine
     assert direct.not_finite > 0
     assert library.largest < 1e-13
-    assert draw(geometry_maps, island_maps).startswith(b"\x89PNG")
+    assert cases.draw(geometry_maps, island_maps).startswith(b"\x89PNG")
     tallies = [*islands, *geometry, *totals]
-    assert len(corners(tallies).splitlines()) == len(tallies) + 2
+    assert len(cases.corners(tallies).splitlines()) == len(tallies) + 2
 
 
 def test_a_tally_counts_what_goes_wrong():

@@ -133,10 +133,10 @@ def test_certificates_are_the_errors_at_held_out_points(small):
 
 
 def test_longer_forms_err_less(small):
-    rows = islands.front((2, 5))
-    for name in islands.NAMES:
-        assert rows[1][f"error_{name}"] < rows[0][f"error_{name}"] < 0.5
-        assert rows[1][f"coefficients_{name}"] > rows[0][f"coefficients_{name}"]
+    for which in (FORCE, AREA):
+        short, long = (islands.fitted(which, count, 0.8) for count in (2, 5))
+        assert long.error < short.error < 0.5
+        assert long.length > short.length
 
 
 def test_a_form_that_does_not_rise_is_refused(small, monkeypatch):

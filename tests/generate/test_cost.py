@@ -8,7 +8,7 @@ import itertools
 import numpy as np
 import pytest
 
-from generate.pages import cost, cost_islands, cost_page, cost_totals, page, timing
+from generate.pages import cost, cost_islands, cost_totals, page, timing
 from mbma_tables import ConvergenceError, contact
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.classical import ring_matrix
@@ -183,7 +183,7 @@ def test_first_use_is_that_of_the_second_process(few_totals, monkeypatch):
 
 def test_a_study_becomes_data_page_and_figure(tmp_path, monkeypatch):
     shipped = shipped_costs()
-    own = [row for row in shipped.rows if row.tier not in ("unit", cost_page.BRUTE_FORCE)]
+    own = [row for row in shipped.rows if row.tier not in ("unit", cost.BRUTE_FORCE)]
     monkeypatch.setattr(cost, "island_rows", lambda: own[:20])
     monkeypatch.setattr(cost, "total_rows", lambda: own[20:])
     seconds = iter([3.0, shipped.seconds, 2.0])
@@ -196,7 +196,7 @@ def test_a_study_becomes_data_page_and_figure(tmp_path, monkeypatch):
         assert row.cost == pytest.approx(expected.cost, rel=1.5e-3, abs=0)
     text = (page.ROOT / "docs" / "cost.md").read_text(encoding="utf-8")
     assert page.fill(text, parts).count("|") == text.count("|")
-    assert page.fill(text, cost_page.parts_of(shipped)) == text
+    assert page.fill(text, cost.parts_of(shipped)) == text
     assert files["docs/figures/cost.png"].startswith(b"\x89PNG\r\n\x1a\n")
 
 
@@ -211,7 +211,7 @@ def test_the_pareto_front_is_what_nothing_dominates():
     for _ in range(50):
         places = rng.integers(1, 6, (12, 2))
         rows = [Row("exact", str(k), "both", float(error), float(time)) for k, (time, error) in enumerate(places)]
-        front = cost_page.pareto_front(rows)
+        front = cost.pareto_front(rows)
 
         def dominated(row, by):
             return by.cost <= row.cost and by.error <= row.error and (by.cost, by.error) != (row.cost, row.error)
@@ -221,7 +221,7 @@ def test_the_pareto_front_is_what_nothing_dominates():
 
 
 def test_the_figure_spans_five_decades_of_time_and_eight_of_error():
-    rows = cost_page.islands_of(shipped_costs())
+    rows = cost.islands_of(shipped_costs())
     classical = max(row.cost for row in rows if row.tier == "classical")
     assert classical / min(row.cost for row in rows) > 1e5
     assert max(row.error for row in rows) / min(row.error for row in rows) > 1e8

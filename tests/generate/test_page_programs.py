@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pathlib
 import re
 
 import numpy as np
@@ -17,6 +16,8 @@ from generate.pages.page import MARKED, ROOT
 from generate.tables import height_coefficients
 from mbma_tables import InputError, Surface, contact, theories
 from mbma_tables.export.law_rows import describe_law
+from mbma_tables.files import shipped_file
+from mbma_tables.islands import height_integrals
 
 PNG = b"\x89PNG"
 
@@ -143,24 +144,18 @@ def test_the_page_on_tables():
     assert [content[:4] for content in files.values()] == [PNG]
 
 
-def test_pieces_of_a_height_integral_are_the_shipped_ones(monkeypatch):
+def test_pieces_of_a_height_integral_are_the_shipped_ones():
     import mpmath
-
-    from mbma_tables.islands import _height_coefficients as shipped
 
     with mpmath.workdps(height_coefficients.DIGITS):
         found = [[float(value) for value in row] for row in height_coefficients.pieces(2)]
-    np.testing.assert_array_equal(found, shipped.TWICE_N_2)
+    np.testing.assert_array_equal(found, height_integrals._ONE)
 
 
-def test_the_module_of_coefficients_is_written_as_it_is(tmp_path, monkeypatch):
-    import mpmath
-
-    from mbma_tables.islands import _height_coefficients as shipped
-
-    target = tmp_path / "made.py"
-    monkeypatch.setattr(mpmath.mp, "dps", mpmath.mp.dps)
+def test_the_file_of_coefficients_is_written_as_it_is(tmp_path, monkeypatch):
+    target = tmp_path / "made.csv"
     monkeypatch.setattr(height_coefficients, "TARGET", target)
-    monkeypatch.setattr(height_coefficients, "pieces", lambda twice: getattr(shipped, f"TWICE_N_{twice}"))
+    shipped = np.loadtxt(shipped_file("height_coefficients.csv"), delimiter=",").reshape(5, 8, 19)
+    monkeypatch.setattr(height_coefficients, "pieces", lambda twice: shipped[twice - 1])
     height_coefficients.main()
-    assert target.read_bytes() == pathlib.Path(shipped.__file__).read_bytes()
+    assert target.read_bytes() == shipped_file("height_coefficients.csv").read_bytes()
