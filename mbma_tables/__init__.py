@@ -24,15 +24,16 @@ if TYPE_CHECKING:
     from mbma_tables.scenes.scene import Scene
     from mbma_tables.surfaces.readings import Reading
     from mbma_tables.surfaces.surface import Surface
-    from mbma_tables.theories.contact import Contact, contact
+    from mbma_tables.theories.contact import contact
     from mbma_tables.theories.law import contact_law
+    from mbma_tables.theories.result import Contact
     from mbma_tables.totals.island import Island, island
     from mbma_tables.totals.law_protocol import ContactLaw
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "Contact": "mbma_tables.theories.contact",
+    "Contact": "mbma_tables.theories.result",
     "ConvergenceError": "mbma_tables.errors",
     "InputError": "mbma_tables.errors",
     "Island": "mbma_tables.totals.island",

@@ -26,7 +26,7 @@ from mbma_tables.scenes.specimen import Specimen
 
 if TYPE_CHECKING:
     from mbma_tables.scenes.run import OtherTheory
-    from mbma_tables.theories.contact import Contact
+    from mbma_tables.theories.result import Contact
 
 MIN_DEPTH = 1e-3  # (h_max - d)/h_max at a curve's second point
 EVEN_FROM = 0.2  # and where its points, geometric so far, become evenly spaced

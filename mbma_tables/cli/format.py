@@ -18,7 +18,7 @@ from mbma_tables.files import write_file
 from mbma_tables.scenes.specimen import Specimen
 
 if TYPE_CHECKING:
-    from mbma_tables.theories.contact import Contact
+    from mbma_tables.theories.result import Contact
 
 DIGITS = 6  # significant digits of a table; JSON and CSV keep all
 SURFACE_NUMBERS = ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "m0", "m2", "m4", "alpha")

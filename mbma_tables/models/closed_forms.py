@@ -130,7 +130,7 @@ def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1
     --------
     >>> force, area, error = closed_totals(Surface(0.8, 1.0, 200.0, 1.0, 3.0), [-2.0, 0.0])
     >>> area.round(2)
-    array([0.2 , 0.02])
+    array([0.21, 0.02])
     >>> error < 0.1
     True
     """

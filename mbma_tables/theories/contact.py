@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
-import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -18,12 +16,12 @@ from mbma_tables.models.protocol import QUANTITIES
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.theories.mbma import Mbma
-from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
+from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma
+from mbma_tables.theories.result import Contact, Source
 from mbma_tables.totals.contact import wanted_quantities
 
 KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by
-MAX_GRADIENT = 1.0
 ATTRIBUTES = {
     "separation": {"long_name": "separation from the mid-plane", "units": "unit of h_rms"},
     "mean_separation": {"long_name": "mean separation", "units": "unit of h_rms"},
@@ -31,125 +29,6 @@ ATTRIBUTES = {
     "area": {"long_name": "real over nominal contact area", "units": "1"},
     "error": {"long_name": "bound on the relative error of force and area", "units": "1"},
 }
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Contact:
-    """A contact: force, area and what follows from them; arrays of the broadcast shape, or DataArrays.
-
-    Attributes
-    ----------
-    separation : ndarray
-        d, between the rigid plane and the mid-plane [length].
-    mean_separation : ndarray
-        u = (h_max + d)/2 (50) [length].
-    force : ndarray or None
-        F/A0 in the unit of E_star; F/(A0 E*) where that is 1. None where not asked for.
-    area : ndarray or None
-        A/A0, None where not asked for. MBMA does not end at 1 under full compression, and this is not clamped.
-    error : ndarray
-        Bound on the relative numerical error of both against the theory (for "mbma" against what the tier stands
-        for), NaN where not known. The theory's own distance from simulation is another number, `scatter`.
-    theory, reading, tier : str
-        What made them; reading and tier are empty where the theory is not MBMA.
-    islands : int or None
-        Islands evaluated; None where that is left to dask, or where there are none.
-    force_by, area_by, separation_by : dict of ndarray, or None
-        Partial derivatives by "separation", "hurst", "q0", "q1", "h_rms" and "h_max", the others held. Asked by
-        pressure or area, that is held in place of the separation, whose own derivatives are `separation_by`, and
-        "pressure" or "area" stands for "separation".
-    """
-
-    separation: Any
-    mean_separation: Any
-    force: Any
-    area: Any
-    error: Any
-    theory: str
-    reading: str
-    tier: str
-    islands: int | None
-    force_by: dict[str, Any] | None = None
-    area_by: dict[str, Any] | None = None
-    separation_by: dict[str, Any] | None = None
-    _source: _Source | None = dataclasses.field(default=None, repr=False)
-
-    @functools.cached_property
-    def stiffness(self) -> Any:
-        """-d(F/A0)/du [stress/length], against the mean separation; computed when first read."""
-        return self._source_of().map(lambda s, u, E: E * self._source_of().theory.answer(s, u).stiffness, self)
-
-    @functools.cached_property
-    def energy(self) -> Any:
-        """Elastic energy per nominal area [stress length], the integral of F/A0 over u; computed when first read."""
-        return self._source_of().map(lambda s, u, E: E * self._source_of().theory.energy(s, u), self)
-
-    @property
-    def mean_pressure(self) -> Any:
-        """Mean pressure in the contact, F/A [stress]; NaN where there is none."""
-        with np.errstate(invalid="ignore"):
-            return self.force / self.area
-
-    @functools.cached_property
-    def scatter(self) -> Any:
-        """Standard deviation of ln F at this mean separation from simulation to simulation; NaN where not known."""
-        return self._source_of().map(lambda s, u, E: self._scatter(s, u)[0], self)
-
-    @functools.cached_property
-    def area_scatter(self) -> Any:
-        """Standard deviation of ln A at this force, likewise."""
-        return self._source_of().map(lambda s, u, E: self._scatter(s, u)[1], self)
-
-    def _scatter(self, surface: Surface, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        theory = self._source_of().theory
-        return theory.scatter(surface, theory.answer(surface, u).area)
-
-    @functools.cached_property
-    def valid(self) -> Any:
-        """Whether the theory was tested for contacts such as these; `reasons` says where and why not."""
-
-        def none(s: Surface, u: FloatArray, E: FloatArray) -> FloatArray:
-            masks = list(self._source_of().concerns(s, u).values())
-            return np.asarray(~np.logical_or.reduce(masks), dtype=float)
-
-        return self._source_of().map(none, self).astype(bool)
-
-    @functools.cached_property
-    def reasons(self) -> dict[str, Any]:
-        """Reasons for which entries are not `valid`, each with a mask; of plain arrays."""
-        u = np.asarray(self.mean_separation)
-        surface = self._source_of().surface
-        plain = Surface(*(np.asarray(getattr(surface, name)) for name in PARAMETERS)) if surface.labelled else surface
-        return {reason: mask for reason, mask in self._source_of().concerns(plain, u).items() if mask.any()}
-
-    def _source_of(self) -> _Source:
-        if self._source is None:
-            raise InputError("this Contact was not made by mbma_tables.contact")
-        return self._source
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Source:
-    """What a `Contact` is of, for quantities that are computed when they are read."""
-
-    theory: Theory
-    surface: Surface
-    E_star: Any
-
-    def map(self, function: Callable[[Surface, FloatArray, FloatArray], FloatArray], found: Contact) -> Any:
-        """``function(surface, u, E_star)`` of the contact's entries."""
-        u = found.mean_separation
-        if self.surface.labelled or is_labelled(u) or is_labelled(self.E_star):
-            arrays = {"mean_separation": u, "E_star": self.E_star}
-            return apply_to_surface(lambda *given: (function(*given),), self.surface, arrays, 1)[0]
-        return function(self.surface, np.asarray(u), np.asarray(self.E_star))[()]
-
-    def concerns(self, surface: Surface, u: FloatArray) -> dict[str, Any]:
-        """Every reason against the entries, with its mask."""
-        answer: TheoryAnswer = self.theory.answer(surface, u)
-        steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.force))
-        text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"
-        return {text: steep, **self.theory.concerns(surface, answer, u)}
 
 
 def contact(
@@ -244,7 +123,7 @@ def contact(
         raise InputError(f"derivatives in the surface's parameters come from theory 'mbma', not from {chosen.name!r}")
     options: dict[str, Any] = {
         "by": by,
-        "source": _Source(chosen, surface, E_star),
+        "source": Source(chosen, surface, E_star),
         "derivatives": derivatives,
         "quantities": wanted_quantities(quantities),
     }
@@ -267,7 +146,7 @@ def _contact(
     E_star: Any,
     *,
     by: str,
-    source: _Source,
+    source: Source,
     derivatives: bool,
     quantities: tuple[str, ...],
 ) -> Contact:
