@@ -1,8 +1,8 @@
 """`mbma tables list | info | verify`: what they print and refuse."""
 
 import dataclasses
+import json
 import pathlib
-import re
 
 import pytest
 from click.testing import CliRunner
@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from mbma_tables import greenwood_tripp
 from mbma_tables.cli import main
 from mbma_tables.models import tables as tabulated
-from mbma_tables.tablefiles.netcdf import read_table, write_table
+from mbma_tables.tablefiles.netcdf import FORMAT_VERSION, read_table, write_table
 from mbma_tables.tablefiles.schema import KINDS
 
 
@@ -47,11 +47,19 @@ def test_list(folder):
     assert [line.partition(":")[0] for line in lines] == list(KINDS)
     assert "12 X x 10 mu; reading any" in lines[0]
     assert "9 X x 10 spread x 6 sphere x 7 hurst; reading reported" in lines[1]
-    for kind, line in zip(KINDS, lines, strict=True):
-        path = folder / f"{kind}.nc"
-        facts = read_table(path).attributes
-        assert f"{path.stat().st_size} bytes; data {facts['data_version']}; {path}" in line
-        assert f"error F {facts['largest_error_F']:.2g}, A {facts['largest_error_A']:.2g}" in line
+    rows = json.loads(run("list", "--json"))["tables"]
+    for row, kind, line in zip(rows, KINDS, lines, strict=True):
+        content = read_table(folder / f"{kind}.nc")
+        assert row == {
+            "kind": kind,
+            "path": str(folder / f"{kind}.nc"),
+            "bytes": (folder / f"{kind}.nc").stat().st_size,
+            "nodes": {axis.name: axis.nodes for axis in content.axes},
+            "reading": content.attributes["reading"],
+            "data_version": content.attributes["data_version"],
+            "largest_error": {f: content.attributes[f"largest_error_{f}"] for f in ("F", "A")},
+        }
+        assert f"{row['bytes']} bytes; data {row['data_version']}; {row['path']}" in line
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -64,22 +72,27 @@ def test_info_by_kind_and_by_file(kind, folder):
         assert axis.formula() in text
     for name, value in content.attributes.items():
         assert f"{name}: {value}\n" in text
+    shown = json.loads(run("info", kind, "--json"))
+    assert shown["attributes"] == content.attributes
+    assert shown["attributes"]["format_version"] == FORMAT_VERSION
+    assert shown["axes"] == {a.name: {**a.attributes(), "nodes": a.nodes} for a in content.axes}
 
 
 def test_verify_all_some_and_files(folder):
     lines = run("verify").splitlines()
     assert len(lines) == 2
     for line, kind in zip(lines, KINDS, strict=True):
-        within = re.fullmatch(
-            rf"{folder / kind}.nc: hashes match; 12 conformance points: table within (.*), "
-            "exact solver identical to the last bit",
-            line,
-        )
-        assert within
-        assert 0 <= float(within[1]) < 1e-11
+        assert line.startswith(f"{folder / kind}.nc: hashes match; 12 conformance points: table within ")
+        assert line.endswith(", exact solver identical to the last bit")
     assert run("verify", "island4d").splitlines() == lines[1:]
     assert run("verify", str(folder / "universal.nc")).splitlines() == lines[:1]
     assert run("verify", "island4d", "universal").splitlines() == lines[::-1]
+    tables = json.loads(run("verify", "--json"))["tables"]
+    for row, kind in zip(tables, KINDS, strict=True):
+        assert row.keys() == {"path", "kind", "points", "table_error", "solver_error"}
+        assert (row["path"], row["kind"], row["points"]) == (str(folder / f"{kind}.nc"), kind, 12)
+        assert 0 <= row["table_error"] < 1e-11
+        assert row["solver_error"] == 0
 
 
 def test_answers_of_another_machine(folder, monkeypatch):
@@ -93,13 +106,14 @@ def test_answers_of_another_machine(folder, monkeypatch):
     assert run("verify", "universal").endswith(", exact solver within 2.0e-12\n")
 
 
-def test_a_wrong_checksum_is_an_error(folder):
+@pytest.mark.parametrize("json_form", [[], ["--json"]])
+def test_a_wrong_checksum_is_an_error(json_form, folder):
     path = folder / "universal.nc"
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
     for arguments in (["list"], ["info", "universal"], ["verify"], ["verify", "island4d", str(path)]):
-        message = refused(*arguments)
+        message = refused(*arguments, *json_form)
         assert f"{path}: is damaged (its checksum does not match)" in message
         assert "`python -m generate tables all`" in message
 

@@ -75,7 +75,7 @@ class Report:
             "units": {c.name: c.unit for c in self.columns},
             "columns": {c.name: c.values for c in self.columns},
         }
-        return json.dumps(content, indent=2, allow_nan=False) + "\n"
+        return to_json(content) + "\n"
 
     def to_csv(self) -> str:
         """Comment lines, the columns' names, then their numbers with all their digits."""
@@ -97,6 +97,11 @@ class Report:
             write_file(plot, picture)
         if output.out is None:
             click.echo(text, nl=False)
+
+
+def to_json(content: Any) -> str:
+    """JSON, in which null says that there is no number."""
+    return json.dumps(json.loads(json.dumps(content), parse_constant=lambda _: None), indent=2)
 
 
 def _rounded(value: Any) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mbma_tables.cli.format import Report, to_columns
+from mbma_tables.cli.format import Report, to_columns, to_json
 from mbma_tables.cli.options import check_png, png_option
 from mbma_tables.errors import InputError
 from mbma_tables.files import write_file, written_bytes
@@ -22,14 +22,28 @@ scene_file = click.argument("file", type=click.Path(path_type=Path))
 
 @click.command("plan", short_help="How a scene would be computed, at what error and price.")
 @scene_file
-def plan_command(file: Path) -> None:
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
+def plan_command(file: Path, as_json: bool) -> None:
     """How the scene in FILE would be computed: steps, why each is there, certified error and measured cost.
 
     Example: mbma plan examples/scene_joint.toml
     """
     from mbma_tables.scenes.scene import Scene
 
-    click.echo(Scene.from_toml(file).explain(), nl=False)
+    plan = Scene.from_toml(file).plan()
+    if not as_json:
+        click.echo(plan.text(), nl=False)
+        return
+    content = {
+        "rtol": plan.rtol,
+        "error": plan.error,
+        "seconds": plan.seconds,
+        "first_use_seconds": plan.first_use,
+        "steps": [vars(step) | {"tier": step.tier_name} for step in plan.steps],
+        "left_out": plan.left_out,
+        "switched_off": plan.switched_off,
+    }
+    click.echo(to_json(content))
 
 
 def _show(step: str, done: int, total: int) -> None:
@@ -42,10 +56,11 @@ def _show(step: str, done: int, total: int) -> None:
 @scene_file
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write it to result.nc or result.csv.")
 @png_option
-def run_command(file: Path, out: Path | None, plot: Path | None) -> None:
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
+def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) -> None:
     """Compute the scene in FILE, and nothing that it does not ask for.
 
-    CSV and the table hold what is known at gaps; netCDF holds everything.
+    CSV and the table hold what is known at gaps; netCDF and JSON hold everything.
 
     Example: mbma run examples/scene_joint.toml --out joint.nc
     """
@@ -58,14 +73,17 @@ def run_command(file: Path, out: Path | None, plot: Path | None) -> None:
     if plot is not None and not {"force", "area"} <= scene.outputs:
         raise InputError("--plot draws force and area: ask for both in [effects] on")
     found = scene.run(_show if sys.stderr.isatty() else None)
-    files: dict[Path, bytes] = {}
     if plot is not None:
-        files[plot] = _picture(found)
+        write_file(plot, _picture(found))
     if out is not None:
-        files[out] = _report(found).to_csv().encode() if out.suffix == ".csv" else _to_netcdf(found)
-    for path, content in files.items():
-        write_file(path, content)
-    if out is None:
+        write_file(out, _report(found).to_csv().encode() if out.suffix == ".csv" else _to_netcdf(found))
+    if as_json:
+        variables = {
+            str(name): {"dims": list(field.dims), "units": field.attrs["units"], "values": field.values.tolist()}
+            for name, field in found.variables.items()
+        }
+        click.echo(to_json({"attributes": found.attrs, "variables": variables}))
+    elif out is None:
         click.echo(_report(found).to_table(), nl=False)
 
 

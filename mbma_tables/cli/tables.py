@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -21,33 +23,56 @@ def tables_group() -> None:
 
 
 @tables_group.command("list")
-def list_command() -> None:
+@click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines.")
+def list_command(as_json: bool) -> None:
     """Kind, size, nodes and largest held-out error of the shipped tables."""
     from mbma_tables.tablefiles.netcdf import read_table
     from mbma_tables.tablefiles.schema import KINDS
 
-    # all before the first line, so that a failure leaves nothing printed
-    for kind, content in [(kind, read_table(_path(kind), kind)) for kind in KINDS]:
-        path, facts = _path(kind), content.attributes
-        nodes = " x ".join(f"{axis.nodes} {axis.name}" for axis in content.axes)
-        errors = ", ".join(f"{f} {facts[f'largest_error_{f}']:.2g}" for f in ("F", "A"))
+    rows: list[dict[str, Any]] = []
+    for kind in KINDS:
+        path = _path(kind)
+        content = read_table(path, kind)
+        rows.append(
+            {
+                "kind": kind,
+                "path": str(path),
+                "bytes": path.stat().st_size,
+                "nodes": {axis.name: axis.nodes for axis in content.axes},
+                "reading": content.attributes["reading"],
+                "data_version": content.attributes["data_version"],
+                "largest_error": {f: content.attributes[f"largest_error_{f}"] for f in ("F", "A")},
+            }
+        )
+    if as_json:
+        click.echo(json.dumps({"tables": rows}, indent=2))
+        return
+    for row in rows:
+        nodes = " x ".join(f"{count} {name}" for name, count in row["nodes"].items())
+        errors = ", ".join(f"{f} {error:.2g}" for f, error in row["largest_error"].items())
         click.echo(
-            f"{kind}: {nodes}; reading {facts['reading']}; largest held-out error {errors}; "
-            f"{path.stat().st_size} bytes; data {facts['data_version']}; {path}"
+            f"{row['kind']}: {nodes}; reading {row['reading']}; largest held-out error {errors}; "
+            f"{row['bytes']} bytes; data {row['data_version']}; {row['path']}"
         )
 
 
 @tables_group.command("info")
 @click.argument("table")
-def info_command(table: str) -> None:
+@click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines.")
+def info_command(table: str, as_json: bool) -> None:
     """Axes and attributes of TABLE (a kind or a file)."""
     from mbma_tables.tablefiles.netcdf import read_table
     from mbma_tables.tablefiles.schema import KINDS
 
     content = read_table(_path(table), table if table in KINDS else None)
-    for axis in content.axes:
+    axes = {axis.name: {**axis.attributes(), "nodes": axis.nodes} for axis in content.axes}
+    if as_json:
+        click.echo(json.dumps({"axes": axes, "attributes": content.attributes}, indent=2))
+        return
+    for name, attributes in axes.items():
         click.echo(
-            f"axis {axis.name}: {axis.long_name}, {axis.low:g} to {axis.high:g}, {axis.nodes} nodes, {axis.formula()}"
+            f"axis {name}: {attributes['long_name']}, {attributes['first']:g} to {attributes['last']:g}, "
+            f"{attributes['nodes']} nodes, {attributes['position_formula']}"
         )
     for name, value in content.attributes.items():
         click.echo(f"{name}: {value}")
@@ -55,16 +80,22 @@ def info_command(table: str) -> None:
 
 @tables_group.command("verify")
 @click.argument("tables", nargs=-1)
-def verify_command(tables: tuple[str, ...]) -> None:
+@click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines.")
+def verify_command(tables: tuple[str, ...], as_json: bool) -> None:
     """Check hashes and conformance points of TABLES (kinds or files; all shipped ones if none is named).
 
     The conformance points are answered by the table and by the exact solver, and compared with the stored answers.
     """
+    import dataclasses
+
     from mbma_tables.models.verify import verify
     from mbma_tables.tablefiles.schema import KINDS
 
-    # all before the first line, so that a failure leaves nothing printed
-    for v in [verify(_path(t), t if t in KINDS else None) for t in tables or KINDS]:
+    verdicts = [verify(_path(t), t if t in KINDS else None) for t in tables or KINDS]
+    if as_json:
+        click.echo(json.dumps({"tables": [dataclasses.asdict(v) for v in verdicts]}, indent=2))
+        return
+    for v in verdicts:
         found = f"within {v.solver_error:.1e}" if v.solver_error else "identical to the last bit"
         click.echo(
             f"{v.path}: hashes match; {v.points} conformance points: table within {v.table_error:.1e}, "

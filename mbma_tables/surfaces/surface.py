@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
+import functools
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +45,8 @@ class Surface:
     ------
     InputError, OutOfRangeError
         For NaN, infinite, masked or empty input, and for numbers outside these ranges.
+    TypeError
+        For an unknown argument; the message names the nearest known one.
 
     Examples
     --------
@@ -326,3 +330,20 @@ def _shown(value: Any) -> str:
     if is_labelled(value):
         return f"<DataArray {dict(value.sizes)}>"
     return repr(np.asarray(value).item()) if np.ndim(value) == 0 else repr(value)
+
+
+def _with_hint(init: Any) -> Any:
+    """`Surface.__init__` whose complaint about an unknown argument names the nearest known one."""
+
+    @functools.wraps(init)
+    def checked(self: Surface, *given: Any, **named: Any) -> None:
+        for name in named.keys() - {*PARAMETERS, "fit"}:
+            near = ["hurst"] if name == "H" else difflib.get_close_matches(name.lower(), PARAMETERS, 1)
+            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(PARAMETERS)}"
+            raise TypeError(f"Surface has no argument {name!r}: {hint}")
+        init(self, *given, **named)
+
+    return checked
+
+
+Surface.__init__ = _with_hint(Surface.__init__)  # type: ignore[method-assign]
