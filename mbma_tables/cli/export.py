@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mbma_tables.cli.options import optional_specimen_options, reading_option
+from mbma_tables.cli.options import optional_specimen_options, reading_option, theory_option
 from mbma_tables.errors import InputError
 from mbma_tables.export import CODE, DATA, SOLVERS
 from mbma_tables.files import write_file
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure instead.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
 @click.option("--exponential", is_flag=True, help="For calculix and abaqus: Persson's exponential law instead of rows.")
+@theory_option
 @reading_option
 @click.option("--check", is_flag=True, help="Of source code: build it and replay its conformance points.")
 def export_command(
@@ -43,6 +44,7 @@ def export_command(
     conductivity: float | None,
     conductivity_unit: str | None,
     exponential: bool,
+    theory: str,
     reading: str,
     check: bool,
 ) -> None:
@@ -53,6 +55,8 @@ def export_command(
     Example: mbma export calculix --surface concrete --E-star 13.3 --length-unit mm --stress-unit MPa --out law.inp
     """
     if target in CODE:
+        if theory != "mbma":
+            raise InputError(f"source code is of the MBMA model: leave --theory out, got {theory!r}")
         _export_code(target, out, reading, check)
         return
     if check:
@@ -78,6 +82,7 @@ def export_command(
         conductivity=conductivity,
         conductivity_unit=conductivity_unit,
         reading=reading,
+        theory=theory,
     )
     if exponential:
         files = {out: solvers.exponential(specimen.surface, specimen.E_star, law.comments).encode()}

@@ -34,6 +34,7 @@ def _header(law: LawTable) -> dict[str, Any]:
         "x_unit": law.x_unit,
         "y_unit": law.y_unit,
         "largest_error": law.largest_error,
+        "theory": law.theory,
         "comments": list(law.comments),
     }
 
@@ -90,6 +91,7 @@ def to_netcdf(law: LawTable) -> bytes:
             "title": law.comments[0],
             "comment": "\n".join(law.comments),
             "largest_error": law.largest_error,
+            "theory": law.theory,
             "interpolation": "linear",
         },
     )
@@ -109,6 +111,7 @@ def to_hdf5(law: LawTable) -> bytes:
             file[name].attrs["units"] = unit
         file.attrs["comments"] = "\n".join(law.comments)
         file.attrs["largest_error"] = law.largest_error
+        file.attrs["theory"] = law.theory
     return stream.getvalue()
 
 

@@ -19,12 +19,17 @@ from mbma_tables.errors import InputError
 from mbma_tables.export.text import number
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.theories.contact import contact
 from mbma_tables.theories.law import contact_law
+from mbma_tables.theories.mbma import Mbma
+from mbma_tables.theories.protocol import Theory, UserTheory
+from mbma_tables.theories.registry import get_theory
 from mbma_tables.totals.conductance import conductance
 from mbma_tables.totals.law_protocol import ContactLaw
 
 QUANTITIES = ("pressure", "conductance")
 FLOOR = 1e-3  # of the largest pressure: below it, errors are relative to this and not to the pressure
+LOOKED_AT = 200  # compressions at which validity and scatter are looked at
 FINE = 20_001  # points at which the error of a choice of rows is measured
 MIN_ROWS, MAX_ROWS = 3, 5000
 ROUNDS = 40  # of making the errors of chords equal
@@ -46,6 +51,8 @@ class LawTable:
         is above `FLOOR` of its largest.
     comments : tuple of str
         What a reader of the file must know.
+    theory : str
+        Whose law it is.
     """
 
     x: FloatArray
@@ -56,6 +63,7 @@ class LawTable:
     y_unit: str
     largest_error: float
     comments: tuple[str, ...]
+    theory: str = "mbma"
 
 
 def rounded(values: FloatArray) -> FloatArray:
@@ -144,6 +152,7 @@ def describe_law(
     conductivity_unit: str | None = None,
     reading: str | Reading = "reported",
     evenly: bool = False,
+    theory: str | Theory | UserTheory = "mbma",
 ) -> LawTable:
     """A contact law as rows for a code that interpolates linearly.
 
@@ -166,6 +175,9 @@ def describe_law(
     conductivity : float, optional
         k_s = 2 k1 k2/(k1 + k2) for conductance, thermal or electrical, with its unit.
     reading : str or Reading
+        Of the MBMA model.
+    theory : str or theory
+        As for `contact`.
     evenly : bool
         Equally spaced rows instead, for comparison.
 
@@ -197,7 +209,7 @@ def describe_law(
         _check_unit("conductivity_unit", conductivity_unit)
         k_s = number_in("conductivity", conductivity, 1e-300, 1e300)
         names = ("pressure", "conductance", stress_unit, f"{conductivity_unit}/{length_unit}")
-    law = contact_law(surface, LAW_RTOL, reading=reading, E_star=modulus)
+    law = contact_law(surface, LAW_RTOL, reading=reading, E_star=modulus, theory=theory)
     fine_x, fine_y = _curve(law, quantity, _range_end(law, largest_overclosure), k_s, modulus)
 
     def with_rows(count: int) -> tuple[FloatArray, FloatArray, float]:
@@ -216,7 +228,10 @@ def describe_law(
             f"rows are closer than {MIN_STEP:g} {length_unit}, which some readers cannot tell apart: "
             "take fewer rows or a smaller unit of length"
         )
-    return LawTable(x, y, *names, error, _comments(surface, law, modulus, names, x, error))
+    own = Mbma(reading=reading) if theory == Mbma.name else get_theory(theory)
+    comments = _comments(surface, law, modulus, names, x, error)
+    known = _validity(surface, law, own, float(_range_end(law, largest_overclosure)), stress_unit)
+    return LawTable(x, y, *names, error, (*comments, *known), law.theory)
 
 
 def _check_unit(name: str, unit: str) -> None:
@@ -227,7 +242,7 @@ def _check_unit(name: str, unit: str) -> None:
 def _range_end(law: ContactLaw, asked: float | None) -> float:
     """The largest overclosure: as asked, or at full compression, or where the force turns down."""
     turn = law.turning_point
-    end = law.h_max if turn is None else (law.h_max - turn) / 2
+    end = (law.h_max - (law.lowest if turn is None else turn)) / 2
     found = end if asked is None else float(asked)
     if not 0 < found <= end:
         why = "full compression" if turn is None else "where the force of this surface turns down"
@@ -257,17 +272,15 @@ def _fewest(
 def _comments(
     surface: Surface, law: ContactLaw, E_star: float, names: tuple[str, str, str, str], x: FloatArray, error: float
 ) -> tuple[str, ...]:
-    from mbma_tables.models.tables import universal_model
-
-    attributes = universal_model().content.attributes
     numbers = ", ".join(f"{name} = {float(getattr(surface, name)):.10g}" for name in PARAMETERS)
     unit, end = "the unit of length of the conductance", "the same"
     if names[0] == "overclosure":
         unit, end = names[2], "full compression"
         if law.turning_point is not None:
             end = "where the force of this surface turns down; nothing is known beyond"
+    model = f"MBMA model, reading {law.reading!r}" if law.theory == Mbma.name else f"theory {law.theory!r}"
     return (
-        f"Contact law of a rough surface, MBMA model, reading {law.reading!r}; mbma_tables {__version__}",
+        f"Contact law of a rough surface, {model}; mbma_tables {__version__}",
         f"{names[1]} [{names[3]}] against {names[0]} [{names[2]}]",
         f"surface: {numbers}; lengths in {unit}",
         f"E* = {E_star:.10g}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; pressure is force over nominal area",
@@ -275,5 +288,37 @@ def _comments(
         "c = 0 is first contact: bodies meet where their mean planes are h_max apart",
         f"range: {names[0]} from 0 to {x[-1]:.10g}, {end}",
         f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, above 1e-3 of the largest value",
-        f"table: data {str(attributes['values_sha256'])[:16]}",
+        f"the law is within {law.error:.1e} of its theory, in pressure and area",
     )
+
+
+def _validity(surface: Surface, law: ContactLaw, theory: Theory, end: float, stress_unit: str) -> tuple[str, ...]:
+    """Lines that say where the law holds, how far simulations scatter about it, and where its numbers come from."""
+    u = law.h_max - end * np.arange(1, LOOKED_AT + 1) / LOOKED_AT
+    found = contact(surface, mean_separation=u, E_star=law.E_star, theory=theory)
+    pressure = np.asarray(law.force(u=u))
+    lines = []
+    for reason, mask in found.reasons.items():
+        first, last = pressure[mask].min(), pressure[mask].max()
+        lines.append(f"not valid from p = {first:.4g} to {last:.4g} {stress_unit}: {reason}")
+    if law.softening is not None:
+        lines.append(
+            f"softening: stiffness falls with compression from c = {law.h_max - law.softening:.4g}, "
+            f"p = {float(law.force(u=law.softening)):.4g} {stress_unit} on, which no simulation shows"
+        )
+    if law.highest < np.inf:
+        lines.append(
+            f"the theory has no last contact: its pressure at c = 0, {float(law.force(law.h_max)):.4g} {stress_unit}, "
+            "is written as zero"
+        )
+    scatter = np.asarray(found.scatter)
+    known = np.flatnonzero(np.isfinite(scatter))
+    places = known[np.linspace(0, known.size - 1, 5).astype(int)] if known.size else known
+    listed = ", ".join(f"{scatter[k]:.2g} at {pressure[k]:.3g}" for k in places)
+    spread = f"one standard deviation of ln p at a given c: {listed} {stress_unit}" if listed else "not known"
+    lines.append(f"scatter of simulations about the theory, {spread}")
+    if isinstance(theory, Mbma):
+        from mbma_tables.models.tables import universal_model
+
+        lines.append(f"table: data {str(universal_model().content.attributes['values_sha256'])[:16]}")
+    return tuple(lines)

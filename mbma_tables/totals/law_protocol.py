@@ -17,6 +17,7 @@ from mbma_tables.totals.law_kernel import AREA, AREA_SLOPE, ENERGY, FORCE, FORCE
 
 BLOCK = 1 << 16  # gaps between two looks for Ctrl-C
 SCAN = 49  # gaps at which a law's stiffness is looked at for its maximum
+ROUNDING = 4 * float(np.finfo(float).eps)
 DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polynomials'
 
 
@@ -90,10 +91,12 @@ class ContactLaw(abc.ABC):
         if separation is not None and u is not None:
             raise InputError("separation and u: give one of them")
         d = finite_array("separation", separation) if u is None else 2 * finite_array("u", u) - self.h_max
-        limit = "-h_max = " if self.lowest == -self.h_max else ""
-        require("separation", d, d >= self.lowest, f"at least {limit}{self.lowest:.17g}, where the theory ends")
+        # ends that are no round numbers are met but for rounding
+        limit, slack = ("-h_max = ", 0.0) if self.lowest == -self.h_max else ("", ROUNDING * self.h_max)
+        require("separation", d, d >= self.lowest - slack, f"at least {limit}{self.lowest:.17g}, where the theory ends")
         if self.highest < math.inf:
-            require("separation", d, d <= self.highest, f"at most {self.highest:.17g}, where the law ends")
+            good = d <= self.highest * (1 + ROUNDING)
+            require("separation", d, good, f"at most {self.highest:.17g}, where the law ends")
         return d
 
     def _map(self, what: int, separation: Any, u: Any = None) -> Any:

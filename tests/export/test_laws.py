@@ -11,6 +11,7 @@ from mbma_tables import InputError, Surface, contact
 from mbma_tables.export import DATA, SOLVERS, data, law_rows, solvers
 from mbma_tables.export.law_rows import FLOOR, describe_law
 from mbma_tables.export.solvers import calculix, exponential, optistruct
+from mbma_tables.theories import THEORIES
 
 UNITS = {"length_unit": "mm", "stress_unit": "MPa"}
 CONCRETE = Surface.named("concrete")
@@ -18,6 +19,42 @@ CONCRETE = Surface.named("concrete")
 
 def law_of(surface=CONCRETE, **changed):
     return describe_law(surface, 13.3, **(UNITS | {"rows": 40} | changed))
+
+
+@pytest.mark.parametrize("theory", THEORIES)
+def test_rows_of_any_theory(theory):
+    law = law_of(theory=theory, rows=50)
+    x = np.random.default_rng(1).uniform(0, 0.99 * law.x[-1], 500)
+    model = contact(CONCRETE, mean_separation=CONCRETE.h_max - x, E_star=13.3, theory=theory).force
+    kept = model > FLOOR * law.y[-1]
+    assert np.abs(np.interp(x, law.x, law.y) / model - 1)[kept].max() <= 1.02 * law.largest_error
+    text = "\n".join(law.comments)
+    assert law.theory == theory
+    assert ("MBMA model" if theory == "mbma" else f"theory {theory!r}") in law.comments[0]
+    assert "of its theory, in pressure and area" in text
+    assert "scatter of simulations about the theory" in text
+    assert ("softening: stiffness falls with compression" in text) == (theory == "mbma")
+    assert ("table: data" in text) == (theory == "mbma")
+    assert json.loads(data.to_json(law))["theory"] == theory
+
+
+def test_the_header_says_where_a_law_is_not_valid():
+    (areas,) = (line for line in law_of().comments if line.startswith("not valid") and "areas" in line)
+    first, last = (float(areas.split()[k]) for k in (5, 7))
+    assert contact(CONCRETE, pressure=first, E_star=13.3).area == pytest.approx(0.1, rel=0.06)
+    assert last == pytest.approx(law_of().y[-1], rel=0.02)
+    assert any("scatter" in line and "not known" in line for line in law_of().comments)
+
+
+def test_the_header_lists_the_scatter_where_it_is_known(monkeypatch):
+    from mbma_tables.theories import Persson
+
+    monkeypatch.setattr(Persson, "scatter", lambda self, surface, area: (0.1 + area, area))
+    (line,) = (line for line in law_of(theory="persson").comments if line.startswith("scatter"))
+    spreads = [float(part.split()[0]) for part in line.split(": ")[1].split(", ")]
+    assert len(spreads) == 5
+    assert spreads == sorted(spreads)
+    assert "ln p at a given c" in line
 
 
 @pytest.mark.parametrize("name", ["concrete", "asphalt", "challenge"])
@@ -186,6 +223,8 @@ def test_data_come_back(target, tmp_path):
         ({"quantity": "stiffness"}, "quantity must be one of"),
         ({"quantity": "conductance"}, "conductance needs"),
         ({"reading": "other"}, "reading"),
+        ({"theory": "other"}, "theory must be one of"),
+        ({"theory": "persson", "reading": "printed"}, "options of theory 'mbma'"),
     ],
 )
 def test_refused(changed, said):
