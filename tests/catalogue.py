@@ -23,6 +23,11 @@ import pytest
 
 from mbma_tables import Surface
 from mbma_tables.surfaces.cases import CASES
+from mbma_tables.surfaces.readings import PRINTED, REPORTED
+
+# readings of one's own: other numbers, and other formulas
+OWN = dataclasses.replace(PRINTED, name="own", jacobian="exact", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)
+LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)
 
 
 @dataclasses.dataclass(frozen=True)

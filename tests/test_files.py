@@ -1,6 +1,5 @@
 """Files are written whole or not at all, whatever fails; what is read is a regular file of a believable size."""
 
-import ast
 import concurrent.futures
 import errno
 import os
@@ -12,13 +11,11 @@ import subprocess
 import sys
 
 import pytest
-from click.testing import CliRunner
 
 import mbma_tables
 from mbma_tables import files
-from mbma_tables.cli import main
 from mbma_tables.errors import InputError
-from mbma_tables.files import read_file, write_file, written_bytes
+from mbma_tables.files import read_file, write_file
 from mbma_tables.islands.height_integrals import height_integral
 
 ROOT = pathlib.Path(mbma_tables.__file__).parents[1]
@@ -44,24 +41,17 @@ def test_a_file_is_replaced_and_keeps_its_mode(old):
     assert (old.parent / "b" / "c.txt").read_bytes() == b"deep"
 
 
-@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS, errno.EIO])
 @pytest.mark.parametrize(("owner", "step"), [("os", "fsync"), ("shutil", "copymode"), ("os", "replace")])
-def test_a_step_that_fails_leaves_the_old_file(old, owner, step, code, monkeypatch):
+@pytest.mark.parametrize(
+    ("fault", "seen"),
+    [(OSError(errno.EIO, "Input/output error"), InputError), (KeyboardInterrupt(""), KeyboardInterrupt)],
+)
+def test_a_step_that_fails_leaves_the_old_file(old, owner, step, fault, seen, monkeypatch):
     def fail(*_):
-        raise OSError(code, os.strerror(code))
+        raise fault
 
     monkeypatch.setattr(getattr(files, owner), step, fail)
-    with pytest.raises(InputError, match=rf"a\.txt cannot be written: {os.strerror(code)}"):
-        write_file(old, b"new")
-    assert unchanged(old)
-
-
-def test_an_interruption_leaves_the_old_file(old, monkeypatch):
-    def interrupt(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(files.os, "fsync", interrupt)
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(seen, match=r"a\.txt cannot be written: Input/output|^$"):
         write_file(old, b"new")
     assert unchanged(old)
 
@@ -107,33 +97,14 @@ def test_links_are_followed(old):
     assert old.read_bytes() == read_file(link, 3) == b"new"
 
 
-def unusual(folder):
-    """What is no place for a file, or none to read from."""
-    os.mkfifo(folder / "pipe")
-    (folder / "circle").symlink_to(folder / "circle")
-    (folder / "folder").mkdir()
-    (folder / "file").write_bytes(b"")
-    return {
-        "pipe": folder / "pipe",
-        "device": pathlib.Path("/dev/zero"),
-        "circle": folder / "circle",
-        "folder": folder / "folder",
-        "below a file": folder / "file" / "a.txt",
-        "in no folder": folder / "missing" / "a.txt",
-    }
-
-
-@pytest.mark.parametrize("what", ["pipe", "device", "circle", "folder", "below a file", "in no folder"])
+@pytest.mark.parametrize("what", ["pipe", "/dev/zero", ".", "file/a.txt", "missing/a.txt"])
 def test_only_regular_files_are_written_and_read(what, tmp_path):
-    path = unusual(tmp_path)[what]
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "file").write_bytes(b"")
     with pytest.raises(InputError, match="cannot be written"):
-        write_file(path, b"new")
+        write_file(tmp_path / what, b"new")
     with pytest.raises(InputError, match="cannot be read"):
-        read_file(path, 100)
-    command = ["curve", "--surface", "concrete", "--points", "5", "--csv", "--out", str(path)]
-    result = CliRunner().invoke(main, command)
-    assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1)
-    assert result.stderr.startswith("mbma: ")
+        read_file(tmp_path / what, 100)
 
 
 def test_a_size_is_not_believed(tmp_path):
@@ -144,40 +115,6 @@ def test_a_size_is_not_believed(tmp_path):
         read_file(path, 1000)
     path.write_bytes(bytes(1000))
     assert read_file(path, 1000) == bytes(1000)
-
-
-def test_a_library_that_fails_is_an_error_of_the_file():
-    def fail(path):
-        raise RuntimeError("wrong\nshape")
-
-    with pytest.raises(OSError, match="wrong"):
-        written_bytes("law.nc", fail)
-
-
-# what may write by itself: into a stream, or into a temporary folder
-WRITERS = {
-    ("mbma_tables/files.py", "open"),
-    ("mbma_tables/plots.py", "savefig"),
-    ("generate/pages/page.py", "savefig"),
-    ("generate/pages/cost.py", "write_bytes"),
-    ("mbma_tables/cli/scene.py", "to_netcdf"),
-    ("mbma_tables/export/data.py", "to_netcdf"),
-}
-WRITING = {"write_text", "write_bytes", "savefig", "savetxt", "to_netcdf", "tofile", "mkstemp", "NamedTemporaryFile"}
-MODES = {first + rest for first in "wxa" for rest in ("", "b", "t", "b+", "+")}
-
-
-def test_all_files_are_written_by_write_file():
-    found = set()
-    for path in (*ROOT.glob("mbma_tables/**/*.py"), *ROOT.glob("generate/**/*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call):
-                name = getattr(node.func, "attr", getattr(node.func, "id", ""))
-                given = (*node.args, *(keyword.value for keyword in node.keywords))
-                modes = {argument.value for argument in given if isinstance(argument, ast.Constant)}
-                if name in WRITING or (name == "open" and modes & MODES):
-                    found.add((str(path.relative_to(ROOT)), name))
-    assert found == WRITERS
 
 
 SMALL = "from mbma_tables.islands.height_integrals import height_integral as h; print(repr(float(h(1.5, 0.3))))"

@@ -1,20 +1,11 @@
 """Importing the package stays cheap: heavy modules come in when first needed."""
 
-import json
-import subprocess
-import sys
-
 import pytest
+from helpers import fresh
 
 import mbma_tables
 
 HEAVY = ("scipy", "numba", "matplotlib", "xarray", "SurfaceTopography", "llvmlite", "pandas")
-
-
-def fresh(code):
-    """What a new interpreter prints as JSON."""
-    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=True)
-    return json.loads(done.stdout)
 
 
 def test_nothing_heavy_comes_with_the_package():

@@ -1,25 +1,22 @@
 """What must hold of every surface and every gap, whatever their numbers; MBMA_GAUNTLET sets how many are tried."""
 
-import dataclasses
 import math
-import os
 
 import dask
 import numpy as np
 import pytest
 import scipy.integrate
 import xarray as xr
+from catalogue import LEVEL, OWN
+from helpers import SCALE
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from mbma_tables import OutOfRangeError, Scene, Surface, contact, contact_law, island
 from mbma_tables.models import TIERS
-from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED
+from mbma_tables.surfaces.readings import PRINTED, READINGS
 
-SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))
 EPS = np.finfo(float).eps
-OWN = dataclasses.replace(PRINTED, name="own", jacobian="exact", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)
-LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)
 
 hursts = st.floats(0.3, 1)
 zetas = st.floats(math.log10(3.6), 6).map(lambda power: 10**power)

@@ -7,7 +7,8 @@ import warnings
 
 import numpy as np
 import pytest
-from fuzzing import SCALE, finite, spoilt
+from fuzzing import finite, spoilt
+from helpers import SCALE
 
 from mbma_tables import InputError, Surface
 from mbma_tables.surfaces.maps import read_map

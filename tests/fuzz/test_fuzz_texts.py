@@ -5,10 +5,11 @@ import tomllib
 
 import numpy as np
 import pytest
-from fuzzing import SCALE, changed, finite, spoilt, toml_text
+from fuzzing import changed, finite, spoilt, toml_text
+from helpers import SCALE
 
 from generate.tables import configuration
-from mbma_tables import InputError, Scene
+from mbma_tables import Scene
 from mbma_tables.tablefiles.schema import KINDS
 
 EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
@@ -74,10 +75,3 @@ def test_configurations(kind, by_structure, tmp_path, tally):
         content = toml_text(changed(document, rng)) if by_structure else spoilt(text, rng)
         found = tally.read_file(path, content, nodes)
         assert found is None or all(finite(values) and (np.diff(values) > 0).all() for values in found)
-
-
-def test_a_configuration_that_is_too_long(tmp_path):
-    path = tmp_path / "table.toml"
-    path.write_bytes(b"#" * (2**20 + 1))
-    with pytest.raises(InputError, match="bytes"):
-        configuration.load("universal", path)

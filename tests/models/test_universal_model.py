@@ -1,6 +1,8 @@
 """`UniversalModel` against the solver within the error that it states, and at every edge."""
 
 import dataclasses
+import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -154,18 +156,25 @@ def test_the_error_is_that_of_the_cell(small):
 def test_shipped_tables_are_opened_once_and_files_by_their_kind(tmp_path):
     assert open_table("universal") is universal_model() is open_table()
     path = write_table(tmp_path / "other.nc", small_table(ISLAND4D))
-    assert open_table(path).name == "island4d"
+    model = open_table(path)
+    assert model.name == "island4d"
+    # an opened table does not follow its file, and a replaced one is opened again
+    content = small_table(ISLAND4D)
+    write_table(path, dataclasses.replace(content, attributes=content.attributes | {"history": "another"}))
+    assert "history" not in model.content.attributes
+    assert open_table(path).content.attributes["history"] == "another"
 
 
-def test_threads_share_a_model(small):
-    from concurrent.futures import ThreadPoolExecutor
+def test_threads_that_open_one_table_at_once():
+    gate = threading.Barrier(16)
 
-    rng = np.random.default_rng(23)
-    X, mu = rng.uniform(-2, 6, (8, 5000)), 10 ** rng.uniform(-8, 2, (8, 5000))
-    alone = [small.answer(x, m).phi_F for x, m in zip(X, mu, strict=True)]
-    with ThreadPoolExecutor(8) as pool:
-        together = list(pool.map(lambda pair: small.answer(*pair).phi_F, zip(X, mu, strict=True)))
-    np.testing.assert_array_equal(together, alone)
+    def opened(_):
+        gate.wait()
+        return open_table("universal")
+
+    tabulated._opened.cache_clear()
+    with ThreadPoolExecutor(16) as threads:
+        assert len({id(model) for model in threads.map(opened, range(16))}) == 1
 
 
 def test_content_is_not_changed(small):

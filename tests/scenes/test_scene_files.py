@@ -100,6 +100,8 @@ MISTAKES = {
         'surface = "concrete"\n' + ON + AT,
         r"surface: 'concrete' is not of type 'object'; write \[surface\]",
     ),
+    "a number beyond doubles": (SURFACE + ON + f"[prescribed]\nseparations = [{10**400}]\n", "must be real numbers"),
+    "lists without end": (SURFACE + ON + "[prescribed]\nseparations = " + "[" * 100_000, "is not a TOML file"),
     "no toml": ("[surface\n", "is not a TOML file"),
 }
 
@@ -159,3 +161,6 @@ def test_a_psd_file(tmp_path):
     (tmp_path / "psd.txt").write_text(lines, encoding="utf-8")
     path = write(tmp_path, '[surface]\npsd = "psd.txt"\nh_max = 0.3\n' + ON + AT.replace("0.5", "0.1"))
     assert float(Scene.from_toml(path).surface.hurst) == pytest.approx(0.8, rel=0.02, abs=0)
+    (tmp_path / "psd.txt").write_text("# q C\n")
+    with pytest.raises(InputError, match="must hold two columns"):
+        Scene.from_toml(path)

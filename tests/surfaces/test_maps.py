@@ -4,6 +4,7 @@ import dataclasses
 import math
 import os
 import sys
+import types
 import warnings
 from pathlib import Path
 
@@ -238,6 +239,11 @@ class TestTopography:
         with pytest.raises(InputError, match="dx and dy belong to a plain array"):
             Surface.from_map(topography, 1.0)
 
+    def test_sizes_that_are_no_numbers(self):
+        given = types.SimpleNamespace(heights=lambda: np.ones((40, 40)), physical_sizes=("a", "b"))
+        with pytest.raises(InputError, match="physical_sizes must be real numbers"):
+            Surface.from_map(given)
+
     def test_with_holes_is_refused(self):
         holed = np.ma.masked_where(BASE > 2.0, BASE)
         topography = topography_class()(holed, (SIDE, SIDE))
@@ -370,6 +376,7 @@ class TestRefused:
             ({"heights": [[1, 2], [3]]}, InputError, "array of numbers"),
             ({"heights": [["a"] * 40] * 40}, InputError, "real numbers"),
             ({"heights": np.zeros((0, 40))}, InputError, "empty"),
+            ({"heights": np.ma.masked_array(np.zeros((40, 40), "f8,i4"))}, InputError, "heights must be real numbers"),
             ({"heights": BASE * 1e40}, OutOfRangeError, "at most 1e30"),
             ({"dx": None}, InputError, "dx is missing"),
             ({"dx": -1.0}, OutOfRangeError, "dx must be in"),
@@ -411,6 +418,13 @@ class TestRefused:
             Surface.from_psd(**arguments)
 
 
+class Charge:
+    """An object whose unpickling is seen."""
+
+    def __reduce__(self):
+        return pytest.fail, ("a pickle was executed",)
+
+
 class TestFiles:
     def test_without_the_reader_says_what_to_install(self, monkeypatch, tmp_path):
         monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
@@ -424,6 +438,14 @@ class TestFiles:
         (tmp_path / "b.sur").write_text("not a map")
         with pytest.raises(InputError, match=r"cannot read .*b\.sur"):
             read_map(tmp_path / "b.sur")
+
+    @pytest.mark.parametrize(("suffix", "save"), [("npy", np.save), ("npz", np.savez)])
+    def test_arrays_of_objects_are_not_unpickled(self, suffix, save, tmp_path):
+        pytest.importorskip("NuMPI")
+        path = tmp_path / f"map.{suffix}"
+        save(path, np.full((40, 40), Charge(), dtype=object), allow_pickle=True)
+        with pytest.raises(InputError, match="cannot read"):
+            read_map(path)
 
     @pytest.mark.parametrize(("name", "reason"), [("al3d-1.al3d", "above 1"), ("di-1.di", "above 1")])
     def test_measured_maps(self, name, reason):

@@ -1,11 +1,12 @@
 """Every damaged, edited or foreign file is refused on open, by a message that names it and says what to do."""
 
 import dataclasses
-import os
+import itertools
 
 import netCDF4
 import numpy as np
 import pytest
+from fuzzing import spoilt
 from small_tables import copied, edited, seal, small_table, unseal
 
 from mbma_tables.errors import TableFileError
@@ -31,51 +32,16 @@ def refused(path, kind=None):
     return message
 
 
-def damages(content, rng):
-    """Without end: one way after the other to damage bytes, each with its name."""
-    size = len(content)
-    body = size - SEAL_LENGTH
-    while True:
-        for low, high in ((0, size), (0, 4096), (body, size)):
-            place, bit = int(rng.integers(low, high)), int(rng.integers(8))
-            yield f"bit {bit} of byte {place}", _put(content, place, bytes([content[place] ^ 1 << bit]))
-        for low in (0, body):
-            length = int(rng.integers(low, size))
-            yield f"cut to {length}", content[:length]
-        yield "head lost", content[int(rng.integers(1, size)) :]
-        extra = bytes(rng.integers(0, 256, int(rng.integers(1, 200)), dtype=np.uint8))
-        yield f"{len(extra)} bytes more", content + extra
-        length = int(rng.integers(1, 2000))
-        first, second = (int(p) for p in rng.integers(0, size - length, 2))
-        yield f"{length} zeros at {first}", _put(content, first, bytes(length))
-        yield f"{length} ones at {first}", _put(content, first, b"\xff" * length)
-        one, other = content[first : first + length], content[second : second + length]
-        yield f"{length} bytes of {first} and {second} swapped", _put(_put(content, first, other), second, one)
-        yield f"{length} bytes repeated", content[:first] + one + content[first:]
-        yield f"{length} bytes left out", content[:first] + content[first + length :]
-
-
-def _put(content, place, piece):
-    return content[:place] + piece + content[place + len(piece) :]
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_damaged_bytes_never_reach_the_library(kind, sources, tmp_path):
-    content = sources[kind]
+    content, rng = sources[kind], np.random.default_rng(8)
     path = tmp_path / f"{kind}.nc"
-    done = 0
-    for what, damaged in damages(content, np.random.default_rng(8)):
-        if damaged == content:
-            continue
-        path.write_bytes(damaged)
-        try:
+    in_the_seal = (content[:k] + bytes([content[k] ^ 1 << k % 8]) + content[k + 1 :] for k in range(-SEAL_LENGTH, -1))
+    for damaged in itertools.chain(in_the_seal, (spoilt(content, rng) for _ in range(200))):
+        if damaged != content:
+            path.write_bytes(damaged)
             message = refused(path, kind)
-        except BaseException as fault:
-            raise AssertionError(f"{what}: {fault}") from fault
-        assert "damaged" in message or "cut short" in message, what
-        done += 1
-        if done == 300:
-            break
+            assert "damaged" in message or "cut short" in message
 
 
 @pytest.mark.parametrize("length", [0, 1, 8, SEAL_LENGTH - 1, SEAL_LENGTH, SEAL_LENGTH + 1])
@@ -161,12 +127,6 @@ def test_variables_left_out_or_in_another_type(sources, tmp_path):
         refused(copied(path, sources[kind], change_type=(name, ("f4", "i4")[number % 2])), kind)
 
 
-def test_an_empty_edit_is_no_edit(sources, tmp_path):
-    for kind in KINDS:
-        found = read_table(edited(tmp_path / "table.nc", sources[kind], lambda d: None), kind)
-        np.testing.assert_array_equal(found.coefficients, small_table(kind).coefficients)
-
-
 def test_the_wrong_kind_under_a_right_name(sources, tmp_path):
     for kind, other in (KINDS, KINDS[::-1]):
         path = tmp_path / f"{kind}.nc"
@@ -191,10 +151,6 @@ def test_no_table_at_all(tmp_path):
     for name, content in (("empty.nc", b""), ("text.nc", b"X,mu,phi_F\n1,2,3\n" * 50), ("zeros.nc", bytes(5000))):
         (tmp_path / name).write_bytes(content)
         assert "is not a table file" in refused(tmp_path / name)
-    (tmp_path / "under_a_file").write_bytes(b"")
-    assert "cannot be read" in refused(tmp_path / "under_a_file" / "table.nc")
-    os.mkfifo(tmp_path / "pipe")
-    assert "not a regular file" in refused(tmp_path / "pipe")
 
 
 @pytest.mark.parametrize("format", ["NETCDF4", "NETCDF3_CLASSIC"])
@@ -220,21 +176,6 @@ def test_a_file_larger_than_any_table(tmp_path):
     with path.open("wb") as file:
         file.truncate(MAX_BYTES + 1)
     assert f"has more than {MAX_BYTES} bytes" in refused(path)
-
-
-def test_a_file_that_may_not_be_read(sources, tmp_path):
-    path = tmp_path / "secret.nc"
-    path.write_bytes(sources[UNIVERSAL])
-    path.chmod(0)
-    own = os.geteuid()
-    # whoever may read everything becomes nobody for a moment
-    if own == 0:
-        os.seteuid(65534)
-    try:
-        assert "cannot be read: Permission denied" in refused(path)
-    finally:
-        if own == 0:
-            os.seteuid(own)
 
 
 def rehashed(path, source, edit):

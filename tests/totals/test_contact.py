@@ -1,26 +1,19 @@
 """`contact` against brute force, its own bound, the paper's case, power laws, limits, invariants, bad input."""
 
-import dataclasses
 import functools
 import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from catalogue import LEVEL, OWN, random_gaps, random_surfaces
 
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, greenwood_tripp
 from mbma_tables import contact as contact_by_tier
-from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED, get_reading
+from mbma_tables.surfaces.readings import READINGS, get_reading
 from mbma_tables.totals.island import geometry
 from mbma_tables.totals.island_sum import kinks
 
 contact = functools.partial(contact_by_tier, tier="exact")
-
-OWN = dataclasses.replace(
-    PRINTED, name="own", jacobian="exact", offset=True, beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5
-)
-LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)
 
 
 def brute(surface, separation, reading):
@@ -57,19 +50,6 @@ def brute(surface, separation, reading):
 
 def one_surface(hurst, zeta_1, h_max=3.0, h_rms=1.0):
     return Surface(hurst, 0.2, 0.2 * zeta_1, h_rms, h_max * h_rms)
-
-
-def scattered(count, seed):
-    rng = np.random.default_rng(seed)
-    hurst = rng.uniform(0.1, 1, count)
-    hurst[::9] = 1
-    zeta_1 = 10 ** rng.uniform(math.log10(3.01), 8, count)
-    zeta_1[::7], zeta_1[::11] = 3.01, 1e8
-    h_max = rng.uniform(2.5, 4.7, count)
-    share = rng.uniform(-1, 1, count)
-    share[::5] = 1 - 10 ** rng.uniform(-4, -0.5, count)[::5]
-    share[3::20], share[4::20] = -1, 0.9999
-    return Surface(hurst, 0.2, 0.2 * zeta_1, 1.0, h_max), share * h_max
 
 
 BRUTE_POINTS = [
@@ -112,7 +92,8 @@ def test_against_brute_force(hurst, zeta_1, share, reading):
 
 @functools.cache
 def fine_contact(reading, count):
-    surfaces, separation = scattered(count, seed=11)
+    surfaces = random_surfaces(count, seed=11)
+    separation = random_gaps(surfaces, seed=12)
     return surfaces, separation, contact(surfaces, separation, reading=reading, rtol=2e-11)
 
 
@@ -179,34 +160,6 @@ def test_rigid_spheres_carry_more(reading):
         loss = rigid.force / exact.force - 1
         assert (np.diff(loss[:7]) > 0).all()
         assert rigid.tier == "rigid"
-
-
-@pytest.mark.parametrize("reading", READINGS)
-@pytest.mark.parametrize("hurst", [0.5, 0.7, 0.8, 1.0])
-@pytest.mark.parametrize("zeta_1", [10.0, 216.0, 1e5])
-def test_force_rises_as_the_gap_closes(reading, hurst, zeta_1):
-    surface = one_surface(hurst, zeta_1)
-    found = contact(surface, np.linspace(2.999, -3, 80), reading=reading, rtol=1e-6)
-    assert (np.diff(found.force) > 0).all()
-    assert (np.diff(found.area) > 0).all()
-
-
-@settings(deadline=None, max_examples=25)
-@given(
-    hurst=st.floats(0.2, 1),
-    zeta_1=st.floats(3.01, 1e5),
-    share=st.floats(-1, 0.99),
-    power=st.floats(-9, 9),
-    modulus=st.floats(1e-3, 1e12),
-)
-def test_any_unit_of_length_and_stress(hurst, zeta_1, share, power, modulus):
-    unit = 10**power
-    one = contact(Surface(hurst, 1.0, zeta_1, 0.3, 1.0), share)
-    other = contact(Surface(hurst, 1 / unit, zeta_1 / unit, 0.3 * unit, unit), share * unit, E_star=modulus)
-    assert other.force == pytest.approx(one.force * modulus, rel=2e-8, abs=0)
-    assert other.area == pytest.approx(one.area, rel=2e-8, abs=0)
-    # h_max + d cancels towards full compression: digits of h_max are what remains
-    assert other.mean_separation == pytest.approx(one.mean_separation * unit, rel=0, abs=1e-15 * unit)
 
 
 def test_force_is_proportional_to_slope():
@@ -304,3 +257,35 @@ def test_one_quantity_alone(tier, wanted):
 def test_unknown_quantities(wanted):
     with pytest.raises(InputError, match="quantities must be some of"):
         contact_by_tier(Surface(0.8, 1.0, 100.0, 1.0, 3.0), 1.0, quantities=wanted)
+
+
+ROUGH = Surface(0.8, 1.0, 216.0, 1.0, 3.0)
+GAPS = np.linspace(-2.0, 2.9, 40)
+
+
+def frozen():
+    gaps = GAPS.copy()
+    gaps.flags.writeable = False
+    return gaps
+
+
+KINDS = {
+    "strided": np.repeat(GAPS, 3)[::3],
+    "read-only": frozen(),
+    "reversed view": GAPS[::-1].copy()[::-1],
+    "Fortran order": np.asfortranarray(GAPS.reshape(5, 8)),
+    "list": GAPS.tolist(),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_layout_does_not_matter(kind):
+    found, expected = contact_by_tier(ROUGH, KINDS[kind]), contact_by_tier(ROUGH, GAPS)
+    np.testing.assert_array_equal(np.ravel(found.force), expected.force)
+    np.testing.assert_array_equal(np.ravel(found.area), expected.area)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, int])
+def test_other_numbers_are_the_doubles_that_they_are(dtype):
+    gaps = GAPS.astype(dtype)
+    np.testing.assert_array_equal(contact_by_tier(ROUGH, gaps).force, contact_by_tier(ROUGH, gaps.astype(float)).force)

@@ -5,10 +5,10 @@ A pair may differ by what the slope between the two says, and by the errors stat
 
 import dataclasses
 import math
-import os
 
 import numpy as np
 import pytest
+from helpers import SCALE
 
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island
 from mbma_tables.islands import newton
@@ -28,7 +28,6 @@ from mbma_tables.totals.island import geometry
 from mbma_tables.totals.island_sum import kinks
 from mbma_tables.totals.kernel import SMALL_POWER
 
-SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))
 STEP = 1e-9
 WIDE = 1e-6
 EPS = np.finfo(float).eps

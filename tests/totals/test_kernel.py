@@ -1,10 +1,10 @@
 """The compiled pass: its rule, its islands against `islands.geometry`, its independence of order and batch."""
 
-import dataclasses
 import math
 
 import numpy as np
 import pytest
+from catalogue import LEVEL, OWN
 from numpy.polynomial import legendre
 
 from mbma_tables import ConvergenceError, OutOfRangeError, Surface, contact
@@ -16,9 +16,6 @@ from mbma_tables.totals import intervals
 from mbma_tables.totals import kernel as lookup
 from mbma_tables.totals.island import geometry
 from mbma_tables.totals.island_sum import kinks
-
-OWN = dataclasses.replace(PRINTED, name="own", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)
-LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)
 
 
 @pytest.mark.parametrize(("straight", "width", "points"), [(False, 1.0, 31), (True, 3.0, 31), (True, 1.0, 21)])
@@ -64,26 +61,6 @@ def test_islands_are_those_of_geometry(reading):
     expected = np.stack([g["X"], g["mu"], force, area, g["h_d"], g["D_d"], g["sigma_d"]])
     np.testing.assert_allclose(nodes, expected, rtol=1e-11)
     assert np.median(np.abs(nodes[:4] / expected[:4] - 1)) < 1e-14
-
-
-def scattered(count):
-    rng = np.random.default_rng(41)
-    hurst = rng.choice([0.3, 0.55, 0.8, 1.0], count)
-    zeta_1 = rng.choice([3.01, 40.0, 1e4], count)
-    return Surface(hurst, 0.2, 0.2 * zeta_1, 1.0, rng.choice([2.5, 4.0], count)), rng.uniform(-2.5, 4.2, count)
-
-
-def test_no_entry_knows_its_neighbours():
-    surfaces, gaps = scattered(300)
-    batch = contact(surfaces, gaps)
-    order = np.random.default_rng(42).permutation(300)
-    names = ("hurst", "q0", "q1", "h_rms", "h_max")
-    shuffled = contact(Surface(*(getattr(surfaces, name)[order] for name in names)), gaps[order])
-    for name in ("force", "area", "error"):
-        np.testing.assert_array_equal(getattr(shuffled, name), getattr(batch, name)[order])
-    for k in range(0, 300, 7):
-        one = contact(Surface(*(getattr(surfaces, name)[k] for name in names)), gaps[k])
-        assert (one.force, one.area, one.error) == (batch.force[k], batch.area[k], batch.error[k])
 
 
 def test_no_step_across_a_kink():

@@ -8,15 +8,18 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from catalogue import LEVEL, OWN
+from helpers import difference_weights
 
 from generate.tables.exact_geometry import divisor, exact_island
 from mbma_tables import Surface, contact
 from mbma_tables.models.tables import universal_model
-from mbma_tables.surfaces.readings import PRINTED, REPORTED, get_reading
+from mbma_tables.surfaces.readings import REPORTED, get_reading
 from mbma_tables.totals.island_sum import kinks
 
-OWN = dataclasses.replace(PRINTED, name="own", jacobian="exact", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)
-LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)
+# each of two flags by itself
+NO_OFFSET = dataclasses.replace(OWN, name="no offset", offset=False)
+OF_HEIGHTS = dataclasses.replace(OWN, name="of heights", summit_sigma=False)
 NAMES = ("hurst", "q0", "q1", "h_rms", "h_max", "separation")
 
 # hurst, zeta_1, h_max/h_rms, (h_max - d)/h_rms
@@ -31,11 +34,6 @@ CASES = [
 ]
 # next to a kink, where a derivative that forgot it would be wrong: the third number is reach over the kink
 AT_KINKS = [(0.9, 100.0, 0, 0.95), (0.9, 100.0, 0, 1.05), (0.9, 100.0, 1, 0.97), (0.9, 100.0, 1, 1.03)]
-
-
-def weights(offsets):
-    """Of values at `offsets`, for the derivative at 0."""
-    return np.linalg.solve(np.vander(offsets, increasing=True).T, np.eye(offsets.size)[1])
 
 
 def differences(numbers, reading, step):
@@ -54,7 +52,7 @@ def differences(numbers, reading, step):
         points = np.repeat(np.asarray(numbers, dtype=float)[:, None], 7, axis=1)
         points[place] += span * offsets
         shifted.append(points)
-        spans.append(weights(offsets) / span)
+        spans.append(difference_weights(offsets) / span)
     points = np.stack(shifted, axis=1)
     found = contact(Surface(*points[:5]), points[5], tier="exact", reading=reading, rtol=1e-11)
     return [np.einsum("nk,nk->n", spans, values) for values in (found.force, found.area)]
@@ -85,7 +83,7 @@ def test_against_differences(case, reading):
 
 
 @pytest.mark.parametrize("case", [CASES[0], CASES[2], CASES[3]])
-@pytest.mark.parametrize("reading", [OWN, LEVEL], ids=lambda reading: reading.name)
+@pytest.mark.parametrize("reading", [OWN, LEVEL, NO_OFFSET, OF_HEIGHTS], ids=lambda reading: reading.name)
 def test_a_reading_of_ones_own_against_differences(case, reading):
     against_differences(numbers_of(case), reading, 4e-3)
 
@@ -245,21 +243,3 @@ def test_slopes_refine_as_totals_do(rtol):
     np.testing.assert_allclose(slopes.error, plain.error, rtol=1e-6)
     np.testing.assert_allclose(slopes.force, plain.force, rtol=1e-12)
     np.testing.assert_allclose(slopes.area, plain.area, rtol=1e-12)
-
-
-@pytest.mark.parametrize(("offset", "summit_sigma"), [(True, False), (False, True), (False, False)])
-def test_slopes_of_readings_of_ones_own(offset, summit_sigma):
-    """Each of the two flags by itself, against differences of the totals."""
-    own = dataclasses.replace(OWN, offset=offset, summit_sigma=summit_sigma)
-    hurst, gap, step = 0.8, 0.4, 1e-4
-
-    def log_totals(hurst, gap):
-        found = contact(Surface(hurst, 0.3, 60.0, 0.7, 2.1), gap, reading=own, rtol=1e-10)
-        return np.log([found.force, found.area])
-
-    found = contact(Surface(hurst, 0.3, 60.0, 0.7, 2.1), gap, reading=own, rtol=1e-10, derivatives=True)
-    by_hurst = (log_totals(hurst + step, gap) - log_totals(hurst - step, gap)) / (2 * step)
-    by_gap = (log_totals(hurst, gap + step) - log_totals(hurst, gap - step)) / (2 * step)
-    for k, (value, by) in enumerate(((found.force, found.force_by), (found.area, found.area_by))):
-        assert by["hurst"] / value == pytest.approx(by_hurst[k], rel=1e-5, abs=0)
-        assert by["separation"] / value == pytest.approx(by_gap[k], rel=1e-5, abs=0)

@@ -4,19 +4,19 @@ The model's kinks are `ISLAND_KINKS` and `TOTAL_KINKS`. Slopes are found by one-
 derivatives that the library gives just either side. MBMA_GAUNTLET sets how many places are looked at.
 """
 
-import dataclasses
 import math
-import os
 
 import numpy as np
 import pytest
+from catalogue import LEVEL, OWN
+from helpers import SCALE, difference_weights
 
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island
 from mbma_tables.islands.four_numbers import from_axes, to_axes
 from mbma_tables.islands.geometry import FIELDS
 from mbma_tables.models.island4d import RAW
 from mbma_tables.models.tables import island4d_model, universal_model
-from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED
+from mbma_tables.surfaces.readings import READINGS, REPORTED
 from mbma_tables.surfaces.spectrum import band_moment
 from mbma_tables.totals.intervals import NARROW
 from mbma_tables.totals.island import geometry
@@ -24,9 +24,6 @@ from mbma_tables.totals.island_sum import kinks
 from mbma_tables.totals.kernel import SMALL_POWER
 from mbma_tables.totals.law import TERMS
 
-SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))
-OWN = dataclasses.replace(PRINTED, name="own", jacobian="exact", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)
-LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False)
 EVERY = [*READINGS.values(), OWN, LEVEL]
 PROMISED = 1e-6  # of derivatives
 STEP = 1e-9
@@ -42,7 +39,7 @@ TOTAL_KINKS = {"zeta_d": {"force", "area"}, "zeta_u": set()}
 
 # slope at 0 from values at 0, 1, 2 ... steps on one side
 OFFSETS = np.arange(6.0)
-WEIGHTS = np.linalg.solve(np.vander(OFFSETS, increasing=True).T, np.eye(6)[1])
+WEIGHTS = difference_weights(OFFSETS)
 
 
 def surfaces(rng, count):

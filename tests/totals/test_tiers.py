@@ -2,40 +2,24 @@
 
 import dataclasses
 import functools
-import json
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from catalogue import LEVEL, OWN, random_gaps, random_surfaces
+from helpers import fresh
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact
-from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED
+from mbma_tables.surfaces.readings import READINGS, REPORTED
 from mbma_tables.totals import island_sum, kernel, sensitivity
 
-OWN = dataclasses.replace(PRINTED, name="own", jacobian="exact", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)
-LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)
 OPEN = dataclasses.replace(REPORTED, name="open", floor_d=1.3, floor_u=2.2, density_divisor=11.0)
-
-
-def held_out(count, seed, least_hurst=0.3, least_zeta_1=3.01):
-    """Random surfaces and gaps from 0.9999 h_max to -h_max, ends included."""
-    rng = np.random.default_rng(seed)
-    hurst = rng.uniform(least_hurst, 1, count)
-    hurst[::10] = 1
-    zeta_1 = 10 ** rng.uniform(math.log10(least_zeta_1), 4, count)
-    zeta_1[::13], zeta_1[5::17] = least_zeta_1, 1e4
-    h_max = rng.uniform(2.5, 4.7, count)
-    share = rng.uniform(-1, 0.9999, count)
-    share[1::5] = 1 - 10 ** rng.uniform(-4, -0.5, count)[1::5]
-    share[::6], share[3::9] = 0.9999, -1
-    return Surface(hurst, 0.2, 0.2 * zeta_1, 1.0, h_max), share * h_max
 
 
 @functools.cache
 def solved(reading):
-    surfaces, gaps = held_out(80, seed=101)
+    surfaces = random_surfaces(80, seed=101, hurst=(0.3, 1.0), zeta_1=(3.01, 1e4))
+    gaps = random_gaps(surfaces, seed=102)
     return surfaces, gaps, contact(surfaces, gaps, tier="exact", reading=reading, rtol=1e-10)
 
 
@@ -75,7 +59,8 @@ def test_the_bound_is_true_at_any_tolerance(rtol):
 
 @pytest.mark.parametrize("reading", [OWN, LEVEL, OPEN], ids=lambda reading: reading.name)
 def test_a_reading_of_ones_own(reading):
-    surfaces, gaps = held_out(25, seed=102, least_hurst=0.4, least_zeta_1=3.6)
+    surfaces = random_surfaces(25, seed=102, hurst=(0.4, 1.0), zeta_1=(3.6, 1e4))
+    gaps = random_gaps(surfaces, seed=103)
     true = contact(surfaces, gaps, tier="exact", reading=reading, rtol=1e-9)
     found = contact(surfaces, gaps, reading=reading, rtol=1e-9)
     assert (found.reading, true.reading) == (reading.name, reading.name)
@@ -188,12 +173,7 @@ def test_bad_options():
         contact(surface, 1.0, outside="exact", derivatives=True)
 
 
-def fresh(code):
-    """What a new interpreter prints as JSON."""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return json.loads(done.stdout)
-
-
+@pytest.mark.slow
 def test_memory_is_that_of_the_batch():
     code = """
 import json, resource, tracemalloc
@@ -216,20 +196,6 @@ print(json.dumps([traced / gaps.nbytes, grown / gaps.nbytes, found.islands / gap
     assert grown < 30
 
 
-def test_importing_and_building_surfaces_open_no_table():
-    loaded = fresh("""
-import builtins, json, os, sys
-opened = []
-sys.addaudithook(lambda event, given: opened.append(str(given[0])) if event == "open" else None)
-import mbma_tables
-mbma_tables.Surface(0.8, 0.2, 40.0, 1.0, 3.0).alpha
-print(json.dumps([sorted(sys.modules), [name for name in opened if name.endswith(".nc")]]))
-""")
-    modules, tables = loaded
-    assert {"netCDF4", "xarray", "dask"}.isdisjoint(modules)
-    assert tables == []
-
-
 SURFACE = Surface(0.8, 0.3, 60.0, 0.7, 2.1)
 
 
@@ -238,14 +204,6 @@ def test_the_floor_of_zeta_u_itself_is_refused(tier):
     with pytest.raises(OutOfRangeError, match=r"q1/q0 must be greater than 3\.5"):
         contact(Surface(0.8, 1.0, 3.5, 1.0, 3.0), 1.0, tier=tier, reading=OWN)
     assert contact(Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), 1.0, tier=tier, reading=OWN).force > 0
-
-
-@pytest.mark.parametrize(("wanted", "other"), [("force", "area"), ("area", "force")])
-def test_one_quantity_alone(wanted, other):
-    gaps = np.linspace(-2.0, 2.0, 9)
-    alone, both = contact(SURFACE, gaps, quantities=[wanted]), contact(SURFACE, gaps)
-    np.testing.assert_allclose(getattr(alone, wanted), getattr(both, wanted), rtol=1e-8)
-    assert getattr(alone, other) is None
 
 
 def test_one_gap_more_changes_no_bit():

@@ -1,17 +1,12 @@
-"""Ways to spoil an input, and the one outcome that is allowed: a typed error, or a right answer.
-
-MBMA_GAUNTLET multiplies how many inputs each format gets.
-"""
+"""Ways to spoil an input, and the one outcome that is allowed: a typed error, or a right answer."""
 
 import copy
-import os
 import signal
 
 import numpy as np
 
 from mbma_tables import MbmaError
 
-SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))
 LONGEST = 10.0  # seconds for one input
 WORDS = [
     b"",

@@ -1,0 +1,37 @@
+"""Fixtures of several files; what they need is imported when they are first asked for."""
+
+import signal
+
+import pytest
+
+
+@pytest.fixture(scope="session", params=["universal", "island4d"])
+def built(request, tmp_path_factory):
+    """(kind, its content) of a small table built here."""
+    from small_builds import KINDS, small
+
+    from generate.tables.build import build
+    from generate.tables.chunks import ChunkedSolver
+    from generate.tables.configuration import load
+
+    path = small(tmp_path_factory.mktemp("built"), request.param)
+    configuration = load(request.param, path)
+    kind = KINDS[request.param](configuration)
+    return kind, build(kind, configuration, ChunkedSolver())
+
+
+@pytest.fixture
+def tally(record_property):
+    """Reads inputs one by one, each under a watch, and counts what it tried."""
+    from fuzzing import Endless, Tally
+
+    def ring(*_):
+        raise Endless
+
+    before = signal.signal(signal.SIGALRM, ring)
+    count = Tally()
+    yield count
+    signal.signal(signal.SIGALRM, before)
+    record_property("inputs fuzzed", count.tried)
+    record_property("refused", count.refused)
+    assert count.tried

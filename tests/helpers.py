@@ -1,0 +1,44 @@
+"""What several test files do alike."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+from click.testing import CliRunner
+
+SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))  # multiplies the counts of random tests
+
+
+def difference_weights(offsets):
+    """Weights of values at `offsets` for the derivative at 0, exact for polynomials of that many terms."""
+    return np.linalg.solve(np.vander(offsets, increasing=True).T, np.eye(offsets.size)[1])
+
+
+def fresh(code, *arguments):
+    """What `code` prints as JSON in a new interpreter."""
+    command = [sys.executable, "-W", "error", "-c", code, *arguments]
+    return json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+
+
+def run(*arguments):
+    """What `mbma` prints."""
+    from mbma_tables.cli import main
+
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert (result.exit_code, result.stderr) == (0, "")
+    return result.stdout
+
+
+def refused(*arguments):
+    """What `mbma` says as it refuses: a line or two, and nothing else."""
+    from mbma_tables.cli import main
+
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert result.exit_code == 2, result.output
+    assert isinstance(result.exception, SystemExit)
+    assert result.stdout == ""
+    assert result.stderr.startswith("mbma: ")
+    assert 1 <= len(result.stderr.splitlines()) <= 2
+    return result.stderr
