@@ -13,21 +13,17 @@ from collections.abc import Iterable, Sequence
 from importlib import metadata
 from typing import Any
 
-import numpy as np
-
 from generate.pages import timing
 from generate.pages.cost_islands import island_rows
-from generate.pages.cost_totals import brute_force_rows, total_rows
+from generate.pages.cost_totals import total_rows
 from generate.pages.page import png, table
 from mbma_tables.scenes.costs import COLUMNS, UNIT, Costs, Row, read_costs
 
-BRUTE_FORCE = "boundary_elements"
 METHODS = {"classical": "classical iteration", "exact": "Newton (exact)"}
 LIBRARIES = ("numpy", "scipy", "numba")
 HEAD = """\
 # What accuracy costs, measured by python -m generate pages cost; docs/cost.md says how. Costs are times over that of a
-# fixed piece of work in the same run; the row of tier unit has its seconds. Times of boundary_elements are of others'
-# machines.
+# fixed piece of work in the same run; the row of tier unit has its seconds.
 """
 
 
@@ -53,7 +49,7 @@ def study() -> list[Row]:
     rows += total_rows()
     # the least: what else the machine does can only add
     unit = min(*seconds, timing.measure(lambda: None)[1])
-    return [Row(UNIT, "seconds", "both", None, unit), *rows, *brute_force_rows(unit)]
+    return [Row(UNIT, "seconds", "both", None, unit), *rows]
 
 
 def pareto_front(rows: Sequence[Row]) -> list[Row]:
@@ -136,7 +132,6 @@ def parts_of(costs: Costs) -> dict[str, str]:
         "totals": f"They span {spans(totals)}.\n\n{rows_table(totals, pareto_front(totals))}",
         "once": rows_table(once),
         "alone": single_table(costs),
-        "brute_force": rows_table(row for row in costs.rows if row.tier == BRUTE_FORCE),
     }
 
 
@@ -164,9 +159,6 @@ def draw(costs: Costs) -> bytes:
         panel.set(xlabel="time / fixed piece of work", title=title)
         panel.grid(alpha=0.3)
     panels[0].set_ylabel("largest relative error")
-    others = np.array([row.cost for row in costs.rows if row.tier == BRUTE_FORCE])
-    if others.size:
-        panels[1].axvspan(others.min(), others.max(), color="0.85", zorder=0)
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=8)
     return png(figure)
 

@@ -20,11 +20,8 @@ from mbma_tables.islands.classical import iterate, ring_matrix
 from mbma_tables.islands.newton import extent_squared
 from mbma_tables.models import TIERS, answer_islands, get_model
 from mbma_tables.models.closed_forms import FormulaModel
-from mbma_tables.models.tables import open_table
-from mbma_tables.models.universal import UniversalModel
 from mbma_tables.scenes.costs import Row
 from mbma_tables.surfaces.readings import get_reading
-from mbma_tables.tablefiles.splines import coefficients
 from mbma_tables.totals.island import geometry
 
 ISLANDS = 1000  # evaluated in a batch
@@ -45,7 +42,6 @@ MESHES = {
 }
 NEWTON_RTOLS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 NEWTON_NODES = (8, 12, 16, 24, 32, 48, 64, 96)
-UNIVERSAL_SHARES = (0.06, 0.12, 0.25, 0.5)  # of the shipped table's nodes along each axis
 FORMS = ("pocket", "standard", "long")
 
 
@@ -123,33 +119,16 @@ def _profiles(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
 
 
 def model_rows() -> Iterator[Row]:
-    """Models that do not solve: the shipped ones, each closed form, and coarser universal tables."""
+    """Models that do not solve: the shipped ones and each closed form."""
     held = held_out()
     models: list[tuple[str, str, Any]] = [
         (tier, "island", get_model(tier, 1e-8, get_reading("reported"))) for tier in TIERS if tier != "exact"
     ]
     models += [("formula", f"island form={name}", FormulaModel(name)) for name in FORMS]
-    for share in UNIVERSAL_SHARES:
-        coarse = coarser_universal(share)
-        shape = "x".join(str(axis.nodes) for axis in coarse.content.axes)
-        models.append(("universal", f"island nodes={shape}", coarse))
     for tier, name, model in models:
         answer = answer_islands(model, held.islands)
         cost, _ = measure(functools.partial(answer_islands, model, held.islands))
         yield Row(tier, name, "both", held.error(answer.phi_F, answer.phi_A), cost / ISLANDS, 2)
-
-
-def coarser_universal(share: float) -> UniversalModel:
-    """The universal table on that share of its nodes along each axis, in memory; its error field says nothing."""
-    content = open_table("universal").content
-    axes = tuple(dataclasses.replace(axis, nodes=round(share * axis.nodes)) for axis in content.axes)
-    X, mu = (g.ravel() for g in np.meshgrid(*(axis.values for axis in axes), indexing="ij"))
-    ratio = log_ratio(X, mu, 1e-11).reshape(*(axis.nodes for axis in axes), 2)
-    cells = np.zeros((*(axis.nodes - 1 for axis in axes), 2))
-    spline = coefficients(ratio, 5, len(axes))
-    return UniversalModel(
-        dataclasses.replace(content, axes=axes, log_ratio=ratio, coefficients=spline, local_error=cells)
-    )
 
 
 def island_rows() -> list[Row]:

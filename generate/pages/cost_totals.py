@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from generate.pages.comparisons import REFERENCES
 from generate.pages.timing import GAPS, held_out_surfaces, measure, measured_gaps, variant
 from generate.tables.chunks import log_ratio
 from mbma_tables import Scene, Surface, contact, contact_law, theories
@@ -160,13 +159,6 @@ def first_use_rows() -> Iterator[Row]:
         taken = [float(subprocess.run(command, check=True, capture_output=True).stdout) for _ in range(4)]
         # the first fills the caches
         yield Row(tier, "import", "both", None, min(taken[1:]) / seconds)
-
-
-def brute_force_rows(seconds: float) -> Iterator[Row]:
-    """Boundary elements, each load's time on the machine of those who ran them, over this machine's fixed work."""
-    data = REFERENCES["bem"]
-    for force, spent in zip(data.column("force"), data.column("seconds_per_step"), strict=True):
-        yield Row("boundary_elements", f"load force={force:g}", "both", None, spent / seconds)
 
 
 def total_rows() -> list[Row]:

@@ -7,7 +7,7 @@ processor, tolerance and arguments. So a resumed run computes what is missing, a
 from __future__ import annotations
 
 import concurrent.futures
-import hashlib
+import io
 import pathlib
 from collections.abc import Iterator
 
@@ -21,7 +21,6 @@ from mbma_tables.islands import greenwood_tripp
 from mbma_tables.tablefiles.provenance import SOLVER, digest_arrays, digest_json, processor, source_digest, versions
 
 CHUNK = 2000
-DIGEST_LENGTH = 64
 Chunk = tuple[FloatArray, FloatArray, float, int]  # the arguments of `log_ratio`
 CODE = (*SOLVER, "generate.tables.chunks")
 
@@ -83,23 +82,17 @@ class ChunkedSolver:
         with tqdm(total=len(chunks), initial=len(results), desc=label, unit="chunk", disable=None) as bar:
             for number, result in self._computed(missing):
                 if self.folder is not None:
-                    body = result.tobytes()
-                    digest = hashlib.sha256(keys[number].encode() + body).hexdigest().encode()
-                    write_file(self.folder / keys[number], digest + body, make_folders=True)
+                    content = io.BytesIO()
+                    np.save(content, result)
+                    write_file(self.folder / keys[number], content.getvalue(), make_folders=True)
                 results[number] = result
                 bar.update()
         return np.concatenate([results[number] for number in range(len(chunks))]).reshape((*np.shape(X), 2))
 
     def _load(self, key: str) -> FloatArray | None:
-        """A kept chunk; None where there is none, or where it is damaged."""
-        try:
-            content = (self.folder / key).read_bytes() if self.folder is not None else b""
-        except OSError:
-            return None
-        digest, body = content[:DIGEST_LENGTH], content[DIGEST_LENGTH:]
-        if digest != hashlib.sha256(key.encode() + body).hexdigest().encode():
-            return None
-        return np.frombuffer(body).reshape(-1, 2)
+        """A kept chunk, which is written whole or not at all; None where there is none."""
+        path = None if self.folder is None else self.folder / key
+        return np.asarray(np.load(path)) if path is not None and path.exists() else None
 
     def _computed(self, missing: dict[int, Chunk]) -> Iterator[tuple[int, FloatArray]]:
         """Numbers and results of chunks, as they finish."""
