@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,11 @@ from mbma_tables.errors import InputError, OutOfRangeError
 
 SHOWN = 3  # offending entries quoted in a message
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 FloatArray = NDArray[np.float64]
+Numbers: TypeAlias = "np.float64 | FloatArray | xr.DataArray"  # what answers hold: a number, an array, or by names
 
 
 def describe_entries(values: FloatArray, mask: NDArray[np.bool_]) -> str:

@@ -162,7 +162,7 @@ def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory]
 
     gap = answer.mean_separation / specimen.surface.h_rms
     label = theory_label(answer.theory) + (f", {answer.reading}" if answer.reading else "")
-    curves = [Curve(label, gap, answer.force, answer.area, answer.scatter, answer.area_scatter)]
+    curves = [Curve(label, *map(np.asarray, (gap, answer.force, answer.area, answer.scatter, answer.area_scatter)))]
     for name, line in others.items():
         known = np.isfinite(line.force)
         curves.append(Curve(theory_label(name), gap[known], *(field[known] for field in line)))

@@ -83,7 +83,8 @@ def total_rows(surface: tuple[float, ...], separations: Any, reading: Reading, r
     from mbma_tables.theories.contact import contact
 
     found = contact(Surface(*surface), separations, reading=reading, rtol=rtol)
-    for separation, force, area in zip(found.separation, found.force, found.area, strict=True):
+    numbers = map(np.asarray, (found.separation, found.force, found.area))
+    for separation, force, area in zip(*numbers, strict=True):
         scales = (abs(force) or 1.0, abs(area) or 1.0)
         yield row("total", (*surface, separation, 1.0, rtol), (force, area), scales)
 

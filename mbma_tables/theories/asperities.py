@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, positive_modulus
+from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, positive_modulus
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.labels import takes_labelled
 from mbma_tables.surfaces.surface import Surface
@@ -36,14 +36,14 @@ class Asperities:
         A/A0.
     """
 
-    separation: Any
-    mean_separation: Any
-    force: Any
-    area: Any
+    separation: Numbers
+    mean_separation: Numbers
+    force: Numbers
+    area: Numbers
 
 
 @takes_labelled()
-def mean_separation(surface: Surface, separation: ArrayLike) -> Any:
+def mean_separation(surface: Surface, separation: ArrayLike) -> Numbers:
     """Average interfacial separation u = (h_max + d)/2 [length] at separations d [length], Eq. (50).
 
     Examples
@@ -54,11 +54,12 @@ def mean_separation(surface: Surface, separation: ArrayLike) -> Any:
     """
     gap = finite_array("separation", separation)
     broadcast_shape(separation=gap, surface=surface.hurst)
-    return (surface.h_max / 2 + gap / 2)[()]
+    average: FloatArray = surface.h_max / 2 + gap / 2
+    return average[()]
 
 
 @takes_labelled()
-def separation(surface: Surface, mean_separation: ArrayLike) -> Any:
+def separation(surface: Surface, mean_separation: ArrayLike) -> Numbers:
     """Separation d = 2 u - h_max [length] at average interfacial separations u [length], Eq. (50).
 
     Examples
@@ -69,7 +70,8 @@ def separation(surface: Surface, mean_separation: ArrayLike) -> Any:
     """
     average = finite_array("mean_separation", mean_separation)
     broadcast_shape(mean_separation=average, surface=surface.hurst)
-    return (2 * average - surface.h_max)[()]
+    gap: FloatArray = 2 * average - surface.h_max
+    return gap[()]
 
 
 @takes_labelled(Asperities)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import erf, erfinv, exp1
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, positive_modulus, require
+from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, positive_modulus, require
 from mbma_tables.errors import ConvergenceError, InputError
 from mbma_tables.labels import takes_labelled
 from mbma_tables.surfaces import spectrum
@@ -45,7 +45,7 @@ _T, _T_WEIGHTS = (
 
 
 @takes_labelled()
-def persson_area(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1.0) -> Any:
+def persson_area(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1.0) -> Numbers:
     """A/A0 = erf(p0/(2 sqrt(G))) at the largest magnification, G = E*^2 m2/4 (Eq. 18).
 
     Parameters
@@ -75,11 +75,12 @@ def persson_area(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1.0) ->
     require("force", pressure, pressure >= 0, "zero or positive")
     modulus = positive_modulus(E_star)
     broadcast_shape(force=pressure, surface=surface.hurst, E_star=modulus)
-    return erf(pressure / modulus / np.sqrt(surface.m2))
+    area: FloatArray = erf(pressure / modulus / np.sqrt(surface.m2))
+    return area
 
 
 @takes_labelled()
-def persson_separation(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1.0, method: Method = "full") -> Any:
+def persson_separation(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1.0, method: Method = "full") -> Numbers:
     """Average interfacial separation u of Persson's theory (Eqs. 19-21).
 
     Parameters
@@ -128,7 +129,8 @@ def persson_separation(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1
             "at most lambda E*, where the simplified form (20) reaches u = 0",
         )
         average = u0 * (log_lambda - log_p)
-    return (average.reshape(shape) * surface.s)[()]
+    length: FloatArray = average.reshape(shape) * surface.s
+    return length[()]
 
 
 @takes_labelled()

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, is_labelled
+from mbma_tables.arguments import FloatArray, Numbers, is_labelled
 from mbma_tables.labels import apply_to_surface
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
@@ -44,43 +44,43 @@ class Contact:
         "pressure" or "area" stands for "separation".
     """
 
-    separation: Any
-    mean_separation: Any
-    force: Any
-    area: Any
-    error: Any
+    separation: Numbers
+    mean_separation: Numbers
+    force: Numbers
+    area: Numbers
+    error: Numbers
     theory: str
     reading: str
     tier: str
     islands: int | None
-    force_by: dict[str, Any] | None = None
-    area_by: dict[str, Any] | None = None
-    separation_by: dict[str, Any] | None = None
+    force_by: dict[str, Numbers] | None = None
+    area_by: dict[str, Numbers] | None = None
+    separation_by: dict[str, Numbers] | None = None
     _source: Source = dataclasses.field(repr=False, kw_only=True)
 
     @functools.cached_property
-    def stiffness(self) -> Any:
+    def stiffness(self) -> Numbers:
         """-d(F/A0)/du [stress/length], against the mean separation; computed when first read."""
         return self._source.map(lambda s, u, E: E * self._source.theory.answer(s, u).stiffness, self)
 
     @functools.cached_property
-    def energy(self) -> Any:
+    def energy(self) -> Numbers:
         """Elastic energy per nominal area [stress length], the integral of F/A0 over u; computed when first read."""
         return self._source.map(lambda s, u, E: E * self._source.theory.energy(s, u), self)
 
     @property
-    def mean_pressure(self) -> Any:
+    def mean_pressure(self) -> Numbers:
         """Mean pressure in the contact, F/A [stress]; NaN where there is none."""
         with np.errstate(invalid="ignore"):
             return self.force / self.area
 
     @functools.cached_property
-    def scatter(self) -> Any:
+    def scatter(self) -> Numbers:
         """Standard deviation of ln F at this mean separation from simulation to simulation; NaN where not known."""
         return self._source.map(lambda s, u, E: self._scatter(s, u)[0], self)
 
     @functools.cached_property
-    def area_scatter(self) -> Any:
+    def area_scatter(self) -> Numbers:
         """Standard deviation of ln A at this force, likewise."""
         return self._source.map(lambda s, u, E: self._scatter(s, u)[1], self)
 
@@ -89,7 +89,7 @@ class Contact:
         return theory.scatter(surface, theory.answer(surface, u).area)
 
     @functools.cached_property
-    def valid(self) -> Any:
+    def valid(self) -> Numbers:
         """Whether the theory was tested for contacts such as these; `reasons` says where and why not."""
 
         def none(s: Surface, u: FloatArray, E: FloatArray) -> FloatArray:
@@ -115,12 +115,13 @@ class Source:
     surface: Surface
     E_star: Any
 
-    def map(self, function: Callable[[Surface, FloatArray, FloatArray], FloatArray], found: Contact) -> Any:
+    def map(self, function: Callable[[Surface, FloatArray, FloatArray], FloatArray], contact: Contact) -> Numbers:
         """``function(surface, u, E_star)`` of the contact's entries."""
-        u = found.mean_separation
+        u = contact.mean_separation
         if self.surface.labelled or is_labelled(u) or is_labelled(self.E_star):
             arrays = {"mean_separation": u, "E_star": self.E_star}
-            return apply_to_surface(lambda *given: (function(*given),), self.surface, arrays, 1)[0]
+            found: Numbers = apply_to_surface(lambda *given: (function(*given),), self.surface, arrays, 1)[0]
+            return found
         return function(self.surface, np.asarray(u), np.asarray(self.E_star))[()]
 
     def concerns(self, surface: Surface, u: FloatArray) -> dict[str, Any]:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import broadcast_shape, finite_array, require
+from mbma_tables.arguments import Numbers, broadcast_shape, finite_array, require
 
 
-def mean_conductivity(k1: ArrayLike, k2: ArrayLike) -> Any:
+def mean_conductivity(k1: ArrayLike, k2: ArrayLike) -> Numbers:
     """k_s = 2 k1 k2/(k1 + k2) of two bodies, positive conductivities in one unit."""
     first, second = finite_array("k1", k1), finite_array("k2", k2)
     require("k1", first, first > 0, "positive")
@@ -19,7 +17,7 @@ def mean_conductivity(k1: ArrayLike, k2: ArrayLike) -> Any:
     return (2 / (1 / first + 1 / second))[()]
 
 
-def conductance(stiffness_mean: ArrayLike, k_s: ArrayLike, E_star: ArrayLike) -> Any:
+def conductance(stiffness_mean: ArrayLike, k_s: ArrayLike, E_star: ArrayLike) -> Numbers:
     """Conductance per nominal area, h = -(k_s/E*) dp/du.
 
     J. R. Barber, "Bounds on the electrical resistance between contacting elastic rough bodies", Proc. R. Soc. A 459

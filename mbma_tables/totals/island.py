@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, is_labelled, require
+from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, is_labelled, require
 from mbma_tables.islands.geometry import FIELDS, fill_islands
 from mbma_tables.models import AnyModel, answer_islands, get_model, tier_name
 from mbma_tables.surfaces.readings import Reading, get_reading
@@ -44,20 +44,20 @@ class Island:
         What made them.
     """
 
-    delta: Any
-    zeta_d: Any
-    zeta_u: Any
-    R_d: Any
-    R_u: Any
-    D: Any
-    sigma: Any
-    h_d: Any
-    eta: Any
-    X: Any
-    mu: Any
-    force: Any
-    area: Any
-    error: Any
+    delta: Numbers
+    zeta_d: Numbers
+    zeta_u: Numbers
+    R_d: Numbers
+    R_u: Numbers
+    D: Numbers
+    sigma: Numbers
+    h_d: Numbers
+    eta: Numbers
+    X: Numbers
+    mu: Numbers
+    force: Numbers
+    area: Numbers
+    error: Numbers
     reading: str
     tier: str
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, finite_array, is_labelled, require
+from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, require
 from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import ConvergenceError, InputError
 from mbma_tables.totals.law_kernel import AREA, AREA_SLOPE, ENERGY, FORCE, FORCE_SLOPE
@@ -99,48 +99,48 @@ class ContactLaw(abc.ABC):
             require("separation", d, good, f"at most {self.highest:.17g}, where the law ends")
         return d
 
-    def _map(self, what: int, separation: Any, u: Any = None) -> Any:
+    def _map(self, what: int, separation: Any, u: Any = None) -> Numbers:
         given = separation if u is None else u
         if is_labelled(given):
             from mbma_tables.labels import apply
 
-            if u is not None:
-                return apply(lambda block: self._map(what, None, block), (u,), 1)
-            return apply(lambda block: self._map(what, block), (separation,), 1)
+            places = (lambda block: (block, None)) if u is None else (lambda block: (None, block))
+            found: Numbers = apply(lambda block: self._map(what, *places(block)), (given,), 1)
+            return found
         d = self._gaps(separation, u)
         flat, out = np.ascontiguousarray(d).reshape(-1), np.empty(d.size)
         in_blocks(lambda block: self._fill(what, flat[block], out[block]), d.size, BLOCK)
         return out.reshape(d.shape)[()]
 
-    def __call__(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Any:
+    def __call__(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
         """The same as `force`."""
         return self._map(FORCE, separation, u)
 
-    def force(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Any:
+    def force(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
         """F/A0 in the unit of E_star at d; where contact ends at h_max, zero from there on."""
         return self._map(FORCE, separation, u)
 
-    def area(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Any:
+    def area(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
         """A/A0 at d; where contact ends at h_max, zero from there on."""
         return self._map(AREA, separation, u)
 
-    def stiffness(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Any:
+    def stiffness(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
         """-dF/dd per nominal area; MBMA's jumps where zeta_d reaches its floor, and belongs to the larger gap there."""
         return self._map(FORCE_SLOPE, separation, u)
 
-    def stiffness_mean(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Any:
+    def stiffness_mean(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
         """-dF/du per nominal area, against the mean separation u = (h_max + d)/2: twice `stiffness`."""
         return 2 * self.stiffness(separation, u=u)
 
-    def area_slope(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Any:
+    def area_slope(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
         """-d(A/A0)/dd."""
         return self._map(AREA_SLOPE, separation, u)
 
-    def energy(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Any:
+    def energy(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
         """Elastic energy per nominal area, the integral of force from d to last contact."""
         return self._map(ENERGY, separation, u)
 
-    def separation(self, *, force: ArrayLike | None = None, area: ArrayLike | None = None) -> Any:
+    def separation(self, *, force: ArrayLike | None = None, area: ArrayLike | None = None) -> Numbers:
         """Gap d at a given force or area, on the branch of first contact; where contact ends at h_max, that at zero.
 
         Raises
@@ -155,7 +155,8 @@ class ContactLaw(abc.ABC):
         if is_labelled(given):
             from mbma_tables.labels import apply
 
-            return apply(lambda block: self.separation(**{name: block}), (given,), 1)
+            found: Numbers = apply(lambda block: self.separation(**{name: block}), (given,), 1)
+            return found
         what, wanted = (FORCE if name == "force" else AREA), finite_array(name, given)
         turn = self.turning_point if what == FORCE else self.area_turning_point
         end = self.lowest if turn is None else turn
@@ -185,7 +186,7 @@ class ContactLaw(abc.ABC):
         step = (self.h_max - max(self.lowest, -self.h_max)) / 2 / SCAN
         u = self.h_max - step * np.arange(1, SCAN + 1)
         u[-1] = max(u[-1], (self.h_max + self.lowest) / 2)
-        values = self.stiffness_mean(u=u)
+        values = np.asarray(self.stiffness_mean(u=u))
         falls = values[1:] < values[:-1] * (1 - DIGITS * self.error)
         if not falls.any():
             return None
