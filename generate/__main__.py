@@ -13,7 +13,11 @@ from generate.pages.page import PAGES, ROOT, write
 from mbma_tables.errors import MbmaError
 
 # imported when asked for: each needs packages of the extra "generate"
-GROUPS = {"tables": "generate.tables.commands", "formulas": "generate.formulas.commands"}
+GROUPS = {
+    "boundary_elements": "generate.boundary_elements.run",
+    "formulas": "generate.formulas.commands",
+    "tables": "generate.tables.commands",
+}
 
 
 class Generator(click.Group):

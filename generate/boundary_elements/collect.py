@@ -1,0 +1,150 @@
+"""One netCDF file of all surfaces that are solved, with what made them."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import pathlib
+import platform
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from generate.boundary_elements import solve
+from generate.boundary_elements.design import SPLITS, Task
+from mbma_tables import bearing
+from mbma_tables.errors import InputError
+from mbma_tables.tablefiles.provenance import physics_digest
+
+MODULES = ("generate.boundary_elements.surfaces", "generate.boundary_elements.solve", "mbma_tables.bearing")
+ENDS = bearing.BANDS + 2
+
+# name: (dimension beside the surface, what it is); all are numbers without a unit
+NUMBERS = {
+    "q0_h_rms": (None, "q0 h_rms at rms gradient 1: q0 h_rms/g of any scale"),
+    "h_max": (None, "highest point above the mean, in h_rms"),
+    "anisotropy": (None, "root of the ratio of the gradient tensor's eigenvalues"),
+    "slope_kurtosis": (None, "3/8 <|w|^4> of the whitened gradient w: 3 if Gaussian"),
+    "force": ("load", "F/(A0 E* g), g the rms gradient in two dimensions"),
+    "area": ("load", "A/A0, area_raw less (pi - 1 + ln 2)/24 times the length of cell edges between contact and gap"),
+    "area_raw": ("load", "A/A0, the share of grid points with pressure"),
+    "mean_separation": ("load", "u, the mean gap, in h_rms"),
+    "energy": ("load", "elastic energy over A0 E* g h_rms"),
+    "pressure_weighted_height": ("load", "H_p = <p h>/<p>, in h_rms; equals u + 2 energy/force"),
+    "residual": ("load", "the engine's complementarity error"),
+    "seconds": ("load", "processor time of the load"),
+    "quantiles": ("quantile", "heights below which shares of the surface lie, in h_rms"),
+    "mean_height": ("top", "M(a), mean height of the highest share a of the surface, in h_rms"),
+    "top_gradient": ("top", "(2/sqrt(pi)) <|w|>/sqrt(2) over the highest share a: 1 if Gaussian"),
+    "band_q": ("band", "q/q0 of a band of wavenumbers, the variance-weighted root mean square"),
+    "band_variance": ("band", "share of h_rms^2 in the band"),
+    "band_inverse_q2": ("band", "mean (q0/q)^2 of the band, weighted by variance"),
+    "band_gradient": ("band", "share of g^2 = 2 m2 in the band"),
+    "band_curvature": ("band", "m4 h_rms^2/g^4 of the band: alpha = m0 m4/m2^2 is 4 times its sum"),
+    "band_energy": ("band_or_end", "elastic energy of the pressure's waves by band, over A0 E* g h_rms"),
+}
+SINGLE = {"quantiles", "mean_height", "top_gradient", "band_energy"}  # kept to 7 digits
+LOADED = {"band_energy"}
+
+
+def _read(task: Task, folder: pathlib.Path) -> dict[str, Any] | None:
+    try:
+        with np.load(folder / f"{task.recipe.name}.npz", allow_pickle=False) as content:
+            return dict(content)
+    except FileNotFoundError:
+        return None
+
+
+def _stacked(name: str, found: Sequence[dict[str, Any]], loads: int) -> xr.Variable:
+    """One number or curve of all surfaces; NaN where a surface has fewer loads."""
+    dimension, meaning = NUMBERS[name]
+    own = [np.atleast_1d(content[name]) for content in found]
+    if dimension is None:
+        values, dims = np.array([v.item() for v in own]), ["surface"]
+    elif dimension == "load" or name in LOADED:
+        values = np.full((len(own), loads, *own[0].shape[1:]), np.nan)
+        for row, v in zip(values, own, strict=True):
+            row[: len(v)] = v
+        dims = ["surface", "load", *([] if dimension == "load" else [dimension])]
+    else:
+        values, dims = np.array(own), ["surface", dimension]
+    kind = "f4" if name in SINGLE else "f8"
+    unit = "s" if name == "seconds" else "1"
+    return xr.Variable(dims, values.astype(kind), {"long_name": meaning, "units": unit})
+
+
+def dataset(tasks: Sequence[Task], folder: pathlib.Path) -> xr.Dataset:
+    """All solved surfaces of these tasks."""
+    read = [(task, content) for task in tasks if (content := _read(task, folder)) is not None]
+    if not read:
+        raise InputError(f"no surface of this campaign is in {folder}")
+    recipes, found = [task.recipe for task, _ in read], [content for _, content in read]
+    kinds = sorted({recipe.kind for recipe in recipes})
+    loads = max(len(content["force"]) for content in found)
+    data = xr.Dataset({name: _stacked(name, found, loads) for name in NUMBERS})
+    data["kind"] = _flags([kinds.index(r.kind) for r in recipes], kinds, "family of surfaces")
+    data["split"] = _flags(
+        [SPLITS.index(task.split) for task, _ in read], SPLITS, "what a fit may see: the training set and no other"
+    )
+    for name, meaning in {
+        "hurst": "Hurst exponent",
+        "zeta_1": "q1/q0",
+        "waves": "longest (at a plateau: roll-off) waves along a side",
+        "shape": "parameter of the kind; the ratio of the cell's sides where stretched",
+        "seed": "of numpy.random.default_rng, which draws the phases",
+        "points": "grid points along a side",
+    }.items():
+        values = np.array([getattr(recipe, name) for recipe in recipes])
+        data[name] = ("surface", values, {"long_name": meaning, "units": "1"})
+    data["quantile"] = (
+        "quantile",
+        bearing.QUANTILES,
+        {"long_name": "share of the surface below a height", "units": "1"},
+    )
+    data["top"] = (
+        "top",
+        bearing.FRACTIONS,
+        {"long_name": "share of the surface, from the highest point down", "units": "1"},
+    )
+    engines = sorted({str(content["engine"]) for content in found})
+    numpys = sorted({str(content["numpy"]) for content in found})
+    data.attrs = {
+        "Conventions": "CF-1.11",
+        "title": "Random rough surfaces pressed flat, by boundary elements",
+        "institution": "mbma_tables contributors",
+        "source": f"{', '.join(engines)}: conjugate gradients of Polonsky and Keer, force control, "
+        f"tolerance {solve.TOLERANCE:g}; periodic, frictionless, without adhesion",
+        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate boundary_elements --collect",
+        "references": "area correction: Yastrebov, Anciaux, Molinari, arXiv:1701.02727",
+        "comment": "A surface is made anew by generate.boundary_elements.surfaces.heights from kind, hurst, zeta_1, "
+        "waves, shape, seed and points. split: no fit sees anything but training; refine repeats surfaces on grids. "
+        "band_energy has the waves longer than the surface's first and those shorter than its last at its ends.",
+        "versions": json.dumps({"engine": engines, "numpy": numpys, "python": platform.python_version()}),
+        "code_sha256": physics_digest(MODULES),
+        "surfaces_planned": len(tasks),
+        "surfaces_solved": len(found),
+    }
+    return data
+
+
+def _flags(numbers: Sequence[int], meanings: Sequence[str], name: str) -> xr.Variable:
+    attributes = {
+        "long_name": name,
+        "flag_values": np.arange(len(meanings), dtype="i1"),
+        "flag_meanings": " ".join(meanings),
+    }
+    return xr.Variable("surface", np.array(numbers, "i1"), attributes)
+
+
+def collect(tasks: Sequence[Task], folder: pathlib.Path, target: pathlib.Path) -> int:
+    """Write the file; the number of surfaces in it."""
+    data = dataset(tasks, folder)
+    coordinates = ("quantile", "top")
+    encoding = {str(name): {"zlib": True, "complevel": 9} for name in data.data_vars}
+    encoding |= {name: {"_FillValue": None} for name in coordinates}
+    partial = target.with_suffix(".partial")
+    data.to_netcdf(partial, engine="netcdf4", encoding=encoding)
+    partial.replace(target)
+    return int(data.sizes["surface"])

@@ -1,0 +1,82 @@
+"""`python -m generate boundary_elements`: run the campaign, or gather what there is of it into one file."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import pathlib
+import shutil
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import click
+from tqdm import tqdm
+
+from generate.boundary_elements.collect import collect
+from generate.boundary_elements.design import Task, campaign
+from generate.boundary_elements.solve import simulate_to
+
+HERE = pathlib.Path("boundary_elements")
+
+
+def run(tasks: Sequence[Task], folder: pathlib.Path, executor: Any = None) -> None:
+    """Solve what `folder` does not hold yet, one file a surface; no executor: here, one after the other."""
+    folder.mkdir(parents=True, exist_ok=True)
+    missing = [task.recipe for task in tasks if not (folder / f"{task.recipe.name}.npz").exists()]
+    # a terminal may say that it has no columns
+    width = shutil.get_terminal_size().columns
+    done = len(tasks) - len(missing)
+    with tqdm(total=len(tasks), initial=done, desc="surfaces", unit="surface", ncols=width, disable=None) as bar:
+        if executor is None:
+            for recipe in missing:
+                simulate_to(recipe, str(folder))
+                bar.update()
+            return
+        futures = [executor.submit(simulate_to, recipe, str(folder)) for recipe in missing]
+        try:
+            for future in concurrent.futures.as_completed(futures):
+                future.result()
+                bar.update()
+        except BaseException:
+            for future in futures:
+                future.cancel()
+            raise
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--folder", type=click.Path(path_type=pathlib.Path), default=HERE, show_default=True, help="One file a surface."
+)
+@click.option("--collect", "target", type=click.Path(path_type=pathlib.Path), help="Write this netCDF file, no runs.")
+@click.option("--scale", type=click.FloatRange(0, min_open=True), default=1.0, help="Times the surfaces of a node.")
+@click.option("--points", type=click.IntRange(64), default=1024, show_default=True, help="Largest grid to run.")
+@click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
+@click.option("--scheduler", help="Address of a dask scheduler, whose workers see this checkout and the folder.")
+@click.option("--list", "listed", is_flag=True, help="Say what would run, and what is there.")
+def main(
+    folder: pathlib.Path,
+    target: pathlib.Path | None,
+    scale: float,
+    points: int,
+    workers: int,
+    scheduler: str | None,
+    listed: bool,
+) -> None:
+    """Solve random surfaces by boundary elements (Tamaas, the extra `simulate`): four hours on two cores.
+
+    Stopped and called again, it goes on where it was. Small grids come first, every kind of surface in turn.
+    """
+    from generate.__main__ import engine
+
+    tasks = [task for task in campaign(scale) if task.recipe.points <= points]
+    if target is not None:
+        counted = collect(tasks, folder, target)
+        click.echo(f"{target}: {counted} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
+        return
+    if listed:
+        for task in tasks:
+            state = "there" if (folder / f"{task.recipe.name}.npz").exists() else "missing"
+            click.echo(f"{task.recipe.name} {task.split} {state}")
+        return
+    with warnings.catch_warnings(), engine(workers, scheduler, processes=True) as executor:
+        run(tasks, folder, executor)

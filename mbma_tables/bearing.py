@@ -1,0 +1,136 @@
+"""What a height map knows of its tops: bearing curve, gradients of its highest parts, anisotropy, radial spectrum."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbma_tables.arguments import FloatArray
+
+FRACTIONS = np.logspace(-4.5, 0, 91)  # shares of the map, from the highest point down
+MIN_TOP_POINTS = 16  # gradients are averaged over at least so many points
+QUANTILES = 1 - np.concatenate([[0], np.logspace(-5, -1, 61)[:-1], np.linspace(0.1, 1, 139)])
+BANDS = 40
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RadialSpectrum:
+    """Height variance by bands of wavenumber.
+
+    Attributes
+    ----------
+    q : numpy.ndarray, shape (BANDS,)
+        Wavenumber of each band, the root of mean q^2 weighted by variance [1/length]; NaN for an empty band.
+    q2_mean_inverse : numpy.ndarray, shape (BANDS,)
+        Mean q^-2 of each band, weighted by variance [length^2].
+    variance, gradient, curvature : numpy.ndarray, shape (BANDS,)
+        What the band adds to m0 [length^2], to 2 m2, and to m4 [1/length^2].
+    band : numpy.ndarray, shape (n, n // 2 + 1)
+        Number of the band of every wavevector of the real transform; -1 below the longest wave, BANDS above the
+        shortest.
+    """
+
+    q: FloatArray
+    q2_mean_inverse: FloatArray
+    variance: FloatArray
+    gradient: FloatArray
+    curvature: FloatArray
+    band: NDArray[np.intp]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Bearing:
+    """Curves and numbers of a map that contact depends on; lengths in the map's unit.
+
+    Attributes
+    ----------
+    h_rms, h_max, gradient : float
+        Root-mean-square height, highest point above the mean, rms gradient in two dimensions.
+    quantiles : numpy.ndarray, shape (200,)
+        Heights below which shares `QUANTILES` of the map lie, highest first.
+    mean_height : numpy.ndarray, shape (91,)
+        M(a), mean height of the highest share a of the map, a = `FRACTIONS`.
+    top_gradient : numpy.ndarray, shape (91,)
+        (2/sqrt(pi)) <|w|>/sqrt(2) over the same tops, w the gradient whitened by its own tensor: 1 if Gaussian.
+    anisotropy : float
+        Root of the ratio of the gradient tensor's eigenvalues, at least 1.
+    slope_kurtosis : float
+        (3/8) <|w|^4>: 3 if Gaussian.
+    """
+
+    h_rms: float
+    h_max: float
+    gradient: float
+    quantiles: FloatArray
+    mean_height: FloatArray
+    top_gradient: FloatArray
+    anisotropy: float
+    slope_kurtosis: float
+
+
+def wavevectors(shape: tuple[int, int], sizes: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """Wavevectors of the real transform of a periodic map [1/length]."""
+    qx = 2 * np.pi / sizes[0] * np.fft.fftfreq(shape[0], 1 / shape[0])[:, None]
+    qy = 2 * np.pi / sizes[1] * np.fft.rfftfreq(shape[1], 1 / shape[1])[None, :]
+    return qx, qy
+
+
+def half_plane_weights(shape: tuple[int, int]) -> FloatArray:
+    """How many wavevectors each column of the real transform stands for."""
+    weights = np.full(shape[1] // 2 + 1, 2.0)
+    weights[0] = 1.0
+    if shape[1] % 2 == 0:
+        weights[-1] = 1.0
+    return weights
+
+
+def radial_spectrum(heights: FloatArray, sizes: tuple[float, float]) -> RadialSpectrum:
+    """Variance of a periodic map by logarithmic bands of wavenumber."""
+    qx, qy = wavevectors(heights.shape, sizes)  # type: ignore[arg-type]
+    q = np.hypot(qx, qy)
+    transform = np.fft.rfft2(heights) / heights.size
+    power = np.abs(transform) ** 2 * half_plane_weights(heights.shape)  # type: ignore[arg-type]
+    power[0, 0] = 0.0
+    lit = power > 1e-20 * power.max()
+    edges = np.geomspace(q[lit].min() * (1 - 1e-9), q[lit].max() * (1 + 1e-9), BANDS + 1)
+    band = np.searchsorted(edges, q) - 1
+    power[~lit] = 0.0
+
+    def total(values: FloatArray) -> FloatArray:
+        return np.bincount(band.ravel() + 1, values.ravel(), BANDS + 2)[1:-1]
+
+    variance, gradient = total(power), total(power * q**2)
+    inverse = total(power / np.where(q > 0, q, 1.0) ** 2)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return RadialSpectrum(
+            np.sqrt(gradient / variance), inverse / variance, variance, gradient, 0.375 * total(power * q**4), band
+        )
+
+
+def bearing(heights: FloatArray, sizes: tuple[float, float]) -> Bearing:
+    """Curves of a periodic map; its mean is taken off, gradients are spectral."""
+    values = heights - heights.mean()
+    qx, qy = wavevectors(values.shape, sizes)
+    transform = np.fft.rfft2(values)
+    slopes = np.stack([np.fft.irfft2(1j * q * transform, s=values.shape).ravel() for q in (qx, qy)])
+    tensor = slopes @ slopes.T / values.size
+    eigenvalues, directions = np.linalg.eigh(tensor)
+    whitened = np.hypot(*(directions.T @ slopes / np.sqrt(eigenvalues)[:, None]))
+    order = np.argsort(values, axis=None)[::-1]
+    ordered = values.ravel()[order]
+    count = np.arange(1, values.size + 1)
+    share = count / values.size
+    first = min(MIN_TOP_POINTS, values.size) - 1
+    tops = np.cumsum(whitened[order]) / count * (2 / np.sqrt(np.pi)) / np.sqrt(2)
+    return Bearing(
+        float(values.std()),
+        float(ordered[0]),
+        float(np.sqrt(np.trace(tensor))),
+        np.interp(1 - QUANTILES, (count - 1) / (values.size - 1), ordered),
+        np.interp(FRACTIONS, share, np.cumsum(ordered) / count),
+        np.interp(np.maximum(FRACTIONS, share[first]), share, tops),
+        float(np.sqrt(eigenvalues[1] / eigenvalues[0])),
+        float(0.375 * np.mean(whitened**4)),
+    )
