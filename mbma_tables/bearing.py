@@ -70,14 +70,14 @@ class Bearing:
     slope_kurtosis: float
 
 
-def wavevectors(shape: tuple[int, int], sizes: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+def wavevectors(shape: tuple[int, ...], sizes: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
     """Wavevectors of the real transform of a periodic map [1/length]."""
-    qx = 2 * np.pi / sizes[0] * np.fft.fftfreq(shape[0], 1 / shape[0])[:, None]
-    qy = 2 * np.pi / sizes[1] * np.fft.rfftfreq(shape[1], 1 / shape[1])[None, :]
+    qx = np.asarray(2 * np.pi / sizes[0] * np.fft.fftfreq(shape[0], 1 / shape[0])[:, None], float)
+    qy = np.asarray(2 * np.pi / sizes[1] * np.fft.rfftfreq(shape[1], 1 / shape[1])[None, :], float)
     return qx, qy
 
 
-def half_plane_weights(shape: tuple[int, int]) -> FloatArray:
+def half_plane_weights(shape: tuple[int, ...]) -> FloatArray:
     """How many wavevectors each column of the real transform stands for."""
     weights = np.full(shape[1] // 2 + 1, 2.0)
     weights[0] = 1.0
@@ -88,10 +88,10 @@ def half_plane_weights(shape: tuple[int, int]) -> FloatArray:
 
 def radial_spectrum(heights: FloatArray, sizes: tuple[float, float]) -> RadialSpectrum:
     """Variance of a periodic map by logarithmic bands of wavenumber."""
-    qx, qy = wavevectors(heights.shape, sizes)  # type: ignore[arg-type]
+    qx, qy = wavevectors(heights.shape, sizes)
     q = np.hypot(qx, qy)
     transform = np.fft.rfft2(heights) / heights.size
-    power = np.abs(transform) ** 2 * half_plane_weights(heights.shape)  # type: ignore[arg-type]
+    power = np.abs(transform) ** 2 * half_plane_weights(heights.shape)
     power[0, 0] = 0.0
     lit = power > 1e-20 * power.max()
     edges = np.geomspace(q[lit].min() * (1 - 1e-9), q[lit].max() * (1 + 1e-9), BANDS + 1)
@@ -99,7 +99,7 @@ def radial_spectrum(heights: FloatArray, sizes: tuple[float, float]) -> RadialSp
     power[~lit] = 0.0
 
     def total(values: FloatArray) -> FloatArray:
-        return np.bincount(band.ravel() + 1, values.ravel(), BANDS + 2)[1:-1]
+        return np.bincount(band.ravel() + 1, values.ravel(), BANDS + 2)[1:-1].astype(float)
 
     variance, gradient = total(power), total(power * q**2)
     inverse = total(power / np.where(q > 0, q, 1.0) ** 2)

@@ -71,11 +71,19 @@ class Constants:
 
 CONSTANTS = Constants()
 PERSSON = dataclasses.replace(
-    CONSTANTS, area_s0=1.0, area_slope=0.0, cover_s0=1.0, weight=1.0, weight_slope=0.0, cubic=0.0, tail=0.0, tail_slope=0.0
+    CONSTANTS,
+    area_s0=1.0,
+    area_slope=0.0,
+    cover_s0=1.0,
+    weight=1.0,
+    weight_slope=0.0,
+    cubic=0.0,
+    tail=0.0,
+    tail_slope=0.0,
 )
 
 
-def _cover(force: FloatArray, s0: ArrayLike, t0: float) -> tuple[FloatArray, FloatArray]:
+def _cover(force: FloatArray, s0: float | FloatArray, t0: float) -> tuple[FloatArray, FloatArray]:
     """erf(sqrt(2) F/sqrt(S)) and its derivative with respect to F."""
     t = force / t0
     S = (s0 + t) / (1 + t)

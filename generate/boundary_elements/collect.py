@@ -142,7 +142,7 @@ def collect(tasks: Sequence[Task], folder: pathlib.Path, target: pathlib.Path) -
     """Write the file; the number of surfaces in it."""
     data = dataset(tasks, folder)
     coordinates = ("quantile", "top")
-    encoding = {str(name): {"zlib": True, "complevel": 9} for name in data.data_vars}
+    encoding: dict[str, dict[str, Any]] = {str(name): {"zlib": True, "complevel": 9} for name in data.data_vars}
     encoding |= {name: {"_FillValue": None} for name in coordinates}
     partial = target.with_suffix(".partial")
     data.to_netcdf(partial, engine="netcdf4", encoding=encoding)

@@ -13,7 +13,12 @@ from collections.abc import Iterator
 
 from generate.boundary_elements.surfaces import Recipe
 
-TRAINING, HELD_OUT_SURFACE, HELD_OUT_SPECTRUM, REFINEMENT = "training", "held_out_surface", "held_out_spectrum", "refine"
+TRAINING, HELD_OUT_SURFACE, HELD_OUT_SPECTRUM, REFINEMENT = (
+    "training",
+    "held_out_surface",
+    "held_out_spectrum",
+    "refine",
+)
 SPLITS = (TRAINING, HELD_OUT_SURFACE, HELD_OUT_SPECTRUM, REFINEMENT)
 
 
@@ -40,9 +45,7 @@ def _nodes(
     """Nodes over all combinations; bands as "zeta_1xwaves"."""
     for hurst, band, shape in itertools.product(hursts.split(), bands.split(), shapes.split()):
         zeta_1, waves = band.split("x")
-        yield Node(
-            Recipe(kind, float(hurst), float(zeta_1), int(waves), 0, points, float(shape)), surfaces, held_out
-        )
+        yield Node(Recipe(kind, float(hurst), float(zeta_1), int(waves), 0, points, float(shape)), surfaces, held_out)
 
 
 def nodes() -> list[Node]:

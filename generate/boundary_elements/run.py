@@ -53,7 +53,7 @@ def run(tasks: Sequence[Task], folder: pathlib.Path, executor: Any = None) -> No
 @click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
 @click.option("--scheduler", help="Address of a dask scheduler, whose workers see this checkout and the folder.")
 @click.option("--list", "listed", is_flag=True, help="Say what would run, and what is there.")
-def main(
+def boundary_elements(
     folder: pathlib.Path,
     target: pathlib.Path | None,
     scale: float,
@@ -66,7 +66,7 @@ def main(
 
     Stopped and called again, it goes on where it was. Small grids come first, every kind of surface in turn.
     """
-    from generate.__main__ import engine
+    from generate.tables.commands import engine
 
     tasks = [task for task in campaign(scale) if task.recipe.points <= points]
     if target is not None:

@@ -72,12 +72,13 @@ def simulate(recipe: Recipe) -> dict[str, Any]:
     surface = unscaled / bearing(unscaled, recipe.sizes).gradient
     known, spectrum = bearing(surface, recipe.sizes), radial_spectrum(surface, recipe.sizes)
     h_rms = known.h_rms
-    wavenumber = np.hypot(*wavevectors(surface.shape, recipe.sizes))  # type: ignore[arg-type]
+    wavenumber = np.hypot(*wavevectors(surface.shape, recipe.sizes))
     wavenumber[0, 0] = np.inf
-    weights = half_plane_weights(surface.shape)  # type: ignore[arg-type]
+    weights = half_plane_weights(surface.shape)
     length = np.array([1, 1, h_rms, h_rms, h_rms, 1, 1])
     contact = Contact(surface, recipe.sizes)
-    rows, shares = [], []
+    rows: list[FloatArray] = []
+    shares: list[FloatArray] = []
     for force in (*LOADS, *HIGHER_LOADS):
         if force > LOADS[-1] and rows[-1][0] > FULL:
             break

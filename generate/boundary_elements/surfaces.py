@@ -91,31 +91,32 @@ def _field(kx: np.ndarray, ky: np.ndarray, amplitude: FloatArray, seed: int, poi
     modes[kx, ky] = amplitude * np.exp(1j * phases)
     edge = ky == 0
     modes[-kx[edge], 0] = np.conj(modes[kx[edge], 0])
-    return np.fft.irfft2(modes, s=(points, points)) * points**2
+    field: FloatArray = np.fft.irfft2(modes, s=(points, points)) * points**2
+    return field
 
 
 def _amplitude(recipe: Recipe, k: FloatArray) -> FloatArray:
-    plain = k ** -(1 + recipe.hurst)
+    plain: FloatArray = k ** -(1 + recipe.hurst)
     if recipe.kind == "plateau":
-        return np.maximum(k, recipe.waves) ** -(1 + recipe.hurst)
+        plain = np.maximum(k, recipe.waves) ** -(1 + recipe.hurst)
     if recipe.kind == "filtered":
         cut = recipe.zeta_1 * recipe.waves
-        return plain * 2.0 ** -((k / cut) ** 2) * -np.expm1(-np.log(2) * (k / recipe.waves) ** 2)
+        plain = plain * 2.0 ** -((k / cut) ** 2) * -np.expm1(-np.log(2) * (k / recipe.waves) ** 2)
     return plain
 
 
 def _transformed(recipe: Recipe, z: FloatArray) -> FloatArray:
     if recipe.kind == "peaks":
-        return np.expm1(recipe.shape * z) / recipe.shape
+        z = np.expm1(recipe.shape * z) / recipe.shape
     if recipe.kind == "valleys":
-        return -np.expm1(-recipe.shape * z) / recipe.shape
+        z = -np.expm1(-recipe.shape * z) / recipe.shape
     if recipe.kind == "worn":
         above = np.logaddexp(0, (z - recipe.shape) / WORN_WIDTH) * WORN_WIDTH
-        return z - (1 - WORN_SLOPE) * above
+        z = z - (1 - WORN_SLOPE) * above
     if recipe.kind == "patchy":
         kx, ky = _half_plane(recipe.waves, PATCH_WAVES * recipe.waves)
         smooth = _field(kx, ky, np.ones(len(kx)), recipe.seed + 10_000_000, recipe.points)
-        return z * np.exp(recipe.shape * smooth / smooth.std())
+        z = z * np.exp(recipe.shape * smooth / smooth.std())
     return z
 
 
@@ -123,6 +124,8 @@ def heights(recipe: Recipe) -> FloatArray:
     """The surface: heights of mean zero and root mean square 1, shape (points, points)."""
     kx, ky = _half_plane(*recipe.band)
     z = _field(kx, ky, _amplitude(recipe, np.hypot(kx, ky)), recipe.seed, recipe.points)
-    z = _transformed(recipe, z / z.std())
+    z /= z.std()
+    z = _transformed(recipe, z)
     z -= z.mean()
-    return z / z.std()
+    z /= z.std()
+    return z

@@ -1,0 +1,177 @@
+r"""The calibrated law where a map is at hand: its tops decide the area, its bearing curve the separation.
+
+Lengths in h_rms, force over A0 E* g as in `calibrated`. The gap is zero where pressure is not, so the
+pressure-weighted height H_p = <p h>/<p> obeys H_p = u + 2 U/F exactly; with dU = -F du that is ::
+
+    u(F) = 2 F integral from F to infinity of H_p/F'^2 dF' - H_p(F)
+
+At light load H_p = M(c A), the mean height of the highest share c A of the map, c = 4/5 exactly for Hertzian
+contact; towards full contact it goes over to the spectrum's own H_p. The area is the law's with the gradient of the
+highest share 1 - (1 - A)^2 of the map in place of g, the 2 A of a paraboloid, and Hertz's elliptic factor.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk, erf
+
+from mbma_tables.arguments import FloatArray
+from mbma_tables.bearing import FRACTIONS
+from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, area, mean_top_height
+
+LIGHTEST, HEAVIEST = -16.0, 1.4  # ln F^ of a map's curve
+NODES = 700
+ERF_INVERSE = (1e-7, 3.9)  # erfinv(A) over which F(A) is tabulated
+
+
+@dataclasses.dataclass(frozen=True)
+class MapConstants:
+    """Constants of the map's law.
+
+    Attributes
+    ----------
+    breadth, breadth_onset : float
+        c = 0.8 max(1, zeta_e/breadth_onset)^breadth for an isotropic map.
+    gaussian_area, spectrum_area : float
+        Contact where the deviation of a Gaussian surface, and then the spectrum's own law, take over.
+    """
+
+    breadth: float = 0.13
+    breadth_onset: float = 3.0
+    gaussian_area: float = 0.2
+    spectrum_area: float = 0.5
+
+
+MAP_CONSTANTS = MapConstants()
+
+
+@functools.lru_cache(maxsize=256)
+def hertz_ellipse(anisotropy: float) -> tuple[float, float]:
+    """Area factor k and height factor c_r of an elliptic Hertzian contact, curvatures as anisotropy^2 to 1."""
+    if anisotropy < 1 + 1e-6:
+        return 1.0, 1.0
+
+    def curvatures(b: float) -> tuple[float, float]:
+        m = 1 - b * b
+        K, E = float(ellipk(m)), float(ellipe(m))
+        return 2 * b / m * (K - E), 2 * b / m * (E / (b * b) - K)
+
+    def mismatch(b: float) -> float:
+        ka, kb = curvatures(b)
+        return kb / ka - anisotropy**2
+
+    b = brentq(mismatch, 1e-6, 1 - 1e-7, xtol=1e-14)
+    ka, kb = curvatures(b)
+    product = np.sqrt(ka * kb)
+    # the circle has curvatures pi/2 at semi-axis 1
+    factor = np.sqrt(b * product * (ka + kb)) / (np.pi / np.sqrt(2))
+    height = (ka + kb * b * b) / (2 * b * product)
+    return float(factor), float(height)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class MapLaw:
+    """The curve of a map.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        The map's own.
+    inverse_q2 : float
+        Mean of (q0/q)^2 over the spectrum, weighted by variance.
+    mean_height, top_gradient : numpy.ndarray, shape (91,)
+        M(a) [h_rms] and the tops' gradient of `bearing`.
+    anisotropy : float
+    """
+
+    spectrum: Spectrum
+    inverse_q2: float
+    mean_height: FloatArray
+    top_gradient: FloatArray
+    anisotropy: float = 1.0
+    constants: Constants = CONSTANTS
+    map_constants: MapConstants = MAP_CONSTANTS
+
+    @functools.cached_property
+    def height_factor(self) -> float:
+        """c of H_p = M(c A)."""
+        # m4/m2 = (3/4) <q^4>/<q^2>; alpha = 1.5 <q^4>/<q^2>^2, gradient^2 = <q^2>
+        ratio = 0.5 * self.spectrum.alpha * self.spectrum.gradient**2
+        breadth = np.sqrt(ratio * self.inverse_q2) / self.map_constants.breadth_onset
+        return float(0.8 * max(1.0, breadth) ** self.map_constants.breadth * hertz_ellipse(self.anisotropy)[1])
+
+    def _mean_height(self, share: FloatArray) -> FloatArray:
+        return np.interp(np.log(np.minimum(share, 1.0)), np.log(FRACTIONS), self.mean_height)
+
+    @functools.cached_property
+    def _log_force_of_area(self) -> tuple[FloatArray, FloatArray]:
+        """ln F over ln erfinv(A), rising."""
+        c = self.constants
+        log_e = np.linspace(np.log(ERF_INVERSE[0]), np.log(ERF_INVERSE[1]), NODES)
+        e = np.exp(log_e)
+        s0 = min(c.area_s0 + c.area_slope * np.log(self.spectrum.alpha / 10), 0.95)
+        s0 /= hertz_ellipse(round(self.anisotropy, 3))[0] ** 2
+        # 2 y^2 (1 + y/t0) = e^2 (s0 + y/t0) at A = erf(e)
+        y = e * np.sqrt(max(s0, 1.0) / 2)
+        for _ in range(60):
+            value = 2 * y**2 * (1 + y / c.area_t0) - e**2 * (s0 + y / c.area_t0)
+            y = np.maximum(y - value / (4 * y + 6 * y**2 / c.area_t0 - e**2 / c.area_t0), 0.3 * y)
+        top = -np.expm1(2 * np.log1p(-np.minimum(erf(e), 1 - 1e-12)))
+        gradient = np.interp(np.log(top), np.log(FRACTIONS), self.top_gradient)
+        return log_e, np.maximum.accumulate(np.log(y * gradient) + 1e-12 * np.arange(NODES))
+
+    def area(self, force: ArrayLike) -> FloatArray:
+        """A/A0 at F/(A0 E* g)."""
+        log_e, log_force = self._log_force_of_area
+        return np.asarray(erf(np.exp(np.interp(np.log(np.asarray(force, float)), log_force, log_e))))
+
+    def top_height(self, force: FloatArray, contact: FloatArray) -> FloatArray:
+        """Pressure-weighted height less that of the spectrum's own law."""
+        law = Law(self.spectrum, None, self.constants)
+        m = self.map_constants
+        near = np.exp(-((contact / m.gaussian_area) ** 2))
+        share = np.exp(-((contact / m.spectrum_area) ** 4))
+        own = _pressure_height(law, force)
+        # the Gaussian surface's force at this contact
+        grid = np.linspace(LIGHTEST - 2, HEAVIEST + 1, 2000)
+        log_gaussian = np.interp(contact, area(np.exp(grid), self.spectrum.alpha, self.constants), grid)
+        top = np.minimum(self.height_factor * contact, 1.0)
+        deviation = _pressure_height(law, np.exp(log_gaussian)) - mean_top_height(np.minimum(top, 1 - 1e-12))
+        return np.asarray(share * (self._mean_height(top) + (1 - near) * deviation - own))
+
+    @functools.cached_property
+    def _curve(self) -> tuple[FloatArray, FloatArray]:
+        """ln F and u, u falling."""
+        log_force = np.linspace(LIGHTEST, HEAVIEST, NODES)
+        force = np.exp(log_force)
+        difference = self.top_height(force, self.area(force))
+        # u is linear in H_p, and the spectrum's own H_p gives u_P
+        beyond = CubicSpline(log_force, difference * np.exp(-log_force)).antiderivative()
+        correction = 2 * force * (beyond(log_force[-1]) - beyond(log_force)) - difference
+        u = Law(self.spectrum, None, self.constants).separation_persson(force)[0] + correction
+        # where few points touch it may run back by a little
+        return log_force, np.minimum.accumulate(u - 1e-12 * np.arange(NODES))
+
+    def separation(self, force: ArrayLike) -> FloatArray:
+        """Mean separation [h_rms] at F/(A0 E* g)."""
+        log_force, u = self._curve
+        return np.asarray(np.interp(np.log(np.asarray(force, float)), log_force, u))
+
+    def force(self, u: ArrayLike) -> FloatArray:
+        """F/(A0 E* g) at mean separations [h_rms]; zero above the tabulated lightest."""
+        log_force, nodes = self._curve
+        gap = np.asarray(u, float)
+        positive = nodes > 1e-9
+        log_u = np.log(nodes[positive][::-1])
+        found = np.exp(np.interp(np.log(gap), log_u, log_force[positive][::-1]))
+        return np.asarray(np.where(gap <= nodes[0], found, 0.0))
+
+
+def _pressure_height(law: Law, force: FloatArray) -> FloatArray:
+    return np.asarray(law.separation_persson(force)[0] + 2 * law.energy(force) / force)

@@ -1,0 +1,163 @@
+"""The boundary-element campaign: its engine against closed forms and others' results, its surfaces, its file."""
+
+import dataclasses
+import os
+import pathlib
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+
+from generate.boundary_elements.collect import collect
+from generate.boundary_elements.design import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Task, campaign, nodes
+from generate.boundary_elements.run import boundary_elements, run
+from generate.boundary_elements.solve import Contact, simulate
+from generate.boundary_elements.surfaces import Recipe, heights
+from mbma_tables.bearing import FRACTIONS, bearing, radial_spectrum
+
+pytest.importorskip("tamaas")
+SQUARE = (1.0, 1.0)
+RECIPE = Recipe("self_affine", 0.8, 8, 2, 5, 64)
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.8])
+def test_wavy_surface_against_westergaard(share):
+    # mean pressure p over p* = pi E* amplitude/wavelength: A/A0 = (2/pi) asin(sqrt(p/p*)) (Westergaard 1939)
+    amplitude, points = 0.01, 512
+    wave = amplitude * np.cos(2 * np.pi * np.arange(points) / points)
+    full = np.pi * amplitude
+    contact = Contact(np.tile(wave[:, None], (1, 8)), (1.0, 8 / points), 1e-9)
+    result = contact.press(share * full)
+    assert result["area_raw"] == pytest.approx(2 / np.pi * np.arcsin(np.sqrt(share)), abs=2 / points)
+    # mean gap/amplitude of the same solution, from u = integral of -dU/du's closed form
+    s = share
+    assert result["mean_separation"] == pytest.approx(amplitude * (1 - s + s * np.log(s)), rel=2e-3)
+
+
+def test_force_is_the_derivative_of_energy():
+    surface = heights(RECIPE)
+    surface /= bearing(surface, SQUARE).gradient
+    contact = Contact(surface, SQUARE, 1e-9)
+    forces = np.geomspace(0.08, 0.12, 9)
+    results = [contact.press(force) for force in forces]
+    energy, gap, height = (
+        np.array([r[k] for r in results]) for k in ("energy", "mean_separation", "pressure_weighted_height")
+    )
+    np.testing.assert_allclose(height, gap + 2 * energy / forces, rtol=1e-7)
+    work = -np.sum((forces[1:] + forces[:-1]) / 2 * np.diff(gap))
+    assert energy[-1] - energy[0] == pytest.approx(work, rel=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [0, 1])
+def test_maps_solved_by_others(number):
+    folder = os.environ.get("MBMA_REFERENCE_MAPS")
+    if folder is None:
+        pytest.skip("no reference maps: set MBMA_REFERENCE_MAPS to their folder")
+    path = pathlib.Path(folder)
+    table = (path.parent / f"rolloff_{number}.csv").read_text().splitlines()
+    rows = np.array([[float(x) for x in line.split(",")[:4]] for line in table if line[:1].isdigit()])
+    contact = Contact(np.load(path / f"rolloff_{number}.npy"), SQUARE)
+    for force, area, area_raw, gap in rows[:6]:
+        result = contact.press(force)
+        assert result["area"] == pytest.approx(area, rel=1e-6)
+        assert result["area_raw"] == pytest.approx(area_raw, rel=1e-6)
+        assert result["mean_separation"] == pytest.approx(gap, rel=1e-6)
+
+
+class TestSurfaces:
+    def test_spectrum_is_the_one_asked_for(self):
+        # h_rms and gradient of fixed amplitudes |k|^-(1+H) on the lattice
+        k = np.hypot(*np.meshgrid(np.arange(-16, 17), np.arange(-16, 17)))
+        lattice = k[(k >= 2) & (k <= 16)]
+        gradient = np.sqrt(np.sum(lattice**-1.6) / np.sum(lattice**-3.6)) * 2 * np.pi
+        known = bearing(heights(RECIPE), SQUARE)
+        assert known.gradient == pytest.approx(gradient, rel=1e-12)
+        assert known.h_rms == pytest.approx(1, rel=1e-12)
+
+    def test_seed_gives_the_same_surface_on_every_grid(self):
+        fine = heights(dataclasses.replace(RECIPE, points=256))
+        np.testing.assert_allclose(fine[::4, ::4], heights(RECIPE), atol=1e-12)
+
+    @pytest.mark.parametrize(("kind", "shape"), [("peaks", 0.5), ("valleys", 0.5), ("worn", 1.0), ("patchy", 0.6)])
+    def test_transforms_skew_and_normalise(self, kind, shape):
+        z = heights(Recipe(kind, 0.8, 4, 4, 3, 128, shape))
+        assert abs(z.mean()) < 1e-12
+        assert z.std() == pytest.approx(1)
+        skewness, kurtosis = np.mean(z**3), np.mean(z**4)
+        assert {"peaks": skewness > 0.5, "valleys": skewness < -0.5, "worn": skewness < -0.3}.get(kind, kurtosis > 3.5)
+
+    def test_stretched_gradients(self):
+        recipe = Recipe("stretched", 0.8, 8, 4, 1, 128, 4.0)
+        assert bearing(heights(recipe), recipe.sizes).anisotropy == pytest.approx(4, rel=1e-6)
+
+    def test_filters_pass_half_at_their_cutoffs(self):
+        z = heights(Recipe("filtered", 0.5, 8, 4, 1, 256))
+        power = np.abs(np.fft.rfft2(z)) ** 2
+        plain = np.arange(1, 65.0) ** -3
+        passed = np.sqrt(power[0, 1:65] / plain)
+        # amplitudes: L-filter half at 4, S-filter half at 32 waves
+        assert passed[3] / passed[15] == pytest.approx(
+            0.5 * (1 - 2**-64) / (1 - 2**-16) * 2 ** (-((4 / 32) ** 2) + (16 / 32) ** 2), rel=1e-3
+        )
+
+    def test_bearing_of_a_paraboloid(self):
+        n = 401
+        x = (np.arange(n) - n // 2) / n
+        heap = np.maximum(1 - 8 * (x[:, None] ** 2 + x[None, :] ** 2), 0)
+        known = bearing(heap, SQUARE)
+        # M(a) of the cap: the mean height of its highest share falls linearly
+        share = FRACTIONS[60]
+        base = np.pi / 8
+        top = 1 - heap.mean()
+        assert known.mean_height[60] == pytest.approx(top - share / base / 2, abs=2e-4)
+
+    def test_spectrum_adds_up(self):
+        z = heights(RECIPE)
+        spectrum = radial_spectrum(z, SQUARE)
+        assert spectrum.variance.sum() == pytest.approx(1)
+        assert np.sqrt(spectrum.gradient.sum()) == pytest.approx(bearing(z, SQUARE).gradient)
+
+
+class TestCampaign:
+    def test_design_holds_out_whole_spectra_and_whole_surfaces(self):
+        tasks = campaign()
+        assert len({task.recipe.name for task in tasks}) == len(tasks)
+
+        def spectra(split):
+            return {dataclasses.replace(task.recipe, seed=0) for task in tasks if task.split == split}
+
+        assert not spectra(TRAINING) & spectra(HELD_OUT_SPECTRUM)
+        assert {r.kind for r in spectra(TRAINING)} == {r.kind for r in spectra(HELD_OUT_SPECTRUM)}
+        assert len({task.recipe.seed for task in tasks}) >= len(nodes())
+
+    def test_scale_keeps_seeds(self):
+        names = {task.recipe.name for task in campaign()}
+        assert names < {task.recipe.name for task in campaign(2)}
+        assert {task.recipe.name for task in campaign(0.5)} < names
+
+    def test_runs_resumes_and_collects(self, tmp_path):
+        tasks = [Task(RECIPE, "training"), Task(dataclasses.replace(RECIPE, seed=6), "held_out_surface")]
+        run(tasks[:1], tmp_path)
+        before = (tmp_path / f"{RECIPE.name}.npz").stat().st_mtime_ns
+        target = tmp_path / "evidence.nc"
+        assert collect(tasks, tmp_path, target) == 1
+        run(tasks, tmp_path)
+        assert (tmp_path / f"{RECIPE.name}.npz").stat().st_mtime_ns == before
+        assert collect(tasks, tmp_path, target) == 2
+        with xr.open_dataset(target) as data:
+            assert data.split.values.tolist() == [SPLITS.index(task.split) for task in tasks]
+            assert all("units" in v.attrs or "flag_meanings" in v.attrs for v in data.data_vars.values())
+            own = simulate(RECIPE)
+            np.testing.assert_allclose(data.area[0, : len(own["force"])], own["area"], rtol=1e-12)
+            np.testing.assert_allclose(data.band_energy[0, :15].sum("band_or_end"), own["energy"][:15], rtol=1e-6)
+            identity = data.mean_separation + 2 * data.energy / data.force
+            np.testing.assert_allclose(data.pressure_weighted_height, identity, atol=1e-6)
+
+    def test_command_lists_and_refuses_an_empty_folder(self, tmp_path):
+        listed = CliRunner().invoke(boundary_elements, ["--list", "--scale", "0.1", "--points", "64", "--folder", str(tmp_path)])
+        assert listed.exit_code == 0
+        assert "missing" in listed.output
+        empty = CliRunner().invoke(boundary_elements, ["--folder", str(tmp_path), "--collect", str(tmp_path / "a.nc")])
+        assert "no surface" in str(empty.exception)
