@@ -15,6 +15,7 @@ from mbma_tables.errors import MbmaError
 # imported when asked for: each needs packages of the extra "generate"
 GROUPS = {
     "boundary_elements": "generate.boundary_elements.run",
+    "calibrated": "generate.calibrated",
     "formulas": "generate.formulas.commands",
     "tables": "generate.tables.commands",
 }

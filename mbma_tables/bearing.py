@@ -54,6 +54,9 @@ class Bearing:
         M(a), mean height of the highest share a of the map, a = `FRACTIONS`.
     top_gradient : numpy.ndarray, shape (91,)
         (2/sqrt(pi)) <|w|>/sqrt(2) over the same tops, w the gradient whitened by its own tensor: 1 if Gaussian.
+    tension_force, tension : numpy.ndarray, shape (91,)
+        Mean pressures F at which full contact would pull on shares `FRACTIONS` of the map, and the mean pull then,
+        <max(-p, 0)> over the whole map [E*].
     anisotropy : float
         Root of the ratio of the gradient tensor's eigenvalues, at least 1.
     slope_kurtosis : float
@@ -66,6 +69,8 @@ class Bearing:
     quantiles: FloatArray
     mean_height: FloatArray
     top_gradient: FloatArray
+    tension_force: FloatArray
+    tension: FloatArray
     anisotropy: float
     slope_kurtosis: float
 
@@ -124,6 +129,9 @@ def bearing(heights: FloatArray, sizes: tuple[float, float]) -> Bearing:
     share = count / values.size
     first = min(MIN_TOP_POINTS, values.size) - 1
     tops = np.cumsum(whitened[order]) / count * (2 / np.sqrt(np.pi)) / np.sqrt(2)
+    # pressures of full contact, E* |q| h_q/2, about their mean; lowest first
+    full = np.sort(np.fft.irfft2(transform * np.hypot(qx, qy) / 2, s=values.shape), axis=None)
+    pull = (np.cumsum(full) - full * count) / values.size
     return Bearing(
         float(values.std()),
         float(ordered[0]),
@@ -131,6 +139,8 @@ def bearing(heights: FloatArray, sizes: tuple[float, float]) -> Bearing:
         np.interp(1 - QUANTILES, (count - 1) / (values.size - 1), ordered),
         np.interp(FRACTIONS, share, np.cumsum(ordered) / count),
         np.interp(np.maximum(FRACTIONS, share[first]), share, tops),
+        np.interp(FRACTIONS, share, -full),
+        np.interp(FRACTIONS, share, -pull),
         float(np.sqrt(eigenvalues[1] / eigenvalues[0])),
         float(0.375 * np.mean(whitened**4)),
     )

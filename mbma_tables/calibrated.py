@@ -3,15 +3,16 @@ r"""Contact of a rough surface by Persson's energy integral, its cover and weigh
 Units: force :math:`\hat F = F/(A_0 E^* g)` with g the rms gradient in two dimensions, lengths in h_rms, wavenumbers
 x = q/q0, elastic energy over :math:`A_0 E^* g h_{rms}`. A spectrum enters by its shares w(x) of h_rms^2 per d ln x. ::
 
-    S(F; s0, t0)  = (s0 + t)/(1 + t),  t = F/t0;        cover(F; s0, t0) = erf(sqrt(2) F/sqrt(S))
-    A/A0          = cover(F)                             s0 of Nayak's alpha
-    P(x; F)       = cover(F g/g(x))                      g(x)^2: the gradient's square of waves below x
-    U(F)          = 1/(4 g^) integral x w(x) W(P) d ln x,   W(P) = a P + b P^3 + (1 - a - b) P^4,   g^ = g/(q0 h_rms)
-    u_P(F)        = integral from F to infinity of dU/F    so that F = -dU/du, and full contact is exact
-    F_G(u)        = F_P(u) exp(-c max(u - 2, 0)^2)         a Gaussian surface without end
+    A/A0    = erf(sqrt(2) F/sqrt(S)),  S = (s0 + t)/(1 + t),  t = F/t0,  s0 of Nayak's alpha (S = 1: Persson's)
+    P(x; F) = erf(sqrt(2) F g/g(x))                      g(x)^2: the gradient's square of the waves below x
+    U(F)    = 1/(4 g^) integral x w(x) W(P) d ln x,      W(P) = a P + b P^3 + (1 - a - b) P^16,  g^ = g/(q0 h_rms)
+    u_P(F)  = integral from F to infinity of dU/F        so that F = -dU/du, and full contact is exact
+    F_G(u)  = F_P(u) exp(-c max(u - u0, 0)^2)            a Gaussian surface without end
+    F(u)    = F_G(u) - F_G(h_max)                        one that ends at h_max: its stiffness is the endless one's
 
-W = P is Persson's theory with weight 1. Because P depends on F and x through y = F g/g(x) alone, the inner integral
-is a function of y, tabulated once: a curve is then one sum over the spectrum.
+W = P is Persson's theory with weight 1, W = gamma P + (1 - gamma) P^3 Yang and Persson's. a and c depend on the
+spectrum's mean wavenumber over its root mean square, which needs no Hurst exponent. Because P depends on F and x
+through y = F g/g(x) alone, the inner integral is a function of y, tabulated once: a curve is one sum over waves.
 """
 
 from __future__ import annotations
@@ -28,11 +29,14 @@ from mbma_tables.arguments import FloatArray
 
 LOG_Y = (-32.0, 2.25)  # ln y of the tabulated inner integrals; above its end they are below 1e-150
 Y_NODES = 1200
-POWERS = (1, 3, 4)  # of the cover in the weight W
+POWERS = (1, 3, 16)  # of the cover in the weight W
 CLOSEST = -36.0  # ln ln x where a self-affine spectrum's quadrature begins
 PANEL, PANEL_NODES = 1.0, 10  # its panels, in ln ln x below x = e and in ln x above
 LOG_FORCE = (-21.0, 1.6)  # ln F^ over which a curve is tabulated
 FORCE_NODES = 227
+
+
+MEAN_WAVE = 0.8  # <q>/sqrt(<q^2>) that the constants' slopes refer to
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,70 +47,50 @@ class Constants:
     ----------
     area_s0, area_slope, area_t0 : float
         S of the area: s0 = area_s0 + area_slope ln(alpha/10), at most 0.95.
-    cover_s0, cover_t0 : float
-        S of the cover P in the energy integral.
     weight, weight_slope, cubic : float
-        W's coefficients: of P, with its slope in (H - 0.7), and of P^3.
-    tail, tail_slope : float
-        Of the Gaussian tail factor, the slope again in (H - 0.7).
-    closure : float
-        Exponent b of F^b = F_G(u)^b - F_G(h_max)^b.
-    mixing : float
-        Height u where half of a map's own heights have come in.
+        W's coefficients a, with its slope in the mean wavenumber less 0.8, and b.
+    tail, tail_slope, onset : float
+        c of the Gaussian tail factor, the slope again in the mean wavenumber, and u0.
     """
 
     area_s0: float = 0.497
     area_slope: float = 0.041
     area_t0: float = 0.321
-    cover_s0: float = 0.50
-    cover_t0: float = 0.303
-    weight: float = 0.393
-    weight_slope: float = 0.149
-    cubic: float = -0.517
-    tail: float = 0.892
-    tail_slope: float = 0.516
-    closure: float = 0.749
-    mixing: float = 1.034
+    weight: float = 0.440
+    weight_slope: float = 0.225
+    cubic: float = 0.429
+    tail: float = 0.268
+    tail_slope: float = 0.296
+    onset: float = 1.319
 
 
 CONSTANTS = Constants()
-PERSSON = dataclasses.replace(
-    CONSTANTS,
-    area_s0=1.0,
-    area_slope=0.0,
-    cover_s0=1.0,
-    weight=1.0,
-    weight_slope=0.0,
-    cubic=0.0,
-    tail=0.0,
-    tail_slope=0.0,
-)
+PERSSON = Constants(1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+YANG_PERSSON = dataclasses.replace(PERSSON, weight=0.42, cubic=0.58)
 
 
-def _cover(force: FloatArray, s0: float | FloatArray, t0: float) -> tuple[FloatArray, FloatArray]:
-    """erf(sqrt(2) F/sqrt(S)) and its derivative with respect to F."""
-    t = force / t0
-    S = (s0 + t) / (1 + t)
-    argument = force * np.sqrt(2 / S)
-    slope = np.sqrt(2 / S) * (1 - 0.5 * t * (1 - s0) / ((1 + t) * (s0 + t)))
-    return erf(argument), 2 / np.sqrt(np.pi) * np.exp(-(argument**2)) * slope
+def _cover(force: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """erf(sqrt(2) F), Persson's contact of unit gradient, and its derivative."""
+    return erf(np.sqrt(2) * force), np.sqrt(8 / np.pi) * np.exp(-2 * force**2)
 
 
 def area(force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """A/A0 at F/(A0 E* g) on a surface of Nayak's parameter alpha = m0 m4/m2^2."""
+    values = np.asarray(force, float)
     s0 = np.minimum(constants.area_s0 + constants.area_slope * np.log(np.asarray(alpha) / 10), 0.95)
-    return _cover(np.asarray(force, float), s0, constants.area_t0)[0]
+    t = values / constants.area_t0
+    return np.asarray(erf(values * np.sqrt(2 * (1 + t) / (s0 + t))))
 
 
-@functools.lru_cache(maxsize=64)
-def _inner_integrals(s0: float, t0: float) -> tuple[BSpline, ...]:
+@functools.cache
+def _inner_integrals() -> tuple[BSpline, ...]:
     """ln of I_n(y) = integral from y to infinity of dP^n/y', for n in POWERS, over ln y."""
     log_y = np.linspace(*LOG_Y, Y_NODES)
     node, weight = np.polynomial.legendre.leggauss(12)
     step = log_y[1] - log_y[0]
     y = np.exp(log_y[:-1, None] + step * (node + 1) / 2)
-    P, dP = _cover(y, s0, t0)
-    dP_end = _cover(np.exp(log_y), s0, t0)[1]
+    P, dP = _cover(y)
+    dP_end = _cover(np.exp(log_y))[1]
     shapes = []
     for n in POWERS:
         # dP^n/y' = n P^(n-1) P' d ln y'
@@ -118,16 +102,16 @@ def _inner_integrals(s0: float, t0: float) -> tuple[BSpline, ...]:
     return tuple(shapes)
 
 
-def _inner(y: FloatArray, coefficients: FloatArray, s0: float, t0: float) -> FloatArray:
+def _inner(y: FloatArray, coefficients: FloatArray) -> FloatArray:
     """Sum of a_n I_n(y)."""
     log_y = np.log(y)
     inside = np.clip(log_y, *LOG_Y)
     total = np.zeros(np.shape(y))
-    for n, a, shape in zip(POWERS, coefficients, _inner_integrals(s0, t0), strict=True):
+    for n, a, shape in zip(POWERS, coefficients, _inner_integrals(), strict=True):
         value = np.exp(shape(inside))
         if n == 1:
             # below the table I_1 is a logarithm, the others are constant
-            value += _cover(np.zeros(1), s0, t0)[1] * (inside - log_y) * (log_y < LOG_Y[0])
+            value += np.sqrt(8 / np.pi) * (inside - log_y) * (log_y < LOG_Y[0])
         total += a * value
     return np.where(log_y < LOG_Y[1], total, 0.0)
 
@@ -148,8 +132,6 @@ class Spectrum:
         g/(q0 h_rms).
     alpha : float
         m0 m4/m2^2.
-    hurst : float
-        Exponent that the constants' slopes refer to.
     """
 
     x: FloatArray
@@ -157,7 +139,11 @@ class Spectrum:
     below: FloatArray
     gradient: float
     alpha: float
-    hurst: float = 0.7
+
+    @functools.cached_property
+    def mean_wave(self) -> float:
+        """<q>/sqrt(<q^2>), weighted by variance: 1 for a single wavelength, less the broader the spectrum."""
+        return float(np.sum(self.x * self.variance) / self.gradient)
 
     @classmethod
     def self_affine(cls, hurst: float, zeta_1: float, panel: float = PANEL) -> Spectrum:
@@ -184,11 +170,10 @@ class Spectrum:
             growth(mid, log_x) / m2,
             float(np.sqrt(m2 / m0)),
             float(1.5 * m0 * m4 / m2**2),
-            hurst,
         )
 
     @classmethod
-    def from_shares(cls, x: ArrayLike, variance: ArrayLike, hurst: float = 0.7) -> Spectrum:
+    def from_shares(cls, x: ArrayLike, variance: ArrayLike) -> Spectrum:
         """Bands of wavenumber x (each its root mean square) that hold these shares of the height variance."""
         wavenumber, share = np.asarray(x, float), np.asarray(variance, float)
         held = share > 0
@@ -198,7 +183,7 @@ class Spectrum:
         # a band's own waves lie half below its middle
         below = (np.cumsum(slopes) - slopes / 2) / m2
         alpha = 1.5 * np.sum(share * wavenumber**4) / m2**2
-        return cls(wavenumber, share, below, float(np.sqrt(m2)), float(alpha), hurst)
+        return cls(wavenumber, share, below, float(np.sqrt(m2)), float(alpha))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -220,8 +205,12 @@ class Law:
     @functools.cached_property
     def _coefficients(self) -> FloatArray:
         c = self.constants
-        a = c.weight + c.weight_slope * (self.spectrum.hurst - 0.7)
+        a = c.weight + c.weight_slope * (self.spectrum.mean_wave - MEAN_WAVE)
         return np.array([a, c.cubic, 1 - a - c.cubic])
+
+    @property
+    def _tail(self) -> float:
+        return self.constants.tail + self.constants.tail_slope * (self.spectrum.mean_wave - MEAN_WAVE)
 
     def _over_spectrum(self, force: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """y = F g/g(x), shape (..., n), 1/g(x) and the spectrum's weights x w/(4 g^)."""
@@ -232,29 +221,27 @@ class Law:
     def energy(self, force: ArrayLike) -> FloatArray:
         """Elastic energy U of the endless Gaussian surface, before its tail factor."""
         y, _, shares = self._over_spectrum(force)
-        P, _ = _cover(y, self.constants.cover_s0, self.constants.cover_t0)
+        P, _ = _cover(y)
         weights = sum(a * P**n for n, a in zip(POWERS, self._coefficients, strict=True))
         return np.asarray(weights @ shares)
 
     def separation_persson(self, force: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """u_P and du_P/d ln F, before the tail factor."""
-        c = self.constants
         y, inverse, shares = self._over_spectrum(force)
-        u = _inner(y, self._coefficients, c.cover_s0, c.cover_t0) @ (shares * inverse)
-        P, dP = _cover(y, c.cover_s0, c.cover_t0)
+        u = _inner(y, self._coefficients) @ (shares * inverse)
+        P, dP = _cover(y)
         slope = sum(a * n * P ** (n - 1) for n, a in zip(POWERS, self._coefficients, strict=True)) * dP
         return u, -np.asarray(slope @ (shares * inverse))
 
     @functools.cached_property
-    def _curve(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """ln F_P nodes, falling; u; d ln F_G/du."""
+    def _curve(self) -> tuple[FloatArray, FloatArray]:
+        """ln F_P, falling, and u."""
         log_force = np.linspace(*LOG_FORCE[::-1], FORCE_NODES)
-        u, slope = self.separation_persson(np.exp(log_force))
-        return log_force, u, slope
+        return log_force, self.separation_persson(np.exp(log_force))[0]
 
     def _log_force_persson(self, u: FloatArray) -> FloatArray:
         """ln F_P(u): from the tabulated curve, then Newton's method on it."""
-        log_nodes, u_nodes, _ = self._curve
+        log_nodes, u_nodes = self._curve
         log_force = np.interp(np.log(u), np.log(u_nodes), log_nodes)
         for _ in range(30):
             value, slope = self.separation_persson(np.exp(log_force))
@@ -271,8 +258,8 @@ class Law:
         flat = values.ravel()
         log_force = self._log_force_persson(flat)
         _, slope = self.separation_persson(np.exp(log_force))
-        tail = self.constants.tail + self.constants.tail_slope * (self.spectrum.hurst - 0.7)
-        above = np.maximum(flat - 2, 0)
+        tail = self._tail
+        above = np.maximum(flat - self.constants.onset, 0)
         return (
             (log_force - tail * above**2).reshape(values.shape),
             (-1 / slope + 2 * tail * above).reshape(values.shape),
@@ -288,24 +275,31 @@ class Law:
         log_gaussian, rate = self.gaussian(gap)
         if self.h_max is None:
             return np.exp(log_gaussian), rate * np.exp(log_gaussian)
-        b = self.constants.closure
-        log_end, _ = self.gaussian(self.h_max)
-        # F^b = F_G^b (1 - r), r = (F_G(h_max)/F_G)^b
-        share = -np.expm1(np.minimum(b * (log_end - log_gaussian), 0.0))
-        touching = share > 0
-        safe = np.where(touching, share, 1.0)
-        force = np.where(touching, np.exp(log_gaussian) * safe ** (1 / b), 0.0)
-        return force, np.where(touching, rate * np.exp(log_gaussian) * safe ** (1 / b - 1), 0.0)
+        end, touching = np.exp(self.gaussian(self.h_max)[0]), gap < self.h_max
+        endless = np.exp(log_gaussian)
+        force = np.where(touching, endless - end, 0.0)
+        return force, np.where(touching, rate * endless, 0.0)
+
+    def separation(self, force: ArrayLike) -> FloatArray:
+        """Mean separation u [h_rms] at F/(A0 E* g): the inverse of `force`."""
+        given = np.asarray(force, float)
+        end = 0.0 if self.h_max is None else np.exp(self.gaussian(self.h_max)[0])
+        goal = np.log(given.ravel() + end)
+        log_nodes, u_nodes = self._curve
+        tail, onset = self._tail, self.constants.onset
+        log_force = np.interp(goal, (log_nodes - tail * np.maximum(u_nodes - onset, 0) ** 2)[::-1], log_nodes[::-1])
+        for _ in range(30):
+            u, slope = self.separation_persson(np.exp(log_force))
+            above = np.maximum(u - onset, 0)
+            step = (log_force - tail * above**2 - goal) / (1 - 2 * tail * above * slope)
+            log_force -= step
+            if np.all(np.abs(step) < 1e-12):
+                break
+        return self.separation_persson(np.exp(log_force))[0].reshape(given.shape)
 
     def area(self, force: ArrayLike) -> FloatArray:
         """A/A0 at F/(A0 E* g)."""
         return area(force, self.spectrum.alpha, self.constants)
-
-    def force_with_heights(self, u: ArrayLike, share_above: ArrayLike) -> FloatArray:
-        """Force at u [h_rms] on a map of which these shares lie above u: closes itself at the highest point."""
-        gap, share = np.asarray(u, float), np.asarray(share_above, float)
-        mixed = gap + (-ndtri(np.maximum(share, 1e-300)) - gap) * -np.expm1(-((gap / self.constants.mixing) ** 4))
-        return np.where(share > 0, np.exp(self.gaussian(mixed)[0]), 0.0)
 
 
 def mean_top_height(share: ArrayLike) -> FloatArray:

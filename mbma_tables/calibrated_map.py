@@ -6,8 +6,10 @@ pressure-weighted height H_p = <p h>/<p> obeys H_p = u + 2 U/F exactly; with dU 
     u(F) = 2 F integral from F to infinity of H_p/F'^2 dF' - H_p(F)
 
 At light load H_p = M(c A), the mean height of the highest share c A of the map, c = 4/5 exactly for Hertzian
-contact; towards full contact it goes over to the spectrum's own H_p. The area is the law's with the gradient of the
-highest share 1 - (1 - A)^2 of the map in place of g, the 2 A of a paraboloid, and Hertz's elliptic factor.
+contact. Towards full contact the map's valleys decide: gaps open where the pressures of full contact would pull, and
+u is the spectrum's u_P at the force F_D at which Gaussian pressures of full contact would pull as much in the mean,
+<max(-p, 0)>; no constant is fitted there. The area is the law's with the gradient of the highest share 1 - (1 - A)^2
+of the map in place of g, the 2 A of a paraboloid, and Hertz's elliptic factor.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
-from scipy.special import ellipe, ellipk, erf
+from scipy.special import ellipe, ellipk, erf, ndtr
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.bearing import FRACTIONS
@@ -27,6 +29,8 @@ from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, area, me
 
 LIGHTEST, HEAVIEST = -16.0, 1.4  # ln F^ of a map's curve
 NODES = 700
+MIN_TENSION, MIN_SHARE = 1e-12, 1e-4  # pulls on fewer points are one point's
+MIN_RATIO = 0.05
 ERF_INVERSE = (1e-7, 3.9)  # erfinv(A) over which F(A) is tabulated
 
 
@@ -38,14 +42,14 @@ class MapConstants:
     ----------
     breadth, breadth_onset : float
         c = 0.8 max(1, zeta_e/breadth_onset)^breadth for an isotropic map.
-    gaussian_area, spectrum_area : float
-        Contact where the deviation of a Gaussian surface, and then the spectrum's own law, take over.
+    gaussian_area, valley_area : float
+        Contact where the deviation of a Gaussian surface from M(c A), and then the valleys, take over.
     """
 
     breadth: float = 0.13
     breadth_onset: float = 3.0
     gaussian_area: float = 0.2
-    spectrum_area: float = 0.5
+    valley_area: float = 0.5
 
 
 MAP_CONSTANTS = MapConstants()
@@ -85,8 +89,8 @@ class MapLaw:
         The map's own.
     inverse_q2 : float
         Mean of (q0/q)^2 over the spectrum, weighted by variance.
-    mean_height, top_gradient : numpy.ndarray, shape (91,)
-        M(a) [h_rms] and the tops' gradient of `bearing`.
+    mean_height, top_gradient, tension_force, tension : numpy.ndarray, shape (91,)
+        Of `bearing`: M(a) [h_rms], the tops' gradient, and the pulls of full contact [E* g].
     anisotropy : float
     """
 
@@ -94,6 +98,8 @@ class MapLaw:
     inverse_q2: float
     mean_height: FloatArray
     top_gradient: FloatArray
+    tension_force: FloatArray
+    tension: FloatArray
     anisotropy: float = 1.0
     constants: Constants = CONSTANTS
     map_constants: MapConstants = MAP_CONSTANTS
@@ -131,30 +137,43 @@ class MapLaw:
         log_e, log_force = self._log_force_of_area
         return np.asarray(erf(np.exp(np.interp(np.log(np.asarray(force, float)), log_force, log_e))))
 
-    def top_height(self, force: FloatArray, contact: FloatArray) -> FloatArray:
-        """Pressure-weighted height less that of the spectrum's own law."""
-        law = Law(self.spectrum, None, self.constants)
-        m = self.map_constants
-        near = np.exp(-((contact / m.gaussian_area) ** 2))
-        share = np.exp(-((contact / m.spectrum_area) ** 4))
-        own = _pressure_height(law, force)
-        # the Gaussian surface's force at this contact
-        grid = np.linspace(LIGHTEST - 2, HEAVIEST + 1, 2000)
-        log_gaussian = np.interp(contact, area(np.exp(grid), self.spectrum.alpha, self.constants), grid)
-        top = np.minimum(self.height_factor * contact, 1.0)
-        deviation = _pressure_height(law, np.exp(log_gaussian)) - mean_top_height(np.minimum(top, 1 - 1e-12))
-        return np.asarray(share * (self._mean_height(top) + (1 - near) * deviation - own))
+    def gaussian_force(self, force: ArrayLike) -> FloatArray:
+        """F_D: where Gaussian pressures of full contact pull as much in the mean as the map's do at F."""
+        # <max(-p, 0)> of Gaussian pressures, standard deviation 1/2
+        x = np.linspace(-3.0, 4.0, 1500)
+        gaussian = 0.5 * np.exp(-2 * x * x) / np.sqrt(2 * np.pi) - x * ndtr(-2 * x)
+        kept = (self.tension > MIN_TENSION) & (FRACTIONS >= MIN_SHARE)
+        matched = np.interp(-np.log(self.tension[kept]), -np.log(gaussian), x)[::-1]
+        own = self.tension_force[kept][::-1]
+        given = np.asarray(force, float)
+        found = np.interp(given, own, matched) + np.maximum(given - own[-1], 0) * (matched[-1] / own[-1])
+        # at light loads another closure rules: any positive curve that rises
+        return np.asarray(np.maximum(found, MIN_RATIO * given))
 
     @functools.cached_property
     def _curve(self) -> tuple[FloatArray, FloatArray]:
         """ln F and u, u falling."""
+        law, m = Law(self.spectrum, None, self.constants), self.map_constants
         log_force = np.linspace(LIGHTEST, HEAVIEST, NODES)
         force = np.exp(log_force)
-        difference = self.top_height(force, self.area(force))
-        # u is linear in H_p, and the spectrum's own H_p gives u_P
+        contact = self.area(force)
+        # the valleys' curve, and its pressure-weighted height u + 2 U/F
+        u = law.separation_persson(self.gaussian_force(force))[0]
+        work = CubicSpline(log_force, u * force).antiderivative()
+        # U_full - integral of F' (-du/dF') dF', by parts
+        full = np.sum(self.spectrum.x * self.spectrum.variance) / (4 * self.spectrum.gradient)
+        energy = full - u * force - (work(log_force[-1]) - work(log_force))
+        valleys = u + 2 * energy / force
+        # the tops', with the deviation of a Gaussian surface from M(c A) at the same contact
+        grid = np.linspace(LIGHTEST - 2, HEAVIEST + 1, 2000)
+        same = np.exp(np.interp(contact, area(np.exp(grid), self.spectrum.alpha, self.constants), grid))
+        top = np.minimum(self.height_factor * contact, 1 - 1e-12)
+        deviation = law.separation_persson(same)[0] + 2 * law.energy(same) / same - mean_top_height(top)
+        tops = self._mean_height(top) + -np.expm1(-((contact / m.gaussian_area) ** 2)) * deviation
+        difference = np.exp(-((contact / m.valley_area) ** 4)) * (tops - valleys)
+        # u is linear in H_p
         beyond = CubicSpline(log_force, difference * np.exp(-log_force)).antiderivative()
-        correction = 2 * force * (beyond(log_force[-1]) - beyond(log_force)) - difference
-        u = Law(self.spectrum, None, self.constants).separation_persson(force)[0] + correction
+        u = u + 2 * force * (beyond(log_force[-1]) - beyond(log_force)) - difference
         # where few points touch it may run back by a little
         return log_force, np.minimum.accumulate(u - 1e-12 * np.arange(NODES))
 
@@ -171,7 +190,3 @@ class MapLaw:
         log_u = np.log(nodes[positive][::-1])
         found = np.exp(np.interp(np.log(gap), log_u, log_force[positive][::-1]))
         return np.asarray(np.where(gap <= nodes[0], found, 0.0))
-
-
-def _pressure_height(law: Law, force: FloatArray) -> FloatArray:
-    return np.asarray(law.separation_persson(force)[0] + 2 * law.energy(force) / force)

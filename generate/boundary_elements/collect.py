@@ -38,6 +38,8 @@ NUMBERS = {
     "quantiles": ("quantile", "heights below which shares of the surface lie, in h_rms"),
     "mean_height": ("top", "M(a), mean height of the highest share a of the surface, in h_rms"),
     "top_gradient": ("top", "(2/sqrt(pi)) <|w|>/sqrt(2) over the highest share a: 1 if Gaussian"),
+    "tension_force": ("top", "F/(A0 E* g) at which full contact would pull on a share a of the surface"),
+    "tension": ("top", "mean pull <max(-p, 0)> of full contact at that force, over E* g"),
     "band_q": ("band", "q/q0 of a band of wavenumbers, the variance-weighted root mean square"),
     "band_variance": ("band", "share of h_rms^2 in the band"),
     "band_inverse_q2": ("band", "mean (q0/q)^2 of the band, weighted by variance"),
@@ -45,7 +47,7 @@ NUMBERS = {
     "band_curvature": ("band", "m4 h_rms^2/g^4 of the band: alpha = m0 m4/m2^2 is 4 times its sum"),
     "band_energy": ("band_or_end", "elastic energy of the pressure's waves by band, over A0 E* g h_rms"),
 }
-SINGLE = {"quantiles", "mean_height", "top_gradient", "band_energy"}  # kept to 7 digits
+SINGLE = {"quantiles", "mean_height", "top_gradient", "tension_force", "tension", "band_energy"}  # kept to 7 digits
 LOADED = {"band_energy"}
 
 

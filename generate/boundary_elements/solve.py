@@ -97,6 +97,8 @@ def simulate(recipe: Recipe) -> dict[str, Any]:
         "quantiles": known.quantiles / h_rms,
         "mean_height": known.mean_height / h_rms,
         "top_gradient": known.top_gradient,
+        "tension_force": known.tension_force,
+        "tension": known.tension,
         "anisotropy": known.anisotropy,
         "slope_kurtosis": known.slope_kurtosis,
         "band_q": spectrum.q / recipe.q0,

@@ -156,7 +156,9 @@ class TestCampaign:
             np.testing.assert_allclose(data.pressure_weighted_height, identity, atol=1e-6)
 
     def test_command_lists_and_refuses_an_empty_folder(self, tmp_path):
-        listed = CliRunner().invoke(boundary_elements, ["--list", "--scale", "0.1", "--points", "64", "--folder", str(tmp_path)])
+        listed = CliRunner().invoke(
+            boundary_elements, ["--list", "--scale", "0.1", "--points", "64", "--folder", str(tmp_path)]
+        )
         assert listed.exit_code == 0
         assert "missing" in listed.output
         empty = CliRunner().invoke(boundary_elements, ["--folder", str(tmp_path), "--collect", str(tmp_path / "a.nc")])
