@@ -29,6 +29,7 @@ TAIL_AREA = 0.1
 # errors that count alike: model noise plus the scatter of surfaces at light contact
 NOISE = {"area": (0.015, 0.15), "tail": (0.05, 0.25), "map": (0.03, 0.1)}
 LIGHT = 0.01
+STEP = 0.01  # relative, of numerical derivatives: laws of maps are interpolated
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -40,6 +41,7 @@ class Case:
     node: tuple[float | str, ...]
     waves: int
     spectrum: Spectrum
+    own_spectrum: Spectrum
     h_max: float
     curves: dict[str, Any]
     force: FloatArray
@@ -57,7 +59,7 @@ class Case:
 
     def map_law(self, constants: Constants, map_constants: MapConstants) -> MapLaw:
         """The map's law."""
-        return MapLaw(self.spectrum, **self.curves, constants=constants, map_constants=map_constants)
+        return MapLaw(self.own_spectrum, **self.curves, constants=constants, map_constants=map_constants)
 
     def noise(self, name: str) -> FloatArray:
         """Errors of ln F or ln A that count as one."""
@@ -77,20 +79,22 @@ def cases(data: xr.Dataset) -> list[Case]:
         share, x = one.band_variance.values, one.band_q.values
         plain = kind == "self_affine"
         seen = np.isfinite(one.force.values) & (one.area.values > 0) & (one.area.values < EDGES[-1])
-        curves = {
+        curves: dict[str, Any] = {
             name: one[name].values.astype(float) for name in ("mean_height", "top_gradient", "tension_force", "tension")
         }
         curves |= {
             "inverse_q2": float(np.nansum(share * one.band_inverse_q2.values)),
             "anisotropy": float(one.anisotropy),
         }
+        own_spectrum = Spectrum.from_shares(x[share > 0], share[share > 0])
         found.append(
             Case(
                 kind,
                 split,
                 (kind, hurst, zeta_1, int(one.waves), float(one["shape"])),
                 int(one.waves),
-                Spectrum.self_affine(hurst, zeta_1) if plain else Spectrum.from_shares(x[share > 0], share[share > 0]),
+                Spectrum.self_affine(hurst, zeta_1) if plain else own_spectrum,
+                own_spectrum,
                 float(one.h_max),
                 curves,
                 *(one[name].values[seen] for name in ("force", "area", "mean_separation")),
@@ -101,7 +105,7 @@ def cases(data: xr.Dataset) -> list[Case]:
 
 def _solve(residuals: Callable[[FloatArray], FloatArray], start: Iterable[float]) -> FloatArray:
     """Robust least squares."""
-    return np.asarray(least_squares(residuals, list(start), loss="soft_l1", x_scale="jac").x)
+    return np.asarray(least_squares(residuals, list(start), loss="soft_l1", x_scale="jac", diff_step=STEP).x)
 
 
 def fit_area(seen: Sequence[Case], constants: Constants) -> Constants:
@@ -171,16 +175,28 @@ def fit(training: Sequence[Case]) -> Constants:
 
 
 def fit_map(training: Sequence[Case], constants: Constants) -> MapConstants:
-    """The map's law: force at equal u, all kinds of surfaces."""
-    names = [field.name for field in dataclasses.fields(MapConstants)]
+    """The map's law: area of stretched surfaces, then force at equal u of all kinds."""
+    stretched = [one for one in training if one.kind == "stretched"]
 
-    def residuals(values: FloatArray) -> FloatArray:
-        own = MapConstants(*map(float, values))
+    def areas(values: FloatArray) -> FloatArray:
+        own = dataclasses.replace(MAP_CONSTANTS, elliptic=values[0])
+        found = [np.log(one.map_law(constants, own).area(one.force) / one.area) / one.noise("map") for one in stretched]
+        return np.concatenate(found)
+
+    (elliptic,) = _solve(areas, [MAP_CONSTANTS.elliptic])
+
+    def trial(values: FloatArray) -> MapConstants:
+        breadth, onset, gaussian_area, valley_area, merging_area = map(float, values)
+        return MapConstants(breadth, onset, gaussian_area, valley_area, merging_area, float(elliptic))
+
+    def forces(values: FloatArray) -> FloatArray:
+        own = trial(values)
         return np.concatenate(
-            [errors(one, one.map_law(constants, own))["force"] / one.noise("map") for one in training]
+            [errors(one, one.map_law(constants, own))["force"] / one.noise("map") for one in training if one.waves > 1]
         )
 
-    return MapConstants(*map(float, _solve(residuals, [getattr(MAP_CONSTANTS, name) for name in names])))
+    start = dataclasses.astuple(MAP_CONSTANTS)[:-1]
+    return trial(_solve(forces, start))
 
 
 def errors(one: Case, law: Law | MapLaw, stiffness: bool = False) -> dict[str, FloatArray]:
@@ -192,7 +208,8 @@ def errors(one: Case, law: Law | MapLaw, stiffness: bool = False) -> dict[str, F
     }
     if stiffness:
         # both by one spline through the simulated loads, so that its error cancels
-        slopes = [CubicSpline(log_force, np.log(u))(log_force, 1) * u for u in (law.separation(one.force), one.u)]
+        gaps: list[FloatArray] = [law.separation(one.force), one.u]
+        slopes: list[FloatArray] = [gap * CubicSpline(log_force, np.log(gap)).derivative()(log_force) for gap in gaps]
         found["stiffness"] = np.log(slopes[1] / slopes[0])
     return found
 
@@ -235,15 +252,17 @@ def report(evidence: Sequence[Case], constants: Constants, map_constants: MapCon
         "spectrum": lambda one: one.law(constants),
         "map": lambda one: one.map_law(constants, map_constants),
     }
+    groups: dict[str, Callable[[Case], bool]] = {
+        "1 wave": lambda one: one.kind in GAUSSIAN and one.waves < MIN_WAVES,
+        "2-3 waves": lambda one: one.gaussian and one.waves < 4,
+        "4 waves": lambda one: one.gaussian and one.waves >= 4,
+        "stretched": lambda one: one.kind == "stretched",
+        "transformed": lambda one: one.kind not in (*GAUSSIAN, "stretched"),
+    }
     sets = {
         f"{split}, {label}": [one for one in evidence if one.split == split and member(one)]
         for split in (TRAINING, HELD_OUT_SURFACE, HELD_OUT_SPECTRUM)
-        for label, member in {
-            "2-3 waves": lambda one: one.gaussian and one.waves < 4,
-            "4 waves": lambda one: one.gaussian and one.waves >= 4,
-            "stretched": lambda one: one.kind == "stretched",
-            "transformed": lambda one: one.kind not in (*GAUSSIAN, "stretched"),
-        }.items()
+        for label, member in groups.items()
     }
     return {name: {form: summary(own, make) for form, make in forms.items()} for name, own in sets.items() if own}
 
@@ -260,7 +279,7 @@ def calibrated(evidence: pathlib.Path, out: pathlib.Path | None, maps: bool) -> 
     training = [one for one in found if one.split == TRAINING]
     constants = fit(training)
     map_constants = fit_map(training, constants) if maps else MAP_CONSTANTS
-    told = {
+    told: dict[str, Any] = {
         "constants": dataclasses.asdict(constants),
         "map_constants": dataclasses.asdict(map_constants),
         "cross_validation": cross_validate(training),
@@ -269,7 +288,7 @@ def calibrated(evidence: pathlib.Path, out: pathlib.Path | None, maps: bool) -> 
         "evidence": {"code_sha256": source, "training": len(training), "surfaces": len(found)},
     }
     for name in ("constants", "map_constants"):
-        click.echo(f"{name}: " + ", ".join(f"{k} {v:.4g}" for k, v in told[name].items()))  # type: ignore[attr-defined]
+        click.echo(f"{name}: " + ", ".join(f"{k} {v:.4g}" for k, v in told[name].items()))
     show = functools.partial(_show, told["errors"])
     for quantity in ("area", "force", "stiffness"):
         show(quantity)

@@ -46,26 +46,26 @@ class Constants:
     Attributes
     ----------
     area_s0, area_slope, area_t0 : float
-        S of the area: s0 = area_s0 + area_slope ln(alpha/10), at most 0.95.
+        S of the area: s0 = area_s0 + area_slope ln(alpha/10), at most Persson's 1.
     weight, weight_slope, cubic : float
         W's coefficients a, with its slope in the mean wavenumber less 0.8, and b.
     tail, tail_slope, onset : float
         c of the Gaussian tail factor, the slope again in the mean wavenumber, and u0.
     """
 
-    area_s0: float = 0.497
-    area_slope: float = 0.041
-    area_t0: float = 0.321
-    weight: float = 0.440
-    weight_slope: float = 0.225
+    area_s0: float = 0.509
+    area_slope: float = 0.0277
+    area_t0: float = 0.332
+    weight: float = 0.4335
+    weight_slope: float = 0.16
     cubic: float = 0.429
-    tail: float = 0.268
-    tail_slope: float = 0.296
-    onset: float = 1.319
+    tail: float = 0.222
+    tail_slope: float = 0.062
+    onset: float = 1.222
 
 
 CONSTANTS = Constants()
-PERSSON = Constants(1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+PERSSON = Constants(area_s0=1.0, area_slope=0.0, weight=1.0, weight_slope=0.0, cubic=0.0, tail=0.0, tail_slope=0.0)
 YANG_PERSSON = dataclasses.replace(PERSSON, weight=0.42, cubic=0.58)
 
 
@@ -77,7 +77,7 @@ def _cover(force: FloatArray) -> tuple[FloatArray, FloatArray]:
 def area(force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """A/A0 at F/(A0 E* g) on a surface of Nayak's parameter alpha = m0 m4/m2^2."""
     values = np.asarray(force, float)
-    s0 = np.minimum(constants.area_s0 + constants.area_slope * np.log(np.asarray(alpha) / 10), 0.95)
+    s0 = np.minimum(constants.area_s0 + constants.area_slope * np.log(np.asarray(alpha) / 10), 1.0)
     t = values / constants.area_t0
     return np.asarray(erf(values * np.sqrt(2 * (1 + t) / (s0 + t))))
 

@@ -28,9 +28,10 @@ from mbma_tables.bearing import FRACTIONS
 from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, area, mean_top_height
 
 LIGHTEST, HEAVIEST = -16.0, 1.4  # ln F^ of a map's curve
-NODES = 700
+NODES = 400
 MIN_TENSION, MIN_SHARE = 1e-12, 1e-4  # pulls on fewer points are one point's
 MIN_RATIO = 0.05
+ELLIPTIC_AREA = 0.03  # contact above which Hertz's elliptic factor holds as it is
 ERF_INVERSE = (1e-7, 3.9)  # erfinv(A) over which F(A) is tabulated
 
 
@@ -41,15 +42,21 @@ class MapConstants:
     Attributes
     ----------
     breadth, breadth_onset : float
-        c = 0.8 max(1, zeta_e/breadth_onset)^breadth for an isotropic map.
+        c = 0.8 max(1, zeta_e/breadth_onset)^breadth for an isotropic map, once contacts have merged.
     gaussian_area, valley_area : float
         Contact where the deviation of a Gaussian surface from M(c A), and then the valleys, take over.
+    merging_area : float
+        Contact over which c grows from a single contact's 4/5.
+    elliptic : float
+        Further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces.
     """
 
-    breadth: float = 0.13
-    breadth_onset: float = 3.0
-    gaussian_area: float = 0.2
-    valley_area: float = 0.5
+    breadth: float = 0.119
+    breadth_onset: float = 1.86
+    gaussian_area: float = 0.165
+    valley_area: float = 0.55
+    merging_area: float = 0.0084
+    elliptic: float = 0.8
 
 
 MAP_CONSTANTS = MapConstants()
@@ -121,14 +128,16 @@ class MapLaw:
         c = self.constants
         log_e = np.linspace(np.log(ERF_INVERSE[0]), np.log(ERF_INVERSE[1]), NODES)
         e = np.exp(log_e)
-        s0 = min(c.area_s0 + c.area_slope * np.log(self.spectrum.alpha / 10), 0.95)
-        s0 /= hertz_ellipse(round(self.anisotropy, 3))[0] ** 2
+        s0 = min(c.area_s0 + c.area_slope * np.log(self.spectrum.alpha / 10), 1.0)
+        contact = erf(e)
+        light = 1 + self.map_constants.elliptic * np.exp(-contact / ELLIPTIC_AREA)
+        s0 = s0 / hertz_ellipse(round(self.anisotropy, 3))[0] ** (2 * light)
         # 2 y^2 (1 + y/t0) = e^2 (s0 + y/t0) at A = erf(e)
-        y = e * np.sqrt(max(s0, 1.0) / 2)
+        y = e / np.sqrt(2)
         for _ in range(60):
             value = 2 * y**2 * (1 + y / c.area_t0) - e**2 * (s0 + y / c.area_t0)
             y = np.maximum(y - value / (4 * y + 6 * y**2 / c.area_t0 - e**2 / c.area_t0), 0.3 * y)
-        top = -np.expm1(2 * np.log1p(-np.minimum(erf(e), 1 - 1e-12)))
+        top = -np.expm1(2 * np.log1p(-np.minimum(contact, 1 - 1e-12)))
         gradient = np.interp(np.log(top), np.log(FRACTIONS), self.top_gradient)
         return log_e, np.maximum.accumulate(np.log(y * gradient) + 1e-12 * np.arange(NODES))
 
@@ -167,9 +176,13 @@ class MapLaw:
         # the tops', with the deviation of a Gaussian surface from M(c A) at the same contact
         grid = np.linspace(LIGHTEST - 2, HEAVIEST + 1, 2000)
         same = np.exp(np.interp(contact, area(np.exp(grid), self.spectrum.alpha, self.constants), grid))
-        top = np.minimum(self.height_factor * contact, 1 - 1e-12)
-        deviation = law.separation_persson(same)[0] + 2 * law.energy(same) / same - mean_top_height(top)
-        tops = self._mean_height(top) + -np.expm1(-((contact / m.gaussian_area) ** 2)) * deviation
+        height = law.separation_persson(same)[0] + 2 * law.energy(same) / same
+        shares = np.linspace(np.log(FRACTIONS[0]), 0, 2000)
+        own = np.interp(-height, -mean_top_height(np.exp(shares)), shares)
+        near = np.exp(-((contact / m.gaussian_area) ** 2))
+        factor = 0.8 + (self.height_factor - 0.8) * -np.expm1(-contact / m.merging_area)
+        top = np.minimum(near * np.log(factor * contact) + (1 - near) * own, 0.0)
+        tops = self._mean_height(np.exp(top))
         difference = np.exp(-((contact / m.valley_area) ** 4)) * (tops - valleys)
         # u is linear in H_p
         beyond = CubicSpline(log_force, difference * np.exp(-log_force)).antiderivative()

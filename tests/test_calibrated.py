@@ -1,0 +1,179 @@
+"""The calibrated law: its quadrature, its limits, and others' boundary elements and simulations."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.special import erf
+
+from mbma_tables.bearing import FRACTIONS, bearing, radial_spectrum
+from mbma_tables.calibrated import PERSSON, YANG_PERSSON, Law, Spectrum, area, mean_top_height
+from mbma_tables.calibrated_map import MapLaw, hertz_ellipse
+from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories.persson import persson_separation
+
+HARD = [(0.1, 1e5), (0.3, 128.0), (0.8, 64.0), (1.0, 3.5)]
+FORCES = np.geomspace(1e-6, 2.0, 25)
+SURFACE = Spectrum.self_affine(0.8, 64.0)
+
+
+@pytest.mark.parametrize(("hurst", "zeta_1"), HARD)
+def test_own_quadrature_is_below_1e_7(hurst, zeta_1):
+    plain, fine = (Law(Spectrum.self_affine(hurst, zeta_1, panel)) for panel in (1.0, 0.3))
+    for values, exact in zip(plain.separation_persson(FORCES), fine.separation_persson(FORCES), strict=True):
+        np.testing.assert_allclose(values, exact, rtol=1e-7)
+
+
+def test_separation_against_nested_quadrature():
+    # u = integral of dU/F by scipy, over a spectrum of three waves
+    spectrum = Spectrum.from_shares([1.0, 3.0, 10.0], [0.7, 0.2, 0.1])
+    law = Law(spectrum)
+    for force in (0.01, 0.3, 0.9):
+
+        def integrand(log_force):
+            step = 1e-4
+            high, low = law.energy(np.exp([log_force + step, log_force - step]))
+            return (high - low) / (2 * step) * math.exp(-log_force)
+
+        expected = quad(integrand, math.log(force), 1.5, epsabs=0, epsrel=1e-9, limit=200)[0]
+        assert law.separation_persson(force)[0] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize(("constants", "gamma"), [(PERSSON, 1.0), (YANG_PERSSON, 0.42)])
+def test_special_cases_are_perssons(constants, gamma):
+    surface = Surface(hurst=0.8, q0=1.0, q1=64.0, h_rms=1.0, h_max=3.0)
+    law = Law(Spectrum.self_affine(0.8, 64.0), None, constants)
+    loads = np.array([0.003, 0.03, 0.3, 0.8])
+    assert law.area(loads) == pytest.approx(erf(math.sqrt(2) * loads), rel=1e-12)
+    if gamma == 0.42:
+        expected = persson_separation(surface, loads * surface.rms_gradient)
+        np.testing.assert_allclose(law.separation(loads), expected, rtol=1e-6)
+
+
+class TestLaw:
+    @pytest.mark.parametrize("h_max", [None, 3.2])
+    def test_inverse_and_stiffness(self, h_max):
+        law = Law(SURFACE, h_max)
+        u = np.array([0.003, 0.1, 0.8, 1.5, 2.4, 3.0])
+        force, stiffness = law.force_and_stiffness(u)
+        np.testing.assert_allclose(law.separation(force), u, rtol=1e-9)
+        step = 1e-5
+        np.testing.assert_allclose(stiffness, (law.force(u - step) - law.force(u + step)) / (2 * step), rtol=1e-4)
+
+    def test_ends_at_h_max(self):
+        law = Law(SURFACE, 3.2)
+        assert law.force([3.2, 4.0]).tolist() == [0, 0]
+        assert 0 < law.force(3.1999) < 1e-6
+
+    @pytest.mark.parametrize("hurst", [0.1, 0.5, 1.0])
+    @pytest.mark.parametrize("zeta_1", [3.5, 100.0, 1e5])
+    def test_force_and_stiffness_rise_with_compression(self, hurst, zeta_1):
+        law = Law(Spectrum.self_affine(hurst, zeta_1), 3.5)
+        force, stiffness = law.force_and_stiffness(np.linspace(3.49, 0.01, 150))
+        assert np.all(np.diff(force) > 0)
+        assert np.all(np.diff(stiffness) > 0)
+
+    def test_full_contact_holds_all_energy(self):
+        # U = (1/4) sum q |h_q|^2
+        assert Law(SURFACE).energy(6.0) == pytest.approx(SURFACE.mean_wave / 4, rel=1e-9)
+
+    def test_bands_agree_with_the_power_law(self):
+        edges = np.geomspace(1, 64, 2001)
+        inside = (edges[1:] ** -1.6 - edges[:-1] ** -1.6) / -1.6
+        x = np.sqrt((edges[1:] ** 0.4 - edges[:-1] ** 0.4) / 0.4 / inside)
+        law = Law(Spectrum.from_shares(x, inside), 3.2)
+        np.testing.assert_allclose(law.force([0.1, 1.0]), Law(SURFACE, 3.2).force([0.1, 1.0]), rtol=1e-3)
+
+
+# F/(A0 E*), A/A0, u/h_rms of a 2048 x 2048 run of the contact-mechanics challenge (rms gradient 1; Mueser et al. 2017)
+CHALLENGE = [(0.001, 0.00212, 2.333), (0.01, 0.02036, 1.334), (0.03, 0.0595, 0.819)]
+# Green's function molecular dynamics by Y. Zhou (H 0.8, zeta_1 100, rms gradient 0.2766): F/(A0 E*), A/A0, u/h_rms
+GFMD = [(0.005, 0.0399, 1.190), (0.025, 0.1852, 0.441), (0.065, 0.4326, 0.127), (0.113, 0.6571, 0.038)]
+
+
+def test_contact_challenge():
+    # plateau from 0.2 q_r to q_r, power law to 200 q_r
+    edges = np.geomspace(0.2, 200, 4001)
+    middle = np.sqrt(edges[1:] * edges[:-1])
+    shares = np.minimum(middle**2, middle**-1.6) * np.diff(np.log(edges))
+    law = Law(Spectrum.from_shares(middle, shares), 3.45)
+    force, contact, gap = np.array(CHALLENGE).T
+    np.testing.assert_allclose(law.area(force), contact, rtol=0.1)
+    np.testing.assert_allclose(law.force(gap), force, rtol=0.35)
+
+
+def test_molecular_dynamics():
+    force, contact, gap = np.array(GFMD).T
+    law = Law(Spectrum.self_affine(0.8, 100.0))
+    np.testing.assert_allclose(law.area(force / 0.2766), contact, rtol=0.1)
+    np.testing.assert_allclose(law.force(gap) * 0.2766, force, rtol=0.15)
+
+
+class TestHertz:
+    def test_table_of_ellipses(self):
+        # complete elliptic integrals, tabulated independently
+        ratios = (1.5, 2, 3, 4, 6, 8, 16, 32)
+        found = np.array([hertz_ellipse(ratio) for ratio in ratios])
+        area_factors = [1.013, 1.036, 1.079, 1.113, 1.160, 1.192, 1.261, 1.320]
+        np.testing.assert_allclose(found[:, 0], area_factors, atol=6e-4)
+        np.testing.assert_allclose(found[:, 1], [1.01, 1.025, 1.057, 1.086, 1.129, 1.16, 1.235, 1.31], atol=3e-3)
+        assert hertz_ellipse(1.0) == (1.0, 1.0)
+
+    def test_gaussian_tops(self):
+        # M_G(a) = phi(z)/a
+        assert mean_top_height(0.5) == pytest.approx(math.sqrt(2 / math.pi))
+        assert mean_top_height(1e-4) == pytest.approx(3.959, abs=1e-3)
+
+
+class TestMap:
+    @pytest.fixture(scope="class")
+    @staticmethod
+    def law():
+        n = 128
+        rng = np.random.default_rng(4)
+        k = np.hypot(np.fft.fftfreq(n, 1 / n)[:, None], np.arange(n // 2 + 1)[None, :])
+        inside = (k >= 3) & (k <= 32)
+        modes = np.where(inside, np.where(inside, k, 1.0) ** -1.8 * np.exp(2j * np.pi * rng.random(k.shape)), 0)
+        heights = np.fft.irfft2(modes, s=(n, n))
+        heights /= bearing(heights, (1.0, 1.0)).gradient
+        known, bands = bearing(heights, (1.0, 1.0)), radial_spectrum(heights, (1.0, 1.0))
+        held = bands.variance > 0
+        spectrum = Spectrum.from_shares(bands.q[held], bands.variance[held])
+        inverse = np.nansum(bands.variance * bands.q2_mean_inverse) / known.h_rms**2
+        return MapLaw(
+            spectrum,
+            inverse,
+            known.mean_height / known.h_rms,
+            known.top_gradient,
+            known.tension_force,
+            known.tension,
+            known.anisotropy,
+        )
+
+    def test_gaussian_map_is_near_the_law_of_its_spectrum(self, law):
+        plain = Law(law.spectrum)
+        forces = np.array([0.05, 0.2, 0.6])
+        np.testing.assert_allclose(law.area(forces), plain.area(forces), rtol=0.05)
+        np.testing.assert_allclose(law.separation(forces), plain.separation(forces), rtol=0.1)
+
+    def test_gaussian_pressures_are_their_own(self, law):
+        np.testing.assert_allclose(law.gaussian_force([0.2, 0.5, 1.0]), [0.2, 0.5, 1.0], rtol=0.03)
+
+    def test_curve_falls_and_inverts(self, law):
+        forces = np.geomspace(1e-4, 1.2, 40)
+        u = law.separation(forces)
+        assert np.all(np.diff(u) < 0)
+        np.testing.assert_allclose(law.force(u), forces, rtol=2e-3)
+        assert law.force(law.mean_height[0] + 1) == 0
+
+    def test_steeper_tops_carry_more_on_less_area(self, law):
+        steep = dataclasses.replace(law, top_gradient=law.top_gradient * np.where(FRACTIONS < 0.1, 2.0, 1.0))
+        assert steep.area(0.005) == pytest.approx(law.area(0.005) / 2, rel=0.05)
+
+
+def test_area_is_linear_at_light_loads_and_one_at_the_heaviest():
+    alpha = SURFACE.alpha
+    assert area(1e-5, alpha) / area(1e-6, alpha) == pytest.approx(10, rel=1e-3)
+    assert area(4.0, alpha) == pytest.approx(1)
