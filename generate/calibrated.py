@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
 import pathlib
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 import click
 import numpy as np
@@ -17,10 +16,11 @@ from scipy.optimize import least_squares
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, SPLITS, TRAINING
 from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import CONSTANTS, MEAN_WAVE, Constants, Law, Spectrum, area
+from mbma_tables.calibrated import CONSTANTS, MEAN_WAVE, Constants, Law, Spectrum
 from mbma_tables.calibrated_map import MAP_CONSTANTS, MapConstants, MapLaw
 
 GAUSSIAN = ("self_affine", "plateau", "filtered")
+QUANTITIES = ("area", "force", "stiffness")
 EDGES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9, 0.98)  # contact fractions between which errors are told
 FOLDS = 5
 MIN_WAVES = 2  # constants see no surface of one longest wave a side
@@ -103,24 +103,20 @@ def cases(data: xr.Dataset) -> list[Case]:
     return found
 
 
-def _solve(residuals: Callable[[FloatArray], FloatArray], start: Iterable[float]) -> FloatArray:
-    """Robust least squares."""
-    return np.asarray(least_squares(residuals, list(start), loss="soft_l1", x_scale="jac", diff_step=STEP).x)
+Fitted = TypeVar("Fitted", Constants, MapConstants)
 
 
-def fit_area(seen: Sequence[Case], constants: Constants) -> Constants:
-    """s0, its slope and t0 of the area."""
+def _fitted(start: Fitted, names: Sequence[str], residuals: Callable[[Fitted], list[FloatArray]]) -> Fitted:
+    """Constants of which the named ones make the residuals small, by robust least squares."""
 
-    def trial(values: FloatArray) -> Constants:
-        return dataclasses.replace(constants, area_s0=values[0], area_slope=values[1], area_t0=values[2])
+    def trial(values: FloatArray) -> Fitted:
+        return dataclasses.replace(start, **dict(zip(names, map(float, values), strict=True)))
 
-    def residuals(values: FloatArray) -> FloatArray:
-        c = trial(values)
-        return np.concatenate(
-            [np.log(area(one.force, one.spectrum.alpha, c) / one.area) / one.noise("area") for one in seen]
-        )
-
-    return trial(_solve(residuals, (constants.area_s0, constants.area_slope, constants.area_t0)))
+    first = [getattr(start, name) for name in names]
+    found = least_squares(
+        lambda values: np.concatenate(residuals(trial(values))), first, loss="soft_l1", x_scale="jac", diff_step=STEP
+    )
+    return trial(found.x)
 
 
 def fit_weight(seen: Sequence[Case], constants: Constants) -> Constants:
@@ -143,87 +139,57 @@ def fit_weight(seen: Sequence[Case], constants: Constants) -> Constants:
     return dataclasses.replace(constants, weight=float(a), cubic=float(b), weight_slope=float(slope))
 
 
-def fit_tail(seen: Sequence[Case], constants: Constants) -> Constants:
-    """c, its slope and u0 of the Gaussian tail factor, with F = F_G(u) - F_G(h_max)."""
-    endless = dataclasses.replace(constants, tail=0.0, tail_slope=0.0)
-    known = []
-    for one in seen:
-        kept = one.area < TAIL_AREA
-        law = Law(one.spectrum, None, endless)
-        gaussian = law.gaussian(np.append(one.u[kept], one.h_max))[0]
-        known.append((one, kept, gaussian[:-1], gaussian[-1], one.spectrum.mean_wave - MEAN_WAVE))
-
-    def residuals(values: FloatArray) -> FloatArray:
-        c, slope, onset = values
-        parts = []
-        for one, kept, at_u, at_end, wave in known:
-            tail = c + slope * wave
-            here = at_u - tail * np.maximum(one.u[kept] - onset, 0) ** 2
-            end = at_end - tail * max(one.h_max - onset, 0) ** 2
-            force = here + np.log(-np.expm1(np.minimum(end - here, -1e-9)))
-            parts.append((force - np.log(one.force[kept])) / one.noise("tail")[kept])
-        return np.concatenate(parts)
-
-    c, slope, onset = map(float, _solve(residuals, (constants.tail, constants.tail_slope, constants.onset)))
-    return dataclasses.replace(constants, tail=c, tail_slope=slope, onset=onset)
-
-
 def fit(training: Sequence[Case]) -> Constants:
-    """The spectrum's law."""
+    """The spectrum's law: area at equal force; u from 3% contact up; the tail where less than a tenth touches."""
     seen = [one for one in training if one.gaussian]
-    return fit_tail(seen, fit_weight(seen, fit_area(seen, CONSTANTS)))
+
+    def areas(trial: Constants) -> list[FloatArray]:
+        return [errors(one, one.law(trial), "area") / one.noise("area") for one in seen]
+
+    def tails(trial: Constants) -> list[FloatArray]:
+        return [(errors(one, one.law(trial), "force") / one.noise("tail"))[one.area < TAIL_AREA] for one in seen]
+
+    constants = fit_weight(seen, _fitted(CONSTANTS, ("area_s0", "area_slope", "area_t0"), areas))
+    return _fitted(constants, ("tail", "onset"), tails)
 
 
 def fit_map(training: Sequence[Case], constants: Constants) -> MapConstants:
     """The map's law: area of stretched surfaces, then force at equal u of all kinds."""
-    stretched = [one for one in training if one.kind == "stretched"]
 
-    def areas(values: FloatArray) -> FloatArray:
-        own = dataclasses.replace(MAP_CONSTANTS, elliptic=values[0])
-        found = [np.log(one.map_law(constants, own).area(one.force) / one.area) / one.noise("map") for one in stretched]
-        return np.concatenate(found)
+    def areas(trial: MapConstants) -> list[FloatArray]:
+        seen = [one for one in training if one.kind == "stretched"]
+        return [errors(one, one.map_law(constants, trial), "area") / one.noise("map") for one in seen]
 
-    (elliptic,) = _solve(areas, [MAP_CONSTANTS.elliptic])
+    def forces(trial: MapConstants) -> list[FloatArray]:
+        seen = [one for one in training if one.waves >= MIN_WAVES]
+        return [errors(one, one.map_law(constants, trial), "force") / one.noise("map") for one in seen]
 
-    def trial(values: FloatArray) -> MapConstants:
-        breadth, onset, gaussian_area, valley_area, merging_area = map(float, values)
-        return MapConstants(breadth, onset, gaussian_area, valley_area, merging_area, float(elliptic))
-
-    def forces(values: FloatArray) -> FloatArray:
-        own = trial(values)
-        return np.concatenate(
-            [errors(one, one.map_law(constants, own))["force"] / one.noise("map") for one in training if one.waves > 1]
-        )
-
-    start = dataclasses.astuple(MAP_CONSTANTS)[:-1]
-    return trial(_solve(forces, start))
+    names = [field.name for field in dataclasses.fields(MapConstants) if field.name != "elliptic"]
+    return _fitted(_fitted(MAP_CONSTANTS, ("elliptic",), areas), names, forces)
 
 
-def errors(one: Case, law: Law | MapLaw, stiffness: bool = False) -> dict[str, FloatArray]:
-    """ln of law over simulation: area at equal force, force at equal u, stiffness at equal force."""
+def errors(one: Case, law: Law | MapLaw, quantity: str) -> FloatArray:
+    """ln of law over simulation: "area" at equal force, "force" at equal u, "stiffness" at equal force."""
     log_force = np.log(one.force)
-    found = {
-        "area": np.log(law.area(one.force) / one.area),
-        "force": np.log(np.maximum(law.force(one.u), 1e-6 * one.force)) - log_force,
-    }
-    if stiffness:
-        # both by one spline through the simulated loads, so that its error cancels
-        gaps: list[FloatArray] = [law.separation(one.force), one.u]
-        slopes: list[FloatArray] = [gap * CubicSpline(log_force, np.log(gap)).derivative()(log_force) for gap in gaps]
-        found["stiffness"] = np.log(slopes[1] / slopes[0])
-    return found
+    if quantity == "area":
+        return np.asarray(np.log(law.area(one.force) / one.area))
+    if quantity == "force":
+        return np.asarray(np.log(np.maximum(law.force(one.u), 1e-6 * one.force)) - log_force)
+    # both by one spline through the simulated loads, so that its error cancels
+    gaps: list[FloatArray] = [law.separation(one.force), one.u]
+    slopes: list[FloatArray] = [gap * CubicSpline(log_force, np.log(gap)).derivative()(log_force) for gap in gaps]
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.log(slopes[1] / slopes[0]))
 
 
 def summary(seen: Sequence[Case], make: Callable[[Case], Law | MapLaw]) -> dict[str, list[list[float]]]:
     """By contact fraction: mean, standard deviation, 90% quantile of the magnitude and number of errors."""
-    contact = np.concatenate([one.area for one in seen])
-    each = [errors(one, make(one), stiffness=True) for one in seen]
-    bins = np.digitize(contact, EDGES) - 1
+    bins = np.digitize(np.concatenate([one.area for one in seen]), EDGES) - 1
     told = {}
-    for name in each[0]:
-        values = np.concatenate([one[name] for one in each])
+    for quantity in QUANTITIES:
+        values = np.concatenate([errors(one, make(one), quantity) for one in seen])
         parts = [values[(bins == k) & np.isfinite(values)] for k in range(len(EDGES) - 1)]
-        told[name] = [
+        told[quantity] = [
             [float(p.mean()), float(p.std()), float(np.quantile(np.abs(p), 0.9)), len(p)] if len(p) else []
             for p in parts
         ]
@@ -231,19 +197,34 @@ def summary(seen: Sequence[Case], make: Callable[[Case], Law | MapLaw]) -> dict[
 
 
 def cross_validate(training: Sequence[Case]) -> dict[str, Any]:
-    """Constants without a fifth of the spectra at a time, and the errors of the spectra left out."""
+    """Constants without a fifth of the spectra at a time: their spread, and errors on the spectra left out."""
     seen = [one for one in training if one.gaussian]
     order = sorted({one.node for one in seen})
-    fits, left = [], []
+    own: dict[tuple[float | str, ...], Constants] = {}
     for fold in range(FOLDS):
         out = set(order[fold::FOLDS])
-        own = fit([one for one in seen if one.node not in out])
-        fits.append(list(dataclasses.astuple(own)))
-        left += [(one, own) for one in seen if one.node in out]
-    constants = {id(one): own for one, own in left}
-    told = summary([one for one, _ in left], lambda one: one.law(constants[id(one)]))
+        own |= dict.fromkeys(out, fit([one for one in seen if one.node not in out]))
+    spread = np.std([dataclasses.astuple(constants) for constants in set(own.values())], axis=0)
     names = [field.name for field in dataclasses.fields(Constants)]
-    return {"spread": dict(zip(names, np.std(fits, axis=0).tolist(), strict=True)), "errors": told}
+    told = summary(seen, lambda one: one.law(own[one.node]))
+    return {"spread": dict(zip(names, spread.tolist(), strict=True)), "errors": told}
+
+
+def coverage(seen: Sequence[Case], constants: Constants, stated: dict[str, Any]) -> dict[str, list[float]]:
+    """Shares of held-out errors within one and two of the root mean squares that cross-validation states."""
+    middles = np.log(np.sqrt(np.multiply(EDGES[1:], EDGES[:-1])))
+    told = {}
+    for quantity in QUANTITIES:
+        log_sigma = np.log([np.hypot(*part[:2]) for part in stated[quantity]])
+        sizes = np.concatenate(
+            [
+                np.abs(errors(one, one.law(constants), quantity))
+                / np.exp(np.interp(np.log(one.area), middles, log_sigma))
+                for one in seen
+            ]
+        )
+        told[quantity] = [float(np.mean(sizes < limit)) for limit in (1, 2)]
+    return told
 
 
 def report(evidence: Sequence[Case], constants: Constants, map_constants: MapConstants) -> dict[str, Any]:
@@ -279,26 +260,26 @@ def calibrated(evidence: pathlib.Path, out: pathlib.Path | None, maps: bool) -> 
     training = [one for one in found if one.split == TRAINING]
     constants = fit(training)
     map_constants = fit_map(training, constants) if maps else MAP_CONSTANTS
+    checked = cross_validate(training)
     told: dict[str, Any] = {
         "constants": dataclasses.asdict(constants),
         "map_constants": dataclasses.asdict(map_constants),
-        "cross_validation": cross_validate(training),
+        "cross_validation": checked,
+        "coverage": coverage(
+            [one for one in found if one.split != TRAINING and one.gaussian], constants, checked["errors"]
+        ),
         "contact_edges": EDGES,
         "errors": report(found, constants, map_constants),
         "evidence": {"code_sha256": source, "training": len(training), "surfaces": len(found)},
     }
     for name in ("constants", "map_constants"):
         click.echo(f"{name}: " + ", ".join(f"{k} {v:.4g}" for k, v in told[name].items()))
-    show = functools.partial(_show, told["errors"])
-    for quantity in ("area", "force", "stiffness"):
-        show(quantity)
+    click.echo(f"held-out errors within one and two standard deviations: {told['coverage']}")
+    for quantity in QUANTITIES:
+        click.echo(f"{quantity}: mean and standard deviation of ln(law/simulation) [%] between contacts {EDGES}")
+        for name, forms in told["errors"].items():
+            for form, values in forms.items():
+                cells = [f"{100 * p[0]:+4.0f}±{100 * p[1]:<3.0f}" if p else "    -   " for p in values[quantity]]
+                click.echo(f"  {name:32s} {form:9s} " + " ".join(cells))
     if out is not None:
         out.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
-
-
-def _show(told: dict[str, Any], quantity: str) -> None:
-    click.echo(f"{quantity}: mean and standard deviation of ln(law/simulation) [%] between contacts {EDGES}")
-    for name, forms in told.items():
-        for form, values in forms.items():
-            cells = [f"{100 * p[0]:+4.0f}±{100 * p[1]:<3.0f}" if p else "    -   " for p in values[quantity]]
-            click.echo(f"  {name:32s} {form:9s} " + " ".join(cells))

@@ -10,7 +10,7 @@ x = q/q0, elastic energy over :math:`A_0 E^* g h_{rms}`. A spectrum enters by it
     F_G(u)  = F_P(u) exp(-c max(u - u0, 0)^2)            a Gaussian surface without end
     F(u)    = F_G(u) - F_G(h_max)                        one that ends at h_max: its stiffness is the endless one's
 
-W = P is Persson's theory with weight 1, W = gamma P + (1 - gamma) P^3 Yang and Persson's. a and c depend on the
+W = P is Persson's theory with weight 1, W = gamma P + (1 - gamma) P^3 Yang and Persson's. a depends on the
 spectrum's mean wavenumber over its root mean square, which needs no Hurst exponent. Because P depends on F and x
 through y = F g/g(x) alone, the inner integral is a function of y, tabulated once: a curve is one sum over waves.
 """
@@ -36,7 +36,7 @@ LOG_FORCE = (-21.0, 1.6)  # ln F^ over which a curve is tabulated
 FORCE_NODES = 227
 
 
-MEAN_WAVE = 0.8  # <q>/sqrt(<q^2>) that the constants' slopes refer to
+MEAN_WAVE = 0.8  # <q>/sqrt(<q^2>) that W's slope refers to
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,23 +49,22 @@ class Constants:
         S of the area: s0 = area_s0 + area_slope ln(alpha/10), at most Persson's 1.
     weight, weight_slope, cubic : float
         W's coefficients a, with its slope in the mean wavenumber less 0.8, and b.
-    tail, tail_slope, onset : float
-        c of the Gaussian tail factor, the slope again in the mean wavenumber, and u0.
+    tail, onset : float
+        c and u0 of the Gaussian tail factor.
     """
 
-    area_s0: float = 0.509
-    area_slope: float = 0.0277
-    area_t0: float = 0.332
-    weight: float = 0.4335
-    weight_slope: float = 0.16
-    cubic: float = 0.429
-    tail: float = 0.222
-    tail_slope: float = 0.062
-    onset: float = 1.222
+    area_s0: float = 0.5116
+    area_slope: float = 0.0292
+    area_t0: float = 0.3356
+    weight: float = 0.4376
+    weight_slope: float = 0.1634
+    cubic: float = 0.4227
+    tail: float = 0.193
+    onset: float = 1.157
 
 
 CONSTANTS = Constants()
-PERSSON = Constants(area_s0=1.0, area_slope=0.0, weight=1.0, weight_slope=0.0, cubic=0.0, tail=0.0, tail_slope=0.0)
+PERSSON = Constants(area_s0=1.0, area_slope=0.0, weight=1.0, weight_slope=0.0, cubic=0.0, tail=0.0)
 YANG_PERSSON = dataclasses.replace(PERSSON, weight=0.42, cubic=0.58)
 
 
@@ -208,10 +207,6 @@ class Law:
         a = c.weight + c.weight_slope * (self.spectrum.mean_wave - MEAN_WAVE)
         return np.array([a, c.cubic, 1 - a - c.cubic])
 
-    @property
-    def _tail(self) -> float:
-        return self.constants.tail + self.constants.tail_slope * (self.spectrum.mean_wave - MEAN_WAVE)
-
     def _over_spectrum(self, force: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """y = F g/g(x), shape (..., n), 1/g(x) and the spectrum's weights x w/(4 g^)."""
         inverse = 1 / np.sqrt(self.spectrum.below)
@@ -258,7 +253,7 @@ class Law:
         flat = values.ravel()
         log_force = self._log_force_persson(flat)
         _, slope = self.separation_persson(np.exp(log_force))
-        tail = self._tail
+        tail = self.constants.tail
         above = np.maximum(flat - self.constants.onset, 0)
         return (
             (log_force - tail * above**2).reshape(values.shape),
@@ -286,7 +281,7 @@ class Law:
         end = 0.0 if self.h_max is None else np.exp(self.gaussian(self.h_max)[0])
         goal = np.log(given.ravel() + end)
         log_nodes, u_nodes = self._curve
-        tail, onset = self._tail, self.constants.onset
+        tail, onset = self.constants.tail, self.constants.onset
         log_force = np.interp(goal, (log_nodes - tail * np.maximum(u_nodes - onset, 0) ** 2)[::-1], log_nodes[::-1])
         for _ in range(30):
             u, slope = self.separation_persson(np.exp(log_force))
