@@ -31,6 +31,7 @@ LIGHTEST, HEAVIEST = -16.0, 1.4  # ln F^ of a map's curve
 NODES = 400
 MIN_TENSION, MIN_SHARE = 1e-12, 1e-4  # pulls on fewer points are one point's
 MIN_RATIO = 0.05
+MIN_GRADIENT = 1e-3
 ELLIPTIC_AREA = 0.03  # contact above which Hertz's elliptic factor holds as it is
 ERF_INVERSE = (1e-7, 3.9)  # erfinv(A) over which F(A) is tabulated
 
@@ -119,8 +120,14 @@ class MapLaw:
         breadth = np.sqrt(ratio * self.inverse_q2) / self.map_constants.breadth_onset
         return float(0.8 * max(1.0, breadth) ** self.map_constants.breadth * hertz_ellipse(self.anisotropy)[1])
 
-    def _mean_height(self, share: FloatArray) -> FloatArray:
-        return np.interp(np.log(np.minimum(share, 1.0)), np.log(FRACTIONS), self.mean_height)
+    @functools.cached_property
+    def weighted_height(self) -> FloatArray:
+        """M_w(a): mean height of the highest share a weighted by its gradient, to which pressures are proportional."""
+        steps = np.diff(FRACTIONS, prepend=0.0)
+        heights = np.diff(FRACTIONS * self.mean_height, prepend=0.0)
+        gradients = np.maximum(np.diff(FRACTIONS * self.top_gradient, prepend=0.0), MIN_GRADIENT * steps)
+        mean = np.cumsum(heights / steps * gradients) / np.cumsum(gradients)
+        return np.asarray(np.minimum.accumulate(mean))
 
     @functools.cached_property
     def _log_force_of_area(self) -> tuple[FloatArray, FloatArray]:
@@ -182,7 +189,7 @@ class MapLaw:
         near = np.exp(-((contact / m.gaussian_area) ** 2))
         factor = 0.8 + (self.height_factor - 0.8) * -np.expm1(-contact / m.merging_area)
         top = np.minimum(near * np.log(factor * contact) + (1 - near) * own, 0.0)
-        tops = self._mean_height(np.exp(top))
+        tops = np.interp(top, np.log(FRACTIONS), self.weighted_height)
         difference = np.exp(-((contact / m.valley_area) ** 4)) * (tops - valleys)
         # u is linear in H_p
         beyond = CubicSpline(log_force, difference * np.exp(-log_force)).antiderivative()
