@@ -164,7 +164,7 @@ def fit_map(training: Sequence[Case], constants: Constants) -> MapConstants:
         seen = [one for one in training if one.waves >= MIN_WAVES]
         return [errors(one, one.map_law(constants, trial), "force") / one.noise("map") for one in seen]
 
-    names = [field.name for field in dataclasses.fields(MapConstants) if field.name != "elliptic"]
+    names = [name for name in dataclasses.asdict(MAP_CONSTANTS) if name not in ("elliptic", "tension_area")]
     return _fitted(_fitted(MAP_CONSTANTS, ("elliptic",), areas), names, forces)
 
 

@@ -76,9 +76,13 @@ def _cover(force: FloatArray) -> tuple[FloatArray, FloatArray]:
 def area(force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """A/A0 at F/(A0 E* g) on a surface of Nayak's parameter alpha = m0 m4/m2^2."""
     values = np.asarray(force, float)
-    s0 = np.minimum(constants.area_s0 + constants.area_slope * np.log(np.asarray(alpha) / 10), 1.0)
     t = values / constants.area_t0
-    return np.asarray(erf(values * np.sqrt(2 * (1 + t) / (s0 + t))))
+    return np.asarray(erf(values * np.sqrt(2 * (1 + t) / (light_factor(alpha, constants) + t))))
+
+
+def light_factor(alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
+    """s0, the value of S at light loads."""
+    return np.minimum(constants.area_s0 + constants.area_slope * np.log(np.asarray(alpha) / 10), 1.0)
 
 
 @functools.cache

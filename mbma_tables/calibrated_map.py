@@ -8,7 +8,8 @@ pressure-weighted height H_p = <p h>/<p> obeys H_p = u + 2 U/F exactly; with dU 
 At light load H_p = M(c A), the mean height of the highest share c A of the map, c = 4/5 exactly for Hertzian
 contact. Towards full contact the map's valleys decide: gaps open where the pressures of full contact would pull, and
 u is the spectrum's u_P at the force F_D at which Gaussian pressures of full contact would pull as much in the mean,
-<max(-p, 0)>; no constant is fitted there. The area is the law's with the gradient of the highest share 1 - (1 - A)^2
+<max(-p, 0)>; no constant is fitted there. The area there is that of Gaussian pressures that pull on the same share; at
+light loads it is the law's with the gradient of the highest share 1 - (1 - A)^2
 of the map in place of g, the 2 A of a paraboloid, and Hertz's elliptic factor.
 """
 
@@ -21,14 +22,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
-from scipy.special import ellipe, ellipk, erf, ndtr
+from scipy.special import ellipe, ellipk, erf, expit, ndtr, ndtri
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.bearing import FRACTIONS
-from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, area, mean_top_height
+from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, area, light_factor, mean_top_height
 
 LIGHTEST, HEAVIEST = -16.0, 1.4  # ln F^ of a map's curve
-NODES = 400
+NODES = 500
+LOG_FORCE = np.linspace(LIGHTEST, HEAVIEST, NODES)
 MIN_TENSION, MIN_SHARE = 1e-12, 1e-4  # pulls on fewer points are one point's
 MIN_RATIO = 0.05
 MIN_GRADIENT = 1e-3
@@ -46,18 +48,21 @@ class MapConstants:
         c = 0.8 max(1, zeta_e/breadth_onset)^breadth for an isotropic map, once contacts have merged.
     gaussian_area, valley_area : float
         Contact where the deviation of a Gaussian surface from M(c A), and then the valleys, take over.
+    tension_area : float
+        Contact where the area pulled on in full contact takes over from the tops'.
     merging_area : float
         Contact over which c grows from a single contact's 4/5.
     elliptic : float
         Further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces.
     """
 
-    breadth: float = 0.119
-    breadth_onset: float = 1.86
-    gaussian_area: float = 0.165
-    valley_area: float = 0.55
-    merging_area: float = 0.0084
-    elliptic: float = 0.8
+    breadth: float = 0.12
+    breadth_onset: float = 1.93
+    gaussian_area: float = 0.167
+    valley_area: float = 0.552
+    tension_area: float = 0.6
+    merging_area: float = 0.0085
+    elliptic: float = 0.825
 
 
 MAP_CONSTANTS = MapConstants()
@@ -118,7 +123,7 @@ class MapLaw:
         # m4/m2 = (3/4) <q^4>/<q^2>; alpha = 1.5 <q^4>/<q^2>^2, gradient^2 = <q^2>
         ratio = 0.5 * self.spectrum.alpha * self.spectrum.gradient**2
         breadth = np.sqrt(ratio * self.inverse_q2) / self.map_constants.breadth_onset
-        return float(0.8 * max(1.0, breadth) ** self.map_constants.breadth * hertz_ellipse(self.anisotropy)[1])
+        return float(0.8 * max(1.0, breadth) ** self.map_constants.breadth * self._ellipse[1])
 
     @functools.cached_property
     def weighted_height(self) -> FloatArray:
@@ -129,16 +134,13 @@ class MapLaw:
         mean = np.cumsum(heights / steps * gradients) / np.cumsum(gradients)
         return np.asarray(np.minimum.accumulate(mean))
 
-    @functools.cached_property
-    def _log_force_of_area(self) -> tuple[FloatArray, FloatArray]:
-        """ln F over ln erfinv(A), rising."""
+    def _tops_area(self) -> FloatArray:
+        """A/A0 by the tops' gradient on the curve's forces."""
         c = self.constants
-        log_e = np.linspace(np.log(ERF_INVERSE[0]), np.log(ERF_INVERSE[1]), NODES)
-        e = np.exp(log_e)
-        s0 = min(c.area_s0 + c.area_slope * np.log(self.spectrum.alpha / 10), 1.0)
+        e = np.exp(np.linspace(np.log(ERF_INVERSE[0]), np.log(ERF_INVERSE[1]), NODES))
         contact = erf(e)
         light = 1 + self.map_constants.elliptic * np.exp(-contact / ELLIPTIC_AREA)
-        s0 = s0 / hertz_ellipse(round(self.anisotropy, 3))[0] ** (2 * light)
+        s0 = light_factor(self.spectrum.alpha, c) / self._ellipse[0] ** (2 * light)
         # 2 y^2 (1 + y/t0) = e^2 (s0 + y/t0) at A = erf(e)
         y = e / np.sqrt(2)
         for _ in range(60):
@@ -146,12 +148,38 @@ class MapLaw:
             y = np.maximum(y - value / (4 * y + 6 * y**2 / c.area_t0 - e**2 / c.area_t0), 0.3 * y)
         top = -np.expm1(2 * np.log1p(-np.minimum(contact, 1 - 1e-12)))
         gradient = np.interp(np.log(top), np.log(FRACTIONS), self.top_gradient)
-        return log_e, np.maximum.accumulate(np.log(y * gradient) + 1e-12 * np.arange(NODES))
+        log_force = np.maximum.accumulate(np.log(y * gradient) + 1e-12 * np.arange(NODES))
+        return np.asarray(erf(np.exp(np.interp(LOG_FORCE, log_force, np.log(e)))))
+
+    def _valleys_area(self) -> FloatArray:
+        """A/A0 of Gaussian pressures of full contact that would pull on the same share as the map's."""
+        pulled = np.exp(np.interp(np.exp(LOG_FORCE), self.tension_force[::-1], np.log(FRACTIONS[::-1])))
+        beyond = np.maximum(np.exp(LOG_FORCE) / self.tension_force[0], 1.0)
+        force = np.maximum(-ndtri(np.minimum(pulled, 0.5)) / 2, 0.0) * beyond
+        alpha = self.spectrum.alpha
+        # Hertz's elliptic factor, in the place of alpha's: s0/k^2
+        t = force / self.constants.area_t0
+        s0 = light_factor(alpha, self.constants) / self._ellipse[0] ** 2
+        return np.asarray(erf(force * np.sqrt(2 * (1 + t) / (s0 + t))))
+
+    @functools.cached_property
+    def _ellipse(self) -> tuple[float, float]:
+        return hertz_ellipse(round(self.anisotropy, 3))
+
+    @functools.cached_property
+    def _contact(self) -> FloatArray:
+        """A/A0 on the curve's forces."""
+        tops, valleys = self._tops_area(), self._valleys_area()
+        mixed = valleys + (tops - valleys) * np.exp(-((tops / self.map_constants.tension_area) ** 6))
+        return np.maximum.accumulate(np.minimum(mixed, 1 - 1e-15) * (1 + 1e-13 * np.arange(NODES)))
 
     def area(self, force: ArrayLike) -> FloatArray:
         """A/A0 at F/(A0 E* g)."""
-        log_e, log_force = self._log_force_of_area
-        return np.asarray(erf(np.exp(np.interp(np.log(np.asarray(force, float)), log_force, log_e))))
+        known = self._contact
+        found = np.interp(
+            np.log(np.asarray(force, float)), LOG_FORCE, np.log(known / (1 - np.minimum(known, 1 - 1e-15)))
+        )
+        return np.asarray(expit(found))
 
     def gaussian_force(self, force: ArrayLike) -> FloatArray:
         """F_D: where Gaussian pressures of full contact pull as much in the mean as the map's do at F."""
@@ -170,9 +198,7 @@ class MapLaw:
     def _curve(self) -> tuple[FloatArray, FloatArray]:
         """ln F and u, u falling."""
         law, m = Law(self.spectrum, None, self.constants), self.map_constants
-        log_force = np.linspace(LIGHTEST, HEAVIEST, NODES)
-        force = np.exp(log_force)
-        contact = self.area(force)
+        log_force, force, contact = LOG_FORCE, np.exp(LOG_FORCE), self._contact
         # the valleys' curve, and its pressure-weighted height u + 2 U/F
         u = law.separation_persson(self.gaussian_force(force))[0]
         work = CubicSpline(log_force, u * force).antiderivative()
