@@ -19,6 +19,7 @@ LOADS = (4.4e-4, 1e-3, 2e-3, 4.5e-3, 0.01, 0.02, 0.04, 0.07, 0.11, 0.17, 0.25, 0
 HIGHER_LOADS = (1.5, 2.1, 3.0)  # ... and on, where heavy tails of the gradient keep gaps open
 FULL = 0.96
 TOLERANCE = 1e-6
+MAX_ITERATIONS = 50_000  # surfaces stretched 1:16 take 4,000
 CORRECTION = (np.pi - 1 + np.log(2)) / 24  # Yastrebov, Anciaux, Molinari 2017
 
 
@@ -39,11 +40,15 @@ class Contact:
         )
         self.model.E, self.model.nu = 1.0, 0.0
         self._solver = tamaas.PolonskyKeerRey(self.model, self.surface, tolerance)
+        self._solver.max_iter = MAX_ITERATIONS
+        self._tolerance = tolerance
 
     def press(self, force: float) -> dict[str, float]:
         """Contact under a mean pressure F/(A0 E*); areas as shares of A0, lengths as those of the map."""
         started = time.process_time()
         residual = self._solver.solve(force)
+        if not residual <= self._tolerance:
+            raise RuntimeError(f"boundary elements at F/(A0 E*) = {force:g} end with a residual of {residual:.1e}")
         seconds = time.process_time() - started
         pressure, moved = np.asarray(self.model.traction), np.asarray(self.model.displacement)
         touching = pressure > 0
