@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import concurrent.futures
+import functools
 import pathlib
 import shutil
-import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import click
@@ -20,27 +20,30 @@ HERE = pathlib.Path("boundary_elements")
 
 
 def run(tasks: Sequence[Task], folder: pathlib.Path, executor: Any = None) -> None:
-    """Solve what `folder` does not hold yet, one file a surface; no executor: here, one after the other."""
+    """Solve what `folder` does not hold yet, one file a surface; no executor: here, one after the other.
+
+    Surfaces that fail are left out until the end, then named.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     missing = [task.recipe for task in tasks if not (folder / f"{task.recipe.name}.npz").exists()]
+    if executor is None:
+        attempts: Iterator[Callable[[], str]] = (functools.partial(simulate_to, r, str(folder)) for r in missing)
+    else:
+        futures = [executor.submit(simulate_to, recipe, str(folder)) for recipe in missing]
+        attempts = (future.result for future in concurrent.futures.as_completed(futures))
     # a terminal may say that it has no columns
     width = shutil.get_terminal_size().columns
     done = len(tasks) - len(missing)
+    failures = []
     with tqdm(total=len(tasks), initial=done, desc="surfaces", unit="surface", ncols=width, disable=None) as bar:
-        if executor is None:
-            for recipe in missing:
-                simulate_to(recipe, str(folder))
-                bar.update()
-            return
-        futures = [executor.submit(simulate_to, recipe, str(folder)) for recipe in missing]
-        try:
-            for future in concurrent.futures.as_completed(futures):
-                future.result()
-                bar.update()
-        except BaseException:
-            for future in futures:
-                future.cancel()
-            raise
+        for attempt in attempts:
+            try:
+                attempt()
+            except RuntimeError as fault:
+                failures.append(str(fault))
+            bar.update()
+    if failures:
+        raise RuntimeError(f"{len(failures)} of {len(missing)} surfaces failed: {failures[0]}")
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
@@ -52,7 +55,6 @@ def run(tasks: Sequence[Task], folder: pathlib.Path, executor: Any = None) -> No
 @click.option("--points", type=click.IntRange(64), default=1024, show_default=True, help="Largest grid to run.")
 @click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
 @click.option("--scheduler", help="Address of a dask scheduler, whose workers see this checkout and the folder.")
-@click.option("--list", "listed", is_flag=True, help="Say what would run, and what is there.")
 def boundary_elements(
     folder: pathlib.Path,
     target: pathlib.Path | None,
@@ -60,7 +62,6 @@ def boundary_elements(
     points: int,
     workers: int,
     scheduler: str | None,
-    listed: bool,
 ) -> None:
     """Solve random surfaces by boundary elements (Tamaas, the extra `simulate`): four hours on two cores.
 
@@ -73,10 +74,5 @@ def boundary_elements(
         counted = collect(tasks, folder, target)
         click.echo(f"{target}: {counted} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
         return
-    if listed:
-        for task in tasks:
-            state = "there" if (folder / f"{task.recipe.name}.npz").exists() else "missing"
-            click.echo(f"{task.recipe.name} {task.split} {state}")
-        return
-    with warnings.catch_warnings(), engine(workers, scheduler, processes=True) as executor:
+    with engine(workers, scheduler, processes=True) as executor:
         run(tasks, folder, executor)

@@ -122,7 +122,11 @@ def simulate_to(recipe: Recipe, folder: str) -> str:
     target = pathlib.Path(folder) / f"{recipe.name}.npz"
     if not target.exists():
         partial = target.with_suffix(f".{os.getpid()}.partial")
+        try:
+            found = simulate(recipe)
+        except RuntimeError as fault:
+            raise RuntimeError(f"{recipe.name}: {fault}") from None
         with open(partial, "wb") as stream:
-            np.savez_compressed(stream, **simulate(recipe))
+            np.savez_compressed(stream, **found)
         partial.replace(target)
     return recipe.name

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 
+from generate.boundary_elements import solve
 from generate.boundary_elements.collect import collect
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Task, campaign, nodes
 from generate.boundary_elements.run import boundary_elements, run
@@ -155,11 +156,13 @@ class TestCampaign:
             identity = data.mean_separation + 2 * data.energy / data.force
             np.testing.assert_allclose(data.pressure_weighted_height, identity, atol=1e-6)
 
-    def test_command_lists_and_refuses_an_empty_folder(self, tmp_path):
-        listed = CliRunner().invoke(
-            boundary_elements, ["--list", "--scale", "0.1", "--points", "64", "--folder", str(tmp_path)]
-        )
-        assert listed.exit_code == 0
-        assert "missing" in listed.output
+    def test_failures_come_last_and_are_named(self, tmp_path, monkeypatch):
+        monkeypatch.setattr(solve, "MAX_ITERATIONS", 2)
+        tasks = [Task(RECIPE, "training"), Task(dataclasses.replace(RECIPE, seed=6), "training")]
+        with pytest.raises(RuntimeError, match=rf"2 of 2 surfaces failed: {RECIPE.name}"):
+            run(tasks, tmp_path)
+        assert not list(tmp_path.iterdir())
+
+    def test_command_refuses_an_empty_folder(self, tmp_path):
         empty = CliRunner().invoke(boundary_elements, ["--folder", str(tmp_path), "--collect", str(tmp_path / "a.nc")])
         assert "no surface" in str(empty.exception)
