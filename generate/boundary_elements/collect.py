@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime
 import json
 import pathlib
-import platform
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,7 +15,7 @@ from generate.boundary_elements import solve
 from generate.boundary_elements.design import SPLITS, Task
 from mbma_tables import bearing
 from mbma_tables.errors import InputError
-from mbma_tables.tablefiles.provenance import physics_digest
+from mbma_tables.tablefiles.provenance import source_digest, versions
 
 MODULES = ("generate.boundary_elements.surfaces", "generate.boundary_elements.solve", "mbma_tables.bearing")
 ENDS = bearing.BANDS + 2
@@ -123,8 +122,8 @@ def dataset(tasks: Sequence[Task], folder: pathlib.Path) -> xr.Dataset:
         "comment": "A surface is made anew by generate.boundary_elements.surfaces.heights from kind, hurst, zeta_1, "
         "waves, shape, seed and points. split: no fit sees anything but training; refine repeats surfaces on grids. "
         "band_energy has the waves longer than the surface's first and those shorter than its last at its ends.",
-        "versions": json.dumps({"engine": engines, "numpy": numpys, "python": platform.python_version()}),
-        "code_sha256": physics_digest(MODULES),
+        "versions": json.dumps(versions() | {"engine": ", ".join(engines), "numpy": ", ".join(numpys)}),
+        "code_sha256": source_digest(MODULES),
         "surfaces_planned": len(tasks),
         "surfaces_solved": len(found),
     }

@@ -7,7 +7,6 @@ import functools
 import pathlib
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
 
 import click
 from tqdm import tqdm
@@ -19,17 +18,17 @@ from generate.boundary_elements.solve import simulate_to
 HERE = pathlib.Path("boundary_elements")
 
 
-def run(tasks: Sequence[Task], folder: pathlib.Path, executor: Any = None) -> None:
-    """Solve what `folder` does not hold yet, one file a surface; no executor: here, one after the other.
+def run(tasks: Sequence[Task], folder: pathlib.Path, pool: concurrent.futures.Executor | None = None) -> None:
+    """Solve what `folder` does not hold yet, one file a surface; no pool: here, one after the other.
 
     Surfaces that fail are left out until the end, then named.
     """
     folder.mkdir(parents=True, exist_ok=True)
     missing = [task.recipe for task in tasks if not (folder / f"{task.recipe.name}.npz").exists()]
-    if executor is None:
+    futures = [] if pool is None else [pool.submit(simulate_to, recipe, str(folder)) for recipe in missing]
+    if pool is None:
         attempts: Iterator[Callable[[], str]] = (functools.partial(simulate_to, r, str(folder)) for r in missing)
     else:
-        futures = [executor.submit(simulate_to, recipe, str(folder)) for recipe in missing]
         attempts = (future.result for future in concurrent.futures.as_completed(futures))
     # a terminal may say that it has no columns
     width = shutil.get_terminal_size().columns
@@ -41,6 +40,11 @@ def run(tasks: Sequence[Task], folder: pathlib.Path, executor: Any = None) -> No
                 attempt()
             except RuntimeError as fault:
                 failures.append(str(fault))
+            except BaseException:
+                # else leaving the pool waits for all of them
+                for future in futures:
+                    future.cancel()
+                raise
             bar.update()
     if failures:
         raise RuntimeError(f"{len(failures)} of {len(missing)} surfaces failed: {failures[0]}")
@@ -67,12 +71,12 @@ def boundary_elements(
 
     Stopped and called again, it goes on where it was. Small grids come first, every kind of surface in turn.
     """
-    from generate.tables.commands import engine
+    from generate.tables.commands import executor
 
     tasks = [task for task in campaign(scale) if task.recipe.points <= points]
     if target is not None:
         counted = collect(tasks, folder, target)
         click.echo(f"{target}: {counted} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
         return
-    with engine(workers, scheduler, processes=True) as executor:
-        run(tasks, folder, executor)
+    with executor(workers, scheduler) as pool:
+        run(tasks, folder, pool)
