@@ -53,14 +53,14 @@ class Constants:
         c and u0 of the Gaussian tail factor.
     """
 
-    area_s0: float = 0.5116
-    area_slope: float = 0.0292
-    area_t0: float = 0.3356
-    weight: float = 0.4376
-    weight_slope: float = 0.1634
-    cubic: float = 0.4227
-    tail: float = 0.193
-    onset: float = 1.157
+    area_s0: float = 0.5131
+    area_slope: float = 0.03034
+    area_t0: float = 0.3399
+    weight: float = 0.4411
+    weight_slope: float = 0.1718
+    cubic: float = 0.416
+    tail: float = 0.1356
+    onset: float = 1.01
 
 
 CONSTANTS = Constants()

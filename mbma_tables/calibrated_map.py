@@ -56,13 +56,13 @@ class MapConstants:
         Further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces.
     """
 
-    breadth: float = 0.12
-    breadth_onset: float = 1.93
-    gaussian_area: float = 0.167
-    valley_area: float = 0.552
+    breadth: float = 0.1498
+    breadth_onset: float = 2.484
+    gaussian_area: float = 0.2068
+    valley_area: float = 0.63
     tension_area: float = 0.6
-    merging_area: float = 0.0085
-    elliptic: float = 0.825
+    merging_area: float = 0.007491
+    elliptic: float = 0.84
 
 
 MAP_CONSTANTS = MapConstants()

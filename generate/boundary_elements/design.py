@@ -111,18 +111,23 @@ def refinement() -> list[Recipe]:
     ]
 
 
+def cost(recipe: Recipe) -> float:
+    """Grid points a side, more where stretching makes the equations ill-conditioned."""
+    return recipe.points * (max(1.0, recipe.shape / 4) if recipe.kind == "stretched" else 1.0)
+
+
 def campaign(scale: float = 1.0) -> list[Task]:
-    """Every surface to solve, small grids first and kinds in turn, so that stopping early leaves a balanced set.
+    """Every surface to solve, cheap ones first and kinds in turn, so that stopping early leaves a balanced set.
 
     `scale` multiplies the number of surfaces of every node (at least 1; below 1 the last nodes keep one).
     """
-    tasks = [(r.points, 0, 0, Task(r, REFINEMENT)) for r in refinement()]
+    tasks = [(cost(r), 0, 0, Task(r, REFINEMENT)) for r in refinement()]
     for node in nodes():
         for turn in range(max(1, round(node.surfaces * scale))):
             split = HELD_OUT_SPECTRUM if node.held_out else HELD_OUT_SURFACE if turn == 1 else TRAINING
             # of the spectrum alone, so that a longer list moves no seed; its order mixes the kinds
             seed = zlib.crc32(node.recipe.name.encode()) % 10_000_000 * 100 + turn
             recipe = dataclasses.replace(node.recipe, seed=seed)
-            tasks.append((recipe.points, turn, seed, Task(recipe, split)))
+            tasks.append((cost(recipe), turn, seed, Task(recipe, split)))
     tasks.sort(key=lambda entry: entry[:3])
     return [entry[3] for entry in tasks]
