@@ -14,93 +14,21 @@ import xarray as xr
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
-from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, SPLITS, TRAINING
+from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
+from generate.boundary_elements.evidence import GAUSSIAN, MAX_AREA, MIN_WAVES, Case, cases
 from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import CONSTANTS, MEAN_WAVE, Constants, Law, Spectrum
+from mbma_tables.calibrated import CONSTANTS, MEAN_WAVE, Constants, Law
 from mbma_tables.calibrated_map import MAP_CONSTANTS, MapConstants, MapLaw
 
-GAUSSIAN = ("self_affine", "plateau", "filtered")
 QUANTITIES = ("area", "force", "stiffness")
-EDGES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9, 0.98)  # contact fractions between which errors are told
+EDGES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9, MAX_AREA)  # contact fractions between which errors are told
 FOLDS = 5
-MIN_WAVES = 2  # constants see no surface of one longest wave a side
-WEIGHT_AREA = 0.03  # W is fitted above this contact, the tail below TAIL_AREA
+WEIGHT_GAP = 1.0  # W is fitted where u is less [h_rms], the tail where less than TAIL_AREA touches
 TAIL_AREA = 0.1
 # errors that count alike: model noise plus the scatter of surfaces at light contact
 NOISE = {"area": (0.015, 0.15), "tail": (0.05, 0.25), "map": (0.03, 0.1)}
 LIGHT = 0.01
 STEP = 0.01  # relative, of numerical derivatives: laws of maps are interpolated
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Case:
-    """One simulated surface: what laws may know of it, and what was found."""
-
-    kind: str
-    split: str
-    node: tuple[float | str, ...]
-    waves: int
-    spectrum: Spectrum
-    own_spectrum: Spectrum
-    h_max: float
-    curves: dict[str, Any]
-    force: FloatArray
-    area: FloatArray
-    u: FloatArray
-
-    @property
-    def gaussian(self) -> bool:
-        """Whether constants of the spectrum's law are fitted to surfaces like it."""
-        return self.kind in GAUSSIAN and self.waves >= MIN_WAVES
-
-    def law(self, constants: Constants) -> Law:
-        """The spectrum's law with h_max."""
-        return Law(self.spectrum, self.h_max, constants)
-
-    def map_law(self, constants: Constants, map_constants: MapConstants) -> MapLaw:
-        """The map's law."""
-        return MapLaw(self.own_spectrum, **self.curves, constants=constants, map_constants=map_constants)
-
-    def noise(self, name: str) -> FloatArray:
-        """Errors of ln F or ln A that count as one."""
-        floor, scatter = NOISE[name]
-        return floor + scatter * np.exp(-self.area / LIGHT)
-
-
-def cases(data: xr.Dataset) -> list[Case]:
-    """Surfaces of a file by `python -m generate boundary_elements`, refinements left out."""
-    kinds = data.kind.attrs["flag_meanings"].split()
-    found = []
-    for number in range(data.sizes["surface"]):
-        one = data.isel(surface=number)
-        if (split := SPLITS[int(one.split)]) not in (TRAINING, HELD_OUT_SURFACE, HELD_OUT_SPECTRUM):
-            continue
-        kind, hurst, zeta_1 = kinds[int(one.kind)], float(one.hurst), float(one.zeta_1)
-        share, x = one.band_variance.values, one.band_q.values
-        plain = kind == "self_affine"
-        seen = np.isfinite(one.force.values) & (one.area.values > 0) & (one.area.values < EDGES[-1])
-        curves: dict[str, Any] = {
-            name: one[name].values.astype(float) for name in ("mean_height", "top_gradient", "tension_force", "tension")
-        }
-        curves |= {
-            "inverse_q2": float(np.nansum(share * one.band_inverse_q2.values)),
-            "anisotropy": float(one.anisotropy),
-        }
-        own_spectrum = Spectrum.from_shares(x[share > 0], share[share > 0])
-        found.append(
-            Case(
-                kind,
-                split,
-                (kind, hurst, zeta_1, int(one.waves), float(one["shape"])),
-                int(one.waves),
-                Spectrum.self_affine(hurst, zeta_1) if plain else own_spectrum,
-                own_spectrum,
-                float(one.h_max),
-                curves,
-                *(one[name].values[seen] for name in ("force", "area", "mean_separation")),
-            )
-        )
-    return found
 
 
 Fitted = TypeVar("Fitted", Constants, MapConstants)
@@ -119,11 +47,17 @@ def _fitted(start: Fitted, names: Sequence[str], residuals: Callable[[Fitted], l
     return trial(found.x)
 
 
+def noise(one: Case, name: str) -> FloatArray:
+    """Errors of ln F or ln A that count as one."""
+    floor, scatter = NOISE[name]
+    return np.asarray(floor + scatter * np.exp(-one.area / LIGHT))
+
+
 def fit_weight(seen: Sequence[Case], constants: Constants) -> Constants:
     """a, its slope and b of W: u is linear in them; errors of u count as the errors of ln F that they are."""
     rows, aims = [], []
     for one in seen:
-        kept = one.area > WEIGHT_AREA
+        kept = one.u < WEIGHT_GAP
         scale = -one.u * np.gradient(np.log(one.u), np.log(one.force))
         pure = [
             Law(
@@ -140,14 +74,14 @@ def fit_weight(seen: Sequence[Case], constants: Constants) -> Constants:
 
 
 def fit(training: Sequence[Case]) -> Constants:
-    """The spectrum's law: area at equal force; u from 3% contact up; the tail where less than a tenth touches."""
+    """The spectrum's law: area at equal force; u below h_rms; the tail where less than a tenth touches."""
     seen = [one for one in training if one.gaussian]
 
     def areas(trial: Constants) -> list[FloatArray]:
-        return [errors(one, one.law(trial), "area") / one.noise("area") for one in seen]
+        return [errors(one, one.law(trial), "area") / noise(one, "area") for one in seen]
 
     def tails(trial: Constants) -> list[FloatArray]:
-        return [(errors(one, one.law(trial), "force") / one.noise("tail"))[one.area < TAIL_AREA] for one in seen]
+        return [(errors(one, one.law(trial), "force") / noise(one, "tail"))[one.area < TAIL_AREA] for one in seen]
 
     constants = fit_weight(seen, _fitted(CONSTANTS, ("area_s0", "area_slope", "area_t0"), areas))
     return _fitted(constants, ("tail", "onset"), tails)
@@ -158,11 +92,11 @@ def fit_map(training: Sequence[Case], constants: Constants) -> MapConstants:
 
     def areas(trial: MapConstants) -> list[FloatArray]:
         seen = [one for one in training if one.kind == "stretched"]
-        return [errors(one, one.map_law(constants, trial), "area") / one.noise("map") for one in seen]
+        return [errors(one, one.map_law(constants, trial), "area") / noise(one, "map") for one in seen]
 
     def forces(trial: MapConstants) -> list[FloatArray]:
         seen = [one for one in training if one.waves >= MIN_WAVES]
-        return [errors(one, one.map_law(constants, trial), "force") / one.noise("map") for one in seen]
+        return [errors(one, one.map_law(constants, trial), "force") / noise(one, "map") for one in seen]
 
     names = [name for name in dataclasses.asdict(MAP_CONSTANTS) if name not in ("elliptic", "tension_area")]
     return _fitted(_fitted(MAP_CONSTANTS, ("elliptic",), areas), names, forces)

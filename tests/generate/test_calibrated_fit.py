@@ -1,0 +1,52 @@
+"""The fit of the calibrated law: it finds constants that are known, and says how far off a law is."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from generate.boundary_elements.design import TRAINING
+from generate.boundary_elements.evidence import Case
+from generate.calibrated import EDGES, QUANTITIES, coverage, cross_validate, errors, fit, summary
+from mbma_tables.calibrated import CONSTANTS, Law, Spectrum
+
+FORCES = np.geomspace(4e-4, 1.0, 15)
+TRUE = dataclasses.replace(
+    CONSTANTS, area_s0=0.55, area_slope=0.02, weight=0.47, weight_slope=0.3, cubic=0.35, tail=0.2, onset=1.2
+)
+
+
+def case(hurst, zeta_1, h_max=6.0, factor=1.0):
+    """A surface on which simulation agrees with TRUE, forces times a factor."""
+    spectrum = Spectrum.self_affine(hurst, zeta_1)
+    law = Law(spectrum, h_max, TRUE)
+    return Case(
+        "self_affine", TRAINING, (hurst, zeta_1), 4, spectrum, spectrum, h_max, {}, FORCES, law.area(FORCES),
+        law.separation(FORCES / factor),
+    )  # fmt: skip
+
+
+def test_known_constants_are_found():
+    found = fit([case(hurst, zeta_1) for hurst in (0.3, 0.6, 1.0) for zeta_1 in (8.0, 64.0)])
+    for name, value in dataclasses.asdict(TRUE).items():
+        assert getattr(found, name) == pytest.approx(value, rel=1e-3), name
+
+
+def test_errors_are_those_of_equal_separation_force_and_stiffness():
+    off = case(0.8, 32.0, factor=1.1)
+    law = off.law(TRUE)
+    np.testing.assert_allclose(errors(off, law, "force"), -np.log(1.1), rtol=1e-6)
+    np.testing.assert_allclose(errors(off, law, "area"), 0, atol=1e-12)
+    exact = case(0.8, 32.0)
+    np.testing.assert_allclose(errors(exact, exact.law(TRUE), "stiffness"), 0, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_cross_validation_states_errors_that_cover():
+    rng = np.random.default_rng(1)
+    seen = [case(h, z, factor=np.exp(0.05 * rng.normal())) for h in (0.3, 0.5, 0.7, 0.9, 1.0) for z in (16.0, 24.0)]
+    told = cross_validate(seen)
+    assert set(told["spread"]) == set(dataclasses.asdict(CONSTANTS))
+    assert all(0 <= share <= 1 for pair in coverage(seen, TRUE, told["errors"]).values() for share in pair)
+    assert summary(seen, lambda one: one.law(TRUE))["area"][4][:2] == pytest.approx([0, 0], abs=1e-12)
+    assert len(told["errors"][QUANTITIES[1]]) == len(EDGES) - 1
