@@ -25,7 +25,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk, erf, expit, ndtr, ndtri
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.bearing import FRACTIONS
+from mbma_tables.bearing import FRACTIONS, bearing, radial_spectrum
 from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, area, light_factor, mean_top_height
 
 LIGHTEST, HEAVIEST = -16.0, 1.4  # ln F^ of a map's curve
@@ -116,6 +116,24 @@ class MapLaw:
     anisotropy: float = 1.0
     constants: Constants = CONSTANTS
     map_constants: MapConstants = MAP_CONSTANTS
+
+    @classmethod
+    def from_heights(cls, heights: FloatArray, sizes: tuple[float, float]) -> MapLaw:
+        """The law of a periodic map of these sides; mirror any other first, so that its edges meet.
+
+        Lengths of its answers are in the map's own h_rms, forces over A0 E* g with its own rms gradient.
+        """
+        known, bands = bearing(heights, sizes), radial_spectrum(heights, sizes)
+        held = bands.variance > 0
+        return cls(
+            Spectrum.from_shares(bands.q[held], bands.variance[held]),
+            float(np.sum(bands.variance[held] * bands.q2_mean_inverse[held]) / known.h_rms**2),
+            known.mean_height / known.h_rms,
+            known.top_gradient,
+            known.tension_force / known.gradient,
+            known.tension / known.gradient,
+            known.anisotropy,
+        )
 
     @functools.cached_property
     def height_factor(self) -> float:

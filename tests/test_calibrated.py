@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import erf
 
-from mbma_tables.bearing import FRACTIONS, bearing, radial_spectrum
+from mbma_tables.bearing import FRACTIONS
 from mbma_tables.calibrated import PERSSON, YANG_PERSSON, Law, Spectrum, area, mean_top_height
 from mbma_tables.calibrated_map import MapLaw, hertz_ellipse
 from mbma_tables.surfaces.surface import Surface
@@ -137,26 +137,22 @@ class TestMap:
         inside = (k >= 3) & (k <= 32)
         modes = np.where(inside, np.where(inside, k, 1.0) ** -1.8 * np.exp(2j * np.pi * rng.random(k.shape)), 0)
         heights = np.fft.irfft2(modes, s=(n, n))
-        heights /= bearing(heights, (1.0, 1.0)).gradient
-        known, bands = bearing(heights, (1.0, 1.0)), radial_spectrum(heights, (1.0, 1.0))
-        held = bands.variance > 0
-        spectrum = Spectrum.from_shares(bands.q[held], bands.variance[held])
-        inverse = np.nansum(bands.variance * bands.q2_mean_inverse) / known.h_rms**2
-        return MapLaw(
-            spectrum,
-            inverse,
-            known.mean_height / known.h_rms,
-            known.top_gradient,
-            known.tension_force,
-            known.tension,
-            known.anisotropy,
-        )
+        return MapLaw.from_heights(heights, (1.0, 1.0))
 
     def test_gaussian_map_is_near_the_law_of_its_spectrum(self, law):
         plain = Law(law.spectrum)
         forces = np.array([0.05, 0.2, 0.6])
         np.testing.assert_allclose(law.area(forces), plain.area(forces), rtol=0.05)
         np.testing.assert_allclose(law.separation(forces), plain.separation(forces), rtol=0.1)
+
+    def test_scale_of_heights_and_sides_cancels(self):
+        n = 64
+        x = np.arange(n) / n * 2 * np.pi
+        heights = np.cos(3 * x)[:, None] + np.sin(2 * x)[None, :] + 0.3 * np.cos(9 * x[:, None] + 7 * x[None, :])
+        one, other = MapLaw.from_heights(heights, (1.0, 1.0)), MapLaw.from_heights(7 * heights, (1e-6, 1e-6))
+        loads = np.array([0.01, 0.3])
+        np.testing.assert_allclose(one.separation(loads), other.separation(loads), rtol=1e-9)
+        np.testing.assert_allclose(one.area(loads), other.area(loads), rtol=1e-9)
 
     def test_gaussian_pressures_are_their_own(self, law):
         np.testing.assert_allclose(law.gaussian_force([0.2, 0.5, 1.0]), [0.2, 0.5, 1.0], rtol=0.03)
