@@ -53,14 +53,14 @@ class Constants:
         c and u0 of the Gaussian tail factor.
     """
 
-    area_s0: float = 0.5131
-    area_slope: float = 0.03034
-    area_t0: float = 0.3399
-    weight: float = 0.4411
-    weight_slope: float = 0.1718
-    cubic: float = 0.416
-    tail: float = 0.1356
-    onset: float = 1.01
+    area_s0: float = 0.5097
+    area_slope: float = 0.02905
+    area_t0: float = 0.3352
+    weight: float = 0.4451
+    weight_slope: float = 0.05435
+    cubic: float = 0.4057
+    tail: float = 0.1571
+    onset: float = 0.9413
 
 
 CONSTANTS = Constants()

@@ -56,13 +56,13 @@ class MapConstants:
         Further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces.
     """
 
-    breadth: float = 0.1498
-    breadth_onset: float = 2.484
-    gaussian_area: float = 0.2068
-    valley_area: float = 0.63
+    breadth: float = 0.2209
+    breadth_onset: float = 3.08
+    gaussian_area: float = 0.2544
+    valley_area: float = 0.641
     tension_area: float = 0.6
-    merging_area: float = 0.007491
-    elliptic: float = 0.84
+    merging_area: float = 0.009548
+    elliptic: float = 0.9361
 
 
 MAP_CONSTANTS = MapConstants()
