@@ -1,7 +1,7 @@
-r"""Contact of a rough surface by Persson's energy integral, its cover and weight calibrated on boundary elements.
+"""Contact of a rough surface by Persson's energy integral, its cover and weight calibrated on boundary elements.
 
-Units: force :math:`\hat F = F/(A_0 E^* g)` with g the rms gradient in two dimensions, lengths in h_rms, wavenumbers
-x = q/q0, elastic energy over :math:`A_0 E^* g h_{rms}`. A spectrum enters by its shares w(x) of h_rms^2 per d ln x. ::
+Units: force over A0 E* g with g the rms gradient in two dimensions, lengths in h_rms, wavenumbers x = q/q0, elastic
+energy over A0 E* g h_rms. A spectrum enters by its shares w(x) of h_rms^2 per d ln x. ::
 
     A/A0    = erf(sqrt(2) F/sqrt(S)),  S = (s0 + t)/(1 + t),  t = F/t0,  s0 of Nayak's alpha (S = 1: Persson's)
     P(x; F) = erf(sqrt(2) F g/g(x))                      g(x)^2: the gradient's square of the waves below x
@@ -34,8 +34,6 @@ CLOSEST = -36.0  # ln ln x where a self-affine spectrum's quadrature begins
 PANEL, PANEL_NODES = 1.0, 10  # its panels, in ln ln x below x = e and in ln x above
 LOG_FORCE = (-21.0, 1.6)  # ln F^ over which a curve is tabulated
 FORCE_NODES = 227
-
-
 MEAN_WAVE = 0.8  # <q>/sqrt(<q^2>) that W's slope refers to
 
 

@@ -1,16 +1,17 @@
-r"""The calibrated law where a map is at hand: its tops decide the area, its bearing curve the separation.
+"""The calibrated law where a map is at hand: its tops decide at light loads, its valleys near full contact.
 
 Lengths in h_rms, force over A0 E* g as in `calibrated`. The gap is zero where pressure is not, so the
 pressure-weighted height H_p = <p h>/<p> obeys H_p = u + 2 U/F exactly; with dU = -F du that is ::
 
     u(F) = 2 F integral from F to infinity of H_p/F'^2 dF' - H_p(F)
 
-At light load H_p = M(c A), the mean height of the highest share c A of the map, c = 4/5 exactly for Hertzian
-contact. Towards full contact the map's valleys decide: gaps open where the pressures of full contact would pull, and
-u is the spectrum's u_P at the force F_D at which Gaussian pressures of full contact would pull as much in the mean,
-<max(-p, 0)>; no constant is fitted there. The area there is that of Gaussian pressures that pull on the same share; at
-light loads it is the law's with the gradient of the highest share 1 - (1 - A)^2
-of the map in place of g, the 2 A of a paraboloid, and Hertz's elliptic factor.
+At light load H_p = M(c A), the mean height of the highest share c A of the map, weighted by gradient because pressures
+are proportional to it; c = 4/5 exactly for Hertzian contact. The area is the law's with the gradient of the highest
+share 1 - (1 - A)^2 of the map in place of g, the 2 A of a paraboloid, and Hertz's elliptic factor.
+
+Towards full contact the map's valleys decide: gaps open where the pressures of full contact would pull. u is the
+spectrum's u_P at the force F_D at which Gaussian pressures of full contact pull as much in the mean, <max(-p, 0)>; the
+area is the law's at the force at which they pull on the same share. No constant is fitted there.
 """
 
 from __future__ import annotations
@@ -51,17 +52,17 @@ class MapConstants:
     tension_area : float
         Contact where the area pulled on in full contact takes over from the tops'.
     merging_area : float
-        Contact over which c grows from a single contact's 4/5.
+        Contact over which c grows from a single contact's.
     elliptic : float
         Further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces.
     """
 
-    breadth: float = 0.2209
-    breadth_onset: float = 3.08
-    gaussian_area: float = 0.2544
-    valley_area: float = 0.641
+    breadth: float = 0.2208
+    breadth_onset: float = 3.081
+    gaussian_area: float = 0.2545
+    valley_area: float = 0.6409
     tension_area: float = 0.6
-    merging_area: float = 0.009548
+    merging_area: float = 0.009561
     elliptic: float = 0.9361
 
 
@@ -231,7 +232,8 @@ class MapLaw:
         shares = np.linspace(np.log(FRACTIONS[0]), 0, 2000)
         own = np.interp(-height, -mean_top_height(np.exp(shares)), shares)
         near = np.exp(-((contact / m.gaussian_area) ** 2))
-        factor = 0.8 + (self.height_factor - 0.8) * -np.expm1(-contact / m.merging_area)
+        single = 0.8 * self._ellipse[1]
+        factor = single + (self.height_factor - single) * -np.expm1(-contact / m.merging_area)
         top = np.minimum(near * np.log(factor * contact) + (1 - near) * own, 0.0)
         tops = np.interp(top, np.log(FRACTIONS), self.weighted_height)
         difference = np.exp(-((contact / m.valley_area) ** 4)) * (tops - valleys)
