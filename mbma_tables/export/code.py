@@ -142,13 +142,7 @@ def source_texts(target: str, model: UniversalModel, reading: Reading) -> dict[s
 
 
 def web_assembly(c_texts: dict[str, str]) -> bytes:
-    """The C sources compiled to WebAssembly.
-
-    Raises
-    ------
-    InputError
-        Where the compiler is missing or fails.
-    """
+    """The C sources compiled to WebAssembly."""
     if importlib.util.find_spec("ziglang") is None:
         raise InputError(
             "javascript is compiled from C by the package ziglang, which is not installed: "

@@ -69,13 +69,7 @@ def to_matlab(law: LawTable) -> bytes:
 
 
 def matlab_reader(law: LawTable, name: str) -> bytes:
-    """The function NAME.m that looks up the MATLAB file NAME.mat.
-
-    Raises
-    ------
-    InputError
-        For a name that MATLAB cannot call.
-    """
+    """The function NAME.m that looks up the MATLAB file NAME.mat."""
     return READER.format(name=checked_name(name, MAX_MATLAB_NAME), title=comment(law.comments[1:2], "%")).encode()
 
 

@@ -8,8 +8,8 @@ both signs.
 
 from __future__ import annotations
 
+import bisect
 import dataclasses
-from collections.abc import Callable
 
 import numpy as np
 
@@ -222,7 +222,12 @@ def describe_law(
     if rows is not None:
         x, y, error = with_rows(whole_number_in("rows", rows, MIN_ROWS, MAX_ROWS))
     else:
-        x, y, error = _fewest(with_rows, number_in("rtol", 1e-3 if rtol is None else rtol, 1e-7, 0.5))
+        asked = number_in("rtol", 1e-3 if rtol is None else rtol, 1e-7, 0.5)
+        # the error falls with the number of rows
+        fewest = bisect.bisect_left(range(MAX_ROWS + 1), -asked, MIN_ROWS, key=lambda count: -with_rows(count)[2])
+        if fewest > MAX_ROWS:
+            raise InputError(f"rtol = {asked:g} needs more than {MAX_ROWS} rows under linear interpolation")
+        x, y, error = with_rows(fewest)
     if (np.diff(x) <= (MIN_STEP if quantity == "pressure" else 0.0)).any():
         raise InputError(
             f"rows are closer than {MIN_STEP:g} {length_unit}, which some readers cannot tell apart: "
@@ -247,25 +252,6 @@ def _range_end(law: ContactLaw, asked: float | None) -> float:
     if not 0 < found <= end:
         why = "full compression" if turn is None else "where the force of this surface turns down"
         raise InputError(f"largest_overclosure must be in (0, {end:g}], up to {why}, got {found:g}")
-    return found
-
-
-def _fewest(
-    with_rows: Callable[[int], tuple[FloatArray, FloatArray, float]], rtol: float
-) -> tuple[FloatArray, FloatArray, float]:
-    """The fewest rows that meet the tolerance."""
-    low, high = MIN_ROWS, 2 * MIN_ROWS
-    while (found := with_rows(high))[2] > rtol:
-        if high >= MAX_ROWS:
-            raise InputError(f"rtol = {rtol:g} needs more than {MAX_ROWS} rows under linear interpolation")
-        low, high = high, min(2 * high, MAX_ROWS)
-    while high - low > 1:
-        middle = (low + high) // 2
-        trial = with_rows(middle)
-        if trial[2] <= rtol:
-            high, found = middle, trial
-        else:
-            low = middle
     return found
 
 

@@ -21,28 +21,14 @@ UNIT = "unit"
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """One measurement.
-
-    Attributes
-    ----------
-    tier, variant : str
-        What answered, and what was asked of it: "gap rtol=1e-06", "island", "open".
-    quantity : str
-        "both", "force" or "area".
-    error : float or None
-        Largest relative error found on held-out surfaces or islands.
-    cost : float
-        Time over that of the fixed work; seconds in the row of tier `UNIT`.
-    evaluations : float or None
-        Kernel evaluations: islands for a gap, pressures for a solved island, height integrals for a tabulated one.
-    """
+    """One measurement: what answered, what was asked of it, largest relative error found, time and evaluations."""
 
     tier: str
-    variant: str
-    quantity: str
+    variant: str  # "gap rtol=1e-06", "island", "open"
+    quantity: str  # "both", "force" or "area"
     error: float | None
-    cost: float
-    evaluations: float | None = None
+    cost: float  # time over that of the fixed work; seconds in the row of tier `UNIT`
+    evaluations: float | None = None  # islands for a gap, pressures for an exact island, height integrals for a table
 
     @functools.cached_property
     def what(self) -> str:
@@ -80,13 +66,7 @@ class Costs:
 
 
 def read_costs(path: pathlib.Path) -> Costs:
-    """Costs from a CSV file with `COLUMNS`.
-
-    Raises
-    ------
-    TableFileError
-        Where it cannot be read or is no such file.
-    """
+    """Costs from a CSV file with `COLUMNS`."""
 
     def number(text: str) -> float | None:
         return float(text) if text else None

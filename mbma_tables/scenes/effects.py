@@ -33,13 +33,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def chosen(on: Iterable[str], off: Iterable[str]) -> tuple[frozenset[str], frozenset[str]]:
-    """Outputs asked for and refinements switched off, checked against each other.
-
-    Raises
-    ------
-    InputError
-        For unknown names, contradictions, and nothing asked for.
-    """
+    """Outputs asked for and refinements switched off, checked against each other."""
     wanted, without = list(on), list(off)
     for name in (*wanted, *without):
         if name not in EFFECTS:

@@ -105,13 +105,7 @@ def effective_modulus_of(given: Mapping[str, Any]) -> float | None:
 
 
 def read_specimen(path: pathlib.Path) -> Specimen:
-    """The specimen of a TOML file with the tables [surface] and [material] of a scene.
-
-    Raises
-    ------
-    InputError
-        For mistakes in the file: one message that starts with its path.
-    """
+    """The specimen of a TOML file with the tables [surface] and [material] of a scene."""
     entries = read_toml(path, "surface")
     tables = {name: schema()["properties"][name] for name in ("surface", "material")}
     try:

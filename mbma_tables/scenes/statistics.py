@@ -86,13 +86,7 @@ def _number_of_islands(pairs: Pairs, reading: Reading, rtol: float) -> Integrals
 def island_statistics(problem: Problem, surface: Surface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
     """Number of islands at every gap; load, area and density of islands along their approach (Eqs. 40, 42).
 
-    Returns
-    -------
-    dict
-        `island_number` (gap), `island_delta`, `island_force`, `island_area` (approach), and `island_density`
-        (gap, approach), zero beyond h_max - d; lengths and stresses in the units of the surface and of E_star.
-    float
-        Bound on the relative error.
+    The density is zero beyond h_max - d. Also returns the bound on the relative error.
     """
     reading, rtol, tier = _asked(problem, step)
     pairs = Pairs.of(surface, surface.h_max - gap)

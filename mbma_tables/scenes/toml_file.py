@@ -20,13 +20,7 @@ LONG_KEY = re.compile(r"""(?<![^\s.,=\[\]{}#"'])(?:(?:"[^"\n]*"|'[^'\n]*'|[^\s.,
 
 
 def read_toml(path: pathlib.Path, what: str) -> dict[str, Any]:
-    """The entries of a TOML file; `what` says of which kind it should be.
-
-    Raises
-    ------
-    InputError
-        Where it is not a regular file, cannot be read, is too long, or is not TOML.
-    """
+    """The entries of a TOML file; `what` says of which kind it should be."""
     try:
         content = read_file(path, MAX_BYTES)
     except InputError as fault:
@@ -52,13 +46,7 @@ def schema() -> dict[str, Any]:
 
 
 def check(entries: Mapping[str, Any], rules: Mapping[str, Any]) -> None:
-    """Refuse what a JSON schema does not allow, with its place and what to write instead.
-
-    Raises
-    ------
-    InputError
-        For the fault that matters most.
-    """
+    """Refuse what a JSON schema does not allow, with its place and what to write instead."""
     import jsonschema
 
     faults = list(jsonschema.Draft202012Validator(rules).iter_errors(entries))

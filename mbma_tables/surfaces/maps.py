@@ -50,53 +50,30 @@ def radial_spectrum(
 ) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.complex128]]:
     """C(q) of a map, averaged over narrow rings up to the Nyquist circle pi/max(dx, dy) (Eqs. 4, 5).
 
-    Parameters
-    ----------
-    heights : numpy.ndarray, shape (nx, ny)
-        Heights, their trend removed, windowed unless periodic [length].
-    dx, dy : float
-        Sampling steps along the first and the second axis [length].
-
-    Returns
-    -------
-    q, C, waves : numpy.ndarray, shape (n,)
-        Mean wavenumber of each ring, mean C [length^4] and number of wavevectors. C times waves times the cell
-        (2 pi)^2/(nx dx ny dy) is the variance of height in the ring.
-    directions : numpy.ndarray, shape (2, n)
-        Mean of exp(2 i theta) and of exp(4 i theta) around the ring, weighted by power.
+    Returns mean wavenumber of each ring, mean C, number of wavevectors, and power-weighted means of exp(2 i theta) and
+    exp(4 i theta), shape (2, n). C times waves times (2 pi)^2/(nx dx ny dy) is the variance of height in the ring.
     """
     nx, ny = heights.shape
     step_x, step_y = 2 * math.pi / (nx * dx), 2 * math.pi / (ny * dy)
-    power = np.abs(np.fft.rfft2(heights)) ** 2
-    power *= 1 / (nx * ny) ** 2 / (step_x * step_y)
-    qx = (step_x * nx) * np.fft.fftfreq(nx)[:, None]
-    qy = (step_y * ny) * np.fft.rfftfreq(ny)[None, :]
+    power = np.abs(np.fft.fft2(heights)) ** 2 / (nx * ny) ** 2 / (step_x * step_y)
+    qx, qy = np.meshgrid(step_x * nx * np.fft.fftfreq(nx), step_y * ny * np.fft.fftfreq(ny), indexing="ij")
     q = np.hypot(qx, qy)
-    copies = np.full(q.shape, 2.0)
-    copies[:, 0] = 1.0
-    if ny % 2 == 0:
-        copies[:, -1] = 1.0
     inside = (q > 0) & (q <= math.pi / max(dx, dy) * (1 + 1e-12))
     measured = q[inside & (power > MIN_POWER * power.max())]
     if measured.size == 0:
         raise NotSelfAffineError("every wave of the map is shorter than two sampling steps")
     inside &= (q >= measured.min()) & (q <= measured.max())
-    q, count, strength = q[inside], copies[inside], (copies * power)[inside]
+    q, strength = q[inside], power[inside]
     ring = np.rint(RINGS * q / min(step_x, step_y)).astype(int)
-    waves: FloatArray = np.bincount(ring, count).astype(float)
+    waves: FloatArray = np.bincount(ring).astype(float)
     filled = waves > 0
     total = np.bincount(ring, strength)[filled]
     waves = waves[filled]
-    # the half-plane holds theta and stands for theta + pi too, for which both exponentials are the same
     turn = ((qx + 1j * qy)[inside] / q) ** 2
-    directions: NDArray[np.complex128] = np.array(
-        [
-            np.bincount(ring, strength * t.real)[filled] + 1j * np.bincount(ring, strength * t.imag)[filled]
-            for t in (turn, turn**2)
-        ]
-    )
+    sums = [[np.bincount(ring, strength * part)[filled] for part in (t.real, t.imag)] for t in (turn, turn**2)]
+    directions: NDArray[np.complex128] = np.array([real + 1j * imaginary for real, imaginary in sums])
     directions /= np.where(total > 0, total, 1.0)
-    return np.bincount(ring, count * q)[filled] / waves, total / waves, waves, directions
+    return np.bincount(ring, q)[filled] / waves, total / waves, waves, directions
 
 
 def _refuse_edges(heights: FloatArray) -> None:

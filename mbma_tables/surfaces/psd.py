@@ -204,22 +204,8 @@ def fit_spectrum(
 ) -> FittedSurface:
     """The surface whose band fits C, in the paper's convention or a profile's; for spectra and maps alike.
 
-    Parameters
-    ----------
-    q, C, counts, variances : numpy.ndarray
-        Wavenumber, positive spectrum, independent samples and variance of height that each entry stands for.
-    h_max : float
-        Highest point.
-    usable : tuple of float
-        Wavenumbers between which the spectrum is to be trusted.
-    band : tuple of float or None
-        The band, where the user forces it.
-    power : float
-        What `variances` adds up to if nothing is left out.
-    convention : str
-        'profile', or one whose C is the paper's by now.
-    known : object
-        Further fields of `SpectrumFit`.
+    `counts` and `variances` are independent samples and variance of height of each entry; `power` is the sum of all
+    variances, `usable` the range to be trusted, `known` further fields of `SpectrumFit`.
     """
     profile = convention == "profile"
     unit = float(q.min())
