@@ -62,13 +62,7 @@ def by_force(ax: Any, surface: Surface, ordinate: Callable[[Any, Any], Any], **s
     ax.set(xscale="log", xlabel=r"$F/(A_0 E^*)$")
 
 
-def area_only(force: Any, area: Any) -> Any:
-    """The area."""
-    return area
-
-
-def slope(gradient: Any, force: Any, area: Any) -> Any:
-    """Kappa, Eq. (51)."""
+def _kappa(gradient: Any, force: Any, area: Any) -> Any:
     return area / force * gradient
 
 
@@ -92,7 +86,7 @@ def simulations() -> Iterator[tuple[str, Any]]:
         axes[0, 0].plot(data.column("mean_separation_over_h_rms"), scaled, "k.", label="boundary elements")
         axes[0, 0].legend(fontsize="small")
         for ax in axes[0, 1:]:
-            by_force(ax, surface, area_only)
+            by_force(ax, surface, lambda force, area: area)
             ax.plot(scaled, data.column("area"), "k.")
             ax.set(yscale="log", ylabel=r"$A/A_0$")
         yield title, figure
@@ -106,7 +100,7 @@ def roads() -> Iterator[tuple[str, Any]]:
         surface = Surface.named(name)
         by_gap(gap_ax, surface, 1e-6)
         gap_ax.set_title(name)
-        by_force(ax, surface, area_only)
+        by_force(ax, surface, lambda force, area: area)
         force = np.geomspace(1e-5, 0.3, 2) * surface.rms_gradient
         ax.plot(force, 2 * force / surface.rms_gradient, "k:", label="kappa = 2")
         ax.set(yscale="log", ylabel=r"$A/A_0$", title=name)
@@ -123,8 +117,8 @@ def resolution() -> Iterator[tuple[str, Any]]:
         surface = Surface.named(f"resolution-{zeta_1}")
         first = {} if zeta_1 == RESOLUTIONS[0] else {"label": "_"}
         by_gap(ax, surface, 1e-7, (*READINGS, "G-W", "Persson simplified"), ls=style, lw=1, **first)
-        by_force(pair[0], surface, area_only, ls=style, lw=1, **first)
-        by_force(pair[1], surface, functools.partial(slope, surface.rms_gradient), ls=style, lw=1, **first)
+        by_force(pair[0], surface, lambda force, area: area, ls=style, lw=1, **first)
+        by_force(pair[1], surface, functools.partial(_kappa, surface.rms_gradient), ls=style, lw=1, **first)
         for panel in (ax, pair[0]):
             panel.plot([], [], "k", ls=style, label=f"zeta_1 = {zeta_1}")
     pair[0].set(yscale="log", ylabel=r"$A/A_0$")

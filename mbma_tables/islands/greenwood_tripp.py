@@ -132,7 +132,7 @@ def rigid_sphere(X: FloatArray, mu: FloatArray) -> FloatArray:
     return np.stack([math.pi / 5 * mu * height_integral(2.5, -X), math.pi / 2 * height_integral(2.0, -X)])
 
 
-def nodes_needed(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
+def _nodes_needed(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
     """Gauss nodes that usually give `rtol`; the estimate of each solution decides."""
     digits = max(-math.log10(rtol), 3.0)
     softness = np.log10(np.maximum(mu, 1.0)) / 12
@@ -140,31 +140,23 @@ def nodes_needed(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
     return wanted
 
 
-def _levels(X: FloatArray, mu: FloatArray, rtol: float) -> NDArray[np.intp]:
-    wanted = np.searchsorted(LEVELS, nodes_needed(X, mu, rtol))
-    return np.minimum(wanted, len(LEVELS) - 1)
-
-
 def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None) -> dict[str, Any]:
     phi = np.full((X.size, 3), np.nan)
     steps = np.zeros(X.size, dtype=np.int64)
     used = np.zeros(X.size, dtype=np.int64)
-    if nodes is not None:
-        batch = _newton(X, mu, rtol, nodes, profiles=False)
-        phi, steps, used = batch.phi, batch.steps, np.full(X.size, nodes)
-        failed = ~np.isfinite(phi).all(axis=1)
-    else:
-        level = _levels(X, mu, rtol)
-        failed = np.ones(X.size, dtype=bool)
-        for number, count in enumerate(LEVELS):
-            now = np.flatnonzero(failed & (level <= number))
-            if now.size == 0:
-                continue
-            batch = _newton(X[now], mu[now], rtol, int(count), profiles=False)
-            phi[now], used[now] = batch.phi, count
-            steps[now] += batch.steps
-            failed[now] = ~(batch.phi[:, 2] <= rtol)
-    return {"phi": phi, "iterations": steps, "nodes": used, "failed": failed}
+    failed = np.ones(X.size, dtype=bool)
+    levels = LEVELS if nodes is None else np.array([nodes])
+    level = np.minimum(np.searchsorted(levels, _nodes_needed(X, mu, rtol)), len(levels) - 1)
+    for number, count in enumerate(levels):
+        now = np.flatnonzero(failed & (level <= number))
+        if now.size == 0:
+            continue
+        batch = _newton(X[now], mu[now], rtol, int(count), profiles=False)
+        phi[now], used[now] = batch.phi, count
+        steps[now] += batch.steps
+        # nodes that were asked for give what they give
+        failed[now] = ~(batch.phi[:, 2] <= (rtol if nodes is None else np.inf))
+    return {"phi": phi, "iterations": steps, "nodes": used, "failed": failed | ~np.isfinite(phi).all(axis=1)}
 
 
 def _solve_classical(
