@@ -286,7 +286,7 @@ def build(kind: Kind, configuration: Configuration, solver: ChunkedSolver) -> Ta
             **kind.attributes(),
             **certificate,
             "target": configuration.target,
-            "configuration": json.dumps(configuration.content(), sort_keys=True),
+            "configuration": json.dumps(dataclasses.asdict(configuration), sort_keys=True),
             "configuration_sha256": configuration.digest(),
             "axis_errors": json.dumps(
                 {name: [float(f"{e:.3e}") for e in errors] for name, errors in resolution.errors.items()}

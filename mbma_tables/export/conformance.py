@@ -121,7 +121,7 @@ def formula_rows(X: FloatArray, mu: FloatArray) -> Iterator[str]:
 def table_rows(model: UniversalModel) -> Iterator[str]:
     """The table's own conformance points, with the answers and tolerances that are stored in it."""
     points = model.content.conformance
-    bound = model.error(points["X"], points["mu"])
+    bound = model.answer(points["X"], points["mu"]).error
     for k in range(bound.size):
         answers = (points["table_F"][k], points["table_A"][k], bound[k])
         yield row("phi", (points["X"][k], points["mu"][k]), answers, answers, points["tolerance"][k])

@@ -18,7 +18,7 @@ from mbma_tables.models import universal_kernel
 from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
 from mbma_tables.models.universal_kernel import Axes, Table
 from mbma_tables.tablefiles.interpolate import fill_2d
-from mbma_tables.tablefiles.schema import TableContent, error_cell
+from mbma_tables.tablefiles.schema import TableContent
 
 TINY = 1e-200  # replaces mu = 0 where a slope is asked for
 BLOCK = 1 << 16  # islands between two looks for Ctrl-C
@@ -142,14 +142,3 @@ class UniversalModel:
         cells = (field.shape[0] / (X.nodes - 1), field.shape[1] / (mu.nodes - 1))
         axes = Axes(X.low, X.high, X.offset, X.start, 1 / X.step, mu.low, mu.high, mu.start, 1 / mu.step, *cells)
         return Table(self.content.coefficients, field, axes)
-
-    def error(self, X: FloatArray, mu: FloatArray) -> FloatArray:
-        """Bound on the relative error of both functions at flat arguments."""
-        field = self.kernel.errors
-        lowest = np.maximum(mu, self._mu.low)
-        places = (
-            error_cell(axis, cells, axis.position(x))
-            for axis, cells, x in zip((self._X, self._mu), field.shape, (X, lowest), strict=True)
-        )
-        bound: FloatArray = field[tuple(places)] + universal_kernel.SECOND_ORDER
-        return bound

@@ -114,7 +114,7 @@ def test_the_file_tells_what_each_axis_cost(built):
     assert history[-1]["nodes"] == {axis.name: axis.nodes for axis in content.axes}
     assert history[-1]["largest_error"] == max(content.attributes[f"largest_error_{f}"] for f in "FA")
     assert all(0 < e <= history[-1]["aim"] for pair in errors.values() for e in pair)
-    assert json.loads(content.attributes["configuration"]) == kind.configuration.content()
+    assert json.loads(content.attributes["configuration"]) == dataclasses.asdict(kind.configuration)
 
 
 def test_axis_errors_are_those_of_interpolation_along_that_axis(built):

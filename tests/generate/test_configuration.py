@@ -10,7 +10,6 @@ from generate.__main__ import main
 from generate.tables import configuration
 from generate.tables.commands import TABLES
 from generate.tables.configuration import LIMITS, MIN_NODES, MIN_SHIPPED_POINTS, load, make_axis
-from mbma_tables.errors import InputError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import band_fields
 from mbma_tables.surfaces.readings import READINGS
@@ -42,10 +41,9 @@ def refused_file(kind, folder, text):
 
 
 UNIVERSAL = [
-    ("targt = 1e-4", "unknown key 'targt'; did you mean 'target'?"),
     ("zzz = 1", "unknown key 'zzz'; known are "),
     ("[axes.Y]\nlow = 1", "unknown key 'Y'; known are X, mu"),
-    ("[axes.mu]\nlwo = 1e-3", "[axes.mu]: unknown key 'lwo'; did you mean 'low'?"),
+    ("[axes.mu]\nlwo = 1e-3", "[axes.mu]: unknown key 'lwo'; known are low, high"),
     ("axes = 3", "[axes] must be a table of X, mu, got 3"),
     ("[axes]\nX = [1, 2]", "[axes.X] must be a table of low, high, offset, start, nodes, got [1, 2]"),
     ("kind = 'island4d'", "kind must be 'universal', got 'island4d'"),
@@ -186,8 +184,3 @@ def test_the_limits_of_island4d_stay_within_those_of_mu():
         mu = band_fields(*flat, reading)[0]
         assert (mu >= LIMITS["mu"][0]).all()
         assert (mu <= LIMITS["mu"][1]).all()
-
-
-def test_load_is_refused_for_an_unknown_kind():
-    with pytest.raises(InputError, match="kind must be one of"):
-        load("island3d")
