@@ -1,8 +1,12 @@
 """Fixtures of several files; what they need is imported when they are first asked for."""
 
+import os
 import signal
 
 import pytest
+
+# parallel workers share the cores, and threads of BLAS that wait for each other cost more than the work itself
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 @pytest.fixture(scope="session", params=["universal", "island4d"])

@@ -3,18 +3,13 @@
 import json
 
 import pytest
-from click.testing import CliRunner
+from helpers import refused, run
 
-from mbma_tables.cli import main
 from mbma_tables.scenes.costs import shipped_costs
 
 
-def answer(*arguments):
-    return CliRunner().invoke(main, ["cost", *arguments])
-
-
 def test_the_table_has_a_line_for_each_row():
-    title, _, header, *lines = answer("--tier", "universal").output.splitlines()
+    title, _, header, *lines = run("cost", "--tier", "universal").splitlines()
     assert len(lines) == sum(row.tier == "universal" for row in shipped_costs().rows)
     assert "fixed piece of work" in title
     assert header.split() == ["tier", "variant", "quantity", "error", "cost", "seconds", "evaluations"]
@@ -22,12 +17,10 @@ def test_the_table_has_a_line_for_each_row():
 
 
 def test_json_gives_seconds():
-    found = json.loads(answer("--json").output)
+    found = json.loads(run("cost", "--json"))
     for row in found["rows"]:
         assert row["seconds"] == pytest.approx(row["cost"] * found["unit_seconds"], rel=1e-12, abs=0)
 
 
 def test_an_unknown_tier_is_refused():
-    result = answer("--tier", "best")
-    assert result.exit_code == 2
-    assert "--tier must be one of" in result.output
+    assert "--tier must be one of" in refused("cost", "--tier", "best")

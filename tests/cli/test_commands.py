@@ -5,12 +5,15 @@ import subprocess
 import sys
 import warnings
 
+import click
+import helpers
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from helpers import run
 
-from mbma_tables import Surface, contact, island, theories
-from mbma_tables.cli import main
+from mbma_tables import InputError, Surface, contact, island, theories
+from mbma_tables.cli import Program, main
 from mbma_tables.cli.commands import curve_gaps
 from mbma_tables.materials import effective_modulus
 from mbma_tables.plots import theory_label
@@ -29,24 +32,12 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def run(*arguments: str):
-    result = CliRunner().invoke(main, list(arguments))
-    assert result.exit_code == 0, result.stderr
-    assert result.stderr == ""
-    return result.stdout
-
-
 def refused(folder, *arguments: str) -> str:
     """What a refusal says; it must be short, and must leave the folder as it was."""
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    result = CliRunner().invoke(main, list(arguments))
-    assert result.exit_code == 2, result.output
-    assert isinstance(result.exception, SystemExit)
-    assert result.stdout == ""
-    assert result.stderr.startswith("mbma: ")
-    assert 1 <= len(result.stderr.splitlines()) <= 2
+    said = helpers.refused(*arguments)
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
-    return result.stderr
+    return said
 
 
 def options(numbers: dict[str, float]) -> list[str]:
@@ -207,7 +198,7 @@ def test_material_from_options_and_from_a_file(folder):
         assert found["columns"]["force"] == pytest.approx([expected], rel=1e-12)
     other = json.loads(run("contact", "--file", "s.toml", "--E-star", "2", "-d", "0.3", "--json"))
     assert other["E_star"] == 2.0
-    example = os.path.join(os.path.dirname(__file__), os.pardir, "examples", "concrete.toml")
+    example = os.path.join(os.path.dirname(__file__), os.pardir, os.pardir, "examples", "concrete.toml")
     found = json.loads(run("contact", "--file", example, "-d", "0.3", "--json"))
     assert found["surface"]["length_unit"] == "mm"
     assert found["surface"]["zeta_1"] == Surface.named("concrete").zeta_1
@@ -314,11 +305,8 @@ def test_out_holds_what_stdout_would(folder):
     [
         (options(YANG_PERSSON | {"h_rms": -1.0}), "h_rms must be positive, got -1"),
         (options(YANG_PERSSON | {"zeta_1": 3.0}), "zeta_1 must be greater than 3"),
-        (options(YANG_PERSSON | {"zeta_1": -5.0}), "zeta_1 must be greater than 3"),
         (options(YANG_PERSSON | {"hurst": 1.2}), "hurst must be in (0, 1], got 1.2"),
-        (options(YANG_PERSSON | {"hurst": 0.0}), "hurst must be in (0, 1], got 0"),
         (options(YANG_PERSSON | {"q0": float("nan")}), "q0 must be finite, got nan"),
-        (options(YANG_PERSSON | {"zeta_1": float("inf")}), "zeta_1 must be finite"),
         (options(YANG_PERSSON | {"q1": 10.0}), "a surface needs"),
         (options({"hurst": 0.8, "q0": 1.0}), "a surface needs"),
         (options(CONCRETE | {"m4": 0.5}), "alpha = m0 m4/m2^2 must be in"),
@@ -331,9 +319,7 @@ def test_out_holds_what_stdout_would(folder):
         (["--surface", "concrete", "--reading", "mine"], "reading must be one of"),
         (["--surface", "concrete", "--tier", "fast"], "tier must be"),
         (["--surface", "concrete", "--rtol", "0"], "rtol must be a number in"),
-        (["--surface", "concrete", "--rtol", "nan"], "rtol must be finite"),
         (["--surface", "concrete", "--E-star", "0"], "E_star must be positive"),
-        (["--surface", "concrete", "--E-star", "nan"], "E_star must be finite"),
         (["--surface", "concrete", "--E-star", "1", "--E1", "1"], "a material is E_star alone"),
         (["--surface", "concrete", "--E1", "1", "--nu1", "0"], "a material is E_star alone"),
         (
@@ -344,7 +330,6 @@ def test_out_holds_what_stdout_would(folder):
         (["--surface", "concrete", "--surfce", "x"], "No such option"),
         (["--surface", "concrete", "--rtol", "small"], "not a valid float"),
         (["--surface", "concrete", "--out", "no/such/folder.txt"], "cannot be written"),
-        (["--surface", "concrete", "--out", "."], "not a regular file"),
     ],
 )
 def test_bad_input_of_every_command(folder, arguments, message):
@@ -449,50 +434,27 @@ def test_a_map_is_fitted_and_says_how_well(folder):
     assert f"residual {found['surface']['fit']['residual']:.6g}" in text
 
 
-def test_bad_maps(folder):
-    heights = self_affine_heights(64, 0.7)
-    holed = np.ma.masked_array(heights, mask=np.zeros(heights.shape, dtype=bool))
-    holed[3, 4] = np.ma.masked
-    write_map(folder / "holes.nc", holed)
-    write_map(folder / "tiny.nc", np.array([[0.0, 1.0], [2.0, 0.5]]))
-    write_map(folder / "flat.nc", np.ones((64, 64)))
-    (folder / "text.nc").write_text("no map\n")
-    (folder / "three.xyz").write_text("0 0 0\n1 0 1\n0 1 2\n")
-    messages = {
-        "holes.nc": "has 1 holes",
-        "tiny.nc": "2 x 2 points",
-        "flat.nc": "flat",
-        "text.nc": "cannot read",
-        "three.xyz": "three.xyz",
-        "missing.nc": "no file",
-    }
-    for name, message in messages.items():
-        for command in (["contact", "-d", "0.1"], ["curve", "--plot", "c.png"], ["island", "--delta", "1"]):
-            assert message in refused(folder, *command, "--map", name)
+@pytest.mark.parametrize(
+    ("fault", "code", "said"),
+    [
+        (FileNotFoundError(2, "No such file or directory", "a.txt"), 2, "mbma: a.txt: No such file or directory\n"),
+        (OSError("odd\nfault"), 2, "mbma: odd fault\n"),
+        (click.ClickException("two\nlines"), 2, "mbma: two lines\n"),
+        (InputError("not so"), 2, "mbma: not so\n"),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_every_known_fault_is_one_line(fault, code, said):
+    @click.group(cls=Program)
+    def program():
+        """Nothing else."""
 
+    @program.command()
+    def fail():
+        raise fault
 
-@pytest.mark.parametrize("command", [["contact", "-d", "0.1", "--file"], ["plan"], ["run"]])
-def test_files_that_are_no_toml_are_refused(folder, command):
-    os.mkfifo(folder / "pipe")
-    (folder / "deep.toml").write_text("a = " + "[" * 100_000)
-    (folder / "bytes.toml").write_bytes(b"\xff\xfe\x00")
-    for path, message in {
-        "/dev/zero": "not a regular file",
-        "pipe": "not a regular file",
-        "deep.toml": "is not a TOML file: maximum recursion depth exceeded",
-        "bytes.toml": "is not a TOML file: 'utf-8' codec can't decode",
-    }.items():
-        result = CliRunner().invoke(main, [*command, path])
-        assert (result.exit_code, result.stdout) == (2, "")
-        assert message in result.stderr
-        assert len(result.stderr.splitlines()) == 1
-
-
-def test_a_link_to_itself_is_no_output_file(folder):
-    (folder / "loop").symlink_to("loop")
-    result = CliRunner().invoke(main, ["surfaces", "--out", "loop"])
-    assert result.exit_code == 2
-    assert "loop cannot be written" in result.stderr
+    done = CliRunner().invoke(program, ["fail"])
+    assert (done.exit_code, done.output) == (code, said)
 
 
 def test_an_interrupt_ends_with_130(folder, monkeypatch):

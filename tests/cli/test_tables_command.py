@@ -2,13 +2,12 @@
 
 import dataclasses
 import json
-import pathlib
 
 import pytest
-from click.testing import CliRunner
+from helpers import refused, run
+from small_tables import small_table
 
 from mbma_tables import greenwood_tripp
-from mbma_tables.cli import main
 from mbma_tables.models import tables as tabulated
 from mbma_tables.tablefiles.netcdf import FORMAT_VERSION, read_table, write_table
 from mbma_tables.tablefiles.schema import KINDS
@@ -17,37 +16,18 @@ from mbma_tables.tablefiles.schema import KINDS
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """Small tables in place of the shipped ones."""
-    monkeypatch.syspath_prepend(pathlib.Path(__file__).parent / "tablefiles")
-    from small_tables import small_table
-
     for kind in KINDS:
         write_table(tmp_path / f"{kind}.nc", small_table(kind))
     monkeypatch.setattr(tabulated, "shipped", lambda kind: tmp_path / f"{kind}.nc")
     return tmp_path
 
 
-def run(*arguments):
-    result = CliRunner().invoke(main, ["tables", *arguments])
-    assert (result.exit_code, result.stderr) == (0, "")
-    return result.stdout
-
-
-def refused(*arguments):
-    result = CliRunner().invoke(main, ["tables", *arguments])
-    assert result.exit_code == 2, result.output
-    assert isinstance(result.exception, SystemExit)
-    assert result.stdout == ""
-    assert result.stderr.startswith("mbma: ")
-    assert 1 <= len(result.stderr.splitlines()) <= 2
-    return result.stderr
-
-
 def test_list(folder):
-    lines = run("list").splitlines()
+    lines = run("tables", "list").splitlines()
     assert [line.partition(":")[0] for line in lines] == list(KINDS)
     assert "12 X x 10 mu; reading any" in lines[0]
     assert "9 X x 10 spread x 6 sphere x 7 hurst; reading reported" in lines[1]
-    rows = json.loads(run("list", "--json"))["tables"]
+    rows = json.loads(run("tables", "list", "--json"))["tables"]
     for row, kind, line in zip(rows, KINDS, lines, strict=True):
         content = read_table(folder / f"{kind}.nc")
         assert row == {
@@ -64,30 +44,30 @@ def test_list(folder):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_info_by_kind_and_by_file(kind, folder):
-    text = run("info", kind)
-    assert run("info", str(folder / f"{kind}.nc")) == text
+    text = run("tables", "info", kind)
+    assert run("tables", "info", str(folder / f"{kind}.nc")) == text
     content = read_table(folder / f"{kind}.nc")
     for axis in content.axes:
         assert f"axis {axis.name}: {axis.long_name}, {axis.low:g} to {axis.high:g}, {axis.nodes} nodes" in text
         assert axis.formula() in text
     for name, value in content.attributes.items():
         assert f"{name}: {value}\n" in text
-    shown = json.loads(run("info", kind, "--json"))
+    shown = json.loads(run("tables", "info", kind, "--json"))
     assert shown["attributes"] == content.attributes
     assert shown["attributes"]["format_version"] == FORMAT_VERSION
     assert shown["axes"] == {a.name: {**a.attributes(), "nodes": a.nodes} for a in content.axes}
 
 
 def test_verify_all_some_and_files(folder):
-    lines = run("verify").splitlines()
+    lines = run("tables", "verify").splitlines()
     assert len(lines) == 2
     for line, kind in zip(lines, KINDS, strict=True):
         assert line.startswith(f"{folder / kind}.nc: hashes match; 12 conformance points: table within ")
         assert line.endswith(", exact solver identical to the last bit")
-    assert run("verify", "island4d").splitlines() == lines[1:]
-    assert run("verify", str(folder / "universal.nc")).splitlines() == lines[:1]
-    assert run("verify", "island4d", "universal").splitlines() == lines[::-1]
-    tables = json.loads(run("verify", "--json"))["tables"]
+    assert run("tables", "verify", "island4d").splitlines() == lines[1:]
+    assert run("tables", "verify", str(folder / "universal.nc")).splitlines() == lines[:1]
+    assert run("tables", "verify", "island4d", "universal").splitlines() == lines[::-1]
+    tables = json.loads(run("tables", "verify", "--json"))["tables"]
     for row, kind in zip(tables, KINDS, strict=True):
         assert row.keys() == {"path", "kind", "points", "table_error", "solver_error"}
         assert (row["path"], row["kind"], row["points"]) == (str(folder / f"{kind}.nc"), kind, 12)
@@ -103,7 +83,7 @@ def test_answers_of_another_machine(folder, monkeypatch):
         return dataclasses.replace(found, phi_F=found.phi_F * (1 + 2e-12))
 
     monkeypatch.setattr(greenwood_tripp, "solve", nearby)
-    assert run("verify", "universal").endswith(", exact solver within 2.0e-12\n")
+    assert run("tables", "verify", "universal").endswith(", exact solver within 2.0e-12\n")
 
 
 @pytest.mark.parametrize("json_form", [[], ["--json"]])
@@ -113,19 +93,19 @@ def test_a_wrong_checksum_is_an_error(json_form, folder):
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
     for arguments in (["list"], ["info", "universal"], ["verify"], ["verify", "island4d", str(path)]):
-        message = refused(*arguments, *json_form)
+        message = refused("tables", *arguments, *json_form)
         assert f"{path}: is damaged (its checksum does not match)" in message
         assert "`python -m generate tables all`" in message
 
 
 def test_a_missing_table_and_a_wrong_kind(folder):
-    assert "univrsal: cannot be read: No such file or directory" in refused("verify", "univrsal")
+    assert "univrsal: cannot be read: No such file or directory" in refused("tables", "verify", "univrsal")
     (folder / "universal.nc").replace(folder / "island4d.nc")
-    assert "holds a table of kind 'universal', not island4d" in refused("verify", "island4d")
-    assert "holds a table of kind 'universal', not island4d" in refused("info", "island4d")
-    assert "universal.nc: cannot be read" in refused("list")
+    assert "holds a table of kind 'universal', not island4d" in refused("tables", "verify", "island4d")
+    assert "holds a table of kind 'universal', not island4d" in refused("tables", "info", "island4d")
+    assert "universal.nc: cannot be read" in refused("tables", "list")
 
 
 def test_misuse(folder):
-    assert "TABLE" in refused("info")
-    assert "No such command" in refused("remake")
+    assert "TABLE" in refused("tables", "info")
+    assert "No such command" in refused("tables", "remake")
