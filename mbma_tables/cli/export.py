@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 @click.argument("target", type=click.Choice([*SOLVERS, *DATA, *CODE]))
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write; a folder for source code.")
 @optional_specimen_options
-@click.option("--length-unit", help="Unit of the surface's lengths and of the file, such as mm.")
-@click.option("--stress-unit", help="Unit of the modulus and of the file, such as MPa.")
+@click.option("--length-unit", default="", help="Unit of the surface's lengths and of the file, such as mm.")
+@click.option("--stress-unit", default="", help="Unit of the modulus and of the file, such as MPa.")
 @click.option("--rows", type=int, help="How many rows; else as few as --rtol needs.")
 @click.option("--rtol", type=float, help="Largest relative error of linear interpolation; 1e-3 by default.")
 @click.option("--largest-overclosure", type=float, help="Where the rows end; else at full compression.")
@@ -36,17 +36,11 @@ def export_command(
     target: str,
     out: Path,
     specimen: Specimen | None,
-    length_unit: str | None,
-    stress_unit: str | None,
-    rows: int | None,
-    rtol: float | None,
-    largest_overclosure: float | None,
-    conductivity: float | None,
-    conductivity_unit: str | None,
     exponential: bool,
     theory: str,
     reading: str,
     check: bool,
+    **law_options: Any,
 ) -> None:
     """Write TARGET to a file.
 
@@ -73,16 +67,10 @@ def export_command(
     law = describe_law(
         specimen.surface,
         specimen.E_star,
-        length_unit=length_unit or "",
-        stress_unit=stress_unit or "",
-        quantity="pressure" if conductivity is None else "conductance",
-        rows=rows,
-        rtol=rtol,
-        largest_overclosure=largest_overclosure,
-        conductivity=conductivity,
-        conductivity_unit=conductivity_unit,
+        quantity="pressure" if law_options["conductivity"] is None else "conductance",
         reading=reading,
         theory=theory,
+        **law_options,
     )
     if exponential:
         files = {out: solvers.exponential(specimen.surface, specimen.E_star, law.comments).encode()}

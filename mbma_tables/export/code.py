@@ -160,29 +160,14 @@ def web_assembly(c_texts: dict[str, str]) -> bytes:
 
 @dataclasses.dataclass(frozen=True)
 class Replay:
-    """What a replay in the target found.
-
-    Attributes
-    ----------
-    program : str
-    points : dict of int
-        Rows replayed, by kind.
-    largest : dict of float
-        Largest relative difference, by kind.
-    failed : int
-        Answers beyond their tolerance, and rows that were refused.
-    reason : str
-        Why it did not run or did not end well; empty where all is right.
-    ran : bool
-        False where the program is not installed.
-    """
+    """What a replay in the target found."""
 
     program: str
-    points: dict[str, int]
-    largest: dict[str, float]
-    failed: int
-    reason: str
-    ran: bool = True
+    points: dict[str, int]  # rows replayed, by kind
+    largest: dict[str, float]  # relative difference, by kind
+    failed: int  # answers beyond their tolerance, and rows that were refused
+    reason: str  # why it did not run or did not end well; empty where all is right
+    ran: bool = True  # False where the program is not installed
 
 
 def check(target: str, folder: os.PathLike[str] | str, points: os.PathLike[str] | str | None = None) -> Replay:

@@ -12,7 +12,6 @@ import functools
 import math
 import pathlib
 
-from mbma_tables.errors import TableFileError
 from mbma_tables.files import shipped_file
 
 COLUMNS = ("tier", "variant", "quantity", "error", "cost", "evaluations")
@@ -71,16 +70,13 @@ def read_costs(path: pathlib.Path) -> Costs:
     def number(text: str) -> float | None:
         return float(text) if text else None
 
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            records = list(csv.DictReader(line for line in file if not line.startswith("#")))
-        rows = tuple(
-            Row(r["tier"], r["variant"], r["quantity"], number(r["error"]), float(r["cost"]), number(r["evaluations"]))
-            for r in records
-        )
-        (seconds,) = (row.cost for row in rows if row.tier == UNIT)
-    except (OSError, ValueError, TypeError, KeyError, csv.Error) as fault:
-        raise TableFileError(f"{path} holds no costs ({fault}); reinstall mbma_tables") from None
+    with path.open(encoding="utf-8", newline="") as file:
+        records = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    rows = tuple(
+        Row(r["tier"], r["variant"], r["quantity"], number(r["error"]), float(r["cost"]), number(r["evaluations"]))
+        for r in records
+    )
+    (seconds,) = (row.cost for row in rows if row.tier == UNIT)
     return Costs(rows, seconds)
 
 

@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from mbma_tables.errors import TableFileError
 from mbma_tables.files import shipped_file
 from mbma_tables.scenes.costs import COLUMNS, read_costs, shipped_costs
 
@@ -42,24 +41,6 @@ def read(tmp_path, text):
 )
 def test_costs_are_those_of_the_measured_row(tmp_path, asked, cost):
     assert read(tmp_path, SOME).of(*asked) == pytest.approx(0.002 * cost, rel=1e-12, abs=0, nan_ok=True)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "tier,cost\nunit,1\n",
-        f"{HEADER}\nuniversal,gap,both,,1,\n",
-        f"{HEADER}\nunit,seconds,both,,1,\nunit,seconds,both,,1,\n",
-        f"{HEADER}\nunit,seconds,both,,one,\n",
-        f"{HEADER}\nunit,seconds\n",
-    ],
-)
-def test_files_that_are_no_cost_data_are_refused(tmp_path, text):
-    with pytest.raises(TableFileError, match=r"cost\.csv"):
-        read(tmp_path, text)
-    with pytest.raises(TableFileError, match=r"none\.csv"):
-        read_costs(tmp_path / "none.csv")
 
 
 def test_shipped_costs_have_what_plans_need():
