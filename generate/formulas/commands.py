@@ -19,7 +19,3 @@ def formulas() -> None:
         errors = ", ".join(f"{name} {found.largest:.2e}" for name, found in form.certificates.items())
         click.echo(f"{form.name}: largest held-out error {errors}")
     click.echo(MODULE)
-
-
-if __name__ == "__main__":
-    formulas()

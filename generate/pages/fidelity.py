@@ -20,8 +20,8 @@ from generate.pages.comparisons import (
     force_ratios,
     kappa,
 )
-from generate.pages.fidelity_figures import RESOLUTIONS, ROADS, figures
-from generate.pages.page import table
+from generate.pages.fidelity_figures import RESOLUTIONS, ROADS, drawn
+from generate.pages.page import png, table
 from mbma_tables import Surface
 from mbma_tables.arguments import FloatArray
 
@@ -161,4 +161,4 @@ def measure() -> tuple[dict[str, str], dict[str, bytes]]:
     """The measured parts of the page, and its figures."""
     parts = {"quoted": quoted_table()} | {name: kappa_table(name) for name in ROADS}
     parts |= {name: reference_tables(reference) for name, reference in REFERENCES.items()}
-    return parts, {f"docs/figures/{name}.png": content for name, content in figures()}
+    return parts, {f"docs/figures/{name}.png": png(figure) for name, figure in drawn()}

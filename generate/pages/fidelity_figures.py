@@ -20,7 +20,7 @@ from generate.pages.comparisons import (
     force_ratios,
     sample,
 )
-from generate.pages.page import png, pyplot
+from generate.pages.page import pyplot
 from mbma_tables import Surface, theories
 
 COLOURS = dict(zip((*THEORIES, "Persson"), ("C0", "C1", "C2", "C3", "C4", "C3"), strict=True))
@@ -154,8 +154,3 @@ def drawn() -> Iterator[tuple[str, Any]]:
     """All figures by name."""
     for part in (simulations, roads, resolution, brute_force):
         yield from part()
-
-
-def figures() -> Iterator[tuple[str, bytes]]:
-    """All figures as PNG files, by name."""
-    return ((name, png(figure)) for name, figure in drawn())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from typing import Any
 
 import numpy as np
 
@@ -91,25 +90,17 @@ def verify(path: os.PathLike[str] | str, kind: str | None = None) -> Verdict:
         answers = _replay(content)
     except ValueError as fault:
         raise TableFileError(f"{path}: its conformance points cannot be answered: {fault}") from None
-    errors = [
-        _largest_difference(path, content.kind, who, answer, points, which)
-        for who, answer, which in zip(("the table", "the exact solver"), answers, ("table", "exact"), strict=True)
-    ]
+    errors = []
+    for who, which, answer in zip(("the table", "the exact solver"), ("table", "exact"), answers, strict=True):
+        stored = np.stack([points[f"{which}_{function}"] for function in FUNCTIONS])
+        difference = np.abs(answer / stored - 1)
+        excess = difference / points["tolerance"]
+        if not (excess <= 1).all():
+            worst = np.unravel_index(excess.argmax(), excess.shape)
+            raise TableFileError(
+                f"{path}: the answers of {who} differ from the stored conformance points by {difference[worst]:.1e} "
+                f"where {points['tolerance'][worst[1]]:.1e} is allowed; rebuild the table with "
+                f"`python -m generate tables {content.kind}`"
+            )
+        errors.append(float(difference.max()))
     return Verdict(os.fspath(path), content.kind, points["tolerance"].size, *errors)
-
-
-def _largest_difference(
-    path: Any, kind: str, who: str, answers: FloatArray, points: dict[str, FloatArray], which: str
-) -> float:
-    """The largest relative difference from the stored answers; refused where one exceeds its tolerance."""
-    stored = np.stack([points[f"{which}_{function}"] for function in FUNCTIONS])
-    difference = np.abs(answers / stored - 1)
-    excess = difference / points["tolerance"]
-    if not (excess <= 1).all():
-        worst = np.unravel_index(excess.argmax(), excess.shape)
-        raise TableFileError(
-            f"{path}: the answers of {who} differ from the stored conformance points by {difference[worst]:.1e} where "
-            f"{points['tolerance'][worst[1]]:.1e} is allowed; rebuild the table with "
-            f"`python -m generate tables {kind}`"
-        )
-    return float(difference.max())
