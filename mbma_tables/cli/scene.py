@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -96,7 +97,9 @@ def _report(found: xarray.Dataset) -> Report:
         {name: field.attrs["units"] for name, field in fields.items()},
     )
     facts = found.attrs
-    notes = [f"reading {facts['reading']}, rtol {facts['rtol']:.3g}, error at most {facts['error']:.2g}"]
+    made = f"reading {facts['reading']}" if facts["reading"] else f"theory {facts['theory']}"
+    error = f"error at most {facts['error']:.2g}" if math.isfinite(facts["error"]) else "error not known"
+    notes = [f"{made}, rtol {facts['rtol']:.3g}, {error}"]
     return Report("run", str(facts["title"]), notes, dict(facts), columns)
 
 
@@ -105,8 +108,10 @@ def _to_netcdf(found: xarray.Dataset) -> bytes:
 
 
 def _picture(found: xarray.Dataset) -> bytes:
-    from mbma_tables.plots import Curve, draw_compression, to_png
+    from mbma_tables.plots import Curve, draw_compression, theory_label, to_png
 
     gap = found["mean_separation"].values / found.attrs["surface_h_rms"]
-    curves: list[Any] = [Curve(f"MBMA, {found.attrs['reading']}", gap, found["force"].values, found["area"].values)]
+    reading = found.attrs["reading"]
+    label = theory_label(found.attrs["theory"]) + (f", {reading}" if reading else "")
+    curves: list[Any] = [Curve(label, gap, found["force"].values, found["area"].values)]
     return to_png(draw_compression(curves, str(found.attrs["title"]), f"force  F/A0 [{found['force'].attrs['units']}]"))

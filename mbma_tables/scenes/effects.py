@@ -17,10 +17,12 @@ OUTPUTS = (
     "island_statistics",
     "pressure_profile",
     "comparison",
+    "validity",
 )
 # part of the model, and on unless switched off
 REFINEMENTS = ("subscale_area", "sphere_deformation", "finite_height")
 EFFECTS = (*OUTPUTS, *REFINEMENTS)
+OF_ISLANDS = ("island_statistics", "pressure_profile")  # of MBMA alone
 OF_LAW = ("stiffness", "energy", "conductance")
 COMPARED = (*THEORIES, "persson_simplified")
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from mbma_tables.errors import InputError
 from mbma_tables.scenes.costs import Costs, shipped_costs
 from mbma_tables.scenes.effects import OF_LAW, OUTPUTS, REFINEMENTS
-from mbma_tables.scenes.problem import Problem
+from mbma_tables.scenes.problem import INVERTED, Problem
 
 if TYPE_CHECKING:
     from mbma_tables.models.protocol import AnyModel
@@ -28,6 +28,7 @@ AMPLIFICATION = {"inverse": 2.0, "slopes": 300.0, "profile": 10.0}
 # gaps from which making a law costs less than the totals, by the measured costs
 MIN_LAW_GAPS = {"universal": 2000}
 MIN_LAW_GAPS_OF_OTHERS = 300
+MIN_THEORY_LAW_RTOL = 1e-9
 LADDER = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 
 
@@ -49,6 +50,8 @@ class Step:
         Certified beforehand; NaN where only the answers can say.
     seconds : float
         By the measured costs, without first use; NaN where nothing was measured.
+    theory : str or None
+        The scene's theory where it is not MBMA, in a step that asks it.
     """
 
     name: str
@@ -59,6 +62,7 @@ class Step:
     count: int
     error: float
     seconds: float
+    theory: str | None = None
 
     @property
     def tier_name(self) -> str | None:
@@ -82,6 +86,8 @@ class Plan:
         Seconds that every scene takes.
     first_use : float
         Seconds that the first scene of a process takes besides, for imports and tables; no choice depends on it.
+    theory : str
+        Whose answers these are.
     """
 
     steps: tuple[Step, ...]
@@ -90,6 +96,7 @@ class Plan:
     rtol: float
     overhead: float
     first_use: float
+    theory: str = "mbma"
 
     @property
     def seconds(self) -> float:
@@ -98,8 +105,8 @@ class Plan:
 
     @property
     def error(self) -> float:
-        """Largest error of a step of this model; other theories state their own."""
-        return max((step.error for step in self.steps if step.tier is not None), default=0.0)
+        """Largest error of a step of the scene's theory; those compared state their own."""
+        return max((step.error for step in self.steps if step.tier is not None or step.theory), default=0.0)
 
     def step(self, name: str) -> Step | None:
         """The step with that name."""
@@ -108,9 +115,10 @@ class Plan:
     def text(self) -> str:
         """As a database prints a query plan."""
         times = f"time={_duration(self.seconds)}, first use in a process {_duration(self.first_use)} more"
-        lines = [f"Scene  (rtol={self.rtol:.1e}, {_bound(self.error)}, {times})"]
+        lines = [f"Scene  (rtol={self.rtol:.1e}, {_bound(self.error)}, {times})", f"  theory: {self.theory}"]
         for step in self.steps:
-            by = "" if step.tier is None else f" by {step.tier_name}"
+            source = step.theory or step.tier_name
+            by = "" if source is None else f" by {source}"
             asked = "" if step.rtol is None else f", rtol={step.rtol:.1e}"
             numbers = f"(count={step.count}{asked}, {_bound(step.error)}, time={_duration(step.seconds)})"
             lines += [f"  -> {step.name}{by}  {numbers}", f"       {step.what}", f"       for: {step.why}"]
@@ -191,10 +199,14 @@ class _Planner:
         outputs, dropped = self.problem.outputs, self.problem.dropped
         hertz = "area" in outputs and "subscale_area" in dropped
         totals = [name for name in ("force", "area") if name in outputs and not (name == "area" and hertz)]
-        by_pressure = self.problem.prescribed == "nominal_pressures"
-        of_law = sorted(outputs & set(OF_LAW)) + (["nominal pressures prescribed"] if by_pressure else [])
+        of_law = sorted(outputs & set(OF_LAW))
+        if self.problem.prescribed in INVERTED:
+            of_law.append(f"{self.problem.prescribed} prescribed")
         steps = []
-        if of_law:
+        if self.problem.theory != "mbma":
+            if of_law or totals:
+                steps.append(self.by_theory([*totals, *of_law]))
+        elif of_law:
             steps.append(self.law(of_law))
         elif totals:
             steps.append(self.law(totals) if self.many_gaps() else self.totals(totals))
@@ -206,12 +218,16 @@ class _Planner:
             steps.append(self.summed("island statistics", "island_statistics", what, "rigid"))
         if "pressure_profile" in outputs:
             steps.append(self.profiles())
+        if "validity" in outputs:
+            what = f"where the theory is tested, and its scatter, at {self.count} gaps"
+            steps.append(Step("validity", "validity", what, None, None, self.count, 0.0, self.seconds_of_slopes()))
         steps += [self.other_theory(name) for name in self.problem.theories]
+        theory = self.problem.theory_name
         left_out = tuple(name for name in OUTPUTS if name not in outputs)
         switched_off = tuple(name for name in REFINEMENTS if name in dropped)
         tiers = {step.tier for step in steps if isinstance(step.tier, str)}
         first_use = max((self.costs.of(tier, "import") for tier in tiers), default=0.0)
-        return Plan(tuple(steps), left_out, switched_off, self.rtol, self.costs.of("scene", "call"), first_use)
+        return Plan(tuple(steps), left_out, switched_off, self.rtol, self.costs.of("scene", "call"), first_use, theory)
 
     def many_gaps(self) -> bool:
         """Whether totals at the prescribed gaps cost more than a law, where there is one."""
@@ -225,7 +241,7 @@ class _Planner:
     def law(self, why: Sequence[str]) -> Step:
         from mbma_tables.totals.law import MIN_LAW_RTOL
 
-        inverse = self.problem.prescribed == "nominal_pressures"
+        inverse = self.problem.prescribed in INVERTED
         slopes = self.problem.outputs & {"stiffness", "conductance"}
         factor = AMPLIFICATION["slopes"] if slopes else AMPLIFICATION["inverse"] if inverse else 1.0
         tolerance = self.rtol / factor
@@ -259,6 +275,24 @@ class _Planner:
         seconds = islands * self.costs.of("exact", "profile", asked)
         what = "the island problem solved with p(r) and d(r)"
         return Step("profiles", "pressure_profile", what, "exact", asked, islands, asked, seconds)
+
+    def by_theory(self, why: Sequence[str]) -> Step:
+        """Another theory's answers: its own at few gaps and where slopes are asked, else through its law."""
+        slopes = self.problem.outputs & {"stiffness", "conductance"}
+        name = "law" if self.count >= MIN_LAW_GAPS_OF_OTHERS and not slopes else "contact"
+        what = f"force, area and what follows from them at {self.count} gaps"
+        seconds = self.count * self.costs.of(self.problem.theory_name, "gap")
+        rtol = max((1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_THEORY_LAW_RTOL)
+        asked = rtol if name == "law" else None
+        return Step(
+            name, ", ".join(why), what, None, asked, self.count, math.nan, seconds, theory=self.problem.theory_name
+        )
+
+    def seconds_of_slopes(self) -> float:
+        """Of totals with derivatives, which cost about four times those without."""
+        if self.problem.theory != "mbma":
+            return self.count * self.costs.of(self.problem.theory_name, "gap")
+        return 4 * self.count * self.costs.of("universal", "gap", self.rtol)
 
     def other_theory(self, name: str) -> Step:
         closed = name == "greenwood_williamson"

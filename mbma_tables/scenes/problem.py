@@ -7,16 +7,21 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from mbma_tables.errors import InputError
-from mbma_tables.scenes.effects import COMPARED, chosen, nearest
+from mbma_tables.scenes.effects import COMPARED, OF_ISLANDS, chosen, nearest
+from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.theories.registry import THEORIES, get_theory
 
 if TYPE_CHECKING:
     from mbma_tables.models.protocol import AnyModel
     from mbma_tables.surfaces.readings import Reading
     from mbma_tables.surfaces.surface import Surface
+    from mbma_tables.theories.protocol import Theory, UserTheory
 
-PRESCRIBED = ("separations", "mean_separations", "nominal_pressures")
+PRESCRIBED = ("separations", "mean_separations", "pressures", "areas")
+INVERTED = ("pressures", "areas")  # gaps follow from them
 MIN_RTOL, MAX_RTOL = 1e-10, 0.1
 DEFAULT_RTOL = 1e-6
+DEFAULT_RTOL_OF_OTHERS = 1e-4  # theories that no one table certifies
 MAX_SECONDS = 1e6
 
 
@@ -29,12 +34,14 @@ class Problem:
     without: Sequence[str] = ()
     separations: Any = None
     mean_separations: Any = None
-    nominal_pressures: Any = None
+    pressures: Any = None
+    areas: Any = None
     E_star: float = 1.0
     rtol: float | None = None
     seconds: float | None = None
     reading: str | Reading = "reported"
     tier: str | AnyModel | None = None
+    theory: str | Theory | UserTheory = "mbma"
     conductivities: tuple[float, float] | None = None
     deltas: Any = None
     theories: Sequence[str] = ()
@@ -48,7 +55,6 @@ class Problem:
 
     def __post_init__(self) -> None:
         from mbma_tables.arguments import number_in, whole_number_in
-        from mbma_tables.surfaces.readings import get_reading
 
         for name in ("effects", "without", "theories"):
             if isinstance(getattr(self, name), str):
@@ -59,7 +65,7 @@ class Problem:
         if self.rtol is not None and self.seconds is not None:
             raise InputError("rtol and seconds are both given: give the accuracy or the time budget, one of them")
         number_in("E_star", self.E_star, 1e-300, 1e300)
-        rtol: float | None = DEFAULT_RTOL
+        rtol: float | None = DEFAULT_RTOL if self.theory == "mbma" else DEFAULT_RTOL_OF_OTHERS
         if self.rtol is not None:
             rtol = number_in("rtol", self.rtol, MIN_RTOL, MAX_RTOL)
         if self.seconds is not None:
@@ -78,6 +84,7 @@ class Problem:
         object.__setattr__(self, "gaps", self._checked_gaps(outputs - {"pressure_profile"}))
         self._check_parameters_of_effects()
         self._check_tier()
+        self._check_theory()
 
     def _checked_gaps(self, at_gaps: frozenset[str]) -> Any:
         """The prescribed numbers; None where nothing asks for gaps."""
@@ -106,7 +113,7 @@ class Problem:
             require(given[0], numbers, numbers >= 0, "at least 0: there is no adhesion in the model")
             if "finite_height" in self.dropped:
                 raise InputError(
-                    "nominal_pressures need a law, which ends at h_max: leave finite_height on, or give separations"
+                    f"{given[0]} need a law, which ends at h_max: leave finite_height on, or give separations"
                 )
         return np.atleast_1d(numbers).astype(float)
 
@@ -147,6 +154,33 @@ class Problem:
             raise InputError(f"no tier is named {self.tier!r}; {nearest(self.tier, TIERS)}")
         if self.seconds is not None and not isinstance(self.tier, str):
             raise InputError("the cost of your own island model is not known: give rtol instead of seconds")
+
+    def _check_theory(self) -> None:
+        """What is MBMA's alone is refused beside other theories."""
+        if isinstance(self.theory, str) and self.theory not in THEORIES:
+            raise InputError(f"no theory is named {self.theory!r}; {nearest(self.theory, THEORIES)}")
+        if not isinstance(self.theory, str):
+            get_theory(self.theory)
+        for name in self.theories:
+            if name == self.theory_name:
+                raise InputError(f"the scene is by theory {name!r} itself: leave it out of theories")
+        if self.theory == "mbma":
+            return
+        own = {
+            "tier": self.tier is not None,
+            "reading": self.reading != get_reading("reported"),
+            "without": bool(self.dropped),
+            "seconds": self.seconds is not None,
+        }
+        own |= {f"effect {name!r}": name in self.outputs for name in OF_ISLANDS}
+        given = [name for name, is_given in own.items() if is_given]
+        if given:
+            raise InputError(f"{' and '.join(given)}: of theory 'mbma', not of {self.theory_name!r}: leave out")
+
+    @property
+    def theory_name(self) -> str:
+        """What results call the theory."""
+        return self.theory if isinstance(self.theory, str) else self.theory.name
 
     @property
     def prescribed(self) -> str | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,18 +12,18 @@ import xarray as xr
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
+from mbma_tables.scenes.dataset import TABLES, to_dataset
 from mbma_tables.scenes.plan import Plan, Step
-from mbma_tables.scenes.problem import Problem
-from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.scenes.problem import INVERTED, Problem
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.surface import Surface
     from mbma_tables.theories.protocol import Theory
     from mbma_tables.totals.law import MbmaLaw
+    from mbma_tables.totals.law_protocol import ContactLaw
 
 Progress = Callable[[str, int, int], None]
 BLOCK = 64  # gaps between two reports of progress, where a gap is slow
-TABLES = ("universal", "island4d")
 MAX_SLOPE_OF_STIFFNESS = 3.0  # of log(stiffness) by log(h_max - d); 5/2 next to first contact
 
 
@@ -40,10 +39,13 @@ class Run:
     found: dict[str, tuple[tuple[str, ...], Any]] = dataclasses.field(default_factory=dict)
     errors: dict[str, float] = dataclasses.field(default_factory=dict)
     tiers: dict[str, str] = dataclasses.field(default_factory=dict)
+    reasons: dict[str, list[int]] | None = None
 
     def close(self, step: Step, error: float, tier: str | None) -> None:
         """Note the error bound that a step reached, and its island model."""
-        self.errors[step.name], self.tiers[step.name] = error, str(tier)
+        self.errors[step.name] = error
+        if tier is not None:
+            self.tiers[step.name] = tier
 
 
 def run_plan(problem: Problem, plan: Plan, progress: Progress | None = None) -> xr.Dataset:
@@ -58,11 +60,11 @@ def run_plan(problem: Problem, plan: Plan, progress: Progress | None = None) -> 
     if "finite_height" in problem.dropped:
         surface = dataclasses.replace(surface, h_max=height_without_end(problem, 0.1 * plan.rtol))
     run = Run(problem, surface, plan.rtol, progress or (lambda *_: None))
-    if problem.gaps is not None and problem.prescribed != "nominal_pressures":
+    if problem.gaps is not None and problem.prescribed not in INVERTED:
         run.gap = problem.gaps if problem.prescribed == "separations" else 2 * problem.gaps - h_max
     for step in plan.steps:
         run.progress(step.name, 0, step.count)
-        _STEPS.get(step.name, _comparison)(run, step)
+        (_by_theory if step.theory else _STEPS.get(step.name, _comparison))(run, step)
         run.progress(step.name, step.count, step.count)
     error = max(run.errors.values(), default=0.0)
     if error > plan.rtol:
@@ -71,7 +73,7 @@ def run_plan(problem: Problem, plan: Plan, progress: Progress | None = None) -> 
         )
     if run.gap is not None:
         run.found |= {"separation": (("gap",), run.gap), "mean_separation": (("gap",), (h_max + run.gap) / 2)}
-    return _dataset(run, plan)
+    return to_dataset(run, plan)
 
 
 def height_without_end(problem: Problem, rtol: float) -> float:
@@ -89,7 +91,7 @@ def _law(run: Run, step: Step) -> None:
     problem, wanted = run.problem, run.problem.outputs
     assert step.rtol is not None
     assert step.tier is not None
-    by_pressure = problem.prescribed == "nominal_pressures"
+    inverse = problem.prescribed in INVERTED
     tier, asked = step.tier, step.rtol
     while True:
         try:
@@ -99,32 +101,101 @@ def _law(run: Run, step: Step) -> None:
                 raise
             tier = "exact"
             continue
-        if by_pressure:
-            run.gap = law.separation(force=problem.gaps)
-        # a gap found by force carries the error of the force
-        error = 2 * law.error if by_pressure else law.error
+        error = _find_gaps(run, law) if inverse else law.error
         if wanted & {"stiffness", "conductance"}:
-            error = _slope_error(law, run.gap, by_pressure)
+            error = max(error, _slope_error(law, run.gap, inverse))
         if error <= run.rtol or asked <= MIN_LAW_RTOL:
             break
         asked = max(0.1 * asked, MIN_LAW_RTOL)
-    values = {"nominal_pressure": problem.gaps} if by_pressure else {}
-    if "force" in wanted:
-        values["force"] = law.force(run.gap)
-    if "area" in wanted and "subscale_area" not in problem.dropped:
-        values["area"] = law.area(run.gap)
-    if "stiffness" in wanted:
-        values |= {"stiffness": law.stiffness(run.gap), "stiffness_mean": law.stiffness_mean(run.gap)}
-    if "energy" in wanted:
-        values["energy"] = law.energy(run.gap)
-    if "conductance" in wanted:
-        from mbma_tables.totals.conductance import conductance, mean_conductivity
-
-        assert problem.conductivities is not None
-        k_s = mean_conductivity(*problem.conductivities)
-        values["conductance"] = conductance(law.stiffness_mean(run.gap), k_s, problem.E_star)
-    run.found |= {name: (("gap",), array) for name, array in values.items()}
+    _keep_quantities(
+        run,
+        lambda: law.force(run.gap),
+        lambda: law.area(run.gap),
+        lambda: law.stiffness_mean(run.gap),
+        lambda: law.energy(run.gap),
+    )
     run.close(step, error, dataclasses.replace(step, tier=tier).tier_name)
+
+
+def _find_gaps(run: Run, law: ContactLaw) -> float:
+    """Gaps at the pressures or areas prescribed; the bound on the error of force and area there."""
+    if run.problem.prescribed == "pressures":
+        run.gap = law.separation(force=run.problem.gaps)
+        # a gap found by force carries the error of the force, and area falls less steeply
+        return 2 * law.error
+    run.gap = law.separation(area=run.problem.gaps)
+    gap = run.gap[law.area(run.gap) > 0]
+    ratio = law.stiffness(gap) * law.area(gap) / (law.force(gap) * law.area_slope(gap))
+    return (1 + max(1.0, float(ratio.max(initial=0.0)))) * law.error
+
+
+Quantity = Callable[[], Any]
+
+
+def _keep_quantities(run: Run, force: Quantity, area: Quantity, stiffness_mean: Quantity, energy: Quantity) -> None:
+    """The quantities at gaps that were asked for, and what was prescribed."""
+    problem, wanted = run.problem, run.problem.outputs
+    values: dict[str, Any] = {}
+    if problem.prescribed in INVERTED:
+        values["nominal_pressure" if problem.prescribed == "pressures" else "prescribed_area"] = problem.gaps
+    if "force" in wanted:
+        values["force"] = force()
+    if "area" in wanted and "subscale_area" not in problem.dropped:
+        values["area"] = area()
+    if wanted & {"stiffness", "conductance"}:
+        slope = stiffness_mean()
+        if "stiffness" in wanted:
+            values |= {"stiffness": slope / 2, "stiffness_mean": slope}
+        if "conductance" in wanted:
+            from mbma_tables.totals.conductance import conductance, mean_conductivity
+
+            assert problem.conductivities is not None
+            values["conductance"] = conductance(slope, mean_conductivity(*problem.conductivities), problem.E_star)
+    if "energy" in wanted:
+        values["energy"] = energy()
+    run.found |= {name: (("gap",), array) for name, array in values.items()}
+
+
+def _by_theory(run: Run, step: Step) -> None:
+    """Another theory: at the gaps themselves, or through its law."""
+    problem = run.problem
+    if step.name == "law":
+        from mbma_tables.theories.law import contact_law
+
+        assert step.rtol is not None
+        law = contact_law(run.surface, step.rtol, E_star=problem.E_star, theory=problem.theory)
+        error = _find_gaps(run, law) if problem.prescribed in INVERTED else law.error
+        _keep_quantities(
+            run,
+            lambda: law.force(run.gap),
+            lambda: law.area(run.gap),
+            lambda: law.stiffness_mean(run.gap),
+            lambda: law.energy(run.gap),
+        )
+    else:
+        from mbma_tables.theories.contact import contact
+
+        assert problem.prescribed is not None
+        known = {problem.prescribed[:-1]: problem.gaps}
+        found = contact(run.surface, E_star=problem.E_star, theory=problem.theory, **known)
+        run.gap, error = found.separation, float(found.error.max())
+        # over d, which moves twice as far as u
+        _keep_quantities(
+            run, lambda: found.force, lambda: found.area, lambda: found.stiffness, lambda: 2 * found.energy
+        )
+    run.close(step, error, None)
+
+
+def _validity(run: Run, step: Step) -> None:
+    from mbma_tables.theories.contact import contact
+    from mbma_tables.theories.mbma import Mbma
+
+    problem = run.problem
+    theory = Mbma(reading=problem.reading, outside="nan") if problem.theory == "mbma" else problem.theory
+    found = contact(run.problem.surface, run.gap, theory=theory)
+    fields = {"valid": found.valid, "scatter": found.scatter, "area_scatter": found.area_scatter}
+    run.found |= {name: (("gap",), values) for name, values in fields.items()}
+    run.reasons = {reason: np.flatnonzero(mask).tolist() for reason, mask in found.reasons.items()}
 
 
 def _slope_error(law: MbmaLaw, gap: Any, inverted: bool) -> float:
@@ -214,76 +285,6 @@ _STEPS = {
     "totals": _totals,
     "hertz area": _islands,
     "island statistics": _islands,
+    "validity": _validity,
     "profiles": _islands,
 }
-
-
-def _units(problem: Problem) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of every quantity that a scene can hold."""
-    length = problem.length_unit or "length"
-    stress = problem.stress_unit or ("stress" if problem.E_star != 1.0 else "1")
-
-    def of_stress(unit: str) -> str:
-        return unit if stress == "1" else f"{stress} {unit}"
-
-    hertz = "subscale_area" in problem.dropped
-    units = {
-        "separation": (length, "d, rigid plane to mid-plane"),
-        "mean_separation": (length, "u = (h_max + d)/2 (Eq. 50)"),
-        "nominal_pressure": (stress, "F/A0 as prescribed"),
-        "force": (stress, "nominal pressure F/A0"),
-        "area": ("1", "Hertz area of the summits over A0 (eta = 1)" if hertz else "real contact area A/A0"),
-        "stiffness": (f"{stress}/{length}", "-dF/dd per nominal area"),
-        "stiffness_mean": (f"{stress}/{length}", "-dF/du per nominal area"),
-        "energy": (of_stress(length), "elastic energy per nominal area"),
-        "conductance": (f"conductivity/{length}", "conductance per nominal area"),
-        "island_number": (f"1/{length}^2", "islands in contact per nominal area (Eq. 42)"),
-        "island_delta": (length, "approach of an island"),
-        "island_force": (of_stress(f"{length}^2"), "load of an island at that approach"),
-        "island_area": (f"{length}^2", "contact area of an island at that approach"),
-        "island_density": (f"1/{length}^3", "islands per nominal area and approach"),
-        "profile_delta": (length, "approach of the island"),
-        "profile_radius": (length, "radius r in the island"),
-        "profile_pressure": (stress, "pressure p(r) (Eq. 36)"),
-        "profile_gap": (length, "d(r), deformed sphere to mid-plane of the summits (Eq. 34)"),
-    }
-    for name in problem.theories:
-        units |= {f"{name}_force": (stress, f"F/A0 by {name}"), f"{name}_area": ("1", f"A/A0 by {name}")}
-    return units
-
-
-def _dataset(run: Run, plan: Plan) -> xr.Dataset:
-    problem, units = run.problem, _units(run.problem)
-    variables = {
-        name: xr.Variable(dims, values, {"units": units[name][0], "long_name": units[name][1]})
-        for name, (dims, values) in run.found.items()
-    }
-    named = ("separation", "mean_separation", "nominal_pressure", "profile_delta", "island_delta")
-    facts: dict[str, Any] = {
-        "title": problem.title,
-        "plan": plan.text(),
-        "rtol": plan.rtol,
-        "error": max(run.errors.values(), default=0.0),
-        "errors": json.dumps(run.errors),
-        "reading": get_reading(problem.reading).name,
-        "tiers": json.dumps(run.tiers),
-        "switched_off": " ".join(sorted(problem.dropped)),
-        "E_star": float(problem.E_star),
-        "table_hashes": json.dumps(_hashes(problem, set(run.tiers.values()))),
-    }
-    numbers = ("hurst", "q0", "q1", "h_rms", "h_max")
-    facts |= {f"surface_{name}": float(getattr(problem.surface, name)) for name in numbers}
-    return xr.Dataset(variables, attrs=facts).set_coords([name for name in named if name in variables])
-
-
-def _hashes(problem: Problem, tiers: set[str]) -> dict[str, str]:
-    """Hashes of the values of the tables that answered."""
-    used = sorted(tiers & set(TABLES))
-    if not used:
-        return {}
-    from mbma_tables.models.tables import open_table
-
-    tables: dict[str, Any] = {name: open_table(name) for name in used}
-    if not isinstance(problem.tier, str | None):
-        tables[problem.tier.name] = problem.tier
-    return {name: str(table.content.attributes["values_sha256"]) for name, table in tables.items() if name in used}

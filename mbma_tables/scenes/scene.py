@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from mbma_tables.arguments import finite_array
 from mbma_tables.errors import InputError
 from mbma_tables.scenes.plan import Plan, make_plan
-from mbma_tables.scenes.problem import Problem
+from mbma_tables.scenes.problem import INVERTED, PRESCRIBED, Problem
 from mbma_tables.scenes.specimen import effective_modulus_of, from_tables
 from mbma_tables.scenes.toml_file import check, read_toml, schema
 
@@ -31,24 +31,27 @@ class Scene(Problem):
         Effects asked for, names of `mbma_tables.scenes.effects.OUTPUTS`.
     without : sequence of str
         Refinements of the model switched off: "subscale_area", "sphere_deformation", "finite_height".
-    separations, mean_separations, nominal_pressures : array_like, one of them
-        d [length], u [length], or F/A0 in the unit of `E_star`; one number or a list.
+    separations, mean_separations, pressures, areas : array_like, one of them
+        d [length], u [length], F/A0 in the unit of `E_star`, or A/A0; one number or a list.
     E_star : float
         Effective modulus; stresses come out in its unit. 1 gives them over E*.
     rtol : float, optional
-        Relative error asked for, in [1e-10, 0.1]; 1e-6 where no `seconds` are given either.
+        Relative error asked for, in [1e-10, 0.1]; 1e-6 where no `seconds` are given either, 1e-4 of other theories.
     seconds : float, optional
         Instead of `rtol`: a time budget, spent on as much accuracy as the measured costs allow.
     reading : str or Reading
         Which reading of the paper's equations.
     tier : str or IslandModel, optional
         Island model, as for `contact`; without it the plan chooses between "universal" and "exact".
+    theory : str or theory
+        "mbma", another one of `mbma_tables.theories.THEORIES`, or an object, as for `contact`. Refinements, tier,
+        reading and islands are MBMA's.
     conductivities : pair of float, optional
         Of the two bodies, thermal or electrical, for "conductance".
     deltas : array_like, optional
         Approaches [length] of the islands of "pressure_profile".
     theories : sequence of str
-        For "comparison": "greenwood_williamson", "persson", "persson_simplified".
+        For "comparison": names of other theories, or "persson_simplified".
     points : int
         Points of the distribution of "island_statistics", over the approach.
     length_unit, stress_unit, title : str, optional
@@ -140,10 +143,11 @@ def _arguments(content: Mapping[str, Any], folder: pathlib.Path, title: str) -> 
         return {name: finite_array(name, value) * float(specimen.surface.h_rms) for name, value in table.items()}
 
     prescribed = dict(content.get("prescribed", {}))
-    if "over_h_rms" in prescribed and "nominal_pressures" in prescribed:
-        raise InputError("[prescribed]: over_h_rms is about lengths, nominal_pressures have none: leave it out")
+    for name in INVERTED:
+        if "over_h_rms" in prescribed and name in prescribed:
+            raise InputError(f"[prescribed]: over_h_rms is about lengths, {name} have none: leave it out")
     if not prescribed and "prescribed" in content:
-        raise InputError("[prescribed] is empty: give separations, mean_separations or nominal_pressures")
+        raise InputError(f"[prescribed] is empty: give one of {', '.join(PRESCRIBED)}")
     statistics = content.get("island_statistics", {})
     if statistics and "island_statistics" not in content["effects"]["on"]:
         raise InputError("[island_statistics] is given and the effect is off: add it to on, or leave the table out")
@@ -156,7 +160,7 @@ def _arguments(content: Mapping[str, Any], folder: pathlib.Path, title: str) -> 
         "stress_unit": stress_unit,
         "title": title,
     }
-    found |= {name: content[name] for name in ("title", "reading") if name in content}
+    found |= {name: content[name] for name in ("title", "theory", "reading") if name in content}
     found |= lengths(prescribed) | lengths(dict(content.get("pressure_profile", {})))
     found |= dict(content.get("accuracy", {})) | statistics | content.get("comparison", {})
     if "conductance" in content:

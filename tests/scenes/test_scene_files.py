@@ -61,20 +61,26 @@ MISTAKES = {
     ),
     "effects as text": (SURFACE + '[effects]\non = "force"\n' + AT, "effects.on: 'force' is not of type 'array'"),
     "nothing prescribed": (SURFACE + ON, "give one of separations"),
-    "empty prescribed": (SURFACE + ON + "[prescribed]\n", "give separations"),
+    "unknown theory of the scene": ('theory = "persons"\n' + SURFACE + ON + AT, "did you mean 'persson'"),
+    "areas over h_rms": (SURFACE + ON + "[prescribed]\nareas = [0.01]\nover_h_rms = true\n", "areas have none"),
+    "reading of another theory": (
+        'theory = "persson"\nreading = "printed"\n' + SURFACE + ON + AT,
+        "reading: of theory 'mbma', not of 'persson'",
+    ),
+    "empty prescribed": (SURFACE + ON + "[prescribed]\n", "give one of separations, mean_separations"),
     "pressure and separation": (
-        SURFACE + ON + "[prescribed]\nseparations = [0.5]\nnominal_pressures = [0.1]\n",
+        SURFACE + ON + "[prescribed]\nseparations = [0.5]\npressures = [0.1]\n",
         "prescribe one of",
     ),
     "below the model's end": (SURFACE + ON + "[prescribed]\nseparations = [-2.0]\n", "at least -h_max"),
     "negative mean separation": (SURFACE + ON + "[prescribed]\nmean_separations = [-0.1]\n", "at least 0"),
-    "negative pressure": (SURFACE + ON + "[prescribed]\nnominal_pressures = [-1.0]\n", "at least 0"),
+    "negative pressure": (SURFACE + ON + "[prescribed]\npressures = [-1.0]\n", "at least 0"),
     "pressure over h_rms": (
-        SURFACE + ON + "[prescribed]\nnominal_pressures = [0.01]\nover_h_rms = true\n",
+        SURFACE + ON + "[prescribed]\npressures = [0.01]\nover_h_rms = true\n",
         "leave it out",
     ),
     "pressure without an end": (
-        SURFACE + '[effects]\non = ["force"]\noff = ["finite_height"]\n[prescribed]\nnominal_pressures = [0.01]\n',
+        SURFACE + '[effects]\non = ["force"]\noff = ["finite_height"]\n[prescribed]\npressures = [0.01]\n',
         "leave finite_height on, or give separations",
     ),
     "text for a number": (
@@ -126,7 +132,7 @@ def test_each_mistake_has_a_message_that_says_what_to_write_instead(kind, tmp_pa
 PLANNED = {
     "time too short": (SURFACE + ON + AT + "[accuracy]\nseconds = 1e-8\n", "the cheapest plan takes"),
     "too tight for a law": (SURFACE + '[effects]\non = ["energy"]\n' + AT + "[accuracy]\nrtol = 1e-10\n", "at best"),
-    "unreachable pressure": (SURFACE + ON + "[prescribed]\nnominal_pressures = [1e6]\n", "where the branch ends"),
+    "unreachable pressure": (SURFACE + ON + "[prescribed]\npressures = [1e6]\n", "where the branch ends"),
 }
 
 

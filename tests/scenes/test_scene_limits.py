@@ -113,7 +113,7 @@ def test_the_top_of_a_whole_gaussian_by_mean_separations():
             {"effects": ("force", "pressure_profile"), "deltas": (0.1,), "without": ("sphere_deformation",)},
             "pressure_profile is of the deformed sphere",
         ),
-        ({"separations": None, "nominal_pressures": (-1.0,)}, "no adhesion in the model"),
+        ({"separations": None, "pressures": (-1.0,)}, "no adhesion in the model"),
         ({"effects": ("conductance",), "conductivities": (1.0, 2.0, 3.0)}, "two numbers"),
         ({"effects": ("conductance",), "conductivities": (1.0, -2.0)}, "positive"),
         ({"effects": ("comparison",), "theories": ("person",)}, "did you mean 'persson'"),

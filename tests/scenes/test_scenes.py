@@ -27,7 +27,7 @@ PARTS = {
 
 def scene_of(*effects, **more):
     parts = {name: value for effect in effects for name, value in PARTS.get(effect, {}).items()}
-    if set(effects) != {"pressure_profile"} and not {"nominal_pressures", "mean_separations"} & set(more):
+    if set(effects) != {"pressure_profile"} and not {"pressures", "mean_separations"} & set(more):
         parts["separations"] = GAPS
     return Scene(CONCRETE, effects=effects, **(parts | more))
 
@@ -45,7 +45,7 @@ def test_totals_are_within_the_tolerance(rtol):
 def test_pressures_stiffness_and_energy(rtol):
     exact = contact_law(CONCRETE, 1e-9, E_star=2.0)
     pressures = exact.force(np.array(GAPS))
-    more = {"nominal_pressures": pressures, "E_star": 2.0, "rtol": rtol}
+    more = {"pressures": pressures, "E_star": 2.0, "rtol": rtol}
     found = scene_of("force", "area", "stiffness", "energy", "conductance", **more).run()
     np.testing.assert_allclose(found["area"], exact.area(np.array(GAPS)), rtol=rtol)
     # central differences of fresh totals, with an error of h^2
@@ -146,7 +146,7 @@ def test_the_tolerance_is_split_in_one_way():
     asked = {
         "totals": scene_of("force", rtol=1e-4),
         "law": scene_of("energy", rtol=1e-4),
-        "inverse": scene_of("force", nominal_pressures=[1e-3], rtol=1e-4),
+        "inverse": scene_of("force", pressures=[1e-3], rtol=1e-4),
         "slopes": scene_of("stiffness", rtol=1e-4),
         "profile": scene_of("pressure_profile", rtol=1e-4),
     }
@@ -218,7 +218,7 @@ def test_python_mistakes(more, words):
 
 
 WATCHED = {
-    "mbma_tables.theories.contact": {"force", "area"},
+    "mbma_tables.theories.contact": {"force", "area", "validity"},
     "mbma_tables.totals.law": {"stiffness", "energy", "conductance"},
     "mbma_tables.totals.conductance": {"conductance"},
     "mbma_tables.theories.asperities": {"comparison"},
@@ -280,7 +280,7 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
     asked = set(effects)
     of_law = bool(asked & {"stiffness", "energy", "conductance"})
     expected = {
-        "contact": 0 if of_law else int(bool(asked & {"force", "area"})),
+        "contact": int(not of_law and bool(asked & {"force", "area"})) + int("validity" in asked),
         "mbma_law": int(of_law),
         "island_statistics": int("island_statistics" in asked),
         "profiles": int("pressure_profile" in asked),
@@ -289,7 +289,7 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
         "hertz_area": 0,
     }
     assert {name: len(calls.get(name, ())) for name in expected} == expected
-    if expected["contact"]:
+    if not of_law and asked & {"force", "area"}:
         assert calls["contact"][0]["quantities"] == tuple(name for name in ("force", "area") if name in asked)
 
 

@@ -1,0 +1,148 @@
+"""Scenes by any theory: what they answer, how they ask, what they say of themselves, and what is MBMA's alone."""
+
+import json
+
+import numpy as np
+import pytest
+
+from mbma_tables import InputError, Scene, Surface, contact, contact_law
+from mbma_tables.scenes.plan import MIN_LAW_GAPS_OF_OTHERS
+from mbma_tables.theories import THEORIES, Persson
+
+CONCRETE = Surface.named("concrete")
+MODULUS = 13.3
+PRESSURES = [0.01, 0.1]
+QUANTITIES = ("force", "area", "stiffness", "energy", "conductance")
+each = pytest.mark.parametrize("theory", THEORIES)
+
+
+class Springs:
+    """A theory of one's own."""
+
+    name = "springs"
+
+    def answer(self, surface, mean_separation):
+        force = np.exp(-3 * mean_separation / surface.h_rms)
+        return force, 0.1 * force
+
+
+def scene_of(theory, **more):
+    given = {"effects": ("force", "area"), "E_star": MODULUS, "rtol": 1e-4} | more
+    return Scene(CONCRETE, theory=theory, **given)
+
+
+@pytest.mark.parametrize("theory", [*THEORIES, Springs()], ids=lambda t: getattr(t, "name", t))
+def test_quantities_at_a_pressure_are_the_contacts(theory):
+    found = scene_of(theory, effects=QUANTITIES, pressures=PRESSURES, conductivities=(1.0, 3.0)).run()
+    truth = contact(CONCRETE, pressure=PRESSURES, E_star=MODULUS, theory=theory)
+    expected = {
+        "separation": truth.separation,
+        "mean_separation": truth.mean_separation,
+        "force": PRESSURES,
+        "area": truth.area,
+        "stiffness_mean": truth.stiffness,
+        "stiffness": truth.stiffness / 2,
+        "energy": 2 * truth.energy,
+        "conductance": 1.5 / MODULUS * truth.stiffness,
+        "nominal_pressure": PRESSURES,
+    }
+    for name, values in expected.items():
+        assert found[name].values == pytest.approx(values, rel=1e-4), name
+    assert found.attrs["theory"] == getattr(theory, "name", theory)
+    assert (found.attrs["reading"] == "") == (theory != "mbma")
+
+
+@each
+def test_the_four_ways_to_ask_meet(theory):
+    by_pressure = scene_of(theory, pressures=PRESSURES).run()
+    known = {
+        "areas": by_pressure["area"].values,
+        "separations": by_pressure["separation"].values,
+        "mean_separations": by_pressure["mean_separation"].values,
+    }
+    for name, values in known.items():
+        again = scene_of(theory, **{name: values}).run()
+        assert again["force"].values == pytest.approx(PRESSURES, rel=1e-5), name
+        assert again.attrs["error"] <= 1e-4
+    assert "prescribed_area" in scene_of(theory, areas=known["areas"]).run().coords
+
+
+@each
+def test_many_gaps_go_through_the_law_of_the_theory(theory):
+    u = np.linspace(0.3, 1.0, max(MIN_LAW_GAPS_OF_OTHERS, 2000))
+    scene = scene_of(theory, mean_separations=u, rtol=1e-5)
+    (step,) = scene.plan().steps
+    assert step.name == "law"
+    found = scene.run()
+    truth = contact(CONCRETE, mean_separation=u[::37], E_star=MODULUS, theory=theory)
+    assert found["force"].values[::37] == pytest.approx(truth.force, rel=1e-5)
+    assert found["area"].values[::37] == pytest.approx(truth.area, rel=1e-5)
+    # slopes are asked of the theory itself, or of MBMA's law, which bounds them
+    slopes = scene_of(theory, effects=("stiffness",), mean_separations=u[::37], rtol=1e-5).run()
+    assert slopes["stiffness_mean"].values == pytest.approx(truth.stiffness, rel=1e-5)
+
+
+def test_areas_that_mbma_reaches_within_the_bound_stated():
+    law = contact_law(CONCRETE, 1e-9, E_star=MODULUS)
+    areas = law.area(np.array([0.9, 0.5, 0.0, -1.0]))
+    found = scene_of("mbma", areas=areas, rtol=1e-6).run()
+    truth = law.force(law.separation(area=areas))
+    assert np.abs(found["force"].values / truth - 1).max() <= found.attrs["error"] <= 1e-6
+
+
+@each
+def test_a_plan_names_its_theory(theory):
+    text = scene_of(theory, pressures=PRESSURES).explain()
+    assert f"  theory: {theory}\n" in text
+    assert ("by universal" in text) == (theory == "mbma")
+    assert (f"-> contact by {theory}" in text) == (theory != "mbma")
+
+
+@each
+def test_validity_is_an_effect(theory):
+    u = [0.8, 0.05]
+    found = scene_of(theory, effects=("force", "validity"), mean_separations=u).run()
+    truth = contact(CONCRETE, mean_separation=u, theory=theory)
+    assert found["valid"].values.tolist() == truth.valid.tolist()
+    np.testing.assert_array_equal(found["scatter"], truth.scatter)
+    np.testing.assert_array_equal(found["area_scatter"], truth.area_scatter)
+    assert set(json.loads(found.attrs["reasons"])) == set(truth.reasons)
+    assert "valid" not in scene_of(theory, mean_separations=u).run()
+
+
+def test_theories_beside_one_another():
+    found = scene_of("persson", effects=("force", "comparison"), theories=("mbma",), separations=[0.2]).run()
+    for theory, name in (("persson", "force"), ("mbma", "mbma_force")):
+        assert found[name].item() == pytest.approx(contact(CONCRETE, 0.2, E_star=MODULUS, theory=theory).force)
+
+
+@pytest.mark.parametrize(
+    ("more", "match"),
+    [
+        ({"theory": "person"}, "no theory is named 'person'; did you mean 'persson'"),
+        ({"tier": "exact"}, "tier: of theory 'mbma', not of 'persson'"),
+        ({"reading": "printed"}, "reading: of theory 'mbma'"),
+        ({"without": ("sphere_deformation",)}, "without: of theory 'mbma'"),
+        ({"rtol": None, "seconds": 1.0}, "seconds: of theory 'mbma'"),
+        ({"effects": ("island_statistics",)}, "effect 'island_statistics': of theory 'mbma'"),
+        ({"effects": ("comparison",), "theories": ("persson",)}, "by theory 'persson' itself"),
+        ({"areas": [0.1]}, "prescribe one of separations, mean_separations, pressures, areas"),
+        ({"separations": None, "areas": [-0.1]}, "areas must be at least 0"),
+        ({"theory": 3}, "theory must be one of"),
+    ],
+)
+def test_what_is_refused(more, match):
+    with pytest.raises(InputError, match=match):
+        scene_of(**({"theory": "persson", "separations": [0.5]} | more)).run()
+
+
+def test_a_file_and_an_object_ask_the_same():
+    content = {
+        "theory": "persson",
+        "surface": {"name": "concrete"},
+        "effects": {"on": ["force", "area"]},
+        "prescribed": {"areas": [0.01, 0.1]},
+    }
+    by_file, by_object = Scene.from_mapping(content).run(), scene_of(Persson(), E_star=1.0, areas=[0.01, 0.1]).run()
+    assert by_file["force"].values.tolist() == by_object["force"].values.tolist()
+    assert by_file["area"].values == pytest.approx([0.01, 0.1], rel=1e-9)
