@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import json
 import pathlib
-import re
 import tomllib
 from collections.abc import Mapping
 from typing import Any
@@ -15,8 +14,6 @@ from mbma_tables.files import read_file
 from mbma_tables.scenes.effects import nearest
 
 MAX_BYTES = 2**20
-# the time to parse a dotted key grows with the square of its parts
-LONG_KEY = re.compile(r"""(?<![^\s.,=\[\]{}#"'])(?:(?:"[^"\n]*"|'[^'\n]*'|[^\s.,=\[\]{}#"']+)[ \t]*\.[ \t]*){20}""")
 
 
 def read_toml(path: pathlib.Path, what: str) -> dict[str, Any]:
@@ -26,10 +23,7 @@ def read_toml(path: pathlib.Path, what: str) -> dict[str, Any]:
     except InputError as fault:
         raise InputError(f"{fault}; give the path of a {what} file") from None
     try:
-        text = content.decode("utf-8")
-        if LONG_KEY.search(text):
-            raise ValueError("a key has more than 20 parts")
-        entries = tomllib.loads(text)
+        entries = tomllib.loads(content.decode("utf-8"))
         # refuses whole numbers and nesting that no message could quote
         repr(entries)
     except (ValueError, RecursionError) as fault:
