@@ -12,36 +12,19 @@ import mpmath
 import netCDF4
 import numpy as np
 import pytest
+import small_builds
 import xarray
 from independent_reader import Reader, height_integral, seal_matches
+from small_builds import KINDS
 
 from generate.tables.build import build
 from generate.tables.chunks import ChunkedSolver
 from generate.tables.configuration import load
-from generate.tables.island4d import Island4d
-from generate.tables.universal import Universal
 from mbma_tables.surfaces.readings import REPORTED
 from mbma_tables.tablefiles.netcdf import write_table
 from mbma_tables.totals.island import geometry
 
 SHIPPED = pathlib.Path(__file__).parents[1] / "tables"
-KINDS = {"universal": Universal, "island4d": Island4d}
-SMALL = {
-    "universal": """
-target = 0.05
-certificate_points = 128
-axes.X = {low = 0.0, high = 6.0, nodes = 9}
-axes.mu = {low = 1e-3, high = 10.0, nodes = 10}
-""",
-    "island4d": """
-target = 0.1
-certificate_points = 128
-axes.X.nodes = 8
-axes.spread.nodes = 14
-axes.sphere.nodes = 8
-axes.hurst.nodes = 8
-""",
-}
 
 
 @pytest.fixture(scope="module")
@@ -50,9 +33,7 @@ def small(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tables")
     paths = {}
     for kind, maker in KINDS.items():
-        own = folder / f"{kind}.toml"
-        own.write_text(SMALL[kind], encoding="utf-8")
-        configuration = load(kind, own)
+        configuration = load(kind, small_builds.small(folder, kind))
         paths[kind] = write_table(folder / f"{kind}.nc", build(maker(configuration), configuration, ChunkedSolver()))
     return paths
 
@@ -281,7 +262,7 @@ def test_error_field_is_read_where_the_library_reads_it(small):
 
     model, reader = open_table(small["universal"]), Reader(small["universal"])
     rng = np.random.default_rng(5)
-    X, mu = rng.uniform(0, 6, 40), np.exp(rng.uniform(math.log(1e-3), math.log(10), 40))
+    X, mu = rng.uniform(0.5, 6, 40), np.exp(rng.uniform(math.log(1e-3), math.log(10), 40))
     theirs = model.answer(X, mu).error
     ours = [max(reader.error(f, point) for f in "FA") for point in zip(X, mu, strict=True)]
     # the library adds what the expansion below the first mu leaves, 1e-12

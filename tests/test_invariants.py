@@ -130,8 +130,8 @@ def test_laws_in_any_unit(surface, share, power, stress):
         assert abs(other.turning_point / unit - law.turning_point) <= 2 * math.sqrt(room) * law.h_max
 
 
-@invariant(4, surface=surfaces, share=st.floats(0.05, 0.9), power=st.floats(-12, 12), stress=st.floats(-12, 12))
 @pytest.mark.slow
+@invariant(4, surface=surfaces, share=st.floats(0.05, 0.9), power=st.floats(-12, 12), stress=st.floats(-12, 12))
 def test_scenes_in_any_unit(surface, share, power, stress):
     unit, modulus, gap = 10**power, 10**stress, float(gaps_of(surface, share))
     effects = ("force", "area", "stiffness", "energy", "conductance", "island_statistics")

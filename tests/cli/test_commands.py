@@ -493,6 +493,7 @@ def test_the_module_runs_and_reports(folder):
     assert list(folder.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_terminal_without_the_units_letters(folder):
     name = os.fsdecode(b"caf\xc3\xa9\xff.toml")
     (folder / name).write_text("[surface]\nlength_unit = 'µm'\n" + toml(CONCRETE).partition("\n")[2], encoding="utf-8")

@@ -1,41 +1,18 @@
 """Odd maps, spectra, and map files."""
 
-import contextlib
-import io
-import types
 import warnings
 
 import numpy as np
-import pytest
-from fuzzing import finite, spoilt
+from fuzzing import finite
 from helpers import SCALE
 
-from mbma_tables import InputError, Surface
-from mbma_tables.surfaces.maps import read_map
+from mbma_tables import Surface
 
 POINTS = 40
 NOISE = np.random.default_rng(0).standard_normal((POINTS, POINTS))
 Q = 2 * np.pi * np.hypot(np.fft.fftfreq(POINTS)[:, None], np.fft.rfftfreq(POINTS)[None, :])
 ROUGH = np.fft.irfft2(np.fft.rfft2(NOISE) / np.where(Q > 0, Q, np.inf) ** 1.8, s=NOISE.shape)
-DTYPES = [
-    "f2",
-    "f4",
-    ">f8",
-    "f8",
-    "f16",
-    "i1",
-    "i8",
-    "u8",
-    "?",
-    "c16",
-    "O",
-    "U3",
-    "S3",
-    "M8[s]",
-    "m8[s]",
-    "V4",
-    "f8,i4",
-]
+DTYPES = ["f2", "f4", ">f8", "f16", "i1", "i8", "u8", "?", "c16", "O", "U3", "S3", "M8[s]", "m8[s]", "V4", "f8,i4"]
 SPECIAL = [np.nan, np.inf, -np.inf, 0.0, -0.0, 5e-324, 1e-200, 1e154, 1e300, -1e308, 1e18]
 
 
@@ -127,31 +104,6 @@ def test_map_arrays(tally):
         assert np.asarray(heights).tobytes() == before
 
 
-def test_topographies(tally):
-    rng = np.random.default_rng(12)
-    sizes = [
-        (1.0, 1.0),
-        (1.0,),
-        (1.0, -1.0),
-        (np.nan, 1.0),
-        ("a", "b"),
-        None,
-        3.0,
-        [[1, 2], [3, 4]],
-        (1e-320, 1.0),
-        (1, None),
-    ]
-    for _ in range(60 * SCALE):
-        grid = odd_array(ROUGH, rng)
-        given = types.SimpleNamespace(
-            heights=lambda grid=grid: grid,
-            physical_sizes=sizes[rng.integers(len(sizes)) if rng.integers(2) else 0],
-            is_periodic=[True, False, None][rng.integers(3)],
-            unit=["um", None, 5, ""][rng.integers(4)],
-        )
-        assert surface_is_right(tally.read(lambda: Surface.from_map(given, **options(rng))))  # noqa: B023
-
-
 def test_spectra(tally):
     rng = np.random.default_rng(13)
     q = np.geomspace(1.0, 100.0, 50)
@@ -160,40 +112,3 @@ def test_spectra(tally):
         own = {key: value for key, value in options(rng).items() if key == "band"}
         own["convention"] = ["paper", "isotropic", "profile", "none", None][rng.integers(5)]
         assert surface_is_right(tally.read(lambda: Surface.from_psd(*given, h_max=odd_number(rng), **own)))  # noqa: B023
-
-
-def as_npy(array):
-    stream = io.BytesIO()
-    np.save(stream, array)
-    return stream.getvalue()
-
-
-def as_npz(array):
-    stream = io.BytesIO()
-    np.savez_compressed(stream, array)
-    return stream.getvalue()
-
-
-def as_text(array):
-    stream = io.BytesIO()
-    np.savetxt(stream, array)
-    return b"# Width: 10 um\n# Height: 10 um\n# Value units: nm\n" + stream.getvalue()
-
-
-@pytest.mark.parametrize(("suffix", "written"), [("npy", as_npy), ("npz", as_npz), ("asc", as_text)])
-def test_map_files(suffix, written, tmp_path, tally):
-    pytest.importorskip("NuMPI")
-    rng = np.random.default_rng(14)
-    content = written(ROUGH[:8, :8])
-
-    def grid(path):
-        found = read_map(path)
-        return np.ma.filled(found.heights(), np.nan)
-
-    # what reading imports takes its time; numpy's own files do not say how large the map is
-    (tmp_path / f"good.{suffix}").write_bytes(content)
-    with contextlib.nullcontext() if suffix == "asc" else pytest.raises(InputError, match="physical_sizes"):
-        assert grid(tmp_path / f"good.{suffix}").shape == (8, 8)
-    for _ in range(12 * SCALE):
-        found = tally.read_file(tmp_path / f"map.{suffix}", spoilt(content, rng), grid)
-        assert found is None or (found.dtype.kind in "fiu" and found.size <= ROUGH.size)

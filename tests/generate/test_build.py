@@ -11,7 +11,6 @@ from small_builds import KINDS, SMALL, small
 
 from generate.__main__ import main
 from generate.tables import build as build_module
-from generate.tables import commands, island4d
 from generate.tables.build import UncertifiedError, build, certify, evaluate, held_out, resolve
 from generate.tables.chunks import ChunkedSolver, log_ratio
 from generate.tables.configuration import load
@@ -219,50 +218,21 @@ def middle(content, function, spread=0):
     return (*(slice(n // 2 - spread, n // 2 + 1 + spread) for n in content.coefficients.shape[:-1]), function)
 
 
-@pytest.mark.parametrize("number", [0, 1])
-def test_numbers_that_are_no_numbers_break_the_first_rule(built, number):
+def test_what_no_islands_can_do_breaks_a_rule(built):
     kind, content = built
-    with pytest.raises(UncertifiedError, match="force and area finite"):
-        kind.check(bump(content, middle(content, number), np.nan))
-
-
-@pytest.mark.parametrize("number", [0, 1])
-def test_more_than_a_rigid_sphere_breaks_a_rule(built, number):
-    kind, content = built
-    with pytest.raises(UncertifiedError, match="no larger than a rigid sphere's"):
-        kind.check(bump(content, middle(content, number, 1), 20.0))
-
-
-@pytest.mark.parametrize(("number", "function"), [(0, "force"), (1, "area")])
-def test_a_table_not_monotone_in_X_breaks_a_rule(built, number, function):
-    kind, content = built
-    # a dip across every other axis, so that nothing else is uneven
-    place = (content.coefficients.shape[0] // 2, *(slice(None),) * (len(content.axes) - 1), number)
-    with pytest.raises(UncertifiedError, match=f"{function} increasing in X"):
-        kind.check(bump(content, place, -12.0))
-
-
-def test_a_force_that_falls_with_the_stiffness_breaks_a_rule(built):
-    kind, content = built
-    rule = "force increasing in mu" if content.kind == "universal" else "force increasing with the spread"
-    place = (slice(None), content.coefficients.shape[1] // 2, *(slice(None),) * (len(content.axes) - 2), 0)
-    with pytest.raises(UncertifiedError, match=rule):
-        kind.check(bump(content, place, -12.0))
-
-
-@pytest.mark.parametrize("built", ["universal"], indirect=True)
-def test_a_missed_rigid_limit_breaks_a_rule(built):
-    kind, content = built
-    with pytest.raises(UncertifiedError, match="rigid limit"):
-        kind.check(bump(content, (Ellipsis, 0), -0.01))
-
-
-@pytest.mark.parametrize("built", ["island4d"], indirect=True)
-def test_a_missed_rigid_limit_at_the_smallest_spread_breaks_a_rule(built):
-    kind, content = built
-    # mu is about 0.01 there
-    with pytest.raises(UncertifiedError, match="rigid limit"):
-        kind.check(bump(content, (Ellipsis, 1), -5.0))
+    nodes, others = content.coefficients.shape[:2], (slice(None),) * (len(content.axes) - 2)
+    dips = (nodes[0] // 2, slice(None), *others), (slice(None), nodes[1] // 2, *others)
+    of_mu = "force increasing in mu" if content.kind == "universal" else "force increasing with the spread"
+    # at the smallest spread mu is about 0.01
+    limit = ((Ellipsis, 0), -0.01) if content.kind == "universal" else ((Ellipsis, 1), -5.0)
+    spoilt = [("force increasing in X", (*dips[0], 0), -12.0), ("area increasing in X", (*dips[0], 1), -12.0)]
+    spoilt += [(of_mu, (*dips[1], 0), -12.0), ("rigid limit", *limit)]
+    for number in (0, 1):
+        spoilt.append(("force and area finite", middle(content, number), np.nan))
+        spoilt.append(("no larger than a rigid sphere's", middle(content, number, 1), 20.0))
+    for rule, place, height in spoilt:
+        with pytest.raises(UncertifiedError, match=rule):
+            kind.check(bump(content, place, height))
 
 
 def test_an_unspoiled_table_passes_and_survives_its_file(built, tmp_path):
@@ -277,46 +247,3 @@ def test_island4d_says_when_it_covers_a_part_only(tmp_path):
     assert narrow.attributes()["covers"].startswith("the islands within the axes, of those that the model visits")
     assert "0.6 <= H <= 0.9" in narrow.attributes()["covers"]
     assert shipped.attributes()["covers"].startswith("every island that the model visits for 0.3 <= H <= 1,")
-
-
-@pytest.mark.parametrize(("what", "kinds"), [("heights", []), ("all", ["universal", "island4d"])])
-def test_what_is_made_and_where(what, kinds, monkeypatch, tmp_path):
-    made = []
-    monkeypatch.setattr(commands.height_coefficients, "main", lambda: made.append("heights"))
-    monkeypatch.setattr(commands, "make_table", lambda c, path, *_: made.append((c.kind, path.name)))
-    done = CliRunner().invoke(main, ["tables", what, "--out", str(tmp_path / "here"), "--workers", "1"])
-    assert done.exit_code == 0
-    assert made == ["heights", *((kind, f"{kind}.nc") for kind in kinds)]
-
-
-@pytest.fixture
-def universal(tmp_path):
-    configuration = load("universal", small(tmp_path, "universal"))
-    return KINDS["universal"](configuration), configuration
-
-
-def test_a_target_out_of_reach_ends_the_refinement(universal, monkeypatch):
-    kind, configuration = universal
-    aims = []
-    monkeypatch.setattr(build_module, "ROUNDS", 2)
-    monkeypatch.setattr(build_module, "resolve", lambda *given: aims.append(given[3]) or resolve(*given))
-    certificate = {"largest_error_F": 2 * configuration.target, "largest_error_A": 0.0}
-    monkeypatch.setattr(build_module, "certify", lambda *_: certificate)
-    with pytest.raises(UncertifiedError, match=r"is still 2\.00e-04 after 2 refinements, the target 1\.00e-04"):
-        build(kind, configuration, ChunkedSolver())
-    # twice too much asks for less than half
-    assert aims[1] == pytest.approx(0.4 * aims[0], rel=1e-12, abs=0)
-
-
-def test_a_table_that_is_not_finite_is_not_written(universal, monkeypatch):
-    monkeypatch.setattr(build_module, "local_errors", lambda *_: np.full((8, 8, 2), np.nan))
-    with pytest.raises(UncertifiedError, match=r"error_F, which is not finite|not over its axes"):
-        build(*universal, ChunkedSolver())
-
-
-def test_axes_that_no_surface_visits(tmp_path, monkeypatch):
-    monkeypatch.setattr(island4d, "MAX_DRAWS", 8)
-    kind = KINDS["island4d"](load("island4d", small(tmp_path, "island4d")))
-    monkeypatch.setattr(kind, "_visited", lambda draw: ([np.zeros(draw)] * 4, np.zeros(draw, dtype=bool)))
-    with pytest.raises(UncertifiedError, match="hardly a surface visits these axes"):
-        kind.manifold(10)

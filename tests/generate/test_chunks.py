@@ -12,10 +12,8 @@ import time
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from small_builds import SMALL
 
-from generate.__main__ import main
 from generate.tables import chunks, commands
 from generate.tables.chunks import ChunkedSolver, WorkerError, log_ratio
 from mbma_tables.models.tables import shipped
@@ -149,19 +147,6 @@ def test_a_dask_scheduler_is_an_executor_too(expected):
         commands.executor(2, cluster.scheduler_address) as pool,
     ):
         np.testing.assert_array_equal(run(ChunkedSolver(pool)), expected)
-
-
-def test_executors(monkeypatch):
-    with commands.executor(1, None) as pool:
-        assert pool is None
-    with commands.executor(2, None) as pool:
-        assert isinstance(pool, concurrent.futures.ProcessPoolExecutor)
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    done = CliRunner().invoke(main, ["tables", "universal", "--scheduler", "tcp://127.0.0.1:1", "--out", "no.nc"])
-    assert (done.exit_code, done.stderr.splitlines()) == (
-        2,
-        ["generate: --scheduler needs dask: pip install 'mbma_tables[distributed]'"],
-    )
 
 
 def features():

@@ -1,7 +1,5 @@
 """Configurations: what is allowed, and that whatever is not ends in one line, exit code 2 and nothing written."""
 
-import tomllib
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -9,7 +7,7 @@ from click.testing import CliRunner
 from generate.__main__ import main
 from generate.tables import configuration
 from generate.tables.commands import TABLES
-from generate.tables.configuration import LIMITS, MIN_NODES, MIN_SHIPPED_POINTS, load, make_axis
+from generate.tables.configuration import LIMITS, MIN_NODES, MIN_SHIPPED_POINTS, load
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import band_fields
 from mbma_tables.surfaces.readings import READINGS
@@ -48,19 +46,14 @@ UNIVERSAL = [
     ("[axes]\nX = [1, 2]", "[axes.X] must be a table of low, high, offset, start, nodes, got [1, 2]"),
     ("kind = 'island4d'", "kind must be 'universal', got 'island4d'"),
     ("target = '1e-4'", "target must be real numbers"),
-    ("target = true", "target must be real numbers"),
-    ("target = nan", "target must be finite, got nan"),
     ("target = 1e-12", "target must be a number in [1e-11, 0.1], got 1e-12"),
     (f"target = {LARGE}", "target must be real numbers"),
     ("max_nodes = 1e5", "max_nodes must be a whole number in"),
-    ("max_nodes = true", "max_nodes must be a whole number in"),
     ("max_nodes = 63", "nodes to begin with, max_nodes allows 63"),
     ("certificate_points = 99", "certificate_points must be a whole number in [100, "),
     ("seed = -1", "seed must be a whole number in [0, "),
     ("reading = 'rubbed'", "reading must be one of ['printed', 'reported']"),
-    ("reading = ['reported']", "reading must be one of ['printed', 'reported']"),
     ("[axes.mu]\nlow = 0.0", "axes.mu.low must be a number in [1e-30, 1e+10], got 0.0"),
-    ("[axes.mu]\nlow = nan", "axes.mu.low must be finite, got nan"),
     ("[axes.mu]\nlow = 5.0\nhigh = 5.0", "axes.mu must have low < high"),
     ("[axes.mu]\noffset = 1.0", "axes.mu takes no offset, only axes.X does"),
     ("[axes.X]\nlow = 5.0\nhigh = 2.0", "axes.X must have low < high"),
@@ -68,11 +61,9 @@ UNIVERSAL = [
     ("[axes.X]\noffset = 6.25", "axes.X is logarithmic and needs low + offset > 0, got -6.25 and 6.25"),
     ("[axes.X]\noffset = 1e12", "axes.X must have low < high, far enough apart for its nodes to differ"),
     ("[axes.X]\nnodes = 7", "axes.X.nodes must be a whole number in [8, "),
-    ("[axes.X]\nstart = 'many'", "axes.X.start must be a whole number in [8, "),
     ("[axes.X]\nnodes = 50000", "nodes to begin with, max_nodes allows 120000"),
     ("target = ", "is not a TOML file"),
     (b"reading = '\xff'", "is not a TOML file"),
-    ("a = " + "[" * 5000, "is not a TOML file"),
     ("#" * 100_000, "has more than 65536 bytes"),
 ]
 ISLAND4D = [
@@ -89,13 +80,6 @@ ISLAND4D = [
 )
 def test_a_bad_configuration_is_refused(kind, text, message, tmp_path):
     assert message in refused_file(kind, tmp_path, text)
-
-
-def test_a_file_that_cannot_be_read_is_refused(tmp_path):
-    missing = str(tmp_path / "missing.toml")
-    message = refused("universal", tmp_path, "--config", missing)
-    assert f"{missing} cannot be read: No such file or directory" in message
-    assert "not a regular file" in refused("universal", tmp_path, "--config", str(tmp_path))
 
 
 @pytest.mark.parametrize("target", ["nan", "0", "-1e-6", "1e-300", "tight"])
@@ -126,18 +110,6 @@ LIMITS_OF = {"universal": ("X", "mu"), "island4d": ("X", "spread", "sphere", "hu
 
 
 @pytest.mark.parametrize("kind", LIMITS_OF)
-def test_the_shipped_configuration_says_what_is_built(kind):
-    written = tomllib.loads((HERE / f"{kind}.toml").read_text(encoding="utf-8"))
-    made = load(kind)
-    assert tuple(made.axes) == LIMITS_OF[kind]
-    for name, axis in made.axes.items():
-        given = written["axes"][name]
-        assert (axis.low, axis.high, axis.start) == (given["low"], given["high"], given["start"])
-        assert axis.nodes is None
-    assert (made.target, made.seed, made.reading) == (written["target"], written["seed"], written["reading"])
-
-
-@pytest.mark.parametrize("kind", LIMITS_OF)
 def test_a_target_alone_is_a_configuration(kind):
     shipped = load(kind)
     loose, tight = load(kind, target=1e-3), load(kind, target=shipped.target / 3)
@@ -157,14 +129,6 @@ def test_an_axis_of_another_range_starts_from_the_fewest_nodes(tmp_path):
     assert found.axes["X"] == shipped.axes["X"]
     path.write_text("[axes.mu]\nhigh = 10.0\nstart = 17")
     assert load("universal", path).axes["mu"].start == 17
-
-
-def test_axes_span_what_is_configured():
-    for kind in LIMITS_OF:
-        for name, given in load(kind).axes.items():
-            axis = make_axis(name, "", "linear" if name in ("sphere", "hurst") else "log", given, 11)
-            assert (axis.values[0], axis.values[-1]) == (given.low, given.high)
-            assert (np.diff(axis.values) > 0).all()
 
 
 def test_the_solver_works_on_every_corner_that_the_limits_allow():

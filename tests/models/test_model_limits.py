@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact, greenwood_tripp
-from mbma_tables.models.island4d import Island4dModel
+from mbma_tables import InputError, OutOfRangeError, TableFileError, greenwood_tripp
 from mbma_tables.models.tables import island4d_model, open_table, universal_model
 from mbma_tables.surfaces.readings import REPORTED
 from mbma_tables.totals.island import geometry, scale_area, scale_force
@@ -73,14 +72,6 @@ def test_where_islands_lie():
     assert {spread[0], sphere[0]} == {0}
 
 
-def test_a_hole_that_no_single_axis_tells_of(monkeypatch):
-    model = Island4dModel(island4d_model().content)
-    monkeypatch.setattr(model, "_covers", lambda place: np.array([False]))
-    with pytest.raises(OutOfRangeError, match="islands outside the table's axes") as caught:
-        model.lookup(*RAW[:, :1])
-    assert caught.value.mask.all()
-
-
 @pytest.mark.parametrize("number", range(4), ids=NAMES)
 def test_derivatives_are_those_of_the_lookup(number):
     rng = np.random.default_rng(12)
@@ -107,17 +98,3 @@ def test_derivatives_are_those_of_the_lookup(number):
 def test_a_missing_table_says_so(tmp_path):
     with pytest.raises(TableFileError, match="missing"):
         open_table(tmp_path / "missing.nc")
-
-
-def test_the_solver_gives_up_in_the_right_places(monkeypatch):
-    from mbma_tables import ConvergenceError
-    from mbma_tables.totals import island_sum
-
-    def gives_up(pairs, *_, **__):
-        raise ConvergenceError("no end", np.arange(pairs.compression.size) == 1)
-
-    monkeypatch.setattr(island_sum, "sum_islands", gives_up)
-    surface = Surface(0.8, 1.0, 200.0, 1.0, [3.0, 90.0, 3.0, 95.0])
-    with pytest.raises(ConvergenceError, match="no end") as caught:
-        contact(surface, [1.0, -89.0, 0.0, -94.0], outside="exact")
-    np.testing.assert_array_equal(caught.value.mask, [False, False, False, True])

@@ -33,18 +33,6 @@ def largest_error(model, X, mu):
     return error, found.error
 
 
-def test_the_shipped_table_keeps_its_word():
-    model = shipped_model()
-    X_axis, mu_axis = model.content.axes
-    rng = np.random.default_rng(20)
-    X = rng.uniform(X_axis.low, X_axis.high, 600)
-    mu = 10 ** rng.uniform(np.log10(mu_axis.low), np.log10(mu_axis.high), 600)
-    error, bound = largest_error(model, X, mu)
-    assert (error <= bound).all()
-    assert bound.max() < 1e-7
-    assert error.max() < 1e-8
-
-
 def test_below_the_shipped_table_to_first_order():
     model = shipped_model()
     X_axis, mu_axis = model.content.axes
@@ -96,36 +84,12 @@ def test_edges_to_the_last_bit(small):
         small.answer(inside, np.array([np.nextafter(mu_axis.high, np.inf)]))
 
 
-def test_corners_are_nodes_of_the_table(small):
-    X_axis, mu_axis = small.content.axes
-    for i, x in ((0, X_axis.low), (-1, X_axis.high)):
-        for j, m in ((0, mu_axis.low), (-1, mu_axis.high)):
-            found = small.log_ratio(np.array([x]), np.array([m]))[:, 0]
-            np.testing.assert_allclose(found, small.content.log_ratio[i, j], rtol=1e-9)
-
-
 def test_no_step_where_the_table_ends_below(small):
     _, mu_axis = small.content.axes
     X = np.linspace(-2, 6, 40)
     above = small.log_ratio(X, np.full(40, np.nextafter(mu_axis.low, 1)))
     below = small.log_ratio(X, np.full(40, np.nextafter(mu_axis.low, 0)))
     np.testing.assert_allclose(above, below, rtol=1e-9)
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e9, -1e9])
-def test_what_is_out_of_range_is_marked(small, bad):
-    X = np.array([0.0, bad, 1.0, bad])
-    with pytest.raises(OutOfRangeError) as caught:
-        small.answer(X, np.ones(4))
-    np.testing.assert_array_equal(caught.value.mask, [False, True, False, True])
-    assert "at (1,)" in str(caught.value)
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e9])
-def test_a_mu_that_is_out_of_range_is_marked(small, bad):
-    with pytest.raises(OutOfRangeError) as caught:
-        small.answer(np.zeros(3), np.array([1.0, bad, 0.0]))
-    np.testing.assert_array_equal(caught.value.mask, [False, True, False])
 
 
 def test_shapes_and_input_are_kept(small):
@@ -177,25 +141,15 @@ def test_threads_that_open_one_table_at_once():
         assert len({id(model) for model in threads.map(opened, range(16))}) == 1
 
 
-def test_content_is_not_changed(small):
-    before = dataclasses.replace(small.content, coefficients=small.content.coefficients.copy())
-    small.answer(np.linspace(-2, 6, 100), np.logspace(-9, 2, 100))
-    np.testing.assert_array_equal(before.coefficients, small.content.coefficients)
-
-
 @pytest.mark.parametrize("shape", [(2, 3), (1, 2, 2)])
 def test_marks_have_the_shape_of_the_arguments(small, shape):
-    X = np.zeros(shape)
-    X.flat[-1] = 7.0
-    for given in ((X, np.ones(shape)), (np.zeros(shape), 1e9 * (X > 0))):
-        with pytest.raises(OutOfRangeError) as caught:
-            small.answer(*given)
-        np.testing.assert_array_equal(caught.value.mask, X > 0)
-
-
-def test_a_negative_mu_is_refused(small):
-    with pytest.raises(OutOfRangeError):
-        small.answer(np.zeros(2), np.array([1.0, -1e-9]))
+    last = np.zeros(shape, dtype=bool)
+    last.flat[-1] = True
+    for bad in (np.nan, np.inf, -np.inf, 1e9, -1e9):
+        for given in ((np.where(last, bad, 0.0), np.ones(shape)), (np.zeros(shape), np.where(last, bad, 1.0))):
+            with pytest.raises(OutOfRangeError) as caught:
+                small.answer(*given)
+            np.testing.assert_array_equal(caught.value.mask, last)
 
 
 def test_slopes_at_mu_zero_are_the_rigid_spheres(small):

@@ -82,12 +82,3 @@ def test_another_spline_is_found_out(tmp_path):
     path = write_table(tmp_path / "a.nc", dataclasses.replace(content, coefficients=content.coefficients + 1e-7))
     with pytest.raises(TableFileError, match="the answers of the table differ"):
         verify(path)
-
-
-def test_the_wrong_kind_and_damage(path):
-    other = next(kind for kind in KINDS if kind != path.stem)
-    with pytest.raises(TableFileError, match=f"not {other}"):
-        verify(path, other)
-    path.write_bytes(path.read_bytes()[:-1])
-    with pytest.raises(TableFileError, match="cut short"):
-        verify(path)

@@ -7,7 +7,7 @@ import pytest
 from catalogue import LEVEL, OWN
 from numpy.polynomial import legendre
 
-from mbma_tables import ConvergenceError, OutOfRangeError, Surface, contact
+from mbma_tables import ConvergenceError, Surface, contact
 from mbma_tables.models.protocol import BOTH
 from mbma_tables.models.tables import universal_model
 from mbma_tables.models.universal_kernel import UNRESOLVED
@@ -63,31 +63,6 @@ def test_islands_are_those_of_geometry(reading):
     assert np.median(np.abs(nodes[:4] / expected[:4] - 1)) < 1e-14
 
 
-def test_no_step_across_a_kink():
-    """The same integral on either side: value and area slope agree to the last digits that the gap has."""
-    for hurst, zeta_1 in ((0.8, 216.0), (0.4, 10.0), (1.0, 1e4)):
-        surface = Surface(hurst, 0.2, 0.2 * zeta_1, 1.0, 3.0)
-        for kink in kinks(hurst, zeta_1, REPORTED):
-            if kink < 6:
-                gaps = 3.0 - kink + np.array([-1e-12, 1e-12])
-                found = contact(surface, gaps, rtol=1e-11)
-                np.testing.assert_allclose(found.force[0], found.force[1], rtol=2e-10)
-                np.testing.assert_allclose(found.area[0], found.area[1], rtol=2e-10)
-
-
-def test_next_to_first_contact_and_beyond():
-    surface = Surface(0.8, 0.2, 43.2, 1.0, 4.0)
-    found = contact(surface, [math.nextafter(4, 3), 4.0, math.nextafter(4, 5), 1e300], rtol=1e-10)
-    # 2^-51 below h_max: l^(7/2) and l^(10/3) from 2^-31 on
-    near = contact(surface, 4 - 2.0**-31, rtol=1e-10)
-    depth = 4 - math.nextafter(4, 3)
-    assert found.force[0] == pytest.approx(near.force * (depth * 2.0**31) ** 3.5, rel=1e-6, abs=0)
-    assert found.area[0] == pytest.approx(near.area * (depth * 2.0**31) ** (10 / 3), rel=1e-6, abs=0)
-    for name in ("force", "area", "error"):
-        assert getattr(found, name)[1:].tolist() == [0, 0, 0]
-    assert found.islands % 31 == 0
-
-
 def totals(compression, rtol=1e-9, jacobian=5 / 9):
     """`kernel.total` of one surface."""
     surface = lookup.surface_constants(0.8, 216.0, REPORTED.numbers, True, 216.0)._replace(jacobian=jacobian)
@@ -121,12 +96,6 @@ def test_what_cannot_be_resolved_is_said(monkeypatch):
     with pytest.raises(ConvergenceError, match="quadrature did not reach its tolerance") as caught:
         contact(surface, [0.0, 1.0], outside="nan")
     assert caught.value.mask.tolist() == [[False, False], [False, True]]
-
-
-def test_an_empty_surface_of_the_table_is_refused_before_the_pass():
-    with pytest.raises(OutOfRangeError) as caught:
-        contact(Surface([0.5, 0.8], 0.2, 40.0, 1.0, 3.0), [[0.0], [-4.0]])
-    assert caught.value.mask.tolist() == [[False, False], [True, True]]
 
 
 @pytest.mark.parametrize("reading", [REPORTED, OWN], ids=lambda reading: reading.name)

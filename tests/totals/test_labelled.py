@@ -209,6 +209,7 @@ print("whole")
 """
 
 
+@pytest.mark.slow
 def test_cold_tables_opened_by_many_threads():
     done = subprocess.run([sys.executable, "-c", COLD], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -154,22 +154,6 @@ def test_energy_against_totals():
     assert law.energy(-0.5 * law.h_max) == pytest.approx(true, rel=1.1e-8, abs=0)
 
 
-@pytest.mark.parametrize("case", [CASES[0], CASES[4]])
-def test_energy_falls_by_the_force(case):
-    law = law_of(case)
-    depth = depths(law, 52, least=1e-3)
-    depth = depth[depth < 1.99 * law.h_max]
-    step = 1e-3 * depth
-    gaps = law.h_max - depth
-    offsets = np.arange(-3.0, 4)
-    weights = difference_weights(offsets)
-    slope = law.energy(gaps[:, None] + step[:, None] * offsets) @ weights / step
-    ends = law.layer * np.sinh(law.breaks) ** 2
-    clear = (np.abs(depth[:, None] / ends[1:] - 1) > 0.01).all(axis=1)
-    assert clear.sum() > 300
-    np.testing.assert_allclose(-slope[clear], law.force(gaps)[clear], rtol=1e-8)
-
-
 @pytest.mark.parametrize("case", CASES)
 def test_round_trips(case):
     law = law_of(case)
