@@ -18,6 +18,7 @@ import numpy as np
 
 from mbma_tables import __version__
 from mbma_tables.arguments import FloatArray
+from mbma_tables.errors import InputError
 from mbma_tables.export.text import block_comment
 from mbma_tables.islands import height_integrals as heights
 from mbma_tables.models import closed_form_functions, universal_kernel
@@ -59,6 +60,8 @@ CONVENTIONS = (
 
 def c_texts(model: UniversalModel, reading: Reading) -> dict[str, str]:
     """Names and texts of the C sources, the self-test apart."""
+    if reading.addition != "sum":
+        raise InputError(f"exported code adds the areas of islands: reading {reading.name!r} takes their cover")
     constants, arrays = numbers(model, reading)
     texts = {}
     for name, title in TITLES.items():

@@ -67,7 +67,7 @@ def contact(
     tier : {"universal", "island4d", "exact", "formula", "rigid"} or island model
         MBMA's island model: a table, the full solver, a closed form, or spheres that do not deform; or an object: a
         table from `open_table`, or a model of one's own with a `name` and ``answer(X, mu)``.
-    reading : {"reported", "printed"} or Reading
+    reading : {"reported", "printed", "fitted"} or Reading
         Which reading of the paper's equations MBMA takes.
     E_star : array_like
         Effective modulus, (1 - nu1^2)/E1 + (1 - nu2^2)/E2 inverted; force is in its unit.

@@ -108,7 +108,8 @@ class Mbma(Theory):
     def concerns(self, surface: Surface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Where the paper's own assumptions fail."""
         return {
-            f"areas of islands are added, A/A0 is above {MAX_AREA:g}": answer.area > MAX_AREA,
+            f"areas of islands are added, A/A0 is above {MAX_AREA:g}": (answer.area > MAX_AREA)
+            & (self.reading.addition == "sum"),
             "stiffness falls with compression here, which no simulation shows": mean_separation
             < self.softening(surface),
         }

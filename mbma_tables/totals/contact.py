@@ -111,6 +111,9 @@ def totals_at(
             force_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
         else:
             force, area, error, islands = totals_of(model, pairs, reading, rtol, outside, which)
+        if area_by is not None and reading.addition == "cover":
+            kept = np.exp(-area.reshape(shape))  # dA = exp(-sum) dsum
+            area_by = {name: slope * kept for name, slope in area_by.items()}
     except (ConvergenceError, OutOfRangeError) as fault:
         if fault.mask is not None:
             fault.mask = fault.mask.reshape(shape)
@@ -119,7 +122,7 @@ def totals_at(
         separation=gap[()],
         mean_separation=((h_max + gap) / 2)[()],
         force=(force.reshape(shape) * stress)[()] if which != AREA else None,
-        area=area.reshape(shape)[()] if which != FORCE else None,
+        area=reading.area_of(area).reshape(shape)[()] if which != FORCE else None,
         error=error.reshape(shape)[()],
         reading=reading.name,
         tier=model.name,

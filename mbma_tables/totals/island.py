@@ -100,7 +100,7 @@ def island(
         Approach z_max - d of the island [length], positive.
     tier : {"universal", "island4d", "exact", "formula", "rigid"} or island model
         The island model, by name or an object, as for `contact`.
-    reading : {"reported", "printed"} or Reading
+    reading : {"reported", "printed", "fitted"} or Reading
         Which reading of the paper's equations.
     E_star : array_like
         Effective modulus; force is in its unit times length squared.

@@ -188,7 +188,7 @@ def mbma_law(
         depth = layer * np.sinh(tau) ** 2
         found = totals_of(model, Pairs.of(surface, depth), choice, inner)
         worst = max(worst, float(np.max(found.error)))
-        force, area = found.force.reshape(tau.shape), found.area.reshape(tau.shape)
+        force, area = found.force.reshape(tau.shape), choice.area_of(found.area).reshape(tau.shape)
         if not (force.all() and area.all()):
             raise OutOfRangeError(f"h_max is {h_max / h_rms:g} h_rms, so high that force or area underflow")
         log_depth = np.log(depth)
