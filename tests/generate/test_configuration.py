@@ -13,7 +13,6 @@ from mbma_tables.islands.four_numbers import band_fields
 from mbma_tables.surfaces.readings import READINGS
 
 LARGE = "1" + "0" * 400
-HERE = configuration.HERE
 
 
 def refused(kind, folder, *arguments):

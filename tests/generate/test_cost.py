@@ -28,21 +28,6 @@ def by_variant(rows):
     return {(row.tier, row.variant, row.quantity): row for row in rows}
 
 
-def test_measure_counts_the_fixed_work_itself_as_one(monkeypatch):
-    clock = [0.0]
-
-    def work(seconds):
-        clock[0] += seconds
-
-    monkeypatch.setattr(timing.time, "perf_counter", lambda: clock[0])
-    monkeypatch.setattr(timing, "fixed_work", lambda: work(1e-3))
-    calls = []
-    cost, seconds = timing.measure(lambda: (calls.append(1), work(5e-3)))
-    assert cost == pytest.approx(5, rel=1e-9, abs=0)
-    assert seconds == pytest.approx(1e-3, rel=1e-9, abs=0)
-    assert len(calls) == 2 + timing.ROUNDS[1]
-
-
 def test_fixed_work_is_the_integral_of_erfcx_over_its_step():
     mpmath = pytest.importorskip("mpmath")
     integral = mpmath.quad(lambda x: mpmath.exp(x * x) * mpmath.erfc(x), [-5, -4, -2, 0, 2, 5])
