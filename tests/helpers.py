@@ -42,3 +42,13 @@ def refused(*arguments):
     assert result.stderr.startswith("mbma: ")
     assert 1 <= len(result.stderr.splitlines()) <= 2
     return result.stderr
+
+
+class Springs:
+    """A user's theory: an exponential force, its area proportional to it."""
+
+    name = "springs"
+
+    def answer(self, surface, mean_separation):
+        force = np.exp(-3 * mean_separation / surface.h_rms)
+        return force, 0.1 * force

@@ -21,7 +21,9 @@ def law_of(surface=CONCRETE, **changed):
     return describe_law(surface, 13.3, **(UNITS | {"rows": 40} | changed))
 
 
-@pytest.mark.parametrize("theory", THEORIES)
+@pytest.mark.parametrize(
+    "theory", [pytest.param(name, marks=pytest.mark.slow if name == "persson" else ()) for name in THEORIES]
+)
 def test_rows_of_any_theory(theory):
     law = law_of(theory=theory, rows=50)
     x = np.random.default_rng(1).uniform(0, 0.99 * law.x[-1], 500)

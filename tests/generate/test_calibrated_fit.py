@@ -26,6 +26,7 @@ def case(hurst, zeta_1, h_max=6.0, factor=1.0):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_known_constants_are_found():
     found = fit([case(hurst, zeta_1) for hurst in (0.3, 0.6, 1.0) for zeta_1 in (8.0, 64.0)])
     for name, value in dataclasses.asdict(TRUE).items():

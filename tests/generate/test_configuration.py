@@ -5,7 +5,6 @@ import pytest
 from click.testing import CliRunner
 
 from generate.__main__ import main
-from generate.tables import configuration
 from generate.tables.commands import TABLES
 from generate.tables.configuration import LIMITS, MIN_NODES, MIN_SHIPPED_POINTS, load
 from mbma_tables.islands import greenwood_tripp
@@ -51,7 +50,7 @@ UNIVERSAL = [
     ("max_nodes = 63", "nodes to begin with, max_nodes allows 63"),
     ("certificate_points = 99", "certificate_points must be a whole number in [100, "),
     ("seed = -1", "seed must be a whole number in [0, "),
-    ("reading = 'rubbed'", "reading must be one of ['printed', 'reported']"),
+    ("reading = 'rubbed'", "reading must be one of ['fitted', 'printed', 'reported']"),
     ("[axes.mu]\nlow = 0.0", "axes.mu.low must be a number in [1e-30, 1e+10], got 0.0"),
     ("[axes.mu]\nlow = 5.0\nhigh = 5.0", "axes.mu must have low < high"),
     ("[axes.mu]\noffset = 1.0", "axes.mu takes no offset, only axes.X does"),

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from helpers import Springs
 
 from mbma_tables import InputError, Scene, Surface, contact, contact_law
 from mbma_tables.scenes.plan import MIN_LAW_GAPS_OF_OTHERS
@@ -14,16 +15,6 @@ MODULUS = 13.3
 PRESSURES = [0.01, 0.1]
 QUANTITIES = ("force", "area", "stiffness", "energy", "conductance")
 each = pytest.mark.parametrize("theory", THEORIES)
-
-
-class Springs:
-    """A theory of one's own."""
-
-    name = "springs"
-
-    def answer(self, surface, mean_separation):
-        force = np.exp(-3 * mean_separation / surface.h_rms)
-        return force, 0.1 * force
 
 
 def scene_of(theory, **more):

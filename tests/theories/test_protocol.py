@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers import Springs
 from scipy.integrate import quad
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact_law, theories
@@ -79,16 +80,6 @@ def test_a_load_beyond_the_branch_is_refused():
         Mbma().mean_separation_at(SURFACE, "force", np.array(1.0))
     with pytest.raises(OutOfRangeError, match="below 1"):
         Persson().mean_separation_at(SURFACE, "area", np.array(1.0))
-
-
-class Springs:
-    """A user's theory: an exponential force, its area proportional to it."""
-
-    name = "springs"
-
-    def answer(self, surface, mean_separation):
-        force = np.exp(-3 * mean_separation / surface.h_rms)
-        return force, 0.1 * force
 
 
 def test_a_users_own_object_is_a_theory():
