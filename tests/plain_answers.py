@@ -147,6 +147,16 @@ def statuses():
         yield name, (*found, slopes[0])
 
 
+class Bounded:
+    """A theory whose contact ends at h_max, with a force that has no bound at u = 0."""
+
+    name = "bounded"
+
+    def answer(self, surface, u):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return (surface.h_max - u) ** 1.5 / u, 0.1 * (surface.h_max - u)
+
+
 def laws():
     from mbma_tables import Surface, contact_law
 
@@ -162,6 +172,12 @@ def laws():
             one, most = getattr(law, name)([2.5, -h_max if turn is None else turn])
             wanted = np.array([0.0, 1e-9 * one, one, 0.99 * most])
             yield f"inverse of {name} at H = {hurst}", law.separation(**{name: wanted})
+    for theory in ("greenwood_williamson", Bounded()):
+        law = contact_law(Surface(0.8, 1.0, 30.0, 1.0, 4.0), rtol=1e-3, theory=theory)
+        for name in ("force", "area", "stiffness", "area_slope", "energy"):
+            yield f"law of {law.theory}, {name}", getattr(law, name)([-1.0, 2.0, 3.999999])
+        yield f"inverse of {law.theory}", law.at_pressure(law.force([-1.0, 2.0]))[0]
+    law = contact_law(Surface(0.8, 1.0, 30.0, 1.0, 4.0), reading="printed", rtol=1e-3)
     own = law.compiled("energy")
     yield "bound", (own(1.0), own(5.0), math.isnan(own(-4.1)), math.isnan(own(math.nan)))
 

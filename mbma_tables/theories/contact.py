@@ -62,8 +62,9 @@ def contact(
         F/A0 in the unit of `E_star`; the answer is on the branch of first contact.
     area : array_like
         A/A0, likewise.
-    theory : {"mbma", "persson", "greenwood_williamson"} or theory
-        By name, or an object: one of `mbma_tables.theories`, or any with a `name` and ``answer(surface, u)``.
+    theory : str or theory
+        By name, one of `mbma_tables.theories.THEORIES`, or an object: one of `mbma_tables.theories`, or any with a
+        `name` and ``answer(surface, u)``.
     tier : {"universal", "island4d", "exact", "formula", "rigid"} or island model
         MBMA's island model: a table, the full solver, a closed form, or spheres that do not deform; or an object: a
         table from `open_table`, or a model of one's own with a `name` and ``answer(X, mu)``.

@@ -12,6 +12,7 @@ from generate.__main__ import main
 from generate.pages import comparisons, fidelity_figures
 from generate.pages import export as export_page
 from generate.pages import tables as table_page
+from generate.pages import theories as theories_page
 from generate.pages.page import MARKED, ROOT
 from generate.tables import height_coefficients
 from mbma_tables import InputError, Surface, contact, theories
@@ -63,6 +64,15 @@ def test_errors_are_one_line(fault, said, monkeypatch):
     assert done.exit_code == 2
     assert done.stderr.startswith(f"generate: {said}")
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_the_page_of_theories_lists_them_all():
+    text = (ROOT / "docs" / "theories.md").read_text(encoding="utf-8")
+    for name in theories.THEORIES:
+        assert f"\n| `{name}`" in text
+    parts, files = theories_page.measure()
+    assert f"<!-- measured: answers -->\n\n{parts['answers']}\n\n<!-- end -->" in text
+    assert files["docs/figures/theories.png"].startswith(PNG[:8])
 
 
 @pytest.mark.slow

@@ -1,0 +1,48 @@
+"""The measured part of docs/theories.md: what every theory says of one surface, and their curves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from generate.pages.page import table
+from mbma_tables import Surface, contact
+from mbma_tables.plots import Curve, draw_compression, theory_label, to_png
+from mbma_tables.theories import THEORIES, get_theory
+from mbma_tables.theories.protocol import answer_where_finite
+
+PRESSURES = (1e-4, 1e-3, 1e-2)  # over E*
+CURVE_POINTS = 121
+
+
+def answers() -> str:
+    """Separation, area and stiffness of the concrete road at a few pressures, by every theory."""
+    road = Surface.named("concrete")
+    lines = []
+    for pressure in PRESSURES:
+        for name in THEORIES:
+            found = contact(road, pressure=pressure, theory=name)
+            spread = f"{found.scatter:.2g}" if np.isfinite(found.scatter) else "not known"
+            numbers = (found.mean_separation / road.h_rms, 100 * found.area, found.stiffness * road.h_rms / pressure)
+            valid = "yes" if found.valid else "no"
+            lines.append([f"{pressure:g}", f"`{name}`", *(f"{number:.3g}" for number in numbers), valid, spread])
+    return table(["F/(A0 E*)", "theory", "u/h_rms", "A/A0 [%]", "stiffness h_rms/F", "valid", "scatter of ln F"], lines)
+
+
+def draw() -> bytes:
+    """Force and area of the concrete road by every theory."""
+    road = Surface.named("concrete")
+    u = float(road.h_max) * (1 - np.linspace(0.002, 1.0, CURVE_POINTS))
+    curves = []
+    for name in THEORIES:
+        theory = get_theory(name)
+        found = answer_where_finite(theory, road, u)
+        known = np.isfinite(found.force)
+        scatter, area_scatter = theory.scatter(road, found.area[known])
+        gap = u[known] / road.h_rms
+        curves.append(Curve(theory_label(name), gap, found.force[known], found.area[known], scatter, area_scatter))
+    return to_png(draw_compression(curves, "concrete road of Lorenz, by every theory"))
+
+
+def measure() -> tuple[dict[str, str], dict[str, bytes]]:
+    """The measured part of the page, and its figure."""
+    return {"answers": answers()}, {"docs/figures/theories.png": draw()}
