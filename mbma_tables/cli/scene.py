@@ -113,5 +113,6 @@ def _picture(found: xarray.Dataset) -> bytes:
     gap = found["mean_separation"].values / found.attrs["surface_h_rms"]
     reading = found.attrs["reading"]
     label = theory_label(found.attrs["theory"]) + (f", {reading}" if reading else "")
-    curves: list[Any] = [Curve(label, gap, found["force"].values, found["area"].values)]
+    bands = [found[name].values if name in found else None for name in ("scatter", "area_scatter")]
+    curves: list[Any] = [Curve(label, gap, found["force"].values, found["area"].values, *bands)]
     return to_png(draw_compression(curves, str(found.attrs["title"]), f"force  F/A0 [{found['force'].attrs['units']}]"))

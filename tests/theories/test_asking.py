@@ -38,6 +38,22 @@ def test_stiffness_and_energy_are_those_of_the_law():
     assert found.mean_pressure == pytest.approx(found.force / found.area, rel=1e-15)
 
 
+@pytest.mark.parametrize("tier", ["exact", "formula", "island4d"])
+def test_other_tiers_have_stiffness_and_validity_too(tier):
+    u = [0.0, 0.05, 0.3, 1.0, 2.0, 2.99, 3.0]
+    table, other = (contact(SURFACE, mean_separation=u, tier=t) for t in ("universal", tier))
+    assert other.stiffness == pytest.approx(table.stiffness, rel={"exact": 1e-6}.get(tier, 5e-3))
+    assert other.valid.tolist() == table.valid.tolist()
+    assert set(other.reasons) == set(table.reasons)
+    rigid = contact(SURFACE, mean_separation=[1.0, 2.0], tier="rigid")
+    assert rigid.stiffness == pytest.approx(contact_law(SURFACE, tier="rigid").stiffness_mean(u=[1.0, 2.0]), rel=1e-6)
+
+
+def test_surfaces_beyond_the_table_have_validity():
+    surface = Surface([0.05, 0.8], 1.0, 1e8, 1.0, 4.5)
+    assert contact(surface, mean_separation=[2.25, 0.5], outside="exact").valid.tolist() == [False, False]
+
+
 def test_no_load_is_first_contact():
     found = contact(SURFACE, pressure=[0.0, 1e-9])
     assert found.separation[0] == 3.0
