@@ -137,8 +137,9 @@ def test_curve_of_any_theory(folder, theory):
     arguments = ("curve", "--surface", "concrete", "--theory", theory, "--points", "9", "--plot", "c.png", "--json")
     found = json.loads(run(*arguments))
     columns = found["columns"]
-    # Persson's theory has no finite force at u = 0
-    assert len(columns["force"]) == len(found["valid"]) == (8 if theory == "persson" else 9)
+    # some, as Persson's, have no finite force at u = 0, the last gap
+    assert len(columns["force"]) == len(found["valid"])
+    assert len(columns["force"]) in ({8} if theory == "persson" else {9} if theory == "mbma" else {8, 9})
     answer = contact(Surface.named("concrete"), columns["separation"], theory=theory)
     assert columns["force"] == answer.force.tolist()
     assert columns["area"] == answer.area.tolist()

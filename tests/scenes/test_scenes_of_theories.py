@@ -61,15 +61,17 @@ def test_the_four_ways_to_ask_meet(theory):
 @each
 def test_many_gaps_go_through_the_law_of_the_theory(theory):
     u = np.linspace(0.3, 1.0, max(MIN_LAW_GAPS_OF_OTHERS, 2000))
-    scene = scene_of(theory, mean_separations=u, rtol=1e-5)
+    own = float(contact(CONCRETE, mean_separation=0.5, theory=theory).error)
+    rtol = max(1e-5, 3 * own)
+    scene = scene_of(theory, mean_separations=u, rtol=rtol)
     (step,) = scene.plan().steps
     assert step.name == "law"
     found = scene.run()
     truth = contact(CONCRETE, mean_separation=u[::37], E_star=MODULUS, theory=theory)
-    assert found["force"].values[::37] == pytest.approx(truth.force, rel=1e-5)
-    assert found["area"].values[::37] == pytest.approx(truth.area, rel=1e-5)
+    assert found["force"].values[::37] == pytest.approx(truth.force, rel=rtol)
+    assert found["area"].values[::37] == pytest.approx(truth.area, rel=rtol)
     # slopes are asked of the theory itself, or of MBMA's law, which bounds them
-    slopes = scene_of(theory, effects=("stiffness",), mean_separations=u[::37], rtol=1e-5).run()
+    slopes = scene_of(theory, effects=("stiffness",), mean_separations=u[::37], rtol=rtol).run()
     assert slopes["stiffness_mean"].values == pytest.approx(truth.stiffness, rel=1e-5)
 
 

@@ -188,8 +188,11 @@ def test_a_law_is_the_contact():
         law = contact_law(SURFACE, E_star=MODULUS, theory=name)
         found = contact(SURFACE, pressure=[0.1, 1.0], E_star=MODULUS, theory=name)
         point = law.at_pressure([0.1, 1.0])
+        # slopes of polynomials within a theory's own error are so much worse
+        close = {"stiffness": max(1e-5, 100 * float(found.error.max()))}
         for field in ("separation", "mean_separation", "area", "stiffness"):
-            assert getattr(point, field) == pytest.approx(getattr(found, field), rel=1e-5), field
+            near = close.get(field, max(1e-5, float(found.error.max())))
+            assert getattr(point, field) == pytest.approx(getattr(found, field), rel=near), field
 
 
 class Noisy(Cones):
