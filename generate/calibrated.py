@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import GAUSSIAN, MAX_AREA, MIN_WAVES, Case, cases
+from generate.calibrated_table import write as write_table
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import CONSTANTS, MEAN_WAVE, Constants, Law
 from mbma_tables.calibrated_map import MAP_CONSTANTS, MapConstants, MapLaw
@@ -185,8 +186,9 @@ def report(evidence: Sequence[Case], constants: Constants, map_constants: MapCon
 @click.command()
 @click.argument("evidence", type=click.Path(path_type=pathlib.Path, exists=True))
 @click.option("--out", type=click.Path(path_type=pathlib.Path), help="JSON file of constants and errors.")
+@click.option("--table", type=click.Path(path_type=pathlib.Path), help="The library's file: table and errors.")
 @click.option("--maps/--no-maps", default=True, help="Whether to fit the map's law too: minutes.")
-def calibrated(evidence: pathlib.Path, out: pathlib.Path | None, maps: bool) -> None:
+def calibrated(evidence: pathlib.Path, out: pathlib.Path | None, table: pathlib.Path | None, maps: bool) -> None:
     """Fit the calibrated law to the training set of EVIDENCE; tell its errors there and on held-out surfaces."""
     with xr.open_dataset(evidence) as data:
         found = cases(data.load())
@@ -217,3 +219,5 @@ def calibrated(evidence: pathlib.Path, out: pathlib.Path | None, maps: bool) -> 
                 click.echo(f"  {name:32s} {form:9s} " + " ".join(cells))
     if out is not None:
         out.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    if table is not None:
+        click.echo(f"{table}: {write_table(table, told, found, summary)}")

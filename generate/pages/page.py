@@ -18,7 +18,7 @@ import click
 from mbma_tables.files import write_file
 
 ROOT = pathlib.Path(__file__).parents[2]
-PAGES = ("cost", "export", "fidelity", "formula", "islands", "stability", "tables", "theories")
+PAGES = ("calibrated", "cost", "export", "fidelity", "formula", "islands", "stability", "tables")
 MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 

@@ -144,6 +144,27 @@ def _without_holes(grid: Any) -> FloatArray:
     return heights
 
 
+def _flattened(grid: Any, periodic: bool, detrend: str | None) -> tuple[FloatArray, str]:
+    """Heights less their trend, and which one it was."""
+    values = _without_holes(grid)
+    trend = detrend if detrend is not None else ("mean" if periodic else "plane")
+    if trend not in DETRENDS:
+        raise InputError(f"detrend must be one of {', '.join(DETRENDS)}, got {detrend!r}")
+    flat = _detrended(values, DETRENDS[trend])
+    size = float(np.abs(values).max())
+    if not float(np.abs(flat).max()) > max(1e3 * np.finfo(float).eps * size, MIN_LENGTH):
+        raise NotSelfAffineError(f"the map is flat: nothing is left once its {trend} is subtracted")
+    return flat, trend
+
+
+def detrended_map(
+    heights: Any, dx: float | None, dy: float | None, periodic: bool | None, detrend: str | None
+) -> tuple[FloatArray, float, float, bool]:
+    """Heights less their trend [length], sampling steps and periodicity; arguments as of `Surface.from_map`."""
+    grid, step_x, step_y, periodic, _ = _grid_of(heights, dx, dy, periodic)
+    return _flattened(grid, periodic, detrend)[0], step_x, step_y, periodic
+
+
 def fit_map(
     heights: Any,
     dx: float | None,
@@ -155,22 +176,15 @@ def fit_map(
 ) -> FittedSurface:
     """The self-affine surface fitted to a height map; see `Surface.from_map`."""
     grid, step_x, step_y, periodic, unit = _grid_of(heights, dx, dy, periodic)
-    values = _without_holes(grid)
-    trend = detrend if detrend is not None else ("mean" if periodic else "plane")
-    if trend not in DETRENDS:
-        raise InputError(f"detrend must be one of {', '.join(DETRENDS)}, got {detrend!r}")
     top = None if h_max is None else check_height(h_max)
-    flat = _detrended(values, DETRENDS[trend])
-    size = float(np.abs(values).max())
-    if not float(np.abs(flat).max()) > max(1e3 * np.finfo(float).eps * size, MIN_LENGTH):
-        raise NotSelfAffineError(f"the map is flat: nothing is left once its {trend} is subtracted")
+    flat, trend = _flattened(grid, periodic, detrend)
     _refuse_edges(flat)
     # heights of order one, so that their squares neither underflow nor overflow
     scale = float(np.abs(flat).max())
     windowed = flat / scale if periodic else _windowed(flat / scale)
     q, C, waves, directions = radial_spectrum(windowed, step_x, step_y)
     C = C * scale**2
-    nx, ny = values.shape
+    nx, ny = flat.shape
     steps = 2 * math.pi / (nx * step_x), 2 * math.pi / (ny * step_y)
     low = float(q[0]) if periodic else WINDOW_LOBE * max(steps)
     fitted = fit_spectrum(

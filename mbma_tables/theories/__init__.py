@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         mean_separation,
         separation,
     )
+    from mbma_tables.theories.calibrated import BoundLaw, Calibrated
     from mbma_tables.theories.mbma import Mbma
     from mbma_tables.theories.persson import Method, Persson, persson_area, persson_force, persson_separation
     from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 __all__ = [
     "THEORIES",
     "Asperities",
+    "BoundLaw",
+    "Calibrated",
     "GreenwoodWilliamson",
     "Mbma",
     "Method",
@@ -41,6 +44,7 @@ __all__ = [
 # a theory's module is imported when it is first asked for
 _MODULES = {
     "asperities": ("Asperities", "GreenwoodWilliamson", "greenwood_williamson", "mean_separation", "separation"),
+    "calibrated": ("BoundLaw", "Calibrated"),
     "mbma": ("Mbma",),
     "persson": ("Method", "Persson", "persson_area", "persson_force", "persson_separation"),
     "protocol": ("Theory", "TheoryAnswer", "UserTheory"),

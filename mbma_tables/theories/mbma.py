@@ -105,6 +105,11 @@ class Mbma(Theory):
         # of the same islands by the table, whose derivatives are at hand
         return Mbma("universal", self.reading, outside="nan")._maximum(surface, "stiffness", unknown)
 
+    def scatter(self, surface: Surface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """As for any theory, of the reading that was compared with simulations; NaN for others."""
+        known = super().scatter(surface, area)
+        return known if self.reading == get_reading("reported") else (known[0] * np.nan, known[1] * np.nan)
+
     def concerns(self, surface: Surface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Where the paper's own assumptions fail."""
         return {

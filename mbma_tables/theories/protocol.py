@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from mbma_tables.arguments import FloatArray, describe_entries, require
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.theories import calibrated_table
 
 ROOT_RTOL = 1e-12  # of forces and areas at which a separation is asked
 ENERGY_RTOL = 1e-9
@@ -66,10 +67,11 @@ class Theory(abc.ABC):
     def scatter(self, surface: Surface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of ln F at given u and of ln A at given F against simulations, at A/A0 = `area`.
 
-        NaN where they are not known: theories without data to compare with.
+        Root mean squares of ln(theory/simulation), of the boundary elements in the calibrated law's file; NaN where
+        they are not known.
         """
-        unknown = np.full(np.shape(area), np.nan)
-        return unknown, unknown
+        table = calibrated_table.shipped()
+        return table.standard_deviation(self.name, "force", area), table.standard_deviation(self.name, "area", area)
 
     def energy(self, surface: Surface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], the integral of F/(A0 E*) from u to last contact."""

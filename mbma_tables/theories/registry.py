@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "mbma": ("mbma", "Mbma"),
+    "calibrated": ("calibrated", "Calibrated"),
     "persson": ("persson", "Persson"),
     "greenwood_williamson": ("asperities", "GreenwoodWilliamson"),
 }

@@ -1,0 +1,279 @@
+"""The file of the calibrated law: its table, what that is worth, and how far theories are from simulation."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+import functools
+import hashlib
+import json
+import os
+import pathlib
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy.interpolate import PchipInterpolator, make_interp_spline
+
+from generate.boundary_elements.design import TRAINING
+from generate.boundary_elements.evidence import Case
+from mbma_tables.arguments import FloatArray
+from mbma_tables.calibrated import Constants, Law, Spectrum, light_factor
+from mbma_tables.calibrated_map import MapConstants
+from mbma_tables.files import write_file, written_bytes
+from mbma_tables.surfaces.surface import Surface
+from mbma_tables.tablefiles.netcdf import HDF5_LOCK, SEAL
+from mbma_tables.tablefiles.provenance import source_digest, versions
+from mbma_tables.tablefiles.splines import coefficients
+from mbma_tables.theories.asperities import GreenwoodWilliamson
+from mbma_tables.theories.calibrated_table import AXES, QUANTITIES, fill, load
+from mbma_tables.theories.mbma import Mbma
+from mbma_tables.theories.persson import Persson
+from mbma_tables.theories.protocol import Theory
+
+# answered inside; nodes reach further, since a spline is worst near its ends
+COVERED = {"hurst": (0.1, 1.0), "log_zeta_1": (np.log(3.0), np.log(1e5)), "log_separation": (np.log(1e-6), np.log(8.0))}
+HURST = np.linspace(0.04, 1.06, 50)
+LOG_ZETA = np.linspace(np.log(2.0), np.log(2e5), 33)
+LOG_U = np.linspace(np.log(5e-7), np.log(10.0), 108)
+LOG_FORCE = np.linspace(-38.0, 1.3, 380)  # ln F^ between whose separations the nodes lie
+DEGREE = 5
+CERTIFICATE = (300, 40)  # held-out surfaces, separations of each
+HIGHEST = (2.5, 6.0)  # their h_max/h_rms
+NEAREST = 0.95  # of h_max: nearer to it force is a small difference
+PROCESSES = 2
+DIGITS = 4  # of constants
+MIN_ERRORS = 5  # that state a scatter
+STATISTICS = ("bias", "standard_deviation", "largest_of_nine_in_ten", "number")
+MODULES = ("mbma_tables.calibrated", "generate.calibrated", "generate.calibrated_table")
+LONG_NAMES = {
+    "hurst": "Hurst exponent",
+    "log_zeta_1": "natural logarithm of q1/q0",
+    "log_separation": "natural logarithm of the mean separation over h_rms",
+}
+# u/h_max at which a theory's curve is known
+DEPTHS = np.concatenate([1 - np.geomspace(1e-4, 0.5, 150), np.geomspace(0.5, 1e-6, 151)[1:]])
+
+Summary = Callable[[Sequence[Case], Callable[[Case], Any]], dict[str, Any]]
+
+
+class TheoryCurve:
+    """A theory on one simulated surface, in the units of the calibrated law."""
+
+    def __init__(self, theory: Theory, one: Case) -> None:
+        _, hurst, zeta_1, *_ = one.node
+        self._surface = Surface(float(hurst), 1.0, float(zeta_1), 1.0, one.h_max)
+        self._theory, self._gradient = theory, float(self._surface.rms_gradient)
+        low = float(theory.interval(self._surface)[0])
+        u = DEPTHS * one.h_max
+        u = u[u > low]
+        found = theory.answer(self._surface, u)
+        rising = np.append(True, np.diff(np.minimum(found.force, 1e300)) > 0) & (found.force > 0)
+        self._u = u[rising]
+        self._log_force = np.log(found.force[rising] / self._gradient)
+        self._log_area = np.log(found.area[rising])
+
+    def reaches(self, force: FloatArray) -> Any:
+        """Which loads lie on the theory's curve."""
+        log_force = np.log(force)
+        return (log_force > self._log_force[0]) & (log_force < self._log_force[-1])
+
+    def area(self, force: FloatArray) -> FloatArray:
+        """A/A0 at F/(A0 E* g)."""
+        return np.asarray(np.exp(PchipInterpolator(self._log_force, self._log_area)(np.log(force))))
+
+    def separation(self, force: FloatArray) -> FloatArray:
+        """Mean separation [h_rms] at F/(A0 E* g)."""
+        return np.asarray(PchipInterpolator(self._log_force, self._u)(np.log(force)))
+
+    def force(self, u: FloatArray) -> FloatArray:
+        """F/(A0 E* g) at mean separations [h_rms]."""
+        return self._theory.answer(self._surface, np.minimum(u, self._surface.h_max)).force / self._gradient
+
+
+def _known(curves: dict[int, TheoryCurve]) -> Callable[[Case], TheoryCurve]:
+    return lambda one: curves[id(one)]
+
+
+def others(found: Sequence[Case], summary: Summary) -> dict[str, dict[str, Any]]:
+    """Errors of theories that nothing was fitted for, on all self-affine surfaces of two or more waves a side."""
+    told = {}
+    for theory in (Mbma(outside="nan"), Persson(), GreenwoodWilliamson()):
+        seen, curves = [], {}
+        for one in found:
+            if one.kind != "self_affine" or not one.gaussian:
+                continue
+            curve = TheoryCurve(theory, one)
+            kept = curve.reaches(one.force)
+            if kept.sum() > 3:
+                part = dataclasses.replace(one, force=one.force[kept], area=one.area[kept], u=one.u[kept])
+                seen.append(part)
+                curves[id(part)] = curve
+        told[theory.name] = summary(seen, _known(curves))
+    return told
+
+
+def log_force(law: Law) -> FloatArray:
+    """ln F_P at the nodes in separation."""
+    u, _ = law.separation_persson(np.exp(LOG_FORCE))
+    x = make_interp_spline(np.log(u[::-1]), LOG_FORCE[::-1], k=5)(LOG_U)
+    for _ in range(3):
+        value, slope = law.separation_persson(np.exp(x))
+        x = x - np.clip((np.log(value) - LOG_U) * value / slope, -0.5, 0.5)
+    return np.asarray(x)
+
+
+def _row(constants: Constants, hurst: float) -> FloatArray:
+    """`log_force` of one Hurst exponent."""
+    return np.array(
+        [log_force(Law(Spectrum.self_affine(float(hurst), float(np.exp(z))), None, constants)) for z in LOG_ZETA]
+    )
+
+
+def certificate(path: pathlib.Path) -> dict[str, float]:
+    """Largest and 99% relative errors of the table in a file, against the law's own quadrature at held-out points."""
+    table, rng = load(path), np.random.default_rng(20)
+    surfaces, points = CERTIFICATE
+    misses = []
+    for _ in range(surfaces):
+        # one in five on each edge
+        hurst, log_zeta = (
+            float(np.clip(low + (high - low) * rng.uniform(-0.3, 1.3), low, high))
+            for low, high in (COVERED["hurst"], COVERED["log_zeta_1"])
+        )
+        top = rng.uniform(*HIGHEST)
+        spectrum = Spectrum.self_affine(hurst, float(np.exp(log_zeta)))
+        far = NEAREST * top
+        u = np.concatenate(
+            [
+                rng.uniform(0, far, points // 2),
+                np.exp(rng.uniform(COVERED["log_separation"][0], np.log(far), points // 2)),
+            ]
+        )
+        out = np.empty((3, u.size))
+        row = np.array([[hurst, log_zeta, float(light_factor(spectrum.alpha, table.constants)), top]])
+        fill(table.coefficients, table.numbers, row, np.zeros(u.size, np.intp), u, out)
+        law = Law(spectrum, top, table.constants)
+        force, stiffness = law.force_and_stiffness(u)
+        exact = (force, stiffness, law.area(force))
+        misses.append([np.abs(mine / theirs - 1) for mine, theirs in zip(out[[0, 2, 1]], exact, strict=True)])
+    values = np.concatenate(misses, axis=1)
+    names = ("force", "stiffness", "area")
+    return {f"largest_error_{name}": float(row.max()) for name, row in zip(names, values, strict=True)} | {
+        f"p99_error_{name}": float(np.quantile(row, 0.99)) for name, row in zip(names, values, strict=True)
+    }
+
+
+def _cells(told: dict[str, Any], bins: int) -> FloatArray:
+    """Statistics by quantity and contact, NaN where there are none."""
+    return np.array(
+        [[part or [np.nan] * len(STATISTICS) for part in told[name]] + [] for name in QUANTITIES], float
+    ).reshape(len(QUANTITIES), bins, len(STATISTICS))
+
+
+def _stated(cells: FloatArray) -> FloatArray:
+    """Root mean square errors where there are enough of them."""
+    return np.where(cells[..., 3] >= MIN_ERRORS, np.hypot(cells[..., 0], cells[..., 1]), np.nan)
+
+
+def dataset(told: dict[str, Any], found: Sequence[Case], summary: Summary) -> xr.Dataset:
+    """The file's content but for its certificate."""
+    constants = Constants(*(float(f"{value:.{DIGITS}g}") for value in told["constants"].values()))
+    map_constants = MapConstants(**told["map_constants"])
+    with ProcessPoolExecutor(PROCESSES) as pool:
+        values = np.array(list(pool.map(functools.partial(_row, constants), HURST)))
+    edges = np.array(told["contact_edges"])
+    bins = edges.size - 1
+    known = others(found, summary)
+    by_map = summary(
+        [one for one in found if one.split == TRAINING and one.gaussian],
+        lambda one: one.map_law(constants, map_constants),
+    )
+    stated = {
+        "calibrated": _cells(told["cross_validation"]["errors"], bins),
+        "calibrated_map": _cells(by_map, bins),
+        **{name: _cells(content, bins) for name, content in known.items()},
+    }
+    rows = {f"{name}, {form}": content for name, forms in told["errors"].items() for form, content in forms.items()}
+    rows |= {f"self-affine, {name}": content for name, content in known.items()}
+    text = {"units": "1"}
+    data = xr.Dataset(
+        {
+            "log_force": (AXES, values, {"long_name": "ln F_P, F/(A0 E* g) before the tail factor", **text}),
+            "spline": (
+                tuple(f"{name}_knot" for name in AXES),
+                coefficients(values, DEGREE, 3),
+                {"long_name": "coefficients of cardinal quintic B-splines that interpolate log_force", **text},
+            ),
+            "stated_scatter": (
+                ("theory", "quantity", "contact"),
+                np.array([_stated(cells) for cells in stated.values()]),
+                {"long_name": "root mean square of ln(theory/simulation)", **text},
+            ),
+            "accuracy": (
+                ("set", "quantity", "contact", "statistic"),
+                np.array([_cells(content, bins) for content in rows.values()]),
+                {"long_name": "statistics of ln(theory/simulation), and their number", **text},
+            ),
+        },
+        {
+            **{
+                name: (name, nodes, {"long_name": LONG_NAMES[name], **text, "covered": COVERED[name]})
+                for name, nodes in zip(AXES, (HURST, LOG_ZETA, LOG_U), strict=True)
+            },
+            "contact": ("contact", np.sqrt(edges[1:] * edges[:-1]), {"long_name": "A/A0, middle of a bin", **text}),
+            "contact_low": ("contact", edges[:-1], {"long_name": "A/A0, low end of a bin", **text}),
+            "contact_high": ("contact", edges[1:], {"long_name": "A/A0, high end of a bin", **text}),
+        },
+    )
+    data.attrs = {
+        "Conventions": "CF-1.11",
+        "title": "Contact of rough surfaces: Persson's energy integral calibrated on boundary elements, tabulated",
+        "institution": "mbma_tables contributors",
+        "source": "mbma_tables.calibrated, its constants fitted to the training set of the boundary-element campaign",
+        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate calibrated",
+        "references": "docs/calibrated.md",
+        "comment": "F_G = F_P exp(-law_tail max(u - law_onset, 0)^2); F(u) = F_G(u) - F_G(h_max); lengths in h_rms. "
+        "quantity: area at equal force, force at equal mean separation, stiffness at equal force. calibrated_map: "
+        "where a map is at hand. stated_scatter: of calibrated from cross-validation, of calibrated_map on the "
+        "training set, of other theories on self-affine surfaces",
+        "mbma_kind": "calibrated",
+        "theories": " ".join(stated),
+        "quantities": " ".join(QUANTITIES),
+        "statistics": " ".join(STATISTICS),
+        "sets": "; ".join(rows),
+        **{f"law_{name}": value for name, value in dataclasses.asdict(constants).items()},
+        **{f"map_{name}": value for name, value in told["map_constants"].items()},
+        "coverage": json.dumps(told["coverage"]),
+        "evidence": json.dumps(told["evidence"]),
+        "versions": json.dumps(versions(), sort_keys=True),
+        "source_sha256": source_digest(MODULES),
+        "source_modules": " ".join(MODULES),
+    }
+    return data
+
+
+def write(
+    path: os.PathLike[str] | str, told: dict[str, Any], found: Sequence[Case], summary: Summary
+) -> dict[str, float]:
+    """Write the file from what `generate calibrated` found, its `summary` of errors by contact; the certificate."""
+    data, target = dataset(told, found, summary), pathlib.Path(path)
+    # float32 would keep no 1e-5 of a force over its whole range of slopes; nodes only serve readers
+    encoding: dict[str, dict[str, Any]] = {
+        str(name): {"zlib": True, "complevel": 9, "shuffle": True, "_FillValue": None} for name in data.variables
+    }
+    encoding["log_force"]["dtype"] = "f4"
+
+    def store() -> None:
+        with HDF5_LOCK:
+            body = written_bytes(target.name, lambda name: data.to_netcdf(name, engine="netcdf4", encoding=encoding))
+        write_file(target, body + SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n", make_folders=True)
+
+    data.attrs["largest_error_force"] = np.nan
+    store()
+    found_errors = certificate(target)
+    data.attrs |= found_errors | {"certificate_points": CERTIFICATE[0] * CERTIFICATE[1]}
+    store()
+    return found_errors

@@ -1,0 +1,102 @@
+"""The measured parts of docs/calibrated.md: what `python -m generate calibrated` wrote, and a figure."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from generate.pages.page import ROOT, png, pyplot, table
+from mbma_tables import Surface
+from mbma_tables.calibrated import CONSTANTS
+from mbma_tables.files import shipped_file
+from mbma_tables.theories import THEORIES, get_theory
+
+SHOWN = {  # sets and forms of the accuracy table
+    "held_out_surface, 2-3 waves, spectrum": "new surfaces, 2-3 waves a side, spectrum",
+    "held_out_spectrum, 2-3 waves, spectrum": "new spectra, 2-3 waves, spectrum",
+    "held_out_surface, 4 waves, spectrum": "new surfaces, 4-8 waves, spectrum",
+    "held_out_spectrum, 4 waves, spectrum": "new spectra, 4-8 waves, spectrum",
+    "held_out_surface, 1 wave, spectrum": "new surfaces, 1 wave, spectrum",
+    "held_out_surface, 4 waves, map": "new surfaces, 4-8 waves, map",
+    "held_out_spectrum, 4 waves, map": "new spectra, 4-8 waves, map",
+    "held_out_spectrum, 2-3 waves, map": "new spectra, 2-3 waves, map",
+    "held_out_spectrum, stretched, map": "new spectra, stretched 1:3 to 1:12, map",
+    "held_out_spectrum, transformed, map": "new spectra, transformed heights, map",
+    "self-affine, mbma": "self-affine: MBMA `reported`",
+    "self-affine, persson": "self-affine: Persson",
+    "self-affine, greenwood_williamson": "self-affine: Greenwood-Williamson",
+}
+DATA = ROOT / "docs" / "data" / "bem_hurst0.8_zeta64.csv"
+COLOURS = {"mbma": "C0", "calibrated": "k", "calibrated_map": "0.5", "persson": "C3", "greenwood_williamson": "C2"}
+
+
+def accuracy(data: xr.Dataset, quantity: str) -> str:
+    """Bias and standard deviation in percent, by contact fraction."""
+    ends = zip(data.contact_low.values, data.contact_high.values, strict=True)
+    header = ["surfaces, and what is known of them", *(f"{100 * a:g}-{100 * b:g}%" for a, b in ends)]
+    sets, number = data.attrs["sets"].split("; "), data.attrs["quantities"].split().index(quantity)
+    rows = []
+    for name, label in SHOWN.items():
+        if name not in sets:
+            continue
+        cells = data.accuracy.values[sets.index(name), number]
+        told = [f"{100 * c[0]:+.0f} ± {100 * c[1]:.0f}" if c[3] >= 1 else "—" for c in cells]
+        rows.append([label, *told])
+    return table(header, rows)
+
+
+def numbers(data: xr.Dataset) -> str:
+    """Constants, the table's certificate, and how honest the stated scatter is."""
+    constants = [(f"`{name}`", f"{data.attrs[f'law_{name}']:.4g}") for name in vars(CONSTANTS)]
+    constants += [
+        (f"`{name.removeprefix('map_')}` (map)", f"{value:.4g}")
+        for name, value in data.attrs.items()
+        if name.startswith("map_")
+    ]
+    errors = [
+        (f"largest (99%) error of {what} by the table", f"{data.attrs[f'largest_error_{what}']:.1e}"
+         f" ({data.attrs[f'p99_error_{what}']:.1e})")
+        for what in ("force", "area", "stiffness")
+    ]  # fmt: skip
+    covered = [
+        (f"held-out errors of {what} within one and two of the stated", f"{one:.0%}, {two:.0%}")
+        for what, (one, two) in json.loads(data.attrs["coverage"]).items()
+    ]
+    evidence = json.loads(data.attrs["evidence"])
+    counts = [("surfaces simulated, of which in the training set", f"{evidence['surfaces']}, {evidence['training']}")]
+    return table(["what", "value"], [*constants, *counts, *errors, *covered])
+
+
+def draw(data: xr.Dataset) -> bytes:
+    """One surface's curves with the stated scatter as a band, and every theory's scatter of force."""
+    figure, (left, right) = pyplot().subplots(1, 2, figsize=(9, 3.6), dpi=100, layout="constrained")
+    force, _, _, u = np.loadtxt(DATA, delimiter=",", skiprows=4).T[:4]
+    surface = Surface(0.8, 1.0, 64.0, 1.0, 3.3973)
+    gap = np.linspace(0.01, 3.38, 200)
+    g = float(surface.rms_gradient)
+    for name in THEORIES:
+        found = get_theory(name).answer(surface, gap)
+        left.semilogy(gap, found.force / g, color=COLOURS[name], label=name)
+        if name == "calibrated":
+            spread = np.exp(get_theory(name).scatter(surface, found.area)[0])
+            left.fill_between(gap, found.force / g / spread, found.force / g * spread, color="0.8")
+    left.semilogy(u, force, "ko", mfc="none", label="boundary elements")
+    left.set(xlabel="u/h_rms", ylabel="F/(A0 E* g)", ylim=(1e-5, 3), title="H 0.8, zeta_1 64, h_max 3.4 h_rms")
+    left.legend(fontsize="small")
+    number = data.attrs["quantities"].split().index("force")
+    for k, name in enumerate(data.attrs["theories"].split()):
+        right.loglog(data.contact, data.stated_scatter.values[k, number], "o-", color=COLOURS[name], label=name)
+    right.set(xlabel="A/A0", ylabel="rms of ln(F/simulated) at equal u", title="Stated scatter of force")
+    right.legend(fontsize="small")
+    return png(figure)
+
+
+def measure() -> tuple[dict[str, str], dict[str, bytes]]:
+    """The measured parts of the page, and its figure."""
+    with xr.open_dataset(shipped_file("calibrated.nc")) as opened:
+        data: Any = opened.load()
+    parts = {name: accuracy(data, name) for name in ("area", "force", "stiffness")} | {"numbers": numbers(data)}
+    return parts, {"docs/figures/calibrated.png": draw(data)}
