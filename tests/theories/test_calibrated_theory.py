@@ -16,7 +16,7 @@ from mbma_tables.bearing import bearing
 from mbma_tables.calibrated import CONSTANTS, Law, Spectrum
 from mbma_tables.files import shipped_file
 from mbma_tables.theories import Calibrated, Mbma, get_theory
-from mbma_tables.theories.calibrated import force_at_area
+from mbma_tables.theories.calibrated_curves import force_at_area
 from mbma_tables.theories.calibrated_table import NAME, QUANTITIES, load, shipped
 
 DATA = pathlib.Path(__file__).parents[2] / "docs" / "data"
