@@ -41,6 +41,7 @@ class Places:
         self.gradient = gradient[self.owner] if hurst.size > 1 else gradient
 
     def covered(self, table: calibrated_table.Table) -> Any:
+        """Whether the table holds each surface."""
         return table.covers(self.rows[:, 0], self.rows[:, 1])
 
     def outside(self, mask: Any) -> list[tuple[int, Any]]:
