@@ -45,7 +45,8 @@ def test_the_header_says_where_a_law_is_not_valid():
     first, last = (float(areas.split()[k]) for k in (5, 7))
     assert contact(CONCRETE, pressure=first, E_star=13.3).area == pytest.approx(0.1, rel=0.06)
     assert last == pytest.approx(law_of().y[-1], rel=0.02)
-    assert any("scatter" in line and "not known" in line for line in law_of().comments)
+    assert any("scatter" in line and "ln p at a given c" in line for line in law_of().comments)
+    assert any("scatter" in line and "not known" in line for line in law_of(reading="printed").comments)
 
 
 def test_the_header_lists_the_scatter_where_it_is_known(monkeypatch):
