@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import functools
-import hashlib
 import json
 import os
 import pathlib
@@ -19,12 +18,11 @@ from scipy.interpolate import PchipInterpolator, make_interp_spline
 
 from generate.boundary_elements.design import TRAINING
 from generate.boundary_elements.evidence import Case
+from generate.calibrated_file import write_part
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import Constants, Law, Spectrum, light_factor
 from mbma_tables.calibrated_map import MapConstants
-from mbma_tables.files import write_file, written_bytes
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.tablefiles.netcdf import HDF5_LOCK, SEAL
 from mbma_tables.tablefiles.provenance import source_digest, versions
 from mbma_tables.tablefiles.splines import coefficients
 from mbma_tables.theories.asperities import GreenwoodWilliamson
@@ -178,6 +176,34 @@ def _stated(cells: FloatArray) -> FloatArray:
     return np.where(cells[..., 3] >= MIN_ERRORS, np.hypot(cells[..., 0], cells[..., 1]), np.nan)
 
 
+def _attributes(told: dict[str, Any], constants: Constants, theories: list[str], sets: list[str]) -> dict[str, Any]:
+    """What the file says of itself."""
+    return {
+        "Conventions": "CF-1.11",
+        "title": "Contact of rough surfaces: Persson's energy integral calibrated on boundary elements, tabulated",
+        "institution": "mbma_tables contributors",
+        "source": "mbma_tables.calibrated, its constants fitted to the training set of the boundary-element campaign",
+        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate calibrated",
+        "references": "docs/calibrated.md",
+        "comment": "F_G = F_P exp(-law_tail max(u - law_onset, 0)^2); F(u) = F_G(u) - F_G(h_max); lengths in h_rms. "
+        "quantity: area at equal force, force at equal mean separation, stiffness at equal force. calibrated_map: "
+        "where a map is at hand. stated_scatter: of calibrated from cross-validation, of calibrated_map on the "
+        "training set, of other theories on self-affine surfaces",
+        "mbma_kind": "calibrated",
+        "theories": " ".join(theories),
+        "quantities": " ".join(QUANTITIES),
+        "statistics": " ".join(STATISTICS),
+        "sets": "; ".join(sets),
+        **{f"law_{name}": value for name, value in dataclasses.asdict(constants).items()},
+        **{f"map_{name}": value for name, value in told["map_constants"].items()},
+        "coverage": json.dumps(told["coverage"]),
+        "evidence": json.dumps(told["evidence"]),
+        "versions": json.dumps(versions(), sort_keys=True),
+        "source_sha256": source_digest(MODULES),
+        "source_modules": " ".join(MODULES),
+    }
+
+
 def dataset(told: dict[str, Any], found: Sequence[Case], summary: Summary) -> xr.Dataset:
     """The file's content but for its certificate."""
     constants = Constants(*(float(f"{value:.{DIGITS}g}") for value in told["constants"].values()))
@@ -228,52 +254,20 @@ def dataset(told: dict[str, Any], found: Sequence[Case], summary: Summary) -> xr
             "contact_high": ("contact", edges[1:], {"long_name": "A/A0, high end of a bin", **text}),
         },
     )
-    data.attrs = {
-        "Conventions": "CF-1.11",
-        "title": "Contact of rough surfaces: Persson's energy integral calibrated on boundary elements, tabulated",
-        "institution": "mbma_tables contributors",
-        "source": "mbma_tables.calibrated, its constants fitted to the training set of the boundary-element campaign",
-        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate calibrated",
-        "references": "docs/calibrated.md",
-        "comment": "F_G = F_P exp(-law_tail max(u - law_onset, 0)^2); F(u) = F_G(u) - F_G(h_max); lengths in h_rms. "
-        "quantity: area at equal force, force at equal mean separation, stiffness at equal force. calibrated_map: "
-        "where a map is at hand. stated_scatter: of calibrated from cross-validation, of calibrated_map on the "
-        "training set, of other theories on self-affine surfaces",
-        "mbma_kind": "calibrated",
-        "theories": " ".join(stated),
-        "quantities": " ".join(QUANTITIES),
-        "statistics": " ".join(STATISTICS),
-        "sets": "; ".join(rows),
-        **{f"law_{name}": value for name, value in dataclasses.asdict(constants).items()},
-        **{f"map_{name}": value for name, value in told["map_constants"].items()},
-        "coverage": json.dumps(told["coverage"]),
-        "evidence": json.dumps(told["evidence"]),
-        "versions": json.dumps(versions(), sort_keys=True),
-        "source_sha256": source_digest(MODULES),
-        "source_modules": " ".join(MODULES),
-    }
+    data.attrs = _attributes(told, constants, list(stated), list(rows))
     return data
 
 
 def write(
     path: os.PathLike[str] | str, told: dict[str, Any], found: Sequence[Case], summary: Summary
 ) -> dict[str, float]:
-    """Write the file from what `generate calibrated` found, its `summary` of errors by contact; the certificate."""
+    """Write the root of the file from what `generate calibrated` found, errors told by `summary`; the certificate."""
     data, target = dataset(told, found, summary), pathlib.Path(path)
     # float32 would keep no 1e-5 of a force over its whole range of slopes; nodes only serve readers
-    encoding: dict[str, dict[str, Any]] = {
-        str(name): {"zlib": True, "complevel": 9, "shuffle": True, "_FillValue": None} for name in data.variables
-    }
-    encoding["log_force"]["dtype"] = "f4"
-
-    def store() -> None:
-        with HDF5_LOCK:
-            body = written_bytes(target.name, lambda name: data.to_netcdf(name, engine="netcdf4", encoding=encoding))
-        write_file(target, body + SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n", make_folders=True)
-
+    data.log_force.encoding["dtype"] = "f4"
     data.attrs["largest_error_force"] = np.nan
-    store()
+    write_part(target, data)
     found_errors = certificate(target)
     data.attrs |= found_errors | {"certificate_points": CERTIFICATE[0] * CERTIFICATE[1]}
-    store()
+    write_part(target, data)
     return found_errors

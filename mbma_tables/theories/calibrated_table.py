@@ -128,6 +128,22 @@ def shipped() -> Table:
     return load(shipped_file(NAME))
 
 
+@functools.cache
+def shipped_part(group: str) -> tuple[dict[str, FloatArray], dict[str, Any]]:
+    """Variables and attributes of a group of the shipped file, read once."""
+    import netCDF4
+
+    path = shipped_file(NAME)
+    body = read_sealed(path)
+    with HDF5_LOCK, netCDF4.Dataset(path.name, memory=body) as data:
+        data.set_auto_mask(False)
+        if group not in data.groups:
+            raise TableFileError(f"{path}: has no group {group!r}, only {sorted(data.groups)}")
+        part = data[group]
+        variables = {name: np.array(variable[...]) for name, variable in part.variables.items()}
+        return variables, {name: part.getncattr(name) for name in part.ncattrs()}
+
+
 @njit(cache=True, fastmath=_FAST, error_model="numpy")
 def _eight(c: FloatArray, numbers: FloatArray, hurst: float, log_zeta: float, k: int) -> Eight:
     """Coefficients k to k + 7 in ln u of one surface."""

@@ -4,11 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from generate.boundary_elements.design import TRAINING
 from generate.boundary_elements.evidence import Case
 from generate.calibrated import EDGES, QUANTITIES, coverage, cross_validate, errors, fit, summary
+from generate.calibrated_file import read_parts, write_part
 from mbma_tables.calibrated import CONSTANTS, Law, Spectrum
+from mbma_tables.errors import TableFileError
 
 FORCES = np.geomspace(4e-4, 1.0, 15)
 TRUE = dataclasses.replace(
@@ -51,3 +54,22 @@ def test_cross_validation_states_errors_that_cover():
     assert all(0 <= share <= 1 for pair in coverage(seen, TRUE, told["errors"]).values() for share in pair)
     assert summary(seen, lambda one: one.law(TRUE))["area"][4][:2] == pytest.approx([0, 0], abs=1e-12)
     assert len(told["errors"][QUANTITIES[1]]) == len(EDGES) - 1
+
+
+def test_parts_of_the_file_leave_one_another_alone(tmp_path):
+    path = tmp_path / "calibrated.nc"
+    root = xr.Dataset({"a": ("contact", [1.0, 2.0])}, attrs={"theories": "calibrated persson"})
+    write_part(path, root)
+    # a dimension of the same name and another length
+    group = xr.Dataset({"b": ("contact", np.arange(3, dtype="i4")), "c": 2.5}, attrs={"eta": 0.4})
+    write_part(path, group, "hardness")
+    write_part(path, xr.Dataset(attrs={"limit": 0.3}), "leakage")
+    write_part(path, root.assign(a=root.a * 2))
+    parts = read_parts(path)
+    assert list(parts) == ["", "hardness", "leakage"]
+    assert parts["hardness"].identical(group)
+    assert parts["leakage"].attrs == {"limit": 0.3}
+    assert parts[""].a.values.tolist() == [2, 4]
+    path.write_bytes(path.read_bytes()[:-5])
+    with pytest.raises(TableFileError):
+        write_part(path, root)
