@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable
 from typing import Any
 
@@ -19,6 +20,7 @@ from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma
 from mbma_tables.theories.result import Contact, Source
+from mbma_tables.theories.sensitivity import differentiate
 from mbma_tables.totals.contact import wanted_quantities
 
 KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by
@@ -77,7 +79,8 @@ def contact(
     outside : {"raise", "exact", "nan"}
         For surfaces with islands outside MBMA's table: an error, the exact solver, or NaN.
     derivatives : bool
-        Whether `force_by`, `area_by` and `separation_by` are asked for (MBMA).
+        Whether `force_by`, `area_by` and `separation_by` are asked for: MBMA's by its own differentiated sums, other
+        theories' by numerical differentiation, to 1e-6.
     quantities : iterable of {"force", "area"}
         What is wanted of MBMA. One alone costs less; the other is then None, and `error` is of the one.
 
@@ -120,8 +123,6 @@ def contact(
         refuse_options_of_mbma(
             tier=tier != "universal", reading=reading != "reported", rtol=rtol != 1e-8, outside=outside != "raise"
         )
-    if derivatives and not isinstance(chosen, Mbma):
-        raise InputError(f"derivatives in the surface's parameters come from theory 'mbma', not from {chosen.name!r}")
     options: dict[str, Any] = {
         "by": by,
         "source": Source(chosen, surface, E_star),
@@ -160,14 +161,21 @@ def _contact(
         wanted = QUANTITIES if derivatives else quantities
         totals = theory.totals(surface, places.get("separation", value), E_star, derivatives, wanted)
         fields = vars(totals) | places
-        if derivatives and by in ("pressure", "area"):
-            held = "force" if by == "pressure" else "area"
-            fields |= _at_fixed(held, by, {"force": totals.force_by, "area": totals.area_by}, totals.force / E_star)
     else:
-        found = theory.answer(surface, np.asarray(places["mean_separation"]))
+        u = np.asarray(places["mean_separation"])
+        found = theory.answer(surface, u)
+        source = dataclasses.replace(source, answer=found)
         error = np.broadcast_to(found.error, np.shape(found.force))[()]
         fields = {"force": (E_star * found.force)[()], "area": found.area[()], "error": error} | places
         fields |= {"reading": "", "tier": "", "islands": None}
+        if derivatives:
+            force_by, area_by = differentiate(theory, surface, u)
+            fields |= {"force_by": {name: (E_star * slope)[()] for name, slope in force_by.items()}}
+            fields |= {"area_by": {name: slope[()] for name, slope in area_by.items()}}
+    if derivatives and by in ("pressure", "area"):
+        held = "force" if by == "pressure" else "area"
+        slopes = {"force": fields["force_by"], "area": fields["area_by"]}
+        fields |= _at_fixed(held, by, slopes, fields["force"] / E_star)
     for name in QUANTITIES:
         if name not in quantities:
             fields |= {name: None, f"{name}_by": None}

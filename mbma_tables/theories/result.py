@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -59,14 +59,26 @@ class Contact:
     _source: Source = dataclasses.field(repr=False, kw_only=True)
 
     @functools.cached_property
+    def _answer(self) -> TheoryAnswer:
+        """The theory's answer at these separations, asked once."""
+        source = self._source
+        if source.answer is not None:
+            return source.answer
+        found: Any = source.map(lambda s, u, E: source.theory.answer(s, u), self, 4)
+        return TheoryAnswer(*found)
+
+    @functools.cached_property
     def stiffness(self) -> Numbers:
         """-d(F/A0)/du [stress/length], against the mean separation; computed when first read."""
-        return self._source.map(lambda s, u, E: E * self._source.theory.answer(s, u).stiffness, self)
+        found: Numbers = (self._source.E_star * self._answer.stiffness)[()]
+        return found
 
     @functools.cached_property
     def energy(self) -> Numbers:
         """Elastic energy per nominal area [stress length], the integral of F/A0 over u; computed when first read."""
-        return self._source.map(lambda s, u, E: E * self._source.theory.energy(s, u), self)
+        source = self._source
+        found: Numbers = source.map(lambda s, u, E: (E * source.theory.energy(s, u),), self, 1)[0]
+        return found
 
     @property
     def mean_pressure(self) -> Numbers:
@@ -74,37 +86,43 @@ class Contact:
         with np.errstate(invalid="ignore"):
             return self.force / self.area
 
-    @functools.cached_property
+    @property
     def scatter(self) -> Numbers:
         """Standard deviation of ln F at this mean separation from simulation to simulation; NaN where not known."""
-        return self._source.map(lambda s, u, E: self._scatter(s, u)[0], self)
+        return self._scatter[0]
 
-    @functools.cached_property
+    @property
     def area_scatter(self) -> Numbers:
         """Standard deviation of ln A at this force, likewise."""
-        return self._source.map(lambda s, u, E: self._scatter(s, u)[1], self)
+        return self._scatter[1]
 
-    def _scatter(self, surface: Surface, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        theory = self._source.theory
-        return theory.scatter(surface, theory.answer(surface, u).area)
+    @functools.cached_property
+    def _scatter(self) -> tuple[Numbers, ...]:
+        area = self._answer.area if self.area is None else self.area
+        return self._source.map(lambda s, u, E, A: self._source.theory.scatter(s, A), self, 2, {"area": area})
 
     @functools.cached_property
     def valid(self) -> Numbers:
         """Whether the theory was tested for contacts such as these; `reasons` says where and why not."""
 
-        def none(s: Surface, u: FloatArray, E: FloatArray) -> FloatArray:
-            masks = list(self._source.concerns(s, u).values())
-            return np.asarray(~np.logical_or.reduce(masks), dtype=float)
+        def none(s: Surface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[FloatArray]:
+            masks = list(self._source.concerns(s, u, TheoryAnswer(*answer)).values())
+            return (np.asarray(~np.logical_or.reduce(masks), dtype=float),)
 
-        return self._source.map(none, self).astype(bool)
+        return self._source.map(none, self, 1, self._answer._asdict())[0].astype(bool)
 
     @functools.cached_property
     def reasons(self) -> dict[str, Any]:
         """Reasons for which entries are not `valid`, each with a mask; of plain arrays."""
-        u = np.asarray(self.mean_separation)
-        surface = self._source.surface
-        plain = Surface(*(np.asarray(getattr(surface, name)) for name in PARAMETERS)) if surface.labelled else surface
-        return {reason: mask for reason, mask in self._source.concerns(plain, u).items() if mask.any()}
+        surface, answer = self._source.surface, self._answer
+        fields: list[Any] = [*answer, self.mean_separation, *(getattr(surface, name) for name in PARAMETERS)]
+        if is_labelled(answer.force):
+            import xarray as xr
+
+            fields = list(xr.broadcast(*map(xr.DataArray, fields)))
+            surface = Surface(*map(np.asarray, fields[5:]))
+        found = self._source.concerns(surface, np.asarray(fields[4]), TheoryAnswer(*map(np.asarray, fields[:4])))
+        return {reason: mask for reason, mask in found.items() if mask.any()}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -114,19 +132,24 @@ class Source:
     theory: Theory
     surface: Surface
     E_star: Any
+    answer: TheoryAnswer | None = None  # where it is known already
 
-    def map(self, function: Callable[[Surface, FloatArray, FloatArray], FloatArray], contact: Contact) -> Numbers:
-        """``function(surface, u, E_star)`` of the contact's entries."""
-        u = contact.mean_separation
-        if self.surface.labelled or is_labelled(u) or is_labelled(self.E_star):
-            arrays = {"mean_separation": u, "E_star": self.E_star}
-            found: Numbers = apply_to_surface(lambda *given: (function(*given),), self.surface, arrays, 1)[0]
+    def map(
+        self,
+        function: Callable[..., tuple[FloatArray, ...]],
+        contact: Contact,
+        outputs: int,
+        more: Mapping[str, Any] | None = None,
+    ) -> tuple[Numbers, ...]:
+        """``function(surface, u, E_star, *more)`` of the contact's entries."""
+        arrays = {"mean_separation": contact.mean_separation, "E_star": self.E_star, **(more or {})}
+        if self.surface.labelled or any(map(is_labelled, arrays.values())):
+            found: tuple[Numbers, ...] = apply_to_surface(function, self.surface, arrays, outputs)
             return found
-        return function(self.surface, np.asarray(u), np.asarray(self.E_star))[()]
+        return tuple(part[()] for part in function(self.surface, *map(np.asarray, arrays.values())))
 
-    def concerns(self, surface: Surface, u: FloatArray) -> dict[str, Any]:
+    def concerns(self, surface: Surface, u: FloatArray, answer: TheoryAnswer) -> dict[str, Any]:
         """Every reason against the entries, with its mask."""
-        answer: TheoryAnswer = self.theory.answer(surface, u)
         steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.force))
         text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"
         return {text: steep, **self.theory.concerns(surface, answer, u)}
