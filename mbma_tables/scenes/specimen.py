@@ -49,6 +49,7 @@ def from_map(path: pathlib.Path) -> Specimen:
     from mbma_tables.surfaces.surface import Surface
 
     surface = Surface.from_map(read_map(path))
+    assert isinstance(surface, Surface)
     unit = None if surface.fit is None else surface.fit.length_unit
     return Specimen(surface, f"fitted to the map {_printable(path)}", unit)
 

@@ -14,8 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbma_tables import bearing
 from mbma_tables.arguments import FloatArray, finite_array, require
 from mbma_tables.errors import InputError, MbmaError, NotSelfAffineError
+from mbma_tables.surfaces.measured import Heights, MeasuredSurface
+from mbma_tables.surfaces.power_law import SCATTER, log_bins
+from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.psd import MAX_LENGTH, MIN_LENGTH, FittedSurface, check_band, check_height, fit_spectrum
 
 DETRENDS = {"mean": 0, "plane": 1, "quadratic": 2}
@@ -202,6 +206,58 @@ def fit_map(
         length_unit=unit,
     )
     return _with_anisotropy(fitted, q, C * waves, directions)
+
+
+def _matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> FloatArray:
+    """C of averaged samples, tilted a little so that its variance and mean square wavenumber are those of all waves.
+
+    The longest waves of a map are few, and samples do not reach half way to the next ones.
+    """
+    from scipy.optimize import brentq
+
+    def excess(tilt: float) -> float:
+        laws = PowerLaws(q, C * (q / q[0]) ** tilt)
+        return math.log(2 * laws.moment(2) / laws.moment(0) / square)
+
+    tilted = C * (q / q[0]) ** brentq(excess, -4.0, 4.0)
+    return np.asarray(tilted * (variance / PowerLaws(q, tilted).moment(0)))
+
+
+def measured_map(
+    heights: Any, dx: float | None, dy: float | None, periodic: bool | None, detrend: str | None, h_max: float | None
+) -> MeasuredSurface:
+    """A height map as its own radial spectrum, heights and curves; see `Surface.from_map`."""
+    grid, step_x, step_y, periodic, unit = _grid_of(heights, dx, dy, periodic)
+    flat, trend = _flattened(grid, periodic, detrend)
+    # lengths of order one, so that their powers neither underflow nor overflow
+    scale = float(np.abs(flat).max())
+    values, unit_x, unit_y = flat / scale, step_x / scale, step_y / scale
+    q, C, waves, _ = radial_spectrum(values if periodic else _windowed(values), unit_x, unit_y)
+    bins = log_bins(q, C, waves / (2.0 if periodic else 2.0 * WINDOW_OVERLAP))
+    own = Heights.of(values)
+    C_bins = _matched(bins.q, np.exp(bins.log_c), own.h_rms**2, float((C * waves) @ q**2 / (C @ waves)))
+    if not periodic:
+        # its mirror images continue it
+        values = np.concatenate([values, values[::-1]])
+        values = np.concatenate([values, values[:, ::-1]], axis=1)
+    sizes = values.shape[0] * unit_x, values.shape[1] * unit_y
+    curves = bearing.bearing(values, sizes)
+    known = MeasuredSurface(
+        bins.q,
+        C_bins,
+        None if h_max is None else check_height(h_max) / scale,
+        own,
+        curves,
+        bearing.radial_spectrum(values, sizes),
+        1 / (1 / bins.weight - SCATTER**2),
+        curves.anisotropy,
+    ).scaled(scale, unit)
+    steps: tuple[dict[str, Any], ...] = (
+        {"step": "read", "points": list(flat.shape), "dx": step_x, "dy": step_y, "unit": unit},
+        {"step": "detrend", "kind": trend},
+        {"step": "edges", "kind": "periodic" if periodic else "Hann window for the spectrum, mirrored for the curves"},
+    )
+    return dataclasses.replace(known, provenance=steps)
 
 
 def _with_anisotropy(

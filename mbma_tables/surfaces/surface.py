@@ -12,17 +12,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import broadcast_shape, finite_array, is_labelled, require
+from mbma_tables.errors import InputError
 from mbma_tables.surfaces import spectrum
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.cases import get_case
 
 if TYPE_CHECKING:
+    from mbma_tables.surfaces.measured import MeasuredSurface
     from mbma_tables.surfaces.psd import SpectrumFit
 
 PARAMETERS = ("hurst", "q0", "q1", "h_rms", "h_max")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Surface:
+class Surface(AnySurface):
     """A self-affine surface with the spectrum C(q) ~ q^(-2-2H) between q0 and q1 (Eq. 6).
 
     Any consistent length unit. Every argument may be an array; they broadcast to a batch of surfaces. Where one is
@@ -194,6 +197,70 @@ class Surface:
         return cls(**fit_psd(q, C, h_max, convention, band)._asdict())
 
     @classmethod
+    def from_spectrum(
+        cls,
+        q: ArrayLike,
+        C: ArrayLike,
+        *,
+        h_max: float | None = None,
+        heights: ArrayLike | None = None,
+        convention: str = "paper",
+        unit: str | None = None,
+    ) -> MeasuredSurface:
+        """The surface of an isotropic spectrum as it is: no Hurst exponent, no fit.
+
+        Parameters
+        ----------
+        q : array_like, shape (n,)
+            Wavenumber, 1/length, positive, in any order and spacing.
+        C : array_like, shape (n,)
+            Spectrum [length^4], not negative; a power law is taken between neighbours.
+        h_max : float, optional
+            Height of the highest point above the mid-plane [length]; that of `heights` if not given.
+        heights : array_like, optional
+            Heights measured anywhere on the surface [length], of any shape; their mean is taken off. A Gaussian that
+            ends at h_max if not given.
+        convention : {"paper", "isotropic"}, optional
+            h_rms^2 = 2 pi integral C q dq (Eqs. 4-6) or = integral C q dq / (2 pi).
+        unit : str, optional
+            Name of the length unit.
+
+        Returns
+        -------
+        MeasuredSurface
+            Its `fit()` is the self-affine surface nearest to it.
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            For input that is no spectrum.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from mbma_tables import Surface
+        >>> q = np.geomspace(1, 100, 40)
+        >>> surface = Surface.from_spectrum(q, 1e-3 * q**-3.4, h_max=0.3)
+        >>> print(f"h_rms = {surface.h_rms:.4f}, rms gradient {surface.rms_gradient:.3f}, alpha = {surface.alpha:.1f}")
+        h_rms = 0.0669, rms gradient 0.394, alpha = 106.5
+        """
+        from mbma_tables.surfaces.measured import Heights, MeasuredSurface
+
+        if convention not in ("paper", "isotropic"):
+            raise InputError(
+                f"convention must be 'paper' or 'isotropic', got {convention!r}; a profile's goes to from_profile"
+            )
+        wavenumber, spectrum = finite_array("q", q), finite_array("C", C)
+        if wavenumber.ndim != 1 or wavenumber.shape != spectrum.shape:
+            raise InputError(
+                f"q and C must be two columns of one length, got shapes {wavenumber.shape} and {spectrum.shape}"
+            )
+        order = np.argsort(wavenumber, kind="stable")
+        scale = 1.0 if convention == "paper" else 1 / (4 * math.pi**2)
+        known = None if heights is None else Heights.of(heights)
+        return MeasuredSurface(wavenumber[order], scale * spectrum[order], h_max, known, unit=unit)
+
+    @classmethod
     def from_map(
         cls,
         heights: Any,
@@ -204,8 +271,9 @@ class Surface:
         detrend: str | None = None,
         h_max: float | None = None,
         band: tuple[float, float] | None = None,
-    ) -> Surface:
-        """The self-affine surface fitted to a measured height map.
+        model: str = "self-affine",
+    ) -> Surface | MeasuredSurface:
+        """The surface of a measured height map: its own spectrum and heights, or the self-affine one fitted to it.
 
         Parameters
         ----------
@@ -224,13 +292,15 @@ class Surface:
             Height of the highest point above the mid-plane [length]; by default the map's, after detrending.
         band : tuple of float, optional
             (q0, q1) to fit and to take; else a flat roll-off below and a departure above are found and left out.
+        model : {"self-affine", "measured"}, optional
+            Five numbers fitted to it, or the map's own spectrum, heights and curves, without a fit.
 
         Returns
         -------
-        Surface
-            With `fit`, a `SpectrumFit`. h_rms is that of the fitted law between q0 and q1. Without a roll-off q0 is
-            the map's own lowest wavenumber, though under a window the line is fitted from twice that on; without a
-            cut q1 is the largest measured wavenumber, at most pi/max(dx, dy).
+        Surface or MeasuredSurface
+            Five numbers come with `fit`, a `SpectrumFit`. h_rms is that of the fitted law between q0 and q1. Without a
+            roll-off q0 is the map's own lowest wavenumber, though under a window the line is fitted from twice that
+            on; without a cut q1 is the largest measured wavenumber, at most pi/max(dx, dy).
 
         Raises
         ------
@@ -252,7 +322,14 @@ class Surface:
         >>> print(f"H = {surface.hurst:.2f}, q0 = {surface.q0:.3f}, fitted at {surface.fit.points} points")
         H = 0.80, q0 = 6.283, fitted at 32 points
         """
-        from mbma_tables.surfaces.maps import fit_map
+        from mbma_tables.surfaces.maps import fit_map, measured_map
+
+        if model not in ("self-affine", "measured"):
+            raise InputError(f"model must be 'self-affine' or 'measured', got {model!r}")
+        if model == "measured":
+            if band is not None:
+                raise InputError("band belongs to model='self-affine': a measured surface is not fitted")
+            return measured_map(heights, dx, dy, periodic, detrend, h_max)
 
         return cls(**fit_map(heights, dx, dy, periodic, detrend, h_max, band)._asdict())
 
@@ -267,19 +344,9 @@ class Surface:
         return np.shape(self.hurst)
 
     @property
-    def zeta_1(self) -> Any:
-        """Largest magnification q1/q0 (Eq. 13)."""
-        return self.q1 / self.q0
-
-    @property
     def s(self) -> Any:
         """Unit of height, h_rms/sqrt(1 - zeta_1^(-2H)) [length]."""
         return self.h_rms / np.sqrt(-np.expm1(-2 * self.hurst * np.log(self.zeta_1)))
-
-    @property
-    def m0(self) -> Any:
-        """Variance of height [length^2], Eq. (8)."""
-        return self.h_rms**2
 
     @property
     def m2(self) -> Any:
@@ -291,30 +358,20 @@ class Surface:
         """Variance of a profile's second derivative [1/length^2], Eq. (7)."""
         return (self.s * self.q0**2) ** 2 * spectrum.band_moment(4, self.hurst, 1.0, self.zeta_1)
 
-    @property
-    def alpha(self) -> Any:
-        """Nayak's bandwidth parameter, Eq. (3)."""
-        return self.m0 * self.m4 / self.m2**2
+    def sampled(self) -> MeasuredSurface:
+        """The same surface by its spectrum, two samples of which hold all of it.
 
-    @property
-    def rms_gradient(self) -> Any:
-        """Root-mean-square gradient of the surface, sqrt(2 m2)."""
-        return np.sqrt(2 * self.m2)
+        Raises
+        ------
+        InputError
+            For a batch.
+        """
+        from mbma_tables.surfaces.measured import MeasuredSurface
 
-    @property
-    def summit_density(self) -> Any:
-        """Nayak's density of summits [1/length^2], Eq. (2)."""
-        return self.m4 / (spectrum.NAYAK * self.m2)
-
-    @property
-    def summit_radius(self) -> Any:
-        """Mean radius of summits [length], Eq. (2)."""
-        return spectrum.RADIUS / np.sqrt(self.m4)
-
-    @property
-    def summit_sigma(self) -> Any:
-        """Standard deviation of summit heights [length], Eq. (2)."""
-        return np.sqrt((1 - spectrum.BROADENING / self.alpha) * self.m0)
+        if self.labelled or self.shape != ():
+            raise InputError("a batch has no single spectrum: take one surface at a time")
+        ends = np.array([self.q0, self.q1])
+        return MeasuredSurface(ends, self.power_spectrum(ends), self.h_max)
 
     def power_spectrum(self, q: ArrayLike) -> Any:
         """C(q) of Eq. (6) [length^4], zero outside [q0, q1]; for one surface or broadcasting against it."""

@@ -1,0 +1,135 @@
+"""What every surface answers, five numbers or a measured spectrum: moments, summits, and the sum of two surfaces."""
+
+from __future__ import annotations
+
+import abc
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.surfaces import spectrum
+
+if TYPE_CHECKING:
+    from mbma_tables.surfaces.measured import MeasuredSurface
+
+
+class AnySurface(abc.ABC):
+    """A rough surface, or a batch: what theories and everything above them ask.
+
+    Attributes
+    ----------
+    q0, q1 : array_like
+        Smallest and largest wavenumber of its roughness [1/length].
+    h_rms, h_max : array_like
+        Root-mean-square height, and highest point above the mid-plane [length].
+    m2, m4 : array_like
+        Variance of a profile's slope, and of its second derivative [1/length^2], Eq. (1).
+    """
+
+    # plain fields of one class, properties of the other
+    q0: Any
+    q1: Any
+    h_rms: Any
+    h_max: Any
+
+    @property
+    @abc.abstractmethod
+    def m2(self) -> Any:
+        """Variance of a profile's slope, Eq. (7)."""
+
+    @property
+    @abc.abstractmethod
+    def m4(self) -> Any:
+        """Variance of a profile's second derivative [1/length^2], Eq. (7)."""
+
+    @property
+    @abc.abstractmethod
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the batch; () for one surface."""
+
+    @property
+    @abc.abstractmethod
+    def labelled(self) -> bool:
+        """Whether any parameter is an xarray DataArray."""
+
+    @abc.abstractmethod
+    def power_spectrum(self, q: ArrayLike) -> Any:
+        """C(q) [length^4] as h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), zero outside [q0, q1]."""
+
+    @abc.abstractmethod
+    def sampled(self) -> MeasuredSurface:
+        """The same surface by samples of its spectrum.
+
+        Raises
+        ------
+        InputError
+            For a batch.
+        """
+
+    @property
+    def zeta_1(self) -> Any:
+        """Largest magnification q1/q0 (Eq. 13)."""
+        return self.q1 / self.q0
+
+    @property
+    def m0(self) -> Any:
+        """Variance of height [length^2], Eq. (8)."""
+        return self.h_rms**2
+
+    @property
+    def alpha(self) -> Any:
+        """Nayak's bandwidth parameter, Eq. (3)."""
+        return self.m0 * self.m4 / self.m2**2
+
+    @property
+    def rms_gradient(self) -> Any:
+        """Root-mean-square gradient of the surface, sqrt(2 m2)."""
+        return np.sqrt(2 * self.m2)
+
+    @property
+    def summit_density(self) -> Any:
+        """Nayak's density of summits [1/length^2], Eq. (2)."""
+        return self.m4 / (spectrum.NAYAK * self.m2)
+
+    @property
+    def summit_radius(self) -> Any:
+        """Mean radius of summits [length], Eq. (2)."""
+        return spectrum.RADIUS / np.sqrt(self.m4)
+
+    @property
+    def summit_sigma(self) -> Any:
+        """Standard deviation of summit heights [length], Eq. (2)."""
+        return np.sqrt((1 - spectrum.BROADENING / self.alpha) * self.m0)
+
+    def combined(self, other: AnySurface) -> MeasuredSurface:
+        """The one rough surface that stands for two that touch: spectra add, heights convolve.
+
+        Parameters
+        ----------
+        other : AnySurface
+            The other surface, in the same length unit; both are independent of each other.
+
+        Returns
+        -------
+        MeasuredSurface
+            Its h_max is reached by as small a share of it as theirs by them: of Gaussian surfaces the root of the sum
+            of squares.
+
+        Raises
+        ------
+        InputError
+            For a batch, and for surfaces of different units.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface
+        >>> one = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=3.0, h_max=9.0)
+        >>> other = Surface(hurst=0.7, q0=0.05, q1=5.0, h_rms=4.0, h_max=12.0)
+        >>> both = one.combined(other)
+        >>> f"h_rms = {both.h_rms:.2f}, h_max = {both.h_max:.1f}, q from {both.q0:g} to {both.q1:g}"
+        'h_rms = 5.00, h_max = 15.0, q from 0.01 to 5'
+        """
+        from mbma_tables.surfaces.measured import combination
+
+        return combination(self.sampled(), other.sampled())

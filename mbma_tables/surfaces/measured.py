@@ -1,0 +1,379 @@
+"""A surface that is its own spectrum: what was measured, or stated in samples, with no fit in between."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.arguments import FloatArray, finite_array, require
+from mbma_tables.bearing import Bearing, RadialSpectrum
+from mbma_tables.errors import InputError, OutOfRangeError
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.power_laws import PowerLaws
+from mbma_tables.surfaces.spectrum import MIN_ZETA_1
+from mbma_tables.surfaces.surface import Surface
+
+_TAIL = np.logspace(-6, -1, 61)[:-1]
+SHARES = np.concatenate([[0.0], _TAIL, np.linspace(0.1, 0.9, 81), 1 - _TAIL[::-1], [1.0]])  # of a surface, from its top
+SAME_LAW = 0.01  # of ln C about one power law: a spectrum this straight counts as self-affine
+FINE = 1.02  # between wavenumbers of a sum of spectra: a sum of power laws is none, by 1e-4 at most
+SIDE = 1e-12  # beside a wavenumber, relative
+MIN_SHARE = 1e-300  # of a surface, as a normal number
+TAIL_NODES = 400  # shares at which heights are convolved
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Heights:
+    """The distribution of a surface's heights about their mean.
+
+    Attributes
+    ----------
+    quantiles : numpy.ndarray, shape (203,)
+        Heights above which `SHARES` of the surface lie, highest first [length].
+    h_rms, h_max : float
+        Root mean square, and highest point [length].
+    skewness, kurtosis : float
+        0 and 3 if Gaussian.
+    top : float
+        Share of the surface that its highest point stands for.
+    """
+
+    quantiles: FloatArray
+    h_rms: float
+    h_max: float
+    skewness: float
+    kurtosis: float
+    top: float
+
+    @classmethod
+    def of(cls, heights: ArrayLike) -> Heights:
+        """Of sampled heights, of any shape and mean.
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            For heights that are no numbers, or all the same.
+        """
+        values = np.sort(finite_array("heights", heights), axis=None)
+        values = values - values.mean()
+        size = float(np.abs(values).max())
+        if not size > 0:
+            raise InputError("heights are all the same: nothing is left once their mean is subtracted")
+        scaled = values / size
+        variance = float(np.mean(scaled**2))
+        return cls(
+            np.interp(SHARES, np.linspace(0, 1, values.size), values[::-1]),
+            size * math.sqrt(variance),
+            float(values[-1]),
+            float(np.mean(scaled**3)) / variance**1.5,
+            float(np.mean(scaled**4)) / variance**2,
+            1 / values.size,
+        )
+
+    @classmethod
+    def gaussian(cls, h_rms: float, h_max: float) -> Heights:
+        """Of a Gaussian surface with that highest point."""
+        from scipy.special import ndtr, ndtri
+
+        quantiles = np.clip(-h_rms * ndtri(SHARES), -h_max, h_max)
+        return cls(quantiles, h_rms, h_max, 0.0, 3.0, max(float(ndtr(-h_max / h_rms)), MIN_SHARE))
+
+    def scaled(self, factor: float) -> Heights:
+        """The same in another unit."""
+        lengths = (factor * self.quantiles, factor * self.h_rms, factor * self.h_max)
+        return Heights(*lengths, self.skewness, self.kurtosis, self.top)
+
+    def convolved(self, other: Heights) -> Heights:
+        """Of the sum of two independent heights; cumulants add."""
+        from scipy.special import ndtr, ndtri
+
+        # as fine in both tails as in the middle
+        edges = ndtr(np.linspace(-6.0, 6.0, TAIL_NODES + 1))
+        share, weight = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+        one, two = (np.interp(share, SHARES, each.quantiles) for each in (self, other))
+        sums, weights = np.add.outer(one, two).ravel(), np.multiply.outer(weight, weight).ravel()
+        order = np.argsort(-sums)
+        above = np.cumsum(weights[order]) - weights[order] / 2
+        deviates = ndtri(np.clip(above / weights.sum(), MIN_SHARE, 1 - 1e-16))
+
+        def height(share: Any) -> FloatArray:
+            # in the scale in which a Gaussian is straight
+            return np.asarray(np.interp(ndtri(share), deviates, sums[order]))
+
+        # as for two Gaussians, the squares of whose h_max add: the logarithms of shares, weighted by variance
+        squares = np.array([self.h_rms, other.h_rms]) ** 2
+        top = math.exp(float(squares @ np.log([self.top, other.top])) / squares.sum())
+        h_rms = math.sqrt(squares.sum())
+        gaussian = self.is_gaussian and other.is_gaussian
+        h_max = math.hypot(self.h_max, other.h_max) if gaussian else float(height(top))
+        skewness = (self.skewness * self.h_rms**3 + other.skewness * other.h_rms**3) / h_rms**3
+        excess = ((self.kurtosis - 3) * self.h_rms**4 + (other.kurtosis - 3) * other.h_rms**4) / h_rms**4
+        quantiles = np.clip(height(np.clip(SHARES, top, 1 - top)), None, h_max)
+        return Heights(quantiles, h_rms, h_max, skewness, 3 + excess, top)
+
+    @property
+    def is_gaussian(self) -> bool:
+        """Whether skewness and kurtosis are a Gaussian's exactly: heights that were not measured."""
+        return self.skewness == 0 and self.kurtosis == 3
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class MeasuredSurface(AnySurface):
+    """A surface that is its own isotropic spectrum; `Surface.from_spectrum`, `from_map` and `combined` make one.
+
+    Parameters
+    ----------
+    q : array_like, shape (n,)
+        Wavenumber [1/length], positive, rising; a repeated one is a jump of the spectrum.
+    C : array_like, shape (n,)
+        Spectrum [length^4] as h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), not negative: a power law between
+        neighbours, nothing beyond the ends or beside a zero.
+    h_max : float, optional
+        Height of the highest point above the mid-plane [length]; that of `heights` if not given.
+    heights : Heights, optional
+        Distribution of heights; a Gaussian that ends at h_max if not given.
+    bearing : Bearing, optional
+        Curves of a periodic map: what its tops and valleys look like (`mbma_tables.bearing`).
+    bands : RadialSpectrum, optional
+        The same map's spectrum by bands, unsmoothed; goes with `bearing`.
+    samples : array_like, shape (n,), optional
+        Independent samples behind each entry of C, as weights of a fit.
+    anisotropy : float, optional
+        Root of the ratio of the gradient tensor's eigenvalues, 1 if isotropic; None where not measured.
+    unit : str, optional
+        Name of the length unit; None where there is none.
+    provenance : sequence of mapping, optional
+        What was done to the measurement, a plain record each step: {"step": "detrend", "kind": "plane"}, ...
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        For what is no spectrum: NaN, wrong shapes, negative values, less than a factor 3 of wavenumbers.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mbma_tables import Surface
+    >>> q = np.geomspace(0.2, 50, 200)  # a plateau up to 1, then H = 0.8
+    >>> surface = Surface.from_spectrum(q, 0.01 * np.minimum(1, q**-3.6), h_max=1.1, unit="um")
+    >>> surface
+    MeasuredSurface(200 waves from q = 0.2 to 50, h_rms=0.2634, h_max=1.1, rms gradient 0.7808, unit='um')
+    """
+
+    q: Any
+    C: Any
+    h_max: Any = None
+    heights: Any = None
+    bearing: Bearing | None = None
+    bands: RadialSpectrum | None = None
+    samples: Any = None
+    anisotropy: float | None = None
+    unit: str | None = None
+    provenance: tuple[Mapping[str, Any], ...] = ()
+
+    def __post_init__(self) -> None:
+        q, C = finite_array("q", self.q), finite_array("C", self.C)
+        if q.ndim != 1 or q.shape != C.shape or q.size < 2:
+            raise InputError(f"q and C must be two columns of one length, got shapes {q.shape} and {C.shape}")
+        require("q", q, q > 0, "positive (leave q = 0 out)")
+        require("q", q, np.diff(q, prepend=q[0]) >= 0, "rising")
+        require("C", C, C >= 0, "zero or positive")
+        held = np.flatnonzero(C > 0)
+        inside = slice(held[0], held[-1] + 1) if held.size else slice(0)
+        keep = {"q": q[inside].copy(), "C": C[inside].copy()}
+        if self.samples is not None:
+            samples = finite_array("samples", self.samples)
+            require("samples", samples, samples > 0, "positive")
+            keep["samples"] = np.broadcast_to(samples, q.shape)[inside].copy()
+        for name, array in keep.items():
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        if held.size < 2 or not self.laws.moment(0) > 0:
+            raise InputError("the spectrum holds no height: no two neighbours in q have positive C")
+        require(
+            "largest q over smallest", np.asarray(self.zeta_1), self.zeta_1 > MIN_ZETA_1, "greater than 3 (more waves)"
+        )
+        if not all(math.isfinite(m) and m > 0 for m in (self.m0, self.m2, self.m4)):
+            raise OutOfRangeError("the spectrum's moments overflow or vanish: choose another length unit")
+        if self.heights is None:
+            if self.h_max is None:
+                raise InputError("h_max is missing: the highest point above the mid-plane, or heights= of the surface")
+            object.__setattr__(self, "heights", Heights.gaussian(self.h_rms, one_height(self.h_max)))
+        object.__setattr__(self, "h_max", self.heights.h_max if self.h_max is None else one_height(self.h_max))
+        object.__setattr__(self, "provenance", tuple(self.provenance))
+
+    def __repr__(self) -> str:
+        numbers = f"h_rms={self.h_rms:.4g}, h_max={self.h_max:.4g}, rms gradient {self.rms_gradient:.4g}"
+        unit = "" if self.unit is None else f", unit={self.unit!r}"
+        return f"MeasuredSurface({self.q.size} waves from q = {self.q0:.4g} to {self.q1:.4g}, {numbers}{unit})"
+
+    @functools.cached_property
+    def laws(self) -> PowerLaws:
+        """The power laws between samples."""
+        return PowerLaws(self.q, self.C)
+
+    @property
+    def q0(self) -> Any:
+        """Smallest wavenumber [1/length]."""
+        return self.q[0]
+
+    @property
+    def q1(self) -> Any:
+        """Largest wavenumber [1/length]."""
+        return self.q[-1]
+
+    @property
+    def h_rms(self) -> Any:
+        """Root-mean-square height of the spectrum [length]."""
+        return np.float64(math.sqrt(self.laws.moment(0)))
+
+    @property
+    def m2(self) -> Any:
+        """Variance of a profile's slope, Eq. (1)."""
+        return np.float64(self.laws.moment(2))
+
+    @property
+    def m4(self) -> Any:
+        """Variance of a profile's second derivative [1/length^2], Eq. (1)."""
+        return np.float64(self.laws.moment(4))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of one surface, ()."""
+        return ()
+
+    @property
+    def labelled(self) -> bool:
+        """False: there are no parameters to be DataArrays."""
+        return False
+
+    @property
+    def skewness(self) -> float:
+        """Skewness of heights."""
+        return float(self.heights.skewness)
+
+    @property
+    def kurtosis(self) -> float:
+        """Kurtosis of heights, 3 if Gaussian."""
+        return float(self.heights.kurtosis)
+
+    @functools.cached_property
+    def hurst(self) -> float | None:
+        """Hurst exponent of a spectrum that is one power law within a percent; None of any other."""
+        x, y = np.log(self.q), np.log(np.maximum(self.C, np.finfo(float).tiny))
+        slope, level = np.polyfit(x, y, 1)
+        exponent = -slope / 2 - 1
+        straight = np.abs(y - level - slope * x).max() <= SAME_LAW
+        return float(min(exponent, 1.0)) if straight and 0 < exponent <= 1 + SAME_LAW else None
+
+    def fit(self, band: tuple[float, float] | None = None) -> Surface:
+        """The self-affine surface nearest to it: five numbers, and how well they describe the spectrum.
+
+        Parameters
+        ----------
+        band : tuple of float, optional
+            (q0, q1) to fit and to take, as a plain power law; else a roll-off below and a departure above are found
+            and left out.
+
+        Returns
+        -------
+        Surface
+            With `fit`, a `SpectrumFit`. Its h_rms is that of the fitted law between q0 and q1.
+
+        Raises
+        ------
+        NotSelfAffineError
+            Where no power law with 0 < H <= 1 describes it; the message has the numbers.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from mbma_tables import Surface
+        >>> q = np.geomspace(0.2, 50, 200)  # a plateau up to 1, then H = 0.8
+        >>> nearest = Surface.from_spectrum(q, 0.01 * np.minimum(1, q**-3.6), h_max=1.1).fit()
+        >>> f"H = {nearest.hurst:.2f} from q = {nearest.q0:.2f}, {nearest.fit.variance_share:.0%} of the variance"
+        'H = 0.80 from q = 1.00, 58% of the variance'
+        """
+        from mbma_tables.surfaces.psd import check_band, fit_spectrum
+
+        steps = np.diff(self.q, prepend=self.q[0]) + np.diff(self.q, append=self.q[-1])
+        positive = self.C > 0
+        fitted = fit_spectrum(
+            self.q[positive],
+            self.C[positive],
+            (np.ones(self.q.size) if self.samples is None else self.samples)[positive],
+            (math.pi * self.C * self.q * steps)[positive],
+            h_max=float(self.h_max),
+            usable=(float(self.q0), float(self.q1)),
+            band=check_band(band, float(self.q0), float(self.q1)),
+            power=float(self.m0),
+            convention="paper",
+        )
+        return Surface(**fitted._asdict())
+
+    def power_spectrum(self, q: ArrayLike) -> Any:
+        """C(q) [length^4], a power law between samples, zero outside [q0, q1]."""
+        wavenumber = finite_array("q", q)
+        require("q", wavenumber, wavenumber > 0, "positive")
+        return self.laws.at(wavenumber)[()]
+
+    def sampled(self) -> MeasuredSurface:
+        """Itself."""
+        return self
+
+    def scaled(self, factor: float, unit: str | None) -> MeasuredSurface:
+        """The same surface in another length unit, of which the old one is `factor`."""
+        known, bands = self.bearing, self.bands
+        if known is not None:
+            lengths = {name: factor * getattr(known, name) for name in ("h_rms", "h_max", "quantiles", "mean_height")}
+            known = dataclasses.replace(known, **lengths)
+        if bands is not None:
+            q2, m0, m4 = factor**2 * bands.q2_mean_inverse, factor**2 * bands.variance, bands.curvature / factor**2
+            bands = dataclasses.replace(bands, q=bands.q / factor, q2_mean_inverse=q2, variance=m0, curvature=m4)
+        return dataclasses.replace(
+            self,
+            q=self.q / factor,
+            C=self.C * factor**4,
+            h_max=self.h_max * factor,
+            heights=self.heights.scaled(factor),
+            bearing=known,
+            bands=bands,
+            unit=unit,
+        )
+
+
+def one_height(h_max: Any) -> float:
+    """h_max as one positive number."""
+    height = finite_array("h_max", h_max)
+    if height.shape != ():
+        raise InputError(f"h_max must be one number, got shape {height.shape}")
+    require("h_max", height, height > 0, "positive")
+    return float(height)
+
+
+def combination(one: MeasuredSurface, other: MeasuredSurface) -> MeasuredSurface:
+    """The surface that stands for two; see `AnySurface.combined`."""
+    if one.unit != other.unit:
+        raise InputError(
+            f"the surfaces are in different units, {one.unit!r} and {other.unit!r}: give both in the same one"
+        )
+    low, high = min(one.q0, other.q0), max(one.q1, other.q1)
+    fine = np.geomspace(low, high, math.ceil(math.log(high / low) / math.log(FINE)) + 1)
+    grid = np.unique(np.clip(np.concatenate([fine, one.q, other.q]), low, high))
+    # both sides of every wavenumber, for where a band ends the sum jumps
+    above, below = (one.laws.at(side) + other.laws.at(side) for side in (grid[:-1] * (1 + SIDE), grid[1:] * (1 - SIDE)))
+    q, C = np.repeat(grid, 2)[1:-1], np.stack([above, below], axis=1).ravel()
+    kept = np.append(True, (np.diff(q) > 0) | (np.abs(np.diff(C)) > 1e-9 * C[1:]))
+    return MeasuredSurface(
+        q[kept],
+        C[kept],
+        heights=one.heights.convolved(other.heights),
+        unit=one.unit,
+        provenance=({"step": "combined", "of": [list(one.provenance), list(other.provenance)]},),
+    )

@@ -1,0 +1,171 @@
+"""Surfaces that are their own spectrum: moments, places in the spectrum, heights, units, and two surfaces as one."""
+
+from __future__ import annotations
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mbma_tables import InputError, Surface
+from mbma_tables.surfaces.measured import SHARES, Heights, MeasuredSurface
+from mbma_tables.surfaces.power_laws import PowerLaws
+
+FIVE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.5, h_max=4.0)
+# a plateau, a rise, a jump and a gap
+Q = np.array([0.5, 1.0, 2.0, 2.0, 3.0, 5.0, 8.0, 20.0, 40.0])
+C = np.array([3.0, 3.0, 4.0, 2.0, 0.5, 0.0, 1e-2, 1e-3, 5e-5])
+MOMENTS = ("h_rms", "m0", "m2", "m4", "alpha", "rms_gradient", "summit_density", "summit_radius", "summit_sigma")
+
+
+def integral(order: int, low: float, high: float) -> float:
+    """m_n by mpmath's quadrature over the pieces of Q, C."""
+    share = {0: 1, 2: 0.5, 4: 0.375}[order]
+    total = mpmath.mpf(0)
+    for a, b, first, last in zip(Q[:-1], Q[1:], C[:-1], C[1:], strict=True):
+        start, end = max(a, low), min(b, high)
+        if b > a and first > 0 and last > 0 and end > start:
+            power = math.log(last / first) / math.log(b / a)
+            total += mpmath.quad(
+                lambda q, a=a, first=first, power=power: first * (q / a) ** power * q ** (order + 1), [start, end]
+            )
+    return float(2 * mpmath.pi * share * total)
+
+
+class TestPowerLaws:
+    def test_moments_of_bands_are_integrals(self):
+        laws = PowerLaws(Q, C)
+        for order in (0, 2, 4):
+            assert laws.moment(order) == pytest.approx(integral(order, 0, 99), rel=1e-13)
+            for low, high in [(0.6, 0.9), (0.7, 2.5), (1.5, 30.0), (9.0, 40.0), (30.0, 30.001)]:
+                a, b = laws.place(low), laws.place(high)
+                assert laws.between(order, a, b) == pytest.approx(integral(order, low, high), rel=1e-10)
+                assert laws.below(order, b) == pytest.approx(integral(order, 0, high), rel=1e-12)
+        assert laws.above(laws.place(10.0)) == pytest.approx(integral(0, 10, 99), rel=1e-12)
+
+    @given(st.floats(-300, 0))
+    def test_variance_above_is_inverted_down_to_nothing(self, log_share: float):
+        laws = PowerLaws(Q, C)
+        wanted = laws.moment(0) * math.exp(log_share)
+        place = laws.where_above_is(wanted)
+        assert laws.above(place) == pytest.approx(wanted, rel=1e-12)
+        assert Q[0] <= math.exp(laws.log_q(place)) * (1 + 1e-15)
+
+    def test_spectrum_between_samples(self):
+        laws = PowerLaws(Q, C)
+        assert laws.at(Q[[0, 1, 4, 7, 8]]) == pytest.approx(C[[0, 1, 4, 7, 8]], rel=1e-14)
+        assert laws.at(np.array([0.49, 4.0, 6.0, 40.1])).tolist() == [0, 0, 0, 0]
+        assert laws.at(np.array([math.sqrt(160.0)])) == pytest.approx(math.sqrt(1e-5), rel=1e-13)
+
+
+class TestMeasuredSurface:
+    @pytest.mark.parametrize("count", [2, 3, 50])
+    def test_samples_of_a_self_affine_spectrum_are_that_surface(self, count: int):
+        q = np.geomspace(FIVE.q0, FIVE.q1, count)
+        found = Surface.from_spectrum(q[::-1], FIVE.power_spectrum(q)[::-1], h_max=4.0)
+        for name in MOMENTS:
+            assert getattr(found, name) == pytest.approx(getattr(FIVE, name), rel=1e-12), name
+        assert found.hurst == pytest.approx(0.8, rel=1e-12)
+        assert found.fit().hurst == pytest.approx(0.8, rel=1e-6) if count > 10 else True
+        assert (found.shape, found.labelled, found.skewness, found.kurtosis) == ((), False, 0, 3)
+
+    def test_other_convention(self):
+        q = np.geomspace(FIVE.q0, FIVE.q1, 9)
+        one = Surface.from_spectrum(q, FIVE.power_spectrum(q), h_max=4.0)
+        other = Surface.from_spectrum(q, 4 * np.pi**2 * FIVE.power_spectrum(q), h_max=4.0, convention="isotropic")
+        assert other.h_rms == pytest.approx(one.h_rms, rel=1e-14)
+
+    def test_lengths_scale_with_the_unit(self):
+        heights = np.random.default_rng(3).normal(size=1000)
+        one = Surface.from_spectrum(Q, C, heights=heights, unit="um")
+        other = one.scaled(1e-6, "m")
+        assert other.h_rms == pytest.approx(1e-6 * one.h_rms, rel=1e-14)
+        assert other.m2 == pytest.approx(one.m2, rel=1e-13)
+        assert other.heights.quantiles == pytest.approx(1e-6 * one.heights.quantiles)
+        assert (other.h_max, other.unit) == (pytest.approx(1e-6 * one.h_max), "m")
+
+    def test_nothing_given_is_changed(self):
+        q, c = Q.copy(), C.copy()
+        found = Surface.from_spectrum(q, c, h_max=9.0)
+        q[0] = c[0] = 7.0
+        assert (found.q0, found.C[0]) == (0.5, 3.0)
+        with pytest.raises(ValueError, match="read-only"):
+            found.q[0] = 1.0
+
+    @pytest.mark.parametrize(
+        ("q", "c", "options", "reason"),
+        [
+            (Q, C, {}, "h_max is missing"),
+            (Q, -C, {"h_max": 1.0}, "C must be zero or positive"),
+            (Q, np.where(Q == 1, np.nan, C), {"h_max": 1.0}, r"C must be finite, got nan at \(1,\)"),
+            (Q - 0.5, C, {"h_max": 1.0}, "q must be positive"),
+            (Q[:3], C[:2], {"h_max": 1.0}, "two columns of one length"),
+            (Q[:1], C[:1], {"h_max": 1.0}, "two columns of one length"),
+            ([1.0, 2.0], [1.0, 1.0], {"h_max": 1.0}, "greater than 3"),
+            ([1.0, 9.0], [0.0, 0.0], {"h_max": 1.0}, "holds no height"),
+            ([1.0, 9.0, 99.0], [1.0, 0.0, 1.0], {"h_max": 1.0}, "holds no height"),
+            (Q, C, {"h_max": -1.0}, "h_max must be positive"),
+            (Q, C, {"heights": np.ones(9)}, "heights are all the same"),
+            (Q, C, {"h_max": 1.0, "convention": "profile"}, "convention must be"),
+        ],
+    )
+    def test_what_is_no_spectrum_is_refused(self, q, c, options, reason):
+        with pytest.raises(InputError, match=reason):
+            Surface.from_spectrum(q, c, **options)
+
+
+class TestCombined:
+    def test_spectra_add(self):
+        other = Surface(hurst=0.6, q0=0.05, q1=7.0, h_rms=0.5, h_max=2.0)
+        both = FIVE.combined(other)
+        for name in ("m0", "m2", "m4"):
+            assert getattr(both, name) == pytest.approx(getattr(FIVE, name) + getattr(other, name), rel=1e-6)
+        q = np.array([0.02, 0.05001, 1.0, 1.9999, 2.001, 6.0])
+        assert both.power_spectrum(q) == pytest.approx(FIVE.power_spectrum(q) + other.power_spectrum(q), rel=1e-5)
+        assert both.h_max == pytest.approx(math.hypot(4.0, 2.0))
+        back = other.combined(FIVE)
+        assert back.m4 == pytest.approx(both.m4, rel=1e-12)
+
+    def test_a_sum_may_be_added_to(self):
+        twice = FIVE.combined(FIVE)
+        thrice = twice.combined(FIVE)
+        assert thrice.m2 == pytest.approx(3 * FIVE.m2, rel=1e-9)
+        assert thrice.hurst == pytest.approx(0.8, rel=1e-6)
+
+    @pytest.mark.parametrize("law", ["exponential", "uniform", "normal"])
+    def test_heights_convolve(self, law: str):
+        rng = np.random.default_rng(5)
+        x, y = rng.normal(size=200_000), getattr(rng, law)(size=200_000)
+        found, truth = Heights.of(x).convolved(Heights.of(y)), Heights.of(x + y)
+        middle = (SHARES > 0.001) & (SHARES < 0.999)
+        assert np.abs(found.quantiles - truth.quantiles)[middle].max() < 0.03 * truth.h_rms
+        assert found.h_max == pytest.approx(truth.h_max, rel=0.15)  # the highest of many: chance
+        assert found.skewness == pytest.approx(truth.skewness, abs=0.02)
+        assert found.kurtosis == pytest.approx(truth.kurtosis, abs=0.1)
+
+    def test_units_must_agree(self):
+        one = Surface.from_spectrum(Q, C, h_max=9.0, unit="um")
+        with pytest.raises(InputError, match="different units, 'um' and None"):
+            one.combined(FIVE)
+
+    def test_a_batch_is_refused(self):
+        with pytest.raises(InputError, match="one surface at a time"):
+            Surface(hurst=[0.5, 0.8], q0=0.01, q1=2.0, h_rms=1.5, h_max=4.0).combined(FIVE)
+
+
+def test_a_map_is_its_own_spectrum():
+    noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((128, 128)))
+    q = np.hypot(np.fft.fftfreq(128)[:, None], np.fft.rfftfreq(128))
+    q[0, 0] = np.inf
+    heights = np.fft.irfft2(noise * q**-1.8)
+    found = Surface.from_map(heights, dx=0.5, periodic=True, model="measured")
+    assert isinstance(found, MeasuredSurface)
+    assert found.h_rms == pytest.approx(heights.std(), rel=1e-12)
+    assert found.h_max == pytest.approx(heights.max() - heights.mean(), rel=1e-9)
+    # the spectrum ends at the Nyquist circle, the map's corners hold waves beyond
+    assert found.rms_gradient == pytest.approx(found.bearing.gradient, rel=0.05)
+    assert [step["step"] for step in found.provenance] == ["read", "detrend", "edges"]
+    assert found.fit().hurst == pytest.approx(0.8, abs=0.05)
