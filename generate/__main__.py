@@ -16,6 +16,7 @@ from mbma_tables.errors import MbmaError
 GROUPS = {
     "boundary_elements": "generate.boundary_elements.run",
     "calibrated": "generate.calibrated",
+    "leakage": "generate.boundary_elements.leakage",
     "formulas": "generate.formulas.commands",
     "tables": "generate.tables.commands",
 }

@@ -149,3 +149,6 @@ def collect(tasks: Sequence[Task], folder: pathlib.Path, target: pathlib.Path) -
     data.to_netcdf(partial, engine="netcdf4", encoding=encoding)
     partial.replace(target)
     return int(data.sizes["surface"])
+
+
+def collect_leakage(tasks, folder, target): ...

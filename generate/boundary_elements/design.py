@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from generate.boundary_elements.surfaces import Recipe
 
@@ -92,6 +92,24 @@ def nodes() -> list[Node]:
     return small + middle + large
 
 
+def leakage_nodes() -> list[Node]:
+    """Nodes whose gaps are solved for flow: four surfaces tell how far cells of one spectrum differ."""
+    return [
+        *_nodes("self_affine", "0.2 0.4 0.6 0.8 1", "8x8 16x4", 256, 4),
+        *_nodes("self_affine", "0.4 0.8", "32x2", 256, 2),
+        *_nodes("self_affine", "0.3 0.5 0.7 0.9", "12x5", 256, 3, held_out=True),
+        *_nodes("plateau", "0.4 0.8", "8x8 16x4", 256, 2),
+        *_nodes("plateau", "0.6 1", "12x5", 256, 2, held_out=True),
+        *_nodes("stretched", "0.8", "16x4", 256, 2, "2 4"),
+        *_nodes("stretched", "0.6", "12x5", 256, 1, "3", held_out=True),
+        *_nodes("self_affine", "0.4 0.6 0.8", "32x4", 512, 2),
+        *_nodes("self_affine", "0.4 0.8", "64x2", 512, 2),
+        *_nodes("self_affine", "0.3 0.7 0.9", "24x5", 512, 1, held_out=True),
+        *_nodes("self_affine", "0.4 0.8", "64x4", 1024, 1, held_out=True),
+        *_nodes("self_affine", "0.8", "128x2", 1024, 1, held_out=True),
+    ]
+
+
 def refinement() -> list[Recipe]:
     """The same surfaces on grids of 2 to 32 points a shortest wave, at most 512 points a side."""
     surfaces = [
@@ -121,8 +139,14 @@ def campaign(scale: float = 1.0) -> list[Task]:
 
     `scale` multiplies the number of surfaces of every node (at least 1; below 1 the last nodes keep one).
     """
-    tasks = [(cost(r), 0, 0, Task(r, REFINEMENT)) for r in refinement()]
-    for node in nodes():
+    repeated = [Task(recipe, REFINEMENT) for recipe in refinement()]
+    return sorted(repeated + tasks_of(nodes(), scale), key=lambda task: cost(task.recipe))
+
+
+def tasks_of(chosen: Iterable[Node], scale: float = 1.0) -> list[Task]:
+    """Surfaces of nodes, cheap ones first."""
+    tasks = []
+    for node in chosen:
         for turn in range(max(1, round(node.surfaces * scale))):
             split = HELD_OUT_SPECTRUM if node.held_out else HELD_OUT_SURFACE if turn == 1 else TRAINING
             # of the spectrum alone, so that a longer list moves no seed; its order mixes the kinds

@@ -14,20 +14,26 @@ from tqdm import tqdm
 from generate.boundary_elements.collect import collect
 from generate.boundary_elements.design import Task, campaign
 from generate.boundary_elements.solve import simulate_to
+from generate.boundary_elements.surfaces import Recipe
 
 HERE = pathlib.Path("boundary_elements")
 
 
-def run(tasks: Sequence[Task], folder: pathlib.Path, pool: concurrent.futures.Executor | None = None) -> None:
+def run(
+    tasks: Sequence[Task],
+    folder: pathlib.Path,
+    pool: concurrent.futures.Executor | None = None,
+    solve: Callable[[Recipe, str], str] = simulate_to,
+) -> None:
     """Solve what `folder` does not hold yet, one file a surface; no pool: here, one after the other.
 
     Surfaces that fail are left out until the end, then named.
     """
     folder.mkdir(parents=True, exist_ok=True)
     missing = [task.recipe for task in tasks if not (folder / f"{task.recipe.name}.npz").exists()]
-    futures = [] if pool is None else [pool.submit(simulate_to, recipe, str(folder)) for recipe in missing]
+    futures = [] if pool is None else [pool.submit(solve, recipe, str(folder)) for recipe in missing]
     if pool is None:
-        attempts: Iterator[Callable[[], str]] = (functools.partial(simulate_to, r, str(folder)) for r in missing)
+        attempts: Iterator[Callable[[], str]] = (functools.partial(solve, r, str(folder)) for r in missing)
     else:
         attempts = (future.result for future in concurrent.futures.as_completed(futures))
     # a terminal may say that it has no columns

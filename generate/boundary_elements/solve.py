@@ -6,6 +6,7 @@ import importlib.metadata
 import os
 import pathlib
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,10 @@ CORRECTION = (np.pi - 1 + np.log(2)) / 24  # Yastrebov, Anciaux, Molinari 2017
 class Contact:
     """A periodic map against a rigid plane: Polonsky and Keer's conjugate gradients as Tamaas has them, E* = 1.
 
-    Each load starts from the pressures of the one before.
+    Each load starts from the pressures of the one before; `gap` has the last one's gaps, zero in contact.
     """
+
+    gap: FloatArray
 
     def __init__(self, surface: FloatArray, sizes: tuple[float, float], tolerance: float = TOLERANCE) -> None:
         os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -56,6 +59,7 @@ class Contact:
         raw = float(touching.mean())
         # the engine moves the whole surface by the gap; elastic energy has the displacement about its mean
         gap = moved - self.surface
+        self.gap = np.where(touching, 0.0, np.maximum(gap - gap[touching].mean(), 0.0))
         return {
             "area": raw - CORRECTION * edges / touching.size,
             "area_raw": raw,
@@ -117,13 +121,15 @@ def simulate(recipe: Recipe) -> dict[str, Any]:
     }
 
 
-def simulate_to(recipe: Recipe, folder: str) -> str:
+def simulate_to(
+    recipe: Recipe, folder: str, solve: Callable[[Recipe], dict[str, Any]] = simulate
+) -> str:
     """Simulate one surface into a file of its own, which stands only when it is whole."""
     target = pathlib.Path(folder) / f"{recipe.name}.npz"
     if not target.exists():
         partial = target.with_suffix(f".{os.getpid()}.partial")
         try:
-            found = simulate(recipe)
+            found = solve(recipe)
         except RuntimeError as fault:
             raise RuntimeError(f"{recipe.name}: {fault}") from None
         with open(partial, "wb") as stream:
