@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -46,8 +46,17 @@ NUMBERS = {
     "band_curvature": ("band", "m4 h_rms^2/g^4 of the band: alpha = m0 m4/m2^2 is 4 times its sum"),
     "band_energy": ("band_or_end", "elastic energy of the pressure's waves by band, over A0 E* g h_rms"),
 }
+OF_LEAKAGE = {
+    name: NUMBERS[name]
+    for name in ("q0_h_rms", "h_max", "anisotropy", "force", "area", "area_raw", "mean_separation", "residual")
+} | {
+    "seconds": NUMBERS["seconds"],
+    "flow": ("axis", "k along both axes of the cell: flow per width k h_rms^3 dp/(12 viscosity length); 0: blocked"),
+    "band_q": NUMBERS["band_q"],
+    "band_variance": NUMBERS["band_variance"],
+}
 SINGLE = {"quantiles", "mean_height", "top_gradient", "tension_force", "tension", "band_energy"}  # kept to 7 digits
-LOADED = {"band_energy"}
+LOADED = {"band_energy", "flow"}
 
 
 def _read(task: Task, folder: pathlib.Path) -> dict[str, Any] | None:
@@ -60,7 +69,7 @@ def _read(task: Task, folder: pathlib.Path) -> dict[str, Any] | None:
 
 def _stacked(name: str, found: Sequence[dict[str, Any]], loads: int) -> xr.Variable:
     """One number or curve of all surfaces; NaN where a surface has fewer loads."""
-    dimension, meaning = NUMBERS[name]
+    dimension, meaning = (NUMBERS | OF_LEAKAGE)[name]
     own = [np.atleast_1d(content[name]) for content in found]
     if dimension is None:
         values, dims = np.array([v.item() for v in own]), ["surface"]
@@ -76,18 +85,23 @@ def _stacked(name: str, found: Sequence[dict[str, Any]], loads: int) -> xr.Varia
     return xr.Variable(dims, values.astype(kind), {"long_name": meaning, "units": unit})
 
 
-def dataset(tasks: Sequence[Task], folder: pathlib.Path) -> xr.Dataset:
-    """All solved surfaces of these tasks."""
+def _read_all(tasks: Sequence[Task], folder: pathlib.Path) -> tuple[list[Task], list[dict[str, Any]]]:
+    """Tasks that are solved, and what was found."""
     read = [(task, content) for task in tasks if (content := _read(task, folder)) is not None]
     if not read:
         raise InputError(f"no surface of this campaign is in {folder}")
-    recipes, found = [task.recipe for task, _ in read], [content for _, content in read]
+    return [task for task, _ in read], [content for _, content in read]
+
+
+def _described(tasks: Sequence[Task], found: Sequence[dict[str, Any]], names: Iterable[str]) -> xr.Dataset:
+    """These numbers of solved surfaces, with what made each."""
+    recipes = [task.recipe for task in tasks]
     kinds = sorted({recipe.kind for recipe in recipes})
     loads = max(len(content["force"]) for content in found)
-    data = xr.Dataset({name: _stacked(name, found, loads) for name in NUMBERS})
+    data = xr.Dataset({name: _stacked(name, found, loads) for name in names})
     data["kind"] = _flags([kinds.index(r.kind) for r in recipes], kinds, "family of surfaces")
     data["split"] = _flags(
-        [SPLITS.index(task.split) for task, _ in read], SPLITS, "what a fit may see: the training set and no other"
+        [SPLITS.index(task.split) for task in tasks], SPLITS, "what a fit may see: the training set and no other"
     )
     for name, meaning in {
         "hurst": "Hurst exponent",
@@ -99,6 +113,35 @@ def dataset(tasks: Sequence[Task], folder: pathlib.Path) -> xr.Dataset:
     }.items():
         values = np.array([getattr(recipe, name) for recipe in recipes])
         data[name] = ("surface", values, {"long_name": meaning, "units": "1"})
+    return data
+
+
+def _attributes(
+    found: Sequence[dict[str, Any]], planned: int, command: str, title: str, comment: str, modules: Iterable[str]
+) -> dict[str, Any]:
+    engines = sorted({str(content["engine"]) for content in found})
+    numpys = sorted({str(content["numpy"]) for content in found})
+    return {
+        "Conventions": "CF-1.11",
+        "title": title,
+        "institution": "mbma_tables contributors",
+        "source": f"{', '.join(engines)}: conjugate gradients of Polonsky and Keer, force control, "
+        f"tolerance {solve.TOLERANCE:g}; periodic, frictionless, without adhesion",
+        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate {command} --collect",
+        "references": "area correction: Yastrebov, Anciaux, Molinari, arXiv:1701.02727",
+        "comment": "A surface is made anew by generate.boundary_elements.surfaces.heights from kind, hurst, zeta_1, "
+        f"waves, shape, seed and points. split: no fit sees anything but training{comment}",
+        "versions": json.dumps(versions() | {"engine": ", ".join(engines), "numpy": ", ".join(numpys)}),
+        "code_sha256": source_digest(tuple(modules)),
+        "surfaces_planned": planned,
+        "surfaces_solved": len(found),
+    }
+
+
+def dataset(tasks: Sequence[Task], folder: pathlib.Path) -> xr.Dataset:
+    """All solved surfaces of these tasks."""
+    solved, found = _read_all(tasks, folder)
+    data = _described(solved, found, NUMBERS)
     data["quantile"] = (
         "quantile",
         bearing.QUANTILES,
@@ -109,24 +152,30 @@ def dataset(tasks: Sequence[Task], folder: pathlib.Path) -> xr.Dataset:
         bearing.FRACTIONS,
         {"long_name": "share of the surface, from the highest point down", "units": "1"},
     )
-    engines = sorted({str(content["engine"]) for content in found})
-    numpys = sorted({str(content["numpy"]) for content in found})
-    data.attrs = {
-        "Conventions": "CF-1.11",
-        "title": "Random rough surfaces pressed flat, by boundary elements",
-        "institution": "mbma_tables contributors",
-        "source": f"{', '.join(engines)}: conjugate gradients of Polonsky and Keer, force control, "
-        f"tolerance {solve.TOLERANCE:g}; periodic, frictionless, without adhesion",
-        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate boundary_elements --collect",
-        "references": "area correction: Yastrebov, Anciaux, Molinari, arXiv:1701.02727",
-        "comment": "A surface is made anew by generate.boundary_elements.surfaces.heights from kind, hurst, zeta_1, "
-        "waves, shape, seed and points. split: no fit sees anything but training; refine repeats surfaces on grids. "
+    data.attrs = _attributes(
+        found,
+        len(tasks),
+        "boundary_elements",
+        "Random rough surfaces pressed flat, by boundary elements",
+        "; refine repeats surfaces on grids. "
         "band_energy has the waves longer than the surface's first and those shorter than its last at its ends.",
-        "versions": json.dumps(versions() | {"engine": ", ".join(engines), "numpy": ", ".join(numpys)}),
-        "code_sha256": source_digest(MODULES),
-        "surfaces_planned": len(tasks),
-        "surfaces_solved": len(found),
-    }
+        MODULES,
+    )
+    return data
+
+
+def leakage_dataset(tasks: Sequence[Task], folder: pathlib.Path) -> xr.Dataset:
+    """Contact and flow of all solved surfaces of these tasks."""
+    solved, found = _read_all(tasks, folder)
+    data = _described(solved, found, OF_LEAKAGE)
+    data.attrs = _attributes(
+        found,
+        len(tasks),
+        "leakage",
+        "Flow through the gaps of random rough surfaces pressed flat, by boundary elements and Reynolds' equation",
+        ". Loads end where both axes are blocked.",
+        (*MODULES, "generate.boundary_elements.flow"),
+    )
     return data
 
 
@@ -139,16 +188,11 @@ def _flags(numbers: Sequence[int], meanings: Sequence[str], name: str) -> xr.Var
     return xr.Variable("surface", np.array(numbers, "i1"), attributes)
 
 
-def collect(tasks: Sequence[Task], folder: pathlib.Path, target: pathlib.Path) -> int:
+def collect(data: xr.Dataset, target: pathlib.Path) -> int:
     """Write the file; the number of surfaces in it."""
-    data = dataset(tasks, folder)
-    coordinates = ("quantile", "top")
     encoding: dict[str, dict[str, Any]] = {str(name): {"zlib": True, "complevel": 9} for name in data.data_vars}
-    encoding |= {name: {"_FillValue": None} for name in coordinates}
+    encoding |= {str(name): {"_FillValue": None} for name in data.coords}
     partial = target.with_suffix(".partial")
     data.to_netcdf(partial, engine="netcdf4", encoding=encoding)
     partial.replace(target)
     return int(data.sizes["surface"])
-
-
-def collect_leakage(tasks, folder, target): ...

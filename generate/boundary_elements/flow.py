@@ -43,7 +43,7 @@ def open_ways(gap: FloatArray) -> tuple[np.ndarray, tuple[bool, bool]]:
                     heap.append(there)
                 # the same gap reached in two cells: a path around the torus
                 winds[start] |= np.array(met) != place[there]
-    component[~winds[component].any(axis=1)] = 0
+    component[np.logical_not(winds[component].any(axis=1))] = 0
     along = winds.any(axis=0)
     return component[labels], (bool(along[0]), bool(along[1]))
 

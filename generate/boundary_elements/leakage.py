@@ -9,7 +9,7 @@ from typing import Any
 import click
 import numpy as np
 
-from generate.boundary_elements.collect import collect_leakage  # noqa
+from generate.boundary_elements.collect import collect, leakage_dataset
 from generate.boundary_elements.design import leakage_nodes, tasks_of
 from generate.boundary_elements.flow import flow_conductance
 from generate.boundary_elements.run import run
@@ -77,7 +77,7 @@ def leakage(folder: pathlib.Path, target: pathlib.Path | None, points: int, work
 
     tasks = [task for task in tasks_of(leakage_nodes()) if task.recipe.points <= points]
     if target is not None:
-        counted = collect_leakage(tasks, folder, target)
+        counted = collect(leakage_dataset(tasks, folder), target)
         click.echo(f"{target}: {counted} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
         return
     with executor(workers, None) as pool:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 import click
 from tqdm import tqdm
 
-from generate.boundary_elements.collect import collect
+from generate.boundary_elements.collect import collect, dataset
 from generate.boundary_elements.design import Task, campaign
 from generate.boundary_elements.solve import simulate_to
 from generate.boundary_elements.surfaces import Recipe
@@ -81,7 +81,7 @@ def boundary_elements(
 
     tasks = [task for task in campaign(scale) if task.recipe.points <= points]
     if target is not None:
-        counted = collect(tasks, folder, target)
+        counted = collect(dataset(tasks, folder), target)
         click.echo(f"{target}: {counted} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
         return
     with executor(workers, scheduler) as pool:

@@ -121,9 +121,7 @@ def simulate(recipe: Recipe) -> dict[str, Any]:
     }
 
 
-def simulate_to(
-    recipe: Recipe, folder: str, solve: Callable[[Recipe], dict[str, Any]] = simulate
-) -> str:
+def simulate_to(recipe: Recipe, folder: str, solve: Callable[[Recipe], dict[str, Any]] = simulate) -> str:
     """Simulate one surface into a file of its own, which stands only when it is whole."""
     target = pathlib.Path(folder) / f"{recipe.name}.npz"
     if not target.exists():

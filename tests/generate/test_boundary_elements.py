@@ -10,7 +10,7 @@ import xarray as xr
 from click.testing import CliRunner
 
 from generate.boundary_elements import solve
-from generate.boundary_elements.collect import collect
+from generate.boundary_elements.collect import collect, dataset
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Task, campaign, nodes
 from generate.boundary_elements.run import boundary_elements, run
 from generate.boundary_elements.solve import Contact, simulate
@@ -143,10 +143,10 @@ class TestCampaign:
         run(tasks[:1], tmp_path)
         before = (tmp_path / f"{RECIPE.name}.npz").stat().st_mtime_ns
         target = tmp_path / "evidence.nc"
-        assert collect(tasks, tmp_path, target) == 1
+        assert collect(dataset(tasks, tmp_path), target) == 1
         run(tasks, tmp_path)
         assert (tmp_path / f"{RECIPE.name}.npz").stat().st_mtime_ns == before
-        assert collect(tasks, tmp_path, target) == 2
+        assert collect(dataset(tasks, tmp_path), target) == 2
         with xr.open_dataset(target) as data:
             assert data.split.values.tolist() == [SPLITS.index(task.split) for task in tasks]
             assert all("units" in v.attrs or "flag_meanings" in v.attrs for v in data.data_vars.values())

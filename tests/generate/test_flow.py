@@ -1,0 +1,78 @@
+"""Reynolds' equation on gaps: closed forms, another solver, and ways that are open or blocked."""
+
+import numpy as np
+import pytest
+
+from generate.boundary_elements.flow import flow_conductance, open_ways
+
+POINTS = 96
+X = (np.arange(POINTS) + 0.5) / POINTS
+
+
+def test_profiles_along_and_across():
+    # along: mean of h^3; across: 1/<h^-3> = (1 - a^2)^(5/2)/(1 + a^2/2) for h = 1 + a cos(x)
+    a = 0.4
+    gap = np.repeat(1 + a * np.cos(2 * np.pi * X)[:, None], 24, axis=1)
+    across, along = flow_conductance(gap, (1.0, 0.25))
+    assert along == pytest.approx(1 + 1.5 * a**2, rel=1e-12)
+    # a face's harmonic mean is a trapezoidal rule, which converges at once where periodic
+    assert across == pytest.approx((1 - a**2) ** 2.5 / (1 + a**2 / 2), rel=1e-10)
+
+
+def test_small_isotropic_waves():
+    # second order in s/u for an isotropic field: k = u^3 (1 - 3/2 s^2/u^2)
+    a = 0.02
+    gap = 1 + a * (np.cos(2 * np.pi * 2 * X)[:, None] + np.cos(2 * np.pi * 2 * X)[None, :])
+    found = flow_conductance(gap)
+    np.testing.assert_allclose(found, 1 - 1.5 * a**2, atol=1e-6)
+
+
+def test_scale_of_gaps_and_sides():
+    gap = np.exp(0.3 * np.random.default_rng(1).standard_normal((20, 40)))
+    first = flow_conductance(gap, (1.0, 2.0))
+    np.testing.assert_allclose(flow_conductance(1e-3 * gap, (3.0, 6.0)), 1e-9 * first, rtol=1e-10)
+    np.testing.assert_allclose(flow_conductance(gap.T, (2.0, 1.0)), first[::-1], rtol=1e-10)
+
+
+def test_a_dam_blocks_one_way():
+    gap = np.ones((16, 16))
+    gap[5] = 0
+    np.testing.assert_allclose(flow_conductance(gap), [0.0, 15 / 16], rtol=1e-12)
+    gap[:, 7] = 0
+    assert flow_conductance(gap).tolist() == [0.0, 0.0]
+
+
+def test_a_slanted_channel_is_open_both_ways():
+    # steps of one along x and y in turn: 32 faces in series
+    gap = np.zeros((16, 16))
+    for i in range(16):
+        gap[i, i] = gap[i, (i + 1) % 16] = 1.0
+    assert open_ways(gap)[1] == (True, True)
+    np.testing.assert_allclose(flow_conductance(gap), 1 / 32, rtol=1e-12)
+
+
+def test_dead_ends_carry_nothing():
+    gap = np.zeros((16, 16))
+    gap[:, 3] = 1.0
+    straight = flow_conductance(gap)
+    # a branch, and a hole that leads nowhere
+    gap[4, 3:9] = gap[10:13, 10:13] = 5.0
+    gap[4, 3] = 1.0
+    assert (open_ways(gap)[0] > 0).sum() == 16 + 5
+    np.testing.assert_allclose(flow_conductance(gap), straight, rtol=1e-12)
+
+
+@pytest.mark.slow
+def test_another_solver():
+    transport = pytest.importorskip("reynoldsflow.transport")
+    rng = np.random.default_rng(3)
+    q = np.hypot(np.fft.fftfreq(64, 1 / 64)[:, None], np.fft.rfftfreq(64, 1 / 64))
+    field = np.fft.irfft2(np.where((q >= 2) & (q <= 12), np.fft.rfft2(rng.standard_normal((64, 64))), 0))
+    # 5% and 30% of the points touch
+    for level, touching in ((1.6, 0.055), (0.5, 0.31)):
+        gap = np.maximum(field / field.std() + level, 0)
+        assert np.mean(gap == 0) == pytest.approx(touching, abs=0.03)
+        for axis, values in enumerate((gap, gap.T)):
+            kept, _, flux = transport.solve_fluid_problem(values, "scipy-spsolve", boundary_mode="periodic")
+            theirs, _ = transport.compute_total_flux(kept, flux, 64, "periodic")
+            assert flow_conductance(gap)[axis] == pytest.approx(theirs, rel=1e-6)
