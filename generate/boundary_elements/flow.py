@@ -6,6 +6,8 @@ factorisation. What is closed by contact is found by labelling connected gaps, n
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.ndimage import label
 from scipy.sparse import coo_array, diags_array
@@ -42,9 +44,9 @@ def open_ways(gap: FloatArray) -> tuple[np.ndarray, tuple[bool, bool]]:
                     place[there] = met
                     heap.append(there)
                 # the same gap reached in two cells: a path around the torus
-                winds[start] |= np.array(met) != place[there]
-    component[np.logical_not(winds[component].any(axis=1))] = 0
-    along = winds.any(axis=0)
+                winds[start] |= np.not_equal(met, place[there])
+    component[~winds[component].any(axis=1)] = 0
+    along: Any = winds.any(axis=0)
     return component[labels], (bool(along[0]), bool(along[1]))
 
 
