@@ -13,7 +13,7 @@ E_STAR = 13.3
 
 def law(name: str, rows: int, evenly: bool = False) -> LawTable:
     """Rows of a named surface."""
-    return describe_law(Surface.named(name), E_STAR, length_unit="mm", stress_unit="MPa", rows=rows, evenly=evenly)
+    return describe_law(Surface.named(name), E_STAR, stress_unit="MPa", rows=rows, evenly=evenly)
 
 
 def errors() -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mbma_tables.cli.format import SURFACE_NUMBERS, Report, report_answer, to_columns
+from mbma_tables.cli.format import SURFACE_NUMBERS, Report, report_answer, shown_unit, to_columns
 from mbma_tables.cli.options import (
     Model,
     Output,
@@ -23,6 +23,7 @@ from mbma_tables.cli.options import (
 )
 from mbma_tables.errors import InputError
 from mbma_tables.scenes.specimen import Specimen
+from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
     from mbma_tables.scenes.run import OtherTheory
@@ -36,21 +37,21 @@ COLUMNS = ("separation", "mean_separation", "force", "area", "error")
 ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
 
 
-def _lengths(name: str, numbers: list[float], specimen: Specimen, over_h_rms: bool) -> Any:
-    """The lengths of an option, in the surface's unit."""
+def _numbers(name: str, given: list[float | str], specimen: Specimen, over_h_rms: bool) -> Any:
+    """The numbers of an option in the specimen's units."""
     from mbma_tables.arguments import finite_array
 
-    return finite_array(name, numbers) * (specimen.surface.h_rms if over_h_rms else 1.0)
+    if not over_h_rms:
+        return finite_array(name, specimen.units.number(name, given))
+    named = [text for text in given if isinstance(text, str)]
+    if named:
+        raise InputError(f"--over-h-rms is about multiples of h_rms, which have no unit, got {', '.join(named)}")
+    return finite_array(name, given) * specimen.surface.h_rms
 
 
 def _asked(model: Model, specimen: Specimen) -> dict[str, Any]:
     """Keywords for `contact`."""
     return {**vars(model), "E_star": 1.0 if specimen.E_star is None else specimen.E_star}
-
-
-def _stress_units(specimen: Specimen) -> dict[str, str]:
-    unit = "F/(A0 E*)" if specimen.E_star is None else "F/A0"
-    return {"force": unit, "area": "A/A0", "stiffness": f"{unit} per {specimen.length_unit or 'length'}"}
 
 
 @click.command("contact", short_help="Force and area at given gaps, pressures or areas.")
@@ -63,10 +64,10 @@ def _stress_units(specimen: Specimen) -> dict[str, str]:
 @theory_options
 @output_options
 def contact_command(
-    separation: list[float] | None,
-    mean_separation: list[float] | None,
-    pressure: list[float] | None,
-    area: list[float] | None,
+    separation: list[float | str] | None,
+    mean_separation: list[float | str] | None,
+    pressure: list[float | str] | None,
+    area: list[float | str] | None,
     over_h_rms: bool,
     specimen: Specimen,
     model: Model,
@@ -74,9 +75,10 @@ def contact_command(
 ) -> None:
     """Force, real contact area and stiffness -dF/du at given gaps, pressures or areas.
 
-    Lengths are in the surface's own unit. Force is F/(A0 E*), or F/A0 where a modulus is given; area is A/A0.
+    Plain numbers are in the units of the surface and of the modulus, "0.8um" is converted to them. Force is
+    F/(A0 E*), or F/A0 where a modulus is given; area is A/A0.
 
-    Example: mbma contact --surface yang-persson -d 2,1.5 --over-h-rms
+    Example: mbma contact --surface challenge --E-star 25MPa --length-unit mm -p 100kPa
     """
     lengths = {"separation": separation, "mean_separation": mean_separation}
     known = lengths | {"pressure": pressure, "area": area}
@@ -89,12 +91,12 @@ def contact_command(
     from mbma_tables.arguments import require
     from mbma_tables.theories.contact import contact
 
-    asked = _lengths(name, numbers, specimen, over_h_rms)
+    asked = _numbers(name, numbers, specimen, over_h_rms)
     if name == "mean_separation":
         require(name, asked, asked >= 0, "at least 0, where the model ends")
     answer = contact(specimen.surface, **{name: asked}, **_asked(model, specimen))
     values = {column: getattr(answer, column) for column in (*COLUMNS[:-1], "stiffness", COLUMNS[-1])}
-    report_answer("contact", specimen, model, answer, values, _stress_units(specimen)).write(output)
+    report_answer("contact", specimen, model, answer, values).write(output)
 
 
 def curve_gaps(h_max: float, points: int) -> Any:
@@ -141,7 +143,7 @@ def curve_command(
         gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).force)]
     answer = contact(surface, gap, **asked)
     values = {name: getattr(answer, name) for name in COLUMNS}
-    units = _stress_units(specimen)
+    units = {}
     others = {
         name: other_theory(name, surface, gap, asked["E_star"])
         for name in COMPARED
@@ -150,7 +152,7 @@ def curve_command(
     for theory, line in others.items() if compare else ():
         for quantity in ("force", "area"):
             values[f"{theory}_{quantity}"] = getattr(line, quantity)
-            units[f"{theory}_{quantity}"] = units[quantity]
+            units[f"{theory}_{quantity}"] = shown_unit(quantity, specimen.units)
     picture = b"" if plot is None else _draw(specimen, answer, others)
     report_answer("curve", specimen, model, answer, values, units).write(output, plot, picture)
 
@@ -158,7 +160,7 @@ def curve_command(
 def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory]) -> bytes:
     import numpy as np
 
-    from mbma_tables.plots import Curve, draw_compression, theory_label, to_png
+    from mbma_tables.plots import FORCE_LABEL, Curve, draw_compression, theory_label, to_png
 
     gap = answer.mean_separation / specimen.surface.h_rms
     label = theory_label(answer.theory) + (f", {answer.reading}" if answer.reading else "")
@@ -166,7 +168,8 @@ def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory]
     for name, line in others.items():
         known = np.isfinite(line.force)
         curves.append(Curve(theory_label(name), gap[known], *(field[known] for field in line)))
-    return to_png(draw_compression(curves, specimen.title, f"force  {_stress_units(specimen)['force']}"))
+    unit = unit_of("force", specimen.units)
+    return to_png(draw_compression(curves, specimen.title, FORCE_LABEL if unit == "1" else f"force  F/A0 [{unit}]"))
 
 
 @click.command("island", short_help="Contact islands at given approaches.")
@@ -176,7 +179,7 @@ def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory]
 @model_options
 @output_options
 def island_command(
-    delta: list[float] | None, over_h_rms: bool, specimen: Specimen, model: Model, output: Output
+    delta: list[float | str] | None, over_h_rms: bool, specimen: Specimen, model: Model, output: Output
 ) -> None:
     """Band, radii, densities, force and area of contact islands at given approaches.
 
@@ -190,10 +193,9 @@ def island_command(
 
     asked = _asked(model, specimen)
     del asked["theory"]
-    answer = island(specimen.surface, _lengths("delta", delta, specimen, over_h_rms), **asked)
+    answer = island(specimen.surface, _numbers("delta", delta, specimen, over_h_rms), **asked)
     values = {name: getattr(answer, name) for name in ("delta", *ISLAND_FIELDS, "force", "area", "error")}
-    square = f"{specimen.length_unit or 'length'}^2"
-    units = {"force": square if specimen.E_star is None else f"[E*] {square}", "area": square}
+    units = {name: unit_of(f"island_{name}", specimen.units) for name in ("force", "area")}
     report_answer("island", specimen, model, answer, values, units).write(output)
 
 

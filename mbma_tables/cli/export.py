@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mbma_tables.cli.options import optional_specimen_options, reading_option, theory_option
+from mbma_tables.cli.options import optional_specimen_options, quantity_option, reading_option, theory_option
 from mbma_tables.errors import InputError
 from mbma_tables.export import CODE, DATA, SOLVERS
 from mbma_tables.files import write_file
@@ -21,11 +21,9 @@ if TYPE_CHECKING:
 @click.argument("target", type=click.Choice([*SOLVERS, *DATA, *CODE]))
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write; a folder for source code.")
 @optional_specimen_options
-@click.option("--length-unit", default="", help="Unit of the surface's lengths and of the file, such as mm.")
-@click.option("--stress-unit", default="", help="Unit of the modulus and of the file, such as MPa.")
 @click.option("--rows", type=int, help="How many rows; else as few as --rtol needs.")
 @click.option("--rtol", type=float, help="Largest relative error of linear interpolation; 1e-3 by default.")
-@click.option("--largest-overclosure", type=float, help="Where the rows end; else at full compression.")
+@quantity_option("--largest-overclosure", help="Where the rows end; else at full compression.")
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure instead.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
 @click.option("--exponential", is_flag=True, help="For calculix and abaqus: Persson's exponential law instead of rows.")
@@ -67,6 +65,7 @@ def export_command(
     law = describe_law(
         specimen.surface,
         specimen.E_star,
+        stress_unit=specimen.stress_unit,
         quantity="pressure" if law_options["conductivity"] is None else "conductance",
         reading=reading,
         theory=theory,

@@ -8,6 +8,7 @@ import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -16,6 +17,7 @@ from mbma_tables import __version__
 from mbma_tables.cli.options import Model, Output
 from mbma_tables.files import write_file
 from mbma_tables.scenes.specimen import Specimen
+from mbma_tables.units import Units, unit_of
 
 if TYPE_CHECKING:
     from mbma_tables.theories.result import Contact
@@ -110,17 +112,10 @@ def _rounded(value: Any) -> str:
     return f"{value:.{DIGITS}g}" if isinstance(value, float) else str(value)
 
 
-def units_of(length: str | None) -> dict[str, str]:
-    """Unit of every named number that has one, for a unit of length."""
-    unit = length or "length"
-    lengths = ("separation", "mean_separation", "delta", "R_d", "R_u", "sigma", "h_d", "h_rms", "h_max")
-    return {
-        **dict.fromkeys(lengths, unit),
-        **dict.fromkeys(("q0", "q1"), f"1/{unit}"),
-        **dict.fromkeys(("D", "m4"), f"1/{unit}^2"),
-        "m0": f"{unit}^2",
-        "error": "relative",
-    }
+def shown_unit(name: str, units: Units) -> str:
+    """The unit of a column; "-" where it has none."""
+    unit = "relative" if name == "error" else unit_of(name, units)
+    return "-" if unit == "1" else unit
 
 
 def to_columns(values: Mapping[str, Any], units: Mapping[str, str]) -> list[Column]:
@@ -136,10 +131,11 @@ def to_columns(values: Mapping[str, Any], units: Mapping[str, str]) -> list[Colu
 
 def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     """The surface's numbers for a program, and lines of them for a reader."""
-    surface, units = specimen.surface, units_of(specimen.length_unit)
+    surface = specimen.surface
     numbers = {name: float(getattr(surface, name)) for name in SURFACE_NUMBERS}
-    facts: dict[str, Any] = {"length_unit": specimen.length_unit, **numbers}
-    shown = [f"{name} {value:.6g} {units.get(name, '')}".rstrip() for name, value in numbers.items()]
+    facts: dict[str, Any] = {"length_unit": surface.unit, **numbers}
+    units = {name: shown_unit(name, specimen.units).strip("-") for name in numbers}
+    shown = [f"{name} {value:.6g} {units[name]}".rstrip() for name, value in numbers.items()]
     notes = ["surface: " + ", ".join(shown)]
     if surface.fit is not None:
         values = {field.name: getattr(surface.fit, field.name) for field in dataclasses.fields(surface.fit)}
@@ -173,11 +169,18 @@ def _validity(answer: Contact) -> tuple[list[str], dict[str, Any]]:
 
 
 def report_answer(
-    command: str, specimen: Specimen, model: Model, answer: Any, values: Mapping[str, Any], units: Mapping[str, str]
+    command: str,
+    specimen: Specimen,
+    model: Model,
+    answer: Any,
+    values: Mapping[str, Any],
+    units: Mapping[str, str] = MappingProxyType({}),
 ) -> Report:
-    """The report of a command that evaluated the model; `units` are those that `units_of` does not know."""
+    """The report of a command that evaluated the model; `units` are those that do not follow from names."""
     surface, notes = _surface_facts(specimen)
-    scale = "forces are over E*, none was given" if specimen.E_star is None else f"E* is {specimen.E_star:.6g}"
+    scale = "forces are over E*, none was given"
+    if specimen.E_star is not None:
+        scale = f"E* is {specimen.E_star:.6g} {specimen.stress_unit or ''}".rstrip()
     made = f"reading {answer.reading}, tier {answer.tier}, rtol {model.rtol:g}" if answer.reading else ""
     notes += [f"{made or f'theory {model.theory}'}; {scale}", "error bounds the relative error of force and area"]
     facts = {
@@ -191,12 +194,12 @@ def report_answer(
         "tier": answer.tier or None,
         "rtol": model.rtol,
         "E_star": specimen.E_star,
+        "stress_unit": specimen.stress_unit,
         "surface": surface,
     }
     if command != "island":
         lines, known = _validity(answer)
         notes += lines
         facts |= known
-    return Report(
-        command, specimen.title, notes, facts, to_columns(values, {**units_of(specimen.length_unit), **units})
-    )
+    own = {name: shown_unit(name, specimen.units) for name in values}
+    return Report(command, specimen.title, notes, facts, to_columns(values, {**own, **units}))

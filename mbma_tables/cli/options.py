@@ -51,22 +51,34 @@ class Output:
             raise InputError("one of --json and --csv, not both")
 
 
-def _parse_numbers(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) -> list[float] | None:
+def _parse_number(ctx: click.Context, param: click.Parameter, given: str | None) -> float | str | None:
+    """A number, or the text of one with its unit, which is read where the name is known."""
+    if given is None:
+        return None
+    try:
+        return float(given)
+    except ValueError:
+        if not given.strip()[:1] or given.strip()[0] not in "+-.0123456789":
+            raise click.BadParameter(f"{given!r} is not a number, nor one with its unit.", ctx, param) from None
+        return given
+
+
+def _parse_numbers(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) -> list[float | str] | None:
     """All numbers of a repeated option, with commas between them; None where it was not given."""
-    numbers = []
+    numbers: list[Any] = []
     for text in given:
-        try:
-            numbers += [float(part) for part in text.split(",")] if text.strip() else []
-        except ValueError:
-            raise click.BadParameter(
-                f"{text!r} is not a number, nor numbers with commas between them.", ctx, param
-            ) from None
+        numbers += [_parse_number(ctx, param, part) for part in text.split(",")] if text.strip() else []
     return numbers if given else None
 
 
+def quantity_option(*names: str, help: str) -> Decorator:
+    """An option that takes a number, or one with its unit."""
+    return click.option(*names, callback=_parse_number, metavar="X[UNIT]", help=help)
+
+
 def numbers_option(*names: str, help: str) -> Decorator:
-    """An option that may be repeated, each time with one number or several."""
-    return click.option(*names, multiple=True, callback=_parse_numbers, metavar="X[,X...]", help=help)
+    """An option that may be repeated, each time with one number or several, each perhaps with its unit."""
+    return click.option(*names, multiple=True, callback=_parse_numbers, metavar="X[UNIT][,X...]", help=help)
 
 
 def _group(
@@ -89,7 +101,11 @@ def _group(
 
 
 def _specimen(given: Mapping[str, Any]) -> Specimen:
-    """The surface that the options describe, with its modulus; a modulus option overrides that of a file."""
+    """The surface that the options describe, with its modulus; a modulus option overrides that of a file.
+
+    Plain numbers are in --length-unit and --stress-unit where those are given, else in the units known from a file.
+    """
+    length, stress = given["length_unit"], given["stress_unit"]
     numbers = {key: given[key] for key in NUMBERS if given[key] is not None}
     used = [f"--{key}" for key in ("surface", "file", "map") if given[key] is not None] + ["numbers"] * bool(numbers)
     if len(used) != 1:
@@ -104,9 +120,12 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
     elif given["surface"] is not None:
         specimen = from_name(given["surface"])
     else:
-        specimen = from_numbers(numbers)
-    modulus = effective_modulus_of({key: given[key] for key in MATERIAL if given[key] is not None})
-    return specimen if modulus is None else dataclasses.replace(specimen, E_star=modulus)
+        specimen = from_numbers(numbers, length)
+    material = {key: given[key] for key in MATERIAL if given[key] is not None}
+    if material:
+        modulus, unit = effective_modulus_of(material, stress)
+        specimen = dataclasses.replace(specimen, E_star=modulus, stress_unit=unit or specimen.stress_unit)
+    return specimen.in_units(length, stress)
 
 
 over_h_rms = click.option("--over-h-rms", is_flag=True, help="The lengths given are multiples of h_rms.")
@@ -116,21 +135,23 @@ _SPECIMEN_OPTIONS = (
     click.option("--file", type=click.Path(path_type=Path), metavar="TOML", help="Surface: a TOML file."),
     click.option("--map", type=click.Path(path_type=Path), metavar="MAP", help="Surface: fitted to a map of heights."),
     click.option("--hurst", type=float, help="Surface in numbers: Hurst exponent, in (0, 1]."),
-    click.option("--q0", type=float, help="Smallest wavenumber [1/length]."),
-    click.option("--q1", type=float, help="Largest wavenumber [1/length]; or give --zeta-1."),
+    quantity_option("--q0", help="Smallest wavenumber [1/length]."),
+    quantity_option("--q1", help="Largest wavenumber [1/length]; or give --zeta-1."),
     click.option("--zeta-1", "zeta_1", type=float, help="Largest magnification q1/q0, above 3."),
-    click.option("--h-rms", "h_rms", type=float, help="Root-mean-square height [length]."),
-    click.option("--h-max", "h_max", type=float, help="Highest point above the mid-plane [length]."),
-    click.option("--m0", type=float, help="Surface by moments: hurst, h_max, variance of height [length^2],"),
+    quantity_option("--h-rms", "h_rms", help="Root-mean-square height [length]."),
+    quantity_option("--h-max", "h_max", help="Highest point above the mid-plane [length]."),
+    quantity_option("--m0", help="Surface by moments: hurst, h_max, variance of height [length^2],"),
     click.option("--m2", type=float, help="variance of a profile's slope,"),
-    click.option("--m4", type=float, help="variance of a profile's second derivative [1/length^2]."),
-    click.option("--E-star", "E_star", type=float, help="Effective modulus; without one forces are over E*."),
-    click.option("--E1", "E1", type=float, help="Instead of --E-star: Young's modulus,"),
+    quantity_option("--m4", help="variance of a profile's second derivative [1/length^2]."),
+    quantity_option("--E-star", "E_star", help="Effective modulus; without one forces are over E*."),
+    quantity_option("--E1", "E1", help="Instead of --E-star: Young's modulus,"),
     click.option("--nu1", "nu1", type=float, help="and Poisson's ratio of one body,"),
-    click.option("--E2", "E2", type=float, help="Young's modulus of the other,"),
+    quantity_option("--E2", "E2", help="Young's modulus of the other,"),
     click.option("--nu2", "nu2", type=float, help="and its Poisson's ratio."),
+    click.option("--length-unit", metavar="UNIT", help="Unit of plain lengths and of the answer, such as mm."),
+    click.option("--stress-unit", metavar="UNIT", help="Unit of a plain modulus and of the answer, such as MPa."),
 )
-_SPECIMEN_NAMES = ("surface", "file", "map", *NUMBERS, *MATERIAL)
+_SPECIMEN_NAMES = ("surface", "file", "map", *NUMBERS, *MATERIAL, "length_unit", "stress_unit")
 
 specimen_options = _group("specimen", _SPECIMEN_NAMES, _specimen, *_SPECIMEN_OPTIONS)
 # None where none of them is given

@@ -26,6 +26,7 @@ from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.registry import get_theory
 from mbma_tables.totals.conductance import conductance
 from mbma_tables.totals.law_protocol import ContactLaw
+from mbma_tables.units import Units, in_unit, resolve
 
 QUANTITIES = ("pressure", "conductance")
 FLOOR = 1e-3  # of the largest pressure: below it, errors are relative to this and not to the pressure
@@ -140,14 +141,14 @@ def _curve(
 
 def describe_law(
     surface: Surface,
-    E_star: float,
+    E_star: float | str,
     *,
-    length_unit: str,
-    stress_unit: str,
+    length_unit: str | None = None,
+    stress_unit: str | None = None,
     quantity: str = "pressure",
     rows: int | None = None,
     rtol: float | None = None,
-    largest_overclosure: float | None = None,
+    largest_overclosure: float | str | None = None,
     conductivity: float | None = None,
     conductivity_unit: str | None = None,
     reading: str | Reading = "reported",
@@ -160,18 +161,18 @@ def describe_law(
     ----------
     surface : Surface
         One surface.
-    E_star : float
-        Effective modulus [stress]: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
-    length_unit, stress_unit : str
-        Names of the units that the numbers are in.
+    E_star : float or str
+        Effective modulus in `stress_unit`, or with its unit: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
+    length_unit, stress_unit : str, optional
+        Units of the rows. A surface or modulus that has another one is converted; one that has none is in these.
     quantity : {"pressure", "conductance"}
         Pressure against overclosure, or conductance against pressure.
     rows : int, optional
         How many; else as few as `rtol` needs, 1e-3 where neither is given.
     rtol : float, optional
         Largest relative error of the interpolation where the result is above a thousandth of its largest.
-    largest_overclosure : float, optional
-        Where the rows end [length]; else at full compression, or where the force turns down.
+    largest_overclosure : float or str, optional
+        Where the rows end, in the rows' unit or with its own; else at full compression, or where the force turns down.
     conductivity : float, optional
         k_s = 2 k1 k2/(k1 + k2) for conductance, thermal or electrical, with its unit.
     reading : str or Reading
@@ -189,28 +190,32 @@ def describe_law(
     Examples
     --------
     >>> road = Surface.named("concrete")
-    >>> law = describe_law(road, 13.3, length_unit="mm", stress_unit="MPa", rows=20)
-    >>> law.y_name, law.y_unit, round(law.largest_error, 3)
-    ('pressure', 'MPa', 0.013)
+    >>> law = describe_law(road, "13.3 MPa", rows=20)
+    >>> law.y_name, law.y_unit, law.x_unit, round(law.largest_error, 3)
+    ('pressure', 'MPa', 'mm', 0.013)
     """
-    _check_unit("length_unit", length_unit)
-    _check_unit("stress_unit", stress_unit)
+    surface = in_unit(surface, length_unit)
+    plain, stress_unit = resolve({"E_star": E_star}, stress_unit, "stress")
+    length_unit = _known("length_unit", surface.unit)
+    stress_unit = _known("stress_unit", stress_unit)
     if surface.shape != ():
         raise InputError("a contact law is of one surface, not of a batch")
     if quantity not in QUANTITIES:
         raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
-    modulus = number_in("E_star", E_star, 1e-300, 1e300)
+    modulus = number_in("E_star", plain["E_star"], 1e-300, 1e300)
+    end = Units(length_unit).number("overclosure", largest_overclosure)
     if rows is not None and rtol is not None:
         raise InputError("rows and rtol are both given: give one of them")
     k_s, names = 1.0, ("overclosure", "pressure", length_unit, stress_unit)
     if quantity == "conductance":
         if conductivity is None or not conductivity_unit:
             raise InputError("conductance needs conductivity, k_s = 2 k1 k2/(k1 + k2), and conductivity_unit")
-        _check_unit("conductivity_unit", conductivity_unit)
+        if not conductivity_unit.isprintable():
+            raise InputError(f"conductivity_unit is not printable: {conductivity_unit!r}")
         k_s = number_in("conductivity", conductivity, 1e-300, 1e300)
         names = ("pressure", "conductance", stress_unit, f"{conductivity_unit}/{length_unit}")
     law = contact_law(surface, LAW_RTOL, reading=reading, E_star=modulus, theory=theory)
-    fine_x, fine_y = _curve(law, quantity, _range_end(law, largest_overclosure), k_s, modulus)
+    fine_x, fine_y = _curve(law, quantity, _range_end(law, end), k_s, modulus)
 
     def with_rows(count: int) -> tuple[FloatArray, FloatArray, float]:
         places = np.linspace(0, fine_x[-1], count) if evenly else spread(fine_x, fine_y, count)
@@ -235,13 +240,14 @@ def describe_law(
         )
     own = Mbma(reading=reading) if theory == Mbma.name else get_theory(theory)
     comments = _comments(surface, law, modulus, names, x, error)
-    known = _validity(surface, law, own, float(_range_end(law, largest_overclosure)), stress_unit)
+    known = _validity(surface, law, own, float(_range_end(law, end)), stress_unit)
     return LawTable(x, y, *names, error, (*comments, *known), law.theory)
 
 
-def _check_unit(name: str, unit: str) -> None:
-    if not unit or not unit.isprintable():
-        raise InputError(f"{name} is missing or not printable: a law without units is read wrongly sooner or later")
+def _known(name: str, unit: str | None) -> str:
+    if unit is None:
+        raise InputError(f"{name} is missing: a law without units is read wrongly sooner or later")
+    return unit
 
 
 def _range_end(law: ContactLaw, asked: float | None) -> float:
@@ -280,7 +286,7 @@ def _comments(
 
 def _validity(surface: Surface, law: ContactLaw, theory: Theory, end: float, stress_unit: str) -> tuple[str, ...]:
     """Lines that say where the law holds, how far simulations scatter about it, and where its numbers come from."""
-    u = law.h_max - end * np.arange(1, LOOKED_AT + 1) / LOOKED_AT
+    u = np.linspace(law.h_max, law.h_max - end, LOOKED_AT + 1)[1:]
     found = contact(surface, mean_separation=u, E_star=law.E_star, theory=theory)
     pressure = np.asarray(law.force(u=u))
     lines = []

@@ -10,6 +10,7 @@ import xarray as xr
 from mbma_tables.scenes.plan import Plan
 from mbma_tables.scenes.problem import Problem
 from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
     from mbma_tables.scenes.run import Run
@@ -19,40 +20,36 @@ TABLES = ("universal", "island4d")
 
 def _units(problem: Problem) -> dict[str, tuple[str, str]]:
     """Unit and meaning of every quantity that a scene can hold."""
-    length = problem.length_unit or "length"
-    stress = problem.stress_unit or ("stress" if problem.E_star != 1.0 else "1")
-
-    def of_stress(unit: str) -> str:
-        return unit if stress == "1" else f"{stress} {unit}"
-
     hertz = "subscale_area" in problem.dropped
-    units = {
-        "separation": (length, "d, rigid plane to mid-plane"),
-        "mean_separation": (length, "u = (h_max + d)/2 (Eq. 50)"),
-        "nominal_pressure": (stress, "F/A0 as prescribed"),
-        "prescribed_area": ("1", "A/A0 as prescribed"),
-        "valid": ("1", "whether the theory was tested for contacts such as these"),
-        "scatter": ("1", "standard deviation of ln F at this gap from simulation to simulation"),
-        "area_scatter": ("1", "standard deviation of ln A at this force from simulation to simulation"),
-        "force": (stress, "nominal pressure F/A0"),
-        "area": ("1", "Hertz area of the summits over A0 (eta = 1)" if hertz else "real contact area A/A0"),
-        "stiffness": (f"{stress}/{length}", "-dF/dd per nominal area"),
-        "stiffness_mean": (f"{stress}/{length}", "-dF/du per nominal area"),
-        "energy": (of_stress(length), "elastic energy per nominal area"),
-        "conductance": (f"conductivity/{length}", "conductance per nominal area"),
-        "island_number": (f"1/{length}^2", "islands in contact per nominal area (Eq. 42)"),
-        "island_delta": (length, "approach of an island"),
-        "island_force": (of_stress(f"{length}^2"), "load of an island at that approach"),
-        "island_area": (f"{length}^2", "contact area of an island at that approach"),
-        "island_density": (f"1/{length}^3", "islands per nominal area and approach"),
-        "profile_delta": (length, "approach of the island"),
-        "profile_radius": (length, "radius r in the island"),
-        "profile_pressure": (stress, "pressure p(r) (Eq. 36)"),
-        "profile_gap": (length, "d(r), deformed sphere to mid-plane of the summits (Eq. 34)"),
+    # the name that has its unit, and what it is
+    quantities = {
+        "separation": ("separation", "d, rigid plane to mid-plane"),
+        "mean_separation": ("separation", "u = (h_max + d)/2 (Eq. 50)"),
+        "nominal_pressure": ("pressure", "F/A0 as prescribed"),
+        "prescribed_area": ("area", "A/A0 as prescribed"),
+        "valid": ("valid", "whether the theory was tested for contacts such as these"),
+        "scatter": ("scatter", "standard deviation of ln F at this gap from simulation to simulation"),
+        "area_scatter": ("scatter", "standard deviation of ln A at this force from simulation to simulation"),
+        "force": ("force", "nominal pressure F/A0"),
+        "area": ("area", "Hertz area of the summits over A0 (eta = 1)" if hertz else "real contact area A/A0"),
+        "stiffness": ("stiffness", "-dF/dd per nominal area"),
+        "stiffness_mean": ("stiffness", "-dF/du per nominal area"),
+        "energy": ("energy", "elastic energy per nominal area"),
+        "island_number": ("D", "islands in contact per nominal area (Eq. 42)"),
+        "island_delta": ("delta", "approach of an island"),
+        "island_force": ("island_force", "load of an island at that approach"),
+        "island_area": ("island_area", "contact area of an island at that approach"),
+        "island_density": ("island_density", "islands per nominal area and approach"),
+        "profile_delta": ("delta", "approach of the island"),
+        "profile_radius": ("R_d", "radius r in the island"),
+        "profile_pressure": ("pressure", "pressure p(r) (Eq. 36)"),
+        "profile_gap": ("separation", "d(r), deformed sphere to mid-plane of the summits (Eq. 34)"),
     }
     for name in problem.theories:
-        units |= {f"{name}_force": (stress, f"F/A0 by {name}"), f"{name}_area": ("1", f"A/A0 by {name}")}
-    return units
+        quantities |= {f"{name}_force": ("force", f"F/A0 by {name}"), f"{name}_area": ("area", f"A/A0 by {name}")}
+    units = {name: (unit_of(like, problem.units), meaning) for name, (like, meaning) in quantities.items()}
+    per_length = f"conductivity/{unit_of('separation', problem.units)}"
+    return units | {"conductance": (per_length, "conductance per nominal area")}
 
 
 def to_dataset(run: Run, plan: Plan) -> xr.Dataset:

@@ -10,6 +10,7 @@ from mbma_tables.errors import InputError
 from mbma_tables.scenes.effects import COMPARED, OF_ISLANDS, chosen, nearest
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.theories.registry import THEORIES, get_theory
+from mbma_tables.units import Units, in_unit, known, resolve
 
 if TYPE_CHECKING:
     from mbma_tables.models.protocol import AnyModel
@@ -27,7 +28,7 @@ MAX_SECONDS = 1e6
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Problem:
-    """The parameters of `Scene`, with the derived fields `outputs`, `dropped` and `gaps`."""
+    """The parameters of `Scene`, with the derived fields `outputs`, `dropped`, `gaps` and `units`."""
 
     surface: Surface
     effects: Sequence[str] = ("force", "area")
@@ -36,7 +37,7 @@ class Problem:
     mean_separations: Any = None
     pressures: Any = None
     areas: Any = None
-    E_star: float = 1.0
+    E_star: Any = 1.0
     rtol: float | None = None
     seconds: float | None = None
     reading: str | Reading = "reported"
@@ -52,6 +53,7 @@ class Problem:
     outputs: frozenset[str] = dataclasses.field(init=False)
     dropped: frozenset[str] = dataclasses.field(init=False)
     gaps: Any = dataclasses.field(init=False)
+    units: Units = dataclasses.field(init=False)
 
     def __post_init__(self) -> None:
         from mbma_tables.arguments import number_in, whole_number_in
@@ -62,6 +64,7 @@ class Problem:
         outputs, dropped = chosen(self.effects, self.without)
         if self.surface.labelled or self.surface.shape != ():
             raise InputError("a scene has one surface, not a batch: make a scene for each")
+        self._set_units()
         if self.rtol is not None and self.seconds is not None:
             raise InputError("rtol and seconds are both given: give the accuracy or the time budget, one of them")
         number_in("E_star", self.E_star, 1e-300, 1e300)
@@ -85,6 +88,22 @@ class Problem:
         self._check_parameters_of_effects()
         self._check_tier()
         self._check_theory()
+
+    def _set_units(self) -> None:
+        """Lengths in the surface's unit, stresses in that of E*."""
+        unit = None if self.length_unit is None else known(self.length_unit)
+        if None not in (unit, self.surface.unit) and unit != self.surface.unit:
+            raise InputError(
+                f"length_unit is {unit!r} and the surface's own {self.surface.unit!r}: ask for surface.to({unit!r})"
+            )
+        found, stress = resolve({"E_star": self.E_star}, self.stress_unit, "stress")
+        over_modulus = stress is None and isinstance(self.E_star, int | float) and self.E_star == 1.0
+        units = Units(unit or self.surface.unit, "1" if over_modulus else stress)
+        derived = {"surface": in_unit(self.surface, unit), "units": units, "length_unit": units.length} | found
+        for name in ("separations", "mean_separations", "pressures", "deltas"):
+            derived[name] = units.number(name, getattr(self, name))
+        for name, value in (derived | {"stress_unit": stress}).items():
+            object.__setattr__(self, name, value)
 
     def _checked_gaps(self, at_gaps: frozenset[str]) -> Any:
         """The prescribed numbers; None where nothing asks for gaps."""

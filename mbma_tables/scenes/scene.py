@@ -12,7 +12,7 @@ from mbma_tables.arguments import finite_array
 from mbma_tables.errors import InputError
 from mbma_tables.scenes.plan import Plan, make_plan
 from mbma_tables.scenes.problem import INVERTED, PRESCRIBED, Problem
-from mbma_tables.scenes.specimen import effective_modulus_of, from_tables
+from mbma_tables.scenes.specimen import from_tables
 from mbma_tables.scenes.toml_file import check, read_toml, schema
 
 if TYPE_CHECKING:
@@ -32,9 +32,10 @@ class Scene(Problem):
     without : sequence of str
         Refinements of the model switched off: "subscale_area", "sphere_deformation", "finite_height".
     separations, mean_separations, pressures, areas : array_like, one of them
-        d [length], u [length], F/A0 in the unit of `E_star`, or A/A0; one number or a list.
-    E_star : float
-        Effective modulus; stresses come out in its unit. 1 gives them over E*.
+        d [length], u [length], F/A0 in the unit of `E_star`, or A/A0; one number or a list. Texts such as "0.8 um" are
+        converted to the units of the surface and the modulus.
+    E_star : float or str
+        Effective modulus; stresses come out in its unit. 1 gives them over E*. A text has its unit: "100 GPa".
     rtol : float, optional
         Relative error asked for, in [1e-10, 0.1]; 1e-6 where no `seconds` are given either, 1e-4 of other theories.
     seconds : float, optional
@@ -54,8 +55,12 @@ class Scene(Problem):
         For "comparison": names of other theories, or "persson_simplified".
     points : int
         Points of the distribution of "island_statistics", over the approach.
-    length_unit, stress_unit, title : str, optional
-        Texts for the result.
+    length_unit : str, optional
+        Of a surface that does not know its own.
+    stress_unit : str, optional
+        That `E_star` is in, or is converted to where it has one of its own.
+    title : str, optional
+        For the result.
 
     Raises
     ------
@@ -131,10 +136,7 @@ class Scene(Problem):
 def _arguments(content: Mapping[str, Any], folder: pathlib.Path, title: str) -> dict[str, Any]:
     """The arguments of `Scene` from a file's content; files that it names are relative to `folder`."""
     check(content, schema())
-    specimen = from_tables(content["surface"], folder, title)
-    material = dict(content.get("material", {}))
-    stress_unit = material.pop("stress_unit", None)
-    E_star = effective_modulus_of(material)
+    specimen = from_tables(content, folder, title)
 
     def lengths(table: dict[str, Any]) -> dict[str, Any]:
         """The numbers of a table, in the surface's unit."""
@@ -155,9 +157,8 @@ def _arguments(content: Mapping[str, Any], folder: pathlib.Path, title: str) -> 
         "surface": specimen.surface,
         "effects": content["effects"]["on"],
         "without": content["effects"].get("off", ()),
-        "E_star": 1.0 if E_star is None else E_star,
-        "length_unit": specimen.length_unit,
-        "stress_unit": stress_unit,
+        "E_star": 1.0 if specimen.E_star is None else specimen.E_star,
+        "stress_unit": specimen.stress_unit,
         "title": title,
     }
     found |= {name: content[name] for name in ("title", "theory", "reading") if name in content}

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from mbma_tables.errors import InputError
 from mbma_tables.files import read_file
 from mbma_tables.scenes.toml_file import check, read_toml, schema
+from mbma_tables.units import Units, factor, in_unit, known, resolve
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.surface import Surface
@@ -30,8 +31,29 @@ class Specimen:
 
     surface: Surface
     title: str
-    length_unit: str | None = None
     E_star: float | None = None
+    stress_unit: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.stress_unit is not None and self.E_star is None:
+            raise InputError(
+                f"a unit of stress, {self.stress_unit}, is given and no modulus: give E_star, or leave the unit out"
+            )
+
+    @property
+    def units(self) -> Units:
+        """Of its lengths and stresses."""
+        return Units(self.surface.unit, "1" if self.E_star is None else self.stress_unit)
+
+    def in_units(self, length: str | None, stress: str | None) -> Specimen:
+        """The same in units asked for: converted from those that are known, said to be in them otherwise."""
+        modulus, unit = self.E_star, self.stress_unit
+        if stress is not None:
+            stress = known(stress, "stress")
+            if modulus is not None and unit is not None:
+                modulus *= factor(unit, stress, "stress")
+            unit = stress
+        return dataclasses.replace(self, surface=in_unit(self.surface, length), E_star=modulus, stress_unit=unit)
 
 
 def from_name(name: str) -> Specimen:
@@ -40,7 +62,7 @@ def from_name(name: str) -> Specimen:
     from mbma_tables.surfaces.surface import Surface
 
     case = get_case(name)
-    return Specimen(Surface.named(name), case.title, case.length_unit)
+    return Specimen(Surface.named(name), case.title)
 
 
 def from_map(path: pathlib.Path) -> Specimen:
@@ -50,8 +72,7 @@ def from_map(path: pathlib.Path) -> Specimen:
 
     surface = Surface.from_map(read_map(path))
     assert isinstance(surface, Surface)
-    unit = None if surface.fit is None else surface.fit.length_unit
-    return Specimen(surface, f"fitted to the map {_printable(path)}", unit)
+    return Specimen(surface, f"fitted to the map {_printable(path)}")
 
 
 def _printable(path: pathlib.Path) -> str:
@@ -59,8 +80,10 @@ def _printable(path: pathlib.Path) -> str:
     return os.fsencode(path.name).decode("utf-8", "replace")
 
 
-def from_numbers(given: Mapping[str, Any], title: str = "surface given by numbers") -> Specimen:
-    """The surface with one complete set of numbers."""
+def from_numbers(
+    given: Mapping[str, Any], unit: str | None = None, title: str = "surface given by numbers"
+) -> Specimen:
+    """The surface with one complete set of numbers, plain ones in `unit`."""
     from mbma_tables.arguments import require
     from mbma_tables.surfaces.spectrum import MIN_ZETA_1
     from mbma_tables.surfaces.surface import Surface
@@ -70,14 +93,15 @@ def from_numbers(given: Mapping[str, Any], title: str = "surface given by number
             f"a surface needs {', '.join(BAND)} (or zeta_1 for q1), or {', '.join(MOMENTS)}; got "
             f"{', '.join(given) or 'none of them'}"
         )
-    numbers = {key: _one_number(key, value) for key, value in given.items()}
+    plain, unit = resolve(given, unit)
+    numbers = {key: _one_number(key, value) for key, value in plain.items()}
     if "m0" in numbers:
-        return Specimen(Surface.from_moments(**numbers), title)
+        return Specimen(Surface.from_moments(**numbers, unit=unit), title)
     if "zeta_1" in numbers:
         zeta_1 = numbers.pop("zeta_1")
         require("zeta_1", zeta_1, zeta_1 > MIN_ZETA_1, "greater than 3, so that the smallest island has a band")
         numbers["q1"] = numbers["q0"] * zeta_1
-    return Specimen(Surface(**numbers), title)
+    return Specimen(Surface(**numbers, unit=unit), title)
 
 
 def _one_number(name: str, value: Any) -> Any:
@@ -89,20 +113,21 @@ def _one_number(name: str, value: Any) -> Any:
     return array
 
 
-def effective_modulus_of(given: Mapping[str, Any]) -> float | None:
-    """E* from a material's numbers; None if there are none."""
+def effective_modulus_of(given: Mapping[str, Any], unit: str | None = None) -> tuple[float | None, str | None]:
+    """E* from a material's numbers, None if there are none, and its unit: the one given, or the first named."""
     from mbma_tables.arguments import require
     from mbma_tables.materials import effective_modulus
 
+    plain, unit = resolve(given, unit, "stress")
     if not given:
-        return None
-    numbers = {key: _one_number(key, value) for key, value in given.items()}
+        return None, unit
+    numbers = {key: _one_number(key, value) for key, value in plain.items()}
     if set(numbers) == {"E_star"}:
         require("E_star", numbers["E_star"], numbers["E_star"] > 0, "positive")
-        return float(numbers["E_star"])
+        return float(numbers["E_star"]), unit
     if set(numbers) != set(MATERIAL[1:]):
         raise InputError(f"a material is E_star alone, or all of E1, nu1, E2, nu2; got {', '.join(given)}")
-    return float(effective_modulus(**numbers))
+    return float(effective_modulus(**numbers)), unit
 
 
 def read_specimen(path: pathlib.Path) -> Specimen:
@@ -111,19 +136,21 @@ def read_specimen(path: pathlib.Path) -> Specimen:
     tables = {name: schema()["properties"][name] for name in ("surface", "material")}
     try:
         check(entries, {"type": "object", "required": ["surface"], "additionalProperties": False, "properties": tables})
-        material = dict(entries.get("material", {}))
-        if "stress_unit" in material:
-            raise InputError("[material]: stress_unit belongs in scenes; leave it out")
-        title = f"surface of {_printable(path)}"
-        return dataclasses.replace(
-            from_tables(entries["surface"], path.parent, title), E_star=effective_modulus_of(material)
-        )
+        return from_tables(entries, path.parent, f"surface of {_printable(path)}")
     except InputError as fault:
         raise InputError(f"{path}: {fault}") from None
 
 
-def from_tables(surface: Mapping[str, Any], folder: pathlib.Path, title: str) -> Specimen:
-    """The specimen of a table [surface]; files that it names are relative to `folder`."""
+def from_tables(entries: Mapping[str, Any], folder: pathlib.Path, title: str) -> Specimen:
+    """The specimen of the tables [surface] and [material]; files that they name are relative to `folder`."""
+    material = dict(entries.get("material", {}))
+    modulus, stress_unit = effective_modulus_of(material, material.pop("stress_unit", None))
+    found = _from_table(entries["surface"], folder, title)
+    return dataclasses.replace(found, E_star=modulus, stress_unit=stress_unit)
+
+
+def _from_table(surface: Mapping[str, Any], folder: pathlib.Path, title: str) -> Specimen:
+    """The surface of a table [surface]."""
     numbers = dict(surface)
     texts = {name: numbers.pop(name, None) for name in ("name", "map", "psd", "convention", "length_unit")}
     given = [name for name in ("name", "map", "psd") if texts[name] is not None]
@@ -133,20 +160,15 @@ def from_tables(surface: Mapping[str, Any], folder: pathlib.Path, title: str) ->
         raise InputError(f"[surface]: {given[0]} and numbers ({', '.join(numbers)}) are given: leave one of them out")
     if texts["convention"] is not None and given != ["psd"]:
         raise InputError("[surface]: convention belongs to a psd: give psd = ..., or leave it out")
-    if given == ["name"]:
-        found = from_name(str(texts["name"]))
-    elif given == ["map"]:
-        found = from_map(_file(folder, str(texts["map"]), "map"))
-    elif given == ["psd"]:
-        found = _from_psd(_file(folder, str(texts["psd"]), "psd"), numbers, texts["convention"] or "paper")
-    else:
-        found = from_numbers(numbers, title)
     unit = texts["length_unit"]
-    if unit is not None and found.length_unit not in (None, unit):
-        raise InputError(
-            f"[surface]: length_unit is {unit!r}, the surface's own {found.length_unit!r}: leave length_unit out"
-        )
-    return dataclasses.replace(found, length_unit=unit or found.length_unit)
+    if given == ["name"]:
+        return from_name(str(texts["name"])).in_units(unit, None)
+    if given == ["map"]:
+        return from_map(_file(folder, str(texts["map"]), "map")).in_units(unit, None)
+    if given == ["psd"]:
+        path = _file(folder, str(texts["psd"]), "psd")
+        return _from_psd(path, numbers, texts["convention"] or "paper", unit)
+    return from_numbers(numbers, unit, title)
 
 
 def _file(folder: pathlib.Path, name: str, key: str) -> pathlib.Path:
@@ -156,8 +178,8 @@ def _file(folder: pathlib.Path, name: str, key: str) -> pathlib.Path:
     return path
 
 
-def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str) -> Specimen:
-    """The surface fitted to two columns of text, q and C."""
+def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str, unit: str | None) -> Specimen:
+    """The surface fitted to two columns of text, q and C, in a unit of length."""
     import numpy as np
 
     from mbma_tables.surfaces.surface import Surface
@@ -175,5 +197,6 @@ def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str) -
         raise InputError(f"[surface]: {path.name} must hold two columns of numbers, q and C: {fault}") from None
     if columns.shape[1] != 2:
         raise InputError(f"[surface]: {path.name} must hold two columns, q and C, got {columns.shape[1]}")
-    surface = Surface.from_psd(columns[:, 0], columns[:, 1], h_max=numbers["h_max"], convention=convention)
-    return Specimen(surface, f"fitted to {path.name}")
+    h_max = Units(unit).number("h_max", numbers["h_max"])
+    surface = Surface.from_psd(columns[:, 0], columns[:, 1], h_max=h_max, convention=convention)
+    return Specimen(in_unit(surface, unit), f"fitted to {path.name}")

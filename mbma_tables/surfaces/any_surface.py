@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import abc
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mbma_tables.errors import InputError
 from mbma_tables.surfaces import spectrum
+from mbma_tables.units import factor
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.measured import MeasuredSurface
@@ -25,6 +27,8 @@ class AnySurface(abc.ABC):
         Root-mean-square height, and highest point above the mid-plane [length].
     m2, m4 : array_like
         Variance of a profile's slope, and of its second derivative [1/length^2], Eq. (1).
+    unit : str or None
+        The unit of length; None where it is not known.
     """
 
     # plain fields of one class, properties of the other
@@ -32,6 +36,7 @@ class AnySurface(abc.ABC):
     q1: Any
     h_rms: Any
     h_max: Any
+    unit: str | None
 
     @property
     @abc.abstractmethod
@@ -66,6 +71,28 @@ class AnySurface(abc.ABC):
         InputError
             For a batch.
         """
+
+    @abc.abstractmethod
+    def scaled(self, factor: float, unit: str | None) -> Self:
+        """The same surface in another length unit, of which the old one is `factor`."""
+
+    def to(self, unit: str) -> Self:
+        """The same surface in another unit of length.
+
+        Raises
+        ------
+        InputError
+            Where its own unit is not known, and for an unknown one.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface
+        >>> Surface(hurst=0.8, q0=0.5, q1=100.0, h_rms=0.2, h_max=0.6, unit="mm").to("um")
+        Surface(hurst=0.8, q0=0.0005, q1=0.1, h_rms=200.0, h_max=600.0, unit='um')
+        """
+        if self.unit is None:
+            raise InputError(f"the surface's unit is not known: make it with unit=..., then ask for {unit!r}")
+        return self.scaled(factor(self.unit, unit), unit)
 
     @property
     def zeta_1(self) -> Any:
@@ -108,18 +135,18 @@ class AnySurface(abc.ABC):
         Parameters
         ----------
         other : AnySurface
-            The other surface, in the same length unit; both are independent of each other.
+            The other surface; both are independent of each other.
 
         Returns
         -------
         MeasuredSurface
             Its h_max is reached by as small a share of it as theirs by them: of Gaussian surfaces the root of the sum
-            of squares.
+            of squares. It is in the unit of the first.
 
         Raises
         ------
         InputError
-            For a batch, and for surfaces of different units.
+            For a batch, and where one knows its unit and the other does not.
 
         Examples
         --------

@@ -11,14 +11,14 @@ from mbma_tables.errors import InputError
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A named surface, its length unit and where the paper uses it.
+    """A named surface, its length unit, None where all is over h_rms, and where the paper uses it.
 
     `numbers` are arguments of `Surface`, or of `Surface.from_moments` where the paper gives moments.
     """
 
     name: str
     title: str
-    length_unit: str
+    length_unit: str | None
     numbers: Mapping[str, float]
 
 
@@ -46,7 +46,9 @@ CASES = {
         Case("asphalt", "asphalt road of Lorenz (Figs. 13b, 14b)", "mm", _ASPHALT),
         Case("challenge", "contact-mechanics challenge (Fig. 15)", "um", _CHALLENGE),
         *(
-            Case(f"resolution-{zeta_1}", f"resolution study, zeta_1 = {zeta_1} (Figs. 16, 17)", "h_rms", numbers)
+            Case(
+                f"resolution-{zeta_1}", f"resolution study over h_rms, zeta_1 = {zeta_1} (Figs. 16, 17)", None, numbers
+            )
             for zeta_1, numbers in _RESOLUTIONS.items()
         ),
     )

@@ -18,6 +18,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.units import Units
 
 _TAIL = np.logspace(-6, -1, 61)[:-1]
 SHARES = np.concatenate([[0.0], _TAIL, np.linspace(0.1, 0.9, 81), 1 - _TAIL[::-1], [1.0]])  # of a surface, from its top
@@ -147,7 +148,7 @@ class MeasuredSurface(AnySurface):
     anisotropy : float, optional
         Root of the ratio of the gradient tensor's eigenvalues, 1 if isotropic; None where not measured.
     unit : str, optional
-        Name of the length unit; None where there is none.
+        The unit of length, such as "um"; None where it is not known. Results carry it.
     provenance : sequence of mapping, optional
         What was done to the measurement, a plain record each step: {"step": "detrend", "kind": "plane"}, ...
 
@@ -207,6 +208,7 @@ class MeasuredSurface(AnySurface):
             object.__setattr__(self, "heights", Heights.gaussian(self.h_rms, one_height(self.h_max)))
         object.__setattr__(self, "h_max", self.heights.h_max if self.h_max is None else one_height(self.h_max))
         object.__setattr__(self, "provenance", tuple(self.provenance))
+        object.__setattr__(self, "unit", Units(self.unit).length)
 
     def __repr__(self) -> str:
         numbers = f"h_rms={self.h_rms:.4g}, h_max={self.h_max:.4g}, rms gradient {self.rms_gradient:.4g}"
@@ -315,7 +317,7 @@ class MeasuredSurface(AnySurface):
             power=float(self.m0),
             convention="paper",
         )
-        return Surface(**fitted._asdict())
+        return Surface(**fitted._asdict(), unit=self.unit)
 
     def power_spectrum(self, q: ArrayLike) -> Any:
         """C(q) [length^4], a power law between samples, zero outside [q0, q1]."""
@@ -359,10 +361,12 @@ def one_height(h_max: Any) -> float:
 
 def combination(one: MeasuredSurface, other: MeasuredSurface) -> MeasuredSurface:
     """The surface that stands for two; see `AnySurface.combined`."""
-    if one.unit != other.unit:
+    if (one.unit is None) != (other.unit is None):
         raise InputError(
-            f"the surfaces are in different units, {one.unit!r} and {other.unit!r}: give both in the same one"
+            f"one surface is in {one.unit or other.unit!r}, the unit of the other is not known: make it with unit=..."
         )
+    if one.unit is not None:
+        other = other.to(one.unit)
     low, high = min(one.q0, other.q0), max(one.q1, other.q1)
     fine = np.geomspace(low, high, math.ceil(math.log(high / low) / math.log(FINE)) + 1)
     grid = np.unique(np.clip(np.concatenate([fine, one.q, other.q]), low, high))

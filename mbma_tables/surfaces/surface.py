@@ -16,6 +16,7 @@ from mbma_tables.errors import InputError
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.cases import get_case
+from mbma_tables.units import Units
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.measured import MeasuredSurface
@@ -28,7 +29,7 @@ PARAMETERS = ("hurst", "q0", "q1", "h_rms", "h_max")
 class Surface(AnySurface):
     """A self-affine surface with the spectrum C(q) ~ q^(-2-2H) between q0 and q1 (Eq. 6).
 
-    Any consistent length unit. Every argument may be an array; they broadcast to a batch of surfaces. Where one is
+    Lengths are in one unit. Every argument may be an array; they broadcast to a batch of surfaces. Where one is
     an xarray DataArray, dask-backed or not, `contact` answers with DataArrays, and arguments are checked then.
 
     Parameters
@@ -41,8 +42,10 @@ class Surface(AnySurface):
         Root-mean-square height, length.
     h_max : array_like
         Height of the highest point above the mid-plane, length; contact starts there.
+    unit : str, optional
+        The unit of length, such as "um"; None where it is not known. Results carry it.
     fit : SpectrumFit, optional
-        Where the surface was fitted to a measurement: how well.
+        Where the surface was fitted to a measurement: how well, in the measurement's unit.
 
     Raises
     ------
@@ -68,9 +71,11 @@ class Surface(AnySurface):
     q1: Any
     h_rms: Any
     h_max: Any
+    unit: str | None = dataclasses.field(default=None, kw_only=True)
     fit: SpectrumFit | None = dataclasses.field(default=None, repr=False, kw_only=True)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "unit", Units(self.unit).length)
         if self.labelled:
             # perhaps lazy: checked block by block, where numbers are computed
             return
@@ -90,11 +95,24 @@ class Surface(AnySurface):
         require("q1/q0", zeta_1, zeta_1 <= spectrum.MAX_ZETA_1, "at most 1e8")
 
     def __repr__(self) -> str:
-        return f"Surface({', '.join(f'{name}={_shown(getattr(self, name))}' for name in PARAMETERS)})"
+        numbers = [f"{name}={_shown(getattr(self, name))}" for name in PARAMETERS]
+        return f"Surface({', '.join([*numbers, *([f'unit={self.unit!r}'] if self.unit else [])])})"
+
+    def scaled(self, factor: float, unit: str | None) -> Surface:
+        """The same surface in another length unit, of which the old one is `factor`."""
+        waves, lengths = (self.q0 / factor, self.q1 / factor), (self.h_rms * factor, self.h_max * factor)
+        return dataclasses.replace(self, q0=waves[0], q1=waves[1], h_rms=lengths[0], h_max=lengths[1], unit=unit)
 
     @classmethod
     def from_moments(
-        cls, *, hurst: ArrayLike, m0: ArrayLike, m2: ArrayLike, m4: ArrayLike, h_max: ArrayLike
+        cls,
+        *,
+        hurst: ArrayLike,
+        m0: ArrayLike,
+        m2: ArrayLike,
+        m4: ArrayLike,
+        h_max: ArrayLike,
+        unit: str | None = None,
     ) -> Surface:
         """The surface with these spectral moments (Eqs. 1, 7).
 
@@ -106,6 +124,8 @@ class Surface(AnySurface):
             Variance of height [length^2], of a profile's slope, of its second derivative [1/length^2].
         h_max : array_like
             Height of the highest point above the mid-plane [length].
+        unit : str, optional
+            The unit of length.
 
         Returns
         -------
@@ -124,11 +144,11 @@ class Surface(AnySurface):
         >>> print(f"zeta_1 = {road.zeta_1:.4f}, q0 = {road.q0:.6f}")
         zeta_1 = 64.8598, q0 = 0.538132
         """
-        return cls(hurst, *spectrum.band_from_moments(hurst, m0, m2, m4), h_max)
+        return cls(hurst, *spectrum.band_from_moments(hurst, m0, m2, m4), h_max, unit=unit)
 
     @classmethod
     def named(cls, name: str) -> Surface:
-        """One of the paper's cases, in the length unit that `mbma_tables.surfaces.cases.CASES` gives for it.
+        """One of the paper's cases, in the paper's unit of length where it has one.
 
         Raises
         ------
@@ -138,11 +158,14 @@ class Surface(AnySurface):
         Examples
         --------
         >>> from mbma_tables import Surface
-        >>> float(Surface.named("challenge").h_rms)
-        0.762
+        >>> challenge = Surface.named("challenge")
+        >>> float(challenge.h_rms), challenge.unit
+        (0.762, 'um')
         """
-        numbers = get_case(name).numbers
-        return cls.from_moments(**numbers) if "m0" in numbers else cls(*(numbers[name] for name in PARAMETERS))
+        case = get_case(name)
+        make: Any = cls.from_moments if "m0" in case.numbers else cls
+        surface: Surface = make(**case.numbers, unit=case.length_unit)
+        return surface
 
     @classmethod
     def from_psd(
@@ -298,9 +321,9 @@ class Surface(AnySurface):
         Returns
         -------
         Surface or MeasuredSurface
-            Five numbers come with `fit`, a `SpectrumFit`. h_rms is that of the fitted law between q0 and q1. Without a
-            roll-off q0 is the map's own lowest wavenumber, though under a window the line is fitted from twice that
-            on; without a cut q1 is the largest measured wavenumber, at most pi/max(dx, dy).
+            In a topography's unit. Five numbers come with `fit`, a `SpectrumFit`. h_rms is that of the fitted law
+            between q0 and q1. Without a roll-off q0 is the map's own lowest wavenumber, though under a window the line
+            is fitted from twice that on; without a cut q1 is the largest measured wavenumber, at most pi/max(dx, dy).
 
         Raises
         ------
@@ -331,7 +354,8 @@ class Surface(AnySurface):
                 raise InputError("band belongs to model='self-affine': a measured surface is not fitted")
             return measured_map(heights, dx, dy, periodic, detrend, h_max)
 
-        return cls(**fit_map(heights, dx, dy, periodic, detrend, h_max, band)._asdict())
+        fitted = fit_map(heights, dx, dy, periodic, detrend, h_max, band)
+        return cls(**fitted._asdict(), unit=fitted.fit.length_unit)
 
     @property
     def labelled(self) -> bool:
@@ -371,7 +395,7 @@ class Surface(AnySurface):
         if self.labelled or self.shape != ():
             raise InputError("a batch has no single spectrum: take one surface at a time")
         ends = np.array([self.q0, self.q1])
-        return MeasuredSurface(ends, self.power_spectrum(ends), self.h_max)
+        return MeasuredSurface(ends, self.power_spectrum(ends), self.h_max, unit=self.unit)
 
     def power_spectrum(self, q: ArrayLike) -> Any:
         """C(q) of Eq. (6) [length^4], zero outside [q0, q1]; for one surface or broadcasting against it."""
@@ -394,7 +418,7 @@ def _with_hint(init: Any) -> Any:
 
     @functools.wraps(init)
     def checked(self: Surface, *given: Any, **named: Any) -> None:
-        for name in named.keys() - {*PARAMETERS, "fit"}:
+        for name in named.keys() - {*PARAMETERS, "unit", "fit"}:
             near = ["hurst"] if name == "H" else difflib.get_close_matches(name.lower(), PARAMETERS, 1)
             hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(PARAMETERS)}"
             raise TypeError(f"Surface has no argument {name!r}: {hint}")

@@ -11,6 +11,7 @@ from mbma_tables.cli import main
 from mbma_tables.export import SOLVERS, code
 
 LAW = ["--surface", "concrete", "--E-star", "13.3", "--length-unit", "mm", "--stress-unit", "MPa", "--rows", "20"]
+NUMBERS = ["--hurst", "0.8", "--q0", "0.1", "--zeta-1", "50", "--h-rms", "1", "--h-max", "3"]
 
 
 def run(*arguments):
@@ -76,9 +77,9 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["calculix", "--out", "law", *WITHOUT["--length-unit"]], "length_unit is missing"),
+        (["calculix", "--out", "law", *NUMBERS, "--E-star", "13.3MPa"], "length_unit is missing"),
         (["calculix", "--out", "law", *WITHOUT["--stress-unit"]], "stress_unit is missing"),
-        (["calculix", "--out", "law", *WITHOUT["--E-star"]], "a modulus is needed"),
+        (["calculix", "--out", "law", *WITHOUT["--E-star"]], "is given and no modulus"),
         (["calculix", "--out", "law", *WITHOUT["--surface"]], "one surface is needed"),
         (["calculix", "--out", "law", *WITHOUT["--rows"], "--rows", "300"], "holds 200 rows"),
         (["calculix", "--out", "law", *LAW, "--largest-overclosure", "5"], "largest_overclosure must be in"),
@@ -89,7 +90,7 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
         (["matlab", "--out", "law.txt", *LAW], "must be NAME.mat"),
         (
             ["abaqus", "--out", "law", *LAW, *CONDUCTANCE, "W\n*INCLUDE, INPUT=evil"],
-            "conductivity_unit is missing or not",
+            "conductivity_unit is not printable",
         ),
         (["cobol", "--out", "law", *LAW], "cobol"),
         (["c", "--out", "code", "--reading", "other"], "reading"),

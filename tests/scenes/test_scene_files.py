@@ -37,7 +37,7 @@ MISTAKES = {
     "missing map": ('[surface]\nmap = "none.nc"\n' + ON + AT, "is not a file; paths are relative"),
     "missing psd": ('[surface]\npsd = "none.txt"\nh_max = 1.0\n' + ON + AT, "is not a file"),
     "convention without psd": ('[surface]\nname = "concrete"\nconvention = "paper"\n' + ON + AT, "give psd"),
-    "another length unit": ('[surface]\nname = "concrete"\nlength_unit = "m"\n' + ON + AT, "leave length_unit out"),
+    "another length unit": ('[surface]\nname = "concrete"\nlength_unit = "MPa"\n' + ON + AT, "no known unit of length"),
     "hurst above one": (
         "[surface]\nhurst = 1.8\nq0 = 1.0\nzeta_1 = 50\nh_rms = 0.1\nh_max = 0.3\n" + ON + AT,
         r"hurst must be in \(0, 1\]",
@@ -85,7 +85,7 @@ MISTAKES = {
     ),
     "text for a number": (
         SURFACE + ON + '[prescribed]\nseparations = ["a"]\n',
-        r"separations\[0\]: 'a' is not of type 'number'",
+        "separations must be a number, or one with its unit, got 'a'",
     ),
     "not finite": (SURFACE + ON + "[prescribed]\nseparations = [nan]\n", "must be finite"),
     "impossible tolerance": (

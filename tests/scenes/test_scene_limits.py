@@ -81,9 +81,10 @@ def test_progress_in_blocks():
 @pytest.mark.parametrize(
     ("given", "units"),
     [
-        ({}, ("1", "1/length", "length")),
-        ({"E_star": 2.0}, ("stress", "stress/length", "stress length")),
-        ({"E_star": 2.0, "stress_unit": "MPa", "length_unit": "mm"}, ("MPa", "MPa/mm", "MPa mm")),
+        ({"surface": dataclasses.replace(CONCRETE, unit=None)}, ("1", "1/length", "length")),
+        ({"E_star": 2.0}, ("stress", "stress/mm", "stress mm")),
+        ({"E_star": 2.0, "stress_unit": "MPa"}, ("MPa", "MPa/mm", "MPa mm")),
+        ({"E_star": "2 MPa", "surface": CONCRETE.to("m")}, ("MPa", "MPa/m", "MPa m")),
     ],
 )
 def test_units(given, units):

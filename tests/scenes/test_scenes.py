@@ -198,7 +198,7 @@ def test_a_result_names_what_made_it():
     assert found.attrs["reading"] == "printed"
     assert set(json.loads(found.attrs["table_hashes"])) <= set(json.loads(found.attrs["tiers"]).values())
     assert found["force"].attrs["units"] == "1"
-    assert found["separation"].attrs["units"] == "length"
+    assert found["separation"].attrs["units"] == "mm"
 
 
 @pytest.mark.parametrize(

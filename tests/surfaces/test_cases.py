@@ -46,7 +46,7 @@ def test_each_says_what_it_is():
         assert get_case(name) is case
         assert case.name == name
         assert "Fig" in case.title
-        assert case.length_unit in ("nm", "um", "mm", "h_rms")
+        assert case.length_unit in ("nm", "um", "mm", None)
 
 
 def test_unknown_name():

@@ -148,7 +148,7 @@ class TestCombined:
 
     def test_units_must_agree(self):
         one = Surface.from_spectrum(Q, C, h_max=9.0, unit="um")
-        with pytest.raises(InputError, match="different units, 'um' and None"):
+        with pytest.raises(InputError, match="one surface is in 'um', the unit of the other is not known"):
             one.combined(FIVE)
 
     def test_a_batch_is_refused(self):

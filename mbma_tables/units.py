@@ -1,0 +1,240 @@
+"""Units of length and stress: which there are, how "0.8 um" is read and converted, and what unit a result has.
+
+One rule holds everywhere. A number is in the unit that is known: the surface's, or the modulus's. A number that names
+its unit is converted to that. A unit asked for converts what has another one, and says in which unit plain numbers are
+where none is known yet. What cannot be converted is refused.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import re
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+from mbma_tables.errors import InputError
+
+_POUND_PER_INCH = Fraction("4.4482216152605") / Fraction("0.0254") ** 2
+SIZES: dict[str, dict[str, Fraction]] = {
+    "length": {
+        "m": Fraction(1),
+        "km": Fraction(1000),
+        "cm": Fraction("1e-2"),
+        "mm": Fraction("1e-3"),
+        "um": Fraction("1e-6"),
+        "nm": Fraction("1e-9"),
+        "angstrom": Fraction("1e-10"),
+        "pm": Fraction("1e-12"),
+        "ft": Fraction("0.3048"),
+        "in": Fraction("0.0254"),
+        "mil": Fraction("0.0254e-3"),
+        "uin": Fraction("0.0254e-6"),
+    },
+    "stress": {
+        "Pa": Fraction(1),
+        "kPa": Fraction(10**3),
+        "MPa": Fraction(10**6),
+        "GPa": Fraction(10**9),
+        "TPa": Fraction(10**12),
+        "bar": Fraction(10**5),
+        "atm": Fraction(101325),
+        "psi": _POUND_PER_INCH,
+        "ksi": 1000 * _POUND_PER_INCH,
+        "Msi": 10**6 * _POUND_PER_INCH,
+    },
+}
+ALIASES = {"micron": "um", "Å": "angstrom", "inch": "in", "N/mm^2": "MPa", "N/mm2": "MPa", "N/m^2": "Pa", "N/m2": "Pa"}
+# powers of length and of stress of whatever has a name and a unit
+DIMENSIONS = {
+    **dict.fromkeys(("h_rms", "h_max", "Ra", "Rq", "Rsm", "Sa", "Sq", "Sp"), (1, 0)),
+    **dict.fromkeys(("separation", "mean_separation", "delta", "R_d", "R_u", "sigma", "h_d", "overclosure"), (1, 0)),
+    **dict.fromkeys(("separations", "mean_separations", "deltas"), (1, 0)),
+    **dict.fromkeys(("q0", "q1"), (-1, 0)),
+    **dict.fromkeys(("D", "m4", "Sds"), (-2, 0)),
+    **dict.fromkeys(("E_star", "E1", "E2", "pressure", "pressures", "force"), (0, 1)),
+    "m0": (2, 0),
+    "stiffness": (-1, 1),
+    "energy": (1, 1),
+    "island_force": (2, 1),
+    "island_area": (2, 0),
+    "island_density": (-3, 0),
+}
+_ASCII = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "²": "2"})
+_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(.*)", re.DOTALL)
+
+
+def known(unit: Any, kind: str = "length") -> str:
+    """A unit's name as this package writes it.
+
+    Raises
+    ------
+    InputError
+        For what is no unit of that kind; the message names the nearest ones.
+
+    Examples
+    --------
+    >>> from mbma_tables.units import known
+    >>> known("µm"), known("N/mm^2", "stress")
+    ('um', 'MPa')
+    """
+    if not isinstance(unit, str):
+        raise InputError(f"a unit of {kind} is a text such as {next(iter(SIZES[kind]))!r}, got {unit!r}")
+    plain = ALIASES.get(unit.strip(), unit.strip().translate(_ASCII))
+    plain = ALIASES.get(plain, plain)
+    if plain not in SIZES[kind]:
+        near = difflib.get_close_matches(plain, SIZES[kind], 3, 0.5) or SIZES[kind]
+        raise InputError(f"{unit!r} is no known unit of {kind}: write {' or '.join(near)}")
+    return plain
+
+
+def factor(have: str, want: str, kind: str = "length", power: int = 1) -> float:
+    """By what a number in one unit is multiplied to be in another, rounded once.
+
+    Examples
+    --------
+    >>> from mbma_tables.units import factor
+    >>> factor("um", "mm"), factor("GPa", "MPa", "stress"), factor("mm", "m", power=-1)
+    (0.001, 1000.0, 1000.0)
+    """
+    return float((SIZES[kind][known(have, kind)] / SIZES[kind][known(want, kind)]) ** power)
+
+
+def read(name: str, text: str) -> tuple[float, str | None]:
+    """A number and the unit of length or stress that a text gives it, None where it gives none.
+
+    Raises
+    ------
+    InputError
+        For what is no number, and for a unit that `name` cannot have.
+
+    Examples
+    --------
+    >>> from mbma_tables.units import read
+    >>> read("h_rms", "0.8um"), read("q0", "6.28/mm"), read("m4", "62 1/mm^2"), read("E1", "210 GPa")
+    ((0.8, 'um'), (6.28, 'mm'), (62.0, 'mm'), (210.0, 'GPa'))
+    """
+    found = _NUMBER.fullmatch(text)
+    if found is None:
+        raise InputError(f"{name} must be a number, or one with its unit, got {text!r}")
+    number, rest = float(found[1]), found[2].strip()
+    if not rest:
+        return number, None
+    length, stress = DIMENSIONS.get(name, (0, 0))
+    if not (length or stress):
+        raise InputError(f"{name} has no unit: leave {rest!r} out")
+    kind, power = ("length", length) if length else ("stress", stress)
+    base = rest.translate(_ASCII).replace("**", "^")
+    size = str(abs(power))
+    # 1/mm^2, /mm2, mm^-2 and mm-2 for power -2
+    patterns = [rf"(.*?)\^?{power}"] if power != 1 else [r"(.*)"]
+    if power < 0:
+        patterns.append(r"1? ?/ ?(.*)" if power == -1 else rf"1? ?/ ?(.*?)\^?{size}")
+    for pattern in patterns:
+        whole = re.fullmatch(pattern, base)
+        if whole is not None:
+            return number, known(whole[1], kind)
+    sample = unit_of(name, Units(next(iter(SIZES["length"])), next(iter(SIZES["stress"]))))
+    raise InputError(f"{name} = {text!r}: the unit must be like {sample}")
+
+
+@dataclasses.dataclass(frozen=True)
+class Units:
+    """The units that numbers are in; None where not known, and stress "1" where it is over E*."""
+
+    length: str | None = None
+    stress: str | None = None
+
+    def __post_init__(self) -> None:
+        for kind in ("length", "stress"):
+            unit = getattr(self, kind)
+            if unit is not None and (kind, unit) != ("stress", "1"):
+                object.__setattr__(self, kind, known(unit, kind))
+
+    def number(self, name: str, value: Any) -> Any:
+        """`value` in these units: plain numbers as they are, "0.8 um" converted, lists entry by entry.
+
+        Raises
+        ------
+        InputError
+            Where a unit is given and none is known.
+
+        Examples
+        --------
+        >>> from mbma_tables.units import Units
+        >>> Units("um", "MPa").number("separation", [2, "1.5e-3 mm"])
+        [2, 1.5]
+        """
+        if isinstance(value, list | tuple):
+            return [self.number(name, entry) for entry in value]
+        if not isinstance(value, str):
+            return value
+        number, unit = read(name, value)
+        if unit is None:
+            return number
+        length, power = DIMENSIONS[name]
+        kind = "length" if length else "stress"
+        own = self.length if length else self.stress
+        if own == "1":
+            raise InputError(f"{name} = {value!r} needs a modulus, which is missing: stresses are over E* without one")
+        if own is None:
+            mend = "give the surface its unit" if length else "give E* with its unit, such as '100 GPa'"
+            raise InputError(f"{name} = {value!r} beside numbers whose unit of {kind} is not known: {mend}")
+        return number * factor(unit, own, kind, length or power)
+
+
+def resolve(
+    given: Mapping[str, Any], asked: str | None = None, kind: str = "length"
+) -> tuple[dict[str, Any], str | None]:
+    """Numbers in one unit of length or stress, and that unit: the one asked for, else the first that is named.
+
+    Raises
+    ------
+    InputError
+        Where some name a unit and others, which need one too, do not, and none is asked for.
+
+    Examples
+    --------
+    >>> from mbma_tables.units import resolve
+    >>> resolve({"hurst": 0.8, "h_rms": "0.8 um", "h_max": "3e-3 mm"})
+    ({'hurst': 0.8, 'h_rms': 0.8, 'h_max': 3.0}, 'um')
+    """
+    named = {name: read(name, value)[1] for name, value in given.items() if isinstance(value, str)}
+    unit = known(asked, kind) if asked else next((u for u in named.values() if u is not None), None)
+    if unit is not None and not asked:
+        plain = [n for n in given if any(DIMENSIONS.get(n, ())) and named.get(n) is None]
+        if plain:
+            raise InputError(
+                f"{', '.join(plain)} without a unit beside numbers in {unit}: write the unit to each, "
+                f"or give {kind}_unit"
+            )
+    own = Units(length=unit) if kind == "length" else Units(stress=unit)
+    return {name: own.number(name, value) for name, value in given.items()}, unit
+
+
+def unit_of(name: str, units: Units) -> str:
+    """The unit of a quantity by its name, such as "MPa/um"; "1" for numbers without one.
+
+    Examples
+    --------
+    >>> from mbma_tables.units import Units, unit_of
+    >>> unit_of("stiffness", Units("um", "MPa")), unit_of("m4", Units("mm")), unit_of("energy", Units("mm"))
+    ('MPa/um', '1/mm^2', 'stress mm')
+    """
+    length, stress = DIMENSIONS.get(name, (0, 0))
+    powers = ((units.stress or "stress", stress), (units.length or "length", length))
+    above = [_power(unit, n) for unit, n in powers if n > 0 and unit != "1"]
+    below = [_power(unit, -n) for unit, n in powers if n < 0]
+    return (" ".join(above) or "1") + "".join(f"/{part}" for part in below)
+
+
+def _power(unit: str, power: int) -> str:
+    return unit if power == 1 else f"{unit}^{power}"
+
+
+def in_unit(surface: Any, unit: str | None) -> Any:
+    """A surface in the unit asked for: converted where it knows its own, said to be in it where it does not."""
+    if unit is None:
+        return surface
+    return dataclasses.replace(surface, unit=unit) if surface.unit is None else surface.to(unit)

@@ -1,0 +1,318 @@
+"""Units: read and converted rightly in every entry, kept through results, refused where they conflict."""
+
+import json
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbma_tables import InputError, Scene, Surface
+from mbma_tables.cli import main
+from mbma_tables.export.law_rows import describe_law
+from mbma_tables.units import ALIASES, DIMENSIONS, SIZES, Units, factor, known, read, resolve, unit_of
+
+# in metres and pascals, written down again: 1 in = 25.4 mm, 1 lbf = 4.4482216152605 N
+METRES = {"m": 1, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "angstrom": 1e-10, "pm": 1e-12}
+METRES |= {"in": 0.0254, "ft": 12 * 0.0254, "mil": 2.54e-5, "uin": 2.54e-8}
+PASCALS = {"Pa": 1, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "TPa": 1e12, "bar": 1e5, "atm": 101325}
+PASCALS |= {"psi": 6894.757293168361, "ksi": 6894757.293168361, "Msi": 6894757293.168361}
+EPS = np.finfo(float).eps
+LENGTH_NAMES = [name for name, (length, stress) in DIMENSIONS.items() if length and not stress]
+SPELLINGS = {
+    1: ("{0}",),
+    2: ("{0}^2", "{0}2", "{0}**2", "{0}²"),
+    -1: ("1/{0}", "/{0}", "{0}^-1", "{0}-1"),
+    -2: ("1/{0}^2", "/{0}2", "{0}^-2", "1/{0}²"),
+    -3: ("1/{0}^3", "{0}^-3"),
+}
+
+
+def run(*arguments):
+    found = CliRunner().invoke(main, [str(a) for a in arguments])
+    return found.exit_code, found.output
+
+
+def test_sizes():
+    for kind, known_sizes in (("length", METRES), ("stress", PASCALS)):
+        assert set(SIZES[kind]) == set(known_sizes)
+        for unit, size in known_sizes.items():
+            assert float(SIZES[kind][unit]) == pytest.approx(size, rel=1e-15)
+    assert {known("µm"), known("μm"), known("micron"), known(" um ")} == {"um"}
+    assert known("N/mm²", "stress") == known("N/mm2", "stress") == "MPa"
+    assert all(any(unit in sizes for sizes in SIZES.values()) for unit in ALIASES.values())
+
+
+@settings(max_examples=1000, deadline=None)
+@given(
+    number=st.floats(-1e12, 1e12, allow_subnormal=False).filter(lambda x: x == 0 or abs(x) > 1e-12),
+    name=st.sampled_from(LENGTH_NAMES),
+    have=st.sampled_from(sorted(METRES)),
+    want=st.sampled_from(sorted(METRES)),
+    spelling=st.integers(0, 3),
+    space=st.sampled_from(["", " ", "  "]),
+)
+def test_any_length_converts(number, name, have, want, spelling, space):
+    power = DIMENSIONS[name][0]
+    forms = SPELLINGS[power]
+    unit = forms[spelling % len(forms)].format(have)
+    # 5 1/mm needs the space that 5/mm does not
+    text = f"{number!r}{space or (' ' if unit[0] == '1' else '')}{unit}"
+    found = Units(want).number(name, text)
+    exact = Fraction(number) * (SIZES["length"][have] / SIZES["length"][want]) ** power
+    assert abs(Fraction(found) - exact) <= abs(exact) * Fraction(2 * EPS)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.floats(1e-6, 1e6), st.sampled_from(sorted(PASCALS)), st.sampled_from(sorted(PASCALS)))
+def test_any_stress_converts(number, have, want):
+    found = Units(stress=want).number("pressure", f"{number!r} {have}")
+    assert found == pytest.approx(number * PASCALS[have] / PASCALS[want], rel=4 * EPS)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.sampled_from(sorted(METRES)), st.sampled_from(sorted(METRES)))
+def test_a_surface_there_and_back(have, want):
+    surface = Surface(0.8, [0.5, 1.0], 100.0, 0.2, 0.6, unit=have)
+    moved = surface.to(want)
+    assert moved.unit == want
+    # what has no unit stays, what has one goes with its power
+    for name in ("hurst", "zeta_1", "alpha", "rms_gradient", "m2"):
+        np.testing.assert_allclose(getattr(moved, name), getattr(surface, name), rtol=1e-13)
+    for name in ("q0", "q1", "h_rms", "h_max", "m0", "m4"):
+        size = (METRES[have] / METRES[want]) ** DIMENSIONS[name][0]
+        np.testing.assert_allclose(getattr(moved, name), getattr(surface, name) * size, rtol=1e-13)
+        np.testing.assert_allclose(getattr(moved.to(have), name), getattr(surface, name), rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("h_rms", "0.8 um^2"), ("q0", "6 mm"), ("m0", "1 mm"), ("hurst", "0.8 um"), ("E1", "210 mm"), ("h_rms", "1 MPa")]
+    + [("h_rms", text) for text in ("um", "", "1,5 um", "0.8 furlong", "nan um", "1 um um")],
+)
+def test_texts_that_are_refused(name, text):
+    with pytest.raises(InputError, match=name + "|no known unit"):
+        read(name, text)
+
+
+def test_two_surfaces_in_their_own_units():
+    one, other = Surface(0.8, 0.5, 100.0, 0.2, 0.6, unit="mm"), Surface(0.8, 0.5e-3, 0.1, 200.0, 600.0, unit="um")
+    both, same = one.combined(other), one.combined(one)
+    assert both.unit == "mm"
+    for name in ("h_rms", "h_max", "q0", "q1", "m2", "m4"):
+        assert getattr(both, name) == pytest.approx(getattr(same, name), rel=1e-9)
+    assert both.to("um").h_rms == pytest.approx(1e3 * both.h_rms, rel=1e-14)
+    with pytest.raises(InputError, match="the unit of the other is not known"):
+        one.combined(PLAIN)
+
+
+def test_units_of_results():
+    expected = {"force": "MPa", "stiffness": "MPa/um", "energy": "MPa um", "q0": "1/um", "area": "1"}
+    assert {name: unit_of(name, Units("um", "MPa")) for name in expected} == expected
+    assert unit_of("stiffness", Units("um", "1")) == "1/um"
+    assert unit_of("island_force", Units("um", "1")) == "um^2"
+    assert unit_of("stiffness", Units()) == "stress/length"
+
+
+NUMBERS = {"hurst": 0.8, "q0": "6.283/mm", "zeta_1": 100, "h_rms": "0.8 um", "h_max": "2.4e-3 mm"}
+
+
+def test_resolve_takes_the_first_unit_or_the_one_asked_for():
+    assert resolve(NUMBERS)[1] == "mm"
+    plain, unit = resolve(NUMBERS, "m")
+    assert unit == "m"
+    assert [plain[name] for name in NUMBERS] == pytest.approx([0.8, 6283.0, 100, 0.8e-6, 2.4e-6], rel=1e-15)
+    # plain numbers are in the unit asked for
+    assert resolve({"h_rms": 2.0, "h_max": "6 mm"}, "um") == ({"h_rms": 2.0, "h_max": 6000.0}, "um")
+    with pytest.raises(InputError, match="h_max without a unit beside numbers in um: write the unit to each"):
+        resolve({"h_rms": "2 um", "h_max": 6.0})
+
+
+CONCRETE = Surface.named("concrete")
+PLAIN = Surface(0.8, 0.1, 10.0, 1.0, 3.0)
+PYTHON = {
+    "no unit": (lambda: PLAIN.to("mm"), "the surface's unit is not known: make it with unit="),
+    "no such unit": (lambda: Surface(0.8, 0.1, 10.0, 1.0, 3.0, unit="millimetre"), "no known unit of length"),
+    "no text": (lambda: CONCRETE.to(1.0), "a unit of length is a text"),
+    "stress for length": (lambda: CONCRETE.to("MPa"), "'MPa' is no known unit of length"),
+    "scene": (lambda: Scene(CONCRETE, separations=[0.5], length_unit="m"), r"ask for surface.to\('m'\)"),
+    "gap of a plain surface": (lambda: Scene(PLAIN, separations=["1 um"]), "give the surface its unit"),
+    "pressure without E*": (lambda: Scene(CONCRETE, pressures=["1 MPa"]), "needs a modulus"),
+    "pressure beside a plain E*": (lambda: Scene(CONCRETE, pressures=["1 MPa"], E_star=9.0), "give E\\* with its unit"),
+    "export without a length unit": (lambda: describe_law(PLAIN, "13 MPa", rows=9), "length_unit is missing"),
+    "export without a stress unit": (lambda: describe_law(CONCRETE, 13.0, rows=9), "stress_unit is missing"),
+    "export into a wrong unit": (lambda: describe_law(CONCRETE, "13 MPa", length_unit="kg", rows=9), "no known unit"),
+}
+
+
+@pytest.mark.parametrize("case", PYTHON)
+def test_conflicts_in_python(case):
+    make, said = PYTHON[case]
+    with pytest.raises(InputError, match=said) as caught:
+        make()
+    assert "\n" not in str(caught.value)
+
+
+SURFACE = '[surface]\nhurst = 0.8\nq0 = "0.1/mm"\nzeta_1 = 50\nh_rms = "800 um"\n'
+REST = '[effects]\non = ["force"]\n'
+TOML = {
+    "plain beside a unit": (SURFACE + "h_max = 3\n" + REST, "h_max without a unit beside numbers in mm"),
+    "wrong power": (SURFACE + 'h_max = "3 1/mm"\n' + REST, "h_max|no known unit"),
+    "unit of a plain surface": (
+        "[surface]\nhurst = 0.8\nq0 = 0.1\nzeta_1 = 50\nh_rms = 1\nh_max = 3\n"
+        + REST
+        + '[prescribed]\nseparations = "1 mm"\n',
+        "give the surface its unit",
+    ),
+    "stress of no modulus": (
+        SURFACE + 'h_max = "3 mm"\n' + REST + '[prescribed]\npressures = "1 MPa"\n',
+        "needs a modulus",
+    ),
+    "unit of no modulus": (SURFACE + 'h_max = "3 mm"\n[material]\nstress_unit = "MPa"\n' + REST, "no modulus"),
+    "moduli without one": (
+        SURFACE + 'h_max = "3 mm"\n[material]\nE1 = "210 GPa"\nnu1 = 0.3\nE2 = 70\nnu2 = 0.3\n' + REST,
+        "E2 without a unit beside numbers in GPa",
+    ),
+    "length for stress": (
+        SURFACE + 'h_max = "3 mm"\n[material]\nE_star = "210 mm"\n' + REST,
+        "no known unit of stress",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", TOML)
+def test_conflicts_in_toml(case, tmp_path):
+    content, said = TOML[case]
+    (tmp_path / "scene.toml").write_text(content)
+    with pytest.raises(InputError, match=said) as caught:
+        Scene.from_toml(tmp_path / "scene.toml")
+    assert "\n" not in str(caught.value)
+
+
+BAND = ("--hurst", "0.8", "--q0", "0.1/mm", "--zeta-1", "50", "--h-rms", "800um")
+COMMANDS = {
+    "plain beside a unit": ((*BAND, "--h-max", "3", "-d", "1"), "h_max without a unit beside numbers in mm"),
+    "gap without the surface's": (
+        ("--hurst", "0.8", "--q0", "0.1", "--zeta-1", "50", "--h-rms", "1", "--h-max", "3", "-d", "1mm"),
+        "give the surface its unit",
+    ),
+    "pressure without E*": (("--surface", "concrete", "-p", "1MPa"), "needs a modulus"),
+    "pressure beside a plain E*": (("--surface", "concrete", "--E-star", "9", "-p", "1MPa"), "give E* with its unit"),
+    "no such unit": (("--surface", "concrete", "-d", "1", "--length-unit", "mn"), "'mn' is no known unit of length"),
+    "stress unit and no modulus": (("--surface", "concrete", "-d", "1", "--stress-unit", "MPa"), "no modulus"),
+    "multiples with a unit": (("--surface", "concrete", "-d", "1mm", "--over-h-rms"), "multiples of h_rms"),
+    "number with a unit": (("--surface", "concrete", "-a", "1mm"), "area has no unit"),
+}
+
+
+@pytest.mark.parametrize("case", COMMANDS)
+def test_conflicts_on_the_command_line(case):
+    arguments, said = COMMANDS[case]
+    code, text = run("contact", *arguments)
+    assert code == 2
+    assert said in text
+    assert len(text.strip().splitlines()) == 1
+
+
+def asked(*arguments):
+    code, text = run("contact", *arguments, "--json")
+    assert code == 0, text
+    return json.loads(text)
+
+
+def test_the_command_line_converts():
+    plain = asked("--surface", "concrete", "--E-star", "13.3MPa", "-d", "0.5,0.2")
+    moved = asked("--surface", "concrete", "--E-star", "13.3MPa", "-d", "500um,0.2mm", "--length-unit", "m")
+    assert (plain["units"]["separation"], plain["units"]["force"], plain["units"]["area"]) == ("mm", "MPa", "-")
+    assert (moved["units"]["separation"], moved["units"]["stiffness"]) == ("m", "MPa/m")
+    for name, size in {"separation": 1e-3, "force": 1, "area": 1, "stiffness": 1e3}.items():
+        found, expected = (np.array(answer["columns"][name]) for answer in (moved, plain))
+        np.testing.assert_allclose(found, size * expected, rtol=1e-8)
+    pascals = asked("--surface", "concrete", "--E-star", "13.3MPa", "--stress-unit", "Pa", "-p", "1kPa")
+    assert pascals["columns"]["force"] == pytest.approx([1000.0], rel=1e-12)
+    assert (pascals["E_star"], pascals["stress_unit"], pascals["units"]["force"]) == (13.3e6, "Pa", "Pa")
+
+
+def test_h_rms_with_its_unit():
+    numbers = ("--hurst", "0.8", "--q0", "6.283/mm", "--zeta-1", "100", "--h-rms", "0.8um", "--h-max", "2.4um")
+    found = asked(*numbers, "-d", "1um", "--length-unit", "um")
+    assert found["surface"]["h_rms"] == 0.8
+    assert found["surface"]["q0"] == pytest.approx(6.283e-3, rel=1e-15)
+    assert found["columns"]["separation"] == [1.0]
+    assert asked(*numbers, "-d", "1um")["surface"]["length_unit"] == "mm"
+
+
+def test_a_surface_file_states_both_units(tmp_path):
+    path = tmp_path / "s.toml"
+    path.write_text('[surface]\nname = "concrete"\n[material]\nE_star = "0.0133 GPa"\nstress_unit = "MPa"\n')
+    found = asked("--file", path, "-d", "0.5")
+    assert (found["E_star"], found["stress_unit"], found["units"]["force"]) == (pytest.approx(13.3), "MPa", "MPa")
+    # a modulus of the command line is in the file's unit, unless it has its own
+    assert asked("--file", path, "--E-star", "20", "-d", "0.5")["E_star"] == 20
+    assert asked("--file", path, "--E-star", "2GPa", "-d", "0.5")["stress_unit"] == "GPa"
+    assert asked("--file", path, "-d", "500", "--length-unit", "um", "--stress-unit", "Pa")["E_star"] == pytest.approx(
+        13.3e6
+    )
+
+
+def test_a_scene_file_with_units(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        SURFACE + 'h_max = "2.4 mm"\nlength_unit = "um"\n'
+        '[material]\nE_star = "0.1 GPa"\n[prescribed]\npressures = ["100 kPa", 2e-4]\n'
+        '[effects]\non = ["force", "stiffness"]\n[accuracy]\nrtol = 1e-4\n'
+    )
+    found = Scene.from_toml(path).run()
+    assert found["force"].values == pytest.approx([1e-4, 2e-4], rel=1e-4)
+    assert {name: found[name].attrs["units"] for name in ("force", "stiffness", "separation")} == {
+        "force": "GPa",
+        "stiffness": "GPa/um",
+        "separation": "um",
+    }
+    assert found.attrs["surface_h_rms"] == 800.0
+
+
+SOURCES = {
+    "named": ("--surface", "concrete"),
+    "numbers": tuple(
+        f"--{name.replace('_', '-')}={float(getattr(CONCRETE, name))!r}{unit}"
+        for name, unit in {"hurst": "", "q0": "/mm", "q1": "/mm", "h_rms": "mm", "h_max": "mm"}.items()
+    ),
+    "file": ("--file", "examples/concrete.toml"),
+}
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_an_export_converts_what_knows_its_unit(source, tmp_path):
+    """A surface in mm, asked for in m: until now its numbers were written as metres."""
+    material = () if source == "file" else ("--E-star", "13.3")
+    laws = {}
+    for length, stress in (("mm", "MPa"), ("m", "MPa")):
+        path = tmp_path / f"{length}.json"
+        arguments = (*SOURCES[source], *material, "--length-unit", length, "--stress-unit", stress)
+        code, text = run("export", "json", *arguments, "--rows", 20, "--out", path)
+        assert code == 0, text
+        laws[length] = json.loads(path.read_text())
+    assert any("h_max = 0.0011;" in line or "h_max = 0.0011 " in line for line in laws["m"]["comments"][2:3])
+    assert laws["m"]["x_unit"] == "m"
+    ends = {unit: law["columns"]["overclosure"][-1] for unit, law in laws.items()}
+    assert ends["m"] == pytest.approx(1e-3 * ends["mm"], rel=1e-6)
+    tops = {unit: law["columns"]["pressure"][-1] for unit, law in laws.items()}
+    assert tops["m"] == pytest.approx(tops["mm"], rel=1e-3)
+
+
+def test_an_export_keeps_the_surfaces_unit():
+    law = describe_law(CONCRETE, "13.3 MPa", rows=20, largest_overclosure="500 um")
+    assert (law.x_unit, law.y_unit, law.x[-1]) == ("mm", "MPa", 0.5)
+    other = describe_law(CONCRETE, "13.3 MPa", length_unit="um", stress_unit="kPa", rows=20, largest_overclosure=500)
+    assert (other.x_unit, other.y_unit) == ("um", "kPa")
+    np.testing.assert_allclose(other.x, 1e3 * law.x, rtol=2e-6)
+    np.testing.assert_allclose(other.y, 1e3 * law.y, rtol=1e-5)
+
+
+def test_the_factor_is_rounded_once():
+    assert factor("um", "mm") == 1e-3
+    assert factor("nm", "mm", power=-2) == 1e12
+    assert factor("GPa", "MPa", "stress") == 1e3
