@@ -18,6 +18,7 @@ GROUPS = {
     "calibrated": "generate.calibrated",
     "leakage": "generate.boundary_elements.leakage",
     "formulas": "generate.formulas.commands",
+    "grids": "generate.boundary_elements.grids",
     "tables": "generate.tables.commands",
 }
 
