@@ -16,7 +16,6 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import click
-import numpy as np
 from tqdm import tqdm
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, campaign
@@ -35,7 +34,7 @@ COLUMNS = ("hurst", "zeta_1", "waves", "seed", "points", "start", "force", "area
 HEAD = """\
 # Held-out surfaces of boundary_elements.nc on grids of 32 to 1024 points a side, by python -m generate grids.
 # force in A0 E* g, g the rms gradient of the finest grid; area A/A0, corrected for its perimeter; separation in h_rms.
-# seconds of the processor for one load; cost: those over the fixed piece of work of docs/cost.md, timed before and after
+# seconds of the processor a load; cost: those over the fixed piece of work of docs/cost.md, timed before and after.
 """
 
 

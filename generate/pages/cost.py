@@ -18,6 +18,7 @@ from generate.pages.cost_islands import island_rows
 from generate.pages.cost_totals import total_rows
 from generate.pages.page import png, table
 from mbma_tables.scenes.costs import COLUMNS, UNIT, Costs, Row, read_costs
+from mbma_tables.theories import THEORIES
 
 METHODS = {"classical": "classical iteration", "exact": "Newton (exact)"}
 LIBRARIES = ("numpy", "scipy", "numba")
@@ -125,7 +126,7 @@ def parts_of(costs: Costs) -> dict[str, str]:
     islands, totals = islands_of(costs), totals_of(costs)
     names = ("import", "call", "law", "profile", "lookup")
     once = [row for row in costs.rows if (row.what in names and row.quantity == "both") or row.what == "invert"]
-    once += [row for row in costs.rows if row.tier in ("greenwood_williamson", "persson")]
+    once += [row for row in costs.rows if row.tier in THEORIES and row.what not in names]
     return {
         "unit": f"Here the fixed work took {1e6 * costs.seconds:.0f} us, on one core.",
         "islands": f"They span {spans(islands)}.\n\n{rows_table(islands, pareto_front(islands))}",

@@ -21,10 +21,10 @@ from generate.calibrated import QUANTITIES, errors
 from generate.pages.page import ROOT
 from mbma_tables import Surface, theories
 from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import CONSTANTS, PERSSON, YANG_PERSSON, Constants, Law, Spectrum
+from mbma_tables.calibrated import CONSTANTS, YANG_PERSSON, Law, Spectrum
 from mbma_tables.calibrated_map import MAP_CONSTANTS
 from mbma_tables.errors import MbmaError
-from mbma_tables.surfaces.readings import PRINTED, REPORTED, Reading
+from mbma_tables.surfaces.readings import REPORTED, Reading
 from mbma_tables.theories.calibrated_curves import standing_for
 
 DATA = ROOT / "docs" / "data"
@@ -96,10 +96,6 @@ def _theory(theory: theories.Theory) -> Callable[[Case], Any]:
     return lambda one: Curve(lambda surface, u: theory.answer(surface, u)[:2], surface_of(one))
 
 
-def _persson(constants: Constants) -> Callable[[Case], Any]:
-    return lambda one: Law(one.spectrum, None, constants)
-
-
 def _map(one: Case) -> Any:
     if not one.curves:
         raise MbmaError("no map")
@@ -113,9 +109,8 @@ THEORIES: dict[str, Callable[[Case], Any]] = {
     "MBMA cover": _mbma(COVER),
     "calibrated": lambda one: one.law(CONSTANTS),
     "calibrated, map": _map,
-    "Persson": _persson(YANG_PERSSON),
+    "Persson": lambda one: Law(one.spectrum, None, YANG_PERSSON),
     "Persson simplified": _theory(theories.Persson("simplified")),
-    "Persson, weight 1": _persson(PERSSON),
     "G-W": _theory(theories.GreenwoodWilliamson()),
 }
 TIERS = {"formula": _mbma("reported", "formula"), "rigid": _mbma("reported", "rigid")}
@@ -182,7 +177,7 @@ def _self_affine(hurst: float, zeta_1: float, h_max: float, rows: Any) -> Case:
 
 def earlier() -> list[Case]:
     """The 105 surfaces of docs/data/boundary_elements.csv, to which the reading `fitted` was fitted."""
-    table, keys = _columns("boundary_elements.csv"), ("hurst", "L_over_lambda0", "zeta_1", "seed")
+    table, keys = _columns("boundary_elements.csv"), ("hurst", "L_over_lambda0", "zeta_1", "seed", "n")
     found = []
     for node in dict.fromkeys(zip(*(table[key] for key in keys), strict=True)):
         own = table[np.logical_and.reduce([table[key] == value for key, value in zip(keys, node, strict=True)])]

@@ -29,12 +29,14 @@ def plan_command(file: Path, as_json: bool) -> None:
 
     Example: mbma plan examples/scene_joint.toml
     """
+    from mbma_tables.scenes.advice import advice
     from mbma_tables.scenes.scene import Scene
 
-    plan = Scene.from_toml(file).plan()
+    scene = Scene.from_toml(file)
     if not as_json:
-        click.echo(plan.text(), nl=False)
+        click.echo(scene.explain(), nl=False)
         return
+    plan = scene.plan()
     content = {
         "rtol": plan.rtol,
         "error": plan.error,
@@ -43,6 +45,7 @@ def plan_command(file: Path, as_json: bool) -> None:
         "steps": [vars(step) | {"tier": step.tier_name} for step in plan.steps],
         "left_out": plan.left_out,
         "switched_off": plan.switched_off,
+        "advice": advice(scene).strip(),
     }
     click.echo(to_json(content))
 

@@ -114,13 +114,13 @@ class Plan:
 
     def text(self) -> str:
         """As a database prints a query plan."""
-        times = f"time={_duration(self.seconds)}, first use in a process {_duration(self.first_use)} more"
+        times = f"time={duration(self.seconds)}, first use in a process {duration(self.first_use)} more"
         lines = [f"Scene  (rtol={self.rtol:.1e}, {_bound(self.error)}, {times})", f"  theory: {self.theory}"]
         for step in self.steps:
             source = step.theory or step.tier_name
             by = "" if source is None else f" by {source}"
             asked = "" if step.rtol is None else f", rtol={step.rtol:.1e}"
-            numbers = f"(count={step.count}{asked}, {_bound(step.error)}, time={_duration(step.seconds)})"
+            numbers = f"(count={step.count}{asked}, {_bound(step.error)}, time={duration(step.seconds)})"
             lines += [f"  -> {step.name}{by}  {numbers}", f"       {step.what}", f"       for: {step.why}"]
         lines.append(f"  left out: {', '.join(self.left_out) or 'nothing'}")
         if self.switched_off:
@@ -132,7 +132,8 @@ def _bound(error: float) -> str:
     return "error not certified" if math.isnan(error) else f"error={error:.1e}"
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """A time in its unit."""
     if math.isnan(seconds):
         return "not measured"
     unit, size = next(((u, s) for u, s in (("s", 1.0), ("ms", 1e-3)) if seconds >= s), ("us", 1e-6))
@@ -157,10 +158,25 @@ def make_plan(problem: Problem, costs: Costs | None = None) -> Plan:
             plan = _Planner(problem, rtol, measured).plan()
         except InputError:
             continue  # too tight for a law
+        if plan.error > rtol:
+            continue  # too tight for the theory
+        if math.isnan(plan.seconds):
+            raise InputError(f"the cost of {_unpriced(plan)} is not known: give rtol instead of seconds")
         if plan.seconds <= problem.seconds:
             return plan
         least = plan.seconds
     raise InputError(f"seconds = {problem.seconds:g} is too little: the cheapest plan takes about {least:.3g} s")
+
+
+def _unpriced(plan: Plan) -> str:
+    step = next(step for step in plan.steps if math.isnan(step.seconds))
+    return f"theory {step.theory!r}" if step.theory else f"step {step.name!r}"
+
+
+def seconds_by_theory(costs: Costs, theory: str, count: int, inverse: bool, energy: bool = False) -> float:
+    """Seconds of another theory than MBMA asked directly, by mean separation or by pressure or area."""
+    each = costs.of(theory, "invert" if inverse else "gap") + (costs.of(theory, "energy") if energy else 0.0)
+    return costs.of(theory, "call") + count * each
 
 
 def certified_error(tier: str | AnyModel, asked: float) -> float:
@@ -277,16 +293,28 @@ class _Planner:
         return Step("profiles", "pressure_profile", what, "exact", asked, islands, asked, seconds)
 
     def by_theory(self, why: Sequence[str]) -> Step:
-        """Another theory's answers: its own at few gaps and where slopes are asked, else through its law."""
-        slopes = self.problem.outputs & {"stiffness", "conductance"}
-        name = "law" if self.count >= MIN_LAW_GAPS_OF_OTHERS and not slopes else "contact"
-        what = f"force, area and what follows from them at {self.count} gaps"
-        seconds = self.count * self.costs.of(self.problem.theory_name, "gap")
+        """Another theory's answers: its own, or through its law where that costs less and no slopes are asked."""
+        outputs, theory = self.problem.outputs, self.problem.theory_name
+        inverse = self.problem.prescribed in INVERTED
         rtol = max((1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_THEORY_LAW_RTOL)
-        asked = rtol if name == "law" else None
-        return Step(
-            name, ", ".join(why), what, None, asked, self.count, math.nan, seconds, theory=self.problem.theory_name
-        )
+        direct = seconds_by_theory(self.costs, theory, self.count, inverse, "energy" in outputs)
+        each = self.costs.of("law", "lookup") + (self.costs.of("law", "invert", quantity="force") if inverse else 0.0)
+        by_law = self.costs.of(theory, "law", rtol) + self.count * each
+        pays = self.count >= MIN_LAW_GAPS_OF_OTHERS if math.isnan(direct) else by_law < direct
+        own = self.own_error()
+        name, asked, error, seconds = "contact", None, own, direct
+        if pays and not outputs & {"stiffness", "conductance"}:
+            name, asked, seconds = "law", rtol, by_law
+            error = (AMPLIFICATION["inverse"] if inverse else 1.0) * (rtol + own)
+        what = f"force, area and what follows from them at {self.count} gaps"
+        return Step(name, ", ".join(why), what, None, asked, self.count, error, seconds, theory=theory)
+
+    def own_error(self) -> float:
+        """The numerical error that the scene's theory states of an answer."""
+        from mbma_tables.theories.registry import get_theory
+
+        surface = self.problem.surface
+        return float(get_theory(self.problem.theory).answer(surface, 0.5 * surface.h_max).error)
 
     def seconds_of_slopes(self) -> float:
         """Of totals with derivatives, which cost about four times those without."""

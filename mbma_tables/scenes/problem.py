@@ -189,7 +189,6 @@ class Problem:
             "tier": self.tier is not None,
             "reading": self.reading != get_reading("reported"),
             "without": bool(self.dropped),
-            "seconds": self.seconds is not None,
         }
         own |= {f"effect {name!r}": name in self.outputs for name in OF_ISLANDS}
         given = [name for name, is_given in own.items() if is_given]

@@ -106,8 +106,10 @@ class Scene(Problem):
         return make_plan(self)
 
     def explain(self) -> str:
-        """The plan as text."""
-        return self.plan().text()
+        """The plan as text, and in one line which theory is nearer to brute force where another is."""
+        from mbma_tables.scenes.advice import advice
+
+        return self.plan().text() + advice(self)
 
     def run(self, progress: Callable[[str, int, int], None] | None = None) -> xarray.Dataset:
         """Compute what was asked for.

@@ -6,6 +6,7 @@ import pytest
 
 from mbma_tables.files import shipped_file
 from mbma_tables.scenes.costs import COLUMNS, read_costs, shipped_costs
+from mbma_tables.theories import THEORIES
 
 HEADER = ",".join(COLUMNS)
 SOME = f"""# a comment
@@ -47,7 +48,8 @@ def test_shipped_costs_have_what_plans_need():
     costs = shipped_costs()
     needed = [(tier, what) for tier in ("exact", "universal", "rigid") for what in ("gap", "call", "import", "law")]
     needed += [("law", "lookup"), ("law", "invert"), ("exact", "profile"), ("scene", "call")]
-    needed += [("greenwood_williamson", "gap"), ("persson", "gap"), ("island4d", "gap")]
+    needed += [(name, what) for name in THEORIES[1:] for what in ("gap", "call", "invert", "energy", "law")]
+    needed += [("island4d", "gap")]
     for tier, what in needed:
         assert 0 < costs.of(tier, what, 1e-4, "force") < 10, (tier, what)
     errors = [row.error for row in costs.rows if row.tier == "universal" and row.what == "gap"]
