@@ -53,7 +53,7 @@ DIMENSIONS = {
     **dict.fromkeys(("separations", "mean_separations", "deltas"), (1, 0)),
     **dict.fromkeys(("q0", "q1"), (-1, 0)),
     **dict.fromkeys(("D", "m4", "Sds"), (-2, 0)),
-    **dict.fromkeys(("E_star", "E1", "E2", "pressure", "pressures", "force"), (0, 1)),
+    **dict.fromkeys(("E_star", "E1", "E2", "pressure", "pressures", "mean_pressure", "force"), (0, 1)),
     "m0": (2, 0),
     "stiffness": (-1, 1),
     "energy": (1, 1),
@@ -168,20 +168,28 @@ class Units:
         """
         if isinstance(value, list | tuple):
             return [self.number(name, entry) for entry in value]
+        length, power = DIMENSIONS.get(name, (0, 0))
+        kind, own = ("length", self.length) if length else ("stress", self.stress)
         if not isinstance(value, str):
+            # of a DataArray
+            stated = getattr(value, "attrs", {}).get("units")
+            if own in SIZES[kind] and stated in SIZES[kind] and (length or power) == 1 and stated != own:
+                raise InputError(
+                    f"{name} is in {stated!r} by its attribute units, and asked for in {own!r}: convert it"
+                )
             return value
         number, unit = read(name, value)
         if unit is None:
             return number
-        length, power = DIMENSIONS[name]
-        kind = "length" if length else "stress"
-        own = self.length if length else self.stress
         if own == "1":
             raise InputError(f"{name} = {value!r} needs a modulus, which is missing: stresses are over E* without one")
         if own is None:
             mend = "give the surface its unit" if length else "give E* with its unit, such as '100 GPa'"
             raise InputError(f"{name} = {value!r} beside numbers whose unit of {kind} is not known: {mend}")
         return number * factor(unit, own, kind, length or power)
+
+
+UNKNOWN = Units()
 
 
 def resolve(
@@ -211,6 +219,14 @@ def resolve(
             )
     own = Units(length=unit) if kind == "length" else Units(stress=unit)
     return {name: own.number(name, value) for name, value in given.items()}, unit
+
+
+def modulus_and_units(E_star: Any, surface: Any, asked: str | None = None) -> tuple[Any, Units]:
+    """A modulus as a number, and the units of results: the surface's, and the one asked for or named by "100 GPa"."""
+    given, stress = resolve({"E_star": E_star}, asked, "stress")
+    # without a modulus, stresses are over it
+    absent = stress is None and isinstance(E_star, int | float) and E_star == 1.0
+    return given["E_star"], Units(surface.unit, "1" if absent else stress)
 
 
 def unit_of(name: str, units: Units) -> str:

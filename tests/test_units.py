@@ -1,6 +1,7 @@
 """Units: read and converted rightly in every entry, kept through results, refused where they conflict."""
 
 import json
+import pickle
 from fractions import Fraction
 
 import numpy as np
@@ -9,7 +10,7 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbma_tables import InputError, Scene, Surface
+from mbma_tables import InputError, Scene, Surface, contact, contact_law
 from mbma_tables.cli import main
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.units import ALIASES, DIMENSIONS, SIZES, Units, factor, known, read, resolve, unit_of
@@ -316,3 +317,40 @@ def test_the_factor_is_rounded_once():
     assert factor("um", "mm") == 1e-3
     assert factor("nm", "mm", power=-2) == 1e12
     assert factor("GPa", "MPa", "stress") == 1e3
+
+
+@pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
+def test_a_contact_keeps_its_units(theory):
+    plain = contact(CONCRETE, [0.5, 0.2], E_star=13.3, theory=theory)
+    found = contact(CONCRETE.to("um"), ["0.5 mm", 200], E_star="0.0133 GPa", theory=theory)
+    expected = {"separation": "um", "force": "GPa", "area": "1", "stiffness": "GPa/um", "energy": "GPa um"}
+    assert expected.items() <= found.units.items()
+    sizes = {"separation": 1e3, "force": 1e-3, "area": 1, "stiffness": 1e-6, "energy": 1, "mean_pressure": 1e-3}
+    for name, size in sizes.items():
+        np.testing.assert_allclose(getattr(found, name), size * getattr(plain, name), rtol=1e-7)
+    joint = contact(CONCRETE, pressure="10 kPa", E_star="13.3 MPa", theory=theory)
+    assert joint.force == pytest.approx(0.01, rel=1e-9)
+    assert plain.units["force"] == "stress"
+    assert contact(CONCRETE, 0.5, theory=theory).units["stiffness"] == "1/mm"
+
+
+def test_a_labelled_contact_keeps_its_units():
+    xr = pytest.importorskip("xarray")
+    gaps = xr.DataArray([0.5, 0.2], dims="gap")
+    found = contact(CONCRETE, gaps, E_star="13.3 MPa")
+    assert (found.force.attrs["units"], found.units["mean_separation"]) == ("MPa", "mm")
+    assert contact(CONCRETE, gaps.assign_attrs(units="mm")).force.values == pytest.approx(found.force.values / 13.3)
+    with pytest.raises(InputError, match="separation is in 'um' by its attribute units, and asked for in 'mm'"):
+        contact(CONCRETE, gaps.assign_attrs(units="um"))
+
+
+@pytest.mark.parametrize("theory", ["mbma", "persson"])
+def test_a_law_keeps_its_units(theory):
+    law = contact_law(CONCRETE.to("um"), 1e-5, E_star="13.3 MPa", theory=theory)
+    assert law.units == Units("um", "MPa")
+    assert law.force(u="0.7 mm") == law.force(u=700.0)
+    assert law.separation(force="10 kPa") == law.separation(force=0.01)
+    assert law.at_pressure("10 kPa").area == law.at_pressure(0.01).area
+    assert pickle.loads(pickle.dumps(law)).units == law.units
+    with pytest.raises(InputError, match="needs a modulus"):
+        contact_law(CONCRETE, 1e-3).at_pressure("10 kPa")

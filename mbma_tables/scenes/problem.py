@@ -10,7 +10,7 @@ from mbma_tables.errors import InputError
 from mbma_tables.scenes.effects import COMPARED, OF_ISLANDS, chosen, nearest
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.theories.registry import THEORIES, get_theory
-from mbma_tables.units import Units, in_unit, known, resolve
+from mbma_tables.units import Units, in_unit, known, modulus_and_units
 
 if TYPE_CHECKING:
     from mbma_tables.models.protocol import AnyModel
@@ -96,13 +96,12 @@ class Problem:
             raise InputError(
                 f"length_unit is {unit!r} and the surface's own {self.surface.unit!r}: ask for surface.to({unit!r})"
             )
-        found, stress = resolve({"E_star": self.E_star}, self.stress_unit, "stress")
-        over_modulus = stress is None and isinstance(self.E_star, int | float) and self.E_star == 1.0
-        units = Units(unit or self.surface.unit, "1" if over_modulus else stress)
-        derived = {"surface": in_unit(self.surface, unit), "units": units, "length_unit": units.length} | found
+        surface = in_unit(self.surface, unit)
+        E_star, units = modulus_and_units(self.E_star, surface, self.stress_unit)
+        derived = {"surface": surface, "E_star": E_star, "units": units, "length_unit": surface.unit}
         for name in ("separations", "mean_separations", "pressures", "deltas"):
             derived[name] = units.number(name, getattr(self, name))
-        for name, value in (derived | {"stress_unit": stress}).items():
+        for name, value in derived.items():
             object.__setattr__(self, name, value)
 
     def _checked_gaps(self, at_gaps: frozenset[str]) -> Any:

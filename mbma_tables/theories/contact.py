@@ -22,14 +22,15 @@ from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma
 from mbma_tables.theories.result import Contact, Source
 from mbma_tables.theories.sensitivity import differentiate
 from mbma_tables.totals.contact import wanted_quantities
+from mbma_tables.units import modulus_and_units, unit_of
 
 KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by
-ATTRIBUTES = {
-    "separation": {"long_name": "separation from the mid-plane", "units": "unit of h_rms"},
-    "mean_separation": {"long_name": "mean separation", "units": "unit of h_rms"},
-    "force": {"long_name": "force over nominal area", "units": "unit of E_star"},
-    "area": {"long_name": "real over nominal contact area", "units": "1"},
-    "error": {"long_name": "bound on the relative error of force and area", "units": "1"},
+MEANING = {
+    "separation": "separation from the mid-plane",
+    "mean_separation": "mean separation",
+    "force": "force over nominal area",
+    "area": "real over nominal contact area",
+    "error": "bound on the relative error of force and area",
 }
 
 
@@ -56,12 +57,13 @@ def contact(
     surface : Surface
         One surface or a batch; it broadcasts against what is known.
     separation : array_like
-        d between the rigid plane and the mid-plane [length], at least -h_max (full compression). From h_max
-        on there is no contact, and force and area are zero. Exactly one of the four is given.
+        d between the rigid plane and the mid-plane, in the surface's unit or, as text, with its own ("0.8 um"); at
+        least -h_max (full compression). From h_max on there is no contact, and force and area are zero. Exactly one
+        of the four is given.
     mean_separation : array_like
         u = (h_max + d)/2 (50) [length].
     pressure : array_like
-        F/A0 in the unit of `E_star`; the answer is on the branch of first contact.
+        F/A0 in the unit of `E_star`, or with its own; the answer is on the branch of first contact.
     area : array_like
         A/A0, likewise.
     theory : str or theory
@@ -72,8 +74,8 @@ def contact(
         table from `open_table`, or a model of one's own with a `name` and ``answer(X, mu)``.
     reading : {"reported", "printed", "fitted"} or Reading
         Which reading of the paper's equations MBMA takes.
-    E_star : array_like
-        Effective modulus, (1 - nu1^2)/E1 + (1 - nu2^2)/E2 inverted; force is in its unit.
+    E_star : array_like or str
+        Effective modulus, (1 - nu1^2)/E1 + (1 - nu2^2)/E2 inverted; force is in its unit, which "100 GPa" names.
     rtol : float
         Relative error asked of MBMA's force and area, in [1e-11, 0.1]. A table adds its own error; `error` holds both.
     outside : {"raise", "exact", "nan"}
@@ -114,8 +116,13 @@ def contact(
     '1.942 um, 38.5 MPa/um'
     >>> f"{contact(surface, pressure=10.0, E_star=100e3, theory='persson').area:.3%}"
     '0.295%'
+    >>> joint = contact(Surface.named("challenge").to("mm"), pressure="100 kPa", E_star="25 MPa")
+    >>> f"{joint.mean_separation:.3e} {joint.units['separation']}, {joint.stiffness:.1f} {joint.units['stiffness']}"
+    '1.642e-03 mm, 471.9 MPa/mm'
     """
     by, value = _known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
+    E_star, units = modulus_and_units(E_star, surface)
+    value = units.number(by, value)
     chosen = get_theory(theory)
     if theory == Mbma.name:
         chosen = Mbma(tier, reading, rtol, outside)
@@ -125,7 +132,7 @@ def contact(
         )
     options: dict[str, Any] = {
         "by": by,
-        "source": Source(chosen, surface, E_star),
+        "source": Source(chosen, surface, E_star, units),
         "derivatives": derivatives,
         "quantities": wanted_quantities(quantities),
     }
@@ -218,6 +225,7 @@ def _at_fixed(held: str, by: str, slopes: dict[str, Any], per_modulus: Any) -> d
 def _of_labelled(surface: Surface, value: Any, E_star: Any, options: dict[str, Any]) -> Contact:
     """`contact` of DataArrays, lazily where they are."""
     by, theory, wanted = options["by"], options["source"].theory, options["quantities"]
+    units = options["source"].units
     names: tuple[str, ...] = (*wanted, "error")
     fields: dict[str, Any] = {"force": None, "area": None}
     if by not in ("separation", "mean_separation"):
@@ -235,7 +243,7 @@ def _of_labelled(surface: Surface, value: Any, E_star: Any, options: dict[str, A
 
     outputs = apply_to_surface(answer, surface, {by: value, "E_star": E_star}, len(names) + len(slopes))
     for found, name in zip(outputs, names, strict=False):
-        fields[name] = found.rename(name).assign_attrs(ATTRIBUTES[name])
+        fields[name] = found.rename(name).assign_attrs(long_name=MEANING[name], units=unit_of(name, units))
     for (kind, name), found in zip(slopes, outputs[len(names) :], strict=True):
         fields.setdefault(kind, {})[name] = found
     # what was given is kept, with its name and attributes

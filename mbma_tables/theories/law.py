@@ -23,9 +23,10 @@ from mbma_tables.theories import law_kernel
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma
-from mbma_tables.totals.law import MIN_LAW_RTOL, SAMPLES, fit_pieces, mbma_law, one_surface
+from mbma_tables.totals.law import MIN_LAW_RTOL, SAMPLES, MbmaLaw, fit_pieces, mbma_law, one_surface
 from mbma_tables.totals.law_kernel import AREA, AREA_SLOPE, FORCE
 from mbma_tables.totals.law_protocol import ContactLaw
+from mbma_tables.units import UNKNOWN, Units, modulus_and_units
 
 FIRST_CONTACT = 1e-6  # of (h_max - u)/h_max: below it a law is a power of h_max - u
 MAX_SPAN = 10.0  # u/h_max up to which a theory without last contact is covered
@@ -62,6 +63,7 @@ class TheoryLaw(ContactLaw):
     ends: bool
     reading: str = ""
     tier: str = ""
+    units: Units = UNKNOWN
 
     @functools.cached_property
     def _law(self) -> law_kernel.Law:
@@ -122,7 +124,7 @@ def contact_law(
     rtol: float = 1e-8,
     tier: str | AnyModel = "universal",
     reading: str | Reading = "reported",
-    E_star: float = 1.0,
+    E_star: float | str = 1.0,
     *,
     theory: str | Theory | UserTheory = "mbma",
 ) -> ContactLaw:
@@ -161,7 +163,19 @@ def contact_law(
     >>> f"{persson.force(u=2.0):.4g}, {persson.at_pressure(1e-4).mean_separation:.3f}"
     '0.0001832, 2.276'
     """
-    modulus = number_in("E_star", E_star, np.finfo(float).tiny, np.finfo(float).max)
+    number, units = modulus_and_units(E_star, surface)
+    modulus = number_in("E_star", number, np.finfo(float).tiny, np.finfo(float).max)
+    return dataclasses.replace(_law_in_numbers(surface, rtol, tier, reading, modulus, theory), units=units)
+
+
+def _law_in_numbers(
+    surface: Surface,
+    rtol: float,
+    tier: str | AnyModel,
+    reading: str | Reading,
+    modulus: float,
+    theory: str | Theory | UserTheory,
+) -> MbmaLaw | TheoryLaw:
     if theory == Mbma.name:
         return mbma_law(surface, rtol, tier, reading, modulus)
     refuse_options_of_mbma(tier=tier != "universal", reading=reading != "reported")

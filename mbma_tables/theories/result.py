@@ -13,7 +13,9 @@ from mbma_tables.arguments import FloatArray, Numbers, is_labelled
 from mbma_tables.labels import apply_to_surface
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
+from mbma_tables.units import Units, unit_of
 
+WITH_UNITS = ("separation", "mean_separation", "force", "area", "stiffness", "energy", "mean_pressure")
 MAX_GRADIENT = 1.0  # rms gradient above which heights and wavenumbers are hardly in one unit
 
 
@@ -57,6 +59,11 @@ class Contact:
     area_by: dict[str, Numbers] | None = None
     separation_by: dict[str, Numbers] | None = None
     _source: Source = dataclasses.field(repr=False, kw_only=True)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each quantity; "1" where it has none, and stresses are over E* where no modulus was given."""
+        return {name: unit_of(name, self._source.units) for name in WITH_UNITS}
 
     @functools.cached_property
     def _answer(self) -> TheoryAnswer:
@@ -132,6 +139,7 @@ class Source:
     theory: Theory
     surface: Surface
     E_star: Any
+    units: Units
     answer: TheoryAnswer | None = None  # where it is known already
 
     def map(

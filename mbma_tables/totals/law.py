@@ -26,6 +26,7 @@ from mbma_tables.totals import law_kernel
 from mbma_tables.totals.island_sum import kinks, totals_of
 from mbma_tables.totals.kernel import Pairs
 from mbma_tables.totals.law_protocol import ContactLaw
+from mbma_tables.units import UNKNOWN, Units
 
 TERMS = law_kernel.TERMS
 MAX_PIECES = 400
@@ -64,6 +65,7 @@ class MbmaLaw(ContactLaw):
     energies: FloatArray
     errors: FloatArray
     theory: str = "mbma"
+    units: Units = UNKNOWN
 
     @property
     def lowest(self) -> float:

@@ -14,6 +14,7 @@ from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled
 from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import ConvergenceError, InputError
 from mbma_tables.totals.law_kernel import AREA, AREA_SLOPE, ENERGY, FORCE, FORCE_SLOPE
+from mbma_tables.units import Units
 
 BLOCK = 1 << 16  # gaps between two looks for Ctrl-C
 SCAN = 49  # gaps at which a law's stiffness is looked at for its maximum
@@ -33,7 +34,8 @@ class LawPoint(NamedTuple):
 class ContactLaw(abc.ABC):
     """Force and area of one surface against its gap; made by `contact_law`, picklable, a few kB.
 
-    Every method takes the separation d [length], or the mean separation ``u=`` instead.
+    Every method takes the separation d, or the mean separation ``u=`` instead: numbers in the law's unit of length, or
+    texts with their own, "0.8 um".
 
     Attributes
     ----------
@@ -47,6 +49,8 @@ class ContactLaw(abc.ABC):
         Gap below which force, or area, falls again, where it does; inverses end there.
     theory, reading, tier : str
         What made it; reading and tier are empty where the theory is not MBMA.
+    units : Units
+        Of lengths and stresses, as far as the surface and the modulus knew theirs.
 
     Examples
     --------
@@ -68,6 +72,7 @@ class ContactLaw(abc.ABC):
     theory: str
     reading: str
     tier: str
+    units: Units
 
     @property
     @abc.abstractmethod
@@ -90,6 +95,7 @@ class ContactLaw(abc.ABC):
     def _gaps(self, separation: Any, u: Any) -> FloatArray:
         if separation is not None and u is not None:
             raise InputError("separation and u: give one of them")
+        separation, u = (self.units.number("separation", gap) for gap in (separation, u))
         d = finite_array("separation", separation) if u is None else 2 * finite_array("u", u) - self.h_max
         # ends that are no round numbers are met but for rounding
         limit, slack = ("-h_max = ", 0.0) if self.lowest == -self.h_max else ("", ROUNDING * self.h_max)
@@ -151,7 +157,7 @@ class ContactLaw(abc.ABC):
         if (force is None) == (area is None):
             raise InputError("give force or area, one of them")
         name = "area" if force is None else "force"
-        given: Any = area if force is None else force
+        given: Any = area if force is None else self.units.number("force", force)
         if is_labelled(given):
             from mbma_tables.labels import apply
 

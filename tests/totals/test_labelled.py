@@ -52,7 +52,7 @@ def test_dimensions_by_name():
         np.testing.assert_array_equal(values.transpose("surface", "case", "gap"), getattr(plain, name))
         assert values.surface.values.tolist() == ["a", "b", "c"]
         assert values.gap.values.tolist() == list(range(7))
-    assert found.force.attrs == {"long_name": "force over nominal area", "units": "unit of E_star"}
+    assert found.force.attrs == {"long_name": "force over nominal area", "units": "1"}
     assert found.area.attrs["units"] == found.error.attrs["units"] == "1"
     assert found.separation is gaps
     assert gaps.attrs == {"units": "mm", "long_name": "separation"}
