@@ -48,11 +48,11 @@ SIZES: dict[str, dict[str, Fraction]] = {
 ALIASES = {"micron": "um", "Å": "angstrom", "inch": "in", "N/mm^2": "MPa", "N/mm2": "MPa", "N/m^2": "Pa", "N/m2": "Pa"}
 # powers of length and of stress of whatever has a name and a unit
 DIMENSIONS = {
-    **dict.fromkeys(("h_rms", "h_max", "Ra", "Rq", "Rsm", "Sa", "Sq", "Sp"), (1, 0)),
+    **dict.fromkeys(("h_rms", "h_max", "Ra", "Rq", "Rsm", "Sa", "Sq", "Sp", "longest", "shortest"), (1, 0)),
     **dict.fromkeys(("separation", "mean_separation", "delta", "R_d", "R_u", "sigma", "h_d", "overclosure"), (1, 0)),
     **dict.fromkeys(("separations", "mean_separations", "deltas"), (1, 0)),
     **dict.fromkeys(("q0", "q1"), (-1, 0)),
-    **dict.fromkeys(("D", "m4", "Sds"), (-2, 0)),
+    **dict.fromkeys(("D", "m4", "Sds", "Spd"), (-2, 0)),
     **dict.fromkeys(("E_star", "E1", "E2", "pressure", "pressures", "mean_pressure", "force"), (0, 1)),
     "m0": (2, 0),
     "stiffness": (-1, 1),

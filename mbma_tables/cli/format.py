@@ -137,6 +137,9 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     units = {name: shown_unit(name, specimen.units).strip("-") for name in numbers}
     shown = [f"{name} {value:.6g} {units[name]}".rstrip() for name, value in numbers.items()]
     notes = ["surface: " + ", ".join(shown)]
+    assumed = [line for record in surface.provenance for line in record.get("assumed", ())]
+    notes += [f"assumed: {line}" for line in assumed]
+    facts["assumed"] = assumed
     if surface.fit is not None:
         values = {field.name: getattr(surface.fit, field.name) for field in dataclasses.fields(surface.fit)}
         facts["fit"] = {name: v.tolist() if hasattr(v, "tolist") else v for name, v in values.items()}

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 BAND = ("hurst", "q0", "q1", "h_rms", "h_max")
 MAGNIFICATION = ("hurst", "q0", "zeta_1", "h_rms", "h_max")
 MOMENTS = ("hurst", "m0", "m2", "m4", "h_max")
-NUMBERS = tuple(dict.fromkeys(BAND + MAGNIFICATION + MOMENTS))
+ROUGHNESS = ("Rq", "Ra", "Sq", "Sa", "Rdq", "Sdq", "Rsm", "Sds", "Spd", "Sp", "longest", "shortest")
+NUMBERS = tuple(dict.fromkeys(BAND + MAGNIFICATION + MOMENTS + ROUGHNESS))
 MATERIAL = ("E_star", "E1", "nu1", "E2", "nu2")
 MAX_SPECTRUM_BYTES = 16 * 2**20
 
@@ -88,10 +89,17 @@ def from_numbers(
     from mbma_tables.surfaces.spectrum import MIN_ZETA_1
     from mbma_tables.surfaces.surface import Surface
 
+    if set(given) & set(ROUGHNESS):
+        alien = set(given) - {*ROUGHNESS, "hurst", "h_max"}
+        if alien:
+            raise InputError(
+                f"{', '.join(alien)} beside numbers of a drawing: leave them out, or give longest or shortest"
+            )
+        return Specimen(Surface.from_roughness(**{"hurst": None, **given}, unit=unit), title)
     if set(given) not in (set(BAND), set(MAGNIFICATION), set(MOMENTS)):
         raise InputError(
-            f"a surface needs {', '.join(BAND)} (or zeta_1 for q1), or {', '.join(MOMENTS)}; got "
-            f"{', '.join(given) or 'none of them'}"
+            f"a surface needs {', '.join(BAND)} (or zeta_1 for q1), or {', '.join(MOMENTS)}, or "
+            f"roughness (Rq, ...); got {', '.join(given) or 'none of them'}"
         )
     plain, unit = resolve(given, unit)
     numbers = {key: _one_number(key, value) for key, value in plain.items()}

@@ -6,6 +6,7 @@ import dataclasses
 import difflib
 import functools
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,6 +47,8 @@ class Surface(AnySurface):
         The unit of length, such as "um"; None where it is not known. Results carry it.
     fit : SpectrumFit, optional
         Where the surface was fitted to a measurement: how well, in the measurement's unit.
+    provenance : sequence of mapping, optional
+        What it was made from, and what was assumed; a plain record each step.
 
     Raises
     ------
@@ -73,6 +76,7 @@ class Surface(AnySurface):
     h_max: Any
     unit: str | None = dataclasses.field(default=None, kw_only=True)
     fit: SpectrumFit | None = dataclasses.field(default=None, repr=False, kw_only=True)
+    provenance: tuple[Mapping[str, Any], ...] = dataclasses.field(default=(), repr=False, kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unit", Units(self.unit).length)
@@ -145,6 +149,73 @@ class Surface(AnySurface):
         zeta_1 = 64.8598, q0 = 0.538132
         """
         return cls(hurst, *spectrum.band_from_moments(hurst, m0, m2, m4), h_max, unit=unit)
+
+    @classmethod
+    def from_roughness(
+        cls,
+        *,
+        hurst: Any,
+        h_max: Any = None,
+        Sp: Any = None,
+        Rq: Any = None,
+        Ra: Any = None,
+        Sq: Any = None,
+        Sa: Any = None,
+        Rdq: Any = None,
+        Sdq: Any = None,
+        Rsm: Any = None,
+        Sds: Any = None,
+        Spd: Any = None,
+        longest: Any = None,
+        shortest: Any = None,
+        unit: str | None = None,
+    ) -> Surface:
+        """The self-affine surface that numbers of a drawing or a profilometer describe.
+
+        One height, one highest point, a Hurst exponent, and two of slope, longest wave and shortest wave (or slope and
+        density of summits). What a drawing does not tell is to be given: nothing is filled in. `provenance` holds
+        what each number was taken to mean; docs/roughness.md has typical values. Lengths are numbers in one unit, or
+        texts with theirs.
+
+        Parameters
+        ----------
+        hurst : array_like
+            Hurst exponent, in (0, 1].
+        h_max, Sp : array_like, one of them
+            Height of the highest point above the mid-plane [length].
+        Rq, Ra, Sq, Sa : array_like, one of them
+            Root-mean-square or mean absolute height of a profile or of a map [length].
+        Rdq, Sdq, Rsm : array_like, one of them, optional
+            Root-mean-square slope of a profile, gradient of a map, or mean spacing of a profile's elements [length].
+        Sds, Spd : array_like, one of them, optional
+            Summits per area [1/length^2].
+        longest, shortest : array_like, optional
+            Wavelengths at which the roughness ends [length].
+        unit : str, optional
+            The unit of length.
+
+        Returns
+        -------
+        Surface
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            For too few or too many numbers, and for those that no band with 3 < q1/q0 <= 1e8 has.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface
+        >>> ground = Surface.from_roughness(Ra="0.4 um", Rdq=0.1, longest="100 um", hurst=0.8, h_max="1.8 um")
+        >>> print(f"h_rms = {ground.h_rms:.3f} {ground.unit}, shortest wave {6.2832 / ground.q1:.2f} {ground.unit}")
+        h_rms = 0.501 um, shortest wave 1.12 um
+        >>> ground.provenance[0]["assumed"][1]
+        'h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered'
+        """
+        given = {name: value for name, value in locals().items() if name not in ("cls", "unit")}
+        from mbma_tables.surfaces.roughness import surface_of_roughness
+
+        return cls(**surface_of_roughness(unit, given)._asdict())
 
     @classmethod
     def named(cls, name: str) -> Surface:
@@ -418,7 +489,7 @@ def _with_hint(init: Any) -> Any:
 
     @functools.wraps(init)
     def checked(self: Surface, *given: Any, **named: Any) -> None:
-        for name in named.keys() - {*PARAMETERS, "unit", "fit"}:
+        for name in named.keys() - {*PARAMETERS, "unit", "fit", "provenance"}:
             near = ["hurst"] if name == "H" else difflib.get_close_matches(name.lower(), PARAMETERS, 1)
             hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(PARAMETERS)}"
             raise TypeError(f"Surface has no argument {name!r}: {hint}")

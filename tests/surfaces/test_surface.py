@@ -142,7 +142,7 @@ def test_an_unknown_argument_gets_a_hint(name, hint):
 
 def test_constructors_show_their_options():
     assert {"periodic", "detrend", "h_max", "band"} <= set(inspect.signature(Surface.from_map).parameters)
-    assert list(inspect.signature(Surface).parameters) == [*GOOD, "unit", "fit"]
+    assert list(inspect.signature(Surface).parameters) == [*GOOD, "unit", "fit", "provenance"]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,137 @@
+"""From the numbers of a drawing or of a profilometer to a self-affine surface, with every assumption in words.
+
+A profile along any line of an isotropic surface has its variance of height m0 and, for the variance of slope, m2, while
+the gradient of the surface has 2 m2. Everything else here follows from Gaussian heights.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.errors import InputError
+from mbma_tables.surfaces import spectrum
+from mbma_tables.units import resolve
+
+HEIGHTS = ("Rq", "Ra", "Sq", "Sa")
+SLOPES = ("Rdq", "Sdq", "Rsm")
+SUMMITS = ("Sds", "Spd")
+WAVES = ("longest", "shortest")
+ROUGHNESS = (*HEIGHTS, *SLOPES, *SUMMITS, *WAVES, "Sp")
+SAID = {
+    "Rq": "h_rms = Rq: the profile is long and held no filter that takes out waves of the surface",
+    "Ra": "h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered",
+    "Sq": "h_rms = Sq: the map is large and held no filter that takes out waves of the surface",
+    "Sa": "h_rms = sqrt(pi/2) Sa: heights are Gaussian; the map is large and unfiltered",
+    "Rdq": "m2 = Rdq^2: the surface is isotropic, and Rdq was measured down to the shortest wave",
+    "Sdq": "m2 = Sdq^2/2: the surface is isotropic, and Sdq was measured down to the shortest wave",
+    "Rsm": "m2 = (2 pi h_rms/Rsm)^2: heights are Gaussian, every upward crossing of the mean line counts (Rice 1945);"
+    " where an instrument leaves out small ones, the slope found here is a lower bound",
+    "Sds": "m4 = 6 pi sqrt(3) m2 Sds: heights are Gaussian (Nayak 1971, Eq. 2), and every summit is counted",
+    "Spd": "m4 = 6 pi sqrt(3) m2 Spd: heights are Gaussian (Nayak 1971, Eq. 2), and every summit is counted; where "
+    "small ones are pruned, as ISO 25178-2 does, the curvature found here is a lower bound",
+    "longest": "q0 = 2 pi/longest: no roughness of longer waves",
+    "shortest": "q1 = 2 pi/shortest: no roughness of shorter waves",
+    "hurst": "the spectrum is one power law with this Hurst exponent between its longest and its shortest wave",
+    "h_max": "contact begins at h_max above the mid-plane",
+    "Sp": "h_max = Sp: contact begins at the highest point of the map, which a larger one would exceed",
+}
+
+
+class Drawn(NamedTuple):
+    """The five numbers of a surface, its unit, and what was given and assumed."""
+
+    hurst: Any
+    q0: Any
+    q1: Any
+    h_rms: Any
+    h_max: Any
+    unit: str | None
+    provenance: tuple[Mapping[str, Any], ...]
+
+
+def _one_of(names: tuple[str, ...], given: Mapping[str, Any], what: str, needed: bool = True) -> str | None:
+    """Which of the names is given, at most one."""
+    found = [name for name in names if name in given]
+    if len(found) > 1 or (needed and not found):
+        raise InputError(f"{what}: give one of {', '.join(names)}; got {' and '.join(found) or 'none'}")
+    return found[0] if found else None
+
+
+def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> Drawn:
+    """The surface that numbers of a drawing describe; see `Surface.from_roughness`."""
+    given, unit = resolve({name: value for name, value in numbers.items() if value is not None}, unit)
+    height = _one_of(HEIGHTS, given, "the height of roughness")
+    slope = _one_of(SLOPES, given, "the slope of roughness", needed=False)
+    summits = _one_of(SUMMITS, given, "the density of summits", needed=False)
+    top = _one_of(("h_max", "Sp"), given, "the highest point, which Rq and Ra do not tell")
+    if "hurst" not in given:
+        raise InputError(
+            "hurst is missing: a drawing does not tell it; 0.8 is common, and `sensitivity` says what it costs"
+        )
+    band = [name for name in (slope, summits, *(wave for wave in WAVES if wave in given)) if name is not None]
+    if len(band) != 2 or band[0] in SUMMITS or (summits and not slope):
+        raise InputError(
+            "the band of waves needs a slope (Rdq, Sdq or Rsm) with one of longest, shortest and Sds, or longest and "
+            f"shortest; got {' and '.join(band) or 'none'}"
+        )
+    arrays = {name: finite_array(name, value) for name, value in given.items()}
+    for name, array in arrays.items():
+        require(name, array, array > 0, "positive")
+    require("hurst", arrays["hurst"], arrays["hurst"] <= 1, "in (0, 1]")
+    shape = broadcast_shape(**arrays)
+    at = {name: np.broadcast_to(array, shape) for name, array in arrays.items()}
+    assert height is not None
+    assert top is not None
+    h_rms = at[height] * (math.sqrt(math.pi / 2) if height in ("Ra", "Sa") else 1.0)
+    q0, q1 = _band(at, h_rms, slope, summits)
+    used = ("hurst", height, top, *band)
+    shown = {name: given[name].tolist() if hasattr(given[name], "tolist") else given[name] for name in used}
+    record = {"step": "from_roughness", "given": shown, "unit": unit, "assumed": [SAID[name] for name in used]}
+    return Drawn(at["hurst"], q0, q1, h_rms, at[top], unit, (record,))
+
+
+def _band(
+    at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str | None, summits: str | None
+) -> tuple[FloatArray, FloatArray]:
+    """Smallest and largest wavenumber."""
+    ends = {wave: 2 * math.pi / at[wave] for wave in WAVES if wave in at}
+    if slope is None:
+        return ends["longest"], ends["shortest"]
+    m2 = {
+        "Rdq": lambda: at["Rdq"] ** 2,
+        "Sdq": lambda: at["Sdq"] ** 2 / 2,
+        "Rsm": lambda: (2 * math.pi * h_rms / at["Rsm"]) ** 2,
+    }[slope]()
+    if summits is not None:
+        q0, q1, _ = spectrum.band_from_moments(at["hurst"], h_rms**2, m2, spectrum.NAYAK * m2 * at[summits])
+        return q0, q1
+    if "longest" in ends:
+        zeta = _ratio(at["hurst"], m2 / (h_rms * ends["longest"]) ** 2, at[slope], slope, 0)
+        return ends["longest"], ends["longest"] * zeta
+    zeta = _ratio(at["hurst"], m2 / (h_rms * ends["shortest"]) ** 2, at[slope], slope, 2)
+    return ends["shortest"] / zeta, ends["shortest"]
+
+
+def _ratio(hurst: FloatArray, wanted: FloatArray, slope: FloatArray, name: str, power: int) -> FloatArray:
+    """zeta_1 at which m2/m0 over q0^2, or over q1^2 where power is 2, has the wanted value."""
+    from scipy.optimize.elementwise import find_root
+
+    def ratio(x: Any, h: Any) -> Any:
+        zeta = np.exp(x)
+        return spectrum.band_moment(2, h, 1.0, zeta) / spectrum.band_moment(0, h, 1.0, zeta) / zeta**power
+
+    ends = math.log(spectrum.MIN_ZETA_1), math.log(spectrum.MAX_ZETA_1)
+    least, most = np.sort(np.stack([ratio(end, hurst) for end in ends]), axis=0)
+    bounds = [slope * (end / wanted) ** (-0.5 if name == "Rsm" else 0.5) for end in (least, most)]
+    low, high = (float(f(np.stack(bounds))) for f in (np.min, np.max))
+    good = (wanted > least) & (wanted < most)
+    require(name, slope, good, f"between {low:.4g} and {high:.4g}, for a band of 3 < q1/q0 < 1e8 with these waves")
+    found = find_root(
+        lambda x, h, goal: np.log(ratio(x, h) / goal), ends, args=(hurst, wanted), tolerances={"xrtol": 1e-15}
+    )
+    return np.asarray(np.exp(found.x))
