@@ -68,10 +68,9 @@ def from_name(name: str) -> Specimen:
 
 def from_map(path: pathlib.Path) -> Specimen:
     """The surface fitted to a measured map."""
-    from mbma_tables.surfaces.maps import read_map
     from mbma_tables.surfaces.surface import Surface
 
-    surface = Surface.from_map(read_map(path))
+    surface = Surface.from_map(path)
     assert isinstance(surface, Surface)
     return Specimen(surface, f"fitted to the map {_printable(path)}")
 

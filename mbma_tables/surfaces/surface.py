@@ -366,28 +366,35 @@ class Surface(AnySurface):
         h_max: float | None = None,
         band: tuple[float, float] | None = None,
         model: str = "self-affine",
+        **treatment: Any,
     ) -> Surface | MeasuredSurface:
         """The surface of a measured height map: its own spectrum and heights, or the self-affine one fitted to it.
 
         Parameters
         ----------
-        heights : array_like, shape (nx, ny), or topography
-            Heights [length], at least 32 x 32; or an object with SurfaceTopography's `heights()`, `physical_sizes`
-            and `is_periodic`, which is not imported for that.
+        heights : array_like, shape (nx, ny), path or topography
+            Heights [length], at least 32 x 32, NaN or masked where undefined; a file of any format that
+            SurfaceTopography reads (the extra `maps`); or an object with that library's `heights()`,
+            `physical_sizes` and `is_periodic`.
         dx, dy : float, optional
             Sampling steps along the first and the second axis [length]; dy is dx if not given. A topography has its
-            own.
+            own, most files too.
         periodic : bool, optional
             Whether the map continues periodically; else a Hann window is applied. A topography's own flag, False for
             an array.
-        detrend : {"mean", "plane", "quadratic"}, optional
-            The least-squares polynomial to subtract; by default the mean of a periodic map, the plane of any other.
+        detrend : str, optional
+            What to subtract: mean, plane, quadratic, or another mode of SurfaceTopography's `detrend`; by default the
+            mean of a periodic map, the plane of any other.
         h_max : float, optional
             Height of the highest point above the mid-plane [length]; by default the map's, after detrending.
         band : tuple of float, optional
             (q0, q1) to fit and to take; else a flat roll-off below and a departure above are found and left out.
         model : {"self-affine", "measured"}, optional
             Five numbers fitted to it, or the map's own spectrum, heights and curves, without a fit.
+        **treatment
+            `outliers`, `fill`, `short_cutoff`, `long_cutoff`, `tip_radius`, `reliable`, `window` of
+            `mbma_tables.surfaces.treatment.Treatment`; `unit` of the lengths where a file has none, `channel` of a
+            file. What was done is the surface's `provenance`.
 
         Returns
         -------
@@ -416,16 +423,16 @@ class Surface(AnySurface):
         >>> print(f"H = {surface.hurst:.2f}, q0 = {surface.q0:.3f}, fitted at {surface.fit.points} points")
         H = 0.80, q0 = 6.283, fitted at 32 points
         """
-        from mbma_tables.surfaces.maps import fit_map, measured_map
+        from mbma_tables.surfaces.maps import fit_map, measured_map, prepared
 
         if model not in ("self-affine", "measured"):
             raise InputError(f"model must be 'self-affine' or 'measured', got {model!r}")
+        if model == "measured" and band is not None:
+            raise InputError("band belongs to model='self-affine': a measured surface is not fitted")
+        treated = prepared(heights, dx, dy, periodic, {"detrend": detrend, **treatment})
         if model == "measured":
-            if band is not None:
-                raise InputError("band belongs to model='self-affine': a measured surface is not fitted")
-            return measured_map(heights, dx, dy, periodic, detrend, h_max)
-
-        fitted = fit_map(heights, dx, dy, periodic, detrend, h_max, band)
+            return measured_map(treated, h_max)
+        fitted = fit_map(treated, h_max, band)
         return cls(**fitted._asdict(), unit=fitted.fit.length_unit)
 
     @property

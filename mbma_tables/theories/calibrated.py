@@ -11,7 +11,7 @@ from mbma_tables.arguments import FloatArray, finite_array, require
 from mbma_tables.calibrated import Law, Spectrum, light_factor
 from mbma_tables.calibrated_map import MapLaw
 from mbma_tables.errors import InputError
-from mbma_tables.surfaces.maps import detrended_map
+from mbma_tables.surfaces.maps import prepared
 from mbma_tables.surfaces.psd import CONVENTIONS, check_height
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import calibrated_table
@@ -199,8 +199,9 @@ class Calibrated(_Calibrated):
         >>> bool(contact(law.surface, pressure=0.01, theory=law).valid)
         True
         """
-        values, step_x, step_y, whole = detrended_map(heights, dx, dy, periodic, detrend)
-        if not whole:
+        treated = prepared(heights, dx, dy, periodic, {"detrend": detrend})
+        values, (step_x, step_y) = treated.heights, treated.steps
+        if not treated.periodic:
             values = np.concatenate([values, values[::-1]])
             values = np.concatenate([values, values[:, ::-1]], axis=1)
         values = values - values.mean()

@@ -1,0 +1,226 @@
+"""What is done to a measurement before its spectrum is taken, and what is said of it."""
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+
+from mbma_tables import Surface
+from mbma_tables.errors import InputError, NotSelfAffineError
+from mbma_tables.surfaces.treatment import Treatment, read_measurement, treat
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")
+    library = pytest.importorskip("SurfaceTopography")
+
+# of numpy, to that library, when a test calls it
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
+POINTS, STEP = 96, 0.25
+SIDE = POINTS * STEP
+
+
+def waves(highest=12, seed=4, shape=(POINTS, POINTS)):
+    """A periodic sum of a few dozen waves, at most `highest` a side."""
+    rng = np.random.default_rng(seed)
+    x, y = (np.arange(n) / n for n in shape)
+    heights = np.zeros(shape)
+    for m, n in rng.integers(-highest, highest + 1, (60, 2)):
+        phase = 2 * np.pi * np.add.outer(m * x, n * y) + rng.uniform(0, 6)
+        heights += np.cos(phase) / (1 + np.hypot(m, n)) ** 1.5
+    return heights - heights.mean()
+
+
+MAP = waves()
+
+
+def treated(heights=MAP, periodic=False, unit=None, info=None, steps=(STEP, STEP), **options):
+    return treat(heights, steps, periodic, Treatment(**options), unit, info)
+
+
+def told(result, step):
+    return next(entry["told"] for entry in result.provenance if entry["step"] == step)
+
+
+@pytest.mark.parametrize(
+    ("mode", "theirs"),
+    [("plane", "height"), ("quadratic", "curvature"), ("median", "median"), ("slope", "slope"), ("mean", "center")],
+)
+def test_trends_are_the_librarys(mode, theirs):
+    x = np.linspace(0, 1, POINTS)
+    bent = MAP + 3 * x[:, None] - 2 * x[None, :] ** 2 + 7
+    other = library.Topography(bent, (SIDE, SIDE)).detrend(theirs).heights()
+    np.testing.assert_allclose(treated(bent, detrend=mode).heights, other, atol=1e-12)
+
+
+@pytest.mark.parametrize("degree", ["mean", "plane", "quadratic"])
+def test_trends_of_a_line(degree):
+    line = MAP[5] + np.linspace(0, 2, POINTS) ** 2
+    other = library.UniformLineScan(line, SIDE).detrend({"mean": "center", "plane": "height"}.get(degree, "curvature"))
+    np.testing.assert_allclose(treated(line, steps=(STEP,), detrend=degree).heights, other.heights(), atol=1e-12)
+
+
+class TestHoles:
+    def test_a_few_are_filled_unasked_and_told(self):
+        holed = MAP.copy()
+        holed[20:24, 30:34] = np.nan
+        found = treated(holed)
+        assert "16 of 9216 points" in told(found, "fill")
+        # harmonic: the mean of the four neighbours, before the plane is taken off
+        inside = found.heights[21, 31]
+        near = [found.heights[21 + i, 31 + j] for i, j in ((0, 1), (1, 0), (0, -1), (-1, 0))]
+        assert inside == pytest.approx(np.mean(near), abs=1e-9)
+        assert np.isfinite(found.heights).all()
+
+    def test_many_only_when_asked(self):
+        holed = np.where(np.random.default_rng(0).random(MAP.shape) < 0.2, np.nan, MAP)
+        with pytest.raises(InputError, match="more than 5%: fill them"):
+            treated(holed)
+        assert np.isfinite(treated(holed, fill="harmonic").heights).all()
+
+    def test_masked_is_undefined(self):
+        masked = np.ma.masked_greater(MAP, np.quantile(MAP, 0.99))
+        nan = np.where(masked.mask, np.nan, MAP)
+        np.testing.assert_array_equal(treated(masked).heights, treated(nan).heights)
+
+    def test_nothing_but_holes(self):
+        with pytest.raises(InputError, match="every height is undefined"):
+            treated(np.full((40, 40), np.nan))
+
+
+class TestOutliers:
+    def test_a_bad_pixel_goes_and_little_else(self):
+        spoilt = MAP.copy()
+        spoilt[40, 50], spoilt[0, 0] = 30.0, -20.0
+        found = treated(spoilt, outliers=10)
+        assert "2 of 9216 points" in told(found, "outliers")
+        left = np.abs(found.heights - treated(MAP).heights)
+        assert left.max() < 0.3 * MAP.std()
+        assert left.mean() < 1e-3 * MAP.std()
+
+    def test_a_clean_map_loses_nothing(self):
+        found = treated(outliers=10)
+        assert "0 of 9216 points" in told(found, "outliers")
+        np.testing.assert_array_equal(found.heights, treated().heights)
+
+
+class TestCutoff:
+    @pytest.mark.parametrize("periodic", [True, False])
+    def test_gradient_and_variance_that_go(self, periodic):
+        whole, cut = treated(periodic=periodic), treated(periodic=periodic, short_cutoff=SIDE / 6.5)
+        entry = next(e for e in cut.provenance if e["step"] == "short_cutoff")
+
+        def squares(heights):
+            if not periodic:
+                heights = np.block([[heights, heights[:, ::-1]], [heights[::-1], heights[::-1, ::-1]]])
+            size = heights.shape[0] * STEP
+            scan = library.Topography(heights, (size, size), periodic=True)
+            return heights.var(), np.mean(sum(np.square(part) for part in scan.fourier_derivative()))
+
+        before, after = squares(whole.heights), squares(cut.heights)
+        assert entry["of_variance"] == pytest.approx(1 - after[0] / before[0], rel=1e-9)
+        assert entry["of_gradient"] == pytest.approx(1 - after[1] / before[1], rel=1e-9)
+        assert 0.1 < entry["of_gradient"] < 0.9
+        assert f"area at light load is {math.sqrt(before[1] / after[1]):.2g} times" in entry["told"]
+        assert cut.waves == (0.0, pytest.approx(2 * np.pi * 6.5 / SIDE))
+
+    def test_periodic_waves_are_those_of_the_library(self):
+        cut = treated(periodic=True, short_cutoff=3.0, long_cutoff=12.0)
+        other = library.Topography(MAP, (SIDE, SIDE), periodic=True)
+        other = other.longcut(cutoff_wavelength=12.0).shortcut(cutoff_wavelength=3.0)
+        np.testing.assert_allclose(cut.heights, other.heights(), atol=1e-12)
+
+    def test_a_line(self):
+        line = MAP[3]
+        cut = treated(line, periodic=True, steps=(STEP,), short_cutoff=3.0)
+        other = library.UniformLineScan(line - line.mean(), SIDE, periodic=True).shortcut(cutoff_wavelength=3.0)
+        np.testing.assert_allclose(cut.heights, other.heights(), atol=1e-12)
+
+    def test_the_surface_ends_there(self):
+        surface = Surface.from_map(MAP, STEP, periodic=True, short_cutoff=3.0, model="measured")
+        assert surface.q1 <= 2 * np.pi / 3 * (1 + 1e-9)
+        assert [entry["step"] for entry in surface.provenance] == ["read", "detrend", "short_cutoff", "edges"]
+
+    @pytest.mark.parametrize(
+        ("options", "message"),
+        [
+            ({"short_cutoff": 5.0, "long_cutoff": 4.0}, "long_cutoff must be larger"),
+            ({"short_cutoff": 1e9}, "leaves no wave"),
+            ({"short_cutoff": -1.0}, "short_cutoff must be a number"),
+            ({"outliers": math.nan}, "outliers must be finite"),
+            ({"fill": "zero"}, "fill must be one of harmonic"),
+            ({"detrend": "cubic"}, "detrend must be one of mean"),
+        ],
+    )
+    def test_refused(self, options, message):
+        with pytest.raises((InputError, NotSelfAffineError), match=message):
+            treated(periodic=True, **options)
+
+
+class TestReliability:
+    SHARP = waves(30, seed=8)
+
+    def test_a_tip_cannot_follow(self):
+        found = treated(self.SHARP, tip_radius=5.0)
+        limit = library.Topography(treated(self.SHARP).heights, (SIDE, SIDE)).scanning_probe_reliability_cutoff(5.0)
+        assert limit > 2 * STEP
+        entry = next(e for e in found.provenance if e["step"] == "reliability")
+        assert entry["wavelength"] == pytest.approx(limit)
+        assert found.waves[1] == pytest.approx(2 * np.pi / limit)
+
+    def test_a_fine_tip_can(self):
+        assert "follows every wave" in told(treated(tip_radius=1e-3), "reliability")
+
+    def test_what_the_file_says_counts_unless_told_otherwise(self):
+        info = {"instrument": {"parameters": {"resolution": {"value": 2000.0, "unit": "nm"}}}}
+        found = treated(unit="um", info=info)
+        assert found.waves[1] == pytest.approx(2 * np.pi / 2.0)
+        assert treated(unit="um", info=info, reliable=False).waves[1] == math.inf
+        assert treated(unit="um", info=info, short_cutoff=4.0).waves[1] == pytest.approx(2 * np.pi / 4.0)
+
+
+class TestReading:
+    def test_arrays_in_files(self, tmp_path):
+        np.save(tmp_path / "a.npy", MAP)
+        np.savetxt(tmp_path / "a.txt", MAP)
+        np.savetxt(tmp_path / "a.csv", MAP, delimiter=",")
+        plain = Surface.from_map(MAP, STEP, model="measured")
+        for name in ("a.npy", "a.txt", "a.csv"):
+            found = Surface.from_map(tmp_path / name, STEP, unit="um", model="measured")
+            assert found.h_rms == pytest.approx(plain.h_rms, rel=1e-9)
+            assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=1e-9)
+            assert found.unit == "um"
+            with pytest.raises(InputError, match="has no lengths: give the sampling step dx"):
+                Surface.from_map(tmp_path / name)
+
+    def test_a_file_knows_its_lengths_and_unit(self, tmp_path):
+        path = tmp_path / "a.nc"
+        library.Topography(MAP, (SIDE, SIDE), unit="nm").to_netcdf(str(path))
+        found = Surface.from_map(path, model="measured")
+        assert found.unit == "nm"
+        assert found.h_rms == pytest.approx(Surface.from_map(MAP, STEP, model="measured").h_rms, rel=1e-6)
+        with pytest.raises(InputError, match="has its own lengths"):
+            read_measurement(path, dx=1.0)
+        with pytest.raises(InputError, match="is in nm"):
+            read_measurement(path, unit="um")
+        with pytest.raises(InputError, match="has channels 0 to 0, not 3"):
+            read_measurement(path, channel=3)
+
+    def test_a_csv_of_words(self, tmp_path):
+        (tmp_path / "w.csv").write_text("1,2,3,4,5\na,b,c,d,e\n")
+        with pytest.raises(InputError, match="must hold numbers with commas"):
+            read_measurement(tmp_path / "w.csv")
+
+
+@pytest.mark.parametrize("window", ["hann", "blackman", "tukey"])
+def test_a_window_is_the_librarys(window):
+    found = treated(MAP[3], steps=(STEP,), window=window)
+    scan = library.UniformLineScan(found.heights, SIDE).window(window)
+    weights = np.asarray(scan.window_data)
+    expected = scan.heights() - weights * np.average(found.heights, weights=weights)
+    np.testing.assert_allclose(found.windowed(), expected, atol=1e-12)
+
+
+def test_an_unknown_option_is_named():
+    with pytest.raises(TypeError, match="from_map has no option cutoff"):
+        Surface.from_map(MAP, STEP, cutoff=2.0)
