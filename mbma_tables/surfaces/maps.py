@@ -18,7 +18,8 @@ from mbma_tables.surfaces.measured import Heights, MeasuredSurface
 from mbma_tables.surfaces.power_law import SCATTER, log_bins
 from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.psd import FittedSurface, check_band, check_height, fit_spectrum
-from mbma_tables.surfaces.treatment import Treated, Treatment, grid_of, read_measurement, treat
+from mbma_tables.surfaces.treatment import LENGTHS, Treated, Treatment, grid_of, read_measurement, treat
+from mbma_tables.units import Units, known, resolve
 
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
 WINDOW_LOBE = 2.0  # half-width of a Hann window's main lobe, in grid steps: closer to q = 0 it mixes with the mean
@@ -73,23 +74,28 @@ def _refuse_edges(heights: FloatArray) -> None:
 
 
 def prepared(
-    source: Any, dx: float | None, dy: float | None, periodic: bool | None, options: Mapping[str, Any]
+    source: Any, dx: Any, dy: Any, periodic: bool | None, options: Mapping[str, Any], dimensions: int = 2
 ) -> Treated:
-    """The map of a file, an array or a topography, treated; arguments as of `Surface.from_map`."""
+    """A map, or a line scan, of a file, an array or a topography, treated; arguments as of `Surface.from_map`."""
     options = dict(options)
     unit, channel = options.pop("unit", None), options.pop("channel", None)
     unknown = options.keys() - {field.name for field in dataclasses.fields(Treatment)}
     if unknown:
-        raise TypeError(f"from_map has no option {', '.join(sorted(unknown))}: see mbma_tables.surfaces.treatment")
-    treatment = Treatment(**options)
+        raise TypeError(f"there is no option {', '.join(sorted(unknown))}: see mbma_tables.surfaces.treatment")
+    lengths, unit = resolve({name: step for name, step in (("dx", dx), ("dy", dy)) if step is not None}, unit)
+    dx, dy = lengths.get("dx"), lengths.get("dy")
     if isinstance(source, str | os.PathLike):
         source, dx, dy = read_measurement(source, dx, dy, unit, channel), None, None
     elif channel is not None:
         raise InputError("channel belongs to a file")
-    grid, steps, whole, own, info = grid_of(source, dx, dy, periodic)
-    if unit is not None and own not in (None, unit):
-        raise InputError(f"the topography is in {own}, the unit given is {unit}: leave it out")
-    return treat(grid, steps, whole, treatment, own or unit, info)
+    grid, steps, whole, own, info = grid_of(source, dx, dy, periodic, dimensions)
+    own = unit if own is None else known(own)
+    if unit is not None and unit != own:
+        raise InputError(f"lengths are in {own}, not in {unit}: leave the unit out")
+    units = Units(own)
+    options |= {name: units.number(name, options[name]) for name in options.keys() & {*LENGTHS, "outliers"}}
+    treatment = Treatment(**options)
+    return treat(grid, steps, whole, treatment, own, info)
 
 
 def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | None) -> FittedSurface:

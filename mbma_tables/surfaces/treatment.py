@@ -30,6 +30,7 @@ MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
 USUAL, USUAL_DEVIATES = 0.99, 2.576  # share of points that set the scale of differences, and where it ends if Gaussian
 MAX_TEXT_BYTES = 256 * 2**20
 MIN_LENGTH, MAX_LENGTH = 1e-30, 1e30  # in any unit: fourth powers of them, which C has, keep their digits
+LENGTHS = ("short_cutoff", "long_cutoff", "tip_radius")  # options that are lengths
 Provenance = tuple[Mapping[str, Any], ...]
 
 
@@ -69,7 +70,7 @@ class Treatment:
     window: str | None = None
 
     def __post_init__(self) -> None:
-        for name in ("outliers", "short_cutoff", "long_cutoff", "tip_radius"):
+        for name in ("outliers", *LENGTHS):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, number_in(name, getattr(self, name), MIN_LENGTH, MAX_LENGTH))
         for name, allowed in (("fill", FILLS), ("detrend", DETRENDS)):
@@ -212,8 +213,6 @@ def _channel_of(
         )
     elif dx is not None or dy is not None:
         raise InputError(f"{path.name} has its own lengths: leave dx and dy out")
-    if unit is not None and chosen.unit not in (None, unit):
-        raise InputError(f"{path.name} is in {chosen.unit}: leave the unit {unit!r} out, or convert what it gives")
     if unit is not None and chosen.unit is None:
         given["unit"] = unit
     return reader.topography(**given)

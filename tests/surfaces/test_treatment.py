@@ -201,8 +201,8 @@ class TestReading:
         assert found.h_rms == pytest.approx(Surface.from_map(MAP, STEP, model="measured").h_rms, rel=1e-6)
         with pytest.raises(InputError, match="has its own lengths"):
             read_measurement(path, dx=1.0)
-        with pytest.raises(InputError, match="is in nm"):
-            read_measurement(path, unit="um")
+        with pytest.raises(InputError, match="lengths are in nm, not in um"):
+            Surface.from_map(path, unit="um")
         with pytest.raises(InputError, match="has channels 0 to 0, not 3"):
             read_measurement(path, channel=3)
 
@@ -222,5 +222,14 @@ def test_a_window_is_the_librarys(window):
 
 
 def test_an_unknown_option_is_named():
-    with pytest.raises(TypeError, match="from_map has no option cutoff"):
+    with pytest.raises(TypeError, match="there is no option cutoff"):
         Surface.from_map(MAP, STEP, cutoff=2.0)
+
+
+def test_lengths_with_their_unit():
+    plain = Surface.from_map(MAP, STEP, unit="um", short_cutoff=3.0, model="measured")
+    named = Surface.from_map(MAP, "250 nm", unit="um", short_cutoff="3e-6 m", model="measured")
+    assert named.q1 == pytest.approx(plain.q1, rel=1e-12)
+    assert named.unit == "um"
+    with pytest.raises(InputError, match="whose unit of length is not known"):
+        Surface.from_map(MAP, STEP, short_cutoff="3 um")
