@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from mbma_tables.theories.contact import contact
     from mbma_tables.theories.law import contact_law
     from mbma_tables.theories.result import Contact
+    from mbma_tables.theories.unknowns import sensitivity
     from mbma_tables.totals.island import Island, island
     from mbma_tables.totals.law_protocol import ContactLaw
 
@@ -50,6 +51,7 @@ _HOMES = {
     "height_integral": "mbma_tables.islands.height_integrals",
     "island": "mbma_tables.totals.island",
     "open_table": "mbma_tables.models.tables",
+    "sensitivity": "mbma_tables.theories.unknowns",
 }
 _MODULES = {
     "greenwood_tripp": "mbma_tables.islands.greenwood_tripp",
@@ -75,6 +77,7 @@ __all__ = [
     "height_integral",
     "island",
     "open_table",
+    "sensitivity",
     "theories",
 ]
 

@@ -57,6 +57,7 @@ DIMENSIONS = {
     **dict.fromkeys(("E_star", "E1", "E2", "pressure", "pressures", "mean_pressure", "force"), (0, 1)),
     "m0": (2, 0),
     "stiffness": (-1, 1),
+    "conductance": (-1, 0),
     "energy": (1, 1),
     "island_force": (2, 1),
     "island_area": (2, 0),

@@ -17,6 +17,7 @@ from mbma_tables.cli.commands import contact_command, curve_command, island_comm
 from mbma_tables.cli.cost import cost_command
 from mbma_tables.cli.export import export_command
 from mbma_tables.cli.scene import plan_command, run_command
+from mbma_tables.cli.sensitivity import sensitivity_command
 from mbma_tables.cli.tables import tables_group
 from mbma_tables.errors import MbmaError
 
@@ -70,6 +71,7 @@ for command in (
     curve_command,
     island_command,
     surfaces_command,
+    sensitivity_command,
     tables_group,
     plan_command,
     run_command,

@@ -1,0 +1,124 @@
+"""How much each unknown matters: against derivatives in closed form, laws of scaling, and plain differences."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from mbma_tables import InputError, Surface, contact, sensitivity
+from mbma_tables.cli import main
+from mbma_tables.theories import THEORIES
+
+SURFACE = Surface(0.8, 0.06, 12.0, 0.5, 1.7, unit="um")
+HELD = {"mean_separation": 1.1, "pressure": 0.03, "area": 0.02}
+SLOW = [pytest.param(name, marks=pytest.mark.slow if name == "persson" else ()) for name in THEORIES]
+
+
+@pytest.mark.parametrize("theory", SLOW)
+@pytest.mark.parametrize("by", HELD)
+def test_answers_scale_as_they_must(theory, by):
+    """Another unit of length or stress changes no ratio, whatever the theory."""
+    found = sensitivity(SURFACE, **{by: HELD[by]}, E_star="10 GPa", theory=theory)
+    lengths = {"mean_separation": (1, 0), "force": (0, 1), "area": (0, 0), "stiffness": (-1, 1), "conductance": (-1, 0)}
+    assert set(found.answers) == set(lengths) - {{"pressure": "force"}.get(by, by)}
+    for answer in found.answers:
+        slope = {name: row[answer] for name, row in found.slopes.items()}
+        length = slope["h_rms"] + slope["h_max"] + slope.get("mean_separation", 0) - slope["q0"] - slope["q1"]
+        stress = slope["E_star"] + slope.get("pressure", 0)
+        assert (length, stress) == (
+            pytest.approx(lengths[answer][0], abs=2e-5),
+            pytest.approx(lengths[answer][1], abs=2e-5),
+        )
+        assert all(abs(row[answer]) < 1e-5 for row in found.errors.values())
+
+
+@pytest.mark.parametrize("by", ["separation", "pressure"])
+def test_derivatives_of_the_model(by):
+    given = {"separation": 0.8} if by == "separation" else {"pressure": 0.03}
+    found = sensitivity(SURFACE, **given, E_star=10.0)
+    exact = contact(SURFACE, **given, E_star=10.0, derivatives=True)
+    for name in ("hurst", "q0", "q1", "h_rms", "h_max"):
+        number = getattr(SURFACE, name)
+        assert found.slopes[name]["area"] == pytest.approx(exact.area_by[name] * number / exact.area, abs=1e-5)
+        if by == "separation":
+            assert found.slopes[name]["force"] == pytest.approx(exact.force_by[name] * number / exact.force, abs=1e-5)
+        else:
+            # u = (h_max + d)/2
+            moved = (exact.separation_by[name] + (name == "h_max")) / 2 * number / exact.mean_separation
+            assert found.slopes[name]["mean_separation"] == pytest.approx(moved, abs=1e-5)
+
+
+def test_numbers_of_a_drawing_are_the_unknowns():
+    drawing = {"hurst": 0.8, "Ra": 0.4, "Rdq": 0.1, "longest": 100.0, "h_max": 1.8}
+    surface = Surface.from_roughness(**drawing, unit="um")
+    found = sensitivity(surface, pressure=0.02, E_star=10.0, theory="persson")
+    assert list(found.parameters) == ["hurst", "Ra", "h_max", "Rdq", "longest", "E_star", "pressure"]
+    # Persson's area is a function of p/(E* g) alone
+    slopes = {name: row["area"] for name, row in found.slopes.items()}
+    assert slopes["Rdq"] == pytest.approx(-slopes["pressure"], abs=1e-6)
+    assert max(abs(slopes[name]) for name in ("hurst", "Ra", "h_max", "longest")) < 1e-6
+    # in another unit it is a surface by its five numbers
+    assert "q1" in sensitivity(surface.to("mm"), pressure=0.02, E_star=10.0).parameters
+
+
+def test_ranges():
+    ranges = {"hurst": (0.7, 0.9), "h_max": ("1.5 um", "2.5e-3 mm")}
+    found = sensitivity(SURFACE, pressure=0.03, E_star=10.0, theory="calibrated", ranges=ranges)
+    for name, ends in {"hurst": (0.7, 0.9), "h_max": (1.5, 2.5)}.items():
+        numbers = {p: getattr(SURFACE, p) for p in ("hurst", "q0", "q1", "h_rms", "h_max")} | {
+            name: np.linspace(*ends, 41)
+        }
+        stiffness = contact(Surface(**numbers), pressure=0.03, E_star=10.0, theory="calibrated").stiffness
+        assert found.ranges[name]["stiffness"] == pytest.approx((stiffness.min(), stiffness.max()), rel=1e-3)
+        low, high = found.ranges["all"]["stiffness"]
+        assert low <= found.ranges[name]["stiffness"][0] * (1 + 1e-9)
+        assert high >= found.ranges[name]["stiffness"][1] * (1 - 1e-9)
+    assert "all" not in sensitivity(SURFACE, pressure=0.03, E_star=10.0, ranges={"hurst": (0.7, 0.9)}).ranges
+    text = str(found)
+    assert "range of hurst: " in text
+    assert "10\n" not in text.splitlines()[1]
+
+
+def test_a_hurst_exponent_of_one_is_stepped_down_from():
+    smooth = Surface(1.0, 0.06, 12.0, 0.5, 1.7)
+    found = sensitivity(smooth, mean_separation=1.1)
+    exact = contact(smooth, mean_separation=1.1, derivatives=True)
+    assert found.slopes["hurst"]["force"] == pytest.approx(exact.force_by["hurst"] / exact.force, rel=1e-4)
+    assert "E_star" not in found.parameters
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({}, "give exactly one of separation"),
+        ({"pressure": 0.1, "area": 0.1}, "got pressure and area"),
+        ({"separation": 2.0}, "there is no contact at this separation"),
+        ({"pressure": [0.1, 0.2]}, "pressure must be one number"),
+        ({"pressure": 0.1, "ranges": {"h": (1, 2)}}, "there is no 'h'; there are hurst"),
+        ({"pressure": 0.1, "ranges": {"hurst": 0.5}}, "hurst needs two numbers"),
+        ({"pressure": 0.1, "ranges": {"hurst": (0.9, 0.7)}}, "two rising positive numbers"),
+        ({"pressure": 0.1, "ranges": {"hurst": (0.9, 1.7)}}, "hurst must be in"),
+        ({"pressure": 0.1, "surface": Surface([0.7, 0.8], 0.06, 12.0, 0.5, 1.7)}, "not of a batch"),
+    ],
+)
+def test_refused(changed, said):
+    given = {"surface": SURFACE, "E_star": 10.0} | changed
+    with pytest.raises(InputError, match=said):
+        sensitivity(given.pop("surface"), **given)
+
+
+def test_the_command():
+    arguments = ["--surface", "challenge", "--E-star", "25MPa", "-p", "100kPa", "--range", "h-max=2um:4um"]
+    result = CliRunner().invoke(main, ["sensitivity", *arguments, "--json"])
+    assert result.exit_code == 0, result.output
+    answer = json.loads(result.output)
+    found = sensitivity(Surface.named("challenge"), pressure=0.1, E_star="25 MPa", ranges={"h_max": (2.0, 4.0)})
+    assert answer["columns"]["area"] == [row["area"] for row in found.slopes.values()]
+    assert answer["columns"]["unit"] == ["-", "1/um", "1/um", "um", "um", "MPa", "MPa"]
+    assert answer["ranges"]["h_max"]["stiffness"] == list(found.ranges["h_max"]["stiffness"])
+    text = CliRunner().invoke(main, ["sensitivity", *arguments]).output
+    assert "range of h_max: mean_separation" in text
+    assert "MPa/um" in text
+    bad = CliRunner().invoke(main, ["sensitivity", *arguments[:-1], "h_max:2"])
+    assert (bad.exit_code, bad.output) == (2, "mbma: --range must be like h_max=2um:4um, got 'h_max:2'\n")
