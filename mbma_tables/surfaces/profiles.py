@@ -1,0 +1,191 @@
+"""Line scans: the isotropic surface whose profile was measured.
+
+A profile's spectrum C_1D, with h_rms^2 = integral C_1D dq/pi, is the isotropic one seen from the side:
+C_1D(q) = 4 pi integral from q of C q' dq'/sqrt(q'^2 - q^2), an Abel transform. Its inverse is sought as a spectrum that
+is a power law between nodes, as straight in its logarithms as the scatter of the measured waves allows. Height variance
+and gradient need no inverse, the profile has them, and the spectrum found is held to both.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from mbma_tables.arguments import FloatArray
+from mbma_tables.errors import NotSelfAffineError
+from mbma_tables.surfaces.measured import Heights, MeasuredSurface, one_height
+from mbma_tables.surfaces.treatment import Treated
+
+PER_DECADE = 10  # nodes of the spectrum
+PANELS = 8  # between two nodes
+STRAIGHT = 1.0  # change of slope, d ln C/d ln q, from node to node that is as likely as one standard deviation
+HELD = 1e3  # weight of height variance and gradient, which are met to 1e-5
+OVERLAP = 35 / 18  # waves under a Hann window that carry what one independent wave does
+END = 1e-3  # share of the squared gradient in the waves above the surface's last
+LONGEST = 4  # of the trace's longest waves: where they hold half of the variance there is no roll-off
+MIN_NODES = 5
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ProfileSpectrum:
+    """A line scan's spectrum in bins, and what follows from it.
+
+    Attributes
+    ----------
+    edges, mean, count : numpy.ndarray
+        Wavenumbers between bins, shape (n + 1,) [1/length]; mean C_1D [length^3] and number of waves, shape (n,).
+    kernel : numpy.ndarray, shape (n, PANELS n)
+        C_1D of each bin for C = 1 on each panel.
+    h_rms, gradient : float
+        Of the surface, if isotropic [length], [-].
+    h_rms_error, gradient_error : float
+        Relative standard errors, of a Gaussian surface.
+    longest : float
+        Share of the height variance in the LONGEST longest waves.
+    """
+
+    edges: FloatArray
+    mean: FloatArray
+    count: FloatArray
+    kernel: FloatArray
+    h_rms: float
+    gradient: float
+    h_rms_error: float
+    gradient_error: float
+    longest: float
+
+    @classmethod
+    def of(cls, treated: Treated) -> ProfileSpectrum:
+        """Of a treated line scan."""
+        heights, step = treated.heights, treated.steps[0]
+        length = heights.size * step
+        unit = 2 * math.pi / length
+        transform = step * np.fft.rfft(treated.windowed())
+        last = (heights.size - 1) // 2
+        q, C = unit * np.arange(1, last + 1), np.abs(transform[1 : last + 1]) ** 2 / length
+        overlap = 1.0 if treated.periodic else OVERLAP
+        low, high = treated.waves
+        held = (q >= low * (1 - 1e-9)) & (q <= high * (1 + 1e-9))
+        if held.any():
+            # nothing but rounding and leakage beyond where the surface ends
+            rest = np.cumsum((C * q**2 * held)[::-1])[::-1]
+            held &= rest > END * rest[0]
+        q, C = q[held], C[held]
+        bins = math.ceil(PER_DECADE * math.log10(q[-1] / q[0])) if q.size > 1 else 0
+        if bins < MIN_NODES:
+            raise NotSelfAffineError(f"the line scan holds {q.size} waves: too few for a spectrum")
+        edges = np.geomspace(q[0] - unit / 2, q[-1] + unit / 2, bins + 1)
+        filled = np.unique(np.searchsorted(edges, q, side="right") - 1)
+        edges = np.append(edges[filled], edges[-1])
+        number = np.searchsorted(edges, q, side="right") - 1
+        count = np.bincount(number).astype(float)
+        sides = 4 * np.pi * np.sqrt(np.maximum(_panels(edges) ** 2 - q[:, None] ** 2, 0))
+        kernel = np.add.reduceat(np.diff(sides, axis=1), np.searchsorted(number, np.arange(count.size)), axis=0)
+        slopes = C * q**2
+        # a wave's power is exponentially distributed: its square's mean is twice its mean's square
+        errors = [math.sqrt(each @ each / 2) / each.sum() / 2 for each in (C, slopes)]
+        return cls(
+            edges,
+            np.bincount(number, C) / count,
+            count / overlap,
+            kernel / count[:, None],
+            float(heights.std()),
+            math.sqrt(2 * slopes.sum() * unit / np.pi),
+            errors[0],
+            math.sqrt(overlap) * errors[1],
+            float(C[:LONGEST].sum() / C.sum()),
+        )
+
+    def isotropic(self) -> FloatArray:
+        """C at the edges [length^4], h_rms^2 = 2 pi integral C q dq."""
+        from scipy.optimize import least_squares
+        from scipy.special import digamma
+
+        log_q, fine = np.log(self.edges), _panels(self.edges)
+        middle = np.log(fine[1:] * fine[:-1]) / 2
+        between = np.stack([np.interp(middle, log_q, row) for row in np.eye(log_q.size)], axis=1)
+        independent = np.maximum(self.count, 1.0)
+        weight = np.sqrt(independent)
+        # the logarithm of a mean of few waves lies low
+        wanted = np.log(self.mean) - digamma(independent) + np.log(independent)
+        bend = np.diff(np.diff(np.eye(log_q.size), axis=0) / np.diff(log_q)[:, None], axis=0) / STRAIGHT
+        sums = np.stack([np.pi * np.diff(fine**2), np.pi / 2 * np.diff(fine**4)])
+        totals = np.log([self.h_rms**2, self.gradient**2])
+
+        def deviations(log_C: FloatArray) -> FloatArray:
+            C = np.exp(between @ log_C)
+            seen, held = np.log(self.kernel @ C) - wanted, np.log(sums @ C) - totals
+            return np.concatenate([weight * seen, bend @ log_C, HELD * held])
+
+        def jacobian(log_C: FloatArray) -> FloatArray:
+            C = np.exp(between @ log_C)
+            seen = (self.kernel * C) @ between / (self.kernel @ C)[:, None]
+            held = (sums * C) @ between / (sums @ C)[:, None]
+            return np.vstack([weight[:, None] * seen, bend, HELD * held])
+
+        middles = np.sqrt(self.edges[1:] * self.edges[:-1])
+        start = np.interp(log_q, np.log(middles), np.log(self.mean / (2 * np.pi * middles)))
+        return np.asarray(np.exp(least_squares(deviations, start, jac=jacobian).x))
+
+
+def _panels(edges: FloatArray) -> FloatArray:
+    """Ends of the panels between nodes, evenly spaced in ln q."""
+    place = np.arange(PANELS * (edges.size - 1) + 1) / PANELS
+    return np.asarray(np.exp(np.interp(place, np.arange(edges.size), np.log(edges))))
+
+
+def measured_profile(treated: Treated, h_max: Any) -> MeasuredSurface:
+    """The isotropic surface of a treated line scan; see `Surface.from_profile`."""
+    # lengths of order one, so that their powers neither underflow nor overflow
+    scale = float(np.abs(treated.heights).max())
+    steps, waves = (treated.steps[0] / scale,), (scale * treated.waves[0], scale * treated.waves[1])
+    scaled = dataclasses.replace(treated, heights=treated.heights / scale, steps=steps, waves=waves)
+    found = ProfileSpectrum.of(scaled)
+    heights = Heights.of(scaled.heights)
+    surface = MeasuredSurface(
+        found.edges,
+        found.isotropic(),
+        None if h_max is None else one_height(h_max) / scale,
+        heights,
+        samples=np.interp(np.log(found.edges), np.log(found.edges[:-1]), found.count),
+    ).scaled(scale, treated.unit)
+    read = {"step": "read", "points": list(treated.heights.shape), "steps": list(treated.steps), "unit": treated.unit}
+    edges = "periodic" if treated.periodic else "under a window for the spectrum"
+    notes = _limits(found, steps[0] * scaled.heights.size)
+    provenance = (read, *treated.provenance, {"step": "edges", "kind": edges}, *notes)
+    return dataclasses.replace(surface, provenance=provenance)
+
+
+def _limits(found: ProfileSpectrum, length: float) -> tuple[dict[str, Any], ...]:
+    """What a single trace tells, how well, and what it cannot."""
+    errors = (
+        f"h_rms is known to {found.h_rms_error:.1%} and the rms gradient to {found.gradient_error:.1%} (one standard "
+        "error, of a Gaussian surface)"
+    )
+    # expected Euler characteristic of a Gaussian square above the level: one summit left
+    waves = length * found.gradient / math.sqrt(2) / found.h_rms
+    level = math.sqrt(2 * math.log(max(waves**2 / (2 * math.pi) ** 1.5, 2.0)))
+    level = math.sqrt(2 * math.log(max(level * waves**2 / (2 * math.pi) ** 1.5, 2.0)))
+    unseen = (
+        "one trace cannot tell anisotropy: across a lay the gradient is up to sqrt(2) times too large, along it too "
+        f"small. Its highest point is a line's: a Gaussian square of its length reaches about {level:.1f} h_rms"
+    )
+    notes = [
+        {
+            "step": "errors",
+            "h_rms": found.h_rms_error,
+            "rms_gradient": found.gradient_error,
+            "told": errors,
+        },
+        {"step": "unseen", "h_max": level, "told": unseen},
+    ]
+    if found.longest > 0.5:
+        told = (
+            f"the {LONGEST} longest waves of the trace hold {found.longest:.0%} of its variance: h_rms grows with its "
+            "length, and its error is larger than stated"
+        )
+        notes.append({"step": "no roll-off", "share": found.longest, "told": told})
+    return tuple(notes)

@@ -1,0 +1,142 @@
+"""Line scans: traces of surfaces that are known."""
+
+import warnings
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from mbma_tables import Surface
+from mbma_tables.errors import InputError, NotSelfAffineError
+from mbma_tables.surfaces.profiles import ProfileSpectrum
+from mbma_tables.surfaces.treatment import Treated
+
+POINTS = 8000
+SHORTEST = 2 * np.pi / 6  # six sampling steps a wave
+
+
+def plateau(hurst, roll_off, longest):
+    """C(q) of a surface with a roll-off, zero outside [longest, SHORTEST]."""
+    return lambda q: np.where((q >= longest) & (q <= SHORTEST), np.maximum(q, roll_off) ** (-2 - 2 * hurst), 0.0)
+
+
+def trace(C, longest, seed, points=POINTS, waves=3000):
+    """A line across an isotropic surface that is a sum of plane waves in random directions."""
+    rng = np.random.default_rng(seed)
+    edges = np.geomspace(longest, SHORTEST, waves + 1)
+    q = edges[:-1] * (edges[1:] / edges[:-1]) ** rng.random(waves)
+    variance = 2 * np.pi * C(q) * q * np.diff(edges)
+    along = q * np.cos(2 * np.pi * rng.random(waves))
+    amplitude = np.sqrt(2 * variance * rng.exponential(size=waves)) * np.exp(2j * np.pi * rng.random(waves))
+    block = 100
+    coarse = np.exp(1j * block * np.outer(np.arange(points // block), along)) * amplitude
+    return (coarse @ np.exp(1j * np.outer(np.arange(block), along)).T).real.ravel()
+
+
+def moments(C, longest, *orders):
+    """2 pi integral C q^(1 + order) dq."""
+    edges = np.geomspace(longest, SHORTEST, 4001)
+    q = np.sqrt(edges[1:] * edges[:-1])
+    return [float(np.sum(2 * np.pi * C(q) * q ** (1 + order) * np.diff(edges))) for order in orders]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("hurst", "waves"), [(0.8, 20), (0.4, 40)])
+def test_fifty_traces(hurst, waves):
+    # roll-off at `waves` waves a trace
+    roll_off = 2 * np.pi * waves / POINTS
+    C = plateau(hurst, roll_off, roll_off / 8)
+    m0, m2 = moments(C, roll_off / 8, 0, 2)
+    found = [Surface.from_profile(trace(C, roll_off / 8, seed), 1.0) for seed in range(50)]
+    for name, truth, bar in (("h_rms", m0**0.5, 0.05), ("rms_gradient", m2**0.5, 0.10)):
+        ratio = np.array([float(getattr(surface, name)) for surface in found]) / truth
+        stated = np.array([surface.provenance[-2][name] for surface in found])
+        assert ratio.mean() == pytest.approx(1, abs=bar)
+        # as wide as they scatter; 50 of them know their own scatter to 10%
+        assert stated.mean() == pytest.approx(ratio.std(), rel=0.35)
+        inside = np.abs(ratio - 1) < 2 * stated
+        assert inside.mean() > 0.84
+    # the spectrum between roll-off and end
+    q = np.geomspace(1.5 * roll_off, SHORTEST / 1.5, 12)
+    mean = np.mean([np.log(surface.power_spectrum(q)) for surface in found], axis=0)
+    np.testing.assert_allclose(np.exp(mean) / C(q), 1, atol=0.25)
+
+
+def test_the_kernel_is_the_abel_transform():
+    roll_off = 2 * np.pi * 40 / POINTS
+    C = plateau(0.8, roll_off, roll_off / 4)
+    found = ProfileSpectrum.of(Treated(trace(C, roll_off / 4, 3), (1.0,), False, None, (0.0, np.inf), ()))
+    fine = np.exp(np.interp(np.arange(found.kernel.shape[1] + 1) / 8, np.arange(found.edges.size), np.log(found.edges)))
+    own = found.kernel @ (np.sqrt(fine[1:] * fine[:-1]) ** -3.6)
+    for k in (8, 15, 20):
+        waves = 2 * np.pi / POINTS * np.arange(1, POINTS // 2)
+        waves = waves[(waves >= found.edges[k]) & (waves < found.edges[k + 1])]
+
+        def seen(q):
+            reach = np.sqrt(found.edges[-1] ** 2 - q**2)
+            return 4 * np.pi * quad(lambda t: np.hypot(q, t) ** -3.6, 0, reach, limit=200)[0]
+
+        assert own[k] == pytest.approx(np.mean([seen(q) for q in waves]), rel=0.01)
+
+
+def test_height_variance_and_gradient_are_the_lines_own():
+    roll_off = 2 * np.pi * 40 / POINTS
+    line = trace(plateau(0.6, roll_off, roll_off / 4), roll_off / 4, 5)
+    surface = Surface.from_profile(line, 1.0)
+    x = np.arange(POINTS)
+    flat = line - np.polyval(np.polyfit(x, line, 1), x)
+    assert surface.h_rms == pytest.approx(flat.std(), rel=1e-4)
+    # finite differences see six points a wave a little flatter
+    assert surface.m2 == pytest.approx(np.mean(np.gradient(flat)[1:-1] ** 2), rel=0.2)
+    assert surface.h_max == pytest.approx(flat.max())
+
+
+def test_units_do_not_matter():
+    roll_off = 2 * np.pi * 40 / POINTS
+    line = trace(plateau(0.6, roll_off, roll_off / 4), roll_off / 4, 5)
+    one, other = Surface.from_profile(line, 1.0), Surface.from_profile(1e-9 * line, "1e3 nm", unit="m")
+    assert other.h_rms == pytest.approx(1e-9 * one.h_rms, rel=1e-9)
+    assert other.rms_gradient == pytest.approx(1e-3 * one.rms_gradient, rel=1e-4)
+    assert other.unit == "m"
+
+
+def test_what_one_trace_cannot_tell():
+    line = np.cumsum(np.random.default_rng(2).standard_normal(4000))
+    told = [entry.get("told", "") for entry in Surface.from_profile(line, 1.0).provenance]
+    assert any("cannot tell anisotropy" in text for text in told)
+    assert any("h_rms grows with its length" in text for text in told)
+
+
+def test_files_and_scans(tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        library = pytest.importorskip("SurfaceTopography")
+    roll_off = 2 * np.pi * 40 / POINTS
+    line = trace(plateau(0.6, roll_off, roll_off / 4), roll_off / 4, 5)
+    plain = Surface.from_profile(line, 0.5)
+    np.savetxt(tmp_path / "a.csv", np.c_[0.5 * np.arange(POINTS), line], delimiter=",")
+    np.save(tmp_path / "a.npy", line)
+    for found in (
+        Surface.from_profile(tmp_path / "a.csv"),
+        Surface.from_profile(tmp_path / "a.npy", 0.5),
+        Surface.from_profile(library.UniformLineScan(line, 0.5 * POINTS)),
+    ):
+        assert found.h_rms == pytest.approx(plain.h_rms, rel=1e-9)
+        assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=1e-4)
+    with pytest.raises(InputError, match="from_profile takes line scans"):
+        Surface.from_map(library.UniformLineScan(line, 0.5 * POINTS))
+    with pytest.raises(InputError, match="from_map takes maps"):
+        Surface.from_profile(library.Topography(np.eye(40), (1, 1)))
+
+
+@pytest.mark.parametrize(
+    ("line", "error", "message"),
+    [
+        (np.eye(40), InputError, "one-dimensional"),
+        (np.arange(20.0), NotSelfAffineError, "20 points hold too few scales"),
+        (np.arange(200.0), NotSelfAffineError, "flat"),
+    ],
+)
+def test_refused(line, error, message):
+    with pytest.raises(error, match=message):
+        Surface.from_profile(line, 1.0)
