@@ -11,13 +11,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from generate.boundary_elements import solve
 from generate.boundary_elements.design import SPLITS, Task
 from mbma_tables import bearing
+from mbma_tables.boundary_elements import TOLERANCE
 from mbma_tables.errors import InputError
 from mbma_tables.tablefiles.provenance import source_digest, versions
 
-MODULES = ("generate.boundary_elements.surfaces", "generate.boundary_elements.solve", "mbma_tables.bearing")
+MODULES = (
+    "generate.boundary_elements.surfaces",
+    "generate.boundary_elements.solve",
+    "mbma_tables.boundary_elements",
+    "mbma_tables.bearing",
+)
 ENDS = bearing.BANDS + 2
 
 # name: (dimension beside the surface, what it is); all are numbers without a unit
@@ -126,7 +131,7 @@ def _attributes(
         "title": title,
         "institution": "mbma_tables contributors",
         "source": f"{', '.join(engines)}: conjugate gradients of Polonsky and Keer, force control, "
-        f"tolerance {solve.TOLERANCE:g}; periodic, frictionless, without adhesion",
+        f"tolerance {TOLERANCE:g}; periodic, frictionless, without adhesion",
         "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate {command} --collect",
         "references": "area correction: Yastrebov, Anciaux, Molinari, arXiv:1701.02727",
         "comment": "A surface is made anew by generate.boundary_elements.surfaces.heights from kind, hurst, zeta_1, "

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.metadata
 import os
 import pathlib
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -14,62 +13,13 @@ import numpy as np
 from generate.boundary_elements.surfaces import Recipe, heights
 from mbma_tables.arguments import FloatArray
 from mbma_tables.bearing import BANDS, bearing, half_plane_weights, radial_spectrum, wavevectors
+from mbma_tables.boundary_elements import LOADS as LOADS
+from mbma_tables.boundary_elements import Contact as Contact
+from mbma_tables.errors import ConvergenceError
 
-# F/(A0 E* g), g the rms gradient: from 0.1% to 97% contact of a Gaussian surface ...
-LOADS = (4.4e-4, 1e-3, 2e-3, 4.5e-3, 0.01, 0.02, 0.04, 0.07, 0.11, 0.17, 0.25, 0.37, 0.53, 0.75, 1.05)
-HIGHER_LOADS = (1.5, 2.1, 3.0)  # ... and on, where heavy tails of the gradient keep gaps open
+# beyond LOADS, where heavy tails of the gradient keep gaps open
+HIGHER_LOADS = (1.5, 2.1, 3.0)
 FULL = 0.96
-TOLERANCE = 1e-6
-MAX_ITERATIONS = 50_000  # surfaces stretched 1:16 take 4,000
-CORRECTION = (np.pi - 1 + np.log(2)) / 24  # Yastrebov, Anciaux, Molinari 2017
-
-
-class Contact:
-    """A periodic map against a rigid plane: Polonsky and Keer's conjugate gradients as Tamaas has them, E* = 1.
-
-    Each load starts from the pressures of the one before; `gap` has the last one's gaps, zero in contact.
-    """
-
-    gap: FloatArray
-
-    def __init__(self, surface: FloatArray, sizes: tuple[float, float], tolerance: float = TOLERANCE) -> None:
-        os.environ.setdefault("OMP_NUM_THREADS", "1")
-        import tamaas
-
-        tamaas.set_log_level(tamaas.LogLevel.error)
-        self.surface = np.ascontiguousarray(surface, dtype=float)
-        self.model = tamaas.ModelFactory.createModel(
-            tamaas.model_type.basic_2d, list(map(float, sizes)), list(surface.shape)
-        )
-        self.model.E, self.model.nu = 1.0, 0.0
-        self._solver = tamaas.PolonskyKeerRey(self.model, self.surface, tolerance)
-        self._solver.max_iter = MAX_ITERATIONS
-        self._tolerance = tolerance
-
-    def press(self, force: float) -> dict[str, float]:
-        """Contact under a mean pressure F/(A0 E*); areas as shares of A0, lengths as those of the map."""
-        started = time.process_time()
-        residual = self._solver.solve(force)
-        if not residual <= self._tolerance:
-            raise RuntimeError(f"boundary elements at F/(A0 E*) = {force:g} end with a residual of {residual:.1e}")
-        seconds = time.process_time() - started
-        pressure, moved = np.asarray(self.model.traction), np.asarray(self.model.displacement)
-        touching = pressure > 0
-        edges = sum(int(np.count_nonzero(touching != np.roll(touching, 1, axis))) for axis in (0, 1))
-        raw = float(touching.mean())
-        # the engine moves the whole surface by the gap; elastic energy has the displacement about its mean
-        gap = moved - self.surface
-        self.gap = np.where(touching, 0.0, np.maximum(gap - gap[touching].mean(), 0.0))
-        return {
-            "area": raw - CORRECTION * edges / touching.size,
-            "area_raw": raw,
-            "mean_separation": float(gap.mean() - gap[touching].mean()),
-            "energy": float(np.mean(pressure * (moved - moved.mean())) / 2),
-            "pressure_weighted_height": float(np.mean(pressure * self.surface) / force),
-            "residual": float(residual),
-            "seconds": seconds,
-        }
-
 
 QUANTITIES = ("area", "area_raw", "mean_separation", "energy", "pressure_weighted_height", "residual", "seconds")
 
@@ -128,7 +78,7 @@ def simulate_to(recipe: Recipe, folder: str, solve: Callable[[Recipe], dict[str,
         partial = target.with_suffix(f".{os.getpid()}.partial")
         try:
             found = solve(recipe)
-        except RuntimeError as fault:
+        except (ConvergenceError, RuntimeError) as fault:
             raise RuntimeError(f"{recipe.name}: {fault}") from None
         with open(partial, "wb") as stream:
             np.savez_compressed(stream, **found)

@@ -19,11 +19,13 @@ if TYPE_CHECKING:
     from mbma_tables.theories.mbma import Mbma
     from mbma_tables.theories.persson import Method, Persson, persson_area, persson_force, persson_separation
     from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
+    from mbma_tables.theories.simulated import BoundaryElements
 
 __all__ = [
     "THEORIES",
     "Asperities",
     "BoundLaw",
+    "BoundaryElements",
     "Calibrated",
     "GreenwoodWilliamson",
     "Mbma",
@@ -48,6 +50,7 @@ _MODULES = {
     "mbma": ("Mbma",),
     "persson": ("Method", "Persson", "persson_area", "persson_force", "persson_separation"),
     "protocol": ("Theory", "TheoryAnswer", "UserTheory"),
+    "simulated": ("BoundaryElements",),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}
 

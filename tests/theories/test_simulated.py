@@ -1,0 +1,106 @@
+"""Boundary elements of one map as a theory of it."""
+
+import numpy as np
+import pytest
+
+from mbma_tables import Surface, contact, contact_law
+from mbma_tables.errors import InputError, MbmaError, OutOfRangeError
+from mbma_tables.theories import BoundaryElements
+
+pytest.importorskip("tamaas")
+LOADS = (4e-3, 0.01, 0.025, 0.06, 0.12, 0.25, 0.5, 0.9)
+
+
+def heights(points=64, seed=3):
+    noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((points, points)))
+    q = np.hypot(np.fft.fftfreq(points)[:, None], np.fft.rfftfreq(points))
+    return 0.02 * np.fft.irfft2(np.where((q > 1.5 / points) & (q <= 0.25), noise / np.maximum(q, 0.01) ** 1.5, 0))
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return BoundaryElements.from_map(heights(), 1.0, periodic=True, unit="um", loads=LOADS)
+
+
+def test_it_answers_what_was_simulated(truth):
+    force, area, u, _ = truth.rows
+    found = contact(truth.surface, mean_separation=u, theory=truth)
+    np.testing.assert_allclose(found.force, force, rtol=1e-9)
+    np.testing.assert_allclose(found.area, area, rtol=1e-9)
+    assert found.valid.all()
+    assert (found.scatter == 0).all()
+    assert found.theory == "boundary_elements"
+
+
+def test_force_is_the_energys_slope(truth):
+    # two things that the simulation measures apart
+    _, _, u, energy = truth.rows
+    fine = np.geomspace(u[-1], u[0], 4001)
+    force = contact(truth.surface, mean_separation=fine, theory=truth).force
+    work = np.sum((force[1:] + force[:-1]) / 2 * np.diff(fine))
+    assert work == pytest.approx(energy[-1] - energy[0], rel=0.01)
+    np.testing.assert_allclose(truth.energy(truth.surface, u), energy, rtol=1e-9)
+
+
+def test_between_loads_within_its_error(truth):
+    between = np.sqrt(np.array(LOADS[1:]) * np.array(LOADS[:-1]))
+    finer = BoundaryElements.from_map(heights(), 1.0, periodic=True, loads=np.sort([*LOADS, *between]))
+    found = contact(truth.surface, mean_separation=finer.rows[2, 1::2], theory=truth)
+    assert found.error.max() < 0.2
+    for name, row in (("force", 0), ("area", 1)):
+        assert np.abs(np.log(getattr(found, name) / finer.rows[row, 1::2])).max() < found.error.max()
+
+
+def test_it_is_a_law_like_any_other(truth):
+    law = contact_law(truth.surface, theory=truth, E_star=10.0)
+    pressure = 10.0 * truth.rows[0, 3]
+    assert law.at_pressure(pressure).mean_separation == pytest.approx(truth.rows[2, 3], rel=0.02)
+    direct = contact(truth.surface, pressure=pressure, theory=truth, E_star=10.0)
+    assert law.at_pressure(pressure).stiffness == pytest.approx(direct.stiffness, rel=0.05)
+
+
+def test_what_was_not_simulated_is_refused(truth):
+    with pytest.raises(OutOfRangeError, match="which were simulated"):
+        contact(truth.surface, mean_separation=10 * truth.rows[2, 0], theory=truth)
+    with pytest.raises(OutOfRangeError, match="know that map alone"):
+        contact(Surface(0.8, 0.1, 2.0, 1.0, 3.0), mean_separation=1.0, theory=truth)
+
+
+def test_a_coarse_grid_is_not_valid():
+    coarse = 0.1 * np.random.default_rng(1).standard_normal((48, 48))
+    truth = BoundaryElements.from_map(coarse, 1.0, periodic=True, loads=LOADS[3:])
+    found = contact(truth.surface, mean_separation=truth.rows[2], theory=truth)
+    assert not found.valid.any()
+    assert "sampling steps" in next(iter(found.reasons))
+
+
+def test_a_map_is_continued_by_its_mirror_images():
+    half = heights()[:32, :40]
+    images = np.block([[half, half[:, ::-1]], [half[::-1], half[::-1, ::-1]]])
+    one = BoundaryElements.from_map(half, 1.0, detrend="mean", loads=LOADS[2:6])
+    other = BoundaryElements.from_map(images, 1.0, periodic=True, loads=LOADS[2:6])
+    np.testing.assert_allclose(one.rows, other.rows, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"force": [1.0, 2.0, 3.0]}, "at least 4 loads"),
+        ({"force": [1.0, 2.0, 2.0, 3.0]}, "force must be rising"),
+        ({"area": [0.0, 0.1, 0.2, 0.3]}, "loads must be positive"),
+        ({"mean_separation": [1.0, 2.0, 3.0, 4.0]}, "mean_separation must be falling"),
+    ],
+)
+def test_rows_that_make_no_law(truth, change, message):
+    rows = {"force": [1e-3, 0.01, 0.02, 0.1], "area": [0.01, 0.02, 0.1, 0.2], "mean_separation": [4.0, 3.0, 2.0, 1.0]}
+    columns = rows | {"energy": [1.0, 2.0, 3.0, 4.0]} | change
+    if len(columns["force"]) == 3:
+        columns = {name: column[:3] for name, column in columns.items()}
+    with pytest.raises(InputError, match=message):
+        BoundaryElements(truth.surface, **columns)
+
+
+def test_without_the_engine_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "tamaas", None)
+    with pytest.raises(MbmaError, match=r"pip install 'mbma_tables\[simulate\]'"):
+        BoundaryElements.from_map(heights(), 1.0, periodic=True)
