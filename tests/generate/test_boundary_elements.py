@@ -9,7 +9,6 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 
-from generate.boundary_elements import solve
 from generate.boundary_elements.collect import collect, dataset
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Task, campaign, nodes
 from generate.boundary_elements.run import boundary_elements, run
@@ -157,7 +156,7 @@ class TestCampaign:
             np.testing.assert_allclose(data.pressure_weighted_height, identity, atol=1e-6)
 
     def test_failures_come_last_and_are_named(self, tmp_path, monkeypatch):
-        monkeypatch.setattr(solve, "MAX_ITERATIONS", 2)
+        monkeypatch.setattr("mbma_tables.boundary_elements.MAX_ITERATIONS", 2)
         tasks = [Task(RECIPE, "training"), Task(dataclasses.replace(RECIPE, seed=6), "training")]
         with pytest.raises(RuntimeError, match=rf"2 of 2 surfaces failed: {RECIPE.name}"):
             run(tasks, tmp_path)
