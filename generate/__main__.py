@@ -19,6 +19,7 @@ GROUPS = {
     "leakage": "generate.boundary_elements.leakage",
     "formulas": "generate.formulas.commands",
     "grids": "generate.boundary_elements.grids",
+    "measured_maps": "generate.boundary_elements.measured_maps",
     "tables": "generate.tables.commands",
 }
 

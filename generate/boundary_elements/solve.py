@@ -25,17 +25,21 @@ QUANTITIES = ("area", "area_raw", "mean_separation", "energy", "pressure_weighte
 
 
 def simulate(recipe: Recipe) -> dict[str, Any]:
-    """All that is kept of one surface: lengths in h_rms, force in A0 E* g, energy in A0 E* g h_rms."""
-    unscaled = heights(recipe)
+    """All that is kept of one random surface."""
+    return pressed(heights(recipe), recipe.sizes, recipe.q0)
+
+
+def pressed(unscaled: FloatArray, sizes: tuple[float, float], q0: float) -> dict[str, Any]:
+    """All that is kept of one periodic map: lengths in h_rms, force in A0 E* g, energy in A0 E* g h_rms."""
     # rms gradient 1: mean pressure is then F/(A0 E* g)
-    surface = unscaled / bearing(unscaled, recipe.sizes).gradient
-    known, spectrum = bearing(surface, recipe.sizes), radial_spectrum(surface, recipe.sizes)
+    surface = unscaled / bearing(unscaled, sizes).gradient
+    known, spectrum = bearing(surface, sizes), radial_spectrum(surface, sizes)
     h_rms = known.h_rms
-    wavenumber = np.hypot(*wavevectors(surface.shape, recipe.sizes))
+    wavenumber = np.hypot(*wavevectors(surface.shape, sizes))
     wavenumber[0, 0] = np.inf
     weights = half_plane_weights(surface.shape)
     length = np.array([1, 1, h_rms, h_rms, h_rms, 1, 1])
-    contact = Contact(surface, recipe.sizes)
+    contact = Contact(surface, sizes)
     rows: list[FloatArray] = []
     shares: list[FloatArray] = []
     for force in (*LOADS, *HIGHER_LOADS):
@@ -51,7 +55,7 @@ def simulate(recipe: Recipe) -> dict[str, Any]:
         **dict(zip(QUANTITIES, np.array(rows).T, strict=True)),
         "force": np.array((*LOADS, *HIGHER_LOADS)[: len(rows)]),
         "band_energy": np.array(shares),
-        "q0_h_rms": recipe.q0 * h_rms,
+        "q0_h_rms": q0 * h_rms,
         "h_max": known.h_max / h_rms,
         "quantiles": known.quantiles / h_rms,
         "mean_height": known.mean_height / h_rms,
@@ -60,9 +64,9 @@ def simulate(recipe: Recipe) -> dict[str, Any]:
         "tension": known.tension,
         "anisotropy": known.anisotropy,
         "slope_kurtosis": known.slope_kurtosis,
-        "band_q": spectrum.q / recipe.q0,
+        "band_q": spectrum.q / q0,
         "band_variance": spectrum.variance / h_rms**2,
-        "band_inverse_q2": spectrum.q2_mean_inverse * recipe.q0**2,
+        "band_inverse_q2": spectrum.q2_mean_inverse * q0**2,
         "band_gradient": spectrum.gradient,
         # in units of 1/h_rms^2: m0 m4/m2^2 is 4 times its sum at g = 1
         "band_curvature": spectrum.curvature * h_rms**2,

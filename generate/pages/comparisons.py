@@ -1,10 +1,8 @@
-"""What the page on fidelity compares: theories at given loads, gaps and areas, and reference data of brute force."""
+"""Theories at given loads, gaps and areas, for what the paper quotes and shows."""
 
 from __future__ import annotations
 
-import dataclasses
 import functools
-import pathlib
 from typing import Any
 
 import numpy as np
@@ -14,7 +12,6 @@ from mbma_tables import Surface, theories
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import OutOfRangeError
 
-DATA = pathlib.Path(__file__).parents[2] / "docs" / "data"
 READINGS = {"MBMA reported": "reported", "MBMA printed": "printed"}
 PERSSON: dict[str, theories.Method] = {"Persson full": "full", "Persson simplified": "simplified"}
 SEPARATIONS: dict[str, theories.Theory] = {
@@ -25,38 +22,6 @@ SEPARATIONS: dict[str, theories.Theory] = {
 THEORIES = tuple(SEPARATIONS)
 AREA_THEORIES = (*READINGS, "G-W", "Persson")  # (18) is Persson's area in full and simplified alike
 GAPS = 60  # a curve
-
-
-@dataclasses.dataclass(frozen=True)
-class Reference:
-    """A data set made by brute force, and the surface that it is compared with."""
-
-    file: str
-    title: str
-    zeta_1: float
-    gradient: float
-    h_max: float
-    band: tuple[float, float]  # A/A0
-
-    def surface(self, h_max: float | None = None) -> Surface:
-        """The self-affine surface (H = 0.8) of the data's rms gradient."""
-        unit = Surface(0.8, 1.0, self.zeta_1, 1.0, 1.0)
-        h_rms = self.gradient / unit.rms_gradient
-        return Surface(0.8, 1.0, self.zeta_1, h_rms, (h_max or self.h_max) * h_rms)
-
-    def column(self, name: str) -> FloatArray:
-        """One column of the data file."""
-        text = (DATA / self.file).read_text(encoding="utf-8")
-        lines = [line for line in text.splitlines() if not line.startswith("#")]
-        table = np.genfromtxt(lines, delimiter=",", names=True)
-        return np.atleast_1d(np.asarray(table[name], dtype=float))
-
-
-REFERENCES = {
-    "bem": Reference("bem_hurst0.8_zeta64.csv", "Boundary elements", 64, 1.0, 3.3973, (0.002, 0.12)),
-    "gfmd": Reference("gfmd_hurst0.8_zeta100.csv", "Molecular dynamics", 100, 0.2766, 3.4, (0.002, 0.08)),
-    "challenge": Reference("challenge.csv", "Contact-mechanics challenge", 200, 1.0, 3.45, (0.002, 0.12)),
-}
 
 
 @functools.cache
@@ -104,15 +69,3 @@ def kappa(surface: Surface, theory: str, area: Any) -> FloatArray:
     """A/F sqrt(2 m2) E*, Eq. (51), at the contact areas A/A0."""
     force, reached = solve(surface, theory, "area", area)
     return np.asarray(reached / force * surface.rms_gradient)
-
-
-def area_ratios(reference: Reference, surface: Surface) -> dict[str, FloatArray]:
-    """Area over the data's area at the data's forces."""
-    force, area = reference.column("force"), reference.column("area")
-    return {t: solve(surface, t, "force", force)[1] / area for t in AREA_THEORIES}
-
-
-def force_ratios(reference: Reference, surface: Surface) -> dict[str, FloatArray]:
-    """Force over the data's force at the data's separations over h_rms."""
-    force, u = reference.column("force"), reference.column("mean_separation_over_h_rms")
-    return {t: force_at(surface, t, u) / force for t in THEORIES}

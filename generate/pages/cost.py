@@ -1,4 +1,4 @@
-"""What accuracy costs: tables/cost.csv, docs/cost.md and its figure, every time a ratio to one fixed piece of work."""
+"""What accuracy costs: docs/cost.md, its data and figures, every time a ratio to one fixed piece of work."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from collections.abc import Iterable, Sequence
 from importlib import metadata
 from typing import Any
 
-from generate.pages import timing
+from generate.pages import cost_distances, timing
 from generate.pages.cost_islands import island_rows
 from generate.pages.cost_totals import total_rows
 from generate.pages.page import png, table
-from mbma_tables.scenes.costs import COLUMNS, UNIT, Costs, Row, read_costs
+from mbma_tables.scenes.costs import COLUMNS, UNIT, Costs, Distance, Row, read_costs, read_distances
 from mbma_tables.theories import THEORIES
 
 METHODS = {"classical": "classical iteration", "exact": "Newton (exact)"}
@@ -121,7 +121,7 @@ def single_table(costs: Costs) -> str:
     return table(["tier", "asked", "alone", "time over that of both", "islands a gap", "for both"], cells)
 
 
-def parts_of(costs: Costs) -> dict[str, str]:
+def parts_of(costs: Costs, distances: Sequence[Distance]) -> dict[str, str]:
     """The measured parts of the page."""
     islands, totals = islands_of(costs), totals_of(costs)
     names = ("import", "call", "law", "profile", "lookup")
@@ -133,6 +133,7 @@ def parts_of(costs: Costs) -> dict[str, str]:
         "totals": f"They span {spans(totals)}.\n\n{rows_table(totals, pareto_front(totals))}",
         "once": rows_table(once),
         "alone": single_table(costs),
+        "distances": cost_distances.to_table(distances, costs.seconds),
     }
 
 
@@ -166,10 +167,15 @@ def draw(costs: Costs) -> bytes:
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
     """The measured parts of the page, and its files."""
-    content = to_csv(study()).encode()
-    # the page shows what the file holds, rounded as it is there
+    data = {"cost.csv": to_csv(study()).encode()}
+    data["distance.csv"] = cost_distances.to_csv(cost_distances.study()).encode()
+    # the page shows what the files hold, rounded as it is there
     with tempfile.TemporaryDirectory() as folder:
-        path = pathlib.Path(folder) / "cost.csv"
-        path.write_bytes(content)
-        costs = read_costs(path)
-    return parts_of(costs), {"tables/cost.csv": content, "docs/figures/cost.png": draw(costs)}
+        for name, content in data.items():
+            (pathlib.Path(folder) / name).write_bytes(content)
+        costs = read_costs(pathlib.Path(folder) / "cost.csv")
+        distances = read_distances(pathlib.Path(folder) / "distance.csv")
+    files = {f"tables/{name}": content for name, content in data.items()}
+    files |= {"docs/figures/cost.png": draw(costs)}
+    files |= {"docs/figures/distance.png": cost_distances.draw(distances, costs.seconds)}
+    return parts_of(costs, distances), files

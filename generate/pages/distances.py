@@ -16,7 +16,7 @@ import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
-from generate.boundary_elements.evidence import MIN_WAVES, Case, cases
+from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case, cases
 from generate.calibrated import QUANTITIES, errors
 from generate.pages.page import ROOT
 from mbma_tables import Surface, theories
@@ -32,6 +32,7 @@ LOW, HIGH = 0.01, 0.97  # A/A0 of the simulations between which distances are su
 # u/h_max at which a theory's curve is known
 DEPTHS = np.concatenate([1 - np.geomspace(1e-4, 0.5, 150), np.geomspace(0.5, 1e-6, 151)[1:]])
 COVER = dataclasses.replace(REPORTED, name="reported, areas as a cover", addition="cover")
+MEASURED = {"al3d-1": "measured: optical map", "di-1": "measured: AFM map"}
 ROLLOFF = (0.041954782, 0.037331897)  # h_max of the maps
 
 
@@ -112,6 +113,17 @@ THEORIES: dict[str, Callable[[Case], Any]] = {
     "Persson": lambda one: Law(one.spectrum, None, YANG_PERSSON),
     "Persson simplified": _theory(theories.Persson("simplified")),
     "G-W": _theory(theories.GreenwoodWilliamson()),
+}
+HUES = {
+    "MBMA reported": "C0",
+    "MBMA printed": "C1",
+    "MBMA fitted": "C9",
+    "MBMA cover": "C4",
+    "calibrated": "k",
+    "calibrated, map": "0.5",
+    "Persson": "C3",
+    "Persson simplified": "C6",
+    "G-W": "C2",
 }
 TIERS = {"formula": _mbma("reported", "formula"), "rigid": _mbma("reported", "rigid")}
 FITTED_TO = {"training": ("calibrated", "calibrated, map"), "earlier": ("MBMA fitted",)}
@@ -215,6 +227,23 @@ def rolloff(number: int) -> Case:
     return _simulated("plateau", spectrum, ROLLOFF[number] / h_rms, rows)
 
 
+def measured(name: str) -> Case:
+    """A measured map as `python -m generate measured_maps` kept it."""
+    with np.load(DATA / f"measured_{name}.npz", allow_pickle=False) as content:
+        one = dict(content)
+    share, seen = one["band_variance"], (one["area"] > 0) & (one["area"] < MAX_AREA)
+    curves: dict[str, Any] = {
+        key: one[key].astype(float) for key in ("mean_height", "top_gradient", "tension_force", "tension")
+    }
+    curves |= {
+        "inverse_q2": float(np.nansum(share * one["band_inverse_q2"])),
+        "anisotropy": float(one["anisotropy"]),
+    }
+    spectrum = Spectrum.from_shares(one["band_q"][share > 0], share[share > 0])
+    rows = [one[key][seen] for key in ("force", "area", "mean_separation")]
+    return dataclasses.replace(_simulated("measured", spectrum, float(one["h_max"]), rows), curves=curves)
+
+
 def data_sets() -> dict[str, DataSet]:
     """All data sets, by name."""
 
@@ -235,7 +264,8 @@ def data_sets() -> dict[str, DataSet]:
         "bem": DataSet("an older set, mean of 4", [older("bem")]),
         "gfmd": DataSet("molecular dynamics", [older("gfmd")]),
         "challenge": DataSet("contact challenge", [older("challenge")]),
-        "rolloff": DataSet("two maps with plateau", [rolloff(0), rolloff(1)]),
+        "rolloff": DataSet("two with plateau, by spectrum", [rolloff(0), rolloff(1)]),
+        **{name: DataSet(title, [measured(name)]) for name, title in MEASURED.items()},
     }
 
 

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from generate.pages.comparisons import (
-    AREA_THEORIES,
-    PERSSON,
-    READINGS,
-    REFERENCES,
-    THEORIES,
-    Reference,
-    area_ratios,
-    force_at,
-    force_ratios,
-    kappa,
-)
-from generate.pages.fidelity_figures import RESOLUTIONS, ROADS, drawn
+from generate.calibrated import QUANTITIES
+from generate.pages import distances
+from generate.pages.comparisons import AREA_THEORIES, PERSSON, READINGS, THEORIES, force_at, kappa
+from generate.pages.fidelity_figures import RESOLUTIONS, drawn
 from generate.pages.page import png, table
 from mbma_tables import Surface
-from mbma_tables.arguments import FloatArray
 
 STEEL = 200e3  # MPa, the E* at which the paper's 3.5e-4 E* is its 70 MPa
-AREAS = np.array([1e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.2])  # A/A0 of the tables of kappa
+HEIGHTS = (3.0, 3.4, 4.0)  # h_max/h_rms
 Values = dict[str, Any]
 
 
@@ -69,12 +60,11 @@ def quoted_forces() -> Iterable[Quoted]:
     yield case, "F over Persson simplified, u = 0: MBMA meets it", 1.0, READINGS, meets
     yield case, "the same: G-W", "orders of magnitude", (), meets
 
-    other, bem = Surface.named("papangelo"), REFERENCES["bem"]
-    u, load = (bem.column(name) for name in ("mean_separation_over_h_rms", "force"))
-    for k in np.flatnonzero((u < 0.05) & (u > 0.01)):
-        brute = load[k] * other.rms_gradient / bem.gradient
-        what = f"F over boundary elements, u = {u[k]:.4g} h_rms: MBMA"
-        yield "papangelo", what, "within 2x", (), over(forces(other, u[k]), brute)
+    other, bem = Surface.named("papangelo"), distances.older("bem")
+    for u, force in zip(bem.u, bem.force, strict=True):
+        if 0.01 < u < 0.05:
+            what = f"F over boundary elements, u = {u:.4g} h_rms: MBMA"
+            yield "papangelo", what, "within 2x", (), over(forces(other, u), force * other.rms_gradient)
 
 
 def quoted_slopes() -> Iterable[Quoted]:
@@ -108,57 +98,58 @@ def quoted_table() -> str:
     return table(["case", "what", "paper", *THEORIES], rows)
 
 
-def kappa_table(name: str) -> str:
-    """Kappa over a range of loads."""
-    columns = [kappa(Surface.named(name), t, AREAS) for t in AREA_THEORIES]
-    rows = [[f"{area:g}", *(show(column[k]) for column in columns)] for k, area in enumerate(AREAS)]
-    return table(["A/A0", *AREA_THEORIES], rows)
+def percent(value: float) -> str:
+    """A distance in percent, two digits."""
+    return f"{float(f'{100 * value:.2g}'):g}" if np.isfinite(value) else "—"
 
 
-def reference_tables(reference: Reference) -> str:
-    """The tables of one data set."""
-    surface = reference.surface()
-    force, area, u = (reference.column(n) for n in ("force", "area", "mean_separation_over_h_rms"))
-    areas, loads = area_ratios(reference, surface), force_ratios(reference, surface)
-    low, high = reference.band
-    inside = (area >= low) & (area <= high)
+def summary_table(sets: Iterable[distances.DataSet]) -> str:
+    """Root mean square distances of every theory from data sets: area, force and stiffness."""
+    rows = []
+    for one in sets:
+        cells = []
+        for name, theory in distances.THEORIES.items():
+            found = distances.distances(one.seen, theory)
+            told = [distances.summed_up(one.seen, values) for values in found.values()]
+            text = " / ".join(percent(rms) for rms, _, _ in told)
+            # stiffness may be missing at a last load by itself
+            short = " †" if 0 < told[0][2] < 0.995 else ""
+            cells.append("—" if text == "— / — / —" else f"{text}{'*' if name in one.fitted else ''}{short}")
+        rows.append([f"{one.title} ({len(one.seen)})", *cells])
+    return table(["simulated surfaces (number)", *distances.THEORIES], rows)
 
-    def rows(first: Sequence[FloatArray], ratios: dict[str, FloatArray]) -> list[list[str]]:
-        columns = [*first, *ratios.values()]
-        return [[show(column[k]) for column in columns] for k in range(force.size)]
 
-    def span(values: FloatArray) -> str:
-        chosen = values[inside]
-        reached = chosen[np.isfinite(chosen)]
-        if reached.size == 0:
-            return "—"
-        missing = f" (not reached: {chosen.size - reached.size} of {chosen.size})" if reached.size < chosen.size else ""
-        return f"{reached.min():.2f} to {reached.max():.2f}{missing}"
+def challenge_table() -> str:
+    """Theory over simulation at each load of the contact challenge."""
+    one = distances.older("challenge")
+    found = {name: distances.distances([one], theory) for name, theory in distances.THEORIES.items()}
+    known = [name for name, values in found.items() if np.isfinite(values["area"]).any()]
+    rows = [
+        [f"{area:.2g}", quantity, *(show(np.exp(found[name][quantity][k])) for name in known)]
+        for k, area in enumerate(one.area)
+        for quantity in QUANTITIES
+    ]
+    return table(["A/A0", "theory over simulation", *known], rows)
 
-    def spread(h_max: float) -> list[str]:
-        other = reference.surface(h_max)
-        by_area, by_force = area_ratios(reference, other), force_ratios(reference, other)
-        return [f"{h_max:g}", *(span(d[t]) for d in (by_area, by_force) for t in READINGS)]
 
-    return "\n\n".join(
-        [
-            "Area at equal force, model over data:",
-            table(["F/(A0 E*)", "A/A0 data", *AREA_THEORIES], rows([force, area], areas)),
-            f"Its range from {low:.1%} to {high:.0%} contact:",
-            table(AREA_THEORIES, [[span(values) for values in areas.values()]]),
-            "Force at equal separation, model over data:",
-            table(["u/h_rms", "F/(A0 E*) data", *THEORIES], rows([u, force], loads)),
-            "The effect of h_max on both, over the same range of contact (area ratios, then force ratios):",
-            table(
-                ["h_max/h_rms", *(f"{kind}, {t}" for kind in ("area", "force") for t in READINGS)],
-                [spread(h_max) for h_max in (3.0, reference.h_max, 4.0)],
-            ),
-        ]
-    )
+def heights_table() -> str:
+    """What another h_max would do to the distance of force at equal separation."""
+    names = ("MBMA reported", "MBMA fitted", "calibrated")
+    rows = []
+    for key, title in (("bem", "older set"), ("gfmd", "molecular dynamics")):
+        for h_max in HEIGHTS:
+            one = dataclasses.replace(distances.older(key), h_max=h_max)
+            found = [distances.distances([one], distances.THEORIES[name])["force"] for name in names]
+            rows.append([title, f"{h_max:g}", *(percent(distances.summed_up([one], part)[0]) for part in found)])
+    return table(["data", "h_max/h_rms", *names], rows)
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
     """The measured parts of the page, and its figures."""
-    parts = {"quoted": quoted_table()} | {name: kappa_table(name) for name in ROADS}
-    parts |= {name: reference_tables(reference) for name, reference in REFERENCES.items()}
+    parts = {
+        "summary": summary_table(distances.data_sets().values()),
+        "challenge": challenge_table(),
+        "heights": heights_table(),
+        "quoted": quoted_table(),
+    }
     return parts, {f"docs/figures/{name}.png": png(figure) for name, figure in drawn()}

@@ -1,4 +1,4 @@
-"""Figures of the page on fidelity: the paper's Figures 11-17 and the ratios to brute force."""
+"""Figures of the page on fidelity: ratios to brute force, and the paper's Figures 11-17."""
 
 from __future__ import annotations
 
@@ -8,22 +8,23 @@ from typing import Any
 
 import numpy as np
 
+from generate.calibrated import QUANTITIES
+from generate.pages import distances
 from generate.pages.comparisons import (
     AREA_THEORIES,
     GAPS,
     PERSSON,
     READINGS,
-    REFERENCES,
     THEORIES,
-    area_ratios,
     force_at,
-    force_ratios,
     sample,
 )
 from generate.pages.page import pyplot
 from mbma_tables import Surface, theories
 
 COLOURS = dict(zip((*THEORIES, "Persson"), ("C0", "C1", "C2", "C3", "C4", "C3"), strict=True))
+BANDED = ("MBMA reported", "calibrated")
+BINS = (0.0005, 0.002, 0.005, 0.01, 0.03, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 0.9, 0.98)
 ROADS = ("concrete", "asphalt")
 RESOLUTIONS = (125, 250, 500, 1000)
 
@@ -79,15 +80,15 @@ def simulations() -> Iterator[tuple[str, Any]]:
     yield "fig11", figure
 
     for name, key, title in (("papangelo", "bem", "fig12"), ("challenge", "challenge", "fig15")):
-        surface, data = Surface.named(name), REFERENCES[key]
+        surface, data = Surface.named(name), distances.older(key)
         figure, axes = new(columns=2 if key == "challenge" else 1, squeeze=False)
-        scaled = data.column("force") * surface.rms_gradient / data.gradient
+        scaled = data.force * surface.rms_gradient
         by_gap(axes[0, 0], surface, 1e-6)
-        axes[0, 0].plot(data.column("mean_separation_over_h_rms"), scaled, "k.", label="boundary elements")
+        axes[0, 0].plot(data.u, scaled, "k.", label="boundary elements")
         axes[0, 0].legend(fontsize="small")
         for ax in axes[0, 1:]:
             by_force(ax, surface, lambda force, area: area)
-            ax.plot(scaled, data.column("area"), "k.")
+            ax.plot(scaled, data.area, "k.")
             ax.set(yscale="log", ylabel=r"$A/A_0$")
         yield title, figure
 
@@ -128,29 +129,65 @@ def resolution() -> Iterator[tuple[str, Any]]:
         yield title, figure
 
 
-def brute_force() -> Iterator[tuple[str, Any]]:
-    """Ratios to the reference data."""
-    figure, axes = new(2, len(REFERENCES), sharey="row")
-    for column, reference in zip(axes.T, REFERENCES.values(), strict=True):
-        surface = reference.surface()
-        for ax, ratios, abscissa in (
-            (column[0], area_ratios(reference, surface), "area"),
-            (column[1], force_ratios(reference, surface), "mean_separation_over_h_rms"),
-        ):
-            for name, values in ratios.items():
-                ax.plot(reference.column(abscissa), values, ".-", color=COLOURS[name], label=name)
+def _ratio_axes(axes: Any, titles: Iterable[str]) -> None:
+    """Labels of panels, one row for each quantity."""
+    for line, quantity in zip(axes, QUANTITIES, strict=True):
+        for ax in line:
             ax.axhline(1, color="k", lw=0.5)
-        column[0].set(xscale="log", xlabel=r"$A/A_0$ of the data", xlim=(1e-4, 1.5))
-        column[0].set_title(reference.title, fontsize="small")
-        column[1].set(yscale="log", xlabel=r"$u/h_{rms}$", xlim=(0, 3.2))
-    axes[0, 0].set_ylabel("area, model / data")
-    axes[1, 0].set_ylabel("force, model / data")
-    # below the panels, where it hides no curve
-    figure.legend(*axes[1, 2].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
-    yield "reference", figure
+            ax.set(xscale="log", xlim=(2e-4, 1.1), yscale="linear" if quantity == "area" else "log")
+            ax.set_ylim((0.4, 1.6) if quantity == "area" else (0.1, 10))
+            ax.grid(alpha=0.3)
+        line[0].set_ylabel(f"{quantity}, theory / simulation")
+    for ax, title in zip(axes[0], titles, strict=True):
+        ax.set_title(title, fontsize="small")
+    for ax in axes[-1]:
+        ax.set_xlabel(r"$A/A_0$ simulated")
+
+
+def held_out() -> Iterator[tuple[str, Any]]:
+    """Geometric mean of ratios on held-out surfaces by contact fraction, one standard deviation as a band."""
+    seen = distances.held_out()
+    area = np.concatenate([one.area for one in seen])
+    bins = np.digitize(area, BINS) - 1
+    figure, axes = new(3, 1, sharex=True, squeeze=False)
+    figure.set_size_inches(9, 9)
+    for name, theory in distances.THEORIES.items():
+        found = distances.distances(seen, theory)
+        for ax, values in zip(axes[:, 0], found.values(), strict=True):
+            parts = [values[(bins == k) & np.isfinite(values)] for k in range(len(BINS) - 1)]
+            known = [k for k, part in enumerate(parts) if len(part) > 4]
+            x = [np.sqrt(BINS[k] * BINS[k + 1]) for k in known]
+            mean, spread = (np.array([measure(parts[k]) for k in known]) for measure in (np.mean, np.std))
+            ax.plot(x, np.exp(mean), ".-", color=distances.HUES[name], label=name)
+            if name in BANDED:
+                ax.fill_between(
+                    x, np.exp(mean - spread), np.exp(mean + spread), color=distances.HUES[name], alpha=0.15, lw=0
+                )
+    _ratio_axes(axes, [f"{len(seen)} held-out self-affine surfaces"])
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
+    yield "fidelity", figure
+
+
+def by_data_set() -> Iterator[tuple[str, Any]]:
+    """Ratios to the data of others, and to measured maps."""
+    sets = distances.data_sets()
+    for name, keys in (("reference", ("bem", "gfmd", "challenge", "rolloff")), ("maps", tuple(distances.MEASURED))):
+        figure, axes = new(3, len(keys), sharex=True, sharey="row")
+        figure.set_size_inches(9, 7.5)
+        for column, key in zip(axes.T, keys, strict=True):
+            for theory, make in distances.THEORIES.items():
+                for one in sets[key].seen:
+                    found = distances.distances([one], make)
+                    for ax, values in zip(column, found.values(), strict=True):
+                        label = theory if one is sets[key].seen[0] else "_"
+                        ax.plot(one.area, np.exp(values), ".-", color=distances.HUES[theory], label=label, lw=1, ms=4)
+        _ratio_axes(axes, [sets[key].title for key in keys])
+        # below the panels, where it hides no curve
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
+        yield name, figure
 
 
 def drawn() -> Iterator[tuple[str, Any]]:
     """All figures by name."""
-    for part in (simulations, roads, resolution, brute_force):
+    for part in (held_out, by_data_set, simulations, roads, resolution):
         yield from part()

@@ -2,38 +2,51 @@
 
 from __future__ import annotations
 
-import json
+from typing import Any
 
 import click
 
-from mbma_tables.cli.format import Column, Report
+from mbma_tables.cli.format import Column, Report, to_json
 from mbma_tables.errors import InputError
 
 
 @click.command("cost", short_help="What accuracy costs, in time.")
 @click.option("--tier", help="Rows of this tier alone.")
+@click.option("--distance", is_flag=True, help="Theories' distance from brute force in place of numerical error.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
-def cost_command(tier: str | None, as_json: bool) -> None:
+def cost_command(tier: str | None, distance: bool, as_json: bool) -> None:
     """Error and time of everything that answers, as measured on held-out surfaces.
 
     Costs are times over that of a fixed piece of work; seconds are those of the machine that measured. docs/cost.md
-    says what each row is.
+    says what each row is. With --distance: root mean squares of ln(theory/boundary elements), of area at equal force
+    and force at equal separation, light at 1-10% contact and deep at 10-97%.
 
     Example: mbma cost --tier universal
     """
-    from mbma_tables.scenes.costs import UNIT, shipped_costs
+    from mbma_tables.scenes.costs import UNIT, shipped_costs, shipped_distances
 
     costs = shipped_costs()
+    if distance:
+        if tier is not None:
+            raise InputError("--tier is about numerical error: leave it or --distance out")
+        near = [vars(row) | {"seconds": row.cost * costs.seconds} for row in shipped_distances()]
+        _show("distance", near, costs.seconds, as_json)
+        return
     rows = [row for row in costs.rows if row.tier != UNIT]
     if tier is not None:
         known = tuple(dict.fromkeys(row.tier for row in rows))
         rows = [row for row in rows if row.tier == tier]
         if not rows:
             raise InputError(f"--tier must be one of {known}, got {tier!r}")
-    records = [{**vars(row), "seconds": row.cost * costs.seconds} for row in rows]
-    if as_json:
-        click.echo(json.dumps({"unit_seconds": costs.seconds, "rows": records}, indent=2))
-        return
     names = ("tier", "variant", "quantity", "error", "cost", "seconds", "evaluations")
-    columns = [Column(name, "-", [record[name] for record in records]) for name in names]
-    click.echo(Report("cost", f"fixed piece of work {costs.seconds:.3g} s", [], {}, columns).to_table(), nl=False)
+    full = [vars(row) | {"seconds": row.cost * costs.seconds} for row in rows]
+    records = [{name: record[name] for name in names} for record in full]
+    _show("cost", records, costs.seconds, as_json)
+
+
+def _show(title: str, records: list[dict[str, Any]], unit: float, as_json: bool) -> None:
+    if as_json:
+        click.echo(to_json({"unit_seconds": unit, "rows": records}))
+        return
+    columns = [Column(name, "-", [record[name] for record in records]) for name in records[0]]
+    click.echo(Report(title, f"fixed piece of work {unit:.3g} s", [], {}, columns).to_table(), nl=False)

@@ -16,6 +16,7 @@ from mbma_tables.files import shipped_file
 
 COLUMNS = ("tier", "variant", "quantity", "error", "cost", "evaluations")
 UNIT = "unit"
+NAMES = ("theory", "way")  # of a distance; its other fields are numbers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,17 +65,57 @@ class Costs:
         return self.seconds * row.cost
 
 
+@dataclasses.dataclass(frozen=True)
+class Distance:
+    """A way to a theory's answers: its cost, and the theory's distance from boundary elements on held-out surfaces.
+
+    Distances are root mean squares of ln(theory/simulation), of area at equal force and of force at equal mean
+    separation, light at 1-10% contact and deep at 10-97%.
+    """
+
+    theory: str
+    way: str
+    cost: float  # of a point, over that of the fixed work
+    once: float  # of what is made beforehand for a surface
+    area_light: float
+    area_deep: float
+    force_light: float
+    force_deep: float
+    reached_light: float  # share of simulated loads that the theory reaches
+    reached_deep: float
+
+
+DISTANCE_COLUMNS = tuple(field.name for field in dataclasses.fields(Distance))
+
+
+def _records(path: pathlib.Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+def read_distances(path: pathlib.Path) -> tuple[Distance, ...]:
+    """Distances from a CSV file with `DISTANCE_COLUMNS`."""
+    return tuple(
+        Distance(*(text if name in NAMES else float(text) for name, text in record.items()))  # type: ignore[arg-type]
+        for record in _records(path)
+    )
+
+
+@functools.cache
+def shipped_distances() -> tuple[Distance, ...]:
+    """The distances that ship with the library."""
+    return read_distances(shipped_file("distance.csv"))
+
+
 def read_costs(path: pathlib.Path) -> Costs:
     """Costs from a CSV file with `COLUMNS`."""
 
     def number(text: str) -> float | None:
         return float(text) if text else None
 
-    with path.open(encoding="utf-8", newline="") as file:
-        records = list(csv.DictReader(line for line in file if not line.startswith("#")))
     rows = tuple(
         Row(r["tier"], r["variant"], r["quantity"], number(r["error"]), float(r["cost"]), number(r["evaluations"]))
-        for r in records
+        for r in _records(path)
     )
     (seconds,) = (row.cost for row in rows if row.tier == UNIT)
     return Costs(rows, seconds)

@@ -5,7 +5,7 @@ import json
 import pytest
 from helpers import refused, run
 
-from mbma_tables.scenes.costs import shipped_costs
+from mbma_tables.scenes.costs import DISTANCE_COLUMNS, shipped_costs, shipped_distances
 
 
 def test_the_table_has_a_line_for_each_row():
@@ -24,3 +24,15 @@ def test_json_gives_seconds():
 
 def test_an_unknown_tier_is_refused():
     assert "--tier must be one of" in refused("cost", "--tier", "best")
+
+
+def test_distances_are_told_beside_times():
+    title, _, header, *lines = run("cost", "--distance").splitlines()
+    assert title.endswith("s")
+    assert header.split() == [*DISTANCE_COLUMNS, "seconds"]
+    assert len(lines) == len(shipped_distances())
+    found = json.loads(run("cost", "--distance", "--json"))
+    for row, expected in zip(found["rows"], shipped_distances(), strict=True):
+        assert (row["theory"], row["way"]) == (expected.theory, expected.way)
+        assert row["seconds"] == pytest.approx(expected.cost * found["unit_seconds"], rel=1e-12, abs=0)
+    assert "leave it or --distance out" in refused("cost", "--distance", "--tier", "exact")

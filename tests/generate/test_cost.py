@@ -8,11 +8,11 @@ import itertools
 import numpy as np
 import pytest
 
-from generate.pages import cost, cost_islands, cost_totals, page, timing
+from generate.pages import cost, cost_distances, cost_islands, cost_totals, distances, page, timing
 from mbma_tables import contact
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.classical import ring_matrix
-from mbma_tables.scenes.costs import Row, read_costs, shipped_costs
+from mbma_tables.scenes.costs import Distance, Row, read_costs, read_distances, shipped_costs, shipped_distances
 
 COST, SECONDS = 2.0, 1e-3
 
@@ -156,6 +156,7 @@ def test_a_study_becomes_data_page_and_figure(tmp_path, monkeypatch):
     monkeypatch.setattr(cost, "total_rows", lambda: own[20:])
     seconds = iter([3.0, shipped.seconds, 2.0])
     monkeypatch.setattr(timing, "measure", lambda run: (1.0, next(seconds)))
+    monkeypatch.setattr(cost_distances, "study", shipped_distances)
     parts, files = cost.measure()
     (tmp_path / "cost.csv").write_bytes(files["tables/cost.csv"])
     # the fastest fixed work seen is the unit
@@ -164,8 +165,9 @@ def test_a_study_becomes_data_page_and_figure(tmp_path, monkeypatch):
         assert row.cost == pytest.approx(expected.cost, rel=1e-3, abs=0)
     text = (page.ROOT / "docs" / "cost.md").read_text(encoding="utf-8")
     assert page.fill(text, parts).count("|") == text.count("|")
-    assert page.fill(text, cost.parts_of(shipped)) == text
-    assert files["docs/figures/cost.png"].startswith(b"\x89PNG\r\n\x1a\n")
+    assert page.fill(text, cost.parts_of(shipped, shipped_distances())) == text
+    for name in ("cost", "distance"):
+        assert files[f"docs/figures/{name}.png"].startswith(b"\x89PNG\r\n\x1a\n")
 
 
 def test_rows_come_back_from_the_file(tmp_path):
@@ -186,3 +188,52 @@ def test_the_pareto_front_is_what_nothing_dominates():
 
         assert not any(dominated(row, by) for row in front for by in rows)
         assert all(any(by.cost <= row.cost and by.error <= row.error for by in front) for row in rows)
+
+
+def test_distances_become_data_and_come_back(tmp_path):
+    rows = (Distance("calibrated", "table", 1.5, 0.0, 0.04, 0.01, 0.12, 0.018, 1.0, 1.0), *shipped_distances()[1:3])
+    (tmp_path / "distance.csv").write_text(cost_distances.to_csv(rows), encoding="utf-8")
+    assert read_distances(tmp_path / "distance.csv") == rows
+
+
+@pytest.mark.slow
+def test_points_of_theories_are_priced(monkeypatch):
+    monkeypatch.setattr(cost_distances, "measure", once)
+    monkeypatch.setattr(cost_distances, "SLOW_POINTS", 2)
+    found = list(cost_distances.ways())
+    known = {*distances.THEORIES, *distances.TIERS, "area alone"}
+    assert {name for _, _, name, _, _ in found} <= known
+    assert {label for label, *_ in found} == set(distances.THEORIES)
+    prices = {(label, way): (cost, made) for label, way, _, cost, made in found}
+    assert prices["calibrated", "table"] == (COST / (3 * cost_distances.POINTS), 0)
+    assert prices["calibrated", "law"] == (COST / (3 * cost_distances.POINTS), COST / 3)
+    assert prices["MBMA reported", "exact"] == (COST / 6, 0)
+
+
+def test_grids_converge_and_are_told_by_contact():
+    rows = {row.way: row for row in cost_distances.grid_rows()}
+    by_grid = [rows[f"{grid} x {grid}, cold"] for grid in cost_distances.GRIDS]
+    for name in ("force_light", "force_deep"):
+        values = [getattr(row, name) for row in by_grid]
+        assert values == sorted(values, reverse=True), name
+    for name in ("area_light", "area_deep"):
+        values = [getattr(row, name) for row in by_grid]
+        # two points a shortest wave and more
+        assert values[0] > values[1] > 0.1 > 0.03 > max(values[2:]), name
+        assert values[-1] < 0.01
+    costs = [row.cost for row in by_grid]
+    assert costs == sorted(costs)
+
+
+def test_the_shipped_distances_are_those_of_the_theories():
+    shipped = {(row.theory, row.way): row for row in shipped_distances()}
+    seen = distances.held_out()
+    found = distances.distances(seen, distances.THEORIES["G-W"])
+    row = shipped["G-W", "quadrature"]
+    for quantity in ("area", "force"):
+        for ends, kind in zip(cost_distances.RANGES, ("light", "deep"), strict=True):
+            expected = distances.summed_up(seen, found[quantity], *ends)[0]
+            assert getattr(row, f"{quantity}_{kind}") == pytest.approx(expected, rel=1e-3)
+    # tiers solve one theory
+    tiers = [shipped["MBMA reported", way] for way in ("universal", "exact", "law")]
+    assert len({(row.area_light, row.force_deep) for row in tiers}) == 1

@@ -1,0 +1,231 @@
+"""What nearness to boundary elements costs: tables/distance.csv, the second half of docs/cost.md and its figure."""
+
+from __future__ import annotations
+
+import csv
+import functools
+import io
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from generate.boundary_elements.grids import GRIDS, STARTS
+from generate.boundary_elements.surfaces import Recipe, heights
+from generate.pages.distances import COVER, DATA, HIGH, HUES, LOW, THEORIES, TIERS, distances, held_out, summed_up
+from generate.pages.page import png, pyplot, table
+from generate.pages.timing import measure
+from mbma_tables import Surface, contact, contact_law
+from mbma_tables.arguments import FloatArray
+from mbma_tables.calibrated import Law, Spectrum, area
+from mbma_tables.scenes.costs import DISTANCE_COLUMNS, Distance
+from mbma_tables.theories import Calibrated, Persson
+
+DEEP = 0.1  # A/A0: distances are told from LOW to DEEP and from DEEP to HIGH
+RANGES = ((LOW, DEEP), (DEEP, HIGH))
+SIMULATED = "boundary elements"
+POINTS, SLOW_POINTS = 1000, 50  # of each timed surface, in one call
+TIMED = ((0.3, 12.0, 3.4), (0.5, 21.0, 3.6), (0.9, 12.0, 3.0))  # H, zeta_1, h_max/h_rms: those of the grids
+MAP = Recipe("self_affine", 0.8, 16.0, 4, 1, 256)
+LAW_RTOL = 1e-6
+HEAD = """\
+# Distance of theories from boundary elements on held-out surfaces, and processor time, by python -m generate pages
+# cost; docs/cost.md says how. Distances are root mean squares of ln(theory/simulation), light at 1-10% contact and deep
+# at 10-97%; reached is the share of simulated loads there that the theory reaches. cost is of one point, once of what
+# is made beforehand for a surface, both over the fixed piece of work of cost.csv.
+"""
+SHAPES = {"MBMA": "o", "calibrated": "s", "Persson": "^", "G-W": "v"}
+
+
+def surfaces() -> list[Surface]:
+    """The surfaces on which theories are timed."""
+    return [Surface(hurst, 1.0, zeta_1, 1.0, top) for hurst, zeta_1, top in TIMED]
+
+
+def _points(surface: Surface, count: int) -> FloatArray:
+    return np.linspace(0.02, 0.98, count) * float(surface.h_max)
+
+
+def _each(answer: Callable[[Surface, FloatArray], Any], count: int = POINTS) -> float:
+    """Cost of a point: force and area at mean separations of each surface, one call a surface."""
+    asked = [(surface, _points(surface, count)) for surface in surfaces()]
+    cost, _ = measure(lambda: [answer(surface, u) for surface, u in asked])
+    return cost / (len(asked) * count)
+
+
+def _asked(**options: Any) -> Callable[[Surface, FloatArray], Any]:
+    return lambda surface, u: contact(surface, mean_separation=u, **options)
+
+
+def _by_law(**options: Any) -> tuple[float, float]:
+    """Costs of a point of a law, and of making it."""
+    laws = {surface.h_max: contact_law(surface, LAW_RTOL, **options) for surface in surfaces()}
+
+    def answer(surface: Surface, u: FloatArray) -> Any:
+        law = laws[surface.h_max]
+        return law.force(u=u), law.area(u=u)
+
+    made, _ = measure(lambda: [contact_law(surface, LAW_RTOL, **options) for surface in surfaces()])
+    return _each(answer), made / len(laws)
+
+
+def _closed_form(surface: Surface, force: FloatArray) -> Any:
+    return area(force, surface.alpha)
+
+
+def _quadrature(surface: Surface, u: FloatArray) -> Any:
+    spectrum = Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1))
+    law = Law(spectrum, float(surface.h_max / surface.h_rms))
+    force = law.force(u / surface.h_rms)
+    return force, law.area(force)
+
+
+def _by_map() -> tuple[float, float]:
+    """Costs of a point of the law of a map of 256 x 256 points, and of making it."""
+    z = heights(MAP)
+    make = functools.partial(Calibrated.from_map, z, 1 / len(z), periodic=True)
+    law = make()
+    u = _points(law.surface, POINTS)
+    made, _ = measure(make)
+    return measure(lambda: contact(law.surface, mean_separation=u, theory=law))[0] / POINTS, made
+
+
+def ways() -> Iterator[tuple[str, str, str, float, float]]:
+    """Theory, way to it, name of its distances, cost of a point and once a surface."""
+    yield "calibrated", "closed form, area of a force", "area alone", _each(_closed_form), 0
+    yield "calibrated", "quadrature", "calibrated", _each(_quadrature), 0
+    yield "calibrated", "table", "calibrated", _each(_asked(theory="calibrated")), 0
+    yield "calibrated", "law", "calibrated", *_by_law(theory="calibrated")
+    yield "calibrated, map", "map of 256 x 256", "calibrated, map", *_by_map()
+    yield "Persson", "inverse of (19)", "Persson", _each(_asked(theory="persson"), SLOW_POINTS), 0
+    yield "Persson", "law", "Persson", *_by_law(theory="persson")
+    name = "Persson simplified"
+    yield name, "inverse of (20)", name, _each(_asked(theory=Persson("simplified"))), 0
+    yield "G-W", "quadrature", "G-W", _each(_asked(theory="greenwood_williamson")), 0
+    yield "G-W", "law", "G-W", *_by_law(theory="greenwood_williamson")
+    for tier in ("universal", "exact", "island4d", "formula", "rigid"):
+        count = SLOW_POINTS if tier == "exact" else POINTS
+        known = tier if tier in TIERS else "MBMA reported"
+        options: dict[str, Any] = {"tier": tier, "rtol": 1e-4 if tier in ("formula", "rigid") else LAW_RTOL}
+        yield "MBMA reported", tier, known, _each(_asked(**options), count), 0
+    yield "MBMA reported", "law", "MBMA reported", *_by_law()
+    for name, reading in (("printed", "printed"), ("fitted", "fitted"), ("cover", COVER)):
+        cost = _each(_asked(reading=reading, rtol=LAW_RTOL))
+        yield f"MBMA {name}", "universal", f"MBMA {name}", cost, 0
+
+
+def study() -> list[Distance]:
+    """Every theory, with its distances from all held-out surfaces, and boundary elements on coarser grids."""
+    return [*theory_rows(), *grid_rows()]
+
+
+def theory_rows() -> list[Distance]:
+    """Every theory, with its distances from all held-out surfaces."""
+    seen, known = held_out(), dict[str, list[float]]()
+    for name, theory in (THEORIES | TIERS).items():
+        found = distances(seen, theory)
+        parts = [summed_up(seen, found[quantity], *ends) for quantity in ("area", "force") for ends in RANGES]
+        known[name] = [part[0] for part in parts] + [part[2] for part in parts[:2]]
+    known["area alone"] = [*known["calibrated"][:2], np.nan, np.nan, 1, 1]
+    return [Distance(label, way, cost, once, *known[name]) for label, way, name, cost, once in ways()]
+
+
+def _missed(own: Any) -> Iterator[tuple[int, str, FloatArray]]:
+    """Contact and distance of each load of one surface, by grid and quantity, from what its finest two converge to."""
+    on = {grid: own[own["points"] == grid] for grid in GRIDS}
+    on = {grid: rows[rows["start"] == rows["start"][0]] for grid, rows in on.items() if rows.size}
+    coarse, fine = list(on.values())[-2:]
+    touching, u = (2 * fine[name] - coarse[name] for name in ("area", "mean_separation"))
+    for grid, part in on.items():
+        yield grid, "area", np.stack([touching, np.log(part["area"] / touching)])
+        log_force, gap = np.log(part["force"]), part["mean_separation"]
+        open_ = gap > 0
+        curve = PchipInterpolator(np.log(gap[open_])[::-1], log_force[open_][::-1])
+        yield grid, "force", np.stack([touching, curve(np.log(u)) - log_force])
+
+
+def grid_rows() -> list[Distance]:
+    """Boundary elements on their own grids."""
+    lines = (DATA / "boundary_element_grids.csv").read_text(encoding="utf-8").splitlines()
+    data = np.genfromtxt([s for s in lines if not s.startswith("#")], delimiter=",", names=True, dtype=None)
+    missed: dict[tuple[int, str], list[FloatArray]] = {}
+    for seed in np.unique(data["seed"]):
+        for grid, quantity, values in _missed(data[data["seed"] == seed]):
+            missed.setdefault((grid, quantity), []).append(values)
+    rows = []
+    for grid, start in itertools.product(GRIDS, STARTS):
+        timed = data["cost"][(data["points"] == grid) & (data["start"] == start)]
+        parts = []
+        for quantity in ("area", "force"):
+            contacts, values = np.concatenate(missed[grid, quantity], axis=1)
+            kept = [values[(contacts >= low) & (contacts <= high)] for low, high in RANGES]
+            parts += [float(np.sqrt(np.mean(part**2))) for part in kept]
+        parts += [1.0, 1.0]
+        if timed.size:
+            rows.append(Distance(SIMULATED, f"{grid} x {grid}, {start}", float(timed.mean()), 0, *parts))
+    return rows
+
+
+def to_csv(rows: Sequence[Distance]) -> str:
+    """The rows as text."""
+    text = io.StringIO()
+    text.write(HEAD)
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(DISTANCE_COLUMNS)
+    for row in rows:
+        writer.writerow(f"{v:.4g}" if isinstance(v, float | int) else v for v in vars(row).values())
+    return text.getvalue()
+
+
+def _percent(value: float) -> str:
+    return f"{float(f'{100 * value:.2g}'):g}%" if np.isfinite(value) else "—"
+
+
+def duration(seconds: float) -> str:
+    """A time to two digits, in its unit."""
+    unit, size = next(((u, s) for u, s in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)) if seconds >= s), ("ns", 1e-9))
+    return f"{float(f'{seconds / size:.2g}'):g} {unit}"
+
+
+def to_table(rows: Sequence[Distance], unit: float) -> str:
+    """The rows as a Markdown table, times in seconds."""
+    lines = [
+        [
+            row.theory,
+            row.way,
+            duration(row.cost * unit),
+            duration(row.once * unit) if row.once else "",
+            *(_percent(v) for v in (row.area_light, row.area_deep, row.force_light, row.force_deep)),
+            "" if row.reached_deep > 0.995 else f"{row.reached_light:.0%}, {row.reached_deep:.0%}",
+        ]
+        for row in rows
+    ]
+    kinds = [f"{what}, {ends}" for what in ("area", "force") for ends in ("1-10%", "10-97%")]
+    return table(["theory", "way", "a point", "once a surface", *kinds, "reached"], lines)
+
+
+def draw(rows: Sequence[Distance], unit: float) -> bytes:
+    """Distance against time: area above, force below, light contact left, deep contact right."""
+    figure, axes = pyplot().subplots(2, 2, figsize=(9, 7.4), dpi=100, layout="constrained", sharex=True, sharey=True)
+    fields = (("area_light", "area_deep"), ("force_light", "force_deep"))
+    for line, names in zip(axes, fields, strict=True):
+        for panel, name in zip(line, names, strict=True):
+            for theory, colour in (HUES | {SIMULATED: "C5"}).items():
+                marker = next((shape for start, shape in SHAPES.items() if theory.startswith(start)), "*")
+                own = [row for row in rows if row.theory == theory]
+                x, y = [row.cost * unit for row in own], [100 * getattr(row, name) for row in own]
+                panel.loglog(x, y, marker, color=colour, ls="none", ms=6, label=theory)
+                for row, a, b in zip(own, x, y, strict=True):
+                    if theory == SIMULATED and row.way.endswith("cold"):
+                        panel.annotate(row.way.split()[0], (a, b), (4, 3), textcoords="offset points", fontsize=7)
+            panel.grid(alpha=0.3)
+    for panel, title in zip(axes[0], ("1-10% contact", "10-97% contact"), strict=True):
+        panel.set_title(title)
+    axes[0, 0].set_ylabel("area at equal force, rms distance [%]")
+    axes[1, 0].set_ylabel("force at equal separation, rms distance [%]")
+    for panel in axes[1]:
+        panel.set(xlabel="processor time a point [s]", xlim=(1e-8, 1e3))
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
+    return png(figure)

@@ -1,0 +1,45 @@
+"""Measured maps pressed flat, from a file made here to what docs/fidelity.md reads."""
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from generate.boundary_elements.measured_maps import LARGEST, continued
+from generate.pages import distances
+from mbma_tables import Surface, contact
+from mbma_tables.theories import Calibrated
+
+
+def test_a_map_is_continued_by_its_mirror_images():
+    heights = np.random.default_rng(0).standard_normal((40, LARGEST + 10))
+    whole = continued(heights)
+    assert whole.shape == (80, 2 * LARGEST)
+    assert whole.mean() == pytest.approx(0, abs=1e-12)
+    # no step across any edge
+    np.testing.assert_array_equal(whole, whole[::-1])
+    np.testing.assert_array_equal(whole, whole[:, ::-1])
+    assert whole[3, 4] - whole[0, 0] == pytest.approx(heights[3, 9] - heights[0, 5])
+
+
+def test_a_file_of_heights_becomes_a_case(tmp_path, monkeypatch):
+    pytest.importorskip("tamaas")
+    pytest.importorskip("SurfaceTopography")
+    from generate.boundary_elements.measured_maps import measured_maps
+
+    x = np.linspace(0, 2 * np.pi, 33)[:-1]
+    noise = np.random.default_rng(1).standard_normal((32, 32))
+    smooth = np.fft.irfft2(np.fft.rfft2(noise) * (np.arange(17) < 5) * (abs(np.fft.fftfreq(32, 1 / 32)) < 5)[:, None])
+    grid = smooth + np.sin(x)[:, None]
+    np.savetxt(tmp_path / "own.asc", grid)
+    text = (tmp_path / "own.asc").read_text()
+    (tmp_path / "own.asc").write_text("# Width: 1 m\n# Height: 1 m\n# Value units: m\n" + text)
+    done = CliRunner().invoke(measured_maps, [str(tmp_path / "own.asc"), "--folder", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    monkeypatch.setattr(distances, "DATA", tmp_path)
+    one = distances.measured("own")
+    # what is kept gives the law that the map itself gives
+    law = Calibrated.from_map(grid, 1 / 32, periodic=False)
+    force = one.force[one.area > 0.02] * law.surface.rms_gradient
+    mine = distances.THEORIES["calibrated, map"](one).area(one.force[one.area > 0.02])
+    assert mine == pytest.approx(contact(law.surface, pressure=force, theory=law).area, rel=0.02)
+    assert isinstance(distances.surface_of(one), Surface)
