@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import pathlib
 
@@ -9,22 +10,19 @@ import click
 import numpy as np
 
 from generate.boundary_elements.solve import pressed
-from mbma_tables.arguments import FloatArray
 from mbma_tables.files import write_file
-from mbma_tables.surfaces.maps import detrended_map
+from mbma_tables.surfaces.maps import prepared
+from mbma_tables.surfaces.treatment import Treated
+from mbma_tables.theories.simulated import continued
 
 TARGET = pathlib.Path("docs/data")
 LARGEST = 256  # points a side that are kept, from the middle
 
 
-def continued(heights: FloatArray) -> FloatArray:
-    """The middle of a map and its mirror images, which is periodic."""
-    middle = tuple(slice((n - min(n, LARGEST)) // 2, (n + min(n, LARGEST)) // 2) for n in heights.shape)
-    kept = heights[middle]
-    whole = np.concatenate([kept, kept[::-1]])
-    whole = np.concatenate([whole, whole[:, ::-1]], axis=1)
-    mean: FloatArray = whole - whole.mean()
-    return mean
+def middle(treated: Treated) -> Treated:
+    """At most `LARGEST` points a side from the middle of a map."""
+    kept = tuple(slice((n - min(n, LARGEST)) // 2, (n + min(n, LARGEST)) // 2) for n in treated.heights.shape)
+    return dataclasses.replace(treated, heights=treated.heights[kept])
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
@@ -32,13 +30,9 @@ def continued(heights: FloatArray) -> FloatArray:
 @click.option("--folder", type=click.Path(path_type=pathlib.Path), default=TARGET, show_default=True)
 def measured_maps(maps: tuple[pathlib.Path, ...], folder: pathlib.Path) -> None:
     """Press measured maps, read by SurfaceTopography, flat: a few minutes each."""
-    import SurfaceTopography
-
     for path in maps:
-        topography = SurfaceTopography.read_topography(str(path))
-        heights, dx, dy, _ = detrended_map(topography, None, None, False, None)
-        surface = continued(heights)
-        sizes = surface.shape[0] * dx, surface.shape[1] * dy
+        treated = middle(prepared(path, None, None, False, {}))
+        surface, sizes = continued(treated)
         # in units of the shorter side, as random surfaces are
         unit = min(sizes)
         found = pressed(surface / unit, (sizes[0] / unit, sizes[1] / unit), 2 * np.pi)
@@ -46,6 +40,4 @@ def measured_maps(maps: tuple[pathlib.Path, ...], folder: pathlib.Path) -> None:
         np.savez_compressed(content, **found)
         target = folder / f"measured_{path.stem}.npz"
         write_file(target, content.getvalue(), make_folders=True)
-        click.echo(
-            f"{target}: h_rms {heights.std():.4g} {topography.unit}, anisotropy {float(found['anisotropy']):.3g}"
-        )
+        click.echo(f"{target}: h_rms {surface.std():.4g} {treated.unit}, anisotropy {float(found['anisotropy']):.3g}")

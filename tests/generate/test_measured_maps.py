@@ -4,28 +4,23 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from generate.boundary_elements.measured_maps import LARGEST, continued
+from generate.boundary_elements.measured_maps import LARGEST, measured_maps, middle
 from generate.pages import distances
 from mbma_tables import Surface, contact
+from mbma_tables.surfaces.maps import prepared
 from mbma_tables.theories import Calibrated
 
 
-def test_a_map_is_continued_by_its_mirror_images():
+def test_the_middle_of_a_map_is_kept():
     heights = np.random.default_rng(0).standard_normal((40, LARGEST + 10))
-    whole = continued(heights)
-    assert whole.shape == (80, 2 * LARGEST)
-    assert whole.mean() == pytest.approx(0, abs=1e-12)
-    # no step across any edge
-    np.testing.assert_array_equal(whole, whole[::-1])
-    np.testing.assert_array_equal(whole, whole[:, ::-1])
-    assert whole[3, 4] - whole[0, 0] == pytest.approx(heights[3, 9] - heights[0, 5])
+    kept = middle(prepared(heights, 1.0, 1.0, False, {"detrend": "mean"})).heights
+    assert kept.shape == (40, LARGEST)
+    assert kept - kept[0, 0] == pytest.approx(heights[:, 5:-5] - heights[0, 5], abs=1e-12)
 
 
 def test_a_file_of_heights_becomes_a_case(tmp_path, monkeypatch):
     pytest.importorskip("tamaas")
     pytest.importorskip("SurfaceTopography")
-    from generate.boundary_elements.measured_maps import measured_maps
-
     x = np.linspace(0, 2 * np.pi, 33)[:-1]
     noise = np.random.default_rng(1).standard_normal((32, 32))
     smooth = np.fft.irfft2(np.fft.rfft2(noise) * (np.arange(17) < 5) * (abs(np.fft.fftfreq(32, 1 / 32)) < 5)[:, None])
