@@ -1,7 +1,7 @@
-"""Lookups timed: tables against scipy, tiers against each other, laws against numpy, threads, the first call.
+"""Lookups timed: tables against scipy, totals against the solver, laws against numpy, the first call.
 
 Run with ``python benchmarks/lookup.py``. One core; every ratio is of two times taken in turn in this run, the median
-over the rounds, so that what else the machine does falls on both. Errors stand beside the times.
+over the rounds, so that what else the machine does falls on both. docs/cost.md has error against time of every tier.
 """
 
 from __future__ import annotations
@@ -12,9 +12,7 @@ os.environ["NUMBA_NUM_THREADS"] = "1"
 os.environ["OMP_NUM_THREADS"] = "1"
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
-import concurrent.futures
 import dataclasses
-import hashlib
 import json
 import pathlib
 import statistics
@@ -43,8 +41,6 @@ HELD_OUT = 500
 SURFACES = 2_000
 GAPS = 100_000
 NOMINAL_EXACT = 15_000  # islands/s, a rate to compare with that is not measured here
-MIXED = 10_000_000
-THREADS = 16
 SEED = 7
 
 
@@ -175,32 +171,6 @@ def held_out(count: int, rng: np.random.Generator) -> tuple[Surface, np.ndarray]
     return Surface(hurst, 1.0, zeta_1, 1.0, h_max), rng.uniform(-1, 0.9999, count) * h_max
 
 
-def tiers(rng: np.random.Generator) -> None:
-    """Totals of every tier on held-out surfaces: time and error."""
-    surfaces, gaps = held_out(HELD_OUT, rng)
-    start = time.perf_counter()
-    truth = contact(surfaces, gaps, tier="exact", rtol=1e-10)
-    spent_truth = time.perf_counter() - start
-    click.echo(f"\nTotals on {HELD_OUT} held-out surfaces and gaps, against exact at 1e-10")
-    found: dict[str, Any] = {}
-
-    def run(tier: str) -> Callable[[], None]:
-        def call() -> None:
-            found[tier] = contact(surfaces, gaps, tier=tier)
-
-        return call
-
-    taken = rounds({tier: run(tier) for tier in ("universal", "island4d", "formula", "rigid")}, 3)
-    taken |= rounds({"exact": run("exact")}, 1)
-    report("exact at 1e-10: time a total", 1e6 * spent_truth / HELD_OUT, "us")
-    for tier in ("exact", "universal", "island4d", "formula", "rigid"):
-        error = max(np.abs(found[tier].force / truth.force - 1).max(), np.abs(found[tier].area / truth.area - 1).max())
-        report(f"{tier} at 1e-8: time a total", microseconds(taken[tier], HELD_OUT), "us")
-        report(f"{tier} at 1e-8: largest error of force or area", error, "")
-        stated = float((found[tier].error).max())
-        report(f"{tier} at 1e-8: largest error that it states", stated, "")
-
-
 def totals(rng: np.random.Generator) -> None:
     """`contact` on many surfaces, with derivatives, and on many gaps of one surface."""
     surfaces, gaps = held_out(SURFACES, rng)
@@ -281,43 +251,6 @@ def calibrated(rng: np.random.Generator) -> None:
     report("faster than the law's quadrature", microseconds(taken["law"], HELD_OUT) / spent, "x")
 
 
-def threads(rng: np.random.Generator) -> None:
-    """Mixed lookups on many threads, compared bit by bit with one thread."""
-    raw, universal = open_table("island4d").content, open_table("universal")
-    law = contact_law(Surface.named("asphalt"))
-    chunk = POINTS
-    jobs = MIXED // chunk
-    at_four, at_two = np.ascontiguousarray(random_places(raw, rng).T), random_places(universal.content, rng).T
-    X, mu = (axis.coordinate(place) for axis, place in zip(universal.content.axes, at_two, strict=True))
-    gaps = rng.uniform(-law.h_max, law.h_max, chunk)
-
-    def job(number: int) -> bytes:
-        # every job its own order of the same points
-        turn = number * 37 % chunk
-        status = np.empty(chunk, dtype=np.int64)
-        if number % 3 == 0:
-            out = np.empty((2, chunk))
-            fill_4d(raw.coefficients, np.roll(at_four, turn, axis=1), out)
-        elif number % 3 == 1:
-            out = np.empty((chunk, 3))
-            universal_kernel.fill_phi(np.roll(X, turn), np.roll(mu, turn), universal.kernel, status, out)
-        else:
-            out = law.force(np.roll(gaps, turn))
-        return hashlib.blake2b(out.tobytes()).digest()
-
-    start = time.perf_counter()
-    alone = [job(number) for number in range(jobs)]
-    single = time.perf_counter() - start
-    start = time.perf_counter()
-    with concurrent.futures.ThreadPoolExecutor(THREADS) as pool:
-        together = list(pool.map(job, range(jobs)))
-    shared = time.perf_counter() - start
-    differing = sum(a != b for a, b in zip(alone, together, strict=True))
-    click.echo(f"\n{jobs * chunk} mixed lookups (both tables, a law) on {THREADS} threads and on one")
-    report("blocks that differ in any bit", differing, "", at_most=0)
-    report(f"one thread against {THREADS} threads ({os.cpu_count()} cores)", single / shared, "x")
-
-
 def fresh_process() -> None:
     """Import, first lookup with compiled code at hand, and the very first one."""
     lookup = (
@@ -341,19 +274,15 @@ def fresh_process() -> None:
 
 @click.command()
 @click.option("--json", "json_path", type=click.Path(path_type=pathlib.Path, dir_okay=False), help="Write the table.")
-@click.option("--threads", "with_threads", is_flag=True, help="10 million lookups on 16 threads as well.")
-def main(json_path: pathlib.Path | None, with_threads: bool) -> None:
+def main(json_path: pathlib.Path | None) -> None:
     """Time the lookups."""
     rng = np.random.default_rng(SEED)
     load = os.getloadavg()
     click.echo(f"{os.cpu_count()} cores, load average {load[0]:.2f} at the start; numpy {np.__version__}")
     island_tables(rng)
-    tiers(rng)
     totals(rng)
     laws(rng)
     calibrated(rng)
-    if with_threads:
-        threads(rng)
     fresh_process()
     end = os.getloadavg()
     click.echo(f"\nload average {end[0]:.2f} at the end")
