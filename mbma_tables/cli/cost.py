@@ -48,5 +48,6 @@ def _show(title: str, records: list[dict[str, Any]], unit: float, as_json: bool)
     if as_json:
         click.echo(to_json({"unit_seconds": unit, "rows": records}))
         return
-    columns = [Column(name, "-", [record[name] for record in records]) for name in records[0]]
+    known = [{name: None if value != value else value for name, value in record.items()} for record in records]
+    columns = [Column(name, "-", [record[name] for record in known]) for name in records[0]]
     click.echo(Report(title, f"fixed piece of work {unit:.3g} s", [], {}, columns).to_table(), nl=False)

@@ -31,6 +31,8 @@ def test_distances_are_told_beside_times():
     assert title.endswith("s")
     assert header.split() == [*DISTANCE_COLUMNS, "seconds"]
     assert len(lines) == len(shipped_distances())
+    # no force is known of an area alone
+    assert lines[0].split()[-5:-3] == ["-", "-"]
     found = json.loads(run("cost", "--distance", "--json"))
     for row, expected in zip(found["rows"], shipped_distances(), strict=True):
         assert (row["theory"], row["way"]) == (expected.theory, expected.way)
