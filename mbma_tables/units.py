@@ -51,7 +51,7 @@ DIMENSIONS = {
     **dict.fromkeys(("h_rms", "h_max", "Ra", "Rq", "Rsm", "Sa", "Sq", "Sp", "longest", "shortest"), (1, 0)),
     **dict.fromkeys(("separation", "mean_separation", "delta", "R_d", "R_u", "sigma", "h_d", "overclosure"), (1, 0)),
     **dict.fromkeys(("separations", "mean_separations", "deltas"), (1, 0)),
-    **dict.fromkeys(("dx", "dy", "short_cutoff", "long_cutoff", "tip_radius"), (1, 0)),
+    **dict.fromkeys(("dx", "dy", "short_cutoff", "long_cutoff", "tip_radius", "extrapolate_to"), (1, 0)),
     **dict.fromkeys(("q0", "q1"), (-1, 0)),
     **dict.fromkeys(("D", "m4", "Sds", "Spd"), (-2, 0)),
     **dict.fromkeys(("E_star", "E1", "E2", "pressure", "pressures", "mean_pressure", "force"), (0, 1)),

@@ -70,7 +70,7 @@ def from_map(path: pathlib.Path) -> Specimen:
     """The surface fitted to a measured map."""
     from mbma_tables.surfaces.surface import Surface
 
-    surface = Surface.from_map(path)
+    surface = Surface.from_map(path, model="self-affine")
     assert isinstance(surface, Surface)
     return Specimen(surface, f"fitted to the map {_printable(path)}")
 

@@ -365,7 +365,9 @@ class Surface(AnySurface):
         detrend: str | None = None,
         h_max: float | None = None,
         band: tuple[float, float] | None = None,
-        model: str = "self-affine",
+        model: str = "measured",
+        extrapolate_to: Any = None,
+        extrapolate_hurst: float | None = None,
         **treatment: Any,
     ) -> Surface | MeasuredSurface:
         """The surface of a measured height map: its own spectrum and heights, or the self-affine one fitted to it.
@@ -389,8 +391,11 @@ class Surface(AnySurface):
             Height of the highest point above the mid-plane [length]; by default the map's, after detrending.
         band : tuple of float, optional
             (q0, q1) to fit and to take; else a flat roll-off below and a departure above are found and left out.
-        model : {"self-affine", "measured"}, optional
-            Five numbers fitted to it, or the map's own spectrum, heights and curves, without a fit.
+        model : {"measured", "self-affine"}, optional
+            The map's own spectrum, heights and curves, without a fit, or five numbers fitted to it.
+        extrapolate_to, extrapolate_hurst : float, optional
+            Continue the measured spectrum to this wavelength [length] by a power law of this Hurst exponent; what
+            that changes is told.
         **treatment
             `outliers`, `fill`, `short_cutoff`, `long_cutoff`, `tip_radius`, `reliable`, `window` of
             `mbma_tables.surfaces.treatment.Treatment`; `unit` of the lengths where a file has none, `channel` of a
@@ -419,19 +424,23 @@ class Surface(AnySurface):
         >>> noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((128, 128)))
         >>> q = np.hypot(np.fft.fftfreq(128)[:, None], np.fft.rfftfreq(128))
         >>> q[0, 0] = np.inf
-        >>> surface = Surface.from_map(np.fft.irfft2(noise / abs(noise) * q**-1.8), dx=1 / 128, periodic=True)
+        >>> heights = np.fft.irfft2(noise / abs(noise) * q**-1.8)
+        >>> surface = Surface.from_map(heights, dx=1 / 128, periodic=True, model="self-affine")
         >>> print(f"H = {surface.hurst:.2f}, q0 = {surface.q0:.3f}, fitted at {surface.fit.points} points")
         H = 0.80, q0 = 6.283, fitted at 32 points
         """
         from mbma_tables.surfaces.maps import fit_map, measured_map, prepared
+        from mbma_tables.surfaces.resolution import finished
 
         if model not in ("self-affine", "measured"):
             raise InputError(f"model must be 'self-affine' or 'measured', got {model!r}")
         if model == "measured" and band is not None:
             raise InputError("band belongs to model='self-affine': a measured surface is not fitted")
+        if model != "measured" and (extrapolate_to is not None or extrapolate_hurst is not None):
+            raise InputError("extrapolate_to and extrapolate_hurst belong to model='measured'")
         treated = prepared(heights, dx, dy, periodic, {"detrend": detrend, **treatment})
         if model == "measured":
-            return measured_map(treated, h_max)
+            return finished(measured_map(treated, h_max), extrapolate_to, extrapolate_hurst)
         fitted = fit_map(treated, h_max, band)
         return cls(**fitted._asdict(), unit=fitted.fit.length_unit)
 
@@ -443,6 +452,8 @@ class Surface(AnySurface):
         periodic: bool | None = None,
         detrend: str | None = None,
         h_max: float | None = None,
+        extrapolate_to: Any = None,
+        extrapolate_hurst: float | None = None,
         **treatment: Any,
     ) -> MeasuredSurface:
         """The isotropic surface of which a line was measured, by a stylus for instance.
@@ -454,7 +465,7 @@ class Surface(AnySurface):
             instance; or such a line scan.
         dx : float, optional
             Sampling step [length], of an array.
-        periodic, detrend, **treatment
+        periodic, detrend, extrapolate_to, extrapolate_hurst, **treatment
             As for `from_map`; `tip_radius` is the stylus's.
         h_max : float, optional
             Height of the highest point above the mid-plane [length]; by default the line's, which lies below that of a
@@ -479,14 +490,15 @@ class Surface(AnySurface):
         >>> noise = np.fft.rfft(np.random.default_rng(1).standard_normal(4000))
         >>> line = np.fft.irfft(noise * np.minimum(1, (np.arange(2001) / 40.0 + 1e-9) ** -1.3))
         >>> surface = Surface.from_profile(line, dx=0.5, unit="um", periodic=True)
-        >>> print(surface.provenance[-2]["told"])
+        >>> print(surface.provenance[-3]["told"])
         h_rms is known to 5.2% and the rms gradient to 1.4% (one standard error, of a Gaussian surface)
         """
         from mbma_tables.surfaces.maps import prepared
         from mbma_tables.surfaces.profiles import measured_profile
+        from mbma_tables.surfaces.resolution import finished
 
         treated = prepared(heights, dx, None, periodic, {"detrend": detrend, **treatment}, dimensions=1)
-        return measured_profile(treated, h_max)
+        return finished(measured_profile(treated, h_max), extrapolate_to, extrapolate_hurst)
 
     @property
     def labelled(self) -> bool:

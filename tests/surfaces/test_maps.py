@@ -1,6 +1,7 @@
 """Surfaces from spectra and maps: known surfaces come back, everything else is refused with its reason."""
 
 import dataclasses
+import functools
 import math
 import os
 import sys
@@ -18,6 +19,8 @@ from mbma_tables import Surface
 from mbma_tables.errors import InputError, MbmaError, NotSelfAffineError, OutOfRangeError
 from mbma_tables.surfaces.maps import radial_spectrum
 from mbma_tables.surfaces.treatment import read_measurement
+
+from_map = functools.partial(Surface.from_map, model="self-affine")
 
 SIDE = 2 * math.pi  # so that wavenumbers are whole numbers
 POINTS = 256
@@ -69,7 +72,7 @@ class TestKnownMaps:
     def test_a_periodic_band_comes_back(self, hurst, q0):
         truth = Surface(hurst, q0, 100.0, 1.7, 3.0)
         heights = synthetic(truth)
-        found = Surface.from_map(heights, STEP, periodic=True)
+        found = from_map(heights, STEP, periodic=True)
         assert found.hurst == pytest.approx(hurst, abs=0.01)
         assert found.q0 == pytest.approx(q0, rel=1e-12)
         assert found.q1 == pytest.approx(100, rel=1e-3)
@@ -82,7 +85,7 @@ class TestKnownMaps:
     @pytest.mark.parametrize("hurst", [0.3, 0.5, 0.8, 1.0])
     def test_a_flat_roll_off_is_found(self, hurst):
         truth = Surface(hurst, 8.0, 100.0, 1.0, 3.0)
-        found = Surface.from_map(synthetic(truth, plateau=True), STEP, periodic=True)
+        found = from_map(synthetic(truth, plateau=True), STEP, periodic=True)
         assert found.fit.roll_off == found.q0 == pytest.approx(8, rel=0.01)
         assert found.hurst == pytest.approx(hurst, abs=0.01)
         assert found.h_rms == pytest.approx(1, rel=0.02)
@@ -93,7 +96,7 @@ class TestKnownMaps:
 
     @pytest.mark.parametrize("seed", range(4))
     def test_random_amplitudes_scatter_as_the_fit_says(self, seed):
-        found = Surface.from_map(synthetic(ROUGH, gaussian=True, seed=seed), STEP, periodic=True)
+        found = from_map(synthetic(ROUGH, gaussian=True, seed=seed), STEP, periodic=True)
         assert abs(found.fit.hurst - 0.8) < 4 * found.fit.hurst_error < 0.08
         assert found.h_rms == pytest.approx(1, rel=0.12)
         assert found.rms_gradient == pytest.approx(ROUGH.rms_gradient, rel=0.05)
@@ -104,7 +107,7 @@ class TestKnownMaps:
         # a quarter of the side of a larger surface: sampling scatter of its few long waves, plus the window's bias
         truth = Surface(hurst, 1.0, 400.0, 1.0, 3.0)
         heights = synthetic(truth, 1024, gaussian=True, seed=seed)[:POINTS, :POINTS]
-        found = Surface.from_map(heights, SIDE / 1024)
+        found = from_map(heights, SIDE / 1024)
         assert found.fit.windowed
         assert found.fit.detrend == "plane"
         assert found.q0 == pytest.approx(4, rel=1e-12)
@@ -115,45 +118,45 @@ class TestKnownMaps:
 
     def test_a_noise_floor_is_left_out(self):
         noise = 0.003 * np.random.default_rng(3).standard_normal(BASE.shape)
-        found = Surface.from_map(BASE + noise, STEP, periodic=True)
+        found = from_map(BASE + noise, STEP, periodic=True)
         assert found.fit.cut_off == found.q1 == pytest.approx(100, rel=0.1)
         assert found.hurst == pytest.approx(0.8, abs=0.05)
 
     def test_a_sharp_end_on_either_side_is_left_out(self):
         # the window smears the band's ends into its surroundings
-        found = Surface.from_map(BASE, STEP)
+        found = from_map(BASE, STEP)
         assert found.fit.roll_off == pytest.approx(4, rel=0.1)
         assert found.fit.cut_off == pytest.approx(100, rel=0.1)
         assert found.hurst == pytest.approx(0.8, abs=0.05)
 
     def test_form_is_removed_by_the_right_trend(self):
         bowl = CUT_OUT + 30 * (X**2 + Y**2)
-        plain = Surface.from_map(CUT_OUT, STEP, detrend="quadratic")
-        found = Surface.from_map(bowl, STEP, detrend="quadratic")
+        plain = from_map(CUT_OUT, STEP, detrend="quadratic")
+        found = from_map(bowl, STEP, detrend="quadratic")
         assert dataclasses.astuple(found.fit)[:3] == pytest.approx(dataclasses.astuple(plain.fit)[:3], rel=1e-6)
         assert found.h_max == pytest.approx(plain.h_max, rel=1e-9)
         with pytest.raises(NotSelfAffineError, match="a wave stands out"):
-            Surface.from_map(bowl, STEP)
+            from_map(bowl, STEP)
 
     def test_a_forced_band_is_taken(self):
-        found = Surface.from_map(BASE, STEP, periodic=True, band=(8, 60))
+        found = from_map(BASE, STEP, periodic=True, band=(8, 60))
         assert (found.q0, found.q1) == (8.0, 60.0)
         assert found.h_rms == pytest.approx(seen_in(ROUGH, 8, 60).h_rms, rel=0.05)
 
     def test_h_max_can_be_given(self):
-        assert Surface.from_map(BASE, STEP, periodic=True, h_max=4.5).h_max == 4.5
+        assert from_map(BASE, STEP, periodic=True, h_max=4.5).h_max == 4.5
 
     def test_a_rectangle_with_oblong_steps(self):
         heights = synthetic(Surface(0.8, 4.0, 50.0, 1.0, 3.0), gaussian=True, seed=2)[:, ::2]
-        found = Surface.from_map(heights, STEP, 2 * STEP, periodic=True)
-        turned = Surface.from_map(heights.T, 2 * STEP, STEP, periodic=True)
+        found = from_map(heights, STEP, 2 * STEP, periodic=True)
+        turned = from_map(heights.T, 2 * STEP, STEP, periodic=True)
         assert found.hurst == pytest.approx(0.8, abs=0.06)
         assert found.q1 == pytest.approx(50, rel=1e-3)
         assert turned.h_rms == pytest.approx(found.h_rms, rel=1e-9)
 
     def test_the_map_is_left_alone(self):
         given_map = CUT_OUT.copy()
-        Surface.from_map(given_map, STEP)
+        from_map(given_map, STEP)
         np.testing.assert_array_equal(given_map, CUT_OUT)
 
     def test_above_one_within_the_tolerance_holds_one(self):
@@ -161,7 +164,7 @@ class TestKnownMaps:
         waves = np.fft.fftfreq(POINTS, 1 / POINTS)
         q = np.hypot(waves[:, None], waves[None, :])
         steeper = np.fft.ifft2(np.fft.fft2(heights) * np.where(q > 0, q, 1) ** -0.23).real
-        found = Surface.from_map(steeper, STEP, periodic=True)
+        found = from_map(steeper, STEP, periodic=True)
         assert found.hurst == 1.0
         assert found.fit.hurst_held
         assert found.fit.hurst == pytest.approx(1.03, abs=0.005)
@@ -174,8 +177,8 @@ class TestKnownMaps:
     lift=st.floats(-1e3, 1e3),
 )
 def test_units_do_not_matter(length, height, lift):
-    plain = Surface.from_map(CUT_OUT, STEP)
-    scaled = Surface.from_map(height * (CUT_OUT + lift), length * STEP)
+    plain = from_map(CUT_OUT, STEP)
+    scaled = from_map(height * (CUT_OUT + lift), length * STEP)
     assert scaled.hurst == pytest.approx(plain.hurst, rel=1e-7)
     assert scaled.q0 * length == pytest.approx(plain.q0, rel=1e-7)
     assert scaled.q1 * length == pytest.approx(plain.q1, rel=1e-7)
@@ -221,7 +224,7 @@ class TestRadialSpectrum:
 class TestTopography:
     def test_is_taken_as_it_is(self):
         topography = topography_class()(BASE, (SIDE, SIDE), periodic=True, unit="um")
-        found, plain = Surface.from_map(topography), Surface.from_map(BASE, STEP, periodic=True)
+        found, plain = from_map(topography), from_map(BASE, STEP, periodic=True)
         assert found.h_rms == pytest.approx(plain.h_rms, rel=1e-12)
         assert found.fit == dataclasses.replace(plain.fit, length_unit="um")
         assert not found.fit.windowed
@@ -231,32 +234,32 @@ class TestTopography:
         q, C = topography.power_spectrum_from_area(nb_points_per_decade=20)
         inside = (q > 4) & (q < 95)
         found = Surface.from_psd(q[inside], C[inside], h_max=3, convention="isotropic")
-        plain = Surface.from_map(BASE, STEP, periodic=True, band=(found.q0, found.q1))
+        plain = from_map(BASE, STEP, periodic=True, band=(found.q0, found.q1))
         assert found.hurst == pytest.approx(plain.hurst, abs=0.02)
         assert found.h_rms == pytest.approx(plain.h_rms, rel=0.05)
 
     def test_has_its_own_sizes(self):
         topography = topography_class()(BASE, (SIDE, SIDE), periodic=True)
         with pytest.raises(InputError, match="dx and dy belong to a plain array"):
-            Surface.from_map(topography, 1.0)
+            from_map(topography, 1.0)
 
     def test_sizes_that_are_no_numbers(self):
         given = types.SimpleNamespace(heights=lambda: np.ones((40, 40)), physical_sizes=("a", "b"))
         with pytest.raises(InputError, match="physical_sizes must be real numbers"):
-            Surface.from_map(given)
+            from_map(given)
 
     def test_with_holes_is_refused(self):
         holed = np.ma.masked_where(BASE > 1.0, BASE)
         topography = topography_class()(holed, (SIDE, SIDE))
         with pytest.raises(InputError, match=f"has {holed.mask.sum()} holes among 65536 points, more than 5%"):
-            Surface.from_map(topography)
+            from_map(topography)
 
     def test_a_line_scan_is_refused(self):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             scans = pytest.importorskip("SurfaceTopography")
         with pytest.raises(InputError, match="from_profile takes line scans"):
-            Surface.from_map(scans.UniformLineScan(BASE[0], SIDE))
+            from_map(scans.UniformLineScan(BASE[0], SIDE))
 
 
 def profile_spectrum(surface, q):
@@ -349,7 +352,7 @@ class TestRefused:
     )
     def test_maps_that_are_not_self_affine(self, heights, options, reason):
         with pytest.raises(NotSelfAffineError, match=reason):
-            Surface.from_map(heights, STEP, **options)
+            from_map(heights, STEP, **options)
 
     @pytest.mark.parametrize(
         ("C", "reason"),
@@ -395,7 +398,7 @@ class TestRefused:
     def test_bad_maps(self, change, error, message):
         arguments = {"heights": BASE, "dx": STEP} | change
         with pytest.raises(error, match=message):
-            Surface.from_map(**arguments)
+            from_map(**arguments)
 
     @pytest.mark.parametrize(
         ("change", "error", "message"),
@@ -456,4 +459,4 @@ class TestFiles:
         if folder is None:
             pytest.skip("no reference maps: set MBMA_REFERENCE_MAPS to their folder")
         with pytest.raises(NotSelfAffineError, match=reason):
-            Surface.from_map(read_measurement(folder / name))
+            from_map(read_measurement(folder / name))

@@ -167,5 +167,5 @@ def test_a_map_is_its_own_spectrum():
     assert found.h_max == pytest.approx(heights.max() - heights.mean(), rel=1e-9)
     # the spectrum ends at the Nyquist circle, the map's corners hold waves beyond
     assert found.rms_gradient == pytest.approx(found.bearing.gradient, rel=0.05)
-    assert [step["step"] for step in found.provenance] == ["read", "detrend", "edges"]
+    assert [step["step"] for step in found.provenance] == ["read", "detrend", "edges", "resolution"]
     assert found.fit().hurst == pytest.approx(0.8, abs=0.05)

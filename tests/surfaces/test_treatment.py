@@ -139,7 +139,13 @@ class TestCutoff:
     def test_the_surface_ends_there(self):
         surface = Surface.from_map(MAP, STEP, periodic=True, short_cutoff=3.0, model="measured")
         assert surface.q1 <= 2 * np.pi / 3 * (1 + 1e-9)
-        assert [entry["step"] for entry in surface.provenance] == ["read", "detrend", "short_cutoff", "edges"]
+        assert [entry["step"] for entry in surface.provenance] == [
+            "read",
+            "detrend",
+            "short_cutoff",
+            "edges",
+            "resolution",
+        ]
 
     @pytest.mark.parametrize(
         ("options", "message"),

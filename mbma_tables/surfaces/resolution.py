@@ -1,0 +1,104 @@
+"""Area is a matter of resolution: what the shortest waves of a measurement do, and a power law beyond them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from mbma_tables.arguments import number_in
+from mbma_tables.errors import InputError
+from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.units import Units
+
+STEPS_PER_OCTAVE = 8  # of an extrapolated spectrum
+
+
+def resolution(surface: MeasuredSurface) -> dict[str, Any]:
+    """A record of how much the shortest octave of a measured spectrum matters.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mbma_tables import Surface
+    >>> from mbma_tables.surfaces.resolution import resolution
+    >>> q = np.geomspace(1, 100, 50)
+    >>> print(resolution(Surface.from_spectrum(q, q**-3.6, h_max=3.0, unit="um"))["told"])
+    area is a matter of resolution: waves are known down to 0.06283 um, and without the last octave of them area at light load would be 1.1 times larger
+    """  # noqa: E501
+    laws = surface.laws
+    below = float(laws.below(2, laws.place(np.asarray(surface.q1 / 2))))
+    factor = math.sqrt(laws.moment(2) / below) if below > 0 else math.inf
+    shortest = 2 * math.pi / float(surface.q1)
+    told = (
+        f"area is a matter of resolution: waves are known down to {shortest:.4g} {surface.unit or ''}".rstrip()
+        + f", and without the last octave of them area at light load would be {factor:.2g} times larger"
+    )
+    return {"step": "resolution", "shortest": shortest, "area_without_last_octave": factor, "told": told}
+
+
+def finished(surface: MeasuredSurface, shortest: Any = None, hurst: Any = None) -> MeasuredSurface:
+    """A measured surface with that record, and continued to a shorter wavelength where that is asked for."""
+    if (shortest is None) != (hurst is None):
+        raise InputError("extrapolate_to and extrapolate_hurst: give both or neither")
+    known = dataclasses.replace(surface, provenance=(*surface.provenance, resolution(surface)))
+    return known if shortest is None else extrapolated(known, shortest, hurst)
+
+
+def extrapolated(surface: MeasuredSurface, shortest: Any, hurst: Any) -> MeasuredSurface:
+    """A measured spectrum continued to a shorter wavelength by a power law that is stated, not measured.
+
+    Parameters
+    ----------
+    surface : MeasuredSurface
+    shortest : float
+        Wavelength down to which it is continued [length].
+    hurst : float
+        C goes like q^(-2-2H), from the mean level of the last measured octave.
+
+    Returns
+    -------
+    MeasuredSurface
+        Its record says what that changes. Curves of the map's tops and valleys are left out: they are not known of
+        the waves added.
+
+    Raises
+    ------
+    InputError
+        Where that wavelength was measured.
+    """
+    wave, exponent = (
+        number_in("extrapolate_to", Units(surface.unit).number("extrapolate_to", shortest), 1e-30, 1e30),
+        number_in("extrapolate_hurst", hurst, 0.0, 1.0),
+    )
+    last, end = float(surface.q1), 2 * math.pi / wave
+    if not end > last:
+        raise InputError(
+            f"extrapolate_to must be below the shortest measured wavelength, {2 * math.pi / last:.6g}, got {wave:g}"
+        )
+    slope = 2 + 2 * exponent
+    octave = last / 2 * 2 ** ((np.arange(STEPS_PER_OCTAVE) + 0.5) / STEPS_PER_OCTAVE)
+    known = np.asarray(surface.power_spectrum(octave))
+    level = float(np.mean(np.log(known[known > 0]) + slope * np.log(octave[known > 0])))
+    q = np.geomspace(last, end, max(2, math.ceil(math.log2(end / last) * STEPS_PER_OCTAVE) + 1))
+    samples = None if surface.samples is None else np.append(surface.samples, np.full(q.size, surface.samples[-1]))
+    longer = MeasuredSurface(
+        np.append(surface.q, q),
+        np.append(surface.C, np.exp(level - slope * np.log(q))),
+        surface.h_max,
+        surface.heights,
+        samples=samples,
+        anisotropy=surface.anisotropy,
+        unit=surface.unit,
+    )
+    area = float(surface.rms_gradient / longer.rms_gradient)
+    stiffness = float(surface.h_rms / longer.h_rms)
+    told = (
+        f"continued to waves of {wave:.4g} {surface.unit or ''}".rstrip()
+        + f" by a power law with H = {exponent:g}, which was not measured: area at light load is {area:.3g} times "
+        f"that of the measured waves, stiffness and conductance at a pressure {stiffness:.3g} times"
+    )
+    record = {"step": "extrapolated", "shortest": wave, "hurst": exponent, "area": area, "stiffness": stiffness}
+    return dataclasses.replace(longer, provenance=(*surface.provenance, record | {"told": told}))

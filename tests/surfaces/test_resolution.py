@@ -1,0 +1,56 @@
+"""What the shortest waves do, and power laws beyond them."""
+
+import numpy as np
+import pytest
+
+from mbma_tables import Surface
+from mbma_tables.errors import InputError
+from mbma_tables.surfaces.resolution import extrapolated, resolution
+
+WHOLE = Surface(0.7, 1.0, 400.0, 0.3, 1.0)
+
+
+def measured(end):
+    """The longer waves of `WHOLE`."""
+    q = np.geomspace(1.0, end, 120)
+    return Surface.from_spectrum(q, WHOLE.power_spectrum(q * (1 - 1e-12)), h_max=1.0, unit="um")
+
+
+def test_the_last_octave():
+    found = resolution(measured(100.0))
+    assert found["shortest"] == pytest.approx(2 * np.pi / 100)
+    expected = float(measured(100.0).rms_gradient / measured(50.0).rms_gradient)
+    assert found["area_without_last_octave"] == pytest.approx(expected, rel=1e-3)
+    assert f"{expected:.2g} times larger" in found["told"]
+
+
+def test_the_true_power_law_gives_the_whole_surface_back():
+    longer = extrapolated(measured(50.0), 2 * np.pi / 400, 0.7)
+    assert longer.rms_gradient == pytest.approx(WHOLE.rms_gradient, rel=2e-3)
+    assert longer.m4 == pytest.approx(WHOLE.m4, rel=4e-3)
+    assert longer.q1 == pytest.approx(400.0)
+    record = longer.provenance[-1]
+    assert record["area"] == pytest.approx(float(measured(50.0).rms_gradient / WHOLE.rms_gradient), rel=2e-3)
+    assert "which was not measured" in record["told"]
+
+
+def test_as_options_of_a_map():
+    noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((64, 64)))
+    q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
+    q[0, 0] = np.inf
+    heights = np.fft.irfft2(noise * q**-1.8)
+    options = {"dx": 1.0, "periodic": True, "unit": "um", "model": "measured"}
+    plain = Surface.from_map(heights, **options)
+    longer = Surface.from_map(heights, **options, extrapolate_to="100 nm", extrapolate_hurst=0.8)
+    assert longer.q1 == pytest.approx(2 * np.pi / 0.1)
+    assert longer.rms_gradient > 1.2 * plain.rms_gradient
+    assert [entry["step"] for entry in longer.provenance[-2:]] == ["resolution", "extrapolated"]
+    with pytest.raises(InputError, match="both or neither"):
+        Surface.from_map(heights, **options, extrapolate_to=0.1)
+
+
+def test_what_was_measured_is_not_replaced():
+    with pytest.raises(InputError, match="must be below the shortest measured wavelength"):
+        extrapolated(measured(50.0), 1.0, 0.7)
+    with pytest.raises(InputError, match="extrapolate_hurst must be a number"):
+        extrapolated(measured(50.0), 0.01, 1.7)
