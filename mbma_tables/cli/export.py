@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,8 @@ from mbma_tables.scenes.specimen import Specimen
 if TYPE_CHECKING:
     from mbma_tables.export.law_rows import LawTable
 
+NAMED = ("calculix", "abaqus", "modelica")
+
 
 @click.command("export", short_help="A contact law, or the whole model, for other codes.")
 @click.argument("target", type=click.Choice([*SOLVERS, *DATA, *CODE]))
@@ -26,7 +29,11 @@ if TYPE_CHECKING:
 @quantity_option("--largest-overclosure", help="Where the rows end; else at full compression.")
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure instead.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
-@click.option("--exponential", is_flag=True, help="For calculix and abaqus: Persson's exponential law instead of rows.")
+@click.option(
+    "--pressures", metavar="X:X", help="Smallest and largest pressure: where the error holds, and the rows end."
+)
+@click.option("--name", help="Of the interaction or table: calculix, abaqus, modelica.")
+@click.option("--exponential", is_flag=True, help="For calculix: Persson's exponential law instead of rows.")
 @theory_option
 @reading_option
 @click.option("--check", is_flag=True, help="Of source code: build it and replay its conformance points.")
@@ -34,6 +41,7 @@ def export_command(
     target: str,
     out: Path,
     specimen: Specimen | None,
+    name: str | None,
     exponential: bool,
     theory: str,
     reading: str,
@@ -44,11 +52,14 @@ def export_command(
 
     Solvers and data take a surface, a modulus and units; c, fortran and javascript are the whole model as code.
 
-    Example: mbma export calculix --surface concrete --E-star 13.3 --length-unit mm --stress-unit MPa --out law.inp
+    Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
     """
+    given = {option: value for option, value in law_options.items() if value is not None}
+    named = {"name": name} if name is not None else {}
     if target in CODE:
         if theory != "mbma":
             raise InputError(f"source code is of the MBMA model: leave --theory out, got {theory!r}")
+        _refuse(f"{target} is the whole model", given | named | {"surface": specimen} | {"exponential": exponential})
         _export_code(target, out, reading, check)
         return
     if check:
@@ -57,29 +68,53 @@ def export_command(
         raise InputError("one surface is needed: see the options --surface, --file, --map, --hurst")
     if specimen.E_star is None:
         raise InputError("a modulus is needed: --E-star, or --E1 --nu1 and, unless the other body is rigid, --E2 --nu2")
-    if exponential and target not in ("calculix", "abaqus"):
-        raise InputError(f"--exponential is a law of calculix and abaqus, not of {target}")
+    if target not in NAMED:
+        _refuse(f"{target} has no name to choose", named)
     from mbma_tables.export import solvers
+
+    if exponential:
+        if target != "calculix":
+            raise InputError(f"--exponential is a law of calculix, not of {target}")
+        own = {"theory": theory != "mbma", "reading": reading != "reported"}
+        _refuse("--exponential is Persson's law in two numbers", given | own)
+        text = solvers.exponential(specimen.surface, specimen.E_star, stress_unit=specimen.stress_unit, **named)
+        write_file(out, text.encode())
+        click.echo(out)
+        return
     from mbma_tables.export.law_rows import describe_law
 
+    if "pressures" in given:
+        given["pressures"] = _pressures(given["pressures"])
     law = describe_law(
         specimen.surface,
         specimen.E_star,
         stress_unit=specimen.stress_unit,
-        quantity="pressure" if law_options["conductivity"] is None else "conductance",
+        quantity="pressure" if "conductivity" not in given else "conductance",
         reading=reading,
         theory=theory,
-        **law_options,
+        **given,
     )
-    if exponential:
-        files = {out: solvers.exponential(specimen.surface, specimen.E_star, law.comments).encode()}
-    elif target in SOLVERS:
-        files = {out: getattr(solvers, target)(law).encode()}
+    if target in SOLVERS:
+        files = {out: getattr(solvers, target)(law, **named).encode()}
     else:
         files = _data_files(target, out, law)
     for path, content in files.items():
         write_file(path, content)
         click.echo(path)
+
+
+def _refuse(why: str, given: Mapping[str, Any]) -> None:
+    """Refuse options that would be without effect."""
+    useless = [f"--{option.replace('_', '-')}" for option, value in given.items() if value not in (None, False)]
+    if useless:
+        raise InputError(f"{why}: leave {' and '.join(useless)} out")
+
+
+def _pressures(text: str) -> tuple[float | str, ...]:
+    ends = text.split(":")
+    if len(ends) != 2:
+        raise InputError(f"--pressures must be like 0.1:100 or 0.1MPa:100MPa, got {text!r}")
+    return tuple(ends)
 
 
 def _data_files(target: str, out: Path, law: LawTable) -> dict[Path, bytes]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mbma_tables.arguments import finite_array
 from mbma_tables.errors import InputError
 from mbma_tables.export.law_rows import LawTable
 from mbma_tables.export.text import checked_name, comment, csv_cell
@@ -36,6 +37,7 @@ def _header(law: LawTable) -> dict[str, Any]:
         "largest_error": law.largest_error,
         "theory": law.theory,
         "comments": list(law.comments),
+        "floor": law.floor,
     }
 
 
@@ -51,8 +53,45 @@ def to_csv(law: LawTable) -> bytes:
 
 def to_json(law: LawTable) -> bytes:
     """One object: the header, and the columns by name."""
+    return (json.dumps(_content(law), indent=1) + "\n").encode()
+
+
+def _content(law: LawTable) -> dict[str, Any]:
     content = _header(law) | {"columns": {law.x_name: law.x.tolist(), law.y_name: law.y.tolist()}}
-    return (json.dumps(content, indent=1) + "\n").encode()
+    return content if law.behaviour is None else content | {"behaviour": _content(law.behaviour)}
+
+
+def from_json(content: str | bytes) -> LawTable:
+    """The law in a file of `to_json`.
+
+    Raises
+    ------
+    InputError
+        For what is no such file.
+    """
+    try:
+        return _law_of(json.loads(content))
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
+        raise InputError(f"this is no law as `mbma export json` writes it: {type(fault).__name__}: {fault}") from None
+
+
+def _law_of(held: dict[str, Any]) -> LawTable:
+    x, y = (finite_array(held[axis], held["columns"][held[axis]]) for axis in ("x", "y"))
+    if x.ndim != 1 or x.shape != y.shape or not (np.diff(x) > 0).all():
+        raise ValueError("two columns of one length are needed, the first of them rising")
+    return LawTable(
+        x=x,
+        y=y,
+        x_name=str(held["x"]),
+        y_name=str(held["y"]),
+        x_unit=str(held["x_unit"]),
+        y_unit=str(held["y_unit"]),
+        largest_error=float(held["largest_error"]),
+        comments=tuple(map(str, held["comments"])),
+        theory=str(held["theory"]),
+        floor=float(held["floor"]),
+        behaviour=_law_of(held["behaviour"]) if "behaviour" in held else None,
+    )
 
 
 def to_matlab(law: LawTable) -> bytes:
@@ -60,7 +99,7 @@ def to_matlab(law: LawTable) -> bytes:
     from scipy.io import savemat
 
     stream = io.BytesIO()
-    text = {name: str(value) for name, value in _header(law).items() if name not in ("x", "y", "comments")}
+    text = {name: value for name, value in _header(law).items() if name not in ("x", "y", "comments")}
     comments = np.array(law.comments, dtype=object)
     named = {"x": law.x[:, None], "y": law.y[:, None], "x_name": law.x_name, "y_name": law.y_name}
     savemat(stream, named | text | {"comments": comments}, format="5", oned_as="column")
@@ -89,7 +128,9 @@ def to_netcdf(law: LawTable) -> bytes:
             "interpolation": "linear",
         },
     )
-    return written_bytes("law.nc", lambda path: dataset.to_netcdf(path, engine="netcdf4"))
+    # CF 2.5.1: a coordinate has no missing values, nor has anything here
+    whole = {name: {"_FillValue": None} for name in (law.x_name, law.y_name)}
+    return written_bytes("law.nc", lambda path: dataset.to_netcdf(path, engine="netcdf4", encoding=whole))
 
 
 def to_hdf5(law: LawTable) -> bytes:

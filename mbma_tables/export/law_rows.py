@@ -1,22 +1,19 @@
 """A contact law as rows for other codes: what it is, in which units, and rows chosen by their error.
 
 Overclosure is c = h_max - u with the mean separation u = (h_max + d)/2 (50): zero at first contact, rising as bodies
-approach, so that -dp/du = dp/dc. Linear interpolation over a step h has an error of about h^2 p''/8. Rows are spaced so
-that this is the same fraction of p everywhere above a floor, and are then moved by half of it, so that the error has
-both signs.
+approach, so that -dp/du = dp/dc.
 """
 
 from __future__ import annotations
 
-import bisect
 import dataclasses
 
 import numpy as np
 
 from mbma_tables import __version__
-from mbma_tables.arguments import FloatArray, number_in, whole_number_in
+from mbma_tables.arguments import FloatArray, number_in
 from mbma_tables.errors import InputError
-from mbma_tables.export.text import number
+from mbma_tables.export.chords import chosen_rows
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.theories.contact import contact
@@ -29,13 +26,10 @@ from mbma_tables.totals.law_protocol import ContactLaw
 from mbma_tables.units import Units, in_unit, resolve
 
 QUANTITIES = ("pressure", "conductance")
-FLOOR = 1e-3  # of the largest pressure: below it, errors are relative to this and not to the pressure
+FLOOR = 1e-3  # of the largest value, where no range is given: below it, errors are relative to this, not to the value
 LOOKED_AT = 200  # compressions at which validity and scatter are looked at
 FINE = 20_001  # points at which the error of a choice of rows is measured
-MIN_ROWS, MAX_ROWS = 3, 5000
-ROUNDS = 40  # of making the errors of chords equal
 LAW_RTOL = 1e-8
-MIN_STEP = 1e-10  # some readers change rows that are closer than this in the file's unit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,11 +43,15 @@ class LawTable:
     x_name, y_name, x_unit, y_unit : str
     largest_error : float
         Largest relative error of linear interpolation between the rows as written against the model, where y
-        is above `FLOOR` of its largest.
+        is above `floor`.
     comments : tuple of str
         What a reader of the file must know.
     theory : str
         Whose law it is.
+    floor : float
+        Value below which errors are relative to it.
+    behaviour : LawTable or None
+        The pressure of the same joint, with its conductance.
     """
 
     x: FloatArray
@@ -65,63 +63,8 @@ class LawTable:
     largest_error: float
     comments: tuple[str, ...]
     theory: str = "mbma"
-
-
-def rounded(values: FloatArray) -> FloatArray:
-    """Numbers as a file holds them."""
-    return np.array([float(number(value)) for value in values])
-
-
-def spread(x: FloatArray, y: FloatArray, count: int) -> FloatArray:
-    """Places of `count` rows along x whose chords have equal errors relative to max(y, floor), by iteration."""
-    scale = np.maximum(y, FLOOR * y[-1])
-    # logarithmic in y above the floor to begin with, linear below
-    filled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(y)) / scale[1:])]) + np.linspace(0, 3, x.size)
-    places = _cut(filled, x, count)
-    best, found = np.inf, places
-    for _ in range(ROUNDS):
-        chords = np.interp(places, x, y)
-        step = np.clip(np.searchsorted(places, x, side="right") - 1, 0, count - 2)
-        error = np.zeros(count - 1)
-        np.maximum.at(error, step, np.abs(np.interp(x, places, chords) - y) / scale)
-        if error.max() < best:
-            best, found = error.max(), places
-        # the error of a chord falls like the square of its length
-        root = np.sqrt(error + 1e-3 * error.max())
-        places = _cut(np.concatenate([[0.0], np.cumsum(root)]), places, count)
-    return found
-
-
-def _cut(filled: FloatArray, x: FloatArray, count: int) -> FloatArray:
-    """`count` places between which `filled` grows by equal amounts."""
-    places: FloatArray = np.interp(np.linspace(filled[0], filled[-1], count), filled, x)
-    places[0], places[-1] = x[0], x[-1]
-    return places
-
-
-def chord_error(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArray) -> float:
-    """Largest relative error of linear interpolation where y is above the floor."""
-    kept = fine_y > FLOOR * fine_y[-1]
-    return float(np.abs(np.interp(fine_x[kept], x, y) / fine_y[kept] - 1).max())
-
-
-def balanced(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArray) -> FloatArray:
-    """Rows moved by half of the error of the chords beside them, which halves the largest error."""
-    scale = np.maximum(fine_y, FLOOR * fine_y[-1])
-    over = (np.interp(fine_x, x, y) - fine_y) / scale
-    step = np.clip(np.searchsorted(x, fine_x, side="right") - 1, 0, x.size - 2)
-    high, low = np.zeros(x.size - 1), np.zeros(x.size - 1)
-    np.maximum.at(high, step, over)
-    np.minimum.at(low, step, over)
-    middle = (high + low) / 2
-    beside = np.concatenate([[middle[0]], (middle[1:] + middle[:-1]) / 2, [middle[-1]]])
-    moved = np.maximum(y - beside * np.maximum(y, FLOOR * y[-1]), 0.0)
-    moved[0] = y[0]
-    # pressure rises; conductance may fall where the model's stiffness jumps
-    if (np.diff(fine_y) >= 0).all():
-        moved = np.maximum.accumulate(moved)
-    result: FloatArray = moved
-    return result
+    floor: float = 0.0
+    behaviour: LawTable | None = None
 
 
 def _curve(
@@ -149,6 +92,7 @@ def describe_law(
     rows: int | None = None,
     rtol: float | None = None,
     largest_overclosure: float | str | None = None,
+    pressures: tuple[float | str, float | str] | None = None,
     conductivity: float | None = None,
     conductivity_unit: str | None = None,
     reading: str | Reading = "reported",
@@ -170,9 +114,13 @@ def describe_law(
     rows : int, optional
         How many; else as few as `rtol` needs, 1e-3 where neither is given.
     rtol : float, optional
-        Largest relative error of the interpolation where the result is above a thousandth of its largest.
+        Largest relative error of the interpolation where the result is above a thousandth of its largest, or
+        between `pressures`.
     largest_overclosure : float or str, optional
         Where the rows end, in the rows' unit or with its own; else at full compression, or where the force turns down.
+    pressures : pair of float or str, optional
+        Smallest and largest pressure of the user's problem: rows end at the largest, and the error holds from the
+        smallest on. Not with `largest_overclosure`.
     conductivity : float, optional
         k_s = 2 k1 k2/(k1 + k2) for conductance, thermal or electrical, with its unit.
     reading : str or Reading
@@ -203,9 +151,8 @@ def describe_law(
     if quantity not in QUANTITIES:
         raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
     modulus = number_in("E_star", plain["E_star"], 1e-300, 1e300)
-    end = Units(length_unit).number("overclosure", largest_overclosure)
-    if rows is not None and rtol is not None:
-        raise InputError("rows and rtol are both given: give one of them")
+    units = Units(length_unit, stress_unit)
+    end = units.number("overclosure", largest_overclosure)
     k_s, names = 1.0, ("overclosure", "pressure", length_unit, stress_unit)
     if quantity == "conductance":
         if conductivity is None or not conductivity_unit:
@@ -214,40 +161,53 @@ def describe_law(
             raise InputError(f"conductivity_unit is not printable: {conductivity_unit!r}")
         k_s = number_in("conductivity", conductivity, 1e-300, 1e300)
         names = ("pressure", "conductance", stress_unit, f"{conductivity_unit}/{length_unit}")
+    elif conductivity is not None or conductivity_unit is not None:
+        raise InputError("conductivity and conductivity_unit belong to quantity='conductance': leave them out")
     law = contact_law(surface, LAW_RTOL, reading=reading, E_star=modulus, theory=theory)
-    fine_x, fine_y = _curve(law, quantity, _range_end(law, end), k_s, modulus)
-
-    def with_rows(count: int) -> tuple[FloatArray, FloatArray, float]:
-        places = np.linspace(0, fine_x[-1], count) if evenly else spread(fine_x, fine_y, count)
-        x = rounded(places)
-        y = np.interp(x, fine_x, fine_y)
-        y = rounded(y if evenly else balanced(x, y, fine_x, fine_y))
-        return x, y, chord_error(x, y, fine_x, fine_y)
-
-    if rows is not None:
-        x, y, error = with_rows(whole_number_in("rows", rows, MIN_ROWS, MAX_ROWS))
-    else:
-        asked = number_in("rtol", 1e-3 if rtol is None else rtol, 1e-7, 0.5)
-        # the error falls with the number of rows
-        fewest = bisect.bisect_left(range(MAX_ROWS + 1), -asked, MIN_ROWS, key=lambda count: -with_rows(count)[2])
-        if fewest > MAX_ROWS:
-            raise InputError(f"rtol = {asked:g} needs more than {MAX_ROWS} rows under linear interpolation")
-        x, y, error = with_rows(fewest)
-    if (np.diff(x) <= (MIN_STEP if quantity == "pressure" else 0.0)).any():
-        raise InputError(
-            f"rows are closer than {MIN_STEP:g} {length_unit}, which some readers cannot tell apart: "
-            "take fewer rows or a smaller unit of length"
+    least, end = _range(law, end, pressures, units)
+    fine_x, fine_y = _curve(law, quantity, end, k_s, modulus)
+    floor = FLOOR * float(fine_y[-1])
+    if pressures is not None:
+        floor = least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
+    x, y, error = chosen_rows(fine_x, fine_y, floor, rows, rtol, evenly)
+    behaviour = None
+    if quantity == "conductance":
+        behaviour = describe_law(
+            surface,
+            modulus,
+            stress_unit=stress_unit,
+            rows=rows,
+            rtol=rtol,
+            largest_overclosure=end if pressures is None else None,
+            pressures=pressures,
+            reading=reading,
+            theory=theory,
+            evenly=evenly,
         )
     own = Mbma(reading=reading) if theory == Mbma.name else get_theory(theory)
-    comments = _comments(surface, law, modulus, names, x, error)
-    known = _validity(surface, law, own, float(_range_end(law, end)), stress_unit)
-    return LawTable(x, y, *names, error, (*comments, *known), law.theory)
+    comments = _comments(surface, law, modulus, names, x, error, floor, units)
+    known = _validity(surface, law, own, end, stress_unit)
+    return LawTable(x, y, *names, error, (*comments, *known), law.theory, floor, behaviour)
 
 
 def _known(name: str, unit: str | None) -> str:
     if unit is None:
         raise InputError(f"{name} is missing: a law without units is read wrongly sooner or later")
     return unit
+
+
+def _range(
+    law: ContactLaw, end: float | None, pressures: tuple[float | str, float | str] | None, units: Units
+) -> tuple[float, float]:
+    """Smallest pressure whose error counts, and largest overclosure, by a range of pressures or by an overclosure."""
+    if pressures is None:
+        return 0.0, _range_end(law, end)
+    if end is not None:
+        raise InputError("largest_overclosure and pressures are both given: give one of them")
+    low, high = (number_in("pressures", units.number("pressure", p), 1e-300, 1e300) for p in pressures)
+    if low >= high:
+        raise InputError(f"pressures must be two rising numbers, got {low:g} and {high:g}")
+    return low, (law.h_max - float(law.separation(force=high))) / 2
 
 
 def _range_end(law: ContactLaw, asked: float | None) -> float:
@@ -262,24 +222,33 @@ def _range_end(law: ContactLaw, asked: float | None) -> float:
 
 
 def _comments(
-    surface: Surface, law: ContactLaw, E_star: float, names: tuple[str, str, str, str], x: FloatArray, error: float
+    surface: Surface,
+    law: ContactLaw,
+    E_star: float,
+    names: tuple[str, str, str, str],
+    x: FloatArray,
+    error: float,
+    floor: float,
+    units: Units,
 ) -> tuple[str, ...]:
     numbers = ", ".join(f"{name} = {float(getattr(surface, name)):.10g}" for name in PARAMETERS)
-    unit, end = "the unit of length of the conductance", "the same"
+    end = "the same"
     if names[0] == "overclosure":
-        unit, end = names[2], "full compression"
+        end = "the largest asked for, or full compression"
         if law.turning_point is not None:
-            end = "where the force of this surface turns down; nothing is known beyond"
+            end = "where the force of this surface turns down, or the largest asked for; nothing is known beyond"
     model = f"MBMA model, reading {law.reading!r}" if law.theory == Mbma.name else f"theory {law.theory!r}"
     return (
         f"Contact law of a rough surface, {model}; mbma_tables {__version__}",
         f"{names[1]} [{names[3]}] against {names[0]} [{names[2]}]",
-        f"surface: {numbers}; lengths in {unit}",
-        f"E* = {E_star:.10g}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; pressure is force over nominal area",
+        f"surface: {numbers}; lengths in {units.length}",
+        f"E* = {E_star:.10g} {units.stress}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2",
+        "pressure is force over nominal area;",
         "overclosure c = h_max - u, u = (h_max + d)/2 the mean separation, d the separation from the mid-plane;",
         "c = 0 is first contact: bodies meet where their mean planes are h_max apart",
         f"range: {names[0]} from 0 to {x[-1]:.10g}, {end}",
-        f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, above 1e-3 of the largest value",
+        f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, "
+        f"above {names[1]} {floor:.4g} {names[3]}",
         f"the law is within {law.error:.1e} of its theory, in pressure and area",
     )
 

@@ -1,19 +1,24 @@
 """Contact laws in the words of finite-element and system codes; each target is one function of a `LawTable`.
 
-CalculiX 2.20 was run with what is written here; the others are written from their manuals.
+CalculiX 2.20 was run with what is written here, force and conductance; the others are written from their manuals.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
+import numpy as np
+
+from mbma_tables import __version__
 from mbma_tables.errors import InputError
 from mbma_tables.export.law_rows import LawTable
 from mbma_tables.export.text import DIGITS, checked_name, comment, number
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.units import in_unit, modulus_and_units
 
 MAX_CALCULIX_ROWS = 200
+MAX_CALCULIX_CONDUCTANCES = 20  # of more, 2.20 keeps the last twenty, without a message
+MIN_CALCULIX_STEP = 1e-10  # overclosures that are closer are moved apart when they are read
 MAX_NAME = 80  # letters of a name in CalculiX and Abaqus
 
 
@@ -22,27 +27,35 @@ def _is_pressure(law: LawTable, target: str) -> None:
         raise InputError(f"{target} takes pressure against overclosure here, got {law.y_name} against {law.x_name}")
 
 
-def _interaction(name: str, card: str, rows: str) -> str:
-    return f"*SURFACE INTERACTION, NAME={checked_name(name, MAX_NAME)}\n{card}\n{rows}"
+def _interaction(name: str, *cards: str) -> str:
+    return f"*SURFACE INTERACTION, NAME={checked_name(name, MAX_NAME)}\n{''.join(cards)}"
 
 
-def _tabular(law: LawTable, name: str, conductance: str) -> str:
-    """The cards that CalculiX and Abaqus share but for the one of conductance."""
-    card = "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR" if law.y_name == "pressure" else conductance
-    # the other way about than in the law: pressure, overclosure, or conductance, pressure
-    return _interaction(name, card, "".join(f"{number(y)}, {number(x)}\n" for x, y in zip(law.x, law.y, strict=True)))
+def _card(head: str, law: LawTable) -> str:
+    """A card with its rows, the other way about than in the law: pressure, overclosure, or conductance, pressure."""
+    return f"{head}\n" + "".join(f"{number(y)}, {number(x)}\n" for x, y in zip(law.x, law.y, strict=True))
 
 
 def calculix(law: LawTable, name: str = "ROUGH") -> str:
     """A surface interaction for CalculiX, with the contact pair that reads it rightly.
 
+    A law of conductance comes with a linear closure, the only one with which 2.20 takes a table of conductances.
+
     Raises
     ------
     InputError
-        For more than 200 rows, which its arrays do not hold.
+        For more rows than its arrays hold, 200 of pressure or 20 of conductance, and for rows that it would move apart.
     """
-    if law.x.size > MAX_CALCULIX_ROWS:
-        raise InputError(f"CalculiX holds {MAX_CALCULIX_ROWS} rows, this law has {law.x.size}: give fewer rows")
+    most = MAX_CALCULIX_ROWS if law.behaviour is None else MAX_CALCULIX_CONDUCTANCES
+    if law.x.size > most:
+        raise InputError(f"CalculiX holds {most} rows of {law.y_name}, this law has {law.x.size}: give fewer rows")
+    if law.behaviour is not None:
+        return _calculix_conductance(law, law.behaviour, name)
+    if (np.diff(law.x) <= MIN_CALCULIX_STEP).any():
+        raise InputError(
+            f"rows are closer than {MIN_CALCULIX_STEP:g} {law.x_unit}, which CalculiX cannot tell apart: take fewer "
+            "rows or a smaller unit of length"
+        )
     notes = (
         *law.comments,
         "CalculiX keeps the pressure constant beyond the last row. Use this interaction with",
@@ -50,29 +63,66 @@ def calculix(law: LawTable, name: str = "ROUGH") -> str:
         "and no other type: 2.20 reads TABULAR wrongly with SURFACE TO SURFACE and MORTAR, without a message.",
         "Place the bodies so that their surfaces touch where the mean planes are h_max apart.",
     )
-    return comment(notes, "**") + _tabular(law, name, "*GAP CONDUCTANCE")
+    return comment(notes, "**") + _interaction(name, _card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law))
+
+
+def _calculix_conductance(law: LawTable, behaviour: LawTable, name: str) -> str:
+    slope = float(behaviour.y[-1] / behaviour.x[-1])
+    notes = (
+        *law.comments,
+        "Use this interaction with",
+        f"  *CONTACT PAIR, INTERACTION={name}, TYPE=SURFACE TO SURFACE",
+        "and no other type: with NODE TO SURFACE 2.20 takes one conductance for all pressures, or none, silently.",
+        f"The closure is linear here, p = {number(slope)} c, and the law's at the largest pressure alone:",
+        "2.20 takes no table of pressures beside one of conductances. Prescribe forces; for closures export pressure.",
+    )
+    linear = f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n{number(slope)}\n"
+    return comment(notes, "**") + _interaction(name, linear, _card("*GAP CONDUCTANCE", law))
 
 
 def abaqus(law: LawTable, name: str = "ROUGH") -> str:
-    """A surface interaction for Abaqus, which continues the last slope beyond the last row."""
+    """A surface interaction for Abaqus, which continues the last slope beyond the last row; pressure, or both."""
     notes = (*law.comments, "Abaqus continues the last slope beyond the last row: stay within the range.")
-    return comment(notes, "**") + _tabular(law, name, "*GAP CONDUCTANCE, PRESSURE")
+    cards = [_card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law.behaviour or law)]
+    if law.behaviour is not None:
+        cards.append(_card("*GAP CONDUCTANCE, PRESSURE", law))
+    return comment(notes, "**") + _interaction(name, *cards)
 
 
-def exponential(surface: Surface, E_star: float, comments: Iterable[str], name: str = "ROUGH") -> str:
-    """The card of an exponential law: Persson's for light loads, p = beta E* exp(-u/u0) (20), with c0 = u0 ln 100."""
+def exponential(
+    surface: Surface,
+    E_star: float | str,
+    *,
+    length_unit: str | None = None,
+    stress_unit: str | None = None,
+    name: str = "ROUGH",
+) -> str:
+    """CalculiX's card of an exponential law: Persson's for light loads, p = beta E* exp(-u/u0) (20).
+
+    Abaqus has a card of that name for another curve, which ends at a clearance.
+    """
     from mbma_tables.theories import persson_force
 
+    surface = in_unit(surface, length_unit)
+    modulus, units = modulus_and_units(E_star, surface, stress_unit)
+    for kind in ("length", "stress"):
+        if getattr(units, kind) in (None, "1"):
+            raise InputError(f"{kind}_unit is missing: a law without units is read wrongly sooner or later")
     h_rms = float(surface.h_rms)
-    near, far = (float(persson_force(surface, u * h_rms, E_star, method="simplified")) for u in (1.0, 2.0))
+    near, far = (float(persson_force(surface, u * h_rms, modulus, method="simplified")) for u in (1.0, 2.0))
     u0 = h_rms / math.log(near / far)
     p0 = near * math.exp((h_rms - float(surface.h_max)) / u0)
+    numbers = ", ".join(f"{key} = {float(getattr(surface, key)):.10g}" for key in PARAMETERS)
     notes = (
-        *comments,
-        "EXPONENTIAL is Persson's law for light loads, p = p0 exp(c/u0), not the MBMA model's: c0 = u0 ln 100",
+        f"Contact law of a rough surface by Persson's theory for light loads; mbma_tables {__version__}",
+        f"p = p0 exp(c/u0), p0 = {number(p0)} {units.stress}, u0 = {number(u0)} {units.length}; u0 ln 100, p0 follow",
+        f"surface: {numbers}; lengths in {units.length}; E* = {modulus:.10g} {units.stress}",
+        "overclosure c = h_max - u with the mean separation u: bodies touch where the mean planes are h_max apart;",
+        "this law has no last contact: at c = 0 its pressure is p0. It holds for light loads alone.",
     )
     row = f"{number(u0 * math.log(100))}, {number(p0)}\n"
-    return comment(notes, "**") + _interaction(name, "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL", row)
+    card = f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n{row}"
+    return comment(notes, "**") + _interaction(name, card)
 
 
 def lsdyna(law: LawTable, curve: int = 1) -> str:
@@ -86,7 +136,8 @@ def optistruct(law: LawTable, contact: int = 1, table: int = 2) -> str:
     """PCONT and TABLES1 for OptiStruct, in long fields of 16 columns."""
     _is_pressure(law, "OptiStruct")
     pairs = [f"{value:<16.9E}" for row in zip(law.x, law.y, strict=True) for value in row]
-    lines = [f"PCONT,{contact:d},,,STFTAB,{table:d}", f"{'TABLES1*':<8}{table:<16d}{'':<16}{'':<16}{'':<16}*"]
+    # the keyword stands where a line begins: on the first one that field is the friction coefficient
+    lines = [f"PCONT,{contact:d}", f"+,STFTAB,{table:d}", f"{'TABLES1*':<8}{table:<16d}{'':<16}{'':<16}{'':<16}*"]
     lines.append(f"{'*':<8}")
     fields = [*pairs, f"{'ENDT':<16}"]
     lines += [f"{'*':<8}{''.join(fields[start : start + 4])}".rstrip() for start in range(0, len(fields), 4)]

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from mbma_tables.cli import main
-from mbma_tables.export import SOLVERS, code
+from mbma_tables.export import SOLVERS, code, data
 
 LAW = ["--surface", "concrete", "--E-star", "13.3", "--length-unit", "mm", "--stress-unit", "MPa", "--rows", "20"]
 NUMBERS = ["--hurst", "0.8", "--q0", "0.1", "--zeta-1", "50", "--h-rms", "1", "--h-max", "3"]
@@ -65,9 +65,23 @@ def test_javascript_without_its_compiler(tmp_path, monkeypatch):
 
 
 def test_exponential(tmp_path):
-    assert run("abaqus", "--out", tmp_path / "law", "--exponential", *LAW).exit_code == 0
-    last = (tmp_path / "law").read_text().splitlines()[-1]
-    assert np.all(np.array(last.split(", "), dtype=float) > 0)
+    law = [*LAW[:-2], "--name", "JOINT"]
+    assert run("calculix", "--out", tmp_path / "law", "--exponential", *law).exit_code == 0
+    text = (tmp_path / "law").read_text()
+    assert np.all(np.array(text.splitlines()[-1].split(", "), dtype=float) > 0)
+    assert "*SURFACE INTERACTION, NAME=JOINT\n" in text
+    # what it says is of this law, not of rows that are not there
+    assert "Persson" in text
+    assert "rows" not in text
+    assert "MBMA" not in text.replace("mbma_tables", "")
+
+
+def test_a_range_of_pressures(tmp_path):
+    law = [*LAW[:-2], "--rtol", "1e-3", "--pressures", "1kPa:0.5"]
+    assert run("json", "--out", tmp_path / "law.json", *law).exit_code == 0
+    held = data.from_json((tmp_path / "law.json").read_bytes())
+    assert held.y[-1] == pytest.approx(0.5, rel=2e-3)
+    assert held.floor == pytest.approx(1e-3, rel=1e-6)
 
 
 CONDUCTANCE = ["--conductivity", "50", "--conductivity-unit"]
@@ -85,7 +99,7 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
         (["calculix", "--out", "law", *LAW, "--largest-overclosure", "5"], "largest_overclosure must be in"),
         (["calculix", "--out", "no/such/folder/law", *LAW], "cannot be written"),
         (["csv", "--out", "law", *LAW, "--check"], "none to replay"),
-        (["csv", "--out", "law", *LAW, "--exponential"], "law of calculix and abaqus"),
+        (["csv", "--out", "law", *LAW, "--exponential"], "--exponential is a law of calculix, not of csv"),
         (["matlab", "--out", "1law.mat", *LAW], "a name must be a letter"),
         (["matlab", "--out", "law.txt", *LAW], "must be NAME.mat"),
         (
@@ -94,6 +108,18 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
         ),
         (["cobol", "--out", "law", *LAW], "cobol"),
         (["c", "--out", "code", "--reading", "other"], "reading"),
+        (["c", "--out", "code", "--surface", "concrete"], "c is the whole model: leave --surface out"),
+        (["c", "--out", "code", "--rows", "3", "--exponential"], "leave --rows and --exponential out"),
+        (["javascript", "--out", "code", "--name", "X"], "leave --name out"),
+        (["abaqus", "--out", "law", *LAW[:-2], "--exponential"], "law of calculix, not of abaqus"),
+        (["calculix", "--out", "law", *LAW, "--exponential"], "leave --rows out"),
+        (["calculix", "--out", "law", *LAW[:-2], "--exponential", "--theory", "persson"], "leave --theory out"),
+        (["csv", "--out", "law", *LAW, "--name", "X"], "csv has no name to choose: leave --name out"),
+        (["calculix", "--out", "law", *LAW, "--name", "1 X"], "a name must be a letter"),
+        (["calculix", "--out", "law", *LAW, "--pressures", "1"], "--pressures must be like 0.1:100"),
+        (["calculix", "--out", "law", *LAW, "--pressures", "2:1"], "pressures must be two rising numbers"),
+        (["calculix", "--out", "law", *LAW, "--pressures", "1:1e9"], "force must be at most"),
+        (["calculix", "--out", "law", *LAW, "--conductivity-unit", "W/K"], "belong to quantity='conductance'"),
     ],
 )
 def test_bad_requests(arguments, said, tmp_path, monkeypatch):

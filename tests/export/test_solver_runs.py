@@ -1,4 +1,4 @@
-"""Laws tried in the program itself: CalculiX presses two blocks together, Octave looks up, ncdump reads."""
+"""Laws tried in the program itself: CalculiX presses and heats two blocks, Octave looks up, ncdump and R read."""
 
 import re
 import shutil
@@ -7,8 +7,8 @@ import subprocess
 import numpy as np
 import pytest
 
-from mbma_tables import Surface
-from mbma_tables.export.data import matlab_reader, to_matlab, to_netcdf
+from mbma_tables import Surface, contact
+from mbma_tables.export.data import matlab_reader, to_csv, to_matlab, to_netcdf
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.solvers import calculix
 
@@ -97,3 +97,72 @@ def test_ncdump_reads(tmp_path):
     values = re.search(r"\n pressure = ([^;]*);", said.stdout).group(1)
     np.testing.assert_array_equal([float(v) for v in values.split(",")], law.y)
     assert 'pressure:units = "MPa"' in said.stdout
+
+
+def heated(card, pressures, side, stiff, conductivity):
+    """The two blocks pressed by forces, 100 degrees above and 0 below, steady state at each pressure."""
+    deck = blocks(None, card, [], side, stiff).replace("NODE TO SURFACE", "SURFACE TO SURFACE")
+    deck = deck.replace("*SOLID", f"*CONDUCTIVITY\n{conductivity!r}\n*EXPANSION\n0.\n*SOLID", 1)
+    steps = "".join(
+        "*STEP\n*COUPLED TEMPERATURE-DISPLACEMENT, STEADY STATE\n1., 1.\n*BOUNDARY\n"
+        + "".join(f"{node}, 1, 3\n{node}, 11, 11, 0.\n" for node in (1, 2, 3, 4))
+        + "".join(f"{node}, 1, 2\n" for node in range(5, 17))
+        + "".join(f"{node}, 11, 11, 100.\n" for node in (13, 14, 15, 16))
+        + "*CLOAD\n"
+        + "".join(f"{node}, 3, {-p * side**2 / 4:.9e}\n" for node in (13, 14, 15, 16))
+        + "*NODE PRINT, NSET=TOP, TOTALS=ONLY\nRFL\n*END STEP\n"
+        for p in pressures
+    )
+    return deck + "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 50.\n" + steps
+
+
+@needs("ccx")
+@pytest.mark.parametrize(("length", "stress"), [("mm", "MPa"), ("m", "Pa")], ids=["mm", "SI"])
+def test_calculix_conducts_as_the_law_says(tmp_path, length, stress):
+    """Heat through two blocks and their joint, against the resistances in series."""
+    surface, k = Surface.named("challenge"), 50.0  # mW/(mm K), or W/(m K)
+    law = describe_law(
+        surface,
+        "25 MPa",
+        length_unit=length,
+        stress_unit=stress,
+        quantity="conductance",
+        conductivity=k,
+        conductivity_unit="W/(m K)",
+        pressures=("1 kPa", "2 MPa"),
+        rows=20,
+    )
+    side = SIDE[length]
+    unit = {"MPa": 1.0, "Pa": 1e6}[stress]
+    pressures = unit * np.geomspace(1.1e-3, 1.9, 8)
+    (tmp_path / "heat.inp").write_text(heated(calculix(law), pressures.tolist(), side, 1e6 * unit, k))
+    said = subprocess.run(["ccx", "heat"], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    flux = [
+        abs(float(line)) / side**2
+        for line in (tmp_path / "heat.dat").read_text().splitlines()
+        if re.fullmatch(r"\s+-?\d\.\d+E[+-]\d+", line)
+    ]
+    assert len(flux) == 8, said.stdout[-2000:]
+    joint = 1 / (100 / np.array(flux) - 2 * side / k)
+    found = contact(surface.to(length), pressure=pressures, E_star=25 * unit)
+    np.testing.assert_allclose(joint, found.stiffness * k / (25 * unit), rtol=1e-2)
+
+
+@needs("Rscript")
+def test_r_reads(tmp_path):
+    law = describe_law(Surface.named("asphalt"), 20.0, stress_unit="MPa", rows=30)
+    (tmp_path / "law.csv").write_bytes(to_csv(law))
+    (tmp_path / "law.nc").write_bytes(to_netcdf(law))
+    script = """
+    rows <- read.csv("law.csv", comment.char = "#", check.names = FALSE)
+    cat(names(rows), sep = "|"); cat("\n"); cat(sprintf("%.17g", rows[[1]]), sprintf("%.17g", rows[[2]])); cat("\n")
+    if (requireNamespace("ncdf4", quietly = TRUE)) {
+      file <- ncdf4::nc_open("law.nc")
+      cat(sprintf("%.17g", c(ncdf4::ncvar_get(file, "overclosure"), ncdf4::ncvar_get(file, "pressure"))))
+    }
+    """
+    said = subprocess.run(["Rscript", "-e", script], cwd=tmp_path, capture_output=True, text=True, check=True)
+    names, *tables = said.stdout.strip().splitlines()
+    assert names == "overclosure [mm]|pressure [MPa]"
+    for table in tables:
+        np.testing.assert_array_equal(np.array(table.split(), dtype=float), np.concatenate([law.x, law.y]))

@@ -76,7 +76,7 @@ def test_solver_decks(target: str, law: LawTable) -> None:
 
 
 def test_exponential_cards(law: LawTable) -> None:
-    lines = solvers.exponential(Surface.named("concrete"), 13.3, [HOSTILE]).splitlines()
+    lines = solvers.exponential(Surface.named("concrete"), "13.3 MPa").splitlines()
     live = [line for line in lines if not line.startswith("**")]
     assert len(live) == 3
     assert live[0].startswith("*SURFACE INTERACTION")

@@ -1,0 +1,106 @@
+"""Rows of a curve for linear interpolation, chosen by their error.
+
+Linear interpolation over a step h has an error of about h^2 y''/8. Rows are spaced so that this is the same fraction of
+y everywhere above a floor, and are then moved by half of it, so that the error has both signs.
+"""
+
+from __future__ import annotations
+
+import bisect
+
+import numpy as np
+
+from mbma_tables.arguments import FloatArray, number_in, whole_number_in
+from mbma_tables.errors import InputError
+from mbma_tables.export.text import number
+
+MIN_ROWS, MAX_ROWS = 3, 5000
+ROUNDS = 40  # of making the errors of chords equal
+
+
+def chosen_rows(
+    fine_x: FloatArray, fine_y: FloatArray, floor: float, rows: int | None, rtol: float | None, evenly: bool = False
+) -> tuple[FloatArray, FloatArray, float]:
+    """Rows of a curve on fine points, as a file holds them, and their largest relative error where y is above `floor`.
+
+    As many as `rows`, or as few as `rtol` needs; 1e-3 where neither is given.
+    """
+    if rows is not None and rtol is not None:
+        raise InputError("rows and rtol are both given: give one of them")
+
+    def with_rows(count: int) -> tuple[FloatArray, FloatArray, float]:
+        places = np.linspace(0, fine_x[-1], count) if evenly else spread(fine_x, fine_y, count, floor)
+        x = rounded(places)
+        y = np.interp(x, fine_x, fine_y)
+        y = rounded(y if evenly else balanced(x, y, fine_x, fine_y, floor))
+        return x, y, chord_error(x, y, fine_x, fine_y, floor)
+
+    if rows is not None:
+        x, y, error = with_rows(whole_number_in("rows", rows, MIN_ROWS, MAX_ROWS))
+    else:
+        asked = number_in("rtol", 1e-3 if rtol is None else rtol, 1e-7, 0.5)
+        # the error falls with the number of rows
+        fewest = bisect.bisect_left(range(MAX_ROWS + 1), -asked, MIN_ROWS, key=lambda count: -with_rows(count)[2])
+        if fewest > MAX_ROWS:
+            raise InputError(f"rtol = {asked:g} needs more than {MAX_ROWS} rows under linear interpolation")
+        x, y, error = with_rows(fewest)
+    if (np.diff(x) <= 0).any():
+        raise InputError("rows are too close to be told apart: take fewer rows, or a larger smallest pressure")
+    return x, y, error
+
+
+def rounded(values: FloatArray) -> FloatArray:
+    """Numbers as a file holds them."""
+    return np.array([float(number(value)) for value in values])
+
+
+def spread(x: FloatArray, y: FloatArray, count: int, floor: float) -> FloatArray:
+    """Places of `count` rows along x whose chords have equal errors relative to max(y, floor), by iteration."""
+    scale = np.maximum(y, floor)
+    # logarithmic in y above the floor to begin with, linear below
+    filled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(y)) / scale[1:])]) + np.linspace(0, 3, x.size)
+    places = _cut(filled, x, count)
+    best, found = np.inf, places
+    for _ in range(ROUNDS):
+        chords = np.interp(places, x, y)
+        step = np.clip(np.searchsorted(places, x, side="right") - 1, 0, count - 2)
+        error = np.zeros(count - 1)
+        np.maximum.at(error, step, np.abs(np.interp(x, places, chords) - y) / scale)
+        if error.max() < best:
+            best, found = error.max(), places
+        # the error of a chord falls like the square of its length
+        root = np.sqrt(error + 1e-3 * error.max())
+        places = _cut(np.concatenate([[0.0], np.cumsum(root)]), places, count)
+    return found
+
+
+def _cut(filled: FloatArray, x: FloatArray, count: int) -> FloatArray:
+    """`count` places between which `filled` grows by equal amounts."""
+    places: FloatArray = np.interp(np.linspace(filled[0], filled[-1], count), filled, x)
+    places[0], places[-1] = x[0], x[-1]
+    return places
+
+
+def chord_error(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArray, floor: float) -> float:
+    """Largest relative error of linear interpolation where y is above the floor."""
+    kept = fine_y > floor
+    return float(np.abs(np.interp(fine_x[kept], x, y) / fine_y[kept] - 1).max())
+
+
+def balanced(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArray, floor: float) -> FloatArray:
+    """Rows moved by half of the error of the chords beside them, which halves the largest error."""
+    scale = np.maximum(fine_y, floor)
+    over = (np.interp(fine_x, x, y) - fine_y) / scale
+    step = np.clip(np.searchsorted(x, fine_x, side="right") - 1, 0, x.size - 2)
+    high, low = np.zeros(x.size - 1), np.zeros(x.size - 1)
+    np.maximum.at(high, step, over)
+    np.minimum.at(low, step, over)
+    middle = (high + low) / 2
+    beside = np.concatenate([[middle[0]], (middle[1:] + middle[:-1]) / 2, [middle[-1]]])
+    moved = np.maximum(y - beside * np.maximum(y, floor), 0.0)
+    moved[0] = y[0]
+    # pressure rises; conductance may fall where the model's stiffness jumps
+    if (np.diff(fine_y) >= 0).all():
+        moved = np.maximum.accumulate(moved)
+    result: FloatArray = moved
+    return result
