@@ -14,6 +14,7 @@ import xarray as xr
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
+from generate import calibrated_hardness
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import GAUSSIAN, MAX_AREA, MIN_WAVES, Case, cases
 from generate.calibrated_table import write as write_table
@@ -188,8 +189,15 @@ def report(evidence: Sequence[Case], constants: Constants, map_constants: MapCon
 @click.option("--out", type=click.Path(path_type=pathlib.Path), help="JSON file of constants and errors.")
 @click.option("--table", type=click.Path(path_type=pathlib.Path), help="The library's file: table and errors.")
 @click.option("--maps/--no-maps", default=True, help="Whether to fit the map's law too: minutes.")
-def calibrated(evidence: pathlib.Path, out: pathlib.Path | None, table: pathlib.Path | None, maps: bool) -> None:
+@click.option("--hardness", is_flag=True, help="EVIDENCE has capped pressures: fit what a hardness adds.")
+def calibrated(
+    evidence: pathlib.Path, out: pathlib.Path | None, table: pathlib.Path | None, maps: bool, hardness: bool
+) -> None:
     """Fit the calibrated law to the training set of EVIDENCE; tell its errors there and on held-out surfaces."""
+    if hardness:
+        with xr.open_dataset(evidence) as data:
+            click.echo("\n".join(calibrated_hardness.lines(*calibrated_hardness.write(data.load(), table))))
+        return
     with xr.open_dataset(evidence) as data:
         found = cases(data.load())
         source = data.attrs.get("code_sha256", "")

@@ -5,12 +5,13 @@ from __future__ import annotations
 import datetime
 import json
 import pathlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from generate.boundary_elements import capped
 from generate.boundary_elements.design import SPLITS, Task
 from mbma_tables import bearing
 from mbma_tables.boundary_elements import TOLERANCE
@@ -60,6 +61,28 @@ OF_LEAKAGE = {
     "band_q": NUMBERS["band_q"],
     "band_variance": NUMBERS["band_variance"],
 }
+# of surfaces pressed with capped pressures
+OF_HARDNESS: dict[str, tuple[str | None, str]] = {
+    name: NUMBERS[name] for name, (dimension, _) in NUMBERS.items() if dimension in (None, "quantile", "top", "band")
+} | {
+    name: ("hardness", meaning)
+    for name, meaning in {
+        "force": "F/(A0 E* g), g the rms gradient in two dimensions",
+        "area": "A/A0: area_raw less (pi - 1 + ln 2)/24 times the cell edges between elastic contact and gap, those of "
+        "points beside yielded ones counted 1.8 times; at least force/eta",
+        "area_raw": "A/A0, the share of grid points with pressure",
+        "area_yielded": "yielded A/A0: area_yielded_raw and (pi - 1 + ln 2)/24 times 0.65 of its edges; at most "
+        "force/eta",
+        "area_yielded_raw": "share of grid points at the hardness",
+        "mean_separation": "u, the mean gap, yielded points flattened, in h_rms",
+        "plane_separation": "gap between mean planes, interpenetration of yielded points counted, in h_rms",
+        "energy": "elastic energy over A0 E* g h_rms",
+        "frozen_stiffness": "-dF/du of the contact area as it is, over A0 E* g/h_rms",
+        "residual": "mean complementarity error over force and h_rms",
+        "iterations": "of the conjugate gradients",
+        "seconds": "processor time of the load",
+    }.items()
+}
 SINGLE = {"quantiles", "mean_height", "top_gradient", "tension_force", "tension", "band_energy"}  # kept to 7 digits
 LOADED = {"band_energy", "flow"}
 
@@ -72,9 +95,11 @@ def _read(task: Task, folder: pathlib.Path) -> dict[str, Any] | None:
         return None
 
 
-def _stacked(name: str, found: Sequence[dict[str, Any]], loads: int) -> xr.Variable:
+def _stacked(
+    name: str, found: Sequence[dict[str, Any]], loads: int, known: Mapping[str, tuple[str | None, str]]
+) -> xr.Variable:
     """One number or curve of all surfaces; NaN where a surface has fewer loads."""
-    dimension, meaning = (NUMBERS | OF_LEAKAGE)[name]
+    dimension, meaning = known[name]
     own = [np.atleast_1d(content[name]) for content in found]
     if dimension is None:
         values, dims = np.array([v.item() for v in own]), ["surface"]
@@ -82,10 +107,10 @@ def _stacked(name: str, found: Sequence[dict[str, Any]], loads: int) -> xr.Varia
         values = np.full((len(own), loads, *own[0].shape[1:]), np.nan)
         for row, v in zip(values, own, strict=True):
             row[: len(v)] = v
-        dims = ["surface", "load", *([] if dimension == "load" else [dimension])]
+        dims = ["surface", "load", *([] if dimension == "load" else [str(dimension)])]
     else:
-        values, dims = np.array(own), ["surface", dimension]
-    kind = "f4" if name in SINGLE else "f8"
+        values, dims = np.array(own), ["surface", dimension, *(["load"] if dimension == "hardness" else [])]
+    kind = "f4" if name in SINGLE or dimension == "hardness" else "f8"
     unit = "s" if name == "seconds" else "1"
     return xr.Variable(dims, values.astype(kind), {"long_name": meaning, "units": unit})
 
@@ -98,12 +123,14 @@ def _read_all(tasks: Sequence[Task], folder: pathlib.Path) -> tuple[list[Task], 
     return [task for task, _ in read], [content for _, content in read]
 
 
-def _described(tasks: Sequence[Task], found: Sequence[dict[str, Any]], names: Iterable[str]) -> xr.Dataset:
+def _described(
+    tasks: Sequence[Task], found: Sequence[dict[str, Any]], names: Mapping[str, tuple[str | None, str]]
+) -> xr.Dataset:
     """These numbers of solved surfaces, with what made each."""
     recipes = [task.recipe for task in tasks]
     kinds = sorted({recipe.kind for recipe in recipes})
     loads = max(len(content["force"]) for content in found)
-    data = xr.Dataset({name: _stacked(name, found, loads) for name in names})
+    data = xr.Dataset({name: _stacked(name, found, loads, names) for name in names})
     data["kind"] = _flags([kinds.index(r.kind) for r in recipes], kinds, "family of surfaces")
     data["split"] = _flags(
         [SPLITS.index(task.split) for task in tasks], SPLITS, "what a fit may see: the training set and no other"
@@ -147,6 +174,21 @@ def dataset(tasks: Sequence[Task], folder: pathlib.Path) -> xr.Dataset:
     """All solved surfaces of these tasks."""
     solved, found = _read_all(tasks, folder)
     data = _described(solved, found, NUMBERS)
+    _add_shares(data)
+    data.attrs = _attributes(
+        found,
+        len(tasks),
+        "boundary_elements",
+        "Random rough surfaces pressed flat, by boundary elements",
+        "; refine repeats surfaces on grids. "
+        "band_energy has the waves longer than the surface's first and those shorter than its last at its ends.",
+        MODULES,
+    )
+    return data
+
+
+def _add_shares(data: xr.Dataset) -> None:
+    """Coordinates of the curves of heights."""
     data["quantile"] = (
         "quantile",
         bearing.QUANTILES,
@@ -157,15 +199,29 @@ def dataset(tasks: Sequence[Task], folder: pathlib.Path) -> xr.Dataset:
         bearing.FRACTIONS,
         {"long_name": "share of the surface, from the highest point down", "units": "1"},
     )
+
+
+def hardness_dataset(tasks: Sequence[Task], folder: pathlib.Path) -> xr.Dataset:
+    """All surfaces of these tasks solved with capped pressures."""
+    solved, found = _read_all(tasks, folder)
+    data = _described(solved, found, OF_HARDNESS)
+    _add_shares(data)
+    data["eta"] = (
+        "hardness",
+        np.array(capped.HARDNESSES),
+        {"long_name": "p_m/(E* g), hardness over effective modulus and rms gradient; infinite: elastic", "units": "1"},
+    )
     data.attrs = _attributes(
         found,
         len(tasks),
-        "boundary_elements",
-        "Random rough surfaces pressed flat, by boundary elements",
-        "; refine repeats surfaces on grids. "
-        "band_energy has the waves longer than the surface's first and those shorter than its last at its ends.",
-        MODULES,
-    )
+        "boundary_elements --hardness",
+        "Random rough surfaces pressed flat with pressures capped at a hardness, by boundary elements",
+        "; refine repeats surfaces on grids. Loading only.",
+        (*MODULES, "generate.boundary_elements.capped"),
+    ) | {
+        "source": f"generate.boundary_elements.capped: projected conjugate gradients, force control, tolerance "
+        f"{capped.TOLERANCE:g}; periodic, frictionless, without adhesion"
+    }
     return data
 
 

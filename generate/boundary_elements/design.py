@@ -92,6 +92,37 @@ def nodes() -> list[Node]:
     return small + middle + large
 
 
+def hardness_nodes() -> list[Node]:
+    """Nodes solved with a cap on pressure."""
+    return [
+        *_nodes("self_affine", "0.2 0.4 0.6 0.8 1", "8x8 16x4 32x2", 256, 2),
+        *_nodes("self_affine", "0.3 0.5 0.7 0.9", "12x5 21x3", 256, 1, held_out=True),
+        *_nodes("plateau", "0.4 0.8", "8x8 16x4", 256, 2),
+        *_nodes("plateau", "0.6 1", "12x5", 256, 1, held_out=True),
+        *_nodes("filtered", "0.4 0.8", "8x4", 256, 1),
+        *_nodes("filtered", "0.6", "10x3", 256, 1, held_out=True),
+        *_nodes("stretched", "0.6", "12x5", 256, 1, "3 6", held_out=True),
+        *_nodes("self_affine", "0.3 0.5 0.8", "64x2", 512, 2),
+        *_nodes("self_affine", "0.4 0.7 0.9", "42x3", 512, 1, held_out=True),
+        *_nodes("plateau", "0.6", "24x5", 512, 1, held_out=True),
+        *_nodes("self_affine", "0.5 0.8", "128x2", 1024, 1),
+        *_nodes("self_affine", "0.7", "85x3", 1024, 1, held_out=True),
+    ]
+
+
+def hardness_tasks() -> list[Task]:
+    """Their surfaces, and three of 16 waves a side on grids of 4 to 32 points a shortest wave."""
+    refined = [
+        Recipe("self_affine", 0.3, 8, 2, 911, 0),
+        Recipe("self_affine", 0.8, 8, 2, 912, 0),
+        Recipe("plateau", 0.6, 4, 4, 913, 0),
+    ]
+    repeated = [
+        Task(dataclasses.replace(r, points=points), REFINEMENT) for points in (64, 128, 256, 512) for r in refined
+    ]
+    return sorted(repeated + tasks_of(hardness_nodes()), key=lambda task: task.recipe.points)
+
+
 def leakage_nodes() -> list[Node]:
     """Nodes whose gaps are solved for flow: four surfaces tell how far cells of one spectrum differ."""
     return [

@@ -11,8 +11,9 @@ from collections.abc import Callable, Iterator, Sequence
 import click
 from tqdm import tqdm
 
-from generate.boundary_elements.collect import collect, dataset
-from generate.boundary_elements.design import Task, campaign
+from generate.boundary_elements.capped import simulate_capped_to
+from generate.boundary_elements.collect import collect, dataset, hardness_dataset
+from generate.boundary_elements.design import Task, campaign, hardness_tasks
 from generate.boundary_elements.solve import simulate_to
 from generate.boundary_elements.surfaces import Recipe
 
@@ -64,6 +65,7 @@ def run(
 @click.option("--scale", type=click.FloatRange(0, min_open=True), default=1.0, help="Times the surfaces of a node.")
 @click.option("--points", type=click.IntRange(64), default=1024, show_default=True, help="Largest grid to run.")
 @click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
+@click.option("--hardness", is_flag=True, help="A smaller campaign, with pressures capped at several hardnesses.")
 @click.option("--scheduler", help="Address of a dask scheduler, whose workers see this checkout and the folder.")
 def boundary_elements(
     folder: pathlib.Path,
@@ -71,18 +73,21 @@ def boundary_elements(
     scale: float,
     points: int,
     workers: int,
+    hardness: bool,
     scheduler: str | None,
 ) -> None:
     """Solve random surfaces by boundary elements (Tamaas, the extra `simulate`): four hours on two cores.
+
+    With --hardness a solver of its own caps pressures at seven hardnesses: half an hour on two cores, no Tamaas.
 
     Stopped and called again, it goes on where it was. Small grids come first, every kind of surface in turn.
     """
     from generate.tables.commands import executor
 
-    tasks = [task for task in campaign(scale) if task.recipe.points <= points]
+    tasks = [task for task in (hardness_tasks() if hardness else campaign(scale)) if task.recipe.points <= points]
     if target is not None:
-        counted = collect(dataset(tasks, folder), target)
+        counted = collect((hardness_dataset if hardness else dataset)(tasks, folder), target)
         click.echo(f"{target}: {counted} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
         return
     with executor(workers, scheduler) as pool:
-        run(tasks, folder, pool)
+        run(tasks, folder, pool, simulate_capped_to if hardness else simulate_to)

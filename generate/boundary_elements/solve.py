@@ -12,7 +12,7 @@ import numpy as np
 
 from generate.boundary_elements.surfaces import Recipe, heights
 from mbma_tables.arguments import FloatArray
-from mbma_tables.bearing import BANDS, bearing, half_plane_weights, radial_spectrum, wavevectors
+from mbma_tables.bearing import BANDS, RadialSpectrum, bearing, half_plane_weights, radial_spectrum, wavevectors
 from mbma_tables.boundary_elements import LOADS as LOADS
 from mbma_tables.boundary_elements import Contact as Contact
 from mbma_tables.errors import ConvergenceError
@@ -29,12 +29,38 @@ def simulate(recipe: Recipe) -> dict[str, Any]:
     return pressed(heights(recipe), recipe.sizes, recipe.q0)
 
 
-def pressed(unscaled: FloatArray, sizes: tuple[float, float], q0: float) -> dict[str, Any]:
-    """All that is kept of one periodic map: lengths in h_rms, force in A0 E* g, energy in A0 E* g h_rms."""
-    # rms gradient 1: mean pressure is then F/(A0 E* g)
+def prepared(
+    unscaled: FloatArray, sizes: tuple[float, float], q0: float
+) -> tuple[FloatArray, RadialSpectrum, dict[str, Any]]:
+    """A map at rms gradient 1, so that mean pressure is F/(A0 E* g), its spectrum, and what laws may know, in h_rms."""
     surface = unscaled / bearing(unscaled, sizes).gradient
     known, spectrum = bearing(surface, sizes), radial_spectrum(surface, sizes)
     h_rms = known.h_rms
+    curves = {
+        "q0_h_rms": q0 * h_rms,
+        "h_max": known.h_max / h_rms,
+        "quantiles": known.quantiles / h_rms,
+        "mean_height": known.mean_height / h_rms,
+        "top_gradient": known.top_gradient,
+        "tension_force": known.tension_force,
+        "tension": known.tension,
+        "anisotropy": known.anisotropy,
+        "slope_kurtosis": known.slope_kurtosis,
+        "band_q": spectrum.q / q0,
+        "band_variance": spectrum.variance / h_rms**2,
+        "band_inverse_q2": spectrum.q2_mean_inverse * q0**2,
+        "band_gradient": spectrum.gradient,
+        # in units of 1/h_rms^2: m0 m4/m2^2 is 4 times its sum at g = 1
+        "band_curvature": spectrum.curvature * h_rms**2,
+        "numpy": np.__version__,
+    }
+    return surface, spectrum, curves
+
+
+def pressed(unscaled: FloatArray, sizes: tuple[float, float], q0: float) -> dict[str, Any]:
+    """All that is kept of one periodic map: lengths in h_rms, force in A0 E* g, energy in A0 E* g h_rms."""
+    surface, spectrum, curves = prepared(unscaled, sizes, q0)
+    h_rms = float(surface.std())
     wavenumber = np.hypot(*wavevectors(surface.shape, sizes))
     wavenumber[0, 0] = np.inf
     weights = half_plane_weights(surface.shape)
@@ -55,23 +81,8 @@ def pressed(unscaled: FloatArray, sizes: tuple[float, float], q0: float) -> dict
         **dict(zip(QUANTITIES, np.array(rows).T, strict=True)),
         "force": np.array((*LOADS, *HIGHER_LOADS)[: len(rows)]),
         "band_energy": np.array(shares),
-        "q0_h_rms": q0 * h_rms,
-        "h_max": known.h_max / h_rms,
-        "quantiles": known.quantiles / h_rms,
-        "mean_height": known.mean_height / h_rms,
-        "top_gradient": known.top_gradient,
-        "tension_force": known.tension_force,
-        "tension": known.tension,
-        "anisotropy": known.anisotropy,
-        "slope_kurtosis": known.slope_kurtosis,
-        "band_q": spectrum.q / q0,
-        "band_variance": spectrum.variance / h_rms**2,
-        "band_inverse_q2": spectrum.q2_mean_inverse * q0**2,
-        "band_gradient": spectrum.gradient,
-        # in units of 1/h_rms^2: m0 m4/m2^2 is 4 times its sum at g = 1
-        "band_curvature": spectrum.curvature * h_rms**2,
+        **curves,
         "engine": f"Tamaas {importlib.metadata.version('tamaas')}",
-        "numpy": np.__version__,
     }
 
 

@@ -9,8 +9,10 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, finite_array, require
 from mbma_tables.calibrated import Law, Spectrum, light_factor
+from mbma_tables.calibrated import area as law_area
 from mbma_tables.calibrated_map import MapLaw
 from mbma_tables.errors import InputError
+from mbma_tables.hardness import BearingCurve
 from mbma_tables.surfaces.maps import prepared
 from mbma_tables.surfaces.psd import CONVENTIONS, check_height
 from mbma_tables.surfaces.surface import Surface
@@ -103,6 +105,10 @@ class Calibrated(_Calibrated):
             u[mine] = np.where(loads[mine] > 0, places.law(row).separation(np.maximum(loads[mine], 1e-300)), np.inf)
         require(quantity, np.broadcast_to(wanted, places.shape), ~np.isnan(u).reshape(places.shape), "less: u is 0")
         return np.asarray(np.minimum((u * places.h_rms).reshape(places.shape), surface.h_max))
+
+    def area_at(self, surface: Surface, force: FloatArray) -> FloatArray:
+        """A/A0 at a force over A0 E*, in closed form."""
+        return law_area(force / np.asarray(surface.rms_gradient), surface.alpha, calibrated_table.shipped().constants)
 
     def concerns(self, surface: Surface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons for which answers lie outside what boundary elements have tested."""
@@ -229,6 +235,7 @@ class BoundLaw(_Calibrated):
         m0, m2 = h_rms**2, gradient**2 / 2
         self.surface = standing_for(m0, m2, spectrum.alpha, h_max)
         self._curve = Curve(law, h_max / h_rms) if isinstance(law, MapLaw) else None
+        self._heights = BearingCurve(law.mean_height, h_max / h_rms) if isinstance(law, MapLaw) else None
 
     def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length] of this surface, and no other."""
@@ -264,11 +271,23 @@ class BoundLaw(_Calibrated):
         """Reasons for which answers lie outside what boundary elements have tested."""
         return area_concerns(answer.area)
 
-    def scatter(self, surface: Surface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """As for any theory; with a map at hand it is much smaller."""
-        table = calibrated_table.shipped()
-        name = self.name if self._curve is None else f"{self.name}_map"
-        return table.standard_deviation(name, "force", area), table.standard_deviation(name, "area", area)
+    @property
+    def scatter_name(self) -> str:
+        """With a map at hand scatter is much smaller."""
+        return self.name if self._curve is None else f"{self.name}_map"
+
+    def area_at(self, surface: Surface, force: FloatArray) -> FloatArray:
+        """A/A0 at a force over A0 E*."""
+        self._refuse_others(surface)
+        given = np.asarray(force, float) / self._gradient
+        return self.law.area(given) if self._curve is None else self._curve.area(given)
+
+    def bearing_share(self, surface: Surface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Share of heights above the level whose mean gap is u, and its derivative: the map's own heights."""
+        if self._heights is None:
+            return super().bearing_share(surface, mean_separation)
+        share, slope = self._heights(np.asarray(mean_separation) / self._h_rms)
+        return share, slope / self._h_rms
 
     def _refuse_others(self, surface: Surface) -> None:
         own = (self._h_rms, self._h_max)

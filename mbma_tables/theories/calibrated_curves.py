@@ -89,14 +89,13 @@ class Curve:
         rest = np.clip((self._h_max - u) / (self._h_max - self._top), 0, 1)
         force = np.where(above, lightest * rest, force)
         stiffness = np.where(above, lightest / (self._h_max - self._top) * (rest > 0), stiffness)
-        # in proportion below the law's lightest load
+        return force, self.area(force), stiffness
+
+    def area(self, force: FloatArray) -> FloatArray:
+        """A/A0 at a force, in proportion below the law's lightest load."""
         known = np.clip(force, np.exp(LOG_FORCE[0]), np.exp(LOG_FORCE[-1]))
         area = self._law.area(known) * np.minimum(force / known, 1)
-        return (
-            force,
-            np.where(force > np.exp(LOG_FORCE[-1]), np.maximum(area, erf(np.sqrt(2) * force)), area),
-            stiffness,
-        )
+        return np.where(force > np.exp(LOG_FORCE[-1]), np.maximum(area, erf(np.sqrt(2) * force)), area)
 
     def separation(self, quantity: str, wanted: FloatArray, gradient: float) -> FloatArray:
         """Mean separation [h_rms]: the inverse of `answer`."""

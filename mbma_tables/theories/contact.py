@@ -49,6 +49,7 @@ def contact(
     pressure: ArrayLike | None = None,
     area: ArrayLike | None = None,
     theory: str | Theory | UserTheory = "mbma",
+    hardness: ArrayLike | str = np.inf,
 ) -> Contact:
     """Force, real contact area and stiffness of a surface, by what is known: separation, pressure or area.
 
@@ -69,6 +70,10 @@ def contact(
     theory : str or theory
         By name, one of `mbma_tables.theories.THEORIES`, or an object: one of `mbma_tables.theories`, or any with a
         `name` and ``answer(surface, u)``.
+    hardness : array_like
+        Largest pressure p_m that the softer body bears, in the unit of `E_star` (of E* itself where that is 1). The
+        theory's elastic answer goes through `mbma_tables.hardness`; u is then the mean gap with yielded points
+        flattened. Infinite: nothing yields.
     tier : {"universal", "island4d", "exact", "formula", "rigid"} or island model
         MBMA's island model: a table, the full solver, a closed form, or spheres that do not deform; or an object: a
         table from `open_table`, or a model of one's own with a `name` and ``answer(X, mu)``.
@@ -116,13 +121,16 @@ def contact(
     '1.942 um, 38.5 MPa/um'
     >>> f"{contact(surface, pressure=10.0, E_star=100e3, theory='persson').area:.3%}"
     '0.295%'
+    >>> joint = contact(surface, pressure=10.0, E_star=100e3, theory="calibrated", hardness=1500.0)
+    >>> f"psi = {joint.psi:.1f}, {joint.yielded:.0%} of {joint.area:.3%} yields"
+    'psi = 3.6, 87% of 0.702% yields'
     >>> joint = contact(Surface.named("challenge").to("mm"), pressure="100 kPa", E_star="25 MPa")
     >>> f"{joint.mean_separation:.3e} {joint.units['separation']}, {joint.stiffness:.1f} {joint.units['stiffness']}"
     '1.642e-03 mm, 471.9 MPa/mm'
     """
     by, value = _known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
     E_star, units = modulus_and_units(E_star, surface)
-    value = units.number(by, value)
+    value, hardness = units.number(by, value), units.number("hardness", hardness)
     chosen = get_theory(theory)
     if theory == Mbma.name:
         chosen = Mbma(tier, reading, rtol, outside)
@@ -132,13 +140,13 @@ def contact(
         )
     options: dict[str, Any] = {
         "by": by,
-        "source": Source(chosen, surface, E_star, units),
+        "source": Source(chosen, surface, E_star, hardness, units),
         "derivatives": derivatives,
         "quantities": wanted_quantities(quantities),
     }
-    if surface.labelled or is_labelled(value) or is_labelled(E_star):
-        return _of_labelled(surface, value, E_star, options)
-    return _contact(surface, value, E_star, **options)
+    if surface.labelled or any(map(is_labelled, (value, E_star, hardness))):
+        return _of_labelled(surface, value, E_star, hardness, options)
+    return _contact(surface, value, E_star, hardness, **options)
 
 
 def _known(**given: Any) -> tuple[str, Any]:
@@ -153,6 +161,7 @@ def _contact(
     surface: Surface,
     value: Any,
     E_star: Any,
+    hardness: Any,
     *,
     by: str,
     source: Source,
@@ -160,10 +169,10 @@ def _contact(
     quantities: tuple[str, ...],
 ) -> Contact:
     """`contact` of plain arrays."""
-    theory = source.theory
+    theory = source.theory_at(E_star, hardness)
     places: dict[str, Any] = {}
     if by != "separation" or not isinstance(theory, Mbma):
-        value, E_star, places = _places(surface, value, E_star, by, theory)
+        value, E_star, places = _places(surface, value, E_star, hardness, by, theory)
     if isinstance(theory, Mbma):
         wanted = QUANTITIES if derivatives else quantities
         totals = theory.totals(surface, places.get("separation", value), E_star, derivatives, wanted)
@@ -190,11 +199,11 @@ def _contact(
 
 
 def _places(
-    surface: Surface, value: ArrayLike, E_star: ArrayLike, by: str, theory: Theory
+    surface: Surface, value: ArrayLike, E_star: ArrayLike, hardness: ArrayLike, by: str, theory: Theory
 ) -> tuple[FloatArray, FloatArray, dict[str, Any]]:
     """What is known, the modulus, and both separations, all of the broadcast shape."""
     asked, modulus = finite_array(by, value), positive_modulus(E_star)
-    shape = broadcast_shape(**{by: asked, "surface": surface.hurst, "E_star": modulus})
+    shape = broadcast_shape(**{by: asked, "surface": surface.hurst, "E_star": modulus, "hardness": hardness})
     asked, modulus = np.broadcast_to(asked, shape), np.broadcast_to(modulus, shape)
     h_max = np.asarray(surface.h_max)
     if by == "separation":
@@ -222,7 +231,7 @@ def _at_fixed(held: str, by: str, slopes: dict[str, Any], per_modulus: Any) -> d
     return {"separation_by": gap, f"{other}_by": free, f"{held}_by": None}
 
 
-def _of_labelled(surface: Surface, value: Any, E_star: Any, options: dict[str, Any]) -> Contact:
+def _of_labelled(surface: Surface, value: Any, E_star: Any, hardness: Any, options: dict[str, Any]) -> Contact:
     """`contact` of DataArrays, lazily where they are."""
     by, theory, wanted = options["by"], options["source"].theory, options["quantities"]
     units = options["source"].units
@@ -237,11 +246,12 @@ def _of_labelled(surface: Surface, value: Any, E_star: Any, options: dict[str, A
         free = (by if held else "separation", *PARAMETERS, *(("E_star",) if held == "force" else ()))
         slopes = [(kind, name) for kind in kinds for name in free]
 
-    def answer(block: Surface, asked: Any, modulus: Any) -> tuple[Any, ...]:
-        found = _contact(block, asked, modulus, **options)
+    def answer(block: Surface, asked: Any, modulus: Any, cap: Any) -> tuple[Any, ...]:
+        found = _contact(block, asked, modulus, cap, **options)
         return (*(getattr(found, name) for name in names), *(getattr(found, kind)[name] for kind, name in slopes))
 
-    outputs = apply_to_surface(answer, surface, {by: value, "E_star": E_star}, len(names) + len(slopes))
+    arrays = {by: value, "E_star": E_star, "hardness": hardness}
+    outputs = apply_to_surface(answer, surface, arrays, len(names) + len(slopes))
     for found, name in zip(outputs, names, strict=False):
         fields[name] = found.rename(name).assign_attrs(long_name=MEANING[name], units=unit_of(name, units))
     for (kind, name), found in zip(slopes, outputs[len(names) :], strict=True):

@@ -23,6 +23,7 @@ from mbma_tables.theories import law_kernel
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma
+from mbma_tables.theories.yielding import Yielding, checked_hardness
 from mbma_tables.totals.law import MIN_LAW_RTOL, SAMPLES, MbmaLaw, fit_pieces, mbma_law, one_surface
 from mbma_tables.totals.law_kernel import AREA, AREA_SLOPE, FORCE
 from mbma_tables.totals.law_protocol import ContactLaw
@@ -127,6 +128,7 @@ def contact_law(
     E_star: float | str = 1.0,
     *,
     theory: str | Theory | UserTheory = "mbma",
+    hardness: float | str = math.inf,
 ) -> ContactLaw:
     """Force and area of one surface as functions of its gap: the way to answer many gaps, and to invert.
 
@@ -141,6 +143,8 @@ def contact_law(
         As for `contact`; `tier` may be an island model of one's own.
     theory : str or theory
         By name, one of `mbma_tables.theories.THEORIES`, or an object, as for `contact`.
+    hardness : float
+        As for `contact`: the law of loading. Its `energy` is then the work of loading, not what unloading gives back.
 
     Returns
     -------
@@ -165,7 +169,11 @@ def contact_law(
     """
     number, units = modulus_and_units(E_star, surface)
     modulus = number_in("E_star", number, np.finfo(float).tiny, np.finfo(float).max)
-    return dataclasses.replace(_law_in_numbers(surface, rtol, tier, reading, modulus, theory), units=units)
+    cap = checked_hardness(units.number("hardness", hardness))
+    if cap.ndim:
+        raise InputError(f"hardness must be one number, got shape {cap.shape}: a law is of one surface")
+    made = _law_in_numbers(surface, rtol, tier, reading, modulus, theory, float(cap) / modulus)
+    return dataclasses.replace(made, units=units)
 
 
 def _law_in_numbers(
@@ -175,11 +183,15 @@ def _law_in_numbers(
     reading: str | Reading,
     modulus: float,
     theory: str | Theory | UserTheory,
+    hardness: float,
 ) -> MbmaLaw | TheoryLaw:
     if theory == Mbma.name:
-        return mbma_law(surface, rtol, tier, reading, modulus)
-    refuse_options_of_mbma(tier=tier != "universal", reading=reading != "reported")
-    chosen = get_theory(theory)
+        chosen: Theory = Mbma(tier, reading)
+    else:
+        refuse_options_of_mbma(tier=tier != "universal", reading=reading != "reported")
+        chosen = get_theory(theory)
+    if hardness < math.inf:
+        chosen = Yielding(chosen, hardness)
     if isinstance(chosen, Mbma):
         return mbma_law(surface, rtol, chosen.tier, chosen.reading, modulus)
     return _theory_law(one_surface(surface), chosen, number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL), modulus)
@@ -188,7 +200,8 @@ def _law_in_numbers(
 def _theory_law(surface: Surface, theory: Theory, rtol: float, E_star: float) -> TheoryLaw:
     """A law fitted to a theory's answers."""
     h_max, ends = float(surface.h_max), theory.ends_at_h_max
-    low = _lowest(surface, theory)
+    # below the elastic theory's end force depends on the logarithm of u
+    low = _lowest(surface, theory.elastic)
     unbounded = low > 0
     high = min(float(theory.interval(surface)[1]), MAX_SPAN * h_max)
     first = law_kernel.to_x(1 - low / h_max, unbounded, ends)

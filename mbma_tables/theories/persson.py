@@ -328,6 +328,10 @@ class Persson(Theory):
             wanted = erfinv(wanted) * np.sqrt(surface.m2)
         return np.asarray(persson_separation(surface, wanted, method=self.method))
 
+    def area_at(self, surface: Surface, force: FloatArray) -> FloatArray:
+        """A/A0 at a force over A0 E* (18)."""
+        return np.asarray(persson_area(surface, force))
+
     def energy(self, surface: Surface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], from dU = -F du = F (-du/dlog F) dlog F."""
         force = np.asarray(persson_force(surface, mean_separation, method=self.method))

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from mbma_tables import hardness
 from mbma_tables.arguments import FloatArray, describe_entries, require
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
@@ -55,6 +56,31 @@ class Theory(abc.ABC):
     def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]."""
 
+    @property
+    def scatter_name(self) -> str:
+        """Under which its distance from boundary elements is stated."""
+        return self.name
+
+    @property
+    def elastic(self) -> Theory:
+        """The theory of the elastic contact, where this one goes beyond it."""
+        return self
+
+    def at(self, shape: tuple[int, ...], place: Any) -> Theory:
+        """The theory at flat places of a broadcast shape, where it holds arrays of its own."""
+        return self
+
+    def area_at(self, surface: Surface, force: FloatArray) -> FloatArray:
+        """A/A0 at a force over A0 E*."""
+        return self.answer(surface, self.mean_separation_at(surface, "force", force)).area
+
+    def bearing_share(self, surface: Surface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Share of heights above the level whose mean gap is u, and its derivative by u: Gaussian heights."""
+        h_rms = np.asarray(surface.h_rms)
+        end = np.asarray(surface.h_max) / h_rms if self.ends_at_h_max else None
+        share, slope = hardness.bearing_share(np.asarray(mean_separation) / h_rms, end)
+        return share, slope / h_rms
+
     def interval(self, surface: Surface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which "force" or "area" falls: full compression and last contact."""
         high = np.asarray(surface.h_max, dtype=float)
@@ -71,7 +97,8 @@ class Theory(abc.ABC):
         they are not known.
         """
         table = calibrated_table.shipped()
-        return table.standard_deviation(self.name, "force", area), table.standard_deviation(self.name, "area", area)
+        known = [table.standard_deviation(self.scatter_name, quantity, area) for quantity in ("force", "area")]
+        return known[0], known[1]
 
     def energy(self, surface: Surface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], the integral of F/(A0 E*) from u to last contact."""
@@ -80,7 +107,7 @@ class Theory(abc.ABC):
         u = np.asarray(mean_separation, dtype=float)
         low = np.minimum(u, self.interval(surface)[1])
         found = tanhsinh(
-            lambda x, place: self.answer(select(surface, u.shape, place), x).force,
+            lambda x, place: self.at(u.shape, place).answer(select(surface, u.shape, place), x).force,
             *np.broadcast_arrays(low, np.broadcast_to(self.interval(surface)[1], u.shape)),
             args=(_places(u.shape),),
             rtol=ENERGY_RTOL,
@@ -119,7 +146,7 @@ class Theory(abc.ABC):
             # log of the value: loads range over many decades
             place = place.astype(np.intp)
             u = to_u(x, place)
-            value = getattr(self.answer(select(surface, shape, place), u), quantity)
+            value = getattr(self.at(shape, place).answer(select(surface, shape, place), u), quantity)
             with np.errstate(divide="ignore"):
                 return np.asarray(np.log(value) - np.log(target.ravel()[place]))
 

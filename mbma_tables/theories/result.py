@@ -9,13 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, Numbers, is_labelled
+from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, is_labelled
+from mbma_tables.errors import InputError
 from mbma_tables.labels import apply_to_surface
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
+from mbma_tables.theories.yielding import Yielding, checked_hardness
 from mbma_tables.units import Units, unit_of
 
 WITH_UNITS = ("separation", "mean_separation", "force", "area", "stiffness", "energy", "mean_pressure")
+OF_HARDNESS = ("incremental_stiffness", "plane_separation")
+ELASTIC_PSI = 1.1  # up to which elastic areas are within 5% of those with a hardness
 MAX_GRADIENT = 1.0  # rms gradient above which heights and wavenumbers are hardly in one unit
 
 
@@ -63,7 +67,10 @@ class Contact:
     @property
     def units(self) -> dict[str, str]:
         """The unit of each quantity; "1" where it has none, and stresses are over E* where no modulus was given."""
-        return {name: unit_of(name, self._source.units) for name in WITH_UNITS}
+        return {
+            name: unit_of(name, self._source.units)
+            for name in (*WITH_UNITS, *(OF_HARDNESS if self._source.yields else ()))
+        }
 
     @functools.cached_property
     def _answer(self) -> TheoryAnswer:
@@ -71,20 +78,66 @@ class Contact:
         source = self._source
         if source.answer is not None:
             return source.answer
-        found: Any = source.map(lambda s, u, E: source.theory.answer(s, u), self, 4)
+        found: Any = source.map(lambda theory, s, u, E: theory.answer(s, u), self, 4)
         return TheoryAnswer(*found)
 
     @functools.cached_property
     def stiffness(self) -> Numbers:
-        """-d(F/A0)/du [stress/length], against the mean separation; computed when first read."""
+        """-d(F/A0)/du [stress/length] of loading, against the mean separation; computed when first read."""
         found: Numbers = (self._source.E_star * self._answer.stiffness)[()]
         return found
 
     @functools.cached_property
     def energy(self) -> Numbers:
         """Elastic energy per nominal area [stress length], the integral of F/A0 over u; computed when first read."""
+        if self._source.yields:
+            raise InputError(
+                "energy: what a contact that yields gives back is not known, since the shape that stays is not; "
+                "contact_law(..., hardness=...).energy is the work of loading, incremental_stiffness what a small "
+                "unloading starts with"
+            )
+        found: Numbers = self._source.map(lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1)[0]
+        return found
+
+    @functools.cached_property
+    def _state(self) -> tuple[Numbers, ...]:
+        """Yielded share of the contact, incremental stiffness and gap of the mean planes."""
+
+        def state(theory: Theory, s: Surface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[Any, ...]:
+            known = TheoryAnswer(*answer)
+            if not isinstance(theory, Yielding):
+                return np.zeros(known.force.shape), E * known.stiffness, np.broadcast_to(u, known.force.shape)
+            found = theory.state(s, u, known)
+            return found.yielded, E * found.incremental_stiffness, found.plane_separation
+
+        return self._source.map(state, self, 3, self._answer._asdict())
+
+    @property
+    def yielded(self) -> Numbers:
+        """Share of the contact area at the hardness, 0 to 1."""
+        return self._state[0]
+
+    @property
+    def incremental_stiffness(self) -> Numbers:
+        """-d(F/A0)/du [stress/length] of a small unloading, the contact area frozen; `stiffness` if nothing yields."""
+        return self._state[1]
+
+    @property
+    def plane_separation(self) -> Numbers:
+        """Gap between the mean planes [length]: u less what yielded points are flattened."""
+        return self._state[2]
+
+    @property
+    def psi(self) -> Numbers:
+        """Plasticity index E* g/p_m, g the rms gradient; 0 where the hardness is infinite."""
         source = self._source
-        found: Numbers = source.map(lambda s, u, E: (E * source.theory.energy(s, u),), self, 1)[0]
+        found: Numbers = (source.E_star * source.surface.rms_gradient / source.hardness)[()]
+        return found
+
+    @property
+    def elastic_hardness(self) -> Numbers:
+        """Hardness from which the elastic area is within 5%, E* g/1.1 [stress]."""
+        found: Numbers = (self._source.E_star * self._source.surface.rms_gradient / ELASTIC_PSI)[()]
         return found
 
     @property
@@ -106,14 +159,14 @@ class Contact:
     @functools.cached_property
     def _scatter(self) -> tuple[Numbers, ...]:
         area = self._answer.area if self.area is None else self.area
-        return self._source.map(lambda s, u, E, A: self._source.theory.scatter(s, A), self, 2, {"area": area})
+        return self._source.map(lambda theory, s, u, E, A: theory.scatter(s, A), self, 2, {"area": area})
 
     @functools.cached_property
     def valid(self) -> Numbers:
         """Whether the theory was tested for contacts such as these; `reasons` says where and why not."""
 
-        def none(s: Surface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[FloatArray]:
-            masks = list(self._source.concerns(s, u, TheoryAnswer(*answer)).values())
+        def none(theory: Theory, s: Surface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[FloatArray]:
+            masks = list(concerns(theory, s, u, TheoryAnswer(*answer)).values())
             return (np.asarray(~np.logical_or.reduce(masks), dtype=float),)
 
         return self._source.map(none, self, 1, self._answer._asdict())[0].astype(bool)
@@ -121,14 +174,17 @@ class Contact:
     @functools.cached_property
     def reasons(self) -> dict[str, Any]:
         """Reasons for which entries are not `valid`, each with a mask; of plain arrays."""
-        surface, answer = self._source.surface, self._answer
-        fields: list[Any] = [*answer, self.mean_separation, *(getattr(surface, name) for name in PARAMETERS)]
+        source, answer = self._source, self._answer
+        surface = source.surface
+        own: list[Any] = [getattr(surface, name) for name in PARAMETERS]
+        fields: list[Any] = [*answer, self.mean_separation, source.E_star, source.hardness, *own]
         if is_labelled(answer.force):
             import xarray as xr
 
             fields = list(xr.broadcast(*map(xr.DataArray, fields)))
-            surface = Surface(*map(np.asarray, fields[5:]))
-        found = self._source.concerns(surface, np.asarray(fields[4]), TheoryAnswer(*map(np.asarray, fields[:4])))
+            surface = Surface(*map(np.asarray, fields[7:]))
+        *known, u, E_star, hardness = map(np.asarray, fields[:7])
+        found = concerns(source.theory_at(E_star, hardness), surface, u, TheoryAnswer(*known))
         return {reason: mask for reason, mask in found.items() if mask.any()}
 
 
@@ -139,25 +195,44 @@ class Source:
     theory: Theory
     surface: Surface
     E_star: Any
+    hardness: Any
     units: Units
     answer: TheoryAnswer | None = None  # where it is known already
 
+    @property
+    def yields(self) -> bool:
+        """Whether a hardness is given."""
+        return is_labelled(self.hardness) or not np.all(np.isposinf(self.hardness))
+
+    def theory_at(self, E_star: Any, hardness: Any) -> Theory:
+        """The theory, with the hardness where there is one."""
+        if not self.yields:
+            return self.theory
+        broadcast_shape(E_star=E_star, hardness=hardness)
+        return Yielding(self.theory, checked_hardness(hardness) / E_star)
+
     def map(
         self,
-        function: Callable[..., tuple[FloatArray, ...]],
+        function: Callable[..., tuple[Any, ...]],
         contact: Contact,
         outputs: int,
         more: Mapping[str, Any] | None = None,
     ) -> tuple[Numbers, ...]:
-        """``function(surface, u, E_star, *more)`` of the contact's entries."""
-        arrays = {"mean_separation": contact.mean_separation, "E_star": self.E_star, **(more or {})}
-        if self.surface.labelled or any(map(is_labelled, arrays.values())):
-            found: tuple[Numbers, ...] = apply_to_surface(function, self.surface, arrays, outputs)
-            return found
-        return tuple(part[()] for part in function(self.surface, *map(np.asarray, arrays.values())))
+        """``function(theory, surface, u, E_star, *more)`` of the contact's entries."""
+        arrays = {"mean_separation": contact.mean_separation, "E_star": self.E_star, "hardness": self.hardness}
+        arrays |= more or {}
 
-    def concerns(self, surface: Surface, u: FloatArray, answer: TheoryAnswer) -> dict[str, Any]:
-        """Every reason against the entries, with its mask."""
-        steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.force))
-        text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"
-        return {text: steep, **self.theory.concerns(surface, answer, u)}
+        def block(surface: Surface, u: Any, E_star: Any, hardness: Any, *others: Any) -> tuple[Any, ...]:
+            return function(self.theory_at(E_star, hardness), surface, u, E_star, *others)
+
+        if self.surface.labelled or any(map(is_labelled, arrays.values())):
+            found: tuple[Numbers, ...] = apply_to_surface(block, self.surface, arrays, outputs)
+            return found
+        return tuple(part[()] for part in block(self.surface, *map(np.asarray, arrays.values())))
+
+
+def concerns(theory: Theory, surface: Surface, u: FloatArray, answer: TheoryAnswer) -> dict[str, Any]:
+    """Every reason against a theory's answers, with its mask."""
+    steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.force))
+    text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"
+    return {text: steep, **theory.concerns(surface, answer, u)}

@@ -58,7 +58,9 @@ def _derivative(theory: Theory, at: dict[str, FloatArray], name: str, kind: str,
     def moved(x: FloatArray, place: FloatArray) -> FloatArray:
         flat = place.astype(np.intp)
         own = {other: numbers.ravel()[flat] for other, numbers in at.items()} | {name: x}
-        return np.asarray(getattr(theory.answer(Surface(*(own[p] for p in PARAMETERS)), own[GAP]), kind))
+        return np.asarray(
+            getattr(theory.at(value.shape, place).answer(Surface(*(own[p] for p in PARAMETERS)), own[GAP]), kind)
+        )
 
     with np.errstate(all="ignore"):
         found = derivative(

@@ -1,0 +1,146 @@
+"""Pure functions of contacts with a hardness, against mpmath and boundary elements."""
+
+from __future__ import annotations
+
+import mpmath
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.differentiate import derivative
+
+from generate.boundary_elements.capped import CappedContact, project
+from generate.boundary_elements.surfaces import Recipe, heights
+from mbma_tables import hardness
+from mbma_tables.bearing import bearing
+from mbma_tables.boundary_elements import Contact as Elastic
+from mbma_tables.files import shipped_file
+from mbma_tables.theories.calibrated_table import shipped_part
+
+
+def between_walls(x, tau):
+    """Areas by images alone, in 60 digits."""
+    with mpmath.workdps(60):
+        x, width = mpmath.mpf(float(x)), 2 * mpmath.sqrt(mpmath.mpf(float(tau)))
+        reach = range(int(12 * width) + 3)
+        touching = mpmath.erf(x / width) + mpmath.fsum(
+            mpmath.erfc((2 * k - x) / width) - mpmath.erfc((2 * k + x) / width) for k in reach if k
+        )
+        yielded = mpmath.fsum(
+            mpmath.erfc((2 * k + 1 - x) / width) - mpmath.erfc((2 * k + 1 + x) / width) for k in reach
+        )
+        return float(touching), float(yielded)
+
+
+def test_areas_are_those_of_a_diffusion_between_walls():
+    rng = np.random.default_rng(3)
+    tau = np.append(10 ** rng.uniform(-3, 1, 60), [0.0599, 0.0601])
+    x = 10 ** rng.uniform(-12, 0, 62)
+    exact = np.array([between_walls(*point) for point in zip(x, tau, strict=True)])
+    assert hardness._not_at_zero(x, tau) == pytest.approx(exact[:, 0], rel=1e-12)
+    assert hardness._at_cap(x, tau) == pytest.approx(exact[:, 1], rel=1e-11, abs=1e-250)
+
+
+@pytest.mark.parametrize("u", [1e-250, 1e-10, 1e-3, 0.1, 0.39, 1.0, 3.0, 5.0, 8.2, 20.0])
+def test_bearing_share_of_gaussian_heights(u):
+    with mpmath.workdps(30):
+        level = mpmath.findroot(
+            lambda d: mpmath.log(d * mpmath.ncdf(d) + mpmath.npdf(d)) - mpmath.log(u),
+            -float(mpmath.sqrt(-2 * mpmath.log(u))) if u < 0.4 else u,
+        )
+        assert hardness.bearing_share(u)[0] == pytest.approx(float(mpmath.ncdf(-level)), rel=1e-12)
+
+
+def test_derivatives_of_the_force():
+    u = np.geomspace(1e-4, 3.4, 30)
+    slope = derivative(lambda x: hardness.bearing_share(x, 3.5)[0], u, initial_step=0.02 * np.minimum(u, 3.5 - u)).df
+    assert hardness.bearing_share(u, 3.5)[1] == pytest.approx(slope, rel=1e-7)
+    elastic, share, eta = np.meshgrid([0.01, 0.3, 5.0], [0.001, 0.3, 0.9], [0.05, 0.4, 3.0])
+    _, by_elastic, by_share = hardness.force(elastic, share, eta)
+
+    def log_force(x, q, e, cap):
+        return np.log(hardness.force(e * np.exp(x), q, cap)[0])
+
+    found = derivative(log_force, np.zeros(27), args=(share.ravel(), elastic.ravel(), eta.ravel()), initial_step=0.1)
+    assert by_elastic.ravel() == pytest.approx(found.df, rel=1e-7, abs=1e-9)
+    found = derivative(
+        lambda q, e, cap: log_force(0.0, q, e, cap),
+        share.ravel(),
+        args=(elastic.ravel(), eta.ravel()),
+        initial_step=0.1 * np.minimum(share, 1 - share).ravel(),
+    )
+    assert by_share.ravel() == pytest.approx(found.df, rel=1e-6, abs=1e-9)
+
+
+def test_bearing_curve_of_a_map_is_that_of_its_heights():
+    surface = heights(Recipe("worn", 0.8, 8, 4, 3, 128, 0.5))
+    known = bearing(surface, (1.0, 1.0))
+    curve = hardness.BearingCurve(known.mean_height / known.h_rms, known.h_max / known.h_rms)
+    levels = np.quantile(surface, [0.1, 0.5, 0.9, 0.99])
+    u = np.array([np.maximum(level - surface, 0).mean() for level in levels])
+    assert curve(u)[0] == pytest.approx([0.9, 0.5, 0.1, 0.01], rel=0.03)
+    slope = derivative(lambda x: curve(x)[0], u, initial_step=0.001).df
+    assert curve(u)[1] == pytest.approx(slope, rel=1e-2)
+    assert curve(known.h_max / known.h_rms)[0] == 0
+
+
+def test_projection_is_the_nearest_allowed_field():
+    p = np.random.default_rng(1).normal(size=(16, 16))
+    found = project(p, 0.3, 0.8)
+    assert found.mean() == pytest.approx(0.3, rel=1e-12)
+    assert found.min() == 0
+    assert found.max() == 0.8
+    shift = (p - found)[(found > 0) & (found < 0.8)]
+    assert np.ptp(shift) < 1e-12  # so it is the Euclidean projection
+
+
+def test_capped_boundary_elements():
+    recipe = Recipe("self_affine", 0.8, 8, 2, 1, 64)
+    unscaled = heights(recipe)
+    surface = unscaled / bearing(unscaled, recipe.sizes).gradient
+    elastic, capped = CappedContact(surface, np.inf), CappedContact(surface, 0.2)
+    h_rms = surface.std()
+    for force in (0.01, 0.1):
+        free, held = elastic.press(force), capped.press(force)
+        other = Elastic(surface, recipe.sizes).press(force)
+        for name in ("area", "mean_separation", "energy"):
+            assert free[name] == pytest.approx(other[name], rel=2e-4), name
+        assert held["area"] >= force / 0.2 >= held["area_yielded"] > 0
+        assert capped.pressure.max() <= 0.2
+        assert held["mean_separation"] < free["mean_separation"]
+        # -dF/du of the elastic contact, whose area changes only to second order
+        step = 1e-3 * force
+        above, below = (elastic.press(force + way * step)["mean_separation"] for way in (1, -1))
+        elastic.press(force)
+        assert elastic.frozen_stiffness() == pytest.approx(2 * step / (below - above), rel=0.05)
+    assert h_rms > 0
+
+
+def test_shipped_constants_are_those_of_the_fit():
+    _, attributes = shipped_part("hardness")
+    for name, value in vars(hardness.CONSTANTS).items():
+        assert attributes[f"law_{name}"] == value
+
+
+def test_held_out_surfaces_are_within_the_stated_bars():
+    variables, attributes = shipped_part("hardness")
+    sets, quantities = attributes["sets"].split(), attributes["quantities"].split()
+    held = [sets.index(name) for name in ("held_out_surface", "held_out_spectrum")]
+    numbers = variables["accuracy"][held]
+    share = (numbers[..., 2] * numbers[..., 4]).sum(axis=0) / numbers[..., 4].sum(axis=0)
+    with_h_max, with_heights = (dict(zip(quantities, row, strict=True)) for row in share)
+    assert with_h_max["area"] > 0.97
+    assert with_h_max["yielded"] > 0.95
+    assert with_h_max["stiffness"] > 0.95
+    assert with_h_max["force"] > 0.95  # the aim was 0.97
+    assert with_heights["force"] == 1
+
+
+def test_refined_grids_agree_on_corrected_areas():
+    with xr.open_dataset(shipped_file("calibrated.nc").parents[1] / "docs" / "data" / "hardness.nc") as data:
+        data = data.load()
+    refined = data.sel(surface=data.split == data.split.attrs["flag_meanings"].split().index("refine"))
+    for seed in np.unique(refined.seed):
+        grids = refined.sel(surface=refined.seed == seed).sortby("points")
+        area = grids.area.values[:, :-1]
+        kept = (area[-1] > 0.03) & (area[-1] < 0.95)
+        assert np.abs(np.log(area[1] / area[-1]))[kept].max() < 0.05  # 8 and 32 points a shortest wave

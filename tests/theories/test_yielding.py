@@ -1,0 +1,200 @@
+"""Theories with a hardness: limits, bounds, monotony, and the ways to ask."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from mbma_tables import InputError, Surface, contact, contact_law, hardness
+from mbma_tables.theories import THEORIES, Calibrated, get_theory
+from mbma_tables.theories.calibrated_table import shipped
+from mbma_tables.theories.yielding import Yielding
+
+SURFACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
+MODULUS = 100e3
+HARDNESS = 1500.0
+each = pytest.mark.parametrize("theory", THEORIES)
+
+
+@each
+def test_without_yielding_answers_are_elastic_to_the_last_bit(theory):
+    u = [0.5, 1.9, 2.9]
+    elastic = contact(SURFACE, mean_separation=u, E_star=MODULUS, theory=theory)
+    for cap in (np.inf, [np.inf, np.inf, HARDNESS]):
+        found = contact(SURFACE, mean_separation=u, E_star=MODULUS, theory=theory, hardness=cap)
+        for name in ("force", "area", "stiffness", "error", "incremental_stiffness"):
+            # MBMA's sums with derivatives, which yielding needs, add in another order than those without
+            rel = (1e-8 if name == "error" else 1e-14) if theory == "mbma" and np.ndim(cap) else 0
+            assert getattr(found, name)[:2] == pytest.approx(getattr(elastic, name)[:2], rel=rel, abs=0), name
+        assert (found.yielded[:2] == 0).all()
+        assert (np.broadcast_to(found.psi, 3)[:2] == 0).all()
+
+
+@each
+def test_soft_metal_follows_the_bearing_curve(theory):
+    u = np.array([0.3, 1.0, 2.0, 2.9])
+    cap = 1e-7 * MODULUS * float(SURFACE.rms_gradient)
+    found = contact(SURFACE, mean_separation=u, E_star=MODULUS, theory=theory, hardness=cap)
+    ends = get_theory(theory).ends_at_h_max
+    share = hardness.bearing_share(u, 3.0 if ends else None)[0]
+    assert found.force == pytest.approx(cap * share, rel=0.01)
+    assert found.area == pytest.approx(share, rel=0.01)
+    assert found.yielded == pytest.approx(np.ones(4), rel=1e-9)
+
+
+@each
+def test_pressure_is_inverted_and_slopes_are_those_of_the_curve(theory):
+    pressure = np.array([1e-3, 1.0, 30.0, 300.0])
+    found = contact(SURFACE, pressure=pressure, E_star=MODULUS, theory=theory, hardness=HARDNESS)
+    assert found.force == pytest.approx(pressure, rel=1e-10)
+    assert (found.area >= pressure / HARDNESS * (1 - 1e-10)).all()
+    assert (found.mean_pressure <= HARDNESS * (1 + 1e-12)).all()
+    step = 1e-5
+    near = [
+        contact(
+            SURFACE,
+            mean_separation=found.mean_separation + way * step,
+            E_star=MODULUS,
+            theory=theory,
+            hardness=HARDNESS,
+        )
+        for way in (-1, 1)
+    ]
+    kept = found.mean_separation < 3.0 - 100 * step
+    slope = (near[0].force - near[1].force) / (2 * step)
+    assert found.stiffness[kept] == pytest.approx(slope[kept], rel=1e-5)
+    assert (found.incremental_stiffness > found.stiffness).all()
+    assert (found.plane_separation <= found.mean_separation).all()
+
+
+def test_ten_thousand_contacts_keep_bounds_and_order():
+    rng = np.random.default_rng(16)
+    n = 10_000
+    zeta = 10 ** rng.uniform(0.6, 4, n)
+    surface = Surface(rng.uniform(0.1, 1, n), 1.0, zeta, 10 ** rng.uniform(-3, 0, n), 1.0)
+    surface = Surface(surface.hurst, 1.0, zeta, surface.h_rms, surface.h_rms * rng.uniform(2.5, 5.5, n))
+    eta = 10 ** rng.uniform(-4, 2, n) * surface.rms_gradient
+    u = surface.h_max * rng.uniform(1e-3, 0.999, n)
+    theory = get_theory("calibrated")
+
+    def state(cap, gap):
+        yielding = Yielding(theory, cap)
+        answer = yielding.answer(surface, gap)
+        return answer, yielding.state(surface, gap, answer).yielded * answer.area
+
+    answer, yielded = state(eta, u)
+    x = answer.force / eta
+    assert (answer.area >= x * (1 - 1e-15)).all()
+    assert (answer.area <= 1).all()
+    assert (yielded <= x * (1 + 1e-14)).all()
+    for closer, harder in ((0.99, 1.0), (1.0, 1.05)):
+        other, _ = state(eta * harder, u * closer)
+        assert (other.force >= answer.force * (1 - 1e-13)).all()
+    # at one force: more area under more load, less of it if harder
+    elastic = theory.area_at(surface, answer.force)
+    force, cap = answer.force / surface.rms_gradient, eta / surface.rms_gradient
+    more = theory.area_at(surface, 1.01 * answer.force)
+    assert (hardness.area(np.minimum(1.01 * force, cap), more, cap) >= answer.area * (1 - 1e-12)).all()
+    harder = hardness.area(force, elastic, 1.05 * cap)
+    assert (harder <= answer.area * (1 + 1e-12)).all()
+    assert (hardness.yielded_area(force, elastic, 1.05 * cap) <= yielded * (1 + 1e-12) + 1e-300).all()
+
+
+def test_a_law_with_a_hardness_is_a_law():
+    law = contact_law(SURFACE, theory="calibrated", E_star=MODULUS, hardness=HARDNESS, rtol=1e-5)
+    pressure = np.array([1e-2, 1.0, 100.0, 1000.0])
+    found = contact(SURFACE, pressure=pressure, E_star=MODULUS, theory="calibrated", hardness=HARDNESS)
+    again = law.at_pressure(pressure)
+    assert again.mean_separation == pytest.approx(found.mean_separation, rel=1e-4)
+    assert law.area(u=found.mean_separation) == pytest.approx(found.area, rel=1e-4)
+    assert pickle.loads(pickle.dumps(law)).force(u=1.0) == law.force(u=1.0)
+    with pytest.raises(InputError, match="hardness must be one number"):
+        contact_law(SURFACE, theory="calibrated", hardness=[0.01, 0.02])
+
+
+def test_batches_labels_and_units():
+    caps = np.array([500.0, 1500.0, np.inf])
+    plain = contact(SURFACE, pressure=[[1.0], [30.0]], E_star=MODULUS, hardness=caps, theory="calibrated")
+    assert plain.area.shape == (2, 3)
+    one = contact(SURFACE, pressure=30.0, E_star=MODULUS, hardness=1500.0, theory="calibrated")
+    assert plain.area[1, 1] == pytest.approx(one.area, rel=1e-12)
+    labelled = contact(
+        SURFACE,
+        pressure=xr.DataArray([1.0, 30.0], dims="load"),
+        E_star=MODULUS,
+        hardness=xr.DataArray(caps, dims="metal"),
+        theory="calibrated",
+    )
+    for name in ("area", "yielded", "incremental_stiffness", "scatter", "psi", "valid"):
+        own = getattr(labelled, name)
+        assert set(own.dims) <= {"load", "metal"}
+        assert own.values == pytest.approx(np.broadcast_to(getattr(plain, name), own.shape), rel=1e-12), name
+    named = contact(
+        Surface(0.8, 0.01, 2.0, 1.0, 3.0, unit="um"), pressure="30 MPa", E_star="100 GPa", hardness="1500 MPa",
+        theory="calibrated",
+    )  # fmt: skip
+    assert named.area == pytest.approx(one.area, rel=1e-12)
+    assert named.units["incremental_stiffness"] == "GPa/um"
+
+
+def test_a_map_yields_by_its_own_heights():
+    noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((64, 64)))
+    q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
+    heights = np.fft.irfft2(np.where((q > 0.05) & (q < 0.25), noise, 0))
+    law = Calibrated.from_map(heights, dx=1.0, periodic=True)
+    soft = 1e-5 * float(law.surface.rms_gradient)
+    level = np.quantile(heights - heights.mean(), 0.8)
+    u = np.maximum(level - (heights - heights.mean()), 0).mean()
+    found = contact(law.surface, mean_separation=u, theory=law, hardness=soft)
+    assert found.area == pytest.approx(0.2, rel=0.03)
+    assert found.scatter < shipped().standard_deviation("calibrated", "force", found.area)
+
+
+@pytest.mark.parametrize(
+    ("asked", "match"),
+    [
+        ({"pressure": 2000.0}, "pressure must be at most the hardness"),
+        ({"pressure": 1.0, "hardness": 0.0}, "hardness must be positive, or infinite"),
+        ({"pressure": 1.0, "hardness": np.nan}, "hardness must be finite"),
+        ({"pressure": 1.0, "hardness": "hard"}, "hardness must be a number"),
+        ({"pressure": 1.0, "hardness": [1.0, 2.0, 3.0], "E_star": [1.0, 2.0]}, "do not broadcast"),
+    ],
+)
+def test_what_cannot_be_asked(asked, match):
+    with pytest.raises(InputError, match=match):
+        contact(SURFACE, **({"E_star": MODULUS, "hardness": HARDNESS, "theory": "calibrated"} | asked))
+
+
+def test_unloading_is_refused_beyond_its_first_stiffness():
+    found = contact(SURFACE, pressure=30.0, E_star=MODULUS, hardness=HARDNESS, theory="calibrated")
+    with pytest.raises(InputError, match="gives back is not known"):
+        _ = found.energy
+
+
+def test_derivatives_with_a_hardness():
+    options = {"E_star": MODULUS, "theory": "calibrated"}
+    caps = np.array([500.0, 3000.0])
+    found = contact(SURFACE, pressure=30.0, hardness=caps, derivatives=True, **options)
+    step = 1e-4
+    sides = [
+        contact(Surface(0.8, 0.01, 2.0, 1.0 + way * step, 3.0), pressure=30.0, hardness=caps, **options)
+        for way in (1, -1)
+    ]
+    slope = (sides[0].area - sides[1].area) / (2 * step)
+    assert found.area_by["h_rms"] == pytest.approx(slope, rel=1e-5, abs=1e-7)
+
+
+def test_reasons_and_what_elastic_answers_say():
+    found = contact(SURFACE, pressure=[1.0, 2.0], E_star=MODULUS, hardness=[30.0, 3000.0], theory="calibrated")
+    assert any(
+        "hardness over E*" in reason and mask.tolist() == [True, False] for reason, mask in found.reasons.items()
+    )
+    elastic = contact(SURFACE, pressure=30.0, E_star=MODULUS, theory="calibrated")
+    limit = contact(
+        SURFACE, pressure=30.0, E_star=MODULUS, theory="calibrated", hardness=float(elastic.elastic_hardness)
+    )
+    assert limit.area == pytest.approx(elastic.area, rel=0.05)
+    assert limit.psi == pytest.approx(1.1)
