@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbma_tables import InputError, Scene, Surface, contact, contact_law
+from mbma_tables import InputError, Scene, Surface, contact, contact_law, island
 from mbma_tables.cli import main
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.units import ALIASES, DIMENSIONS, SIZES, Units, factor, known, read, resolve, unit_of
@@ -354,3 +354,9 @@ def test_a_law_keeps_its_units(theory):
     assert pickle.loads(pickle.dumps(law)).units == law.units
     with pytest.raises(InputError, match="needs a modulus"):
         contact_law(CONCRETE, 1e-3).at_pressure("10 kPa")
+
+
+def test_islands_take_units():
+    plain = island(CONCRETE, [0.1, 0.3], E_star=13.3)
+    found = island(CONCRETE.to("um"), ["0.1 mm", 300.0], E_star="13.3 MPa")
+    np.testing.assert_allclose(found.force, 1e6 * plain.force, rtol=1e-12)

@@ -126,10 +126,10 @@ def exponential(
 
 
 def lsdyna(law: LawTable, curve: int = 1) -> str:
-    """A *DEFINE_CURVE for LS-DYNA."""
+    """A *DEFINE_CURVE for LS-DYNA, to be included: without *END, which would end the deck that it is pasted into."""
     head = f"*DEFINE_CURVE\n{curve:10d}{0:10d}{1.0:10.1f}{1.0:10.1f}{0.0:10.1f}{0.0:10.1f}{0:10d}\n"
     rows = "".join(f"{x:20.{DIGITS - 1}E}{y:20.{DIGITS - 1}E}\n" for x, y in zip(law.x, law.y, strict=True))
-    return comment(law.comments, "$") + head + rows + "*END\n"
+    return comment(law.comments, "$") + head + rows
 
 
 def optistruct(law: LawTable, contact: int = 1, table: int = 2) -> str:

@@ -14,6 +14,7 @@ from mbma_tables.islands.geometry import FIELDS, fill_islands
 from mbma_tables.models import AnyModel, answer_islands, get_model, tier_name
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.units import modulus_and_units
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -97,13 +98,13 @@ def island(
     surface : Surface
         One surface or a batch; it broadcasts against `delta`.
     delta : array_like
-        Approach z_max - d of the island [length], positive.
+        Approach z_max - d of the island, positive, in the surface's unit or, as text, with its own.
     tier : {"universal", "island4d", "exact", "formula", "rigid"} or island model
         The island model, by name or an object, as for `contact`.
     reading : {"reported", "printed", "fitted"} or Reading
         Which reading of the paper's equations.
-    E_star : array_like
-        Effective modulus; force is in its unit times length squared.
+    E_star : array_like or str
+        Effective modulus, perhaps with its unit, "100 GPa"; force is in that unit times length squared.
     rtol : float
         Relative error asked of force and area.
 
@@ -122,6 +123,8 @@ def island(
     >>> [f"{number:.4g}" for number in (found.zeta_d[0], found.X[0], found.mu[0])]
     ['6.537', '1.322', '3.352']
     """
+    E_star, units = modulus_and_units(E_star, surface)
+    delta = units.number("delta", delta)
     if surface.labelled or is_labelled(delta) or is_labelled(E_star):
         return _of_labelled(surface, delta, tier, reading, E_star, rtol)
     approach = finite_array("delta", delta)
@@ -140,14 +143,14 @@ def island(
     g = geometry(approach, hurst, zeta_1, rule)
     phi = answer_islands(model, g | {"hurst": hurst})
     s, q0 = surface.s, surface.q0
-    units = {
+    sizes = {
         "R_d": 1 / (s * q0**2),
         "R_u": 1 / (s * q0**2),
         "D": q0**2,
         "sigma": s,
         "h_d": s,
     }
-    values = {name: (g[name] * units.get(name, 1.0))[()] for name in GEOMETRY}
+    values = {name: (g[name] * sizes.get(name, 1.0))[()] for name in GEOMETRY}
     return Island(
         delta=np.broadcast_to(np.asarray(delta, dtype=float), shape)[()],
         force=(modulus * s / q0 * scale_force(g) * phi.phi_F)[()],

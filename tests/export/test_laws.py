@@ -130,7 +130,7 @@ def parse(target, text):
         return [(c, p) for p, c in rows]
     if target == "lsdyna":
         start = lines.index("*DEFINE_CURVE") + 2
-        return [(float(line[:20]), float(line[20:40])) for line in lines[start : lines.index("*END")]]
+        return [(float(line[:20]), float(line[20:40])) for line in lines[start:]]
     if target == "optistruct":
         fields = [
             line[8 + 16 * k : 24 + 16 * k].strip()
