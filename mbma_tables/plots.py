@@ -35,6 +35,18 @@ def theory_label(name: str) -> str:
     return LABELS.get(name, name.replace("_", " ").capitalize())
 
 
+def force_label(unit: str) -> str:
+    """The axis of force in a unit; "1" where it is over the modulus.
+
+    Examples
+    --------
+    >>> from mbma_tables.plots import force_label
+    >>> force_label("MPa"), force_label("1")
+    ('force  F/A0 [MPa]', 'force  F/(A0 E*)')
+    """
+    return FORCE_LABEL if unit == "1" else f"force  F/A0 [{unit}]"
+
+
 @dataclasses.dataclass(frozen=True)
 class Curve:
     """One line of a picture; three arrays of one length.

@@ -160,7 +160,7 @@ def curve_command(
 def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory]) -> bytes:
     import numpy as np
 
-    from mbma_tables.plots import FORCE_LABEL, Curve, draw_compression, theory_label, to_png
+    from mbma_tables.plots import Curve, draw_compression, force_label, theory_label, to_png
 
     gap = answer.mean_separation / specimen.surface.h_rms
     label = theory_label(answer.theory) + (f", {answer.reading}" if answer.reading else "")
@@ -168,8 +168,7 @@ def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory]
     for name, line in others.items():
         known = np.isfinite(line.force)
         curves.append(Curve(theory_label(name), gap[known], *(field[known] for field in line)))
-    unit = unit_of("force", specimen.units)
-    return to_png(draw_compression(curves, specimen.title, FORCE_LABEL if unit == "1" else f"force  F/A0 [{unit}]"))
+    return to_png(draw_compression(curves, specimen.title, force_label(unit_of("force", specimen.units))))
 
 
 @click.command("island", short_help="Contact islands at given approaches.")

@@ -111,11 +111,11 @@ def _to_netcdf(found: xarray.Dataset) -> bytes:
 
 
 def _picture(found: xarray.Dataset) -> bytes:
-    from mbma_tables.plots import Curve, draw_compression, theory_label, to_png
+    from mbma_tables.plots import Curve, draw_compression, force_label, theory_label, to_png
 
     gap = found["mean_separation"].values / found.attrs["surface_h_rms"]
     reading = found.attrs["reading"]
     label = theory_label(found.attrs["theory"]) + (f", {reading}" if reading else "")
     bands = [found[name].values if name in found else None for name in ("scatter", "area_scatter")]
     curves: list[Any] = [Curve(label, gap, found["force"].values, found["area"].values, *bands)]
-    return to_png(draw_compression(curves, str(found.attrs["title"]), f"force  F/A0 [{found['force'].attrs['units']}]"))
+    return to_png(draw_compression(curves, str(found.attrs["title"]), force_label(found["force"].attrs["units"])))
