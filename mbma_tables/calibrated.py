@@ -103,7 +103,7 @@ def _inner_integrals() -> tuple[BSpline, ...]:
     return tuple(shapes)
 
 
-def _inner(y: FloatArray, coefficients: FloatArray) -> FloatArray:
+def inner_integral(y: FloatArray, coefficients: FloatArray) -> FloatArray:
     """Sum of a_n I_n(y)."""
     log_y = np.log(y)
     inside = np.clip(log_y, *LOG_Y)
@@ -225,7 +225,7 @@ class Law:
     def separation_persson(self, force: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """u_P and du_P/d ln F, before the tail factor."""
         y, inverse, shares = self._over_spectrum(force)
-        u = _inner(y, self._coefficients) @ (shares * inverse)
+        u = inner_integral(y, self._coefficients) @ (shares * inverse)
         P, dP = _cover(y)
         slope = sum(a * n * P ** (n - 1) for n, a in zip(POWERS, self._coefficients, strict=True)) * dP
         return u, -np.asarray(slope @ (shares * inverse))

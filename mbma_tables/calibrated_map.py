@@ -26,7 +26,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk, erf, expit, ndtr, ndtri
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.bearing import FRACTIONS, bearing, radial_spectrum
+from mbma_tables.bearing import FRACTIONS, Bearing, RadialSpectrum, bearing, radial_spectrum
 from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, area, light_factor, mean_top_height
 
 LIGHTEST, HEAVIEST = -16.0, 1.4  # ln F^ of a map's curve
@@ -124,7 +124,11 @@ class MapLaw:
 
         Lengths of its answers are in the map's own h_rms, forces over A0 E* g with its own rms gradient.
         """
-        known, bands = bearing(heights, sizes), radial_spectrum(heights, sizes)
+        return cls.from_curves(bearing(heights, sizes), radial_spectrum(heights, sizes))
+
+    @classmethod
+    def from_curves(cls, known: Bearing, bands: RadialSpectrum) -> MapLaw:
+        """The law of a map by its curves and bands."""
         held = bands.variance > 0
         return cls(
             Spectrum.from_shares(bands.q[held], bands.variance[held]),

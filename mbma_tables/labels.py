@@ -15,7 +15,7 @@ import numpy as np
 
 from mbma_tables.arguments import is_labelled
 from mbma_tables.errors import InputError
-from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.surfaces.any_surface import AnySurface
 
 OPTIONS = ("method",)  # arguments that are no arrays
 
@@ -46,15 +46,16 @@ def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
     )
 
 
-def apply_to_surface(answer: Any, surface: Surface, arrays: Mapping[str, Any], outputs: int) -> Any:
+def apply_to_surface(answer: Any, surface: AnySurface, arrays: Mapping[str, Any], outputs: int) -> Any:
     """``answer(surface, *arrays)``, a tuple of `outputs` arrays, of DataArrays; plain arrays among them are refused."""
-    arguments = {name: getattr(surface, name) for name in PARAMETERS} | dict(arrays)
+    count = len(surface.parameters)
+    arguments = {name: getattr(surface, name) for name in surface.parameters} | dict(arrays)
     for name, given in arguments.items():
         if not is_labelled(given) and np.ndim(given):
             raise InputError(f"beside DataArrays, {name} must be one or a scalar, got shape {np.shape(given)}")
 
     def block(*numbers: Any) -> Any:
-        found = answer(Surface(*numbers[: len(PARAMETERS)]), *numbers[len(PARAMETERS) :])
+        found = answer(surface.with_numbers(*numbers[:count]), *numbers[count:])
         return found[0] if outputs == 1 else found
 
     found = apply(block, tuple(arguments.values()), outputs)
@@ -78,7 +79,7 @@ def takes_labelled(result: type | None = None) -> Callable[[Callable[..., Any]],
             if not (surface.labelled or any(map(is_labelled, arrays.values()))):
                 return function(*given, **named)
 
-            def block(own: Surface, *numbers: Any) -> tuple[Any, ...]:
+            def block(own: AnySurface, *numbers: Any) -> tuple[Any, ...]:
                 found = function(own, **dict(zip(arrays, numbers, strict=True)), **options)
                 return (found,) if result is None else tuple(getattr(found, name) for name in fields)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import functools
 import io
 import itertools
 from collections.abc import Callable, Iterator, Sequence
@@ -21,7 +20,7 @@ from mbma_tables import Surface, contact, contact_law
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import Law, Spectrum, area
 from mbma_tables.scenes.costs import DISTANCE_COLUMNS, Distance
-from mbma_tables.theories import Calibrated, Persson
+from mbma_tables.theories import Persson
 
 DEEP = 0.1  # A/A0: distances are told from LOW to DEEP and from DEEP to HIGH
 RANGES = ((LOW, DEEP), (DEEP, HIGH))
@@ -85,11 +84,17 @@ def _quadrature(surface: Surface, u: FloatArray) -> Any:
 def _by_map() -> tuple[float, float]:
     """Costs of a point of the law of a map of 256 x 256 points, and of making it."""
     z = heights(MAP)
-    make = functools.partial(Calibrated.from_map, z, 1 / len(z), periodic=True)
-    law = make()
-    u = _points(law.surface, POINTS)
-    made, _ = measure(make)
-    return measure(lambda: contact(law.surface, mean_separation=u, theory=law))[0] / POINTS, made
+
+    def made() -> Any:
+        found = Surface.from_map(z, 1 / len(z), periodic=True, model="measured")
+        # the curve itself is made when first asked
+        contact(found, mean_separation=float(found.h_rms), theory="calibrated")
+        return found
+
+    surface = made()
+    u = _points(surface, POINTS)
+    answer = measure(lambda: contact(surface, mean_separation=u, theory="calibrated"))[0] / POINTS
+    return answer, measure(made)[0]
 
 
 def ways() -> Iterator[tuple[str, str, str, float, float]]:

@@ -24,10 +24,11 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import CONSTANTS, YANG_PERSSON, Law, Spectrum
 from mbma_tables.calibrated_map import MAP_CONSTANTS
 from mbma_tables.errors import MbmaError
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import REPORTED, Reading
-from mbma_tables.theories.calibrated_curves import standing_for
 
 DATA = ROOT / "docs" / "data"
+HURST, BANDS = 0.8, (3.0 * (1 + 1e-6), 1e8 * (1 - 1e-6))  # of the band that stands for another spectrum
 LOW, HIGH = 0.01, 0.97  # A/A0 of the simulations between which distances are summed up
 # u/h_max at which a theory's curve is known
 DEPTHS = np.concatenate([1 - np.geomspace(1e-4, 0.5, 150), np.geomspace(0.5, 1e-6, 151)[1:]])
@@ -45,7 +46,7 @@ class Curve:
         Where the theory does not take the surface.
     """
 
-    def __init__(self, answer: Callable[[Surface, FloatArray], Any], surface: Surface) -> None:
+    def __init__(self, answer: Callable[[AnySurface, FloatArray], Any], surface: AnySurface) -> None:
         self._answer, self._surface = answer, surface
         self._g, self._h_rms = float(surface.rms_gradient), float(surface.h_rms)
         u = DEPTHS * surface.h_max
@@ -79,14 +80,16 @@ def surface_of(one: Case) -> Surface:
     """What theories of self-affine surfaces are given: its own numbers, or a band of the same moments."""
     if one.kind == "self_affine":
         return Surface(float(one.node[1]), 1.0, float(one.node[2]), 1.0, one.h_max)
-    spectrum = one.own_spectrum
-    return standing_for(1.0, spectrum.gradient**2 / 2, spectrum.alpha, one.h_max)
+    m2 = one.own_spectrum.gradient**2 / 2
+    alphas = [float(Surface(HURST, 1.0, zeta, 1.0, 1.0).alpha) for zeta in BANDS]
+    alpha = min(max(one.own_spectrum.alpha, alphas[0]), alphas[1])
+    return Surface.from_moments(hurst=HURST, m0=1.0, m2=m2, m4=alpha * m2**2, h_max=one.h_max)
 
 
 def _mbma(reading: str | Reading, tier: str = "universal") -> Callable[[Case], Any]:
     theory = theories.Mbma(tier, reading, 1e-6, outside="nan" if tier in ("universal", "island4d") else "raise")
 
-    def answer(surface: Surface, u: FloatArray) -> Any:
+    def answer(surface: AnySurface, u: FloatArray) -> Any:
         found = theory.totals(surface, 2 * u - np.asarray(surface.h_max))
         return found.force, found.area
 

@@ -140,8 +140,9 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     assumed = [line for record in surface.provenance for line in record.get("assumed", ())]
     notes += [f"assumed: {line}" for line in assumed]
     facts["assumed"] = assumed
-    if surface.fit is not None:
-        values = {field.name: getattr(surface.fit, field.name) for field in dataclasses.fields(surface.fit)}
+    fit = getattr(surface, "fit", None)  # of five numbers; of a spectrum a method
+    if dataclasses.is_dataclass(fit):
+        values = {field.name: getattr(fit, field.name) for field in dataclasses.fields(fit)}
         facts["fit"] = {name: v.tolist() if hasattr(v, "tolist") else v for name, v in values.items()}
         notes.append("fit: " + ", ".join(f"{name} {_rounded(v)}" for name, v in facts["fit"].items() if v is not None))
     return facts, notes

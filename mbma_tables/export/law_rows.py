@@ -14,8 +14,8 @@ from mbma_tables import __version__
 from mbma_tables.arguments import FloatArray, number_in
 from mbma_tables.errors import InputError
 from mbma_tables.export.chords import chosen_rows
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.theories.contact import contact
 from mbma_tables.theories.law import contact_law
 from mbma_tables.theories.mbma import Mbma
@@ -30,6 +30,7 @@ FLOOR = 1e-3  # of the largest value, where no range is given: below it, errors 
 LOOKED_AT = 200  # compressions at which validity and scatter are looked at
 FINE = 20_001  # points at which the error of a choice of rows is measured
 LAW_RTOL = 1e-8
+OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # said of a surface that is its own spectrum
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,7 +84,7 @@ def _curve(
 
 
 def describe_law(
-    surface: Surface,
+    surface: AnySurface,
     E_star: float | str,
     *,
     length_unit: str | None = None,
@@ -137,6 +138,7 @@ def describe_law(
 
     Examples
     --------
+    >>> from mbma_tables import Surface
     >>> road = Surface.named("concrete")
     >>> law = describe_law(road, "13.3 MPa", rows=20)
     >>> law.y_name, law.y_unit, law.x_unit, round(law.largest_error, 3)
@@ -222,7 +224,7 @@ def _range_end(law: ContactLaw, asked: float | None) -> float:
 
 
 def _comments(
-    surface: Surface,
+    surface: AnySurface,
     law: ContactLaw,
     E_star: float,
     names: tuple[str, str, str, str],
@@ -231,7 +233,7 @@ def _comments(
     floor: float,
     units: Units,
 ) -> tuple[str, ...]:
-    numbers = ", ".join(f"{name} = {float(getattr(surface, name)):.10g}" for name in PARAMETERS)
+    numbers = ", ".join(f"{name} = {float(getattr(surface, name)):.10g}" for name in surface.parameters or OWN_NUMBERS)
     end = "the same"
     if names[0] == "overclosure":
         end = "the largest asked for, or full compression"
@@ -253,7 +255,7 @@ def _comments(
     )
 
 
-def _validity(surface: Surface, law: ContactLaw, theory: Theory, end: float, stress_unit: str) -> tuple[str, ...]:
+def _validity(surface: AnySurface, law: ContactLaw, theory: Theory, end: float, stress_unit: str) -> tuple[str, ...]:
     """Lines that say where the law holds, how far simulations scatter about it, and where its numbers come from."""
     u = np.linspace(law.h_max, law.h_max - end, LOOKED_AT + 1)[1:]
     found = contact(surface, mean_separation=u, E_star=law.E_star, theory=theory)

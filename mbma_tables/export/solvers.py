@@ -13,7 +13,7 @@ from mbma_tables import __version__
 from mbma_tables.errors import InputError
 from mbma_tables.export.law_rows import LawTable
 from mbma_tables.export.text import DIGITS, checked_name, comment, number
-from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.units import in_unit, modulus_and_units
 
 MAX_CALCULIX_ROWS = 200
@@ -90,7 +90,7 @@ def abaqus(law: LawTable, name: str = "ROUGH") -> str:
 
 
 def exponential(
-    surface: Surface,
+    surface: AnySurface,
     E_star: float | str,
     *,
     length_unit: str | None = None,
@@ -112,7 +112,7 @@ def exponential(
     near, far = (float(persson_force(surface, u * h_rms, modulus, method="simplified")) for u in (1.0, 2.0))
     u0 = h_rms / math.log(near / far)
     p0 = near * math.exp((h_rms - float(surface.h_max)) / u0)
-    numbers = ", ".join(f"{key} = {float(getattr(surface, key)):.10g}" for key in PARAMETERS)
+    numbers = ", ".join(f"{key} = {float(getattr(surface, key)):.10g}" for key in surface.parameters)
     notes = (
         f"Contact law of a rough surface by Persson's theory for light loads; mbma_tables {__version__}",
         f"p = p0 exp(c/u0), p0 = {number(p0)} {units.stress}, u0 = {number(u0)} {units.length}; u0 ln 100, p0 follow",

@@ -136,7 +136,7 @@ def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1
     """
     gap, modulus = finite_array("separation", separation), finite_array("E_star", E_star)
     require("E_star", modulus, modulus > 0, "positive")
-    shape = broadcast_shape(separation=gap, surface=surface.hurst, E_star=modulus)
+    shape = broadcast_shape(separation=gap, surface=surface.h_rms, E_star=modulus)
     fields = {
         "d_over_h_rms": gap / surface.h_rms,
         "h_max_over_h_rms": surface.h_max / surface.h_rms,

@@ -14,8 +14,8 @@ from mbma_tables.units import Units, in_unit, known, modulus_and_units
 
 if TYPE_CHECKING:
     from mbma_tables.models.protocol import AnyModel
+    from mbma_tables.surfaces.any_surface import AnySurface
     from mbma_tables.surfaces.readings import Reading
-    from mbma_tables.surfaces.surface import Surface
     from mbma_tables.theories.protocol import Theory, UserTheory
 
 PRESCRIBED = ("separations", "mean_separations", "pressures", "areas")
@@ -30,7 +30,7 @@ MAX_SECONDS = 1e6
 class Problem:
     """The parameters of `Scene`, with the derived fields `outputs`, `dropped`, `gaps` and `units`."""
 
-    surface: Surface
+    surface: AnySurface
     effects: Sequence[str] = ("force", "area")
     without: Sequence[str] = ()
     separations: Any = None

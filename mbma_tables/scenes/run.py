@@ -17,7 +17,7 @@ from mbma_tables.scenes.plan import Plan, Step
 from mbma_tables.scenes.problem import INVERTED, Problem
 
 if TYPE_CHECKING:
-    from mbma_tables.surfaces.surface import Surface
+    from mbma_tables.surfaces.any_surface import AnySurface
     from mbma_tables.theories.protocol import Theory
     from mbma_tables.totals.law import MbmaLaw
     from mbma_tables.totals.law_protocol import ContactLaw
@@ -32,7 +32,7 @@ class Run:
     """A plan on its way: what steps hand on, and what they found."""
 
     problem: Problem
-    surface: Surface
+    surface: AnySurface
     rtol: float
     progress: Progress
     gap: Any = None
@@ -58,7 +58,8 @@ def run_plan(problem: Problem, plan: Plan, progress: Progress | None = None) -> 
     """
     surface, h_max = problem.surface, float(problem.surface.h_max)
     if "finite_height" in problem.dropped:
-        surface = dataclasses.replace(surface, h_max=height_without_end(problem, 0.1 * plan.rtol))
+        plain: Any = surface
+        surface = dataclasses.replace(plain, h_max=height_without_end(problem, 0.1 * plan.rtol))
     run = Run(problem, surface, plan.rtol, progress or (lambda *_: None))
     if problem.gaps is not None and problem.prescribed not in INVERTED:
         run.gap = problem.gaps if problem.prescribed == "separations" else 2 * problem.gaps - h_max
@@ -80,9 +81,9 @@ def height_without_end(problem: Problem, rtol: float) -> float:
     """Height [length] beyond which the whole Gaussian adds less than `rtol` at the largest gap."""
     h_max = float(problem.surface.h_max)
     gap = problem.gaps.max() if problem.prescribed == "separations" else 2 * problem.gaps.max() - h_max
-    # exp(-(d + t)^2/2) <= exp(-d^2/2) exp(-t^2/2); ten more for the powers before it, one s for h_d
+    # exp(-(d + t)^2/2) <= exp(-d^2/2) exp(-t^2/2); ten more for the powers before it, one s, or h_rms, for h_d
     tail = math.sqrt(2 * (10 - math.log(rtol))) + 1
-    return max(float(gap), 0.0) + tail * float(problem.surface.s)
+    return max(float(gap), 0.0) + tail * float(getattr(problem.surface, "s", problem.surface.h_rms))
 
 
 def _law(run: Run, step: Step) -> None:
@@ -260,7 +261,7 @@ class OtherTheory(NamedTuple):
     area_scatter: FloatArray
 
 
-def other_theory(name: str, surface: Surface, gap: FloatArray, E_star: float) -> OtherTheory:
+def other_theory(name: str, surface: AnySurface, gap: FloatArray, E_star: float) -> OtherTheory:
     """A theory, one of `effects.COMPARED`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
     from mbma_tables.theories.protocol import answer_where_finite
     from mbma_tables.theories.registry import get_theory

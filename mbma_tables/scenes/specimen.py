@@ -15,7 +15,7 @@ from mbma_tables.scenes.toml_file import check, read_toml, schema
 from mbma_tables.units import Units, factor, in_unit, known, resolve
 
 if TYPE_CHECKING:
-    from mbma_tables.surfaces.surface import Surface
+    from mbma_tables.surfaces.any_surface import AnySurface
 
 BAND = ("hurst", "q0", "q1", "h_rms", "h_max")
 MAGNIFICATION = ("hurst", "q0", "zeta_1", "h_rms", "h_max")
@@ -30,7 +30,7 @@ MAX_SPECTRUM_BYTES = 16 * 2**20
 class Specimen:
     """A surface, and what is known about it besides its five numbers."""
 
-    surface: Surface
+    surface: AnySurface
     title: str
     E_star: float | None = None
     stress_unit: str | None = None

@@ -11,16 +11,20 @@ from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.islands.measured import measured_islands
 from mbma_tables.models import AnyModel, IslandAnswer, answer_islands, get_model, tier_name
 from mbma_tables.models.protocol import AREA, BOTH
 from mbma_tables.scenes.plan import Step
 from mbma_tables.scenes.problem import Problem
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.gauss_kronrod import Integrals, integrate
-from mbma_tables.totals.island import geometry, scale_area, scale_force
+from mbma_tables.totals.island import geometry, islands_of, scale_area, scale_force
 from mbma_tables.totals.island_sum import density_of, kinks, sum_islands
 from mbma_tables.totals.kernel import Pairs
+from mbma_tables.totals.measured import IslandCurve
 
 Fields = dict[str, tuple[tuple[str, ...], Any]]
 
@@ -50,11 +54,15 @@ def _outside(tier: str | AnyModel) -> str:
     return "exact" if tier_name(tier) in ("universal", "island4d") else "raise"
 
 
-def hertz_area(problem: Problem, surface: Surface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
+def hertz_area(problem: Problem, surface: AnySurface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
     """A/A0 with eta = 1, and the bound on its relative error."""
     reading, rtol, tier = _asked(problem, step)
-    model = HertzArea(get_model(tier, rtol, reading))
-    found = sum_islands(Pairs.of(surface, surface.h_max - gap), reading, model, rtol, _outside(tier), AREA)
+    model, depth = HertzArea(get_model(tier, rtol, reading)), np.asarray(surface.h_max - gap)
+    if isinstance(surface, MeasuredSurface):
+        own = IslandCurve(surface, model, reading, rtol, _outside(tier)).totals(depth)
+        return {"area": (("gap",), own.area)}, float(own.error.max())
+    assert isinstance(surface, Surface)
+    found = sum_islands(Pairs.of(surface, depth), reading, model, rtol, _outside(tier), AREA)
     return {"area": (("gap",), found.area)}, float(found.error.max())
 
 
@@ -83,19 +91,21 @@ def _number_of_islands(pairs: Pairs, reading: Reading, rtol: float) -> Integrals
     return integrate(integrand, owner[touching], low[touching], high[touching], end.size, rtol)
 
 
-def island_statistics(problem: Problem, surface: Surface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
+def island_statistics(problem: Problem, surface: AnySurface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
     """Number of islands at every gap; load, area and density of islands along their approach (Eqs. 40, 42).
 
     The density is zero beyond h_max - d. Also returns the bound on the relative error.
     """
+    if isinstance(surface, MeasuredSurface):
+        return _own_statistics(problem, surface, gap, step)
+    assert isinstance(surface, Surface)
     reading, rtol, tier = _asked(problem, step)
     pairs = Pairs.of(surface, surface.h_max - gap)
     s, q0 = float(surface.s), float(surface.q0)
     number = _number_of_islands(pairs, reading, rtol)
     error = float(number.error.max(initial=0.0))
+    grid = _grid(problem, float(pairs.compression.max()), float(pairs.layer[0]))
     deepest = np.maximum(pairs.compression.max(), 0)
-    t = np.linspace(0, 1, problem.points + 1)[1:] * _to_angle(deepest, pairs.layer[0])
-    grid = pairs.layer[0] * np.sinh(t) ** 2
     # where no gap touches there is no distribution
     force, area, density = np.zeros(grid.size), np.zeros(grid.size), np.zeros((gap.size, grid.size))
     if deepest > 0:
@@ -119,14 +129,42 @@ def island_statistics(problem: Problem, surface: Surface, gap: FloatArray, step:
     return fields, error
 
 
-def profiles(problem: Problem, surface: Surface, gap: Any, step: Step) -> tuple[Fields, float]:
+def _grid(problem: Problem, deepest: float, layer: float) -> FloatArray:
+    """Approaches up to the deepest, graded towards first contact."""
+    t = np.linspace(0, 1, problem.points + 1)[1:] * np.arcsinh(np.sqrt(max(deepest, 0.0) / layer))
+    return np.asarray(layer * np.sinh(t) ** 2)
+
+
+def _own_statistics(problem: Problem, surface: MeasuredSurface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
+    """`island_statistics` of a surface that is its own spectrum."""
+    reading, rtol, tier = _asked(problem, step)
+    curve = IslandCurve(surface, get_model(tier, rtol, reading), reading, rtol, _outside(tier))
+    depth = float(surface.h_max) - gap
+    found = curve.totals(depth)
+    grid = _grid(problem, float(depth.max()), curve.layer)
+    if depth.max() > 0:
+        nodes = curve.nodes(grid)
+        eta = measured_islands(surface, grid, reading)["eta"] if "subscale_area" in problem.dropped else 1.0
+        force, area = problem.E_star * nodes.force, nodes.area / eta
+        density = np.where(grid <= depth[:, None], curve.density(nodes, depth[:, None]), 0.0)
+    else:
+        force, area, density = np.zeros(grid.size), np.zeros(grid.size), np.zeros((gap.size, grid.size))
+    fields: Fields = {
+        "island_number": (("gap",), found.number),
+        "island_delta": (("approach",), grid),
+        "island_force": (("approach",), force),
+        "island_area": (("approach",), area),
+        "island_density": (("gap", "approach"), density),
+    }
+    return fields, float(found.error.max(initial=curve.island_error))
+
+
+def profiles(problem: Problem, surface: AnySurface, gap: Any, step: Step) -> tuple[Fields, float]:
     """p(r) and d(r) of the islands at these approaches, solved exactly (Eqs. 34, 36, 37)."""
     reading, rtol, _ = _asked(problem, step)
     delta = np.atleast_1d(np.asarray(problem.deltas, dtype=float)).ravel()
-    hurst, zeta_1 = np.full(delta.size, float(surface.hurst)), np.full(delta.size, float(surface.zeta_1))
-    g = geometry(delta / float(surface.h_rms), hurst, zeta_1, reading)
+    g, s, q0 = islands_of(surface, delta, reading)
     solved = greenwood_tripp.solve(g["X"], g["mu"], rtol=rtol)
-    s, q0 = float(surface.s), float(surface.q0)
     radius = np.sqrt(2 * g["R_d"] * g["sigma"])
     dims = ("island", "node")
     fields: Fields = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -29,6 +30,8 @@ class AnySurface(abc.ABC):
         Variance of a profile's slope, and of its second derivative [1/length^2], Eq. (1).
     unit : str or None
         The unit of length; None where it is not known.
+    provenance : tuple of mapping
+        Where it comes from, a plain record each step.
     """
 
     # plain fields of one class, properties of the other
@@ -37,6 +40,7 @@ class AnySurface(abc.ABC):
     h_rms: Any
     h_max: Any
     unit: str | None
+    provenance: tuple[Mapping[str, Any], ...]
 
     @property
     @abc.abstractmethod
@@ -57,6 +61,15 @@ class AnySurface(abc.ABC):
     @abc.abstractmethod
     def labelled(self) -> bool:
         """Whether any parameter is an xarray DataArray."""
+
+    @property
+    @abc.abstractmethod
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the numbers that make it; none where it is its own spectrum."""
+
+    @abc.abstractmethod
+    def with_numbers(self, *numbers: Any) -> Self:
+        """The same kind of surface of other `parameters`, in their order."""
 
     @abc.abstractmethod
     def power_spectrum(self, q: ArrayLike) -> Any:

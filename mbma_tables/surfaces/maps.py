@@ -126,7 +126,7 @@ def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | N
     return _with_anisotropy(fitted, q, C * waves, directions)
 
 
-def _matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> FloatArray:
+def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> FloatArray:
     """C of averaged samples, tilted a little so that its variance and mean square wavenumber are those of all waves.
 
     The longest waves of a map are few, and samples do not reach half way to the next ones.
@@ -158,7 +158,7 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
     q, C, waves, _ = _within_band(treated, scale, radial_spectrum(treated.windowed() / scale, unit_x, unit_y))
     bins = log_bins(q, C, waves / (2.0 if treated.periodic else 2.0 * WINDOW_OVERLAP))
     own = Heights.of(values)
-    C_bins = _matched(bins.q, np.exp(bins.log_c), own.h_rms**2, float((C * waves) @ q**2 / (C @ waves)))
+    C_bins = matched(bins.q, np.exp(bins.log_c), own.h_rms**2, float((C * waves) @ q**2 / (C @ waves)))
     if not treated.periodic:
         # its mirror images continue it
         values = np.concatenate([values, values[::-1]])

@@ -22,6 +22,7 @@ from mbma_tables.units import Units
 
 _TAIL = np.logspace(-6, -1, 61)[:-1]
 SHARES = np.concatenate([[0.0], _TAIL, np.linspace(0.1, 0.9, 81), 1 - _TAIL[::-1], [1.0]])  # of a surface, from its top
+WIDEST, SCAN = 1.5, 400  # ends of the largest islands' band (27a); wavenumbers at which it is tried
 SAME_LAW = 0.01  # of ln C about one power law: a spectrum this straight counts as self-affine
 FINE = 1.02  # between wavenumbers of a sum of spectra: a sum of power laws is none, by 1e-4 at most
 SIDE = 1e-12  # beside a wavenumber, relative
@@ -274,6 +275,16 @@ class MeasuredSurface(AnySurface):
         straight = np.abs(y - level - slope * x).max() <= SAME_LAW
         return float(min(exponent, 1.0)) if straight and 0 < exponent <= 1 + SAME_LAW else None
 
+    @functools.cached_property
+    def longest(self) -> float:
+        """Wavenumber q_L from which a band as wide as the largest islands' holds most height [1/length].
+
+        The lowest of a self-affine spectrum, near the roll-off of one with a plateau. MBMA's floors refer to it.
+        """
+        q = np.unique(np.append(self.q, np.geomspace(self.q0, self.q1, SCAN)))[:-1]
+        start, end = self.laws.place(q), self.laws.place(np.minimum(WIDEST * q, self.q1))
+        return float(q[self.laws.between(0, start, end).argmax()])
+
     def fit(self, band: tuple[float, float] | None = None) -> Surface:
         """The self-affine surface nearest to it: five numbers, and how well they describe the spectrum.
 
@@ -324,6 +335,15 @@ class MeasuredSurface(AnySurface):
         wavenumber = finite_array("q", q)
         require("q", wavenumber, wavenumber > 0, "positive")
         return self.laws.at(wavenumber)[()]
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    def with_numbers(self, *numbers: Any) -> MeasuredSurface:
+        """Itself."""
+        return self
 
     def sampled(self) -> MeasuredSurface:
         """Itself."""

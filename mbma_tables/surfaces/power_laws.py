@@ -102,8 +102,11 @@ class PowerLaws:
 
     def below(self, order: int, place: Place) -> FloatArray:
         """m_n of all longer waves."""
-        piece, rest = place
-        return np.asarray(self._before[order][piece] + self._up(order, piece, self.width[piece] - rest))
+        return self.below_rise(order, place.piece, self.width[place.piece] - place.rest)
+
+    def below_rise(self, order: int, piece: Any, rise: Any) -> FloatArray:
+        """m_n of all waves longer than those at ln(q/lower end of the piece): exact where that is small."""
+        return np.asarray(self._before[order][piece] + self._up(order, piece, rise))
 
     def between(self, order: int, start: Place, end: Place) -> FloatArray:
         """m_n of the waves from one place to a higher one."""

@@ -26,7 +26,7 @@ def resolution(surface: MeasuredSurface) -> dict[str, Any]:
     >>> from mbma_tables.surfaces.resolution import resolution
     >>> q = np.geomspace(1, 100, 50)
     >>> print(resolution(Surface.from_spectrum(q, q**-3.6, h_max=3.0, unit="um"))["told"])
-    area is a matter of resolution: waves are known down to 0.06283 um, and without the last octave of them area at light load would be 1.1 times larger
+    area is a matter of resolution: waves are known down to 0.06283 um, and without the last octave of them area at light load would be 1.2 times larger
     """  # noqa: E501
     laws = surface.laws
     below = float(laws.below(2, laws.place(np.asarray(surface.q1 / 2))))

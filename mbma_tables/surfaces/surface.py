@@ -525,6 +525,15 @@ class Surface(AnySurface):
         """Variance of a profile's second derivative [1/length^2], Eq. (7)."""
         return (self.s * self.q0**2) ** 2 * spectrum.band_moment(4, self.hurst, 1.0, self.zeta_1)
 
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """The five numbers' names."""
+        return PARAMETERS
+
+    def with_numbers(self, *numbers: Any) -> Surface:
+        """Another surface, in the same unit."""
+        return Surface(*numbers, unit=self.unit)
+
     def sampled(self) -> MeasuredSurface:
         """The same surface by its spectrum, two samples of which hold all of it.
 

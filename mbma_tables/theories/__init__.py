@@ -15,7 +15,7 @@ if TYPE_CHECKING:
         mean_separation,
         separation,
     )
-    from mbma_tables.theories.calibrated import BoundLaw, Calibrated
+    from mbma_tables.theories.calibrated import Calibrated
     from mbma_tables.theories.mbma import Mbma
     from mbma_tables.theories.persson import Method, Persson, persson_area, persson_force, persson_separation
     from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 __all__ = [
     "THEORIES",
     "Asperities",
-    "BoundLaw",
     "BoundaryElements",
     "Calibrated",
     "GreenwoodWilliamson",
@@ -46,7 +45,7 @@ __all__ = [
 # a theory's module is imported when it is first asked for
 _MODULES = {
     "asperities": ("Asperities", "GreenwoodWilliamson", "greenwood_williamson", "mean_separation", "separation"),
-    "calibrated": ("BoundLaw", "Calibrated"),
+    "calibrated": ("Calibrated",),
     "mbma": ("Mbma",),
     "persson": ("Method", "Persson", "persson_area", "persson_force", "persson_separation"),
     "protocol": ("Theory", "TheoryAnswer", "UserTheory"),

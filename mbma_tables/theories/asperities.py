@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, positive_modulus
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.labels import takes_labelled
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
 EPSILON = 1e-13  # accuracy of the height integrals
@@ -43,7 +43,7 @@ class Asperities:
 
 
 @takes_labelled()
-def mean_separation(surface: Surface, separation: ArrayLike) -> Numbers:
+def mean_separation(surface: AnySurface, separation: ArrayLike) -> Numbers:
     """Average interfacial separation u = (h_max + d)/2 [length] at separations d [length], Eq. (50).
 
     Examples
@@ -53,13 +53,13 @@ def mean_separation(surface: Surface, separation: ArrayLike) -> Numbers:
     0.8
     """
     gap = finite_array("separation", separation)
-    broadcast_shape(separation=gap, surface=surface.hurst)
+    broadcast_shape(separation=gap, surface=surface.h_rms)
     average: FloatArray = surface.h_max / 2 + gap / 2
     return average[()]
 
 
 @takes_labelled()
-def separation(surface: Surface, mean_separation: ArrayLike) -> Numbers:
+def separation(surface: AnySurface, mean_separation: ArrayLike) -> Numbers:
     """Separation d = 2 u - h_max [length] at average interfacial separations u [length], Eq. (50).
 
     Examples
@@ -69,13 +69,13 @@ def separation(surface: Surface, mean_separation: ArrayLike) -> Numbers:
     0.5
     """
     average = finite_array("mean_separation", mean_separation)
-    broadcast_shape(mean_separation=average, surface=surface.hurst)
+    broadcast_shape(mean_separation=average, surface=surface.h_rms)
     gap: FloatArray = 2 * average - surface.h_max
     return gap[()]
 
 
 @takes_labelled(Asperities)
-def greenwood_williamson(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1.0) -> Asperities:
+def greenwood_williamson(surface: AnySurface, separation: ArrayLike, E_star: ArrayLike = 1.0) -> Asperities:
     """Force and area of equal spheres with Gaussian heights (Eqs. 11, 12), Nayak's summits (Eq. 2).
 
     Parameters
@@ -105,7 +105,7 @@ def greenwood_williamson(surface: Surface, separation: ArrayLike, E_star: ArrayL
     """
     gap = finite_array("separation", separation)
     modulus = positive_modulus(E_star)
-    shape = broadcast_shape(separation=gap, surface=surface.hurst, E_star=modulus)
+    shape = broadcast_shape(separation=gap, surface=surface.h_rms, E_star=modulus)
     density, radius, sigma = surface.summit_density, surface.summit_radius, surface.summit_sigma
     depth = np.broadcast_to(gap / sigma, shape)
     force = 4 / 3 * density * np.sqrt(radius * sigma) * sigma * height_integral(1.5, depth)
@@ -120,7 +120,7 @@ class GreenwoodWilliamson(Theory):
     name = "greenwood_williamson"
     ends_at_h_max = False
 
-    def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
+    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]."""
         gap = 2 * mean_separation - np.asarray(surface.h_max)
         density, radius, sigma = surface.summit_density, surface.summit_radius, surface.summit_sigma
@@ -129,11 +129,11 @@ class GreenwoodWilliamson(Theory):
         slope = 4 * density * np.sqrt(radius * sigma) * height_integral(0.5, gap / sigma)
         return TheoryAnswer(found.force, found.area, slope, np.full(np.shape(gap), EPSILON))
 
-    def interval(self, surface: Surface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+    def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] from u = 0 to where force underflows."""
         high = np.asarray((surface.h_max + MAX_DEPTH * surface.summit_sigma) / 2, dtype=float)
         return np.zeros_like(high), high
 
-    def concerns(self, surface: Surface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons for which answers lie outside what the theory was made for."""
         return {f"asperities are taken as independent, A/A0 is above {MAX_AREA:g}": answer.area > MAX_AREA}

@@ -1,26 +1,45 @@
-"""Curves of the calibrated law on the surfaces of a question, of a spectrum or of a map."""
+"""Curves of the calibrated law on the surfaces of a question, of a spectrum, of heights or of a map."""
 
 from __future__ import annotations
 
+import functools
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
-from scipy.special import erf, erfinv
+from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import BSpline, PchipInterpolator, make_interp_spline
+from scipy.special import erf, erfinv, ndtri
 
 from mbma_tables.arguments import FloatArray, require
-from mbma_tables.calibrated import CONSTANTS, Law, Spectrum, light_factor
+from mbma_tables.bearing import FRACTIONS
+from mbma_tables.calibrated import (
+    CLOSEST,
+    CONSTANTS,
+    LOG_Y,
+    PANEL,
+    PANEL_NODES,
+    Y_NODES,
+    Law,
+    Spectrum,
+    inner_integral,
+    light_factor,
+)
 from mbma_tables.calibrated_map import LOG_FORCE, MapLaw
-from mbma_tables.surfaces.spectrum import MAX_ZETA_1, band_moment
+from mbma_tables.hardness import BearingCurve
+from mbma_tables.surfaces.measured import SHARES, MeasuredSurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import calibrated_table
 
 TESTED_AREA = (1e-3, 0.97)
-MAX_RATIO, GRADING, GRADED = 1.05, 0.8, 120  # between wavenumbers of a spectrum's bands; towards its longest wave
+WIDTHS = (0.01, 0.1, 0.4)  # of panels in ln q, up to which few nodes suffice
+LAW_ERROR = 1e-7  # of the law's own quadrature
+MAP_ERROR = 2e-2  # of a map's curve between its nodes
+LAW_FORCE, LAW_NODES = (-24.0, 1.5), 256  # ln F^ of a tabulated curve
 NODE_STEP = 6  # of a map's curve: its own nodes are rougher than what they stand for
 FULL_NODES = 3  # of a map's curve, from which full contact is continued
-HURST = 0.8  # of the surface that stands for a spectrum or a map
+_GAUSS = [((1 + x) / 2, w / 2) for x, w in map(np.polynomial.legendre.leggauss, (2, 4, 6, PANEL_NODES))]
 
 
 class Places:
@@ -152,39 +171,129 @@ def area_concerns(area: FloatArray) -> dict[str, Any]:
     }
 
 
-def bands(q: FloatArray, C: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Integral of C q dq of narrow bands, and their root mean square wavenumbers, C a power law between samples."""
-    held = np.flatnonzero(C > 0)
-    if held.size < 2:
-        return np.zeros(1), np.ones(1)
+class TabulatedLaw(Law):
+    """A law whose curve is tabulated once, for surfaces that no table holds: each wave is asked once."""
+
+    @functools.cached_property
+    def _spline(self) -> BSpline:
+        log_force, log_y = np.linspace(*LAW_FORCE, LAW_NODES), np.linspace(LOG_Y[0], LOG_Y[1] - 1e-9, Y_NODES)
+        # the inner integrals of this law's weight, as one function
+        inner = make_interp_spline(log_y, np.log(inner_integral(np.exp(log_y), self._coefficients)), k=5)
+        log_g = np.log(self.spectrum.below) / 2
+        shares = self.spectrum.x * self.spectrum.variance / (4 * self.spectrum.gradient) * np.exp(-log_g)
+        y = log_force[:, None] - log_g
+        known = np.where(y < log_y[-1], np.exp(inner(np.minimum(y, log_y[-1]))), 0.0)
+        return make_interp_spline(log_force, np.log(known @ shares), k=5)
+
+    @functools.cached_property
+    def _rate(self) -> BSpline:
+        return self._spline.derivative()
+
+    def separation_persson(self, force: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """u_P and du_P/d ln F, before the tail factor."""
+        given = np.asarray(force, float)
+        log_force = np.log(given)
+        held = np.clip(log_force, *LAW_FORCE)
+        u = np.exp(self._spline(held))
+        slope = u * self._rate(held)
+        # light contact is a logarithm of the load
+        u += slope * np.minimum(log_force - LAW_FORCE[0], 0.0)
+        heavy = log_force > LAW_FORCE[1]
+        if heavy.any():
+            u[heavy], slope[heavy] = super().separation_persson(given[heavy])
+        return u, slope
+
+
+@functools.lru_cache(maxsize=32)
+def own_law(surface: MeasuredSurface) -> OwnLaw:
+    """The law of a surface, kept while it is asked again."""
+    return OwnLaw(surface)
+
+
+class OwnLaw:
+    """The law of a surface that is its own spectrum: of the spectrum, or with its heights or its map's curves."""
+
+    def __init__(self, surface: MeasuredSurface) -> None:
+        self.h_rms, self.h_max = float(surface.h_rms), float(surface.h_max)
+        self.gradient = float(surface.rms_gradient)
+        self.law: Law = TabulatedLaw(spectrum_of(surface), self.h_max / self.h_rms)
+        self.curve: Curve | None = None
+        self.heights: BearingCurve | None = None
+        known = self._map_law(surface)
+        if known is not None:
+            self.curve = Curve(known, self.h_max / self.h_rms)
+            self.heights = BearingCurve(known.mean_height, self.h_max / self.h_rms)
+
+    def _map_law(self, surface: MeasuredSurface) -> MapLaw | None:
+        if surface.bearing is not None and surface.bands is not None:
+            self.h_rms, self.gradient = surface.bearing.h_rms, surface.bearing.gradient
+            return MapLaw.from_curves(surface.bearing, surface.bands)
+        if surface.heights.is_gaussian:
+            return None
+        # heights without a map: gradients and full contact as on Gaussian surfaces
+        heights = surface.heights
+        tops = np.interp(FRACTIONS, SHARES, cumulative_trapezoid(heights.quantiles, SHARES, initial=0.0)) / FRACTIONS
+        level = ndtri(np.minimum(FRACTIONS, 1 - 1e-12))
+        pull = (np.exp(-level * level / 2) / np.sqrt(2 * np.pi) + level * FRACTIONS) / 2
+        spectrum = self.law.spectrum
+        inverse = float(np.sum(spectrum.variance / spectrum.x**2))
+        return MapLaw(
+            spectrum, inverse, tops / heights.h_rms, np.ones(FRACTIONS.size), -level / 2, np.maximum(pull, 0.0)
+        )
+
+    def answer(self, u: FloatArray) -> tuple[list[FloatArray], float]:
+        """Force over A0 E*, area and stiffness at mean separations u >= 0 [length], and their error."""
+        flat = u.ravel() / self.h_rms
+        parts = by_law(self.law, flat) if self.curve is None else self.curve.answer(flat)
+        units = self.gradient, 1.0, self.gradient / self.h_rms
+        scaled = [np.reshape(part, u.shape) * unit for part, unit in zip(parts, units, strict=True)]
+        return scaled, LAW_ERROR if self.curve is None else MAP_ERROR
+
+    def area(self, force: FloatArray) -> FloatArray:
+        """A/A0 at a force over A0 E*."""
+        return (self.law if self.curve is None else self.curve).area(force / self.gradient)
+
+    def mean_separation(self, quantity: str, wanted: FloatArray) -> FloatArray:
+        """Mean separation u [length] at a force over A0 E* or an area below 1; h_max at zero."""
+        if self.curve is not None:
+            return np.asarray(self.curve.separation(quantity, wanted, self.gradient) * self.h_rms)
+        light = light_factor(self.law.spectrum.alpha)
+        force = force_at_area(wanted, light) if quantity == "area" else wanted / self.gradient
+        u = self.law.separation(np.maximum(force, 1e-300)) * self.h_rms
+        return np.where(force > 0, np.minimum(u, self.h_max), self.h_max)
+
+
+def spectrum_of(surface: MeasuredSurface) -> Spectrum:
+    """The spectrum of a surface as a quadrature rule: Gauss nodes between samples, more the further these are apart."""
+    laws = surface.laws
+    low, high = laws.log_low - laws.log_low[0], laws.log_high - laws.log_low[0]
     # graded towards the longest wave, where the gradient of longer ones vanishes
-    width, span = np.log(MAX_RATIO), float(np.log(q[held[-1]] / q[held[0]]))
-    graded = np.append(width * GRADING ** np.arange(GRADED, 0.0, -1), np.arange(width, span, width))
-    edges = np.unique(np.concatenate([np.log(q), np.log(q[held[0]]) + graded[graded < span]]))
-    middle = (edges[1:] + edges[:-1]) / 2
-    number = np.clip(np.searchsorted(np.log(q), middle) - 1, 0, q.size - 2)
-    low, high, a = C[number], C[number + 1], q[number]
-    real = (low > 0) & (high > 0)
-    low, high, a, step, start = low[real], high[real], a[real], np.diff(edges)[real], np.exp(edges[:-1][real])
-    power = np.log(high / low) / np.log(q[number + 1][real] / a)
-    base = low * (start / a) ** power * start**2
-    variance, slopes = base * growth(power + 2, step), base * start**2 * growth(power + 4, step)
-    return variance, np.sqrt(slopes / variance)
-
-
-def growth(power: FloatArray, width: FloatArray) -> FloatArray:
-    """Integral of x^power d ln x from 1 over a width in ln x."""
-    flat = np.abs(power) < 1e-9
-    return np.where(flat, width, np.expm1(power * width) / np.where(flat, 1.0, power))
-
-
-def standing_for(m0: float, m2: float, alpha: float, h_max: float) -> Surface:
-    """A surface of these moments, its alpha the nearest that a band has."""
-
-    def alpha_of(zeta: float) -> float:
-        moments = [float(band_moment(order, HURST, 1.0, zeta)) for order in (0, 2, 4)]
-        return moments[0] * moments[2] / moments[1] ** 2
-
-    low, high = 3.0 * (1 + 1e-6), MAX_ZETA_1 * (1 - 1e-6)
-    near = float(np.clip(alpha, alpha_of(low), alpha_of(high)))
-    return Surface.from_moments(hurst=HURST, m0=m0, m2=m2, m4=near * m2**2 / m0, h_max=h_max)
+    graded = min(high[-1], 1.0) * np.exp(np.arange(CLOSEST, 0.0, PANEL))
+    edges = np.unique(np.concatenate([low, high, graded, np.arange(0.0, high[-1], PANEL)]))
+    piece = np.minimum(np.searchsorted(high, (edges[1:] + edges[:-1]) / 2), high.size - 1)
+    held = edges[:-1] >= low[piece]
+    start, end, piece = edges[:-1][held], edges[1:][held], piece[held]
+    with np.errstate(divide="ignore"):
+        kind = np.searchsorted(WIDTHS, np.maximum(end - start, np.log(end / start)))
+    parts = []
+    for number, (node, weight) in enumerate(_GAUSS):
+        mine = kind == number
+        width = (end - start)[mine, None]
+        places = start[mine, None] + width * node
+        parts.append(
+            np.stack([places, width * weight, np.broadcast_to(piece[mine, None], places.shape)]).reshape(3, -1)
+        )
+    place, step, owner = np.concatenate(parts, axis=1)
+    order = np.argsort(place)
+    step, piece = step[order], owner[order].astype(np.intp)
+    rise = place[order] - low[piece]
+    log_q = laws.log_low[piece] + rise
+    variance = laws.low[piece] * np.exp(2 * (log_q - laws.log_low[0]) + laws.slope[piece] * rise) * step
+    m0, m2, m4 = (laws.moment(order) for order in (0, 2, 4))
+    return Spectrum(
+        np.exp(log_q - laws.log_low[0]),
+        variance / variance.sum(),
+        laws.below_rise(2, piece, rise) / m2,
+        math.sqrt(2 * m2 / m0) / float(surface.q0),
+        m0 * m4 / m2**2,
+    )

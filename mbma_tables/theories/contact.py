@@ -14,8 +14,8 @@ from mbma_tables.errors import InputError
 from mbma_tables.labels import apply_to_surface
 from mbma_tables.models import AnyModel
 from mbma_tables.models.protocol import QUANTITIES
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma
@@ -35,7 +35,7 @@ MEANING = {
 
 
 def contact(
-    surface: Surface,
+    surface: AnySurface,
     separation: ArrayLike | None = None,
     tier: str | AnyModel = "universal",
     reading: str | Reading = "reported",
@@ -158,7 +158,7 @@ def _known(**given: Any) -> tuple[str, Any]:
 
 
 def _contact(
-    surface: Surface,
+    surface: AnySurface,
     value: Any,
     E_star: Any,
     hardness: Any,
@@ -199,11 +199,11 @@ def _contact(
 
 
 def _places(
-    surface: Surface, value: ArrayLike, E_star: ArrayLike, hardness: ArrayLike, by: str, theory: Theory
+    surface: AnySurface, value: ArrayLike, E_star: ArrayLike, hardness: ArrayLike, by: str, theory: Theory
 ) -> tuple[FloatArray, FloatArray, dict[str, Any]]:
     """What is known, the modulus, and both separations, all of the broadcast shape."""
     asked, modulus = finite_array(by, value), positive_modulus(E_star)
-    shape = broadcast_shape(**{by: asked, "surface": surface.hurst, "E_star": modulus, "hardness": hardness})
+    shape = broadcast_shape(**{by: asked, "surface": surface.h_rms, "E_star": modulus, "hardness": hardness})
     asked, modulus = np.broadcast_to(asked, shape), np.broadcast_to(modulus, shape)
     h_max = np.asarray(surface.h_max)
     if by == "separation":
@@ -223,15 +223,16 @@ def _at_fixed(held: str, by: str, slopes: dict[str, Any], per_modulus: Any) -> d
     """Derivatives where force or area is held: of the separation, and of the quantity that is not held."""
     other = "area" if held == "force" else "force"
     steep, follows = slopes[held]["separation"], slopes[other]["separation"]
-    gap = {by: 1 / steep} | {name: -slopes[held][name] / steep for name in PARAMETERS}
-    free = {by: follows / steep} | {name: slopes[other][name] + follows * gap[name] for name in PARAMETERS}
+    names = [name for name in slopes[held] if name != "separation"]
+    gap = {by: 1 / steep} | {name: -slopes[held][name] / steep for name in names}
+    free = {by: follows / steep} | {name: slopes[other][name] + follows * gap[name] for name in names}
     if held == "force":
         gap["E_star"] = -per_modulus / steep
         free["E_star"] = follows * gap["E_star"]
     return {"separation_by": gap, f"{other}_by": free, f"{held}_by": None}
 
 
-def _of_labelled(surface: Surface, value: Any, E_star: Any, hardness: Any, options: dict[str, Any]) -> Contact:
+def _of_labelled(surface: AnySurface, value: Any, E_star: Any, hardness: Any, options: dict[str, Any]) -> Contact:
     """`contact` of DataArrays, lazily where they are."""
     by, theory, wanted = options["by"], options["source"].theory, options["quantities"]
     units = options["source"].units
@@ -243,10 +244,10 @@ def _of_labelled(surface: Surface, value: Any, E_star: Any, hardness: Any, optio
     if options["derivatives"]:
         held = {"pressure": "force", "area": "area"}.get(by)
         kinds = [f"{kind}_by" for kind in wanted if kind != held] + (["separation_by"] if held else [])
-        free = (by if held else "separation", *PARAMETERS, *(("E_star",) if held == "force" else ()))
+        free = (by if held else "separation", *surface.parameters, *(("E_star",) if held == "force" else ()))
         slopes = [(kind, name) for kind in kinds for name in free]
 
-    def answer(block: Surface, asked: Any, modulus: Any, cap: Any) -> tuple[Any, ...]:
+    def answer(block: AnySurface, asked: Any, modulus: Any, cap: Any) -> tuple[Any, ...]:
         found = _contact(block, asked, modulus, cap, **options)
         return (*(getattr(found, name) for name in names), *(getattr(found, kind)[name] for kind, name in slopes))
 

@@ -17,8 +17,8 @@ from mbma_tables.arguments import FloatArray, number_in
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import AnyModel
 from mbma_tables.models.protocol import MAX_RTOL
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import law_kernel
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
@@ -121,7 +121,7 @@ class TheoryLaw(ContactLaw):
 
 
 def contact_law(
-    surface: Surface,
+    surface: AnySurface,
     rtol: float = 1e-8,
     tier: str | AnyModel = "universal",
     reading: str | Reading = "reported",
@@ -177,7 +177,7 @@ def contact_law(
 
 
 def _law_in_numbers(
-    surface: Surface,
+    surface: AnySurface,
     rtol: float,
     tier: str | AnyModel,
     reading: str | Reading,
@@ -197,7 +197,7 @@ def _law_in_numbers(
     return _theory_law(one_surface(surface), chosen, number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL), modulus)
 
 
-def _theory_law(surface: Surface, theory: Theory, rtol: float, E_star: float) -> TheoryLaw:
+def _theory_law(surface: AnySurface, theory: Theory, rtol: float, E_star: float) -> TheoryLaw:
     """A law fitted to a theory's answers."""
     h_max, ends = float(surface.h_max), theory.ends_at_h_max
     # below the elastic theory's end force depends on the logarithm of u
@@ -246,7 +246,7 @@ def _theory_law(surface: Surface, theory: Theory, rtol: float, E_star: float) ->
     )
 
 
-def _lowest(surface: Surface, theory: Theory) -> float:
+def _lowest(surface: AnySurface, theory: Theory) -> float:
     """Mean separation from which a theory has finite force: zero, or the least of `LOWEST` at which it answers."""
     for share in LOWEST:
         u = share * float(surface.h_max)

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 from mbma_tables.arguments import FloatArray
 from mbma_tables.models import TIERS, AnyModel, tier_name
 from mbma_tables.models.protocol import QUANTITIES
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading, get_reading
-from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.protocol import SCAN, Theory, TheoryAnswer, select
 from mbma_tables.totals.contact import Totals, totals_at
 
@@ -45,7 +46,7 @@ class Mbma(Theory):
 
     def totals(
         self,
-        surface: Surface,
+        surface: AnySurface,
         separation: FloatArray,
         E_star: ArrayLike = 1.0,
         derivatives: bool = False,
@@ -56,20 +57,20 @@ class Mbma(Theory):
             surface, separation, self.tier, self.reading, E_star, self.rtol, self.outside, derivatives, quantities
         )
 
-    @property
-    def _has_slopes(self) -> bool:
-        return self.tier_name == "universal" and self.outside != "exact"
+    def _has_slopes(self, surface: AnySurface) -> bool:
+        by_table = self.tier_name == "universal" and self.outside != "exact"
+        return by_table or isinstance(surface, MeasuredSurface)
 
-    def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
+    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length] from 0 to h_max."""
         u = np.asarray(mean_separation, dtype=float)
-        found = self.totals(surface, 2 * u - np.asarray(surface.h_max), derivatives=self._has_slopes)
+        found = self.totals(surface, 2 * u - np.asarray(surface.h_max), derivatives=self._has_slopes(surface))
         if found.force_by is None:
             return TheoryAnswer(found.force, found.area, self._differences(surface, u), found.error)
         # du = dd/2
         return TheoryAnswer(found.force, found.area, -2 * found.force_by["separation"], found.error)
 
-    def _differences(self, surface: Surface, u: FloatArray) -> FloatArray:
+    def _differences(self, surface: AnySurface, u: FloatArray) -> FloatArray:
         """-dF/du by numerical differentiation, for tiers without derivatives."""
         from scipy.differentiate import derivative
 
@@ -93,24 +94,24 @@ class Mbma(Theory):
         )
         return np.where(touching, -slope.df, 0.0)
 
-    def interval(self, surface: Surface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+    def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] from where force or area is largest to first contact."""
         return self._maximum(surface, quantity, np.zeros(surface.shape)), np.asarray(surface.h_max, dtype=float)
 
-    def softening(self, surface: Surface) -> FloatArray:
+    def softening(self, surface: AnySurface) -> FloatArray:
         """Mean separation [length] below which stiffness falls with compression; NaN where it does not."""
         unknown = np.full(surface.shape, np.nan)
-        if self._has_slopes or self.tier_name not in TIERS or self.tier_name == "rigid":
+        if self._has_slopes(surface) or self.tier_name not in TIERS or self.tier_name == "rigid":
             return self._maximum(surface, "stiffness", unknown)
         # of the same islands by the table, whose derivatives are at hand
         return Mbma("universal", self.reading, outside="nan")._maximum(surface, "stiffness", unknown)
 
-    def scatter(self, surface: Surface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
         """As for any theory, of the reading that was compared with simulations; NaN for others."""
         known = super().scatter(surface, area)
         return known if self.reading == get_reading("reported") else (known[0] * np.nan, known[1] * np.nan)
 
-    def concerns(self, surface: Surface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Where the paper's own assumptions fail."""
         return {
             f"areas of islands are added, A/A0 is above {MAX_AREA:g}": (answer.area > MAX_AREA)
@@ -119,7 +120,7 @@ class Mbma(Theory):
             < self.softening(surface),
         }
 
-    def _maximum(self, surface: Surface, quantity: str, otherwise: FloatArray) -> FloatArray:
+    def _maximum(self, surface: AnySurface, quantity: str, otherwise: FloatArray) -> FloatArray:
         """Mean separation of the first local maximum of a quantity under compression, or `otherwise`."""
         from scipy.optimize.elementwise import find_minimum
 

@@ -11,6 +11,7 @@ where w is infinite at q0 in (19) and nothing is here; u0 and lambda of (21) are
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from typing import Any, Literal
 
@@ -19,10 +20,14 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import erf, erfinv, exp1
 
 from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, positive_modulus, require
+from mbma_tables.calibrated import YANG_PERSSON
 from mbma_tables.errors import ConvergenceError, InputError
 from mbma_tables.labels import takes_labelled
 from mbma_tables.surfaces import spectrum
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories.calibrated_curves import LAW_ERROR, TabulatedLaw, spectrum_of
 from mbma_tables.theories.protocol import Theory, TheoryAnswer, select
 from mbma_tables.totals.gauss_kronrod import integrate
 
@@ -45,7 +50,7 @@ _T, _T_WEIGHTS = (
 
 
 @takes_labelled()
-def persson_area(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1.0) -> Numbers:
+def persson_area(surface: AnySurface, force: ArrayLike, E_star: ArrayLike = 1.0) -> Numbers:
     """A/A0 = erf(p0/(2 sqrt(G))) at the largest magnification, G = E*^2 m2/4 (Eq. 18).
 
     Parameters
@@ -74,13 +79,15 @@ def persson_area(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1.0) ->
     pressure = finite_array("force", force)
     require("force", pressure, pressure >= 0, "zero or positive")
     modulus = positive_modulus(E_star)
-    broadcast_shape(force=pressure, surface=surface.hurst, E_star=modulus)
+    broadcast_shape(force=pressure, surface=surface.h_rms, E_star=modulus)
     area: FloatArray = erf(pressure / modulus / np.sqrt(surface.m2))
     return area
 
 
 @takes_labelled()
-def persson_separation(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1.0, method: Method = "full") -> Numbers:
+def persson_separation(
+    surface: AnySurface, force: ArrayLike, E_star: ArrayLike = 1.0, method: Method = "full"
+) -> Numbers:
     """Average interfacial separation u of Persson's theory (Eqs. 19-21).
 
     Parameters
@@ -113,7 +120,10 @@ def persson_separation(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1
     pressure = finite_array("force", force)
     require("force", pressure, pressure > 0, "positive: u is infinite at zero load")
     modulus = positive_modulus(E_star)
-    shape = broadcast_shape(force=pressure, surface=surface.hurst, E_star=modulus)
+    shape = broadcast_shape(force=pressure, surface=surface.h_rms, E_star=modulus)
+    if isinstance(surface, MeasuredSurface):
+        return own_separation(surface, np.broadcast_to(pressure / modulus, shape), _is_full(method))[0][()]
+    assert isinstance(surface, Surface)
     bands = _Bands.of(surface, shape)
     log_load = np.log(pressure) - np.log(modulus)
     log_p = (np.broadcast_to(log_load, shape) - _log_stress(surface)).ravel()
@@ -135,7 +145,7 @@ def persson_separation(surface: Surface, force: ArrayLike, E_star: ArrayLike = 1
 
 @takes_labelled()
 def persson_force(
-    surface: Surface, mean_separation: ArrayLike, E_star: ArrayLike = 1.0, method: Method = "full"
+    surface: AnySurface, mean_separation: ArrayLike, E_star: ArrayLike = 1.0, method: Method = "full"
 ) -> Any:
     """The load at which Persson's theory has the average separation u: the inverse of `persson_separation`.
 
@@ -169,10 +179,13 @@ def persson_force(
     """
     average = finite_array("mean_separation", mean_separation)
     modulus = positive_modulus(E_star)
-    shape = broadcast_shape(mean_separation=average, surface=surface.hurst, E_star=modulus)
+    shape = broadcast_shape(mean_separation=average, surface=surface.h_rms, E_star=modulus)
     full = _is_full(method)
     allowed = average > 0 if full else average >= 0
     require("mean_separation", average, allowed, "positive" if full else "zero or positive")
+    if isinstance(surface, MeasuredSurface):
+        return (modulus * own_force(surface, np.broadcast_to(average, shape), full))[()]
+    assert isinstance(surface, Surface)
     bands = _Bands.of(surface, shape)
     target = np.broadcast_to(average / surface.s, shape)
     if full:
@@ -301,6 +314,26 @@ def _invert(bands: _Bands, target: FloatArray) -> FloatArray:
     raise ConvergenceError(f"no load found for {int(mask.sum())} separations in {MAX_STEPS} steps", mask)
 
 
+@functools.lru_cache(maxsize=32)
+def _own_law(surface: MeasuredSurface, full: bool) -> TabulatedLaw:
+    """Persson's theory of a surface's own spectrum, with Yang and Persson's weight."""
+    if not full:
+        raise InputError("the simplified form (20) is of self-affine surfaces: ask method='full', or surface.fit()")
+    return TabulatedLaw(spectrum_of(surface), None, YANG_PERSSON)
+
+
+def own_separation(surface: MeasuredSurface, force: FloatArray, full: bool) -> tuple[FloatArray, FloatArray]:
+    """u and -du/dlog F [length] at loads over A0 E*."""
+    u, slope = _own_law(surface, full).separation_persson(force / surface.rms_gradient)
+    return u * surface.h_rms, -slope * surface.h_rms
+
+
+def own_force(surface: MeasuredSurface, mean_separation: FloatArray, full: bool) -> FloatArray:
+    """Load over A0 E* at mean separations u [length]."""
+    force = _own_law(surface, full).gaussian(mean_separation / surface.h_rms)[0]
+    return np.asarray(np.exp(force) * surface.rms_gradient)
+
+
 class Persson(Theory):
     """Persson's theory, its separation by the full integral (19) or by the light-load form (20)."""
 
@@ -310,42 +343,45 @@ class Persson(Theory):
     def __init__(self, method: Method = "full") -> None:
         self.method: Method = method
 
-    def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
+    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u > 0 [length]."""
         force = np.asarray(persson_force(surface, mean_separation, method=self.method))
-        error = np.full(force.shape, INVERSE_RTOL)
+        error = np.full(force.shape, LAW_ERROR if isinstance(surface, MeasuredSurface) else INVERSE_RTOL)
         return TheoryAnswer(force, persson_area(surface, force), force / self._decay(surface, force), error)
 
-    def interval(self, surface: Surface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+    def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] of the theory, whose heights have no end."""
         low = np.zeros(surface.shape)
         return low, np.full_like(low, np.inf)
 
-    def mean_separation_at(self, surface: Surface, quantity: str, wanted: FloatArray) -> FloatArray:
+    def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* (19, 20) or an area (18)."""
         if quantity == "area":
             require("area", wanted, wanted < 1, "below 1, which Persson's theory reaches at infinite load")
             wanted = erfinv(wanted) * np.sqrt(surface.m2)
         return np.asarray(persson_separation(surface, wanted, method=self.method))
 
-    def area_at(self, surface: Surface, force: FloatArray) -> FloatArray:
+    def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E* (18)."""
         return np.asarray(persson_area(surface, force))
 
-    def energy(self, surface: Surface, mean_separation: FloatArray) -> FloatArray:
+    def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], from dU = -F du = F (-du/dlog F) dlog F."""
         force = np.asarray(persson_force(surface, mean_separation, method=self.method))
         lighter = force[..., None] * np.exp(-_T)
         batch = select(surface, force.shape, np.arange(force.size).reshape(*force.shape, 1))
         return np.asarray((lighter * self._decay(batch, lighter)) @ _T_WEIGHTS)
 
-    def concerns(self, surface: Surface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
+    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Where heights' end, which the theory does not know, decides."""
         beyond = mean_separation > np.asarray(surface.h_max)
         return {"u is above h_max, where the surface has no contact and the theory's heights have no end": beyond}
 
-    def _decay(self, surface: Surface, force: FloatArray) -> FloatArray:
+    def _decay(self, surface: AnySurface, force: FloatArray) -> FloatArray:
         """-du/dlog F [length] at a load."""
+        if isinstance(surface, MeasuredSurface):
+            return own_separation(surface, force, _is_full(self.method))[1]
+        assert isinstance(surface, Surface)
         bands = _Bands.of(surface, force.shape)
         if not _is_full(self.method):
             return np.asarray(_simplified(bands)[0].reshape(force.shape) * surface.s)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mbma_tables import hardness
 from mbma_tables.arguments import FloatArray, describe_entries, require
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import calibrated_table
 
 ROOT_RTOL = 1e-12  # of forces and areas at which a separation is asked
@@ -42,7 +42,7 @@ class UserTheory(Protocol):
     def name(self) -> str:
         """What results call it."""
 
-    def answer(self, surface: Surface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """F/(A0 E*) and A/A0 at mean separations u [length] of the surface's broadcast shape."""
 
 
@@ -53,7 +53,7 @@ class Theory(abc.ABC):
     ends_at_h_max = True  # whether force vanishes at u = h_max; else its Gaussian heights have no end
 
     @abc.abstractmethod
-    def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
+    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]."""
 
     @property
@@ -70,27 +70,27 @@ class Theory(abc.ABC):
         """The theory at flat places of a broadcast shape, where it holds arrays of its own."""
         return self
 
-    def area_at(self, surface: Surface, force: FloatArray) -> FloatArray:
+    def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E*."""
         return self.answer(surface, self.mean_separation_at(surface, "force", force)).area
 
-    def bearing_share(self, surface: Surface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Share of heights above the level whose mean gap is u, and its derivative by u: Gaussian heights."""
         h_rms = np.asarray(surface.h_rms)
         end = np.asarray(surface.h_max) / h_rms if self.ends_at_h_max else None
         share, slope = hardness.bearing_share(np.asarray(mean_separation) / h_rms, end)
         return share, slope / h_rms
 
-    def interval(self, surface: Surface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+    def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which "force" or "area" falls: full compression and last contact."""
         high = np.asarray(surface.h_max, dtype=float)
         return np.zeros_like(high), high
 
-    def concerns(self, surface: Surface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
+    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """Reasons for which answers lie outside what the theory was tested for, each with a mask."""
         return {}
 
-    def scatter(self, surface: Surface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of ln F at given u and of ln A at given F against simulations, at A/A0 = `area`.
 
         Root mean squares of ln(theory/simulation), of the boundary elements in the calibrated law's file; NaN where
@@ -100,7 +100,7 @@ class Theory(abc.ABC):
         known = [table.standard_deviation(self.scatter_name, quantity, area) for quantity in ("force", "area")]
         return known[0], known[1]
 
-    def energy(self, surface: Surface, mean_separation: FloatArray) -> FloatArray:
+    def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], the integral of F/(A0 E*) from u to last contact."""
         from scipy.integrate import tanhsinh
 
@@ -115,7 +115,7 @@ class Theory(abc.ABC):
         _refuse_unfinished(found.success, "the elastic energy")
         return np.asarray(found.integral)
 
-    def mean_separation_at(self, surface: Surface, quantity: str, wanted: FloatArray) -> FloatArray:
+    def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at which "force" (over A0 E*) or "area" has a wanted value; h_max at zero.
 
         Raises
@@ -179,12 +179,13 @@ def _places(shape: tuple[int, ...]) -> FloatArray:
     return np.arange(int(np.prod(shape)), dtype=float).reshape(shape)
 
 
-def select(surface: Surface, shape: tuple[int, ...], place: Any) -> Surface:
+def select(surface: AnySurface, shape: tuple[int, ...], place: Any) -> AnySurface:
     """The surfaces of a batch, broadcast to `shape`, at flat places."""
     if surface.shape == ():
         return surface
     chosen = np.asarray(place).astype(np.intp)
-    return Surface(*(np.broadcast_to(getattr(surface, name), shape).ravel()[chosen] for name in PARAMETERS))
+    numbers = (np.broadcast_to(getattr(surface, name), shape).ravel()[chosen] for name in surface.parameters)
+    return surface.with_numbers(*numbers)
 
 
 def _refuse_unfinished(success: Any, what: str) -> None:
@@ -193,7 +194,7 @@ def _refuse_unfinished(success: Any, what: str) -> None:
         raise ConvergenceError(f"{what} was not found for {int(failed.sum())} entries", failed)
 
 
-def answer_where_finite(theory: Theory, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
+def answer_where_finite(theory: Theory, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
     """A theory's answers at mean separations u, shape (n,), on one surface; NaN where it has no finite force."""
     u = np.asarray(mean_separation, dtype=float)
     places = np.arange(u.size)
@@ -219,7 +220,7 @@ class Wrapped(Theory):
         self.name = theory.name
         self._theory = theory
 
-    def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
+    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]; the error is not known."""
         from scipy.differentiate import derivative
 

@@ -12,7 +12,7 @@ import numpy as np
 from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, is_labelled
 from mbma_tables.errors import InputError
 from mbma_tables.labels import apply_to_surface
-from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 from mbma_tables.theories.yielding import Yielding, checked_hardness
 from mbma_tables.units import Units, unit_of
@@ -103,7 +103,7 @@ class Contact:
     def _state(self) -> tuple[Numbers, ...]:
         """Yielded share of the contact, incremental stiffness and gap of the mean planes."""
 
-        def state(theory: Theory, s: Surface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[Any, ...]:
+        def state(theory: Theory, s: AnySurface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[Any, ...]:
             known = TheoryAnswer(*answer)
             if not isinstance(theory, Yielding):
                 return np.zeros(known.force.shape), E * known.stiffness, np.broadcast_to(u, known.force.shape)
@@ -165,7 +165,7 @@ class Contact:
     def valid(self) -> Numbers:
         """Whether the theory was tested for contacts such as these; `reasons` says where and why not."""
 
-        def none(theory: Theory, s: Surface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[FloatArray]:
+        def none(theory: Theory, s: AnySurface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[FloatArray]:
             masks = list(concerns(theory, s, u, TheoryAnswer(*answer)).values())
             return (np.asarray(~np.logical_or.reduce(masks), dtype=float),)
 
@@ -176,13 +176,13 @@ class Contact:
         """Reasons for which entries are not `valid`, each with a mask; of plain arrays."""
         source, answer = self._source, self._answer
         surface = source.surface
-        own: list[Any] = [getattr(surface, name) for name in PARAMETERS]
+        own: list[Any] = [getattr(surface, name) for name in surface.parameters]
         fields: list[Any] = [*answer, self.mean_separation, source.E_star, source.hardness, *own]
         if is_labelled(answer.force):
             import xarray as xr
 
             fields = list(xr.broadcast(*map(xr.DataArray, fields)))
-            surface = Surface(*map(np.asarray, fields[7:]))
+            surface = surface.with_numbers(*map(np.asarray, fields[7:]))
         *known, u, E_star, hardness = map(np.asarray, fields[:7])
         found = concerns(source.theory_at(E_star, hardness), surface, u, TheoryAnswer(*known))
         return {reason: mask for reason, mask in found.items() if mask.any()}
@@ -193,7 +193,7 @@ class Source:
     """What a `Contact` is of, for quantities that are computed when they are read."""
 
     theory: Theory
-    surface: Surface
+    surface: AnySurface
     E_star: Any
     hardness: Any
     units: Units
@@ -222,7 +222,7 @@ class Source:
         arrays = {"mean_separation": contact.mean_separation, "E_star": self.E_star, "hardness": self.hardness}
         arrays |= more or {}
 
-        def block(surface: Surface, u: Any, E_star: Any, hardness: Any, *others: Any) -> tuple[Any, ...]:
+        def block(surface: AnySurface, u: Any, E_star: Any, hardness: Any, *others: Any) -> tuple[Any, ...]:
             return function(self.theory_at(E_star, hardness), surface, u, E_star, *others)
 
         if self.surface.labelled or any(map(is_labelled, arrays.values())):
@@ -231,7 +231,7 @@ class Source:
         return tuple(part[()] for part in block(self.surface, *map(np.asarray, arrays.values())))
 
 
-def concerns(theory: Theory, surface: Surface, u: FloatArray, answer: TheoryAnswer) -> dict[str, Any]:
+def concerns(theory: Theory, surface: AnySurface, u: FloatArray, answer: TheoryAnswer) -> dict[str, Any]:
     """Every reason against a theory's answers, with its mask."""
     steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.force))
     text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"

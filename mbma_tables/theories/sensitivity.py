@@ -12,8 +12,9 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
-from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.surfaces.surface import PARAMETERS
 
 if TYPE_CHECKING:
     from mbma_tables.theories.protocol import Theory
@@ -24,7 +25,9 @@ GAP = "mean_separation"
 KINDS = ("force", "area")
 
 
-def differentiate(theory: Theory, surface: Surface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...]:
+def differentiate(
+    theory: Theory, surface: AnySurface, mean_separation: FloatArray
+) -> tuple[dict[str, FloatArray], ...]:
     """Derivatives of F/(A0 E*) and A/A0 by "separation" d and each of the surface's parameters, the others held.
 
     Raises
@@ -33,21 +36,26 @@ def differentiate(theory: Theory, surface: Surface, mean_separation: FloatArray)
         Where differences do not settle on a derivative: at corners of a theory, or where force has no bound.
     """
     shape = np.broadcast_shapes(np.shape(mean_separation), surface.shape)
-    at = {name: np.broadcast_to(np.asarray(getattr(surface, name), float), shape) for name in PARAMETERS}
+    names = (GAP, *surface.parameters)
+    at = {name: np.broadcast_to(np.asarray(getattr(surface, name), float), shape) for name in PARAMETERS[1:]}
+    at |= {name: np.broadcast_to(np.asarray(getattr(surface, name), float), shape) for name in surface.parameters}
     at[GAP] = np.broadcast_to(np.asarray(mean_separation, float), shape)
     whole = theory.answer(surface, at[GAP])
     slopes: tuple[dict[str, FloatArray], ...] = ({}, {})
     for kind, found in zip(KINDS, slopes, strict=True):
-        for name in (GAP, *PARAMETERS):
-            found[name] = _derivative(theory, at, name, kind, getattr(whole, kind))
+        for name in names:
+            found[name] = _derivative(theory, surface, at, name, kind, getattr(whole, kind))
         # d = 2 u - h_max is held, not u
         by_gap = found.pop(GAP)
         found["separation"] = by_gap / 2
-        found["h_max"] = found["h_max"] + by_gap / 2
+        if "h_max" in found:
+            found["h_max"] = found["h_max"] + by_gap / 2
     return slopes
 
 
-def _derivative(theory: Theory, at: dict[str, FloatArray], name: str, kind: str, value: FloatArray) -> FloatArray:
+def _derivative(
+    theory: Theory, surface: AnySurface, at: dict[str, FloatArray], name: str, kind: str, value: FloatArray
+) -> FloatArray:
     """Derivative by one parameter, the others and u held."""
     from scipy.differentiate import derivative
 
@@ -59,7 +67,12 @@ def _derivative(theory: Theory, at: dict[str, FloatArray], name: str, kind: str,
         flat = place.astype(np.intp)
         own = {other: numbers.ravel()[flat] for other, numbers in at.items()} | {name: x}
         return np.asarray(
-            getattr(theory.at(value.shape, place).answer(Surface(*(own[p] for p in PARAMETERS)), own[GAP]), kind)
+            getattr(
+                theory.at(value.shape, place).answer(
+                    surface.with_numbers(*(own[p] for p in surface.parameters)), own[GAP]
+                ),
+                kind,
+            )
         )
 
     with np.errstate(all="ignore"):

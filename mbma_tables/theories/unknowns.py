@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, finite_array
 from mbma_tables.errors import InputError
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.theories.contact import KNOWN, contact
 from mbma_tables.units import Units, modulus_and_units, unit_of
@@ -75,7 +76,7 @@ def _with_unit(name: str, value: float, units: Units) -> str:
 
 
 def sensitivity(
-    surface: Surface,
+    surface: AnySurface,
     *,
     separation: ArrayLike | None = None,
     mean_separation: ArrayLike | None = None,
@@ -126,6 +127,8 @@ def sensitivity(
     if len(held) != 1:
         raise InputError(f"give exactly one of {', '.join(KNOWN)}; got {' and '.join(held) or 'none'}")
     modulus, units = modulus_and_units(E_star, surface)
+    if not isinstance(surface, Surface):
+        raise InputError("sensitivity is to a surface's numbers, and this one is its own spectrum: ask surface.fit()")
     make, parameters = _parameters(surface)
     (by, value), *_ = held.items()
     given = parameters | {"E_star": modulus, by: units.number(by, value)}

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from mbma_tables import hardness as law
 from mbma_tables.arguments import FloatArray, describe_entries, finite_array, require
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.hardness_table import shipped
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
@@ -77,12 +77,12 @@ class Yielding(Theory):
         chosen = np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)]
         return Yielding(self.elastic, chosen)
 
-    def plasticity_index(self, surface: Surface) -> FloatArray:
+    def plasticity_index(self, surface: AnySurface) -> FloatArray:
         """psi = E* g/p_m, g the rms gradient; 0 where the hardness is infinite."""
         return np.asarray(surface.rms_gradient / self.hardness)
 
     def _capped(
-        self, surface: Surface, u: FloatArray, elastic: TheoryAnswer
+        self, surface: AnySurface, u: FloatArray, elastic: TheoryAnswer
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Force and loading stiffness over A0 E*, eta and rms gradient."""
         gradient = np.asarray(surface.rms_gradient)
@@ -96,7 +96,7 @@ class Yielding(Theory):
             stiffness = np.where(force > 0, force * gradient * rate, 0.0)
         return force * gradient, stiffness, eta, gradient
 
-    def answer(self, surface: Surface, mean_separation: FloatArray) -> TheoryAnswer:
+    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and the loading curve's stiffness at mean separations u [length]."""
         u = np.asarray(mean_separation, dtype=float)
         elastic = self.elastic.answer(surface, u)
@@ -110,13 +110,13 @@ class Yielding(Theory):
             *(np.where(np.isinf(self.hardness), one, other) for one, other in zip(elastic, capped, strict=True))
         )
 
-    def _elastic_area(self, surface: Surface, force: FloatArray, elastic: TheoryAnswer) -> FloatArray:
+    def _elastic_area(self, surface: AnySurface, force: FloatArray, elastic: TheoryAnswer) -> FloatArray:
         """A/A0 of the elastic contact at equal force; 0 without force."""
         # where nothing yields or touches, a force that the theory is sure to reach
         needed = (force > 0) & ~np.isinf(self.hardness)
         return np.where(needed, self.elastic.area_at(surface, np.where(needed, force, elastic.force)), 0.0)
 
-    def state(self, surface: Surface, mean_separation: FloatArray, answer: TheoryAnswer) -> State:
+    def state(self, surface: AnySurface, mean_separation: FloatArray, answer: TheoryAnswer) -> State:
         """What yielding adds at mean separations u, where `answer` is this theory's."""
         u = np.asarray(mean_separation, dtype=float)
         elastic = self.elastic.answer(surface, u)
@@ -133,16 +133,16 @@ class Yielding(Theory):
             np.where(bound, u, planes),
         )
 
-    def bearing_share(self, surface: Surface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The elastic theory's."""
         return self.elastic.bearing_share(surface, mean_separation)
 
-    def interval(self, surface: Surface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+    def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which the elastic force falls, and Gaussian heights end in numbers."""
         low, high = self.elastic.interval(surface, "force")
         return low, np.minimum(high, MAX_LEVEL * np.asarray(surface.h_rms))
 
-    def mean_separation_at(self, surface: Surface, quantity: str, wanted: FloatArray) -> FloatArray:
+    def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at which "force" (over A0 E*) or "area" has a wanted value.
 
         Raises
@@ -165,7 +165,7 @@ class Yielding(Theory):
             )
         return self._separation(surface, given)
 
-    def _separation(self, surface: Surface, force: FloatArray) -> FloatArray:
+    def _separation(self, surface: AnySurface, force: FloatArray) -> FloatArray:
         """Newton's method in a bracket: u lies below the elastic contact's, and the start is close."""
         shape = force.shape
         h_max, h_rms = np.asarray(surface.h_max, float), np.asarray(surface.h_rms, float)
@@ -209,7 +209,7 @@ class Yielding(Theory):
                 raise ConvergenceError(f"no separation was found for {int((~done).sum())} pressures", ~done)
         return np.where(free, high, np.where(full, low, u))
 
-    def scatter(self, surface: Surface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of ln F at given u and of ln A at given F against boundary elements with a hardness."""
         force, contact = self.elastic.scatter(surface, area)
         eta = self.hardness / np.asarray(surface.rms_gradient)
@@ -218,7 +218,7 @@ class Yielding(Theory):
         elastic = eta > table.eta[-1]
         return np.where(elastic, force, known[0]), np.where(elastic, contact, known[1])
 
-    def concerns(self, surface: Surface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
+    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """The elastic theory's reasons, and hardnesses below those that were simulated."""
         soft = self.hardness / np.asarray(surface.rms_gradient) < TESTED_ETA * (1 - 1e-9)
         return {

@@ -22,10 +22,13 @@ from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, req
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import AnyModel, get_model
 from mbma_tables.models.protocol import AREA, BOTH, FORCE, OUTSIDE, QUANTITIES
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.island_sum import slopes_of, totals_of
 from mbma_tables.totals.kernel import Pairs
+from mbma_tables.totals.measured import measured_totals
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -50,7 +53,8 @@ class Totals:
     islands : int or None
         Islands evaluated; None where that is left to dask.
     force_by, area_by : dict of ndarray, or None
-        Partial derivatives by "separation", "hurst", "q0", "q1", "h_rms" and "h_max", the others held.
+        Partial derivatives by "separation", "hurst", "q0", "q1", "h_rms" and "h_max", the others held; by the
+        separation alone on a surface that is its own spectrum.
     """
 
     separation: Any
@@ -74,7 +78,7 @@ def wanted_quantities(quantities: Iterable[str]) -> tuple[str, ...]:
 
 
 def totals_at(
-    surface: Surface,
+    surface: AnySurface,
     separation: ArrayLike,
     tier: str | AnyModel = "universal",
     reading: str | Reading = "reported",
@@ -93,27 +97,31 @@ def totals_at(
         raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
     model = get_model(tier, rtol, reading)
     which = BOTH if len(quantities) > 1 else QUANTITIES.index(quantities[0])
-    shape = broadcast_shape(separation=gap, surface=surface.hurst, E_star=modulus)
+    shape = broadcast_shape(separation=gap, surface=surface.h_rms, E_star=modulus)
     gap = np.broadcast_to(gap, shape)
     h_max = np.broadcast_to(np.asarray(surface.h_max), shape)
     require("separation", gap, gap >= -h_max, "at least -h_max, where the model ends")
-    zeta_1 = np.asarray(surface.zeta_1)
-    require(
-        "q1/q0", zeta_1, zeta_1 > reading.floor_u, f"greater than {reading.floor_u:g}, the reading's floor of zeta_u"
-    )
-    pairs = Pairs.of(surface, np.asarray(h_max - gap))
-    stress = modulus * surface.q0 * surface.s
+    depth = np.asarray(h_max - gap)
     force_by = area_by = None
     try:
-        if derivatives:
-            sums, error, islands = slopes_of(model, pairs, reading, rtol, outside)
-            force, area = sums[:, 0, 0], sums[:, 1, 0]
-            force_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
+        if isinstance(surface, MeasuredSurface):
+            stress = modulus
+            force, area, error, islands, by_depth = measured_totals(surface, depth, model, reading, rtol, outside)
+            if derivatives:
+                force_by, area_by = {"separation": -stress * by_depth[0]}, {"separation": -by_depth[1]}
         else:
-            force, area, error, islands = totals_of(model, pairs, reading, rtol, outside, which)
+            assert isinstance(surface, Surface)
+            stress = modulus * surface.q0 * surface.s
+            pairs = _pairs(surface, depth, reading)
+            if derivatives:
+                sums, error, islands = slopes_of(model, pairs, reading, rtol, outside)
+                force, area = sums[:, 0, 0], sums[:, 1, 0]
+                force_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
+            else:
+                force, area, error, islands = totals_of(model, pairs, reading, rtol, outside, which)
         if area_by is not None and reading.addition == "cover":
             kept = np.exp(-area.reshape(shape))  # dA = exp(-sum) dsum
-            area_by = {name: slope * kept for name, slope in area_by.items()}
+            area_by = {name: (slope * kept)[()] for name, slope in area_by.items()}
     except (ConvergenceError, OutOfRangeError) as fault:
         if fault.mask is not None:
             fault.mask = fault.mask.reshape(shape)
@@ -130,6 +138,14 @@ def totals_at(
         force_by=force_by if which != AREA else None,
         area_by=area_by if which != FORCE else None,
     )
+
+
+def _pairs(surface: Surface, depth: FloatArray, reading: Reading) -> Pairs:
+    zeta_1 = np.asarray(surface.zeta_1)
+    require(
+        "q1/q0", zeta_1, zeta_1 > reading.floor_u, f"greater than {reading.floor_u:g}, the reading's floor of zeta_u"
+    )
+    return Pairs.of(surface, depth)
 
 
 def _by_parameter(

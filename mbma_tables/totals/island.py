@@ -10,8 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, is_labelled, require
+from mbma_tables.errors import InputError
 from mbma_tables.islands.geometry import FIELDS, fill_islands
+from mbma_tables.islands.measured import measured_islands
 from mbma_tables.models import AnyModel, answer_islands, get_model, tier_name
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.units import modulus_and_units
@@ -84,7 +88,7 @@ def scale_area(g: dict[str, FloatArray]) -> FloatArray:
 
 
 def island(
-    surface: Surface,
+    surface: AnySurface,
     delta: ArrayLike,
     tier: str | AnyModel = "universal",
     reading: str | Reading = "reported",
@@ -132,17 +136,13 @@ def island(
     modulus = finite_array("E_star", E_star)
     require("E_star", modulus, modulus > 0, "positive")
     rule = get_reading(reading)
-    largest = np.asarray(surface.zeta_1)
-    require("q1/q0", largest, largest > rule.floor_u, f"above floor_u = {rule.floor_u:g} of the reading {rule.name!r}")
     model = get_model(tier, rtol, rule)
-    broadcast_shape(delta=approach, surface=surface.hurst, E_star=modulus)
-    shape = broadcast_shape(delta=approach, surface=surface.hurst)
-    approach, hurst, zeta_1 = (
-        np.broadcast_to(array, shape) for array in (approach / surface.h_rms, surface.hurst, surface.zeta_1)
-    )
-    g = geometry(approach, hurst, zeta_1, rule)
-    phi = answer_islands(model, g | {"hurst": hurst})
-    s, q0 = surface.s, surface.q0
+    broadcast_shape(delta=approach, surface=surface.h_rms, E_star=modulus)
+    shape = broadcast_shape(delta=approach, surface=surface.h_rms)
+    g, s, q0 = islands_of(surface, np.broadcast_to(approach, shape), rule)
+    if isinstance(surface, MeasuredSurface):
+        refuse_bands(model)
+    phi = answer_islands(model, g)
     sizes = {
         "R_d": 1 / (s * q0**2),
         "R_u": 1 / (s * q0**2),
@@ -162,8 +162,30 @@ def island(
     )
 
 
+def islands_of(surface: AnySurface, delta: FloatArray, reading: Reading) -> tuple[dict[str, FloatArray], Any, Any]:
+    """`FIELDS` of islands at approaches > 0 [length], their Hurst exponent where they have one, and units s and q0."""
+    if isinstance(surface, MeasuredSurface):
+        return measured_islands(surface, delta, reading), 1.0, 1.0
+    assert isinstance(surface, Surface)
+    largest = np.asarray(surface.zeta_1)
+    allowed = f"above floor_u = {reading.floor_u:g} of the reading {reading.name!r}"
+    require("q1/q0", largest, largest > reading.floor_u, allowed)
+    hurst, zeta_1 = (np.broadcast_to(array, delta.shape) for array in (surface.hurst, surface.zeta_1))
+    g = geometry(np.asarray(delta / surface.h_rms), hurst, zeta_1, reading)
+    return g | {"hurst": hurst}, surface.s, surface.q0
+
+
+def refuse_bands(model: AnyModel) -> None:
+    """Refuse an island model of self-affine bands alone."""
+    if model.name == "island4d":
+        raise InputError(
+            f"tier {model.name!r} holds islands of self-affine surfaces alone: ask tier 'universal' or 'exact', "
+            "or surface.fit()"
+        )
+
+
 def _of_labelled(
-    surface: Surface, delta: Any, tier: str | AnyModel, reading: str | Reading, E_star: Any, rtol: float
+    surface: AnySurface, delta: Any, tier: str | AnyModel, reading: str | Reading, E_star: Any, rtol: float
 ) -> Island:
     """`island` of DataArrays, lazily where they are."""
     # xarray comes in with its own objects
@@ -171,7 +193,7 @@ def _of_labelled(
 
     names = (*GEOMETRY, "force", "area", "error")
 
-    def answer(block: Surface, own: Any, modulus: Any) -> tuple[Any, ...]:
+    def answer(block: AnySurface, own: Any, modulus: Any) -> tuple[Any, ...]:
         found = island(block, own, tier, reading, modulus, rtol)
         return tuple(np.broadcast_to(getattr(found, name), np.shape(found.force)) for name in names)
 

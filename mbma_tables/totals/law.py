@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,12 +21,15 @@ from mbma_tables.arguments import FloatArray, number_in
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import AnyModel, get_model
 from mbma_tables.models.protocol import MAX_RTOL, MIN_RTOL
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading, get_reading
-from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals import law_kernel
 from mbma_tables.totals.island_sum import kinks, totals_of
 from mbma_tables.totals.kernel import Pairs
 from mbma_tables.totals.law_protocol import ContactLaw
+from mbma_tables.totals.measured import island_curve, measured_totals
 from mbma_tables.units import UNKNOWN, Units
 
 TERMS = law_kernel.TERMS
@@ -143,7 +147,7 @@ def _to_piece(values: FloatArray) -> FloatArray:
     return pieces
 
 
-def one_surface(surface: Surface) -> Surface:
+def one_surface(surface: AnySurface) -> AnySurface:
     """A surface of plain numbers.
 
     Raises
@@ -152,14 +156,14 @@ def one_surface(surface: Surface) -> Surface:
         For a batch.
     """
     if surface.labelled:
-        surface = Surface(*(np.asarray(getattr(surface, name)) for name in PARAMETERS))
+        surface = surface.with_numbers(*(np.asarray(getattr(surface, name)) for name in surface.parameters))
     if surface.shape != ():
         raise InputError(f"a law is of one surface, got a batch of shape {surface.shape}")
     return surface
 
 
 def mbma_law(
-    surface: Surface,
+    surface: AnySurface,
     rtol: float = 1e-8,
     tier: str | AnyModel = "universal",
     reading: str | Reading = "reported",
@@ -175,31 +179,25 @@ def mbma_law(
     asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
     modulus = number_in("E_star", E_star, np.finfo(float).tiny, np.finfo(float).max)
     choice = get_reading(reading)
-    if not surface.zeta_1 > choice.floor_u:
-        raise OutOfRangeError(f"q1/q0 must be greater than {choice.floor_u:g}, the reading's floor of zeta_u")
     inner = max(0.1 * asked, MIN_RTOL)
     model = get_model(tier, inner, choice)
     h_rms, h_max = float(surface.h_rms), float(surface.h_max)
-    layer = h_rms * float(surface.zeta_1) ** -float(surface.hurst)
-    # totals are asked for at E* = 1: the modulus scales what comes out
-    log_stress = math.log(float(surface.q0)) + math.log(float(surface.s))
+    layer, ends, totals = _islands(surface, model, choice, inner)
     worst = 0.0
 
     def residues(tau: FloatArray) -> FloatArray:
         nonlocal worst
         depth = layer * np.sinh(tau) ** 2
-        found = totals_of(model, Pairs.of(surface, depth), choice, inner)
-        worst = max(worst, float(np.max(found.error)))
-        force, area = found.force.reshape(tau.shape), choice.area_of(found.area).reshape(tau.shape)
+        force, area, error = (part.reshape(tau.shape) for part in totals(depth))
+        worst, area = max(worst, float(np.max(error))), choice.area_of(area)
         if not (force.all() and area.all()):
             raise OutOfRangeError(f"h_max is {h_max / h_rms:g} h_rms, so high that force or area underflow")
         log_depth = np.log(depth)
-        return np.stack([np.log(force) + log_stress - 3.5 * log_depth, np.log(area) - 10 / 3 * log_depth], axis=-1)
+        return np.stack([np.log(force) - 3.5 * log_depth, np.log(area) - 10 / 3 * log_depth], axis=-1)
 
     def to_tau(depth: Any) -> Any:
         return np.arcsinh(np.sqrt(np.asarray(depth) / layer))
 
-    ends = [k * h_rms for k in kinks(surface.hurst, surface.zeta_1, choice)]
     edges = to_tau(sorted({0.0, *(e for e in ends if e < 2 * h_max), 2 * h_max}))
     breaks, pieces, errors = fit_pieces(residues, edges, min(asked, RESOLVED))
     errors += worst
@@ -219,6 +217,30 @@ def mbma_law(
         energies=law.energies,
         errors=errors,
     )
+
+
+def _islands(
+    surface: AnySurface, model: AnyModel, reading: Reading, rtol: float
+) -> tuple[float, list[float], Callable[[FloatArray], tuple[FloatArray, ...]]]:
+    """Approach at which an island's band leaves the shortest wave, its kinks [length], and totals at E* = 1."""
+    if isinstance(surface, MeasuredSurface):
+        curve = island_curve(surface, model, reading, rtol, "raise")
+        return (
+            curve.layer,
+            list(curve.kinks),
+            lambda depth: measured_totals(surface, depth, model, reading, rtol, "raise")[:3],
+        )
+    assert isinstance(surface, Surface)
+    if not surface.zeta_1 > reading.floor_u:
+        raise OutOfRangeError(f"q1/q0 must be greater than {reading.floor_u:g}, the reading's floor of zeta_u")
+    h_rms, stress = float(surface.h_rms), float(surface.q0) * float(surface.s)
+
+    def totals(depth: FloatArray) -> tuple[FloatArray, ...]:
+        found = totals_of(model, Pairs.of(surface, depth), reading, rtol)
+        return found.force * stress, found.area, found.error
+
+    ends = [k * h_rms for k in kinks(surface.hurst, surface.zeta_1, reading)]
+    return h_rms * float(surface.zeta_1) ** -float(surface.hurst), ends, totals
 
 
 def fit_pieces(residues: Any, edges: FloatArray, rtol: float) -> tuple[FloatArray, FloatArray, FloatArray]:

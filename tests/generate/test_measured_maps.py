@@ -8,7 +8,6 @@ from generate.boundary_elements.measured_maps import LARGEST, measured_maps, mid
 from generate.pages import distances
 from mbma_tables import Surface, contact
 from mbma_tables.surfaces.maps import prepared
-from mbma_tables.theories import Calibrated
 
 
 def test_the_middle_of_a_map_is_kept():
@@ -33,8 +32,8 @@ def test_a_file_of_heights_becomes_a_case(tmp_path, monkeypatch):
     monkeypatch.setattr(distances, "DATA", tmp_path)
     one = distances.measured("own")
     # what is kept gives the law that the map itself gives
-    law = Calibrated.from_map(grid, 1 / 32, periodic=False)
-    force = one.force[one.area > 0.02] * law.surface.rms_gradient
+    surface = Surface.from_map(grid, 1 / 32, periodic=False, model="measured")
+    force = one.force[one.area > 0.02] * surface.bearing.gradient
     mine = distances.THEORIES["calibrated, map"](one).area(one.force[one.area > 0.02])
-    assert mine == pytest.approx(contact(law.surface, pressure=force, theory=law).area, rel=0.02)
+    assert mine == pytest.approx(contact(surface, pressure=force, theory="calibrated").area, rel=0.02)
     assert isinstance(distances.surface_of(one), Surface)

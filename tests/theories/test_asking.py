@@ -99,11 +99,13 @@ def test_derivatives_keep_the_scales_of_an_elastic_contact(theory):
     assert found.force_by["separation"] == pytest.approx(-found.stiffness / 2, rel=1e-6)
 
 
-def test_a_theory_of_one_spectrum_has_no_such_derivatives():
+@each
+def test_a_surface_that_is_its_own_spectrum_has_derivatives_by_what_is_known(theory):
     q = np.geomspace(0.2, 50, 200)
-    law = Calibrated.from_spectrum(q, 0.01 * np.minimum(1, q**-3.6), h_max=1.1)
-    with pytest.raises(OutOfRangeError, match=r"use this theory's \.surface"):
-        contact(law.surface, pressure=0.03, theory=law, derivatives=True)
+    surface = Surface.from_spectrum(q, 0.01 * np.minimum(1, q**-3.6), h_max=1.1)
+    found = contact(surface, pressure=[0.01, 0.03], theory=theory, derivatives=True)
+    assert set(found.area_by) == {"pressure", "E_star"}
+    assert found.separation_by["pressure"] == pytest.approx(-2 / found.stiffness, rel=1e-5)
 
 
 def test_a_theory_is_asked_once(monkeypatch):

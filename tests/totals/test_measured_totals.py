@@ -1,0 +1,215 @@
+"""MBMA on surfaces that are their own spectrum, against the five numbers, quadrature, and boundary elements."""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law, island
+from mbma_tables.islands.measured import floors_of, measured_islands
+from mbma_tables.models import answer_islands, get_model
+from mbma_tables.surfaces.readings import FITTED, PRINTED, REPORTED, get_reading
+from mbma_tables.totals.measured import IslandCurve
+
+DATA = pathlib.Path(__file__).parents[1] / "data"
+DEPTHS = np.array([1e-9, 1e-4, 0.02, 0.3, 1.0, 1.5, 2.0])  # (h_max - d)/h_max
+
+
+def five_numbers(hurst=0.8, zeta_1=200.0, h_max=3.0):
+    return Surface(hurst=hurst, q0=0.01, q1=0.01 * zeta_1, h_rms=1.0, h_max=h_max)
+
+
+def sampled(surface, count):
+    q = np.geomspace(surface.q0, surface.q1, count)
+    return Surface.from_spectrum(q, surface.power_spectrum(q), h_max=float(surface.h_max))
+
+
+def rough(seed=1, count=60, h_max=3.5, gap=True):
+    """A plateau, a power law with scatter, a gap."""
+    q = np.geomspace(0.2, 60, count)
+    C = np.minimum(1, q**-3.5) * np.random.default_rng(seed).uniform(0.7, 1.4, count)
+    C[count // 2] *= not gap
+    unit = Surface.from_spectrum(q, C, h_max=1.0).h_rms
+    return Surface.from_spectrum(q, C / unit**2, h_max=h_max)
+
+
+@pytest.mark.parametrize("reading", [REPORTED, PRINTED, FITTED], ids=lambda r: r.name)
+@pytest.mark.parametrize(("hurst", "zeta_1"), [(0.8, 200.0), (0.5, 30.0), (1.0, 1000.0), (0.3, 64.0), (0.9, 6.0)])
+def test_a_sampled_power_law_has_the_totals_of_its_five_numbers(reading, hurst, zeta_1):
+    surface = five_numbers(hurst, zeta_1)
+    d = surface.h_max * (1 - DEPTHS[1:])
+    plain = contact(surface, d, reading=reading, derivatives=True)
+    for count in (2, 200):
+        found = contact(sampled(surface, count), d, reading=reading, derivatives=True)
+        bound = float(np.max(plain.error + found.error))
+        for name in ("force", "area"):
+            np.testing.assert_allclose(getattr(found, name), getattr(plain, name), rtol=bound)
+        np.testing.assert_allclose(found.stiffness, plain.stiffness, rtol=10 * bound)
+        slopes = (found.area_by["separation"], plain.area_by["separation"])
+        np.testing.assert_allclose(*slopes, rtol=10 * bound)
+
+
+def test_printed_samples_lose_what_their_digits_lose():
+    surface = five_numbers()
+    d = surface.h_max * (1 - DEPTHS[1:])
+    plain = contact(surface, d)
+    q = np.geomspace(surface.q0, surface.q1, 2000)
+    for digits, bound in ((4, 1e-3), (7, 1e-5)):
+        rounded = [np.array([float(f"{x:.{digits}g}") for x in column]) for column in (q, surface.power_spectrum(q))]
+        found = contact(Surface.from_spectrum(*rounded, h_max=3.0), d)
+        np.testing.assert_allclose(found.force, plain.force, rtol=bound)
+        np.testing.assert_allclose(found.area, plain.area, rtol=bound)
+
+
+def test_exact_and_universal_tiers_agree():
+    surface = rough(count=24)
+    d = surface.h_max * (1 - DEPTHS[1:])
+    exact, table = (contact(surface, d, tier=tier) for tier in ("exact", "universal"))
+    np.testing.assert_allclose(table.force, exact.force, rtol=1e-7)
+    np.testing.assert_allclose(table.area, exact.area, rtol=1e-7)
+
+
+@pytest.mark.parametrize("reading", ["reported", "printed", "fitted"])
+@pytest.mark.parametrize(("gap", "rtol"), [(False, 2e-7), (True, 3e-5)], ids=["whole", "gap"])
+def test_totals_are_the_integral_over_islands(reading, gap, rtol):
+    # ten thousand panels that know nothing of samples, nor of the jump that a gap in the spectrum makes
+    surface, rule = rough(gap=gap), get_reading(reading)
+    model = get_model("rigid", 1e-8, rule)
+    curve = IslandCurve(surface, model, rule, 1e-8)
+    kink = floors_of(surface, rule).kinks[0]
+    node, weight = np.polynomial.legendre.leggauss(4)
+    for depth in (0.05, 1.0, 5.0):
+        edges = np.append(0.0, np.geomspace(1e-9 * depth, depth, 10_000))
+        edges = np.unique(np.append(edges, min(kink, depth)))  # where K1 jumps
+        half = np.diff(edges)[:, None] / 2
+        delta = edges[:-1, None] + half * (1 + node)
+        g = measured_islands(surface, delta, rule)
+        phi = answer_islands(model, g)
+        height = (surface.h_max - depth + delta - g["h_d"]) / g["sigma_d"]
+        density = g["D_d"] * np.exp(-(height**2) / 2) / (np.sqrt(2 * np.pi) * g["sigma_d"])
+        density *= np.where(delta < kink, 1 - 4 / 3 * rule.beta, 1.0)
+        force = g["sigma"] * np.sqrt(2 * g["R_d"] * g["sigma"]) * phi.phi_F
+        area = 2 * np.pi * g["eta"] * g["D"] * g["R_u"] * g["R_d"] * g["sigma"] ** 2 * phi.phi_A
+        found = curve.totals(np.array([depth]))
+        assert found.force[0] == pytest.approx(float(np.sum(force * density * half * weight)), rel=rtol)
+        assert found.area[0] == pytest.approx(float(np.sum(area * density * half * weight)), rel=rtol)
+        assert found.number[0] == pytest.approx(float(np.sum(density * half * weight)), rel=rtol)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 1000), st.floats(0.5, 4.0))
+def test_errors_hold_and_slopes_are_slopes(seed, share):
+    surface = rough(seed)
+    model = get_model("universal", 1e-8, REPORTED)
+    coarse, fine = (IslandCurve(surface, model, REPORTED, rtol) for rtol in (1e-5, 1e-10))
+    depth = surface.h_rms * share * np.array([1e-5, 0.1, 1.0])
+    one, two = coarse.totals(depth), fine.totals(depth)
+    assert (np.abs(one.force / two.force - 1) <= one.error + two.error).all()
+    assert (np.abs(one.area / two.area - 1) <= one.error + two.error).all()
+    step = 1e-4 * depth
+    ends = [fine.totals(depth + sign * step) for sign in (1, -1)]
+    for name in ("force", "area"):
+        slope = (getattr(ends[0], name) - getattr(ends[1], name)) / (2 * step)
+        assert getattr(two, f"{name}_slope") == pytest.approx(slope, rel=2e-5)
+
+
+def test_first_contact_is_a_power_of_depth():
+    curve = IslandCurve(rough(), get_model("universal", 1e-8, REPORTED), REPORTED, 1e-8)
+    depth = np.array([1e-12, 2e-12])
+    found = curve.totals(depth)
+    assert np.log2(found.force[1] / found.force[0]) == pytest.approx(7 / 2, rel=1e-6)
+    assert np.log2(found.area[1] / found.area[0]) == pytest.approx(10 / 3, rel=1e-6)
+    nothing = curve.totals(np.array([0.0, -1.0]))
+    assert nothing.force.tolist() == nothing.area.tolist() == nothing.error.tolist() == [0, 0]
+
+
+def test_lengths_scale():
+    surface = rough()
+    other = surface.scaled(1e-9, None)
+    d = surface.h_max * (1 - DEPTHS[2:])
+    one, two = contact(surface, d), contact(other, 1e-9 * d)
+    np.testing.assert_allclose(two.force, one.force, rtol=1e-9)
+    np.testing.assert_allclose(two.stiffness, 1e9 * one.stiffness, rtol=1e-8)
+
+
+def test_a_law_is_the_contacts():
+    surface = rough()
+    law = contact_law(surface)
+    d = surface.h_max * (1 - DEPTHS)
+    found = contact(surface, d)
+    np.testing.assert_allclose(law.force(d), found.force, rtol=2 * law.error)
+    np.testing.assert_allclose(law.area(d), found.area, rtol=2 * law.error)
+    assert (law.theory, law.reading, law.tier) == ("mbma", "reported", "universal")
+
+
+def test_islands():
+    surface = five_numbers()
+    delta = [0.01, 0.5, 2.0, 8.0]
+    one, two = island(surface, delta), island(sampled(surface, 30), delta)
+    for field in dataclasses.fields(one):
+        value = getattr(one, field.name)
+        if isinstance(value, np.ndarray) and field.name != "error":
+            np.testing.assert_allclose(getattr(two, field.name), value, rtol=1e-12, err_msg=field.name)
+
+
+def test_what_mbma_cannot_use_is_refused_with_the_mend():
+    surface = rough()
+    with pytest.raises(InputError, match=r"ask tier 'universal' or 'exact', or surface\.fit\(\)"):
+        contact(surface, 1.0, tier="island4d")
+    with pytest.raises(InputError, match=r"surface\.fit\(\)"):
+        island(surface, 1.0, tier="island4d")
+    q = np.geomspace(1, 10, 30)
+    blue = Surface.from_spectrum(q, q, h_max=3000.0)
+    with pytest.raises(OutOfRangeError, match="measure shorter waves, or ask another theory"):
+        contact(blue, 1.0)
+    assert contact(blue, mean_separation=500.0, theory="calibrated").force > 0
+    steep = Surface.from_spectrum(np.geomspace(1, 30, 50), np.geomspace(1, 30, 50) ** -2.1, h_max=30.0)
+    deep = contact(steep, -29.0, tier="universal", outside="nan").force
+    assert deep > 0 or np.isnan(deep)
+
+
+class TestRollOff:
+    """Boundary elements on two surfaces with a plateau; no constant of MBMA saw them."""
+
+    @staticmethod
+    def surface(number):
+        hurst, waves, last, top = ((0.8, 8, 128, 0.041954782), (0.6, 4, 64, 0.037331897))[number]
+        q = 2 * np.pi * np.geomspace(1, last, 300)
+        C = np.minimum(1, (q / (2 * np.pi * waves)) ** (-2 - 2 * hurst))
+        share = Surface.from_spectrum(q, C, h_max=1.0).m0
+        return Surface.from_spectrum(q, 1e-4 * C / share, h_max=top), 2 * np.pi * waves
+
+    @pytest.mark.parametrize("number", [0, 1])
+    def test_most_height_is_found_near_the_roll_off(self, number):
+        surface, roll_off = self.surface(number)
+        assert 0.8 < surface.longest / roll_off < 1
+        assert sampled(five_numbers(), 50).longest == pytest.approx(0.01)
+
+    @pytest.mark.parametrize("number", [0, 1])
+    def test_area_at_a_force(self, number):
+        surface, _ = self.surface(number)
+        force, area = np.loadtxt(DATA / f"rolloff_{number}.csv", delimiter=",", usecols=(0, 1), unpack=True)
+        tested = (area > 0.002) & (area < 0.25)
+        ratio = contact(surface, pressure=force[tested]).area / area[tested]
+        assert (ratio > 0.85).all()
+        assert (ratio < 1.1).all()
+
+    @pytest.mark.parametrize("number", [0, 1])
+    def test_floors_at_the_roll_off_are_nearer_to_boundary_elements_than_at_the_lowest_wave(self, number):
+        surface, _ = self.surface(number)
+        force, area = np.loadtxt(DATA / f"rolloff_{number}.csv", delimiter=",", usecols=(0, 1), unpack=True)
+        tested = (area > 0.002) & (area < 0.25)
+        lowest = dataclasses.replace(surface)
+        lowest.__dict__["longest"] = float(surface.q0)
+        far, near = (
+            np.sqrt(np.mean(np.log(contact(s, pressure=force[tested]).area / area[tested]) ** 2))
+            for s in (lowest, surface)
+        )
+        assert near < far
+        # and they let force rise further
+        assert contact(lowest, -lowest.h_max).force < contact(surface, -surface.h_max).force
