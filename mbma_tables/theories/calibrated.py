@@ -134,9 +134,7 @@ class Calibrated(Theory):
             **area_concerns(answer.area),
         }
 
-    def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """As for any theory; with a map at hand it is much smaller."""
-        if not (isinstance(surface, MeasuredSurface) and surface.bearing is not None):
-            return super().scatter(surface, area)
-        table, name = calibrated_table.shipped(), f"{self.name}_map"
-        return table.standard_deviation(name, "force", area), table.standard_deviation(name, "area", area)
+    def scatter_name(self, surface: AnySurface) -> str:
+        """With a map at hand scatter is much smaller."""
+        by_map = isinstance(surface, MeasuredSurface) and surface.bearing is not None
+        return f"{self.name}_map" if by_map else self.name

@@ -56,8 +56,7 @@ class Theory(abc.ABC):
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]."""
 
-    @property
-    def scatter_name(self) -> str:
+    def scatter_name(self, surface: AnySurface) -> str:
         """Under which its distance from boundary elements is stated."""
         return self.name
 
@@ -97,7 +96,7 @@ class Theory(abc.ABC):
         they are not known.
         """
         table = calibrated_table.shipped()
-        known = [table.standard_deviation(self.scatter_name, quantity, area) for quantity in ("force", "area")]
+        known = [table.standard_deviation(self.scatter_name(surface), quantity, area) for quantity in ("force", "area")]
         return known[0], known[1]
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:

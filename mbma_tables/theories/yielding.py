@@ -60,10 +60,9 @@ class Yielding(Theory):
         self._elastic, self.hardness = theory, checked_hardness(hardness)
         self.name, self.ends_at_h_max = theory.name, theory.ends_at_h_max
 
-    @property
-    def scatter_name(self) -> str:
+    def scatter_name(self, surface: AnySurface) -> str:
         """The elastic theory's."""
-        return self._elastic.scatter_name
+        return self._elastic.scatter_name(surface)
 
     @property
     def elastic(self) -> Theory:
@@ -214,7 +213,9 @@ class Yielding(Theory):
         force, contact = self.elastic.scatter(surface, area)
         eta = self.hardness / np.asarray(surface.rms_gradient)
         table = shipped()
-        known = [table.standard_deviation(self.scatter_name, quantity, eta, area) for quantity in ("force", "area")]
+        known = [
+            table.standard_deviation(self.scatter_name(surface), quantity, eta, area) for quantity in ("force", "area")
+        ]
         elastic = eta > table.eta[-1]
         return np.where(elastic, force, known[0]), np.where(elastic, contact, known[1])
 

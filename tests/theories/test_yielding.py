@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from mbma_tables import InputError, Surface, contact, contact_law, hardness
-from mbma_tables.theories import THEORIES, Calibrated, get_theory
+from mbma_tables.theories import THEORIES, get_theory
 from mbma_tables.theories.calibrated_table import shipped
 from mbma_tables.theories.yielding import Yielding
 
@@ -144,11 +144,11 @@ def test_a_map_yields_by_its_own_heights():
     noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((64, 64)))
     q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
     heights = np.fft.irfft2(np.where((q > 0.05) & (q < 0.25), noise, 0))
-    law = Calibrated.from_map(heights, dx=1.0, periodic=True)
-    soft = 1e-5 * float(law.surface.rms_gradient)
+    surface = Surface.from_map(heights, dx=1.0, periodic=True)
+    soft = 1e-5 * float(surface.rms_gradient)
     level = np.quantile(heights - heights.mean(), 0.8)
     u = np.maximum(level - (heights - heights.mean()), 0).mean()
-    found = contact(law.surface, mean_separation=u, theory=law, hardness=soft)
+    found = contact(surface, mean_separation=u, theory="calibrated", hardness=soft)
     assert found.area == pytest.approx(0.2, rel=0.03)
     assert found.scatter < shipped().standard_deviation("calibrated", "force", found.area)
 
