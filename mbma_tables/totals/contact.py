@@ -36,7 +36,7 @@ class Totals:
     """Force and area of the MBMA model at given separations, its fields those of `Contact`.
 
     `error` is of quadrature and islands together, against the model that the tier stands for: for "rigid" spheres that
-    do not deform, far from elastic ones. On a surface that is its own spectrum the derivatives are by the separation alone.
+    do not deform, far from elastic ones. Derivatives on a surface that is its own spectrum are by the separation alone.
     """
 
     separation: Any
