@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mbma_tables.errors import OutOfRangeError
+from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.materials import effective_modulus
 
 moduli = st.floats(1e-6, 1e12)
@@ -43,3 +43,19 @@ def test_out_of_range(arguments, message):
     with pytest.raises(OutOfRangeError, match=message) as caught:
         effective_modulus(*arguments)
     assert caught.value.mask.all()
+
+
+def test_ranges_of_metals():
+    from mbma_tables import materials
+
+    assert len(materials.METALS) >= 12
+    for name in materials.METALS:
+        metal = materials.get(name)
+        assert 20 < metal.E < 420
+        assert 0.2 < metal.nu < 0.45
+        for low, high in (metal.hardness, metal.conductivity):
+            assert 0 < low <= high
+        # hardness over modulus of metals
+        assert metal.hardness[1] / metal.E < 0.06
+    with pytest.raises(InputError, match="steel 4140"):
+        materials.get("steel 4141")

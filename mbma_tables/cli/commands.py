@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -95,7 +96,8 @@ def contact_command(
     if name == "mean_separation":
         require(name, asked, asked >= 0, "at least 0, where the model ends")
     answer = contact(specimen.surface, **{name: asked}, **_asked(model, specimen))
-    values = {column: getattr(answer, column) for column in (*COLUMNS[:-1], "stiffness", COLUMNS[-1])}
+    yields = ("yielded", "incremental_stiffness") if model.hardness != math.inf else ()
+    values = {column: getattr(answer, column) for column in (*COLUMNS[:-1], "stiffness", *yields, COLUMNS[-1])}
     report_answer("contact", specimen, model, answer, values).write(output)
 
 

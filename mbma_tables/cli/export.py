@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mbma_tables.cli.options import optional_specimen_options, quantity_option, reading_option, theory_option
+from mbma_tables.cli.options import (
+    hardness_option,
+    optional_specimen_options,
+    quantity_option,
+    reading_option,
+    theory_option,
+)
 from mbma_tables.errors import InputError
 from mbma_tables.export import CODE, DATA, SOLVERS
 from mbma_tables.files import write_file
@@ -35,6 +41,7 @@ NAMED = ("calculix", "abaqus", "modelica")
 @click.option("--name", help="Of the interaction or table: calculix, abaqus, modelica.")
 @click.option("--exponential", is_flag=True, help="For calculix: Persson's exponential law instead of rows.")
 @theory_option
+@hardness_option
 @reading_option
 @click.option("--check", is_flag=True, help="Of source code: build it and replay its conformance points.")
 def export_command(

@@ -6,6 +6,7 @@ import csv
 import dataclasses
 import io
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -187,6 +188,12 @@ def report_answer(
         scale = f"E* is {specimen.E_star:.6g} {specimen.stress_unit or ''}".rstrip()
     made = f"reading {answer.reading}, tier {answer.tier}, rtol {model.rtol:g}" if answer.reading else ""
     notes += [f"{made or f'theory {model.theory}'}; {scale}", "error bounds the relative error of force and area"]
+    if hasattr(answer, "elastic_hardness"):
+        limit = f"{answer.elastic_hardness:.4g} {specimen.stress_unit or ''}".rstrip()
+        if model.hardness == math.inf:
+            notes.append(f"elastic: area within 5% for hardnesses from {limit} on")
+        else:
+            notes.append(f"hardness {model.hardness}: psi {answer.psi:.3g}, elastic up to 1.1 (from {limit} on)")
     facts = {
         "arguments": {
             key: str(value) if isinstance(value, Path) else value
@@ -197,6 +204,7 @@ def report_answer(
         "reading": answer.reading or None,
         "tier": answer.tier or None,
         "rtol": model.rtol,
+        "hardness": None if model.hardness == math.inf else model.hardness,
         "E_star": specimen.E_star,
         "stress_unit": specimen.stress_unit,
         "surface": surface,

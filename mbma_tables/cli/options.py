@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,7 @@ class Model:
     reading: str
     rtol: float
     theory: str = "mbma"
+    hardness: float | str = math.inf
 
 
 @dataclasses.dataclass(frozen=True)
@@ -198,8 +200,15 @@ theory_option = click.option(
 )
 # of islands, which MBMA alone has
 model_options = _group("model", ("tier", "reading", "rtol"), lambda given: Model(**given), *_MODEL_OPTIONS)
+hardness_option = quantity_option("--hardness", help="Largest pressure that the softer body bears; none: elastic.")
+
+
+def _model(given: Mapping[str, Any]) -> Model:
+    return Model(**{name: value for name, value in given.items() if value is not None})
+
+
 theory_options = _group(
-    "model", ("theory", "tier", "reading", "rtol"), lambda given: Model(**given), theory_option, *_MODEL_OPTIONS
+    "model", ("theory", "tier", "reading", "rtol", "hardness"), _model, theory_option, *_MODEL_OPTIONS, hardness_option
 )
 
 output_options = _group(

@@ -7,6 +7,7 @@ approach, so that -dp/du = dp/dc.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from mbma_tables.theories.law import contact_law
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.registry import get_theory
+from mbma_tables.theories.result import ELASTIC_PSI, Contact
 from mbma_tables.totals.conductance import conductance
 from mbma_tables.totals.law_protocol import ContactLaw
 from mbma_tables.units import Units, in_unit, resolve
@@ -69,9 +71,14 @@ class LawTable:
 
 
 def _curve(
-    law: ContactLaw, quantity: str, max_overclosure: float, k_s: float, E_star: float
+    law: ContactLaw,
+    quantity: str,
+    max_overclosure: float,
+    k_s: float,
+    E_star: float,
+    frozen: Callable[[FloatArray], FloatArray] | None,
 ) -> tuple[FloatArray, FloatArray]:
-    """The law on fine points."""
+    """The law on fine points; conductance by the frozen contact's stiffness where it is not the law's own slope."""
     # squares: fine where p is a high power of the overclosure
     c = max_overclosure * np.linspace(0, 1, FINE) ** 2
     d = law.h_max - 2 * c
@@ -79,6 +86,8 @@ def _curve(
     pressure[0] = stiffness[0] = 0.0
     if quantity == "pressure":
         return c, pressure
+    if frozen is not None:
+        stiffness[1:] = frozen(law.h_max - c[1:])
     rises = np.concatenate([[True], np.diff(pressure) > 0])
     return pressure[rises], np.asarray(conductance(stiffness, k_s, E_star))[rises]
 
@@ -99,6 +108,7 @@ def describe_law(
     reading: str | Reading = "reported",
     evenly: bool = False,
     theory: str | Theory | UserTheory = "mbma",
+    hardness: float | str = np.inf,
 ) -> LawTable:
     """A contact law as rows for a code that interpolates linearly.
 
@@ -128,6 +138,8 @@ def describe_law(
         Of the MBMA model.
     theory : str or theory
         As for `contact`.
+    hardness : float or str
+        As for `contact`: the law of loading, and conductance by the stiffness of the frozen contact.
     evenly : bool
         Equally spaced rows instead, for comparison.
 
@@ -165,9 +177,17 @@ def describe_law(
         names = ("pressure", "conductance", stress_unit, f"{conductivity_unit}/{length_unit}")
     elif conductivity is not None or conductivity_unit is not None:
         raise InputError("conductivity and conductivity_unit belong to quantity='conductance': leave them out")
-    law = contact_law(surface, LAW_RTOL, reading=reading, E_star=modulus, theory=theory)
+    cap = units.number("hardness", hardness)
+    law = contact_law(surface, LAW_RTOL, reading=reading, E_star=modulus, theory=theory, hardness=cap)
     least, end = _range(law, end, pressures, units)
-    fine_x, fine_y = _curve(law, quantity, end, k_s, modulus)
+    own = Mbma(reading=reading) if theory == Mbma.name else get_theory(theory)
+
+    def answer(u: FloatArray) -> Contact:
+        return contact(surface, mean_separation=u, E_star=modulus, theory=own, hardness=cap)
+
+    yields = cap < np.inf
+    frozen = (lambda u: np.asarray(answer(u).incremental_stiffness)) if yields else None
+    fine_x, fine_y = _curve(law, quantity, end, k_s, modulus, frozen)
     floor = FLOOR * float(fine_y[-1])
     if pressures is not None:
         floor = least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
@@ -184,11 +204,19 @@ def describe_law(
             pressures=pressures,
             reading=reading,
             theory=theory,
+            hardness=cap,
             evenly=evenly,
         )
-    own = Mbma(reading=reading) if theory == Mbma.name else get_theory(theory)
     comments = _comments(surface, law, modulus, names, x, error, floor, units)
-    known = _validity(surface, law, own, end, stress_unit)
+    gradient = modulus * float(surface.rms_gradient)
+    if yields:
+        comments += (
+            f"hardness = {cap:.10g} {stress_unit}, plasticity index {gradient / cap:.3g}: loading only, "
+            "unloading starts with the incremental stiffness",
+        )
+    else:
+        comments += (f"elastic: within 5% in area for hardnesses from {gradient / ELASTIC_PSI:.4g} {stress_unit} on",)
+    known = _validity(answer, law, own, end, stress_unit)
     return LawTable(x, y, *names, error, (*comments, *known), law.theory, floor, behaviour)
 
 
@@ -255,10 +283,12 @@ def _comments(
     )
 
 
-def _validity(surface: AnySurface, law: ContactLaw, theory: Theory, end: float, stress_unit: str) -> tuple[str, ...]:
+def _validity(
+    answer: Callable[[FloatArray], Contact], law: ContactLaw, theory: Theory, end: float, stress_unit: str
+) -> tuple[str, ...]:
     """Lines that say where the law holds, how far simulations scatter about it, and where its numbers come from."""
     u = np.linspace(law.h_max, law.h_max - end, LOOKED_AT + 1)[1:]
-    found = contact(surface, mean_separation=u, E_star=law.E_star, theory=theory)
+    found = answer(u)
     pressure = np.asarray(law.force(u=u))
     lines = []
     for reason, mask in found.reasons.items():

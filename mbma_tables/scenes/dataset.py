@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
+from mbma_tables.scenes.effects import CORRELATIONS
 from mbma_tables.scenes.plan import Plan
 from mbma_tables.scenes.problem import Problem
 from mbma_tables.surfaces.readings import get_reading
@@ -35,6 +36,10 @@ def _units(problem: Problem) -> dict[str, tuple[str, str]]:
         "stiffness": ("stiffness", "-dF/dd per nominal area"),
         "stiffness_mean": ("stiffness", "-dF/du per nominal area"),
         "energy": ("energy", "elastic energy per nominal area"),
+        "yielded": ("area", "share of the contact area at the hardness"),
+        "mean_pressure": ("pressure", "mean pressure in the contact"),
+        "plane_separation": ("separation", "gap between mean planes, u less what yielded points are flattened"),
+        "incremental_stiffness": ("stiffness", "-dF/du per nominal area of a small unloading"),
         "island_number": ("D", "islands in contact per nominal area (Eq. 42)"),
         "island_delta": ("delta", "approach of an island"),
         "island_force": ("island_force", "load of an island at that approach"),
@@ -49,7 +54,8 @@ def _units(problem: Problem) -> dict[str, tuple[str, str]]:
         quantities |= {f"{name}_force": ("force", f"F/A0 by {name}"), f"{name}_area": ("area", f"A/A0 by {name}")}
     units = {name: (unit_of(like, problem.units), meaning) for name, (like, meaning) in quantities.items()}
     per_length = f"conductivity/{unit_of('separation', problem.units)}"
-    return units | {"conductance": (per_length, "conductance per nominal area")}
+    correlations = {f"{name}_conductance": (per_length, f"conductance by {name}") for name in CORRELATIONS}
+    return units | correlations | {"conductance": (per_length, "conductance per nominal area")}
 
 
 def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
@@ -73,6 +79,9 @@ def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
         "E_star": float(problem.E_star),
         "table_hashes": json.dumps(_hashes(problem, set(run.tiers.values()))),
     }
+    if problem.hardness is not None:
+        psi = problem.E_star * problem.surface.rms_gradient / problem.hardness
+        facts |= {"hardness": float(problem.hardness), "psi": float(psi)}
     if run.reasons is not None:
         facts["reasons"] = json.dumps(run.reasons)
     numbers = ("hurst", "q0", "q1", "h_rms", "h_max")

@@ -18,13 +18,16 @@ OUTPUTS = (
     "pressure_profile",
     "comparison",
     "validity",
+    "yield",
 )
 # part of the model, and on unless switched off
 REFINEMENTS = ("subscale_area", "sphere_deformation", "finite_height")
 EFFECTS = (*OUTPUTS, *REFINEMENTS)
 OF_ISLANDS = ("island_statistics", "pressure_profile")  # of MBMA alone
 OF_LAW = ("stiffness", "energy", "conductance")
+ELASTIC = ("energy", *OF_ISLANDS)  # of contacts in which nothing yields
 COMPARED = (*THEORIES, "persson_simplified")
+CORRELATIONS = ("cooper_mikic_yovanovich", "mikic")  # of conductance
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -52,6 +55,9 @@ def chosen(on: Iterable[str], off: Iterable[str]) -> tuple[frozenset[str], froze
     if not outputs:
         raise InputError(f"no effect is asked for: on needs at least one of {', '.join(OUTPUTS)}")
     dropped = frozenset(without)
+    if "yield" in outputs and (dropped or outputs & set(ELASTIC)):
+        name = sorted(dropped | outputs & set(ELASTIC))[0]
+        raise InputError(f"{name!r} is of elastic contacts, and effect 'yield' is on: leave one of the two out")
     if "finite_height" in dropped and outputs & set(OF_LAW):
         name = sorted(outputs & set(OF_LAW))[0]
         raise InputError(f"{name!r} comes from a law, which ends at h_max: leave finite_height on, or {name!r} out")

@@ -29,6 +29,7 @@ AMPLIFICATION = {"inverse": 2.0, "slopes": 300.0, "profile": 10.0}
 MIN_LAW_GAPS = {"universal": 2000}
 MIN_LAW_GAPS_OF_OTHERS = 300
 MIN_THEORY_LAW_RTOL = 1e-9
+YIELDING = 3.0  # times an elastic answer (tests/scenes/test_yield.py)
 LADDER = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 
 
@@ -219,7 +220,9 @@ class _Planner:
         if self.problem.prescribed in INVERTED:
             of_law.append(f"{self.problem.prescribed} prescribed")
         steps = []
-        if self.problem.theory != "mbma":
+        if "yield" in outputs:
+            steps.append(self.yielding([*totals, *of_law, "yield"]))
+        elif self.problem.theory != "mbma":
             if of_law or totals:
                 steps.append(self.by_theory([*totals, *of_law]))
         elif of_law:
@@ -308,6 +311,16 @@ class _Planner:
             error = (AMPLIFICATION["inverse"] if inverse else 1.0) * (rtol + own)
         what = f"force, area and what follows from them at {self.count} gaps"
         return Step(name, ", ".join(why), what, None, asked, self.count, error, seconds, theory=theory)
+
+    def yielding(self, why: Sequence[str]) -> Step:
+        """A theory's elastic answers through a hardness."""
+        theory, inverse = self.problem.theory_name, self.problem.prescribed in INVERTED
+        mbma = self.problem.theory == "mbma"
+        seconds = math.nan if mbma else YIELDING * seconds_by_theory(self.costs, theory, self.count, inverse)
+        asked = max(ISLAND_SHARE * self.rtol, MIN_THEORY_LAW_RTOL) if mbma else None
+        error = 2 * (asked + certified_error("universal", asked) if asked else self.own_error())
+        what = f"force, area and what yields at {self.count} gaps"
+        return Step("contact", ", ".join(why), what, None, asked, self.count, error, seconds, theory=theory)
 
     def own_error(self) -> float:
         """The numerical error that the scene's theory states of an answer."""

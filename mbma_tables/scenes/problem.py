@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from mbma_tables.errors import InputError
-from mbma_tables.scenes.effects import COMPARED, OF_ISLANDS, chosen, nearest
+from mbma_tables.scenes.effects import COMPARED, CORRELATIONS, OF_ISLANDS, chosen, nearest
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.theories.registry import THEORIES, get_theory
 from mbma_tables.units import Units, in_unit, known, modulus_and_units
@@ -38,6 +38,7 @@ class Problem:
     pressures: Any = None
     areas: Any = None
     E_star: Any = 1.0
+    hardness: Any = None
     rtol: float | None = None
     seconds: float | None = None
     reading: str | Reading = "reported"
@@ -99,7 +100,7 @@ class Problem:
         surface = in_unit(self.surface, unit)
         E_star, units = modulus_and_units(self.E_star, surface, self.stress_unit)
         derived = {"surface": surface, "E_star": E_star, "units": units, "length_unit": surface.unit}
-        for name in ("separations", "mean_separations", "pressures", "deltas"):
+        for name in ("separations", "mean_separations", "pressures", "deltas", "hardness"):
             derived[name] = units.number(name, getattr(self, name))
         for name, value in derived.items():
             object.__setattr__(self, name, value)
@@ -137,9 +138,10 @@ class Problem:
 
     def _check_parameters_of_effects(self) -> None:
         """Parameters that one effect needs and no other uses."""
-        from mbma_tables.arguments import finite_array, require
+        from mbma_tables.arguments import finite_array, number_in, require
 
         needs = (
+            ("yield", "hardness", self.hardness is not None, "the largest pressure that the softer body bears"),
             ("conductance", "conductivities", self.conductivities is not None, "k1 and k2 of the two bodies"),
             ("pressure_profile", "deltas", self.deltas is not None, "the approaches of the islands"),
             ("comparison", "theories", bool(self.theories), f"one or more of {', '.join(COMPARED)}"),
@@ -148,7 +150,13 @@ class Problem:
             if effect in self.outputs and not given:
                 raise InputError(f"effect {effect!r} needs {name}: {meaning}")
             if effect not in self.outputs and given:
-                raise InputError(f"{name} are given and effect {effect!r} is off: add it to the effects, or leave them")
+                raise InputError(
+                    f"{name} given and effect {effect!r} is off: add it to the effects, or leave {name} out"
+                )
+        if self.hardness is not None:
+            cap = number_in("hardness", self.hardness, 1e-300, 1e300)
+            if self.prescribed == "pressures":
+                require("pressures", self.gaps, self.gaps <= cap, f"at most the hardness, {cap:.6g}")
         if self.conductivities is not None:
             pair = finite_array("conductivities", self.conductivities)
             if pair.shape != (2,):
@@ -158,8 +166,13 @@ class Problem:
             deltas = finite_array("deltas", self.deltas)
             require("deltas", deltas, deltas > 0, "positive")
         for name in self.theories:
-            if name not in COMPARED:
-                raise InputError(f"no theory is named {name!r}; {nearest(str(name), COMPARED)}")
+            if name in CORRELATIONS:
+                if "conductance" not in self.outputs or not ("force" in self.outputs or self.prescribed == "pressures"):
+                    raise InputError(f"{name!r} is of conductance at a pressure: add effects 'conductance' and 'force'")
+                if name == CORRELATIONS[0] and self.hardness is None:
+                    raise InputError(f"{name!r} needs a hardness: add effect 'yield'")
+            elif name not in COMPARED:
+                raise InputError(f"no theory is named {name!r}; {nearest(str(name), (*COMPARED, *CORRELATIONS))}")
 
     def _check_tier(self) -> None:
         if self.tier is None:

@@ -13,6 +13,7 @@ import xarray as xr
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.scenes.dataset import TABLES, to_dataset
+from mbma_tables.scenes.effects import CORRELATIONS
 from mbma_tables.scenes.plan import Plan, Step
 from mbma_tables.scenes.problem import INVERTED, Problem
 
@@ -133,8 +134,15 @@ def _find_gaps(run: Run, law: ContactLaw) -> float:
 Quantity = Callable[[], Any]
 
 
-def _keep_quantities(run: Run, force: Quantity, area: Quantity, stiffness_mean: Quantity, energy: Quantity) -> None:
-    """The quantities at gaps that were asked for, and what was prescribed."""
+def _keep_quantities(
+    run: Run,
+    force: Quantity,
+    area: Quantity,
+    stiffness_mean: Quantity,
+    energy: Quantity,
+    incremental: Quantity | None = None,
+) -> None:
+    """The quantities at gaps that were asked for, and what was prescribed; conductance by the incremental stiffness."""
     problem, wanted = run.problem, run.problem.outputs
     values: dict[str, Any] = {}
     if problem.prescribed in INVERTED:
@@ -151,6 +159,8 @@ def _keep_quantities(run: Run, force: Quantity, area: Quantity, stiffness_mean: 
             from mbma_tables.totals.conductance import conductance, mean_conductivity
 
             assert problem.conductivities is not None
+            if incremental is not None:
+                slope = incremental()
             values["conductance"] = conductance(slope, mean_conductivity(*problem.conductivities), problem.E_star)
     if "energy" in wanted:
         values["energy"] = energy()
@@ -177,13 +187,25 @@ def _by_theory(run: Run, step: Step) -> None:
         from mbma_tables.theories.contact import contact
 
         assert problem.prescribed is not None
-        known = {problem.prescribed[:-1]: problem.gaps}
+        known: dict[str, Any] = {problem.prescribed[:-1]: problem.gaps}
+        if problem.hardness is not None:
+            known["hardness"] = problem.hardness
+            if problem.theory == "mbma":
+                known |= {"reading": problem.reading, "rtol": step.rtol, "tier": problem.tier or "universal"}
         found = contact(run.surface, E_star=problem.E_star, theory=problem.theory, **known)
         run.gap, error = found.separation, float(found.error.max())
         # over d, which moves twice as far as u
         _keep_quantities(
-            run, lambda: found.force, lambda: found.area, lambda: found.stiffness, lambda: 2 * found.energy
+            run,
+            lambda: found.force,
+            lambda: found.area,
+            lambda: found.stiffness,
+            lambda: 2 * found.energy,
+            lambda: found.incremental_stiffness,
         )
+        if problem.hardness is not None:
+            names = ("yielded", "mean_pressure", "plane_separation", "incremental_stiffness")
+            run.found |= {name: (("gap",), getattr(found, name)) for name in names}
     run.close(step, error, None)
 
 
@@ -193,7 +215,8 @@ def _validity(run: Run, step: Step) -> None:
 
     problem = run.problem
     theory = Mbma(reading=problem.reading, outside="nan") if problem.theory == "mbma" else problem.theory
-    found = contact(run.problem.surface, run.gap, theory=theory)
+    yields = {} if problem.hardness is None else {"hardness": problem.hardness, "E_star": problem.E_star}
+    found = contact(run.problem.surface, run.gap, theory=theory, **yields)
     fields = {"valid": found.valid, "scatter": found.scatter, "area_scatter": found.area_scatter}
     run.found |= {name: (("gap",), values) for name, values in fields.items()}
     run.reasons = {reason: np.flatnonzero(mask).tolist() for reason, mask in found.reasons.items()}
@@ -277,8 +300,18 @@ def other_theory(name: str, surface: AnySurface, gap: FloatArray, E_star: float)
 
 
 def _comparison(run: Run, step: Step) -> None:
-    found = other_theory(step.name, run.problem.surface, run.gap, run.problem.E_star)
-    run.found |= {f"{step.name}_force": (("gap",), found.force), f"{step.name}_area": (("gap",), found.area)}
+    if step.name in CORRELATIONS:
+        from mbma_tables.totals import conductance
+
+        problem = run.problem
+        assert problem.conductivities is not None
+        pressure = (run.found.get("nominal_pressure") or run.found["force"])[1]
+        k_s, cap = conductance.mean_conductivity(*problem.conductivities), problem.hardness or np.inf
+        found = conductance.CORRELATIONS[step.name](problem.surface, pressure, k_s, problem.E_star, cap)
+        run.found[f"{step.name}_conductance"] = (("gap",), found)
+        return
+    other = other_theory(step.name, run.problem.surface, run.gap, run.problem.E_star)
+    run.found |= {f"{step.name}_force": (("gap",), other.force), f"{step.name}_area": (("gap",), other.area)}
 
 
 _STEPS = {

@@ -36,6 +36,9 @@ class Scene(Problem):
         converted to the units of the surface and the modulus.
     E_star : float or str
         Effective modulus; stresses come out in its unit. 1 gives them over E*. A text has its unit: "100 GPa".
+    hardness : float or str, optional
+        Largest pressure that the softer body bears, in the unit of `E_star`, for "yield": the theory's elastic answer
+        goes through `mbma_tables.hardness`, and conductance is that of the frozen contact.
     rtol : float, optional
         Relative error asked for, in [1e-10, 0.1]; 1e-6 where no `seconds` are given either, 1e-4 of other theories.
     seconds : float, optional
@@ -166,6 +169,7 @@ def _arguments(content: Mapping[str, Any], folder: pathlib.Path, title: str) -> 
     found |= {name: content[name] for name in ("title", "theory", "reading") if name in content}
     found |= lengths(prescribed) | lengths(dict(content.get("pressure_profile", {})))
     found |= dict(content.get("accuracy", {})) | statistics | content.get("comparison", {})
+    found |= content.get("yield", {})
     if "conductance" in content:
         found["conductivities"] = (content["conductance"]["k1"], content["conductance"]["k2"])
     return found

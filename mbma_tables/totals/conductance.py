@@ -1,7 +1,14 @@
-"""Conductance of a contact from its stiffness (Barber 2003), thermal or electrical."""
+"""Conductance of a contact from its incremental stiffness (Barber 2003), thermal or electrical; older correlations.
+
+Where the contact yields the incremental stiffness is that of the frozen contact, `Contact.incremental_stiffness`. The
+slope of the loading curve is less, by up to ten times: yielded points do not unload along it.
+"""
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import Numbers, broadcast_shape, finite_array, require
@@ -26,7 +33,7 @@ def conductance(stiffness_mean: ArrayLike, k_s: ArrayLike, E_star: ArrayLike) ->
     Parameters
     ----------
     stiffness_mean : array_like
-        -dp/du against the mean separation [stress/length], zero or positive.
+        -dp/du against the mean separation [stress/length], zero or positive; incremental where the contact yields.
     k_s : array_like
         Mean conductivity of the bodies, `mean_conductivity`; thermal or electrical.
     E_star : array_like
@@ -56,3 +63,49 @@ def conductance(stiffness_mean: ArrayLike, k_s: ArrayLike, E_star: ArrayLike) ->
     require("E_star", modulus, modulus > 0, "positive")
     broadcast_shape(stiffness_mean=slope, k_s=mean, E_star=modulus)
     return (mean / modulus * slope)[()]
+
+
+def cooper_mikic_yovanovich(
+    surface: Any, pressure: ArrayLike, k_s: ArrayLike, E_star: ArrayLike, hardness: ArrayLike
+) -> Numbers:
+    """Conductance of plastic contacts, h = 1.25 k_s (m/sigma) (p/H)^0.95; E* does not matter.
+
+    M. G. Cooper, B. B. Mikic, M. M. Yovanovich, Int. J. Heat Mass Transfer 12 (1969) 279-300, in the power law that
+    Yovanovich gave later. m is the mean absolute slope of a Gaussian profile, sqrt(2 m2/pi), sigma is h_rms.
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface
+    >>> from mbma_tables.totals.conductance import cooper_mikic_yovanovich
+    >>> joint = Surface(hurst=0.8, q0=6e3, q1=6e5, h_rms=1e-6, h_max=3.5e-6)  # m
+    >>> float(cooper_mikic_yovanovich(joint, 1e7, 100.0, 1e11, 1e9).round(-2))
+    51800.0
+    """
+    return _by_slope(surface, k_s, 1.25 * (np.asarray(pressure) / hardness) ** 0.95)
+
+
+def mikic(
+    surface: Any, pressure: ArrayLike, k_s: ArrayLike, E_star: ArrayLike, hardness: ArrayLike = np.inf
+) -> Numbers:
+    """Conductance of elastic contacts, h = 1.55 k_s (m/sigma) (sqrt(2) p/(m E*))^0.94; hardness does not matter.
+
+    B. B. Mikic, Int. J. Heat Mass Transfer 17 (1974) 205-214.
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface
+    >>> from mbma_tables.totals.conductance import mikic
+    >>> joint = Surface(hurst=0.8, q0=6e3, q1=6e5, h_rms=1e-6, h_max=3.5e-6)  # m
+    >>> float(mikic(joint, 1e7, 100.0, 1e11).round(-2))
+    21600.0
+    """
+    slope = np.sqrt(2 * surface.m2 / np.pi)
+    return _by_slope(surface, k_s, 1.55 * (np.sqrt(2) * np.asarray(pressure) / (slope * E_star)) ** 0.94)
+
+
+def _by_slope(surface: Any, k_s: ArrayLike, number: Any) -> Numbers:
+    found: Numbers = (np.asarray(k_s) * np.sqrt(2 * surface.m2 / np.pi) / surface.h_rms * number)[()]
+    return found
+
+
+CORRELATIONS = {"cooper_mikic_yovanovich": cooper_mikic_yovanovich, "mikic": mikic}
