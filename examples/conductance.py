@@ -1,17 +1,14 @@
-"""Contact stiffness and thermal contact conductance of a machined joint against its nominal pressure.
+"""Thermal contact conductance of a real joint, ground steel on milled aluminium, with its band of uncertainty.
 
 Barber (2003), "Bounds on the electrical resistance between contacting elastic rough bodies", Proc. R. Soc. A 459,
 53-66: the conductance of a contact between two half-spaces and its incremental stiffness solve the same potential
-problem. With F the normal force, delta the approach of the two bodies, E* the effective modulus and rho1, rho2 the
-resistivities (for heat 1/k1 and 1/k2, inverse conductivities),
+problem. Per nominal area, with k_s = 2 k1 k2/(k1 + k2), p = F/A0 and the mean separation u,
 
-    1/R = 2/((rho1 + rho2) E*) dF/d(delta),
+    h = -(k_s/E*) dp/du.
 
-whatever the shape of the contact. A circular spot of radius a shows the constant: dF/d(delta) = 2 a E* and
-1/R = 4 a/(rho1 + rho2). Per nominal area, with k_s = 2 k1 k2/(k1 + k2), p = F/A0 and the bodies' distance measured
-by the mean separation u, whose change is the approach,
-
-    h = -(k_s/E*) dp/du,      -dp/du = 2 (-dp/dd), as u = (h_max + d)/2 (50).
+The aluminium yields: pressures end at its hardness, and the stiffness that counts is that of the contact area as it is,
+since yielded points unload elastically. The slope of the loading curve would give too little. The band holds the range
+of hardnesses of the alloy, whose temper is not known, and one standard deviation of boundary elements about the law.
 
 Only what flows through the solid contact is counted, no gas, no radiation.
 Run with ``python examples/conductance.py``. SI units: m, Pa, W/(m K).
@@ -26,69 +23,90 @@ import click
 import numpy as np
 from matplotlib.figure import Figure
 
-from mbma_tables import Surface, contact_law
-from mbma_tables.materials import effective_modulus
-from mbma_tables.totals.conductance import conductance, mean_conductivity
+from mbma_tables import Surface, contact, materials
+from mbma_tables.totals.conductance import conductance, cooper_mikic_yovanovich, mean_conductivity, mikic
 
 PICTURE = pathlib.Path(__file__).parents[1] / "docs" / "figures" / "example_conductance.png"
-# both faces' roughness in one, a ground steel face on aluminium
-JOINT = Surface(hurst=0.8, q0=2 * np.pi / 1e-3, q1=2 * np.pi / 2e-6, h_rms=1e-6, h_max=3.5e-6)
-E_STAR = float(effective_modulus(210e9, 0.3, 70e9, 0.33))  # Pa
-K_STEEL, K_ALUMINIUM = 16.0, 167.0  # W/(m K)
+# both faces' roughness in one
+JOINT = Surface(hurst=0.8, q0=2 * np.pi / 1e-3, q1=2 * np.pi / 5e-6, h_rms=1.5e-6, h_max=5.5e-6)
+STEEL, ALUMINIUM = materials.get("steel 4140"), materials.get("aluminium 6061")
+E_STAR = float(materials.effective_modulus(STEEL.E * 1e9, STEEL.nu, ALUMINIUM.E * 1e9, ALUMINIUM.nu))  # Pa
+SOFT, HARD = (1e9 * hardness for hardness in ALUMINIUM.hardness)
+K_STEEL, K_ALUMINIUM = STEEL.conductivity[0], float(np.mean(ALUMINIUM.conductivity))
 K_MEAN = float(mean_conductivity(K_STEEL, K_ALUMINIUM))
-RANGE = (1e4, 5e7)  # Pa
-PRESSURES = (1e4, 1e5, 1e6, 1e7, 5e7)  # Pa
+RANGE = (1e5, 5e7)  # Pa
+PRESSURES = (1e5, 1e6, 1e7, 5e7)  # Pa
 
 
 @dataclasses.dataclass(frozen=True)
 class Curve:
-    """Stiffness, conductance and their slope in logarithms against pressure."""
+    """Against pressure: conductance and its band, the elastic one, and two older correlations."""
 
     pressure: np.ndarray  # Pa
-    stiffness: np.ndarray  # -dp/du, Pa/m
-    conductance: np.ndarray  # W/(m^2 K)
-    slope: np.ndarray  # d log(h)/d log(p)
+    stiffness: np.ndarray  # incremental, Pa/m
+    conductance: np.ndarray  # W/(m^2 K), as all that follow
+    low: np.ndarray
+    high: np.ndarray
+    elastic: np.ndarray
+    loading_slope: np.ndarray
+    plastic_correlation: np.ndarray
+    elastic_correlation: np.ndarray
 
 
 def conductance_curve(points: int = 200) -> Curve:
-    """Along the pressures of RANGE."""
-    law = contact_law(JOINT, E_star=E_STAR)
+    """Along the pressures of RANGE, at the middle hardness and at both ends."""
     pressure = np.geomspace(*RANGE, points)
-    stiffness = law.stiffness_mean(law.separation(force=pressure))
-    h = conductance(stiffness, K_MEAN, E_STAR)
-    slope = np.gradient(np.log(h), np.log(pressure))
-    return Curve(pressure, stiffness, h, slope)
+    middle = np.sqrt(SOFT * HARD)
+    joints = {
+        hardness: contact(JOINT, pressure=pressure, E_star=E_STAR, theory="calibrated", hardness=hardness)
+        for hardness in (SOFT, middle, HARD, np.inf)
+    }
+    h = {p_m: conductance(found.incremental_stiffness, K_MEAN, E_STAR) for p_m, found in joints.items()}
+    spread = np.exp(joints[middle].scatter)
+    return Curve(
+        pressure,
+        joints[middle].incremental_stiffness,
+        h[middle],
+        h[HARD] / spread,
+        h[SOFT] * spread,
+        h[np.inf],
+        conductance(joints[middle].stiffness, K_MEAN, E_STAR),
+        cooper_mikic_yovanovich(JOINT, pressure, K_MEAN, E_STAR, middle),
+        mikic(JOINT, pressure, K_MEAN, E_STAR),
+    )
 
 
 def draw(curve: Curve) -> Figure:
-    """Conductance against pressure, logarithmic, and its slope below."""
-    figure = Figure(figsize=(7, 6), layout="constrained")
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    upper.loglog(curve.pressure / 1e6, curve.conductance, label="thermal contact conductance h")
-    upper.set_ylabel("h [W/(m^2 K)]")
-    # the same curve in another unit
-    factor = K_MEAN / E_STAR * 1e15
-    right = upper.secondary_yaxis("right", functions=(lambda h: h / factor, lambda k: k * factor))
-    right.set_ylabel("stiffness -dp/du [GPa/um]")
-    upper.grid(True, alpha=0.3)
-    lower.semilogx(curve.pressure / 1e6, curve.slope)
-    lower.axhline(1, color="grey", linestyle="--", label="proportional")
-    lower.set(xlabel="nominal pressure p [MPa]", ylabel="d log h/d log p")
-    lower.legend()
+    """Conductance against pressure, logarithmic."""
+    figure = Figure(figsize=(7, 5), layout="constrained")
+    axes = figure.subplots()
+    p = curve.pressure / 1e6
+    axes.fill_between(p, curve.low, curve.high, alpha=0.25, label="temper of the aluminium, scatter of simulations")
+    axes.loglog(p, curve.conductance, label="with yield")
+    axes.loglog(p, curve.elastic, "--", label="elastic")
+    axes.loglog(p, curve.loading_slope, ":", label="slope of the loading curve: wrong")
+    axes.loglog(p, curve.plastic_correlation, "-.", label="Cooper, Mikic, Yovanovich 1969")
+    axes.loglog(p, curve.elastic_correlation, "-.", label="Mikic 1974")
+    axes.set(xlabel="nominal pressure p [MPa]", ylabel="h [W/(m^2 K)]")
+    axes.grid(True, alpha=0.3)
+    axes.legend(fontsize=8)
     return figure
 
 
 def main(out: pathlib.Path = PICTURE, points: int = 200) -> Curve:
     """Compute, print and draw."""
     curve = conductance_curve(points)
-    click.echo(f"E* = {E_STAR / 1e9:.2f} GPa, k_s = {K_MEAN:.2f} W/(m K), h = -(k_s/E*) dp/du")
-    click.echo("p [MPa]   -dp/du [GPa/um]   h [W/(m^2 K)]   d log h/d log p")
-    for p in PRESSURES:
-        at = np.argmin(np.abs(np.log(curve.pressure / p)))
-        row = (curve.pressure[at] / 1e6, curve.stiffness[at] / 1e15, curve.conductance[at], curve.slope[at])
-        click.echo("{:7.2f}   {:15.4g}   {:13.5g}   {:15.3f}".format(*row))
-    exponent = np.polyfit(np.log(curve.pressure), np.log(curve.conductance), 1)[0]
-    click.echo(f"h ~ p^{exponent:.3f} over the whole range")
+    psi = E_STAR * float(JOINT.rms_gradient) / np.array([HARD, SOFT])
+    click.echo(f"rms gradient {JOINT.rms_gradient:.3f}, E* = {E_STAR / 1e9:.1f} GPa, k_s = {K_MEAN:.1f} W/(m K)")
+    click.echo(
+        f"aluminium of {SOFT / 1e9:g} to {HARD / 1e9:g} GPa: psi {psi[1]:.1f} to {psi[0]:.1f}, elastic below 1.1"
+    )
+    click.echo("p [MPa]   h [W/(m^2 K)]   low        high       elastic    slope      CMY        Mikic")
+    columns = ("conductance", "low", "high", "elastic", "loading_slope", "plastic_correlation", "elastic_correlation")
+    for pressure in PRESSURES:
+        at = np.argmin(np.abs(np.log(curve.pressure / pressure)))
+        numbers = "   ".join(f"{getattr(curve, name)[at]:<8.3g}" for name in columns)
+        click.echo(f"{curve.pressure[at] / 1e6:7.2f}   {numbers}".rstrip())
     draw(curve).savefig(out, dpi=120)
     return curve
 

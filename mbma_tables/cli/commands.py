@@ -52,7 +52,9 @@ def _numbers(name: str, given: list[float | str], specimen: Specimen, over_h_rms
 
 def _asked(model: Model, specimen: Specimen) -> dict[str, Any]:
     """Keywords for `contact`."""
-    return {**vars(model), "E_star": 1.0 if specimen.E_star is None else specimen.E_star}
+    asked = {**vars(model), "E_star": 1.0 if specimen.E_star is None else specimen.E_star}
+    cap = asked.pop("hardness")
+    return asked if cap == math.inf else asked | {"hardness": specimen.units.number("hardness", cap)}
 
 
 @click.command("contact", short_help="Force and area at given gaps, pressures or areas.")

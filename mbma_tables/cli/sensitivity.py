@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import click
@@ -50,10 +51,13 @@ def sensitivity_command(
     """
     from mbma_tables.theories.unknowns import sensitivity
 
+    options = vars(model).copy()
+    if options.pop("hardness") != math.inf:
+        raise InputError("sensitivity is of elastic contacts: leave --hardness out")
     modulus: Any = 1.0 if specimen.E_star is None else specimen.E_star
     if specimen.stress_unit is not None:
         modulus = f"{modulus!r} {specimen.stress_unit}"
-    found = sensitivity(specimen.surface, **known, E_star=modulus, ranges=dict(map(_pair, ranges)), **vars(model))
+    found = sensitivity(specimen.surface, **known, E_star=modulus, ranges=dict(map(_pair, ranges)), **options)
     parameters = list(found.parameters)
     columns = [
         Column("parameter", "-", parameters),

@@ -524,3 +524,12 @@ def test_help_answers_without_heavy_imports(command):
     found = subprocess.run([sys.executable, "-c", code, *command.split()], capture_output=True, text=True, check=False)
     assert found.returncode == 0, found.stderr
     assert found.stdout.startswith(f"Usage: mbma {command}".rstrip())
+
+
+def test_contact_with_a_hardness():
+    named = ["contact", "--hurst", "0.8", "--q0", "0.01/um", "--q1", "2/um", "--h-rms", "1um", "--h-max", "3um"]
+    asked = [*named, "--E-star", "100GPa", "-p", "30MPa", "--theory", "calibrated"]
+    text = run(*asked, "--hardness", "1500MPa")
+    assert "psi 3.61, elastic up to 1.1" in text
+    assert "yielded" in text
+    assert "elastic: area within 5% for hardnesses from 4.922 GPa on" in run(*asked)
