@@ -19,16 +19,16 @@ from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFAC
 from generate.boundary_elements.evidence import GAUSSIAN, MAX_AREA, MIN_WAVES, Case, cases
 from generate.calibrated_table import write as write_table
 from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import CONSTANTS, MEAN_WAVE, Constants, Law
+from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum
 from mbma_tables.calibrated_map import MAP_CONSTANTS, MapConstants, MapLaw
 
 QUANTITIES = ("area", "force", "stiffness")
 EDGES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9, MAX_AREA)  # contact fractions between which errors are told
 FOLDS = 5
-WEIGHT_GAP = 1.0  # W is fitted where u is less [h_rms], the tail where less than TAIL_AREA touches
-TAIL_AREA = 0.1
+GRID = np.linspace(-21.0, 1.6, 227)[::-1]  # ln F of curves while they are fitted
+LEAST = 1e-6  # ratio of forces that a law above its h_max counts as
 # errors that count alike: model noise plus the scatter of surfaces at light contact
-NOISE = {"area": (0.015, 0.15), "tail": (0.05, 0.25), "map": (0.03, 0.1)}
+NOISE = {"area": (0.015, 0.15), "force": (0.02, 0.25), "map": (0.03, 0.1)}
 LIGHT = 0.01
 STEP = 0.01  # relative, of numerical derivatives: laws of maps are interpolated
 
@@ -55,38 +55,49 @@ def noise(one: Case, name: str) -> FloatArray:
     return np.asarray(floor + scatter * np.exp(-one.area / LIGHT))
 
 
-def fit_weight(seen: Sequence[Case], constants: Constants) -> Constants:
-    """a, its slope and b of W: u is linear in them; errors of u count as the errors of ln F that they are."""
-    rows, aims = [], []
-    for one in seen:
-        kept = one.u < WEIGHT_GAP
-        scale = -one.u * np.gradient(np.log(one.u), np.log(one.force))
-        pure = [
+@dataclasses.dataclass(frozen=True, eq=False)
+class Parts:
+    """u_P of a spectrum, which is linear in the coefficients of W, on a grid of ln F."""
+
+    spectrum: Spectrum
+    plain: FloatArray
+    first: FloatArray
+    cubic: FloatArray
+
+    @classmethod
+    def of(cls, spectrum: Spectrum) -> Parts:
+        """The parts of P^16, and what P and P^3 add in its place."""
+        plain, first, cubic = (
             Law(
-                one.spectrum, None, dataclasses.replace(constants, weight=a, cubic=b, weight_slope=0.0)
-            ).separation_persson(one.force)[0]
-            for a, b in ((1.0, 0.0), (0.0, 1.0), (0.0, 0.0))
-        ]
-        linear = pure[0] - pure[2]
-        columns = [linear, pure[1] - pure[2], linear * (one.spectrum.mean_wave - MEAN_WAVE)]
-        rows.append(np.stack([(column / scale)[kept] for column in columns], axis=1))
-        aims.append(((one.u - pure[2]) / scale)[kept])
-    a, b, slope = np.linalg.lstsq(np.concatenate(rows), np.concatenate(aims), rcond=None)[0]
-    return dataclasses.replace(constants, weight=float(a), cubic=float(b), weight_slope=float(slope))
+                spectrum, None, dataclasses.replace(CONSTANTS, weight=a, cubic=b, weight_slope=0.0)
+            ).separation_persson(np.exp(GRID))[0]
+            for a, b in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
+        )
+        return cls(spectrum, plain, first - plain, cubic - plain)
+
+    def errors(self, one: Case, trial: Constants) -> FloatArray:
+        """Errors of ln F at equal u, as `errors` has them, without the law's own quadrature for every trial."""
+        law = Law(self.spectrum, None, trial)
+        a, b, _ = law.coefficients
+        u = self.plain + a * self.first + b * self.cubic
+        curve = CubicSpline(np.log(u), GRID - law.tail * u**3)
+        found, end = curve(np.log(one.u)), float(curve(np.log(one.h_max)))
+        return np.asarray(found + np.log(np.maximum(-np.expm1(end - found), LEAST)) - np.log(one.force))
 
 
 def fit(training: Sequence[Case]) -> Constants:
-    """The spectrum's law: area at equal force; u below h_rms; the tail where less than a tenth touches."""
+    """The spectrum's law: area at equal force, then force at equal u."""
     seen = [one for one in training if one.gaussian]
+    parts = [Parts.of(one.spectrum) for one in seen]
 
     def areas(trial: Constants) -> list[FloatArray]:
         return [errors(one, one.law(trial), "area") / noise(one, "area") for one in seen]
 
-    def tails(trial: Constants) -> list[FloatArray]:
-        return [(errors(one, one.law(trial), "force") / noise(one, "tail"))[one.area < TAIL_AREA] for one in seen]
+    def forces(trial: Constants) -> list[FloatArray]:
+        return [part.errors(one, trial) / noise(one, "force") for one, part in zip(seen, parts, strict=True)]
 
-    constants = fit_weight(seen, _fitted(CONSTANTS, ("area_s0", "area_slope", "area_t0"), areas))
-    return _fitted(constants, ("tail", "onset"), tails)
+    constants = _fitted(CONSTANTS, ("area_s0", "area_slope", "area_t0"), areas)
+    return _fitted(constants, ("weight", "weight_slope", "cubic", "tail"), forces)
 
 
 def fit_map(training: Sequence[Case], constants: Constants) -> MapConstants:
@@ -110,7 +121,7 @@ def errors(one: Case, law: Law | MapLaw, quantity: str) -> FloatArray:
     if quantity == "area":
         return np.asarray(np.log(law.area(one.force) / one.area))
     if quantity == "force":
-        return np.asarray(np.log(np.maximum(law.force(one.u), 1e-6 * one.force)) - log_force)
+        return np.asarray(np.log(np.maximum(law.force(one.u), LEAST * one.force)) - log_force)
     # both by one spline through the simulated loads, so that its error cancels
     gaps: list[FloatArray] = [law.separation(one.force), one.u]
     slopes: list[FloatArray] = [gap * CubicSpline(log_force, np.log(gap)).derivative()(log_force) for gap in gaps]

@@ -114,13 +114,13 @@ def others(found: Sequence[Case], summary: Summary) -> dict[str, dict[str, Any]]
 
 
 def log_force(law: Law) -> FloatArray:
-    """ln F_P at the nodes in separation."""
+    """ln F_G at the nodes in separation."""
     u, _ = law.separation_persson(np.exp(LOG_FORCE))
     x = make_interp_spline(np.log(u[::-1]), LOG_FORCE[::-1], k=5)(LOG_U)
     for _ in range(3):
         value, slope = law.separation_persson(np.exp(x))
         x = x - np.clip((np.log(value) - LOG_U) * value / slope, -0.5, 0.5)
-    return np.asarray(x)
+    return np.asarray(x - law.tail * np.exp(3 * LOG_U))
 
 
 def _row(constants: Constants, hurst: float) -> FloatArray:
@@ -185,7 +185,7 @@ def _attributes(told: dict[str, Any], constants: Constants, theories: list[str],
         "source": "mbma_tables.calibrated, its constants fitted to the training set of the boundary-element campaign",
         "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate calibrated",
         "references": "docs/calibrated.md",
-        "comment": "F_G = F_P exp(-law_tail max(u - law_onset, 0)^2); F(u) = F_G(u) - F_G(h_max); lengths in h_rms. "
+        "comment": "F(u) = F_G(u) - F_G(h_max); lengths in h_rms. "
         "quantity: area at equal force, force at equal mean separation, stiffness at equal force. calibrated_map: "
         "where a map is at hand. stated_scatter: of calibrated from cross-validation, of calibrated_map on the "
         "training set, of other theories on self-affine surfaces",
@@ -227,7 +227,7 @@ def dataset(told: dict[str, Any], found: Sequence[Case], summary: Summary) -> xr
     text = {"units": "1"}
     data = xr.Dataset(
         {
-            "log_force": (AXES, values, {"long_name": "ln F_P, F/(A0 E* g) before the tail factor", **text}),
+            "log_force": (AXES, values, {"long_name": "ln F_G, F/(A0 E* g) of a surface without end", **text}),
             "spline": (
                 tuple(f"{name}_knot" for name in AXES),
                 coefficients(values, DEGREE, 3),

@@ -7,12 +7,12 @@ energy over A0 E* g h_rms. A spectrum enters by its shares w(x) of h_rms^2 per d
     P(x; F) = erf(sqrt(2) F g/g(x))                      g(x)^2: the gradient's square of the waves below x
     U(F)    = 1/(4 g^) integral x w(x) W(P) d ln x,      W(P) = a P + b P^3 + (1 - a - b) P^16,  g^ = g/(q0 h_rms)
     u_P(F)  = integral from F to infinity of dU/F        so that F = -dU/du, and full contact is exact
-    F_G(u)  = F_P(u) exp(-c max(u - u0, 0)^2)            a Gaussian surface without end
+    F_G(u)  = F_P(u) exp(-c (1 - nu) u^3)                a Gaussian surface without end
     F(u)    = F_G(u) - F_G(h_max)                        one that ends at h_max: its stiffness is the endless one's
 
 W = P is Persson's theory with weight 1, W = gamma P + (1 - gamma) P^3 Yang and Persson's. a depends on the
-spectrum's mean wavenumber over its root mean square, which needs no Hurst exponent. Because P depends on F and x
-through y = F g/g(x) alone, the inner integral is a function of y, tabulated once: a curve is one sum over waves.
+spectrum's narrowness nu = 1/(<x> <1/x>), which needs no Hurst exponent. Because P depends on F and x through
+y = F g/g(x) alone, the inner integral is a function of y, tabulated once: a curve is one sum over waves.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ CLOSEST = -36.0  # ln ln x where a self-affine spectrum's quadrature begins
 PANEL, PANEL_NODES = 1.0, 10  # its panels, in ln ln x below x = e and in ln x above
 LOG_FORCE = (-21.0, 1.6)  # ln F^ over which a curve is tabulated
 FORCE_NODES = 227
-MEAN_WAVE = 0.8  # <q>/sqrt(<q^2>) that W's slope refers to
+NARROWNESS = 0.65  # that W's slope refers to
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,19 +46,18 @@ class Constants:
     area_s0, area_slope, area_t0 : float
         S of the area: s0 = area_s0 + area_slope ln(alpha/10), at most Persson's 1.
     weight, weight_slope, cubic : float
-        W's coefficients a, with its slope in the mean wavenumber less 0.8, and b.
-    tail, onset : float
-        c and u0 of the Gaussian tail factor.
+        W's coefficients a, with its slope in the narrowness less 0.65, and b.
+    tail : float
+        c of the Gaussian tail factor.
     """
 
     area_s0: float = 0.5097
     area_slope: float = 0.02905
     area_t0: float = 0.3352
-    weight: float = 0.4451
-    weight_slope: float = 0.05435
-    cubic: float = 0.4057
-    tail: float = 0.1571
-    onset: float = 0.9413
+    weight: float = 0.439
+    weight_slope: float = 0.081
+    cubic: float = 0.430
+    tail: float = 0.0665
 
 
 CONSTANTS = Constants()
@@ -142,9 +141,9 @@ class Spectrum:
     alpha: float
 
     @functools.cached_property
-    def mean_wave(self) -> float:
-        """<q>/sqrt(<q^2>), weighted by variance: 1 for a single wavelength, less the broader the spectrum."""
-        return float(np.sum(self.x * self.variance) / self.gradient)
+    def narrowness(self) -> float:
+        """Harmonic over arithmetic mean wavenumber, weighted by variance: 1 for one wavelength, 0 for a broad band."""
+        return float(1 / (np.sum(self.variance * self.x) * np.sum(self.variance / self.x)))
 
     @classmethod
     def self_affine(cls, hurst: float, zeta_1: float, panel: float = PANEL) -> Spectrum:
@@ -204,9 +203,15 @@ class Law:
     constants: Constants = CONSTANTS
 
     @functools.cached_property
-    def _coefficients(self) -> FloatArray:
+    def tail(self) -> float:
+        """c (1 - nu) of the tail factor."""
+        return self.constants.tail * (1 - self.spectrum.narrowness)
+
+    @functools.cached_property
+    def coefficients(self) -> FloatArray:
+        """Of `POWERS` in W."""
         c = self.constants
-        a = c.weight + c.weight_slope * (self.spectrum.mean_wave - MEAN_WAVE)
+        a = c.weight + c.weight_slope * (self.spectrum.narrowness - NARROWNESS)
         return np.array([a, c.cubic, 1 - a - c.cubic])
 
     def _over_spectrum(self, force: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -219,15 +224,15 @@ class Law:
         """Elastic energy U of the endless Gaussian surface, before its tail factor."""
         y, _, shares = self._over_spectrum(force)
         P, _ = _cover(y)
-        weights = sum(a * P**n for n, a in zip(POWERS, self._coefficients, strict=True))
+        weights = sum(a * P**n for n, a in zip(POWERS, self.coefficients, strict=True))
         return np.asarray(weights @ shares)
 
     def separation_persson(self, force: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """u_P and du_P/d ln F, before the tail factor."""
         y, inverse, shares = self._over_spectrum(force)
-        u = inner_integral(y, self._coefficients) @ (shares * inverse)
+        u = inner_integral(y, self.coefficients) @ (shares * inverse)
         P, dP = _cover(y)
-        slope = sum(a * n * P ** (n - 1) for n, a in zip(POWERS, self._coefficients, strict=True)) * dP
+        slope = sum(a * n * P ** (n - 1) for n, a in zip(POWERS, self.coefficients, strict=True)) * dP
         return u, -np.asarray(slope @ (shares * inverse))
 
     @functools.cached_property
@@ -255,11 +260,9 @@ class Law:
         flat = values.ravel()
         log_force = self._log_force_persson(flat)
         _, slope = self.separation_persson(np.exp(log_force))
-        tail = self.constants.tail
-        above = np.maximum(flat - self.constants.onset, 0)
         return (
-            (log_force - tail * above**2).reshape(values.shape),
-            (-1 / slope + 2 * tail * above).reshape(values.shape),
+            (log_force - self.tail * flat**3).reshape(values.shape),
+            (-1 / slope + 3 * self.tail * flat**2).reshape(values.shape),
         )
 
     def force(self, u: ArrayLike) -> FloatArray:
@@ -283,12 +286,10 @@ class Law:
         end = 0.0 if self.h_max is None else np.exp(self.gaussian(self.h_max)[0])
         goal = np.log(given.ravel() + end)
         log_nodes, u_nodes = self._curve
-        tail, onset = self.constants.tail, self.constants.onset
-        log_force = np.interp(goal, (log_nodes - tail * np.maximum(u_nodes - onset, 0) ** 2)[::-1], log_nodes[::-1])
+        log_force = np.interp(goal, (log_nodes - self.tail * u_nodes**3)[::-1], log_nodes[::-1])
         for _ in range(30):
             u, slope = self.separation_persson(np.exp(log_force))
-            above = np.maximum(u - onset, 0)
-            step = (log_force - tail * above**2 - goal) / (1 - 2 * tail * above * slope)
+            step = (log_force - self.tail * u**3 - goal) / (1 - 3 * self.tail * u**2 * slope)
             log_force -= step
             if np.all(np.abs(step) < 1e-12):
                 break

@@ -22,7 +22,7 @@ import functools
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
-from scipy.optimize import brentq
+from scipy.optimize import brentq, isotonic_regression
 from scipy.special import ellipe, ellipk, erf, expit, ndtr, ndtri
 
 from mbma_tables.arguments import FloatArray
@@ -46,7 +46,8 @@ class MapConstants:
     Attributes
     ----------
     breadth, breadth_onset : float
-        c = 0.8 max(1, zeta_e/breadth_onset)^breadth for an isotropic map, once contacts have merged.
+        c = 0.8 max(1, b/breadth_onset)^breadth for an isotropic map, once contacts have merged, b the root mean square
+        over the geometric mean wavenumber.
     gaussian_area, valley_area : float
         Contact where the deviation of a Gaussian surface from M(c A), and then the valleys, take over.
     tension_area : float
@@ -57,8 +58,8 @@ class MapConstants:
         Further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces.
     """
 
-    breadth: float = 0.2208
-    breadth_onset: float = 3.081
+    breadth: float = 0.589
+    breadth_onset: float = 1.418
     gaussian_area: float = 0.2545
     valley_area: float = 0.6409
     tension_area: float = 0.6
@@ -93,6 +94,16 @@ def hertz_ellipse(anisotropy: float) -> tuple[float, float]:
     return float(factor), float(height)
 
 
+def convex(force: FloatArray, u: FloatArray) -> FloatArray:
+    """u(F), from the lightest load on, with compliances that fall: where few points touch it may run back a little.
+
+    Least squares of the compliances, weighted by steps of force: u stays where nothing was wrong.
+    """
+    steps = np.diff(force)
+    compliance = isotonic_regression(-np.diff(u) / steps, weights=steps, increasing=False).x
+    return np.asarray(u[-1] + np.append(np.cumsum((compliance * steps)[::-1])[::-1], 0.0))
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class MapLaw:
     """The curve of a map.
@@ -101,15 +112,12 @@ class MapLaw:
     ----------
     spectrum : Spectrum
         The map's own.
-    inverse_q2 : float
-        Mean of (q0/q)^2 over the spectrum, weighted by variance.
     mean_height, top_gradient, tension_force, tension : numpy.ndarray, shape (91,)
         Of `bearing`: M(a) [h_rms], the tops' gradient, and the pulls of full contact [E* g].
     anisotropy : float
     """
 
     spectrum: Spectrum
-    inverse_q2: float
     mean_height: FloatArray
     top_gradient: FloatArray
     tension_force: FloatArray
@@ -132,7 +140,6 @@ class MapLaw:
         held = bands.variance > 0
         return cls(
             Spectrum.from_shares(bands.q[held], bands.variance[held]),
-            float(np.sum(bands.variance[held] * bands.q2_mean_inverse[held]) / known.h_rms**2),
             known.mean_height / known.h_rms,
             known.top_gradient,
             known.tension_force / known.gradient,
@@ -143,10 +150,11 @@ class MapLaw:
     @functools.cached_property
     def height_factor(self) -> float:
         """c of H_p = M(c A)."""
-        # m4/m2 = (3/4) <q^4>/<q^2>; alpha = 1.5 <q^4>/<q^2>^2, gradient^2 = <q^2>
-        ratio = 0.5 * self.spectrum.alpha * self.spectrum.gradient**2
-        breadth = np.sqrt(ratio * self.inverse_q2) / self.map_constants.breadth_onset
-        return float(0.8 * max(1.0, breadth) ** self.map_constants.breadth * self._ellipse[1])
+        r, m = self.anisotropy, self.map_constants
+        breadth = self.spectrum.gradient / np.exp(np.sum(self.spectrum.variance * np.log(self.spectrum.x)))
+        # stretching an isotropic map by r multiplies it by sqrt(2 (1 + r^2))/(1 + r)
+        breadth *= (1 + r) / np.sqrt(2 * (1 + r * r))
+        return float(0.8 * max(1.0, breadth / m.breadth_onset) ** m.breadth * self._ellipse[1])
 
     @functools.cached_property
     def weighted_height(self) -> FloatArray:
@@ -240,12 +248,13 @@ class MapLaw:
         factor = single + (self.height_factor - single) * -np.expm1(-contact / m.merging_area)
         top = np.minimum(near * np.log(factor * contact) + (1 - near) * own, 0.0)
         tops = np.interp(top, np.log(FRACTIONS), self.weighted_height)
-        difference = np.exp(-((contact / m.valley_area) ** 4)) * (tops - valleys)
+        # nothing is left of the tops in full contact
+        share = (contact / m.valley_area) ** 4 / np.maximum(1 - contact**4, 1e-12)
+        difference = np.exp(-share) * (tops - valleys)
         # u is linear in H_p
         beyond = CubicSpline(log_force, difference * np.exp(-log_force)).antiderivative()
         u = u + 2 * force * (beyond(log_force[-1]) - beyond(log_force)) - difference
-        # where few points touch it may run back by a little
-        return log_force, np.minimum.accumulate(u - 1e-12 * np.arange(NODES))
+        return log_force, convex(force, u)
 
     def separation(self, force: ArrayLike) -> FloatArray:
         """Mean separation [h_rms] at F/(A0 E* g)."""

@@ -77,7 +77,7 @@ class TestLaw:
 
     def test_full_contact_holds_all_energy(self):
         # U = (1/4) sum q |h_q|^2
-        assert Law(SURFACE).energy(6.0) == pytest.approx(SURFACE.mean_wave / 4, rel=1e-9)
+        assert Law(SURFACE).energy(6.0) == pytest.approx(SURFACE.x @ SURFACE.variance / SURFACE.gradient / 4, rel=1e-9)
 
     def test_bands_agree_with_the_power_law(self):
         edges = np.geomspace(1, 64, 2001)

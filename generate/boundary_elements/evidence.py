@@ -63,10 +63,7 @@ def cases(data: xr.Dataset) -> list[Case]:
         curves: dict[str, Any] = {
             name: one[name].values.astype(float) for name in ("mean_height", "top_gradient", "tension_force", "tension")
         }
-        curves |= {
-            "inverse_q2": float(np.nansum(share * one.band_inverse_q2.values)),
-            "anisotropy": float(one.anisotropy),
-        }
+        curves["anisotropy"] = float(one.anisotropy)
         own_spectrum = Spectrum.from_shares(x[share > 0], share[share > 0])
         found.append(
             Case(

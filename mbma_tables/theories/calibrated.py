@@ -37,7 +37,7 @@ class Calibrated(Theory):
     name = "calibrated"
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
-        """Elastic energy over A0 E* [length], by panels in ln u: the tail factor has a corner."""
+        """Elastic energy over A0 E* [length], by panels in ln u."""
         shape = np.broadcast_shapes(np.shape(mean_separation), surface.shape)
         h_max = np.broadcast_to(np.asarray(surface.h_max, float), shape)[..., None]
         start = np.log(np.clip(np.broadcast_to(mean_separation, shape)[..., None] / h_max, MIN_ENERGY_GAP, 1.0))

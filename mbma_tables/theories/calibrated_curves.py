@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import cumulative_trapezoid
-from scipy.interpolate import BSpline, PchipInterpolator, make_interp_spline
+from scipy.interpolate import BSpline, CubicHermiteSpline, PchipInterpolator, make_interp_spline
 from scipy.special import erf, erfinv, ndtri
 
 from mbma_tables.arguments import FloatArray, require
@@ -20,13 +21,12 @@ from mbma_tables.calibrated import (
     LOG_Y,
     PANEL,
     PANEL_NODES,
-    Y_NODES,
     Law,
     Spectrum,
     inner_integral,
     light_factor,
 )
-from mbma_tables.calibrated_map import LOG_FORCE, MapLaw
+from mbma_tables.calibrated_map import LOG_FORCE, MapLaw, convex
 from mbma_tables.hardness import BearingCurve
 from mbma_tables.surfaces.measured import SHARES, MeasuredSurface
 from mbma_tables.surfaces.surface import Surface
@@ -35,10 +35,10 @@ from mbma_tables.theories import calibrated_table
 TESTED_AREA = (1e-3, 0.97)
 WIDTHS = (0.01, 0.1, 0.4)  # of panels in ln q, up to which few nodes suffice
 LAW_ERROR = 1e-7  # of the law's own quadrature
-MAP_ERROR = 2e-2  # of a map's curve between its nodes
+MAP_ERROR = 3e-2  # of a map's curve, which is smoother than the nodes of its law: nine maps in ten
 LAW_FORCE, LAW_NODES = (-24.0, 1.5), 256  # ln F^ of a tabulated curve
-NODE_STEP = 6  # of a map's curve: its own nodes are rougher than what they stand for
-FULL_NODES = 3  # of a map's curve, from which full contact is continued
+INNER_NODES = 1200  # in ln y, of its quintic spline
+NODE_STEP, FINE = 0.2, 8  # of a map's curve, in ln F and ln u: its own nodes are rougher; integrated by so many parts
 _GAUSS = [((1 + x) / 2, w / 2) for x, w in map(np.polynomial.legendre.leggauss, (2, 4, 6, PANEL_NODES))]
 
 
@@ -74,22 +74,38 @@ class Places:
 
 
 class Curve:
-    """A map's curve, smooth and monotone between its nodes, from full contact to the highest point."""
+    """A map's curve from its highest point to full contact: stiffness rises monotonically between nodes of the law."""
 
     def __init__(self, law: MapLaw, h_max: float) -> None:
-        nodes = LOG_FORCE[::NODE_STEP]
-        u = law.separation(np.exp(nodes))
-        kept = (u > 1e-9) & (u < h_max * (1 - 1e-9))
-        # nodes where the curve runs back are left out
-        level = np.minimum.accumulate(np.where(kept, u, np.inf))
-        kept &= u < np.append(np.inf, level[:-1]) * (1 - 1e-9)
-        self._log_u, self._log_force = np.log(u[kept][::-1]), nodes[kept][::-1]
-        self._h_max, self._top = h_max, float(u[kept][0])
-        self._log_force_at = PchipInterpolator(self._log_u, self._log_force)
-        self._rate = self._log_force_at.derivative()
-        # d ln F/d ln u of full contact, over a few nodes
-        first = slice(None, FULL_NODES)
-        self._heaviest_rate = float(np.polyfit(self._log_u[first], self._log_force[first], 1)[0])
+        log_force, u = LOG_FORCE, law.separation(np.exp(LOG_FORCE))
+        kept = np.flatnonzero((u > 1e-9) & (u < h_max * (1 - 1e-9)))
+        nodes = [kept[0]]
+        for k in kept:
+            last = nodes[-1]
+            if log_force[k] - log_force[last] > NODE_STEP or np.log(u[last] / u[k]) > NODE_STEP:
+                nodes.append(k)
+        force, gap = np.append(0, np.exp(log_force[nodes])), np.append(h_max, u[nodes])
+        gap = convex(force, gap)
+        # one stiffness between two nodes, at the middle
+        log_u = np.log(gap)
+        middle = (log_u[1:] + log_u[:-1])[::-1] / 2
+        stiffness = np.log(np.diff(force) / -np.diff(gap))[::-1]
+        self._log_stiffness = PchipInterpolator(middle, stiffness)
+        self._h_max, self._top = h_max, float(np.exp(middle[-1]))
+        self._lightest = float(np.exp(stiffness[-1])) * (h_max - self._top)
+        # force = integral of stiffness over u, from the top
+        fine = np.concatenate([np.linspace(a, b, FINE, endpoint=False) for a, b in itertools.pairwise(middle)])
+        fine = np.append(fine, middle[-1])
+        node, weight = np.polynomial.legendre.leggauss(4)
+        half = np.diff(fine) / 2
+        x = fine[:-1, None] + half[:, None] * (1 + node)
+        work = (np.exp(self._log_stiffness(x) + x) @ weight) * half
+        total = self._lightest + np.append(np.cumsum(work[::-1])[::-1], 0.0)
+        self._log_u, self._log_force = fine, np.log(total)
+        rate = np.exp(self._log_stiffness(fine) + fine) / total
+        self._log_force_at = CubicHermiteSpline(fine, self._log_force, -rate)
+        # -d ln F/d ln u where full contact is continued
+        self._heaviest_rate = -float(rate[0])
         self._law = law
 
     def answer(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -101,13 +117,12 @@ class Curve:
         square = 1 + 2 * self._heaviest_rate * np.minimum(log_u - self._log_u[0], 0)
         force = np.exp(self._log_force_at(inside)) * np.sqrt(square)
         with np.errstate(divide="ignore", invalid="ignore"):
-            rate = np.where(log_u > self._log_u[0], self._rate(inside), self._heaviest_rate / square)
-            stiffness = np.where(u > 0, -force * rate / u, np.inf)
-        lightest = np.exp(self._log_force[-1])
+            full = np.where(u > 0, -force * self._heaviest_rate / square / u, np.inf)
+        stiffness = np.where(log_u > self._log_u[0], np.exp(self._log_stiffness(inside)), full)
         above = u > self._top
         rest = np.clip((self._h_max - u) / (self._h_max - self._top), 0, 1)
-        force = np.where(above, lightest * rest, force)
-        stiffness = np.where(above, lightest / (self._h_max - self._top) * (rest > 0), stiffness)
+        force = np.where(above, self._lightest * rest, force)
+        stiffness = np.where(above & (rest <= 0), 0.0, stiffness)
         return force, self.area(force), stiffness
 
     def area(self, force: FloatArray) -> FloatArray:
@@ -176,9 +191,9 @@ class TabulatedLaw(Law):
 
     @functools.cached_property
     def _spline(self) -> BSpline:
-        log_force, log_y = np.linspace(*LAW_FORCE, LAW_NODES), np.linspace(LOG_Y[0], LOG_Y[1] - 1e-9, Y_NODES)
+        log_force, log_y = np.linspace(*LAW_FORCE, LAW_NODES), np.linspace(LOG_Y[0], LOG_Y[1] - 1e-9, INNER_NODES)
         # the inner integrals of this law's weight, as one function
-        inner = make_interp_spline(log_y, np.log(inner_integral(np.exp(log_y), self._coefficients)), k=5)
+        inner = make_interp_spline(log_y, np.log(inner_integral(np.exp(log_y), self.coefficients)), k=5)
         log_g = np.log(self.spectrum.below) / 2
         shares = self.spectrum.x * self.spectrum.variance / (4 * self.spectrum.gradient) * np.exp(-log_g)
         y = log_force[:, None] - log_g
@@ -235,10 +250,8 @@ class OwnLaw:
         tops = np.interp(FRACTIONS, SHARES, cumulative_trapezoid(heights.quantiles, SHARES, initial=0.0)) / FRACTIONS
         level = ndtri(np.minimum(FRACTIONS, 1 - 1e-12))
         pull = (np.exp(-level * level / 2) / np.sqrt(2 * np.pi) + level * FRACTIONS) / 2
-        spectrum = self.law.spectrum
-        inverse = float(np.sum(spectrum.variance / spectrum.x**2))
         return MapLaw(
-            spectrum, inverse, tops / heights.h_rms, np.ones(FRACTIONS.size), -level / 2, np.maximum(pull, 0.0)
+            self.law.spectrum, tops / heights.h_rms, np.ones(FRACTIONS.size), -level / 2, np.maximum(pull, 0.0)
         )
 
     def answer(self, u: FloatArray) -> tuple[list[FloatArray], float]:

@@ -1,8 +1,8 @@
-"""The calibrated law's table: ln F_P over Hurst exponent, zeta_1 and mean separation, and errors against simulations.
+"""The calibrated law's table: ln F_G over Hurst exponent, zeta_1 and mean separation, and errors against simulations.
 
-F_P is the force of `mbma_tables.calibrated` before its tail factor: smooth, where the factor has a corner. The factor,
-the end at h_max and the area are closed forms, applied here. Below the table's least separation full contact rules,
-F^2 linear in ln u; above its largest ln F is linear in u.
+F_G is the force of `mbma_tables.calibrated` on a surface without end. The end at h_max and the area are closed forms,
+applied here. Below the table's least separation full contact rules, F^2 linear in ln u; above its largest ln F is
+linear in u.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Table:
     covered : numpy.ndarray, shape (3, 2)
         First and last that are answered.
     coefficients : numpy.ndarray
-        Quintic B-splines of ln F_P, the last axis with two zeros more.
+        Quintic B-splines of ln F_G, the last axis with two zeros more.
     constants : Constants
         Of the law.
     error : float
@@ -74,9 +74,8 @@ class Table:
 
     @functools.cached_property
     def numbers(self) -> FloatArray:
-        """What the compiled functions need: first and inverse step of each axis, tail, onset and area_t0."""
-        c = self.constants
-        return np.array([*self.first, *(1 / self.step), c.tail, c.onset, c.area_t0])
+        """What the compiled functions need: first and inverse step of each axis, and area_t0."""
+        return np.array([*self.first, *(1 / self.step), self.constants.area_t0])
 
     def standard_deviation(self, theory: str, quantity: str, area: FloatArray) -> FloatArray:
         """Root mean square of ln(theory/simulation) at contact fractions; NaN where not known."""
@@ -173,9 +172,9 @@ def _lines(c: FloatArray, numbers: FloatArray, surfaces: FloatArray) -> FloatArr
 
 @njit(cache=True, fastmath=_FAST, error_model="numpy", inline="always")
 def _log_gaussian(
-    c: FloatArray, numbers: FloatArray, surfaces: FloatArray, lines: FloatArray, row: int, u: float, log_u: float
+    c: FloatArray, numbers: FloatArray, surfaces: FloatArray, lines: FloatArray, row: int, log_u: float
 ) -> tuple[float, float]:
-    """ln F_G and -d ln F_G/d ln u at u, with the tail factor; from `lines` where there are any."""
+    """ln F_G and -d ln F_G/d ln u; from `lines` where there are any."""
     nodes = c.shape[2] - 6
     place = min(max((log_u - numbers[2]) * numbers[5], 0.0), nodes - 1.0)
     k, z = cell(place, nodes)
@@ -197,8 +196,7 @@ def _log_gaussian(
     elif below < 0.0:
         square = 1.0 + 2.0 * rate * below
         value, rate = value + 0.5 * math.log(square), rate / square
-    above = max(u - numbers[7], 0.0)
-    return value - numbers[6] * above * above, 2.0 * numbers[6] * above * u - rate
+    return value, -rate
 
 
 @njit(cache=True, error_model="numpy")
@@ -209,7 +207,7 @@ def _prepared(c: FloatArray, numbers: FloatArray, surfaces: FloatArray, count: i
     ends = np.empty(surfaces.shape[0])
     for row in range(ends.size):
         h_max = surfaces[row, 3]
-        ends[row] = _log_gaussian(c, numbers, surfaces, lines, row, h_max, math.log(h_max))[0]
+        ends[row] = _log_gaussian(c, numbers, surfaces, lines, row, math.log(h_max))[0]
     return lines, ends
 
 
@@ -221,7 +219,7 @@ def fill(c: FloatArray, numbers: FloatArray, surfaces: FloatArray, owner: Any, u
     each separation.
     """
     lines, ends = _prepared(c, numbers, surfaces, u.size)
-    t0, floors = numbers[8], np.exp(ends)
+    t0, floors = numbers[6], np.exp(ends)
     for n in range(u.size):
         row = owner[n]
         light, h_max, end = surfaces[row, 2], surfaces[row, 3], ends[row]
@@ -230,7 +228,7 @@ def fill(c: FloatArray, numbers: FloatArray, surfaces: FloatArray, owner: Any, u
         elif u[n] <= 0.0:
             out[0, n], out[1, n], out[2, n] = np.inf, 1.0, np.inf
         else:
-            value, rate = _log_gaussian(c, numbers, surfaces, lines, row, u[n], math.log(u[n]))
+            value, rate = _log_gaussian(c, numbers, surfaces, lines, row, math.log(u[n]))
             endless = math.exp(value)
             excess = value - end
             # where both are close their difference loses digits
@@ -251,12 +249,12 @@ def fill_separation(
         row = owner[n]
         end, high, low = ends[row], math.log(surfaces[row, 3]), -MAX_LOG_SEPARATION
         wanted = force[n] * math.exp(-end)
-        if not end + math.log1p(wanted) <= _log_gaussian(c, numbers, surfaces, lines, row, math.exp(low), low)[0]:
+        if not end + math.log1p(wanted) <= _log_gaussian(c, numbers, surfaces, lines, row, low)[0]:
             out[n] = np.nan
             continue
         x = high - 0.5
         for _ in range(MAX_STEPS):
-            value, rate = _log_gaussian(c, numbers, surfaces, lines, row, math.exp(x), x)
+            value, rate = _log_gaussian(c, numbers, surfaces, lines, row, x)
             # in ln(F + F_G(h_max)), which is smooth to the end
             miss = math.log1p((math.expm1(value - end) - wanted) / (1.0 + wanted))
             if miss > 0.0:

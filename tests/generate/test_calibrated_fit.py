@@ -15,7 +15,7 @@ from mbma_tables.errors import TableFileError
 
 FORCES = np.geomspace(4e-4, 1.0, 15)
 TRUE = dataclasses.replace(
-    CONSTANTS, area_s0=0.55, area_slope=0.02, weight=0.47, weight_slope=0.3, cubic=0.35, tail=0.2, onset=1.2
+    CONSTANTS, area_s0=0.55, area_slope=0.02, weight=0.47, weight_slope=0.2, cubic=0.35, tail=0.1
 )
 
 
