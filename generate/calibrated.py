@@ -17,6 +17,7 @@ from scipy.optimize import least_squares
 from generate import calibrated_hardness
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import GAUSSIAN, MAX_AREA, MIN_WAVES, Case, cases
+from generate.calibrated_bars import measure
 from generate.calibrated_table import write as write_table
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum
@@ -25,11 +26,13 @@ from mbma_tables.calibrated_map import MAP_CONSTANTS, MapConstants, MapLaw
 QUANTITIES = ("area", "force", "stiffness")
 EDGES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9, MAX_AREA)  # contact fractions between which errors are told
 FOLDS = 5
+DIGITS = 4  # of constants
 GRID = np.linspace(-21.0, 1.6, 227)[::-1]  # ln F of curves while they are fitted
 LEAST = 1e-6  # ratio of forces that a law above its h_max counts as
 # errors that count alike: model noise plus the scatter of surfaces at light contact
 NOISE = {"area": (0.015, 0.15), "force": (0.02, 0.25), "map": (0.03, 0.1)}
 LIGHT = 0.01
+CLOSE = 1e-4  # relative changes of cost or constants that end a fit
 STEP = 0.01  # relative, of numerical derivatives: laws of maps are interpolated
 
 
@@ -44,9 +47,20 @@ def _fitted(start: Fitted, names: Sequence[str], residuals: Callable[[Fitted], l
 
     first = [getattr(start, name) for name in names]
     found = least_squares(
-        lambda values: np.concatenate(residuals(trial(values))), first, loss="soft_l1", x_scale="jac", diff_step=STEP
+        lambda values: np.concatenate(residuals(trial(values))),
+        first,
+        loss="soft_l1",
+        x_scale="jac",
+        diff_step=STEP,
+        ftol=CLOSE,
+        xtol=CLOSE,
     )
     return trial(found.x)
+
+
+def _rounded(constants: Fitted) -> Fitted:
+    """Constants of so many digits as the library carries."""
+    return type(constants)(*(float(f"{value:.{DIGITS}g}") for value in dataclasses.astuple(constants)))
 
 
 def noise(one: Case, name: str) -> FloatArray:
@@ -68,9 +82,9 @@ class Parts:
     def of(cls, spectrum: Spectrum) -> Parts:
         """The parts of P^16, and what P and P^3 add in its place."""
         plain, first, cubic = (
-            Law(
-                spectrum, None, dataclasses.replace(CONSTANTS, weight=a, cubic=b, weight_slope=0.0)
-            ).separation_persson(np.exp(GRID))[0]
+            Law(spectrum, None, dataclasses.replace(CONSTANTS, weight=a, cubic=b, weight_slope=0.0)).separation_persson(
+                np.exp(GRID)
+            )[0]
             for a, b in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
         )
         return cls(spectrum, plain, first - plain, cubic - plain)
@@ -132,9 +146,9 @@ def errors(one: Case, law: Law | MapLaw, quantity: str) -> FloatArray:
 def summary(seen: Sequence[Case], make: Callable[[Case], Law | MapLaw]) -> dict[str, list[list[float]]]:
     """By contact fraction: mean, standard deviation, 90% quantile of the magnitude and number of errors."""
     bins = np.digitize(np.concatenate([one.area for one in seen]), EDGES) - 1
-    told = {}
+    told, laws = {}, [make(one) for one in seen]
     for quantity in QUANTITIES:
-        values = np.concatenate([errors(one, make(one), quantity) for one in seen])
+        values = np.concatenate([errors(one, law, quantity) for one, law in zip(seen, laws, strict=True)])
         parts = [values[(bins == k) & np.isfinite(values)] for k in range(len(EDGES) - 1)]
         told[quantity] = [
             [float(p.mean()), float(p.std()), float(np.quantile(np.abs(p), 0.9)), len(p)] if len(p) else []
@@ -157,29 +171,26 @@ def cross_validate(training: Sequence[Case]) -> dict[str, Any]:
     return {"spread": dict(zip(names, spread.tolist(), strict=True)), "errors": told}
 
 
-def coverage(seen: Sequence[Case], constants: Constants, stated: dict[str, Any]) -> dict[str, list[float]]:
-    """Shares of held-out errors within one and two of the root mean squares that cross-validation states."""
+def coverage(
+    seen: Sequence[Case], make: Callable[[Case], Law | MapLaw], stated: dict[str, Any]
+) -> dict[str, list[float]]:
+    """Shares of held-out errors within one and two of the stated root mean squares."""
     middles = np.log(np.sqrt(np.multiply(EDGES[1:], EDGES[:-1])))
-    told = {}
+    told, laws = {}, [make(one) for one in seen]
     for quantity in QUANTITIES:
         log_sigma = np.log([np.hypot(*part[:2]) for part in stated[quantity]])
         sizes = np.concatenate(
             [
-                np.abs(errors(one, one.law(constants), quantity))
-                / np.exp(np.interp(np.log(one.area), middles, log_sigma))
-                for one in seen
+                np.abs(errors(one, law, quantity)) / np.exp(np.interp(np.log(one.area), middles, log_sigma))
+                for one, law in zip(seen, laws, strict=True)
             ]
         )
         told[quantity] = [float(np.mean(sizes < limit)) for limit in (1, 2)]
     return told
 
 
-def report(evidence: Sequence[Case], constants: Constants, map_constants: MapConstants) -> dict[str, Any]:
+def report(evidence: Sequence[Case], forms: dict[str, Callable[[Case], Law | MapLaw]]) -> dict[str, Any]:
     """Errors by set of surfaces and by form of the law."""
-    forms: dict[str, Callable[[Case], Law | MapLaw]] = {
-        "spectrum": lambda one: one.law(constants),
-        "map": lambda one: one.map_law(constants, map_constants),
-    }
     groups: dict[str, Callable[[Case], bool]] = {
         "1 wave": lambda one: one.kind in GAUSSIAN and one.waves < MIN_WAVES,
         "2-3 waves": lambda one: one.gaussian and one.waves < 4,
@@ -213,18 +224,25 @@ def calibrated(
         found = cases(data.load())
         source = data.attrs.get("code_sha256", "")
     training = [one for one in found if one.split == TRAINING]
-    constants = fit(training)
-    map_constants = fit_map(training, constants) if maps else MAP_CONSTANTS
+    constants = _rounded(fit(training))
+    map_constants = _rounded(fit_map(training, constants)) if maps else MAP_CONSTANTS
     checked = cross_validate(training)
+    forms: dict[str, Callable[[Case], Law | MapLaw]] = {
+        "spectrum": lambda one: one.law(constants),
+        "map": lambda one: one.map_law(constants, map_constants),
+    }
+    by_map = summary([one for one in training if one.gaussian], forms["map"])
+    held_out = [one for one in found if one.split != TRAINING and one.gaussian]
     told: dict[str, Any] = {
         "constants": dataclasses.asdict(constants),
         "map_constants": dataclasses.asdict(map_constants),
         "cross_validation": checked,
-        "coverage": coverage(
-            [one for one in found if one.split != TRAINING and one.gaussian], constants, checked["errors"]
-        ),
+        "by_map": by_map,
+        "coverage": coverage(held_out, forms["spectrum"], checked["errors"])
+        | {f"{name} (map)": shares for name, shares in coverage(held_out, forms["map"], by_map).items()},
         "contact_edges": EDGES,
-        "errors": report(found, constants, map_constants),
+        "errors": report(found, forms),
+        "bars": measure(found, forms, errors),
         "evidence": {"code_sha256": source, "training": len(training), "surfaces": len(found)},
     }
     for name in ("constants", "map_constants"):
@@ -232,10 +250,14 @@ def calibrated(
     click.echo(f"held-out errors within one and two standard deviations: {told['coverage']}")
     for quantity in QUANTITIES:
         click.echo(f"{quantity}: mean and standard deviation of ln(law/simulation) [%] between contacts {EDGES}")
-        for name, forms in told["errors"].items():
-            for form, values in forms.items():
+        for name, by_form in told["errors"].items():
+            for form, values in by_form.items():
                 cells = [f"{100 * p[0]:+4.0f}±{100 * p[1]:<3.0f}" if p else "    -   " for p in values[quantity]]
                 click.echo(f"  {name:32s} {form:9s} " + " ".join(cells))
+    for bar in told["bars"]:
+        click.echo(
+            f"{bar['what']}: {100 * bar['found']:.1f}% ({100 * bar['limit']:g}%), noise {100 * bar['noise']:.1f}%"
+        )
     if out is not None:
         out.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
     if table is not None:

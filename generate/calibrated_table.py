@@ -16,12 +16,10 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator, make_interp_spline
 
-from generate.boundary_elements.design import TRAINING
 from generate.boundary_elements.evidence import Case
 from generate.calibrated_file import write_part
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import Constants, Law, Spectrum, light_factor
-from mbma_tables.calibrated_map import MapConstants
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.tablefiles.provenance import source_digest, versions
 from mbma_tables.tablefiles.splines import coefficients
@@ -33,19 +31,24 @@ from mbma_tables.theories.protocol import Theory
 
 # answered inside; nodes reach further, since a spline is worst near its ends
 COVERED = {"hurst": (0.1, 1.0), "log_zeta_1": (np.log(3.0), np.log(1e5)), "log_separation": (np.log(1e-6), np.log(8.0))}
-HURST = np.linspace(0.04, 1.06, 50)
-LOG_ZETA = np.linspace(np.log(2.0), np.log(2e5), 33)
-LOG_U = np.linspace(np.log(5e-7), np.log(10.0), 108)
-LOG_FORCE = np.linspace(-38.0, 1.3, 380)  # ln F^ between whose separations the nodes lie
+HURST = np.linspace(0.01, 1.09, 34)
+LOG_ZETA = np.linspace(np.log(1.7), np.log(2.5e5), 40)
+LOG_U = np.linspace(np.log(5e-7), np.log(10.0), 192)
+LOG_FORCE = np.linspace(-38.0, 1.3, 240)  # ln F^ between whose separations the nodes lie
 DEGREE = 5
 CERTIFICATE = (300, 40)  # held-out surfaces, separations of each
 HIGHEST = (2.5, 6.0)  # their h_max/h_rms
 NEAREST = 0.95  # of h_max: nearer to it force is a small difference
 PROCESSES = 2
-DIGITS = 4  # of constants
 MIN_ERRORS = 5  # that state a scatter
 STATISTICS = ("bias", "standard_deviation", "largest_of_nine_in_ten", "number")
-MODULES = ("mbma_tables.calibrated", "generate.calibrated", "generate.calibrated_table")
+MODULES = (
+    "mbma_tables.calibrated",
+    "mbma_tables.calibrated_map",
+    "generate.calibrated",
+    "generate.calibrated_bars",
+    "generate.calibrated_table",
+)
 LONG_NAMES = {
     "hurst": "Hurst exponent",
     "log_zeta_1": "natural logarithm of q1/q0",
@@ -117,7 +120,7 @@ def log_force(law: Law) -> FloatArray:
     """ln F_G at the nodes in separation."""
     u, _ = law.separation_persson(np.exp(LOG_FORCE))
     x = make_interp_spline(np.log(u[::-1]), LOG_FORCE[::-1], k=5)(LOG_U)
-    for _ in range(3):
+    for _ in range(2):
         value, slope = law.separation_persson(np.exp(x))
         x = x - np.clip((np.log(value) - LOG_U) * value / slope, -0.5, 0.5)
     return np.asarray(x - law.tail * np.exp(3 * LOG_U))
@@ -197,6 +200,7 @@ def _attributes(told: dict[str, Any], constants: Constants, theories: list[str],
         **{f"law_{name}": value for name, value in dataclasses.asdict(constants).items()},
         **{f"map_{name}": value for name, value in told["map_constants"].items()},
         "coverage": json.dumps(told["coverage"]),
+        "bars": json.dumps(told["bars"]),
         "evidence": json.dumps(told["evidence"]),
         "versions": json.dumps(versions(), sort_keys=True),
         "source_sha256": source_digest(MODULES),
@@ -206,20 +210,15 @@ def _attributes(told: dict[str, Any], constants: Constants, theories: list[str],
 
 def dataset(told: dict[str, Any], found: Sequence[Case], summary: Summary) -> xr.Dataset:
     """The file's content but for its certificate."""
-    constants = Constants(*(float(f"{value:.{DIGITS}g}") for value in told["constants"].values()))
-    map_constants = MapConstants(**told["map_constants"])
+    constants = Constants(**told["constants"])
     with ProcessPoolExecutor(PROCESSES) as pool:
         values = np.array(list(pool.map(functools.partial(_row, constants), HURST)))
     edges = np.array(told["contact_edges"])
     bins = edges.size - 1
     known = others(found, summary)
-    by_map = summary(
-        [one for one in found if one.split == TRAINING and one.gaussian],
-        lambda one: one.map_law(constants, map_constants),
-    )
     stated = {
         "calibrated": _cells(told["cross_validation"]["errors"], bins),
-        "calibrated_map": _cells(by_map, bins),
+        "calibrated_map": _cells(told["by_map"], bins),
         **{name: _cells(content, bins) for name, content in known.items()},
     }
     rows = {f"{name}, {form}": content for name, forms in told["errors"].items() for form, content in forms.items()}

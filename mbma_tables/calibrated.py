@@ -22,13 +22,13 @@ import functools
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BSpline, make_interp_spline
+from scipy.interpolate import CubicSpline
 from scipy.special import erf, ndtri
 
 from mbma_tables.arguments import FloatArray
 
 LOG_Y = (-32.0, 2.25)  # ln y of the tabulated inner integrals; above its end they are below 1e-150
-Y_NODES = 1200
+Y_NODES = 4800
 POWERS = (1, 3, 16)  # of the cover in the weight W
 CLOSEST = -36.0  # ln ln x where a self-affine spectrum's quadrature begins
 PANEL, PANEL_NODES = 1.0, 10  # its panels, in ln ln x below x = e and in ln x above
@@ -51,13 +51,13 @@ class Constants:
         c of the Gaussian tail factor.
     """
 
-    area_s0: float = 0.5097
-    area_slope: float = 0.02905
-    area_t0: float = 0.3352
-    weight: float = 0.439
-    weight_slope: float = 0.081
-    cubic: float = 0.430
-    tail: float = 0.0665
+    area_s0: float = 0.5127
+    area_slope: float = 0.03088
+    area_t0: float = 0.3412
+    weight: float = 0.4387
+    weight_slope: float = 0.08884
+    cubic: float = 0.4289
+    tail: float = 0.06586
 
 
 CONSTANTS = Constants()
@@ -83,36 +83,31 @@ def light_factor(alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArr
 
 
 @functools.cache
-def _inner_integrals() -> tuple[BSpline, ...]:
-    """ln of I_n(y) = integral from y to infinity of dP^n/y', for n in POWERS, over ln y."""
+def _inner_integrals() -> CubicSpline:
+    """ln of I_n(y) = integral from y to infinity of dP^n/y', for n in POWERS, over ln y; shape (..., 3)."""
     log_y = np.linspace(*LOG_Y, Y_NODES)
     node, weight = np.polynomial.legendre.leggauss(12)
     step = log_y[1] - log_y[0]
     y = np.exp(log_y[:-1, None] + step * (node + 1) / 2)
     P, dP = _cover(y)
     dP_end = _cover(np.exp(log_y))[1]
-    shapes = []
+    values = []
     for n in POWERS:
         # dP^n/y' = n P^(n-1) P' d ln y'
         pieces = (n * P ** (n - 1) * dP) @ weight * step / 2
         # beyond the end the integrand falls like exp(-2 y^2): its own share of the last value
         end = n * dP_end[-1] / (4 * np.exp(2 * log_y[-1]))
-        value = np.cumsum(np.append(pieces, end)[::-1])[::-1]
-        shapes.append(make_interp_spline(log_y, np.log(value), k=5))
-    return tuple(shapes)
+        values.append(np.log(np.cumsum(np.append(pieces, end)[::-1])[::-1]))
+    return CubicSpline(log_y, np.stack(values, axis=1))
 
 
 def inner_integral(y: FloatArray, coefficients: FloatArray) -> FloatArray:
     """Sum of a_n I_n(y)."""
     log_y = np.log(y)
     inside = np.clip(log_y, *LOG_Y)
-    total = np.zeros(np.shape(y))
-    for n, a, shape in zip(POWERS, coefficients, _inner_integrals(), strict=True):
-        value = np.exp(shape(inside))
-        if n == 1:
-            # below the table I_1 is a logarithm, the others are constant
-            value += np.sqrt(8 / np.pi) * (inside - log_y) * (log_y < LOG_Y[0])
-        total += a * value
+    total = np.exp(_inner_integrals()(inside)) @ coefficients
+    # below the table I_1 is a logarithm, the others are constant
+    total += coefficients[0] * np.sqrt(8 / np.pi) * (inside - log_y) * (log_y < LOG_Y[0])
     return np.where(log_y < LOG_Y[1], total, 0.0)
 
 

@@ -58,13 +58,13 @@ class MapConstants:
         Further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces.
     """
 
-    breadth: float = 0.589
-    breadth_onset: float = 1.418
-    gaussian_area: float = 0.2545
-    valley_area: float = 0.6409
+    breadth: float = 0.6083
+    breadth_onset: float = 1.393
+    gaussian_area: float = 0.299
+    valley_area: float = 0.6606
     tension_area: float = 0.6
-    merging_area: float = 0.009561
-    elliptic: float = 0.9361
+    merging_area: float = 0.008524
+    elliptic: float = 0.8281
 
 
 MAP_CONSTANTS = MapConstants()

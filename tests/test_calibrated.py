@@ -10,8 +10,9 @@ from scipy.special import erf
 
 from mbma_tables.bearing import FRACTIONS
 from mbma_tables.calibrated import PERSSON, YANG_PERSSON, Law, Spectrum, area, mean_top_height
-from mbma_tables.calibrated_map import MapLaw, hertz_ellipse
+from mbma_tables.calibrated_map import MapLaw, convex, hertz_ellipse
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories.calibrated_table import shipped
 from mbma_tables.theories.persson import persson_separation
 
 HARD = [(0.1, 1e5), (0.3, 128.0), (0.8, 64.0), (1.0, 3.5)]
@@ -93,22 +94,32 @@ CHALLENGE = [(0.001, 0.00212, 2.333), (0.01, 0.02036, 1.334), (0.03, 0.0595, 0.8
 GFMD = [(0.005, 0.0399, 1.190), (0.025, 0.1852, 0.441), (0.065, 0.4326, 0.127), (0.113, 0.6571, 0.038)]
 
 
+def published_area(force, alpha):
+    """The area law that ours was refined from (a study of 105 other surfaces), as its authors print it."""
+    s0, t = min(0.497 + 0.041 * math.log(alpha / 10), 0.95), force / 0.321
+    return erf(math.sqrt(2) * force / np.sqrt((s0 + t) / (1 + t)))
+
+
+def assert_no_worse(law, force, contact, gap):
+    """Nearer in area than the law before it, and in force within three of the standard deviations that are stated."""
+    before = published_area(force, law.spectrum.alpha)
+    assert np.all(np.abs(law.area(force) - contact) <= np.abs(before - contact))
+    scatter = shipped().standard_deviation("calibrated", "force", contact)
+    assert np.all(np.abs(np.log(law.force(gap) / force)) <= 3 * scatter)
+
+
 def test_contact_challenge():
     # plateau from 0.2 q_r to q_r, power law to 200 q_r
     edges = np.geomspace(0.2, 200, 4001)
     middle = np.sqrt(edges[1:] * edges[:-1])
     shares = np.minimum(middle**2, middle**-1.6) * np.diff(np.log(edges))
-    law = Law(Spectrum.from_shares(middle, shares), 3.45)
-    force, contact, gap = np.array(CHALLENGE).T
-    np.testing.assert_allclose(law.area(force), contact, rtol=0.1)
-    np.testing.assert_allclose(law.force(gap), force, rtol=0.35)
+    assert_no_worse(Law(Spectrum.from_shares(middle, shares), 3.45), *np.array(CHALLENGE).T)
 
 
 def test_molecular_dynamics():
     force, contact, gap = np.array(GFMD).T
-    law = Law(Spectrum.self_affine(0.8, 100.0))
-    np.testing.assert_allclose(law.area(force / 0.2766), contact, rtol=0.1)
-    np.testing.assert_allclose(law.force(gap) * 0.2766, force, rtol=0.15)
+    # 5 to 7% more area than the law below half contact: every atom that touches counts whole, at the rim too
+    assert_no_worse(Law(Spectrum.self_affine(0.8, 100.0)), force / 0.2766, contact, gap)
 
 
 class TestHertz:
@@ -164,9 +175,34 @@ class TestMap:
         np.testing.assert_allclose(law.force(u), forces, rtol=2e-3)
         assert law.force(law.mean_height[0] + 1) == 0
 
+    def test_stretching_leaves_the_height_factor_but_for_its_ellipse(self):
+        rng = np.random.default_rng(5)
+        n = 128
+        k = np.hypot(np.fft.fftfreq(n, 1 / n)[:, None], np.arange(n // 2 + 1)[None, :])
+        inside = (k >= 4) & (k <= 40)
+        modes = np.where(inside, np.where(inside, k, 1.0) ** -1.1 * np.exp(2j * np.pi * rng.random(k.shape)), 0)
+        heights = np.fft.irfft2(modes, s=(n, n))
+        plain, stretched = (MapLaw.from_heights(heights, (size, 1.0)) for size in (1.0, 6.0))
+        assert stretched.anisotropy == pytest.approx(6, rel=0.1)
+        factors = [law.height_factor / hertz_ellipse(round(law.anisotropy, 3))[1] for law in (plain, stretched)]
+        assert factors[0] > 0.81
+        assert factors[1] == pytest.approx(factors[0], rel=0.03)
+
     def test_steeper_tops_carry_more_on_less_area(self, law):
         steep = dataclasses.replace(law, top_gradient=law.top_gradient * np.where(FRACTIONS < 0.1, 2.0, 1.0))
         assert steep.area(0.005) == pytest.approx(law.area(0.005) / 2, rel=0.05)
+
+
+def test_a_curve_made_convex_keeps_what_was():
+    force = np.geomspace(0.01, 1, 60)
+    u = -np.log(force)
+    np.testing.assert_allclose(convex(force, u), u, rtol=1e-12, atol=1e-14)
+    bent = u + 0.5 * np.exp(-(((force - 0.05) / 0.01) ** 2))
+    mended = convex(force, bent)
+    compliance = -np.diff(mended) / np.diff(force)
+    assert np.all(np.diff(compliance) <= 1e-12)
+    assert np.min(-np.diff(bent)) < 0 < np.min(-np.diff(mended))
+    np.testing.assert_allclose(mended[force > 0.3], u[force > 0.3], rtol=1e-9, atol=1e-12)
 
 
 def test_area_is_linear_at_light_loads_and_one_at_the_heaviest():

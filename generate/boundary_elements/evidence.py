@@ -26,6 +26,7 @@ class Case:
     split: str
     node: tuple[float | str, ...]
     waves: int
+    points: int
     spectrum: Spectrum
     own_spectrum: Spectrum
     h_max: float
@@ -71,6 +72,7 @@ def cases(data: xr.Dataset) -> list[Case]:
                 split,
                 (kind, hurst, zeta_1, int(one.waves), float(one["shape"])),
                 int(one.waves),
+                int(one.points),
                 Spectrum.self_affine(hurst, zeta_1) if plain else own_spectrum,
                 own_spectrum,
                 float(one.h_max),

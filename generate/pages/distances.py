@@ -183,7 +183,7 @@ def _simulated(kind: str, spectrum: Spectrum, h_max: float, rows: Any, hurst: fl
     """A surface of a file of numbers; rows of F/(A0 E* g), A/A0 and u/h_rms."""
     node = (kind, hurst, zeta_1, 0, 0.0)
     force, area, u = (np.asarray(row, dtype=float) for row in rows)
-    return Case(kind, "", node, MIN_WAVES, spectrum, spectrum, h_max, {}, force, area, u)
+    return Case(kind, "", node, MIN_WAVES, 0, spectrum, spectrum, h_max, {}, force, area, u)
 
 
 def _self_affine(hurst: float, zeta_1: float, h_max: float, rows: Any) -> Case:

@@ -30,9 +30,21 @@ def test_wavy_surface_against_westergaard(share):
     contact = Contact(np.tile(wave[:, None], (1, 8)), (1.0, 8 / points), 1e-9)
     result = contact.press(share * full)
     assert result["area_raw"] == pytest.approx(2 / np.pi * np.arcsin(np.sqrt(share)), abs=2 / points)
-    # mean gap/amplitude of the same solution, from u = integral of -dU/du's closed form
+    # a row of flat strips of half width a gives by -(2 L/(pi E*)) ln sin(pi a/L) a mean pressure (Sadowsky 1928), here
+    # -(L/(pi E*)) ln s as sin(pi a/L)^2 = s = p/p*; the mean gap is its integral over p from there to p*
     s = share
     assert result["mean_separation"] == pytest.approx(amplitude * (1 - s + s * np.log(s)), rel=2e-3)
+
+
+def test_sphere_against_hertz():
+    # Hertz (1882), E* = R = 1: F = 4 a^3/3, pressure (2 a/pi) sqrt(1 - r^2/a^2), whose mean of -r^2/2 is -a^2/5
+    points, radius = 192, 0.12
+    x = (np.arange(points) + 0.5) / points - 0.5
+    contact = Contact(-(x[:, None] ** 2 + x[None, :] ** 2) / 2, SQUARE, 1e-9)
+    result = contact.press(4 * radius**3 / 3)
+    assert result["area"] == pytest.approx(np.pi * radius**2, rel=0.01)
+    assert np.asarray(contact.model.traction).max() == pytest.approx(2 * radius / np.pi, rel=0.01)
+    assert result["pressure_weighted_height"] == pytest.approx(-(radius**2) / 5, rel=0.01)
 
 
 def test_force_is_the_derivative_of_energy():

@@ -1,5 +1,6 @@
 """The calibrated law as a theory: its table, its scatter, any spectrum, and maps."""
 
+import dataclasses
 import pathlib
 
 import numpy as np
@@ -13,6 +14,7 @@ from generate.boundary_elements.evidence import cases
 from generate.calibrated import errors
 from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact
 from mbma_tables.calibrated import CONSTANTS, Law, Spectrum
+from mbma_tables.calibrated_map import MAP_CONSTANTS
 from mbma_tables.files import shipped_file
 from mbma_tables.theories import Calibrated, Mbma, Persson, get_theory
 from mbma_tables.theories.calibrated_curves import force_at_area
@@ -53,8 +55,11 @@ class TestTable:
             assert all("units" in data[name].attrs and "long_name" in data[name].attrs for name in data.variables
                        if data[name].dtype.kind == "f")  # fmt: skip
 
-    def test_has_the_constants_of_the_law(self):
+    def test_has_the_constants_of_the_laws(self):
         assert shipped().constants == CONSTANTS
+        with xr.open_dataset(shipped_file(NAME)) as data:
+            for name, value in dataclasses.asdict(MAP_CONSTANTS).items():
+                assert data.attrs[f"map_{name}"] == value, name
 
     def test_outside_it_the_law_answers(self):
         batch = Surface([0.05, 0.8, 0.8], 1.0, [100.0, 1e6, 64.0], 1.0, 3.2)
