@@ -31,9 +31,9 @@ from mbma_tables.theories.protocol import Theory
 
 # answered inside; nodes reach further, since a spline is worst near its ends
 COVERED = {"hurst": (0.1, 1.0), "log_zeta_1": (np.log(3.0), np.log(1e5)), "log_separation": (np.log(1e-6), np.log(8.0))}
-HURST = np.linspace(0.01, 1.09, 34)
-LOG_ZETA = np.linspace(np.log(1.7), np.log(2.5e5), 40)
-LOG_U = np.linspace(np.log(5e-7), np.log(10.0), 192)
+HURST = np.linspace(0.01, 1.09, 42)
+LOG_ZETA = np.linspace(np.log(1.7), np.log(2.5e5), 46)
+LOG_U = np.linspace(np.log(5e-7), np.log(10.0), 150)
 LOG_FORCE = np.linspace(-38.0, 1.3, 240)  # ln F^ between whose separations the nodes lie
 DEGREE = 5
 CERTIFICATE = (300, 40)  # held-out surfaces, separations of each

@@ -253,6 +253,24 @@ class TestMap:
         np.testing.assert_allclose(found.mean_separation, plain.mean_separation, rtol=0.1)
         assert np.all(found.scatter <= plain.scatter)
 
+    @settings(max_examples=12)
+    @given(st.integers(0, 10**6), st.floats(1.0, 4.5), st.floats(0.5, 5.0), st.sampled_from([0.0, 0.4, -0.4]))
+    def test_force_area_and_stiffness_rise_with_compression(self, seed, power, sides, skew):
+        # steep or flat spectra, stretched, of skewed heights: few points touch first
+        noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((48, 48)))
+        q = np.hypot(np.fft.fftfreq(48)[:, None], np.fft.rfftfreq(48))
+        heights = np.fft.irfft2(np.where((q > 0.04) & (q < 0.3), noise / np.maximum(q, 0.01) ** power, 0), s=(48, 48))
+        heights /= heights.std()
+        if skew:
+            heights = np.expm1(skew * heights) / skew
+        surface = Surface.from_map(heights, 1.0, sides, periodic=True)
+        top = float(surface.h_max)
+        gaps = top * np.append(np.linspace(1, 0.01, 1500), np.geomspace(0.0099, 1e-6, 500))
+        found = THEORY.answer(surface, gaps)
+        assert np.all(np.diff(found.force) > 0)
+        assert np.all(np.diff(found.area) >= 0)
+        assert np.all(np.diff(found.stiffness[1:]) >= -1e-12 * found.stiffness[2:])
+
     def test_inverses_monotone_and_ends(self, surface):
         top = float(surface.h_max)
         u = np.linspace(1e-5 * top, 1.05 * top, 200)
