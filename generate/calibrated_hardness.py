@@ -90,8 +90,7 @@ def read(data: xr.Dataset) -> list[Capped]:
         share, x = one.band_variance.values, one.band_q.values
         held = share > 0
         own = Spectrum.from_shares(x[held], share[held])
-        inverse = float(np.nansum(share * one.band_inverse_q2.values))
-        map_curve = Curve(MapLaw(own, inverse, **curves, anisotropy=float(one.anisotropy)), h_max)
+        map_curve = Curve(MapLaw(own, **curves, anisotropy=float(one.anisotropy)), h_max)
         spectrum = Spectrum.self_affine(float(one.hurst), float(one.zeta_1)) if kind == "self_affine" else own
         heights = cap.BearingCurve(curves["mean_height"], h_max)
         rows = {name: one[name].values.astype(float) for name in names}
