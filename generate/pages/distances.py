@@ -238,10 +238,7 @@ def measured(name: str) -> Case:
     curves: dict[str, Any] = {
         key: one[key].astype(float) for key in ("mean_height", "top_gradient", "tension_force", "tension")
     }
-    curves |= {
-        "inverse_q2": float(np.nansum(share * one["band_inverse_q2"])),
-        "anisotropy": float(one["anisotropy"]),
-    }
+    curves["anisotropy"] = float(one["anisotropy"])
     spectrum = Spectrum.from_shares(one["band_q"][share > 0], share[share > 0])
     rows = [one[key][seen] for key in ("force", "area", "mean_separation")]
     return dataclasses.replace(_simulated("measured", spectrum, float(one["h_max"]), rows), curves=curves)

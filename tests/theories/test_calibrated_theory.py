@@ -262,7 +262,7 @@ class TestMap:
         heights /= heights.std()
         if skew:
             heights = np.expm1(skew * heights) / skew
-        surface = Surface.from_map(heights, 1.0, sides, periodic=True)
+        surface = Surface.from_map(heights, 1.0, sides, periodic=True, model="measured")
         top = float(surface.h_max)
         gaps = top * np.append(np.linspace(1, 0.01, 1500), np.geomspace(0.0099, 1e-6, 500))
         found = THEORY.answer(surface, gaps)
