@@ -1,7 +1,6 @@
 """Units: read and converted rightly in every entry, kept through results, refused where they conflict."""
 
 import json
-import pathlib
 import pickle
 from fractions import Fraction
 
@@ -282,7 +281,7 @@ SOURCES = {
         f"--{name.replace('_', '-')}={float(getattr(CONCRETE, name))!r}{unit}"
         for name, unit in {"hurst": "", "q0": "/mm", "q1": "/mm", "h_rms": "mm", "h_max": "mm"}.items()
     ),
-    "file": ("--file", str(pathlib.Path(__file__).parents[1] / "examples" / "concrete.toml")),
+    "file": ("--file", "examples/concrete.toml"),
 }
 
 

@@ -16,6 +16,7 @@ from mbma_tables import __version__
 from mbma_tables.cli.commands import contact_command, curve_command, island_command, surfaces_command
 from mbma_tables.cli.cost import cost_command
 from mbma_tables.cli.export import export_command
+from mbma_tables.cli.fit import fit_command
 from mbma_tables.cli.scene import plan_command, run_command
 from mbma_tables.cli.sensitivity import sensitivity_command
 from mbma_tables.cli.tables import tables_group
@@ -71,6 +72,7 @@ for command in (
     curve_command,
     island_command,
     surfaces_command,
+    fit_command,
     sensitivity_command,
     tables_group,
     plan_command,

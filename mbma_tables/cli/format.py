@@ -133,7 +133,9 @@ def to_columns(values: Mapping[str, Any], units: Mapping[str, str]) -> list[Colu
 def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     """The surface's numbers for a program, and lines of them for a reader."""
     surface = specimen.surface
-    numbers = {name: float(getattr(surface, name)) for name in SURFACE_NUMBERS}
+    known = {name: getattr(surface, name) for name in SURFACE_NUMBERS}
+    # a spectrum that is no power law has no Hurst exponent
+    numbers = {name: float(value) for name, value in known.items() if value is not None}
     facts: dict[str, Any] = {"length_unit": surface.unit, **numbers}
     units = {name: shown_unit(name, specimen.units).strip("-") for name in numbers}
     shown = [f"{name} {value:.6g} {units[name]}".rstrip() for name, value in numbers.items()]
@@ -141,6 +143,8 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     assumed = [line for record in surface.provenance for line in record.get("assumed", ())]
     notes += [f"assumed: {line}" for line in assumed]
     facts["assumed"] = assumed
+    notes += [record["told"] for record in surface.provenance if "told" in record]
+    facts["provenance"] = [dict(record) for record in surface.provenance]
     fit = getattr(surface, "fit", None)  # of five numbers; of a spectrum a method
     if dataclasses.is_dataclass(fit):
         values = {field.name: getattr(fit, field.name) for field in dataclasses.fields(fit)}

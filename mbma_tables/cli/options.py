@@ -13,6 +13,7 @@ import click
 
 from mbma_tables.errors import InputError
 from mbma_tables.scenes.specimen import (
+    MAP_OPTIONS,
     MATERIAL,
     NUMBERS,
     Specimen,
@@ -102,6 +103,10 @@ def _group(
     return decorate
 
 
+def _treatment(given: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in given.items() if value is not None}
+
+
 def _specimen(given: Mapping[str, Any]) -> Specimen:
     """The surface that the options describe, with its modulus; a modulus option overrides that of a file.
 
@@ -115,10 +120,13 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
             "one surface is needed: --surface NAME, --file TOML, --map MAP, --hurst --q0 --q1 (or --zeta-1) "
             f"--h-rms --h-max, or --hurst --m0 --m2 --m4 --h-max; got {' and '.join(used) or 'none'}"
         )
+    treatment = _treatment({name: given[name] for name in (*MAP_OPTIONS, "model")})
+    if treatment and given["map"] is None:
+        raise InputError(f"--{next(iter(treatment)).replace('_', '-')} is about a measured map: it goes with --map")
     if given["file"] is not None:
         specimen = read_specimen(given["file"])
     elif given["map"] is not None:
-        specimen = from_map(given["map"])
+        specimen = from_map(given["map"], treatment)
     elif given["surface"] is not None:
         specimen = from_name(given["surface"])
     else:
@@ -130,12 +138,35 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
     return specimen.in_units(length, stress)
 
 
+# in the words of `mbma_tables.surfaces.treatment.Treatment`
+_MAP_OPTIONS = (
+    quantity_option("--dx", "dx", help="Sampling step [length], of a map whose file has none;"),
+    quantity_option("--dy", "dy", help="and along its second axis, if another."),
+    click.option("--channel", type=int, help="Number of the map's channel in its file."),
+    click.option("--periodic/--not-periodic", "periodic", default=None, help="Whether the map continues periodically."),
+    click.option(
+        "--detrend", metavar="MODE", help="What to subtract: mean, plane, quadratic, or a mode of SurfaceTopography."
+    ),
+    click.option("--outliers", type=float, metavar="N", help="Take out points N standard deviations off; try 10."),
+    click.option("--fill", metavar="harmonic", help="Fill undefined points, however many."),
+    quantity_option("--short-cutoff", "short_cutoff", help="Shortest wavelength to keep [length], the resolution."),
+    quantity_option("--long-cutoff", "long_cutoff", help="Longest wavelength to keep [length]."),
+    quantity_option("--tip-radius", "tip_radius", help="Of the probe or stylus [length]: keep what it can follow."),
+    click.option("--reliable/--all-waves", "reliable", default=None, help="Whether the file's own resolution counts."),
+    click.option("--window", metavar="NAME", help="Window of the power spectrum, hann by default."),
+    quantity_option("--extrapolate-to", "extrapolate_to", help="Continue the spectrum to this wavelength [length],"),
+    click.option("--extrapolate-hurst", "extrapolate_hurst", type=float, help="by this Hurst exponent."),
+)
+
+
 over_h_rms = click.option("--over-h-rms", is_flag=True, help="The lengths given are multiples of h_rms.")
 
 _SPECIMEN_OPTIONS = (
     click.option("--surface", metavar="NAME", help="Surface: a case of the paper; `mbma surfaces` lists them."),
     click.option("--file", type=click.Path(path_type=Path), metavar="TOML", help="Surface: a TOML file."),
-    click.option("--map", type=click.Path(path_type=Path), metavar="MAP", help="Surface: fitted to a map of heights."),
+    click.option("--map", type=click.Path(path_type=Path), metavar="MAP", help="Surface: a measured map or line scan."),
+    *_MAP_OPTIONS,
+    click.option("--model", metavar="measured|self-affine", help="Of a map: its own spectrum, or five numbers."),
     click.option("--hurst", type=float, help="Surface in numbers: Hurst exponent, in (0, 1]."),
     quantity_option("--q0", help="Smallest wavenumber [1/length]."),
     quantity_option("--q1", help="Largest wavenumber [1/length]; or give --zeta-1."),
@@ -165,8 +196,9 @@ _SPECIMEN_OPTIONS = (
     click.option("--length-unit", metavar="UNIT", help="Unit of plain lengths and of the answer, such as mm."),
     click.option("--stress-unit", metavar="UNIT", help="Unit of a plain modulus and of the answer, such as MPa."),
 )
-_SPECIMEN_NAMES = ("surface", "file", "map", *NUMBERS, *MATERIAL, "length_unit", "stress_unit")
+_SPECIMEN_NAMES = ("surface", "file", "map", *MAP_OPTIONS, "model", *NUMBERS, *MATERIAL, "length_unit", "stress_unit")
 
+map_options = _group("treatment", MAP_OPTIONS, _treatment, *_MAP_OPTIONS)
 specimen_options = _group("specimen", _SPECIMEN_NAMES, _specimen, *_SPECIMEN_OPTIONS)
 # None where none of them is given
 optional_specimen_options = _group(

@@ -16,6 +16,8 @@ from mbma_tables.units import Units, factor, in_unit, known, resolve
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.any_surface import AnySurface
+    from mbma_tables.surfaces.measured import MeasuredSurface
+    from mbma_tables.surfaces.treatment import Treated
 
 BAND = ("hurst", "q0", "q1", "h_rms", "h_max")
 MAGNIFICATION = ("hurst", "q0", "zeta_1", "h_rms", "h_max")
@@ -23,6 +25,10 @@ MOMENTS = ("hurst", "m0", "m2", "m4", "h_max")
 ROUGHNESS = ("Rq", "Ra", "Sq", "Sa", "Rdq", "Sdq", "Rsm", "Sds", "Spd", "Sp", "longest", "shortest")
 NUMBERS = tuple(dict.fromkeys(BAND + MAGNIFICATION + MOMENTS + ROUGHNESS))
 MATERIAL = ("E_star", "E1", "nu1", "E2", "nu2")
+MAP_OPTIONS = (
+    *("dx", "dy", "channel", "periodic", "detrend", "outliers", "fill", "short_cutoff", "long_cutoff", "tip_radius"),
+    *("reliable", "window", "extrapolate_to", "extrapolate_hurst"),
+)  # of a measured map, in the words of `Surface.from_map`
 MAX_SPECTRUM_BYTES = 16 * 2**20
 
 
@@ -66,13 +72,28 @@ def from_name(name: str) -> Specimen:
     return Specimen(Surface.named(name), case.title)
 
 
-def from_map(path: pathlib.Path) -> Specimen:
-    """The surface fitted to a measured map."""
+def from_map(path: pathlib.Path, treatment: Mapping[str, Any]) -> Specimen:
+    """The surface of a measured map or line scan, with options of `Surface.from_map`."""
     from mbma_tables.surfaces.surface import Surface
 
-    surface = Surface.from_map(path, model="self-affine")
-    assert isinstance(surface, Surface)
+    options = dict(treatment)
+    if options.pop("model", "measured") == "measured":
+        return Specimen(measured(path, options)[1], f"measured: {_printable(path)}")
+    surface = Surface.from_map(path, model="self-affine", **options)
     return Specimen(surface, f"fitted to the map {_printable(path)}")
+
+
+def measured(path: pathlib.Path, treatment: Mapping[str, Any]) -> tuple[Treated, MeasuredSurface]:
+    """Treated heights of a map or line scan, and the surface that they are."""
+    from mbma_tables.surfaces.maps import measured_map, opened, prepared
+    from mbma_tables.surfaces.profiles import measured_profile
+    from mbma_tables.surfaces.resolution import finished
+
+    scan, options = opened(path, treatment)
+    further = options.pop("extrapolate_to", None), options.pop("extrapolate_hurst", None)
+    treated = prepared(scan, None, None, options.pop("periodic", None), options, scan.dim)
+    surface = measured_profile(treated, None) if scan.dim == 1 else measured_map(treated, None)
+    return treated, finished(surface, *further)
 
 
 def _printable(path: pathlib.Path) -> str:
@@ -163,6 +184,9 @@ def _from_table(surface: Mapping[str, Any], folder: pathlib.Path, title: str) ->
     given = [name for name in ("name", "map", "psd") if texts[name] is not None]
     if len(given) > 1:
         raise InputError(f"[surface]: {' and '.join(given)} are given: one of name, map, psd or numbers")
+    treatment = {name: numbers.pop(name) for name in (*MAP_OPTIONS, "model") if name in numbers}
+    if treatment and given != ["map"]:
+        raise InputError(f"[surface]: {', '.join(treatment)}: about a measured map, which is missing: give map = ...")
     if given in (["name"], ["map"]) and numbers:
         raise InputError(f"[surface]: {given[0]} and numbers ({', '.join(numbers)}) are given: leave one of them out")
     if texts["convention"] is not None and given != ["psd"]:
@@ -171,7 +195,7 @@ def _from_table(surface: Mapping[str, Any], folder: pathlib.Path, title: str) ->
     if given == ["name"]:
         return from_name(str(texts["name"])).in_units(unit, None)
     if given == ["map"]:
-        return from_map(_file(folder, str(texts["map"]), "map")).in_units(unit, None)
+        return from_map(_file(folder, str(texts["map"]), "map"), treatment).in_units(unit, None)
     if given == ["psd"]:
         path = _file(folder, str(texts["psd"]), "psd")
         return _from_psd(path, numbers, texts["convention"] or "paper", unit)

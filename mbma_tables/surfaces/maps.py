@@ -73,21 +73,32 @@ def _refuse_edges(heights: FloatArray) -> None:
         )
 
 
+def opened(path: str | os.PathLike[str], options: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:
+    """The topography or line scan in a file, and the options that are left for its treatment."""
+    rest = dict(options)
+    given = {name: rest.pop(name, None) for name in ("dx", "dy")}
+    lengths, unit = resolve({name: step for name, step in given.items() if step is not None}, rest.pop("unit", None))
+    scan = read_measurement(path, lengths.get("dx"), lengths.get("dy"), unit, rest.pop("channel", None))
+    return scan, rest if unit is None else rest | {"unit": unit}
+
+
 def prepared(
     source: Any, dx: Any, dy: Any, periodic: bool | None, options: Mapping[str, Any], dimensions: int = 2
 ) -> Treated:
     """A map, or a line scan, of a file, an array or a topography, treated; arguments as of `Surface.from_map`."""
     options = dict(options)
-    unit, channel = options.pop("unit", None), options.pop("channel", None)
+    if isinstance(source, str | os.PathLike):
+        source, options = opened(source, options | {"dx": dx, "dy": dy})
+        dx = dy = None
+    if options.pop("channel", None) is not None:
+        raise InputError("channel belongs to a file")
+    lengths, unit = resolve(
+        {name: step for name, step in (("dx", dx), ("dy", dy)) if step is not None}, options.pop("unit", None)
+    )
+    dx, dy = lengths.get("dx"), lengths.get("dy")
     unknown = options.keys() - {field.name for field in dataclasses.fields(Treatment)}
     if unknown:
         raise TypeError(f"there is no option {', '.join(sorted(unknown))}: see mbma_tables.surfaces.treatment")
-    lengths, unit = resolve({name: step for name, step in (("dx", dx), ("dy", dy)) if step is not None}, unit)
-    dx, dy = lengths.get("dx"), lengths.get("dy")
-    if isinstance(source, str | os.PathLike):
-        source, dx, dy = read_measurement(source, dx, dy, unit, channel), None, None
-    elif channel is not None:
-        raise InputError("channel belongs to a file")
     grid, steps, whole, own, info = grid_of(source, dx, dy, periodic, dimensions)
     own = unit if own is None else known(own)
     if unit is not None and unit != own:

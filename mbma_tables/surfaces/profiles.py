@@ -25,7 +25,7 @@ STRAIGHT = 1.0  # change of slope, d ln C/d ln q, from node to node that is as l
 HELD = 1e3  # weight of height variance and gradient, which are met to 1e-5
 OVERLAP = 35 / 18  # waves under a Hann window that carry what one independent wave does
 END = 1e-3  # share of the squared gradient in the waves above the surface's last
-LONGEST = 4  # of the trace's longest waves: where they hold half of the variance there is no roll-off
+LONGEST, ROLLED_OFF = 4, 0.5  # longest waves of a trace: where they hold half of the variance there is no roll-off
 MIN_NODES = 5
 
 
@@ -145,6 +145,9 @@ def measured_profile(treated: Treated, h_max: Any) -> MeasuredSurface:
     scaled = dataclasses.replace(treated, heights=treated.heights / scale, steps=steps, waves=waves)
     found = ProfileSpectrum.of(scaled)
     heights = Heights.of(scaled.heights)
+    if found.longest > ROLLED_OFF:
+        # a few waves have no distribution
+        heights = Heights.gaussian(found.h_rms, heights.h_max)
     surface = MeasuredSurface(
         found.edges,
         found.isotropic(),
@@ -182,10 +185,10 @@ def _limits(found: ProfileSpectrum, length: float) -> tuple[dict[str, Any], ...]
         },
         {"step": "unseen", "h_max": level, "told": unseen},
     ]
-    if found.longest > 0.5:
+    if found.longest > ROLLED_OFF:
         told = (
             f"the {LONGEST} longest waves of the trace hold {found.longest:.0%} of its variance: h_rms grows with its "
-            "length, and its error is larger than stated"
+            "length, its error is larger than stated, and heights are taken as Gaussian"
         )
         notes.append({"step": "no roll-off", "share": found.longest, "told": told})
     return tuple(notes)

@@ -26,7 +26,7 @@ def resolution(surface: MeasuredSurface) -> dict[str, Any]:
     >>> from mbma_tables.surfaces.resolution import resolution
     >>> q = np.geomspace(1, 100, 50)
     >>> print(resolution(Surface.from_spectrum(q, q**-3.6, h_max=3.0, unit="um"))["told"])
-    area is a matter of resolution: waves are known down to 0.06283 um, and without the last octave of them area at light load would be 1.2 times larger
+    area is a matter of resolution: waves are known down to 0.06283 um, and without the last octave of them area at light load would be 1.18 times larger
     """  # noqa: E501
     laws = surface.laws
     below = float(laws.below(2, laws.place(np.asarray(surface.q1 / 2))))
@@ -34,7 +34,7 @@ def resolution(surface: MeasuredSurface) -> dict[str, Any]:
     shortest = 2 * math.pi / float(surface.q1)
     told = (
         f"area is a matter of resolution: waves are known down to {shortest:.4g} {surface.unit or ''}".rstrip()
-        + f", and without the last octave of them area at light load would be {factor:.2g} times larger"
+        + f", and without the last octave of them area at light load would be {factor:.2f} times larger"
     )
     return {"step": "resolution", "shortest": shortest, "area_without_last_octave": factor, "told": told}
 

@@ -486,7 +486,7 @@ def _told_of_cutoff(
     length = f"{wavelength:.4g} {unit or ''}".rstrip()
     text = f"a {name.replace('_cutoff', ' cut-off')} at {length} removes {lost[1]:.0%} of the squared gradient"
     if name == "short_cutoff":
-        text += f": area at light load is {math.sqrt(before[1] / after[1]):.2g} times larger than without"
+        text += f": area at light load is {math.sqrt(before[1] / after[1]):.2f} times larger than without"
     text += f"; it removes {lost[0]:.0%} of the height variance"
     return {"step": name, "wavelength": wavelength, "of_gradient": lost[1], "of_variance": lost[0], "told": text}
 

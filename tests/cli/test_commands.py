@@ -423,10 +423,12 @@ def self_affine_heights(points: int, hurst: float) -> np.ndarray:
 
 def test_a_map_is_fitted_and_says_how_well(folder):
     write_map(folder / "m.nc", self_affine_heights(128, 0.7), unit="um", periodic=True)
-    (folder / "s.toml").write_text("[surface]\nmap = 'm.nc'\n")
+    (folder / "s.toml").write_text("[surface]\nmap = 'm.nc'\nmodel = 'self-affine'\n")
     (folder / "sub").mkdir()
     os.chdir(folder / "sub")
-    found = json.loads(run("contact", "--map", "../m.nc", "-d", "1", "--over-h-rms", "--json"))
+    found = json.loads(
+        run("contact", "--map", "../m.nc", "--model", "self-affine", "-d", "1", "--over-h-rms", "--json")
+    )
     assert found["surface"]["hurst"] == pytest.approx(0.7, rel=0.02)
     assert found["surface"]["q0"] == pytest.approx(2 * np.pi / 100, rel=0.05)
     assert found["surface"]["length_unit"] == found["units"]["separation"] == "um"
@@ -434,7 +436,7 @@ def test_a_map_is_fitted_and_says_how_well(folder):
     by_file = json.loads(run("contact", "--file", "../s.toml", "-d", "1", "--over-h-rms", "--json"))
     assert by_file["surface"] == found["surface"]
     assert by_file["columns"] == found["columns"]
-    text = run("contact", "--map", "../m.nc", "-d", "1", "--over-h-rms")
+    text = run("contact", "--map", "../m.nc", "--model", "self-affine", "-d", "1", "--over-h-rms")
     assert f"residual {found['surface']['fit']['residual']:.6g}" in text
 
 

@@ -89,8 +89,9 @@ def options(rng):
 
 
 def surface_is_right(surface):
-    """A surface of five positive finite numbers; or none."""
-    numbers = () if surface is None else (surface.hurst, surface.q0, surface.q1, surface.h_rms, surface.h_max)
+    """A surface of positive finite numbers; or none."""
+    numbers = () if surface is None else (surface.q0, surface.q1, surface.h_rms, surface.h_max)
+    numbers += (surface.hurst,) if isinstance(surface, Surface) else ()
     return finite(*numbers) and all(number > 0 for number in numbers)
 
 

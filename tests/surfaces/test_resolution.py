@@ -21,7 +21,7 @@ def test_the_last_octave():
     assert found["shortest"] == pytest.approx(2 * np.pi / 100)
     expected = float(measured(100.0).rms_gradient / measured(50.0).rms_gradient)
     assert found["area_without_last_octave"] == pytest.approx(expected, rel=1e-3)
-    assert f"{expected:.2g} times larger" in found["told"]
+    assert f"{expected:.2f} times larger" in found["told"]
 
 
 def test_the_true_power_law_gives_the_whole_surface_back():

@@ -121,7 +121,7 @@ class TestCutoff:
         assert entry["of_variance"] == pytest.approx(1 - after[0] / before[0], rel=1e-9)
         assert entry["of_gradient"] == pytest.approx(1 - after[1] / before[1], rel=1e-9)
         assert 0.1 < entry["of_gradient"] < 0.9
-        assert f"area at light load is {math.sqrt(before[1] / after[1]):.2g} times" in entry["told"]
+        assert f"area at light load is {math.sqrt(before[1] / after[1]):.2f} times" in entry["told"]
         assert cut.waves == (0.0, pytest.approx(2 * np.pi * 6.5 / SIDE))
 
     def test_periodic_waves_are_those_of_the_library(self):

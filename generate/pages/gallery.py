@@ -1,0 +1,143 @@
+"""`docs/gallery.md`: measured maps from file to contact law, with boundary elements on the very map."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import os
+import pathlib
+from typing import Any
+
+import numpy as np
+
+from generate.pages.page import ROOT, table
+from mbma_tables.arguments import FloatArray
+from mbma_tables.measurement import curves, described, draw
+from mbma_tables.plots import to_png
+from mbma_tables.scenes.specimen import measured
+from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.theories import BoundaryElements, get_theory
+from mbma_tables.theories.protocol import answer_where_finite
+
+FOLDER = "docs/data/maps"
+ROWS = f"{FOLDER}/boundary_elements.csv"
+COLUMNS = ("force", "area", "mean_separation", "energy")
+SHOWN = (0.002, 0.01, 0.1, 0.3, 0.6)  # contact
+GAPS = np.append(np.geomspace(1e-3, 0.1, 60)[:-1], np.linspace(0.1, 0.995, 300))  # u/h_max
+
+
+@dataclasses.dataclass(frozen=True)
+class Example:
+    """A measurement, its options on the command line, and what it is."""
+
+    name: str
+    options: dict[str, Any]
+    about: str
+
+    @property
+    def command(self) -> str:
+        """As it is typed."""
+        words = [f"--{name.replace('_', '-')} {value}" for name, value in self.options.items()]
+        return " ".join(["mbma fit", f"{FOLDER}/{self.name}", *words])
+
+    def path(self) -> pathlib.Path | None:
+        """The file, in the repository or in the folder that MBMA_REFERENCE_MAPS names; None if in neither."""
+        places = [ROOT / FOLDER, *([pathlib.Path(os.environ[VARIABLE])] if VARIABLE in os.environ else [])]
+        return next((place / self.name for place in places if (place / self.name).is_file()), None)
+
+
+VARIABLE = "MBMA_REFERENCE_MAPS"
+EXAMPLES = (
+    Example("top-1.top", {"short_cutoff": "9.4nm"}, "A force microscope's map of 600 nm, 256 x 256 points."),
+    Example(
+        "frt-2.frt",
+        {"fill": "harmonic", "outliers": 10, "short_cutoff": "0.8mm"},
+        "An optical sensor's map of 30 mm x 60 mm, 150 x 300 points, of which 28% are undefined.",
+    ),
+    Example("dektak-1.csv", {"outliers": 10, "long_cutoff": "100um"}, "A stylus's trace of 1.5 mm, 9600 points."),
+)
+# too large to be shipped; their boundary elements are
+BARS = (
+    Example("al3d-1.al3d", {"short_cutoff": f"{4 * 4.38027e-07 * (1 - 1e-9)}m"}, ""),
+    Example("di-1.di", {"short_cutoff": f"{4 * 500 / 512 * (1 - 1e-9)}nm"}, ""),
+)
+
+
+def read_rows() -> dict[str, FloatArray]:
+    """Boundary elements by map: `COLUMNS`, shape (4, n), lengths in the file's unit."""
+    path = ROOT / ROWS
+    if not path.is_file():
+        return {}
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+    found: dict[str, list[list[float]]] = {}
+    for row in csv.DictReader(lines):
+        found.setdefault(row["map"], []).append([float(row[name]) for name in COLUMNS])
+    return {name: np.array(rows).T for name, rows in found.items()}
+
+
+def written(rows: dict[str, FloatArray]) -> bytes:
+    """The same as a file."""
+    text = io.StringIO()
+    text.write(
+        "# boundary elements on measured maps (Tamaas), plane removed, continued by mirror images, waves below\n"
+    )
+    text.write("# four sampling steps removed; force over A0 E*, lengths in the map's unit\n")
+    lines = csv.writer(text, lineterminator="\n")
+    lines.writerow(["map", *COLUMNS])
+    for name, columns in sorted(rows.items()):
+        lines.writerows([name, *(f"{number:.9g}" for number in row)] for row in columns.T)
+    return text.getvalue().encode()
+
+
+def simulated(example: Example, rows: dict[str, FloatArray]) -> FloatArray | None:
+    """Loads of one map: those that are known, else solved, minutes; None of a line."""
+    path = example.path()
+    if example.name not in rows and path is not None:
+        if measured(path, example.options)[0].heights.ndim == 1:
+            return None
+        rows[example.name] = BoundaryElements.from_map(path, **example.options).rows
+    return rows.get(example.name)
+
+
+def compared(surface: MeasuredSurface, rows: FloatArray) -> str:
+    """The calibrated law and MBMA over boundary elements, as a table."""
+    force, area, u, _ = rows
+    lines = []
+    for share in SHOWN:
+        k = int(np.argmin(np.abs(np.log(area / share))))
+        cells = [f"{area[k]:.2%}"]
+        for theory in map(get_theory, ("calibrated", "mbma")):
+            fine = answer_where_finite(theory, surface, np.append(u[k], GAPS * float(surface.h_max)))
+            known = np.isfinite(fine.force[1:])
+            order = np.argsort(fine.force[1:][known])
+            loads, areas = fine.force[1:][known][order], np.maximum.accumulate(fine.area[1:][known][order])
+            inside = loads[0] <= force[k] <= loads[-1]
+            own = np.exp(np.interp(np.log(force[k]), np.log(loads), np.log(areas)))
+            cells += [f"{own / area[k]:.2f}" if inside else "-", f"{fine.force[0] / force[k]:.2f}".replace("nan", "-")]
+        lines.append(cells)
+    return table(["contact", "calibrated: area at a pressure", "force at a separation", "MBMA: area", "force"], lines)
+
+
+def measure() -> tuple[dict[str, str], dict[str, bytes]]:
+    """Parts of the page, and its figures and data."""
+    rows = read_rows()
+    text, files = [], {}
+    for example in EXAMPLES:
+        path = example.path()
+        assert path is not None
+        treated, surface = measured(path, example.options)
+        found = simulated(example, rows)
+        stem = example.name.split(".")[0]
+        points = None if found is None else dict(zip(COLUMNS, found, strict=True))
+        picture = draw(treated, surface, curves(surface), example.name, "pressure  F/(A0 E*)", points)
+        files[f"docs/figures/gallery_{stem}.png"] = to_png(picture)
+        said = "\n".join(described(surface))
+        text += [f"## {example.name}", example.about, f"```\n$ {example.command} --plot {stem}.png\n{said}\n```"]
+        text += [f"![{example.name}](figures/gallery_{stem}.png)"]
+        if found is not None:
+            text += ["Over boundary elements on this map:", compared(surface, found)]
+    for example in BARS:
+        simulated(example, rows)
+    files[ROWS] = written(rows)
+    return {"maps": "\n\n".join(text)}, files

@@ -1,0 +1,217 @@
+"""What a measured map or line scan says: in lines, in a table of loads, and in one picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbma_tables.arguments import FloatArray
+from mbma_tables.errors import MbmaError, NotSelfAffineError
+from mbma_tables.plots import theory_label
+from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.surfaces.treatment import Treated
+from mbma_tables.theories.protocol import answer_where_finite
+from mbma_tables.theories.registry import get_theory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+DRAWN = ("calibrated", "mbma")
+AREAS = np.array([0.002, 0.01, 0.03, 0.1, 0.3, 0.6])  # contact of a table of loads
+GAPS = np.append(np.geomspace(2e-3, 0.1, 20)[:-1], np.linspace(0.1, 0.98, 60))  # u/h_max of curves
+TESTED_ANISOTROPY, TESTED_SKEWNESS = 16.0, 0.5  # that boundary elements have seen
+
+
+def described(surface: MeasuredSurface) -> list[str]:
+    """Lines on what was found in a measurement, what was done to it, and what follows for theories.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mbma_tables import Surface
+    >>> from mbma_tables.measurement import described
+    >>> q = np.geomspace(1, 100, 50)
+    >>> for line in described(Surface.from_spectrum(q, 0.001 * q**-3.6, h_max=0.2, unit="um"))[:2]:
+    ...     print(line)
+    h_rms 0.06265 um, highest point 0.2 um (3.19 h_rms), rms gradient 0.2888
+    waves from 0.06283 to 6.283 um
+    """
+    unit = surface.unit or "length"
+    h_rms, shortest, longest = float(surface.h_rms), 2 * np.pi / float(surface.q1), 2 * np.pi / float(surface.q0)
+    lines = [
+        f"h_rms {h_rms:.4g} {unit}, highest point {float(surface.h_max):.4g} {unit} "
+        f"({float(surface.h_max) / h_rms:.3g} h_rms), rms gradient {float(surface.rms_gradient):.4g}",
+        f"waves from {shortest:.4g} to {longest:.4g} {unit}",
+    ]
+    try:
+        nearest = surface.fit()
+        assert nearest.fit is not None
+        lines.append(
+            f"self-affine: H = {nearest.hurst:.2f}, q0 = {nearest.q0:.4g}, q1 = {nearest.q1:.4g} 1/{unit}, "
+            f"with {nearest.fit.variance_share:.0%} of the variance"
+        )
+    except NotSelfAffineError as fault:
+        lines.append(f"not self-affine: {fault}")
+    if not surface.heights.is_gaussian:
+        text = f"heights: skewness {surface.skewness:.2g}, kurtosis {surface.kurtosis:.3g} (Gaussian: 0 and 3)"
+        if abs(surface.skewness) > TESTED_SKEWNESS:
+            text += "; so skewed that separations are a guess: solve the map itself (theories.BoundaryElements)"
+        lines.append(text)
+    if surface.bearing is not None:
+        ratio, peaked = surface.bearing.anisotropy, surface.bearing.slope_kurtosis
+        text = f"slopes: anisotropy {ratio:.3g} (rms gradient along over across), kurtosis {peaked:.3g} (Gaussian: 3)"
+        if ratio > TESTED_ANISOTROPY:
+            text += f"; beyond {TESTED_ANISOTROPY:g} no theory here was tested"
+        lines.append(text)
+    return lines + [entry["told"] for entry in surface.provenance if "told" in entry]
+
+
+def curves(surface: MeasuredSurface, E_star: float = 1.0) -> dict[str, dict[str, FloatArray]]:
+    """Force, area, mean separation and their scatter by the theories of the picture."""
+    u = float(surface.h_max) * GAPS
+    found = {}
+    for name in DRAWN:
+        theory = get_theory(name)
+        answer = answer_where_finite(theory, surface, u)
+        scatter, area_scatter = theory.scatter(surface, answer.area)
+        lines = {"force": E_star * answer.force, "area": answer.area, "mean_separation": u}
+        slopes = np.gradient(np.log(np.maximum(answer.force, 1e-300)), u)
+        # a factor of force at a separation is a step of separation at a force
+        found[name] = lines | {"area_scatter": area_scatter, "separation_scatter": scatter / np.abs(slopes)}
+    return found
+
+
+def draw(
+    treated: Treated,
+    surface: MeasuredSurface,
+    answers: Mapping[str, Mapping[str, FloatArray]],
+    title: str,
+    pressure_label: str,
+    simulated: Mapping[str, FloatArray] | None = None,
+) -> Figure:
+    """One picture: heights, spectrum with fit and cut-offs, heights' distribution, area and separation by pressure.
+
+    Parameters
+    ----------
+    treated : Treated
+        The heights themselves.
+    surface : MeasuredSurface
+    answers : mapping
+        Of `curves`.
+    title, pressure_label : str
+    simulated : mapping, optional
+        force, area and mean_separation of boundary elements, drawn as points.
+
+    Raises
+    ------
+    MbmaError
+        Where matplotlib is missing.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise MbmaError("a plot needs matplotlib: pip install 'mbma_tables[plot]'") from None
+    figure = Figure(figsize=(12, 7.5), layout="constrained")
+    parts: Any = figure.subfigures(2, 1)
+    above, below = parts
+    panels = dict(zip("ABC", above.subplots(1, 3), strict=True)) | dict(zip("DE", below.subplots(1, 2), strict=True))
+    unit = surface.unit or "length"
+    _heights(above, panels["A"], treated, unit)
+    _spectrum(panels["B"], surface, unit)
+    _distribution(panels["C"], surface, unit)
+    _by_pressure(panels["D"], answers, simulated, "area", "area_scatter", pressure_label, "real contact area  A/A0")
+    names = ("mean_separation", "separation_scatter", pressure_label, f"mean separation u [{unit}]")
+    _by_pressure(panels["E"], answers, simulated, *names)
+    panels["D"].set_yscale("log")
+    panels["E"].set_ylim(0, 1.05 * float(surface.h_max))
+    panels["D"].legend()
+    figure.suptitle(title)
+    return figure
+
+
+def _heights(figure: Any, axes: Axes, treated: Treated, unit: str) -> None:
+    values = treated.heights
+    sides = [count * step for count, step in zip(values.shape, treated.steps, strict=True)]
+    axes.set_xlabel(f"x [{unit}]")
+    if values.ndim == 1:
+        axes.plot(np.arange(values.size) * treated.steps[0], values, lw=0.5)
+        axes.set_ylabel(f"height [{unit}]")
+        return
+    low, high = np.quantile(values, [0.002, 0.998])
+    shown = axes.imshow(
+        values.T, origin="lower", extent=(0, sides[0], 0, sides[1]), cmap="viridis", vmin=low, vmax=high
+    )
+    axes.set_ylabel(f"y [{unit}]")
+    figure.colorbar(shown, ax=axes, label=f"height [{unit}]", shrink=0.8)
+
+
+def _spectrum(axes: Axes, surface: MeasuredSurface, unit: str) -> None:
+    axes.loglog(surface.q, np.where(surface.C > 0, surface.C, np.nan), ".-", ms=3, lw=1, label="measured")
+    try:
+        nearest = surface.fit()
+        q = np.geomspace(float(nearest.q0), float(nearest.q1), 50)
+        axes.loglog(q, nearest.power_spectrum(q * (1 - 1e-12)), "--", label=f"H = {nearest.hurst:.2f}")
+    except NotSelfAffineError:
+        pass
+    for entry in surface.provenance:
+        if entry["step"] in ("short_cutoff", "long_cutoff"):
+            axes.axvline(2 * np.pi / entry["wavelength"], color="grey", ls=":", label=entry["step"].replace("_", " "))
+        if entry["step"] == "extrapolated":
+            first = next(e["shortest"] for e in surface.provenance if e["step"] == "resolution")
+            axes.axvspan(2 * np.pi / first, float(surface.q1), alpha=0.15, color="grey", label="not measured")
+    axes.set_xlabel(f"q [1/{unit}]")
+    axes.set_ylabel(f"C(q) [{unit}$^4$]")
+    axes.legend()
+
+
+def _distribution(axes: Axes, surface: MeasuredSurface, unit: str) -> None:
+    from mbma_tables.surfaces.measured import SHARES
+
+    # density of heights from their quantiles, smoothed over a few
+    heights, h_rms = np.asarray(surface.heights.quantiles), float(surface.h_rms)
+    grid = np.linspace(-4.5, 4.5, 61)
+    below = np.interp(grid * h_rms, heights[::-1], 1 - np.asarray(SHARES)[::-1])
+    axes.stairs(np.diff(below) / np.diff(grid), grid, label="heights", fill=True, alpha=0.4)
+    axes.plot(grid, np.exp(-(grid**2) / 2) / np.sqrt(2 * np.pi), "k--", lw=1, label="Gaussian")
+    axes.axvline(float(surface.h_max) / h_rms, color="C3", lw=1, label="h_max")
+    axes.set_xlabel("height/h_rms")
+    axes.set_ylabel("density")
+    axes.legend()
+
+
+def _by_pressure(
+    axes: Axes,
+    answers: Mapping[str, Mapping[str, FloatArray]],
+    simulated: Mapping[str, FloatArray] | None,
+    what: str,
+    scatter: str,
+    x_label: str,
+    y_label: str,
+) -> None:
+    for name, found in answers.items():
+        force, value, width = found["force"], found[what], found[scatter]
+        held = np.isfinite(force) & (found["area"] > 1e-4) & (force > 0)
+        (line,) = axes.plot(force[held], value[held], label=theory_label(name))
+        band = held & np.isfinite(width)
+        low, high = (
+            (value * np.exp(-width), value * np.exp(width)) if what == "area" else (value - width, value + width)
+        )
+        axes.fill_between(force[band], low[band], high[band], alpha=0.2, color=line.get_color(), lw=0)
+    if simulated is not None:
+        axes.plot(simulated["force"], simulated[what], "ko", ms=4, mfc="none", label="boundary elements, this very map")
+    axes.set_xscale("log")
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
+    axes.grid(True, which="major", alpha=0.3)
+
+
+def table_of_loads(surface: MeasuredSurface, E_star: float = 1.0) -> dict[str, Any]:
+    """Columns by the calibrated law at a few contacts: pressure, separation, stiffness, and how far off they may be."""
+    from mbma_tables.theories.contact import contact
+
+    found = contact(surface, area=AREAS, theory="calibrated", E_star=E_star)
+    names = ("area", "force", "mean_separation", "stiffness", "area_scatter", "scatter")
+    return {name: getattr(found, name) for name in names}
