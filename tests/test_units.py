@@ -1,6 +1,7 @@
 """Units: read and converted rightly in every entry, kept through results, refused where they conflict."""
 
 import json
+import pathlib
 import pickle
 from fractions import Fraction
 
@@ -281,7 +282,7 @@ SOURCES = {
         f"--{name.replace('_', '-')}={float(getattr(CONCRETE, name))!r}{unit}"
         for name, unit in {"hurst": "", "q0": "/mm", "q1": "/mm", "h_rms": "mm", "h_max": "mm"}.items()
     ),
-    "file": ("--file", "examples/concrete.toml"),
+    "file": ("--file", str(pathlib.Path(__file__).parents[1] / "examples" / "concrete.toml")),
 }
 
 

@@ -33,28 +33,10 @@ from mbma_tables.totals.measured import measured_totals
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Totals:
-    """Force and area of the MBMA model at given separations; arrays of the broadcast shape.
+    """Force and area of the MBMA model at given separations, its fields those of `Contact`.
 
-    Attributes
-    ----------
-    separation : ndarray
-        d, between the rigid plane and the mid-plane [length].
-    mean_separation : ndarray
-        u = (h_max + d)/2 (50) [length].
-    force : ndarray or None
-        F/A0 in the unit of E_star; F/(A0 E*) where that is 1. None where not asked for.
-    area : ndarray or None
-        A/A0, None where not asked for. The model does not end at 1 under full compression, and this is not clamped.
-    error : ndarray
-        Bound on the relative error of both against the model that the tier stands for, of quadrature and islands
-        together. For tier "rigid" that model is the undeformed sphere, which may be far from the elastic one.
-    reading, tier : str
-        What made them.
-    islands : int or None
-        Islands evaluated; None where that is left to dask.
-    force_by, area_by : dict of ndarray, or None
-        Partial derivatives by "separation", "hurst", "q0", "q1", "h_rms" and "h_max", the others held; by the
-        separation alone on a surface that is its own spectrum.
+    `error` is of quadrature and islands together, against the model that the tier stands for: for "rigid" spheres that
+    do not deform, far from elastic ones. Derivatives on a surface that is its own spectrum are by the separation alone.
     """
 
     separation: Any
