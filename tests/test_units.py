@@ -361,3 +361,21 @@ def test_islands_take_units():
     plain = island(CONCRETE, [0.1, 0.3], E_star=13.3)
     found = island(CONCRETE.to("um"), ["0.1 mm", 300.0], E_star="13.3 MPa")
     np.testing.assert_allclose(found.force, 1e6 * plain.force, rtol=1e-12)
+
+
+@pytest.mark.parametrize("theory", ["mbma", "calibrated"])
+def test_a_surface_that_is_its_own_spectrum_has_the_same_rule(theory):
+    q = np.geomspace(0.2, 50, 200)
+    surface = Surface.from_spectrum(q, 0.01 * np.minimum(1, q**-3.6), h_max=1.1, unit="um")
+    plain = contact(surface, mean_separation=0.6, E_star="100 GPa", theory=theory)
+    moved = contact(surface.to("mm"), mean_separation="600 nm", E_star="100 GPa", theory=theory)
+    assert (plain.units["stiffness"], moved.units["stiffness"]) == ("GPa/um", "GPa/mm")
+    for name, size in {"force": 1, "area": 1, "stiffness": 1e3, "energy": 1e-3}.items():
+        assert getattr(moved, name) == pytest.approx(size * getattr(plain, name), rel=1e-9)
+    law = describe_law(surface, "100 GPa", length_unit="mm", rows=20, theory=theory)
+    assert (law.x_unit, law.y_unit) == ("mm", "GPa")
+    assert law.x[-1] == pytest.approx(1e-3 * surface.h_max, rel=1e-3)
+    found = Scene(surface, separations=["0.3e-3 mm"], E_star="100 GPa", theory=theory, rtol=1e-3).run()
+    assert (found["separation"].item(), found["force"].attrs["units"]) == (0.3, "GPa")
+    with pytest.raises(InputError, match="give the surface its unit"):
+        contact(Surface.from_spectrum(q, 0.01 * q**-3.6, h_max=1.1), mean_separation="600 nm", theory=theory)

@@ -85,7 +85,9 @@ def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
     if run.reasons is not None:
         facts["reasons"] = json.dumps(run.reasons)
     numbers = ("hurst", "q0", "q1", "h_rms", "h_max")
-    facts |= {f"surface_{name}": float(getattr(problem.surface, name)) for name in numbers}
+    known = {name: getattr(problem.surface, name) for name in numbers}
+    # a spectrum that is no power law has no Hurst exponent
+    facts |= {f"surface_{name}": float(number) for name, number in known.items() if number is not None}
     return xr.Dataset(variables, attrs=facts).set_coords([name for name in named if name in variables])
 
 
