@@ -18,7 +18,19 @@ import click
 from mbma_tables.files import write_file
 
 ROOT = pathlib.Path(__file__).parents[2]
-PAGES = ("calibrated", "cost", "export", "fidelity", "formula", "gallery", "islands", "stability", "tables", "theories")
+PAGES = (
+    "calibrated",
+    "cost",
+    "export",
+    "fidelity",
+    "formula",
+    "gallery",
+    "islands",
+    "stability",
+    "tables",
+    "theories",
+    "yield",
+)
 MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 

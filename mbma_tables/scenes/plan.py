@@ -29,7 +29,7 @@ AMPLIFICATION = {"inverse": 2.0, "slopes": 300.0, "profile": 10.0}
 MIN_LAW_GAPS = {"universal": 2000}
 MIN_LAW_GAPS_OF_OTHERS = 300
 MIN_THEORY_LAW_RTOL = 1e-9
-YIELDING = 3.0  # times an elastic answer (tests/scenes/test_yield.py)
+YIELDING_CALL, YIELDING_GAP = 4.5, 2.6  # times an elastic call and an elastic answer of many (docs/yield.md)
 LADDER = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 
 
@@ -316,7 +316,9 @@ class _Planner:
         """A theory's elastic answers through a hardness."""
         theory, inverse = self.problem.theory_name, self.problem.prescribed in INVERTED
         mbma = self.problem.theory == "mbma"
-        seconds = math.nan if mbma else YIELDING * seconds_by_theory(self.costs, theory, self.count, inverse)
+        call = self.costs.of(theory, "call")
+        each = seconds_by_theory(self.costs, theory, self.count, inverse) - call
+        seconds = math.nan if mbma else YIELDING_CALL * call + YIELDING_GAP * each
         asked = max(ISLAND_SHARE * self.rtol, MIN_THEORY_LAW_RTOL) if mbma else None
         error = 2 * (asked + certified_error("universal", asked) if asked else self.own_error())
         what = f"force, area and what yields at {self.count} gaps"
