@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from mbma_tables.surfaces.surface import Surface
     from mbma_tables.theories.contact import contact
     from mbma_tables.theories.law import contact_law
+    from mbma_tables.theories.law_object import ContactLaw
     from mbma_tables.theories.result import Contact
     from mbma_tables.theories.unknowns import sensitivity
     from mbma_tables.totals.island import Island, island
-    from mbma_tables.totals.law_protocol import ContactLaw
 
 __version__ = "0.1.0"
 
@@ -43,7 +43,7 @@ _HOMES = {
     "OutOfRangeError": "mbma_tables.errors",
     "Reading": "mbma_tables.surfaces.readings",
     "Surface": "mbma_tables.surfaces.surface",
-    "ContactLaw": "mbma_tables.totals.law_protocol",
+    "ContactLaw": "mbma_tables.theories.law_object",
     "Scene": "mbma_tables.scenes.scene",
     "TableFileError": "mbma_tables.errors",
     "contact": "mbma_tables.theories.contact",

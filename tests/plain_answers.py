@@ -1,8 +1,10 @@
 """Calls into the compiled functions and their answers; as a program, the same of the functions as plain Python."""
 
+import ctypes
 import dataclasses
 import json
 import math
+import struct
 import sys
 
 import numpy as np
@@ -18,9 +20,17 @@ def leave_plain():
     numba.vectorize = lambda signatures, **options: lambda function: np.vectorize(function, otypes=[float])
 
     from mbma_tables.tablefiles import interpolate
-    from mbma_tables.totals import intervals
+    from mbma_tables.theories import law_kernel
+    from mbma_tables.totals import intervals, profile_kernel
 
-    # these two are made of instructions
+    def as_type(source, target):
+        return lambda value: struct.unpack(target, struct.pack(source, value % 2**64 if source == "Q" else value))[0]
+
+    # these are made of instructions
+    law_kernel.number = lambda address, word: ctypes.c_double.from_address(int(address) + 8 * int(word)).value
+    law_kernel.whole = lambda address, word: ctypes.c_int64.from_address(int(address) + 8 * int(word)).value
+    law_kernel.bits_of = profile_kernel.bits_of = as_type("d", "q")
+    profile_kernel.float_of = as_type("Q", "d")
     interpolate.load_lanes = lambda array, offset: tuple(array[offset : offset + 8])
     interpolate.add_lanes = lambda total, weight, lanes: tuple(
         a + weight * b for a, b in zip(total, lanes, strict=True)
@@ -178,7 +188,7 @@ def laws():
             yield f"law of {law.theory}, {name}", getattr(law, name)([-1.0, 2.0, 3.999999])
         yield f"inverse of {law.theory}", law.at_pressure(law.force([-1.0, 2.0]))[0]
     law = contact_law(Surface(0.8, 1.0, 30.0, 1.0, 4.0), reading="printed", rtol=1e-3)
-    own = law.compiled("energy")
+    own = law.compiled().energy
     yield "bound", (own(1.0), own(5.0), math.isnan(own(-4.1)), math.isnan(own(math.nan)))
 
 

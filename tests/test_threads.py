@@ -97,9 +97,8 @@ def test_laws_made_by_many_threads_are_one_law():
     with ThreadPoolExecutor(THREADS) as pool:
         made = list(pool.map(make, range(THREADS)))
     for thread, law in enumerate(made):
-        np.testing.assert_array_equal(law.breaks, alone[thread % 4].breaks)
-        np.testing.assert_array_equal(law.pieces, alone[thread % 4].pieces)
-        np.testing.assert_array_equal(law.energies, alone[thread % 4].energies)
+        np.testing.assert_array_equal(law.block, alone[thread % 4].block)
+        np.testing.assert_array_equal(law.errors, alone[thread % 4].errors)
 
 
 FORK = """

@@ -253,12 +253,12 @@ class _Planner:
         fewest = MIN_LAW_GAPS.get(_name(self.tier(self.rtol)), MIN_LAW_GAPS_OF_OTHERS)
         if self.count < fewest or "finite_height" in self.problem.dropped:
             return False
-        from mbma_tables.totals.law import MIN_LAW_RTOL
+        from mbma_tables.theories.law import MIN_LAW_RTOL
 
         return (1 - ISLAND_SHARE) * self.rtol >= MIN_LAW_RTOL
 
     def law(self, why: Sequence[str]) -> Step:
-        from mbma_tables.totals.law import MIN_LAW_RTOL
+        from mbma_tables.theories.law import MIN_LAW_RTOL
 
         inverse = self.problem.prescribed in INVERTED
         slopes = self.problem.outputs & {"stiffness", "conductance"}

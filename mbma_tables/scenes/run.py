@@ -19,9 +19,8 @@ from mbma_tables.scenes.problem import INVERTED, Problem
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.any_surface import AnySurface
+    from mbma_tables.theories.law_object import ContactLaw
     from mbma_tables.theories.protocol import Theory
-    from mbma_tables.totals.law import MbmaLaw
-    from mbma_tables.totals.law_protocol import ContactLaw
 
 Progress = Callable[[str, int, int], None]
 BLOCK = 64  # gaps between two reports of progress, where a gap is slow
@@ -88,7 +87,7 @@ def height_without_end(problem: Problem, rtol: float) -> float:
 
 
 def _law(run: Run, step: Step) -> None:
-    from mbma_tables.totals.law import MIN_LAW_RTOL, mbma_law
+    from mbma_tables.theories.law import MIN_LAW_RTOL, contact_law
 
     problem, wanted = run.problem, run.problem.outputs
     assert step.rtol is not None
@@ -97,7 +96,7 @@ def _law(run: Run, step: Step) -> None:
     tier, asked = step.tier, step.rtol
     while True:
         try:
-            law = mbma_law(run.surface, asked, tier, problem.reading, problem.E_star)
+            law = contact_law(run.surface, asked, tier, problem.reading, problem.E_star)
         except OutOfRangeError:
             if not isinstance(tier, str) or tier not in TABLES:
                 raise
@@ -222,7 +221,7 @@ def _validity(run: Run, step: Step) -> None:
     run.reasons = {reason: np.flatnonzero(mask).tolist() for reason, mask in found.reasons.items()}
 
 
-def _slope_error(law: MbmaLaw, gap: Any, inverted: bool) -> float:
+def _slope_error(law: ContactLaw, gap: Any, inverted: bool) -> float:
     """Bound on the relative error of the stiffness at these gaps, and of force, area and energy."""
     touching = gap[gap < law.h_max]
     if touching.size == 0:

@@ -1,123 +1,60 @@
-"""`contact_law`: one surface's force and area by any theory, frozen into piecewise polynomials of the gap.
+"""`contact_law`: one surface's force and area by any theory, frozen into polynomials of the gap.
 
-MBMA's laws are `totals.law`'s. For other theories ln F and ln A are fitted against a stretched mean separation in
-which they stay smooth at both ends of contact (`law_kernel`), in pieces halved until they meet the tolerance.
+MBMA's laws are made from a profile of the surface's islands, other theories' from their answers; `law_pieces` fits
+the polynomials and bounds their errors.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mbma_tables.arguments import FloatArray, number_in
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
-from mbma_tables.models import AnyModel
-from mbma_tables.models.protocol import MAX_RTOL
+from mbma_tables.models import AnyModel, get_model
+from mbma_tables.models.protocol import MAX_RTOL, MIN_RTOL
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.theories import law_kernel
+from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories import law_kernel as kernel
+from mbma_tables.theories.law_kernel import AREA_AT, FORCE_AT
+from mbma_tables.theories.law_object import ROUNDING, ContactLaw
+from mbma_tables.theories.law_pieces import (
+    Pieces,
+    Side,
+    assemble,
+    fill_energies,
+    first_fall,
+    order_of,
+    power_record,
+    side_pieces,
+    straight_record,
+)
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma
 from mbma_tables.theories.yielding import Yielding, checked_hardness
-from mbma_tables.totals.law import MIN_LAW_RTOL, SAMPLES, MbmaLaw, fit_pieces, mbma_law, one_surface
-from mbma_tables.totals.law_kernel import AREA, AREA_SLOPE, FORCE
-from mbma_tables.totals.law_protocol import ContactLaw
-from mbma_tables.units import UNKNOWN, Units, modulus_and_units
+from mbma_tables.totals.island_sum import kinks
+from mbma_tables.totals.measured import island_curve, measured_totals
+from mbma_tables.totals.profile import profile
+from mbma_tables.units import modulus_and_units
 
-FIRST_CONTACT = 1e-6  # of (h_max - u)/h_max: below it a law is a power of h_max - u
+MIN_LAW_RTOL = 1e-9
+RESOLVED = 1e-3  # a polynomial this close is one whose error its coefficients show
+POWERS = (3.5, 10 / 3)  # of h_max - d, in which MBMA's force and area start
+MEASURED_LEVERAGE = 30.0  # of a surface that is its own spectrum, as `Profile.leverage` is of others
+LAYER_SHARE = 0.5  # of the boundary layer, up to which those powers leave little
+FIRST_OCTAVES = 20  # below which a theory that ends at h_max is a power of h_max - u
+MOST_OCTAVES = 60
 MAX_SPAN = 10.0  # u/h_max up to which a theory without last contact is covered
 LOWEST = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # u/h_max from which a theory may answer
+LOOKED_AT = 24  # places at which a theory's own error is looked at
 SHARE = 0.1  # of a theory's own error: the polynomials need not be closer to it
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class TheoryLaw(ContactLaw):
-    """A law of another theory than MBMA.
-
-    Where contact ends at h_max, the law is a power of h_max - u in the last millionth of its range, and within about
-    that of the theory.
-
-    Attributes
-    ----------
-    breaks, pieces, energies, errors : ndarray
-        The polynomials: ends of the pieces in x, coefficients, energies at the ends of panels, bounds on their errors.
-    unbounded, ends : bool
-        Whether force has no bound at u = 0, and whether contact ends at h_max.
-    """
-
-    h_max: float
-    E_star: float
-    error: float
-    turning_point: float | None
-    area_turning_point: float | None
-    theory: str
-    breaks: FloatArray
-    pieces: FloatArray
-    energies: FloatArray
-    errors: FloatArray
-    unbounded: bool
-    ends: bool
-    reading: str = ""
-    tier: str = ""
-    units: Units = UNKNOWN
-
-    @functools.cached_property
-    def _law(self) -> law_kernel.Law:
-        return law_kernel.Law(self.breaks, self.pieces, self.energies, self.unbounded, self.ends, self.h_max)
-
-    def _gap(self, x: float) -> float:
-        return self.h_max * (1 - 2 * law_kernel.to_rest(x, self.unbounded, self.ends))
-
-    @functools.cached_property
-    def lowest(self) -> float:
-        """Smallest gap covered: -h_max, or just above it where force has no bound there."""
-        return self._gap(float(self.breaks[0])) if self.unbounded else -self.h_max
-
-    @functools.cached_property
-    def highest(self) -> float:
-        """Largest gap covered; infinite where contact ends at h_max."""
-        return math.inf if self.ends else self._gap(float(self.breaks[-1]))
-
-    def _fill(self, what: int, gap: FloatArray, out: FloatArray) -> None:
-        law_kernel.fill(what, gap, tuple(self._law), out)
-        if what not in (AREA, AREA_SLOPE):
-            out *= self.E_star
-
-    def _invert(self, what: int, wanted: FloatArray, end: float, out: FloatArray) -> None:
-        from scipy.optimize.elementwise import find_root
-
-        law, scale = tuple(self._law), self.E_star if what == FORCE else 1.0
-        last = float(self.breaks[-1])
-        value, slope = np.empty((2, 1))
-        law_kernel.fill_logs(np.array([last]), what, law, value, slope)
-        touching = wanted > 0
-        goal = np.log(np.where(touching, wanted, scale)) - math.log(scale)
-
-        def excess(x: FloatArray, aim: FloatArray) -> FloatArray:
-            found, slopes = np.empty((2, x.size))
-            law_kernel.fill_logs(np.ascontiguousarray(x).ravel(), what, law, found, slopes)
-            return found.reshape(x.shape) - aim
-
-        # lighter than the last piece: the power of h_max - u
-        light = goal <= value[0]
-        x = last + (goal - value[0]) / slope[0]
-        if not light.all():
-            rest = 0.5 * (self.h_max - end) / self.h_max
-            first = law_kernel.to_x(rest, self.unbounded, self.ends)
-            aim = np.minimum(goal[~light], excess(np.array([first]), np.zeros(1))[0])
-            found = find_root(excess, (first, last), args=(aim,), tolerances={"xatol": 0, "xrtol": 1e-15, "fatol": 0})
-            x[~light] = np.where(found.success, found.x, np.nan)
-        for k, place in enumerate(x):
-            out[k] = max(self._gap(place), end)
-        out[~touching] = self.h_max
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
 
 def contact_law(
@@ -167,82 +104,214 @@ def contact_law(
     >>> f"{persson.force(u=2.0):.4g}, {persson.at_pressure(1e-4).mean_separation:.3f}"
     '0.0001832, 2.276'
     """
-    number, units = modulus_and_units(E_star, surface)
-    modulus = number_in("E_star", number, np.finfo(float).tiny, np.finfo(float).max)
+    given, units = modulus_and_units(E_star, surface)
+    modulus = number_in("E_star", given, np.finfo(float).tiny, np.finfo(float).max)
     cap = checked_hardness(units.number("hardness", hardness))
     if cap.ndim:
         raise InputError(f"hardness must be one number, got shape {cap.shape}: a law is of one surface")
-    made = _law_in_numbers(surface, rtol, tier, reading, modulus, theory, float(cap) / modulus)
-    return dataclasses.replace(made, units=units)
-
-
-def _law_in_numbers(
-    surface: AnySurface,
-    rtol: float,
-    tier: str | AnyModel,
-    reading: str | Reading,
-    modulus: float,
-    theory: str | Theory | UserTheory,
-    hardness: float,
-) -> MbmaLaw | TheoryLaw:
     if theory == Mbma.name:
         chosen: Theory = Mbma(tier, reading)
     else:
         refuse_options_of_mbma(tier=tier != "universal", reading=reading != "reported")
         chosen = get_theory(theory)
-    if hardness < math.inf:
-        chosen = Yielding(chosen, hardness)
+    if cap < math.inf:
+        chosen = Yielding(chosen, float(cap) / modulus)
+    one = one_surface(surface)
+    asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
     if isinstance(chosen, Mbma):
-        return mbma_law(surface, rtol, chosen.tier, chosen.reading, modulus)
-    return _theory_law(one_surface(surface), chosen, number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL), modulus)
+        return dataclasses.replace(_mbma_law(one, asked, chosen.tier, chosen.reading, modulus), units=units)
+    try:
+        return dataclasses.replace(_theory_law(one, chosen, asked, modulus), units=units)
+    except ConvergenceError as fault:
+        raise ConvergenceError(f"theory {chosen.name!r}: {fault}; ask for a larger rtol", fault.mask) from None
 
 
-def _theory_law(surface: AnySurface, theory: Theory, rtol: float, E_star: float) -> TheoryLaw:
-    """A law fitted to a theory's answers."""
+def one_surface(surface: AnySurface) -> AnySurface:
+    """A surface of plain numbers.
+
+    Raises
+    ------
+    InputError
+        For a batch.
+    """
+    if surface.labelled:
+        surface = surface.with_numbers(*(np.asarray(getattr(surface, name)) for name in surface.parameters))
+    if surface.shape != ():
+        raise InputError(f"a law is of one surface, got a batch of shape {surface.shape}")
+    return surface
+
+
+def _mbma_law(surface: AnySurface, rtol: float, tier: Any, reading: Reading, E_star: float) -> ContactLaw:
+    """A law of the MBMA model: x = (h_max - d)/(2 h_max), powers of it below half of the boundary layer."""
+    inner = max(0.1 * rtol, MIN_RTOL)
+    model = get_model(tier, inner, reading)
+    h_max = float(surface.h_max)
+    islands = _islands(surface, model, reading, inner)
+    worst = 0.0
+
+    def values(x: FloatArray) -> FloatArray:
+        nonlocal worst
+        force, area, error = islands.totals(x * 2 * h_max)
+        worst = max(worst, float(np.max(error)))
+        if not (force.all() and area.all()):
+            high = h_max / float(surface.h_rms)
+            raise OutOfRangeError(f"h_max is {high:g} h_rms, so high that force or area underflow")
+        return np.stack([force, reading.area_of(area)])
+
+    places = [kink / (2 * h_max) for kink in islands.kinks]
+    tolerance = min(rtol, RESOLVED)
+    for octaves in range(math.ceil(-math.log2(min(LAYER_SHARE * islands.layer / (2 * h_max), *places))), 1100):
+        first, first_error = power_record(values, 2.0**-octaves, POWERS)
+        if first_error[0] <= tolerance:
+            break
+    side = Side(-1, 2.0**-octaves, values, tuple(place for place in places if 2.0**-octaves < place < 1))
+    made = _finish(
+        surface, 1 / (2 * h_max), [side], tolerance, (first, first_error, POWERS), E_star, -h_max, math.inf, 0.0,
+        model.name, reading.name, "mbma",
+    )  # fmt: skip
+    own = np.array([0.0, islands.leverage * worst])
+    return dataclasses.replace(made, error=made.error + worst, errors=made.errors + own)
+
+
+class Islands(NamedTuple):
+    """What a law needs of a surface's islands."""
+
+    layer: float  # approach at which an island's band leaves the shortest wave [length]
+    kinks: list[float]  # approaches at floors of the band [length]
+    leverage: float  # what their error is worth in slopes
+    totals: Callable[[FloatArray], tuple[FloatArray, ...]]  # force with E* = 1, sum of areas and error at h_max - d
+
+
+def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float) -> Islands:
+    if isinstance(surface, MeasuredSurface):
+        curve = island_curve(surface, model, reading, rtol, "raise")
+        own = surface
+
+        def of_curve(depth: FloatArray) -> tuple[FloatArray, ...]:
+            return measured_totals(own, depth, model, reading, rtol, "raise")[:3]
+
+        return Islands(curve.layer, list(curve.kinks), MEASURED_LEVERAGE, of_curve)
+    assert isinstance(surface, Surface)
+    if not surface.zeta_1 > reading.floor_u:
+        raise OutOfRangeError(f"q1/q0 must be greater than {reading.floor_u:g}, the reading's floor of zeta_u")
+    kept = profile(surface, model, reading, rtol)
+    h_rms, stress = float(surface.h_rms), float(surface.q0 * surface.s)
+
+    def of_profile(depth: FloatArray) -> tuple[FloatArray, ...]:
+        force, area = kept.totals(depth / h_rms)
+        return force * stress, area, np.array(kept.error)
+
+    ends = [float(kink) * h_rms for kink in kinks(surface.hurst, surface.zeta_1, reading)]
+    return Islands(h_rms * float(surface.zeta_1) ** -float(surface.hurst), ends, kept.leverage, of_profile)
+
+
+def _theory_law(surface: AnySurface, theory: Theory, rtol: float, E_star: float) -> ContactLaw:
+    """A law fitted to a theory's answers: x from first contact, from u = 0, or from both where force has no bound."""
     h_max, ends = float(surface.h_max), theory.ends_at_h_max
     # below the elastic theory's end force depends on the logarithm of u
-    low = _lowest(surface, theory.elastic)
-    unbounded = low > 0
-    high = min(float(theory.interval(surface)[1]), MAX_SPAN * h_max)
-    first = law_kernel.to_x(1 - low / h_max, unbounded, ends)
-    last = law_kernel.to_x(FIRST_CONTACT if ends else 1 - high / h_max, unbounded, ends)
+    lowest = _lowest(surface, theory.elastic)
+    highest = h_max if ends else min(float(theory.interval(surface)[1]), MAX_SPAN * h_max)
     own = 0.0
-    to_rest = np.vectorize(law_kernel.to_rest, otypes=[float])
 
-    def log_values(x: FloatArray) -> FloatArray:
+    def answer(u: FloatArray) -> FloatArray:
         nonlocal own
-        answer = theory.answer(surface, h_max * (1 - to_rest(x, unbounded, ends)))
-        if not ((answer.force > 0) & (answer.area > 0) & np.isfinite(answer.force)).all():
+        with np.errstate(all="ignore"):
+            found = theory.answer(surface, u)
+        if not ((found.force > 0) & (found.area > 0) & np.isfinite(found.force)).all():
             raise OutOfRangeError(
                 f"theory {theory.name!r} has no positive force and area on all of this surface's gaps"
             )
-        own = max(own, float(np.nan_to_num(answer.error).max()))
-        return np.stack([np.log(answer.force), np.log(answer.area)], axis=-1)
+        own = max(own, float(np.nan_to_num(found.error).max()))
+        return np.stack([found.force, found.area])
 
-    # to know the theory's own error
-    log_values(np.linspace(first, last, SAMPLES))
-    try:
-        breaks, pieces, errors = fit_pieces(log_values, np.array([first, last]), max(rtol, SHARE * own))
-    except ConvergenceError as fault:
-        raise ConvergenceError(f"theory {theory.name!r}: {fault}; ask for a larger rtol", fault.mask) from None
-    law = law_kernel.Law(breaks, pieces, np.empty((breaks.size - 1) * law_kernel.PANELS + 1), unbounded, ends, h_max)
-    law_kernel.fill_energies(law, 0.0 if ends else float(theory.energy(surface, np.array(high))))
-    made = TheoryLaw(
+    answer(lowest + (highest - lowest) * (np.arange(LOOKED_AT) + 0.5) / LOOKED_AT)
+    tolerance = max(min(rtol, RESOLVED), SHARE * own)
+    bends = np.asarray(theory.bends(surface), dtype=float)
+
+    def below(width: float) -> Any:
+        return lambda x: answer(h_max - width * x)
+
+    def above(width: float) -> Any:
+        return lambda x: answer(width * x)
+
+    start = 2.0**-FIRST_OCTAVES
+    if ends and lowest == 0:
+        width = h_max
+        sides = [Side(-1, start, below(width), tuple((h_max - bends) / width))]
+    elif ends:
+        width = h_max / 2
+        sides = [
+            Side(-1, start, below(width), tuple((h_max - bends[bends >= width]) / width)),
+            Side(1, lowest / width, above(width), tuple(bends[bends < width] / width)),
+        ]
+    else:
+        width = highest
+        sides = [Side(1, lowest / width or 0.125, above(width), tuple(bends / width))]
+    if ends:
+        first = straight_record(sides[0].values, start)
+    elif lowest > 0:
+        first = np.zeros(kernel.RECORD), np.zeros(2), (0.0, 0.0)
+    else:
+        for octaves in range(3, MOST_OCTAVES):
+            record, error = power_record(sides[0].values, 2.0**-octaves, (0.0, 0.0))
+            if error[0] <= tolerance:
+                break
+        sides[0] = sides[0]._replace(start=2.0**-octaves)
+        first = record, error, (0.0, 0.0)
+    sides = [side._replace(kinks=tuple(k for k in side.kinks if side.start < k < 1)) for side in sides]
+    beyond = 0.0 if ends else 2 * float(theory.energy(surface, np.array(highest)))
+    made = _finish(
+        surface, 1 / (2 * width), sides, tolerance, first, E_star, 2 * lowest - h_max,
+        math.inf if ends else 2 * highest - h_max, beyond, "", "", theory.name,
+    )  # fmt: skip
+    return dataclasses.replace(made, error=made.error + own)
+
+
+def _finish(
+    surface: AnySurface, scale: float, sides: list[Side], tolerance: float, first: Any, E_star: float,
+    lowest: float, highest: float, beyond: float, tier: str, reading: str, theory: str,
+) -> ContactLaw:  # fmt: skip
+    """Fit the sides, put the block together, and look for turning points."""
+    h_max = float(surface.h_max)
+    pieces: list[Pieces] = [side_pieces(side, tolerance) for side in sides]
+    record, record_error, powers = first
+    made = assemble(h_max, scale, sides, pieces, record, record_error)
+    order, signs = order_of(sides, pieces)
+    fill_energies(made, order, signs, powers[0], beyond)
+    turns = [first_fall(made, order, signs, start) for start in (FORCE_AT, AREA_AT)]
+    side_of = dict(zip(order.tolist(), signs.tolist(), strict=True))
+
+    def gap(turn: tuple[int, float] | None) -> float | None:
+        if turn is None:
+            return None
+        number, t = turn
+        x = made.records[number, kernel.CENTRE] + t / made.records[number, kernel.RATE]
+        return float(side_of[number] * (x / scale - h_max))
+
+    # forces carry the modulus
+    made.records[:, FORCE_AT:AREA_AT] *= E_star
+    made.records[:, kernel.ENERGY_AT] *= E_star
+    slack = ROUNDING * h_max
+    head = made.head
+    head[[kernel.POWER_F, kernel.POWER_A]] = powers
+    head[kernel.LOWEST] = lowest if lowest == -h_max else lowest - slack
+    head[kernel.HIGHEST] = np.finfo(float).max if highest == math.inf else highest * (1 + ROUNDING)
+    head.view(np.int64)[kernel.ENDS] = sides[0].sign < 0
+    block = made.block
+    block.flags.writeable = False
+    return ContactLaw(
         h_max=h_max,
         E_star=E_star,
-        error=float(errors.max()) + own,
-        turning_point=None,
-        area_turning_point=None,
-        theory=theory.name,
-        breaks=breaks,
-        pieces=pieces,
-        energies=law.energies,
-        errors=errors,
-        unbounded=unbounded,
-        ends=ends,
-    )
-    return dataclasses.replace(
-        made, turning_point=_turning_point(made, FORCE), area_turning_point=_turning_point(made, AREA)
+        lowest=lowest,
+        highest=highest,
+        error=float(made.errors[:, 0].max()),
+        turning_point=gap(turns[0]),
+        area_turning_point=gap(turns[1]),
+        theory=theory,
+        reading=reading,
+        tier=tier,
+        block=block,
+        errors=made.errors,
     )
 
 
@@ -258,24 +327,3 @@ def _lowest(surface: AnySurface, theory: Theory) -> float:
         if math.isfinite(force) and force > 0:
             return u
     raise OutOfRangeError(f"theory {theory.name!r} has no finite force on this surface up to u = {u:.6g}")
-
-
-def _turning_point(law: TheoryLaw, which: int) -> float | None:
-    """Gap at which force or area first stops rising with compression."""
-    from scipy.optimize import brentq
-
-    plain = tuple(law._law)
-
-    def slope(x: Any) -> Any:
-        at = np.atleast_1d(np.asarray(x, dtype=float))
-        value, found = np.empty((2, at.size))
-        law_kernel.fill_logs(at, which, plain, value, found)
-        return found if np.ndim(x) else float(found[0])
-
-    steps = np.arange(SAMPLES) / SAMPLES
-    x = np.append((law.breaks[:-1, None] + np.diff(law.breaks)[:, None] * steps).ravel(), law.breaks[-1])
-    rises = slope(x) >= 0
-    if not rises.any():
-        return None
-    k = int(np.flatnonzero(rises)[-1])
-    return law._gap(brentq(slope, x[k], x[k + 1]) if k + 1 < x.size else float(x[k]))

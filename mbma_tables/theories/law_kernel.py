@@ -1,7 +1,14 @@
-"""Compiled evaluation of the laws of any theory: polynomials of ln F and ln A in a stretched mean separation.
+"""Compiled contact laws: values, slopes and energy in one pass, inverses. A law is one block of numbers.
 
-With v = u/h_max the unknown is x = ln v where force has no bound at u = 0, -ln(1 - v) where contact ends at h_max,
-the sum of both where both do, and v itself where neither does. x rises with u.
+The block holds, in words of 8 bytes, `HEAD` numbers (`Head`), rows of two integers (shift, base), and records of
+`RECORD` numbers. With x = (h_max + s d) scale, s the sign of this side of d = 0, the exponent of x picks a row, and
+
+    record = (bits(x) >> shift) + base + (kinks passed),    t = (x - record[CENTRE]) record[RATE],
+    F = sum_k record[FORCE_AT + k] t^k,   A = sum_k record[AREA_AT + k] t^k,
+    E = record[ENERGY_AT] + sum_k record[FORCE_AT + k] t^(k+1)/(k+1)/q,   q = -s scale record[RATE],   -dF/dd = q dF/dt.
+
+Below x = LOW the first record holds: F = t^p times its polynomial, and A likewise.
+Compiled code takes the block's address: a number is passed on faster than an array. No work space, no shared state.
 """
 
 from __future__ import annotations
@@ -10,140 +17,379 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic, overload_method
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import njit
-from mbma_tables.totals.law_kernel import AREA_SLOPE, ENERGY, FORCE_SLOPE, locate, slope_in, value_in
+from mbma_tables.compiled import CONTRACT, njit
+from mbma_tables.totals.profile_kernel import bits_of
 
-PANELS = 8  # of a piece, over which force is integrated
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(20)
+DEGREE = 8
+CENTRE, RATE, FORCE_AT, AREA_AT, ENERGY_AT = 0, 1, 2, 3 + DEGREE, 4 + 2 * DEGREE
+RECORD = 5 + 2 * DEGREE
+FORCE, AREA, STIFFNESS, AREA_SLOPE, ENERGY = range(5)
+
+# words of the head
+(
+    H_MAX, SCALE, LOW, HIGH, PLUS, MINUS, KINK_SIGN, KINK, KINK_SIGN_2, KINK_2, POWER_F, POWER_A, LOWEST, HIGHEST,
+    EXPONENT, MINUS_ROWS, RECORDS, ENDS,
+) = range(18)  # fmt: skip
+HEAD = 18
+
+INVERSE_DEGREE = 5
+INVERSE_BITS = 2  # of the mantissa: 4 buckets an octave of force or area
+INVERSE_RECORD = 3 + INVERSE_DEGREE + 1
+INVERSE_HEAD = 6
+Y_LEAST, Y_LOW, Y_HIGH, Y_TURN, FIRST_BUCKET, END = range(INVERSE_HEAD)
+SURE = 3e-6  # steps, in halves of a record, after which another would change nothing
+STEPS = 200
+EPSILON = 5e-16
 
 
-class Law(NamedTuple):
-    """A law as compiled code takes it."""
+def _loader(kind: Any, code: Any) -> Any:
+    @intrinsic
+    def load(typing: Any, address: Any, word: Any) -> Any:
+        """A word of the block."""
 
-    breaks: FloatArray  # ends of the pieces in x
-    pieces: FloatArray  # coefficients (pieces, TERMS, 2)
-    energies: FloatArray  # integral of force over u from last contact to each end of the panels
-    unbounded: bool  # whether force has no bound at u = 0
-    ends: bool  # whether contact ends at h_max
-    h_max: float
+        def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            pointer = builder.inttoptr(given[0], code.as_pointer())
+            value = builder.load(builder.gep(pointer, [given[1]]))
+            # blocks never change: the loads may leave a loop
+            value.set_metadata("invariant.load", builder.module.add_metadata([]))
+            return value
+
+        return kind(types.int64, types.int64), generate
+
+    return load
 
 
-@njit(cache=True, error_model="numpy")
-def to_x(rest: float, unbounded: bool, ends: bool) -> float:
-    """x at 1 - v."""
-    v = 1.0 - rest
-    if not (unbounded or ends):
-        return v
-    x = 0.0
-    if unbounded:
-        x += math.log(v)
-    if ends:
-        x -= math.log(rest)
+number = _loader(types.float64, ir.DoubleType())
+whole = _loader(types.int64, ir.IntType(64))
+
+
+class Place(NamedTuple):
+    """Where a gap is in a law: its record's first word, t, and q = -s scale rate."""
+
+    word: int
+    t: float
+    q: float
+
+
+@njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
+def _depth(address: int, d: float) -> float:
+    """x of a gap."""
+    plus, minus = number(address, PLUS), number(address, MINUS)
+    side = minus if d < 0.0 else plus
+    x: float = (number(address, H_MAX) + side * d) * number(address, SCALE)
     return x
 
 
-@njit(cache=True, error_model="numpy")
-def to_rest(x: float, unbounded: bool, ends: bool) -> float:
-    """1 - v at x."""
-    if unbounded:
-        return 1.0 / (1.0 + math.exp(x)) if ends else -math.expm1(x)
-    return math.exp(-x) if ends else 1.0 - x
+@njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
+def _record_of(address: int, x: float, d: float) -> Place:
+    """The place of a gap whose x is known better than its d."""
+    plus, minus, rows_below = number(address, PLUS), number(address, MINUS), whole(address, MINUS_ROWS)
+    side = minus if d < 0.0 else plus
+    rows = rows_below if d < 0.0 else 0
+    held = min(max(x, number(address, LOW)), number(address, HIGH))
+    bits = bits_of(held)
+    row = HEAD + 2 * ((bits >> 52) - whole(address, EXPONENT) + rows)
+    record = (bits >> whole(address, row)) + whole(address, row + 1)
+    record += d * number(address, KINK_SIGN) > number(address, KINK)
+    record += d * number(address, KINK_SIGN_2) > number(address, KINK_2)
+    word = whole(address, RECORDS) + record * RECORD
+    rate = number(address, word + RATE)
+    return Place(word, (held - number(address, word + CENTRE)) * rate, -side * number(address, SCALE) * rate)
+
+
+@njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
+def _value(address: int, word: int, t: float) -> float:
+    """A polynomial at t, its constant at `word`."""
+    value = number(address, word + DEGREE)
+    for k in range(DEGREE - 1, -1, -1):
+        value = value * t + number(address, word + k)
+    result: float = value
+    return result
+
+
+@njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
+def _with_slope(address: int, word: int, t: float) -> tuple[float, float]:
+    """It and its derivative, of one pass."""
+    value, slope = number(address, word + DEGREE), 0.0
+    for k in range(DEGREE - 1, -1, -1):
+        slope = slope * t + value
+        value = value * t + number(address, word + k)
+    return value, slope
+
+
+@njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
+def _with_slopes(address: int, word: int, t: float) -> tuple[float, float, float]:
+    """It, its derivative, and half of the second."""
+    value, slope, bend = number(address, word + DEGREE), 0.0, 0.0
+    for k in range(DEGREE - 1, -1, -1):
+        bend = bend * t + slope
+        slope = slope * t + value
+        value = value * t + number(address, word + k)
+    return value, slope, bend
+
+
+@njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
+def _integral(address: int, word: int, t: float, power: float) -> float:
+    """Sum of coefficients t^k/(power + k)."""
+    value = number(address, word + DEGREE) * (1.0 / (power + DEGREE))
+    for k in range(DEGREE - 1, -1, -1):
+        value = value * t + number(address, word + k) * (1.0 / (power + k))
+    result: float = value
+    return result
+
+
+@njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
+def _inside(what: int, address: int, place: Place) -> float:
+    """One of FORCE, AREA, STIFFNESS and AREA_SLOPE (both against -d), ENERGY (over d) at a place."""
+    word, t = place.word, place.t
+    if what == FORCE:
+        return _value(address, word + FORCE_AT, t)
+    if what == AREA:
+        return _value(address, word + AREA_AT, t)
+    if what == STIFFNESS:
+        return _with_slope(address, word + FORCE_AT, t)[1] * place.q
+    if what == AREA_SLOPE:
+        return _with_slope(address, word + AREA_AT, t)[1] * place.q
+    energy: float = number(address, word + ENERGY_AT) + t * _integral(address, word + FORCE_AT, t, 1.0) / place.q
+    return energy
+
+
+@njit(cache=True, fastmath=CONTRACT, error_model="numpy")
+def _first_record(what: int, address: int, x: float) -> Any:
+    """The same below LOW."""
+    if x <= 0.0 and whole(address, ENDS):
+        return 0.0
+    word = whole(address, RECORDS)
+    t = (x - number(address, word + CENTRE)) * number(address, word + RATE)
+    q = -number(address, PLUS) * number(address, SCALE) * number(address, word + RATE)
+    of_area = what in (AREA, AREA_SLOPE)
+    power = number(address, POWER_A) if of_area else number(address, POWER_F)
+    start = word + (AREA_AT if of_area else FORCE_AT)
+    lead = t**power if power != 0.0 else 1.0
+    if what in (FORCE, AREA):
+        return lead * _value(address, start, t)
+    if what == ENERGY:
+        return number(address, word + ENERGY_AT) + lead * t * _integral(address, start, t, 1.0 + power) / q
+    value, slope = _with_slope(address, start, t)
+    return (lead * slope + (power * lead / t * value if power != 0.0 else 0.0)) * q
 
 
 @njit(cache=True, error_model="numpy")
-def stretch(rest: float, unbounded: bool, ends: bool) -> float:
-    """dx/dv."""
-    if not (unbounded or ends):
-        return 1.0
-    return (1.0 / (1.0 - rest) if unbounded else 0.0) + (1.0 / rest if ends else 0.0)
+def evaluate(what: int, address: int, d: float) -> float:
+    """One quantity at a gap; NaN outside the law."""
+    if not number(address, LOWEST) <= d <= number(address, HIGHEST):
+        return math.nan
+    x = _depth(address, d)
+    if x < number(address, LOW):
+        value: float = _first_record(what, address, x)
+        return value
+    return _inside(what, address, _record_of(address, x, d))
 
 
 @njit(cache=True, error_model="numpy")
-def logs(x: float, which: int, law: Law) -> tuple[float, float]:
-    """ln F or ln A at x, and its slope; straight beyond the last break, a power of h_max - u."""
-    last = law.breaks.size - 1
-    held = min(max(x, law.breaks[0]), law.breaks[last])
-    piece = locate(held, law.breaks)
-    a, b = law.breaks[piece], law.breaks[piece + 1]
-    y = (2.0 * held - a - b) / (b - a)
-    slope = slope_in(law.pieces, piece, which, y) * 2.0 / (b - a)
-    return value_in(law.pieces, piece, which, y) + slope * (x - held), slope
+def force_at(address: int, d: float) -> float:
+    """Force at a gap, with fewer arguments to pass; NaN outside the law."""
+    return evaluate(FORCE, address, d)
+
+
+@njit(cache=True, fastmath=CONTRACT, error_model="numpy", nogil=True)
+def fill(address: int, d: FloatArray, force: Any, area: Any, stiffness: Any, area_slope: Any, energy: Any) -> bool:
+    """The quantities whose arrays are given, not None, at each gap; whether all gaps are in the law."""
+    low, lowest, highest = number(address, LOW), number(address, LOWEST), number(address, HIGHEST)
+    below = bad = 0
+    for k in range(d.size):
+        gap = d[k]
+        x = _depth(address, gap)
+        bad += not lowest <= gap <= highest
+        below += x < low
+        place = _record_of(address, x, gap)
+        if force is not None:
+            force[k] = _inside(FORCE, address, place)
+        if area is not None:
+            area[k] = _inside(AREA, address, place)
+        if stiffness is not None:
+            stiffness[k] = _inside(STIFFNESS, address, place)
+        if area_slope is not None:
+            area_slope[k] = _inside(AREA_SLOPE, address, place)
+        if energy is not None:
+            energy[k] = _inside(ENERGY, address, place)
+    # no branch above: entries of the first record are mended here
+    if below:
+        for k in range(d.size):
+            x = _depth(address, d[k])
+            if x < low:
+                if force is not None:
+                    force[k] = _first_record(FORCE, address, x)
+                if area is not None:
+                    area[k] = _first_record(AREA, address, x)
+                if stiffness is not None:
+                    stiffness[k] = _first_record(STIFFNESS, address, x)
+                if area_slope is not None:
+                    area_slope[k] = _first_record(AREA_SLOPE, address, x)
+                if energy is not None:
+                    energy[k] = _first_record(ENERGY, address, x)
+    return bad == 0
 
 
 @njit(cache=True, error_model="numpy")
-def _work(low: float, high: float, law: Law) -> float:
-    """Integral of force over u between two x."""
-    half, centre, total = 0.5 * (high - low), 0.5 * (high + low), 0.0
-    for k in range(_NODES.size):
-        x = centre + half * _NODES[k]
-        steep = stretch(to_rest(x, law.unbounded, law.ends), law.unbounded, law.ends)
-        total += _WEIGHTS[k] * math.exp(logs(x, 0, law)[0]) / steep
-    return half * total * law.h_max
+def _towards(which: int, address: int, gap: float, wanted: float) -> float:
+    """A Newton step from a gap, on the logarithm of force or area: loads range over many decades."""
+    value, slope = evaluate(which, address, gap), evaluate(which + STIFFNESS, address, gap)
+    if not (value > 0.0 and slope > 0.0):
+        return math.nan
+    step = value * math.log(value / wanted) / slope
+    left = number(address, H_MAX) - gap
+    # where contact ends force is nearly a power of what is left
+    return gap + left * -math.expm1(-step / left) if whole(address, ENDS) else gap + step
 
 
 @njit(cache=True, error_model="numpy")
-def _tail(x: float, law: Law) -> float:
-    """Integral of a power of h_max - u from x to first contact."""
-    value, slope = logs(x, 0, law)
-    return math.exp(value) * law.h_max * to_rest(x, law.unbounded, law.ends) / (1.0 - slope)
-
-
-@njit(cache=True, error_model="numpy")
-def _panel_end(k: int, law: Law) -> float:
-    """x at an entry of `energies`."""
-    piece, part = k // PANELS, k % PANELS
-    x: float = law.breaks[piece]
-    if part > 0:
-        x += (law.breaks[piece + 1] - law.breaks[piece]) * part / PANELS
-    return x
-
-
-@njit(cache=True, error_model="numpy")
-def _energy(x: float, law: Law) -> float:
-    """Integral of force over u from last contact to x."""
-    if law.ends and x > law.breaks[law.breaks.size - 1]:
-        return _tail(x, law)
-    piece = locate(max(x, law.breaks[0]), law.breaks)
-    a, b = law.breaks[piece], law.breaks[piece + 1]
-    after = piece * PANELS + min(max(int(PANELS * (x - a) / (b - a)) + 1, 1), PANELS)
-    below: float = law.energies[after]
-    return below + _work(x, _panel_end(after, law), law)
-
-
-@njit(cache=True, error_model="numpy")
-def fill_energies(law: Law, last: float) -> None:
-    """Energies at the panels' ends, into the law; `last` at the last of them where contact does not end at h_max."""
-    end = law.energies.size - 1
-    law.energies[end] = _tail(law.breaks[law.breaks.size - 1], law) if law.ends else last
-    for k in range(end - 1, -1, -1):
-        law.energies[k] = law.energies[k + 1] + _work(_panel_end(k, law), _panel_end(k + 1, law), law)
+def solve(which: int, address: int, wanted: float, low: float, high: float) -> float:
+    """Gap between `low` and `high` at which force or area, falling there, has a value."""
+    gap, before, least = 0.5 * (low + high), math.inf, EPSILON * number(address, H_MAX)
+    for _ in range(STEPS):
+        if evaluate(which, address, gap) > wanted:
+            low = gap
+        else:
+            high = gap
+        following = _towards(which, address, gap, wanted)
+        if abs(following - gap) <= EPSILON * abs(gap) + least:
+            gap = following if low < following < high else gap
+            break
+        # steps that do not halve may go to and fro for ever
+        if not (low < following < high and abs(following - gap) <= 0.5 * before):
+            following = 0.5 * (low + high)
+        before = abs(following - gap)
+        if following in (gap, low, high):
+            break
+        gap = following
+    # the best of the last bracket; its ends may be full compression or first contact
+    best, missed = gap, abs(evaluate(which, address, gap) - wanted)
+    for end in (low, high):
+        other = abs(evaluate(which, address, end) - wanted)
+        if other < missed:
+            best, missed = end, other
+    return best
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def fill(what: int, gap: FloatArray, given: Any, out: FloatArray) -> None:
-    """FORCE, AREA, FORCE_SLOPE, AREA_SLOPE (both against -d) or ENERGY (over d) of each gap d, with E* = 1."""
-    law = Law(*given)
-    which = what if what <= 1 else what - FORCE_SLOPE
-    for k in range(gap.size):
-        rest = 0.5 * (law.h_max - gap[k]) / law.h_max
-        if law.ends and not rest > 0.0:
-            out[k] = 0.0
-            continue
-        x = to_x(rest, law.unbounded, law.ends)
-        if what == ENERGY:
-            out[k] = 2.0 * _energy(x, law)
-            continue
-        value, slope = logs(x, which, law)
-        out[k] = math.exp(value)
-        if what in (FORCE_SLOPE, AREA_SLOPE):
-            out[k] *= -slope * stretch(rest, law.unbounded, law.ends) / (2.0 * law.h_max)
+def fill_inverse_nodes(
+    which: int, address: int, values: FloatArray, end: float, x: FloatArray, side: FloatArray
+) -> None:
+    """x at values, and the sign of its side, for the records of an inverse that ends at a gap."""
+    top = number(address, H_MAX) if whole(address, ENDS) else number(address, HIGHEST)
+    for k in range(values.size):
+        d = solve(which, address, values[k], end, top)
+        x[k] = _depth(address, d)
+        side[k] = number(address, MINUS) if d < 0.0 else number(address, PLUS)
+
+
+@njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
+def _fill_inverse(
+    which: int, address: int, inverse: int, wanted: FloatArray, out: FloatArray, area: Any, stiffness: Any
+) -> bool:
+    """As `fill_inverse`: a polynomial and one step, each in a loop of its own, which keeps more entries in flight.
+
+    The step is of third order. `solve` finds the entries for which one step may not be enough.
+    """
+    least, y_low, y_high = number(inverse, Y_LEAST), number(inverse, Y_LOW), number(inverse, Y_HIGH)
+    turn, first, end = number(inverse, Y_TURN), whole(inverse, FIRST_BUCKET), number(inverse, END)
+    h_max, width = number(address, H_MAX), 1.0 / number(address, SCALE)
+    low, high = number(address, LOW), number(address, HIGH)
+    start = FORCE_AT if which == FORCE else AREA_AT
+    unsure = bad = 0
+    for k in range(wanted.size):
+        y = wanted[k]
+        bad += not least <= y <= y_high
+        held = min(max(y, y_low), y_high)
+        bucket = (bits_of(held) >> (52 - INVERSE_BITS)) - first + (held > turn)
+        word = INVERSE_HEAD + bucket * INVERSE_RECORD
+        t = (held - number(inverse, word)) * number(inverse, word + 1)
+        x = number(inverse, word + 3 + INVERSE_DEGREE)
+        for j in range(INVERSE_DEGREE - 1, -1, -1):
+            x = x * t + number(inverse, word + 3 + j)
+        # x is positive, and its sign free for that of the side
+        out[k] = min(max(x, low), high) * number(inverse, word + 2)
+    for k in range(wanted.size):
+        x = abs(out[k])
+        side = 1.0 if out[k] > 0.0 else -1.0
+        place = _record_of(address, x, (x * width - h_max) * side)
+        value, slope, bend = _with_slopes(address, place.word + start, place.t)
+        inverse_slope = 1.0 / slope
+        step = (wanted[k] - value) * inverse_slope
+        step -= bend * inverse_slope * step * step
+        gap = max((x * width - h_max) * side - step / place.q, end)
+        sure = (abs(step) < SURE) & (wanted[k] >= y_low)
+        unsure += not sure
+        out[k] = gap if sure else math.nan
+        if area is not None:
+            value, slope = _with_slope(address, place.word + AREA_AT, place.t)
+            area[k] = value + slope * step
+        if stiffness is not None:
+            value, slope, bend = _with_slopes(address, place.word + FORCE_AT, place.t)
+            stiffness[k] = 2.0 * (slope + 2.0 * bend * step) * place.q
+    if unsure and not bad:
+        top = h_max if whole(address, ENDS) else number(address, HIGHEST)
+        for k in range(wanted.size):
+            if math.isnan(out[k]):
+                out[k] = solve(which, address, wanted[k], end, top)
+                if area is not None:
+                    area[k] = evaluate(AREA, address, out[k])
+                if stiffness is not None:
+                    stiffness[k] = 2.0 * evaluate(STIFFNESS, address, out[k])
+    return bad == 0
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def fill_logs(x: FloatArray, which: int, given: Any, out: FloatArray, slopes: FloatArray) -> None:
-    """`logs` of each x."""
-    law = Law(*given)
-    for k in range(x.size):
-        out[k], slopes[k] = logs(x[k], which, law)
+def fill_inverse(
+    which: int, address: int, inverse: int, wanted: FloatArray, out: FloatArray, area: Any, stiffness: Any
+) -> bool:
+    """Gaps of forces or areas, with area and -dF/du there where their arrays are given; whether all are in range."""
+    if which == FORCE:
+        return _fill_inverse(FORCE, address, inverse, wanted, out, area, stiffness)
+    return _fill_inverse(AREA, address, inverse, wanted, out, area, stiffness)
+
+
+class CompiledLaw(NamedTuple):
+    """A law for functions that numba compiles: pass it as an argument, and ask it as below. NaN outside the law."""
+
+    block: FloatArray
+
+    def force(self, d: float) -> float:
+        """F/A0 at a separation d."""
+        return evaluate(FORCE, self.block.ctypes.data, d)
+
+    def area(self, d: float) -> float:
+        """A/A0."""
+        return evaluate(AREA, self.block.ctypes.data, d)
+
+    def stiffness(self, d: float) -> float:
+        """-dF/dd."""
+        return evaluate(STIFFNESS, self.block.ctypes.data, d)
+
+    def area_slope(self, d: float) -> float:
+        """-d(A/A0)/dd."""
+        return evaluate(AREA_SLOPE, self.block.ctypes.data, d)
+
+    def energy(self, d: float) -> float:
+        """Integral of force from d to last contact."""
+        return evaluate(ENERGY, self.block.ctypes.data, d)
+
+
+def _offer(name: str, what: int) -> None:
+    """A method of `CompiledLaw` in compiled code."""
+
+    @overload_method(types.NamedUniTuple, name)
+    def offered(law, d):  # type: ignore[no-untyped-def]
+        if getattr(law, "instance_class", None) is not CompiledLaw:
+            return None
+        return lambda law, d: evaluate(what, np.int64(law.block.ctypes.data), d)  # type: ignore[arg-type]
+
+
+for _what, _name in enumerate(("force", "area", "stiffness", "area_slope", "energy")):
+    _offer(_name, _what)

@@ -13,8 +13,10 @@ from mbma_tables.models.protocol import QUANTITIES
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading, get_reading
+from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.protocol import SCAN, Theory, TheoryAnswer, select
 from mbma_tables.totals.contact import Totals, totals_at
+from mbma_tables.totals.island_sum import kinks
 
 MAX_AREA = 0.1  # above it islands begin to lie on one another (docs/fidelity.md)
 
@@ -93,6 +95,13 @@ class Mbma(Theory):
             tolerances={"rtol": 10 * self.rtol},
         )
         return np.where(touching, -slope.df, 0.0)
+
+    def bends(self, surface: AnySurface) -> FloatArray:
+        """Mean separations [length] at which the largest island reaches the floor of zeta_d, and of zeta_u."""
+        if not isinstance(surface, Surface):
+            return np.empty(0)
+        places = np.array(kinks(surface.hurst, surface.zeta_1, self.reading)) * float(surface.h_rms)
+        return np.asarray(surface.h_max - places[places < 2 * surface.h_max] / 2)
 
     def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] from where force or area is largest to first contact."""

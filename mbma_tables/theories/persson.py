@@ -40,6 +40,7 @@ DECAY = 45.0  # exp(-DECAY) of an integrand's largest value counts as nothing
 MAX_RATIO = 26.0  # p0/Y at which u is still a normal number, about exp(-676)
 MIN_LOG_FORCE = -690.0  # log p0/(E* q0 s) of the lightest load that the inverse answers
 INVERSE_RTOL = 1e-10  # of a load found from its separation
+MANY, SPLINE_NODES = 200, 64  # loads of one surface from which a spline gives the first guess; its nodes
 MAX_STEPS = 100  # of the safeguarded Newton iteration; it takes 5 to 15
 
 # exp(-t) over [0, DECAY]: 64 nodes leave 1e-15
@@ -283,7 +284,10 @@ def _invert(bands: _Bands, target: FloatArray) -> FloatArray:
     low = np.full(bands.hurst.size, MIN_LOG_FORCE)
     high = bands.log_top + math.log(MAX_RATIO)
     wanted = target.ravel()
-    most, least = (_full(bands, end)[0] for end in (low, high))
+    one = bool((bands.hurst == bands.hurst[0]).all() and (bands.log_top == bands.log_top[0]).all())
+    some = slice(1) if one else slice(None)
+    few = _Bands(bands.hurst[some], bands.log_top[some], bands.log_bottom[some])
+    most, least = (_full(few, end[some])[0] for end in (low, high))
     inside = (wanted >= least) & (wanted <= most)
     require(
         "mean_separation/s",
@@ -293,6 +297,8 @@ def _invert(bands: _Bands, target: FloatArray) -> FloatArray:
     )
     u0, log_lambda = _simplified(bands)
     guess = np.clip(log_lambda - wanted / u0, low, high)
+    if one and guess.size > MANY:
+        guess = np.clip(_guesses(few, wanted, guess), low, high)
     active = np.ones(guess.size, dtype=bool)
     for _ in range(MAX_STEPS):
         value, slope = np.zeros((2, guess.size))
@@ -332,6 +338,18 @@ def own_force(surface: MeasuredSurface, mean_separation: FloatArray, full: bool)
     """Load over A0 E* at mean separations u [length]."""
     force = _own_law(surface, full).gaussian(mean_separation / surface.h_rms)[0]
     return np.asarray(np.exp(force) * surface.rms_gradient)
+
+
+def _guesses(band: _Bands, wanted: FloatArray, light: FloatArray) -> FloatArray:
+    """Log of the loads at which one surface has u/s = `wanted`, by a spline; `light` is Eq. (20)'s answer."""
+    from scipy.interpolate import CubicSpline
+
+    # at high loads u falls faster than (20) has it
+    log_p = np.linspace(light.min() - 1, band.log_top[0] + math.log(MAX_RATIO), SPLINE_NODES)
+    own = _Bands(*(np.full(SPLINE_NODES, field[0]) for field in (band.hurst, band.log_top, band.log_bottom)))
+    average = _full(own, log_p)[0]
+    spline = CubicSpline(np.log(average[::-1]), log_p[::-1])
+    return np.asarray(spline(np.clip(np.log(wanted), np.log(average[-1]), np.log(average[0]))))
 
 
 class Persson(Theory):

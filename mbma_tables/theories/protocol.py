@@ -85,6 +85,10 @@ class Theory(abc.ABC):
         high = np.asarray(surface.h_max, dtype=float)
         return np.zeros_like(high), high
 
+    def bends(self, surface: AnySurface) -> FloatArray:
+        """Mean separations [length] of one surface, two at most, at which derivatives of force or area jump."""
+        return np.empty(0)
+
     def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """Reasons for which answers lie outside what the theory was tested for, each with a mask."""
         return {}

@@ -95,6 +95,10 @@ class Yielding(Theory):
             stiffness = np.where(force > 0, force * gradient * rate, 0.0)
         return force * gradient, stiffness, eta, gradient
 
+    def bends(self, surface: AnySurface) -> FloatArray:
+        """Where derivatives of the elastic force jump."""
+        return self.elastic.bends(surface)
+
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and the loading curve's stiffness at mean separations u [length]."""
         u = np.asarray(mean_separation, dtype=float)

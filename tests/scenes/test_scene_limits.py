@@ -56,7 +56,7 @@ def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
         # as good, and quicker
         return contact_law(surface, rtol, "universal", *rest)
 
-    monkeypatch.setattr("mbma_tables.totals.law.mbma_law", law)
+    monkeypatch.setattr("mbma_tables.theories.law.contact_law", law)
     scene = scene_of(effects=("energy",), rtol=1e-2)
     found = run_plan(scene, tiered(scene, "universal"))
     assert made == ["universal", "exact"]

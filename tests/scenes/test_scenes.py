@@ -221,7 +221,7 @@ def test_python_mistakes(more, words):
 
 WATCHED = {
     "mbma_tables.theories.contact": {"force", "area", "validity", "yield"},
-    "mbma_tables.totals.law": {"stiffness", "energy", "conductance"},
+    "mbma_tables.theories.law": {"stiffness", "energy", "conductance"},
     "mbma_tables.totals.conductance": {"conductance"},
     "mbma_tables.theories.asperities": {"comparison"},
     "mbma_tables.theories.persson": set(),
@@ -263,7 +263,7 @@ def test_modules_of_an_effect_that_is_off_are_not_imported(name):
 @pytest.mark.parametrize("effects", COMBINATIONS, ids="+".join)
 def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
     import mbma_tables.theories.contact as totals
-    import mbma_tables.totals.law as laws
+    import mbma_tables.theories.law as laws
 
     calls = {}
 
@@ -277,7 +277,7 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
         monkeypatch.setattr(module, name, counted)
 
     count(totals, "contact")
-    count(laws, "mbma_law")
+    count(laws, "contact_law")
     for name in ("island_statistics", "profiles", "hertz_area"):
         count(islands, name)
     for theory in (GreenwoodWilliamson, Persson):
@@ -289,7 +289,7 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
     of_law = bool(asked & {"stiffness", "energy", "conductance"}) and not yields
     expected = {
         "contact": int(yields or (not of_law and bool(asked & {"force", "area"}))) + int("validity" in asked),
-        "mbma_law": int(of_law),
+        "contact_law": int(of_law),
         "island_statistics": int("island_statistics" in asked),
         "profiles": int("pressure_profile" in asked),
         "greenwood_williamson": int("comparison" in asked),

@@ -21,6 +21,7 @@ from mbma_tables.models.island4d import RAW
 from mbma_tables.models.protocol import BOTH
 from mbma_tables.models.tables import island4d_model, universal_model
 from mbma_tables.surfaces.readings import READINGS, REPORTED, get_reading
+from mbma_tables.theories.law_kernel import CENTRE, RATE
 from mbma_tables.totals import island_sum
 from mbma_tables.totals import kernel as lookup
 from mbma_tables.totals.intervals import NARROW, STRETCH, Gap
@@ -408,7 +409,7 @@ def test_laws_do_not_jump_at_their_breaks(rtol, record_property):
         reading = sorted(READINGS)[rng.integers(2)]
         surface = Surface(rng.uniform(0.3, 1), 1.0, 10 ** rng.uniform(0.5, 4), 1.0, rng.uniform(2.5, 4.5))
         law = contact_law(surface, rtol, reading=reading)
-        depth = law.layer * np.sinh(law.breaks[1:-1]) ** 2
+        depth = 2 * law.h_max * (law.records[1:, CENTRE] - 1 / law.records[1:, RATE])
         gaps = law.h_max - depth
         sides = [gaps - sign * STEP * depth for sign in (-0.5, 0.5)]
         for value, slope in ((law.force, law.stiffness), (law.area, law.area_slope)):

@@ -1,0 +1,64 @@
+"""The inverse of a law: polynomials of x in buckets of force or area, found from their bits, as a block of its own.
+
+In words of 8 bytes: `INVERSE_HEAD` numbers, then records of centre, rate, the sign of the side and INVERSE_DEGREE + 1
+coefficients. They are guesses, which a Newton step on the law itself makes exact.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from mbma_tables.arguments import FloatArray
+from mbma_tables.theories import law_kernel as kernel
+from mbma_tables.theories.law_kernel import INVERSE_BITS, INVERSE_DEGREE, INVERSE_RECORD
+
+OCTAVES = 100  # below the largest value; lighter loads are found by iteration
+LEAST = float(np.finfo(float).tiny)
+
+
+@functools.cache
+def _rule() -> tuple[Any, Any]:
+    """Chebyshev points and values there to monomials."""
+    points = chebyshev.chebpts1(INVERSE_DEGREE + 1)
+    return points, np.linalg.inv(np.vander(points, increasing=True)).T
+
+
+def inverse_block(which: int, block: FloatArray, end: float) -> FloatArray:
+    """The inverse of force or area of a law's block, down to the gap `end`."""
+    address, ends = int(block.ctypes.data), bool(block.view(np.int64)[kernel.ENDS])
+    h_max, scale, low = block[kernel.H_MAX], block[kernel.SCALE], block[kernel.LOW]
+
+    def value(d: float) -> float:
+        return float(kernel.evaluate(which, address, d))
+
+    most = value(end)
+    top = h_max - low / scale if ends else float(block[kernel.HIGHEST])
+    bottom = min(max(value(top), most * 2.0**-OCTAVES, LEAST), most)
+    two_sided = block[kernel.PLUS] != block[kernel.MINUS]
+    turn = value(0.0) if two_sided and end < 0 else math.inf
+    bits = 52 - INVERSE_BITS
+    first, last = (int(np.float64(y).view(np.int64) >> bits) for y in (bottom, most))
+    edges = (np.arange(first, last + 2) << bits).view(np.float64)
+    edges[0], edges[-1] = bottom, max(most, edges[-2])
+    if turn < most:
+        edges = np.insert(edges, np.searchsorted(edges, max(turn, bottom)), max(turn, bottom))
+    points, transform = _rule()
+    centre, half = (edges[1:] + edges[:-1]) / 2, (edges[1:] - edges[:-1]) / 2
+    wanted = (centre[:, None] + half[:, None] * points).ravel()
+    x, side = np.empty((2, wanted.size))
+    kernel.fill_inverse_nodes(which, address, wanted, end, x, side)
+    records = np.zeros((centre.size, INVERSE_RECORD))
+    records[:, 0] = centre
+    records[:, 1] = np.divide(1.0, half, out=np.zeros_like(half), where=half > 0)
+    records[:, 2] = side.reshape(-1, points.size)[:, points.size // 2]
+    records[:, 3:] = x.reshape(-1, points.size) @ transform
+    head = np.zeros(kernel.INVERSE_HEAD)
+    head[kernel.Y_LEAST] = 0.0 if ends else value(float(block[kernel.HIGHEST]))
+    head[[kernel.Y_LOW, kernel.Y_HIGH, kernel.Y_TURN, kernel.END]] = bottom, most, turn, end
+    head.view(np.int64)[kernel.FIRST_BUCKET] = first
+    return np.concatenate([head, records.ravel()])

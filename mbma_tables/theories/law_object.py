@@ -1,0 +1,330 @@
+"""What a contact law answers, whatever theory it is of: values, slopes, energy and inverses against the gap.
+
+All of them come from one record of polynomials, found from the bits of the gap (`law_kernel`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, require
+from mbma_tables.compiled import in_blocks
+from mbma_tables.errors import InputError
+from mbma_tables.theories import law_kernel as kernel
+from mbma_tables.theories.law_kernel import AREA, FORCE, CompiledLaw, force_at
+from mbma_tables.units import UNKNOWN, Units
+
+BLOCK = 1 << 16  # gaps between two looks for Ctrl-C
+SCAN = 49  # gaps at which a law's stiffness is looked at for its maximum
+ROUNDING = 4 * float(np.finfo(float).eps)
+DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polynomials'
+QUANTITIES = ("force", "area", "stiffness", "area_slope", "energy")
+
+
+class LawPoint(NamedTuple):
+    """Where a law has a given pressure: separation d, mean separation u, A/A0 and -dF/du, of the pressure's shape."""
+
+    separation: Any
+    mean_separation: Any
+    area: Any
+    stiffness: Any
+
+
+class LawValues(NamedTuple):
+    """What a law answers at separations: F/A0, A/A0, -dF/dd and the energy, of their shape."""
+
+    force: Any
+    area: Any
+    stiffness: Any
+    energy: Any
+
+
+def _plain(given: Any) -> bool:
+    """Whether input is a plain array, whose entries are checked as they are answered."""
+    return type(given) is np.ndarray and given.dtype == np.float64 and given.size > 0
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ContactLaw:
+    """Force and area of one surface against its gap; made by `contact_law`, picklable, tens of kB.
+
+    Every method takes the separation d, or the mean separation ``u=`` instead: numbers in the law's unit of length, or
+    texts with their own, "0.8 um".
+
+    Attributes
+    ----------
+    h_max : float
+        Highest point [length]; where contact ends there, laws answer zero from this gap on.
+    E_star : float
+        Effective modulus, in whose unit force is.
+    lowest, highest : float
+        Gaps d that the law covers; highest is infinite where contact ends at h_max.
+    error : float
+        Bound on the relative error of force and area, of the polynomials and of what they were made from together.
+    turning_point, area_turning_point : float or None
+        Gap below which force, or area, falls again, where it does; inverses end there.
+    theory, reading, tier : str
+        What made it; reading and tier are empty where the theory is not MBMA.
+    block : ndarray
+        The polynomials, in the layout that `mbma_tables.theories.law_kernel` describes.
+    errors : ndarray, shape (records, 2)
+        Bounds on the relative error of a record's values, and of its slopes over F/x.
+    units : Units
+        Of lengths and stresses, as far as the surface and the modulus knew theirs.
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, contact_law
+    >>> law = contact_law(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0), E_star=100e3)  # um, MPa
+    >>> round(float(law.force(1.0)), 4), round(float(law.separation(force=7.9825)), 4)
+    (7.9825, 1.0)
+    >>> round(float(law.stiffness_mean(u=2.0)), 3)  # -dF/du [MPa/um]
+    31.809
+    >>> round(float(law.at_pressure(7.9825).area), 5), round(law.softening, 3)
+    (0.00287, 1.06)
+    """
+
+    h_max: float
+    E_star: float
+    lowest: float
+    highest: float
+    error: float
+    turning_point: float | None
+    area_turning_point: float | None
+    theory: str
+    reading: str
+    tier: str
+    block: FloatArray
+    errors: FloatArray
+    units: Units = UNKNOWN
+
+    @functools.cached_property
+    def _address(self) -> int:
+        return int(self.block.ctypes.data)
+
+    @property
+    def rows(self) -> Any:
+        """Shift and base of each octave of x, shape (octaves, 2)."""
+        return self.block[kernel.HEAD : self._first_word].view(np.int64).reshape(-1, 2)
+
+    @property
+    def records(self) -> FloatArray:
+        """Centre, rate, polynomials of force and area, and energy of each piece, shape (records, RECORD)."""
+        return self.block[self._first_word :].reshape(-1, kernel.RECORD)
+
+    @property
+    def _first_word(self) -> int:
+        return int(self.block.view(np.int64)[kernel.RECORDS])
+
+    def _gaps(self, separation: Any, u: Any) -> FloatArray:
+        if separation is not None and u is not None:
+            raise InputError("separation and u: give one of them")
+        separation, u = (self.units.number("separation", gap) for gap in (separation, u))
+        d = finite_array("separation", separation) if u is None else 2 * finite_array("u", u) - self.h_max
+        # ends that are no round numbers are met but for rounding
+        limit, slack = ("-h_max = ", 0.0) if self.lowest == -self.h_max else ("", ROUNDING * self.h_max)
+        require("separation", d, d >= self.lowest - slack, f"at least {limit}{self.lowest:.17g}, where the theory ends")
+        if self.highest < math.inf:
+            good = d <= self.highest * (1 + ROUNDING)
+            require("separation", d, good, f"at most {self.highest:.17g}, where the law ends")
+        return d
+
+    def _values(self, wanted: tuple[str, ...], separation: Any, u: Any) -> tuple[Any, ...]:
+        """The quantities wanted, in the order of `QUANTITIES`, in one pass."""
+        given = separation if u is None else u
+        if is_labelled(given):
+            from mbma_tables.labels import apply
+
+            def answer(block: Any) -> Any:
+                found = self._values(wanted, block, None) if u is None else self._values(wanted, None, block)
+                return found if len(wanted) > 1 else found[0]
+
+            found = apply(answer, (given,), len(wanted))
+            return found if len(wanted) > 1 else (found,)
+        d = given if u is None and _plain(given) else self._gaps(separation, u)
+        flat = np.ascontiguousarray(d).reshape(-1)
+        out = dict(zip(wanted, np.empty((len(wanted), flat.size)), strict=True))
+
+        def fill(block: slice) -> bool:
+            parts = (out[name][block] if name in out else None for name in QUANTITIES)
+            return bool(kernel.fill(self._address, flat[block], *parts))
+
+        if not all(in_blocks(fill, flat.size, BLOCK)):
+            self._gaps(separation, u)
+        return tuple(values.reshape(d.shape)[()] for values in out.values())
+
+    def __call__(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
+        """The same as `force`."""
+        return self.force(separation, u=u)
+
+    def force(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
+        """F/A0 in the unit of E_star at d; where contact ends at h_max, zero from there on."""
+        if type(separation) is float and u is None:
+            value: np.float64 = force_at(self._address, separation)
+            # NaN: refused below
+            if value == value:
+                return value
+        return self._values(("force",), separation, u)[0]  # type: ignore[no-any-return]
+
+    def area(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
+        """A/A0 at d; where contact ends at h_max, zero from there on."""
+        return self._values(("area",), separation, u)[0]  # type: ignore[no-any-return]
+
+    def stiffness(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
+        """-dF/dd per nominal area; MBMA's jumps where zeta_d reaches its floor, and belongs to the larger gap there."""
+        return self._values(("stiffness",), separation, u)[0]  # type: ignore[no-any-return]
+
+    def stiffness_mean(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
+        """-dF/du per nominal area, against the mean separation u = (h_max + d)/2: twice `stiffness`."""
+        return 2 * self.stiffness(separation, u=u)
+
+    def force_and_stiffness(
+        self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None
+    ) -> tuple[Numbers, Numbers]:
+        """F/A0 and -dF/dd in one pass, as iterations need them."""
+        force, stiffness = self._values(("force", "stiffness"), separation, u)
+        return force, stiffness
+
+    def area_slope(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
+        """-d(A/A0)/dd."""
+        return self._values(("area_slope",), separation, u)[0]  # type: ignore[no-any-return]
+
+    def energy(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
+        """Elastic energy per nominal area, the integral of force from d to last contact."""
+        return self._values(("energy",), separation, u)[0]  # type: ignore[no-any-return]
+
+    def values(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> LawValues:
+        """Force, area, stiffness -dF/dd and energy in one pass."""
+        return LawValues(*self._values(("force", "area", "stiffness", "energy"), separation, u))
+
+    def separation(self, *, force: ArrayLike | None = None, area: ArrayLike | None = None) -> Numbers:
+        """Gap d at a given force or area, on the branch of first contact; where contact ends at h_max, that at zero.
+
+        Raises
+        ------
+        OutOfRangeError
+            Where the branch does not reach the value; the message says how far it goes.
+        """
+        if (force is None) == (area is None):
+            raise InputError("give force or area, one of them")
+        name, given = ("area", area) if force is None else ("force", self.units.number("force", force))
+        return self._inverse(name, given)[0]  # type: ignore[no-any-return]
+
+    def at_pressure(self, pressure: ArrayLike) -> LawPoint:
+        """Separations, area and stiffness -dF/du where F/A0 is `pressure`, on the branch of first contact."""
+        d, area, stiffness = self._inverse("force", self.units.number("force", pressure), 3)
+        return LawPoint(d, (self.h_max + d) / 2, area, stiffness)
+
+    def _inverse(self, name: str, given: Any, count: int = 1) -> tuple[Any, ...]:
+        """Gaps of forces or areas, and with a `count` of 3 area and -dF/du there."""
+        if is_labelled(given):
+            from mbma_tables.labels import apply
+
+            if count == 1:
+                return (apply(lambda block: self._inverse(name, block)[0], (given,), 1),)
+            found: tuple[Any, ...] = apply(lambda block: self._inverse(name, block, count), (given,), count)
+            return found
+        wanted = given if _plain(given) else finite_array(name, given)
+        flat = np.ascontiguousarray(wanted).reshape(-1)
+        out = np.empty((count, flat.size))
+        which, inverse = (FORCE if name == "force" else AREA), self._inverse_block(name)
+        address = int(inverse.ctypes.data)
+
+        def fill(block: slice) -> bool:
+            also = (out[1, block], out[2, block]) if count > 1 else (None, None)
+            return bool(kernel.fill_inverse(which, self._address, address, flat[block], out[0, block], *also))
+
+        if not all(in_blocks(fill, flat.size, BLOCK)):
+            self._refuse(name, wanted, inverse)
+        return tuple(values.reshape(wanted.shape)[()] for values in out)
+
+    def _refuse(self, name: str, wanted: FloatArray, inverse: FloatArray) -> None:
+        require(name, wanted, wanted >= 0, "at least 0")
+        least, most, end = inverse[kernel.Y_LEAST], inverse[kernel.Y_HIGH], inverse[kernel.END]
+        require(name, wanted, wanted >= least, f"at least {least:.6g}, where the law of {self.theory!r} ends")
+        require(name, wanted, wanted <= most, f"at most {most:.6g}, at d = {end:.6g} where the branch ends")
+
+    def _inverse_block(self, name: str) -> FloatArray:
+        """Polynomials of x over force or area, made when first asked for."""
+        from mbma_tables.theories.law_inverse import inverse_block
+
+        made: dict[str, FloatArray] = self.__dict__.setdefault("_inverses", {})
+        if name not in made:
+            turn = self.turning_point if name == "force" else self.area_turning_point
+            which = FORCE if name == "force" else AREA
+            made[name] = inverse_block(which, self.block, self.lowest if turn is None else turn)
+        return made[name]
+
+    @functools.cached_property
+    def softening(self) -> float | None:
+        """Mean separation u [length] below which stiffness falls with compression; None where it rises to the end."""
+        from scipy.optimize import minimize_scalar
+
+        step = (self.h_max - max(self.lowest, -self.h_max)) / 2 / SCAN
+        u = self.h_max - step * np.arange(1, SCAN + 1)
+        u[-1] = max(u[-1], (self.h_max + self.lowest) / 2)
+        values = np.asarray(self.stiffness_mean(u=u))
+        falls = values[1:] < values[:-1] * (1 - DIGITS * self.error)
+        if not falls.any():
+            return None
+        peak = int(falls.argmax())
+        low, high = u[peak + 1], min(u[peak] + step, self.h_max)
+        found = minimize_scalar(
+            lambda x: -self.stiffness_mean(u=x), bounds=(low, high), method="bounded", options={"xatol": 1e-7 * high}
+        )
+        return float(found.x)
+
+    def slope_error(self, separation: ArrayLike) -> Any:
+        """Bound on the error of `stiffness` over F/l, and of `area_slope` over A/l, against those of the theory.
+
+        l = h_max - d where contact ends there, else h_max + d. It covers what the polynomials leave out, and for MBMA
+        the error of the islands, which the sum over them passes on to slopes; not the own error of another theory.
+        """
+        d = self._gaps(separation, None)
+        head = self.block
+        x = (self.h_max + np.where(d < 0, head[kernel.MINUS], head[kernel.PLUS]) * d) * head[kernel.SCALE]
+        bound = self.errors[self._records_at(d, x), 1]
+        if head.view(np.int64)[kernel.ENDS]:
+            left = self.h_max - d
+            with np.errstate(divide="ignore", invalid="ignore"):
+                bound = np.where(left > 0, bound * left * head[kernel.SCALE] / x, 0.0)
+        return bound[()]
+
+    def _records_at(self, d: FloatArray, x: FloatArray) -> Any:
+        """Numbers of the records that hold gaps, as the kernel finds them."""
+        head, whole = self.block, self.block.view(np.int64)
+        bits = np.clip(x, head[kernel.LOW], head[kernel.HIGH]).view(np.int64)
+        row = (bits >> 52) - whole[kernel.EXPONENT] + np.where(d < 0, whole[kernel.MINUS_ROWS], 0)
+        shift, base = np.moveaxis(self.rows[row], -1, 0)
+        passed = (d * head[kernel.KINK_SIGN] > head[kernel.KINK]).astype(int)
+        passed += d * head[kernel.KINK_SIGN_2] > head[kernel.KINK_2]
+        return np.where(x < head[kernel.LOW], 0, (bits >> shift) + base + passed)
+
+    def compiled(self) -> CompiledLaw:
+        """The law for functions that numba compiles: an argument of theirs with methods of one float, such as `force`.
+
+        Examples
+        --------
+        >>> from numba import njit
+        >>> from mbma_tables import Surface, contact_law
+        >>> @njit
+        ... def work(law, first, last, steps):
+        ...     total = 0.0
+        ...     for k in range(steps):
+        ...         total += law.force(first + (last - first) * (k + 0.5) / steps) * (first - last) / steps
+        ...     return total
+        >>> law = contact_law(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0))
+        >>> found = work(law.compiled(), 3.0, 1.0, 1000)
+        >>> bool(abs(found / law.energy(1.0) - 1) < 1e-4)
+        True
+        """
+        return CompiledLaw(self.block)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
