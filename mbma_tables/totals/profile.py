@@ -94,7 +94,9 @@ class Profile:
             total = (density[..., :-1] * shares).sum(axis=(1, 2))
             turned = (density * np.abs(heights * fields[:, RATE]))[..., :-1] * shares
             at_end = np.diagonal(density[..., -1])
-            worst = max(worst, float((c[:, 0, 0] * (turned.sum(axis=(1, 2)) + at_end) / total).max()))
+            carried = total > 0
+            ratio = c[carried, 0, 0] * (turned.sum(axis=(1, 2)) + at_end)[carried] / total[carried]
+            worst = max(worst, float(ratio.max(initial=0.0)))
         return worst
 
 
