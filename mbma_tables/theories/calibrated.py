@@ -36,10 +36,6 @@ class Calibrated(Theory):
 
     name = "calibrated"
 
-    def bends(self, surface: AnySurface) -> FloatArray:
-        """Mean separation [length] at which the tail factor sets in."""
-        return np.array([calibrated_table.shipped().constants.onset * float(surface.h_rms)])
-
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], by panels in ln u."""
         shape = np.broadcast_shapes(np.shape(mean_separation), surface.shape)
