@@ -128,7 +128,10 @@ def sensitivity(
         raise InputError(f"give exactly one of {', '.join(KNOWN)}; got {' and '.join(held) or 'none'}")
     modulus, units = modulus_and_units(E_star, surface)
     if not isinstance(surface, Surface):
-        raise InputError("sensitivity is to a surface's numbers, and this one is its own spectrum: ask surface.fit()")
+        raise InputError(
+            "sensitivity is to a surface's numbers, and this one is its own spectrum: take surface.fit(), or --model "
+            "self-affine; what its shortest waves are worth, `mbma fit` tells"
+        )
     make, parameters = _parameters(surface)
     (by, value), *_ = held.items()
     given = parameters | {"E_star": modulus, by: units.number(by, value)}
@@ -161,14 +164,16 @@ def sensitivity(
 
 def _parameters(surface: Surface) -> tuple[Callable[..., Surface], dict[str, Any]]:
     """How the surface is made, and from which numbers."""
-    if not isinstance(surface, Surface):
-        raise InputError("a measured surface has no numbers to vary: take its self-affine fit(), or vary its spectrum")
     if surface.labelled or surface.shape != ():
         raise InputError("sensitivities are of one surface, not of a batch")
+    own = {name: getattr(surface, name) for name in PARAMETERS}
     first = surface.provenance[0] if surface.provenance else {}
     if first.get("step") == "from_roughness" and first["unit"] == surface.unit:
-        return lambda **numbers: Surface.from_roughness(**numbers), dict(first["given"])
-    return Surface, {name: getattr(surface, name) for name in PARAMETERS}
+        drawn = Surface.from_roughness(**first["given"])
+        # unless a number was replaced since
+        if all(np.isclose(getattr(drawn, name), number, rtol=1e-9) for name, number in own.items()):
+            return lambda **numbers: Surface.from_roughness(**numbers), dict(first["given"])
+    return Surface, own
 
 
 def _one_number(name: str, value: Any) -> float:

@@ -1,5 +1,6 @@
 """How much each unknown matters: against derivatives in closed form, laws of scaling, and plain differences."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -60,6 +61,9 @@ def test_numbers_of_a_drawing_are_the_unknowns():
     assert max(abs(slopes[name]) for name in ("hurst", "Ra", "h_max", "longest")) < 1e-6
     # in another unit it is a surface by its five numbers
     assert "q1" in sensitivity(surface.to("mm"), pressure=0.02, E_star=10.0).parameters
+    moved = sensitivity(dataclasses.replace(surface, h_max=2.5), mean_separation=1.0, theory="calibrated")
+    assert moved.parameters["h_max"] == 2.5
+    assert "q1" in moved.parameters
 
 
 def test_ranges():
@@ -122,3 +126,9 @@ def test_the_command():
     assert "MPa/um" in text
     bad = CliRunner().invoke(main, ["sensitivity", *arguments[:-1], "h_max:2"])
     assert (bad.exit_code, bad.output) == (2, "mbma: --range must be like h_max=2um:4um, got 'h_max:2'\n")
+
+
+def test_a_spectrum_has_no_numbers():
+    q = np.geomspace(0.2, 50, 40)
+    with pytest.raises(InputError, match=r"take surface.fit\(\), or --model self-affine"):
+        sensitivity(Surface.from_spectrum(q, 1e-3 * q**-3.6, h_max=1.0), mean_separation=0.3)
