@@ -62,6 +62,10 @@ class AnySurface(abc.ABC):
     def labelled(self) -> bool:
         """Whether any parameter is an xarray DataArray."""
 
+    def departures(self, by_map: bool = False) -> tuple[str, ...]:
+        """Why it is not the isotropic Gaussian surface that theories are of, nor one like those simulated."""
+        return ()
+
     @property
     @abc.abstractmethod
     def parameters(self) -> tuple[str, ...]:

@@ -134,6 +134,10 @@ class Calibrated(Theory):
             **area_concerns(answer.area),
         }
 
+    def departures(self, surface: AnySurface) -> tuple[str, ...]:
+        """Why a measured surface is not like those that boundary elements have tested."""
+        return surface.departures(by_map=self.scatter_name(surface) != self.name)
+
     def scatter_name(self, surface: AnySurface) -> str:
         """With a map at hand scatter is much smaller."""
         by_map = isinstance(surface, MeasuredSurface) and surface.bearing is not None

@@ -56,6 +56,10 @@ class Theory(abc.ABC):
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]."""
 
+    def departures(self, surface: AnySurface) -> tuple[str, ...]:
+        """Why a measured surface is not one that the theory is of, or was tested on."""
+        return surface.departures()
+
     def scatter_name(self, surface: AnySurface) -> str:
         """Under which its distance from boundary elements is stated."""
         return self.name
@@ -218,6 +222,10 @@ def answer_where_finite(theory: Theory, surface: AnySurface, mean_separation: Fl
 
 class Wrapped(Theory):
     """A user's theory, its stiffness by numerical differentiation."""
+
+    def departures(self, surface: AnySurface) -> tuple[str, ...]:
+        """What it is of, its author knows."""
+        return ()
 
     def __init__(self, theory: UserTheory) -> None:
         self.name = theory.name

@@ -54,6 +54,10 @@ class BoundaryElements(Theory):
     name = "boundary_elements"
     ends_at_h_max = False
 
+    def departures(self, surface: AnySurface) -> tuple[str, ...]:
+        """None: it is of this very map."""
+        return ()
+
     def __init__(
         self,
         surface: AnySurface,

@@ -60,6 +60,10 @@ class Yielding(Theory):
         self._elastic, self.hardness = theory, checked_hardness(hardness)
         self.name, self.ends_at_h_max = theory.name, theory.ends_at_h_max
 
+    def departures(self, surface: AnySurface) -> tuple[str, ...]:
+        """As of the elastic theory."""
+        return self._elastic.departures(surface)
+
     def scatter_name(self, surface: AnySurface) -> str:
         """The elastic theory's."""
         return self._elastic.scatter_name(surface)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import pathlib
+import types
 
 import numpy as np
 import pytest
@@ -13,9 +14,11 @@ from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFAC
 from generate.boundary_elements.evidence import cases
 from generate.calibrated import errors
 from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact
+from mbma_tables.bearing import QUANTILES
 from mbma_tables.calibrated import CONSTANTS, Law, Spectrum
 from mbma_tables.calibrated_map import MAP_CONSTANTS
 from mbma_tables.files import shipped_file
+from mbma_tables.surfaces.measured import Heights, MeasuredSurface
 from mbma_tables.theories import Calibrated, Mbma, Persson, get_theory
 from mbma_tables.theories.calibrated_curves import force_at_area
 from mbma_tables.theories.calibrated_table import NAME, QUANTITIES, load, shipped
@@ -327,3 +330,45 @@ class TestSpectrum:
             contact(surface, pressure=own.force, theory="persson").mean_separation, u, rtol=1e-9)  # fmt: skip
         with pytest.raises(InputError, match="simplified form"):
             contact(surface, mean_separation=u, theory=Persson("simplified"))
+
+
+@pytest.mark.slow
+def test_measured_surfaces_that_are_not_valid_are_those_that_boundary_elements_contradict():
+    # thresholds were read off training surfaces; these were held out
+    data = xr.open_dataset(DATA / "boundary_elements.nc")
+    data = data.isel(surface=np.isin(data.split, [1, 2]))
+    told = {True: [], False: []}
+    for number, one in enumerate(cases(data)):
+        if one.waves < 2:
+            continue
+        own = data.isel(surface=number)
+        heights = Heights.of(np.interp(np.linspace(0, 1, 4000), QUANTILES[::-1], own.quantiles.values[::-1]))
+        slopes = types.SimpleNamespace(slope_kurtosis=float(own.slope_kurtosis))
+        q = np.geomspace(1, 10, 9)
+        surface = MeasuredSurface(q, q**-3.6, None, heights, slopes, anisotropy=float(own.anisotropy))
+        tested = (one.area > 0.01) & (one.area < 0.1)
+        for by_map in (False, True):
+            law = one.map_law(shipped().constants, MAP_CONSTANTS) if by_map else Law(one.own_spectrum, one.h_max)
+            distance = np.sqrt(np.mean(errors(one, law, "area")[tested] ** 2))
+            valid = not surface.departures(by_map)
+            if by_map:
+                assert not valid or distance < 0.1
+            else:
+                told[valid].append(distance)
+    assert max(told[True]) < 0.2
+    assert np.mean(np.array(told[False]) > 0.2) > 0.7
+    assert len(told[True]) > 20 < len(told[False])
+
+
+def test_what_is_told_of_a_measured_surface():
+    heights = np.random.default_rng(1).normal(size=(64, 64))
+    worn = Surface.from_spectrum(
+        *(np.geomspace(1, 30, 40) ** power for power in (1, -3.6)), heights=np.minimum(heights, 0)
+    )
+    for theory in ("calibrated", "mbma", "persson"):
+        found = contact(worn, area=0.05, theory=theory)
+        assert not found.valid
+        assert any("skewness of heights is -" in reason for reason in found.reasons)
+    stretched = dataclasses.replace(SURFACE.sampled(), anisotropy=6.0)
+    assert "anisotropy is 6, tested from 1 to 4.1" in next(iter(contact(stretched, area=0.05).reasons))
+    assert contact(SURFACE.sampled(), area=0.05, theory="calibrated").valid
