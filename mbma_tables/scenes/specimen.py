@@ -210,7 +210,7 @@ def _file(folder: pathlib.Path, name: str, key: str) -> pathlib.Path:
 
 
 def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str, unit: str | None) -> Specimen:
-    """The surface fitted to two columns of text, q and C, in a unit of length."""
+    """The surface of two columns of text, q and C, in a unit of length."""
     import numpy as np
 
     from mbma_tables.surfaces.surface import Surface
@@ -229,5 +229,9 @@ def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str, u
     if columns.shape[1] != 2:
         raise InputError(f"[surface]: {path.name} must hold two columns, q and C, got {columns.shape[1]}")
     h_max = Units(unit).number("h_max", numbers["h_max"])
-    surface = Surface.from_psd(columns[:, 0], columns[:, 1], h_max=h_max, convention=convention)
-    return Specimen(in_unit(surface, unit), f"fitted to {path.name}")
+    # a profile's spectrum is no isotropic one: five numbers are fitted to it
+    model = "self-affine" if convention == "profile" else "measured"
+    surface = Surface.from_spectrum(
+        columns[:, 0], columns[:, 1], h_max=h_max, convention=convention, unit=unit, model=model
+    )
+    return Specimen(surface, f"fitted to {path.name}" if convention == "profile" else f"spectrum {path.name}")

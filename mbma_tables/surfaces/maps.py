@@ -137,6 +137,9 @@ def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | N
     return _with_anisotropy(fitted, q, C * waves, directions)
 
 
+STEEPEST = 4.0  # by which `matched` may tilt a spectrum
+
+
 def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> FloatArray:
     """C of averaged samples, tilted a little so that its variance and mean square wavenumber are those of all waves.
 
@@ -148,7 +151,10 @@ def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> Flo
         laws = PowerLaws(q, C * (q / q[0]) ** tilt)
         return math.log(2 * laws.moment(2) / laws.moment(0) / square)
 
-    tilted = C * (q / q[0]) ** brentq(excess, -4.0, 4.0)
+    if q.size < 2 or not excess(-STEEPEST) < 0 < excess(STEEPEST):
+        # too few waves for a slope
+        return C
+    tilted = C * (q / q[0]) ** brentq(excess, -STEEPEST, STEEPEST)
     return np.asarray(tilted * (variance / PowerLaws(q, tilted).moment(0)))
 
 

@@ -205,7 +205,7 @@ class MeasuredSurface(AnySurface):
         for name, array in keep.items():
             array.setflags(write=False)
             object.__setattr__(self, name, array)
-        if held.size < 2 or not self.laws.moment(0) > 0:
+        if held.size < 2 or not self.laws.width.size:
             raise InputError("the spectrum holds no height: no two neighbours in q have positive C")
         require(
             "largest q over smallest", np.asarray(self.zeta_1), self.zeta_1 > MIN_ZETA_1, "greater than 3 (more waves)"

@@ -46,14 +46,17 @@ class PowerLaws:
         self.log_low, self.log_high = np.log(q[:-1][held]), np.log(q[1:][held])
         self.low, self.high = C[:-1][held], C[1:][held]
         self.width = np.log1p((q[1:][held] - q[:-1][held]) / q[:-1][held])
-        self.slope = np.log(self.high / self.low) / self.width
+        with np.errstate(all="ignore"):
+            self.slope = np.log(self.high / self.low) / self.width
         self._before: dict[int, FloatArray] = {}
         everything = np.arange(self.width.size)
-        for order in SHARES:
-            content = self._up(order, everything, self.width)
-            self._before[order] = np.append(0.0, np.cumsum(content))
-        # summed from the shortest wave, which small sums are about
-        self._after = np.append(np.cumsum(self._up(0, everything, self.width)[::-1])[::-1], 0.0)
+        # what overflows shows as a moment that is not finite
+        with np.errstate(all="ignore"):
+            for order in SHARES:
+                content = self._up(order, everything, self.width)
+                self._before[order] = np.append(0.0, np.cumsum(content))
+            # summed from the shortest wave, which small sums are about
+            self._after = np.append(np.cumsum(self._up(0, everything, self.width)[::-1])[::-1], 0.0)
 
     def moment(self, order: int) -> float:
         """m_0, m_2 or m_4 of all waves."""

@@ -129,7 +129,7 @@ def check_height(h_max: Any) -> float:
 def fit_psd(
     q: ArrayLike, C: ArrayLike, h_max: float, convention: str, band: tuple[float, float] | None
 ) -> FittedSurface:
-    """The self-affine surface fitted to a measured spectrum; see `Surface.from_psd`.
+    """The self-affine surface fitted to a measured spectrum; see `Surface.from_spectrum`.
 
     Notes
     -----

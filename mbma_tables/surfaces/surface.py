@@ -239,58 +239,6 @@ class Surface(AnySurface):
         return surface
 
     @classmethod
-    def from_psd(
-        cls,
-        q: ArrayLike,
-        C: ArrayLike,
-        *,
-        h_max: float,
-        convention: str = "paper",
-        band: tuple[float, float] | None = None,
-    ) -> Surface:
-        """The self-affine surface fitted to a measured power spectrum.
-
-        Parameters
-        ----------
-        q : array_like, shape (n,)
-            Wavenumber, 1/length, positive; in any order and spacing.
-        C : array_like, shape (n,)
-            Spectrum [length^4; a profile's length^3], not negative. Zeros at either end say where it ends;
-            entries that a masked array hides are left out.
-        h_max : float
-            Height of the highest point above the mid-plane [length].
-        convention : {"paper", "isotropic", "profile"}, optional
-            h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), = integral C q dq / (2 pi), or = integral C dq / pi.
-        band : tuple of float, optional
-            (q0, q1) to fit and to take, as a plain power law; else a roll-off below and a departure above are found
-            and left out.
-
-        Returns
-        -------
-        Surface
-            With `fit`, a `SpectrumFit`. Its h_rms is that of the fitted law between q0 and q1.
-
-        Raises
-        ------
-        InputError, OutOfRangeError
-            For input that is no spectrum.
-        NotSelfAffineError
-            Where no power law with 0 < H <= 1 describes it; the message has the numbers.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from mbma_tables import Surface
-        >>> q = np.geomspace(1, 100, 40)
-        >>> surface = Surface.from_psd(q, 1e-3 * q**-3.4, h_max=0.3)
-        >>> print(f"H = {surface.hurst:.3f}, h_rms = {surface.h_rms:.4f}")
-        H = 0.700, h_rms = 0.0669
-        """
-        from mbma_tables.surfaces.psd import fit_psd
-
-        return cls(**fit_psd(q, C, h_max, convention, band)._asdict())
-
-    @classmethod
     def from_spectrum(
         cls,
         q: ArrayLike,
@@ -300,34 +248,46 @@ class Surface(AnySurface):
         heights: ArrayLike | None = None,
         convention: str = "paper",
         unit: str | None = None,
-    ) -> MeasuredSurface:
-        """The surface of an isotropic spectrum as it is: no Hurst exponent, no fit.
+        model: str = "measured",
+        band: tuple[float, float] | None = None,
+    ) -> Surface | MeasuredSurface:
+        """The surface of an isotropic spectrum as it is, or the self-affine one fitted to it.
 
         Parameters
         ----------
         q : array_like, shape (n,)
             Wavenumber, 1/length, positive, in any order and spacing.
         C : array_like, shape (n,)
-            Spectrum [length^4], not negative; a power law is taken between neighbours.
+            Spectrum [length^4; a profile's length^3], not negative; a power law is taken between neighbours. A fit
+            leaves out what a masked array hides.
         h_max : float, optional
             Height of the highest point above the mid-plane [length]; that of `heights` if not given.
         heights : array_like, optional
             Heights measured anywhere on the surface [length], of any shape; their mean is taken off. A Gaussian that
             ends at h_max if not given.
-        convention : {"paper", "isotropic"}, optional
-            h_rms^2 = 2 pi integral C q dq (Eqs. 4-6) or = integral C q dq / (2 pi).
+        convention : {"paper", "isotropic", "profile"}, optional
+            h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), = integral C q dq / (2 pi), or, for a fit alone,
+            = integral C dq / pi.
         unit : str, optional
-            Name of the length unit.
+            The unit of length.
+        model : {"measured", "self-affine"}, optional
+            The spectrum itself, or five numbers fitted to it.
+        band : tuple of float, optional
+            (q0, q1) to fit and to take, as a plain power law; else a roll-off below and a departure above are found
+            and left out.
 
         Returns
         -------
-        MeasuredSurface
-            Its `fit()` is the self-affine surface nearest to it.
+        MeasuredSurface or Surface
+            Of the first, `fit()` is the self-affine surface nearest to it. The second has a `fit`, a `SpectrumFit`; its
+            h_rms is that of the fitted law between q0 and q1.
 
         Raises
         ------
         InputError, OutOfRangeError
             For input that is no spectrum.
+        NotSelfAffineError
+            Where five numbers are asked for and no power law with 0 < H <= 1 describes it; the message has the numbers.
 
         Examples
         --------
@@ -340,9 +300,18 @@ class Surface(AnySurface):
         """
         from mbma_tables.surfaces.measured import Heights, MeasuredSurface
 
+        _check_model(model, band)
+        if model == "self-affine":
+            from mbma_tables.surfaces.psd import fit_psd
+
+            top = Heights.of(heights).h_max if h_max is None and heights is not None else h_max
+            if top is None:
+                raise InputError("h_max is missing: the highest point above the mid-plane, or heights= of the surface")
+            return cls(**fit_psd(q, C, top, convention, band)._asdict(), unit=unit)
         if convention not in ("paper", "isotropic"):
             raise InputError(
-                f"convention must be 'paper' or 'isotropic', got {convention!r}; a profile's goes to from_profile"
+                f"convention must be 'paper' or 'isotropic', got {convention!r}: a profile's spectrum can be fitted, "
+                "with model='self-affine'"
             )
         wavenumber, spectrum = finite_array("q", q), finite_array("C", C)
         if wavenumber.ndim != 1 or wavenumber.shape != spectrum.shape:
@@ -432,10 +401,7 @@ class Surface(AnySurface):
         from mbma_tables.surfaces.maps import fit_map, measured_map, prepared
         from mbma_tables.surfaces.resolution import finished
 
-        if model not in ("self-affine", "measured"):
-            raise InputError(f"model must be 'self-affine' or 'measured', got {model!r}")
-        if model == "measured" and band is not None:
-            raise InputError("band belongs to model='self-affine': a measured surface is not fitted")
+        _check_model(model, band)
         if model != "measured" and (extrapolate_to is not None or extrapolate_hurst is not None):
             raise InputError("extrapolate_to and extrapolate_hurst belong to model='measured'")
         treated = prepared(heights, dx, dy, periodic, {"detrend": detrend, **treatment})
@@ -556,6 +522,13 @@ class Surface(AnySurface):
         scale = self.hurst / math.pi * (self.s / self.q0) ** 2
         inside = (wavenumber >= self.q0) & (wavenumber <= self.q1)
         return np.where(inside, scale * (wavenumber / self.q0) ** (-2 - 2 * self.hurst), 0.0)[()]
+
+
+def _check_model(model: str, band: Any) -> None:
+    if model not in ("measured", "self-affine"):
+        raise InputError(f"model must be 'measured' or 'self-affine', got {model!r}")
+    if model == "measured" and band is not None:
+        raise InputError("band belongs to model='self-affine': a measured surface is not fitted")
 
 
 def _shown(value: Any) -> str:

@@ -112,4 +112,5 @@ def test_spectra(tally):
         given = (odd_array(q, rng), q**-3.4) if rng.integers(2) else (q, odd_array(q**-3.4, rng))
         own = {key: value for key, value in options(rng).items() if key == "band"}
         own["convention"] = ["paper", "isotropic", "profile", "none", None][rng.integers(5)]
-        assert surface_is_right(tally.read(lambda: Surface.from_psd(*given, h_max=odd_number(rng), **own)))  # noqa: B023
+        own["model"] = ["self-affine", "measured"][rng.integers(2)]
+        assert surface_is_right(tally.read(lambda: Surface.from_spectrum(*given, h_max=odd_number(rng), **own)))  # noqa: B023

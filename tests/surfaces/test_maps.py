@@ -233,7 +233,7 @@ class TestTopography:
         topography = topography_class()(BASE, (SIDE, SIDE), periodic=True)
         q, C = topography.power_spectrum_from_area(nb_points_per_decade=20)
         inside = (q > 4) & (q < 95)
-        found = Surface.from_psd(q[inside], C[inside], h_max=3, convention="isotropic")
+        found = Surface.from_spectrum(q[inside], C[inside], h_max=3, convention="isotropic", model="self-affine")
         plain = from_map(BASE, STEP, periodic=True, band=(found.q0, found.q1))
         assert found.hurst == pytest.approx(plain.hurst, abs=0.02)
         assert found.h_rms == pytest.approx(plain.h_rms, rel=0.05)
@@ -282,7 +282,7 @@ class TestSpectra:
         line = np.array([profile_spectrum(truth, wave) for wave in q])
         spectra = {"paper": C, "isotropic": 4 * math.pi**2 * C, "profile": line}
         for convention, spectrum in spectra.items():
-            found = Surface.from_psd(q, spectrum, h_max=4.0, convention=convention)
+            found = Surface.from_spectrum(q, spectrum, h_max=4.0, convention=convention, model="self-affine")
             expected = truth if convention == "profile" else seen_in(truth, q[0], q[-1])
             assert found.hurst == pytest.approx(hurst, abs=0.002)
             assert found.q1 == pytest.approx(expected.q1, rel=0.005)
@@ -296,7 +296,9 @@ class TestSpectra:
         # q1 is not guessed, but the faint drop towards it does not pass for a steeper law
         truth = Surface(hurst, 2.0, 200.0, 1.5, 4.0)
         q = np.geomspace(2, 100, 60)
-        found = Surface.from_psd(q, [profile_spectrum(truth, wave) for wave in q], h_max=4.0, convention="profile")
+        found = Surface.from_spectrum(
+            q, [profile_spectrum(truth, wave) for wave in q], h_max=4.0, convention="profile", model="self-affine"
+        )
         assert found.q1 == 100
         assert found.hurst == pytest.approx(hurst, abs=0.002)
         assert found.h_rms == pytest.approx(seen_in(truth, 2, 100).h_rms, rel=0.005)
@@ -305,7 +307,7 @@ class TestSpectra:
         truth = Surface(0.7, 2.0, 150.0, 1.0, 3.0)
         q = np.geomspace(0.1, 200, 120)
         C = np.where(q <= truth.q1, truth.power_spectrum(np.clip(q, 2, 150)), 0)
-        found = Surface.from_psd(q[::-1], C[::-1], h_max=3)
+        found = Surface.from_spectrum(q[::-1], C[::-1], h_max=3, model="self-affine")
         assert found.fit.roll_off == found.q0 == pytest.approx(2, rel=0.01)
         assert found.q1 == q[q <= 150][-1]
         assert found.h_rms == pytest.approx(1, rel=0.01)
@@ -314,11 +316,11 @@ class TestSpectra:
         q = np.geomspace(1, 100, 40)
         C = np.ma.masked_array(q**-3.4, np.arange(40) % 7 == 3)
         C.data[C.mask] = np.nan
-        assert Surface.from_psd(q, C, h_max=3).hurst == pytest.approx(0.7, rel=1e-9)
+        assert Surface.from_spectrum(q, C, h_max=3, model="self-affine").hurst == pytest.approx(0.7, rel=1e-9)
 
     def test_fit_reads_well(self):
         q = np.geomspace(1, 100, 40)
-        text = repr(Surface.from_psd(q, q**-3.4, h_max=3).fit)
+        text = repr(Surface.from_spectrum(q, q**-3.4, h_max=3, model="self-affine").fit)
         assert text.startswith("SpectrumFit(hurst=0.7, hurst_error=")
         assert "convention='paper'" in text
 
@@ -368,7 +370,7 @@ class TestRefused:
     )
     def test_spectra_that_are_not_self_affine(self, C, reason):
         with pytest.raises(NotSelfAffineError, match=reason):
-            Surface.from_psd(SLOPED, C, h_max=3)
+            Surface.from_spectrum(SLOPED, C, h_max=3, model="self-affine")
 
     @pytest.mark.parametrize(
         ("change", "error", "message"),
@@ -419,7 +421,7 @@ class TestRefused:
     def test_bad_spectra(self, change, error, message):
         arguments = {"q": SLOPED, "C": SLOPED**-3.4, "h_max": 3} | change
         with pytest.raises(error, match=message):
-            Surface.from_psd(**arguments)
+            Surface.from_spectrum(**arguments, model="self-affine")
 
 
 class Charge:
