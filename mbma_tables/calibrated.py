@@ -51,13 +51,13 @@ class Constants:
         c of the Gaussian tail factor.
     """
 
-    area_s0: float = 0.5127
-    area_slope: float = 0.03088
-    area_t0: float = 0.3412
-    weight: float = 0.4387
-    weight_slope: float = 0.08884
-    cubic: float = 0.4289
-    tail: float = 0.06586
+    area_s0: float = 0.5133
+    area_slope: float = 0.03055
+    area_t0: float = 0.3435
+    weight: float = 0.439
+    weight_slope: float = 0.08488
+    cubic: float = 0.4273
+    tail: float = 0.06524
 
 
 CONSTANTS = Constants()

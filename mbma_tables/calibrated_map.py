@@ -58,13 +58,13 @@ class MapConstants:
         Further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces.
     """
 
-    breadth: float = 0.6083
-    breadth_onset: float = 1.393
-    gaussian_area: float = 0.299
-    valley_area: float = 0.6606
+    breadth: float = 0.6264
+    breadth_onset: float = 1.396
+    gaussian_area: float = 0.2829
+    valley_area: float = 0.6562
     tension_area: float = 0.6
-    merging_area: float = 0.008524
-    elliptic: float = 0.8281
+    merging_area: float = 0.008362
+    elliptic: float = 0.813
 
 
 MAP_CONSTANTS = MapConstants()
