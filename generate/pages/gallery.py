@@ -13,11 +13,13 @@ import numpy as np
 
 from generate.pages.page import ROOT, table
 from mbma_tables.arguments import FloatArray
-from mbma_tables.measurement import curves, described, draw
+from mbma_tables.errors import MbmaError
+from mbma_tables.files import write_file
+from mbma_tables.measurement import curves, described, draw, drawn_theory
 from mbma_tables.plots import to_png
 from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.measured import MeasuredSurface
-from mbma_tables.theories import BoundaryElements, get_theory
+from mbma_tables.theories import BoundaryElements
 from mbma_tables.theories.protocol import answer_where_finite
 
 FOLDER = "docs/data/maps"
@@ -97,6 +99,8 @@ def simulated(example: Example, rows: dict[str, FloatArray]) -> FloatArray | Non
         if measured(path, example.options)[0].heights.ndim == 1:
             return None
         rows[example.name] = BoundaryElements.from_map(path, **example.options).rows
+        # at once: what comes after may be stopped
+        write_file(ROOT / ROWS, written(rows))
     return rows.get(example.name)
 
 
@@ -107,8 +111,12 @@ def compared(surface: MeasuredSurface, rows: FloatArray) -> str:
     for share in SHOWN:
         k = int(np.argmin(np.abs(np.log(area / share))))
         cells = [f"{area[k]:.2%}"]
-        for theory in map(get_theory, ("calibrated", "mbma")):
-            fine = answer_where_finite(theory, surface, np.append(u[k], GAPS * float(surface.h_max)))
+        for theory in map(drawn_theory, ("calibrated", "mbma")):
+            try:
+                fine = answer_where_finite(theory, surface, np.append(u[k], GAPS * float(surface.h_max)))
+            except MbmaError:
+                cells += ["-", "-"]
+                continue
             known = np.isfinite(fine.force[1:])
             order = np.argsort(fine.force[1:][known])
             loads, areas = fine.force[1:][known][order], np.maximum.accumulate(fine.area[1:][known][order])
