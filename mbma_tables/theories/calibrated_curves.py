@@ -218,6 +218,12 @@ class TabulatedLaw(Law):
             u[heavy], slope[heavy] = super().separation_persson(given[heavy])
         return u, slope
 
+    def _log_force_persson(self, u: FloatArray) -> FloatArray:
+        """ln F_P(u): beyond the lightest load tabulated a straight line, else by Newton's method."""
+        last, slope = (float(part) for part in self.separation_persson(np.exp(LAW_FORCE[0])))
+        found = super()._log_force_persson(np.minimum(u, last))
+        return np.where(u > last, LAW_FORCE[0] + (u - last) / slope, found)
+
 
 @functools.lru_cache(maxsize=32)
 def own_law(surface: MeasuredSurface) -> OwnLaw:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE
 from generate.boundary_elements.evidence import cases
 from generate.calibrated import errors
-from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact
+from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact, contact_law
 from mbma_tables.bearing import QUANTILES
 from mbma_tables.calibrated import CONSTANTS, Law, Spectrum
 from mbma_tables.calibrated_map import MAP_CONSTANTS
@@ -328,6 +328,12 @@ class TestSpectrum:
             np.testing.assert_allclose(getattr(own, name), getattr(plain, name), rtol=1e-7)
         np.testing.assert_allclose(
             contact(surface, pressure=own.force, theory="persson").mean_separation, u, rtol=1e-9)  # fmt: skip
+        # far beyond h_max, where loads are below 1e-20
+        far = np.array([4.0, 8.0, 15.0]) * SURFACE.h_max
+        loads = [contact(s, mean_separation=far, theory="persson").force for s in (surface, SURFACE)]
+        np.testing.assert_allclose(np.log(loads[0]), np.log(loads[1]), rtol=1e-9)
+        law = contact_law(surface, theory="persson")
+        np.testing.assert_allclose(law.force(u=u), own.force, rtol=2 * law.error)
         with pytest.raises(InputError, match="simplified form"):
             contact(surface, mean_separation=u, theory=Persson("simplified"))
 
