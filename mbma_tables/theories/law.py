@@ -194,8 +194,9 @@ def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float
     assert isinstance(surface, Surface)
     if not surface.zeta_1 > reading.floor_u:
         raise OutOfRangeError(f"q1/q0 must be greater than {reading.floor_u:g}, the reading's floor of zeta_u")
-    kept = profile(surface, model, reading, rtol)
     h_rms, stress = float(surface.h_rms), float(surface.q0 * surface.s)
+    peak = float(surface.h_max) / h_rms
+    kept = profile(float(surface.hurst), float(surface.zeta_1), peak, 2 * peak, model, reading, rtol)
 
     def of_profile(depth: FloatArray) -> tuple[FloatArray, ...]:
         force, area = kept.totals(depth / h_rms)

@@ -22,13 +22,18 @@ from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, req
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import AnyModel, get_model
 from mbma_tables.models.protocol import AREA, BOTH, FORCE, OUTSIDE, QUANTITIES
+from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.totals.island_sum import slopes_of, totals_of
+from mbma_tables.totals.island_sum import QUADRATURE_SHARE, slopes_of, totals_of
 from mbma_tables.totals.kernel import Pairs
 from mbma_tables.totals.measured import measured_totals
+from mbma_tables.totals.profile import profile
+
+MANY_GAPS = 300  # of one surface, from which a profile of its islands costs less than the gaps one by one
+BLOCK = 1 << 14  # gaps between two looks for Ctrl-C
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -100,7 +105,7 @@ def totals_at(
                 force, area = sums[:, 0, 0], sums[:, 1, 0]
                 force_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
             else:
-                force, area, error, islands = totals_of(model, pairs, reading, rtol, outside, which)
+                force, area, error, islands = _totals(model, pairs, reading, rtol, outside, which)
         if area_by is not None and reading.addition == "cover":
             kept = np.exp(-area.reshape(shape))  # dA = exp(-sum) dsum
             area_by = {name: (slope * kept)[()] for name, slope in area_by.items()}
@@ -128,6 +133,30 @@ def _pairs(surface: Surface, depth: FloatArray, reading: Reading) -> Pairs:
         "q1/q0", zeta_1, zeta_1 > reading.floor_u, f"greater than {reading.floor_u:g}, the reading's floor of zeta_u"
     )
     return Pairs.of(surface, depth)
+
+
+def _totals(
+    model: AnyModel, pairs: Pairs, reading: Reading, rtol: float, outside: str, which: int
+) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+    """Totals of pairs: through a profile of the islands where there are many gaps of one surface."""
+    one = pairs.compression.size >= MANY_GAPS and all(
+        (field == field[0]).all() for field in (pairs.hurst, pairs.zeta_1, pairs.peak)
+    )
+    touching = pairs.compression > 0
+    if one and touching.any() and isinstance(model, UniversalModel):
+        # over the whole compression, so that a gap's bits do not depend on the others
+        peak, share = float(pairs.peak[0]), QUADRATURE_SHARE * rtol
+        try:
+            kept = profile(float(pairs.hurst[0]), float(pairs.zeta_1[0]), peak, 2 * peak, model, reading, share)
+        except (ConvergenceError, OutOfRangeError):
+            # gap by gap, which says what is wrong with which
+            return totals_of(model, pairs, reading, rtol, outside, which)
+        sums = np.zeros((2, touching.size))
+        for block in range(0, touching.size, BLOCK):
+            some = np.flatnonzero(touching[block : block + BLOCK]) + block
+            sums[:, some] = kept.totals(pairs.compression[some])
+        return sums[0], sums[1], np.where(touching, kept.error, 0.0), kept.islands
+    return totals_of(model, pairs, reading, rtol, outside, which)
 
 
 def _by_parameter(

@@ -19,7 +19,6 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.models import AnyModel, answer_islands
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals import kernel
 from mbma_tables.totals.island import geometry, scale_area, scale_force
 from mbma_tables.totals.island_sum import jacobian_of, kinks
@@ -58,11 +57,14 @@ class Profile:
         Weights of force and area, shift and rate of the height, as Chebyshev series (`profile_kernel.fill_sums`).
     error : float
         Bound on the relative error of totals, of panels and islands together.
+    islands : int
+        Islands answered for it.
     """
 
     edges: FloatArray
     series: FloatArray
     error: float
+    islands: int
 
     def totals(self, compression: FloatArray) -> FloatArray:
         """F/(A0 E* q0 s) and the sum of areas over A0 at (h_max - d)/h_rms > 0 within the profile, shape (2, gaps)."""
@@ -100,21 +102,22 @@ class Profile:
         return worst
 
 
-def profile(surface: Surface, model: AnyModel, reading: Reading, rtol: float) -> Profile:
-    """The profile of one surface over its whole compression, to `rtol` and the model's own error.
+def profile(
+    hurst: float, zeta_1: float, peak: float, last: float, model: AnyModel, reading: Reading, rtol: float
+) -> Profile:
+    """The profile of one surface with h_max/h_rms = `peak` up to compressions of `last` h_rms.
+
+    It is made to `rtol`, and the model's own error.
 
     Raises
     ------
     ConvergenceError, OutOfRangeError
     """
-    hurst, zeta_1 = float(surface.hurst), float(surface.zeta_1)
-    last = float(2 * surface.h_max / surface.h_rms)
-    peak = float(surface.h_max / surface.h_rms)
-    worst = 0.0
+    worst, islands = 0.0, 0
 
     def fields(low: FloatArray, high: FloatArray) -> FloatArray:
         """Weights, shift and rate at the nodes of panels, shape (4, panels, ORDER)."""
-        nonlocal worst
+        nonlocal worst, islands
         nodes = _rules()[0]
         x = low[:, None] + (high - low)[:, None] * nodes
         flat = x.ravel()
@@ -123,7 +126,7 @@ def profile(surface: Surface, model: AnyModel, reading: Reading, rtol: float) ->
             phi = answer_islands(model, g | {"hurst": np.full(flat.size, hurst)})
         except OutOfRangeError as fault:
             raise OutOfRangeError(f"islands of this surface lie outside the {model.name} table: {fault}") from None
-        worst = max(worst, float(np.max(phi.error)))
+        worst, islands = max(worst, float(np.max(phi.error))), islands + flat.size
         rms = np.full(flat.size, math.sqrt(-math.expm1(-2 * hurst * math.log(zeta_1))))
         below = flat < kinks(hurst, zeta_1, reading)[0]
         each = jacobian_of(reading, rms, below) * rms * kernel.island_density(0.0, g["D_d"], g["sigma_d"])
@@ -157,7 +160,7 @@ def profile(surface: Surface, model: AnyModel, reading: Reading, rtol: float) ->
     ordered = np.concatenate([part[2] for part in kept], axis=1)[:, order]
     _without_powers(ordered, high[order[0]] * _rules()[0], 0)
     series = np.einsum("kj,fpj->pfk", _rules()[4], ordered)
-    return Profile(np.append(low[order], last), np.ascontiguousarray(series), error + worst)
+    return Profile(np.append(low[order], last), np.ascontiguousarray(series), error + worst, islands)
 
 
 def _first_edges(hurst: float, zeta_1: float, last: float, reading: Reading) -> FloatArray:

@@ -388,6 +388,21 @@ def test_one_pass_has_the_bits_of_single_calls(case):
     np.testing.assert_allclose(point.stiffness, law.stiffness_mean(point.separation), rtol=1e-9)
 
 
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10])
+def test_many_gaps_agree_with_single_ones(case, rtol):
+    """A profile of the islands against the quadrature of each gap, at gaps of every size and beyond contact."""
+    surface = surface_of(*case[:3])
+    gaps = float(surface.h_max) * np.append(1 - 2 * np.geomspace(1e-12, 1, 400), [1.0, 1.5])
+    many = contact(surface, gaps, rtol=rtol, reading=case[3])
+    few = [contact(surface, part, rtol=1e-11, reading=case[3]) for part in np.array_split(gaps, 4)]
+    for name in ("force", "area"):
+        single = np.concatenate([getattr(part, name) for part in few])
+        assert (np.abs(getattr(many, name) - single) <= (many.error + 1e-11) * single).all()
+    assert (many.error <= rtol + 2e-9).all()
+    assert many.error[-2:].tolist() == [0.0, 0.0]
+
+
 def test_pieces_join():
     """Polynomials of neighbours meet at their ends, whatever the tolerance, so that inverses have no holes."""
     for case in CASES:
