@@ -35,6 +35,7 @@ SHARPEST = 1e-200
 TERMS = 9  # of the series from there on
 LINEAR, LEAST = 8.3, 1e-300  # mean gaps from which u = d, and below which all heights lie above the level
 LOG_GAPS, STARTS = (-12.0, math.log(8.3)), 16384  # tabulated to start from
+MIN_SPACING = 0.02  # relative, of mean gaps between nodes of a map's bearing curve
 CANCELS, FRACTION_TERMS = 3.0, 60
 EVEN = np.polynomial.legendre.leggauss(8)
 NARROW = 0.05  # half-width over which a difference of complementary error functions is integrated
@@ -254,23 +255,29 @@ class BearingCurve:
         level = np.minimum.accumulate(np.diff(above) / np.diff(FRACTIONS))
         share = np.sqrt(FRACTIONS[1:] * FRACTIONS[:-1])
         gap = level * (1 - share) + np.interp(share, FRACTIONS, above)
-        kept = (gap > 0) & (gap < h_max) & (gap < np.append(np.inf, np.minimum.accumulate(gap)[:-1]))
+        # the highest shares are single points: nodes as close as theirs would make steps
+        kept, last = np.zeros(gap.size, bool), h_max
+        for k, own in enumerate(gap):
+            if 0 < own < (1 - MIN_SPACING) * last:
+                kept[k], last = True, own
         self._top, self._lightest, self._h_max = float(gap[kept][0]), float(share[kept][0]), h_max
         self._log_share = PchipInterpolator(
             np.append(0.0, gap[kept][::-1]), np.append(0.0, np.log(share[kept][::-1])), extrapolate=False
         )
         self._rate = self._log_share.derivative()
+        self._power = max(-float(self._rate(self._top)) * (h_max - self._top), 1.0)
 
     def __call__(self, u: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Q and dQ/du at mean gaps [h_rms]; straight to zero at the highest point above the first share."""
+        """Q and dQ/du at mean gaps [h_rms]; a power of h_max - u, with the same slope, above the first share."""
         gap = np.asarray(u, float)
         inside = np.clip(gap, 0.0, self._top)
         share = np.exp(self._log_share(inside))
-        steep = -self._lightest / (self._h_max - self._top)
-        light, rest = gap > self._top, np.maximum(self._h_max - gap, 0.0)
-        return np.where(light, -steep * rest, share), np.where(
-            light, np.where(rest > 0, steep, 0.0), share * self._rate(inside)
-        )
+        rest = np.maximum(self._h_max - gap, 0.0) / (self._h_max - self._top)
+        above = self._lightest * rest**self._power
+        with np.errstate(divide="ignore", invalid="ignore"):
+            steep = np.where(rest > 0, -above * self._power / (rest * (self._h_max - self._top)), 0.0)
+        light = gap > self._top
+        return np.where(light, above, share), np.where(light, steep, share * self._rate(inside))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
