@@ -63,7 +63,7 @@ class Constants:
     yield_scale: float = 0.7237
     force_light: float = 1.131
     force_eta: float = 1.736
-    force_share: float = 0.4843
+    force_share: float = 0.4839
     frozen: float = 0.3685
     frozen_eta: float = 0.252
     plane_eta: float = 3.153
@@ -265,19 +265,17 @@ class BearingCurve:
             np.append(0.0, gap[kept][::-1]), np.append(0.0, np.log(share[kept][::-1])), extrapolate=False
         )
         self._rate = self._log_share.derivative()
-        self._power = max(-float(self._rate(self._top)) * (h_max - self._top), 1.0)
 
     def __call__(self, u: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Q and dQ/du at mean gaps [h_rms]; a power of h_max - u, with the same slope, above the first share."""
+        """Q and dQ/du at mean gaps [h_rms]; straight to zero at the highest point above the first share."""
         gap = np.asarray(u, float)
         inside = np.clip(gap, 0.0, self._top)
         share = np.exp(self._log_share(inside))
-        rest = np.maximum(self._h_max - gap, 0.0) / (self._h_max - self._top)
-        above = self._lightest * rest**self._power
-        with np.errstate(divide="ignore", invalid="ignore"):
-            steep = np.where(rest > 0, -above * self._power / (rest * (self._h_max - self._top)), 0.0)
-        light = gap > self._top
-        return np.where(light, above, share), np.where(light, steep, share * self._rate(inside))
+        steep = -self._lightest / (self._h_max - self._top)
+        light, rest = gap > self._top, np.maximum(self._h_max - gap, 0.0)
+        return np.where(light, -steep * rest, share), np.where(
+            light, np.where(rest > 0, steep, 0.0), share * self._rate(inside)
+        )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
