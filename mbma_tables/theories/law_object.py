@@ -219,7 +219,9 @@ class ContactLaw:
     def at_pressure(self, pressure: ArrayLike) -> LawPoint:
         """Separations, area and stiffness -dF/du where F/A0 is `pressure`, on the branch of first contact."""
         d, area, stiffness = self._inverse("force", self.units.number("force", pressure), 3)
-        return LawPoint(d, (self.h_max + d) / 2, area, stiffness)
+        mean = d + self.h_max
+        mean *= 0.5
+        return LawPoint(d, mean, area, stiffness)
 
     def _inverse(self, name: str, given: Any, count: int = 1) -> tuple[Any, ...]:
         """Gaps of forces or areas, and with a `count` of 3 area and -dF/du there."""

@@ -124,6 +124,8 @@ def side_pieces(side: Side, rtol: float) -> Pieces:
 def _buckets(e: int, count: int, side: Side) -> FloatArray:
     """Ends of the buckets of an octave, kinks among them."""
     edges = 2.0**e * (1 + np.arange(count + 1) / count)
+    if side.start <= edges[0] and not any(edges[0] < kink < edges[-1] for kink in side.kinks):
+        return edges
     edges = np.concatenate([[max(side.start, edges[0])], edges[edges > side.start * (1 + 1e-15)]])
     edges = np.unique(edges)
     inside = [kink for kink in side.kinks if edges[0] < kink < edges[-1]]

@@ -77,7 +77,7 @@ class Profile:
 
     @functools.cached_property
     def leverage(self) -> float:
-        """What a relative error of islands is worth in slopes over F/l, the largest at panels' ends.
+        """What a relative error of islands is worth in slopes over F/l, the largest at some panels' ends.
 
         An error e of f in F = integral of f G up to l changes l dF/dl by at most e (l f G + integral of f |l dG/dl|).
         """
@@ -86,7 +86,8 @@ class Profile:
         fields = chebyshev.chebval(at, np.moveaxis(self.series, -1, 0), tensor=True)
         delta = self.edges[:-1, None] + np.diff(self.edges)[:, None] * np.append(nodes, 1.0)
         fields[0, :2] *= np.stack([delta[0] ** power for power in POWERS])
-        c = self.edges[1:, None, None]
+        ends = np.unique(np.linspace(0, self.edges.size - 2, SEEN).astype(int))
+        c = self.edges[1 + ends, None, None]
         heights = fields[:, SHIFT] - fields[:, RATE] * c
         gaussian = np.exp(-0.5 * heights**2) * (delta <= c)
         shares = np.diff(self.edges)[:, None] * weights
@@ -95,7 +96,7 @@ class Profile:
             density = gaussian * fields[:, row]
             total = (density[..., :-1] * shares).sum(axis=(1, 2))
             turned = (density * np.abs(heights * fields[:, RATE]))[..., :-1] * shares
-            at_end = np.diagonal(density[..., -1])
+            at_end = density[np.arange(ends.size), ends, -1]
             carried = total > 0
             ratio = c[carried, 0, 0] * (turned.sum(axis=(1, 2)) + at_end)[carried] / total[carried]
             worst = max(worst, float(ratio.max(initial=0.0)))
@@ -114,6 +115,7 @@ def profile(
     ConvergenceError, OutOfRangeError
     """
     worst, islands = 0.0, 0
+    at = tuple(float(kink) for kink in kinks(hurst, zeta_1, reading))
 
     def fields(low: FloatArray, high: FloatArray) -> FloatArray:
         """Weights, shift and rate at the nodes of panels, shape (4, panels, ORDER)."""
@@ -128,14 +130,13 @@ def profile(
             raise OutOfRangeError(f"islands of this surface lie outside the {model.name} table: {fault}") from None
         worst, islands = max(worst, float(np.max(phi.error))), islands + flat.size
         rms = np.full(flat.size, math.sqrt(-math.expm1(-2 * hurst * math.log(zeta_1))))
-        below = flat < kinks(hurst, zeta_1, reading)[0]
-        each = jacobian_of(reading, rms, below) * rms * kernel.island_density(0.0, g["D_d"], g["sigma_d"])
+        each = jacobian_of(reading, rms, flat < at[0]) * rms * kernel.island_density(0.0, g["D_d"], g["sigma_d"])
         rate = rms / g["sigma_d"]
         shift = ((peak + flat) * rms - g["h_d"]) / g["sigma_d"]
         found = np.stack([scale_force(g) * phi.phi_F * each, scale_area(g) * phi.phi_A * each, shift, rate])
         return found.reshape(4, *x.shape)
 
-    edges = _first_edges(hurst, zeta_1, last, reading)
+    edges = _first_edges(zeta_1**-hurst, last, *at)
     low, high = edges[:-1], edges[1:]
     values = fields(low, high)
     kept: list[tuple[FloatArray, FloatArray, FloatArray]] = []
@@ -163,10 +164,9 @@ def profile(
     return Profile(np.append(low[order], last), np.ascontiguousarray(series), error + worst, islands)
 
 
-def _first_edges(hurst: float, zeta_1: float, last: float, reading: Reading) -> FloatArray:
+def _first_edges(layer: float, last: float, at_d: float, at_u: float) -> FloatArray:
     """Panels that double from the boundary layer on, with ends at the kinks, and equal ones above zeta_d's floor."""
-    at_d, at_u = (float(kink) for kink in kinks(hurst, zeta_1, reading))
-    start = min(zeta_1**-hurst, at_d, at_u, last)
+    start = min(layer, at_d, at_u, last)
     breaks = sorted({start, *(kink for kink in (at_d, at_u) if kink < last), last})
     edges = [0.0, start]
     for a, b in itertools.pairwise(breaks):
