@@ -1,6 +1,6 @@
 """Lookups timed: tables against scipy, totals against the solver, laws against numpy, the first call.
 
-Run with ``python benchmarks/lookup.py``. One core; every ratio is of two times taken in turn in this run, the median
+Run with ``python benchmarks/lookup.py``. One core; every ratio is of two processor times taken in turn, the median
 over the rounds, so that what else the machine does falls on both. docs/cost.md has error against time of every tier.
 """
 

@@ -9,7 +9,7 @@ from generate.formulas.printing import MODULE, write_forms
 
 @click.command()
 def formulas() -> None:
-    """Fit and certify the closed forms; write their Python module (about ten minutes)."""
+    """Fit and certify the closed forms; write their Python module (about five minutes)."""
     from generate.formulas.islands import SIZES, island_form
     from generate.formulas.totals import totals_form
 
