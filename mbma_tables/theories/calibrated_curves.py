@@ -89,7 +89,8 @@ class Curve:
         # one stiffness between two nodes, at the middle
         log_u = np.log(gap)
         middle = (log_u[1:] + log_u[:-1])[::-1] / 2
-        stiffness = np.log(np.diff(force) / -np.diff(gap))[::-1]
+        # equal ones differ by rounding
+        stiffness = np.minimum.accumulate(np.log(np.diff(force) / -np.diff(gap))[::-1])
         self._log_stiffness = PchipInterpolator(middle, stiffness)
         self._h_max, self._top = h_max, float(np.exp(middle[-1]))
         self._lightest = float(np.exp(stiffness[-1])) * (h_max - self._top)
