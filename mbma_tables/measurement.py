@@ -167,7 +167,7 @@ def _spectrum(axes: Axes, surface: MeasuredSurface, unit: str) -> None:
     try:
         nearest = surface.fit()
         q = np.geomspace(float(nearest.q0), float(nearest.q1), 50)
-        axes.loglog(q, nearest.power_spectrum(q * (1 - 1e-12)), "--", label=f"H = {nearest.hurst:.2f}")
+        axes.loglog(q, nearest.power_spectrum(np.clip(q, nearest.q0, nearest.q1)), "--", label=f"H = {nearest.hurst:.2f}")
     except NotSelfAffineError:
         pass
     for entry in surface.provenance:
