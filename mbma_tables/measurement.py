@@ -167,7 +167,8 @@ def _spectrum(axes: Axes, surface: MeasuredSurface, unit: str) -> None:
     try:
         nearest = surface.fit()
         q = np.geomspace(float(nearest.q0), float(nearest.q1), 50)
-        axes.loglog(q, nearest.power_spectrum(np.clip(q, nearest.q0, nearest.q1)), "--", label=f"H = {nearest.hurst:.2f}")
+        inside = np.clip(q, nearest.q0, nearest.q1)
+        axes.loglog(q, nearest.power_spectrum(inside), "--", label=f"H = {nearest.hurst:.2f}")
     except NotSelfAffineError:
         pass
     for entry in surface.provenance:
