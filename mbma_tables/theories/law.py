@@ -39,7 +39,8 @@ from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma
 from mbma_tables.theories.yielding import Yielding, checked_hardness
-from mbma_tables.totals.island_sum import kinks
+from mbma_tables.totals.island_sum import kinks, totals_of
+from mbma_tables.totals.kernel import Pairs
 from mbma_tables.totals.measured import island_curve, measured_totals
 from mbma_tables.totals.profile import profile
 from mbma_tables.units import modulus_and_units
@@ -47,7 +48,7 @@ from mbma_tables.units import modulus_and_units
 MIN_LAW_RTOL = 1e-9
 RESOLVED = 1e-3  # a polynomial this close is one whose error its coefficients show
 POWERS = (3.5, 10 / 3)  # of h_max - d, in which MBMA's force and area start
-MEASURED_LEVERAGE = 30.0  # of a surface that is its own spectrum, as `Profile.leverage` is of others
+ROUGH_LEVERAGE = 30.0  # as `Profile.leverage`, where there is no profile
 LAYER_SHARE = 0.5  # of the boundary layer, up to which those powers leave little
 FIRST_OCTAVES = 20  # below which a theory that ends at h_max is a power of h_max - u
 MOST_OCTAVES = 60
@@ -190,20 +191,31 @@ def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float
         def of_curve(depth: FloatArray) -> tuple[FloatArray, ...]:
             return measured_totals(own, depth, model, reading, rtol, "raise")[:3]
 
-        return Islands(curve.layer, list(curve.kinks), MEASURED_LEVERAGE, of_curve)
+        return Islands(curve.layer, list(curve.kinks), ROUGH_LEVERAGE, of_curve)
     assert isinstance(surface, Surface)
     if not surface.zeta_1 > reading.floor_u:
         raise OutOfRangeError(f"q1/q0 must be greater than {reading.floor_u:g}, the reading's floor of zeta_u")
     h_rms, stress = float(surface.h_rms), float(surface.q0 * surface.s)
     peak = float(surface.h_max) / h_rms
-    kept = profile(float(surface.hurst), float(surface.zeta_1), peak, 2 * peak, model, reading, rtol)
+    ends = [float(kink) * h_rms for kink in kinks(surface.hurst, surface.zeta_1, reading)]
+    layer = h_rms * float(surface.zeta_1) ** -float(surface.hurst)
+    try:
+        kept = profile(float(surface.hurst), float(surface.zeta_1), peak, 2 * peak, model, reading, rtol)
+    except ConvergenceError:
+        # a model that is rough between its nodes: gap by gap, where errors are relative to the whole sum
+        one = surface
+
+        def of_gaps(depth: FloatArray) -> tuple[FloatArray, ...]:
+            found = totals_of(model, Pairs.of(one, depth), reading, max(0.03 * rtol, MIN_RTOL))
+            return found.force * stress, found.area, found.error
+
+        return Islands(layer, ends, ROUGH_LEVERAGE, of_gaps)
 
     def of_profile(depth: FloatArray) -> tuple[FloatArray, ...]:
         force, area = kept.totals(depth / h_rms)
         return force * stress, area, np.array(kept.error)
 
-    ends = [float(kink) * h_rms for kink in kinks(surface.hurst, surface.zeta_1, reading)]
-    return Islands(h_rms * float(surface.zeta_1) ** -float(surface.hurst), ends, kept.leverage, of_profile)
+    return Islands(layer, ends, kept.leverage, of_profile)
 
 
 def _theory_law(surface: AnySurface, theory: Theory, rtol: float, E_star: float) -> ContactLaw:
