@@ -60,6 +60,8 @@ def test_a_line_scan(line_file):
     found = json.loads(done.output)
     assert {"errors", "unseen"} <= {entry["step"] for entry in found["provenance"]}
     assert found["anisotropy"] is None
+    assert set(found["columns"]["valid"]) <= {"yes", "no"}
+    assert np.isfinite(found["columns"]["force"]).all()
     assert found["h_rms"] == pytest.approx(float(Surface.from_profile(line_file).h_rms))
 
 
