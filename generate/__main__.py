@@ -17,6 +17,7 @@ GROUPS = {
     "boundary_elements": "generate.boundary_elements.run",
     "calibrated": "generate.calibrated",
     "leakage": "generate.boundary_elements.leakage",
+    "leakage_law": "generate.leakage_law",
     "formulas": "generate.formulas.commands",
     "grids": "generate.boundary_elements.grids",
     "measured_maps": "generate.boundary_elements.measured_maps",

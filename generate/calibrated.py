@@ -19,6 +19,7 @@ from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFAC
 from generate.boundary_elements.evidence import GAUSSIAN, MAX_AREA, MIN_WAVES, Case, cases
 from generate.calibrated_bars import measure
 from generate.calibrated_table import write as write_table
+from generate.leakage_law import write as write_leakage
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum
 from mbma_tables.calibrated_map import MAP_CONSTANTS, MapConstants, MapLaw
@@ -262,3 +263,5 @@ def calibrated(
         out.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
     if table is not None:
         click.echo(f"{table}: {write_table(table, told, found, summary)}")
+        # its gaps have changed with the constants
+        click.echo(f"leakage: {write_leakage(table).attrs['coverage']}")

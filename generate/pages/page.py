@@ -26,6 +26,7 @@ PAGES = (
     "formula",
     "gallery",
     "islands",
+    "leakage",
     "stability",
     "tables",
     "theories",

@@ -40,6 +40,16 @@ def _units(problem: Problem) -> dict[str, tuple[str, str]]:
         "mean_pressure": ("pressure", "mean pressure in the contact"),
         "plane_separation": ("separation", "gap between mean planes, u less what yielded points are flattened"),
         "incremental_stiffness": ("stiffness", "-dF/du per nominal area of a small unloading"),
+        "leakage": (
+            "conductance_of_flow",
+            "flow conductance k h_rms^3: flow per length of seal is it dp/(12 viscosity width)",
+        ),
+        "leakage_valid": ("valid", "whether flow through such contacts was simulated"),
+        "leakage_scatter": (
+            "scatter",
+            "standard deviation of ln of the flow conductance from simulation to simulation",
+        ),
+        "leakage_blocked": ("valid", "whether contact percolates"),
         "island_number": ("D", "islands in contact per nominal area (Eq. 42)"),
         "island_delta": ("delta", "approach of an island"),
         "island_force": ("island_force", "load of an island at that approach"),

@@ -14,6 +14,7 @@ OUTPUTS = (
     "stiffness",
     "energy",
     "conductance",
+    "leakage",
     "island_statistics",
     "pressure_profile",
     "comparison",

@@ -240,6 +240,9 @@ class _Planner:
         if "validity" in outputs:
             what = f"where the theory is tested, and its scatter, at {self.count} gaps"
             steps.append(Step("validity", "validity", what, None, None, self.count, 0.0, self.seconds_of_slopes()))
+        if "leakage" in outputs:
+            what = f"flow through the gaps of contacts at {self.count} gaps"
+            steps.append(Step("leakage", "leakage", what, None, None, self.count, 0.0, self.seconds_of_slopes()))
         steps += [self.other_theory(name) for name in self.problem.theories]
         theory = self.problem.theory_name
         left_out = tuple(name for name in OUTPUTS if name not in outputs)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from mbma_tables.surfaces.any_surface import AnySurface
     from mbma_tables.theories.law_object import ContactLaw
     from mbma_tables.theories.protocol import Theory
+    from mbma_tables.theories.result import Contact
 
 Progress = Callable[[str, int, int], None]
 BLOCK = 64  # gaps between two reports of progress, where a gap is slow
@@ -208,14 +209,25 @@ def _by_theory(run: Run, step: Step) -> None:
     run.close(step, error, None)
 
 
-def _validity(run: Run, step: Step) -> None:
+def _asked(run: Run) -> Contact:
+    """The scene's contact, with what follows from it."""
     from mbma_tables.theories.contact import contact
     from mbma_tables.theories.mbma import Mbma
 
     problem = run.problem
     theory = Mbma(reading=problem.reading, outside="nan") if problem.theory == "mbma" else problem.theory
     yields = {} if problem.hardness is None else {"hardness": problem.hardness, "E_star": problem.E_star}
-    found = contact(run.problem.surface, run.gap, theory=theory, **yields)
+    return contact(run.problem.surface, run.gap, theory=theory, **yields)
+
+
+def _leakage(run: Run, step: Step) -> None:
+    found = _asked(run).leakage
+    fields = {"": found.conductance, "_valid": found.valid, "_scatter": found.scatter, "_blocked": found.blocked}
+    run.found |= {f"leakage{end}": (("gap",), values) for end, values in fields.items()}
+
+
+def _validity(run: Run, step: Step) -> None:
+    found = _asked(run)
     fields = {"valid": found.valid, "scatter": found.scatter, "area_scatter": found.area_scatter}
     run.found |= {name: (("gap",), values) for name, values in fields.items()}
     run.reasons = {reason: np.flatnonzero(mask).tolist() for reason, mask in found.reasons.items()}
@@ -319,5 +331,6 @@ _STEPS = {
     "hertz area": _islands,
     "island statistics": _islands,
     "validity": _validity,
+    "leakage": _leakage,
     "profiles": _islands,
 }

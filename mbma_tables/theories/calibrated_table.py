@@ -144,7 +144,7 @@ def shipped_part(group: str) -> tuple[dict[str, FloatArray], dict[str, Any]]:
 
 
 @njit(cache=True, fastmath=_FAST, error_model="numpy")
-def _eight(c: FloatArray, numbers: FloatArray, hurst: float, log_zeta: float, k: int) -> Eight:
+def eight_of(c: FloatArray, numbers: FloatArray, hurst: float, log_zeta: float, k: int) -> Eight:
     """Coefficients k to k + 7 in ln u of one surface."""
     i, x = cell((hurst - numbers[0]) * numbers[3], c.shape[0] - 4)
     j, y = cell((log_zeta - numbers[1]) * numbers[4], c.shape[1] - 4)
@@ -159,12 +159,12 @@ def _eight(c: FloatArray, numbers: FloatArray, hurst: float, log_zeta: float, k:
 
 
 @njit(cache=True, error_model="numpy")
-def _lines(c: FloatArray, numbers: FloatArray, surfaces: FloatArray) -> FloatArray:
+def lines_of(c: FloatArray, numbers: FloatArray, surfaces: FloatArray) -> FloatArray:
     """All coefficients in ln u of each surface, with zeros behind: for many separations of few surfaces."""
     lines = np.zeros((surfaces.shape[0], c.shape[2] + 8))
     for row in range(surfaces.shape[0]):
         for k in range(0, c.shape[2] - 7, 2):
-            eight = _eight(c, numbers, surfaces[row, 0], surfaces[row, 1], k)
+            eight = eight_of(c, numbers, surfaces[row, 0], surfaces[row, 1], k)
             for n in range(8):
                 lines[row, k + n] = eight[n]
     return lines
@@ -182,7 +182,7 @@ def _log_gaussian(
         line = lines[row]
         c0, c1, c2, c3, c4, c5 = line[k], line[k + 1], line[k + 2], line[k + 3], line[k + 4], line[k + 5]
     else:
-        c0, c1, c2, c3, c4, c5, _, _ = _eight(c, numbers, surfaces[row, 0], surfaces[row, 1], k)
+        c0, c1, c2, c3, c4, c5, _, _ = eight_of(c, numbers, surfaces[row, 0], surfaces[row, 1], k)
     w0, w1, w2, w3, w4, w5 = quintic(z)
     value = w0 * c0 + w1 * c1 + w2 * c2 + w3 * c3 + w4 * c4 + w5 * c5
     w0, w1, w2, w3, w4, w5 = quintic_slope(z)
@@ -203,7 +203,7 @@ def _log_gaussian(
 def _prepared(c: FloatArray, numbers: FloatArray, surfaces: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
     """Lines, empty where there are too few separations for them, and ln F_G(h_max) of each surface."""
     few = count < MIN_SHARED * surfaces.shape[0]
-    lines = _lines(c, numbers, surfaces[:0] if few else surfaces)
+    lines = lines_of(c, numbers, surfaces[:0] if few else surfaces)
     ends = np.empty(surfaces.shape[0])
     for row in range(ends.size):
         h_max = surfaces[row, 3]

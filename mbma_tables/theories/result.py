@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 from mbma_tables.theories.yielding import Yielding, checked_hardness
 from mbma_tables.units import Units, unit_of
+
+if TYPE_CHECKING:
+    from mbma_tables.theories.leakage import Leakage
 
 WITH_UNITS = ("separation", "mean_separation", "force", "area", "stiffness", "energy", "mean_pressure")
 OF_HARDNESS = ("incremental_stiffness", "plane_separation")
@@ -160,6 +163,14 @@ class Contact:
     def _scatter(self) -> tuple[Numbers, ...]:
         area = self._answer.area if self.area is None else self.area
         return self._source.map(lambda theory, s, u, E, A: theory.scatter(s, A), self, 2, {"area": area})
+
+    @functools.cached_property
+    def leakage(self) -> Leakage:
+        """Flow through the gaps of the contact, `theories.leakage.Leakage`; computed when first read."""
+        from mbma_tables.theories.leakage import leakage_of
+
+        area = self._answer.area if self.area is None else self.area
+        return leakage_of(self._source, self, area)
 
     @functools.cached_property
     def valid(self) -> Numbers:

@@ -220,8 +220,9 @@ def test_python_mistakes(more, words):
 
 
 WATCHED = {
-    "mbma_tables.theories.contact": {"force", "area", "validity", "yield"},
+    "mbma_tables.theories.contact": {"force", "area", "validity", "yield", "leakage"},
     "mbma_tables.theories.law": {"stiffness", "energy", "conductance"},
+    "mbma_tables.theories.leakage": {"leakage"},
     "mbma_tables.totals.conductance": {"conductance"},
     "mbma_tables.theories.asperities": {"comparison"},
     "mbma_tables.theories.persson": set(),
@@ -288,7 +289,8 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
     yields = "yield" in asked
     of_law = bool(asked & {"stiffness", "energy", "conductance"}) and not yields
     expected = {
-        "contact": int(yields or (not of_law and bool(asked & {"force", "area"}))) + int("validity" in asked),
+        "contact": int(yields or (not of_law and bool(asked & {"force", "area"})))
+        + len(asked & {"validity", "leakage"}),
         "contact_law": int(of_law),
         "island_statistics": int("island_statistics" in asked),
         "profiles": int("pressure_profile" in asked),

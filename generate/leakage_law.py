@@ -1,0 +1,290 @@
+"""The law of leakage: its constants from the training set, its errors on held-out surfaces, its table."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+import json
+import pathlib
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any, cast
+
+import click
+import numpy as np
+import xarray as xr
+from scipy.interpolate import RegularGridInterpolator
+from scipy.optimize import least_squares
+
+from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
+from generate.calibrated_file import write_part
+from generate.calibrated_table import TheoryCurve
+from generate.leakage_flow import MIN_WAVES, Case, Flow, cases, log_odds
+from mbma_tables import leakage
+from mbma_tables.arguments import FloatArray
+from mbma_tables.calibrated import Constants, Spectrum
+from mbma_tables.leakage import FlowConstants
+from mbma_tables.tablefiles.provenance import source_digest, versions
+from mbma_tables.tablefiles.splines import coefficients
+from mbma_tables.theories.asperities import GreenwoodWilliamson
+from mbma_tables.theories.calibrated_table import load
+from mbma_tables.theories.mbma import Mbma
+from mbma_tables.theories.persson import Persson
+
+EDGES = (0.004, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)  # contact fractions between which errors are told
+NOISE = (0.1, 6.0)  # errors of ln k that count as one: a + b (A/A0)^2, about what cells of one spectrum differ by
+COVERED = {"hurst": (0.1, 1.0), "log_zeta_1": (np.log(3.0), np.log(1e5)), "log_odds": (-14.0, 5.5)}
+HURST, LOG_ZETA = np.linspace(0.04, 1.06, 14), np.linspace(np.log(2.0), np.log(2e5), 14)
+LOG_ODDS = np.linspace(-14.6, 6.2, 53)  # ln A/(Ac - A)
+CERTIFICATE = 16  # held-out surfaces, each at its own odds
+STATISTICS = ("bias", "root_mean_square", "number")
+GROUP = "leakage"
+BLOCKED = -20.0  # residual of what a law blocks and simulation does not
+LARGE = 64.0  # zeta_1 from which surfaces decide between laws, and no constant
+DEGREE = 5
+AXES = ("hurst", "log_zeta_1", "log_odds")
+LONG_NAMES = {
+    "hurst": "Hurst exponent",
+    "log_zeta_1": "natural logarithm of q1/q0",
+    "log_odds": "ln A/(Ac - A), A = A/A0 and Ac = flow_threshold",
+}
+MODULES = ("mbma_tables.calibrated", "mbma_tables.leakage", "generate.leakage_law")
+PROCESSES = 2
+ROOT = pathlib.Path(__file__).parents[1]
+TABLE = ROOT / "tables" / "calibrated.nc"
+EVIDENCE = ROOT / "docs" / "data" / "leakage.nc"
+
+
+def fit(training: Sequence[Flow]) -> FlowConstants:
+    """Constants of the law and of the closed form, by robust least squares up to `leakage.LARGEST_AREA`."""
+    seen = [(flow, flow.one.area < leakage.LARGEST_AREA) for flow in training if flow.one.isotropic]
+
+    def residuals(form: Callable[[Flow, FlowConstants], FloatArray], constants: FlowConstants) -> FloatArray:
+        parts = []
+        for flow, kept in seen:
+            miss = (form(flow, constants) - flow.one.log_k) / (NOISE[0] + NOISE[1] * flow.one.area**2)
+            # the law may block what was open
+            parts.append(np.maximum(miss[kept], BLOCKED))
+        return np.concatenate(parts)
+
+    first = FlowConstants()
+    found = least_squares(
+        lambda x: residuals(Flow.medium, FlowConstants(*map(float, x))),
+        [first.threshold, first.obstruction],
+        loss="soft_l1",
+        diff_step=0.01,
+        x_scale=[0.01, 0.1],
+    )
+    own = [round(float(x), 3) for x in found.x]
+    closed = least_squares(
+        lambda x: residuals(Flow.closed_form, FlowConstants(*own, *map(float, x))),
+        [first.prefactor, first.exponent],
+        loss="soft_l1",
+        diff_step=0.01,
+    )
+    return FlowConstants(*own, *(round(float(x), 3) for x in closed.x))
+
+
+LAWS: dict[str, Callable[[Flow, FlowConstants], FloatArray]] = {
+    "calibrated": Flow.medium,
+    "medium, simulated area and gap": lambda flow, c: flow.medium(c, flow.one.area, flow.one.u),
+    "closed form": Flow.closed_form,
+    "Bruggeman, n = 1/(1 - 0.42)": lambda flow, c: flow.bruggeman(c, 1 / (1 - 0.42)),
+    "Bruggeman, n = 2": lambda flow, c: flow.bruggeman(c, 2.0),
+    "critical junction": Flow.critical_junction,
+    "Patir and Cheng": Flow.patir_cheng,
+    "parallel plates": Flow.parallel_plates,
+}
+SETS: dict[str, Callable[[Case], bool]] = {
+    "training": lambda one: one.isotropic and one.split == TRAINING and one.zeta_1 < LARGE,
+    "held-out surfaces": lambda one: one.isotropic and one.split == HELD_OUT_SURFACE and one.zeta_1 < LARGE,
+    "held-out spectra": lambda one: one.isotropic and one.split == HELD_OUT_SPECTRUM and one.zeta_1 < LARGE,
+    "held out": lambda one: one.isotropic and one.split != TRAINING and one.zeta_1 < LARGE,
+    "plateaus": lambda one: one.kind == "plateau",
+    "stretched": lambda one: one.kind == "stretched",
+    "zeta_1 32, two waves": lambda one: one.zeta_1 == 32 and one.waves < MIN_WAVES,
+    "zeta_1 64 and 128": lambda one: one.zeta_1 >= LARGE,
+}
+
+
+def errors(flow: Flow, log_k: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A/A0 and ln(law/simulation), where both are open."""
+    kept = np.isfinite(log_k)
+    return flow.one.area[kept], log_k[kept] - flow.one.log_k[kept]
+
+
+def summary(parts: Sequence[tuple[FloatArray, FloatArray]], edges: Sequence[float] = EDGES) -> FloatArray:
+    """Bias, root mean square and number of errors between contact fractions."""
+    told = np.full((len(edges) - 1, 3), np.nan)
+    if parts:
+        area, miss = (np.concatenate(each) for each in zip(*parts, strict=True))
+        for k in range(len(edges) - 1):
+            own = miss[(area >= edges[k]) & (area < edges[k + 1])]
+            if own.size:
+                told[k] = own.mean(), np.sqrt(np.mean(own**2)), own.size
+    return told
+
+
+def noise_floor(found: Sequence[Case], edges: Sequence[float] = EDGES) -> FloatArray:
+    """Standard deviation of ln k between cells of one spectrum at equal load, between contact fractions."""
+    areas, variances = [], []
+    for node in sorted({one.node for one in found if one.isotropic}, key=str):
+        own = [one for one in found if one.node == node]
+        size = min(one.log_k.size for one in own)
+        if len(own) > 1:
+            areas.append(np.mean([one.area[:size] for one in own], axis=0))
+            variances.append(np.var([one.log_k[:size] for one in own], axis=0, ddof=1))
+    area, variance = np.concatenate(areas), np.concatenate(variances)
+    return np.sqrt([variance[(area >= low) & (area < high)].mean() for low, high in itertools.pairwise(edges)])
+
+
+def of_theories(flows: Sequence[Flow], constants: FlowConstants) -> dict[str, FloatArray]:
+    """Errors by area and mean gap of other theories on self-affine surfaces; nothing was fitted to these."""
+    told = {}
+    for theory in (Mbma(outside="nan"), Persson(), GreenwoodWilliamson()):
+        parts = []
+        for flow in flows:
+            one = flow.one
+            if one.kind != "self_affine" or not one.isotropic:
+                continue
+            curve = TheoryCurve(theory, cast(Any, one))
+            kept = curve.reaches(one.force)
+            area, u = curve.area(one.force[kept]), curve.separation(one.force[kept])
+            log_k = np.full(one.force.shape, -np.inf)
+            log_k[kept] = flow.medium(constants, area, u)
+            parts.append(errors(flow, log_k))
+        told[theory.name] = summary(parts)
+    return told
+
+
+def _row(constants: FlowConstants, contact: Constants, hurst: float) -> FloatArray:
+    """ln R at the table's nodes of one Hurst exponent."""
+    area = constants.threshold / (1 + np.exp(-LOG_ODDS))
+    spectra = [Spectrum.self_affine(hurst, float(np.exp(z))) for z in LOG_ZETA]
+    return np.array([leakage.contact_factor(spectrum, area, constants, contact) for spectrum in spectra])
+
+
+def dataset(found: Sequence[Case], contact: Constants) -> xr.Dataset:
+    """The group `leakage` of the calibrated law's file, with that law's constants."""
+    flows = [Flow(one, contact) for one in found]
+    constants = fit([flow for flow in flows if flow.one.split == TRAINING])
+    with ProcessPoolExecutor(PROCESSES) as pool:
+        values = np.array(list(pool.map(functools.partial(_row, constants, contact), map(float, HURST))))
+    misses = {label: [errors(f, law(f, constants)) for f in flows] for label, law in LAWS.items()}
+    told = {
+        name: {label: summary([misses[label][k] for k in own]) for label in LAWS}
+        for name, member in SETS.items()
+        if (own := [k for k, f in enumerate(flows) if member(f.one)])
+    }
+    stated = {"calibrated": told["training"]["calibrated"], **of_theories(flows, constants)}
+    blocked = np.concatenate([one.blocked for one in found if one.isotropic], axis=1)
+    edges = np.array(EDGES)
+    shares = [blocked[1][(blocked[0] >= a) & (blocked[0] < b)].mean() for a, b in itertools.pairwise(edges)]
+    text = {"units": "1"}
+    data = xr.Dataset(
+        {
+            "log_factor": (AXES, values, {"long_name": "ln R, k = u^3 (1 - 1.5/(u^2 + 4)) R", **text}),
+            "spline": (
+                tuple(f"{name}_knot" for name in AXES),
+                coefficients(values, DEGREE, 3),
+                {"long_name": "coefficients of cardinal quintic B-splines that interpolate log_factor", **text},
+            ),
+            "accuracy": (
+                ("set", "law", "contact", "statistic"),
+                np.array([list(laws.values()) for laws in told.values()]),
+                {"long_name": "bias, root mean square and number of ln(law/simulation)", **text},
+            ),
+            "stated_scatter": (
+                ("theory", "contact"),
+                np.array([rows[:, 1] for rows in stated.values()]),
+                {"long_name": "root mean square of ln(k/simulation)", **text},
+            ),
+            "noise": (
+                "contact",
+                noise_floor(found),
+                {"long_name": "standard deviation of ln k between cells of one spectrum", **text},
+            ),
+            "share_blocked": ("contact", shares, {"long_name": "share of directions that are blocked", **text}),
+        },
+        {
+            **{
+                name: (name, nodes, {"long_name": LONG_NAMES[name], **text, "covered": COVERED[name]})
+                for name, nodes in zip(AXES, (HURST, LOG_ZETA, LOG_ODDS), strict=True)
+            },
+            "contact": ("contact", (edges[1:] + edges[:-1]) / 2, {"long_name": "A/A0, middle of a bin", **text}),
+            "contact_low": ("contact", edges[:-1], {"long_name": "A/A0, low end of a bin", **text}),
+            "contact_high": ("contact", edges[1:], {"long_name": "A/A0, high end of a bin", **text}),
+        },
+    )
+    data.attrs = {
+        "title": "Flow conductance of gaps: contact factor of an effective medium, and its errors against simulation",
+        "source": "mbma_tables.leakage, its constants fitted to the training set of docs/data/leakage.nc",
+        "references": "docs/leakage.md",
+        "theories": " ".join(stated),
+        "laws": "; ".join(LAWS),
+        "sets": "; ".join(told),
+        "statistics": " ".join(STATISTICS),
+        **{f"flow_{name}": value for name, value in dataclasses.asdict(constants).items()},
+        **{f"law_{name}": value for name, value in dataclasses.asdict(contact).items()},
+        "largest_error_log_factor": certificate(values, constants, contact),
+        "coverage": np.array(coverage(flows, constants, stated["calibrated"])),
+        "versions": json.dumps(versions(), sort_keys=True),
+        "source_sha256": source_digest(MODULES),
+    }
+    return data
+
+
+def certificate(values: FloatArray, constants: FlowConstants, contact: Constants) -> float:
+    """Largest error of ln R between the nodes at held-out surfaces, below `leakage.LARGEST_AREA`."""
+    table = RegularGridInterpolator((HURST, LOG_ZETA, LOG_ODDS), values, method="quintic")
+    rng, largest = np.random.default_rng(21), 0.0
+    odds = np.sort(
+        rng.uniform(COVERED["log_odds"][0], log_odds(np.array(leakage.LARGEST_AREA), constants.threshold), 12)
+    )
+    for _ in range(CERTIFICATE):
+        hurst, log_zeta = (rng.uniform(*COVERED[name]) for name in AXES[:2])
+        exact = leakage.contact_factor(
+            Spectrum.self_affine(hurst, float(np.exp(log_zeta))),
+            constants.threshold / (1 + np.exp(-odds)),
+            constants,
+            contact,
+        )
+        points = np.stack([np.full(odds.size, hurst), np.full(odds.size, log_zeta), odds], axis=1)
+        largest = max(largest, float(np.abs(table(points) - exact).max()))
+    return largest
+
+
+def coverage(flows: Sequence[Flow], constants: FlowConstants, stated: FloatArray) -> list[float]:
+    """Shares of held-out errors up to the largest area of a valid answer within one and two of the stated scatter."""
+    middle = (np.array(EDGES[1:]) + np.array(EDGES[:-1])) / 2
+    parts = [errors(f, f.medium(constants)) for f in flows if SETS["held out"](f.one)]
+    sizes = np.concatenate([np.abs(miss) / np.interp(area, middle, stated[:, 1]) for area, miss in parts])
+    area = np.concatenate([area for area, _ in parts])
+    return [float(np.mean(sizes[area < leakage.LARGEST_AREA] < limit)) for limit in (1, 2)]
+
+
+def write(path: pathlib.Path, evidence: pathlib.Path = EVIDENCE) -> xr.Dataset:
+    """Fit, and write the group into the calibrated law's file; what it holds."""
+    with xr.open_dataset(evidence) as data:
+        found = cases(data.load())
+    made = dataset(found, load(path).constants)
+    write_part(path, made, GROUP)
+    return made
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("evidence", type=click.Path(path_type=pathlib.Path, exists=True), default=EVIDENCE)
+@click.option(
+    "--table", type=click.Path(path_type=pathlib.Path, exists=True), default=TABLE, help="The library's file."
+)
+def leakage_law(evidence: pathlib.Path, table: pathlib.Path) -> None:
+    """Fit the law of leakage to the training set of EVIDENCE, write it beside the calibrated law; tell its errors."""
+    made = write(table, evidence)
+    click.echo(", ".join(f"{name} {made.attrs[f'flow_{name}']:g}" for name in dataclasses.asdict(FlowConstants())))
+    click.echo(f"held-out errors within one and two standard deviations: {made.attrs['coverage']}")
+    click.echo(f"bias and root mean square of ln(law/simulation) between contacts {EDGES}")
+    for name, laws in zip(made.attrs["sets"].split("; "), made.accuracy.values, strict=True):
+        for label, bins in zip(made.attrs["laws"].split("; "), laws, strict=True):
+            click.echo(f"  {name:22s} {label:32s} " + " ".join(f"{b:+.2f} {r:.2f} " for b, r, _ in bins))
+    click.echo(f"  cells of one spectrum {made.noise.values.round(2)}, blocked {made.share_blocked.values.round(2)}")

@@ -1,0 +1,108 @@
+"""The measured parts of docs/leakage.md: how far laws of leakage are from simulation, and their curves."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import xarray as xr
+
+from generate.leakage_flow import cases
+from generate.leakage_law import EDGES, EVIDENCE
+from generate.pages.page import png, pyplot, table
+from mbma_tables import Surface, contact
+from mbma_tables.theories.calibrated_table import shipped_part
+from mbma_tables.theories.leakage_table import GROUP, shipped_flow
+
+BINS = ((0.004, 0.05), (0.05, 0.15), (0.15, 0.3), (0.3, 0.4))
+SHOWN_SETS = ("training", "held out", "plateaus", "stretched", "zeta_1 32, two waves", "zeta_1 64 and 128")
+DRAWN = (0.4, 0.8)  # Hurst exponents
+
+
+def pooled(rows: np.ndarray, bins: tuple[tuple[float, float], ...] = BINS) -> list[str]:
+    """Bias and root mean square in wider bins, from bias, root mean square and number in narrow ones."""
+    told = []
+    for low, high in bins:
+        own = rows[[low <= a and b <= high + 1e-9 for a, b in itertools.pairwise(EDGES)]]
+        own = own[np.isfinite(own[:, 0])]
+        number = own[:, 2].sum()
+        if not number:
+            told.append("")
+            continue
+        bias, square = own[:, 0] @ own[:, 2] / number, own[:, 1] ** 2 @ own[:, 2] / number
+        told.append(f"{bias:+.2f}, {np.sqrt(square):.2f} ({number:.0f})")
+    return told
+
+
+def accuracy() -> str:
+    """Every law on held-out surfaces, and the law on every set."""
+    values, facts = shipped_part(GROUP)
+    sets, laws = facts["sets"].split("; "), facts["laws"].split("; ")
+    errors = values["accuracy"]
+    header = ["law, set", *(f"A {100 * a:.3g}-{100 * b:.3g}%" for a, b in BINS)]
+    held = sets.index("held out")
+    lines = [[f"{law}, held out", *pooled(errors[held, k])] for k, law in enumerate(laws)]
+    for name in SHOWN_SETS:
+        if name in sets and name != "held out":
+            lines.append([f"calibrated, {name}", *pooled(errors[sets.index(name), 0])])
+            if "zeta_1" in name:
+                lines.append([f"closed form, {name}", *pooled(errors[sets.index(name), laws.index("closed form")])])
+    return table(header, lines)
+
+
+def floor() -> str:
+    """Cell-to-cell scatter, stated scatter and share of directions that are blocked, by contact."""
+    values, facts = shipped_part(GROUP)
+    rows = {
+        "cells of one spectrum differ by": values["noise"],
+        **{
+            f"stated scatter, `{name}`": values["stated_scatter"][k] for k, name in enumerate(facts["theories"].split())
+        },
+        "share of directions blocked": values["share_blocked"],
+    }
+    header = ["A [%]", *(f"{100 * a:.3g}-{100 * b:.3g}" for a, b in itertools.pairwise(EDGES))]
+    lines = [[name, *("" if np.isnan(v) else f"{v:.2f}" for v in row)] for name, row in rows.items()]
+    one, two = facts["coverage"]
+    flow = shipped_flow().constants
+    return (
+        f"{table(header, lines)}\n\nHeld-out errors up to 30% contact within one and two of the stated scatter: "
+        f"{one:.0%} and {two:.0%}. Constants: Ac = {flow.threshold:g}, m = {flow.obstruction:g}; closed form "
+        f"{flow.prefactor:g} u^3 (1 - A/Ac)^{flow.exponent:g}. The table is within "
+        f"{facts['largest_error_log_factor']:.2g} of the medium in ln R."
+    )
+
+
+def draw() -> bytes:
+    """k against contact of simulated surfaces, and the laws."""
+    plt = pyplot()
+    with xr.open_dataset(EVIDENCE) as data:
+        found = cases(data.load())
+    figure, panels = plt.subplots(1, 2, figsize=(10, 4.5), layout="constrained", sharey=True)
+    area = np.linspace(0.004, 0.405, 200)
+    flow = shipped_flow().constants
+    for axes, hurst in zip(panels, DRAWN, strict=True):
+        for one in found:
+            if one.kind == "self_affine" and one.node[1] == hurst and (one.isotropic or one.zeta_1 >= 64):
+                colour = "k" if one.zeta_1 < 64 else "r"
+                axes.plot(one.area, np.exp(one.log_k), ".", color=colour, ms=4, alpha=0.6)
+        for zeta, style in ((16.0, "-"), (64.0, "--"), (1024.0, ":")):
+            answer = contact(Surface(hurst, 1.0, zeta, 1.0, 4.0), area=area, theory="calibrated")
+            k = np.where(answer.leakage.blocked, np.nan, answer.leakage.k)
+            axes.plot(area, k, f"C0{style}", label=f"calibrated, zeta_1 {zeta:g}")
+            if zeta == 16:
+                spread = np.exp(answer.leakage.scatter)
+                axes.fill_between(area, k / spread, k * spread, color="C0", alpha=0.2, lw=0)
+                u = answer.mean_separation
+                closed = flow.closed_form(u, area)
+                axes.plot(area, np.where(closed > 0, closed, np.nan), "C1-", lw=1, label="closed form, zeta_1 16")
+                axes.plot(area, u**3, "C2-", lw=1, label="u^3, zeta_1 16")
+        axes.set(xlabel="real contact area  A/A0", yscale="log", ylim=(1e-7, 20), title=f"H = {hurst:g}")
+        axes.grid(alpha=0.3)
+    panels[0].set_ylabel("flow conductance  k")
+    panels[0].legend()
+    return png(figure, dpi=110)
+
+
+def measure() -> tuple[dict[str, str], dict[str, bytes]]:
+    """The measured parts of the page, and its figure."""
+    return {"accuracy": accuracy(), "floor": floor()}, {"docs/figures/leakage.png": draw()}

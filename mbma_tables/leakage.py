@@ -1,0 +1,207 @@
+"""Flow through the gaps of a rough contact: an effective medium of gaps, a closed form, and rates of leakage.
+
+Reynolds' equation div(h^3 grad p) = 0 on the gaps h, no flow where bodies touch, small slopes, solids that the fluid's
+pressure does not move. Flow per length of seal is K (p1 - p2)/(12 viscosity width) with K = k h_rms^3. ::
+
+    k = u^3 (1 - 1.5/(u^2 + 4)) R(A)            u: mean gap over h_rms, A: A/A0; R = 1 without contact, 0 at blocking
+
+The factor beside u^3 is Bruggeman's effective medium of Gaussian gaps, exact to the second order in h_rms/u. R comes
+from the same medium with the gaps of the calibrated law, magnification by magnification: where waves below x are seen
+the law's cover P(x) carries the load, and the mean gap there is that of the waves above x alone, ubar(x) with rms
+height s(x). What leaves contact between x and x + dx has mean gap u1 = d(ubar P)/dP and heights N(u1, s) + N(-u1, s)
+on h > 0, so that ::
+
+    integral over gaps of (h^3 - k)/(h^3 + k) dW = (1 - Ac) (A/Ac)^m
+
+Discs of contact would obstruct like A on the right. Patches of contact obstruct more, light ones most, and k vanishes
+at A = Ac: these are the two constants. Gaps are scaled so that their mean is u. Bruggeman 1935; Dapp, Luecke, Persson,
+Mueser, PRL 108 (2012) 244301 take n = 1/(1 - Ac) dimensions so that k vanishes at Ac.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.arguments import FloatArray
+from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, area
+
+LARGEST_AREA = 0.3  # above it cells of one spectrum differ by factors
+BANDS = 64  # of a spectrum, graded towards both ends
+NODES, LOWEST_GAP, REACH = 80, 1e-6, 8.0  # quadrature in ln(h/s), from u1/s - 8 or 1e-6 to u1/s + 8
+ITERATIONS, TOLERANCE = 80, 1e-12
+NO_COVER = 1e-13  # share of the surface between two magnifications
+LOADS = 4000  # between which the load of a contact fraction is interpolated
+
+
+def wide_gap(u: ArrayLike) -> FloatArray:
+    """k/u^3 of Gaussian gaps of mean u [h_rms] without contact: 1 - 1.5/(u^2 + 4), within 0.4% from u = 2.5 on."""
+    return 1 - 1.5 / (np.asarray(u, float) ** 2 + 4)
+
+
+@dataclasses.dataclass(frozen=True)
+class FlowConstants:
+    """Constants of the flow.
+
+    Attributes
+    ----------
+    threshold : float
+        Ac, the contact fraction at which gaps no longer percolate.
+    obstruction : float
+        m, of contact below it.
+    prefactor, exponent : float
+        Of the closed form prefactor u^3 (1 - A/Ac)^exponent.
+    """
+
+    threshold: float = 0.415
+    obstruction: float = 0.89
+    prefactor: float = 0.77
+    exponent: float = 3.04
+
+    def closed_form(self, u: ArrayLike, area: ArrayLike) -> FloatArray:
+        """k at mean gaps u [h_rms] and A/A0 without a spectrum, to zeta_1 of 32 only; 0 from the threshold on."""
+        left = np.maximum(1 - np.asarray(area, float) / self.threshold, 0)
+        return np.asarray(self.prefactor * np.asarray(u, float) ** 3 * left**self.exponent)
+
+    def obstructed(self, area: ArrayLike) -> FloatArray:
+        """What contact takes from the balance of an effective medium."""
+        return np.asarray((1 - self.threshold) * (np.asarray(area, float) / self.threshold) ** self.obstruction)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Gaps:
+    """Gaps of the endless Gaussian surface by the calibrated law, at a row of loads.
+
+    Attributes
+    ----------
+    share, mean : numpy.ndarray, shape (loads, bands)
+        Share of the surface that leaves contact within a band of magnification, and u1 of it [h_rms].
+    spread : numpy.ndarray, shape (bands,)
+        Rms height of the waves above the band [h_rms].
+    area, separation : numpy.ndarray, shape (loads,)
+        A/A0 and mean gap [h_rms].
+    """
+
+    share: FloatArray
+    mean: FloatArray
+    spread: FloatArray
+    area: FloatArray
+    separation: FloatArray
+
+    def at(self, loads: Any) -> Gaps:
+        """Those of some of the loads."""
+        return Gaps(self.share[loads], self.mean[loads], self.spread, self.area[loads], self.separation[loads])
+
+
+def _shares(spectrum: Spectrum) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Variance, gradient's square and x times variance of bands graded towards both ends of a spectrum."""
+    log_x = np.log(spectrum.x / spectrum.x[0])
+    edges = log_x[-1] * 0.5 * (1 - np.cos(np.pi * np.arange(BANDS + 1) / BANDS))
+    band = np.clip(np.searchsorted(edges, log_x, side="right") - 1, 0, BANDS - 1)
+    x, variance = spectrum.x, spectrum.variance
+    parts = [np.bincount(band, v, BANDS).astype(float) for v in (variance, variance * x**2, variance * x)]
+    held = parts[0] > 0
+    return parts[0][held], parts[1][held] / parts[1].sum(), parts[2][held]
+
+
+def gaps(spectrum: Spectrum, force: ArrayLike, constants: Constants = CONSTANTS) -> Gaps:
+    """Gaps at loads F/(A0 E* g), magnification by magnification."""
+    variance, slope, wave = _shares(spectrum)
+    load = np.asarray(force, float)[:, None]
+    below = np.append(0.0, np.cumsum(slope))
+    below[-1] = 1.0
+    with np.errstate(divide="ignore"):
+        cover = area(np.minimum(load / np.sqrt(below), 1e8), spectrum.alpha, constants)
+    above = np.append(np.cumsum(variance[::-1])[::-1], 0.0)
+    spread = np.sqrt(above[:-1])
+    mean = np.append(_mean_gaps(spectrum, constants, load / cover[:, :-1], below, slope, wave, spread), 0 * load, 1)
+    share = cover[:, :-1] - cover[:, 1:]
+    volume = mean * cover
+    left = np.maximum(volume[:, :-1] - volume[:, 1:], 0)
+    touched = share > NO_COVER
+    return Gaps(
+        np.where(touched, share, 0.0),
+        np.divide(left, share, out=np.zeros(share.shape), where=touched),
+        np.sqrt((above[1:] + above[:-1]) / 2),
+        cover[:, -1],
+        mean[:, 0],
+    )
+
+
+def _mean_gaps(
+    spectrum: Spectrum,
+    constants: Constants,
+    load: FloatArray,
+    below: FloatArray,
+    slope: FloatArray,
+    wave: FloatArray,
+    spread: FloatArray,
+) -> FloatArray:
+    """Mean gap under each load where only the waves from a band on are rough."""
+    found = np.zeros(load.shape)
+    for first in range(slope.size):
+        # as a spectrum of its own, whose lengths are over `spread` and loads over its gradient
+        share = 1 - below[first]
+        part = Spectrum(
+            np.ones(slope.size - first),
+            wave[first:],
+            (np.cumsum(slope[first:]) - slope[first:] / 2) / share,
+            1.0,
+            1.0,
+        )
+        scaled = dataclasses.replace(part, variance=wave[first:] / (spread[first] * np.sqrt(share) * spectrum.gradient))
+        found[:, first] = Law(scaled, None, constants).separation(load[:, first] / np.sqrt(share)) * spread[first]
+    return found
+
+
+def contact_factor(
+    spectrum: Spectrum, contact: ArrayLike, flow: FlowConstants, constants: Constants = CONSTANTS
+) -> FloatArray:
+    """ln R at contact fractions A/A0, rising, above zero and below the threshold."""
+    wanted = np.asarray(contact, float)
+    log_force = np.linspace(np.log(wanted[0]) - 3, 1.0, LOADS)
+    reached = area(np.exp(log_force), spectrum.alpha, constants)
+    force = np.exp(np.interp(np.log(wanted), np.log(reached), log_force))
+    return log_factor(gaps(spectrum, force, constants), flow)
+
+
+def log_factor(found: Gaps, flow: FlowConstants) -> FloatArray:
+    """ln R of a spectrum's gaps, which are scaled to their mean."""
+    share, log_cube = quadrature(found)
+    mean = np.sum(share * np.exp(log_cube / 3), axis=1)
+    log_k = effective_medium(share, log_cube, flow.obstructed(found.area))
+    return np.asarray(log_k - 3 * np.log(mean) - np.log(wide_gap(found.separation)))
+
+
+def quadrature(found: Gaps) -> tuple[FloatArray, FloatArray]:
+    """Shares of the surface and ln h^3 of gaps there [h_rms^3], shape (loads, points)."""
+    centre = found.mean / found.spread
+    low, high = np.log(np.maximum(centre - REACH, LOWEST_GAP)), np.log(centre + REACH)
+    node, weight = np.polynomial.legendre.leggauss(NODES)
+    half = (high - low)[..., None] / 2
+    t = np.exp(low[..., None] + half * (1 + node))
+    density = np.exp(-((t - centre[..., None]) ** 2) / 2) + np.exp(-((t + centre[..., None]) ** 2) / 2)
+    share = found.share[..., None] * density * t * half * weight / np.sqrt(2 * np.pi)
+    rows = len(found.area)
+    return share.reshape(rows, -1), 3 * np.log(t * found.spread[:, None]).reshape(rows, -1)
+
+
+def effective_medium(share: FloatArray, log_cube: FloatArray, blocked: FloatArray) -> FloatArray:
+    """ln k of sum share (h^3 - k)/(h^3 + k) = blocked: Newton's method within a bracket."""
+    low, high = log_cube.min(axis=1), log_cube.max(axis=1)
+    log_k = np.log(np.sum(share * np.exp(log_cube), axis=1))
+    for turn in range(ITERATIONS):
+        ratio = np.tanh((log_cube - log_k[:, None]) / 2)
+        miss = np.sum(share * ratio, axis=1) - blocked
+        low, high = np.where(miss > 0, log_k, low), np.where(miss > 0, high, log_k)
+        step = 2 * miss / np.sum(share * (1 - ratio**2), axis=1)
+        following = log_k + step
+        # halved in every third turn: on steps of the sum Newton's method hardly moves
+        inside = (following > low) & (following < high) & (turn % 3 < 2)
+        log_k = np.where(inside, following, (low + high) / 2)
+        if np.all((np.abs(step) < TOLERANCE) | (high - low < TOLERANCE)):
+            break
+    return np.asarray(log_k)

@@ -1,0 +1,248 @@
+"""Leakage of a contact: its flow conductance, how far that is to be trusted, and rates of liquids and gases."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, require
+from mbma_tables.calibrated import Spectrum
+from mbma_tables.errors import InputError
+from mbma_tables.leakage import LARGEST_AREA
+from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.theories.calibrated_curves import Places, spectrum_of
+from mbma_tables.theories.leakage_table import KEPT, fill_flow, flow_of_spectrum, self_affine, shipped_flow
+from mbma_tables.theories.mbma import Mbma
+from mbma_tables.theories.protocol import Theory
+from mbma_tables.units import unit_of
+
+if TYPE_CHECKING:
+    from mbma_tables.theories.result import Contact, Source
+
+LARGEST_KNUDSEN = 0.1  # mean free path over the channel, to which slip of first order holds
+SLIP = 6.0  # of a plane channel: flow is 1 + 6 Kn times that without slip
+SIMULATED = 64.0  # zeta_1 up to which flow was simulated
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Leakage:
+    """Flow through the gaps of a contact; arrays of the contact's shape.
+
+    Reynolds' equation on the gaps: no flow where bodies touch, small slopes, isotropic roughness, and a fluid whose
+    pressure does not move the solids. It is the mean of a long seal, many longest waves each way; cells of a few waves
+    differ by `scatter`.
+
+    Attributes
+    ----------
+    k : ndarray
+        Flow conductance over h_rms^3: flow per length of seal is k h_rms^3 (p1 - p2)/(12 viscosity width). Exactly 0
+        where `blocked`.
+    conductance : ndarray
+        k h_rms^3 [length^3].
+    """
+
+    k: Numbers
+    conductance: Numbers
+    _source: Source = dataclasses.field(repr=False)
+    _contact: Contact = dataclasses.field(repr=False)
+    _area: Any = dataclasses.field(repr=False)
+
+    @property
+    def blocked(self) -> Any:
+        """Whether contact percolates, A/A0 at or above about 0.41: what then passes no law of gaps tells."""
+        return self.k == 0
+
+    @functools.cached_property
+    def scatter(self) -> Numbers:
+        """Standard deviation of ln k from simulation to simulation, cells of four or more longest waves a side.
+
+        NaN where not known, and where blocked.
+        """
+        return self._map(lambda theory, s, u, E, area: scatter(theory, area))
+
+    @functools.cached_property
+    def closed_form(self) -> Numbers:
+        """k by a closed form of gap and area alone, good to zeta_1 of 32: a second opinion."""
+        constants = shipped_flow().constants
+        return self._map(lambda theory, s, u, E, area: constants.closed_form(u / np.asarray(s.h_rms), area))
+
+    @functools.cached_property
+    def valid(self) -> Any:
+        """Whether flow through contacts such as these was simulated; `reasons` says why not."""
+
+        def good(theory: Theory, surface: Any, u: FloatArray, E: FloatArray, area: FloatArray) -> FloatArray:
+            against = concerns(theory, surface, area)
+            return np.asarray(~np.logical_or.reduce(list(against.values())), float)
+
+        return self._contact.valid & self._map(good).astype(bool)
+
+    @functools.cached_property
+    def reasons(self) -> dict[str, Any]:
+        """What is against entries, each with its mask; of plain arrays."""
+        source = self._source
+        own = concerns(source.theory_at(source.E_star, source.hardness), source.surface, np.asarray(self._area))
+        return self._contact.reasons | {reason: mask for reason, mask in own.items() if mask.any()}
+
+    def _map(self, function: Callable[..., FloatArray]) -> Numbers:
+        found: Numbers = self._source.map(lambda *given: (function(*given),), self._contact, 1, {"area": self._area})[0]
+        return found
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the quantities that have one."""
+        return {"conductance": unit_of("conductance_of_flow", self._source.units)}
+
+    def liquid(self, viscosity: ArrayLike | str, pressure_drop: ArrayLike | str, width: ArrayLike | str) -> Numbers:
+        """Volume that leaks per time and length of seal [length^2/time].
+
+        Parameters
+        ----------
+        viscosity : array_like or str
+            Dynamic viscosity [stress time], such as "1e-3 Pa s"; a number is in the modulus's unit of stress times
+            the unit of time that the result then has.
+        pressure_drop : array_like or str
+            p1 - p2 [stress], or with its unit, such as "0.3 MPa".
+        width : array_like or str
+            Of the seal, along the flow [length], or with its unit, such as "2 mm".
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            For numbers that are not positive and finite, and units that cannot be converted.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact
+        >>> seal = Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5, unit="um")
+        >>> found = contact(seal, area=0.1, E_star="10 MPa", theory="calibrated").leakage
+        >>> f"{found.liquid('1e-3 Pa s', '0.1 MPa', '2 mm'):.3g} um^2/s"
+        '299 um^2/s'
+        """
+        eta, drop, length = self._positive(viscosity=viscosity, pressure_drop=pressure_drop, width=width)
+        broadcast_shape(k=self.k, viscosity=eta, pressure_drop=drop, width=length)
+        return self.conductance * (drop / (12 * eta * length))
+
+    def gas(
+        self,
+        viscosity: ArrayLike | str,
+        pressure_in: ArrayLike | str,
+        pressure_out: ArrayLike | str,
+        width: ArrayLike | str,
+        mean_free_path: ArrayLike | str,
+    ) -> Numbers:
+        """Volume of an ideal gas at the outlet's pressure that leaks per time and length of seal [length^2/time].
+
+        Isothermal: mass flow goes as p1^2 - p2^2. Slip of the first order adds the share 6 Kn, with Kn the mean free
+        path over k^(1/3) h_rms, the gap of parallel plates that pass as much.
+
+        Parameters
+        ----------
+        viscosity, width : array_like or str
+            As for `liquid`.
+        pressure_in, pressure_out : array_like or str
+            Absolute pressures [stress], pressure_in the larger.
+        mean_free_path : array_like or str
+            At the mean pressure (p1 + p2)/2 [length]: about 68 nm bar over it for air at 20 C. 0 leaves slip out.
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            As for `liquid`, and where Kn is above 0.1, in transition flow; where blocked there is no channel, and no
+            Kn.
+        """
+        eta, high, low, length = self._positive(
+            viscosity=viscosity, pressure_in=pressure_in, pressure_out=pressure_out, width=width
+        )
+        require("pressure_in", high, high >= low, "at least pressure_out: it is the larger, absolute pressure")
+        path = self._number("mean_free_path", mean_free_path)
+        require("mean_free_path", path, path >= 0, "at least 0")
+        channel = np.cbrt(self.conductance)
+        open_ = np.asarray(channel) > 0
+        knudsen = np.where(open_, path / np.where(open_, channel, 1.0), 0.0)
+        limit = f"at most {LARGEST_KNUDSEN} of the channel k^(1/3) h_rms: beyond, flow is not that of slip"
+        require("mean_free_path", np.broadcast_to(path, knudsen.shape), knudsen <= LARGEST_KNUDSEN, limit)
+        broadcast_shape(k=knudsen, viscosity=eta, pressure_in=high, pressure_out=low, width=length)
+        return self.conductance * (1 + SLIP * knudsen) * ((high - low) / low * (high + low) / (24 * eta * length))
+
+    def _positive(self, **given: Any) -> list[FloatArray]:
+        found = []
+        for name, value in given.items():
+            number = self._number(name, value)
+            require(name, number, number > 0, "positive")
+            found.append(number)
+        return found
+
+    def _number(self, name: str, value: Any) -> FloatArray:
+        """A number in the units of surface and modulus."""
+        if isinstance(value, str):
+            kind = "h_rms" if name in ("width", "mean_free_path") else "pressure"
+            if name == "viscosity":
+                plain, found, rest = value.strip().rpartition(" ")
+                if rest != "s" or not found:
+                    raise InputError(f"viscosity = {value!r} must be a stress times seconds, such as '1e-3 Pa s'")
+                value = plain
+            value = self._source.units.number(kind, value)
+        return finite_array(name, value)
+
+
+def leakage_of(source: Source, contact: Contact, area: Any) -> Leakage:
+    """The leakage of a contact."""
+
+    def answer(
+        theory: Theory, surface: Any, u: FloatArray, E: FloatArray, share: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        k = flow(theory.elastic, surface, u, share)
+        return k, k * np.asarray(surface.h_rms) ** 3
+
+    k, conductance = source.map(answer, contact, 2, {"area": area})
+    return Leakage(k, conductance, source, contact, area)
+
+
+def flow(theory: Theory, surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatArray:
+    """k of a theory's mean separations u [length] and A/A0; 0 where blocked."""
+    shape = np.broadcast_shapes(np.shape(mean_separation), np.shape(area), surface.shape)
+    contact = np.ascontiguousarray(np.broadcast_to(area, shape), float).ravel()
+    gap = np.broadcast_to(np.asarray(mean_separation) / np.asarray(surface.h_rms), shape)
+    u = np.ascontiguousarray(gap, float).ravel()
+    if isinstance(surface, MeasuredSurface):
+        return flow_of_spectrum(_spectrum(surface), u, contact).reshape(shape)
+    table, places = shipped_flow(), Places(surface, np.zeros(shape))
+    out = np.empty(u.size)
+    inside = table.covers(places.rows[:, 0], places.rows[:, 1])
+    rows = places.rows.copy()
+    # what the table does not cover is answered below
+    rows[~inside] = rows[inside][:1] if inside.any() else table.covered.mean()
+    fill_flow(table.coefficients, table.numbers, rows, places.owner, u, contact, out)
+    for row, mine in places.outside(~inside[places.owner]):
+        out[mine] = flow_of_spectrum(self_affine(*map(float, places.rows[row, :2])), u[mine], contact[mine])
+    return out.reshape(shape)
+
+
+@functools.lru_cache(KEPT)
+def _spectrum(surface: MeasuredSurface) -> Spectrum:
+    """A surface's own spectrum, as one object for one surface."""
+    return spectrum_of(surface)
+
+
+def concerns(theory: Theory, surface: Any, area: FloatArray) -> dict[str, Any]:
+    """Reasons against the flow, beside those against the contact."""
+    large = np.broadcast_to(np.asarray(surface.zeta_1) > SIMULATED, np.shape(area))
+    found = {
+        f"leakage: A/A0 is above {LARGEST_AREA:g}, where cells of one spectrum differ by factors": area > LARGEST_AREA,
+        f"leakage: zeta_1 is above {SIMULATED:g}, beyond simulated flow": large,
+    }
+    if theory.elastic is not theory:
+        found["leakage: yielded contacts were not simulated"] = np.ones(np.shape(area), bool)
+    if isinstance(theory.elastic, Mbma):
+        found["leakage: the mean separation of 'mbma' is off by factors"] = np.ones(np.shape(area), bool)
+    return found
+
+
+def scatter(theory: Theory, area: FloatArray) -> FloatArray:
+    """Standard deviation of ln k at contact fractions."""
+    return shipped_flow().standard_deviation(theory.elastic.name, area)
