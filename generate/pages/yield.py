@@ -101,17 +101,9 @@ def metals() -> str:
         modulus = float(materials.effective_modulus(metal.E, metal.nu, metal.E, metal.nu))
         psi = [modulus * GRADIENT / hardness for hardness in metal.hardness]
         limit = [1.1 * hardness / modulus for hardness in metal.hardness]
-        low, high = metal.conductivity
-        rows.append(
-            [
-                f"`{name}`",
-                f"{metal.E:g}",
-                f"{metal.hardness[0]:g} to {metal.hardness[1]:g}",
-                f"{low:g}" + (f" to {high:g}" if high > low else ""),
-                f"{psi[1]:.1f} to {psi[0]:.1f}",
-                f"{limit[0]:.3f} to {limit[1]:.3f}",
-            ]
-        )
+        spans = (metal.hardness, "g"), (metal.conductivity, "g"), (psi[::-1], ".1f"), (limit, ".3f")
+        cells = (" to ".join(dict.fromkeys(format(number, form) for number in span)) for span, form in spans)
+        rows.append([f"`{name}`", f"{metal.E:g}", *cells])
     header = ["metal", "E [GPa]", "hardness [GPa]", "conductivity [W/(m K)]", f"psi at gradient {GRADIENT:g}"]
     return table([*header, "elastic up to gradient"], rows)
 

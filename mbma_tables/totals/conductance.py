@@ -70,8 +70,11 @@ def cooper_mikic_yovanovich(
 ) -> Numbers:
     """Conductance of plastic contacts, h = 1.25 k_s (m/sigma) (p/H)^0.95; E* does not matter.
 
-    M. G. Cooper, B. B. Mikic, M. M. Yovanovich, Int. J. Heat Mass Transfer 12 (1969) 279-300, in the power law that
-    Yovanovich gave later. m is the mean absolute slope of a Gaussian profile, sqrt(2 m2/pi), sigma is h_rms.
+    Model of M. G. Cooper, B. B. Mikic, M. M. Yovanovich, Int. J. Heat Mass Transfer 12 (1969) 279-300, in the power law
+    of M. M. Yovanovich, "Thermal contact correlations" (1982); the first paper's own is taken to be 1.45 (p/H)^0.985.
+    Both were found in public programs only, neither paper was consulted. This one is within 1.6% of the model for p/H
+    of 1e-6 to 0.023, the other up to 28% below it. m is the mean absolute slope of a Gaussian profile, sqrt(2 m2/pi),
+    sigma is h_rms.
 
     Examples
     --------
@@ -89,7 +92,9 @@ def mikic(
 ) -> Numbers:
     """Conductance of elastic contacts, h = 1.55 k_s (m/sigma) (sqrt(2) p/(m E*))^0.94; hardness does not matter.
 
-    B. B. Mikic, Int. J. Heat Mass Transfer 17 (1974) 205-214.
+    Model of B. B. Mikic, Int. J. Heat Mass Transfer 17 (1974) 205-214. The paper was not consulted: of two public
+    programs one has 1.55, one 1.54, both the power 0.94. This is within 4.3% of the model for sqrt(2) p/(m E*) of 1e-6
+    to 0.023.
 
     Examples
     --------

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from mbma_tables import InputError, OutOfRangeError
-from mbma_tables.totals.conductance import conductance, mean_conductivity
+from mbma_tables import InputError, OutOfRangeError, Surface
+from mbma_tables.totals.conductance import conductance, cooper_mikic_yovanovich, mean_conductivity, mikic
 
 
 def test_mean_conductivity_is_harmonic():
@@ -46,3 +46,21 @@ def test_conductivities_that_do_not_broadcast():
         mean_conductivity([1.0, 2.0], [1.0, 2.0, 3.0])
     with pytest.raises(InputError, match="broadcast"):
         conductance([1.0, 2.0], [1.0, 2.0, 3.0], 1.0)
+
+
+def test_correlations_follow_the_models_they_were_fitted_to():
+    # Gaussian heights cut at a multiple of sigma: spots of the truncated area, elastic ones of half of it
+    cut = np.linspace(2, 4.75, 200)
+    area = np.array([math.erfc(c / math.sqrt(2)) / 2 for c in cut])
+    spots = np.exp(-(cut**2) / 2) / (2 * math.sqrt(2 * math.pi))
+    joint = Surface(hurst=0.8, q0=6e3, q1=6e5, h_rms=1e-6, h_max=3.5e-6)
+    slope = math.sqrt(2 * joint.m2 / math.pi)
+    plastic = slope / joint.h_rms * spots / (1 - np.sqrt(area)) ** 1.5
+    found = cooper_mikic_yovanovich(joint, area * 1e9, 1.0, 1e11, 1e9)
+    np.testing.assert_allclose(found, plastic, rtol=0.016)
+    # the older power law leaves the model at small pressures
+    assert (1.45 * area**0.985 * slope / joint.h_rms / plastic).min() == pytest.approx(0.72, abs=0.005)
+    cut, area, spots = cut[area > 2e-6], area[area > 2e-6], spots[area > 2e-6]
+    elastic = slope / joint.h_rms * spots / math.sqrt(2) / (1 - np.sqrt(area / 2)) ** 1.5
+    found = mikic(joint, area / 2 * slope * 1e11 / math.sqrt(2), 1.0, 1e11)
+    np.testing.assert_allclose(found, elastic, rtol=0.043)
