@@ -21,7 +21,7 @@ from tqdm import tqdm
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, campaign
 from generate.boundary_elements.solve import LOADS, Contact
 from generate.boundary_elements.surfaces import Recipe, heights
-from generate.pages.timing import fixed_work
+from generate.timing import fixed_work
 from mbma_tables.bearing import bearing
 from mbma_tables.files import write_file
 

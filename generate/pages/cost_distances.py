@@ -15,7 +15,7 @@ from generate.boundary_elements.grids import GRIDS, STARTS
 from generate.boundary_elements.surfaces import Recipe, heights
 from generate.pages.distances import COVER, DATA, HIGH, HUES, LOW, THEORIES, TIERS, distances, held_out, summed_up
 from generate.pages.page import png, pyplot, table
-from generate.pages.timing import measure
+from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import Law, Spectrum, area

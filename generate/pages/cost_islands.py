@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from generate.pages.timing import measure, variant
+from generate.timing import measure, variant
 from generate.tables.chunks import log_ratio
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError

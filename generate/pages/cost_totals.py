@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from generate.pages.timing import GAPS, held_out_surfaces, measure, measured_gaps, variant
+from generate.timing import GAPS, held_out_surfaces, measure, measured_gaps, variant
 from generate.tables.chunks import log_ratio
 from mbma_tables import Scene, Surface, contact, contact_law, theories
 from mbma_tables.arguments import FloatArray
