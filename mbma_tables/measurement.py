@@ -184,7 +184,7 @@ def _spectrum(axes: Axes, surface: MeasuredSurface, unit: str) -> None:
 
 
 def _distribution(axes: Axes, surface: MeasuredSurface, unit: str) -> None:
-    from mbma_tables.surfaces.measured import SHARES
+    from mbma_tables.surfaces.heights import SHARES
 
     # density of heights from their quantiles, smoothed over a few
     heights, h_rms = np.asarray(surface.heights.quantiles), float(surface.h_rms)

@@ -13,7 +13,8 @@ from collections.abc import Iterable, Sequence
 from importlib import metadata
 from typing import Any
 
-from generate.pages import cost_distances, timing
+from generate import timing
+from generate.pages import cost_distances
 from generate.pages.cost_islands import island_rows
 from generate.pages.cost_totals import total_rows
 from generate.pages.page import png, table

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from generate.timing import measure, variant
 from generate.tables.chunks import log_ratio
+from generate.timing import measure, variant
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError
 from mbma_tables.islands import greenwood_tripp

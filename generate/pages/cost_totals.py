@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from generate.timing import GAPS, held_out_surfaces, measure, measured_gaps, variant
 from generate.tables.chunks import log_ratio
+from generate.timing import GAPS, held_out_surfaces, measure, measured_gaps, variant
 from mbma_tables import Scene, Surface, contact, contact_law, theories
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp

@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 from mbma_tables import bearing
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError, NotSelfAffineError
-from mbma_tables.surfaces.measured import Heights, MeasuredSurface
+from mbma_tables.surfaces.heights import Heights
+from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.surfaces.measurements import grid_of, read_measurement
 from mbma_tables.surfaces.power_law import SCATTER, log_bins
 from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.psd import FittedSurface, check_band, check_height, fit_spectrum
-from mbma_tables.surfaces.treatment import LENGTHS, Treated, Treatment, grid_of, read_measurement, treat
+from mbma_tables.surfaces.treatment import LENGTHS, Treated, Treatment, treat
 from mbma_tables.units import Units, known, resolve
 
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring

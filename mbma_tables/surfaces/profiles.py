@@ -16,7 +16,8 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import NotSelfAffineError
-from mbma_tables.surfaces.measured import Heights, MeasuredSurface, one_height
+from mbma_tables.surfaces.heights import Heights, one_height
+from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 
 PER_DECADE = 10  # nodes of the spectrum

@@ -298,7 +298,8 @@ class Surface(AnySurface):
         >>> print(f"h_rms = {surface.h_rms:.4f}, rms gradient {surface.rms_gradient:.3f}, alpha = {surface.alpha:.1f}")
         h_rms = 0.0669, rms gradient 0.394, alpha = 106.5
         """
-        from mbma_tables.surfaces.measured import Heights, MeasuredSurface
+        from mbma_tables.surfaces.heights import Heights
+        from mbma_tables.surfaces.measured import MeasuredSurface
 
         _check_model(model, band)
         if model == "self-affine":

@@ -1,4 +1,4 @@
-"""Measured maps and line scans, read and treated by SurfaceTopography (the extra `maps`), each step on record.
+"""Measured maps and line scans, treated by SurfaceTopography (the extra `maps`), each step on record.
 
 Terms are that library's: detrend modes, windows, harmonic filling of undefined data, short and long cut-off, tip
 radius. Only the search for outliers is added here.
@@ -7,19 +7,16 @@ radius. Only the search for outliers is added here.
 from __future__ import annotations
 
 import dataclasses
-import io
 import math
-import os
-import pathlib
 import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, finite_array, number_in, require
-from mbma_tables.errors import InputError, MbmaError, NotSelfAffineError
-from mbma_tables.files import read_file
+from mbma_tables.arguments import FloatArray, number_in
+from mbma_tables.errors import InputError, NotSelfAffineError
+from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH, heights_of, wrapped
 
 DEGREES = {"mean": 0, "plane": 1, "quadratic": 2, "height": 1, "curvature": 2}  # of least-squares polynomials
 DETRENDS = ("mean", "plane", "quadratic", "median", "height", "mad-tilt", "slope", "curvature", "mad-curvature")
@@ -28,8 +25,6 @@ MIN_GRID = 32  # points along each side: 16 wavenumbers, of which a window spoil
 FREE_HOLES = 0.05  # share of undefined points that is filled unasked
 MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
 USUAL, USUAL_DEVIATES = 0.99, 2.576  # share of points that set the scale of differences, and where it ends if Gaussian
-MAX_TEXT_BYTES = 256 * 2**20
-MIN_LENGTH, MAX_LENGTH = 1e-30, 1e30  # in any unit: fourth powers of them, which C has, keep their digits
 LENGTHS = ("short_cutoff", "long_cutoff", "tip_radius")  # options that are lengths
 Provenance = tuple[Mapping[str, Any], ...]
 
@@ -120,170 +115,6 @@ class Treated:
         window = windows[0] if len(windows) == 1 else np.outer(*windows)
         values = self.heights - np.average(self.heights, weights=window)
         return np.asarray(values * (window / math.sqrt(np.mean(window**2))))
-
-
-def library() -> Any:
-    """SurfaceTopography, without its remarks on its own optional parts."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            import SurfaceTopography
-        except ImportError:
-            raise MbmaError("measured maps need SurfaceTopography: pip install 'mbma_tables[maps]'") from None
-    return SurfaceTopography
-
-
-def read_measurement(
-    path: str | os.PathLike[str],
-    dx: float | None = None,
-    dy: float | None = None,
-    unit: str | None = None,
-    channel: int | None = None,
-) -> Any:
-    """The topography or line scan in a file: any format of SurfaceTopography, and text with commas.
-
-    Parameters
-    ----------
-    path : path
-    dx, dy : float, optional
-        Sampling steps [length], where the file has none.
-    unit : str, optional
-        Length unit, where the file has none.
-    channel : int, optional
-        Number of the channel; the file's own default if not given.
-
-    Raises
-    ------
-    MbmaError
-        Where SurfaceTopography is not installed.
-    InputError
-        Where there is no such file, that library cannot read it, or steps are missing or given twice.
-    """
-    module, place = library(), pathlib.Path(path)
-    if not place.is_file():
-        raise InputError(f"there is no file {os.fspath(path)!r}")
-    with warnings.catch_warnings():
-        # its readers complain of what they go around
-        warnings.simplefilter("ignore")
-        try:
-            # opened here: its readers leave open what they cannot read
-            with open(place, "rb") as stream, module.open_topography(stream) as reader:
-                return _channel_of(reader, place, dx, dy, unit, channel)
-        except MbmaError:
-            raise
-        # its readers raise whatever their parsers raise
-        except Exception as fault:
-            reason = str(fault).strip().splitlines() or [type(fault).__name__]
-            if place.suffix.lower() == ".csv":
-                with module.open_topography(io.BytesIO(_without_commas(place))) as reader:
-                    return _channel_of(reader, place, dx, dy, unit, channel)
-            raise InputError(
-                f"SurfaceTopography cannot read {os.fspath(path)!r} as a map: {type(fault).__name__}: {reason[0]}"
-            ) from None
-
-
-def _without_commas(path: pathlib.Path) -> bytes:
-    """A matrix of numbers with commas or semicolons as that library's plain text."""
-    try:
-        lines = read_file(path, MAX_TEXT_BYTES).decode("utf-8-sig").replace(";", ",").splitlines()
-        numbers = np.loadtxt(lines, delimiter=",", ndmin=2)
-    except ValueError as fault:
-        raise InputError(f"{path.name} must hold numbers with commas between them: {fault}") from None
-    content = io.BytesIO()
-    np.savetxt(content, numbers)
-    content.seek(0)
-    return content.getvalue()
-
-
-def _channel_of(
-    reader: Any, path: pathlib.Path, dx: float | None, dy: float | None, unit: str | None, channel: int | None
-) -> Any:
-    channels = reader.channels
-    if channel is not None and not 0 <= channel < len(channels):
-        raise InputError(f"{path.name} has channels 0 to {len(channels) - 1}, not {channel}")
-    chosen = reader.default_channel if channel is None else channels[channel]
-    given: dict[str, Any] = {} if channel is None else {"channel_index": channel}
-    if chosen.physical_sizes is None:
-        if dx is None:
-            raise InputError(f"{path.name} has no lengths: give the sampling step dx")
-        steps = (dx, dx if dy is None else dy)
-        given["physical_sizes"] = tuple(
-            count * number_in("dx, dy", step, MIN_LENGTH, MAX_LENGTH)
-            for count, step in zip(chosen.nb_grid_pts, steps, strict=False)
-        )
-    elif dx is not None or dy is not None:
-        raise InputError(f"{path.name} has its own lengths: leave dx and dy out")
-    if unit is not None and chosen.unit is None:
-        given["unit"] = unit
-    return reader.topography(**given)
-
-
-def grid_of(
-    source: Any, dx: Any, dy: Any, periodic: bool | None, dimensions: int = 2
-) -> tuple[Any, tuple[float, ...], bool, str | None, Mapping[str, Any]]:
-    """Heights, sampling steps, periodicity, unit and the file's remarks, from an array or a topography."""
-    if not callable(getattr(source, "heights", None)):
-        if dx is None:
-            raise InputError("dx is missing: the sampling step of a plain array of heights")
-        given = {"dx": dx, "dy": dx if dy is None else dy} if dimensions == 2 else {"dx": dx}
-        steps = []
-        for name, value in given.items():
-            step = finite_array(name, value)
-            if step.shape != ():
-                raise InputError(f"{name} must be one number, got shape {step.shape}")
-            require(name, step, (step >= MIN_LENGTH) & (step <= MAX_LENGTH), "in [1e-30, 1e30]")
-            steps.append(float(step))
-        return source, tuple(steps), bool(periodic), None, {}
-    if dx is not None or dy is not None:
-        raise InputError("dx and dy belong to a plain array; a topography has its own physical_sizes")
-    if not getattr(source, "is_uniform", True):
-        # its points are nearly as dense where they are not even
-        source = source.to_uniform(nb_points=source.nb_grid_pts[0])
-    grid = source.heights()
-    sizes = getattr(source, "physical_sizes", None)
-    if np.ndim(grid) != dimensions or sizes is None or np.shape(sizes) != (dimensions,):
-        other = "Surface.from_profile takes line scans" if dimensions == 2 else "Surface.from_map takes maps"
-        raise InputError(
-            f"a topography must have heights along {dimensions} axes and as many physical_sizes, got shape "
-            f"{np.shape(grid)} and {sizes}; {other}"
-        )
-    extent = finite_array("physical_sizes", sizes)
-    require("physical_sizes", extent, (extent >= MIN_LENGTH) & (extent <= MAX_LENGTH), "in [1e-30, 1e30]")
-    if periodic is None:
-        periodic = getattr(source, "is_periodic", False)
-    found = tuple(float(size) / max(count, 1) for size, count in zip(extent, np.shape(grid), strict=True))
-    return grid, found, bool(periodic), getattr(source, "unit", None), dict(getattr(source, "info", None) or {})
-
-
-def heights_of(grid: Any, dimensions: int = 2) -> Any:
-    """Heights as a masked array of floats, NaN being undefined; refused where they are infinite or no numbers."""
-    try:
-        values = np.ma.asanyarray(grid)
-    except (TypeError, ValueError) as fault:
-        raise InputError(f"heights must be an array of numbers: {fault}") from None
-    if values.ndim != dimensions:
-        raise InputError(f"heights must be {('one', 'two')[dimensions - 1]}-dimensional, got shape {values.shape}")
-    if values.dtype.kind not in "fiu":
-        raise InputError(f"heights must be real numbers: entries of type {values.dtype}")
-    if values.size == 0:
-        raise InputError("heights is empty: at least one number is needed")
-    numbers = np.ma.getdata(values).astype(float)
-    holes = np.ma.getmaskarray(values) | np.isnan(numbers)
-    if holes.all():
-        raise InputError("every height is undefined")
-    known = finite_array("heights", numbers[~holes])
-    require("heights", known, np.abs(known) <= MAX_LENGTH, "at most 1e30 in magnitude")
-    return np.ma.masked_array(numbers, holes)
-
-
-def wrapped(heights: Any, steps: tuple[float, ...], periodic: bool, unit: str | None = None, **info: Any) -> Any:
-    """A plain array of heights as a topography or line scan; masked points are undefined."""
-    module = library()
-    values = heights if np.ma.getmaskarray(heights).any() else np.ma.getdata(heights)
-    sizes = tuple(count * step for count, step in zip(values.shape, steps, strict=True))
-    if values.ndim == 1:
-        return module.UniformLineScan(values, sizes[0], periodic=periodic, unit=unit, info=info)
-    return module.Topography(values, sizes, periodic=periodic, unit=unit, info=info)
 
 
 def treat(

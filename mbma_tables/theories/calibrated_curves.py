@@ -28,7 +28,8 @@ from mbma_tables.calibrated import (
 )
 from mbma_tables.calibrated_map import LOG_FORCE, MapLaw, convex
 from mbma_tables.hardness import BearingCurve
-from mbma_tables.surfaces.measured import SHARES, MeasuredSurface
+from mbma_tables.surfaces.heights import SHARES
+from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import calibrated_table
 

@@ -16,10 +16,9 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload_method
+from numba.extending import intrinsic
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import CONTRACT, njit
@@ -251,6 +250,8 @@ def _towards(which: int, address: int, gap: float, wanted: float) -> float:
 @njit(cache=True, error_model="numpy")
 def solve(which: int, address: int, wanted: float, low: float, high: float) -> float:
     """Gap between `low` and `high` at which force or area, falling there, has a value."""
+    if not wanted > 0.0:
+        return high
     gap, before, least = 0.5 * (low + high), math.inf, EPSILON * number(address, H_MAX)
     for _ in range(STEPS):
         if evaluate(which, address, gap) > wanted:
@@ -353,43 +354,3 @@ def fill_inverse(
     if which == FORCE:
         return _fill_inverse(FORCE, address, inverse, wanted, out, area, stiffness)
     return _fill_inverse(AREA, address, inverse, wanted, out, area, stiffness)
-
-
-class CompiledLaw(NamedTuple):
-    """A law for functions that numba compiles: pass it as an argument, and ask it as below. NaN outside the law."""
-
-    block: FloatArray
-
-    def force(self, d: float) -> float:
-        """F/A0 at a separation d."""
-        return evaluate(FORCE, self.block.ctypes.data, d)
-
-    def area(self, d: float) -> float:
-        """A/A0."""
-        return evaluate(AREA, self.block.ctypes.data, d)
-
-    def stiffness(self, d: float) -> float:
-        """-dF/dd."""
-        return evaluate(STIFFNESS, self.block.ctypes.data, d)
-
-    def area_slope(self, d: float) -> float:
-        """-d(A/A0)/dd."""
-        return evaluate(AREA_SLOPE, self.block.ctypes.data, d)
-
-    def energy(self, d: float) -> float:
-        """Integral of force from d to last contact."""
-        return evaluate(ENERGY, self.block.ctypes.data, d)
-
-
-def _offer(name: str, what: int) -> None:
-    """A method of `CompiledLaw` in compiled code."""
-
-    @overload_method(types.NamedUniTuple, name)
-    def offered(law, d):  # type: ignore[no-untyped-def]
-        if getattr(law, "instance_class", None) is not CompiledLaw:
-            return None
-        return lambda law, d: evaluate(what, np.int64(law.block.ctypes.data), d)  # type: ignore[arg-type]
-
-
-for _what, _name in enumerate(("force", "area", "stiffness", "area_slope", "energy")):
-    _offer(_name, _what)

@@ -17,7 +17,8 @@ from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled
 from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import InputError
 from mbma_tables.theories import law_kernel as kernel
-from mbma_tables.theories.law_kernel import AREA, FORCE, CompiledLaw, force_at
+from mbma_tables.theories.law_compiled import CompiledLaw
+from mbma_tables.theories.law_kernel import AREA, FORCE, force_at
 from mbma_tables.units import UNKNOWN, Units
 
 BLOCK = 1 << 16  # gaps between two looks for Ctrl-C

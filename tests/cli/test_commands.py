@@ -508,7 +508,7 @@ def test_a_terminal_without_the_units_letters(folder):
     found = subprocess.run(command, capture_output=True, check=False, env=environment)
     assert (found.returncode, found.stderr) == (0, b"")
     assert "surface of café�.toml" in found.stdout.decode("utf-8")
-    assert "h_max 1.1 µm" in found.stdout.decode("utf-8")
+    assert "h_max 1.1 um" in found.stdout.decode("utf-8")
 
 
 @pytest.mark.parametrize("command", ["", "contact", "curve", "island", "surfaces"])

@@ -8,7 +8,8 @@ import itertools
 import numpy as np
 import pytest
 
-from generate.pages import cost, cost_distances, cost_islands, cost_totals, distances, page, timing
+from generate import timing
+from generate.pages import cost, cost_distances, cost_islands, cost_totals, distances, page
 from mbma_tables import contact
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.classical import ring_matrix

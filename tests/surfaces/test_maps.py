@@ -18,7 +18,7 @@ from scipy.integrate import quad
 from mbma_tables import Surface
 from mbma_tables.errors import InputError, MbmaError, NotSelfAffineError, OutOfRangeError
 from mbma_tables.surfaces.maps import radial_spectrum
-from mbma_tables.surfaces.treatment import read_measurement
+from mbma_tables.surfaces.measurements import read_measurement
 
 from_map = functools.partial(Surface.from_map, model="self-affine")
 

@@ -8,7 +8,8 @@ import pytest
 
 from mbma_tables import Surface
 from mbma_tables.errors import InputError, NotSelfAffineError
-from mbma_tables.surfaces.treatment import Treatment, read_measurement, treat
+from mbma_tables.surfaces.measurements import read_measurement
+from mbma_tables.surfaces.treatment import Treatment, treat
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

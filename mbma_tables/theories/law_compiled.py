@@ -1,0 +1,95 @@
+"""A contact law as an argument of functions that numba compiles."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from numba import types
+from numba.core import cgutils
+from numba.extending import (
+    NativeValue,
+    make_attribute_wrapper,
+    models,
+    overload_method,
+    register_model,
+    typeof_impl,
+    unbox,
+)
+
+from mbma_tables.arguments import FloatArray
+from mbma_tables.theories.law_kernel import AREA, AREA_SLOPE, ENERGY, FORCE, STIFFNESS, evaluate
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class CompiledLaw:
+    """A law for functions that numba compiles: pass it as an argument, and ask it as below. NaN outside the law."""
+
+    block: FloatArray
+
+    def force(self, d: float) -> float:
+        """F/A0 at a separation d."""
+        return evaluate(FORCE, self.block.ctypes.data, d)
+
+    def area(self, d: float) -> float:
+        """A/A0."""
+        return evaluate(AREA, self.block.ctypes.data, d)
+
+    def stiffness(self, d: float) -> float:
+        """-dF/dd."""
+        return evaluate(STIFFNESS, self.block.ctypes.data, d)
+
+    def area_slope(self, d: float) -> float:
+        """-d(A/A0)/dd."""
+        return evaluate(AREA_SLOPE, self.block.ctypes.data, d)
+
+    def energy(self, d: float) -> float:
+        """Integral of force from d to last contact."""
+        return evaluate(ENERGY, self.block.ctypes.data, d)
+
+
+class _LawType(types.Type):
+    """Type of `CompiledLaw` in compiled code: its own, as methods of a named tuple would hide fields of all others."""
+
+    def __init__(self) -> None:
+        super().__init__(name="CompiledLaw")
+
+
+_LAW, _BLOCK = _LawType(), types.Array(types.float64, 1, "C")
+
+
+@typeof_impl.register(CompiledLaw)
+def _typeof(law: Any, context: Any) -> Any:
+    return _LAW
+
+
+@register_model(_LawType)
+class _LawModel(models.StructModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, [("block", _BLOCK)])  # type: ignore[no-untyped-call]
+
+
+make_attribute_wrapper(_LawType, "block", "block")
+
+
+@unbox(_LawType)
+def _unbox(kind: Any, law: Any, context: Any) -> Any:
+    block = context.pyapi.object_getattr_string(law, "block")
+    native = context.unbox(_BLOCK, block)
+    context.pyapi.decref(block)
+    proxy = cgutils.create_struct_proxy(kind)(context.context, context.builder)
+    proxy.block = native.value
+    return NativeValue(proxy._getvalue(), is_error=native.is_error, cleanup=native.cleanup)
+
+
+def _offer(name: str, what: int) -> None:
+    """A method of `CompiledLaw` in compiled code."""
+
+    @overload_method(_LawType, name)
+    def offered(law, d):  # type: ignore[no-untyped-def]
+        return lambda law, d: evaluate(what, np.int64(law.block.ctypes.data), d)  # type: ignore[arg-type]
+
+
+for _what, _name in enumerate(("force", "area", "stiffness", "area_slope", "energy")):
+    _offer(_name, _what)
