@@ -45,9 +45,9 @@ class MapConstants:
 
     Attributes
     ----------
-    breadth, breadth_onset : float
-        c = 0.8 max(1, b/breadth_onset)^breadth for an isotropic map, once contacts have merged, b the root mean square
-        over the geometric mean wavenumber.
+    breadth, breadth_onset, curvature : float
+        c = 0.8 max(1, b (alpha/2)^(curvature/2)/breadth_onset)^breadth for an isotropic map, once contacts have merged,
+        b the root mean square over the geometric mean wavenumber, alpha = m0 m4/m2^2.
     gaussian_area, valley_area : float
         Contact where the deviation of a Gaussian surface from M(c A), and then the valleys, take over.
     tension_area : float
@@ -58,13 +58,14 @@ class MapConstants:
         Further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces.
     """
 
-    breadth: float = 0.6264
-    breadth_onset: float = 1.396
-    gaussian_area: float = 0.2829
-    valley_area: float = 0.6562
+    breadth: float = 0.5887
+    breadth_onset: float = 1.5
+    gaussian_area: float = 0.2958
+    valley_area: float = 0.6583
     tension_area: float = 0.6
-    merging_area: float = 0.008362
+    merging_area: float = 0.00768
     elliptic: float = 0.813
+    curvature: float = 0.09473
 
 
 MAP_CONSTANTS = MapConstants()
@@ -154,6 +155,7 @@ class MapLaw:
         breadth = self.spectrum.gradient / np.exp(np.sum(self.spectrum.variance * np.log(self.spectrum.x)))
         # stretching an isotropic map by r multiplies it by sqrt(2 (1 + r^2))/(1 + r)
         breadth *= (1 + r) / np.sqrt(2 * (1 + r * r))
+        breadth *= (self.spectrum.alpha / 2) ** (m.curvature / 2)
         return float(0.8 * max(1.0, breadth / m.breadth_onset) ** m.breadth * self._ellipse[1])
 
     @functools.cached_property
