@@ -21,6 +21,7 @@ Mueser, PRL 108 (2012) 244301 take n = 1/(1 - Ac) dimensions so that k vanishes 
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
@@ -117,7 +118,7 @@ def gaps(spectrum: Spectrum, force: ArrayLike, constants: Constants = CONSTANTS)
         cover = area(np.minimum(load / np.sqrt(below), 1e8), spectrum.alpha, constants)
     above = np.append(np.cumsum(variance[::-1])[::-1], 0.0)
     spread = np.sqrt(above[:-1])
-    mean = np.append(_mean_gaps(spectrum, constants, load / cover[:, :-1], below, slope, wave, spread), 0 * load, 1)
+    mean = np.append(_mean_gaps(spectrum, constants, load / cover[:, :-1], below, variance, wave, spread), 0 * load, 1)
     share = cover[:, :-1] - cover[:, 1:]
     volume = mean * cover
     left = np.maximum(volume[:, :-1] - volume[:, 1:], 0)
@@ -136,24 +137,24 @@ def _mean_gaps(
     constants: Constants,
     load: FloatArray,
     below: FloatArray,
-    slope: FloatArray,
+    variance: FloatArray,
     wave: FloatArray,
     spread: FloatArray,
 ) -> FloatArray:
     """Mean gap under each load where only the waves from a band on are rough."""
     found = np.zeros(load.shape)
-    for first in range(slope.size):
+    middle = (below[:-1] + below[1:]) / 2
+    for first in range(variance.size):
         # as a spectrum of its own, whose lengths are over `spread` and loads over its gradient
         share = 1 - below[first]
         part = Spectrum(
-            np.ones(slope.size - first),
-            wave[first:],
-            (np.cumsum(slope[first:]) - slope[first:] / 2) / share,
-            1.0,
-            1.0,
+            wave[first:] / variance[first:],
+            variance[first:] / spread[first] ** 2,
+            (middle[first:] - below[first]) / share,
+            math.sqrt(share) * spectrum.gradient / spread[first],
+            spectrum.alpha,
         )
-        scaled = dataclasses.replace(part, variance=wave[first:] / (spread[first] * np.sqrt(share) * spectrum.gradient))
-        found[:, first] = Law(scaled, None, constants).separation(load[:, first] / np.sqrt(share)) * spread[first]
+        found[:, first] = Law(part, None, constants).separation(load[:, first] / math.sqrt(share)) * spread[first]
     return found
 
 

@@ -173,6 +173,9 @@ def _contact(
     places: dict[str, Any] = {}
     if by != "separation" or not isinstance(theory, Mbma):
         value, E_star, places = _places(surface, value, E_star, hardness, by, theory)
+    held = {"pressure": "force", "area": "area"}.get(by)
+    if derivatives and held:
+        require(by, value, np.asarray(value) > 0, "positive where derivatives are asked for: a gap has no slope there")
     if isinstance(theory, Mbma):
         wanted = QUANTITIES if derivatives else quantities
         totals = theory.totals(surface, places.get("separation", value), E_star, derivatives, wanted)
@@ -188,8 +191,7 @@ def _contact(
             force_by, area_by = differentiate(theory, surface, u)
             fields |= {"force_by": {name: (E_star * slope)[()] for name, slope in force_by.items()}}
             fields |= {"area_by": {name: slope[()] for name, slope in area_by.items()}}
-    if derivatives and by in ("pressure", "area"):
-        held = "force" if by == "pressure" else "area"
+    if derivatives and held:
         slopes = {"force": fields["force_by"], "area": fields["area_by"]}
         fields |= _at_fixed(held, by, slopes, fields["force"] / E_star)
     for name in QUANTITIES:

@@ -86,6 +86,13 @@ def test_derivatives_at_a_held_quantity(held, theory):
     assert getattr(found, "force_by" if held == "pressure" else "area_by") is None
 
 
+@pytest.mark.parametrize("theory", ["mbma", "calibrated"])
+def test_derivatives_at_first_contact_are_refused(theory):
+    with pytest.raises(OutOfRangeError, match="must be positive where derivatives are asked for") as caught:
+        contact(SURFACE, pressure=[0.0, 0.001], theory=theory, derivatives=True)
+    assert caught.value.mask.tolist() == [True, False]
+
+
 @pytest.mark.parametrize("theory", [name for name in THEORIES if name != "mbma"])
 def test_derivatives_keep_the_scales_of_an_elastic_contact(theory):
     # all heights times c, or all wavenumbers: force times c and the same area

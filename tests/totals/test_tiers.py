@@ -179,9 +179,9 @@ def test_memory_is_that_of_the_batch():
 import json, resource, tracemalloc
 import numpy as np
 from mbma_tables import Surface, contact
-surface = Surface(0.8, 0.2, 40.0, 1.0, 3.0)
 gaps = np.linspace(2.5, 3.0, 200_000)
-contact(surface, gaps[:10])
+surface = Surface(0.8, 0.2, 40.0, np.linspace(0.9, 1.1, gaps.size), 3.0)
+contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), gaps[:10])
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 tracemalloc.start()
 found = contact(surface, gaps)
