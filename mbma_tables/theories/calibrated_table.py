@@ -33,6 +33,14 @@ MAX_LOG_SEPARATION = 690.0  # -ln u at which full contact is taken as reached
 _FAST = {"contract", "reassoc"}
 
 
+def covers(covered: FloatArray, hurst: FloatArray, log_zeta_1: FloatArray) -> Any:
+    """Which surfaces lie between the first and last H and ln zeta_1 in the first rows of `covered`."""
+    inside = True
+    for (low, high), x in zip(covered[:2], (hurst, log_zeta_1), strict=True):
+        inside = inside & (x >= low) & (x <= high)
+    return inside
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Table:
     """The shipped table in memory.
@@ -66,11 +74,7 @@ class Table:
 
     def covers(self, hurst: FloatArray, log_zeta_1: FloatArray) -> Any:
         """Which surfaces lie inside the table."""
-        inside = True
-        for axis, x in enumerate((hurst, log_zeta_1)):
-            low, high = self.covered[axis]
-            inside = inside & (x >= low) & (x <= high)
-        return inside
+        return covers(self.covered, hurst, log_zeta_1)
 
     @functools.cached_property
     def numbers(self) -> FloatArray:

@@ -19,7 +19,7 @@ from mbma_tables.calibrated import Spectrum
 from mbma_tables.compiled import njit
 from mbma_tables.leakage import FlowConstants, contact_factor
 from mbma_tables.tablefiles.interpolate import cell, quintic, quintic_slope
-from mbma_tables.theories.calibrated_table import MIN_SHARED, eight_of, lines_of, shipped_part
+from mbma_tables.theories.calibrated_table import MIN_SHARED, covers, eight_of, lines_of, shipped_part
 
 GROUP = "leakage"
 AXES = ("hurst", "log_zeta_1", "log_odds")
@@ -61,8 +61,7 @@ class FlowTable:
 
     def covers(self, hurst: FloatArray, log_zeta_1: FloatArray) -> Any:
         """Which surfaces lie inside the table."""
-        low, high = self.covered.T
-        return (hurst >= low[0]) & (hurst <= high[0]) & (log_zeta_1 >= low[1]) & (log_zeta_1 <= high[1])
+        return covers(self.covered, hurst, log_zeta_1)
 
     def standard_deviation(self, theory: str, area: FloatArray) -> FloatArray:
         """Root mean square of ln(k/simulation) at contact fractions; NaN where not known or blocked."""

@@ -80,10 +80,6 @@ class Yielding(Theory):
         chosen = np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)]
         return Yielding(self.elastic, chosen)
 
-    def plasticity_index(self, surface: AnySurface) -> FloatArray:
-        """psi = E* g/p_m, g the rms gradient; 0 where the hardness is infinite."""
-        return np.asarray(surface.rms_gradient / self.hardness)
-
     def _capped(
         self, surface: AnySurface, u: FloatArray, elastic: TheoryAnswer
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
