@@ -25,7 +25,7 @@ KINDS = {
     "phi": "X, mu; phi_F, phi_A, the bound on their error",
     "slopes": "X, mu; phi_F by X, phi_A by X, phi_F by mu, phi_A by mu, relative to themselves or |phi/argument|",
     "geometry": f"approach, hurst, zeta_1; {', '.join(FIELDS)}",
-    "total": "hurst, q0, q1, h_rms, h_max, separation, E_star, rtol; force, area",
+    "total": "hurst, q0, q1, h_rms, h_max, separation, E_star, rtol; force, area, stiffness",
     "status": "X, mu; the status",
     "formula": "X, mu; phi_F, phi_A by the closed form",
 }
@@ -83,10 +83,12 @@ def total_rows(surface: tuple[float, ...], separations: Any, reading: Reading, r
     from mbma_tables.theories.contact import contact
 
     found = contact(Surface(*surface), separations, reading=reading, rtol=rtol)
-    numbers = map(np.asarray, (found.separation, found.force, found.area))
-    for separation, force, area in zip(*numbers, strict=True):
-        scales = (abs(force) or 1.0, abs(area) or 1.0)
-        yield row("total", (*surface, separation, 1.0, rtol), (force, area), scales)
+    numbers = map(np.asarray, (found.separation, found.force, found.area, found.stiffness))
+    for separation, *answers in zip(*numbers, strict=True):
+        # without contact all are exactly 0; at a maximum of force, stiffness is
+        scales = [abs(answer) or 1.0 for answer in answers]
+        scales[2] = max(scales[2], scales[0] / surface[4])
+        yield row("total", (*surface, separation, 1.0, rtol), answers, scales)
 
 
 def status_rows(model: UniversalModel) -> Iterator[str]:

@@ -147,7 +147,7 @@ def library(c_folder: pathlib.Path, tmp_path_factory: pytest.TempPathFactory) ->
 def totals(
     library: ctypes.CDLL, surface: tuple[float, ...], gaps: np.ndarray, E_star: float = 1.0, rtol: float = 1e-8
 ) -> tuple:
-    answers, status = np.empty((gaps.size, 3)), np.empty(gaps.size, dtype=np.int32)
+    answers, status = np.empty((gaps.size, 4)), np.empty(gaps.size, dtype=np.int32)
     library.mbma_total_many(
         ctypes.byref(Surface(*surface)),
         ctypes.c_size_t(gaps.size),
