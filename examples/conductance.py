@@ -26,7 +26,6 @@ from matplotlib.figure import Figure
 from mbma_tables import Surface, contact, materials
 from mbma_tables.totals.conductance import conductance, cooper_mikic_yovanovich, mean_conductivity, mikic
 
-PICTURE = pathlib.Path(__file__).parents[1] / "docs" / "figures" / "example_conductance.png"
 # both faces' roughness in one
 JOINT = Surface(hurst=0.8, q0=2 * np.pi / 1e-3, q1=2 * np.pi / 5e-6, h_rms=1.5e-6, h_max=5.5e-6)
 STEEL, ALUMINIUM = materials.get("steel 4140"), materials.get("aluminium 6061")
@@ -93,7 +92,7 @@ def draw(curve: Curve) -> Figure:
     return figure
 
 
-def main(out: pathlib.Path = PICTURE, points: int = 200) -> Curve:
+def main(out: pathlib.Path | None = None, points: int = 200) -> Curve:
     """Compute, print and draw."""
     curve = conductance_curve(points)
     psi = E_STAR * float(JOINT.rms_gradient) / np.array([HARD, SOFT])
@@ -107,9 +106,18 @@ def main(out: pathlib.Path = PICTURE, points: int = 200) -> Curve:
         at = np.argmin(np.abs(np.log(curve.pressure / pressure)))
         numbers = "   ".join(f"{getattr(curve, name)[at]:<8.3g}" for name in columns)
         click.echo(f"{curve.pressure[at] / 1e6:7.2f}   {numbers}".rstrip())
-    draw(curve).savefig(out, dpi=120)
+    if out is not None:
+        draw(curve).savefig(out, dpi=120)
     return curve
 
 
+@click.command()
+@click.option("--points", default=200, show_default=True, type=click.IntRange(min=20), help="Pressures.")
+@click.option("--out", type=click.Path(path_type=pathlib.Path, dir_okay=False), help="Draw to this file, .png or .svg.")
+def command(points: int, out: pathlib.Path | None) -> None:
+    """Thermal contact conductance of ground steel on aluminium."""
+    main(out, points)
+
+
 if __name__ == "__main__":
-    main()
+    command()

@@ -6,7 +6,6 @@ Run with ``python examples/own_island_model.py``.
 from __future__ import annotations
 
 import pathlib
-import sys
 
 import click
 import numpy as np
@@ -39,6 +38,8 @@ class FirstOrder:
         return IslandAnswer(rigid_F / drop_F, rigid_A / drop_A, 1 - 1 / drop_F)
 
 
+@click.command()
+@click.argument("table_file", type=click.Path(path_type=pathlib.Path), default=shipped("universal"))
 def main(table_file: pathlib.Path) -> None:
     """Compare one's own model and one's own table with the shipped ones."""
     surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)  # um
@@ -58,4 +59,4 @@ def main(table_file: pathlib.Path) -> None:
 
 
 if __name__ == "__main__":
-    main(pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else shipped("universal"))
+    main()

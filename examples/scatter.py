@@ -19,7 +19,6 @@ from scipy.special import ndtr, ndtri
 
 from mbma_tables import Surface, contact
 
-PICTURE = pathlib.Path(__file__).parents[1] / "docs" / "figures" / "example_scatter.png"
 BLOCK = 10_000
 SEED = 20260101
 Q0 = 2 * np.pi / 500  # 1/um
@@ -86,7 +85,7 @@ def draw(spread: Spread, nominal: float) -> Figure:
     return figure
 
 
-def main(out: pathlib.Path = PICTURE, samples: int = 200_000) -> Spread:
+def main(out: pathlib.Path | None = None, samples: int = 200_000) -> Spread:
     """Sample, print and draw."""
     spread = spread_of_force(samples)
     middle = np.exp(LOG_H_RMS[0])
@@ -96,14 +95,15 @@ def main(out: pathlib.Path = PICTURE, samples: int = 200_000) -> Spread:
     click.echo(f"mean {mean:.4e} +- {error:.1e}")
     for level, value, error in zip(QUANTILES, spread.quantiles, spread.standard_errors, strict=True):
         click.echo(f"{level:4.0%} below {value:.4e} +- {error:.1e}")
-    draw(spread, nominal).savefig(out, dpi=120)
+    if out is not None:
+        draw(spread, nominal).savefig(out, dpi=120)
     return spread
 
 
 @click.command()
 @click.option("--samples", default=200_000, show_default=True, type=click.IntRange(min=20))
-@click.option("--out", default=PICTURE, show_default=True, type=click.Path(path_type=pathlib.Path, dir_okay=False))
-def command(samples: int, out: pathlib.Path) -> None:
+@click.option("--out", type=click.Path(path_type=pathlib.Path, dir_okay=False), help="Draw to this file, .png or .svg.")
+def command(samples: int, out: pathlib.Path | None) -> None:
     """Spread of force over scattered surfaces."""
     main(out, samples)
 

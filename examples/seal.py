@@ -21,7 +21,6 @@ from scipy.optimize import OptimizeResult, approx_fprime, minimize
 
 from mbma_tables import Surface, contact
 
-PICTURE = pathlib.Path(__file__).parents[1] / "docs" / "figures" / "example_seal.png"
 Q0 = 2 * np.pi / 500  # 1/um
 CREST = 3.0  # h_max/h_rms
 WAVINESS = 2.0  # um
@@ -109,7 +108,7 @@ def draw(found: Found) -> Figure:
     return figure
 
 
-def main(out: pathlib.Path = PICTURE, points: int = 9) -> Found:
+def main(out: pathlib.Path | None = None, points: int = 9) -> Found:
     """Optimise, print and draw."""
     found = optimise(points)
     h_rms, hurst, q1, depth = found.result.x
@@ -119,9 +118,18 @@ def main(out: pathlib.Path = PICTURE, points: int = 9) -> Found:
     click.echo(f"h_rms = {np.exp(h_rms):.4f} um, hurst = {hurst:.4f}, q1 = {np.exp(q1):.4f} /um, depth = {depth:.4f}")
     click.echo(f"A/A0 in the valleys = {np.exp(-found.result.fun):.6f} at {pressure:.6f} MPa")
     click.echo(f"best of a grid of {found.grid_area.size} surfaces: {found.grid_area.max():.6f}")
-    draw(found).savefig(out, dpi=120)
+    if out is not None:
+        draw(found).savefig(out, dpi=120)
     return found
 
 
+@click.command()
+@click.option("--points", default=9, show_default=True, type=click.IntRange(min=2), help="Of the grid along each axis.")
+@click.option("--out", type=click.Path(path_type=pathlib.Path, dir_okay=False), help="Draw to this file, .png or .svg.")
+def command(points: int, out: pathlib.Path | None) -> None:
+    """The roughness of a face seal, by gradients and by a grid."""
+    main(out, points)
+
+
 if __name__ == "__main__":
-    main()
+    command()

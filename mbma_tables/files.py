@@ -7,6 +7,7 @@ import os
 import pathlib
 import shutil
 import stat
+import sys
 import tempfile
 import uuid
 from collections.abc import Callable
@@ -22,7 +23,7 @@ def shipped_file(name: str) -> pathlib.Path:
 
 
 def read_file(path: os.PathLike[str] | str, max_bytes: int) -> bytes:
-    """The content of a regular file of at most `max_bytes`; links are followed.
+    """The content of a regular file of at most `max_bytes`; links are followed, "-" is standard input.
 
     Raises
     ------
@@ -31,9 +32,9 @@ def read_file(path: os.PathLike[str] | str, max_bytes: int) -> bytes:
     """
     try:
         # a pipe would wait for a writer, a device may have no end
-        if not stat.S_ISREG(os.stat(path).st_mode):
+        if os.fspath(path) != "-" and not stat.S_ISREG(os.stat(path).st_mode):
             raise InputError(f"{path} cannot be read: it is not a regular file")
-        with open(path, "rb") as stream:
+        with contextlib.nullcontext(sys.stdin.buffer) if os.fspath(path) == "-" else open(path, "rb") as stream:
             content = stream.read(max_bytes + 1)
     except OSError as fault:
         raise InputError(f"{path} cannot be read: {fault.strerror or fault}") from None
@@ -48,7 +49,7 @@ def write_file(path: os.PathLike[str] | str, content: bytes, make_folders: bool 
     Parameters
     ----------
     path : path
-        Where to write; links are followed.
+        Where to write; links are followed, "-" is standard output.
     content : bytes
         What to write.
     make_folders : bool, optional
@@ -59,6 +60,10 @@ def write_file(path: os.PathLike[str] | str, content: bytes, make_folders: bool 
     InputError
         Where it cannot be written, or is a folder, a device or a pipe; what was there before is unchanged.
     """
+    if os.fspath(path) == "-":
+        sys.stdout.buffer.write(content)
+        sys.stdout.flush()
+        return
     target = pathlib.Path(os.path.realpath(path))
     draft = target.with_name(f".{target.name}.{uuid.uuid4().hex[:12]}.draft")
     try:

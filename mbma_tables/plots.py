@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import io
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+KINDS = ("png", "svg", "pdf")  # of files of pictures
 FORCE_LABEL = "force  F/(A0 E*)"
 LABELS = {"mbma": "MBMA", "greenwood_williamson": "Greenwood-Williamson", "persson_simplified": "Persson, simplified"}
 
@@ -153,8 +154,14 @@ def _band(axes: Axes, x: FloatArray, y: FloatArray, scatter: FloatArray | None) 
     axes.fill_between(x, y / factor, y * factor, where=np.isfinite(scatter).tolist(), alpha=0.25, color=colour, lw=0)
 
 
-def to_png(figure: Figure) -> bytes:
-    """The figure as the content of a PNG file, the same bytes for the same figure."""
+def to_picture(figure: Figure, kind: str = "png") -> bytes:
+    """The figure as the content of a file of a `kind` of `KINDS`, the same bytes for the same figure."""
+    import matplotlib as mpl
+
     content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=120)
+    # text stays text in SVG; nothing of the time or of chance goes into a file
+    stable: Any = {"svg.fonttype": "none", "svg.hashsalt": "mbma_tables"}
+    undated: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    with mpl.rc_context(stable):
+        figure.savefig(content, format=kind, dpi=120, metadata=undated.get(kind))
     return content.getvalue()

@@ -1,9 +1,9 @@
 """The examples run, draw, and print numbers that other ways of computing them give too."""
 
-import contextlib
 import importlib.util
 import pathlib
 import runpy
+import subprocess
 import sys
 
 import numpy as np
@@ -153,19 +153,27 @@ def test_scatter_standard_errors_are_those_of_repeated_samples(scatter):
     assert (np.abs(np.log(own / stated)) < np.log(2)).all()
 
 
+@pytest.mark.parametrize("name", ["seal", "conductance", "scatter", "own_island_model"])
+def test_help_is_asked_of_a_script(name, tmp_path):
+    command = [sys.executable, str(EXAMPLES / f"{name}.py"), "--help"]
+    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    assert said.startswith(f"Usage: {name}.py [OPTIONS]")
+    assert name == "own_island_model" or "--out" in said
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["seal", "conductance", "scatter"])
-def test_runs_as_a_script(name, tmp_path, monkeypatch):
-    # the script as it is, but for where its picture goes
-    text = (EXAMPLES / f"{name}.py").read_text(encoding="utf-8")
-    (tmp_path / "examples").mkdir()
-    (tmp_path / "docs" / "figures").mkdir(parents=True)
-    script = tmp_path / "examples" / f"{name}.py"
-    script.write_text(text, encoding="utf-8")
-    monkeypatch.setattr(sys, "argv", [str(script), *(["--samples", "50"] if name == "scatter" else [])])
-    with contextlib.suppress(SystemExit):
-        runpy.run_path(str(script), run_name="__main__")
-    assert (tmp_path / "docs" / "figures" / f"example_{name}.png").read_bytes().startswith(PNG)
+@pytest.mark.parametrize(
+    ("name", "size"), [("seal", "--points=3"), ("conductance", "--points=40"), ("scatter", "--samples=50")]
+)
+def test_runs_as_a_script(name, size, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [f"{name}.py", size, "--out", "own.svg"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
+    assert ended.value.code == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["own.svg"]
+    assert b"<svg" in (tmp_path / "own.svg").read_bytes()
 
 
 def test_elastic_conductance_is_the_finite_difference_of_pressures(conductance):

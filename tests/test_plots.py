@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mbma_tables.errors import InputError, MbmaError
-from mbma_tables.plots import Curve, draw_compression, to_png
+from mbma_tables.plots import Curve, draw_compression, to_picture
 
 GAP = np.array([3.0, 2.0, 1.0, 0.0])
 FORCE = np.array([0.0, 2e-5, 3e-4, 2e-2])
@@ -60,14 +60,14 @@ def test_every_point_with_contact_is_in_view():
 
 
 def test_png_is_one_and_repeats():
-    first, second = (to_png(draw_compression(two_curves(), "title")) for _ in range(2))
+    first, second = (to_picture(draw_compression(two_curves(), "title")) for _ in range(2))
     assert first.startswith(b"\x89PNG\r\n\x1a\n")
     assert first == second
 
 
 def test_pyplot_stays_out():
     before = "matplotlib.pyplot" in sys.modules
-    to_png(draw_compression(two_curves()))
+    to_picture(draw_compression(two_curves()))
     assert ("matplotlib.pyplot" in sys.modules) == before
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from generate.pages.page import table
 from mbma_tables import Surface, contact
-from mbma_tables.plots import Curve, draw_compression, theory_label, to_png
+from mbma_tables.plots import Curve, draw_compression, theory_label, to_picture
 from mbma_tables.theories import THEORIES, get_theory
 from mbma_tables.theories.protocol import answer_where_finite
 
@@ -40,7 +40,7 @@ def draw() -> bytes:
         scatter, area_scatter = theory.scatter(road, found.area[known])
         gap = u[known] / road.h_rms
         curves.append(Curve(theory_label(name), gap, found.force[known], found.area[known], scatter, area_scatter))
-    return to_png(draw_compression(curves, "concrete road of Lorenz, by every theory"))
+    return to_picture(draw_compression(curves, "concrete road of Lorenz, by every theory"))
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:

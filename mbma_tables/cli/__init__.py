@@ -13,6 +13,8 @@ from typing import Any
 import click
 
 from mbma_tables import __version__
+from mbma_tables.cli import progress
+from mbma_tables.cli.batch import batch_command
 from mbma_tables.cli.commands import contact_command, curve_command, island_command, surfaces_command
 from mbma_tables.cli.cost import cost_command
 from mbma_tables.cli.export import export_command
@@ -51,7 +53,8 @@ class Program(click.Group):
         extra["standalone_mode"] = False
         warnings.showwarning = _show_warning
         try:
-            code = super().main(*args, **extra)
+            with progress.shown("starting"):
+                code = super().main(*args, **extra)
         except click.Abort:
             click.echo("mbma: interrupted", err=True)
             sys.exit(INTERRUPTED)
@@ -61,15 +64,27 @@ class Program(click.Group):
         sys.exit(code if isinstance(code, int) else 0)
 
 
-@click.group("mbma", cls=Program, no_args_is_help=False, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group("mbma", cls=Program, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="mbma")
-def main() -> None:
-    """Contact of rough surfaces by the MBMA model: force and real contact area against gap."""
+@click.pass_context
+def main(context: click.Context) -> None:
+    """Contact of rough surfaces: force, real contact area and stiffness against gap or pressure.
+
+    A file named - is standard input or output. Bash completes options and names after
+    eval "$(_MBMA_COMPLETE=bash_source mbma)"; zsh and fish likewise.
+
+    Example: mbma curve --surface concrete --plot concrete.png
+    """
+    if context.invoked_subcommand is None:
+        progress.echo(context.get_help())
+        return
+    progress.doing(context.invoked_subcommand)
 
 
 for command in (
     contact_command,
     curve_command,
+    batch_command,
     island_command,
     surfaces_command,
     fit_command,

@@ -13,12 +13,12 @@ from mbma_tables.cli.format import SURFACE_NUMBERS, Report, report_answer, shown
 from mbma_tables.cli.options import (
     Model,
     Output,
-    check_png,
+    check_plot,
     model_options,
     numbers_option,
     output_options,
     over_h_rms,
-    png_option,
+    plot_option,
     specimen_options,
     theory_options,
 )
@@ -50,7 +50,7 @@ def _numbers(name: str, given: list[float | str], specimen: Specimen, over_h_rms
     return finite_array(name, given) * specimen.surface.h_rms
 
 
-def _asked(model: Model, specimen: Specimen) -> dict[str, Any]:
+def contact_keywords(model: Model, specimen: Specimen) -> dict[str, Any]:
     """Keywords for `contact`."""
     asked = {**vars(model), "E_star": 1.0 if specimen.E_star is None else specimen.E_star}
     cap = asked.pop("hardness")
@@ -97,7 +97,7 @@ def contact_command(
     asked = _numbers(name, numbers, specimen, over_h_rms)
     if name == "mean_separation":
         require(name, asked, asked >= 0, "at least 0, where the model ends")
-    answer = contact(specimen.surface, **{name: asked}, **_asked(model, specimen))
+    answer = contact(specimen.surface, **{name: asked}, **contact_keywords(model, specimen))
     yields = ("yielded", "incremental_stiffness") if model.hardness != math.inf else ()
     values = {column: getattr(answer, column) for column in (*COLUMNS[:-1], "stiffness", *yields, COLUMNS[-1])}
     report_answer("contact", specimen, model, answer, values).write(output)
@@ -118,7 +118,7 @@ def curve_gaps(h_max: float, points: int) -> Any:
 @click.command("curve", short_help="Force and area from first contact to full compression.")
 @click.option("--points", type=click.IntRange(min=MIN_POINTS), default=41, show_default=True, help="How many gaps.")
 @click.option("--compare", is_flag=True, help="Add all other theories, and Persson's simplified form.")
-@png_option
+@plot_option
 @specimen_options
 @theory_options
 @output_options
@@ -134,14 +134,14 @@ def curve_command(
 
     Example: mbma curve --surface concrete --plot concrete.png
     """
-    check_png(plot, output.out)
+    check_plot(plot, output.out)
     import numpy as np
 
     from mbma_tables.scenes.effects import COMPARED
     from mbma_tables.scenes.run import other_theory
     from mbma_tables.theories.contact import contact
 
-    surface, asked = specimen.surface, _asked(model, specimen)
+    surface, asked = specimen.surface, contact_keywords(model, specimen)
     gap = curve_gaps(float(surface.h_max), points)
     if model.theory != "mbma":
         gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).force)]
@@ -157,14 +157,14 @@ def curve_command(
         for quantity in ("force", "area"):
             values[f"{theory}_{quantity}"] = getattr(line, quantity)
             units[f"{theory}_{quantity}"] = shown_unit(quantity, specimen.units)
-    picture = b"" if plot is None else _draw(specimen, answer, others)
+    picture = b"" if plot is None else _draw(specimen, answer, others, plot.suffix[1:])
     report_answer("curve", specimen, model, answer, values, units).write(output, plot, picture)
 
 
-def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory]) -> bytes:
+def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory], kind: str) -> bytes:
     import numpy as np
 
-    from mbma_tables.plots import Curve, draw_compression, force_label, theory_label, to_png
+    from mbma_tables.plots import Curve, draw_compression, force_label, theory_label, to_picture
 
     gap = answer.mean_separation / specimen.surface.h_rms
     label = theory_label(answer.theory) + (f", {answer.reading}" if answer.reading else "")
@@ -172,7 +172,7 @@ def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory]
     for name, line in others.items():
         known = np.isfinite(line.force)
         curves.append(Curve(theory_label(name), gap[known], *(field[known] for field in line)))
-    return to_png(draw_compression(curves, specimen.title, force_label(unit_of("force", specimen.units))))
+    return to_picture(draw_compression(curves, specimen.title, force_label(unit_of("force", specimen.units))), kind)
 
 
 @click.command("island", short_help="Contact islands at given approaches.")
@@ -194,7 +194,7 @@ def island_command(
         raise InputError("approaches are needed: --delta")
     from mbma_tables.totals.island import island
 
-    asked = _asked(model, specimen)
+    asked = contact_keywords(model, specimen)
     del asked["theory"]
     answer = island(specimen.surface, _numbers("delta", delta, specimen, over_h_rms), **asked)
     values = {name: getattr(answer, name) for name in ("delta", *ISLAND_FIELDS, "force", "area", "error")}

@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from mbma_tables.cli.format import Column, Report, to_json
+from mbma_tables.cli.progress import echo
 from mbma_tables.errors import InputError
 
 
@@ -46,8 +47,8 @@ def cost_command(tier: str | None, distance: bool, as_json: bool) -> None:
 
 def _show(title: str, records: list[dict[str, Any]], unit: float, as_json: bool) -> None:
     if as_json:
-        click.echo(to_json({"unit_seconds": unit, "rows": records}))
+        echo(to_json({"unit_seconds": unit, "rows": records}))
         return
     known = [{name: None if value != value else value for name, value in record.items()} for record in records]
     columns = [Column(name, "-", [record[name] for record in known]) for name in records[0]]
-    click.echo(Report(title, f"fixed piece of work {unit:.3g} s", [], {}, columns).to_table(), nl=False)
+    echo(Report(title, f"fixed piece of work {unit:.3g} s", [], {}, columns).to_table(), nl=False)

@@ -15,6 +15,7 @@ from mbma_tables.cli.options import (
     reading_option,
     theory_option,
 )
+from mbma_tables.cli.progress import echo
 from mbma_tables.errors import InputError
 from mbma_tables.export import CODE, DATA, SOLVERS
 from mbma_tables.files import write_file
@@ -85,8 +86,7 @@ def export_command(
         own = {"theory": theory != "mbma", "reading": reading != "reported"}
         _refuse("--exponential is Persson's law in two numbers", given | own)
         text = solvers.exponential(specimen.surface, specimen.E_star, stress_unit=specimen.stress_unit, **named)
-        write_file(out, text.encode())
-        click.echo(out)
+        _write({out: text.encode()})
         return
     from mbma_tables.export.law_rows import describe_law
 
@@ -105,9 +105,14 @@ def export_command(
         files = {out: getattr(solvers, target)(law, **named).encode()}
     else:
         files = _data_files(target, out, law)
+    _write(files)
+
+
+def _write(files: Mapping[Path, bytes]) -> None:
     for path, content in files.items():
         write_file(path, content)
-        click.echo(path)
+        if str(path) != "-":
+            echo(path)
 
 
 def _refuse(why: str, given: Mapping[str, Any]) -> None:
@@ -138,12 +143,12 @@ def _export_code(target: str, folder: Path, reading: str, check: bool) -> None:
     from mbma_tables.export import code
 
     for path in code.write_code(target, folder, reading):
-        click.echo(path)
+        echo(path)
     if check:
         found = code.check(target, folder)
         if not found.ran:
             raise InputError(f"not checked: {found.reason}")
         for kind, largest in found.largest.items():
-            click.echo(f"{kind}: {found.points[kind]} points, largest relative difference {largest:.1e}")
+            echo(f"{kind}: {found.points[kind]} points, largest relative difference {largest:.1e}")
         if found.reason:
             raise InputError(f"the check failed: {found.reason}")

@@ -8,13 +8,13 @@ from typing import Any
 import click
 
 from mbma_tables.cli.format import Report, to_columns
-from mbma_tables.cli.options import Output, check_png, map_options, output_options, png_option, quantity_option
+from mbma_tables.cli.options import Output, check_plot, map_options, output_options, plot_option, quantity_option
 
 
 @click.command("fit", short_help="What a measured map or line scan says, and how it touches.")
 @click.argument("measurement", metavar="MAP", type=click.Path(path_type=Path))
 @quantity_option("--E-star", "E_star", help="Effective modulus; without one pressures are over E*.")
-@png_option
+@plot_option
 @map_options
 @output_options
 def fit_command(measurement: Path, E_star: Any, plot: Path | None, treatment: dict[str, Any], output: Output) -> None:
@@ -26,9 +26,9 @@ def fit_command(measurement: Path, E_star: Any, plot: Path | None, treatment: di
 
     Example: mbma fit wafer.sur --short-cutoff 2um --plot wafer.png
     """
-    check_png(plot, output.out)
+    check_plot(plot, output.out)
     from mbma_tables.measurement import curves, described, draw, table_of_loads
-    from mbma_tables.plots import to_png
+    from mbma_tables.plots import to_picture
     from mbma_tables.scenes.specimen import effective_modulus_of, measured
     from mbma_tables.units import Units, unit_of
 
@@ -54,5 +54,5 @@ def fit_command(measurement: Path, E_star: Any, plot: Path | None, treatment: di
     picture = b""
     if plot is not None:
         label = "pressure  F/(A0 E*)" if modulus is None else f"pressure [{stress_unit or 'stress'}]"
-        picture = to_png(draw(treated, surface, curves(surface, scale), title, label))
+        picture = to_picture(draw(treated, surface, curves(surface, scale), title, label), plot.suffix[1:])
     report.write(output, plot, picture)

@@ -16,6 +16,7 @@ import click
 
 from mbma_tables import __version__
 from mbma_tables.cli.options import Model, Output
+from mbma_tables.cli.progress import echo
 from mbma_tables.files import write_file
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.units import Units, unit_of
@@ -94,12 +95,12 @@ class Report:
     def write(self, output: Output, plot: Path | None = None, picture: bytes = b"") -> None:
         """To its file, with the picture after it, or to stdout once the picture is written."""
         text = self.to_json() if output.as_json else self.to_csv() if output.as_csv else self.to_table()
-        if output.out is not None:
+        if output.out is not None and str(output.out) != "-":
             write_file(output.out, text.encode())
         if plot is not None:
             write_file(plot, picture)
-        if output.out is None:
-            click.echo(text, nl=False)
+        if output.out is None or str(output.out) == "-":
+            echo(text, nl=False)
 
 
 def to_json(content: Any) -> str:

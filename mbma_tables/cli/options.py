@@ -28,6 +28,8 @@ from mbma_tables.theories.registry import THEORIES
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 DEFAULT_RTOL = 1e-8
+TIERS = ("exact", "universal", "island4d", "formula", "rigid")
+PICTURES = (".png", ".svg", ".pdf")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -138,6 +140,17 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
     return specimen.in_units(length, stress)
 
 
+def _among(*names: str) -> Callable[[click.Context, click.Parameter, str], list[str]]:
+    """What a shell completes."""
+    return lambda ctx, param, incomplete: [name for name in names if name.startswith(incomplete)]
+
+
+def _surface_names(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
+    from mbma_tables.surfaces.cases import CASES
+
+    return _among(*CASES)(ctx, param, incomplete)
+
+
 # in the words of `mbma_tables.surfaces.treatment.Treatment`
 _MAP_OPTIONS = (
     quantity_option("--dx", "dx", help="Sampling step [length], of a map whose file has none;"),
@@ -162,7 +175,12 @@ _MAP_OPTIONS = (
 over_h_rms = click.option("--over-h-rms", is_flag=True, help="The lengths given are multiples of h_rms.")
 
 _SPECIMEN_OPTIONS = (
-    click.option("--surface", metavar="NAME", help="Surface: a case of the paper; `mbma surfaces` lists them."),
+    click.option(
+        "--surface",
+        metavar="NAME",
+        shell_complete=_surface_names,
+        help="Surface: a case of the paper; `mbma surfaces` lists them.",
+    ),
     click.option("--file", type=click.Path(path_type=Path), metavar="TOML", help="Surface: a TOML file."),
     click.option("--map", type=click.Path(path_type=Path), metavar="MAP", help="Surface: a measured map or line scan."),
     *_MAP_OPTIONS,
@@ -213,6 +231,7 @@ reading_option = click.option(
     default="reported",
     show_default=True,
     metavar="reported|printed",
+    shell_complete=_among("reported", "printed"),
     help="Reading of the paper's equations.",
 )
 
@@ -222,13 +241,19 @@ _MODEL_OPTIONS = (
         "--tier",
         default="universal",
         show_default=True,
-        metavar="exact|universal|island4d|formula|rigid",
+        metavar="|".join(TIERS),
+        shell_complete=_among(*TIERS),
         help="Island model.",
     ),
     click.option("--rtol", type=float, default=DEFAULT_RTOL, show_default=True, help="Relative error asked for."),
 )
 theory_option = click.option(
-    "--theory", default="mbma", show_default=True, metavar="|".join(THEORIES), help="Theory; the others have no tier."
+    "--theory",
+    default="mbma",
+    show_default=True,
+    metavar="|".join(THEORIES),
+    shell_complete=_among(*THEORIES),
+    help="Theory; the others have no tier.",
 )
 # of islands, which MBMA alone has
 model_options = _group("model", ("tier", "reading", "rtol"), lambda given: Model(**given), *_MODEL_OPTIONS)
@@ -252,14 +277,14 @@ output_options = _group(
     click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write to a file instead."),
 )
 
-png_option = click.option(
-    "--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw force and area to a PNG file."
+plot_option = click.option(
+    "--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw force and area: FILE.png, .svg or .pdf."
 )
 
 
-def check_png(plot: Path | None, out: Path | None) -> None:
-    """Refuse a picture that is not a PNG file, or that another output would overwrite."""
-    if plot is not None and plot.suffix.lower() != ".png":
-        raise InputError(f"--plot writes PNG: the file's name must end with .png, got {plot}")
+def check_plot(plot: Path | None, out: Path | None) -> None:
+    """Refuse a picture of an unknown kind, or one that another output would overwrite."""
+    if plot is not None and plot.suffix not in PICTURES:
+        raise InputError(f"--plot must end with one of {', '.join(PICTURES)}, got {plot}")
     if plot is not None and plot == out:
         raise InputError(f"--out and --plot name the same file, {out}")

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from mbma_tables.cli.format import Report, to_columns, to_json
-from mbma_tables.cli.options import check_png, png_option
+from mbma_tables.cli.options import check_plot, plot_option
+from mbma_tables.cli.progress import doing, echo
 from mbma_tables.errors import InputError
 from mbma_tables.files import write_file, written_bytes
 
@@ -34,7 +34,7 @@ def plan_command(file: Path, as_json: bool) -> None:
 
     scene = Scene.from_toml(file)
     if not as_json:
-        click.echo(scene.explain(), nl=False)
+        echo(scene.explain(), nl=False)
         return
     plan = scene.plan()
     content = {
@@ -47,19 +47,18 @@ def plan_command(file: Path, as_json: bool) -> None:
         "switched_off": plan.switched_off,
         "advice": advice(scene).strip(),
     }
-    click.echo(to_json(content))
-
-
-def _show(step: str, done: int, total: int) -> None:
-    """Progress on a terminal, on one line."""
-    end = "\n" if done >= total else ""
-    click.echo(f"\r{step}: {done} of {total}", err=True, nl=bool(end))
+    echo(to_json(content))
 
 
 @click.command("run", short_help="Compute a scene.")
 @scene_file
-@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write it to result.nc or result.csv.")
-@png_option
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Write it to result.nc or result.csv; - for CSV to stdout.",
+)
+@plot_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
 def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) -> None:
     """Compute the scene in FILE, and nothing that it does not ask for.
@@ -68,27 +67,27 @@ def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) 
 
     Example: mbma run examples/scene_joint.toml --out joint.nc
     """
-    if out is not None and out.suffix not in SUFFIXES:
+    if out is not None and str(out) != "-" and out.suffix not in SUFFIXES:
         raise InputError(f"--out must end with one of {', '.join(SUFFIXES)}, got {out}")
-    check_png(plot, out)
+    check_plot(plot, out)
     from mbma_tables.scenes.scene import Scene
 
     scene = Scene.from_toml(file)
     if plot is not None and not {"force", "area"} <= scene.outputs:
         raise InputError("--plot draws force and area: ask for both in [effects] on")
-    found = scene.run(_show if sys.stderr.isatty() else None)
+    found = scene.run(lambda step, done, total: doing(f"{step}: {done} of {total}"))
     if plot is not None:
-        write_file(plot, _picture(found))
+        write_file(plot, _picture(found, plot.suffix[1:]))
     if out is not None:
-        write_file(out, _report(found).to_csv().encode() if out.suffix == ".csv" else _to_netcdf(found))
+        write_file(out, _to_netcdf(found) if out.suffix == ".nc" else _report(found).to_csv().encode())
     if as_json:
         variables = {
             str(name): {"dims": list(field.dims), "units": field.attrs["units"], "values": field.values.tolist()}
             for name, field in found.variables.items()
         }
-        click.echo(to_json({"attributes": found.attrs, "variables": variables}))
+        echo(to_json({"attributes": found.attrs, "variables": variables}))
     elif out is None:
-        click.echo(_report(found).to_table(), nl=False)
+        echo(_report(found).to_table(), nl=False)
 
 
 def _report(found: xarray.Dataset) -> Report:
@@ -110,12 +109,13 @@ def _to_netcdf(found: xarray.Dataset) -> bytes:
     return written_bytes("scene.nc", lambda path: found.to_netcdf(path, engine="netcdf4"))
 
 
-def _picture(found: xarray.Dataset) -> bytes:
-    from mbma_tables.plots import Curve, draw_compression, force_label, theory_label, to_png
+def _picture(found: xarray.Dataset, kind: str) -> bytes:
+    from mbma_tables.plots import Curve, draw_compression, force_label, theory_label, to_picture
 
     gap = found["mean_separation"].values / found.attrs["surface_h_rms"]
     reading = found.attrs["reading"]
     label = theory_label(found.attrs["theory"]) + (f", {reading}" if reading else "")
     bands = [found[name].values if name in found else None for name in ("scatter", "area_scatter")]
     curves: list[Any] = [Curve(label, gap, found["force"].values, found["area"].values, *bands)]
-    return to_png(draw_compression(curves, str(found.attrs["title"]), force_label(found["force"].attrs["units"])))
+    drawn = draw_compression(curves, str(found.attrs["title"]), force_label(found["force"].attrs["units"]))
+    return to_picture(drawn, kind)

@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from mbma_tables.cli.progress import echo
+
 
 def _path(name: str) -> Path:
     """A table by kind, or a file."""
@@ -45,12 +47,12 @@ def list_command(as_json: bool) -> None:
             }
         )
     if as_json:
-        click.echo(json.dumps({"tables": rows}, indent=2))
+        echo(json.dumps({"tables": rows}, indent=2))
         return
     for row in rows:
         nodes = " x ".join(f"{count} {name}" for name, count in row["nodes"].items())
         errors = ", ".join(f"{f} {error:.2g}" for f, error in row["largest_error"].items())
-        click.echo(
+        echo(
             f"{row['kind']}: {nodes}; reading {row['reading']}; largest held-out error {errors}; "
             f"{row['bytes']} bytes; data {row['data_version']}; {row['path']}"
         )
@@ -67,15 +69,15 @@ def info_command(table: str, as_json: bool) -> None:
     content = read_table(_path(table), table if table in KINDS else None)
     axes = {axis.name: {**axis.attributes(), "nodes": axis.nodes} for axis in content.axes}
     if as_json:
-        click.echo(json.dumps({"axes": axes, "attributes": content.attributes}, indent=2))
+        echo(json.dumps({"axes": axes, "attributes": content.attributes}, indent=2))
         return
     for name, attributes in axes.items():
-        click.echo(
+        echo(
             f"axis {name}: {attributes['long_name']}, {attributes['first']:g} to {attributes['last']:g}, "
             f"{attributes['nodes']} nodes, {attributes['position_formula']}"
         )
     for name, value in content.attributes.items():
-        click.echo(f"{name}: {value}")
+        echo(f"{name}: {value}")
 
 
 @tables_group.command("verify")
@@ -93,11 +95,11 @@ def verify_command(tables: tuple[str, ...], as_json: bool) -> None:
 
     verdicts = [verify(_path(t), t if t in KINDS else None) for t in tables or KINDS]
     if as_json:
-        click.echo(json.dumps({"tables": [dataclasses.asdict(v) for v in verdicts]}, indent=2))
+        echo(json.dumps({"tables": [dataclasses.asdict(v) for v in verdicts]}, indent=2))
         return
     for v in verdicts:
         found = f"within {v.solver_error:.1e}" if v.solver_error else "identical to the last bit"
-        click.echo(
+        echo(
             f"{v.path}: hashes match; {v.points} conformance points: table within {v.table_error:.1e}, "
             f"exact solver {found}"
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import pathlib
+import sys
 import warnings
 from collections.abc import Mapping
 from typing import Any
@@ -42,6 +43,7 @@ def read_measurement(
     Parameters
     ----------
     path : path
+        "-" is standard input.
     dx, dy : float, optional
         Sampling steps [length], where the file has none.
     unit : str, optional
@@ -57,14 +59,18 @@ def read_measurement(
         Where there is no such file, that library cannot read it, or steps are missing or given twice.
     """
     module, place = library(), pathlib.Path(path)
-    if not place.is_file():
+    piped = os.fspath(path) == "-"
+    if not piped and not place.is_file():
         raise InputError(f"there is no file {os.fspath(path)!r}")
     with warnings.catch_warnings():
         # its readers complain of what they go around
         warnings.simplefilter("ignore")
         try:
             # opened here: its readers leave open what they cannot read
-            with open(place, "rb") as stream, module.open_topography(stream) as reader:
+            with (
+                io.BytesIO(sys.stdin.buffer.read()) if piped else open(place, "rb") as stream,
+                module.open_topography(stream) as reader,
+            ):
                 return _channel_of(reader, place, dx, dy, unit, channel)
         except MbmaError:
             raise

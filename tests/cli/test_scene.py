@@ -44,7 +44,7 @@ def test_run_as_table_json_and_picture(tmp_path):
     ("arguments", "words"),
     [
         (["run", JOINT, "--out", "joint.txt"], "--out must end with"),
-        (["run", JOINT, "--plot", "joint.pdf"], "must end with .png"),
+        (["run", JOINT, "--plot", "joint.jpg"], "must end with one of .png, .svg, .pdf"),
         (["run", JOINT, "--plot", "joint.png"], "ask for both"),
         (["run", "none.toml"], "give the path of a scene file"),
         (["plan", "none.toml"], "give the path of a scene file"),

@@ -93,7 +93,8 @@ def test_shipped_models_keep_the_protocol():
 
 @pytest.mark.slow
 def test_the_example_prints_what_its_page_shows(capsys):
-    runpy.run_path(str(ROOT / "examples" / "own_island_model.py"), run_name="__main__")
+    example = runpy.run_path(str(ROOT / "examples" / "own_island_model.py"))
+    example["main"]([], standalone_mode=False)
     shown = capsys.readouterr().out.splitlines()
     page = (ROOT / "docs" / "models.md").read_text(encoding="utf-8")
     assert len(shown) == 8

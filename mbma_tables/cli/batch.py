@@ -1,0 +1,130 @@
+"""The command `mbma batch`: many surfaces, one a line of a CSV file."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from mbma_tables.cli.commands import COLUMNS, contact_keywords
+from mbma_tables.cli.format import Report, shown_unit, to_columns
+from mbma_tables.cli.options import Model, Output, output_options, quantity_option, theory_options
+from mbma_tables.cli.progress import doing
+from mbma_tables.errors import InputError
+from mbma_tables.files import read_file
+from mbma_tables.scenes.specimen import MATERIAL, NUMBERS, Specimen, effective_modulus_of, from_name, from_numbers
+
+MAX_BYTES = 64 * 2**20
+LOADS = ("separation", "mean_separation", "pressure", "area")
+
+
+@click.command("batch", short_help="Many surfaces from a CSV file.")
+@click.argument("file", metavar="SURFACES.csv", type=click.Path(path_type=Path))
+@quantity_option("--separation", "-d", help="Gap d from the mid-plane [length], for every line.")
+@quantity_option("--mean-separation", "-u", help="Instead: mean separation u = (h_max + d)/2 [length].")
+@quantity_option("--pressure", "-p", help="Instead: force over nominal area, over E* where none is given.")
+@quantity_option("--area", "-a", help="Instead: real over nominal contact area.")
+@quantity_option(
+    "--E-star", "E_star", help="Effective modulus of lines that name none; without one forces are over E*."
+)
+@click.option("--length-unit", metavar="UNIT", help="Unit of plain lengths and of the answer, such as mm.")
+@click.option("--stress-unit", metavar="UNIT", help="Unit of plain moduli and of the answer, such as MPa.")
+@theory_options
+@output_options
+def batch_command(
+    file: Path,
+    E_star: Any,
+    length_unit: str | None,
+    stress_unit: str | None,
+    model: Model,
+    output: Output,
+    **loads: Any,
+) -> None:
+    """A row of the answer for each line of SURFACES.csv.
+
+    Its header names a surface's numbers as the options of `mbma contact` do, "surface" for named ones, moduli (E_star,
+    or E1, nu1, E2, nu2), and separation, mean_separation, pressure or area where these are not options; a column
+    "name" is repeated. Cells are numbers, perhaps with their unit, "0.8um".
+
+    Example: mbma batch surfaces.csv --pressure 1MPa --theory calibrated --csv --out answers.csv
+    """
+    from mbma_tables.surfaces.surface import PARAMETERS, Surface
+    from mbma_tables.theories.contact import contact
+
+    common = {name: value for name, value in loads.items() if value is not None}
+    lines = list(_lines(file))
+    given = {name for _, row in lines for name in row if name in LOADS} | set(common)
+    if len(given) != 1:
+        raise InputError("one of separation, mean_separation, pressure and area is needed, as an option or a column")
+    (load,) = given
+    names, specimens, values = [], [], []
+    units = length_unit, stress_unit
+    for count, (number, row) in enumerate(lines):
+        doing(f"batch: line {count} of {len(lines)}")
+        try:
+            specimen = _specimen(row, E_star, *units)
+            units = units[0] or specimen.surface.unit, units[1] or specimen.stress_unit
+            if load not in common and load not in row:
+                raise InputError(f"{load} is missing")
+            values.append(specimen.units.number(load, row.get(load, common.get(load))))
+        except InputError as fault:
+            raise InputError(f"{file}, line {number}: {fault}") from None
+        names.append(row.get("name", row.get("surface", f"line {number}")))
+        specimens.append(specimen)
+    if len({specimen.units for specimen in specimens}) > 1:
+        raise InputError(f"{file}: some lines know their units and some do not: give --length-unit and --stress-unit")
+    first, moduli = specimens[0], [specimen.E_star for specimen in specimens]
+    columns: dict[str, Any] = {name: [getattr(specimen.surface, name) for specimen in specimens] for name in PARAMETERS}
+    surface = Surface(**columns, unit=first.surface.unit)
+    doing(f"batch of {len(lines)} lines")
+    keywords = contact_keywords(model, first)
+    keywords["E_star"] = [1.0 if modulus is None else modulus for modulus in moduli]
+    keywords[load] = values
+    answer = contact(surface, **keywords)
+    found: dict[str, Any] = {"name": names}
+    found |= {name: getattr(answer, name) for name in (*COLUMNS[:-1], "stiffness", "scatter", "valid", "error")}
+    notes = [f"theory {answer.theory}, rtol {model.rtol:g}", "scatter: of ln force at a separation, by simulations"]
+    shown = {name: shown_unit(name, first.units) for name in found}
+    facts = {"theory": answer.theory, "reading": answer.reading or None, "tier": answer.tier or None}
+    Report("batch", file.name, notes, facts, to_columns(found, shown)).write(output)
+
+
+def _lines(file: Path) -> Any:
+    """Number and filled cells of each line below the header."""
+    text = read_file(file, MAX_BYTES).decode("utf-8-sig", "replace")
+    rows = csv.DictReader(line for line in io.StringIO(text, newline=""))
+    known = {"name", "surface", *NUMBERS, *MATERIAL, *LOADS}
+    unknown = [name for name in rows.fieldnames or () if name.strip() not in known]
+    if unknown:
+        raise InputError(f"{file}: unknown columns {', '.join(unknown)}; there are {', '.join(sorted(known))}")
+    empty = True
+    for row in rows:
+        if None in row:
+            raise InputError(f"{file}, line {rows.line_num}: more cells than the header has")
+        cells = {name.strip(): cell.strip() for name, cell in row.items() if cell and cell.strip()}
+        if cells:
+            empty = False
+            yield rows.line_num, cells
+    if empty:
+        raise InputError(f"{file} has no line of a surface below its header")
+
+
+def _specimen(row: Mapping[str, str], E_star: Any, length: str | None, stress: str | None) -> Specimen:
+    numbers: dict[str, Any] = {name: _number(row[name]) for name in NUMBERS if name in row}
+    if "surface" in row and numbers:
+        raise InputError("a named surface and numbers: one of them")
+    specimen = from_name(row["surface"]) if "surface" in row else from_numbers(numbers, length)
+    material = {name: _number(row[name]) for name in MATERIAL if name in row}
+    modulus, unit = effective_modulus_of(material or ({} if E_star is None else {"E_star": E_star}), stress)
+    return Specimen(specimen.surface, specimen.title, modulus, unit).in_units(length, stress)
+
+
+def _number(text: str) -> Any:
+    try:
+        return float(text)
+    except ValueError:
+        return text

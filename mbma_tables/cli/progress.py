@@ -1,0 +1,62 @@
+"""Signs of life on a terminal: what takes longer than two seconds says so, in one line that is wiped at the end."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import threading
+import time
+from collections.abc import Iterator
+
+import click
+
+PATIENCE = 2.0  # seconds before the first sign
+WIPE = "\r\x1b[K"
+
+_ended = threading.Event()
+_state = {"doing": "working"}
+
+
+def doing(what: str) -> None:
+    """Say what is being done; shown where it takes long."""
+    _state["doing"] = what
+
+
+def echo(text: object, nl: bool = True) -> None:
+    """Print to standard output, with the line of progress gone before."""
+    _end()
+    click.echo(text, nl=nl)
+
+
+@contextlib.contextmanager
+def shown(what: str) -> Iterator[None]:
+    """Show on standard error, if that is a terminal, what is being done and for how long."""
+    _ended.clear()
+    doing(what)
+    if not sys.stderr.isatty():
+        yield
+        return
+    thread = threading.Thread(target=_beat, args=(time.monotonic(),), daemon=True)
+    _state.pop("shown", None)
+    thread.start()
+    try:
+        yield
+    finally:
+        _end()
+        thread.join()
+
+
+def _beat(start: float) -> None:
+    wait = PATIENCE
+    while not _ended.wait(wait):
+        wait = 0.5
+        _state["shown"] = "yes"
+        click.echo(
+            f"{WIPE}mbma: {_state['doing']}, {time.monotonic() - start:.0f} s (Ctrl-C ends it)", err=True, nl=False
+        )
+
+
+def _end() -> None:
+    _ended.set()
+    if _state.pop("shown", None):
+        click.echo(WIPE, err=True, nl=False)
