@@ -2,8 +2,9 @@
 
 Everything of an island depends on its approach delta alone; a gap enters through the Gaussian and the upper limit
 h_max - d. So islands are answered once, at Gauss-Kronrod nodes of panels that break wherever q_d or q_u passes a sample
-of the spectrum; a gap then costs one exponential a node, and the few islands of the panel that its limit cuts. Force
-rises like delta^(5/2) from first contact and area like delta^(7/3): the first panel has Gauss-Jacobi nodes for each.
+of the spectrum; a gap then costs one exponential a node near its limit, a series in the gap for all nodes far below
+it, and the few islands of the panel that its limit cuts. Force rises like delta^(5/2) from first contact and area like
+delta^(7/3): the first panel has Gauss-Jacobi nodes for each.
 """
 
 from __future__ import annotations
@@ -13,9 +14,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.compiled import REORDER, njit
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.islands.measured import floors_of, measured_islands, s_over_h_rms
 from mbma_tables.models import AnyModel, answer_islands
@@ -24,12 +27,13 @@ from mbma_tables.surfaces.power_laws import Place
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
 from mbma_tables.totals.kernel import island_density, jacobian_below
+from mbma_tables.totals.profile_kernel import exp_of_negative
 
 RATIO = 1.25  # between the ends of a panel
 STEP = 0.5  # of a panel, in the least standard deviation of islands' heights
 FIRST = 0.05  # of the least approach at which anything changes: the first panel
 ENDS, FEW = 10, 7  # Gauss-Jacobi nodes of the first panel, and of its check
-BLOCK = 1 << 21  # gaps times nodes held at once
+TERMS = 14  # of a series in the gap over a stretch no longer than a panel may be without the spectrum's samples
 MAX_ROUNDS = 12  # halvings of panels
 QUADRATURE_SHARE = 0.9  # of the tolerance asked for; the islands' own error comes on top
 SAFETY = 4.0  # as in `intervals`
@@ -148,7 +152,8 @@ class IslandCurve:
         spread = float(np.sqrt(laws.below(0, floors.at_d)))
         count = math.ceil(math.log(last / first) / math.log(RATIO))
         steps = np.arange(first, last, STEP * spread)
-        edges = np.unique(np.concatenate([np.geomspace(first, last, count + 1), breaks, steps]))
+        self._stretches = np.unique(np.append(np.geomspace(first, last, count + 1), steps))
+        edges = np.unique(np.append(self._stretches, breaks))
         # breaks that coincide but for rounding
         return np.append(edges[:-1][np.diff(edges) > 1e-12 * edges[:-1]], last)
 
@@ -182,6 +187,17 @@ class IslandCurve:
         unknown = np.isnan(self._columns).any(axis=1)
         self._covered = float(self._nodes.delta[unknown].min(initial=math.inf))
         self._columns[unknown] = 0.0
+        self._by_column = np.ascontiguousarray(self._columns.T)
+        self._shift = self._heights(self._nodes, 0.0)
+        starts = np.unique(np.searchsorted(self._edges, self._stretches[:-1]))
+        self._stretches = np.append(self._edges[starts], end)
+        points, widths = chebyshev.chebpts1(TERMS), np.diff(self._stretches)
+        at = self._stretches[:-1, None] + widths[:, None] * (1 + points) / 2
+        below = self._stops[starts].repeat(TERMS)
+        sums = self._whole(at.ravel(), np.zeros_like(below), below).reshape(*at.shape, -1)
+        # of the nodes below each stretch, over it; its own are added gap by gap
+        self._series = np.linalg.inv(chebyshev.chebvander(points, TERMS - 1)) @ sums
+        self._begins = self._stops[starts]
 
     def _panels(self, low: FloatArray, high: FloatArray) -> Nodes:
         """Islands of panels, shape (panels, 7)."""
@@ -218,22 +234,25 @@ class IslandCurve:
         """Islands per area and approach (42, 46) at depths h_max - d [length]."""
         return np.asarray(nodes.density * np.exp(-0.5 * self._heights(nodes, depth) ** 2))
 
+    def _whole(self, depth: FloatArray, starts: Any, stops: Any) -> FloatArray:
+        """Sums over nodes from `starts` to `stops`, and slopes of the first two, shape (n, 7)."""
+        out = np.empty((depth.size, RULES.shape[1] + 2))
+        _add_nodes(depth, starts, stops, self._shift, 1 / self._nodes.sigma_d, self._by_column, out)
+        return out
+
     def totals(self, depth: FloatArray) -> Found:
         """Totals at depths h_max - d [length], shape (n,); zero where they are not positive."""
         sums, slopes = np.zeros((depth.size, RULES.shape[1])), np.zeros((depth.size, 2))
         whole = np.searchsorted(self._edges, depth, side="right") - 1
-        # panels that lie below the depth, from the islands at hand; sorted, so that a block needs about as many
-        order = np.argsort(depth, kind="stable")
-        full = order[whole[order] >= 0]
-        rows = max(1, BLOCK // self._nodes.delta.size)
-        for k in range(0, full.size, rows):
-            chosen = full[k : k + rows]
-            stops = self._stops[whole[chosen]]
-            nodes, columns = self._nodes.some(slice(stops[-1])), self._columns[: stops[-1]]
-            height = self._heights(nodes, depth[chosen, None])
-            gaussian = np.where(np.arange(stops[-1]) < stops[:, None], np.exp(-0.5 * height * height), 0.0)
-            sums[chosen] += gaussian @ columns
-            slopes[chosen] += (gaussian * height / nodes.sigma_d) @ columns[:, :2]
+        full = np.flatnonzero(whole >= 0)
+        if full.size:
+            own = depth[full]
+            stretch = np.minimum(np.searchsorted(self._stretches, own, side="right") - 1, self._begins.size - 1)
+            near = self._whole(own, self._begins[stretch], self._stops[whole[full]])
+            low, high = self._stretches[stretch], self._stretches[stretch + 1]
+            place = chebyshev.chebvander((2 * own - low - high) / (high - low), TERMS - 1)
+            far = np.einsum("gt,gtc->gc", place, self._series[stretch])
+            sums[full], slopes[full] = np.split(near + far, [-2], axis=1)
         # the panel that the depth cuts, and the island at the depth itself
         for chosen, first in ((full, False), (np.flatnonzero((whole < 0) & (depth > 0)), True)):
             if chosen.size:
@@ -256,6 +275,33 @@ class IslandCurve:
         difference = np.abs(found[:, 2:4] / found[:, :2] - 1).max(axis=1, initial=0.0)
         error = np.where(touching, np.maximum(_bound(difference), self._quadrature_error) + self.island_error, 0.0)
         return Found(sums[:, 0], sums[:, 1], slopes[:, 0], slopes[:, 1], sums[:, 4], error, unknown & (depth > 0))
+
+
+@njit(cache=True, fastmath=REORDER, error_model="numpy", nogil=True)
+def _add_nodes(
+    depth: FloatArray,
+    starts: NDArray[np.intp],
+    stops: NDArray[np.intp],
+    shift: FloatArray,
+    rate: FloatArray,
+    columns: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Sums of the rows of `columns` times exp(-(shift - rate depth)^2/2), and slopes of the first two by depth."""
+    for k in range(depth.size):
+        a = b = c = d = e = slope_a = slope_b = 0.0
+        for j in range(starts[k], stops[k]):
+            height = shift[j] - rate[j] * depth[k]
+            share = exp_of_negative(-0.5 * height * height)
+            turned = share * height * rate[j]
+            a += share * columns[0, j]
+            b += share * columns[1, j]
+            c += share * columns[2, j]
+            d += share * columns[3, j]
+            e += share * columns[4, j]
+            slope_a += turned * columns[0, j]
+            slope_b += turned * columns[1, j]
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4], out[k, 5], out[k, 6] = a, b, c, d, e, slope_a, slope_b
 
 
 def _integrands(nodes: Nodes) -> FloatArray:

@@ -137,8 +137,9 @@ def test_lengths_scale():
     np.testing.assert_allclose(two.stiffness, 1e9 * one.stiffness, rtol=1e-8)
 
 
-def test_a_law_is_the_contacts():
-    surface = rough()
+@pytest.mark.parametrize("count", [60, 2000])
+def test_a_law_is_the_contacts(count):
+    surface = rough(count=count)
     law = contact_law(surface)
     d = surface.h_max * (1 - DEPTHS)
     found = contact(surface, d)
