@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import cumulative_trapezoid
-from scipy.interpolate import BSpline, CubicHermiteSpline, PchipInterpolator, make_interp_spline
+from scipy.interpolate import BSpline, CubicHermiteSpline, CubicSpline, PchipInterpolator, make_interp_spline
 from scipy.special import erf, erfinv, ndtri
 
 from mbma_tables.arguments import FloatArray, require
@@ -27,6 +27,7 @@ from mbma_tables.calibrated import (
     light_factor,
 )
 from mbma_tables.calibrated_map import LOG_FORCE, MapLaw, convex
+from mbma_tables.compiled import CONTRACT, njit
 from mbma_tables.hardness import BearingCurve
 from mbma_tables.surfaces.heights import SHARES
 from mbma_tables.surfaces.measured import MeasuredSurface
@@ -38,7 +39,7 @@ WIDTHS = (0.01, 0.1, 0.4)  # of panels in ln q, up to which few nodes suffice
 LAW_ERROR = 1e-7  # of the law's own quadrature
 MAP_ERROR = 3e-2  # of a map's curve, which is smoother than the nodes of its law: nine maps in ten
 LAW_FORCE, LAW_NODES = (-24.0, 1.5), 256  # ln F^ of a tabulated curve
-INNER_NODES = 1200  # in ln y, of its quintic spline
+INNER_NODES = 2400  # in ln y, of its cubic spline
 NODE_STEP, FINE = 0.2, 8  # of a map's curve, in ln F and ln u: its own nodes are rougher; integrated by so many parts
 _GAUSS = [((1 + x) / 2, w / 2) for x, w in map(np.polynomial.legendre.leggauss, (2, 4, 6, PANEL_NODES))]
 
@@ -188,6 +189,28 @@ def area_concerns(area: FloatArray) -> dict[str, Any]:
     }
 
 
+@njit(cache=True, fastmath=CONTRACT, error_model="numpy", nogil=True)
+def _add_waves(
+    log_force: FloatArray,
+    log_g: FloatArray,
+    shares: FloatArray,
+    start: float,
+    step: float,
+    pieces: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Sums of shares times a function of ln F - ln g, nothing beyond the cubic `pieces` of its logarithm."""
+    for k in range(log_force.size):
+        total = 0.0
+        for j in range(log_g.size):
+            place = log_force[k] - log_g[j] - start
+            number = int(place / step)
+            if number < len(pieces):
+                t, piece = place - step * number, pieces[number]
+                total += shares[j] * math.exp(((piece[0] * t + piece[1]) * t + piece[2]) * t + piece[3])
+        out[k] = total
+
+
 class TabulatedLaw(Law):
     """A law whose curve is tabulated once, for surfaces that no table holds: each wave is asked once."""
 
@@ -195,12 +218,12 @@ class TabulatedLaw(Law):
     def _spline(self) -> BSpline:
         log_force, log_y = np.linspace(*LAW_FORCE, LAW_NODES), np.linspace(LOG_Y[0], LOG_Y[1] - 1e-9, INNER_NODES)
         # the inner integrals of this law's weight, as one function
-        inner = make_interp_spline(log_y, np.log(inner_integral(np.exp(log_y), self.coefficients)), k=5)
+        inner = CubicSpline(log_y, np.log(inner_integral(np.exp(log_y), self.coefficients)))
         log_g = np.log(self.spectrum.below) / 2
         shares = self.spectrum.x * self.spectrum.variance / (4 * self.spectrum.gradient) * np.exp(-log_g)
-        y = log_force[:, None] - log_g
-        known = np.where(y < log_y[-1], np.exp(inner(np.minimum(y, log_y[-1]))), 0.0)
-        return make_interp_spline(log_force, np.log(known @ shares), k=5)
+        total = np.empty(LAW_NODES)
+        _add_waves(log_force, log_g, shares, log_y[0], log_y[1] - log_y[0], np.ascontiguousarray(inner.c.T), total)
+        return make_interp_spline(log_force, np.log(total), k=5)
 
     @functools.cached_property
     def _rate(self) -> BSpline:
