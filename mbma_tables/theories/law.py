@@ -325,6 +325,7 @@ def _finish(
         tier=tier,
         block=block,
         errors=made.errors,
+        surface=surface,
     )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,10 +16,14 @@ from numpy.typing import ArrayLike
 from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, require
 from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import InputError
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import law_kernel as kernel
 from mbma_tables.theories.law_compiled import CompiledLaw
 from mbma_tables.theories.law_kernel import AREA, FORCE, force_at
 from mbma_tables.units import UNKNOWN, Units
+
+if TYPE_CHECKING:
+    from mbma_tables.theories.leakage import LeakageLaw
 
 BLOCK = 1 << 16  # gaps between two looks for Ctrl-C
 SCAN = 49  # gaps at which a law's stiffness is looked at for its maximum
@@ -78,6 +82,8 @@ class ContactLaw:
         Bounds on the relative error of a record's values, and of its slopes over F/x.
     units : Units
         Of lengths and stresses, as far as the surface and the modulus knew theirs.
+    surface : Surface
+        Whose law it is.
 
     Examples
     --------
@@ -104,6 +110,7 @@ class ContactLaw:
     block: FloatArray
     errors: FloatArray
     units: Units = UNKNOWN
+    surface: AnySurface | None = None
 
     @functools.cached_property
     def _address(self) -> int:
@@ -123,7 +130,8 @@ class ContactLaw:
     def _first_word(self) -> int:
         return int(self.block.view(np.int64)[kernel.RECORDS])
 
-    def _gaps(self, separation: Any, u: Any) -> FloatArray:
+    def gaps(self, separation: Any, u: Any) -> FloatArray:
+        """Separations d, checked, of separations or of mean separations."""
         if separation is not None and u is not None:
             raise InputError("separation and u: give one of them")
         separation, u = (self.units.number("separation", gap) for gap in (separation, u))
@@ -148,7 +156,7 @@ class ContactLaw:
 
             found = apply(answer, (given,), len(wanted))
             return found if len(wanted) > 1 else (found,)
-        d = given if u is None and _plain(given) else self._gaps(separation, u)
+        d = given if u is None and _plain(given) else self.gaps(separation, u)
         flat = np.ascontiguousarray(d).reshape(-1)
         out = dict(zip(wanted, np.empty((len(wanted), flat.size)), strict=True))
 
@@ -157,7 +165,7 @@ class ContactLaw:
             return bool(kernel.fill(self._address, flat[block], *parts))
 
         if not all(in_blocks(fill, flat.size, BLOCK)):
-            self._gaps(separation, u)
+            self.gaps(separation, u)
         return tuple(values.reshape(d.shape)[()] for values in out.values())
 
     def __call__(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
@@ -283,13 +291,31 @@ class ContactLaw:
         )
         return float(found.x)
 
+    @functools.cached_property
+    def leakage(self) -> LeakageLaw:
+        """Flow conductance of the gaps at d, ``u=`` or ``pressure=``, a `theories.leakage.LeakageLaw`; made when read.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact_law
+        >>> seal = Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5, unit="um")
+        >>> law = contact_law(seal, E_star="10 MPa", theory="calibrated")
+        >>> f"{law.leakage(pressure='0.05 MPa'):.1g} um^3"
+        '0.001 um^3'
+        """
+        from mbma_tables.theories.leakage import leakage_law
+
+        if self.surface is None:
+            raise InputError("leakage needs the surface, which this law does not hold")
+        return leakage_law(self, self.surface)
+
     def slope_error(self, separation: ArrayLike) -> Any:
         """Bound on the error of `stiffness` over F/l, and of `area_slope` over A/l, against those of the theory.
 
         l = h_max - d where contact ends there, else h_max + d. It covers what the polynomials leave out, and for MBMA
         the error of the islands, which the sum over them passes on to slopes; not the own error of another theory.
         """
-        d = self._gaps(separation, None)
+        d = self.gaps(separation, None)
         head = self.block
         x = (self.h_max + np.where(d < 0, head[kernel.MINUS], head[kernel.PLUS]) * d) * head[kernel.SCALE]
         bound = self.errors[self._records_at(d, x), 1]

@@ -1,7 +1,7 @@
 """Flow conductance of contacts: the contact factor's table of self-affine surfaces, and its scatter.
 
 The table holds ln R of `mbma_tables.leakage` over Hurst exponent, ln zeta_1 and ln A/(Ac - A). Below its least contact
-R is that of the first node, 1 within 1e-3; above its largest, ln R is linear in the odds: a power of Ac - A.
+ln R goes as A^m, as what obstructs; above its largest it is linear in the odds: R is a power of Ac - A.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class FlowTable:
     coefficients : numpy.ndarray
         Quintic B-splines of ln R, the last axis with two zeros more.
     numbers : numpy.ndarray
-        First node and inverse step of each axis, and the threshold.
+        First node and inverse step of each axis, threshold and m.
     covered : numpy.ndarray, shape (2, 2)
         First and last H and ln zeta_1 that are answered from the table.
     constants : FlowConstants
@@ -83,7 +83,7 @@ def shipped_flow() -> FlowTable:
     constants = FlowConstants(*(float(facts[f"flow_{f.name}"]) for f in dataclasses.fields(FlowConstants)))
     return FlowTable(
         np.pad(values["spline"], ((0, 0), (0, 0), (0, 2))),
-        np.array([*numbers, constants.threshold]),
+        np.array([*numbers, constants.threshold, constants.obstruction]),
         COVERED,
         constants,
         float(facts["largest_error_log_factor"]),
@@ -130,6 +130,8 @@ def fill_flow(
         if place > last:
             w0, w1, w2, w3, w4, w5 = quintic_slope(z)
             value += (place - last) * (w0 * c0 + w1 * c1 + w2 * c2 + w3 * c3 + w4 * c4 + w5 * c5)
+        elif place < 0.0:
+            value *= math.exp(numbers[7] * place / numbers[5])
         out[n] = cube * math.exp(min(value, 0.0))
 
 
@@ -153,12 +155,13 @@ def self_affine(hurst: float, log_zeta_1: float) -> Spectrum:
 
 def flow_of_spectrum(spectrum: Spectrum, u: FloatArray, area: FloatArray) -> FloatArray:
     """k of mean gaps [h_rms] and contact fractions of one spectrum; 0 where blocked."""
-    threshold = shipped_flow().constants.threshold
+    constants = shipped_flow().constants
+    threshold = constants.threshold
     log_factor, slope = own_factor(spectrum)
     first, last = log_factor.x[[0, -1]]
     left = np.maximum(threshold - area, np.finfo(float).tiny)
     with np.errstate(divide="ignore"):
         odds = np.log(area / left)
     found = log_factor(np.clip(odds, first, last)) + slope * np.maximum(odds - last, 0)
-    found = np.where(area > 0, found, 0.0)
+    found *= np.exp(constants.obstruction * np.minimum(odds - first, 0.0))
     return np.where(area < threshold, u**3 * (1 - 1.5 / (u**2 + 4)) * np.exp(found), 0.0)
