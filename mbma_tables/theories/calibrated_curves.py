@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline, CubicHermiteSpline, CubicSpline, PchipInterpolator, make_interp_spline
-from scipy.special import erf, erfinv, ndtri
+from scipy.special import erfc, erfinv, ndtri
 
 from mbma_tables.arguments import FloatArray, require
 from mbma_tables.bearing import FRACTIONS
@@ -132,7 +132,9 @@ class Curve:
         """A/A0 at a force, in proportion below the law's lightest load."""
         known = np.clip(force, np.exp(LOG_FORCE[0]), np.exp(LOG_FORCE[-1]))
         area = self._law.area(known) * np.minimum(force / known, 1)
-        return np.where(force > np.exp(LOG_FORCE[-1]), np.maximum(area, erf(np.sqrt(2) * force)), area)
+        # what is left to full contact falls on like that of Gaussian pressures
+        left = erfc(np.sqrt(2) * np.maximum(force, known)) / erfc(np.sqrt(2) * known)
+        return np.where(force > known, 1 - (1 - area) * left, area)
 
     def separation(self, quantity: str, wanted: FloatArray, gradient: float) -> FloatArray:
         """Mean separation [h_rms]: the inverse of `answer`."""

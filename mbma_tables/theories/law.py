@@ -143,31 +143,34 @@ def one_surface(surface: AnySurface) -> AnySurface:
 
 
 def _mbma_law(surface: AnySurface, rtol: float, tier: Any, reading: Reading, E_star: float) -> ContactLaw:
-    """A law of the MBMA model: x = (h_max - d)/(2 h_max), powers of it below half of the boundary layer."""
+    """A law of the MBMA model: x = (h_max - d)/(2 h_max), powers of it below half of the boundary layer.
+
+    Where the tier's table does not cover the islands of full compression, the law ends with the table.
+    """
     inner = max(0.1 * rtol, MIN_RTOL)
     model = get_model(tier, inner, reading)
     h_max = float(surface.h_max)
     islands = _islands(surface, model, reading, inner)
-    worst = 0.0
+    end, worst = islands.end, 0.0
 
     def values(x: FloatArray) -> FloatArray:
         nonlocal worst
-        force, area, error = islands.totals(x * 2 * h_max)
+        force, area, error = islands.totals(x * end)
         worst = max(worst, float(np.max(error)))
         if not (force.all() and area.all()):
             high = h_max / float(surface.h_rms)
             raise OutOfRangeError(f"h_max is {high:g} h_rms, so high that force or area underflow")
         return np.stack([force, reading.area_of(area)])
 
-    places = [kink / (2 * h_max) for kink in islands.kinks]
+    places = [kink / end for kink in islands.kinks]
     tolerance = min(rtol, RESOLVED)
-    for octaves in range(math.ceil(-math.log2(min(LAYER_SHARE * islands.layer / (2 * h_max), *places))), 1100):
+    for octaves in range(math.ceil(-math.log2(min(LAYER_SHARE * islands.layer / end, *places))), 1100):
         first, first_error = power_record(values, 2.0**-octaves, POWERS)
         if first_error[0] <= tolerance:
             break
     side = Side(-1, 2.0**-octaves, values, tuple(place for place in places if 2.0**-octaves < place < 1))
     made = _finish(
-        surface, 1 / (2 * h_max), [side], tolerance, (first, first_error, POWERS), E_star, -h_max, math.inf, 0.0,
+        surface, 1 / end, [side], tolerance, (first, first_error, POWERS), E_star, h_max - end, math.inf, 0.0,
         model.name, reading.name, "mbma",
     )  # fmt: skip
     own = np.array([0.0, islands.leverage * worst])
@@ -177,6 +180,7 @@ def _mbma_law(surface: AnySurface, rtol: float, tier: Any, reading: Reading, E_s
 class Islands(NamedTuple):
     """What a law needs of a surface's islands."""
 
+    end: float  # largest approach [length]
     layer: float  # approach at which an island's band leaves the shortest wave [length]
     kinks: list[float]  # approaches at floors of the band [length]
     leverage: float  # what their error is worth in slopes
@@ -191,7 +195,7 @@ def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float
         def of_curve(depth: FloatArray) -> tuple[FloatArray, ...]:
             return measured_totals(own, depth, model, reading, rtol, "raise")[:3]
 
-        return Islands(curve.layer, list(curve.kinks), ROUGH_LEVERAGE, of_curve)
+        return Islands(curve.end, curve.layer, list(curve.kinks), ROUGH_LEVERAGE, of_curve)
     assert isinstance(surface, Surface)
     if not surface.zeta_1 > reading.floor_u:
         raise OutOfRangeError(f"q1/q0 must be greater than {reading.floor_u:g}, the reading's floor of zeta_u")
@@ -209,13 +213,13 @@ def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float
             found = totals_of(model, Pairs.of(one, depth), reading, max(0.03 * rtol, MIN_RTOL))
             return found.force * stress, found.area, found.error
 
-        return Islands(layer, ends, ROUGH_LEVERAGE, of_gaps)
+        return Islands(2 * float(surface.h_max), layer, ends, ROUGH_LEVERAGE, of_gaps)
 
     def of_profile(depth: FloatArray) -> tuple[FloatArray, ...]:
         force, area = kept.totals(depth / h_rms)
         return force * stress, area, np.array(kept.error)
 
-    return Islands(layer, ends, kept.leverage, of_profile)
+    return Islands(2 * float(surface.h_max), layer, ends, kept.leverage, of_profile)
 
 
 def _theory_law(surface: AnySurface, theory: Theory, rtol: float, E_star: float) -> ContactLaw:

@@ -33,7 +33,7 @@ RATIO = 1.25  # between the ends of a panel
 STEP = 0.5  # of a panel, in the least standard deviation of islands' heights
 FIRST = 0.05  # of the least approach at which anything changes: the first panel
 ENDS, FEW = 10, 7  # Gauss-Jacobi nodes of the first panel, and of its check
-TERMS = 14  # of a series in the gap over a stretch no longer than a panel may be without the spectrum's samples
+TERMS = 12  # of a series in the gap over a stretch, and one for each standard deviation up to the highest point
 MAX_ROUNDS = 12  # halvings of panels
 QUADRATURE_SHARE = 0.9  # of the tolerance asked for; the islands' own error comes on top
 SAFETY = 4.0  # as in `intervals`
@@ -153,6 +153,7 @@ class IslandCurve:
         count = math.ceil(math.log(last / first) / math.log(RATIO))
         steps = np.arange(first, last, STEP * spread)
         self._stretches = np.unique(np.append(np.geomspace(first, last, count + 1), steps))
+        self._terms = TERMS + math.ceil(self.h_max / spread)
         edges = np.unique(np.append(self._stretches, breaks))
         # breaks that coincide but for rounding
         return np.append(edges[:-1][np.diff(edges) > 1e-12 * edges[:-1]], last)
@@ -186,17 +187,20 @@ class IslandCurve:
         self._stops = first.delta.size + NODES.size * np.arange(low.size + 1)
         unknown = np.isnan(self._columns).any(axis=1)
         self._covered = float(self._nodes.delta[unknown].min(initial=math.inf))
+        # up to which a law goes
+        self.end = float(self._nodes.delta[self._nodes.delta < self._covered].max(initial=0.0))
+        self.end = end if self._covered > end else self.end
         self._columns[unknown] = 0.0
         self._by_column = np.ascontiguousarray(self._columns.T)
         self._shift = self._heights(self._nodes, 0.0)
         starts = np.unique(np.searchsorted(self._edges, self._stretches[:-1]))
         self._stretches = np.append(self._edges[starts], end)
-        points, widths = chebyshev.chebpts1(TERMS), np.diff(self._stretches)
+        points, widths = chebyshev.chebpts1(self._terms), np.diff(self._stretches)
         at = self._stretches[:-1, None] + widths[:, None] * (1 + points) / 2
-        below = self._stops[starts].repeat(TERMS)
+        below = self._stops[starts].repeat(self._terms)
         sums = self._whole(at.ravel(), np.zeros_like(below), below).reshape(*at.shape, -1)
         # of the nodes below each stretch, over it; its own are added gap by gap
-        self._series = np.linalg.inv(chebyshev.chebvander(points, TERMS - 1)) @ sums
+        self._series = np.linalg.inv(chebyshev.chebvander(points, self._terms - 1)) @ sums
         self._begins = self._stops[starts]
 
     def _panels(self, low: FloatArray, high: FloatArray) -> Nodes:
@@ -216,7 +220,9 @@ class IslandCurve:
 
     def _shares(self, inner: Nodes, low: FloatArray, high: FloatArray, depths: FloatArray) -> FloatArray:
         """Kronrod less Gauss of each panel over the whole, the largest at any depth that holds the panel."""
-        worst, columns = np.zeros(low.size), np.nan_to_num(self._columns_of(inner, low, high))
+        worst, columns = np.zeros(low.size), self._columns_of(inner, low, high)
+        # panels with islands that are not covered answer nothing
+        columns[np.isnan(columns).any(axis=(1, 2))] = 0.0
         for depth in depths:
             gaussian = np.exp(-0.5 * self._heights(inner, depth) ** 2) * (high <= depth)[:, None]
             sums = np.einsum("pn,pnc->pc", gaussian, columns)
@@ -250,7 +256,7 @@ class IslandCurve:
             stretch = np.minimum(np.searchsorted(self._stretches, own, side="right") - 1, self._begins.size - 1)
             near = self._whole(own, self._begins[stretch], self._stops[whole[full]])
             low, high = self._stretches[stretch], self._stretches[stretch + 1]
-            place = chebyshev.chebvander((2 * own - low - high) / (high - low), TERMS - 1)
+            place = chebyshev.chebvander((2 * own - low - high) / (high - low), self._terms - 1)
             far = np.einsum("gt,gtc->gc", place, self._series[stretch])
             sums[full], slopes[full] = np.split(near + far, [-2], axis=1)
         # the panel that the depth cuts, and the island at the depth itself

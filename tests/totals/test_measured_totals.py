@@ -137,15 +137,28 @@ def test_lengths_scale():
     np.testing.assert_allclose(two.stiffness, 1e9 * one.stiffness, rtol=1e-8)
 
 
-@pytest.mark.parametrize("count", [60, 2000])
-def test_a_law_is_the_contacts(count):
-    surface = rough(count=count)
+@pytest.mark.parametrize(("count", "h_max"), [(60, 3.5), (2000, 3.5), (60, 13.0)])
+def test_a_law_is_the_contacts(count, h_max):
+    surface = rough(count=count, h_max=h_max)
     law = contact_law(surface)
     d = surface.h_max * (1 - DEPTHS)
+    d = d[d >= law.lowest]
     found = contact(surface, d)
     np.testing.assert_allclose(law.force(d), found.force, rtol=2 * law.error)
     np.testing.assert_allclose(law.area(d), found.area, rtol=2 * law.error)
     assert (law.theory, law.reading, law.tier) == ("mbma", "reported", "universal")
+
+
+def test_a_law_ends_with_the_table():
+    # high peaks: the islands of full compression lie outside of the table
+    surface = rough(h_max=30.0)
+    law = contact_law(surface)
+    assert -surface.h_max < law.lowest < surface.h_max / 2
+    d = law.lowest + np.array([1e-9, 0.1, 1.0])
+    np.testing.assert_allclose(law.force(d), contact(surface, d).force, rtol=2 * law.error)
+    with pytest.raises(OutOfRangeError, match="where the theory ends"):
+        law.force(law.lowest - 0.1)
+    np.testing.assert_allclose(law.separation(force=law.force(d)), d, rtol=1e-6)
 
 
 def test_islands():
