@@ -123,7 +123,7 @@ def fit(seen: Sequence[Capped]) -> cap.Constants:
         if what == "yielded":
             return (cap.yielded_area(one.force, elastic_areas[k], one.eta, constants) - one.yielded) / one.area
         if what == "force":
-            return np.log(cap.force(forces[k], shares[k], one.eta, constants)[0] / one.force)
+            return np.log(cap.force(forces[k], 0.0, shares[k], 0.0, one.eta, constants)[0] / one.force)
         if what == "frozen":
             return np.log(frozen[k] * cap.frozen_factor(one.eta, constants) / one.frozen)
         return cap.plane_separation(one.u, one.force / one.eta, one.eta, constants) - one.planes
@@ -160,7 +160,7 @@ def errors_of_law(one: Capped, form: str, constants: cap.Constants) -> dict[str,
         else:
             force, stiffness = one.law.force_and_stiffness(u)
             share = cap.bearing_share(u, one.h_max)[0]
-        return cap.force(force, share, one.eta, constants)[0], stiffness
+        return cap.force(force, 0.0, share, 0.0, one.eta, constants)[0], stiffness
 
     elastic = one.map_curve.area(one.force) if by_map else one.law.area(one.force)
     area = cap.area(one.force, elastic, one.eta, constants)

@@ -95,6 +95,15 @@ def positive_modulus(E_star: ArrayLike) -> FloatArray:
     return modulus
 
 
+def checked_hardness(hardness: ArrayLike) -> FloatArray:
+    """Hardnesses as positive numbers; infinity means that nothing yields."""
+    values = np.asarray(hardness)
+    infinite = np.isposinf(values) if values.dtype.kind in "fiu" else False
+    given = finite_array("hardness", np.where(infinite, 1.0, values) if np.any(infinite) else hardness)
+    require("hardness", given, given > 0, "positive, or infinite where nothing yields")
+    return np.where(infinite, np.inf, given)
+
+
 def number_in(name: str, value: Any, low: float, high: float) -> float:
     """`value` as a float within [low, high]."""
     number = finite_array(name, value)

@@ -22,9 +22,9 @@ import dataclasses
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
-from scipy.special import erf, erfc, erfinv, ndtr, ndtri
+from scipy.special import erfinv, ndtr, ndtri
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.bearing import FRACTIONS
@@ -34,10 +34,12 @@ IMAGES = 0.06  # tau below which images converge faster than the series
 SHARPEST = 1e-200
 TERMS = 9  # of the series from there on
 LINEAR, LEAST = 8.3, 1e-300  # mean gaps from which u = d, and below which all heights lie above the level
-LOG_GAPS, STARTS = (-12.0, math.log(8.3)), 16384  # tabulated to start from
+LOG_GAPS, NODES = (-12.0, math.log(8.3)), 16384  # of tabulated levels
 MIN_SPACING = 0.02  # relative, of mean gaps between nodes of a map's bearing curve
 CANCELS, FRACTION_TERMS = 3.0, 60
-EVEN = np.polynomial.legendre.leggauss(8)
+NODE, WEIGHT = np.polynomial.legendre.leggauss(8)
+SETTLED = 1e-7  # of ln F, before the last step
+MIN_DEPTH = 4 * np.finfo(float).eps  # relative, of separations that rounding leaves distinct
 NARROW = 0.05  # half-width over which a difference of complementary error functions is integrated
 
 
@@ -69,73 +71,73 @@ class Constants:
     plane_eta: float = 3.153
     plane_load: float = 2.334
 
+    @property
+    def exponent(self) -> tuple[float, float, float]:
+        """n0, c and d."""
+        return self.force_light, self.force_eta, self.force_share
+
 
 CONSTANTS = Constants()
 
 
 def area(force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """A/A0 at F/(A0 E* g), at most eta, from the elastic A/A0 at that force."""
-    load, elastic, cap = np.broadcast_arrays(*(np.asarray(v, float) for v in (force, elastic_area, eta)))
-    x = np.minimum(load / cap, 1.0)
-    tau = _variance(load, elastic, cap, constants.area_power, constants.area_scale)
-    # rounding may cross the bounds
-    return np.clip(_not_at_zero(x, tau), x, 1.0)
+    return _between_walls(force, elastic_area, eta, (constants.area_power, constants.area_scale), 1.0)
 
 
 def yielded_area(
     force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS
 ) -> FloatArray:
     """Yielded part of A/A0, likewise."""
-    load, elastic, cap = np.broadcast_arrays(*(np.asarray(v, float) for v in (force, elastic_area, eta)))
-    x = np.minimum(load / cap, 1.0)
-    tau = _variance(load, elastic, cap, constants.yield_power, constants.yield_scale)
-    return np.clip(_at_cap(x, tau), 0.0, x)
+    return _between_walls(force, elastic_area, eta, (constants.yield_power, constants.yield_scale), -1.0)
 
 
-def _variance(load: FloatArray, elastic: FloatArray, cap: FloatArray, power: float, scale: float) -> FloatArray:
-    """tau of the capped pressures; 1 without load."""
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        spread = 2 * (load / erfinv(np.minimum(elastic, 1.0))) ** 2
-        limit = cap**1.5 / scale
-        # the smaller over the larger cannot overflow
-        small, large = np.minimum(spread, limit), np.maximum(spread, limit)
-        S = small * (1 + (small / large) ** power) ** (-1 / power)
-        # an elastic contact that is closed has no variance left
-        return np.where(load > 0, np.maximum(S / (8 * cap**2), SHARPEST), 1.0)
+def _between_walls(
+    force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, numbers: tuple[float, float], sign: float
+) -> FloatArray:
+    known, shape = rows(force, erfinv(np.minimum(elastic_area, 1.0)), eta)
+    out = np.empty(known.shape[1])
+    _fill_area(known, numbers, sign, out)
+    return out.reshape(shape)
 
 
-def _not_at_zero(x: FloatArray, tau: FloatArray) -> FloatArray:
-    """Share of a diffusion from x between walls at 0 and 1 that has not ended at 0 after a variance of 2 tau."""
-    out, few = np.empty(x.shape), tau < IMAGES
-    start, width = x[few], 2 * np.sqrt(tau[few])
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        out[few] = np.where(start > 0, erf(start / width), 0.0) + _difference(2 / width, start / width)
-    out[~few] = x[~few] + _series(x[~few], tau[~few], 1.0)
-    return out
-
-
-def _at_cap(x: FloatArray, tau: FloatArray) -> FloatArray:
-    """Share that has ended at 1."""
-    out, few = np.empty(x.shape), tau < IMAGES
-    start, width = x[few], 2 * np.sqrt(tau[few])
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        out[few] = _difference(1 / width, start / width) + _difference(3 / width, start / width)
-    out[~few] = x[~few] + _series(x[~few], tau[~few], -1.0)
-    return out
-
-
-def _series(x: FloatArray, tau: FloatArray, sign: float) -> FloatArray:
-    out = np.empty(x.size)
-    _fill_series(x, tau, sign, out)
-    return out
+def rows(*given: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
+    """What is given, broadcast and flat, and the shape."""
+    arrays = [np.asarray(value, float) for value in given]
+    shape = np.broadcast(*arrays).shape
+    table = np.empty((len(arrays), *shape))
+    for k, array in enumerate(arrays):
+        table[k] = array
+    return table.reshape(len(arrays), -1), shape
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _fill_series(x: FloatArray, tau: FloatArray, sign: float, out: FloatArray) -> None:
-    for k in range(x.size):
-        first = math.exp(-math.pi * math.pi * tau[k])
-        double = 2.0 * math.cos(math.pi * x[k])
-        before, sine, factor, odd, total, turn = 0.0, math.sin(math.pi * x[k]), first, first, 0.0, 1.0
+def _fill_area(known: FloatArray, numbers: tuple[float, float], sign: float, out: FloatArray) -> None:
+    power, scale = numbers
+    for k in range(out.size):
+        load, spread, cap = known[0, k], known[1, k], known[2, k]
+        x = min(load / cap, 1.0)
+        tau = 1.0
+        if load > 0.0:
+            elastic, limit = 2.0 * (load / spread) ** 2, cap**1.5 / scale
+            # the smaller over the larger cannot overflow; an elastic contact that is closed has no variance left
+            small, large = min(elastic, limit), max(elastic, limit)
+            S = small * (1.0 + (small / large) ** power) ** (-1.0 / power)
+            tau = max(S / (8.0 * cap**2), SHARPEST)
+        share = diffused(x, tau, sign)
+        # rounding may cross the bounds
+        out[k] = min(max(share, x), 1.0) if sign > 0.0 else min(max(share, 0.0), x)
+
+
+@njit(cache=True, error_model="numpy")
+def diffused(x: float, tau: float, sign: float) -> float:
+    """Share of a diffusion from x, between walls at 0 and 1, after a variance of 2 tau.
+
+    What has not ended at 0, or with a negative `sign` what has ended at 1.
+    """
+    if tau >= IMAGES:
+        first, double = math.exp(-math.pi * math.pi * tau), 2.0 * math.cos(math.pi * x)
+        before, sine, factor, odd, total, turn = 0.0, math.sin(math.pi * x), first, first, 0.0, 1.0
         for n in range(1, TERMS + 1):
             turn *= sign
             total += turn * sine * factor / n
@@ -143,17 +145,22 @@ def _fill_series(x: FloatArray, tau: FloatArray, sign: float, out: FloatArray) -
             # first^(n^2) by the odd powers between the squares
             odd *= first * first
             factor *= odd
-        out[k] = total * 2.0 / math.pi
+        return x + total * 2.0 / math.pi
+    width = 2.0 * math.sqrt(tau)
+    if sign > 0.0:
+        return (math.erf(x / width) if x > 0.0 else 0.0) + _difference(2.0 / width, x / width)
+    return _difference(1.0 / width, x / width) + _difference(3.0 / width, x / width)
 
 
-def _difference(centre: FloatArray, half: FloatArray) -> FloatArray:
+@njit(cache=True, error_model="numpy")
+def _difference(centre: float, half: float) -> float:
     """erfc(centre - half) - erfc(centre + half), to relative accuracy where half is small."""
-    found = np.asarray(erfc(centre - half) - erfc(centre + half))
-    close = half < NARROW / np.maximum(centre, 1.0)
-    middle, rate = centre[close], half[close]
-    node, weight = EVEN
-    found[close] = np.exp(-((middle[:, None] + rate[:, None] * node) ** 2)) @ weight * rate * (2 / np.sqrt(np.pi))
-    return np.asarray(found)
+    if half >= NARROW / max(centre, 1.0):
+        return math.erfc(centre - half) - math.erfc(centre + half)
+    total = 0.0
+    for k in range(NODE.size):
+        total += WEIGHT[k] * math.exp(-((centre + half * NODE[k]) ** 2))
+    return total * half * (2.0 / math.sqrt(math.pi))
 
 
 @njit(cache=True, error_model="numpy")
@@ -173,35 +180,42 @@ def _gap(d: float) -> tuple[float, float]:
 
 
 def _levels() -> FloatArray:
-    """Levels at mean gaps equally spaced in the logarithm, close enough to start Newton's method."""
+    """Levels d at mean gaps equally spaced in the logarithm, and their slopes by it."""
+    log_gap = np.linspace(*LOG_GAPS, NODES)
     d = np.linspace(-6.0, LINEAR, 4000)
-    log_gap = np.log(np.exp(-d * d / 2) / np.sqrt(2 * np.pi) + d * ndtr(d))
-    return np.interp(np.linspace(*LOG_GAPS, STARTS), log_gap, d)
+    d = np.interp(log_gap, np.log(np.exp(-d * d / 2) / np.sqrt(2 * np.pi) + d * ndtr(d)), d)
+    for _ in range(4):
+        gap = np.exp(-d * d / 2) / np.sqrt(2 * np.pi) + d * ndtr(d)
+        d += (log_gap - np.log(gap)) * gap / ndtr(d)
+    return np.stack([d, np.exp(log_gap) / ndtr(d)], axis=1)
 
 
-_STARTS = _levels()
+_LEVELS = _levels()
 
 
 @njit(cache=True, error_model="numpy")
 def _level(u: float) -> float:
-    """Level d whose mean gap is u, by Newton's method in the logarithm."""
+    """Level d whose mean gap is u: Hermite's cubics of ln u, to 1e-14, or Newton's method in the logarithm."""
     if u >= LINEAR:
         return u
     if u <= LEAST:
         return -math.inf
     log_u = math.log(u)
-    place = (log_u - LOG_GAPS[0]) * ((STARTS - 1) / (LOG_GAPS[1] - LOG_GAPS[0]))
-    d: float
+    step = (LOG_GAPS[1] - LOG_GAPS[0]) / (NODES - 1)
+    place = (log_u - LOG_GAPS[0]) / step
     if place > 0.0:
-        k = min(int(place), STARTS - 2)
-        d = _STARTS[k] + (place - k) * (_STARTS[k + 1] - _STARTS[k])
-    else:
-        d = -math.sqrt(-2.0 * log_u)
+        k = min(int(place), NODES - 2)
+        x = place - k
+        rise = _LEVELS[k + 1, 0] - _LEVELS[k, 0]
+        first, last = _LEVELS[k, 1] * step - rise, rise - _LEVELS[k + 1, 1] * step
+        d: float = _LEVELS[k, 0] + x * (rise + (1.0 - x) * ((1.0 - x) * first + x * last))
+        return d
+    d = -math.sqrt(-2.0 * log_u)
     for _ in range(30):
         gap, below = _gap(d)
-        step = (math.log(gap) - log_u) * gap / below
-        d -= step
-        if abs(step) <= 3e-7:  # and the next one its square
+        move = (math.log(gap) - log_u) * gap / below
+        d -= move
+        if abs(move) <= 3e-7:  # and the next one its square
             break
     return d
 
@@ -225,10 +239,10 @@ def _fill_bearing(u: FloatArray, h_max: FloatArray, share: FloatArray, slope: Fl
 
 def bearing_share(u: ArrayLike, h_max: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
     """Q(u), share of Gaussian heights above the level of mean gap u [h_rms], and dQ/du; with `h_max` it ends there."""
-    gap, end = np.broadcast_arrays(np.asarray(u, float), np.inf if h_max is None else np.asarray(h_max, float))
-    out = np.empty((2, gap.size))
-    _fill_bearing(gap.flatten(), end.flatten(), *out)
-    return out[0].reshape(gap.shape), out[1].reshape(gap.shape)
+    known, shape = rows(u, np.inf if h_max is None else h_max)
+    out = np.empty_like(known)
+    _fill_bearing(*known, *out)
+    return out[0].reshape(shape), out[1].reshape(shape)
 
 
 def gaussian_gap(share: ArrayLike) -> FloatArray:
@@ -278,36 +292,108 @@ class BearingCurve:
         )
 
 
+@njit(cache=True, error_model="numpy")
+def _joined(
+    elastic: float, stiffness: float, share: float, slope: float, cap: float, numbers: tuple[float, float, float]
+) -> tuple[float, float]:
+    """F, and -d ln F/du."""
+    n, full = numbers[0] + numbers[1] * cap + numbers[2] * share, cap * share
+    small, large = min(elastic, full), max(elastic, full)
+    if small <= 0.0:
+        return 0.0, 0.0
+    gain = math.log(large / small)
+    power = math.exp(-n * gain) if large < math.inf else 0.0
+    lower = math.log1p(power) / n  # of ln F below the smaller
+    weight = power / (1.0 + power)  # of the larger
+    by_n = (lower + weight * gain if power > 0.0 else 0.0) / n
+    by_elastic = 1.0 - weight if elastic <= full else weight
+    # where the elastic force has no bound it has no weight
+    rate = by_elastic * stiffness / elastic if elastic < math.inf else 0.0
+    return small * math.exp(-lower), rate - ((1.0 - by_elastic) / share + numbers[2] * by_n) * slope
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def _fill_force(
-    elastic: FloatArray, share: FloatArray, cap: FloatArray, numbers: tuple[float, float, float], out: FloatArray
-) -> None:
-    for k in range(elastic.size):
-        Q = share[k]
-        n, full = numbers[0] + numbers[1] * cap[k] + numbers[2] * Q, cap[k] * Q
-        small, large = min(elastic[k], full), max(elastic[k], full)
-        if small <= 0.0:
-            out[0, k], out[1, k], out[2, k] = 0.0, 1.0, 0.0
+def _fill_force(known: FloatArray, numbers: tuple[float, float, float], out: FloatArray) -> None:
+    for k in range(known.shape[1]):
+        force, rate = _joined(known[0, k], known[1, k], known[2, k], known[3, k], known[4, k], numbers)
+        out[0, k], out[1, k] = force, force * rate
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def newton_step(
+    elastic: FloatArray,
+    stiffness: FloatArray,
+    share: FloatArray,
+    slope: FloatArray,
+    known: FloatArray,
+    numbers: tuple[float, float, float],
+    bracket: FloatArray,
+    places: NDArray[np.intp],
+) -> NDArray[np.bool_]:
+    """One step of some separations towards their forces; which of them are not there yet.
+
+    `elastic` force, its `stiffness`, `share` Q and its `slope` by u are those at the gaps u in the first row of
+    `bracket`, at `places`; its others have lower and upper bounds of u. Rows of `known`: the wanted force, eta, the
+    last gap with contact, which may be infinite, and h_rms. Forces in A0 E* g.
+    """
+    left = np.ones(places.size, dtype=np.bool_)
+    for k in range(places.size):
+        place = places[k]
+        u, wanted, cap, end = bracket[0, place], known[0, place], known[1, place], known[2, place]
+        force, rate = _joined(elastic[k], stiffness[k], share[k], slope[k], cap, numbers)
+        miss = math.log(force / wanted)
+        if miss > 0.0:
+            bracket[1, place] = u
+        else:
+            bracket[2, place] = u
+        low, high = bracket[1, place], bracket[2, place]
+        # in ln u - ln(end - u): straight at either end of contact
+        rest = 1.0 - u / end
+        ratio = u / rest * math.exp(min(max(miss / (rate * u * rest), -40.0), 40.0))
+        following = ratio / (1.0 + ratio / end)
+        # the next miss would be the square of this one
+        near = abs(miss) <= SETTLED
+        if not low < following < high:
+            following = u if near else (math.sqrt(low * high) if high > 2.0 * low else 0.5 * (low + high))
+        left[k] = not (near or high - low <= MIN_DEPTH * high or following == u)
+        bracket[0, place] = following
+    return left
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def start(known: FloatArray, numbers: tuple[float, float, float], bracket: FloatArray) -> None:
+    """First separations u for `newton_step`, in place of levels d above which a share F/(p_m A0) of heights lies.
+
+    Below the elastic contact's, which are the upper bounds, and below the bearing curve's.
+    """
+    for k in range(known.shape[1]):
+        wanted, cap, h_rms, d = known[0, k], known[1, k], known[3, k], bracket[0, k]
+        low, high = bracket[1, k], bracket[2, k]
+        if not 0.0 < wanted < cap < math.inf:
             continue
-        gain = math.log(large / small)
-        power = math.exp(-n * gain) if large < math.inf else 0.0
-        lower = math.log1p(power) / n  # of ln F below the smaller
-        weight = power / (1.0 + power)  # of the larger
-        by_n = (lower + weight * gain if power > 0.0 else 0.0) / n
-        out[0, k] = small * math.exp(-lower)
-        out[1, k] = 1.0 - weight if elastic[k] <= full else weight
-        out[2, k] = (1.0 - out[1, k]) / Q + numbers[2] * by_n
+        x, density = wanted / cap, math.exp(-0.5 * d * d) / math.sqrt(2.0 * math.pi)
+        gap = _gap(d)[0]
+        # powers of u near both, joined as forces are
+        steep = min(max(gap * density / (x * (1.0 - x)), 1.0), 40.0)
+        n = (numbers[0] + numbers[1] * cap + numbers[2] * x) * steep
+        small, large = min(high, gap * h_rms), max(high, gap * h_rms)
+        u = small * (1.0 + (small / large) ** n) ** (-1.0 / n)
+        bracket[0, k] = min(max(u, low), high * (1.0 - MIN_DEPTH))
 
 
 def force(
-    elastic_force: ArrayLike, share: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """F/(A0 E* g) at a mean gap from the elastic force and Q there, and d ln F by d ln F_el and by dQ."""
-    elastic, Q, cap = np.broadcast_arrays(*(np.asarray(v, float) for v in (elastic_force, share, eta)))
-    out = np.empty((3, elastic.size))
-    numbers = (constants.force_light, constants.force_eta, constants.force_share)
-    _fill_force(elastic.flatten(), Q.flatten(), cap.flatten(), numbers, out)
-    return out[0].reshape(Q.shape), out[1].reshape(Q.shape), out[2].reshape(Q.shape)
+    elastic_force: ArrayLike,
+    stiffness: ArrayLike,
+    share: ArrayLike,
+    slope: ArrayLike,
+    eta: ArrayLike,
+    constants: Constants = CONSTANTS,
+) -> tuple[FloatArray, FloatArray]:
+    """F/(A0 E* g) at a mean gap u and -dF/du, from the elastic force and stiffness, and from Q and dQ/du, there."""
+    known, shape = rows(elastic_force, stiffness, share, slope, eta)
+    out = np.empty((2, known.shape[1]))
+    _fill_force(known, constants.exponent, out)
+    return out[0].reshape(shape), out[1].reshape(shape)
 
 
 def frozen_factor(eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:

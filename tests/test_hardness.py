@@ -36,8 +36,9 @@ def test_areas_are_those_of_a_diffusion_between_walls():
     tau = np.append(10 ** rng.uniform(-3, 1, 60), [0.0599, 0.0601])
     x = 10 ** rng.uniform(-12, 0, 62)
     exact = np.array([between_walls(*point) for point in zip(x, tau, strict=True)])
-    assert hardness._not_at_zero(x, tau) == pytest.approx(exact[:, 0], rel=1e-12)
-    assert hardness._at_cap(x, tau) == pytest.approx(exact[:, 1], rel=1e-11, abs=1e-250)
+    for column, (sign, rel) in enumerate(((1.0, 1e-12), (-1.0, 1e-11))):
+        found = [hardness.diffused(*point, sign) for point in zip(x, tau, strict=True)]
+        assert found == pytest.approx(exact[:, column], rel=rel, abs=1e-250)
 
 
 @pytest.mark.parametrize("u", [1e-250, 1e-10, 1e-3, 0.1, 0.39, 1.0, 3.0, 5.0, 8.2, 20.0])
@@ -55,20 +56,15 @@ def test_derivatives_of_the_force():
     slope = derivative(lambda x: hardness.bearing_share(x, 3.5)[0], u, initial_step=0.02 * np.minimum(u, 3.5 - u)).df
     assert hardness.bearing_share(u, 3.5)[1] == pytest.approx(slope, rel=1e-7)
     elastic, share, eta = np.meshgrid([0.01, 0.3, 5.0], [0.001, 0.3, 0.9], [0.05, 0.4, 3.0])
-    _, by_elastic, by_share = hardness.force(elastic, share, eta)
+    elastic, share, eta = (part.ravel() for part in (elastic, share, eta))
 
-    def log_force(x, q, e, cap):
-        return np.log(hardness.force(e * np.exp(x), q, cap)[0])
+    def log_force(x, by_elastic, by_share, e, q, cap):
+        return np.log(hardness.force(e * np.exp(by_elastic * x), 0.0, q * np.exp(by_share * x), 0.0, cap)[0])
 
-    found = derivative(log_force, np.zeros(27), args=(share.ravel(), elastic.ravel(), eta.ravel()), initial_step=0.1)
-    assert by_elastic.ravel() == pytest.approx(found.df, rel=1e-7, abs=1e-9)
-    found = derivative(
-        lambda q, e, cap: log_force(0.0, q, e, cap),
-        share.ravel(),
-        args=(elastic.ravel(), eta.ravel()),
-        initial_step=0.1 * np.minimum(share, 1 - share).ravel(),
-    )
-    assert by_share.ravel() == pytest.approx(found.df, rel=1e-6, abs=1e-9)
+    for by_elastic, by_share in ((1.0, 0.0), (0.0, 1.0), (1.0, -0.5)):
+        force, stiffness = hardness.force(elastic, -by_elastic * elastic, share, by_share * share, eta)
+        found = derivative(log_force, np.zeros(27), args=(by_elastic, by_share, elastic, share, eta), initial_step=0.05)
+        assert -stiffness / force == pytest.approx(found.df, rel=1e-6, abs=1e-9)
 
 
 def test_bearing_curve_of_a_map_is_that_of_its_heights():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import functools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Self
 
@@ -15,6 +16,13 @@ from mbma_tables.units import factor
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.measured import MeasuredSurface
+
+
+def frozen(values: Any) -> Any:
+    """The same numbers, which nobody can write to where they are a plain array."""
+    if isinstance(values, np.ndarray):
+        values.setflags(write=False)
+    return values
 
 
 class AnySurface(abc.ABC):
@@ -121,15 +129,15 @@ class AnySurface(abc.ABC):
         """Variance of height [length^2], Eq. (8)."""
         return self.h_rms**2
 
-    @property
+    @functools.cached_property
     def alpha(self) -> Any:
         """Nayak's bandwidth parameter, Eq. (3)."""
-        return self.m0 * self.m4 / self.m2**2
+        return frozen(self.m0 * self.m4 / self.m2**2)
 
-    @property
+    @functools.cached_property
     def rms_gradient(self) -> Any:
         """Root-mean-square gradient of the surface, sqrt(2 m2)."""
-        return np.sqrt(2 * self.m2)
+        return frozen(np.sqrt(2 * self.m2))
 
     @property
     def summit_density(self) -> Any:

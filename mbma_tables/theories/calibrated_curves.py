@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,11 +28,13 @@ from mbma_tables.calibrated import (
 )
 from mbma_tables.calibrated_map import LOG_FORCE, MapLaw, convex
 from mbma_tables.compiled import CONTRACT, njit
-from mbma_tables.hardness import BearingCurve
 from mbma_tables.surfaces.heights import SHARES
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import calibrated_table
+
+if TYPE_CHECKING:
+    from mbma_tables.hardness import BearingCurve
 
 TESTED_AREA = (1e-3, 0.97)
 WIDTHS = (0.01, 0.1, 0.4)  # of panels in ln q, up to which few nodes suffice
@@ -265,12 +267,15 @@ class OwnLaw:
         self.h_rms, self.h_max = float(surface.h_rms), float(surface.h_max)
         self.gradient = float(surface.rms_gradient)
         self.law: Law = TabulatedLaw(spectrum_of(surface), self.h_max / self.h_rms)
-        self.curve: Curve | None = None
-        self.heights: BearingCurve | None = None
-        known = self._map_law(surface)
-        if known is not None:
-            self.curve = Curve(known, self.h_max / self.h_rms)
-            self.heights = BearingCurve(known.mean_height, self.h_max / self.h_rms)
+        self._known = self._map_law(surface)
+        self.curve = None if self._known is None else Curve(self._known, self.h_max / self.h_rms)
+
+    @functools.cached_property
+    def heights(self) -> BearingCurve | None:
+        """Its own bearing curve, for a hardness."""
+        from mbma_tables.hardness import BearingCurve
+
+        return None if self._known is None else BearingCurve(self._known.mean_height, self.h_max / self.h_rms)
 
     def _map_law(self, surface: MeasuredSurface) -> MapLaw | None:
         if surface.bearing is not None and surface.bands is not None:

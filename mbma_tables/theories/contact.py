@@ -182,8 +182,10 @@ def _contact(
         fields = vars(totals) | places
     else:
         u = np.asarray(places["mean_separation"])
-        found = theory.answer(surface, u)
-        source = dataclasses.replace(source, answer=found)
+        capped: Any = theory
+        loaded = capped.loaded(surface, u) if source.yields else None
+        found = theory.answer(surface, u) if loaded is None else loaded.answer
+        source = dataclasses.replace(source, answer=found, loaded=loaded)
         error = np.broadcast_to(found.error, np.shape(found.force))[()]
         fields = {"force": (E_star * found.force)[()], "area": found.area[()], "error": error} | places
         fields |= {"reading": "", "tier": "", "islands": None}

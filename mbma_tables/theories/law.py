@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, number_in
+from mbma_tables.arguments import FloatArray, checked_hardness, number_in
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import AnyModel, get_model
 from mbma_tables.models.protocol import MAX_RTOL, MIN_RTOL
@@ -38,7 +38,6 @@ from mbma_tables.theories.law_pieces import (
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma
-from mbma_tables.theories.yielding import Yielding, checked_hardness
 from mbma_tables.totals.island_sum import kinks, totals_of
 from mbma_tables.totals.kernel import Pairs
 from mbma_tables.totals.measured import island_curve, measured_totals
@@ -116,6 +115,8 @@ def contact_law(
         refuse_options_of_mbma(tier=tier != "universal", reading=reading != "reported")
         chosen = get_theory(theory)
     if cap < math.inf:
+        from mbma_tables.theories.yielding import Yielding
+
         chosen = Yielding(chosen, float(cap) / modulus)
     one = one_surface(surface)
     asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, is_labelled
+from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, checked_hardness, is_labelled
 from mbma_tables.errors import InputError
 from mbma_tables.labels import apply_to_surface
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
-from mbma_tables.theories.yielding import Yielding, checked_hardness
 from mbma_tables.units import Units, unit_of
 
 if TYPE_CHECKING:
     from mbma_tables.theories.leakage import Leakage
+    from mbma_tables.theories.yielding import Loaded
 
 WITH_UNITS = ("separation", "mean_separation", "force", "area", "stiffness", "energy", "mean_pressure")
 OF_HARDNESS = ("incremental_stiffness", "plane_separation")
@@ -102,33 +102,33 @@ class Contact:
         found: Numbers = self._source.map(lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1)[0]
         return found
 
+    def _of_loading(self, name: str) -> Numbers:
+        """A number of `Loaded`, over E*."""
+
+        def number(theory: Any, surface: AnySurface, u: FloatArray, E_star: FloatArray) -> tuple[Any, ...]:
+            return (getattr(theory.loaded(surface, u), name),)
+
+        known = self._source.loaded
+        found: Numbers = self._source.map(number, self, 1)[0] if known is None else getattr(known, name)[()]
+        return found
+
     @functools.cached_property
-    def _state(self) -> tuple[Numbers, ...]:
-        """Yielded share of the contact, incremental stiffness and gap of the mean planes."""
-
-        def state(theory: Theory, s: AnySurface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[Any, ...]:
-            known = TheoryAnswer(*answer)
-            if not isinstance(theory, Yielding):
-                return np.zeros(known.force.shape), E * known.stiffness, np.broadcast_to(u, known.force.shape)
-            found = theory.state(s, u, known)
-            return found.yielded, E * found.incremental_stiffness, found.plane_separation
-
-        return self._source.map(state, self, 3, self._answer._asdict())
-
-    @property
     def yielded(self) -> Numbers:
         """Share of the contact area at the hardness, 0 to 1."""
-        return self._state[0]
+        return self._of_loading("yielded") if self._source.yields else 0.0 * self.mean_separation
 
-    @property
+    @functools.cached_property
     def incremental_stiffness(self) -> Numbers:
         """-d(F/A0)/du [stress/length] of a small unloading, the contact area frozen; `stiffness` if nothing yields."""
-        return self._state[1]
+        if not self._source.yields:
+            return self.stiffness
+        found: Numbers = (self._source.E_star * self._of_loading("incremental_stiffness"))[()]
+        return found
 
-    @property
+    @functools.cached_property
     def plane_separation(self) -> Numbers:
         """Gap between the mean planes [length]: u less what yielded points are flattened."""
-        return self._state[2]
+        return self._of_loading("plane_separation") if self._source.yields else self.mean_separation
 
     @property
     def psi(self) -> Numbers:
@@ -209,6 +209,7 @@ class Source:
     hardness: Any
     units: Units
     answer: TheoryAnswer | None = None  # where it is known already
+    loaded: Loaded | None = None  # likewise, with a hardness
 
     @property
     def yields(self) -> bool:
@@ -219,6 +220,8 @@ class Source:
         """The theory, with the hardness where there is one."""
         if not self.yields:
             return self.theory
+        from mbma_tables.theories.yielding import Yielding
+
         broadcast_shape(E_star=E_star, hardness=hardness)
         return Yielding(self.theory, checked_hardness(hardness) / E_star)
 

@@ -6,43 +6,73 @@ pressures capped at the hardness. u is the mean gap, points that yield flattened
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import ndtri
 
 from mbma_tables import hardness as law
-from mbma_tables.arguments import FloatArray, describe_entries, finite_array, require
+from mbma_tables.arguments import FloatArray, checked_hardness, describe_entries
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.hardness_table import shipped
-from mbma_tables.theories.protocol import Theory, TheoryAnswer
+from mbma_tables.theories.protocol import Theory, TheoryAnswer, select
 
 TESTED_ETA = 0.025  # p_m/(E* g) down to which boundary elements were solved
 STEPS = 200
-START = 4.0  # exponent that joins both limits of u
-SETTLED = 1e-7  # of ln F, before the last step
-MIN_DEPTH = 4 * np.finfo(float).eps  # relative, of separations that rounding leaves distinct
 LOWEST = 1e-300
 MAX_LEVEL = 37.0  # of heights over h_rms above which shares are no normal numbers
 
 
-class State(NamedTuple):
-    """What yielding adds to force and area; arrays of the broadcast shape."""
+@dataclasses.dataclass(frozen=True, eq=False)
+class Loaded:
+    """A loaded contact that yields: its answer, and what follows from it and from the elastic contact.
 
-    yielded: FloatArray  # share of the contact area
-    incremental_stiffness: FloatArray  # -dF/du of the frozen contact over A0 E* [1/length]
-    plane_separation: FloatArray  # gap between mean planes [length]
+    Attributes
+    ----------
+    u, h_rms : numpy.ndarray
+        Mean separation and rms height [length].
+    eta : numpy.ndarray
+        p_m/(E* g).
+    load : numpy.ndarray
+        F/(A0 E* g).
+    answer : TheoryAnswer
+        Force, area and stiffness of loading.
+    elastic : TheoryAnswer
+        Of the elastic contact at u.
+    elastic_area : numpy.ndarray
+        A/A0 of the elastic contact at equal force.
+    """
 
+    u: FloatArray
+    h_rms: FloatArray
+    eta: FloatArray
+    load: FloatArray
+    answer: TheoryAnswer
+    elastic: TheoryAnswer
+    elastic_area: FloatArray
 
-def checked_hardness(hardness: ArrayLike) -> FloatArray:
-    """Hardnesses as positive numbers; infinity means that nothing yields."""
-    values = np.asarray(hardness)
-    infinite = np.isposinf(values) if values.dtype.kind in "fiu" else False
-    given = finite_array("hardness", np.where(infinite, 1.0, values) if np.any(infinite) else hardness)
-    require("hardness", given, given > 0, "positive, or infinite where nothing yields")
-    return np.where(infinite, np.inf, given)
+    @property
+    def yielded(self) -> FloatArray:
+        """Share of the contact area at the hardness."""
+        with np.errstate(invalid="ignore"):
+            share = law.yielded_area(self.load, self.elastic_area, self.eta) / self.answer.area
+        return np.where(np.isinf(self.eta) | (self.answer.area == 0), 0.0, share)
+
+    @property
+    def incremental_stiffness(self) -> FloatArray:
+        """-dF/du of the frozen contact over A0 E* [1/length]."""
+        return np.asarray(self.elastic.stiffness * law.frozen_factor(self.eta))
+
+    @property
+    def plane_separation(self) -> FloatArray:
+        """Gap between mean planes [length]."""
+        with np.errstate(invalid="ignore"):
+            planes = self.h_rms * law.plane_separation(self.u / self.h_rms, self.load / self.eta, self.eta)
+        return np.where(np.isinf(self.eta), self.u, planes)
 
 
 class Yielding(Theory):
@@ -80,61 +110,34 @@ class Yielding(Theory):
         chosen = np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)]
         return Yielding(self.elastic, chosen)
 
-    def _capped(
-        self, surface: AnySurface, u: FloatArray, elastic: TheoryAnswer
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Force and loading stiffness over A0 E*, eta and rms gradient."""
-        gradient = np.asarray(surface.rms_gradient)
-        eta = self.hardness / gradient
-        share, slope = self.elastic.bearing_share(surface, u)
-        force, by_elastic, by_share = law.force(elastic.force / gradient, share, eta)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            rate = np.where(elastic.force > 0, by_elastic * elastic.stiffness / elastic.force, 0.0)
-            # where the elastic force has no bound it has no weight
-            rate = np.where(np.isfinite(elastic.force), rate, 0.0) - by_share * slope
-            stiffness = np.where(force > 0, force * gradient * rate, 0.0)
-        return force * gradient, stiffness, eta, gradient
-
     def bends(self, surface: AnySurface) -> FloatArray:
         """Where derivatives of the elastic force jump."""
         return self.elastic.bends(surface)
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and the loading curve's stiffness at mean separations u [length]."""
-        u = np.asarray(mean_separation, dtype=float)
-        elastic = self.elastic.answer(surface, u)
-        if np.isinf(self.hardness).all():
-            return elastic
-        force, stiffness, eta, gradient = self._capped(surface, u, elastic)
-        area = law.area(force / gradient, self._elastic_area(surface, force, elastic), eta)
-        # both of the elastic errors, force and area at that force, may add up
-        capped = TheoryAnswer(force, area, stiffness, 2 * elastic.error)
-        return TheoryAnswer(
-            *(np.where(np.isinf(self.hardness), one, other) for one, other in zip(elastic, capped, strict=True))
-        )
+        return self.loaded(surface, mean_separation).answer
 
-    def _elastic_area(self, surface: AnySurface, force: FloatArray, elastic: TheoryAnswer) -> FloatArray:
-        """A/A0 of the elastic contact at equal force; 0 without force."""
+    def loaded(self, surface: AnySurface, mean_separation: FloatArray) -> Loaded:
+        """The answer at mean separations u [length], and what more is known there."""
+        u, h_rms = np.asarray(mean_separation, dtype=float), np.asarray(surface.h_rms)
+        elastic = self.elastic.answer(surface, u)
+        gradient = np.asarray(surface.rms_gradient)
+        eta = self.hardness / gradient
+        endless = np.isinf(self.hardness)
+        if endless.all():
+            return Loaded(u, h_rms, eta, elastic.force / gradient, elastic, elastic, elastic.area)
+        share, slope = self.elastic.bearing_share(surface, u)
+        load, stiffness = law.force(elastic.force / gradient, elastic.stiffness / gradient, share, slope, eta)
+        force = load * gradient
         # where nothing yields or touches, a force that the theory is sure to reach
-        needed = (force > 0) & ~np.isinf(self.hardness)
-        return np.where(needed, self.elastic.area_at(surface, np.where(needed, force, elastic.force)), 0.0)
-
-    def state(self, surface: AnySurface, mean_separation: FloatArray, answer: TheoryAnswer) -> State:
-        """What yielding adds at mean separations u, where `answer` is this theory's."""
-        u = np.asarray(mean_separation, dtype=float)
-        elastic = self.elastic.answer(surface, u)
-        gradient, h_rms = np.asarray(surface.rms_gradient), np.asarray(surface.h_rms)
-        eta, force = self.hardness / gradient, answer.force / gradient
-        with np.errstate(invalid="ignore"):
-            share = law.yielded_area(force, self._elastic_area(surface, answer.force, elastic), eta) / answer.area
-            planes = h_rms * law.plane_separation(u / h_rms, force / eta, eta)
-            frozen = elastic.stiffness * law.frozen_factor(eta)
-        bound = np.isinf(self.hardness)
-        return State(
-            np.where(bound | (answer.area == 0), 0.0, share),
-            np.where(bound, elastic.stiffness, frozen),
-            np.where(bound, u, planes),
-        )
+        needed = (force > 0) & ~endless
+        at_force = np.where(needed, self.elastic.area_at(surface, np.where(needed, force, elastic.force)), 0.0)
+        # both of the elastic errors, force and area at that force, may add up
+        capped = TheoryAnswer(force, law.area(load, at_force, eta), stiffness * gradient, 2 * elastic.error)
+        if endless.any():
+            capped = TheoryAnswer(*(np.where(endless, one, other) for one, other in zip(elastic, capped, strict=True)))
+        return Loaded(u, h_rms, eta, capped.force / gradient, capped, elastic, at_force)
 
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The elastic theory's."""
@@ -170,47 +173,27 @@ class Yielding(Theory):
 
     def _separation(self, surface: AnySurface, force: FloatArray) -> FloatArray:
         """Newton's method in a bracket: u lies below the elastic contact's, and the start is close."""
-        shape = force.shape
-        h_max, h_rms = np.asarray(surface.h_max, float), np.asarray(surface.h_rms, float)
-        low, high = (np.broadcast_to(end, shape) for end in self.interval(surface))
-        above = np.broadcast_to(self.elastic.mean_separation_at(surface, "force", force), shape)
-        free, full = force == 0, force >= self.hardness
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            gap = law.gaussian_gap(np.clip(force / self.hardness, 0.0, 1.0)) * h_rms
-            # below either limit alone; where both are equal by about a sixth
-            k = START * (1 + self.hardness / np.asarray(surface.rms_gradient))
-            near = np.minimum(above, gap)
-            u = near * (1 + (near / np.maximum(above, gap)) ** k) ** (-1 / k)
-            bottom, top = np.maximum(low, LOWEST), np.array(above)
-            u = np.clip(u, bottom, top * (1 - MIN_DEPTH))
-            goal = np.log(force)
-            done = free | full
-            for self.count in range(STEPS):
-                elastic = self.elastic.answer(surface, u)
-                found, stiffness, _, _ = self._capped(surface, u, elastic)
-                miss = np.log(found) - goal
-                bottom, top = np.where(miss > 0, u, bottom), np.where(miss > 0, top, u)
-                # in ln u - ln(h_max - u): straight at either end of contact
-                stretch = u * (h_max - u) / h_max if self.ends_at_h_max else u
-                step = miss * found / (stiffness * stretch)
-                if self.ends_at_h_max:
-                    ratio = u / (h_max - u) * np.exp(np.clip(step, -40.0, 40.0))
-                    following = h_max * ratio / (1 + ratio)
-                else:
-                    following = u * np.exp(np.clip(step, -40.0, 40.0))
-                outside = ~((following > bottom) & (following < top))
-                middle = np.where(top > 2 * bottom, np.sqrt(bottom * top), (bottom + top) / 2)
-                following = np.where(outside, middle, following)
-                # the next miss would be the square of this one
-                near = np.abs(miss) <= SETTLED
-                u, done = np.where(near & ~done & ~outside, following, u), done | near
-                done = done | (top - bottom <= MIN_DEPTH * top) | (following == u)
-                u = np.where(done, u, following)
-                if done.all():
-                    break
-            else:
-                raise ConvergenceError(f"no separation was found for {int((~done).sum())} pressures", ~done)
-        return np.where(free, high, np.where(full, low, u))
+        low, high = self.interval(surface)
+        above = self.elastic.mean_separation_at(surface, "force", force)
+        gradient, end = np.asarray(surface.rms_gradient), surface.h_max if self.ends_at_h_max else np.inf
+        known, _ = law.rows(force / gradient, self.hardness / gradient, end, surface.h_rms)
+        bracket, _ = law.rows(-ndtri(np.minimum(force / self.hardness, 1.0)), np.maximum(low, LOWEST), above)
+        law.start(known, law.CONSTANTS.exponent, bracket)
+        left = np.flatnonzero((force > 0) & (force < self.hardness) & np.isfinite(self.hardness))
+        for _ in range(STEPS):
+            if not left.size:
+                break
+            some, elastic = select(surface, force.shape, left), self.elastic.at(force.shape, left)
+            found = elastic.answer(some, bracket[0, left])
+            share, slope = elastic.bearing_share(some, bracket[0, left])
+            g = np.asarray(some.rms_gradient)
+            contacts = found.force / g, found.stiffness / g, share, slope
+            left = left[law.newton_step(*contacts, known, law.CONSTANTS.exponent, bracket, left)]
+        else:
+            missed = np.isin(np.arange(force.size), left).reshape(force.shape)
+            raise ConvergenceError(f"no separation was found for {left.size} pressures", missed)
+        u = np.where(force < self.hardness, bracket[0].reshape(force.shape), low)
+        return np.where(np.isinf(self.hardness), above, np.where(force > 0, u, high))
 
     def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of ln F at given u and of ln A at given F against boundary elements with a hardness."""

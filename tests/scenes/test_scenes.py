@@ -223,6 +223,8 @@ WATCHED = {
     "mbma_tables.theories.contact": {"force", "area", "validity", "yield", "leakage"},
     "mbma_tables.theories.law": {"stiffness", "energy", "conductance"},
     "mbma_tables.theories.leakage": {"leakage"},
+    "mbma_tables.theories.yielding": {"yield"},
+    "mbma_tables.hardness": {"yield"},
     "mbma_tables.totals.conductance": {"conductance"},
     "mbma_tables.theories.asperities": {"comparison"},
     "mbma_tables.theories.persson": set(),

@@ -81,9 +81,8 @@ def test_ten_thousand_contacts_keep_bounds_and_order():
     theory = get_theory("calibrated")
 
     def state(cap, gap):
-        yielding = Yielding(theory, cap)
-        answer = yielding.answer(surface, gap)
-        return answer, yielding.state(surface, gap, answer).yielded * answer.area
+        found = Yielding(theory, cap).loaded(surface, gap)
+        return found.answer, found.yielded * found.answer.area
 
     answer, yielded = state(eta, u)
     x = answer.force / eta
