@@ -18,6 +18,7 @@ GROUPS = {
     "calibrated": "generate.calibrated",
     "leakage": "generate.boundary_elements.leakage",
     "leakage_law": "generate.leakage_law",
+    "explorer": "generate.explorer",
     "formulas": "generate.formulas.commands",
     "grids": "generate.boundary_elements.grids",
     "measured_maps": "generate.boundary_elements.measured_maps",

@@ -21,6 +21,7 @@ ROOT = pathlib.Path(__file__).parents[2]
 PAGES = (
     "calibrated",
     "cost",
+    "explorer",
     "export",
     "fidelity",
     "formula",

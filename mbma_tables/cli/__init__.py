@@ -17,7 +17,7 @@ from mbma_tables.cli import progress
 from mbma_tables.cli.batch import batch_command
 from mbma_tables.cli.commands import contact_command, curve_command, island_command, surfaces_command
 from mbma_tables.cli.cost import cost_command
-from mbma_tables.cli.export import export_command
+from mbma_tables.cli.export import explore_command, export_command
 from mbma_tables.cli.fit import fit_command
 from mbma_tables.cli.scene import plan_command, run_command
 from mbma_tables.cli.sensitivity import sensitivity_command
@@ -94,5 +94,6 @@ for command in (
     run_command,
     cost_command,
     export_command,
+    explore_command,
 ):
     main.add_command(command)

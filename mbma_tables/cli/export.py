@@ -13,6 +13,7 @@ from mbma_tables.cli.options import (
     optional_specimen_options,
     quantity_option,
     reading_option,
+    specimen_options,
     theory_option,
 )
 from mbma_tables.cli.progress import echo
@@ -152,3 +153,22 @@ def _export_code(target: str, folder: Path, reading: str, check: bool) -> None:
             echo(f"{kind}: {found.points[kind]} points, largest relative difference {largest:.1e}")
         if found.reason:
             raise InputError(f"the check failed: {found.reason}")
+
+
+@click.command("explore", short_help="A page to explore a surface in a browser.")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="The page, such as explorer.html.")
+@specimen_options
+@theory_option
+@reading_option
+def explore_command(out: Path, specimen: Specimen, theory: str, reading: str) -> None:
+    """Write a page with sliders for the surface, its modulus, theory and reading, or a pasted spectrum.
+
+    One file that needs neither a server nor a network: force, area, stiffness and conductance against gap or pressure.
+
+    Example: mbma explore --surface concrete --E-star 13.3MPa --out explorer.html
+    """
+    from mbma_tables.export.explorer import explorer_page
+
+    page = explorer_page(specimen.surface, specimen.E_star, specimen.stress_unit, theory, reading, specimen.title)
+    write_file(out, page.encode())
+    click.echo(out)

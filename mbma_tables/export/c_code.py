@@ -16,7 +16,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mbma_tables import __version__
+from mbma_tables import __version__, calibrated
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError
 from mbma_tables.export.text import block_comment
@@ -26,6 +26,7 @@ from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
+from mbma_tables.theories import calibrated_curves, calibrated_table, persson
 from mbma_tables.totals import gauss_kronrod, intervals, island_sum, kernel
 
 COMMENT_WIDTH = 108
@@ -180,14 +181,50 @@ def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | fl
     return constants, arrays
 
 
-def numbers_text(constants: dict[str, int | float], arrays: dict[str, FloatArray]) -> str:
-    """The numbers as macros and constant arrays."""
-    lines = ["#ifndef MBMA_TABLE_H", "#define MBMA_TABLE_H", ""]
+def theory_numbers() -> tuple[dict[str, int | float], dict[str, FloatArray]]:
+    """The same of mbma_theories.c: the calibrated law with its table, and Persson's."""
+    table = calibrated_table.shipped()
+    spline = table.coefficients[..., :-2]
+    rules = [np.polynomial.legendre.leggauss(count) for count in (2, 4, 6, 10)]
+    constants: dict[str, int | float] = {"PI": math.pi, "MIN_ZETA_1": MIN_ZETA_1, "MAX_ZETA_1": MAX_ZETA_1}
+    for k, name in enumerate(("HURST", "ZETA", "U")):
+        constants |= {
+            f"NODES_{name}": spline.shape[k] - 4,
+            f"COLUMNS_{name}": spline.shape[k],
+            f"{name}_START": table.first[k],
+            f"{name}_RATE": 1 / table.step[k],
+            f"{name}_LOW": table.covered[k, 0],
+            f"{name}_HIGH": table.covered[k, 1],
+        }
+    constants |= {name.upper(): value for name, value in vars(table.constants).items()}
+    constants |= {
+        "NARROWNESS": calibrated.NARROWNESS,
+        "PERSSON_GAMMA": persson.GAMMA,
+        "CALIBRATED_ERROR": table.error,
+        "PERSSON_ERROR": persson.INVERSE_RTOL,
+        "LAW_ERROR": calibrated_curves.LAW_ERROR,
+        "MAX_LOG_FORCE": -persson.MIN_LOG_FORCE,
+        "GRADED": round(-calibrated.CLOSEST),
+    }
+    padded = [np.stack([np.pad(part, (0, 10 - part.size)) for part in column]) for column in zip(*rules, strict=True)]
+    arrays = {"GAUSS_NODES": padded[0], "GAUSS_WEIGHTS": padded[1], "SPLINE": np.ravel(spline)}
+    return constants, arrays
+
+
+def numbers_text(
+    constants: dict[str, int | float], arrays: dict[str, FloatArray], later: tuple[str, ...] = (), what: str = "TABLE"
+) -> str:
+    """The numbers as macros and constant arrays; those named in `later` as variables, for a program to fill in."""
+    lines = [f"#ifndef MBMA_{what}_H", f"#define MBMA_{what}_H", ""]
     for name, value in constants.items():
-        lines.append(f"#define MBMA_{name} {value if isinstance(value, int) else f'({float(value)!r})'}")
+        text = value if isinstance(value, int) else f"({float(value)!r})"
+        lines.append(f"double MBMA_{name};" if name in later else f"#define MBMA_{name} {text}")
     for name, values in arrays.items():
         shape = "".join(f"[{extent}]" for extent in values.shape)
-        lines += ["", f"static const double MBMA_{name}{shape} = {{", *_initializer(values, "  "), "};"]
+        if name in later:
+            lines += ["", f"double MBMA_{name}{shape};"]
+        else:
+            lines += ["", f"static const double MBMA_{name}{shape} = {{", *_initializer(values, "  "), "};"]
     return "\n".join([*lines, "", "#endif", ""])
 
 

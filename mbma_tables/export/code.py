@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from mbma_tables.errors import InputError
@@ -136,13 +137,13 @@ def source_texts(target: str, model: UniversalModel, reading: Reading) -> dict[s
         opening = comment(lines, "!") if name.endswith(".f90") else block_comment(lines)
         parts = {"HEADER": opening.rstrip()}
         if name == "mbma.mjs":
-            parts["WASM"] = base64.encodebytes(web_assembly(c_texts)).decode("ascii")
+            parts["WASM"] = base64.encodebytes(web_assembly(c_texts, WASM_FUNCTIONS)).decode("ascii")
         texts[name] = c_code.filled(name, **parts)
     return texts
 
 
-def web_assembly(c_texts: dict[str, str]) -> bytes:
-    """The C sources compiled to WebAssembly."""
+def web_assembly(c_texts: dict[str, str], names: Iterable[str]) -> bytes:
+    """C sources compiled to WebAssembly, with the functions and variables that it exports."""
     if importlib.util.find_spec("ziglang") is None:
         raise InputError(
             "javascript is compiled from C by the package ziglang, which is not installed: "
@@ -151,10 +152,11 @@ def web_assembly(c_texts: dict[str, str]) -> bytes:
     with tempfile.TemporaryDirectory() as work:
         for name, text in c_texts.items():
             write_file(pathlib.Path(work, name), text.encode())
-        exports = [f"-Wl,--export={name}" for name in WASM_FUNCTIONS]
-        done = _run([sys.executable, *ZIG, *exports, "mbma.c", "-o", "mbma.wasm"], work)
+        sources = [name for name in c_texts if name.endswith(".c")]
+        exports = [f"-Wl,--export={name}" for name in names]
+        done = _run([sys.executable, *ZIG, *exports, *sources, "-o", "mbma.wasm"], work)
         if done.returncode:
-            raise InputError(f"ziglang did not compile mbma.c: {done.stderr.strip()[:500]}")
+            raise InputError(f"ziglang did not compile {' '.join(sources)}: {done.stderr.strip()[:500]}")
         return pathlib.Path(work, "mbma.wasm").read_bytes()
 
 

@@ -1,0 +1,230 @@
+"""One page to explore a surface in a browser: the exported C as WebAssembly, its tables and the drawing, in one file.
+
+The module is compiled once, by `python -m generate explorer`, from C whose numbers are variables: a page sets them from
+the tables of the day, so that writing one needs no compiler.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import importlib.resources
+import json
+import re
+import zlib
+from typing import Any
+
+import numpy as np
+
+from mbma_tables import __version__
+from mbma_tables.arguments import FloatArray, number_in, positive_modulus
+from mbma_tables.errors import InputError
+from mbma_tables.export import c_code
+from mbma_tables.export.code import web_assembly
+from mbma_tables.models.tables import universal_model
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.surfaces.readings import FITTED, PRINTED, REPORTED, get_reading
+from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories import calibrated, calibrated_table, mbma, result
+from mbma_tables.theories.calibrated_curves import TESTED_AREA
+from mbma_tables.units import Units
+
+MODULE = "explorer.wasm"
+THEORIES = ("mbma", "calibrated", "persson")
+SHOWN_READINGS = (REPORTED, PRINTED, FITTED)
+FUNCTIONS = (
+    *("mbma_total", "mbma_message", "mbma_calibrated", "mbma_persson_separation"),
+    *("mbma_law_of_surface", "mbma_law_of_spectrum", "mbma_law_contact"),
+)
+SCRIPTS = ("model.js", "state.js", "curves.js", "downloads.js", "charts.js", "main.js")
+SWITCHES = ("OFFSET", "SUMMITS", "PRINTED_JACOBIAN")  # whole numbers that depend on the reading
+MIN_FILLED = 1000  # numbers from which an array is a table, which the page fills in
+FRACTION_BITS, ORDER = 43, 3  # of packed tables: steps of 1e-13; times that differences are taken
+MAX_EXACT = 2**53
+MAX_SAMPLES = 1000  # of a spectrum, for a step of a slider to stay short
+
+
+def page_file(name: str) -> bytes:
+    """A file of the page's sources."""
+    return (importlib.resources.files("mbma_tables.export") / "page" / name).read_bytes()
+
+
+def c_sources() -> tuple[dict[str, str], dict[str, FloatArray]]:
+    """The C of the page by file, and the numbers and tables that are variables in it by name."""
+    prototypes, forms = c_code.closed_forms()
+    texts = {
+        name: c_code.filled(name, HEADER="", PROTOTYPES=prototypes, CLOSED_FORMS=forms)
+        for name in ("mbma.h", "mbma.c", "mbma_theories.h", "mbma_theories.c")
+    }
+    values: dict[str, FloatArray] = {}
+    for what, (constants, arrays), fixed in (
+        ("TABLE", c_code.numbers(universal_model(), REPORTED), ()),
+        ("THEORIES_TABLE", c_code.theory_numbers(), ("PI", "MIN_ZETA_1", "MAX_ZETA_1")),
+    ):
+        own = {
+            name: np.asarray(value, float)
+            for name, value in constants.items()
+            if name not in fixed and (isinstance(value, float) or name in SWITCHES)
+        } | {name: array for name, array in arrays.items() if array.size >= MIN_FILLED}
+        texts[f"mbma_{what.lower()}.h"] = c_code.numbers_text(constants, arrays, tuple(own), what)
+        values |= own
+    return texts, values
+
+
+def compiled(texts: dict[str, str], names: list[str]) -> bytes:
+    """The module, with the digest of what it was compiled from in a section of its own at the end."""
+    section = b"\x06digest" + digest_of(texts)
+    module = web_assembly(texts, [*FUNCTIONS, *(f"MBMA_{name}" for name in names)])
+    return module + bytes([0, len(section)]) + section
+
+
+def digest_of(texts: dict[str, str]) -> bytes:
+    """Of what the module is compiled from."""
+    return hashlib.sha256(json.dumps(texts, sort_keys=True).encode()).digest()
+
+
+def packed(values: FloatArray) -> dict[str, Any]:
+    """Numbers as text: whole multiples of 2^-43, differenced, zigzag, by planes of bytes, deflated; or doubles."""
+    flat = np.ravel(values)
+    whole = np.rint(np.ldexp(flat, FRACTION_BITS)).astype(np.int64)
+    for _ in range(ORDER):
+        whole = np.diff(whole, prepend=0)
+    zigzag = (whole << 1) ^ (whole >> 63)
+    # small numbers are errors, whose relative size counts
+    exact = np.abs(flat).max() < 1e-3 or int(zigzag.max()) >= MAX_EXACT
+    planes = np.ascontiguousarray((flat if exact else zigzag).view(np.uint8).reshape(-1, 8).T[: 8 if exact else 7])
+    text = base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
+    return {"count": flat.size, "differences": 0 if exact else ORDER, "bits": FRACTION_BITS, "text": text}
+
+
+def _model(texts: dict[str, str], values: dict[str, FloatArray]) -> dict[str, Any]:
+    """The compiled module and everything that it is filled with."""
+    universal = universal_model()
+    base = {name: float(value) for name, value in values.items() if value.ndim == 0}
+    readings = {}
+    for reading in SHOWN_READINGS:
+        constants, _ = c_code.numbers(universal, reading)
+        changed = {name: float(constants[name]) for name in base if constants.get(name, base[name]) != base[name]}
+        readings[reading.name] = {"changed": changed, "cover": reading.addition == "cover"}
+    return {
+        "module": base64.b64encode(page_file(MODULE)).decode("ascii"),
+        "numbers": base,
+        "tables": {name: packed(value) for name, value in values.items() if value.ndim},
+        "readings": readings,
+    }
+
+
+def _limits() -> dict[str, Any]:
+    """What theories were tested for, in the words of `Contact.reasons`, and their scatter."""
+    table = calibrated_table.shipped()
+    rows = {name: np.where(np.isfinite(table.scatter[name]), table.scatter[name], 0.0) for name in THEORIES}
+    known = {name: np.isfinite(table.scatter[name]) for name in THEORIES}
+    return {
+        "log_area": table.log_area.tolist(),
+        "scatter": {
+            name: {
+                quantity: [float(x) if ok else None for x, ok in zip(rows[name][k], known[name][k], strict=True)]
+                for k, quantity in enumerate(calibrated_table.QUANTITIES)
+            }
+            for name in THEORIES
+        },
+        "gradient": result.MAX_GRADIENT,
+        "mbma_area": mbma.MAX_AREA,
+        "hurst": calibrated.TESTED_HURST,
+        "zeta_1": calibrated.TESTED_ZETA_1,
+        "heights": calibrated.TESTED_HEIGHTS,
+        "area": TESTED_AREA,
+        "max_samples": MAX_SAMPLES,
+    }
+
+
+def _start(surface: AnySurface) -> dict[str, Any]:
+    """The first state's surface."""
+    if isinstance(surface, Surface) and surface.shape == ():
+        return {name: float(getattr(surface, name)) for name in surface.parameters}
+    if not isinstance(surface, MeasuredSurface):
+        raise InputError("the page is of one surface: take one of the batch")
+    if surface.q.size > MAX_SAMPLES:
+        raise InputError(
+            f"the page takes at most {MAX_SAMPLES} samples of a spectrum, and this one has {surface.q.size}: "
+            "thin them out, or take surface.fit()"
+        )
+    pairs = zip(surface.q.tolist(), surface.C.tolist(), strict=True)
+    spectrum = "\n".join(f"{q!r} {C!r}" for q, C in pairs)
+    # five numbers near it, for who turns the spectrum off
+    q0, q1, h_rms = (float(getattr(surface, name)) for name in ("q0", "q1", "h_rms"))
+    return {"hurst": 0.8, "q0": q0, "q1": q1, "h_rms": h_rms, "h_max": float(surface.h_max), "spectrum": spectrum}
+
+
+def explorer_page(
+    surface: AnySurface,
+    E_star: float | None = None,
+    stress_unit: str | None = None,
+    theory: str = "mbma",
+    reading: str = "reported",
+    title: str = "",
+) -> str:
+    """A page of HTML that shows how a surface touches, with sliders; it needs neither a server nor a network.
+
+    Parameters
+    ----------
+    surface : Surface or MeasuredSurface
+        What the page begins with. Of a measured one it takes the spectrum and h_max: heights and maps, which the
+        calibrated law goes by in Python, are not in it.
+    E_star : float, optional
+        Effective modulus; without one stresses are over E*.
+    stress_unit : str, optional
+        Unit of the modulus.
+    theory : {"mbma", "calibrated", "persson"}
+        The one drawn with its scatter at first.
+    reading : {"reported", "printed", "fitted"}
+        Of the paper's equations, at first.
+    title : str
+        What the surface is.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    InputError
+        For a batch, a spectrum of more than 1,000 samples, an unknown theory or reading.
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface
+    >>> page = explorer_page(Surface.named("concrete"), 13.3, "MPa", title="a road")
+    >>> page.count("<script"), "http" in page.split("</head>")[0], len(page) < 4e6
+    (2, False, True)
+    """
+    if theory not in THEORIES:
+        raise InputError(f"the page has the theories {THEORIES}, got {theory!r}")
+    if get_reading(reading) not in SHOWN_READINGS:
+        raise InputError(f"the page has the readings {tuple(shown.name for shown in SHOWN_READINGS)}, got {reading!r}")
+    modulus = 1.0 if E_star is None else number_in("E_star", float(positive_modulus(E_star)), 1e-300, 1e300)
+    units = Units(surface.unit, "1" if E_star is None else stress_unit)
+    start = _start(surface) | {"E_star": modulus, "k_s": 1.0, "theory": theory, "reading": get_reading(reading).name}
+    texts, values = c_sources()
+    data = {
+        "version": __version__,
+        "title": title,
+        "start": start,
+        "units": {"length": units.length, "stress": units.stress},
+        "limits": _limits(),
+        "model": _model(texts, values),
+    }
+    # a script of data ends at nothing but its own tag
+    text = json.dumps(data).replace("<", "\\u003c")
+    scripts = "\n".join(page_file(name).decode() for name in SCRIPTS)
+    parts = {
+        "TITLE": html.escape(title or "contact of a rough surface"),
+        "STYLE": page_file("uPlot.min.css").decode() + page_file("page.css").decode(),
+        "LICENCE": html.escape(page_file("uPlot.LICENSE").decode()),
+        "UPLOT": page_file("uPlot.iife.min.js").decode(),
+        "SCRIPT": f'(async () => {{\n"use strict";\n{scripts}\n}})();',
+        "DATA": text,
+    }
+    return re.sub("@([A-Z]+)@", lambda place: parts[place[1]], page_file("page.html").decode())

@@ -1,0 +1,100 @@
+// The C of mbma_tables as WebAssembly, filled with its numbers and tables.
+
+const DATA = JSON.parse(document.getElementById("data").textContent);
+const LIMITS = DATA.limits;
+const OK = 0, OUTSIDE = 6; // as in mbma.h
+const RTOL = 1e-8; // asked of MBMA's totals
+const LAW_BYTES = 1 << 19; // room for an mbma_law
+
+function bytesOf(text) {
+  const letters = atob(text), bytes = new Uint8Array(letters.length);
+  for (let k = 0; k < letters.length; ++k) bytes[k] = letters.charCodeAt(k);
+  return bytes;
+}
+
+// Undoes `packed` of export/explorer.py.
+async function unpacked({ count, differences, bits, text }) {
+  const stream = new Blob([bytesOf(text)]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const planes = new Uint8Array(await new Response(stream).arrayBuffer());
+  const values = new Float64Array(count);
+  if (differences === 0) {
+    const bytes = new Uint8Array(values.buffer);
+    for (let k = 0; k < bytes.length; ++k) bytes[k] = planes[(k % 8) * count + Math.floor(k / 8)];
+    return values;
+  }
+  for (let plane = planes.length / count - 1; plane >= 0; --plane) {
+    for (let k = 0, at = plane * count; k < count; ++k, ++at) values[k] = 256 * values[k] + planes[at];
+  }
+  for (let k = 0; k < count; ++k) values[k] = values[k] % 2 ? -(values[k] + 1) / 2 : values[k] / 2;
+  for (let n = 0; n < differences; ++n) {
+    for (let k = 1; k < count; ++k) values[k] += values[k - 1];
+  }
+  const unit = 2 ** -bits;
+  for (let k = 0; k < count; ++k) values[k] *= unit;
+  return values;
+}
+
+const tables = await Promise.all(Object.entries(DATA.model.tables).map(async ([name, table]) => [name, await unpacked(table)]));
+const C = (await WebAssembly.instantiate(bytesOf(DATA.model.module))).instance.exports;
+C._initialize();
+const at = (name) => C[`MBMA_${name}`].value;
+// memory that the module does not use: two laws, arguments, answers, a spectrum
+const OWN = 65536 * C.memory.grow(Math.ceil((2 * LAW_BYTES + 2048 + 16 * LIMITS.max_samples) / 65536));
+const LAWS = { persson: OWN, calibrated: OWN + LAW_BYTES };
+const ARGUMENTS = OWN + 2 * LAW_BYTES, ANSWER = ARGUMENTS + 1024, SAMPLES = ANSWER + 1024;
+const numbersAt = (place, count) => new Float64Array(C.memory.buffer, place, count);
+for (const [name, values] of tables) numbersAt(at(name), values.length).set(values);
+for (const [name, value] of Object.entries(DATA.model.numbers)) numbersAt(at(name), 1)[0] = value;
+
+// One surface, reading and modulus as functions of the mean separation, by theory.
+function prepare(state) {
+  const surface = ["hurst", "q0", "q1", "h_rms", "h_max"].map((name) => state[name]);
+  const reading = DATA.model.readings[state.reading];
+  for (const { changed } of Object.values(DATA.model.readings)) {
+    for (const name of Object.keys(changed)) {
+      numbersAt(at(name), 1)[0] = reading.changed[name] ?? DATA.model.numbers[name];
+    }
+  }
+  numbersAt(ARGUMENTS, 5).set(surface);
+  const samples = state.samples;
+  if (samples) {
+    numbersAt(SAMPLES, samples.q.length).set(samples.q);
+    numbersAt(SAMPLES + 8 * samples.q.length, samples.C.length).set(samples.C);
+  }
+  const held = {};
+  const law = (theory) => {
+    const number = theory === "persson" ? 0 : 1, count = samples?.q.length;
+    held[theory] ??= samples
+      ? C.mbma_law_of_spectrum(count, SAMPLES, SAMPLES + 8 * count, state.h_max, number, LAWS[theory])
+      : C.mbma_law_of_surface(ARGUMENTS, number, LAWS[theory]);
+    return held[theory];
+  };
+  const answer = (status) => {
+    if (status !== OK) return null;
+    const [force, area, stiffness] = numbersAt(ANSWER, 3);
+    return { force, area, stiffness };
+  };
+  const byLaw = (theory, u) => answer(law(theory) || C.mbma_law_contact(LAWS[theory], u, state.E_star, ANSWER));
+  return {
+    mbma(u) {
+      const found = answer(C.mbma_total(ARGUMENTS, 2 * u - state.h_max, state.E_star, RTOL, ANSWER));
+      if (found && reading.cover) found.area = -Math.expm1(-found.area);
+      return found;
+    },
+    calibrated(u) {
+      const status = samples ? OUTSIDE : C.mbma_calibrated(ARGUMENTS, u, state.E_star, ANSWER);
+      return status === OUTSIDE ? byLaw("calibrated", u) : answer(status);
+    },
+    persson: (u) => byLaw("persson", u),
+    // the only theory whose separation at a pressure is a formula
+    perssonSeparation(pressure) {
+      const status = law("persson") || C.mbma_persson_separation(LAWS.persson, pressure, state.E_star, ANSWER);
+      return status === OK ? numbersAt(ANSWER, 1)[0] : NaN;
+    },
+    // mbma_law begins with h_rms, h_max, gradient
+    moments() {
+      const status = law("persson"), [h_rms, , gradient] = numbersAt(LAWS.persson, 3);
+      return { status, h_rms, gradient };
+    },
+  };
+}

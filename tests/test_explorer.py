@@ -1,0 +1,345 @@
+"""The page of `mbma explore` in a headless Chromium: its curves are the library's, its controls do what they say."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import ctypes
+import importlib.util
+import re
+import shutil
+import subprocess
+import urllib.parse
+import zlib
+
+import numpy as np
+import pytest
+from helpers import refused, run
+
+from mbma_tables import InputError, Surface, contact
+from mbma_tables.export.explorer import MODULE, c_sources, digest_of, explorer_page, packed, page_file
+
+QUANTITIES = {"gap": "mean_separation", "force": "force", "area": "area", "stiffness": "stiffness"}
+NAMES = ("hurst", "q0", "q1", "h_rms", "h_max")
+GO = """(text) => new Promise((done) => {
+  addEventListener("hashchange", () => setTimeout(done), { once: true });
+  location.hash = text;
+})"""
+
+
+@pytest.fixture(scope="module")
+def opened():
+    if importlib.util.find_spec("playwright") is None:
+        pytest.skip("not installed: playwright")
+    from generate.pages.explorer import browser, program
+
+    if program() is None:
+        pytest.skip("not installed: chromium")
+    with browser() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    """A page about the concrete road in MPa."""
+    path = tmp_path_factory.mktemp("explorer") / "page with blanks.html"
+    run("explore", "--surface", "concrete", "--E-star", "13.3MPa", "--out", str(path))
+    return path.as_uri()
+
+
+@pytest.fixture
+def visit(opened, address):
+    """Opens the page in a state; nothing may fail or be fetched meanwhile."""
+    from generate.pages.explorer import visit
+
+    tabs, faults = [], []
+
+    def at(state="", **options):
+        tab = visit(opened, f"{address}#{state}", **options)
+        tab.on("pageerror", lambda fault: faults.append(str(fault)))
+        tab.on("request", lambda request: faults.append(request.url))
+        tabs.append(tab)
+        return tab
+
+    yield at
+    for tab in tabs:
+        tab.context.close()
+    assert [fault for fault in faults if not fault.startswith("blob:")] == []
+
+
+def download(tab, button: str) -> str:
+    with tab.expect_download() as found:
+        tab.click(button)
+    return found.value.path().read_text(encoding="utf-8")
+
+
+def columns(tab) -> dict[str, np.ndarray]:
+    """The CSV file that the page gives, without units."""
+    rows = [line for line in download(tab, "#csv").splitlines() if not line.startswith("#")]
+    head, *body = csv.reader(rows)
+    numbers = np.array([[float(cell) if cell else np.nan for cell in row] for row in body])
+    return {name.split(" [")[0]: numbers[:, k] for k, name in enumerate(head)}
+
+
+def random_state(rng: np.random.Generator) -> dict:
+    """Any surface, modulus, theory and axis."""
+    q0, h_rms = np.exp(rng.uniform(-8, 8, 2))
+    hurst = rng.choice([1.0, rng.uniform(0.1, 1.0)], p=[0.1, 0.9])
+    numbers = (hurst, q0, q0 * np.exp(rng.uniform(np.log(5.2), np.log(5e4))), h_rms, h_rms * rng.uniform(2.0, 6.0))
+    return {
+        **dict(zip(NAMES, map(float, numbers), strict=True)),
+        "E_star": float(np.exp(rng.uniform(-5, 12))),
+        "theory": str(rng.choice(["mbma", "calibrated", "persson"])),
+        "reading": str(rng.choice(["reported", "printed", "fitted"])),
+        "against": str(rng.choice(["gap", "pressure"])),
+        "beside": "mbma,calibrated,persson",
+    }
+
+
+def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -> float:
+    """Of the page's answers from the library's, relative, in every quantity and theory."""
+    surface, worst = Surface(*(state[name] for name in NAMES)), 0.0
+    for theory in ("mbma", "calibrated", "persson"):
+        known = {name: found[f"{theory} {name}"] for name in QUANTITIES}
+        answered = np.flatnonzero(np.isfinite(known["gap"]))[rows]
+        assert answered.size > 3
+        asked = {"mean_separation": known["gap"]} if state["against"] == "gap" else {"pressure": known["force"]}
+        asked = {name: values[answered] for name, values in asked.items()}
+        options = {"reading": state["reading"]} if theory == "mbma" else {}
+        expected = contact(surface, **asked, E_star=state["E_star"], theory=theory, **options)
+        for name, attribute in QUANTITIES.items():
+            worst = max(worst, np.abs(known[name][answered] / getattr(expected, attribute) - 1).max())
+        spread = {"force": expected.scatter, "area": expected.area_scatter}
+        for name, values in spread.items():
+            np.testing.assert_allclose(found[f"{theory} scatter of ln {name}"][answered], values, rtol=1e-6)
+        assert np.allclose(
+            found[f"{theory} conductance"] * state["E_star"], found[f"{theory} stiffness"], equal_nan=True
+        )
+    return worst
+
+
+@pytest.mark.parametrize("number", [6, pytest.param(200, marks=pytest.mark.slow)])
+def test_curves_are_those_of_the_library(number, visit):
+    rng, tab, worst = np.random.default_rng(2026), visit(), []
+    for _ in range(number):
+        state = random_state(rng)
+        tab.evaluate(GO, urllib.parse.urlencode(state))
+        worst.append(largest_difference(state, columns(tab), slice(rng.integers(9), None, 9)))
+    assert max(worst) < 1e-9
+
+
+def test_the_module_is_of_this_c():
+    texts, _ = c_sources()
+    assert page_file(MODULE).endswith(digest_of(texts)), "run: python -m generate explorer"
+
+
+def test_tables_are_packed_to_the_last_digits_that_count():
+    rng = np.random.default_rng(0)
+    for values in (rng.uniform(-150, 20, 5000), 1e-9 * rng.uniform(size=3000)):
+        held = packed(values)
+        planes = np.frombuffer(zlib.decompress(base64.b64decode(held["text"])), np.uint8).reshape(-1, held["count"])
+        if held["differences"] == 0:
+            assert np.array_equal(planes.T.copy().view(float).ravel(), values)
+            continue
+        zigzag = sum(plane.astype(np.int64) << (8 * k) for k, plane in enumerate(planes))
+        whole = (zigzag >> 1) ^ -(zigzag & 1)
+        for _ in range(held["differences"]):
+            whole = np.cumsum(whole)
+        assert np.abs(np.ldexp(whole.astype(float), -held["bits"]) - values).max() <= 2.0 ** -(held["bits"] + 1)
+
+
+def test_one_file_of_at_most_four_megabytes_that_asks_for_nothing():
+    page = explorer_page(Surface.named("concrete"), title="</script><img src=x onerror=alert(1)>")
+    assert len(page.encode()) < 4e6
+    assert "<img" not in page
+    assert not re.search(r"<(link|script|img|iframe)[^>]*(src|href)=\"(?!data:)", page)
+    assert "The MIT License" in page
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--surface", "concrete", "--theory", "greenwood_williamson"], "the page has the theories"),
+        (["--surface", "concrete", "--reading", "mine"], "reading must be one of"),
+        (["--hurst", "0.8"], "h_max"),
+        ([], "one surface is needed"),
+    ],
+)
+def test_bad_requests_are_refused(arguments, said, tmp_path):
+    out = tmp_path / "page.html"
+    assert said in refused("explore", *arguments, "--out", str(out))
+    assert not out.exists()
+
+
+def test_batches_and_long_spectra_are_refused():
+    with pytest.raises(InputError, match="one surface"):
+        explorer_page(Surface(0.8, 1.0, [10.0, 20.0], 1.0, 3.0))
+    q = np.geomspace(1, 100, 1001)
+    with pytest.raises(InputError, match="at most 1000 samples"):
+        explorer_page(Surface.from_spectrum(q, q**-3.6, h_max=1.0))
+
+
+def test_a_slider_moves_curves_and_address_and_a_link_brings_them_back(visit):
+    tab = visit("theory=calibrated&against=pressure&log=no&beside=persson")
+    before = columns(tab)
+    tab.evaluate(
+        "const s = document.getElementById('slide-h_max'); s.value = 600; s.dispatchEvent(new Event('input'));"
+    )
+    moved = columns(tab)
+    assert tab.input_value("#h_max") == "1.74338"
+    assert (moved["calibrated gap"] > before["calibrated gap"]).all()
+    tab.wait_for_timeout(400)
+    state = tab.evaluate("location.hash").lstrip("#")
+    assert dict(urllib.parse.parse_qsl(state))["h_max"] == "1.74338"
+    again = visit(state)
+    assert again.input_value("#h_max") == "1.74338"
+    assert not again.is_checked("#log")
+    for name, values in columns(again).items():
+        assert np.array_equal(values, moved[name], equal_nan=True), name
+    again.click("button[type=reset]")
+    assert again.input_value("#h_max") == "1.1"
+
+
+@pytest.mark.parametrize(
+    ("field", "text", "said"),
+    [
+        ("hurst", "1.2", "H must be in (0, 1], got 1.2"),
+        ("q1", "1", "more than 3 q₀"),
+        ("q1", "1e12", "at most 1e8 q₀"),
+        ("h_rms", "-1", "h_rms must be positive, got -1"),
+        ("h_max", "", "h_max must be a number"),
+        ("E_star", "thirteen", "E_star must be a number"),
+    ],
+)
+def test_bad_numbers_are_told_beside_their_field(field, text, said, visit):
+    tab = visit()
+    tab.fill(f"#{field}", text)
+    assert said in tab.inner_text(f"#error-{field}")
+    assert tab.get_attribute(f"#{field}", "aria-invalid") == "true"
+    assert tab.is_disabled("#csv")
+    assert "stale" in (tab.locator("section").get_attribute("class") or "")
+    tab.click("button[type=reset]")
+    assert tab.inner_text(f"#error-{field}") == ""
+    assert not tab.is_disabled("#csv")
+
+
+def test_bad_addresses_are_told(visit):
+    assert "theory must be one of" in visit("theory=hertz").inner_text("#error-theory")
+    assert "nothing here" in visit("color=red").inner_text("#error-theory")
+    assert "more than 5.14 q₀" in visit("reading=fitted&q1=2.5&theory=mbma").inner_text("#error-q1")
+
+
+SAMPLES = np.geomspace(0.2, 50, 60)
+SPECTRUM = 0.01 * np.minimum(1, SAMPLES**-3.6)
+
+
+def test_a_pasted_spectrum_is_answered_as_the_library_does(visit):
+    tab = visit()
+    tab.check("input[value=spectrum]")
+    assert "paste two columns" in tab.inner_text("#error-spectrum")
+    tab.fill("#spectrum", "\n".join(f"{q!r}, {C!r}" for q, C in zip(SAMPLES.tolist(), SPECTRUM.tolist(), strict=True)))
+    found, surface = columns(tab), Surface.from_spectrum(SAMPLES, SPECTRUM, h_max=1.1)
+    for theory in ("calibrated", "persson"):
+        expected = contact(surface, mean_separation=found[f"{theory} gap"], E_star=13.3, theory=theory)
+        for name, attribute in QUANTITIES.items():
+            # the library's own law of a spectrum is within 1e-7
+            np.testing.assert_allclose(found[f"{theory} {name}"], getattr(expected, attribute), rtol=1e-7)
+    tab.select_option("#theory", "mbma")
+    assert "needs five numbers" in tab.inner_text("#error-theory")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("1 2 3", "line 1"),
+        ("1 2\nq C", "line 2"),
+        ("1 1\n0.5 1", "q must rise"),
+        ("1 -1", "C must not be negative"),
+        ("1 1\n2 1", "a factor 3"),
+    ],
+)
+def test_bad_spectra_are_told(text, said, visit):
+    tab = visit()
+    tab.check("input[value=spectrum]")
+    tab.fill("#spectrum", text)
+    assert said in tab.inner_text("#error-spectrum")
+
+
+def test_a_page_of_a_spectrum_begins_with_it(opened, tmp_path):
+    from generate.pages.explorer import visit
+
+    path = tmp_path / "own.html"
+    surface = Surface.from_spectrum(SAMPLES, SPECTRUM, h_max=1.1, unit="um")
+    path.write_text(explorer_page(surface, 5.0, "GPa", theory="calibrated"), encoding="utf-8")
+    tab = visit(opened, path.as_uri())
+    assert "60 samples of a spectrum" in tab.inner_text("#subtitle")
+    assert "[GPa/um]" in tab.inner_text("#readout")
+    tab.context.close()
+
+
+@pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
+def test_the_law_as_c_is_the_theory(theory, visit, tmp_path):
+    if shutil.which("gcc") is None:
+        pytest.skip("not installed: gcc")
+    path = tmp_path / "rough_law.c"
+    path.write_text(download(visit(f"theory={theory}"), "#law"), encoding="ascii")
+    strict = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O1", "-shared", "-fPIC")
+    subprocess.run(["gcc", *strict, str(path), "-lm", "-o", str(tmp_path / "law.so")], check=True)
+    law = ctypes.CDLL(str(tmp_path / "law.so")).rough_law
+    law.argtypes = [ctypes.c_double, *[ctypes.POINTER(ctypes.c_double)] * 3]
+
+    def at(c: float) -> tuple[int, list[float]]:
+        out = [ctypes.c_double() for _ in range(3)]
+        return law(c, *map(ctypes.byref, out)), [value.value for value in out]
+
+    surface = Surface.named("concrete")
+    c = float(surface.h_max) * np.exp(np.random.default_rng(3).uniform(np.log(1e-4), np.log(0.99), 400))
+    answers = [at(float(value)) for value in c]
+    assert not any(status for status, _ in answers)
+    pressure, tangent, area = np.array([values for _, values in answers]).T
+    known = contact(surface, mean_separation=surface.h_max - c, E_star=13.3, theory=theory)
+    np.testing.assert_allclose(pressure, known.force, rtol=3e-8)
+    np.testing.assert_allclose(area, known.area, rtol=3e-8)
+    np.testing.assert_allclose(tangent, known.stiffness, rtol=3e-6)
+    assert at(-0.1) == (0, [0.0, 0.0, 0.0])
+    assert at(2.0)[0] == 1
+    assert np.isnan(at(2.0)[1]).all()
+
+
+def test_numbers_under_the_cursor_by_keyboard(visit):
+    tab = visit("theory=calibrated&beside=persson")
+    tab.locator(".chart").first.focus()
+    tab.keyboard.press("End")
+    tab.keyboard.press("ArrowLeft")
+    rows = tab.locator("#readout tr")
+    assert rows.count() == 3
+    assert rows.nth(0).inner_text().startswith("u = 1.078 mm")
+    known = contact(Surface.named("concrete"), mean_separation=1.078, E_star=13.3, theory="calibrated")
+    shown = float(rows.nth(1).locator("td").first.inner_text().split(" ±")[0])
+    assert shown == pytest.approx(known.force, rel=1e-4)
+    assert not known.valid
+    assert "calibrated: A/A0 is below 0.001." in tab.inner_text("#concerns")
+
+
+def test_concerns_are_those_of_the_library(visit):
+    state = {"hurst": 0.15, "q0": 1.0, "q1": 500.0, "h_rms": 0.001, "h_max": 0.006, "theory": "calibrated"}
+    tab = visit(urllib.parse.urlencode(state))
+    said = tab.inner_text("#concerns")
+    gap = float(tab.locator("#readout th").first.inner_text().split()[2])
+    known = contact(Surface(*(state[name] for name in NAMES)), mean_separation=gap, theory="calibrated").reasons
+    assert len(known) > 2
+    for reason in known:
+        assert reason.replace("zeta_1", "q₁/q₀").split(" (")[0] in said.replace(" to 5.5", "")
+
+
+def test_on_a_phone_and_in_the_dark(visit, tmp_path):
+    from matplotlib import image
+
+    tab = visit(viewport={"width": 360, "height": 740}, color_scheme="dark", has_touch=True, is_mobile=True)
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 360
+    assert tab.locator("canvas").count() == 4
+    tab.screenshot(path=str(tmp_path / "dark.png"))
+    picture = image.imread(tmp_path / "dark.png")[..., :3]
+    assert np.median(picture) < 0.2
+    # and curves in it that can be seen
+    assert (picture.max(axis=-1) > 0.6).mean() > 0.005
