@@ -158,6 +158,11 @@ class CappedContact:
             "iterations": float(iterations),
         }
 
+    @property
+    def gap(self) -> FloatArray:
+        """Of the bodies, yielded points flattened."""
+        return np.maximum(self._rest, 0)
+
     def frozen_stiffness(self) -> float:
         """-dF/du of the contact area as it is, sticking neither to yielding nor to opening [E*/length].
 

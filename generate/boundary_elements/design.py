@@ -133,6 +133,7 @@ def leakage_nodes() -> list[Node]:
         *_nodes("plateau", "0.6 1", "12x5", 256, 2, held_out=True),
         *_nodes("stretched", "0.8", "16x4", 256, 2, "2 4"),
         *_nodes("stretched", "0.6", "12x5", 256, 1, "3", held_out=True),
+        *_nodes("yielded", "0.4 0.8", "16x4", 256, 1, "0.05 0.2", held_out=True),
         *_nodes("self_affine", "0.4 0.6 0.8", "32x4", 512, 2),
         *_nodes("self_affine", "0.4 0.8", "64x2", 512, 2),
         *_nodes("self_affine", "0.3 0.7 0.9", "24x5", 512, 1, held_out=True),

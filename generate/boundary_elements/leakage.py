@@ -9,6 +9,7 @@ from typing import Any
 import click
 import numpy as np
 
+from generate.boundary_elements.capped import CappedContact, load_at
 from generate.boundary_elements.collect import collect, leakage_dataset
 from generate.boundary_elements.design import leakage_nodes, tasks_of
 from generate.boundary_elements.flow import flow_conductance
@@ -21,6 +22,7 @@ HERE = pathlib.Path("leakage")
 # F/(A0 E* g): 0.5% to 42% contact, where the last cells are blocked
 LOADS = (0.0025, 0.005, 0.01, 0.02, 0.035, 0.055, 0.08, 0.105, 0.13, 0.155, 0.18, 0.2, 0.22)
 FEW_LOADS = (0.005, 0.02, 0.055, 0.08, 0.105, 0.13, 0.155)  # of the largest grids
+AREAS = (0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)  # that loads of surfaces that yield aim at
 LARGE = 1024
 QUANTITIES = ("area", "area_raw", "mean_separation", "residual", "seconds")
 
@@ -31,9 +33,12 @@ def solve_flow(recipe: Recipe) -> dict[str, Any]:
     surface = unscaled / bearing(unscaled, recipe.sizes).gradient
     known, spectrum = bearing(surface, recipe.sizes), radial_spectrum(surface, recipe.sizes)
     h_rms = known.h_rms
-    contact = Contact(surface, recipe.sizes)
+    contact: Contact | CappedContact = Contact(surface, recipe.sizes)
+    loads = FEW_LOADS if recipe.points >= LARGE else LOADS
+    if recipe.kind == "yielded":
+        contact, loads = CappedContact(surface, recipe.shape), tuple(load_at(area, recipe.shape) for area in AREAS)
     rows, flows, forces = [], [], []
-    for force in FEW_LOADS if recipe.points >= LARGE else LOADS:
+    for force in loads:
         result = contact.press(force)
         flows.append(flow_conductance(contact.gap / h_rms, recipe.sizes))
         forces.append(force)

@@ -27,7 +27,8 @@ class Recipe:
         "self_affine"; "plateau": flat spectrum below q0 down to one wave a side; "filtered": Gaussian filters (ISO
         16610-21) of half transmission at q0 and q1, cut at twice q1; "stretched" along x, `shape` times; heights z in
         h_rms transformed: "peaks" (exp(shape z) - 1)/shape, "valleys" the same upside down, "worn" above the level
-        `shape`, "patchy": times exp(shape y), y a smooth Gaussian field.
+        `shape`, "patchy": times exp(shape y), y a smooth Gaussian field. "yielded": "self_affine", to be pressed with
+        a hardness of `shape` E* g.
     hurst, zeta_1 : float
         Hurst exponent and q1/q0.
     waves : int
