@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
 
 from generate.boundary_elements.design import SPLITS
+from generate.calibrated_table import TheoryCurve
 from mbma_tables import leakage
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import Constants, Law, Spectrum
 from mbma_tables.leakage import FlowConstants
+from mbma_tables.theories.registry import get_theory
+from mbma_tables.theories.yielding import Yielding
 
 MIN_WAVES = 4  # longest waves a side: below, the cell's own scatter rules
 NEAREST = 1e-4  # of A/A0 to the threshold
@@ -43,10 +47,14 @@ class Case:
     @property
     def isotropic(self) -> bool:
         """Whether constants are fitted to surfaces like it."""
-        return self.kind != "stretched" and self.waves >= MIN_WAVES
+        return self.kind not in ("stretched", "yielded") and self.waves >= MIN_WAVES
 
     def law(self, constants: Constants) -> tuple[FloatArray, FloatArray]:
-        """A/A0 and mean gap by the calibrated law, from the spectrum and h_max."""
+        """A/A0 and mean gap by the calibrated law, from the spectrum and h_max, and from the hardness `node` ends in."""
+        if self.kind == "yielded":
+            gradient = self.spectrum.gradient
+            curve = TheoryCurve(Yielding(get_theory("calibrated"), float(self.node[-1]) * gradient), cast(Any, self))
+            return curve.area(self.force), curve.separation(self.force)
         law = Law(self.spectrum, self.h_max, constants)
         return law.area(self.force), law.separation(self.force)
 
@@ -58,7 +66,7 @@ def cases(data: xr.Dataset) -> list[Case]:
     for number in range(data.sizes["surface"]):
         one = data.isel(surface=number)
         kind, share = kinds[int(one.kind)], one.band_variance.values
-        if kind == "self_affine":
+        if kind in ("self_affine", "yielded"):
             spectrum = Spectrum.self_affine(float(one.hurst), float(one.zeta_1))
         else:
             spectrum = Spectrum.from_shares(one.band_q.values[share > 0], share[share > 0])
@@ -94,7 +102,9 @@ class Flow:
     def __init__(self, one: Case, constants: Constants) -> None:
         self.one = one
         self.area, self.u = one.law(constants)
-        self._gaps = leakage.gaps(one.spectrum, one.force, constants)
+        # gaps of contacts that yield are taken for those of elastic ones of equal area
+        load = leakage.load_of(one.spectrum, self.area, constants) if one.kind == "yielded" else one.force
+        self._gaps = leakage.gaps(one.spectrum, load, constants)
         self._share, self._log_cube = leakage.quadrature(self._gaps)
         self._mean = np.sum(self._share * np.exp(self._log_cube / 3), axis=1)
         self._known: dict[FlowConstants, FloatArray] = {}

@@ -103,6 +103,7 @@ SETS: dict[str, Callable[[Case], bool]] = {
     "held out": lambda one: one.isotropic and one.split != TRAINING and one.zeta_1 < LARGE,
     "plateaus": lambda one: one.kind == "plateau",
     "stretched": lambda one: one.kind == "stretched",
+    "yielded": lambda one: one.kind == "yielded",
     "zeta_1 32, two waves": lambda one: one.zeta_1 == 32 and one.waves < MIN_WAVES,
     "zeta_1 64 and 128": lambda one: one.zeta_1 >= LARGE,
 }

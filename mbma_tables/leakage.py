@@ -162,11 +162,15 @@ def contact_factor(
     spectrum: Spectrum, contact: ArrayLike, flow: FlowConstants, constants: Constants = CONSTANTS
 ) -> FloatArray:
     """ln R at contact fractions A/A0, rising, above zero and below the threshold."""
+    return log_factor(gaps(spectrum, load_of(spectrum, contact, constants), constants), flow)
+
+
+def load_of(spectrum: Spectrum, contact: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
+    """Loads F/(A0 E* g) of an elastic contact at contact fractions A/A0, rising and above zero."""
     wanted = np.asarray(contact, float)
     log_force = np.linspace(np.log(wanted[0]) - 3, 1.0, LOADS)
     reached = area(np.exp(log_force), spectrum.alpha, constants)
-    force = np.exp(np.interp(np.log(wanted), np.log(reached), log_force))
-    return log_factor(gaps(spectrum, force, constants), flow)
+    return np.exp(np.interp(np.log(wanted), np.log(reached), log_force))
 
 
 def log_factor(found: Gaps, flow: FlowConstants) -> FloatArray:
