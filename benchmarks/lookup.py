@@ -13,6 +13,7 @@ os.environ["OMP_NUM_THREADS"] = "1"
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import dataclasses
+import functools
 import json
 import pathlib
 import statistics
@@ -259,6 +260,12 @@ def calibrated(rng: np.random.Generator) -> None:
     spent = microseconds(taken["table"], GAPS)
     report("force, area and stiffness of a random separation", 1e3 * spent, "ns")
     report("the same in evaluations of scipy.special.erf", spent / microseconds(taken["erf"], GAPS), "")
+    surfaces, gaps = held_out(SURFACES, rng)
+    asked_of = {"one surface": (surface, u), "one gap a surface": (surfaces, (gaps + surfaces.h_max) / 2)}
+    for what, (batch, mean) in asked_of.items():
+        asked = functools.partial(contact, batch, mean_separation=mean, theory="calibrated")
+        both = rounds({"contact": asked, "leakage": lambda asked=asked: asked().leakage})
+        report(f"contact with leakage, {what}", times_faster(both, "leakage", "contact"), "x", at_most=1.5)
     report("faster than the law's quadrature", microseconds(taken["law"], HELD_OUT) / spent, "x")
 
 

@@ -50,7 +50,7 @@ class Case:
         return self.kind not in ("stretched", "yielded") and self.waves >= MIN_WAVES
 
     def law(self, constants: Constants) -> tuple[FloatArray, FloatArray]:
-        """A/A0 and mean gap by the calibrated law, from the spectrum and h_max, and from the hardness `node` ends in."""
+        """A/A0 and mean gap by the calibrated law, from the spectrum and h_max, and a hardness, the last of `node`."""
         if self.kind == "yielded":
             gradient = self.spectrum.gradient
             curve = TheoryCurve(Yielding(get_theory("calibrated"), float(self.node[-1]) * gradient), cast(Any, self))

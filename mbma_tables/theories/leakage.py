@@ -16,7 +16,7 @@ from mbma_tables.errors import InputError
 from mbma_tables.labels import apply
 from mbma_tables.leakage import LARGEST_AREA, wide_gap
 from mbma_tables.surfaces.measured import MeasuredSurface
-from mbma_tables.theories.calibrated_curves import Places, spectrum_of
+from mbma_tables.theories.calibrated_curves import spectrum_of
 from mbma_tables.theories.law_kernel import ENDS, HIGHEST, KINK_SIGN, KINK_SIGN_2, LOWEST, POWER_A, POWER_F, fill
 from mbma_tables.theories.law_pieces import Side, assemble, power_record, side_pieces, straight_record
 from mbma_tables.theories.leakage_table import KEPT, fill_flow, flow_of_spectrum, self_affine, shipped_flow
@@ -304,15 +304,17 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
     u = np.ascontiguousarray(gap, float).ravel()
     if isinstance(surface, MeasuredSurface):
         return flow_of_spectrum(_spectrum(surface), u, contact).reshape(shape)
-    table, places = shipped_flow(), Places(surface, np.zeros(shape))
-    out = np.empty(u.size)
-    inside = table.covers(places.rows[:, 0], places.rows[:, 1])
-    rows = places.rows.copy()
+    table, out = shipped_flow(), np.empty(u.size)
+    given = np.stack([np.ravel(surface.hurst), np.log(np.ravel(surface.zeta_1))], axis=1)
+    number = np.arange(len(given)).reshape(surface.shape)
+    owner = np.ascontiguousarray(np.broadcast_to(number, shape)).ravel()
+    inside = table.covers(*given.T)
     # what the table does not cover is answered below
-    rows[~inside] = rows[inside][:1] if inside.any() else table.covered.mean()
-    fill_flow(table.coefficients, table.numbers, rows, places.owner, u, contact, out)
-    for row, mine in places.outside(~inside[places.owner]):
-        out[mine] = flow_of_spectrum(self_affine(*map(float, places.rows[row, :2])), u[mine], contact[mine])
+    rows = np.where(inside[:, None], given, table.covered.mean(axis=1))
+    fill_flow(table.coefficients, table.numbers, rows, owner, u, contact, out)
+    for row in np.flatnonzero(~inside):
+        mine = owner == row
+        out[mine] = flow_of_spectrum(self_affine(*map(float, given[row])), u[mine], contact[mine])
     return out.reshape(shape)
 
 
