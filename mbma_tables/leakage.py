@@ -170,7 +170,7 @@ def load_of(spectrum: Spectrum, contact: ArrayLike, constants: Constants = CONST
     wanted = np.asarray(contact, float)
     log_force = np.linspace(np.log(wanted[0]) - 3, 1.0, LOADS)
     reached = area(np.exp(log_force), spectrum.alpha, constants)
-    return np.exp(np.interp(np.log(wanted), np.log(reached), log_force))
+    return np.asarray(np.exp(np.interp(np.log(wanted), np.log(reached), log_force)))
 
 
 def log_factor(found: Gaps, flow: FlowConstants) -> FloatArray:

@@ -34,7 +34,7 @@ def solve_flow(recipe: Recipe) -> dict[str, Any]:
     known, spectrum = bearing(surface, recipe.sizes), radial_spectrum(surface, recipe.sizes)
     h_rms = known.h_rms
     contact: Contact | CappedContact = Contact(surface, recipe.sizes)
-    loads = FEW_LOADS if recipe.points >= LARGE else LOADS
+    loads: tuple[float, ...] = FEW_LOADS if recipe.points >= LARGE else LOADS
     if recipe.kind == "yielded":
         contact, loads = CappedContact(surface, recipe.shape), tuple(load_at(area, recipe.shape) for area in AREAS)
     rows, flows, forces = [], [], []
