@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import difflib
+import functools
+import inspect
 import sys
-from typing import TYPE_CHECKING, Any, TypeAlias
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +19,9 @@ SHOWN = 3  # offending entries quoted in a message
 if TYPE_CHECKING:
     import xarray as xr
 
+P = ParamSpec("P")
+R = TypeVar("R")
+SYMBOLS = {"H": "hurst", "d": "separation", "u": "mean_separation", "p": "pressure", "E": "E_star", "A": "area"}
 FloatArray = NDArray[np.float64]
 Numbers: TypeAlias = "np.float64 | FloatArray | xr.DataArray"  # what answers hold: a number, an array, or by names
 
@@ -27,6 +34,31 @@ def describe_entries(values: FloatArray, mask: NDArray[np.bool_]) -> str:
     quoted = [f"{values[tuple(p)]:.17g} at {tuple(int(i) for i in p)}" for p in places[:SHOWN]]
     more = len(places) - SHOWN
     return ", ".join(quoted) + (f" and {more} more" if more > 0 else "")
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Words that point from an unknown name to the nearest known one."""
+    names = list(known)
+    alike = [other for other in names if other.lower() == name.lower()]
+    near = alike or difflib.get_close_matches(name, names, 1)
+    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(names)}"
+
+
+def hinted(function: Callable[P, R]) -> Callable[P, R]:
+    """A function whose complaint about an unknown argument names the nearest known one, or what a symbol stands for."""
+    parameters = inspect.signature(function).parameters
+    names = [name for name in parameters if name not in ("self", "cls")]
+    called = function.__qualname__.removesuffix(".__init__")
+
+    @functools.wraps(function)
+    def checked(*given: P.args, **named: P.kwargs) -> R:
+        for name in named.keys() - parameters.keys():
+            meant = SYMBOLS.get(name)
+            hint = f"did you mean {meant!r}?" if meant in names else nearest(name, names)
+            raise TypeError(f"{called} has no argument {name!r}: {hint}")
+        return function(*given, **named)
+
+    return checked
 
 
 def is_labelled(value: Any) -> bool:

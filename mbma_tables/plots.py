@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 KINDS = ("png", "svg", "pdf")  # of files of pictures
+GAP_LABEL = "mean separation  u/h_rms"
 FORCE_LABEL = "force  F/(A0 E*)"
 LABELS = {"mbma": "MBMA", "greenwood_williamson": "Greenwood-Williamson", "persson_simplified": "Persson, simplified"}
 
@@ -86,7 +87,40 @@ class Curve:
             raise InputError(f"{self.label!r} has no contact to draw on logarithmic axes")
 
 
-def draw_compression(curves: Sequence[Curve], title: str = "", force_label: str = FORCE_LABEL) -> Figure:
+def new_figure(width: float, height: float) -> Figure:
+    """A figure [inches] that is none of pyplot's, and that notebooks show.
+
+    Raises
+    ------
+    MbmaError
+        Where matplotlib is missing.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise MbmaError("a plot needs matplotlib: pip install 'mbma_tables[plot]'") from None
+    figure: Any = Figure(figsize=(width, height), layout="constrained")
+    figure._repr_png_ = lambda: to_picture(figure, dpi=72)
+    made: Figure = figure
+    return made
+
+
+def draw_lines(lines: Mapping[str, tuple[Any, Any]], x_label: str, y_label: str, scale: str = "log") -> Figure:
+    """Lines (x, y) by their names, on axes of one scale; names are left out where there is one line."""
+    figure = new_figure(5.5, 4)
+    axes = figure.subplots()
+    for name, (x, y) in lines.items():
+        axes.plot(x, y, label=name)
+    axes.set(xlabel=x_label, ylabel=y_label, xscale=scale, yscale=scale)
+    axes.grid(True, which="major", alpha=0.3)
+    if len(lines) > 1:
+        axes.legend()
+    return figure
+
+
+def draw_compression(
+    curves: Sequence[Curve], title: str = "", force_label: str = FORCE_LABEL, gap_label: str = GAP_LABEL
+) -> Figure:
     """Two panels: force (logarithmic) against u/h_rms, and area against force (both logarithmic).
 
     Parameters
@@ -98,6 +132,8 @@ def draw_compression(curves: Sequence[Curve], title: str = "", force_label: str 
         Printed above both panels.
     force_label : str
         What the force is, with its unit.
+    gap_label : str
+        What the gap is, likewise.
 
     Returns
     -------
@@ -119,11 +155,7 @@ def draw_compression(curves: Sequence[Curve], title: str = "", force_label: str 
     """
     if not curves:
         raise InputError("no curves to draw: at least one is needed")
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise MbmaError("a plot needs matplotlib: pip install 'mbma_tables[plot]'") from None
-    figure = Figure(figsize=(10, 4.5), layout="constrained")
+    figure = new_figure(10, 4.5)
     by_gap, by_force = figure.subplots(1, 2)
     for curve in curves:
         marker = "." if curve is curves[0] else ""
@@ -134,7 +166,7 @@ def draw_compression(curves: Sequence[Curve], title: str = "", force_label: str 
     by_gap.set_yscale("log", nonpositive="mask")
     by_force.set_xscale("log", nonpositive="mask")
     by_force.set_yscale("log", nonpositive="mask")
-    by_gap.set_xlabel("mean separation  u/h_rms")
+    by_gap.set_xlabel(gap_label)
     by_gap.set_ylabel(force_label)
     by_force.set_xlabel(force_label)
     by_force.set_ylabel("real contact area  A/A0")
@@ -154,7 +186,7 @@ def _band(axes: Axes, x: FloatArray, y: FloatArray, scatter: FloatArray | None) 
     axes.fill_between(x, y / factor, y * factor, where=np.isfinite(scatter).tolist(), alpha=0.25, color=colour, lw=0)
 
 
-def to_picture(figure: Figure, kind: str = "png") -> bytes:
+def to_picture(figure: Figure, kind: str = "png", dpi: float = 120) -> bytes:
     """The figure as the content of a file of a `kind` of `KINDS`, the same bytes for the same figure."""
     import matplotlib as mpl
 
@@ -163,5 +195,5 @@ def to_picture(figure: Figure, kind: str = "png") -> bytes:
     stable: Any = {"svg.fonttype": "none", "svg.hashsalt": "mbma_tables"}
     undated: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     with mpl.rc_context(stable):
-        figure.savefig(content, format=kind, dpi=120, metadata=undated.get(kind))
+        figure.savefig(content, format=kind, dpi=dpi, metadata=undated.get(kind))
     return content.getvalue()

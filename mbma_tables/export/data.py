@@ -114,20 +114,15 @@ def matlab_reader(law: LawTable, name: str) -> bytes:
 
 def to_netcdf(law: LawTable) -> bytes:
     """A netCDF-4 file with CF attributes."""
-    import xarray as xr
-
-    dataset = xr.Dataset(
-        {law.y_name: (law.x_name, law.y, {"units": law.y_unit, "long_name": law.y_name})},
-        coords={law.x_name: (law.x_name, law.x, {"units": law.x_unit, "long_name": law.x_name})},
-        attrs={
-            "Conventions": "CF-1.11",
-            "title": law.comments[0],
-            "comment": "\n".join(law.comments),
-            "largest_error": law.largest_error,
-            "theory": law.theory,
-            "interpolation": "linear",
-        },
-    )
+    dataset = law.to_dataset()
+    dataset.attrs = {
+        "Conventions": "CF-1.11",
+        "title": law.comments[0],
+        "comment": "\n".join(law.comments),
+        "largest_error": law.largest_error,
+        "theory": law.theory,
+        "interpolation": "linear",
+    }
     # CF 2.5.1: a coordinate has no missing values, nor has anything here
     whole = {name: {"_FillValue": None} for name in (law.x_name, law.y_name)}
     return written_bytes("law.nc", lambda path: dataset.to_netcdf(path, engine="netcdf4", encoding=whole))

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbma_tables import __version__
-from mbma_tables.arguments import FloatArray, number_in
+from mbma_tables.arguments import FloatArray, hinted, number_in
+from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
 from mbma_tables.export.chords import chosen_rows
+from mbma_tables.plots import draw_lines
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.theories.contact import contact
@@ -27,6 +30,9 @@ from mbma_tables.theories.result import ELASTIC_PSI, Contact
 from mbma_tables.totals.conductance import conductance
 from mbma_tables.units import Units, in_unit, resolve
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 QUANTITIES = ("pressure", "conductance")
 FLOOR = 1e-3  # of the largest value, where no range is given: below it, errors are relative to this, not to the value
 LOOKED_AT = 200  # compressions at which validity and scatter are looked at
@@ -35,8 +41,8 @@ LAW_RTOL = 1e-8
 OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # said of a surface that is its own spectrum
 
 
-@dataclasses.dataclass(frozen=True)
-class LawTable:
+@dataclasses.dataclass(frozen=True, repr=False)
+class LawTable(Displayed):
     """Rows of a contact law, ready to be written.
 
     Attributes
@@ -69,6 +75,21 @@ class LawTable:
     floor: float = 0.0
     behaviour: LawTable | None = None
 
+    def _facts(self) -> dict[str, str]:
+        columns = {self.x_name: shown(self.x, self.x_unit), self.y_name: shown(self.y, self.y_unit)}
+        return columns | {"rows": str(self.x.size), "theory": self.theory, "largest error": shown(self.largest_error)}
+
+    def _variables(self) -> dict[str, Variable]:
+        dims = (self.x_name,)
+        return {
+            self.x_name: Variable(self.x, self.x_unit, self.x_name, dims),
+            self.y_name: Variable(self.y, self.y_unit, self.y_name, dims),
+        }
+
+    def _figure(self) -> Figure:
+        labels = (f"{name} [{unit}]" for name, unit in ((self.x_name, self.x_unit), (self.y_name, self.y_unit)))
+        return draw_lines({self.y_name: (self.x[1:], self.y[1:])}, *labels)
+
 
 def _curve(
     law: ContactLaw,
@@ -92,6 +113,7 @@ def _curve(
     return pressure[rises], np.asarray(conductance(stiffness, k_s, E_star))[rises]
 
 
+@hinted
 def describe_law(
     surface: AnySurface,
     E_star: float | str,

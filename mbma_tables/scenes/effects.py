@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
+from mbma_tables.arguments import nearest
 from mbma_tables.errors import InputError
 from mbma_tables.theories.registry import THEORIES
 
@@ -29,13 +29,6 @@ OF_LAW = ("stiffness", "energy", "conductance")
 ELASTIC = ("energy", *OF_ISLANDS)  # of contacts in which nothing yields
 COMPARED = (*THEORIES, "persson_simplified")
 CORRELATIONS = ("cooper_mikic_yovanovich", "mikic")  # of conductance
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Words that point from an unknown name to the nearest known one."""
-    names = list(known)
-    near = difflib.get_close_matches(name, names, 1)
-    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(names)}"
 
 
 def chosen(on: Iterable[str], off: Iterable[str]) -> tuple[frozenset[str], frozenset[str]]:

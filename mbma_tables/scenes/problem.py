@@ -6,8 +6,9 @@ import dataclasses
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from mbma_tables.arguments import nearest
 from mbma_tables.errors import InputError
-from mbma_tables.scenes.effects import COMPARED, CORRELATIONS, OF_ISLANDS, chosen, nearest
+from mbma_tables.scenes.effects import COMPARED, CORRELATIONS, OF_ISLANDS, chosen
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.theories.registry import THEORIES, get_theory
 from mbma_tables.units import Units, in_unit, known, modulus_and_units

@@ -9,9 +9,9 @@ import tomllib
 from collections.abc import Mapping
 from typing import Any
 
+from mbma_tables.arguments import nearest
 from mbma_tables.errors import InputError
 from mbma_tables.files import read_file
-from mbma_tables.scenes.effects import nearest
 
 MAX_BYTES = 2**20
 

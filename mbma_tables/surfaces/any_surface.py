@@ -10,11 +10,15 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
+from mbma_tables.plots import draw_lines
 from mbma_tables.surfaces import spectrum
-from mbma_tables.units import factor
+from mbma_tables.units import Units, factor, unit_of
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbma_tables.surfaces.measured import MeasuredSurface
 
 
@@ -25,7 +29,21 @@ def frozen(values: Any) -> Any:
     return values
 
 
-class AnySurface(abc.ABC):
+MEANINGS = {
+    "hurst": "Hurst exponent",
+    "q0": "smallest wavenumber",
+    "q1": "largest wavenumber",
+    "zeta_1": "largest magnification q1/q0",
+    "h_rms": "root-mean-square height",
+    "h_max": "highest point above the mid-plane",
+    "m2": "variance of a profile's slope",
+    "m4": "variance of a profile's second derivative",
+    "alpha": "Nayak's bandwidth parameter",
+    "rms_gradient": "root-mean-square gradient",
+}
+
+
+class AnySurface(Displayed, abc.ABC):
     """A rough surface, or a batch: what theories and everything above them ask.
 
     Attributes
@@ -153,6 +171,30 @@ class AnySurface(abc.ABC):
     def summit_sigma(self) -> Any:
         """Standard deviation of summit heights [length], Eq. (2)."""
         return np.sqrt((1 - spectrum.BROADENING / self.alpha) * self.m0)
+
+    def _facts(self) -> dict[str, str]:
+        units = Units(self.unit)
+        named = {"Hurst exponent": ("hurst", "1"), "q0": ("q0", ""), "q1": ("q1", ""), "zeta_1": ("zeta_1", "1")}
+        named |= {"h_rms": ("h_rms", ""), "h_max": ("h_max", ""), "rms gradient": ("rms_gradient", "1")}
+        known = {fact: (getattr(self, name), unit or unit_of(name, units)) for fact, (name, unit) in named.items()}
+        return {fact: shown(*value) for fact, value in known.items() if value[0] is not None}
+
+    def _variables(self) -> dict[str, Variable]:
+        units = Units(self.unit)
+        known = {name: getattr(self, name) for name in MEANINGS}
+        return {n: Variable(v, unit_of(n, units), MEANINGS[n]) for n, v in known.items() if v is not None}
+
+    def _figure(self) -> Figure:
+        if self.labelled or self.shape != ():
+            raise InputError("a batch has no single spectrum to draw: take one surface")
+        q = self._wavenumbers()
+        length = self.unit or "length"
+        label = f"wavenumber q [1/{length}]"
+        return draw_lines({"spectrum": (q, self.power_spectrum(q))}, label, f"spectrum C(q) [{length}^4]")
+
+    def _wavenumbers(self) -> Any:
+        """Where the spectrum is drawn."""
+        return np.geomspace(self.q0, self.q1, 200)[1:-1]
 
     def combined(self, other: AnySurface) -> MeasuredSurface:
         """The one rough surface that stands for two that touch: spectra add, heights convolve.

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import finite_array, require
 from mbma_tables.bearing import Bearing, RadialSpectrum
+from mbma_tables.display import Variable
 from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights, one_height
@@ -126,6 +127,14 @@ class MeasuredSurface(AnySurface):
         numbers = f"h_rms={self.h_rms:.4g}, h_max={self.h_max:.4g}, rms gradient {self.rms_gradient:.4g}"
         unit = "" if self.unit is None else f", unit={self.unit!r}"
         return f"MeasuredSurface({self.q.size} waves from q = {self.q0:.4g} to {self.q1:.4g}, {numbers}{unit})"
+
+    def _variables(self) -> dict[str, Variable]:
+        length = self.unit or "length"
+        spectrum = {
+            "q": Variable(self.q, f"1/{length}", "wavenumber", ("q",)),
+            "C": Variable(self.C, f"{length}^4", "power spectrum, h_rms^2 = 2 pi integral C q dq", ("q",)),
+        }
+        return super()._variables() | spectrum
 
     @functools.cached_property
     def laws(self) -> PowerLaws:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
-import functools
 import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -12,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import broadcast_shape, finite_array, is_labelled, require
+from mbma_tables.arguments import broadcast_shape, finite_array, hinted, is_labelled, require
+from mbma_tables.display import shown
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -23,6 +22,11 @@ if TYPE_CHECKING:
     from mbma_tables.surfaces.measured import MeasuredSurface
     from mbma_tables.surfaces.psd import SpectrumFit
 
+TREATMENT = (
+    *("detrend", "outliers", "fill", "short_cutoff", "long_cutoff", "tip_radius", "reliable", "window"),
+    *("unit", "channel"),
+)  # arguments of `from_map` and `from_profile` that are handed on
+SHOWN = 6  # entries of a batch that are printed
 PARAMETERS = ("hurst", "q0", "q1", "h_rms", "h_max")
 
 
@@ -108,6 +112,7 @@ class Surface(AnySurface):
         return dataclasses.replace(self, q0=waves[0], q1=waves[1], h_rms=lengths[0], h_max=lengths[1], unit=unit)
 
     @classmethod
+    @hinted
     def from_moments(
         cls,
         *,
@@ -151,6 +156,7 @@ class Surface(AnySurface):
         return cls(hurst, *spectrum.band_from_moments(hurst, m0, m2, m4), h_max, unit=unit)
 
     @classmethod
+    @hinted
     def from_roughness(
         cls,
         *,
@@ -239,6 +245,7 @@ class Surface(AnySurface):
         return surface
 
     @classmethod
+    @hinted
     def from_spectrum(
         cls,
         q: ArrayLike,
@@ -325,6 +332,7 @@ class Surface(AnySurface):
         return MeasuredSurface(wavenumber[order], scale * spectrum[order], h_max, known, unit=unit)
 
     @classmethod
+    @hinted
     def from_map(
         cls,
         heights: Any,
@@ -338,7 +346,15 @@ class Surface(AnySurface):
         model: str = "measured",
         extrapolate_to: Any = None,
         extrapolate_hurst: float | None = None,
-        **treatment: Any,
+        outliers: float | None = None,
+        fill: str | None = None,
+        short_cutoff: Any = None,
+        long_cutoff: Any = None,
+        tip_radius: Any = None,
+        reliable: bool = True,
+        window: str | None = None,
+        unit: str | None = None,
+        channel: int | None = None,
     ) -> Surface | MeasuredSurface:
         """The surface of a measured height map: its own spectrum and heights, or the self-affine one fitted to it.
 
@@ -366,10 +382,12 @@ class Surface(AnySurface):
         extrapolate_to, extrapolate_hurst : float, optional
             Continue the measured spectrum to this wavelength [length] by a power law of this Hurst exponent; what
             that changes is told.
-        **treatment
-            `outliers`, `fill`, `short_cutoff`, `long_cutoff`, `tip_radius`, `reliable`, `window` of
-            `mbma_tables.surfaces.treatment.Treatment`; `unit` of the lengths where a file has none, `channel` of a
-            file. What was done is the surface's `provenance`.
+        outliers, fill, short_cutoff, long_cutoff, tip_radius, reliable, window : optional
+            As in `mbma_tables.surfaces.treatment.Treatment`; what was done is the surface's `provenance`.
+        unit : str, optional
+            Unit of the lengths, where a file has none.
+        channel : int, optional
+            Of a file with several maps.
 
         Returns
         -------
@@ -399,19 +417,21 @@ class Surface(AnySurface):
         >>> print(f"H = {surface.hurst:.2f}, q0 = {surface.q0:.3f}, fitted at {surface.fit.points} points")
         H = 0.80, q0 = 6.283, fitted at 32 points
         """
+        treatment = {name: value for name, value in locals().items() if name in TREATMENT}
         from mbma_tables.surfaces.maps import fit_map, measured_map, prepared
         from mbma_tables.surfaces.resolution import finished
 
         _check_model(model, band)
         if model != "measured" and (extrapolate_to is not None or extrapolate_hurst is not None):
             raise InputError("extrapolate_to and extrapolate_hurst belong to model='measured'")
-        treated = prepared(heights, dx, dy, periodic, {"detrend": detrend, **treatment})
+        treated = prepared(heights, dx, dy, periodic, treatment)
         if model == "measured":
             return finished(measured_map(treated, h_max), extrapolate_to, extrapolate_hurst)
         fitted = fit_map(treated, h_max, band)
         return cls(**fitted._asdict(), unit=fitted.fit.length_unit)
 
     @staticmethod
+    @hinted
     def from_profile(
         heights: Any,
         dx: Any = None,
@@ -421,7 +441,15 @@ class Surface(AnySurface):
         h_max: float | None = None,
         extrapolate_to: Any = None,
         extrapolate_hurst: float | None = None,
-        **treatment: Any,
+        outliers: float | None = None,
+        fill: str | None = None,
+        short_cutoff: Any = None,
+        long_cutoff: Any = None,
+        tip_radius: Any = None,
+        reliable: bool = True,
+        window: str | None = None,
+        unit: str | None = None,
+        channel: int | None = None,
     ) -> MeasuredSurface:
         """The isotropic surface of which a line was measured, by a stylus for instance.
 
@@ -432,7 +460,7 @@ class Surface(AnySurface):
             instance; or such a line scan.
         dx : float, optional
             Sampling step [length], of an array.
-        periodic, detrend, extrapolate_to, extrapolate_hurst, **treatment
+        periodic, detrend, extrapolate_to, extrapolate_hurst, outliers ... channel
             As for `from_map`; `tip_radius` is the stylus's.
         h_max : float, optional
             Height of the highest point above the mid-plane [length]; by default the line's, which lies below that of a
@@ -460,11 +488,12 @@ class Surface(AnySurface):
         >>> print(surface.provenance[-3]["told"])
         h_rms is known to 5.2% and the rms gradient to 1.4% (one standard error, of a Gaussian surface)
         """
+        treatment = {name: value for name, value in locals().items() if name in TREATMENT}
         from mbma_tables.surfaces.maps import prepared
         from mbma_tables.surfaces.profiles import measured_profile
         from mbma_tables.surfaces.resolution import finished
 
-        treated = prepared(heights, dx, None, periodic, {"detrend": detrend, **treatment}, dimensions=1)
+        treated = prepared(heights, dx, None, periodic, treatment, dimensions=1)
         return finished(measured_profile(treated, h_max), extrapolate_to, extrapolate_hurst)
 
     @property
@@ -536,21 +565,9 @@ def _shown(value: Any) -> str:
     """A number as Python prints it, a DataArray by its sizes."""
     if is_labelled(value):
         return f"<DataArray {dict(value.sizes)}>"
+    if np.size(value) > SHOWN:
+        return f"<{'x'.join(map(str, np.shape(value)))} numbers, {shown(value)}>"
     return repr(np.asarray(value).item()) if np.ndim(value) == 0 else repr(value)
 
 
-def _with_hint(init: Any) -> Any:
-    """`Surface.__init__` whose complaint about an unknown argument names the nearest known one."""
-
-    @functools.wraps(init)
-    def checked(self: Surface, *given: Any, **named: Any) -> None:
-        for name in named.keys() - {*PARAMETERS, "unit", "fit", "provenance"}:
-            near = ["hurst"] if name == "H" else difflib.get_close_matches(name.lower(), PARAMETERS, 1)
-            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(PARAMETERS)}"
-            raise TypeError(f"Surface has no argument {name!r}: {hint}")
-        init(self, *given, **named)
-
-    return checked
-
-
-Surface.__init__ = _with_hint(Surface.__init__)  # type: ignore[method-assign]
+Surface.__init__ = hinted(Surface.__init__)  # type: ignore[method-assign]

@@ -9,7 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, is_labelled, positive_modulus, require
+from mbma_tables.arguments import (
+    FloatArray,
+    broadcast_shape,
+    finite_array,
+    hinted,
+    is_labelled,
+    positive_modulus,
+    require,
+)
 from mbma_tables.errors import InputError
 from mbma_tables.labels import apply_to_surface
 from mbma_tables.models import AnyModel
@@ -34,6 +42,7 @@ MEANING = {
 }
 
 
+@hinted
 def contact(
     surface: AnySurface,
     separation: ArrayLike | None = None,

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, checked_hardness, number_in
+from mbma_tables.arguments import FloatArray, checked_hardness, hinted, number_in
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import AnyModel, get_model
 from mbma_tables.models.protocol import MAX_RTOL, MIN_RTOL
@@ -57,6 +57,7 @@ LOOKED_AT = 24  # places at which a theory's own error is looked at
 SHARE = 0.1  # of a theory's own error: the polynomials need not be closer to it
 
 
+@hinted
 def contact_law(
     surface: AnySurface,
     rtol: float = 1e-8,

@@ -15,17 +15,24 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, require
 from mbma_tables.compiled import in_blocks
+from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
+from mbma_tables.plots import Curve, draw_compression, force_label, theory_label
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import law_kernel as kernel
 from mbma_tables.theories.law_compiled import CompiledLaw
 from mbma_tables.theories.law_kernel import AREA, FORCE, force_at
-from mbma_tables.units import UNKNOWN, Units
+from mbma_tables.theories.result import MEANINGS
+from mbma_tables.units import UNKNOWN, Units, unit_of
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbma_tables.theories.leakage import LeakageLaw
 
 BLOCK = 1 << 16  # gaps between two looks for Ctrl-C
+SHOWN_POINTS = 200  # separations of a law as a Dataset, and of its picture
+SPACED = (1e-3, 0.2)  # of the way down: geometric up to here, then even
 SCAN = 49  # gaps at which a law's stiffness is looked at for its maximum
 ROUNDING = 4 * float(np.finfo(float).eps)
 DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polynomials'
@@ -55,8 +62,8 @@ def _plain(given: Any) -> bool:
     return type(given) is np.ndarray and given.dtype == np.float64 and given.size > 0
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class ContactLaw:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class ContactLaw(Displayed):
     """Force and area of one surface against its gap; made by `contact_law`, picklable, tens of kB.
 
     Every method takes the separation d, or the mean separation ``u=`` instead: numbers in the law's unit of length, or
@@ -334,6 +341,31 @@ class ContactLaw:
         passed = (d * head[kernel.KINK_SIGN] > head[kernel.KINK]).astype(int)
         passed += d * head[kernel.KINK_SIGN_2] > head[kernel.KINK_2]
         return np.where(x < head[kernel.LOW], 0, (bits >> shift) + base + passed)
+
+    def _facts(self) -> dict[str, str]:
+        unit, modulus = self.units.length or "1", unit_of("force", self.units)
+        known = {"theory": self.theory, "reading": self.reading, "tier": self.tier}
+        ends = np.array([max(self.lowest, -self.h_max), self.h_max if math.isinf(self.highest) else self.highest])
+        facts = {name: text for name, text in known.items() if text}
+        facts |= {"d": shown(ends, unit), "E_star": shown(self.E_star, modulus), "error": shown(self.error)}
+        return facts | {"size": f"{self.block.nbytes + self.errors.nbytes} bytes"}
+
+    def _variables(self) -> dict[str, Variable]:
+        ends = min(self.highest, self.h_max), max(self.lowest, -self.h_max)
+        light, deep = np.geomspace(*SPACED, SHOWN_POINTS // 2)[:-1], np.linspace(SPACED[1], 1.0, SHOWN_POINTS // 2)
+        d = ends[0] + (ends[1] - ends[0]) * np.concatenate([light, deep])
+        d = np.maximum(d, ends[1])
+        names = ("separation", "mean_separation", "force", "area", "stiffness", "energy")
+        force, area, stiffness, energy = self.values(d)
+        values = (d, (d + self.h_max) / 2, force, area, 2 * stiffness, energy)
+        return {n: Variable(v, unit_of(n, self.units), MEANINGS[n]) for n, v in zip(names, values, strict=True)}
+
+    def _figure(self) -> Figure:
+        held = self._variables()
+        unit = self.units.length or "length"
+        curve = Curve(theory_label(self.theory), *(held[name].values for name in ("mean_separation", "force", "area")))
+        label = force_label(unit_of("force", self.units))
+        return draw_compression([curve], force_label=label, gap_label=f"mean separation u [{unit}]")
 
     def compiled(self) -> CompiledLaw:
         """The law for functions that numba compiles: an argument of theirs with methods of one float, such as `force`.

@@ -10,24 +10,45 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, checked_hardness, is_labelled
+from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
 from mbma_tables.labels import apply_to_surface
+from mbma_tables.plots import Curve, draw_compression, force_label, theory_label
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 from mbma_tables.units import Units, unit_of
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbma_tables.theories.leakage import Leakage
     from mbma_tables.theories.yielding import Loaded
 
 WITH_UNITS = ("separation", "mean_separation", "force", "area", "stiffness", "energy", "mean_pressure")
 OF_HARDNESS = ("incremental_stiffness", "plane_separation")
+MOST_SHOWN = 10_000  # entries up to which a line says how far to trust them
+MEANINGS = {
+    "separation": "d, rigid plane to mid-plane",
+    "mean_separation": "u = (h_max + d)/2",
+    "force": "force over nominal area",
+    "area": "real over nominal contact area",
+    "stiffness": "-dF/du per nominal area",
+    "energy": "elastic energy per nominal area",
+    "mean_pressure": "mean pressure in the contact",
+    "yielded": "share of the contact area at the hardness",
+    "incremental_stiffness": "-dF/du per nominal area of a small unloading",
+    "plane_separation": "gap between mean planes",
+    "error": "bound on the relative numerical error against the theory",
+    "scatter": "standard deviation of ln F at this mean separation from simulation to simulation",
+    "area_scatter": "standard deviation of ln A at this force from simulation to simulation",
+    "valid": "whether the theory was tested for contacts such as these",
+}
 ELASTIC_PSI = 1.1  # up to which elastic areas are within 5% of those with a hardness
 MAX_GRADIENT = 1.0  # rms gradient above which heights and wavenumbers are hardly in one unit
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Contact:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Contact(Displayed):
     """A contact: force, area and what follows from them; arrays of the broadcast shape, or DataArrays.
 
     Attributes
@@ -74,6 +95,42 @@ class Contact:
             name: unit_of(name, self._source.units)
             for name in (*WITH_UNITS, *(OF_HARDNESS if self._source.yields else ()))
         }
+
+    def _facts(self) -> dict[str, str]:
+        units = self.units
+        known = {"theory": self.theory, "reading": self.reading, "tier": self.tier}
+        facts = {name: text for name, text in known.items() if text}
+        for name in ("mean_separation", "force", "area"):
+            if getattr(self, name) is not None:
+                facts[name] = shown(getattr(self, name), units[name])
+        if self._source.surface.labelled or is_labelled(self.mean_separation) or np.size(self.error) > MOST_SHOWN:
+            return facts
+        more = {"error": self.error, "scatter": self.scatter, "valid": self.valid}
+        return facts | {name: shown(value) for name, value in more.items()}
+
+    def _variables(self) -> dict[str, Variable]:
+        source = self._source
+        names = [name for name in MEANINGS if name not in (*OF_HARDNESS, "yielded") or source.yields]
+        names = [name for name in names if name != "energy" or not source.yields]
+        known = {name: getattr(self, name) for name in names}
+        return {
+            name: Variable(value, unit_of(name, source.units), MEANINGS[name])
+            for name, value in known.items()
+            if value is not None
+        }
+
+    def _origin(self) -> dict[str, str]:
+        source = self._source
+        return {"E_star": shown(source.E_star, unit_of("force", source.units)), "surface": repr(source.surface)}
+
+    def _figure(self) -> Figure:
+        surface = self._source.surface
+        if self.force is None or self.area is None or np.size(self.force) < 2 or surface.shape != ():
+            raise InputError("one surface's force and area at several separations make a curve, and this has none")
+        order = np.argsort(np.ravel(self.mean_separation))
+        fields = (self.mean_separation / surface.h_rms, self.force, self.area, self.scatter, self.area_scatter)
+        curve = Curve(theory_label(self.theory), *(np.ravel(field)[order] for field in fields))
+        return draw_compression([curve], force_label=force_label(self.units["force"]))
 
     @functools.cached_property
     def _answer(self) -> TheoryAnswer:

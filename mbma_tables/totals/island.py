@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, is_labelled, require
+from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, hinted, is_labelled, require
 from mbma_tables.errors import InputError
 from mbma_tables.islands.geometry import FIELDS, fill_islands
 from mbma_tables.islands.measured import measured_islands
@@ -87,6 +87,7 @@ def scale_area(g: dict[str, FloatArray]) -> FloatArray:
     return 2 * math.pi * g["eta"] * g["D"] * g["R_u"] * g["R_d"] * g["sigma"] ** 2
 
 
+@hinted
 def island(
     surface: AnySurface,
     delta: ArrayLike,

@@ -133,7 +133,12 @@ def test_prints_plain_numbers():
 
 @pytest.mark.parametrize(
     ("name", "hint"),
-    [("H", "did you mean hurst"), ("hrms", "mean h_rms"), ("Q0", "mean q0"), ("rough", "there are hurst, q0, q1")],
+    [
+        ("H", "did you mean 'hurst'"),
+        ("hrms", "mean 'h_rms'"),
+        ("Q0", "mean 'q0'"),
+        ("rough", "known are hurst, q0, q1"),
+    ],
 )
 def test_an_unknown_argument_gets_a_hint(name, hint):
     with pytest.raises(TypeError, match=f"no argument '{name}': .*{hint}"):

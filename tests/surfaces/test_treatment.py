@@ -229,7 +229,7 @@ def test_a_window_is_the_librarys(window):
 
 
 def test_an_unknown_option_is_named():
-    with pytest.raises(TypeError, match="there is no option cutoff"):
+    with pytest.raises(TypeError, match="no argument 'cutoff': did you mean"):
         Surface.from_map(MAP, STEP, cutoff=2.0)
 
 

@@ -1,0 +1,118 @@
+"""How answers show themselves: a line in a terminal, a small table with its picture in a notebook, an xarray Dataset.
+
+A class that derives from `Displayed` says what it is (`_facts`), what it holds (`_variables`) and how it is drawn
+(`_figure`).
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from mbma_tables.arguments import is_labelled
+from mbma_tables.errors import MbmaError
+from mbma_tables.plots import to_picture
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+SMALL = 55  # dots per inch of a notebook's picture
+
+
+class Variable(NamedTuple):
+    """An entry of a Dataset; without `dims` those of a batch are numbered."""
+
+    values: Any
+    unit: str = "1"
+    meaning: str = ""
+    dims: tuple[str, ...] | None = None
+
+
+def shown(value: Any, unit: str = "1") -> str:
+    """A number, or the range of an array, with its unit; of a DataArray, which may be lazy, its sizes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mbma_tables.display import shown
+    >>> shown(0.25, "mm"), shown(np.array([1.0, 3.0]))
+    ('0.25 mm', '1 to 3')
+    """
+    if is_labelled(value):
+        return f"<DataArray {dict(value.sizes)}>"
+    numbers = np.asarray(value)
+    if numbers.dtype == bool:
+        return str(bool(numbers)) if numbers.ndim == 0 else f"{int(numbers.sum())} of {numbers.size}"
+    known = numbers[~np.isnan(numbers)]
+    if not known.size:
+        return "not known"
+    ends = dict.fromkeys(f"{end:.4g}" for end in (known.min(), known.max()))
+    return " to ".join(ends) + ("" if unit == "1" else f" {unit}")
+
+
+class Displayed:
+    """What shows itself in a line, as a table with a picture, as a figure, and as a Dataset."""
+
+    def _facts(self) -> Mapping[str, str]:
+        """What it is, by name."""
+        raise NotImplementedError
+
+    def _variables(self) -> Mapping[str, Variable]:
+        """What it holds, by name."""
+        raise NotImplementedError
+
+    def _origin(self) -> Mapping[str, str]:
+        """What else a Dataset says in its attributes."""
+        return {}
+
+    def _figure(self) -> Figure:
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{name} {text}' for name, text in self._facts().items())})"
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><th style='text-align:left'>{html.escape(name)}</th><td style='text-align:left'>{html.escape(text)}"
+            "</td></tr>"
+            for name, text in self._facts().items()
+        )
+        table = f"<div><b>{type(self).__name__}</b><table>{rows}</table>"
+        try:
+            picture = base64.b64encode(to_picture(self._figure(), dpi=SMALL)).decode()
+        # no curve, or no matplotlib: the table stands alone
+        except MbmaError:
+            return f"{table}</div>"
+        return f"{table}<img src='data:image/png;base64,{picture}'></div>"
+
+    def plot(self) -> Figure:
+        """A picture of it; notebooks show the figure, `figure.savefig("name.svg")` keeps it.
+
+        Raises
+        ------
+        InputError
+            Where there is no curve to draw, as of a single contact.
+        MbmaError
+            Where matplotlib is missing.
+        """
+        return self._figure()
+
+    def to_dataset(self) -> xr.Dataset:
+        """What it holds as an xarray Dataset, each variable with its unit and what it is."""
+        import xarray as xr
+
+        variables = {}
+        for name, (values, unit, meaning, dims) in self._variables().items():
+            described = {"units": unit} | ({"long_name": meaning} if meaning else {})
+            if is_labelled(values):
+                variables[name] = values.assign_attrs(described)
+                continue
+            rank = np.ndim(values)
+            own = dims if dims is not None else ("point",) if rank == 1 else tuple(f"dim_{k}" for k in range(rank))
+            variables[name] = xr.Variable(own, values, described)
+        return xr.Dataset(variables, attrs={**self._facts(), **self._origin()})

@@ -1,0 +1,145 @@
+"""What answers say of themselves in a terminal, in a notebook and as Datasets."""
+
+import re
+import sys
+
+import numpy as np
+import pytest
+
+from mbma_tables import InputError, Surface, contact, contact_law, island, sensitivity
+from mbma_tables.arguments import hinted
+from mbma_tables.export.law_rows import describe_law
+
+ROAD = Surface.named("concrete")
+SPECTRUM = Surface.from_spectrum(
+    np.geomspace(1, 100, 40), 1e-3 * np.geomspace(1, 100, 40) ** -3.0, h_max=0.3, unit="um"
+)
+
+
+def displayed():
+    yield ROAD
+    yield SPECTRUM
+    yield contact(ROAD, np.linspace(1, -1, 9), E_star="13.3 MPa")
+    yield contact(SPECTRUM, pressure=[0.001, 0.01], theory="calibrated")
+    yield contact_law(ROAD, E_star="13.3 MPa")
+    yield contact_law(ROAD, theory="persson")
+    yield describe_law(ROAD, "13.3 MPa", rows=20)
+
+
+@pytest.fixture(scope="module", params=range(7), ids=lambda k: str(k))
+def thing(request):
+    return list(displayed())[request.param]
+
+
+def test_a_line_is_short_and_plain(thing):
+    line = repr(thing)
+    assert "\n" not in line
+    assert len(line) < 320
+    assert line.startswith(type(thing).__name__)
+    assert not re.search(r"np\.|array|object at", line)
+
+
+def test_a_notebook_shows_a_table_and_a_small_picture(thing):
+    shown = thing._repr_html_()
+    assert shown.count("<tr>") == len(thing._facts())
+    assert len(re.findall("src='data:image/png;base64,", shown)) == 1
+    assert len(shown) < 60_000
+
+
+def test_without_matplotlib_the_table_stands_alone(monkeypatch, thing):
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    assert "<img" not in thing._repr_html_()
+    assert "<table>" in thing._repr_html_()
+
+
+def test_a_figure_is_none_of_pyplots(thing):
+    before = "matplotlib.pyplot" in sys.modules
+    figure = thing.plot()
+    assert all(axes.get_xlabel() and axes.get_ylabel() for axes in figure.axes)
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    assert ("matplotlib.pyplot" in sys.modules) == before
+
+
+def test_every_variable_has_its_unit(thing):
+    found = thing.to_dataset()
+    assert found.variables
+    assert all(variable.attrs["units"] for variable in found.variables.values())
+    assert all(isinstance(value, str) for value in found.attrs.values())
+
+
+def test_a_dataset_holds_the_answers():
+    answer = contact(ROAD, [[0.8, 0.2], [0.1, 0.0]], E_star="13.3 MPa")
+    found = answer.to_dataset()
+    for name in ("separation", "force", "area", "stiffness", "mean_pressure", "energy", "scatter", "valid", "error"):
+        np.testing.assert_array_equal(found[name], getattr(answer, name))
+    assert found["stiffness"].dims == ("dim_0", "dim_1")
+    assert (found["stiffness"].units, found["force"].units) == ("MPa/mm", "MPa")
+    assert found.attrs["surface"] == repr(ROAD)
+    law = contact_law(ROAD, E_star=13.3).to_dataset()
+    np.testing.assert_allclose(law["force"], contact(ROAD, law["separation"].values, E_star=13.3).force, rtol=1e-8)
+    np.testing.assert_allclose(
+        law["stiffness"], contact(ROAD, law["separation"].values, E_star=13.3).stiffness, rtol=1e-6
+    )
+    np.testing.assert_array_equal(SPECTRUM.to_dataset()["C"], SPECTRUM.C)
+
+
+def test_a_lazy_answer_stays_lazy():
+    da = pytest.importorskip("dask.array")
+    import xarray as xr
+
+    def fail(block):
+        raise AssertionError("computed")
+
+    gaps = xr.DataArray(da.ones(6, chunks=3).map_blocks(fail, dtype=float, meta=np.empty(0)), dims="gap")
+    answer = contact(ROAD, gaps)
+    assert "{'gap': 6}" in repr(answer)
+    assert answer.to_dataset()["stiffness"].units == "1/mm" or answer.to_dataset()["stiffness"].dims == ("gap",)
+    assert "<table>" in Surface(xr.DataArray([0.5, 0.8], dims="site"), 1, 100, 1, 3)._repr_html_()
+
+
+def test_batches_are_summed_up():
+    batch = Surface(np.linspace(0.2, 0.9, 100), 1, 100, 1, 3)
+    assert "hurst=<100 numbers, 0.2 to 0.9>" in repr(batch)
+    answer = contact(batch, 1.0)
+    assert "valid 0 of 100" in repr(answer)
+    assert len(repr(answer)) < 320
+    for single in (batch, answer, contact(ROAD, 0.1)):
+        assert "<img" not in single._repr_html_()
+        with pytest.raises(InputError):
+            single.plot()
+
+
+@pytest.mark.parametrize(
+    ("call", "hint"),
+    [
+        (lambda: contact(ROAD, u=0.3), "contact has no argument 'u': did you mean 'mean_separation'?"),
+        (lambda: contact(ROAD, presure=0.3), "did you mean 'pressure'?"),
+        (lambda: contact_law(ROAD, theroy="persson"), "contact_law has no argument 'theroy': did you mean 'theory'?"),
+        (lambda: island(ROAD, dleta=0.1), "did you mean 'delta'?"),
+        (lambda: sensitivity(ROAD, p=0.1), "did you mean 'pressure'?"),
+        (lambda: describe_law(ROAD, 1.0, row=3), "did you mean 'rows'?"),
+        (lambda: Surface.from_map("x", detrnd="plane"), "Surface.from_map has no argument 'detrnd': did you mean"),
+        (lambda: Surface.from_profile("x", tipradius=1), "did you mean 'tip_radius'?"),
+        (lambda: Surface.from_moments(H=0.7), "did you mean 'hurst'?"),
+        (lambda: Surface.from_roughness(rq=0.7), "did you mean 'Rq'?"),
+        (lambda: Surface.from_spectrum([1], [1], hmax=1), "did you mean 'h_max'?"),
+    ],
+)
+def test_misspelt_arguments_get_a_hint(call, hint):
+    with pytest.raises(TypeError, match=re.escape(hint)):
+        call()
+
+
+def test_a_hinted_function_keeps_its_signature():
+    import inspect
+
+    def plain(a, *, b=2):
+        """Doc."""
+        return a + b
+
+    checked = hinted(plain)
+    assert inspect.signature(checked) == inspect.signature(plain)
+    assert (checked(1, b=3), checked.__doc__) == (4, "Doc.")
+    for name in ("from_map", "from_profile"):
+        kinds = {p.kind for p in inspect.signature(getattr(Surface, name)).parameters.values()}
+        assert inspect.Parameter.VAR_KEYWORD not in kinds
