@@ -25,10 +25,10 @@ import numpy as np
 
 from mbma_tables import Surface, greenwood_tripp
 from mbma_tables.islands.classical import iterate, ring_matrix
+from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.newton import extent_squared
 from mbma_tables.surfaces.readings import READINGS
 from mbma_tables.totals.gauss_kronrod import NODES_21 as NODES
-from mbma_tables.totals.island import geometry
 from mbma_tables.totals.island_sum import kinks
 
 SPLITS = 8  # intervals between two kinks, each with the quadrature's 21 nodes

@@ -19,13 +19,15 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
-from scipy.special import erf, ndtri
 
 from mbma_tables.arguments import FloatArray
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 LOG_Y = (-32.0, 2.25)  # ln y of the tabulated inner integrals; above its end they are below 1e-150
 Y_NODES = 4800
@@ -67,11 +69,15 @@ YANG_PERSSON = dataclasses.replace(PERSSON, weight=0.42, cubic=0.58)
 
 def _cover(force: FloatArray) -> tuple[FloatArray, FloatArray]:
     """erf(sqrt(2) F), Persson's contact of unit gradient, and its derivative."""
+    from scipy.special import erf
+
     return erf(np.sqrt(2) * force), np.sqrt(8 / np.pi) * np.exp(-2 * force**2)
 
 
 def area(force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """A/A0 at F/(A0 E* g) on a surface of Nayak's parameter alpha = m0 m4/m2^2."""
+    from scipy.special import erf
+
     values = np.asarray(force, float)
     t = values / constants.area_t0
     return np.asarray(erf(values * np.sqrt(2 * (1 + t) / (light_factor(alpha, constants) + t))))
@@ -85,6 +91,8 @@ def light_factor(alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArr
 @functools.cache
 def _inner_integrals() -> CubicSpline:
     """ln of I_n(y) = integral from y to infinity of dP^n/y', for n in POWERS, over ln y; shape (..., 3)."""
+    from scipy.interpolate import CubicSpline
+
     log_y = np.linspace(*LOG_Y, Y_NODES)
     node, weight = np.polynomial.legendre.leggauss(12)
     step = log_y[1] - log_y[0]
@@ -297,6 +305,8 @@ class Law:
 
 def mean_top_height(share: ArrayLike) -> FloatArray:
     """M_G(a) = phi(z)/a, z = -Phi^-1(a): mean height of the highest share a of a Gaussian surface [h_rms]."""
+    from scipy.special import ndtri
+
     a = np.asarray(share, float)
     z = ndtri(a)
     result: NDArray[np.float64] = np.exp(-z * z / 2) / np.sqrt(2 * np.pi) / a

@@ -1,13 +1,14 @@
-"""numba's decorators, which here also work where no folder can keep what they compile."""
+"""numba where it is needed: functions are compiled when they are first called, so that importing modules stays light.
+
+What is compiled is kept for later processes, and made in each where no folder can keep it.
+"""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
-
-import numba
-from numba.extending import register_jitable
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Answer = TypeVar("Answer")
@@ -16,33 +17,71 @@ Answer = TypeVar("Answer")
 CONTRACT = {"contract"}
 REORDER = {"contract", "reassoc", "arcp"}
 
+_plain: list[Callable[..., Any]] = []  # which numba has not been told of
 
-def _kept(decorate: Callable[..., Any], *signature: Any, **options: Any) -> Callable[[Function], Function]:
-    def wrap(function: Function) -> Function:
+
+class Compiled:
+    """A function that numba compiles when it is first called, from Python or from compiled code."""
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        functools.update_wrapper(self, function)
+        self._function, self._options = function, options
+
+    @functools.cached_property
+    def dispatcher(self) -> Any:
+        """numba's own object."""
+        import numba
+        from numba.extending import register_jitable
+
+        while _plain:
+            register_jitable(fastmath=CONTRACT, error_model="numpy")(_plain.pop())
         try:
-            made: Function = decorate(*signature, **options)(function)
+            return numba.njit(**self._options)(self._function)
         # "no locator available": neither the package's folder nor the user's can be written
         except RuntimeError:
-            made = decorate(*signature, **(options | {"cache": False}))(function)
-        return made
+            return numba.njit(**(self._options | {"cache": False}))(self._function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it, compiled."""
+        return self.dispatcher(*arguments)
+
+    def __getattr__(self, name: str) -> Any:
+        # numba asks for `_numba_type_` where compiled code calls this
+        if name == "_numba_type_" or not name.startswith("_"):
+            return getattr(self.dispatcher, name)
+        raise AttributeError(name)
+
+
+class Instruction:
+    """An intrinsic of numba's, made when compiled code first names it."""
+
+    def __init__(self, define: Callable[..., Any]) -> None:
+        self._define = define
+
+    @functools.cached_property
+    def _numba_type_(self) -> Any:
+        from numba.core.registry import cpu_target
+        from numba.extending import intrinsic
+
+        made, context = intrinsic(self._define), cpu_target.typing_context
+        context.refresh()
+        return context.resolve_value_type(made)
+
+
+def njit(**options: Any) -> Callable[[Function], Function]:
+    """`numba.njit`, put off; with `cache=True` the code is kept where numba finds a folder for it."""
+
+    def wrap(function: Function) -> Function:
+        made: Any = Compiled(function, options)
+        return made  # type: ignore[no-any-return]
 
     return wrap
 
 
-def njit(**options: Any) -> Callable[[Function], Function]:
-    """`numba.njit`; with `cache=True` the code is kept for later processes where numba finds a folder for it."""
-    return _kept(numba.njit, **options)
-
-
-def vectorize(signatures: list[str], **options: Any) -> Callable[[Function], Function]:
-    """`numba.vectorize`, kept likewise."""
-    return _kept(numba.vectorize, signatures, **options)
-
-
 def jitable(function: Function) -> Function:
     """A plain function, of numbers and numpy arrays alike, that compiled code may call too."""
-    made: Function = register_jitable(function)
-    return made
+    _plain.append(function)
+    return function
 
 
 def in_blocks(fill: Callable[[slice], Answer], count: int, size: int, threads: int = 1) -> list[Answer]:

@@ -67,10 +67,10 @@ def solver():
 
 
 def tables():
+    from mbma_tables.islands.geometry import geometry
     from mbma_tables.models.tables import island4d_model, universal_model
     from mbma_tables.surfaces.readings import REPORTED
     from mbma_tables.tablefiles.interpolate import fill_2d, fill_gradient_2d
-    from mbma_tables.totals.island import geometry
 
     model = universal_model()
     lowest, highest = model.content.axes[1].low, model.content.axes[1].high
@@ -98,9 +98,9 @@ def tables():
 
 
 def band():
+    from mbma_tables.islands.geometry import geometry
     from mbma_tables.surfaces.readings import PRINTED, REPORTED
     from mbma_tables.surfaces.spectrum import band_moment
-    from mbma_tables.totals.island import geometry
 
     approach, hurst = np.array([1e-9, 1e-3, 0.1, 2.0, 30.0]), np.array([0.8, 0.5, 1.0, 0.3, 0.8])
     plain = dataclasses.replace(REPORTED, name="plain", offset=False, summit_sigma=False)

@@ -20,9 +20,9 @@ from small_builds import KINDS
 from generate.tables.build import build
 from generate.tables.chunks import ChunkedSolver
 from generate.tables.configuration import load
+from mbma_tables.islands.geometry import geometry
 from mbma_tables.surfaces.readings import REPORTED
 from mbma_tables.tablefiles.netcdf import write_table
-from mbma_tables.totals.island import geometry
 
 SHIPPED = pathlib.Path(__file__).parents[1] / "tables"
 

@@ -17,12 +17,12 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.classical import iterate, ring_matrix
+from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.newton import extent_squared
 from mbma_tables.models import TIERS, answer_islands, get_model
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.scenes.costs import Row
 from mbma_tables.surfaces.readings import get_reading
-from mbma_tables.totals.island import geometry
 
 ISLANDS = 1000  # evaluated in a batch
 HARD = 12  # of them, for the classical iteration

@@ -21,9 +21,9 @@ from generate.tables.exact_geometry import DOUBLES, divisor, exact_island
 from mbma_tables import Surface, contact, greenwood_tripp
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import MbmaError
+from mbma_tables.islands.geometry import geometry
 from mbma_tables.models import answer_islands, get_model
 from mbma_tables.surfaces.readings import Reading, get_reading
-from mbma_tables.totals.island import geometry
 from mbma_tables.totals.island_sum import kinks
 
 DIGITS = 40

@@ -22,11 +22,11 @@ from generate.tables.configuration import Configuration, make_axis
 from generate.tables.universal import MAX_DRAWS, visited_surfaces
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, band_fields, from_axes, hat_scales, to_axes
+from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.surfaces.spectrum import BROADENING
 from mbma_tables.tablefiles.schema import DEGREES, ISLAND4D, SYMBOLS, Axis, TableContent, grid_labels, numbered
-from mbma_tables.totals.island import geometry
 
 LOOKUP = (
     "given delta_over_h_rms, zeta_d, zeta_u, hurst; delta_over_h_rms is the approach read at zeta_1 without bound, "

@@ -10,11 +10,11 @@ from scipy.stats import qmc
 from generate.tables.build import ConformancePoints, UncertifiedError
 from generate.tables.configuration import Configuration, make_axis
 from mbma_tables.arguments import FloatArray
+from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.surfaces.readings import READINGS
 from mbma_tables.tablefiles.interpolate import fill_gradient_2d
 from mbma_tables.tablefiles.schema import DEGREES, SYMBOLS, UNIVERSAL, Axis, TableContent, grid_labels, numbered
-from mbma_tables.totals.island import geometry
 
 LOOKUP = (
     "X = (delta - h_d)/sigma and mu = (8/3) D sigma sqrt(2 R_u R_d) of the island, in any consistent units",

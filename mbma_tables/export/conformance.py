@@ -15,7 +15,7 @@ import numpy as np
 from mbma_tables.arguments import FloatArray
 from mbma_tables.export.c_code import FORM
 from mbma_tables.export.text import comment
-from mbma_tables.islands.geometry import FIELDS, fill_islands
+from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.models import closed_form_functions, universal_kernel
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.readings import Reading
@@ -68,9 +68,8 @@ def phi_rows(model: UniversalModel, X: FloatArray, mu: FloatArray) -> Iterator[s
 
 
 def geometry_rows(approach: FloatArray, hurst: FloatArray, zeta_1: FloatArray, reading: Reading) -> Iterator[str]:
-    """Islands by the compiled runtime."""
-    out = np.empty((len(FIELDS), approach.size))
-    fill_islands(approach, hurst, zeta_1, reading.numbers, out)
+    """Islands by the library."""
+    out = np.stack(list(geometry(approach, hurst, zeta_1, reading).values()))
     for k in range(approach.size):
         # a height of exactly 0 is met exactly
         scales = np.where(out[:, k] == 0, 1.0, np.abs(out[:, k]))

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import scipy.special
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import njit
@@ -22,11 +21,13 @@ BLOCK = 1 << 26  # products of a ring and a ring between two looks for Ctrl-C, a
 
 def ring_matrix(rings: int) -> FloatArray:
     """w at the rings' middles per unit radius a, from pressures on `rings` rings of equal width (Eq. 37)."""
+    from scipy.special import ellipkm1
+
     r = (np.arange(rings) + 0.5) / rings
     t, rho = r[None, :], r[:, None]
     complement = ((t - rho) / (t + rho)) ** 2
     np.fill_diagonal(complement, 1.0)
-    matrix: FloatArray = 4 / np.pi * t / (t + rho) * scipy.special.ellipkm1(complement) / rings
+    matrix: FloatArray = 4 / np.pi * t / (t + rho) * ellipkm1(complement) / rings
     # the midpoint rule across ln|t - rho| is of second order with ln(h/2 pi) in the ring itself
     np.fill_diagonal(matrix, 2 / np.pi * np.log(16 * np.pi * r * rings) / rings)
     return matrix

@@ -8,20 +8,22 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import InputError
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.islands.height_integrals import integrals
 from mbma_tables.models import universal_kernel
 from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
 from mbma_tables.models.universal_kernel import Axes, Table
-from mbma_tables.tablefiles.interpolate import fill_2d
+from mbma_tables.tablefiles.interpolate import fill_2d, quintic
 from mbma_tables.tablefiles.schema import TableContent
 
 TINY = 1e-200  # replaces mu = 0 where a slope is asked for
 BLOCK = 1 << 16  # islands between two looks for Ctrl-C
+SMALL = 1 << 13  # islands up to which numpy answers, without a compiler
 
 
 class UniversalModel:
@@ -81,12 +83,48 @@ class UniversalModel:
         def fill(block: slice) -> None:
             universal_kernel.fill_phi(flat_X[block], flat_mu[block], self.kernel, status[block], out[block])
 
-        in_blocks(fill, flat_X.size, BLOCK, (os.cpu_count() or 1) if parallel else 1)
+        if flat_X.size <= SMALL:
+            self._fill_small(flat_X, flat_mu, status, out)
+        else:
+            in_blocks(fill, flat_X.size, BLOCK, (os.cpu_count() or 1) if parallel else 1)
         missing = status != universal_kernel.OK
         if outside == "exact" and missing.any():
             solved = greenwood_tripp.solve(flat_X[missing], flat_mu[missing], rtol=EXACT_RTOL)
             out[missing] = np.stack([solved.phi_F, solved.phi_A, solved.error], axis=-1)
         return IslandAnswer(*(column.reshape(shape)[()] for column in out.T))
+
+    def _fill_small(self, X: FloatArray, mu: FloatArray, status: NDArray[np.int64], out: FloatArray) -> None:
+        """`universal_kernel.fill_phi` in numpy."""
+        axes, c, errors = self.kernel.axes, self.kernel.coefficients, self.kernel.errors
+        status[:] = np.select(
+            [axes.X_low > X, axes.X_high < X, mu > axes.mu_high],
+            [universal_kernel.X_BELOW, universal_kernel.X_ABOVE, universal_kernel.MU_ABOVE],
+        )
+        out[:] = np.nan
+        good = status == universal_kernel.OK
+        x, m = X[good], mu[good]
+        inside = np.maximum(m, axes.mu_low)
+        cells, weights = [], []
+        places = (
+            (np.log(x + axes.X_offset) - axes.X_start) * axes.X_rate,
+            (np.log(inside) - axes.mu_start) * axes.mu_rate,
+        )
+        for place, size in zip(places, c.shape, strict=False):
+            first = np.minimum(place.astype(np.intp), size - 6)
+            cells.append(first)
+            weights.append(quintic(place - first))
+        logs = np.zeros((x.size, 2))
+        for a, across in enumerate(weights[0]):
+            row = sum(along[:, None] * c[cells[0] + a, cells[1] + b] for b, along in enumerate(weights[1]))
+            logs += across[:, None] * row
+        log_F, log_A = logs.T * (m / inside)
+        parts = (
+            np.clip((place * rate).astype(np.intp), 0, size - 1)
+            for place, rate, size in zip(places, (axes.X_cells, axes.mu_cells), errors.shape, strict=True)
+        )
+        phi_F = np.pi / 5 * m * integrals(2.5, -x) * np.exp(log_F)
+        phi_A = np.pi / 2 * integrals(2.0, -x) * np.exp(log_A)
+        out[good] = np.stack([phi_F, phi_A, errors[tuple(parts)] + universal_kernel.SECOND_ORDER], axis=-1)
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
         """Phi_F and Phi_A of islands, both: one costs what both do."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.measured import measured_islands
 from mbma_tables.models import AnyModel, IslandAnswer, answer_islands, get_model, tier_name
 from mbma_tables.models.protocol import AREA, BOTH
@@ -21,7 +22,7 @@ from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.gauss_kronrod import Integrals, integrate
-from mbma_tables.totals.island import geometry, islands_of, scale_area, scale_force
+from mbma_tables.totals.island import islands_of, scale_area, scale_force
 from mbma_tables.totals.island_sum import density_of, kinks, sum_islands
 from mbma_tables.totals.kernel import Pairs
 from mbma_tables.totals.measured import IslandCurve

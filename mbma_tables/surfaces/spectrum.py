@@ -14,78 +14,71 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
-from mbma_tables.compiled import njit, vectorize
+from mbma_tables.compiled import jitable
 
 NAYAK = 6 * math.pi * math.sqrt(3)  # summit density is m4 / (NAYAK m2), Eq. (2)
 RADIUS = 3 * math.sqrt(math.pi) / 8  # summit radius is RADIUS / sqrt(m4), Eq. (2)
 BROADENING = 0.8968  # summit variance is (1 - BROADENING/alpha) m0, Eq. (2)
 MIN_ZETA_1, MAX_ZETA_1 = 3.0, 1e8  # of a whole surface; above 3 for the floors 1.5 and 3 of (27), (30)
+BISECTIONS = 56  # of log(zeta_1), to rounding
+TINY = 1e-300  # in place of 0, where a quotient tends to 1
 
 
-@njit(cache=True, error_model="numpy")
-def _growth(power: float, log_ratio: float) -> float:
+@jitable
+def _growth(power: Any, log_ratio: Any) -> Any:
     """(r^power - 1)/(power log r) with r = exp(log_ratio): 1 where either is 0."""
     x = power * log_ratio
-    return math.expm1(x) / x if x != 0.0 else 1.0
+    x = x + TINY * (x == 0.0)
+    return np.expm1(x) / x
 
 
-@njit(cache=True, error_model="numpy")
-def m0_of(hurst: float, log_za: float, log_ratio: float) -> float:
+@jitable
+def m0_of(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
     """Variance of height over the band, Eq. (7), in s^2."""
-    return 2.0 * hurst * math.exp(-2.0 * hurst * log_za) * log_ratio * _growth(-2.0 * hurst, log_ratio)
+    return 2.0 * hurst * np.exp(-2.0 * hurst * log_za) * log_ratio * _growth(-2.0 * hurst, log_ratio)
 
 
-@njit(cache=True, error_model="numpy")
-def m2_of(hurst: float, log_za: float, log_ratio: float) -> float:
+@jitable
+def m2_of(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
     """Variance of a profile's slope over the band, Eq. (7), in (s q0)^2."""
     power = 2.0 - 2.0 * hurst
-    return hurst * math.exp(power * log_za) * log_ratio * _growth(power, log_ratio)
+    return hurst * np.exp(power * log_za) * log_ratio * _growth(power, log_ratio)
 
 
-@njit(cache=True, error_model="numpy")
-def m4_of(hurst: float, log_za: float, log_ratio: float) -> float:
+@jitable
+def m4_of(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
     """Variance of a profile's second derivative over the band, Eq. (7), in (s q0^2)^2."""
     power = 4.0 - 2.0 * hurst
-    return 0.75 * hurst * math.exp(power * log_za) * log_ratio * _growth(power, log_ratio)
+    return 0.75 * hurst * np.exp(power * log_za) * log_ratio * _growth(power, log_ratio)
 
 
-@njit(cache=True, error_model="numpy")
-def alpha_of(hurst: float, log_ratio: float) -> float:
+@jitable
+def alpha_of(hurst: Any, log_ratio: Any) -> Any:
     """Nayak's bandwidth parameter m0 m4/m2^2, Eq. (3): a function of zb/za alone, 1.5 where that is 1."""
     g2 = _growth(2.0 - 2.0 * hurst, log_ratio)
     # grouped so that nothing overflows
     return 1.5 * (_growth(-2.0 * hurst, log_ratio) / g2) * (_growth(4.0 - 2.0 * hurst, log_ratio) / g2)
 
 
-@njit(cache=True, error_model="numpy")
-def summit_rate(hurst: float, log_za: float, log_ratio: float) -> float:
+@jitable
+def summit_rate(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
     """m4/m2 over the band [q0^2], which summit densities are made of, Eq. (2); finite for a band of no width."""
     growth = _growth(4.0 - 2.0 * hurst, log_ratio) / _growth(2.0 - 2.0 * hurst, log_ratio)
-    return 0.75 * math.exp(2.0 * log_za) * growth
-
-
-@vectorize(["f8(f8, f8, f8, i8)"], cache=True)
-def _moment(hurst: float, log_za: float, log_ratio: float, order: int) -> float:
-    if order == 0:
-        return m0_of(hurst, log_za, log_ratio)
-    if order == 2:
-        return m2_of(hurst, log_za, log_ratio)
-    return m4_of(hurst, log_za, log_ratio)
+    return 0.75 * np.exp(2.0 * log_za) * growth
 
 
 def band_moment(order: int, hurst: Any, zeta_a: Any, zeta_b: Any) -> Any:
     """Spectral moment m_n, n = 0, 2, 4, over the band [zeta_a, zeta_b]; arrays broadcast (Eq. 31)."""
     start = np.asarray(zeta_a, dtype=float)
     width = np.asarray(zeta_b, dtype=float) - start
-    return _moment(hurst, np.log(start), np.log1p(width / start), order)
+    moment = {0: m0_of, 2: m2_of, 4: m4_of}[order]
+    return moment(np.asarray(hurst, dtype=float), np.log(start), np.log1p(width / start))
 
 
 def band_from_moments(
     hurst: ArrayLike, m0: ArrayLike, m2: ArrayLike, m4: ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(q0, q1, h_rms) of the self-affine band with these moments; arrays broadcast. See `Surface.from_moments`."""
-    from scipy.optimize import brentq
-
     given = {name: finite_array(name, value) for name, value in {"hurst": hurst, "m0": m0, "m2": m2, "m4": m4}.items()}
     require("hurst", given["hurst"], (given["hurst"] > 0) & (given["hurst"] <= 1), "in (0, 1]")
     for name in ("m0", "m2", "m4"):
@@ -95,7 +88,7 @@ def band_from_moments(
     # alpha rises with zeta_1 at a given Hurst exponent
     alpha = (a / b) * (c / b)
     low, high = math.log(MIN_ZETA_1), math.log(MAX_ZETA_1)
-    least, most = (np.vectorize(alpha_of)(h, end) for end in (low, high))
+    least, most = (alpha_of(h, end) for end in (low, high))
     allowed = f"({least.min():.6g}, {most.max():.6g}]" if least.size == 1 else "the range"
     require(
         "alpha = m0 m4/m2^2",
@@ -103,16 +96,11 @@ def band_from_moments(
         (alpha > least) & (alpha <= most),
         f"in {allowed} that 3 < zeta_1 <= 1e8 gives at this hurst",
     )
-    log_zeta = np.empty(shape)
-    for place in np.ndindex(shape):
-        goal = float(alpha[place])
-        log_zeta[place] = brentq(
-            lambda x, hurst=float(h[place]), goal=goal: math.log(alpha_of(hurst, x) / goal),
-            low,
-            high,
-            xtol=1e-15,
-            rtol=4 * np.finfo(float).eps,
-        )
+    ends = np.full(shape, low), np.full(shape, high)
+    for _ in range(BISECTIONS):
+        log_zeta = 0.5 * (ends[0] + ends[1])
+        more = alpha_of(h, log_zeta) < alpha
+        ends = np.where(more, log_zeta, ends[0]), np.where(more, ends[1], log_zeta)
     zeta_1 = np.exp(log_zeta)
     q0 = np.sqrt(b / a / (band_moment(2, h, 1.0, zeta_1) / band_moment(0, h, 1.0, zeta_1)))
     return q0, q0 * zeta_1, np.sqrt(a)

@@ -10,17 +10,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from llvmlite import ir
-from numba import types
-from numba.core.imputils import impl_ret_untracked
-from numba.extending import intrinsic
-from numba.np.arrayobj import make_array
-
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import njit
+from mbma_tables.compiled import Instruction, jitable, njit
 
-Six = tuple[float, float, float, float, float, float]
-Four = tuple[float, float, float, float]
+Six = tuple[Any, Any, Any, Any, Any, Any]
+Four = tuple[Any, Any, Any, Any]
 Eight = tuple[float, float, float, float, float, float, float, float]
 Ten = tuple[float, float, float, float, float, float, float, float, float, float]
 
@@ -28,63 +22,68 @@ _FAST = {"contract", "reassoc"}
 ZERO = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 LANES = 8
-_TUPLE = types.UniTuple(types.float64, LANES)
-_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
-_INDEX = ir.IntType(32)
-
-
-def _to_vector(builder: Any, lanes: Any) -> Any:
-    vector = ir.Constant(_VECTOR, ir.Undefined)
-    for n in range(LANES):
-        vector = builder.insert_element(vector, builder.extract_value(lanes, n), _INDEX(n))
-    return vector
-
-
-def _to_tuple(context: Any, builder: Any, vector: Any) -> Any:
-    lanes = ir.Constant(context.get_value_type(_TUPLE), ir.Undefined)
-    for n in range(LANES):
-        lanes = builder.insert_value(lanes, builder.extract_element(vector, _INDEX(n)), n)
-    return impl_ret_untracked(context, builder, _TUPLE, lanes)
 
 
 def _load_lanes(typing_context: Any, array: Any, offset: Any) -> Any:
     """Eight neighbours of a flat, contiguous array of doubles, from `offset` on."""
-    del typing_context
+    from llvmlite import ir
+    from numba import types
+    from numba.np.arrayobj import make_array
+
+    vector = ir.VectorType(ir.DoubleType(), LANES)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         data = make_array(signature.args[0])(context, builder, arguments[0]).data
         start = builder.gep(data, [arguments[1]], inbounds=True)
-        vector = builder.load(builder.bitcast(start, _VECTOR.as_pointer()))
+        loaded = builder.load(builder.bitcast(start, vector.as_pointer()))
         # doubles, not vectors, are what numpy aligns
-        vector.align = 8
-        return _to_tuple(context, builder, vector)
+        loaded.align = 8
+        return _to_tuple(context, builder, signature, loaded)
 
-    return _TUPLE(array, offset), generate
+    return types.UniTuple(types.float64, LANES)(array, offset), generate
 
 
 def _add_lanes(typing_context: Any, total: Any, weight: Any, lanes: Any) -> Any:
     """``total + weight * lanes``, lane by lane."""
-    del typing_context
+    from llvmlite import ir
+    from numba import types
+
+    width, place = ir.VectorType(ir.DoubleType(), LANES), ir.IntType(32)
+
+    def to_vector(builder: Any, values: Any) -> Any:
+        vector = ir.Constant(width, ir.Undefined)
+        for n in range(LANES):
+            vector = builder.insert_element(vector, builder.extract_value(values, n), place(n))
+        return vector
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        del signature
-        spread = ir.Constant(_VECTOR, ir.Undefined)
+        spread = ir.Constant(width, ir.Undefined)
         for n in range(LANES):
-            spread = builder.insert_element(spread, arguments[1], _INDEX(n))
-        product = builder.fmul(spread, _to_vector(builder, arguments[2]), flags=("contract",))
-        vector = builder.fadd(_to_vector(builder, arguments[0]), product, flags=("contract",))
-        return _to_tuple(context, builder, vector)
+            spread = builder.insert_element(spread, arguments[1], place(n))
+        product = builder.fmul(spread, to_vector(builder, arguments[2]), flags=("contract",))
+        vector = builder.fadd(to_vector(builder, arguments[0]), product, flags=("contract",))
+        return _to_tuple(context, builder, signature, vector)
 
-    return _TUPLE(total, weight, lanes), generate
+    return types.UniTuple(types.float64, LANES)(total, weight, lanes), generate
+
+
+def _to_tuple(context: Any, builder: Any, signature: Any, vector: Any) -> Any:
+    from llvmlite import ir
+    from numba.core.imputils import impl_ret_untracked
+
+    lanes = ir.Constant(context.get_value_type(signature.return_type), ir.Undefined)
+    for n in range(LANES):
+        lanes = builder.insert_value(lanes, builder.extract_element(vector, ir.IntType(32)(n)), n)
+    return impl_ret_untracked(context, builder, signature.return_type, lanes)
 
 
 # compiled code calls these with fewer arguments than they are defined with
-load_lanes: Any = intrinsic(_load_lanes)
-add_lanes: Any = intrinsic(_add_lanes)
+load_lanes: Any = Instruction(_load_lanes)
+add_lanes: Any = Instruction(_add_lanes)
 
 
-@njit(cache=True, fastmath=_FAST, error_model="numpy")
-def quintic(u: float) -> Six:
+@jitable
+def quintic(u: Any) -> Six:
     """The six cardinal quintic B-splines that reach the cell, at u in [0, 1] of it."""
     v = 1.0 - u
     u2, v2 = u * u, v * v
@@ -97,8 +96,8 @@ def quintic(u: float) -> Six:
     return v5 / 120.0, w1, w2, w3, w4, u5 / 120.0
 
 
-@njit(cache=True, fastmath=_FAST, error_model="numpy")
-def quintic_slope(u: float) -> Six:
+@jitable
+def quintic_slope(u: Any) -> Six:
     """Derivatives of `quintic` by u."""
     v = 1.0 - u
     u2, v2 = u * u, v * v
@@ -109,16 +108,16 @@ def quintic_slope(u: float) -> Six:
     return -v2 * v2 / 24.0, s1, s2, s3, s4, u2 * u2 / 24.0
 
 
-@njit(cache=True, fastmath=_FAST, error_model="numpy")
-def cubic(u: float) -> Four:
+@jitable
+def cubic(u: Any) -> Four:
     """The four cardinal cubic B-splines that reach the cell, at u in [0, 1] of it."""
     v = 1.0 - u
     u2, v2 = u * u, v * v
     return v2 * v / 6.0, 2.0 / 3.0 - u2 * (1.0 - 0.5 * u), 2.0 / 3.0 - v2 * (1.0 - 0.5 * v), u2 * u / 6.0
 
 
-@njit(cache=True, fastmath=_FAST, error_model="numpy")
-def cubic_slope(u: float) -> Four:
+@jitable
+def cubic_slope(u: Any) -> Four:
     """Derivatives of `cubic` by u."""
     v = 1.0 - u
     return -0.5 * v * v, u * (1.5 * u - 2.0), -v * (1.5 * v - 2.0), 0.5 * u * u
@@ -163,7 +162,8 @@ def value_2d(c: FloatArray, x: float, y: float) -> tuple[float, float]:
 
 @njit(cache=True, fastmath=_FAST, error_model="numpy", inline="always")
 def _mix_six(w: Six, a: float, b: float, c: float, d: float, e: float, f: float) -> float:
-    return w[0] * a + w[1] * b + w[2] * c + w[3] * d + w[4] * e + w[5] * f
+    value: float = w[0] * a + w[1] * b + w[2] * c + w[3] * d + w[4] * e + w[5] * f
+    return value
 
 
 @njit(cache=True, fastmath=_FAST, error_model="numpy")

@@ -9,8 +9,6 @@ from __future__ import annotations
 import functools
 
 import numpy as np
-import scipy.linalg
-import scipy.special
 
 from mbma_tables.arguments import FloatArray
 
@@ -25,6 +23,9 @@ def padding(degree: int) -> int:
 @functools.lru_cache(maxsize=32)
 def _factors(nodes: int, degree: int) -> tuple[FloatArray, FloatArray]:
     """LU factors of the conditions of one axis."""
+    import scipy.linalg
+    import scipy.special
+
     size, pad = nodes + degree - 1, padding(degree)
     matrix = np.zeros((size, size))
     for node in range(nodes):
@@ -56,6 +57,8 @@ def coefficients(values: FloatArray, degree: int, axes: int) -> FloatArray:
     ndarray
         Each interpolated axis longer by ``degree - 1``.
     """
+    import scipy.linalg
+
     result = np.asarray(values, dtype=np.float64)
     for axis in range(axes):
         moved = np.moveaxis(result, axis, 0)

@@ -206,7 +206,8 @@ def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float
     ends = [float(kink) * h_rms for kink in kinks(surface.hurst, surface.zeta_1, reading)]
     layer = h_rms * float(surface.zeta_1) ** -float(surface.hurst)
     try:
-        kept = profile(float(surface.hurst), float(surface.zeta_1), peak, 2 * peak, model, reading, rtol)
+        made: Any = profile
+        kept = made(float(surface.hurst), float(surface.zeta_1), peak, 2 * peak, model, reading, rtol)
     except ConvergenceError:
         # a model that is rough between its nodes: gap by gap, where errors are relative to the whole sum
         one = surface

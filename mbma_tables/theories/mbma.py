@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from mbma_tables.theories.protocol import SCAN, Theory, TheoryAnswer, select
 from mbma_tables.totals.contact import Totals, totals_at
 from mbma_tables.totals.island_sum import kinks
 
+GOLDEN = (5**0.5 - 1) / 2
+SECTIONS = 24  # of a scan's step, to 1e-6
 MAX_AREA = 0.1  # above it islands begin to lie on one another (docs/fidelity.md)
 
 
@@ -51,7 +54,7 @@ class Mbma(Theory):
         surface: AnySurface,
         separation: FloatArray,
         E_star: ArrayLike = 1.0,
-        derivatives: bool = False,
+        derivatives: bool | str = False,
         quantities: tuple[str, ...] = QUANTITIES,
     ) -> Totals:
         """Force and area at separations d [length]."""
@@ -66,7 +69,8 @@ class Mbma(Theory):
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length] from 0 to h_max."""
         u = np.asarray(mean_separation, dtype=float)
-        found = self.totals(surface, 2 * u - np.asarray(surface.h_max), derivatives=self._has_slopes(surface))
+        slopes = "separation" if self._has_slopes(surface) else False
+        found = self.totals(surface, 2 * u - np.asarray(surface.h_max), derivatives=slopes)
         if found.force_by is None:
             return TheoryAnswer(found.force, found.area, self._differences(surface, u), found.error)
         # du = dd/2
@@ -131,8 +135,6 @@ class Mbma(Theory):
 
     def _maximum(self, surface: AnySurface, quantity: str, otherwise: FloatArray) -> FloatArray:
         """Mean separation of the first local maximum of a quantity under compression, or `otherwise`."""
-        from scipy.optimize.elementwise import find_minimum
-
         depth = np.arange(1, SCAN + 1) / SCAN
         h_max = np.asarray(surface.h_max, dtype=float)
         batch = select(surface, surface.shape, np.arange(h_max.size).reshape(*surface.shape, 1))
@@ -142,12 +144,26 @@ class Mbma(Theory):
         result = np.array(otherwise, dtype=float).reshape(-1)
         if turns.size:
             peak = falls[turns].argmax(axis=-1)
+            chosen = select(surface, surface.shape, turns)
 
-            def negative(x: FloatArray, place: FloatArray) -> FloatArray:
-                chosen = select(surface, surface.shape, place)
-                return -np.asarray(getattr(self.answer(chosen, h_max.ravel()[place.astype(int)] * (1 - x)), quantity))
+            def value(x: FloatArray) -> FloatArray:
+                return np.asarray(getattr(self.answer(chosen, h_max.ravel()[turns] * (1 - x)), quantity))
 
-            bracket = (np.maximum(peak, 0.5) / SCAN, (peak + 1) / SCAN, (peak + 2) / SCAN)
-            found = find_minimum(negative, bracket, args=(turns.astype(float),), tolerances={"xrtol": 1e-6})
-            result[turns] = h_max.ravel()[turns] * (1 - found.x)
+            result[turns] = h_max.ravel()[turns] * (
+                1 - _highest(value, np.maximum(peak, 0.5) / SCAN, (peak + 2) / SCAN)
+            )
         return result.reshape(surface.shape)
+
+
+def _highest(value: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray) -> FloatArray:
+    """Where a function of arrays is highest between `low` and `high`, by golden sections."""
+    inner, outer = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+    at_inner, at_outer = value(inner), value(outer)
+    for _ in range(SECTIONS):
+        below = at_inner > at_outer
+        low, high = np.where(below, low, inner), np.where(below, outer, high)
+        at_kept = np.where(below, at_inner, at_outer)
+        inner, outer = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+        fresh = value(np.where(below, inner, outer))
+        at_inner, at_outer = np.where(below, fresh, at_kept), np.where(below, at_kept, fresh)
+    return (low + high) / 2

@@ -12,11 +12,12 @@ and A/A0 likewise.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
@@ -31,8 +32,10 @@ from mbma_tables.totals.island_sum import QUADRATURE_SHARE, slopes_of, totals_of
 from mbma_tables.totals.kernel import Pairs
 from mbma_tables.totals.measured import measured_totals
 from mbma_tables.totals.profile import profile
+from mbma_tables.totals.sensitivity import BY_COMPRESSION
 
-MANY_GAPS = 300  # of one surface, from which a profile of its islands costs less than the gaps one by one
+# surfaces whose islands are kept as a profile, in numpy; of more, those with so many gaps each that it costs less
+FEW_SURFACES, MANY_GAPS = 16, 300
 BLOCK = 1 << 14  # gaps between two looks for Ctrl-C
 
 
@@ -72,10 +75,13 @@ def totals_at(
     E_star: ArrayLike = 1.0,
     rtol: float = 1e-8,
     outside: str = "raise",
-    derivatives: bool = False,
+    derivatives: bool | str = False,
     quantities: Iterable[str] = QUANTITIES,
 ) -> Totals:
-    """Force and area of the MBMA model at separations d; what `mbma_tables.contact` says of them holds."""
+    """Force and area of the MBMA model at separations d; what `mbma_tables.contact` says of them holds.
+
+    `derivatives` may be "separation", for those alone.
+    """
     quantities, reading = wanted_quantities(quantities), get_reading(reading)
     gap = finite_array("separation", separation)
     modulus = finite_array("E_star", E_star)
@@ -90,22 +96,26 @@ def totals_at(
     require("separation", gap, gap >= -h_max, "at least -h_max, where the model ends")
     depth = np.asarray(h_max - gap)
     force_by = area_by = None
+    by_depth: tuple[FloatArray, ...] = ()
     try:
         if isinstance(surface, MeasuredSurface):
             stress = modulus
             force, area, error, islands, by_depth = measured_totals(surface, depth, model, reading, rtol, outside)
-            if derivatives:
-                force_by, area_by = {"separation": -stress * by_depth[0]}, {"separation": -by_depth[1]}
         else:
             assert isinstance(surface, Surface)
             stress = modulus * surface.q0 * surface.s
             pairs = _pairs(surface, depth, reading)
-            if derivatives:
+            if derivatives is True:
                 sums, error, islands = slopes_of(model, pairs, reading, rtol, outside)
                 force, area = sums[:, 0, 0], sums[:, 1, 0]
                 force_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
             else:
-                force, area, error, islands = _totals(model, pairs, reading, rtol, outside, which)
+                (force, area, *slopes), error, islands = _totals(
+                    model, surface, pairs, reading, rtol, outside, which, bool(derivatives), shape
+                )
+                by_depth = tuple(slope.reshape(shape) / surface.h_rms for slope in slopes)
+        if derivatives and by_depth:
+            force_by, area_by = {"separation": -stress * by_depth[0]}, {"separation": -by_depth[1]}
         if area_by is not None and reading.addition == "cover":
             kept = np.exp(-area.reshape(shape))  # dA = exp(-sum) dsum
             area_by = {name: (slope * kept)[()] for name, slope in area_by.items()}
@@ -135,28 +145,65 @@ def _pairs(surface: Surface, depth: FloatArray, reading: Reading) -> Pairs:
     return Pairs.of(surface, depth)
 
 
-def _totals(
-    model: AnyModel, pairs: Pairs, reading: Reading, rtol: float, outside: str, which: int
-) -> tuple[FloatArray, FloatArray, FloatArray, int]:
-    """Totals of pairs: through a profile of the islands where there are many gaps of one surface."""
-    one = pairs.compression.size >= MANY_GAPS and all(
-        (field == field[0]).all() for field in (pairs.hurst, pairs.zeta_1, pairs.peak)
-    )
-    touching = pairs.compression > 0
-    if one and touching.any() and isinstance(model, UniversalModel):
-        # over the whole compression, so that a gap's bits do not depend on the others
-        peak, share = float(pairs.peak[0]), QUADRATURE_SHARE * rtol
+def _by_profiles(
+    model: UniversalModel, pairs: Pairs, number: NDArray[np.intp], reading: Reading, rtol: float, slopes: bool
+) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:
+    """Sums of pairs of the surfaces `number`, perhaps their slopes by the compression, error and islands, by profiles.
+
+    The last are the pairs whose surface has no profile.
+    """
+    sums, error, islands = np.zeros((4 if slopes else 2, number.size)), np.zeros(number.size), 0
+    touching = np.flatnonzero(pairs.compression > 0)
+    touching = touching[np.argsort(number[touching], kind="stable")]
+    failed = [touching[:0]]
+    for places in np.split(touching, np.flatnonzero(np.diff(number[touching])) + 1):
+        if not places.size:
+            continue
+        hurst, zeta_1, peak = (float(field[places[0]]) for field in (pairs.hurst, pairs.zeta_1, pairs.peak))
         try:
-            kept = profile(float(pairs.hurst[0]), float(pairs.zeta_1[0]), peak, 2 * peak, model, reading, share)
+            # over the whole compression, so that a gap's bits do not depend on the others
+            kept = profile(hurst, zeta_1, peak, 2 * peak, model, reading, QUADRATURE_SHARE * rtol)
         except (ConvergenceError, OutOfRangeError):
-            # gap by gap, which says what is wrong with which
-            return totals_of(model, pairs, reading, rtol, outside, which)
-        sums = np.zeros((2, touching.size))
-        for block in range(0, touching.size, BLOCK):
-            some = np.flatnonzero(touching[block : block + BLOCK]) + block
-            sums[:, some] = kept.totals(pairs.compression[some])
-        return sums[0], sums[1], np.where(touching, kept.error, 0.0), kept.islands
-    return totals_of(model, pairs, reading, rtol, outside, which)
+            failed.append(places)
+            continue
+        islands += kept.islands
+        error[places] = kept.error
+        for block in range(0, places.size, BLOCK):
+            some = places[block : block + BLOCK]
+            sums[:, some] = kept.totals(pairs.compression[some], slopes)
+    return sums, error, islands, np.sort(np.concatenate(failed))
+
+
+def _totals(
+    model: AnyModel, surface: Surface, pairs: Pairs, reading: Reading, rtol: float, outside: str, which: int,
+    slopes: bool, shape: tuple[int, ...],
+) -> tuple[FloatArray, FloatArray, int]:  # fmt: skip
+    """Force, area and perhaps slopes of both by the compression as rows, their error, islands.
+
+    By profiles of islands where surfaces are few or have many gaps each, else gap by gap.
+    """
+    count, size = math.prod(surface.shape), pairs.hurst.size
+    if isinstance(model, UniversalModel) and count <= max(FEW_SURFACES, size // MANY_GAPS):
+        number = np.broadcast_to(np.arange(count).reshape(surface.shape), shape).ravel()
+        sums, error, islands, left = _by_profiles(model, pairs, number, reading, rtol, slopes)
+    else:
+        sums, error, islands, left = np.empty((4 if slopes else 2, size)), np.empty(size), 0, np.arange(size)
+    if left.size:
+        # gap by gap, which also says what is wrong with which
+        try:
+            if slopes:
+                columns, error[left], more = slopes_of(model, pairs.some(left), reading, rtol, outside)
+                sums[:, left] = columns[:, :, [0, BY_COMPRESSION]].T.reshape(4, -1)
+            else:
+                found = totals_of(model, pairs.some(left), reading, rtol, outside, which)
+                sums[0, left], sums[1, left], error[left], more = found
+        except (ConvergenceError, OutOfRangeError) as fault:
+            mask = np.zeros(size, dtype=bool)
+            mask[left] = True if fault.mask is None else fault.mask
+            fault.mask, fault.args = mask, (str(fault).replace(f"of {left.size} entries", f"of {size} entries"),)
+            raise
+        islands += more
+    return sums, error, islands
 
 
 def _by_parameter(

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, hinted, is_labelled, require
 from mbma_tables.errors import InputError
-from mbma_tables.islands.geometry import FIELDS, fill_islands
+from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.measured import measured_islands
 from mbma_tables.models import AnyModel, answer_islands, get_model, tier_name
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -68,13 +68,6 @@ class Island:
 
 
 GEOMETRY = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
-
-
-def geometry(approach: FloatArray, hurst: FloatArray, zeta_1: FloatArray, reading: Reading) -> dict[str, FloatArray]:
-    """`FIELDS` of islands at delta/h_rms = approach > 0, in units of s and 1/q0; arguments of one shape."""
-    out = np.empty((len(FIELDS), approach.size))
-    fill_islands(approach.ravel(), hurst.ravel(), zeta_1.ravel(), reading.numbers, out)
-    return dict(zip(FIELDS, out.reshape((len(FIELDS), *approach.shape)), strict=True))
 
 
 def scale_force(g: dict[str, FloatArray]) -> FloatArray:

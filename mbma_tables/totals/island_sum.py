@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
-from mbma_tables.islands.geometry import floor_offset
+from mbma_tables.islands.geometry import floor_offset, geometry
 from mbma_tables.models import AnyModel, answer_islands, exact_model
 from mbma_tables.models.protocol import AREA, BOTH, FORCE
 from mbma_tables.models.universal import UniversalModel
@@ -20,7 +20,7 @@ from mbma_tables.surfaces.readings import Reading
 from mbma_tables.totals import kernel
 from mbma_tables.totals.gauss_kronrod import integrate
 from mbma_tables.totals.intervals import STRETCH
-from mbma_tables.totals.island import geometry, scale_area, scale_force
+from mbma_tables.totals.island import scale_area, scale_force
 from mbma_tables.totals.kernel import Pairs
 
 QUADRATURE_SHARE = 0.9  # of the tolerance asked for; a table's own error comes on top

@@ -11,33 +11,45 @@ import dataclasses
 import functools
 import itertools
 import math
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.models import AnyModel, answer_islands
+from mbma_tables.islands.geometry import geometry
+from mbma_tables.models import answer_islands
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.totals import kernel
-from mbma_tables.totals.island import geometry, scale_area, scale_force
+from mbma_tables.totals.island import scale_area, scale_force
 from mbma_tables.totals.island_sum import jacobian_of, kinks
-from mbma_tables.totals.profile_kernel import ENDS, ORDER, RATE, SHIFT, fill_sums
+from mbma_tables.totals.profile_kernel import ENDS, ORDER, RATE, SHIFT, WEIGHT_AREA, WEIGHT_FORCE, fill_sums
 
+KEPT = 64  # profiles, for whoever asks the same surface again
 WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
 MAX_ROUNDS, MAX_PANELS = 12, 400
 SEEN = 9  # gaps a panel is checked at
+FEW = 256  # gaps summed in numpy, without a compiler
 HIGH = 6.0  # of sigma_d: islands beyond carry less than 1e-7
 POWERS = (2.5, 7 / 3)  # of delta, in which weights of force and area start
+
+
+def _rule_with_power(power: float) -> tuple[FloatArray, FloatArray]:
+    """Gauss nodes and weights for integrals of x^power times a smooth function over [0, 1] (Golub and Welsch)."""
+    n = np.arange(ENDS)
+    diagonal = power**2 / ((2 * n + power) * (2 * n + power + 2))
+    k = n[1:]
+    beside = 2 * k * (k + power) / (2 * k + power) / np.sqrt((2 * k + power) ** 2 - 1)
+    nodes, vectors = np.linalg.eigh(np.diag((1 + diagonal) / 2) + np.diag(beside / 2, 1) + np.diag(beside / 2, -1))
+    return nodes, vectors[0] ** 2 / (power + 1)
 
 
 @functools.cache
 def _rules() -> tuple[FloatArray, ...]:
     """Gauss nodes and weights on [0, 1], those with the powers of delta, and values at the nodes to a series."""
-    from scipy.special import roots_sh_jacobi
-
     x, w = np.polynomial.legendre.leggauss(ORDER)
-    jacobi = [roots_sh_jacobi(ENDS, power + 1, power + 1) for power in POWERS]
+    jacobi = [_rule_with_power(power) for power in POWERS]
     transform = np.linalg.inv(chebyshev.chebvander(x, ORDER - 1))
     halves = np.concatenate([(x - 1) / 2, (x + 1) / 2])
     between = chebyshev.chebvander(halves, ORDER - 1) @ transform
@@ -66,14 +78,72 @@ class Profile:
     error: float
     islands: int
 
-    def totals(self, compression: FloatArray) -> FloatArray:
-        """F/(A0 E* q0 s) and the sum of areas over A0 at (h_max - d)/h_rms > 0 within the profile, shape (2, gaps)."""
+    def totals(self, compression: FloatArray, slopes: bool = False) -> FloatArray:
+        """F/(A0 E* q0 s) and the sum of areas over A0 at (h_max - d)/h_rms > 0 within the profile, shape (2, gaps).
+
+        With their derivatives by the compression it is (4, gaps). `FEW` gaps, and derivatives, are summed in numpy.
+        """
+        if slopes or compression.size <= FEW:
+            parts = [self._sums(compression[k : k + FEW]) for k in range(0, compression.size, FEW)]
+            return np.concatenate(parts, axis=1)[: 4 if slopes else 2]
         order = np.argsort(compression, kind="stable")
         sums, out = np.empty((2, compression.size)), np.empty((2, compression.size))
         nodes, weights, end_nodes, end_weights, *_ = _rules()
         fill_sums(compression[order], self.edges, self.series, nodes, weights, end_nodes, end_weights, sums)
         out[:, order] = sums
         return out
+
+    @functools.cached_property
+    def _fields(self) -> FloatArray:
+        """Fields of the panels but the first at their Gauss nodes, weights times the nodes' own, and ends of panels."""
+        nodes, weights = _rules()[:2]
+        basis = chebyshev.chebvander(2 * nodes - 1, ORDER - 1)
+        fields = np.moveaxis(self.series[1:] @ basis.T, 0, 1)
+        fields[:2] *= np.diff(self.edges)[1:, None] * weights
+        ends = np.broadcast_to(self.edges[2:, None], fields.shape[1:])
+        return np.concatenate([fields, ends[None]]).reshape(5, -1)
+
+    def _first(self, width: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Weights of force and area, shift and rate at the nodes of [0, width] in the first panel, by rule."""
+        end_nodes, end_weights = _rules()[2:4]
+        basis = chebyshev.chebvander(2 * width[:, None, None] / self.edges[1] * end_nodes - 1, ORDER - 1)
+        fields = np.einsum("fk,grnk->fgrn", self.series[0], basis)
+        powers = np.stack([width ** (power + 1) for power in POWERS], axis=-1)[:, :, None]
+        weights = np.stack([fields[row] for row in (WEIGHT_FORCE, WEIGHT_AREA)])[[0, 1], :, [0, 1]]
+        return np.moveaxis(weights, 0, 1) * end_weights * powers, fields[SHIFT], fields[RATE]
+
+    @np.errstate(under="ignore")
+    def _sums(self, c: FloatArray) -> FloatArray:
+        """`fill_sums` in numpy, with derivatives by the compression: shape (4, gaps)."""
+        nodes, weights = _rules()[:2]
+        low_panel = np.clip(np.searchsorted(self.edges, c, side="right") - 1, 0, self.edges.size - 2)
+
+        def add(weight: Any, shift: Any, rate: Any, gap: FloatArray) -> tuple[FloatArray, FloatArray]:
+            height = shift - rate * gap
+            terms = weight * np.exp(-0.5 * height * height)
+            return terms.sum(axis=-1), (terms * height * rate).sum(axis=-1)
+
+        force, area, shift, rate, ends = self._fields
+        gap, low = c[:, None], self.edges[low_panel]
+        inside = ends <= low[:, None]
+        parts = [add(weight * inside, shift, rate, gap) for weight in (force, area)]
+        sums = np.stack([part[k] for k in (0, 1) for part in parts])
+        first = self._first(np.minimum(c, self.edges[1]))
+        sums += np.concatenate(add(*first, c[:, None, None]), axis=-1).T
+        # the panel that the gap cuts, and the island at the gap itself
+        width = np.diff(self.edges)[low_panel]
+        place = np.append(nodes, 1.0) * (c - low)[:, None]
+        basis = chebyshev.chebvander(2 * place / width[:, None] - 1, ORDER - 1)
+        fields = np.einsum("gfk,gnk->fgn", self.series[low_panel], basis)
+        cut = low_panel > 0
+        shares = np.where(cut, c - low, 0.0)[:, None] * weights
+        for row in range(2):
+            value, slope = add(fields[row, :, :-1] * shares, fields[SHIFT, :, :-1], fields[RATE, :, :-1], gap)
+            sums[row] += value
+            power = np.where(cut, 1.0, c ** POWERS[row])
+            height = fields[SHIFT, :, -1] - fields[RATE, :, -1] * c
+            sums[2 + row] += slope + power * fields[row, :, -1] * np.exp(-0.5 * height * height)
+        return sums
 
     @functools.cached_property
     def leverage(self) -> float:
@@ -103,8 +173,9 @@ class Profile:
         return worst
 
 
+@functools.lru_cache(maxsize=KEPT)
 def profile(
-    hurst: float, zeta_1: float, peak: float, last: float, model: AnyModel, reading: Reading, rtol: float
+    hurst: float, zeta_1: float, peak: float, last: float, model: Any, reading: Reading, rtol: float
 ) -> Profile:
     """The profile of one surface with h_max/h_rms = `peak` up to compressions of `last` h_rms.
 
@@ -146,7 +217,8 @@ def profile(
         ends = np.stack([low, middle, middle, high], axis=-1).reshape(-1, 2).T
         halves = fields(*ends)
         seen = _disagreement(low, high, values, halves, last)
-        good = seen <= rtol
+        # no nearer than islands themselves are known
+        good = seen <= max(rtol, worst)
         if good.any():
             error = max(error, float(seen[good].max()))
             kept.append((low[good], high[good], values[:, good]))

@@ -8,12 +8,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import CONTRACT, njit
+from mbma_tables.compiled import CONTRACT, Instruction, njit
 
 ORDER = 16  # Gauss nodes of a panel
 ENDS = 12  # Gauss-Jacobi nodes of the panel at delta = 0
@@ -25,18 +22,22 @@ _LN2_HIGH, _LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10
 _LEAST = -700.0  # below it an exponential counts as this one's
 
 
-def _reinterpret(given: Any, made: Any, code: Any) -> Any:
-    """A compiled function that takes the bits of one type for another's."""
+def _reinterpret(made: str) -> Any:
+    """A compiled function that takes the bits of a number for one of another type."""
 
-    @intrinsic
-    def cast(typing: Any, value: Any) -> Any:
-        return made(given), lambda context, builder, signature, values: builder.bitcast(values[0], code)
+    def define(typing: Any, value: Any) -> Any:
+        from numba import types
 
-    return cast
+        kind = getattr(types, made)
+        return kind(value), lambda context, builder, signature, given: builder.bitcast(
+            given[0], context.get_value_type(kind)
+        )
+
+    return Instruction(define)
 
 
-bits_of = _reinterpret(types.float64, types.int64, ir.IntType(64))
-float_of = _reinterpret(types.int64, types.float64, ir.DoubleType())
+bits_of = _reinterpret("int64")
+float_of = _reinterpret("float64")
 
 
 @njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)

@@ -9,9 +9,8 @@ import pytest
 from catalogue import random_surfaces
 
 from generate.tables.exact_geometry import DIGITS, divisor, exact_island
-from mbma_tables.islands.geometry import FIELDS
+from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED
-from mbma_tables.totals.island import geometry
 
 
 def one_geometry(approach, hurst, zeta_1, reading):

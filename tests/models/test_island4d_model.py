@@ -8,12 +8,12 @@ from small_tables import small_table
 
 from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, island
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, hat_scales, to_axes
+from mbma_tables.islands.geometry import geometry
 from mbma_tables.models import tables as tabulated
 from mbma_tables.models.island4d import Island4dModel
 from mbma_tables.surfaces.readings import REPORTED
 from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import ISLAND4D
-from mbma_tables.totals.island import geometry
 
 
 @pytest.fixture(scope="module")

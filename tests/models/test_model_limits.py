@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from mbma_tables import InputError, OutOfRangeError, TableFileError, greenwood_tripp
+from mbma_tables.islands.geometry import geometry
 from mbma_tables.models.tables import island4d_model, open_table, universal_model
 from mbma_tables.surfaces.readings import REPORTED
-from mbma_tables.totals.island import geometry, scale_area, scale_force
+from mbma_tables.totals.island import scale_area, scale_force
 
 NAMES = ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")
 

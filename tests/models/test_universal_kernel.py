@@ -8,10 +8,10 @@ import pytest
 from helpers import difference_weights
 
 from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
+from mbma_tables.islands.geometry import geometry
 from mbma_tables.models import universal_kernel
 from mbma_tables.models.tables import island4d_model, universal_model
 from mbma_tables.surfaces.readings import REPORTED
-from mbma_tables.totals.island import geometry
 
 
 def scattered(count, seed, low=None):

@@ -112,7 +112,7 @@ def test_one_axis_against_scipy_and_more_components(degree, nodes):
 
 @pytest.mark.parametrize("degree", [3, 5])
 def test_weights_at_fifty_digits(degree):
-    value, slope = (kernel.py_func for kernel in WEIGHTS[degree])
+    value, slope = WEIGHTS[degree]
     with mpmath.workdps(50):
         for number in range(degree + 1):
 
@@ -137,7 +137,7 @@ def test_weights_at_fifty_digits(degree):
 
 @pytest.mark.parametrize("degree", [3, 5])
 def test_smooth_across_the_borders_of_cells(degree):
-    value, slope = (kernel.py_func for kernel in WEIGHTS[degree])
+    value, slope = WEIGHTS[degree]
     with mpmath.workdps(60):
         one, zero = mpmath.mpf(1), mpmath.mpf(0)
         for order in range(degree):

@@ -9,8 +9,8 @@ from catalogue import LEVEL, OWN, random_gaps, random_surfaces
 
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, greenwood_tripp
 from mbma_tables import contact as contact_by_tier
+from mbma_tables.islands.geometry import geometry
 from mbma_tables.surfaces.readings import READINGS, get_reading
-from mbma_tables.totals.island import geometry
 from mbma_tables.totals.island_sum import kinks
 
 contact = functools.partial(contact_by_tier, tier="exact")

@@ -13,6 +13,7 @@ from helpers import SCALE
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island
 from mbma_tables.islands import newton
 from mbma_tables.islands.four_numbers import band_fields, from_axes, to_axes
+from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.height_integrals import ORDERS, f_half, height_integral
 from mbma_tables.models import answer_islands
 from mbma_tables.models.closed_form_functions import RANGES
@@ -25,7 +26,6 @@ from mbma_tables.theories.law_kernel import CENTRE, RATE
 from mbma_tables.totals import island_sum
 from mbma_tables.totals import kernel as lookup
 from mbma_tables.totals.intervals import NARROW, STRETCH, Gap
-from mbma_tables.totals.island import geometry
 from mbma_tables.totals.island_sum import kinks
 from mbma_tables.totals.kernel import SMALL_POWER
 

@@ -13,14 +13,13 @@ from helpers import SCALE, difference_weights
 
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island
 from mbma_tables.islands.four_numbers import from_axes, to_axes
-from mbma_tables.islands.geometry import FIELDS
+from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.models.island4d import RAW
 from mbma_tables.models.tables import island4d_model, universal_model
 from mbma_tables.surfaces.readings import READINGS, REPORTED
 from mbma_tables.surfaces.spectrum import band_moment
 from mbma_tables.theories.law_kernel import CENTRE, RATE
 from mbma_tables.totals.intervals import NARROW
-from mbma_tables.totals.island import geometry
 from mbma_tables.totals.island_sum import kinks
 from mbma_tables.totals.kernel import SMALL_POWER
 

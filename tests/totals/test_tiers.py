@@ -223,12 +223,12 @@ def test_one_gap_more_changes_no_bit():
 @pytest.mark.parametrize("derivatives", [False, True])
 def test_long_batches_run_in_blocks(monkeypatch, derivatives):
     """Between two blocks Ctrl-C is honoured; the bits are those of one block."""
-    gaps = np.linspace(-2.1, 2.1, 50)
+    surfaces = Surface(0.8, 0.3, 60.0, 0.7, np.linspace(2.1, 2.2, 50))
     module, name = (sensitivity, "fill_totals_with_slopes") if derivatives else (kernel, "fill_totals")
-    whole, calls, fill = contact(SURFACE, gaps, derivatives=derivatives), [], getattr(module, name)
+    whole, calls, fill = contact(surfaces, 1.0, derivatives=derivatives), [], getattr(module, name)
     monkeypatch.setattr(module, name, lambda *given: calls.append(given) or fill(*given))
     monkeypatch.setattr(island_sum, "SLOPES_BLOCK" if derivatives else "BLOCK", 16)
-    cut = contact(SURFACE, gaps, derivatives=derivatives)
+    cut = contact(surfaces, 1.0, derivatives=derivatives)
     assert len(calls) == 4
     np.testing.assert_array_equal(cut.force, whole.force)
     assert cut.islands == whole.islands
@@ -238,4 +238,4 @@ def test_long_batches_run_in_blocks(monkeypatch, derivatives):
 
     monkeypatch.setattr(module, name, interrupt)
     with pytest.raises(KeyboardInterrupt):
-        contact(SURFACE, gaps, derivatives=derivatives)
+        contact(surfaces, 1.0, derivatives=derivatives)
