@@ -46,6 +46,7 @@ SMALL = (
 @pytest.mark.parametrize("asked", SMALL)
 def test_small_requests_need_no_compiler(asked):
     """numba takes long to import and longer to compile: what numpy answers at once does not wait for it."""
-    code = f"from mbma_tables import {asked.partition('(')[0]}, Surface; {asked}; import sys, json; print(json.dumps(sorted(sys.modules)))"
+    names = f"{asked.partition(chr(40))[0]}, Surface"
+    code = f"from mbma_tables import {names}; {asked}; import sys, json; print(json.dumps(sorted(sys.modules)))"
     loaded = {name.partition(".")[0] for name in fresh(code)}
     assert loaded.isdisjoint({"numba", "llvmlite"})
