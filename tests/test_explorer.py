@@ -233,17 +233,25 @@ SAMPLES = np.geomspace(0.2, 50, 60)
 SPECTRUM = 0.01 * np.minimum(1, SAMPLES**-3.6)
 
 
+def rows(q: np.ndarray, C: np.ndarray) -> str:
+    return "\n".join(f"{x!r}, {y!r}" for x, y in zip(q.tolist(), C.tolist(), strict=True))
+
+
 def test_a_pasted_spectrum_is_answered_as_the_library_does(visit):
     tab = visit()
     tab.check("input[value=spectrum]")
     assert "paste two columns" in tab.inner_text("#error-spectrum")
-    tab.fill("#spectrum", "\n".join(f"{q!r}, {C!r}" for q, C in zip(SAMPLES.tolist(), SPECTRUM.tolist(), strict=True)))
+    tab.fill("#spectrum", rows(SAMPLES, SPECTRUM))
     found, surface = columns(tab), Surface.from_spectrum(SAMPLES, SPECTRUM, h_max=1.1)
     for theory in ("calibrated", "persson"):
         expected = contact(surface, mean_separation=found[f"{theory} gap"], E_star=13.3, theory=theory)
         for name, attribute in QUANTITIES.items():
             # the library's own law of a spectrum is within 1e-7
             np.testing.assert_allclose(found[f"{theory} {name}"], getattr(expected, attribute), rtol=1e-7)
+    # in SurfaceTopography's convention
+    tab.fill("#spectrum", rows(SAMPLES, 4 * np.pi**2 * SPECTRUM))
+    tab.select_option("#convention", "isotropic")
+    np.testing.assert_allclose(columns(tab)["calibrated force"], found["calibrated force"], rtol=1e-9)
     tab.select_option("#theory", "mbma")
     assert "needs five numbers" in tab.inner_text("#error-theory")
 

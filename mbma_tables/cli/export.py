@@ -170,5 +170,4 @@ def explore_command(out: Path, specimen: Specimen, theory: str, reading: str) ->
     from mbma_tables.export.explorer import explorer_page
 
     page = explorer_page(specimen.surface, specimen.E_star, specimen.stress_unit, theory, reading, specimen.title)
-    write_file(out, page.encode())
-    click.echo(out)
+    _write({out: page.encode()})

@@ -197,8 +197,8 @@ def explorer_page(
     --------
     >>> from mbma_tables import Surface
     >>> page = explorer_page(Surface.named("concrete"), 13.3, "MPa", title="a road")
-    >>> page.count("<script"), "http" in page.split("</head>")[0], len(page) < 4e6
-    (2, False, True)
+    >>> page.startswith("<!doctype html>"), "<title>a road</title>" in page, len(page) < 4e6
+    (True, True, True)
     """
     if theory not in THEORIES:
         raise InputError(f"the page has the theories {THEORIES}, got {theory!r}")

@@ -38,23 +38,33 @@ function separations(model, theory, h_max) {
     const share = k <= 20 ? 10 ** ((k - 20) / 5) * 0.05 : 0.05 + (0.95 * (k - 20)) / 40;
     const depth = h_max * (theory === "mbma" ? share : Math.min(share, 1 - 1e-6)), found = model[theory](h_max - depth);
     if (!found || !(found.force > (nodes.at(-1)?.force ?? 0))) break;
-    nodes.push({ depth, force: found.force });
+    const { force, stiffness } = found;
+    // x = ln depth against y = ln force
+    nodes.push({ force, x: Math.log(depth), y: Math.log(force), slope: force / (stiffness * depth) });
   }
   return (pressure) => {
     const last = nodes.findIndex(({ force }) => force >= pressure);
     if (last < 0) return NaN;
-    let low = last ? Math.log(nodes[last - 1].depth) : -Infinity, high = Math.log(nodes[last].depth), at = high;
-    for (let k = 0; k < 40; ++k) {
+    let low = last ? nodes[last - 1].x : -Infinity, high = nodes[last].x;
+    let at = last ? cubic(nodes[last - 1], nodes[last], Math.log(pressure)) : high + nodes[0].slope * Math.log(pressure / nodes[0].force);
+    for (let k = 0; k < 60; ++k) {
+      if (!(at >= low && at <= high)) at = low > -Infinity ? (low + high) / 2 : high - 1;
       const depth = Math.exp(at), { force, stiffness } = model[theory](h_max - depth) ?? { force: NaN };
       const miss = Math.log(force / pressure), step = (miss * force) / (stiffness * depth);
       if (miss > 0) high = at;
       else low = at;
-      const next = at - step > low && at - step < high ? at - step : low > -Infinity ? (low + high) / 2 : at - 1;
-      if (Math.abs(miss) < 1e-13 || next === at) break;
-      at = next;
+      at -= step;
+      // Newton's method squares what is missing
+      if (Math.abs(miss) < 1e-7) break;
     }
     return h_max - Math.exp(at);
   };
+}
+
+// x at y by a cubic through two nodes with slopes dx/dy.
+function cubic(p, q, y) {
+  const h = q.y - p.y, s = (y - p.y) / h, d = q.x - p.x, a = h * p.slope - d, b = d - h * q.slope;
+  return p.x + s * d + s * (1 - s) * (a * (1 - s) + b * s);
 }
 
 // Standard deviations of logarithms, as `Contact.scatter`: by contact fraction, null where not known.

@@ -39,7 +39,7 @@ for (const [name, { label, unit, group, low, high, decades }] of Object.entries(
   };
 }
 for (const name of WORDS.reading) by("reading").append(new Option(name));
-for (const name of ["theory", "reading", "against"]) {
+for (const name of ["theory", "reading", "against", "convention"]) {
   by(name).addEventListener("change", () => {
     state[name] = by(name).value;
     update();
@@ -78,7 +78,7 @@ function showSource() {
 // The controls as the state has them.
 function show() {
   for (const { show: own } of Object.values(NUMBERS)) own();
-  for (const name of ["theory", "reading", "against"]) by(name).value = state[name];
+  for (const name of ["theory", "reading", "against", "convention"]) by(name).value = state[name];
   by("log").checked = state.log === "yes";
   for (const box of form.elements.beside) box.checked = state.beside.includes(box.value);
   if (state.spectrum !== "" || by("spectrum").value === "") by("spectrum").value = state.spectrum;

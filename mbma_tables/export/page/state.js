@@ -17,8 +17,9 @@ const WORDS = {
   reading: Object.keys(DATA.model.readings),
   against: ["gap", "pressure"],
   log: ["yes", "no"],
+  convention: ["paper", "isotropic"],
 };
-const FIRST = { against: "gap", log: "yes", beside: ["calibrated", "persson"], spectrum: "", ...DATA.start };
+const FIRST = { against: "gap", log: "yes", beside: ["calibrated", "persson"], spectrum: "", convention: "paper", ...DATA.start };
 
 // The state that an address asks for, and what is wrong with it.
 function stateOf(address) {
@@ -50,9 +51,9 @@ function addressOf(state) {
   return `#${parts}`;
 }
 
-// Columns of a pasted spectrum, with its fault in words.
-function samplesOf(text) {
-  const q = [], C = [];
+// Columns of a pasted spectrum, with its fault in words; C as the paper has it.
+function samplesOf(text, convention) {
+  const q = [], C = [], unit = convention === "isotropic" ? 1 / (4 * Math.PI ** 2) : 1;
   for (const [k, line] of text.split("\n").entries()) {
     const row = line.replace(/#.*/, "").trim();
     if (row === "") continue;
@@ -62,7 +63,7 @@ function samplesOf(text) {
     if (!(numbers[0] >= (q.at(-1) ?? 0))) return { fault: `${where}: q must rise from line to line` };
     if (!(numbers[1] >= 0)) return { fault: `${where}: C must not be negative` };
     q.push(numbers[0]);
-    C.push(numbers[1]);
+    C.push(unit * numbers[1]);
   }
   if (q.length > LIMITS.max_samples) return { fault: `${q.length} lines are given, ${LIMITS.max_samples} is the most here: thin them out` };
   const held = q.filter((value, k) => C[k] > 0);
@@ -80,7 +81,7 @@ function faultsOf(state) {
   }
   if (state.spectrum !== "") {
     for (const name of ["hurst", "q0", "q1", "h_rms"]) delete errors[name];
-    const samples = samplesOf(state.spectrum);
+    const samples = samplesOf(state.spectrum, state.convention);
     if (samples.fault) errors.spectrum = samples.fault;
     else state.samples = samples;
     if (state.theory === "mbma") {
