@@ -106,8 +106,8 @@ def measure() -> tuple[dict[str, str], dict[str, bytes]]:
         picture = tab.screenshot()
     rows = [["size of the file", f"{len(text.encode()) / 1e6:.2f} MB", "", ""]]
     for name, found in {"opening to the first curves": first, **timed}.items():
-        clock, processor = zip(*found, strict=True)
-        row = (statistics.median(clock), max(clock), statistics.median(processor))
-        rows.append([name, *(f"{milliseconds:.0f} ms" for milliseconds in row)])
+        clock, spent = zip(*found, strict=True)
+        numbers = (statistics.median(clock), max(clock), statistics.median(spent))
+        rows.append([name, *(f"{milliseconds:.0f} ms" for milliseconds in numbers)])
     header = ["what", "median", "largest", "processor time of the page, median"]
     return {"numbers": table(header, rows)}, {"docs/figures/explorer.png": picture}
