@@ -235,7 +235,7 @@ def leakage_dataset(tasks: Sequence[Task], folder: pathlib.Path) -> xr.Dataset:
         "leakage",
         "Flow through the gaps of random rough surfaces pressed flat, by boundary elements and Reynolds' equation",
         ". Loads end where both axes are blocked.",
-        (*MODULES, "generate.boundary_elements.flow"),
+        (*MODULES, "mbma_tables.reynolds"),
     )
     return data
 

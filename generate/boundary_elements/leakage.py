@@ -12,11 +12,11 @@ import numpy as np
 from generate.boundary_elements.capped import CappedContact, load_at
 from generate.boundary_elements.collect import collect, leakage_dataset
 from generate.boundary_elements.design import leakage_nodes, tasks_of
-from generate.boundary_elements.flow import flow_conductance
 from generate.boundary_elements.run import run
 from generate.boundary_elements.solve import Contact, simulate_to
 from generate.boundary_elements.surfaces import Recipe, heights
 from mbma_tables.bearing import bearing, radial_spectrum
+from mbma_tables.reynolds import flow_conductance
 
 HERE = pathlib.Path("leakage")
 # F/(A0 E* g): 0.5% to 42% contact, where the last cells are blocked

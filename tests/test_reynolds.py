@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from generate.boundary_elements.flow import flow_conductance, open_ways
+from mbma_tables.reynolds import flow_conductance, open_ways
 
 POINTS = 96
 X = (np.arange(POINTS) + 0.5) / POINTS
