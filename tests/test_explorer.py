@@ -273,6 +273,48 @@ def test_bad_spectra_are_told(text, said, visit):
     assert said in tab.inner_text("#error-spectrum")
 
 
+def test_a_map_is_taken_by_its_spectrum_which_the_page_says(opened, tmp_path):
+    from generate.pages.explorer import visit
+
+    path, heights = tmp_path / "map.html", np.random.default_rng(8).normal(size=(64, 64))
+    q = np.hypot(*np.meshgrid(*2 * [2 * np.pi * np.fft.fftfreq(64)]))
+    spectrum = np.where((q > 0.15) & (q < 1.5), np.maximum(q, 0.15) ** -1.8, 0.0)
+    surface = Surface.from_map(np.fft.ifft2(np.fft.fft2(heights) * spectrum).real ** 3, 1.0, periodic=True)
+    path.write_text(explorer_page(surface), encoding="utf-8")
+    tab = visit(opened, path.as_uri())
+    assert "goes by its heights" in tab.inner_text("#origin")
+    assert tab.input_value("#theory") == "calibrated"
+    assert surface.departures()
+    for reason in surface.departures():
+        assert reason in tab.inner_text("#concerns")
+    tab.context.close()
+    with pytest.raises(InputError, match="of five numbers"):
+        explorer_page(surface, theory="mbma")
+
+
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+def test_any_address_is_drawn_or_refused(seed, visit):
+    rng, tab, drawn = np.random.default_rng(seed), visit(), 0
+    odd = ("", "NaN", "Infinity", "-0", "1e400", "0x10", "1e-320", "-1")
+    count = 40 if seed == 0 else 400
+    for _ in range(count):
+        state = random_state(rng)
+        q0 = 10 ** rng.uniform(-150, 150)
+        state |= {"q0": q0, "q1": q0 * 10 ** rng.uniform(0.3, 8.5), "hurst": rng.choice([1.0, 1e-3, rng.uniform()])}
+        for name in rng.choice([*NAMES, "E_star", "k_s"], rng.integers(3), replace=False):
+            state[str(name)] = rng.choice([*odd, *(10 ** rng.uniform(-310, 308, 3)).astype(str)])
+        if rng.uniform() < 0.3:
+            q = np.sort(10 ** rng.uniform(-3, 5, rng.integers(1, 40)))
+            C = q**-3.5 * rng.choice([0.0, 1.0, 1.0, 1e200], q.size)
+            state["spectrum"] = rows(q, C).replace("\n", ";")
+        tab.evaluate(GO, urllib.parse.urlencode(state))
+        faults = [text for text in tab.locator(".error").all_inner_texts() if text]
+        assert bool(faults) == tab.is_disabled("#csv")
+        drawn += not faults
+    # and the fixture sees that nothing was thrown
+    assert 0.1 * count < drawn < count
+
+
 def test_a_page_of_a_spectrum_begins_with_it(opened, tmp_path):
     from generate.pages.explorer import visit
 

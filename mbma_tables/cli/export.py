@@ -158,9 +158,9 @@ def _export_code(target: str, folder: Path, reading: str, check: bool) -> None:
 @click.command("explore", short_help="A page to explore a surface in a browser.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="The page, such as explorer.html.")
 @specimen_options
-@theory_option
+@click.option("--theory", metavar="mbma|calibrated|persson", help="Drawn first; calibrated for a map, else mbma.")
 @reading_option
-def explore_command(out: Path, specimen: Specimen, theory: str, reading: str) -> None:
+def explore_command(out: Path, specimen: Specimen, theory: str | None, reading: str) -> None:
     """Write a page with sliders for the surface, its modulus, theory and reading, or a pasted spectrum.
 
     One file that needs neither a server nor a network: force, area, stiffness and conductance against gap or pressure.

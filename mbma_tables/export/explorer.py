@@ -43,6 +43,9 @@ SWITCHES = ("OFFSET", "SUMMITS", "PRINTED_JACOBIAN")  # whole numbers that depen
 MIN_FILLED = 1000  # numbers from which an array is a table, which the page fills in
 FRACTION_BITS, ORDER = 43, 3  # of packed tables: steps of 1e-13; times that differences are taken
 MAX_EXACT = 2**53
+MAP_NOTE = (
+    "By the map's spectrum and h_max alone: in Python the calibrated law goes by its heights, too, and is nearer."
+)
 MAX_SAMPLES = 1000  # of a spectrum, for a step of a slider to stay short
 
 
@@ -162,7 +165,7 @@ def explorer_page(
     surface: AnySurface,
     E_star: float | None = None,
     stress_unit: str | None = None,
-    theory: str = "mbma",
+    theory: str | None = None,
     reading: str = "reported",
     title: str = "",
 ) -> str:
@@ -177,8 +180,8 @@ def explorer_page(
         Effective modulus; without one stresses are over E*.
     stress_unit : str, optional
         Unit of the modulus.
-    theory : {"mbma", "calibrated", "persson"}
-        The one drawn with its scatter at first.
+    theory : {"mbma", "calibrated", "persson"}, optional
+        The one drawn with its scatter at first; MBMA if not given, of a spectrum the calibrated law.
     reading : {"reported", "printed", "fitted"}
         Of the paper's equations, at first.
     title : str
@@ -191,7 +194,7 @@ def explorer_page(
     Raises
     ------
     InputError
-        For a batch, a spectrum of more than 1,000 samples, an unknown theory or reading.
+        For a batch, a spectrum of more than 1,000 samples or with MBMA, an unknown theory or reading.
 
     Examples
     --------
@@ -200,6 +203,10 @@ def explorer_page(
     >>> page.startswith("<!doctype html>"), "<title>a road</title>" in page, len(page) < 4e6
     (True, True, True)
     """
+    measured = isinstance(surface, MeasuredSurface)
+    theory = theory or ("calibrated" if measured else "mbma")
+    if theory == "mbma" and measured:
+        raise InputError("MBMA in the page is of five numbers: take another theory, or surface.fit()")
     if theory not in THEORIES:
         raise InputError(f"the page has the theories {THEORIES}, got {theory!r}")
     if get_reading(reading) not in SHOWN_READINGS:
@@ -213,6 +220,8 @@ def explorer_page(
         "title": title,
         "start": start,
         "units": {"length": units.length, "stress": units.stress},
+        "departures": list(surface.departures()),
+        "note": MAP_NOTE if isinstance(surface, MeasuredSurface) and surface.bearing is not None else "",
         "limits": _limits(),
         "model": _model(texts, values),
     }

@@ -86,6 +86,7 @@ function scatterOf(state, curve) {
 function concernsOf(state, curve, h_rms, gradient) {
   const always = (holds) => () => holds, [low, high] = LIMITS.area, reasons = [];
   reasons.push(["the rms gradient is above 1: are heights and wavenumbers in one unit?", always(gradient > LIMITS.gradient)]);
+  if (state.samples && state.spectrum === FIRST.spectrum) DATA.departures.forEach((text) => reasons.push([text, always(true)]));
   if (curve.theory === "mbma") {
     const gap = softening(curve);
     reasons.push([`areas of islands are added, A/A0 is above ${LIMITS.mbma_area}`, (k) => !DATA.model.readings[state.reading].cover && curve.area[k] > LIMITS.mbma_area]);

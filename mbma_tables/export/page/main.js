@@ -145,6 +145,7 @@ function open(next, errors = {}) {
   update(errors);
 }
 
+by("origin").textContent = DATA.note;
 by("version").textContent = `mbma_tables ${DATA.version}: its C as WebAssembly, with its tables. Nothing is sent anywhere.`;
 open(state, addressErrors);
 document.documentElement.dataset.ready = performance.now();
