@@ -28,6 +28,7 @@ TAIL_SHARE = 4.0  # of the last two coefficients, for all that follow: they fall
 NEAR = 1e-7  # relative width of a bucket below which it takes its neighbour's polynomials
 FIRST_BUCKETS = {-1: 16, -2: 8, -3: 4}  # of the octaves below x = 1, where Gaussians of heights bend; 2 below
 SLOPES = 100.0  # times the tolerance of values: that of slopes, over F/x where they are smaller
+COARSE, COARSE_SLOPES = 1e-7, 10.0  # tolerance above which octaves begin with one bucket; and that of slopes there
 FOR_SLOPES = 4  # times more buckets are tried for the sake of slopes
 KEPT = DEGREE + 1
 
@@ -83,7 +84,9 @@ def fit(values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 def side_pieces(side: Side, rtol: float) -> Pieces:
     """The records of a side, its first one excepted."""
     first = math.floor(math.log2(side.start))
-    counts = {e: FIRST_BUCKETS.get(e, 2) for e in range(first, 0)}
+    coarse = rtol > COARSE
+    slopes = COARSE_SLOPES if coarse else SLOPES
+    counts = {e: 1 if coarse else FIRST_BUCKETS.get(e, 2) for e in range(first, 0)}
     done: dict[int, tuple[FloatArray, ...]] = {}
     enough: dict[int, int] = {}
     while len(done) < len(counts):
@@ -99,7 +102,7 @@ def side_pieces(side: Side, rtol: float) -> Pieces:
             if worst[0] <= rtol:
                 enough.setdefault(e, FOR_SLOPES * counts[e])
             # slopes of what carries noise do not become better
-            if worst[0] <= rtol and (worst[2] <= SLOPES * rtol or counts[e] >= enough[e]):
+            if worst[0] <= rtol and (worst[2] <= slopes * rtol or counts[e] >= enough[e]):
                 done[e] = (fitted[0][mine], fitted[1][mine, :2], low[mine], high[mine])
             else:
                 counts[e] *= 2
