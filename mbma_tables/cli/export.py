@@ -18,95 +18,63 @@ from mbma_tables.cli.options import (
 )
 from mbma_tables.cli.progress import echo
 from mbma_tables.errors import InputError
-from mbma_tables.export import CODE, DATA, SOLVERS
+from mbma_tables.export import CODE, DATA, LAWS, SOLVERS
 from mbma_tables.files import write_file
 from mbma_tables.scenes.specimen import Specimen
 
 if TYPE_CHECKING:
     from mbma_tables.export.law_rows import LawTable
 
-NAMED = ("calculix", "abaqus", "modelica")
+LAW_OPTIONS = frozenset({"specimen", "theory", "reading", "hardness", "conductivity", "conductivity_unit"})
+ROW_OPTIONS = {"rows", "rtol", "largest_overclosure", "pressures"}
+OPTIONS = {
+    **dict.fromkeys((*SOLVERS, *DATA), LAW_OPTIONS | ROW_OPTIONS),
+    **dict.fromkeys(("calculix", "abaqus", "modelica"), LAW_OPTIONS | ROW_OPTIONS | {"name"}),
+    **dict.fromkeys(LAWS, LAW_OPTIONS | {"name"}),
+    **dict.fromkeys(CODE, frozenset({"reading", "check"})),
+    "calculix --exponential": frozenset({"specimen", "name", "exponential"}),
+}
+DEFAULTS = {"theory": "mbma", "reading": "reported", "exponential": False, "check": False}
 
 
 @click.command("export", short_help="A contact law, or the whole model, for other codes.")
-@click.argument("target", type=click.Choice([*SOLVERS, *DATA, *CODE]))
+@click.argument("target", type=click.Choice([*SOLVERS, *DATA, *LAWS, *CODE]))
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write; a folder for source code.")
 @optional_specimen_options
 @click.option("--rows", type=int, help="How many rows; else as few as --rtol needs.")
 @click.option("--rtol", type=float, help="Largest relative error of linear interpolation; 1e-3 by default.")
 @quantity_option("--largest-overclosure", help="Where the rows end; else at full compression.")
-@click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure instead.")
+@click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure, or as well.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
 @click.option(
     "--pressures", metavar="X:X", help="Smallest and largest pressure: where the error holds, and the rows end."
 )
-@click.option("--name", help="Of the interaction or table: calculix, abaqus, modelica.")
+@click.option("--name", help="Of the interaction, table, functions or module.")
 @click.option("--exponential", is_flag=True, help="For calculix: Persson's exponential law instead of rows.")
 @theory_option
 @hardness_option
 @reading_option
-@click.option("--check", is_flag=True, help="Of source code: build it and replay its conformance points.")
-def export_command(
-    target: str,
-    out: Path,
-    specimen: Specimen | None,
-    name: str | None,
-    exponential: bool,
-    theory: str,
-    reading: str,
-    check: bool,
-    **law_options: Any,
-) -> None:
+@click.option("--check", is_flag=True, help="Of the whole model: build it and replay its conformance points.")
+def export_command(target: str, out: Path, **options: Any) -> None:
     """Write TARGET to a file.
 
-    Solvers and data take a surface, a modulus and units; c, fortran and javascript are the whole model as code.
+    Solvers and data take a surface, a modulus and units, and so do laws as code, which end in -law; c, fortran and
+    javascript are the whole model as code.
 
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
     """
-    given = {option: value for option, value in law_options.items() if value is not None}
-    named = {"name": name} if name is not None else {}
+    given = {name: value for name, value in options.items() if value is not None and value != DEFAULTS.get(name)}
+    _refuse_unused(target, given)
     if target in CODE:
-        if theory != "mbma":
-            raise InputError(f"source code is of the MBMA model: leave --theory out, got {theory!r}")
-        _refuse(f"{target} is the whole model", given | named | {"surface": specimen} | {"exponential": exponential})
-        _export_code(target, out, reading, check)
+        _export_code(target, out, options["reading"], "check" in given)
         return
-    if check:
-        raise InputError(f"--check replays points in source code; {target} has none to replay")
+    specimen: Specimen | None = given.pop("specimen", None)
     if specimen is None:
         raise InputError("one surface is needed: see the options --surface, --file, --map, --hurst")
     if specimen.E_star is None:
         raise InputError("a modulus is needed: --E-star, or --E1 --nu1 and, unless the other body is rigid, --E2 --nu2")
-    if target not in NAMED:
-        _refuse(f"{target} has no name to choose", named)
-    from mbma_tables.export import solvers
-
-    if exponential:
-        if target != "calculix":
-            raise InputError(f"--exponential is a law of calculix, not of {target}")
-        own = {"theory": theory != "mbma", "reading": reading != "reported"}
-        _refuse("--exponential is Persson's law in two numbers", given | own)
-        text = solvers.exponential(specimen.surface, specimen.E_star, stress_unit=specimen.stress_unit, **named)
-        _write({out: text.encode()})
-        return
-    from mbma_tables.export.law_rows import describe_law
-
-    if "pressures" in given:
-        given["pressures"] = _pressures(given["pressures"])
-    law = describe_law(
-        specimen.surface,
-        specimen.E_star,
-        stress_unit=specimen.stress_unit,
-        quantity="pressure" if "conductivity" not in given else "conductance",
-        reading=reading,
-        theory=theory,
-        **given,
-    )
-    if target in SOLVERS:
-        files = {out: getattr(solvers, target)(law, **named).encode()}
-    else:
-        files = _data_files(target, out, law)
-    _write(files)
+    joint = {"surface": specimen.surface, "E_star": specimen.E_star, "stress_unit": specimen.stress_unit}
+    _write(_law_files(target, out, joint, given))
 
 
 def _write(files: Mapping[Path, bytes]) -> None:
@@ -116,11 +84,32 @@ def _write(files: Mapping[Path, bytes]) -> None:
             echo(path)
 
 
-def _refuse(why: str, given: Mapping[str, Any]) -> None:
+def _refuse_unused(target: str, given: Mapping[str, Any]) -> None:
     """Refuse options that would be without effect."""
-    useless = [f"--{option.replace('_', '-')}" for option, value in given.items() if value not in (None, False)]
-    if useless:
-        raise InputError(f"{why}: leave {' and '.join(useless)} out")
+    kind = f"{target} --exponential" if "exponential" in given else target
+    taken = OPTIONS.get(kind, OPTIONS[target])
+    names = {"specimen": "surface"}
+    unused = [f"--{names.get(name, name).replace('_', '-')}" for name in given if name not in taken]
+    if unused:
+        raise InputError(f"without effect on {kind if kind in OPTIONS else target}: leave {' and '.join(unused)} out")
+
+
+def _law_files(target: str, out: Path, joint: dict[str, Any], given: dict[str, Any]) -> dict[Path, bytes]:
+    """What is written of one surface's law, by its files."""
+    from mbma_tables.export import law_code, solvers
+    from mbma_tables.export.law_rows import describe_law
+
+    if target in LAWS:
+        return {out: law_code.law_text(target, **joint, **given).encode()}
+    named = {"name": given.pop("name")} if "name" in given else {}
+    if given.pop("exponential", False):
+        return {out: solvers.exponential(**joint, **named).encode()}
+    if "pressures" in given:
+        given["pressures"] = _pressures(given["pressures"])
+    law = describe_law(**joint, quantity="pressure" if "conductivity" not in given else "conductance", **given)
+    if target in SOLVERS:
+        return {out: getattr(solvers, target)(law, **named).encode()}
+    return _data_files(target, out, law)
 
 
 def _pressures(text: str) -> tuple[float | str, ...]:

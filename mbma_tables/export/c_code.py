@@ -7,10 +7,8 @@ any machine; 120,000 numbers are 2.5 MB of text and a fraction of a second of co
 from __future__ import annotations
 
 import ast
-import importlib.resources
 import inspect
 import math
-import re
 import textwrap
 from collections.abc import Iterator
 
@@ -19,7 +17,7 @@ import numpy as np
 from mbma_tables import __version__, calibrated
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError
-from mbma_tables.export.text import block_comment
+from mbma_tables.export.text import filled, opening
 from mbma_tables.islands import height_integrals as heights
 from mbma_tables.models import closed_form_functions, universal_kernel
 from mbma_tables.models.universal import UniversalModel
@@ -29,7 +27,6 @@ from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
 from mbma_tables.theories import calibrated_curves, calibrated_table, persson
 from mbma_tables.totals import gauss_kronrod, intervals, island_sum, kernel
 
-COMMENT_WIDTH = 108
 FORM = "standard"  # that of tier "formula"
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # as `contact` allows
 NUMBERS_FILE = "mbma_table.h"
@@ -66,12 +63,12 @@ def c_texts(model: UniversalModel, reading: Reading) -> dict[str, str]:
     constants, arrays = numbers(model, reading)
     texts = {}
     for name, title in TITLES.items():
-        opening = block_comment(header(model, reading, title, USAGE))
+        head = opening(header(model, reading, title, USAGE), "/*")
         if name == NUMBERS_FILE:
-            texts[name] = f"{opening}\n{numbers_text(constants, arrays)}"
+            texts[name] = f"{head}\n{numbers_text(constants, arrays)}"
         else:
             prototypes, forms = closed_forms()
-            texts[name] = filled(name, HEADER=opening, CLOSED_FORMS=forms, PROTOTYPES=prototypes)
+            texts[name] = filled(name, HEADER=head, CLOSED_FORMS=forms, PROTOTYPES=prototypes)
     return texts
 
 
@@ -102,13 +99,6 @@ def closed_forms() -> tuple[str, str]:
                 lines += textwrap.wrap(text, 120, initial_indent="    ", subsequent_indent="        ")
             definitions.append("\n".join([*lines, "}\n"]))
     return "".join(f"{head};\n" for head in heads), "\n".join(definitions)
-
-
-def filled(name: str, **parts: str) -> str:
-    """A template with its places, such as @HEADER@, filled in."""
-    text = (importlib.resources.files("mbma_tables.export") / "templates" / f"{name}.in").read_text(encoding="utf-8")
-    # in one pass: a header may hold such a name itself
-    return re.sub("@([A-Z_]+)@", lambda place: parts[place[1]], text)
 
 
 def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | float], dict[str, FloatArray]]:
@@ -240,14 +230,14 @@ def _initializer(values: FloatArray, indent: str) -> Iterator[str]:
 
 
 def header(model: UniversalModel, reading: Reading, title: str, usage: str) -> list[str]:
-    """Lines of a file's opening comment: what it is and what made it, range, error, conventions, licence."""
+    """Paragraphs of a file's opening comment: what it is and what made it, range, error, conventions, licence."""
     content = model.content
     found, (X, mu) = content.attributes, content.axes
     worst, visited = (
         max(float(found[f"{which}largest_error_{name}"]) for name in ("F", "A")) for which in ("", "visited_")
     )
     form, certificates = closed_form_functions.RANGES[FORM], closed_form_functions.CERTIFICATES[FORM]
-    paragraphs = (
+    return [
         title,
         f"Written by mbma_tables {__version__}. {usage}",
         "MBMA model of rough contact (Guo, Ma and Zhu): Phi_F and Phi_A of a contact island over (X, mu) by a quintic "
@@ -263,5 +253,4 @@ def header(model: UniversalModel, reading: Reading, title: str, usage: str) -> l
         f"relative error {certificates['phi_F'].largest:.2g} of Phi_F, {certificates['phi_A'].largest:.2g} of Phi_A.",
         *CONVENTIONS,
         *LICENCE,
-    )
-    return [line for text in paragraphs for line in textwrap.wrap(text, COMMENT_WIDTH, break_long_words=False)]
+    ]

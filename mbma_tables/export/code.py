@@ -17,7 +17,7 @@ from typing import NamedTuple
 from mbma_tables.errors import InputError
 from mbma_tables.export import CODE, c_code
 from mbma_tables.export.conformance import KINDS, POINTS_FILE, points_text
-from mbma_tables.export.text import block_comment, comment
+from mbma_tables.export.text import filled, opening
 from mbma_tables.files import write_file
 from mbma_tables.models.tables import open_table
 from mbma_tables.models.universal import UniversalModel
@@ -134,11 +134,10 @@ def source_texts(target: str, model: UniversalModel, reading: Reading) -> dict[s
     texts = {} if target == "javascript" else dict(c_texts)
     for name, title in language.titles.items():
         lines = c_code.header(model, reading, title, language.usage)
-        opening = comment(lines, "!") if name.endswith(".f90") else block_comment(lines)
-        parts = {"HEADER": opening.rstrip()}
+        parts = {"HEADER": opening(lines, "!" if name.endswith(".f90") else "/*")}
         if name == "mbma.mjs":
             parts["WASM"] = base64.encodebytes(web_assembly(c_texts, WASM_FUNCTIONS)).decode("ascii")
-        texts[name] = c_code.filled(name, **parts)
+        texts[name] = filled(name, **parts)
     return texts
 
 

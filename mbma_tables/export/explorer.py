@@ -22,6 +22,7 @@ from mbma_tables.arguments import FloatArray, number_in, positive_modulus
 from mbma_tables.errors import InputError
 from mbma_tables.export import c_code
 from mbma_tables.export.code import web_assembly
+from mbma_tables.export.text import filled
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
@@ -58,7 +59,7 @@ def c_sources() -> tuple[dict[str, str], dict[str, FloatArray]]:
     """The C of the page by file, and the numbers and tables that are variables in it by name."""
     prototypes, forms = c_code.closed_forms()
     texts = {
-        name: c_code.filled(name, HEADER="", PROTOTYPES=prototypes, CLOSED_FORMS=forms)
+        name: filled(name, HEADER="", PROTOTYPES=prototypes, CLOSED_FORMS=forms)
         for name in ("mbma.h", "mbma.c", "mbma_theories.h", "mbma_theories.c")
     }
     values: dict[str, FloatArray] = {}

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import importlib.resources
 import re
+import textwrap
 from collections.abc import Iterable
 
 from mbma_tables.errors import InputError
 
+COMMENT_WIDTH = 108
 DIGITS = 10  # of the numbers in a law's file
 _ASCII = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "\N{MIDDLE DOT}": ".", "²": "2"})
 # what ends or begins a comment in C, ends a script in a page, or is a trigraph
@@ -46,6 +49,25 @@ def block_comment(lines: Iterable[str]) -> str:
     """
     body = "".join(f" * {_MARKS.sub(lambda mark: mark[0] + ' ', printable(line))}".rstrip() + "\n" for line in lines)
     return f"/*\n{body} */"
+
+
+def opening(paragraphs: Iterable[str], mark: str) -> str:
+    """What a source file begins with: wrapped paragraphs as comments by their mark, "/*" for one comment of C."""
+    lines = [line for text in paragraphs for line in textwrap.wrap(text, COMMENT_WIDTH, break_long_words=False)]
+    return (block_comment(lines) if mark == "/*" else comment(lines, mark)).rstrip()
+
+
+def wrapped(items: Iterable[str], indent: str = "", end: str = "") -> str:
+    """Items of a list, with commas between them, on lines of 120 columns that end as a continued line must."""
+    text = textwrap.fill(", ".join(items), 118, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
+    return text.replace("\n", f"{end}\n")
+
+
+def filled(name: str, **parts: str) -> str:
+    """A template with its places, such as @HEADER@, filled in."""
+    text = (importlib.resources.files("mbma_tables.export") / "templates" / f"{name}.in").read_text(encoding="utf-8")
+    # in one pass: a header may hold such a name itself
+    return re.sub("@([A-Z_]+)@", lambda place: parts[place[1]], text)
 
 
 def csv_cell(text: str) -> str:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from mbma_tables.cli import main
-from mbma_tables.export import SOLVERS, code, data
+from mbma_tables.cli import export, main
+from mbma_tables.export import CODE, DATA, LAWS, SOLVERS, code, data
 
 LAW = ["--surface", "concrete", "--E-star", "13.3", "--length-unit", "mm", "--stress-unit", "MPa", "--rows", "20"]
 NUMBERS = ["--hurst", "0.8", "--q0", "0.1", "--zeta-1", "50", "--h-rms", "1", "--h-max", "3"]
@@ -98,8 +98,8 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
         (["calculix", "--out", "law", *WITHOUT["--rows"], "--rows", "300"], "holds 200 rows"),
         (["calculix", "--out", "law", *LAW, "--largest-overclosure", "5"], "largest_overclosure must be in"),
         (["calculix", "--out", "no/such/folder/law", *LAW], "cannot be written"),
-        (["csv", "--out", "law", *LAW, "--check"], "none to replay"),
-        (["csv", "--out", "law", *LAW, "--exponential"], "--exponential is a law of calculix, not of csv"),
+        (["csv", "--out", "law", *LAW, "--check"], "without effect on csv: leave --check out"),
+        (["csv", "--out", "law", *LAW, "--exponential"], "without effect on csv: leave --exponential out"),
         (["matlab", "--out", "1law.mat", *LAW], "a name must be a letter"),
         (["matlab", "--out", "law.txt", *LAW], "must be NAME.mat"),
         (
@@ -108,13 +108,13 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
         ),
         (["cobol", "--out", "law", *LAW], "cobol"),
         (["c", "--out", "code", "--reading", "other"], "reading"),
-        (["c", "--out", "code", "--surface", "concrete"], "c is the whole model: leave --surface out"),
+        (["c", "--out", "code", "--surface", "concrete"], "without effect on c: leave --surface out"),
         (["c", "--out", "code", "--rows", "3", "--exponential"], "leave --rows and --exponential out"),
         (["javascript", "--out", "code", "--name", "X"], "leave --name out"),
-        (["abaqus", "--out", "law", *LAW[:-2], "--exponential"], "law of calculix, not of abaqus"),
+        (["abaqus", "--out", "law", *LAW[:-2], "--exponential"], "without effect on abaqus: leave --exponential out"),
         (["calculix", "--out", "law", *LAW, "--exponential"], "leave --rows out"),
         (["calculix", "--out", "law", *LAW[:-2], "--exponential", "--theory", "persson"], "leave --theory out"),
-        (["csv", "--out", "law", *LAW, "--name", "X"], "csv has no name to choose: leave --name out"),
+        (["csv", "--out", "law", *LAW, "--name", "X"], "without effect on csv: leave --name out"),
         (["calculix", "--out", "law", *LAW, "--name", "1 X"], "a name must be a letter"),
         (["calculix", "--out", "law", *LAW, "--pressures", "1"], "--pressures must be like 0.1:100"),
         (["calculix", "--out", "law", *LAW, "--pressures", "2:1"], "pressures must be two rising numbers"),
@@ -129,3 +129,58 @@ def test_bad_requests(arguments, said, tmp_path, monkeypatch):
     assert said in result.output
     assert len(result.output.strip().splitlines()) <= 2
     assert list(tmp_path.iterdir()) == []
+
+
+BASE = ["--surface", "concrete", "--E-star", "13.3MPa"]
+ANY = {
+    "--rows": ["7"],
+    "--rtol": ["0.01"],
+    "--largest-overclosure": ["0.5mm"],
+    "--pressures": ["1kPa:0.5MPa"],
+    "--conductivity": ["3", "--conductivity-unit", "mW/(mm K)"],
+    "--name": ["OTHER"],
+    "--exponential": [],
+    "--theory": ["calibrated"],
+    "--hardness": ["2MPa", "--theory", "calibrated"],
+    "--reading": ["printed"],
+    "--check": [],
+}
+
+
+EVERY = [*SOLVERS, *DATA, *LAWS, *CODE]
+
+
+@pytest.mark.parametrize("target", EVERY)
+def test_an_option_without_effect_is_refused(target, tmp_path):
+    base = [] if target in CODE else BASE
+    for option in {name.replace("_", "-") for name in (*export.LAW_OPTIONS, *export.ROW_OPTIONS)} | {"check"}:
+        if f"--{option}" not in ANY or option.replace("-", "_") in export.OPTIONS[target]:
+            continue
+        result = run(target, "--out", tmp_path / "law.mat", *base, f"--{option}", *ANY[f"--{option}"])
+        assert result.exit_code == 2, option
+        assert f"without effect on {target}: leave --{option}" in result.output
+        assert len(result.output.strip().splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+# one of each kind: within a kind the same function takes the options
+KINDS = (
+    [("abaqus", option) for option in ANY] + [("c-law", option) for option in ANY] + [("c", option) for option in ANY]
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("target", "option"), [pair for pair in KINDS if pair[1].strip("-").replace("-", "_") in export.OPTIONS[pair[0]]]
+)
+def test_an_option_has_an_effect(target, option, tmp_path, monkeypatch):
+    monkeypatch.setattr(code, "check", lambda target, folder: code.Replay("cc", {"phi": 7}, {"phi": 0.0}, 0, ""))
+    base = [] if target in CODE else BASE
+    plain = run(target, "--out", tmp_path / "plain", *base)
+    given = run(target, "--out", tmp_path / "given", *base, option, *ANY[option])
+    assert (plain.exit_code, given.exit_code) == (0, 0), given.output
+    wrote, changed = (
+        [path.read_bytes() for path in sorted([*(tmp_path / name).rglob("*.*"), tmp_path / name]) if path.is_file()]
+        for name in ("plain", "given")
+    )
+    assert wrote != changed or "largest relative difference" in given.output

@@ -1,0 +1,166 @@
+"""A joint: the law of one surface with its units, and what every file that is written of it says at its head.
+
+Overclosure is c = h_max - u with the mean separation u = (h_max + d)/2 (50): zero at first contact, rising as bodies
+approach, so that -dp/du = dp/dc.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from mbma_tables import __version__
+from mbma_tables.arguments import FloatArray, number_in
+from mbma_tables.errors import InputError
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.readings import Reading
+from mbma_tables.theories.contact import contact
+from mbma_tables.theories.law import contact_law
+from mbma_tables.theories.law_object import ContactLaw
+from mbma_tables.theories.mbma import Mbma
+from mbma_tables.theories.protocol import Theory, UserTheory
+from mbma_tables.theories.registry import get_theory
+from mbma_tables.theories.result import ELASTIC_PSI, Contact
+from mbma_tables.units import Units, in_unit, resolve
+
+LAW_RTOL = 1e-8
+LOOKED_AT = 200  # compressions at which validity and scatter are looked at
+OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # said of a surface that is its own spectrum
+
+
+@dataclasses.dataclass(frozen=True)
+class Joint:
+    """One surface's law, whose units are known.
+
+    Attributes
+    ----------
+    surface : Surface
+        In the units of the law.
+    law : ContactLaw
+    theory : theory
+        What the law was made from, without the hardness.
+    modulus : float
+        E*.
+    hardness : float
+        Infinite where the contact is elastic.
+    length, stress : str
+        Their units.
+    """
+
+    surface: AnySurface
+    law: ContactLaw
+    theory: Theory
+    modulus: float
+    hardness: float
+    length: str
+    stress: str
+
+    @property
+    def units(self) -> Units:
+        """Both units."""
+        return Units(self.length, self.stress)
+
+    def answer(self, u: FloatArray) -> Contact:
+        """The theory itself at mean separations."""
+        return contact(self.surface, mean_separation=u, E_star=self.modulus, theory=self.theory, hardness=self.hardness)
+
+    def header(self, what: str, range_: str, *more: str, end: float) -> tuple[str, ...]:
+        """Lines at the head of a file: what is in it, its range, its own error; validity up to an overclosure `end`."""
+        law, stress = self.law, self.stress
+        names = self.surface.parameters or OWN_NUMBERS
+        numbers = ", ".join(f"{name} = {float(getattr(self.surface, name)):.10g}" for name in names)
+        model = f"MBMA model, reading {law.reading!r}" if law.theory == Mbma.name else f"theory {law.theory!r}"
+        gradient = self.modulus * float(self.surface.rms_gradient)
+        plastic = f"elastic: within 5% in area for hardnesses from {gradient / ELASTIC_PSI:.4g} {stress} on"
+        if self.hardness < np.inf:
+            plastic = (
+                f"hardness = {self.hardness:.10g} {stress}, plasticity index {gradient / self.hardness:.3g}: "
+                "loading only, unloading starts with the incremental stiffness"
+            )
+        return (
+            f"Contact law of a rough surface, {model}; mbma_tables {__version__}",
+            what,
+            f"surface: {numbers}; lengths in {self.length}",
+            f"E* = {self.modulus:.10g} {stress}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2",
+            "pressure is force over nominal area;",
+            "overclosure c = h_max - u, u = (h_max + d)/2 the mean separation, d the separation from the mid-plane;",
+            "c = 0 is first contact: bodies meet where their mean planes are h_max apart",
+            f"range: {range_}",
+            *more,
+            f"the law is within {law.error:.1e} of its theory, in pressure and area",
+            plastic,
+            *self._validity(end),
+        )
+
+    def _validity(self, end: float) -> tuple[str, ...]:
+        """Lines that say where the law holds, how far simulations scatter about it, and where its numbers are from."""
+        law, stress_unit = self.law, self.stress
+        u = np.linspace(law.h_max, law.h_max - end, LOOKED_AT + 1)[1:]
+        found = self.answer(u)
+        pressure = np.asarray(law.force(u=u))
+        lines = []
+        for reason, mask in found.reasons.items():
+            first, last = pressure[mask].min(), pressure[mask].max()
+            lines.append(f"not valid from p = {first:.4g} to {last:.4g} {stress_unit}: {reason}")
+        if law.softening is not None:
+            lines.append(
+                f"softening: stiffness falls with compression from c = {law.h_max - law.softening:.4g}, "
+                f"p = {float(law.force(u=law.softening)):.4g} {stress_unit} on, which no simulation shows"
+            )
+        if law.highest < np.inf:
+            lines.append(f"no last contact: pressure is {float(law.force(law.h_max)):.4g} {stress_unit} at c = 0")
+        scatter = np.asarray(found.scatter)
+        known = np.flatnonzero(np.isfinite(scatter))
+        places = known[np.linspace(0, known.size - 1, 5).astype(int)] if known.size else known
+        listed = ", ".join(f"{scatter[k]:.2g} at {pressure[k]:.3g}" for k in places)
+        spread = f"one standard deviation of ln p at a given c: {listed} {stress_unit}" if listed else "not known"
+        lines.append(f"scatter of simulations about the theory, {spread}")
+        if isinstance(self.theory, Mbma):
+            from mbma_tables.models.tables import universal_model
+
+            lines.append(f"table: data {str(universal_model().content.attributes['values_sha256'])[:16]}")
+        return tuple(lines)
+
+
+def frozen_joint(
+    surface: AnySurface,
+    E_star: float | str,
+    length_unit: str | None = None,
+    stress_unit: str | None = None,
+    reading: str | Reading = "reported",
+    theory: str | Theory | UserTheory = "mbma",
+    hardness: float | str = np.inf,
+) -> Joint:
+    """The law of one surface in known units, as `describe_law` and `write_law` take them.
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        For a batch of surfaces and missing units, and as `contact_law`.
+    """
+    surface = in_unit(surface, length_unit)
+    plain, stress_unit = resolve({"E_star": E_star}, stress_unit, "stress")
+    length, stress = _known("length_unit", surface.unit), _known("stress_unit", stress_unit)
+    if surface.shape != ():
+        raise InputError("a contact law is of one surface, not of a batch")
+    modulus = number_in("E_star", plain["E_star"], 1e-300, 1e300)
+    cap = Units(length, stress).number("hardness", hardness)
+    law = contact_law(surface, LAW_RTOL, reading=reading, E_star=modulus, theory=theory, hardness=cap)
+    own = Mbma(reading=reading) if theory == Mbma.name else get_theory(theory)
+    return Joint(surface, law, own, modulus, float(cap), length, stress)
+
+
+def _known(name: str, unit: str | None) -> str:
+    if unit is None:
+        raise InputError(f"{name} is missing: a law without units is read wrongly sooner or later")
+    return unit
+
+
+def checked_conductivity(conductivity: float | None, unit: str | None) -> tuple[float, str]:
+    """k_s = 2 k1 k2/(k1 + k2) and its unit, both needed for a conductance."""
+    if conductivity is None or not unit:
+        raise InputError("conductance needs conductivity, k_s = 2 k1 k2/(k1 + k2), and conductivity_unit")
+    if not unit.isprintable():
+        raise InputError(f"conductivity_unit is not printable: {unit!r}")
+    return number_in("conductivity", conductivity, 1e-300, 1e300), unit

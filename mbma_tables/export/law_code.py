@@ -1,0 +1,171 @@
+"""A contact law as source code that needs nothing else: one description, `law_numbers`, and a template a language."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from mbma_tables.arguments import FloatArray
+from mbma_tables.errors import InputError
+from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
+from mbma_tables.export.law_numbers import DIGITS, LawNumbers, law_numbers
+from mbma_tables.export.text import checked_name, filled, opening, wrapped
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.readings import Reading
+from mbma_tables.theories.protocol import Theory, UserTheory
+
+MAX_NAME = 31  # letters, as Fortran and C99 read them
+SCALARS = ("h_max", "c_least", "c_turn", "c_most", "split", "scale", "power_p", "power_a")
+
+
+class Language(NamedTuple):
+    """How a law is written in one language.
+
+    `call` is a function's call with {name}, {what} and {x}; `number` writes a float, `arrays` the polynomials by the
+    names of their places in the template, `conductance` the
+    function of that name with {ratio}, also by places.
+    """
+
+    template: str
+    mark: str  # of comments
+    usage: str
+    call: str
+    number: Callable[[float], str]
+    arrays: Callable[[LawNumbers], dict[str, str]]
+    conductance: dict[str, str]
+
+
+def law_text(
+    target: str,
+    surface: AnySurface,
+    E_star: float | str,
+    *,
+    name: str = "law",
+    length_unit: str | None = None,
+    stress_unit: str | None = None,
+    conductivity: float | None = None,
+    conductivity_unit: str | None = None,
+    reading: str | Reading = "reported",
+    theory: str | Theory | UserTheory = "mbma",
+    hardness: float | str = math.inf,
+) -> str:
+    """A contact law as source code: pressure, tangent, area, energy and the overclosure at a pressure.
+
+    Parameters
+    ----------
+    target : str
+        One of `mbma_tables.export.LAWS`.
+    surface, E_star, length_unit, stress_unit, reading, theory, hardness
+        As for `describe_law`.
+    name : str
+        What functions, modules or packages are called, or begin with.
+    conductivity, conductivity_unit
+        k_s = 2 k1 k2/(k1 + k2) with its unit, for the function `conductance` as well.
+
+    Returns
+    -------
+    str
+        The text of one file.
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        As `describe_law`; and for conductance with a hardness, which is not the slope of the law.
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface
+    >>> text = law_text("c-law", Surface.named("concrete"), "13.3 MPa", name="road", theory="calibrated")
+    >>> "double road_with_tangent(double c, double *tangent);" in text
+    True
+    """
+    if target not in LANGUAGES:
+        raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
+    language, name = LANGUAGES[target], checked_name(name, MAX_NAME)
+    conducts = conductivity is not None or conductivity_unit is not None
+    k_s, k_unit = checked_conductivity(conductivity, conductivity_unit) if conducts else (0.0, "")
+    joint = frozen_joint(surface, E_star, length_unit, stress_unit, reading, theory, hardness)
+    if conducts and joint.hardness < math.inf:
+        raise InputError("conductance of yielded contact is not a slope of its law: leave conductivity or hardness out")
+    numbers = law_numbers(joint.law)
+    lines = [*_head(joint, numbers, f"{k_unit}/{joint.length}" if conducts else ""), language.usage]
+    parts = {
+        "HEADER": opening((line.format(name=name) for line in [*lines, _example(joint, language)]), language.mark),
+        "NAME": name,
+        "RECORDS": str(numbers.centre.size),
+        "STEP": str(1 << (numbers.centre.size - 1).bit_length() - 1),
+        "ENDS": str(int(numbers.ends)),
+        "CONDUCTANCE": "",
+        "PROTOTYPE": "",
+        **{scalar.upper(): language.number(getattr(numbers, scalar)) for scalar in SCALARS},
+        **language.arrays(numbers),
+    }
+    if conducts:
+        ratio = language.number(k_s / joint.modulus)
+        parts |= {place: text.format(name=name, ratio=ratio) for place, text in language.conductance.items()}
+    return filled(language.template, **parts)
+
+
+def _head(joint: Joint, numbers: LawNumbers, conductance_unit: str) -> tuple[str, ...]:
+    """The lines that every file has."""
+    length, stress = joint.length, joint.stress
+    what = f"pressure [{stress}], tangent dp/dc [{stress}/{length}], area A/A0, energy, the integral of pressure"
+    what += f" [{stress} {length}]"
+    what += f", and conductance [{conductance_unit}]" if conductance_unit else ""
+    begin = "no contact below c = 0" if numbers.ends else f"c from {numbers.c_least:.10g}"
+    range_ = f"{begin}, to {numbers.c_most:.10g}; there is no answer outside"
+    more = f"overclosure at a pressure: up to c = {numbers.c_turn:.10g}"
+    more += ", where pressure turns down" if numbers.c_turn < numbers.c_most else ""
+    lines = joint.header(f"{what}, against overclosure c [{length}]", range_, more, end=numbers.c_turn)
+    return tuple(line.replace("{", "{{").replace("}", "}}") for line in lines)
+
+
+def _example(joint: Joint, language: Language) -> str:
+    """One line with values of the library's law."""
+    law = joint.law
+    c = float(f"{(law.h_max - (law.lowest if law.turning_point is None else law.turning_point)) / 8:.3g}")
+    p, k = (float(value) for value in law.force_and_stiffness(law.h_max - 2 * c))
+    answers = {"pressure": (c, p), "tangent": (c, 2 * k), "overclosure": (p, c)}
+    said = ", ".join(
+        f"{language.call.format(name='{name}', what=what, x=language.number(float(f'{x:.7g}')))} = {y:.7g}"
+        for what, (x, y) in answers.items()
+    )
+    return f"Example: {said}"
+
+
+def _rows_of_c(numbers: LawNumbers) -> dict[str, str]:
+    """Coefficients as whole numbers in units of their own, which is shortest."""
+
+    def polynomial(row: FloatArray) -> str:
+        place = math.floor(math.log10(abs(row).max())) + round(math.log10(DIGITS))
+        return f"Q(1e{place},{','.join(f'{value * 10.0**-place:.0f}' for value in row)})"
+
+    rows = [
+        f"{{{centre:.17g},{rate:.17g},{energy:.16g},{polynomial(force)},{polynomial(area)}}},"
+        for centre, rate, energy, force, area in zip(
+            numbers.centre, numbers.rate, numbers.energy, numbers.force, numbers.area, strict=True
+        )
+    ]
+    return {"ROWS": "\n".join(rows), "EDGES": wrapped(map(repr, numbers.edges.tolist()))}
+
+
+def _c_number(value: float) -> str:
+    return "-INFINITY" if value == -math.inf else repr(value)
+
+
+C_CONDUCTANCE = {
+    "PROTOTYPE": "\ndouble {name}_conductance(double c);",
+    "CONDUCTANCE": "\ndouble {name}_conductance(double c) {{ return {ratio}*{name}_tangent(c); }}\n",
+}
+LANGUAGES = {
+    "c-law": Language(
+        "law.c",
+        "/*",
+        "C99, also C++11: cc -O2 -c {name}.c, link with -lm; declare what you call as below. Outside the range: NaN.",
+        "{name}_{what}({x})",
+        _c_number,
+        _rows_of_c,
+        C_CONDUCTANCE,
+    ),
+}

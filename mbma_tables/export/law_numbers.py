@@ -1,0 +1,136 @@
+"""A contact law as numbers for other languages: polynomials in order of rising overclosure, found by their edges.
+
+Record k, which holds where edges[k - 1] <= scale c < edges[k], is, with x = scale c up to c = split and x = scale
+(c - h_max) beyond it,
+
+    t = (x - centre) rate,   p = sum_j force[j] t^j,   A/A0 = sum_j area[j] t^j,   dp/dc = scale rate dp/dt,
+    energy = energy_0 + t sum_j force[j] t^j/(j + 1)/(scale rate).
+
+Where contact ends at c = 0 the first record's polynomials are multiplied by t^power. These are the numbers of
+`ContactLaw`, but for digits that do not matter; each language's template is a reader of them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from mbma_tables.arguments import FloatArray
+from mbma_tables.theories import law_kernel as kernel
+from mbma_tables.theories.law_kernel import AREA_AT, CENTRE, ENERGY_AT, FORCE_AT, RATE
+from mbma_tables.theories.law_object import ROUNDING, ContactLaw
+
+DIGITS = 1e-15  # of a record's largest coefficient: what is left out of each
+
+
+@dataclasses.dataclass(frozen=True)
+class LawNumbers:
+    """Numbers of a law against overclosure c, from first contact at 0 (see the module).
+
+    Attributes
+    ----------
+    h_max : float
+    c_least, c_turn, c_most : float
+        The law's range; inverses end at c_turn, where pressure turns down, or at c_most.
+    ends : bool
+        Whether contact ends at c = 0: pressure is zero below, and c_least is minus infinity.
+    split, scale : float
+    power_p, power_a : float
+        Of pressure and area in the first record; zero where contact does not end.
+    edges : ndarray, shape (records - 1,)
+        Of scale c.
+    centre, rate, energy : ndarray, shape (records,)
+    force, area : ndarray, shape (records, 9)
+    """
+
+    h_max: float
+    c_least: float
+    c_turn: float
+    c_most: float
+    ends: bool
+    split: float
+    scale: float
+    power_p: float
+    power_a: float
+    edges: FloatArray
+    centre: FloatArray
+    rate: FloatArray
+    energy: FloatArray
+    force: FloatArray
+    area: FloatArray
+
+
+def law_numbers(law: ContactLaw) -> LawNumbers:
+    """The numbers of a law."""
+    head = law.block
+    h_max, ends = law.h_max, bool(head.view(np.int64)[kernel.ENDS])
+    scale = 2 * float(head[kernel.SCALE])
+    # sides in order of rising c: by the depth below h_max, then by the height above full compression
+    sides = ([-1.0] if ends else []) + ([1.0] if head[kernel.MINUS] > 0 else [])
+    edges: list[FloatArray] = []
+    numbers, signs = [], []
+    for sign in sides:
+        x, records = _intervals(law, sign)
+        if sign > 0:
+            x, records = (h_max * scale - x)[::-1], records[::-1]
+        edges.append(x[:-1] if edges else x[1:-1])
+        numbers.append(records)
+        signs.append(np.full(records.size, -sign))
+    records, of_side = law.records[np.concatenate(numbers)], np.concatenate(signs)
+    turn = law.lowest if law.turning_point is None else law.turning_point
+    return LawNumbers(
+        h_max=h_max,
+        c_least=-math.inf if ends else (h_max - float(head[kernel.HIGHEST])) / 2,
+        c_turn=(h_max - turn) / 2,
+        c_most=(h_max - float(head[kernel.LOWEST])) / 2,
+        ends=ends,
+        split=h_max / 2 if len(sides) > 1 else (2 * h_max if ends else -math.inf),
+        scale=scale,
+        power_p=float(head[kernel.POWER_F]) if ends else 0.0,
+        power_a=float(head[kernel.POWER_A]) if ends else 0.0,
+        edges=np.concatenate(edges),
+        centre=of_side * records[:, CENTRE],
+        rate=of_side * records[:, RATE],
+        energy=records[:, ENERGY_AT] / 2,
+        force=_rounded(records[:, FORCE_AT:AREA_AT]),
+        area=_rounded(records[:, AREA_AT:ENERGY_AT]),
+    )
+
+
+def _intervals(law: ContactLaw, sign: float) -> tuple[FloatArray, Any]:
+    """Ends of the intervals of x on the side where x = (h_max + sign d) scale, and the records that hold there."""
+    head, whole = law.block, law.block.view(np.int64)
+    two = head[kernel.PLUS] != head[kernel.MINUS]
+    octaves = int(whole[kernel.MINUS_ROWS]) if two else len(law.rows)
+    first = octaves if two and sign > 0 else 0
+    edges = [np.array([0.0, head[kernel.LOW], 1.0])]
+    for k, shift in enumerate(law.rows[first : first + octaves, 0]):
+        # shifts of 63 mark octaves in which this side has nothing
+        buckets = 1 << max(52 - int(shift), 0)
+        edges.append(2.0 ** (int(whole[kernel.EXPONENT]) - 1023 + k) * (1 + np.arange(buckets) / buckets))
+    for kink_sign, kink in ((kernel.KINK_SIGN, kernel.KINK), (kernel.KINK_SIGN_2, kernel.KINK_2)):
+        if head[kink_sign] == sign:
+            edges.append(np.array([(head[kink] + law.h_max) * head[kernel.SCALE]]))
+    least = (law.h_max + law.lowest) * head[kernel.SCALE] if sign > 0 else 0.0
+    x = np.unique(np.concatenate(edges))
+    x = np.concatenate([[least], x[x > least * (1 + ROUNDING)]])
+    middle = (x[1:] + x[:-1]) / 2
+    records = law._records_at(sign * (middle / head[kernel.SCALE] - law.h_max), middle)
+    begins = np.concatenate([[True], np.diff(records) != 0])
+    return np.append(x[:-1][begins], x[-1]), records[begins]
+
+
+def _rounded(rows: FloatArray) -> FloatArray:
+    """Rows without the digits that add nothing to their largest entry."""
+    unit = 10.0 ** np.floor(np.log10(np.abs(rows).max(axis=1))) * DIGITS
+    return np.array([[_decimal(value, step) for value in row] for row, step in zip(rows, unit, strict=True)])
+
+
+def _decimal(value: float, unit: float) -> float:
+    """The shortest number within half a unit."""
+    if abs(value) < unit / 2:
+        return 0.0
+    return float(f"{value:.{min(max(math.ceil(math.log10(abs(value) / unit)), 1), 17)}g}")

@@ -1,0 +1,89 @@
+"""Laws for the tests of exported laws, and points of them by the library."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+import shutil
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mbma_tables import ContactLaw, Surface, contact_law
+from mbma_tables.export.law_code import law_text
+
+POINTS = 10_000
+VALUES, TANGENTS = 1e-13, 1e-11  # what agreement is asked of exported laws
+CONDUCTIVITY = 3.0
+# h_max is a dyadic number, so that c = (h_max - d)/2 is exact
+ROAD = Surface(0.8, 0.01, 2.0, 1.0, 3.0, unit="mm")
+ASKED: dict[str, tuple[Surface, dict[str, Any]]] = {
+    "mbma": (ROAD, {}),
+    "calibrated": (ROAD, {"theory": "calibrated"}),
+    "hardened": (ROAD, {"theory": "calibrated", "hardness": 2.0}),
+    "persson": (ROAD, {"theory": "persson"}),
+    # its force turns down
+    "turning": (Surface(0.35, 1.0, 1e4, 0.125, 0.375, unit="mm"), {}),
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Points:
+    """What a law answers at overclosures, by its own methods."""
+
+    law: ContactLaw
+    c: np.ndarray
+    p: np.ndarray
+    tangent: np.ndarray
+    area: np.ndarray
+    energy: np.ndarray
+    c_turn: float
+
+    def assert_equal(self, p: Any, tangent: Any, area: Any, energy: Any, close: float = VALUES) -> None:
+        """Values as the law's, tangents as its slopes, of which those about a maximum are relative to p/c."""
+        for found, known in ((p, self.p), (area, self.area), (energy, self.energy)):
+            np.testing.assert_allclose(found, known, rtol=close, atol=0)
+        slope = np.maximum(np.abs(self.tangent), 1e-2 * self.p / np.abs(self.c))
+        assert np.abs((np.asarray(tangent) - self.tangent) / slope).max() <= max(TANGENTS, close)
+
+    def pressures(self) -> np.ndarray:
+        """Pressures on the branch of first contact."""
+        return self.p[self.c < self.c_turn]
+
+    def assert_inverse(self, c: Any) -> None:
+        """Overclosures at `pressures`: where the library has them, but for what pressure there leaves open."""
+        wanted = self.pressures()
+        d, back = self.law.h_max - 2 * np.asarray(c), self.law.separation(force=wanted)
+        assert np.abs(np.asarray(self.law.force(d)) / wanted - 1).max() <= 1e-12
+        slope = np.asarray(self.law.stiffness(back))
+        known = (self.law.h_max - back) / 2
+        assert (np.abs(c - known) <= 1e-12 * (np.abs(known) + np.abs(wanted / slope))).all()
+
+
+@functools.cache
+def points(name: str) -> Points:
+    surface, options = ASKED[name]
+    law = contact_law(surface, E_star="13.3 MPa", **options)
+    h, rng = law.h_max, np.random.default_rng(18)
+    ends = math.isinf(law.highest)
+    near = h - 2 * h * 10 ** rng.uniform(-12, -0.6, POINTS // 2)
+    grid = 2.0**-30
+    rest = grid * np.floor(rng.uniform(law.lowest, h if ends else law.highest, POINTS // 2) / grid)
+    c = (h - np.concatenate([near, rest])) / 2
+    d = h - 2 * c
+    assert ((h - d) / 2 == c).all()
+    turn = law.lowest if law.turning_point is None else law.turning_point
+    found = law.values(d)
+    return Points(law, c, found.force, 2 * found.stiffness, found.area, found.energy / 2, (h - turn) / 2)
+
+
+def text(target: str, law: str, **options: Any) -> str:
+    surface, asked = ASKED[law]
+    return law_text(target, surface, "13.3 MPa", **(asked | options))
+
+
+def needs(*programs: str) -> Any:
+    missing = [program for program in programs if shutil.which(program) is None]
+    return pytest.mark.skipif(bool(missing), reason=f"not installed: {', '.join(missing)}")
