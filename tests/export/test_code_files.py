@@ -17,7 +17,7 @@ from mbma_tables.surfaces.readings import Reading
 
 @pytest.fixture
 def no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(code, "web_assembly", lambda c_texts: b"wasm")
+    monkeypatch.setattr(code, "web_assembly", lambda *given: b"wasm")
 
 
 @pytest.mark.usefixtures("no_compiler")
