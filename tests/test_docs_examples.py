@@ -14,6 +14,7 @@ BLOCKS = {name: re.findall(r"```python\n(.*?)```", text, re.DOTALL) for name, te
 @pytest.mark.parametrize("page", [name for name, blocks in BLOCKS.items() if blocks])
 def test_code_of_a_page_runs(page, monkeypatch):
     pytest.importorskip("dask")
+    pytest.importorskip("tamaas")
     monkeypatch.chdir(ROOT)
     names = {"__name__": "__main__"}
     for block in BLOCKS[page]:

@@ -20,7 +20,7 @@ from mbma_tables.plots import to_picture
 from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.theories import BoundaryElements
-from mbma_tables.theories.protocol import answer_where_finite
+from mbma_tables.theories.protocol import Theory, answer_where_finite
 
 FOLDER = "docs/data/maps"
 ROWS = f"{FOLDER}/boundary_elements.csv"
@@ -104,27 +104,34 @@ def simulated(example: Example, rows: dict[str, FloatArray]) -> FloatArray | Non
     return rows.get(example.name)
 
 
+def ratios(
+    theory: Theory, surface: MeasuredSurface, force: FloatArray, area: FloatArray, u: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """A theory's area at a force and force at a separation over simulated ones; NaN where it does not reach them."""
+    fine = answer_where_finite(theory, surface, np.append(u, GAPS * float(surface.h_max)))
+    loads, areas = fine.force[u.size :], fine.area[u.size :]
+    order = np.argsort(np.where(np.isfinite(loads), loads, np.inf))[: np.isfinite(loads).sum()]
+    loads, areas = loads[order], np.maximum.accumulate(areas[order])
+    # of a force that vanishes nothing is to be read between the gaps
+    held = loads > 0
+    own = np.interp(np.log(force), np.log(loads[held]), np.log(areas[held]), np.nan, np.nan)
+    return np.exp(own) / area, fine.force[: u.size] / force
+
+
 def compared(surface: MeasuredSurface, rows: FloatArray) -> str:
     """The calibrated law and MBMA over boundary elements, as a table."""
-    force, area, u, _ = rows
-    lines = []
-    for share in SHOWN:
-        k = int(np.argmin(np.abs(np.log(area / share))))
-        cells = [f"{area[k]:.2%}"]
-        for theory in map(drawn_theory, ("calibrated", "mbma")):
-            try:
-                fine = answer_where_finite(theory, surface, np.append(u[k], GAPS * float(surface.h_max)))
-            except MbmaError:
-                cells += ["-", "-"]
-                continue
-            known = np.isfinite(fine.force[1:])
-            order = np.argsort(fine.force[1:][known])
-            loads, areas = fine.force[1:][known][order], np.maximum.accumulate(fine.area[1:][known][order])
-            inside = loads[0] <= force[k] <= loads[-1]
-            own = np.exp(np.interp(np.log(force[k]), np.log(loads), np.log(areas)))
-            cells += [f"{own / area[k]:.2f}" if inside else "-", f"{fine.force[0] / force[k]:.2f}".replace("nan", "-")]
-        lines.append(cells)
-    return table(["contact", "calibrated: area at a pressure", "force at a separation", "MBMA: area", "force"], lines)
+    force, area, u, _ = rows[:, [int(np.argmin(np.abs(np.log(rows[1] / share)))) for share in SHOWN]]
+    columns = [[f"{share:.2%}" for share in area]]
+    for theory in map(drawn_theory, ("calibrated", "mbma")):
+        try:
+            found = ratios(theory, surface, force, area, u)
+        except MbmaError:
+            found = np.full(u.size, np.nan), np.full(u.size, np.nan)
+        columns += [[f"{ratio:.2f}".replace("nan", "-") for ratio in part] for part in found]
+    return table(
+        ["contact", "calibrated: area at a pressure", "force at a separation", "MBMA: area", "force"],
+        list(zip(*columns, strict=True)),
+    )
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:

@@ -28,6 +28,7 @@ PAGES = (
     "gallery",
     "islands",
     "leakage",
+    "maps",
     "stability",
     "tables",
     "theories",

@@ -337,14 +337,19 @@ def _finish(
 
 
 def _lowest(surface: AnySurface, theory: Theory) -> float:
-    """Mean separation from which a theory has finite force: zero, or the least of `LOWEST` at which it answers."""
-    for share in LOWEST:
-        u = share * float(surface.h_max)
+    """Mean separation from which a theory has finite force: zero, the least of `LOWEST`, or where its answers begin."""
+
+    def answers(u: float) -> bool:
         try:
             with np.errstate(all="ignore"):
                 force = float(theory.answer(surface, np.array(u)).force)
         except InputError:
-            continue
-        if math.isfinite(force) and force > 0:
+            return False
+        return math.isfinite(force) and force > 0
+
+    for share in LOWEST:
+        if answers(u := share * float(surface.h_max)):
             return u
+    if answers(u := float(theory.interval(surface)[0])):
+        return u
     raise OutOfRangeError(f"theory {theory.name!r} has no finite force on this surface up to u = {u:.6g}")

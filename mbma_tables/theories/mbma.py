@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.models import TIERS, AnyModel, tier_name
+from mbma_tables.models import TIERS, AnyModel, get_model, tier_name
 from mbma_tables.models.protocol import QUANTITIES
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
@@ -18,6 +18,7 @@ from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.protocol import SCAN, Theory, TheoryAnswer, select
 from mbma_tables.totals.contact import Totals, totals_at
 from mbma_tables.totals.island_sum import kinks
+from mbma_tables.totals.measured import island_curve
 
 GOLDEN = (5**0.5 - 1) / 2
 SECTIONS = 24  # of a scan's step, to 1e-6
@@ -108,8 +109,14 @@ class Mbma(Theory):
         return np.asarray(surface.h_max - places[places < 2 * surface.h_max] / 2)
 
     def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
-        """Mean separations [length] from where force or area is largest to first contact."""
-        return self._maximum(surface, quantity, np.zeros(surface.shape)), np.asarray(surface.h_max, dtype=float)
+        """Mean separations [length] from where force or area is largest, or the table ends, to first contact."""
+        lowest = np.zeros(surface.shape)
+        if isinstance(surface, MeasuredSurface):
+            model = get_model(self.tier, self.rtol, self.reading)
+            # islands up to an approach of 2 h_max make u = 0
+            end = island_curve(surface, model, self.reading, self.rtol, self.outside).end
+            lowest = np.asarray(surface.h_max - end / 2)
+        return self._maximum(surface, quantity, lowest), np.asarray(surface.h_max, dtype=float)
 
     def softening(self, surface: AnySurface) -> FloatArray:
         """Mean separation [length] below which stiffness falls with compression; NaN where it does not."""
@@ -135,10 +142,12 @@ class Mbma(Theory):
 
     def _maximum(self, surface: AnySurface, quantity: str, otherwise: FloatArray) -> FloatArray:
         """Mean separation of the first local maximum of a quantity under compression, or `otherwise`."""
+        # where some islands are not covered, it is looked for among the rest
+        theory = self if self.outside == "exact" else Mbma(self.tier, self.reading, self.rtol, "nan")
         depth = np.arange(1, SCAN + 1) / SCAN
         h_max = np.asarray(surface.h_max, dtype=float)
         batch = select(surface, surface.shape, np.arange(h_max.size).reshape(*surface.shape, 1))
-        values = np.reshape(getattr(self.answer(batch, h_max[..., None] * (1 - depth)), quantity), (-1, SCAN))
+        values = np.reshape(getattr(theory.answer(batch, h_max[..., None] * (1 - depth)), quantity), (-1, SCAN))
         falls = np.diff(values, axis=-1) < 0
         turns = np.flatnonzero(falls.any(axis=-1))
         result = np.array(otherwise, dtype=float).reshape(-1)
@@ -147,7 +156,7 @@ class Mbma(Theory):
             chosen = select(surface, surface.shape, turns)
 
             def value(x: FloatArray) -> FloatArray:
-                return np.asarray(getattr(self.answer(chosen, h_max.ravel()[turns] * (1 - x)), quantity))
+                return np.asarray(getattr(theory.answer(chosen, h_max.ravel()[turns] * (1 - x)), quantity))
 
             result[turns] = h_max.ravel()[turns] * (
                 1 - _highest(value, np.maximum(peak, 0.5) / SCAN, (peak + 2) / SCAN)

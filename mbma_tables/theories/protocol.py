@@ -103,8 +103,11 @@ class Theory(abc.ABC):
         """Standard deviations of ln F at given u and of ln A at given F against simulations, at A/A0 = `area`.
 
         Root mean squares of ln(theory/simulation), of the boundary elements in the calibrated law's file; NaN where
-        they are not known.
+        they are not known, as on surfaces unlike those.
         """
+        if self.departures(surface):
+            unknown = np.full(np.broadcast_shapes(np.shape(area), surface.shape), np.nan)
+            return unknown, unknown
         table = calibrated_table.shipped()
         known = [table.standard_deviation(self.scatter_name(surface), quantity, area) for quantity in ("force", "area")]
         return known[0], known[1]

@@ -145,11 +145,8 @@ class BoundaryElements(Theory):
 
     def _left_out(self) -> float:
         """Relative difference that every other load makes between the outer ones."""
-        count = self.rows.shape[1]
-        if count < 2 * MIN_LOADS - 1:
-            return float("nan")
         fewer = self._between(slice(None, None, 2))
-        last = count - 1 if count % 2 else count - 2
+        last = (self.rows.shape[1] - 1) // 2 * 2
         u = np.log(self.rows[2, 1:last:2])
         changes = [np.abs(few(u) - all_(u)).max() for few, all_ in zip(fewer[:2], self._curves[:2], strict=True)]
         return float(max(changes))

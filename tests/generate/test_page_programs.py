@@ -10,10 +10,11 @@ import pytest
 from click.testing import CliRunner
 
 from generate.__main__ import main
-from generate.pages import distances, fidelity_figures
+from generate.pages import distances, fidelity_figures, maps
 from generate.pages import export as export_page
 from generate.pages import tables as table_page
 from generate.pages import theories as theories_page
+from generate.pages.gallery import ratios
 from generate.pages.page import MARKED, ROOT
 from generate.tables import height_coefficients
 from mbma_tables import InputError, Surface, contact, theories
@@ -34,6 +35,27 @@ def run(command, *arguments):
 @pytest.mark.parametrize("what", [[], ["tables"], ["formulas"], ["pages"]])
 def test_every_command_has_help(what):
     assert run(main, *what, "--help").startswith(f"Usage: main {' '.join(what)}".rstrip())
+
+
+def test_ratios_of_a_theory_to_itself_are_one():
+    surface = Surface(hurst=0.8, q0=0.01, q1=0.5, h_rms=1.0, h_max=3.0)
+    u = np.array([1.2, 2.0, 2.5])
+    found = contact(surface, mean_separation=u, theory="persson")
+    area, force = ratios(theories.Persson(), surface, found.force, 2 * found.area, u)
+    np.testing.assert_allclose(area, 0.5, rtol=1e-3)
+    np.testing.assert_allclose(force, 1.0, rtol=1e-9)
+    assert np.isnan(ratios(theories.Persson(), surface, np.array([1e3]), np.array([1.0]), u[:1])[0])
+
+
+def test_shapes_are_told_with_extremes_and_validity():
+    surface = Surface.from_map(np.random.default_rng(1).normal(size=(32, 32)), 1e3, periodic=True)
+    u = 0.5 * surface.h_max * np.ones(2)
+    found = contact(surface, mean_separation=u, theory="calibrated")
+    rows = np.stack([found.force, np.full(2, 0.05), u])
+    area, force, valid = maps.summary([("one", surface, rows)])[3:]
+    assert force == "1.00 (1.00 to 1.00)"
+    assert area.startswith(f"{found.area[0] / 0.05:.2f} (")
+    assert valid in ("0%", "100%")
 
 
 def test_a_page_is_written_with_its_figures(tmp_path, monkeypatch):

@@ -59,6 +59,14 @@ def test_it_is_a_law_like_any_other(truth):
     assert law.at_pressure(pressure).stiffness == pytest.approx(direct.stiffness, rel=0.05)
 
 
+def test_a_law_of_light_loads_alone(truth):
+    few = BoundaryElements(truth.surface, *truth.rows[:, :4])
+    law = contact_law(few.surface, theory=few)
+    assert law.lowest == pytest.approx(2 * truth.rows[2, 3] - few.surface.h_max)
+    assert 0.01 < law.error < 1
+    np.testing.assert_allclose(law.force(u=truth.rows[2, 1:3]), truth.rows[0, 1:3], rtol=law.error)
+
+
 def test_what_was_not_simulated_is_refused(truth):
     with pytest.raises(OutOfRangeError, match="which were simulated"):
         contact(truth.surface, mean_separation=10 * truth.rows[2, 0], theory=truth)

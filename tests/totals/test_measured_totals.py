@@ -159,6 +159,12 @@ def test_a_law_ends_with_the_table():
     with pytest.raises(OutOfRangeError, match="where the theory ends"):
         law.force(law.lowest - 0.1)
     np.testing.assert_allclose(law.separation(force=law.force(d)), d, rtol=1e-6)
+    # as far as there is a table, contacts are found by pressure and known to be valid or not
+    found = contact(surface, pressure=law.force(d))
+    np.testing.assert_allclose(found.separation, d, rtol=1e-6)
+    assert found.valid.shape == (3,)
+    with pytest.raises(OutOfRangeError, match="at most what theory 'mbma' reaches"):
+        contact(surface, pressure=2 * law.force(law.lowest))
 
 
 def test_islands():

@@ -1,0 +1,95 @@
+"""`docs/maps.md`: theories on surfaces that are not isotropic or not Gaussian, over boundary elements on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+
+from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, SPLITS
+from generate.boundary_elements.surfaces import Recipe, heights
+from generate.pages.gallery import BARS, EXAMPLES, ratios, read_rows
+from generate.pages.page import ROOT, table
+from mbma_tables import Surface, contact
+from mbma_tables.arguments import FloatArray
+from mbma_tables.errors import MbmaError
+from mbma_tables.measurement import drawn_theory
+from mbma_tables.scenes.specimen import measured
+from mbma_tables.surfaces.measured import MeasuredSurface
+
+KINDS = ("stretched", "peaks", "valleys", "patchy", "worn")
+GRADIENT = 0.1  # that surfaces are given: theories ask for a small one
+# contacts that are summed up: as far as islands do not lie on one another, and all
+RANGES = {"mbma": (0.01, 0.1), "calibrated": (0.01, 0.97)}
+Seen = tuple[str, MeasuredSurface, FloatArray]
+
+
+def simulated() -> Iterator[Seen]:
+    """Held-out surfaces by name, as maps, with F/(A0 E*), A/A0 and u of boundary elements."""
+    data = xr.load_dataset(ROOT / "docs/data/boundary_elements.nc")
+    kinds = data.kind.attrs["flag_meanings"].split()
+    order = [KINDS.index(kinds[k]) if kinds[k] in KINDS else -1 for k in data.kind.values]
+    for number in np.lexsort((data["shape"].values, np.array(order))):
+        one = data.isel(surface=number)
+        kind, shape = kinds[int(one.kind)], float(one["shape"])
+        if kind not in KINDS or SPLITS[int(one.split)] not in (HELD_OUT_SURFACE, HELD_OUT_SPECTRUM):
+            continue
+        points = int(one.points)
+        recipe = Recipe(kind, float(one.hurst), float(one.zeta_1), int(one.waves), int(one.seed), points, shape)
+        steps = [side / points for side in recipe.sizes]
+        values = heights(recipe)
+        # of the map as it is, whose h_rms is 1
+        scale = GRADIENT * float(one.q0_h_rms) / recipe.q0
+        surface = Surface.from_map(scale * values, *steps, periodic=True)
+        assert isinstance(surface, MeasuredSurface)
+        rows = np.stack([one.force * GRADIENT, one.area, one.mean_separation * scale])
+        name = f"stretched 1:{shape:g}" if kind == "stretched" else f"{kind} {shape:g}"
+        yield name, surface, rows[:, np.isfinite(rows).all(axis=0) & (one.area.values > 0)]
+
+
+def from_files() -> Iterator[Seen]:
+    """Measured maps with boundary elements, those of the gallery and what else is at hand."""
+    for example in (*EXAMPLES, *BARS):
+        path, rows = example.path(), read_rows().get(example.name)
+        if path is not None and rows is not None:
+            yield f"measured: {example.name}", measured(path, example.options)[1], rows[:3]
+
+
+def summary(seen: list[Seen]) -> list[str]:
+    """Cells of one row: area and force of both theories over simulation, and how many answers are valid."""
+    cells = []
+    for name, (low, high) in RANGES.items():
+        theory, found = drawn_theory(name), []
+        for _, surface, rows in seen:
+            force, area, u = rows[:, (rows[1] >= low) & (rows[1] <= high)]
+            try:
+                valid = contact(surface, mean_separation=u, theory=theory).valid
+                found.append(np.stack([*ratios(theory, surface, force, area, u), valid]))
+            except MbmaError:
+                found.append(np.full((3, u.size), np.nan))
+        columns = np.concatenate(found, axis=1)
+        for column in columns[:2]:
+            known = column[np.isfinite(column) & (column > 0)]
+            mean = np.exp(np.mean(np.log(known))) if known.size else np.nan
+            cells.append(f"{mean:.2f} ({known.min():.2f} to {known.max():.2f})" if known.size else "-")
+        answered = np.isfinite(columns[2])
+        cells.append(f"{columns[2][answered].mean():.0%}" if answered.any() else "-")
+    return cells
+
+
+def measure() -> tuple[dict[str, str], dict[str, bytes]]:
+    """Parts of the page; no other files."""
+    groups: dict[str, list[Seen]] = {}
+    for one in (*simulated(), *from_files()):
+        groups.setdefault(one[0], []).append(one)
+    rows = []
+    for name, seen in groups.items():
+        kurtosis, skewness, stretch = (
+            np.mean([getattr(s.bearing, key, getattr(s, key, 0.0)) for _, s, _ in seen])
+            for key in ("slope_kurtosis", "skewness", "anisotropy")
+        )
+        rows.append([f"{name} ({len(seen)})", f"{stretch:.1f}", f"{kurtosis:.1f}", f"{skewness:.1f}", *summary(seen)])
+    header = ["surfaces (number)", "anisotropy", "kurtosis of slopes", "skewness"]
+    header += [f"{name}: {what}" for name in ("MBMA", "calibrated") for what in ("area", "force", "valid")]
+    return {"shapes": table(header, rows)}, {}
