@@ -3,5 +3,5 @@
 # the targets, in the order in which help lists them
 SOLVERS = ("calculix", "abaqus", "lsdyna", "optistruct", "comsol", "moose", "modelica")  # functions of `solvers`
 DATA = ("csv", "json", "matlab", "netcdf", "hdf5", "parquet")  # functions of `data`, named to_csv and so on
-LAWS = ("c-law",)  # keys of `law_code.LANGUAGES`
+LAWS = ("c-law", "fortran-law", "javascript-law", "python-law", "jax-law", "matlab-law")  # keys of `law_code.LANGUAGES`
 CODE = ("c", "fortran", "javascript")  # keys of `code.LANGUAGES`

@@ -150,22 +150,121 @@ def _rows_of_c(numbers: LawNumbers) -> dict[str, str]:
     return {"ROWS": "\n".join(rows), "EDGES": wrapped(map(repr, numbers.edges.tolist()))}
 
 
-def _c_number(value: float) -> str:
-    return "-INFINITY" if value == -math.inf else repr(value)
+def _lists(numbers: LawNumbers) -> dict[str, str]:
+    """Arrays in brackets, as Python and JavaScript have them."""
+    return {
+        **{name.upper(): f"[{wrapped(map(repr, getattr(numbers, name).tolist()))}]" for name in FLAT},
+        **{place: f"[\n{_lines(rows, '[', '],')}\n]" for place, rows in (("P", numbers.force), ("A", numbers.area))},
+    }
 
 
-C_CONDUCTANCE = {
-    "PROTOTYPE": "\ndouble {name}_conductance(double c);",
-    "CONDUCTANCE": "\ndouble {name}_conductance(double c) {{ return {ratio}*{name}_tangent(c); }}\n",
-}
+def _matrices(numbers: LawNumbers) -> dict[str, str]:
+    """Columns and matrices of MATLAB."""
+    return {
+        **{name.upper(): f"[\n{_lines(getattr(numbers, name)[:, None], '', ';')}]" for name in FLAT},
+        **{place: f"[\n{_lines(rows, '', ';')}]" for place, rows in (("P", numbers.force), ("A", numbers.area))},
+    }
+
+
+def _data(numbers: LawNumbers) -> dict[str, str]:
+    """Statements of Fortran, one a record: no statement grows with the law."""
+    edges = [*numbers.edges, math.inf]
+    columns = zip(edges, numbers.centre, numbers.rate, numbers.energy, numbers.force, numbers.area, strict=True)
+    lines = []
+    for k, (edge, centre, rate, energy, force, area) in enumerate(columns, 1):
+        heads = wrapped(map(_fortran_number, (edge, centre, rate, energy)))
+        lines.append(f"  data edges({k}), centre({k}), rate({k}), energies({k}) &\n    / {heads} /")
+        for name, row in (("p_", force), ("a_", area)):
+            text = wrapped(map(_fortran_number, row), "    ", " &")
+            lines.append(f"  data ({name}(k_, {k}), k_ = 0, 8) / &\n{text} /")
+    return {"DATA": "\n".join(lines), "PUBLIC": "", "SUBROUTINE": ""}
+
+
+def _lines(rows: FloatArray, begin: str, end: str) -> str:
+    return "\n".join(f"{begin}{', '.join(map(repr, row))}{end}" for row in rows.tolist())
+
+
+def _fortran_number(value: float) -> str:
+    if math.isinf(value):
+        return "-huge(1d0)" if value < 0 else "1d300"
+    text = repr(float(value))
+    return text.replace("e", "d") if "e" in text else f"{text}d0"
+
+
+def _with_infinity(text: str) -> Callable[[float], str]:
+    return lambda value: text if value == -math.inf else repr(float(value))
+
+
+FLAT = ("edges", "centre", "rate", "energy")
+PYTHON_CONDUCTANCE = """
+
+def conductance(c{given}):
+    return {{ratio}} * tangent(c{passed})
+
+"""
+NAN = "Outside the range: NaN."
 LANGUAGES = {
     "c-law": Language(
         "law.c",
         "/*",
-        "C99, also C++11: cc -O2 -c {name}.c, link with -lm; declare what you call as below. Outside the range: NaN.",
+        f"C99, also C++11: cc -O2 -c {{name}}.c, link with -lm; declare what you call as below. {NAN}",
         "{name}_{what}({x})",
-        _c_number,
+        _with_infinity("-INFINITY"),
         _rows_of_c,
-        C_CONDUCTANCE,
+        {
+            "PROTOTYPE": "\ndouble {name}_conductance(double c);",
+            "CONDUCTANCE": "\ndouble {name}_conductance(double c) {{ return {ratio}*{name}_tangent(c); }}\n",
+        },
+    ),
+    "fortran-law": Language(
+        "law.f90",
+        "!",
+        f"Fortran 2008: gfortran -c {{name}}.f90, then use {{name}}; functions are elemental, of real(real64). {NAN}",
+        "{what}({x})",
+        _fortran_number,
+        _data,
+        {
+            "PUBLIC": ", conductance",
+            "CONDUCTANCE": "\n  elemental function conductance(c) result(h)\n    real(dp), intent(in) :: c\n"
+            "    real(dp) :: h\n    h = {ratio}*tangent(c)\n  end function conductance\n",
+        },
+    ),
+    "javascript-law": Language(
+        "law.mjs",
+        "/*",
+        "An ECMAScript module: import {{{{ pressure, withTangent, area, energy, overclosure }}}} from './{name}.mjs'. "
+        "Outside the range a RangeError, of what is no number a TypeError is thrown.",
+        "{what}({x})",
+        _with_infinity("-Infinity"),
+        _lists,
+        {"CONDUCTANCE": "\nexport function conductance(c) {{\n  return {ratio} * tangent(c);\n}}\n"},
+    ),
+    "python-law": Language(
+        "law.py",
+        "#",
+        "Python with numpy alone: import {name}; arrays of any shape. Outside the range: ValueError.",
+        "{name}.{what}({x})",
+        _with_infinity("-np.inf"),
+        _lists,
+        {"CONDUCTANCE": PYTHON_CONDUCTANCE.format(given="", passed="")},
+    ),
+    "jax-law": Language(
+        "law.jax.py",
+        "#",
+        "Python with jax alone, differentiable by c, p and the pytree LAW. Set jax_enable_x64 before the import, or "
+        f"answers are in single precision. {NAN}",
+        "{name}.{what}({x})",
+        _with_infinity("-jnp.inf"),
+        _lists,
+        {"CONDUCTANCE": PYTHON_CONDUCTANCE.format(given=", law=LAW", passed=", law")},
+    ),
+    "matlab-law": Language(
+        "law.m",
+        "%",
+        "MATLAB and Octave: law = {name}(); arrays of any shape. Outside the range: an error.",
+        "law.{what}({x})",
+        _with_infinity("-Inf"),
+        _matrices,
+        {"CONDUCTANCE": "\n    kept.conductance = @(c) {ratio}*kept.tangent(c);"},
     ),
 }
