@@ -12,163 +12,102 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.interpolate import PchipInterpolator
 from scipy.optimize import least_squares
-from scipy.special import erf, erfinv
 
-from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, SPLITS, TRAINING
-from generate.boundary_elements.evidence import GAUSSIAN
+from generate.boundary_elements.design import SPLITS, TRAINING
+from generate.boundary_elements.evidence import GAUSSIAN, Capped, capped
 from generate.calibrated_file import write_part
+from generate.pages.page import ROOT
+from mbma_tables import Surface, contact
 from mbma_tables import hardness as cap
 from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import Law, Spectrum
-from mbma_tables.calibrated_map import MapLaw
 from mbma_tables.tablefiles.provenance import source_digest, versions
-from mbma_tables.theories.calibrated_curves import Curve
-from mbma_tables.theories.hardness_table import GROUP, QUANTITIES
+from mbma_tables.theories import calibrated_table
+from mbma_tables.theories.registry import get_theory
+from mbma_tables.theories.yielding import GROUP, QUANTITIES, Scatter, Yielding
 
 LIGHTEST, HEAVIEST = 0.01, 0.97  # A/A0 that constants are fitted to
 EDGES = (0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.95)  # contact fractions between which errors are told
 BARS = {"area": 0.05, "yielded": 0.05, "force": np.log(1.25), "stiffness": np.log(1.25)}
 STATISTICS = ("bias", "standard_deviation", "share_within_bar", "largest", "number")
-NOISE = {"area": 0.015, "yielded": 0.03, "force": 0.03, "frozen": 0.05, "planes": 0.02}  # errors that count alike
+# constants of each part, and errors that count alike: "planes" is the gap between mean planes
+PARTS: dict[str, tuple[tuple[str, ...], float]] = {
+    "area": (("area_power", "area_scale"), 0.015),
+    "yielded": (("yield_power", "yield_scale"), 0.03),
+    "force": (("force_light", "force_eta", "force_share"), 0.03),
+    "stiffness": (("frozen", "frozen_eta"), 0.05),
+    "planes": (("plane_eta", "plane_load"), 0.02),
+}
 DIGITS = 4
-LEVELS = np.geomspace(1e-5, 1.0, 400)  # u/h_max of a law's curve
 FORMS = {"calibrated": "h_max", "calibrated_map": "heights"}
+ELASTIC = "elastic"  # the simulated elastic contact and h_max, for what a hardness adds to any theory
+OTHERS = ("mbma", "persson")  # theories of which what is said of their errors is tested
+LEAST = 1e-9  # mean separation at which theories end [h_rms]
+TURN = 0.01  # of ln A_el, for derivatives
+FOLDS = 5
+REFERENCE = "docs/data/hardness.csv"  # another code's surfaces
+WAVES = 3  # longest waves a side: with fewer h_max says little of the highest heights
 MODULES = ("mbma_tables.hardness", "generate.calibrated_hardness")
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Capped:
-    """One surface at one hardness: what was found, and the elastic contact of the same surface, simulated and by laws.
-
-    Loads are in rows as simulated; `elastic` has the surface's forces, areas, mean gaps and stiffnesses if elastic.
-    """
-
-    kind: str
-    split: str
-    eta: float
-    h_max: float
-    law: Law
-    map_curve: Curve
-    heights: cap.BearingCurve
-    force: FloatArray
-    area: FloatArray
-    yielded: FloatArray
-    u: FloatArray
-    planes: FloatArray
-    frozen: FloatArray
-    elastic: dict[str, FloatArray]
-
-    def elastic_area(self) -> FloatArray:
-        """Simulated, at these forces."""
-        known = PchipInterpolator(np.log(self.elastic["force"]), np.log(erfinv(self.elastic["area"])))
-        return np.asarray(erf(np.exp(known(np.log(self.force)))))
-
-    def elastic_at_gap(self, name: str, beyond: FloatArray, end: float) -> FloatArray:
-        """Simulated force or stiffness at these gaps; by the law, fitted at its end, where not pressed so far."""
-        u = self.elastic["mean_separation"]
-        known = PchipInterpolator(u[::-1], np.log(self.elastic[name][::-1]))
-        inside = self.u > u[-1]
-        return np.asarray(
-            np.where(inside, np.exp(known(np.maximum(self.u, u[-1]))), beyond * self.elastic[name][-1] / end)
-        )
+def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> FloatArray:
+    """Errors of a part where the elastic contact is the simulated one, so that its law's errors stay out."""
+    if part == "area":
+        return np.log(cap.area(one.force, one.elastic_area, one.eta, constants) / one.area)
+    if part == "yielded":
+        return (cap.yielded_area(one.force, one.elastic_area, one.eta, constants) - one.yielded) / one.area
+    if part == "force":
+        return np.log(cap.force(one.elastic[0], 0.0, one.shares[share], 0.0, one.eta, constants)[0] / one.force)
+    if part == "stiffness":
+        return np.log(one.elastic[1] * cap.frozen_factor(one.eta, constants) / one.frozen)
+    return cap.plane_separation(one.u, one.force / one.eta, one.eta, constants) - one.planes
 
 
-def read(data: xr.Dataset) -> list[Capped]:
-    """Surfaces of a file by `python -m generate boundary_elements --hardness`, refinements left out."""
-    kinds, found = data.kind.attrs["flag_meanings"].split(), []
-    names = ("force", "area", "area_yielded", "mean_separation", "plane_separation", "frozen_stiffness")
-    for number in range(data.sizes["surface"]):
-        one = data.isel(surface=number)
-        if (split := SPLITS[int(one.split)]) not in (TRAINING, HELD_OUT_SURFACE, HELD_OUT_SPECTRUM):
-            continue
-        kind, h_max = kinds[int(one.kind)], float(one.h_max)
-        curves: dict[str, Any] = {
-            n: one[n].values.astype(float) for n in ("mean_height", "top_gradient", "tension_force", "tension")
-        }
-        share, x = one.band_variance.values, one.band_q.values
-        held = share > 0
-        own = Spectrum.from_shares(x[held], share[held])
-        map_curve = Curve(MapLaw(own, **curves, anisotropy=float(one.anisotropy)), h_max)
-        spectrum = Spectrum.self_affine(float(one.hurst), float(one.zeta_1)) if kind == "self_affine" else own
-        heights = cap.BearingCurve(curves["mean_height"], h_max)
-        rows = {name: one[name].values.astype(float) for name in names}
-        elastic = {name: values[-1] for name, values in rows.items()}
-        law = Law(spectrum, h_max)
-        for row, eta in enumerate(data.eta.values[:-1]):
-            loads = (rows[name][row] for name in names)
-            parts: list[Any] = [kind, split, float(eta), h_max, law, map_curve, heights, *loads, elastic]
-            found.append(Capped(*parts))
-    return found
+def fitted(one: Capped) -> Any:
+    """Loads that constants are fitted to."""
+    return (one.area > LIGHTEST) & (one.area < HEAVIEST)
 
 
 def fit(seen: Sequence[Capped]) -> cap.Constants:
-    """Constants from the training set; the elastic contact is the simulated one, so that its law's errors stay out."""
+    """Constants from these surfaces."""
     start = cap.CONSTANTS
-    kept = [(one.area > LIGHTEST) & (one.area < HEAVIEST) for one in seen]
-    elastic_areas = [one.elastic_area() for one in seen]
-    forces, frozen, shares = [], [], []
-    for one in seen:
-        end = one.elastic["mean_separation"][-1:]
-        values, ends = one.law.force_and_stiffness(one.u), one.law.force_and_stiffness(end)
-        forces.append(one.elastic_at_gap("force", values[0], float(ends[0][0])))
-        frozen.append(one.elastic_at_gap("frozen_stiffness", values[1], float(ends[1][0])))
-        shares.append(one.heights(one.u)[0])
-
-    def errors(what: str, constants: cap.Constants, k: int) -> FloatArray:
-        one = seen[k]
-        if what == "area":
-            return np.log(cap.area(one.force, elastic_areas[k], one.eta, constants) / one.area)
-        if what == "yielded":
-            return (cap.yielded_area(one.force, elastic_areas[k], one.eta, constants) - one.yielded) / one.area
-        if what == "force":
-            return np.log(cap.force(forces[k], 0.0, shares[k], 0.0, one.eta, constants)[0] / one.force)
-        if what == "frozen":
-            return np.log(frozen[k] * cap.frozen_factor(one.eta, constants) / one.frozen)
-        return cap.plane_separation(one.u, one.force / one.eta, one.eta, constants) - one.planes
-
-    names = {
-        "area": ("area_power", "area_scale"),
-        "yielded": ("yield_power", "yield_scale"),
-        "force": ("force_light", "force_eta", "force_share"),
-        "frozen": ("frozen", "frozen_eta"),
-        "planes": ("plane_eta", "plane_load"),
-    }
     found: dict[str, float] = {}
-    for what, own in names.items():
+    for part, (own, noise) in PARTS.items():
 
-        def residuals(values: FloatArray, what: str = what, own: tuple[str, ...] = own) -> FloatArray:
+        def residuals(
+            values: FloatArray, part: str = part, own: tuple[str, ...] = own, noise: float = noise
+        ) -> FloatArray:
             trial = dataclasses.replace(start, **dict(zip(own, map(float, values), strict=True)))
-            return np.concatenate([errors(what, trial, k)[kept[k]] / NOISE[what] for k in range(len(seen))])
+            return np.concatenate([errors(one, part, trial)[fitted(one)] / noise for one in seen])
 
         best = least_squares(residuals, [getattr(start, name) for name in own], loss="soft_l1", x_scale="jac")
         found |= {name: float(f"{value:.{DIGITS}g}") for name, value in zip(own, best.x, strict=True)}
     return dataclasses.replace(start, **found)
 
 
+def cross_validated(seen: Sequence[Capped]) -> list[cap.Constants]:
+    """For each surface, constants from spectra other than its own."""
+    order = sorted({one.node for one in seen})
+    own: dict[tuple[float | str, ...], cap.Constants] = {}
+    for fold in range(FOLDS):
+        out = set(order[fold::FOLDS])
+        own |= dict.fromkeys(out, fit([one for one in seen if one.node not in out]))
+    return [own[one.node] for one in seen]
+
+
 @functools.cache
 def errors_of_law(one: Capped, form: str, constants: cap.Constants) -> dict[str, FloatArray]:
     """Of the whole law: ln of area and stiffness at equal force, ln of force at equal mean gap, the yielded share."""
+    if form == ELASTIC:
+        return {quantity: errors(one, quantity, constants, 1) for quantity in QUANTITIES}
     by_map = form == "calibrated_map"
-
-    def parts(u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Force with the hardness, and the elastic stiffness."""
-        if by_map:
-            force, _, stiffness = one.map_curve.answer(u)
-            share = one.heights(u)[0]
-        else:
-            force, stiffness = one.law.force_and_stiffness(u)
-            share = cap.bearing_share(u, one.h_max)[0]
-        return cap.force(force, 0.0, share, 0.0, one.eta, constants)[0], stiffness
-
-    elastic = one.map_curve.area(one.force) if by_map else one.law.area(one.force)
-    area = cap.area(one.force, elastic, one.eta, constants)
-    yielded = cap.yielded_area(one.force, elastic, one.eta, constants)
-    force = parts(one.u)[0]
+    area = cap.area(one.force, one.elastic_areas[form], one.eta, constants)
+    yielded = cap.yielded_area(one.force, one.elastic_areas[form], one.eta, constants)
+    at_gap = one.map_curve.answer(one.u)[0] if by_map else one.by_law[0]
+    force = cap.force(at_gap, 0.0, one.shares[0 if by_map else 1], 0.0, one.eta, constants)[0]
     # from pressure to the gap to the stiffness, on the law's own curve
-    endless, steep = parts(one.h_max * LEVELS[:-1])
-    curve = np.log(np.maximum(endless, 1e-30))
+    endless, steep, share = one.curves[form]
+    curve = np.log(np.maximum(cap.force(endless, 0.0, share, 0.0, one.eta, constants)[0], 1e-30))
     frozen = np.log(np.maximum(steep * cap.frozen_factor(one.eta, constants), 1e-30))
     at = np.interp(-np.log(one.force), -curve, frozen)
     return {
@@ -183,58 +122,144 @@ def accuracy(groups: dict[str, list[Capped]], constants: cap.Constants) -> Float
     """Statistics by set, form and quantity from 1% to 95% contact."""
     table = np.full((len(groups), len(FORMS), len(QUANTITIES), len(STATISTICS)), np.nan)
     for row, own in enumerate(groups.values()):
+        kept = np.concatenate([(one.area > LIGHTEST) & (one.area < EDGES[-1]) for one in own])
         for column, form in enumerate(FORMS):
-            told = [errors_of_law(one, form, constants) for one in own]
-            kept = [(one.area > LIGHTEST) & (one.area < EDGES[-1]) for one in own]
             for k, quantity in enumerate(QUANTITIES):
-                e = np.concatenate([part[quantity][mask] for part, mask in zip(told, kept, strict=True)])
+                e = np.concatenate([errors_of_law(one, form, constants)[quantity] for one in own])[kept]
                 size = np.abs(e)
                 table[row, column, k] = e.mean(), e.std(), np.mean(size < BARS[quantity]), size.max(), e.size
     return table
 
 
-def stated(seen: Sequence[Capped], constants: cap.Constants, etas: Sequence[float]) -> FloatArray:
-    """Root mean squares by form, quantity, hardness and contact."""
-    rms = np.full((len(FORMS), len(QUANTITIES), len(etas), len(EDGES) - 1), np.nan)
-    for row, form in enumerate(FORMS):
-        for column, eta in enumerate(etas):
-            own = [one for one in seen if one.eta == eta]
-            told = [errors_of_law(one, form, constants) for one in own]
-            bins = np.digitize(np.concatenate([one.area for one in own]), EDGES) - 1
-            for k, quantity in enumerate(QUANTITIES):
-                e = np.concatenate([part[quantity] for part in told])
-                rms[row, k, column] = [np.sqrt(np.mean(e[bins == b] ** 2)) for b in range(len(EDGES) - 1)]
+def by_contact(seen: Sequence[Capped], values: Sequence[FloatArray], etas: Sequence[float]) -> FloatArray:
+    """Root mean squares of values at simulated contacts, by hardness and contact fraction."""
+    rms = np.full((len(etas), len(EDGES) - 1), np.nan)
+    for row, eta in enumerate(etas):
+        own = [k for k, one in enumerate(seen) if one.eta == eta]
+        bins = np.digitize(np.concatenate([seen[k].area for k in own]), EDGES) - 1
+        e = np.concatenate([values[k] for k in own])
+        rms[row] = [np.sqrt(np.mean(e[bins == b] ** 2)) for b in range(len(EDGES) - 1)]
     return rms
+
+
+def weight_of_elastic(one: Capped, quantity: str, constants: cap.Constants) -> FloatArray:
+    """d ln of the area or the force with a hardness by d ln of the elastic one."""
+    if quantity == "area":
+        turned = (np.minimum(one.elastic_area * np.exp(way * TURN), 1.0) for way in (1, -1))
+        above, below = (cap.area(one.force, elastic, one.eta, constants) for elastic in turned)
+        return np.log(above / below) / (2 * TURN)
+    force, rate = cap.force(one.elastic[0], one.elastic[0], one.shares[1], 0.0, one.eta, constants)
+    return rate / force
+
+
+def blind() -> dict[str, FloatArray]:
+    """Errors of `contact` on surfaces of an independent code, which no fit and no choice of a form saw."""
+    with open(ROOT / REFERENCE, encoding="utf-8") as stream:
+        table = np.genfromtxt((line for line in stream if not line.startswith("#")), delimiter=",", names=True)
+    own = table[np.isfinite(table["eta"]) & (table["area"] > LIGHTEST) & (table["area"] < EDGES[-1])]
+    surface = Surface(own["hurst"], 1.0, own["zeta_1"], 1.0, own["h_max_over_h_rms"])
+    g = surface.rms_gradient
+    options: dict[str, Any] = {"theory": "calibrated", "hardness": own["eta"] * g}
+    found = contact(surface, pressure=own["force"] * g, **options)
+    closer = contact(surface, mean_separation=own["u_gap"], **options)
+    return {
+        "area": np.log(found.area / own["area"]),
+        "yielded": np.asarray(found.yielded - own["area_yielded"] / own["area"]),
+        "force": np.log(closer.force / (own["force"] * g)),
+        "stiffness": np.log(found.incremental_stiffness / (own["kappa"] * g)),
+    }
+
+
+def told_errors(one: Capped, name: str, constants: cap.Constants) -> dict[str, FloatArray]:
+    """Errors of a theory with a hardness on one surface, of force and area."""
+    if name not in OTHERS:
+        return errors_of_law(one, name, constants)
+    surface = Surface(one.node[1], 1.0, one.zeta_1, 1.0, one.h_max)
+    gradient, theory = float(surface.rms_gradient), get_theory(name)
+    force, area = np.full(one.u.shape, np.nan), np.full(one.u.shape, np.nan)
+    # what the theory reaches
+    loads, low = one.force * gradient, np.asarray(theory.interval(surface)[0])
+    held = (one.u < one.h_max) & (one.area > EDGES[0]) & (loads < theory.answer(surface, np.maximum(low, LEAST)).force)
+    force[held] = Yielding(theory, one.eta * gradient).answer(surface, one.u[held]).force / gradient
+    area[held] = cap.area(one.force[held], theory.area_at(surface, loads[held]), one.eta, constants)
+    return {"force": np.log(force / one.force), "area": np.log(area / one.area)}
+
+
+def coverage(seen: Sequence[Capped], constants: cap.Constants, scatter: Scatter) -> dict[str, list[float]]:
+    """Shares of errors from 1% contact within one and two of the stated standard deviations, by theory and quantity."""
+    told: dict[str, list[float]] = {}
+    for name in (*FORMS, *OTHERS):
+        own = [one for one in seen if name in FORMS or one.kind == "self_affine"]
+        for quantity in ("area", "force"):
+            sizes = []
+            for one in own:
+                kept = (one.area > LIGHTEST) & (one.area < EDGES[-1])
+                known = calibrated_table.shipped().standard_deviation(name, quantity, one.area)
+                sigma = scatter.standard_deviation(name, quantity, np.array(one.eta), one.area, known)
+                sizes.append((np.abs(told_errors(one, name, constants)[quantity]) / sigma)[kept])
+            size = np.concatenate(sizes)
+            told[f"{name} {quantity}"] = [float(np.mean(size[np.isfinite(size)] < limit)) for limit in (1, 2)]
+    return told
 
 
 def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[cap.Constants, xr.Dataset]:
     """Fit, test, and write the group of the library's file."""
-    found = read(evidence)
+    found = capped(evidence)
     plain = [one for one in found if one.kind in GAUSSIAN]
     training = [one for one in plain if one.split == TRAINING]
     constants = fit(training)
     groups = {split: [one for one in plain if one.split == split] for split in SPLITS[:3]}
+    groups["three_waves"] = [one for one in plain if one.split != TRAINING and one.waves >= WAVES]
     groups["stretched"] = [one for one in found if one.kind == "stretched"]
     groups = {name: own for name, own in groups.items() if own}
     etas = sorted({one.eta for one in found})
     unit = {"units": "1"}
-    told = accuracy(groups, constants)
+    left_out = cross_validated(training)
+    rms = {
+        form: np.array(
+            [
+                by_contact(
+                    training,
+                    [errors_of_law(one, form, own)[q] for one, own in zip(training, left_out, strict=True)],
+                    etas,
+                )
+                for q in QUANTITIES
+            ]
+        )
+        for form in (*FORMS, ELASTIC)
+    }
+    weights = {
+        q: by_contact(training, [weight_of_elastic(one, q, constants) for one in training], etas)
+        for q in ("area", "force")
+    }
+    contact = np.sqrt(np.multiply(EDGES[1:], EDGES[:-1]))
+    held_out = [one for one in plain if one.split != TRAINING]
+    covered = coverage(held_out, constants, Scatter(np.array(etas), np.log(contact), rms, weights))
     data = xr.Dataset(
         {
             "accuracy": (
                 ("set", "form", "quantity", "statistic"),
-                told,
+                accuracy(groups, constants),
                 {"long_name": "statistics of ln(law/simulation), of the difference for the yielded share", **unit},
             ),
             "stated_scatter": (
-                ("form", "quantity", "hardness", "contact"),
-                stated(training, constants, etas),
-                {"long_name": "root mean square of ln(law/simulation) on the training set", **unit},
+                ("theory", "quantity", "hardness", "contact"),
+                np.array([*rms.values()]),
+                {
+                    "long_name": "root mean square of ln(law/simulation) on the training set, by constants from other "
+                    "spectra; of the theory elastic with the simulated elastic contact",
+                    **unit,
+                },
+            ),
+            "elastic_weight": (
+                ("force_or_area", "hardness", "contact"),
+                np.array([*weights.values()]),
+                {"long_name": "root mean square of d ln(area, force) by d ln of the elastic one", **unit},
             ),
             "eta": ("hardness", etas, {"long_name": "p_m/(E* g)", **unit}),
             "contact": (
                 "contact",
-                np.sqrt(np.multiply(EDGES[1:], EDGES[:-1])),
+                contact,
                 {"long_name": "A/A0, middle of a bin", **unit},
             ),
         },
@@ -244,7 +269,8 @@ def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[ca
             "references": "docs/yield.md",
             "comment": f"accuracy: contacts from {LIGHTEST:g} to {EDGES[-1]:g}; bars {json.dumps(BARS)}. area, yielded "
             "and stiffness of the frozen contact at equal force, force at equal mean gap",
-            "theories": " ".join(FORMS),
+            "theories": " ".join(rms),
+            "coverage": json.dumps(covered),
             "quantities": " ".join(QUANTITIES),
             "statistics": " ".join(STATISTICS),
             "sets": " ".join(groups),
@@ -272,4 +298,14 @@ def lines(constants: cap.Constants, data: xr.Dataset) -> list[str]:
                     f"  {name:18s} {form:8s} {quantity:9s} {bias:+.3f} ± {spread:.3f}, {share:.1%} of {count:.0f} "
                     f"within {BARS[quantity]:.2f}, largest {largest:.2f}"
                 )
+    for quantity, e in blind().items():
+        size = np.abs(e)
+        told.append(
+            f"  {'another code':18s} h_max    {quantity:9s} {e.mean():+.3f} ± {e.std():.3f}, "
+            f"{np.mean(size < BARS[quantity]):.1%} of {e.size} within {BARS[quantity]:.2f}, largest {size.max():.2f}"
+        )
+    told += [
+        f"  held-out errors of {name} within one and two standard deviations: {one:.1%}, {two:.1%}"
+        for name, (one, two) in json.loads(data.attrs["coverage"]).items()
+    ]
     return told

@@ -8,11 +8,11 @@ from typing import Any, cast
 import numpy as np
 import xarray as xr
 
-from generate.boundary_elements.design import SPLITS
+from generate.boundary_elements.evidence import Simulated, simulated
 from generate.calibrated_table import TheoryCurve
 from mbma_tables import leakage
 from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import Constants, Law, Spectrum
+from mbma_tables.calibrated import Constants, Law
 from mbma_tables.leakage import FlowConstants
 from mbma_tables.theories.registry import get_theory
 from mbma_tables.theories.yielding import Yielding
@@ -27,16 +27,9 @@ def log_odds(area: FloatArray, threshold: float) -> FloatArray:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Case:
+class Case(Simulated):
     """One surface, and the flow through it: `log_k` of the geometric mean of both axes, where neither is blocked."""
 
-    kind: str
-    split: str
-    node: tuple[float | str, ...]
-    waves: int
-    zeta_1: float
-    spectrum: Spectrum
-    h_max: float
     force: FloatArray
     area: FloatArray
     u: FloatArray
@@ -61,38 +54,18 @@ class Case:
 
 def cases(data: xr.Dataset) -> list[Case]:
     """Surfaces of a file by `python -m generate leakage`."""
-    kinds = data.kind.attrs["flag_meanings"].split()
     found = []
-    for number in range(data.sizes["surface"]):
-        one = data.isel(surface=number)
-        kind, share = kinds[int(one.kind)], one.band_variance.values
-        if kind in ("self_affine", "yielded"):
-            spectrum = Spectrum.self_affine(float(one.hurst), float(one.zeta_1))
-        else:
-            spectrum = Spectrum.from_shares(one.band_q.values[share > 0], share[share > 0])
+    for one, fields in simulated(data):
         flow, known = one.flow.values, np.isfinite(one.force.values)
         blocked = (flow[known] == 0).mean(axis=1)
         kept = known.copy()
         kept[known] = blocked == 0
         with np.errstate(divide="ignore"):
-            log_flow = np.log(flow)
-        found.append(
-            Case(
-                kind,
-                SPLITS[int(one.split)],
-                (kind, float(one.hurst), float(one.zeta_1), int(one.waves), float(one["shape"])),
-                int(one.waves),
-                float(one.zeta_1),
-                spectrum,
-                float(one.h_max),
-                one.force.values[kept],
-                one.area.values[kept],
-                one.mean_separation.values[kept],
-                log_flow[kept].mean(axis=1),
-                log_flow[kept] @ [1.0, -1.0],
-                np.stack([one.area.values[known], blocked]),
-            )
-        )
+            log_flow = np.log(flow[kept])
+        loads = (one[name].values for name in ("force", "area", "mean_separation"))
+        own = log_flow.mean(axis=1), log_flow @ [1.0, -1.0], np.stack([one.area.values[known], blocked])
+        parts: list[Any] = [*fields, *(load[kept] for load in loads), *own]
+        found.append(Case(*parts))
     return found
 
 

@@ -66,16 +66,17 @@ def project(p: FloatArray, mean: float, cap: float) -> FloatArray:
 
 @dataclasses.dataclass
 class CappedContact:
-    """A periodic map of sides 1 against a rigid plane; each load starts from the pressures of the one before."""
+    """A periodic map against a rigid plane; each load starts from the pressures of the one before."""
 
     surface: FloatArray
+    sizes: tuple[float, float]
     cap: float
     tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
         self.surface = self.surface - self.surface.mean()
         self.h_rms = float(self.surface.std())
-        q = np.hypot(*wavevectors(self.surface.shape, (1.0, 1.0)))
+        q = np.hypot(*wavevectors(self.surface.shape, self.sizes))
         self._compliance = np.divide(2.0, q, out=np.zeros_like(q), where=q > 0)
         self._stiffness = q / 2
         self.pressure: FloatArray | None = None
@@ -210,7 +211,7 @@ def simulate_capped(recipe: Recipe) -> dict[str, Any]:
     found = np.empty((len(QUANTITIES), len(HARDNESSES), len(AREAS)))
     forces = np.array([[load_at(area, eta) for area in AREAS] for eta in HARDNESSES])
     for row, eta in enumerate(HARDNESSES):
-        contact = CappedContact(surface, eta)
+        contact = CappedContact(surface, recipe.sizes, eta)
         for column, force in enumerate(forces[row]):
             result = contact.press(force)
             result["frozen_stiffness"] = contact.frozen_stiffness()

@@ -1,26 +1,33 @@
-"""Surfaces of the evidence, as laws are fitted to them and tested on them."""
+"""Surfaces of the evidence, with or without a hardness, as laws are fitted to them and tested on them."""
 
 from __future__ import annotations
 
 import dataclasses
+import functools
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.interpolate import PchipInterpolator
+from scipy.special import erf, erfinv
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, SPLITS, TRAINING
+from mbma_tables import hardness
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import Constants, Law, Spectrum
 from mbma_tables.calibrated_map import MapConstants, MapLaw
+from mbma_tables.theories.calibrated_curves import Curve
 
 GAUSSIAN = ("self_affine", "plateau", "filtered")
 MIN_WAVES = 2  # constants see no surface of one longest wave a side
 MAX_AREA = 0.98  # beyond, gaps are a few points
+LEVELS = np.geomspace(1e-5, 1.0, 400)  # u/h_max of a law's curve
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Case:
-    """One simulated surface: what laws may know of it, and what was found."""
+class Simulated:
+    """One simulated surface, and what laws may know of it."""
 
     kind: str
     split: str
@@ -30,6 +37,17 @@ class Case:
     spectrum: Spectrum
     own_spectrum: Spectrum
     h_max: float
+
+    @property
+    def zeta_1(self) -> float:
+        """q1/q0."""
+        return float(self.node[2])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Case(Simulated):
+    """With what else is known of its map, and what was found."""
+
     curves: dict[str, Any]
     force: FloatArray
     area: FloatArray
@@ -49,35 +67,110 @@ class Case:
         return MapLaw(self.own_spectrum, **self.curves, constants=constants, map_constants=map_constants)
 
 
-def cases(data: xr.Dataset) -> list[Case]:
-    """Surfaces of a file by `python -m generate boundary_elements`, refinements left out."""
+def simulated(data: xr.Dataset) -> Iterator[tuple[xr.Dataset, tuple[Any, ...]]]:
+    """Surfaces of a file by `python -m generate`, refinements left out, and the fields of `Simulated`."""
     kinds = data.kind.attrs["flag_meanings"].split()
-    found = []
     for number in range(data.sizes["surface"]):
         one = data.isel(surface=number)
         if (split := SPLITS[int(one.split)]) not in (TRAINING, HELD_OUT_SURFACE, HELD_OUT_SPECTRUM):
             continue
         kind, hurst, zeta_1 = kinds[int(one.kind)], float(one.hurst), float(one.zeta_1)
         share, x = one.band_variance.values, one.band_q.values
-        plain = kind == "self_affine"
+        own = Spectrum.from_shares(x[share > 0], share[share > 0])
+        spectrum = Spectrum.self_affine(hurst, zeta_1) if kind in ("self_affine", "yielded") else own
+        node = (kind, hurst, zeta_1, int(one.waves), float(one["shape"]))
+        yield one, (kind, split, node, int(one.waves), int(one.points), spectrum, own, float(one.h_max))
+
+
+def curves_of(one: xr.Dataset) -> dict[str, Any]:
+    """What a map's law knows of a surface beside its spectrum."""
+    names = ("mean_height", "top_gradient", "tension_force", "tension")
+    return {name: one[name].values.astype(float) for name in names} | {"anisotropy": float(one.anisotropy)}
+
+
+def cases(data: xr.Dataset) -> list[Case]:
+    """Surfaces of a file by `python -m generate boundary_elements`, refinements left out."""
+    found = []
+    for one, known in simulated(data):
         seen = np.isfinite(one.force.values) & (one.area.values > 0) & (one.area.values < MAX_AREA)
-        curves: dict[str, Any] = {
-            name: one[name].values.astype(float) for name in ("mean_height", "top_gradient", "tension_force", "tension")
+        loads = (one[name].values[seen] for name in ("force", "area", "mean_separation"))
+        parts: list[Any] = [*known, curves_of(one), *loads]
+        found.append(Case(*parts))
+    return found
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Capped(Simulated):
+    """One surface at one hardness: what was found, and the elastic contact of the same surface, simulated and by laws.
+
+    Loads are in rows as simulated; `bare` has the surface's forces, areas, mean gaps and stiffnesses if elastic.
+    `curves` have force, stiffness and Q of each form of the elastic law at `LEVELS`.
+    """
+
+    eta: float
+    law: Law
+    map_curve: Curve
+    heights: hardness.BearingCurve
+    curves: dict[str, tuple[FloatArray, FloatArray, FloatArray]]
+    force: FloatArray
+    area: FloatArray
+    yielded: FloatArray
+    u: FloatArray
+    planes: FloatArray
+    frozen: FloatArray
+    bare: dict[str, FloatArray]
+
+    @functools.cached_property
+    def elastic_area(self) -> FloatArray:
+        """Simulated, at these forces."""
+        known = PchipInterpolator(np.log(self.bare["force"]), np.log(erfinv(self.bare["area"])))
+        return np.asarray(erf(np.exp(known(np.log(self.force)))))
+
+    @functools.cached_property
+    def elastic(self) -> tuple[FloatArray, FloatArray]:
+        """Simulated force and stiffness at these gaps; by the law, fitted at its end, where not pressed so far."""
+        u, found = self.bare["mean_separation"], []
+        laws = self.by_law, self.law.force_and_stiffness(u[-1:])
+        for name, beyond, end in zip(("force", "frozen_stiffness"), *laws, strict=True):
+            known = PchipInterpolator(u[::-1], np.log(self.bare[name][::-1]))
+            inside = np.exp(known(np.maximum(self.u, u[-1])))
+            found.append(np.where(self.u > u[-1], inside, beyond * self.bare[name][-1] / end[0]))
+        return found[0], found[1]
+
+    @functools.cached_property
+    def by_law(self) -> tuple[FloatArray, FloatArray]:
+        """Elastic force and stiffness at these gaps, by the spectrum's law."""
+        return self.law.force_and_stiffness(self.u)
+
+    @functools.cached_property
+    def elastic_areas(self) -> dict[str, FloatArray]:
+        """At these forces, by each form of the law."""
+        return {"calibrated": self.law.area(self.force), "calibrated_map": self.map_curve.area(self.force)}
+
+    @functools.cached_property
+    def shares(self) -> tuple[FloatArray, FloatArray]:
+        """Q at these gaps, of the surface's heights and of Gaussian ones up to h_max."""
+        return self.heights(self.u)[0], hardness.bearing_share(self.u, self.h_max)[0]
+
+
+def capped(data: xr.Dataset) -> list[Capped]:
+    """Surfaces of a file by `python -m generate boundary_elements --hardness`, refinements left out."""
+    found = []
+    names = ("force", "area", "area_yielded", "mean_separation", "plane_separation", "frozen_stiffness")
+    for one, known in simulated(data):
+        own, spectrum, h_max = Simulated(*known), known[5], known[7]
+        curves, u = curves_of(one), h_max * LEVELS[:-1]
+        law, by_map = Law(spectrum, h_max), Curve(MapLaw(own.own_spectrum, **curves), h_max)
+        heights = hardness.BearingCurve(curves["mean_height"], h_max)
+        force, _, stiffness = by_map.answer(u)
+        levels = {
+            "calibrated": (*law.force_and_stiffness(u), hardness.bearing_share(u, h_max)[0]),
+            "calibrated_map": (force, stiffness, heights(u)[0]),
         }
-        curves["anisotropy"] = float(one.anisotropy)
-        own_spectrum = Spectrum.from_shares(x[share > 0], share[share > 0])
-        found.append(
-            Case(
-                kind,
-                split,
-                (kind, hurst, zeta_1, int(one.waves), float(one["shape"])),
-                int(one.waves),
-                int(one.points),
-                Spectrum.self_affine(hurst, zeta_1) if plain else own_spectrum,
-                own_spectrum,
-                float(one.h_max),
-                curves,
-                *(one[name].values[seen] for name in ("force", "area", "mean_separation")),
-            )
-        )
+        rows = {name: one[name].values.astype(float) for name in names}
+        elastic = {name: values[-1] for name, values in rows.items()}
+        for row, eta in enumerate(data.eta.values[:-1]):
+            loads = (rows[name][row] for name in names)
+            parts: list[Any] = [*known, float(eta), law, by_map, heights, levels, *loads, elastic]
+            found.append(Capped(*parts))
     return found

@@ -36,7 +36,10 @@ def solve_flow(recipe: Recipe) -> dict[str, Any]:
     contact: Contact | CappedContact = Contact(surface, recipe.sizes)
     loads: tuple[float, ...] = FEW_LOADS if recipe.points >= LARGE else LOADS
     if recipe.kind == "yielded":
-        contact, loads = CappedContact(surface, recipe.shape), tuple(load_at(area, recipe.shape) for area in AREAS)
+        contact, loads = (
+            CappedContact(surface, recipe.sizes, recipe.shape),
+            tuple(load_at(area, recipe.shape) for area in AREAS),
+        )
     rows, flows, forces = [], [], []
     for force in loads:
         result = contact.press(force)

@@ -85,12 +85,14 @@ class Table:
         """Root mean square of ln(theory/simulation) at contact fractions; NaN where not known."""
         if theory not in self.scatter:
             return np.full(np.shape(area), np.nan)
-        row = self.scatter[theory][QUANTITIES.index(quantity)]
-        known = np.isfinite(row)
-        with np.errstate(divide="ignore"):
-            # NaN where the theory reached no such contact in the data
-            found = np.interp(np.log(area), self.log_area[known], row[known], right=np.nan if not known[-1] else None)
-        return np.asarray(np.exp(found))
+        return np.asarray(np.exp(at_contact(self.log_area, self.scatter[theory][QUANTITIES.index(quantity)], area)))
+
+
+def at_contact(log_area: FloatArray, row: FloatArray, area: FloatArray) -> FloatArray:
+    """Numbers known at some contact fractions at others; NaN above the last one with a number."""
+    known = np.isfinite(row)
+    with np.errstate(divide="ignore"):
+        return np.interp(np.log(area), log_area[known], row[known], right=None if known[-1] else np.nan)
 
 
 def load(path: pathlib.Path) -> Table:

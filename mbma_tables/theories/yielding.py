@@ -7,8 +7,9 @@ pressures capped at the hardness. u is the mean gap, points that yield flattened
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,13 +19,54 @@ from mbma_tables import hardness as law
 from mbma_tables.arguments import FloatArray, checked_hardness, describe_entries
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories.hardness_table import shipped
+from mbma_tables.theories.calibrated_table import at_contact, shipped_part
 from mbma_tables.theories.protocol import Theory, TheoryAnswer, select
 
+GROUP = "hardness"  # of the calibrated laws' file
+QUANTITIES = ("area", "yielded", "force", "stiffness")
 TESTED_ETA = 0.025  # p_m/(E* g) down to which boundary elements were solved
 STEPS = 200
 LOWEST = 1e-300
 MAX_LEVEL = 37.0  # of heights over h_rms above which shares are no normal numbers
+
+
+class Scatter(NamedTuple):
+    """Errors of contacts with a hardness against boundary elements, from the calibrated laws' file."""
+
+    eta: FloatArray  # p_m/(E* g), rising
+    log_area: FloatArray  # ln of contact fractions
+    rms: dict[str, FloatArray]  # of ln(theory/simulation), by theory; rows `QUANTITIES`, hardnesses, contact fractions
+    weight: dict[str, FloatArray]  # d ln of force and of area by d ln of the elastic one; hardnesses, contact fractions
+
+    def _at(self, rows: FloatArray, eta: FloatArray, area: FloatArray) -> FloatArray:
+        """At hardnesses and contact fractions, held constant beyond those simulated."""
+        shape = np.broadcast_shapes(np.shape(eta), np.shape(area))
+        values = np.array([at_contact(self.log_area, row, np.broadcast_to(area, shape)) for row in rows])
+        y = np.interp(np.log(np.broadcast_to(eta, shape)), np.log(self.eta), np.arange(self.eta.size))
+        below = np.minimum(y.astype(int), self.eta.size - 2)
+        low, high = (np.take_along_axis(values, k[None], 0)[0] for k in (below, below + 1))
+        return np.asarray(low + (high - low) * (y - below))
+
+    def standard_deviation(
+        self, theory: str, quantity: str, eta: FloatArray, area: FloatArray, elastic: FloatArray
+    ) -> FloatArray:
+        """Of ln of the theory over simulation; where not measured, from that of the `elastic` theory and the law's."""
+        row = QUANTITIES.index(quantity)
+        if theory in self.rms:
+            found = self._at(self.rms[theory][row], eta, area)
+        else:
+            passed_on = elastic * self._at(self.weight[quantity], eta, area)
+            found = np.hypot(passed_on, self._at(self.rms["elastic"][row], eta, area))
+        return np.where(eta > self.eta[-1], elastic, found)
+
+
+@functools.cache
+def shipped() -> Scatter:
+    """The shipped file's, read once."""
+    variables, attributes = shipped_part(GROUP)
+    known = zip(str(attributes["theories"]).split(), variables["stated_scatter"], strict=True)
+    weights = dict(zip(("area", "force"), variables["elastic_weight"], strict=True))
+    return Scatter(variables["eta"], np.log(variables["contact"]), dict(known), weights)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -196,15 +238,15 @@ class Yielding(Theory):
         return np.where(np.isinf(self.hardness), above, np.where(force > 0, u, high))
 
     def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Standard deviations of ln F at given u and of ln A at given F against boundary elements with a hardness."""
+        """Standard deviations of ln F at given u and of ln A at given F against boundary elements with a hardness.
+
+        Those of the calibrated law are measured; others are what the elastic theory's become, and the hardness law's
+        own beside it. NaN where the elastic theory's is not known.
+        """
+        eta, table, name = self.hardness / np.asarray(surface.rms_gradient), shipped(), self.scatter_name(surface)
         force, contact = self.elastic.scatter(surface, area)
-        eta = self.hardness / np.asarray(surface.rms_gradient)
-        table = shipped()
-        known = [
-            table.standard_deviation(self.scatter_name(surface), quantity, eta, area) for quantity in ("force", "area")
-        ]
-        elastic = eta > table.eta[-1]
-        return np.where(elastic, force, known[0]), np.where(elastic, contact, known[1])
+        found = table.standard_deviation(name, "force", eta, area, force)
+        return found, table.standard_deviation(name, "area", eta, area, contact)
 
     def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """The elastic theory's reasons, and hardnesses below those that were simulated."""
