@@ -29,8 +29,10 @@ PAGES = (
     "islands",
     "leakage",
     "maps",
+    "readme",
     "stability",
     "tables",
+    "ten_minutes",
     "theories",
     "yield",
 )
@@ -47,7 +49,7 @@ def fill(text: str, parts: Mapping[str, str]) -> str:
 
 def write(name: str, parts: Mapping[str, str], files: Mapping[str, bytes], out: pathlib.Path) -> list[pathlib.Path]:
     """Write a page and its files below a folder; returns their paths."""
-    page = f"docs/{name}.md"
+    page = "README.md" if name == "readme" else f"docs/{name}.md"
     text = fill((ROOT / page).read_text(encoding="utf-8"), parts)
     written = []
     for place, content in {page: text.encode(), **files}.items():
@@ -72,6 +74,17 @@ def pyplot() -> Any:
     from matplotlib import pyplot as plt
 
     return plt
+
+
+def picture(figure: Any) -> bytes:
+    """A pyplot figure as the content of an SVG file, the same bytes for the same figure; closes it."""
+    from matplotlib import pyplot
+
+    from mbma_tables.plots import to_picture
+
+    content = to_picture(figure, "svg")
+    pyplot.close(figure)
+    return content
 
 
 def png(figure: Any, **options: Any) -> bytes:

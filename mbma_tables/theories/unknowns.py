@@ -12,9 +12,12 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, finite_array, hinted
 from mbma_tables.errors import InputError
+from mbma_tables.models import AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.theories.contact import KNOWN, contact
+from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.units import Units, modulus_and_units, unit_of
 
 STEP = 0.02  # of the logarithm of a parameter
@@ -85,7 +88,10 @@ def sensitivity(
     area: ArrayLike | None = None,
     E_star: float | str = 1.0,
     ranges: Mapping[str, tuple[Any, Any]] | None = None,
-    **options: Any,
+    theory: str | Theory | UserTheory = "mbma",
+    tier: str | AnyModel = "universal",
+    reading: str | Reading = "reported",
+    rtol: float = 1e-8,
 ) -> Sensitivity:
     """How much each number of a surface matters to force, area, stiffness and conductance, by any theory.
 
@@ -100,8 +106,8 @@ def sensitivity(
         Effective modulus, as for `contact`.
     ranges : mapping of pairs, optional
         Between what a parameter may lie: {"hurst": (0.6, 0.9), "h_max": ("2 um", "4 um")}.
-    **options
-        theory, tier, reading, rtol: as for `contact`.
+    theory, tier, reading, rtol : optional
+        As for `contact`.
 
     Returns
     -------
@@ -123,6 +129,7 @@ def sensitivity(
     >>> f"stiffness {low:.3g} to {high:.3g} {unit_of('stiffness', found.units)}"
     'stiffness 0.0885 to 0.094 GPa/um'
     """
+    options: Any = {"theory": theory, "tier": tier, "reading": reading, "rtol": rtol}
     known = {"separation": separation, "mean_separation": mean_separation, "pressure": pressure, "area": area}
     held = {name: value for name, value in known.items() if value is not None}
     if len(held) != 1:
