@@ -47,7 +47,7 @@ MAX_EXACT = 2**53
 MAP_NOTE = (
     "By the map's spectrum and h_max alone: in Python the calibrated law goes by its heights, too, and is nearer."
 )
-MAX_SAMPLES = 1000  # of a spectrum, for a step of a slider to stay short
+MAX_SAMPLES = 500  # of a spectrum, for a step of a slider to stay short
 
 
 def page_file(name: str) -> bytes:
@@ -195,7 +195,7 @@ def explorer_page(
     Raises
     ------
     InputError
-        For a batch, a spectrum of more than 1,000 samples or with MBMA, an unknown theory or reading.
+        For a batch, a spectrum of more than 500 samples or with MBMA, an unknown theory or reading.
 
     Examples
     --------
