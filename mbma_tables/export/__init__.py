@@ -3,5 +3,15 @@
 # the targets, in the order in which help lists them
 SOLVERS = ("calculix", "abaqus", "lsdyna", "optistruct", "comsol", "moose", "modelica")  # functions of `solvers`
 DATA = ("csv", "json", "matlab", "netcdf", "hdf5", "parquet")  # functions of `data`, named to_csv and so on
-LAWS = ("c-law", "fortran-law", "javascript-law", "python-law", "jax-law", "matlab-law")  # keys of `law_code.LANGUAGES`
+LAWS = (
+    "c-law",
+    "fortran-law",
+    "javascript-law",
+    "python-law",
+    "jax-law",
+    "matlab-law",
+    "abaqus-uinter",
+    "abaqus-gapcon",
+    "calculix-gapcon",
+)  # keys of `law_code.LANGUAGES`
 CODE = ("c", "fortran", "javascript")  # keys of `code.LANGUAGES`

@@ -23,8 +23,8 @@ class Language(NamedTuple):
     """How a law is written in one language.
 
     `call` is a function's call with {name}, {what} and {x}; `number` writes a float, `arrays` the polynomials by the
-    names of their places in the template, `conductance` the
-    function of that name with {ratio}, also by places.
+    names of their places in the template, `conductance` the function of that name with {ratio}, also by places.
+    `subroutine` is the template of a solver's user subroutine that calls the law, `parts` what is filled in there.
     """
 
     template: str
@@ -34,6 +34,9 @@ class Language(NamedTuple):
     number: Callable[[float], str]
     arrays: Callable[[LawNumbers], dict[str, str]]
     conductance: dict[str, str]
+    subroutine: str = ""
+    parts: tuple[tuple[str, str], ...] = ()
+    only_conductance: bool = False
 
 
 def law_text(
@@ -83,7 +86,7 @@ def law_text(
     if target not in LANGUAGES:
         raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
     language, name = LANGUAGES[target], checked_name(name, MAX_NAME)
-    conducts = conductivity is not None or conductivity_unit is not None
+    conducts = language.only_conductance or conductivity is not None or conductivity_unit is not None
     k_s, k_unit = checked_conductivity(conductivity, conductivity_unit) if conducts else (0.0, "")
     joint = frozen_joint(surface, E_star, length_unit, stress_unit, reading, theory, hardness)
     if conducts and joint.hardness < math.inf:
@@ -96,14 +99,15 @@ def law_text(
         "RECORDS": str(numbers.centre.size),
         "STEP": str(1 << (numbers.centre.size - 1).bit_length() - 1),
         "ENDS": str(int(numbers.ends)),
-        "CONDUCTANCE": "",
-        "PROTOTYPE": "",
+        **dict.fromkeys(("CONDUCTANCE", "PROTOTYPE", "PUBLIC", "FLUX", "SUBROUTINE"), ""),
         **{scalar.upper(): language.number(getattr(numbers, scalar)) for scalar in SCALARS},
         **language.arrays(numbers),
     }
     if conducts:
         ratio = language.number(k_s / joint.modulus)
         parts |= {place: text.format(name=name, ratio=ratio) for place, text in language.conductance.items()}
+    if language.subroutine:
+        parts["SUBROUTINE"] = filled(language.subroutine, **parts | dict(language.parts))
     return filled(language.template, **parts)
 
 
@@ -177,7 +181,7 @@ def _data(numbers: LawNumbers) -> dict[str, str]:
         for name, row in (("p_", force), ("a_", area)):
             text = wrapped(map(_fortran_number, row), "    ", " &")
             lines.append(f"  data ({name}(k_, {k}), k_ = 0, 8) / &\n{text} /")
-    return {"DATA": "\n".join(lines), "PUBLIC": "", "SUBROUTINE": ""}
+    return {"DATA": "\n".join(lines)}
 
 
 def _lines(rows: FloatArray, begin: str, end: str) -> str:
@@ -203,6 +207,29 @@ def conductance(c{given}):
 
 """
 NAN = "Outside the range: NaN."
+FORTRAN = Language(
+    "law.f90",
+    "!",
+    f"Fortran 2008: gfortran -c {{name}}.f90, then use {{name}}; functions are elemental, of real(real64). {NAN}",
+    "{what}({x})",
+    _fortran_number,
+    _data,
+    {
+        "PUBLIC": ", conductance",
+        "CONDUCTANCE": "\n  elemental function conductance(c) result(h)\n    real(dp), intent(in) :: c\n"
+        "    real(dp) :: h\n    h = {ratio}*tangent(c)\n  end function conductance\n",
+    },
+)
+FLUX = """  if (p > 0) then
+    flux = [1, -1]*conductance(c)*(temp(2) - temp(1))
+    ddfddt = conductance(c)*reshape([1, -1, -1, 1], [2, 2])
+    ddfddr(:, 1) = flux/slope*curvature(c)
+  end if
+"""
+READ = (
+    "Written from the manual's list of arguments and called with it by a program of the tests; not run in the solver."
+)
+GAPCON = FORTRAN._replace(subroutine="gapcon.f90", only_conductance=True)
 LANGUAGES = {
     "c-law": Language(
         "law.c",
@@ -216,19 +243,7 @@ LANGUAGES = {
             "CONDUCTANCE": "\ndouble {name}_conductance(double c) {{ return {ratio}*{name}_tangent(c); }}\n",
         },
     ),
-    "fortran-law": Language(
-        "law.f90",
-        "!",
-        f"Fortran 2008: gfortran -c {{name}}.f90, then use {{name}}; functions are elemental, of real(real64). {NAN}",
-        "{what}({x})",
-        _fortran_number,
-        _data,
-        {
-            "PUBLIC": ", conductance",
-            "CONDUCTANCE": "\n  elemental function conductance(c) result(h)\n    real(dp), intent(in) :: c\n"
-            "    real(dp) :: h\n    h = {ratio}*tangent(c)\n  end function conductance\n",
-        },
-    ),
+    "fortran-law": FORTRAN,
     "javascript-law": Language(
         "law.mjs",
         "/*",
@@ -266,5 +281,22 @@ LANGUAGES = {
         _with_infinity("-Inf"),
         _matrices,
         {"CONDUCTANCE": "\n    kept.conductance = @(c) {ratio}*kept.tangent(c);"},
+    ),
+    "abaqus-uinter": FORTRAN._replace(
+        usage="*SURFACE INTERACTION, NAME=..., USER: abaqus job=... user={name}.f90. Place the bodies so that their "
+        "surfaces touch where the mean planes are h_max apart. Beyond the law's range the increment is tried again "
+        f"with a smaller step. Without friction. {READ} Arguments: Abaqus 2017, user subroutines, UINTER.",
+        conductance=FORTRAN.conductance | {"FLUX": FLUX},
+        subroutine="uinter.f90",
+    ),
+    "abaqus-gapcon": GAPCON._replace(
+        usage="*GAP CONDUCTANCE, USER: abaqus job=... user={name}.f90, beside a table of pressures. A pressure beyond "
+        f"the law's range stops the program. {READ} Arguments: Abaqus 6.5 to 2017, user subroutines, GAPCON.",
+        parts=(("SOLVER", "Abaqus/Standard"), ("MORE", ""), ("DECLARED", "")),
+    ),
+    "calculix-gapcon": GAPCON._replace(
+        usage="*GAP CONDUCTANCE, USER: in place of gapcon.f in the sources of CalculiX, which is then built anew. A "
+        f"pressure beyond the law's range stops the program. {READ} Arguments: CalculiX 2.7 to 2.20, gapcon.f.",
+        parts=(("SOLVER", "CalculiX"), ("MORE", ", &\n  area_"), ("DECLARED", ", area_")),
     ),
 }

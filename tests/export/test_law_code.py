@@ -16,6 +16,8 @@ import numpy as np
 import pytest
 from law_points import ASKED, CONDUCTIVITY, needs, points
 
+from mbma_tables import InputError
+
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion", "-Wshadow")
 HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
 
@@ -256,3 +258,122 @@ def test_matlab(name: str, tmp_path: pathlib.Path) -> None:
     said = run("octave-cli", "--quiet", "--no-init-file", "ask.m", folder=asked(name, tmp_path), last_words=OCTAVE_ENDS)
     assert said.startswith("road: overclosure must be in [")
     assert_answers(name, tmp_path)
+
+
+UINTER = """program ask
+  use, intrinsic :: iso_fortran_env, only: dp => real64
+  implicit none
+  integer, parameter :: ndir = 3, nstatv = 2, npred = 1, nprops = 1, mcrd = 3
+  real(dp) :: stress(ndir), ddsddr(ndir, ndir), amki(ndir, ndir), amski(ndir, ndir), flux(2), ddfddt(2, 2), &
+    ddsddt(ndir, 2), ddfddr(2, ndir), statev(nstatv), sed, sfd, spd, svd, scd, pnewdt, rdisp(ndir), drdisp(ndir), &
+    temp(2), dtemp(2), predef(2, npred), dpred(2, npred), time(2), props(nprops), coords(mcrd), alocaldir(3, 3), &
+    drot(2, 2), c
+  integer :: lopenclose, lstate, lsdi, status
+  character(len=80) :: ciname, slname, msname
+  open (10, file="c.txt")
+  open (11, file="values.txt")
+  temp = [20.0_dp, 120.0_dp]
+  do
+    read (10, *, iostat=status) c
+    if (status /= 0) exit
+    rdisp = [c, 1.0_dp, 1.0_dp]
+    stress = -1
+    ddsddr = -1
+    pnewdt = 1d36
+    lopenclose = -1
+    call uinter(stress, ddsddr, amki, amski, flux, ddfddt, ddsddt, ddfddr, statev, sed, sfd, spd, svd, scd, pnewdt, &
+      rdisp, drdisp, temp, dtemp, predef, dpred, time, 1d0, 0d0, ciname, slname, msname, props, coords, alocaldir, &
+      drot, 1d0, 1d0, 7, ndir, nstatv, npred, nprops, mcrd, 1, 1, 1, 0, lopenclose, lstate, lsdi, 0)
+    write (11, "(12es25.16e3, i3)") stress(1), ddsddr(1, 1), sed, flux, ddfddt, ddfddr(:, 1), &
+      sum(abs(stress(2:))) + sum(abs(ddsddr(2:, :))) + sum(abs(ddsddr(1, 2:))) + min(pnewdt, 1d0), lopenclose
+  end do
+end program
+"""
+SOLVER_WARNINGS = ("-std=f2008", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wno-unused-dummy-argument")
+
+
+def called(target: str, program: str, name: str, folder: pathlib.Path, asked: np.ndarray) -> np.ndarray:
+    """What a subroutine answers, called from a program with its solver's list of arguments; its list decides what
+    goes unused."""
+    (folder / "road.f90").write_text(law_points.text(target, name, name="road", **HEAT))
+    (folder / "ask.f90").write_text(program)
+    np.savetxt(folder / "c.txt", asked, "%.17g")
+    run("gfortran", *SOLVER_WARNINGS, "-fcheck=all", "-O1", "road.f90", "ask.f90", "-o", "ask", folder=folder)
+    run("./ask", folder=folder)
+    return np.loadtxt(folder / "values.txt").T
+
+
+@needs("gfortran")
+@pytest.mark.parametrize("name", ["mbma", "calibrated"])
+def test_abaqus_uinter(name: str, tmp_path: pathlib.Path) -> None:
+    known = points(name)
+    c = np.concatenate([known.c, [0.0, -1e-3, -1e36, 5.0]])
+    p, slope, energy, flux_1, flux_2, *others, opened = called("abaqus-uinter", UINTER, name, tmp_path, c)
+    inside, out = slice(known.c.size), slice(known.c.size, None)
+    known.assert_equal(p[inside], slope[inside], known.area, energy[inside])
+    by_temperature, by_gap, rest = np.array(others[:4]), others[4:6], others[6]
+    heat = CONDUCTIVITY / 13.3 * known.tangent
+    np.testing.assert_allclose(by_temperature[:, inside], np.outer([1, -1, -1, 1], heat), rtol=1e-11)
+    np.testing.assert_allclose(flux_1[inside], 100 * heat, rtol=1e-11)
+    assert (flux_1 == -flux_2).all()
+    assert (by_gap[0] == -by_gap[1]).all()
+    # the flux by the gap: differences of the library's slopes
+    far = (known.c > 1e-3) & (known.c < 2.9)
+    step = 1e-5 * known.c[far]
+    slopes = [known.law.stiffness(known.law.h_max - 2 * (known.c[far] + by)) for by in (step, -step)]
+    difference = 100 * CONDUCTIVITY / 13.3 * (slopes[0] - slopes[1]) / step
+    scale = np.abs(flux_1[inside] / known.c)[far]
+    assert np.quantile(np.abs(by_gap[0][inside][far] - difference) / scale, 0.99) < 1e-5
+    # no shear and no hint of a smaller step, but beyond the law, where the increment is to be tried again
+    assert (rest == [*np.ones(known.c.size + 3), 0.25]).all()
+    assert (opened == [*np.ones(known.c.size), 0, 0, 0, 1]).all()
+    assert (p[out][:3] == 0).all()
+
+
+GAPCON = """program ask
+  use, intrinsic :: iso_fortran_env, only: dp => real64
+  implicit none
+  real(dp) :: ak(5), d(2), flowm(2), temp(2), predef(2, 1), time(2), coords(3), p
+  integer :: status
+  character(len=80) :: ciname, slname, msname
+  open (10, file="c.txt")
+  open (11, file="values.txt")
+  do
+    read (10, *, iostat=status) p
+    if (status /= 0) exit
+    d = [0.0_dp, p]
+    call gapcon(ak, d, flowm, temp, predef, time, ciname, slname, msname, coords, 1, 2, 1, 1, 1AREA)
+    write (11, "(5es25.16e3)") ak
+  end do
+end program
+"""
+
+
+@needs("gfortran")
+@pytest.mark.parametrize(("target", "more"), [("abaqus-gapcon", ""), ("calculix-gapcon", ", 1d0")])
+@pytest.mark.parametrize("name", ["mbma", "calibrated"])
+def test_gapcon(target: str, more: str, name: str, tmp_path: pathlib.Path) -> None:
+    law = points(name).law
+    pressure = np.geomspace(1e-9, 0.9, 2000) * points(name).pressures().max()
+    found = called(target, GAPCON.replace("AREA", more), name, tmp_path, np.concatenate([pressure, [0.0, -1.0]]))
+    # as the library's law inverts and differentiates
+    np.testing.assert_allclose(found[0, :-2], CONDUCTIVITY / 13.3 * law.at_pressure(pressure).stiffness, rtol=1e-11)
+    step = 1e-5 * pressure
+    above, below = (law.at_pressure(pressure + by).stiffness for by in (step, -step))
+    difference = CONDUCTIVITY / 13.3 * (above - below) / (2 * step)
+    scale = found[0, :-2] / pressure
+    assert np.quantile(np.abs(found[2, :-2] - difference) / scale, 0.99) < 1e-5
+    assert (found[[1, 3, 4]] == 0).all()
+    assert (found[:, -2:] == 0).all()
+
+
+@pytest.mark.parametrize("target", ["abaqus-gapcon", "calculix-gapcon"])
+def test_conductance_needs_a_conductivity(target: str) -> None:
+    with pytest.raises(InputError, match="conductance needs conductivity"):
+        law_points.text(target, "mbma")
+    with pytest.raises(InputError, match="leave conductivity or hardness out"):
+        law_points.text(target, "hardened", **HEAT)
+    with pytest.raises(InputError, match="target must be one of"):
+        law_points.text("cobol-law", "mbma")
+    with pytest.raises(InputError, match="a name must be a letter"):
+        law_points.text("c-law", "mbma", name="1 x")
