@@ -19,9 +19,10 @@ def leave_plain():
     numba.config.DISABLE_JIT = 1
     numba.vectorize = lambda signatures, **options: lambda function: np.vectorize(function, otypes=[float])
 
+    from mbma_tables import elementary
     from mbma_tables.tablefiles import interpolate
     from mbma_tables.theories import law_kernel
-    from mbma_tables.totals import intervals, profile_kernel
+    from mbma_tables.totals import intervals
 
     def as_type(source, target):
         return lambda value: struct.unpack(target, struct.pack(source, value % 2**64 if source == "Q" else value))[0]
@@ -29,8 +30,8 @@ def leave_plain():
     # these are made of instructions
     law_kernel.number = lambda address, word: ctypes.c_double.from_address(int(address) + 8 * int(word)).value
     law_kernel.whole = lambda address, word: ctypes.c_int64.from_address(int(address) + 8 * int(word)).value
-    law_kernel.bits_of = profile_kernel.bits_of = as_type("d", "q")
-    profile_kernel.float_of = as_type("Q", "d")
+    law_kernel.bits_of = elementary.bits_of = as_type("d", "q")
+    elementary.float_of = as_type("Q", "d")
     interpolate.load_lanes = lambda array, offset: tuple(array[offset : offset + 8])
     interpolate.add_lanes = lambda total, weight, lanes: tuple(
         a + weight * b for a, b in zip(total, lanes, strict=True)

@@ -38,6 +38,8 @@ SMALL = (
     "contact(Surface.named('concrete'), 0.4).valid",
     "contact(Surface.named('concrete'), [0.4, 0.2]).stiffness",
     "contact(Surface.named('concrete'), pressure=1e-4).area",
+    "contact(Surface.named('concrete'), pressure=1e-4, theory='calibrated').stiffness",
+    "contact(Surface.named('concrete'), 0.4, theory='persson').stiffness",
     "island(Surface.named('concrete'), 0.4)",
     "Scene(Surface.named('concrete'), effects=['force', 'area'], separations=[0.4, 0.2]).run()",
 )

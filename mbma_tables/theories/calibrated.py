@@ -60,15 +60,12 @@ class Calibrated(Theory):
         table, places = calibrated_table.shipped(), Places(surface, mean_separation)
         u = places.flat / places.h_rms
         require("mean_separation", places.flat.reshape(places.shape), u.reshape(places.shape) >= 0, "at least 0")
-        out = np.empty((3, u.size))
         covered = places.covered(table)[places.owner]
         if covered.all():
-            calibrated_table.fill(table.coefficients, table.numbers, places.rows, places.owner, u, out)
+            out = table.fill(places.rows, places.owner, u)
         else:
-            some, number = np.flatnonzero(covered), places.owner
-            inside = np.empty((3, some.size))
-            calibrated_table.fill(table.coefficients, table.numbers, places.rows, number[some], u[some], inside)
-            out[:, some] = inside
+            out, some = np.empty((3, u.size)), np.flatnonzero(covered)
+            out[:, some] = table.fill(places.rows, places.owner[some], u[some])
             for row, mine in places.outside(~covered):
                 out[:, mine] = by_law(places.law(row), u[mine])
         force, area, stiffness = out
@@ -94,11 +91,7 @@ class Calibrated(Theory):
         u = np.empty(loads.size)
         covered = places.covered(table)[places.owner] & (loads > 0)
         some = np.flatnonzero(covered)
-        inside = np.empty(some.size)
-        calibrated_table.fill_separation(
-            table.coefficients, table.numbers, places.rows, places.owner[some], loads[some], inside
-        )
-        u[some] = inside
+        u[some] = table.separations(places.rows, places.owner[some], loads[some])
         for row, mine in places.outside(~covered):
             u[mine] = np.where(loads[mine] > 0, places.law(row).separation(np.maximum(loads[mine], 1e-300)), np.inf)
         require(quantity, np.broadcast_to(wanted, places.shape), ~np.isnan(u).reshape(places.shape), "less: u is 0")

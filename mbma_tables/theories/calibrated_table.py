@@ -14,20 +14,24 @@ import pathlib
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import Constants
-from mbma_tables.compiled import njit
+from mbma_tables.compiled import CONTRACT, jitable, njit
+from mbma_tables.elementary import exp, expm1, log
 from mbma_tables.errors import TableFileError
 from mbma_tables.files import shipped_file
-from mbma_tables.tablefiles.interpolate import ZERO, Eight, add_lanes, cell, load_lanes, quintic, quintic_slope
+from mbma_tables.tablefiles.interpolate import PART, Eight, Six, cell, patch_lanes, quintic
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, read_sealed
 
 NAME = "calibrated.nc"
 AXES = ("hurst", "log_zeta_1", "log_separation")
 QUANTITIES = ("area", "force", "stiffness")
 MAX_STEPS = 100
+SMALL = 256  # separations up to which numpy answers, without a compiler
 MIN_SHARED = 32  # separations a surface from which its coefficients in ln u are worth summing
+TINY = 1e-300
 MAX_LOG_SEPARATION = 690.0  # -ln u at which full contact is taken as reached
 
 _FAST = {"contract", "reassoc"}
@@ -52,7 +56,7 @@ class Table:
     covered : numpy.ndarray, shape (3, 2)
         First and last that are answered.
     coefficients : numpy.ndarray
-        Quintic B-splines of ln F_G, the last axis with two zeros more.
+        Quintic B-splines of ln F_G in single precision, the last axis with two zeros more.
     constants : Constants
         Of the law.
     error : float
@@ -75,6 +79,75 @@ class Table:
     def covers(self, hurst: FloatArray, log_zeta_1: FloatArray) -> Any:
         """Which surfaces lie inside the table."""
         return covers(self.covered, hurst, log_zeta_1)
+
+    def fill(self, surfaces: FloatArray, owner: NDArray[np.intp], u: FloatArray) -> FloatArray:
+        """Force, area and -dF/du, shape (3, n), of separations u [h_rms] on the surfaces `owner`; see `fill`."""
+        if u.size <= SMALL:
+            return self._few(surfaces[owner], u)
+        out = np.empty((3, u.size))
+        fill(self.coefficients, self.numbers, surfaces, owner, u, out)
+        return out
+
+    def separations(self, surfaces: FloatArray, owner: NDArray[np.intp], force: FloatArray) -> FloatArray:
+        """Mean separations [h_rms] at forces F/(A0 E* g) > 0; NaN where they lie beyond the table."""
+        if force.size <= SMALL:
+            return self._few_separations(surfaces[owner], force)
+        out = np.empty(force.size)
+        fill_separation(self.coefficients, self.numbers, surfaces, owner, force, out)
+        return out
+
+    def _log_gaussian(self, own: FloatArray, log_u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """ln F_G and its derivative by ln u in numpy."""
+        places = np.stack([own[:, 0], own[:, 1], log_u]) - self.first[:, None]
+        sizes = np.array(self.coefficients.shape)[:, None] - np.array([[5], [5], [7]])
+        places = np.clip(places / self.step[:, None], 0.0, sizes)
+        (i, j, k) = cells = np.minimum(places.astype(np.intp), sizes - 1)
+        x, y, z = places - cells
+        weights, six = [quintic(x), quintic(y)], np.zeros((6, log_u.size))
+        for a, across in enumerate(weights[0]):
+            for b, along in enumerate(weights[1]):
+                six += across * along * self.coefficients[i + a, j + b, k + np.arange(6)[:, None]]
+        value, rate = quintic_at(polynomial_of(six, 0), z)
+        rate = rate / self.step[2]
+        last = self.first[2] + sizes[2] * self.step[2]
+        beyond, below = np.maximum(log_u - last, 0.0), np.minimum(log_u - self.first[2], 0.0)
+        growth, square = np.expm1(beyond), 1.0 + 2.0 * rate * below
+        value = value + rate * growth + 0.5 * np.log(np.where(below < 0, square, 1.0))
+        return value, rate * (growth + 1.0) / np.where(below < 0, square, 1.0)
+
+    def _few(self, own: FloatArray, u: FloatArray) -> FloatArray:
+        """`fill` in numpy."""
+        from scipy.special import erf
+
+        light, h_max = own[:, 2], own[:, 3]
+        held = np.clip(u, TINY, h_max)
+        value, rate = self._log_gaussian(own, np.log(held))
+        endless, end = np.exp(value), self._log_gaussian(own, np.log(h_max))[0]
+        force = -endless * np.expm1(end - value)
+        t = force / self.constants.area_t0
+        out = np.stack([force, erf(force * np.sqrt(2 * (1 + t) / (light + t))), -rate * endless / held])
+        out[:, u >= h_max] = 0.0
+        out[:, u <= 0] = np.array([[np.inf], [1.0], [np.inf]])
+        return out
+
+    def _few_separations(self, own: FloatArray, force: FloatArray) -> FloatArray:
+        """`fill_separation` in numpy."""
+        high, low = np.log(own[:, 3]), np.full(force.size, -MAX_LOG_SEPARATION)
+        end = self._log_gaussian(own, high)[0]
+        wanted, x = force * np.exp(-end), high - 0.5
+        beyond = end + np.log1p(wanted) > self._log_gaussian(own, low)[0]
+        for _ in range(MAX_STEPS):
+            value, rate = self._log_gaussian(own, x)
+            # as there
+            miss = np.log1p((np.expm1(value - end) - wanted) / (1.0 + wanted))
+            low, high = np.where(miss > 0, x, low), np.where(miss > 0, high, x)
+            following = x - miss / rate
+            following = np.where((low < following) & (following < high), following, 0.5 * (low + high))
+            done = np.abs(following - x) <= 4e-16 * np.maximum(1.0, np.abs(x))
+            x = following
+            if (done | (high - low <= 2e-16)).all():
+                break
+        return np.where(beyond, np.nan, np.exp(x))
 
     @functools.cached_property
     def numbers(self) -> FloatArray:
@@ -119,7 +192,7 @@ def load(path: pathlib.Path) -> Table:
         np.array([axis[0] for axis in axes]),
         np.array([(axis[-1] - axis[0]) / (axis.size - 1) for axis in axes]),
         covered,
-        np.pad(values["spline"], ((0, 0), (0, 0), (0, 2))),
+        np.pad(values["spline"].astype(np.float32), ((0, 0), (0, 0), (0, 2))),
         constants,
         error,
         {name: np.log(values["stated_scatter"][k]) for k, name in enumerate(names)},
@@ -154,95 +227,160 @@ def eight_of(c: FloatArray, numbers: FloatArray, hurst: float, log_zeta: float, 
     """Coefficients k to k + 7 in ln u of one surface."""
     i, x = cell((hurst - numbers[0]) * numbers[3], c.shape[0] - 4)
     j, y = cell((log_zeta - numbers[1]) * numbers[4], c.shape[1] - 4)
-    wx, wy = quintic(x), quintic(y)
-    flat = c.reshape(-1)
-    total = ZERO
-    for a in range(6):
-        start = ((i + a) * c.shape[1] + j) * c.shape[2] + k
-        for b in range(6):
-            total = add_lanes(total, wx[a] * wy[b], load_lanes(flat, start + b * c.shape[2]))
-    return total
+    start = (i * c.shape[1] + j) * c.shape[2] + k
+    eight: Eight = patch_lanes(c.reshape(-1), start, c.shape[1] * c.shape[2], c.shape[2], quintic(x), quintic(y))
+    return eight
+
+
+@jitable
+def polynomial_of(c: Any, first: int) -> Six:
+    """The quintic in z of a cell from its six coefficients of B-splines, which begin at `first`."""
+    c0, c1, c2, c3, c4, c5 = c[first], c[first + 1], c[first + 2], c[first + 3], c[first + 4], c[first + 5]
+    return (
+        (c0 + 26.0 * c1 + 66.0 * c2 + 26.0 * c3 + c4) * PART,
+        (-c0 - 10.0 * c1 + 10.0 * c3 + c4) * (5.0 * PART),
+        (c0 + 2.0 * c1 - 6.0 * c2 + 2.0 * c3 + c4) * (10.0 * PART),
+        (-c0 + 2.0 * c1 - 2.0 * c3 + c4) * (10.0 * PART),
+        (c0 - 4.0 * c1 + 6.0 * c2 - 4.0 * c3 + c4) * (5.0 * PART),
+        (-c0 + 5.0 * c1 - 10.0 * c2 + 10.0 * c3 - 5.0 * c4 + c5) * PART,
+    )
 
 
 @njit(cache=True, error_model="numpy")
-def lines_of(c: FloatArray, numbers: FloatArray, surfaces: FloatArray) -> FloatArray:
-    """All coefficients in ln u of each surface, with zeros behind: for many separations of few surfaces."""
-    lines = np.zeros((surfaces.shape[0], c.shape[2] + 8))
-    for row in range(surfaces.shape[0]):
-        for k in range(0, c.shape[2] - 7, 2):
-            eight = eight_of(c, numbers, surfaces[row, 0], surfaces[row, 1], k)
-            for n in range(8):
-                lines[row, k + n] = eight[n]
-    return lines
+def cells_of(c: FloatArray, numbers: FloatArray, surfaces: FloatArray) -> FloatArray:
+    """Quintics in all cells of ln u, shape (surfaces, cells, 6): for many separations of few surfaces."""
+    cells = np.empty((surfaces.shape[0], c.shape[2] - 7, 6))
+    for row in range(cells.shape[0]):
+        for k in range(cells.shape[1]):
+            if k % 3 == 0:
+                eight = eight_of(c, numbers, surfaces[row, 0], surfaces[row, 1], min(k, cells.shape[1] - 1))
+            # three cells have eight coefficients between them
+            own = polynomial_of(eight, k % 3)
+            for n in range(6):
+                cells[row, k, n] = own[n]
+    return cells
 
 
-@njit(cache=True, fastmath=_FAST, error_model="numpy", inline="always")
-def _log_gaussian(
-    c: FloatArray, numbers: FloatArray, surfaces: FloatArray, lines: FloatArray, row: int, log_u: float
-) -> tuple[float, float]:
-    """ln F_G and -d ln F_G/d ln u; from `lines` where there are any."""
-    nodes = c.shape[2] - 6
-    place = min(max((log_u - numbers[2]) * numbers[5], 0.0), nodes - 1.0)
-    k, z = cell(place, nodes)
-    if lines.shape[0] > 0:
-        line = lines[row]
-        c0, c1, c2, c3, c4, c5 = line[k], line[k + 1], line[k + 2], line[k + 3], line[k + 4], line[k + 5]
-    else:
-        c0, c1, c2, c3, c4, c5, _, _ = eight_of(c, numbers, surfaces[row, 0], surfaces[row, 1], k)
-    w0, w1, w2, w3, w4, w5 = quintic(z)
-    value = w0 * c0 + w1 * c1 + w2 * c2 + w3 * c3 + w4 * c4 + w5 * c5
-    w0, w1, w2, w3, w4, w5 = quintic_slope(z)
-    rate = w0 * c0 + w1 * c1 + w2 * c2 + w3 * c3 + w4 * c4 + w5 * c5
-    rate *= numbers[5]
-    beyond = log_u - (numbers[2] + (nodes - 1) / numbers[5])
-    below = log_u - numbers[2]
+@jitable
+def quintic_at(p: Any, z: Any) -> tuple[Any, Any]:
+    """A quintic and its derivative."""
+    value = p[0] + z * (p[1] + z * (p[2] + z * (p[3] + z * (p[4] + z * p[5]))))
+    return value, p[1] + z * (2.0 * p[2] + z * (3.0 * p[3] + z * (4.0 * p[4] + z * 5.0 * p[5])))
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _beyond(value: float, rate: float, log_u: float, numbers: FloatArray, last: float) -> tuple[float, float]:
+    """ln F_G and its derivative by ln u beyond an end of the table, from those at the end."""
+    beyond, below = log_u - (numbers[2] + last / numbers[5]), log_u - numbers[2]
     if beyond > 0.0:
         growth = math.expm1(beyond)
-        value, rate = value + rate * growth, rate * (growth + 1.0)
-    elif below < 0.0:
+        return value + rate * growth, rate * (growth + 1.0)
+    if below < 0.0:
         square = 1.0 + 2.0 * rate * below
-        value, rate = value + 0.5 * math.log(square), rate / square
-    return value, -rate
+        return value + 0.5 * math.log(square), rate / square
+    return value, rate
+
+
+@njit(cache=True, fastmath=_FAST, error_model="numpy")
+def _log_gaussian(
+    c: FloatArray, numbers: FloatArray, surfaces: FloatArray, cells: FloatArray, row: int, log_u: float
+) -> tuple[float, float]:
+    """ln F_G and d ln F_G/d ln u; from `cells` where there are any."""
+    last = c.shape[2] - 7.0
+    k, z = cell(min(max((log_u - numbers[2]) * numbers[5], 0.0), last), c.shape[2] - 6)
+    if cells.shape[0] > 0:
+        value, rate = quintic_at(cells[row, k], z)
+    else:
+        value, rate = quintic_at(polynomial_of(eight_of(c, numbers, surfaces[row, 0], surfaces[row, 1], k), 0), z)
+    return _beyond(value, rate * numbers[5], log_u, numbers, last)
+
+
+@njit(cache=True, fastmath=_FAST, error_model="numpy", forceinline=True)
+def _log_gaussian_twice(
+    c: FloatArray, numbers: FloatArray, hurst: float, log_zeta: float, log_u: float, log_end: float
+) -> tuple[float, float, float]:
+    """ln F_G, its derivative by ln u and ln F_G(h_max) of a surface that is asked once: its weights serve both."""
+    last = c.shape[2] - 7.0
+    k, z = cell(min(max((log_u - numbers[2]) * numbers[5], 0.0), last), c.shape[2] - 6)
+    m, t = cell(min(max((log_end - numbers[2]) * numbers[5], 0.0), last), c.shape[2] - 6)
+    i, x = cell((hurst - numbers[0]) * numbers[3], c.shape[0] - 4)
+    j, y = cell((log_zeta - numbers[1]) * numbers[4], c.shape[1] - 4)
+    wx, wy = quintic(x), quintic(y)
+    flat, row, start = c.reshape(-1), c.shape[1] * c.shape[2], (i * c.shape[1] + j) * c.shape[2]
+    near = patch_lanes(flat, start + k, row, c.shape[2], wx, wy)
+    far = patch_lanes(flat, start + m, row, c.shape[2], wx, wy)
+    value, rate = quintic_at(polynomial_of(near, 0), z)
+    end, end_rate = quintic_at(polynomial_of(far, 0), t)
+    value, rate = _beyond(value, rate * numbers[5], log_u, numbers, last)
+    return value, rate, _beyond(end, end_rate * numbers[5], log_end, numbers, last)[0]
 
 
 @njit(cache=True, error_model="numpy")
 def _prepared(c: FloatArray, numbers: FloatArray, surfaces: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
-    """Lines, empty where there are too few separations for them, and ln F_G(h_max) of each surface."""
+    """Cells, empty where there are too few separations for them, and ln F_G(h_max) of each surface."""
     few = count < MIN_SHARED * surfaces.shape[0]
-    lines = lines_of(c, numbers, surfaces[:0] if few else surfaces)
+    cells = cells_of(c, numbers, surfaces[:0] if few else surfaces)
     ends = np.empty(surfaces.shape[0])
     for row in range(ends.size):
-        h_max = surfaces[row, 3]
-        ends[row] = _log_gaussian(c, numbers, surfaces, lines, row, math.log(h_max))[0]
-    return lines, ends
+        ends[row] = _log_gaussian(c, numbers, surfaces, cells, row, math.log(surfaces[row, 3]))[0]
+    return cells, ends
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
+def _answer(value: float, rate: float, end: float, u: float) -> tuple[float, float]:
+    """Force and stiffness of ln F_G, its derivative, and ln F_G(h_max); without cancellation."""
+    endless = exp(value)
+    return -endless * expm1(end - value), -rate * endless / u
+
+
+@njit(cache=True, fastmath=CONTRACT, error_model="numpy")
+def _run(cells: FloatArray, numbers: FloatArray, end: float, h_max: float, u: FloatArray, out: FloatArray) -> None:
+    """Force and stiffness of separations of one surface inside the table, in a loop that vectorises."""
+    first, rate, last = numbers[2], numbers[5], cells.shape[0] - 1
+    for n in range(u.size):
+        held = min(max(u[n], TINY), h_max)
+        place = (log(held) - first) * rate
+        k = min(max(int(place), 0), last)
+        z = place - k
+        value, slope = quintic_at(cells[k], z)
+        out[0, n], out[2, n] = _answer(value, slope * rate, end, held)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def fill(c: FloatArray, numbers: FloatArray, surfaces: FloatArray, owner: Any, u: FloatArray, out: FloatArray) -> None:
     """Force, area and -dF/du of mean separations u [h_rms] into the columns of `out`.
 
     `surfaces` has a row of Hurst exponent, ln zeta_1, s0 and h_max/h_rms for each surface, `owner` its number for
     each separation.
     """
-    lines, ends = _prepared(c, numbers, surfaces, u.size)
-    t0, floors = numbers[6], np.exp(ends)
+    single = u.size < MIN_SHARED * surfaces.shape[0]
+    cells, ends = _prepared(c, numbers, surfaces[:0] if single else surfaces, u.size)
+    low, high = math.exp(numbers[2]), math.exp(numbers[2] + (c.shape[2] - 7.0) / numbers[5])
+    begin = 0
+    while begin < u.size and not single:
+        row, stop = owner[begin], begin + 1
+        while stop < u.size and owner[stop] == row:
+            stop += 1
+        _run(cells[row], numbers, ends[row], surfaces[row, 3], u[begin:stop], out[:, begin:stop])
+        begin = stop
     for n in range(u.size):
         row = owner[n]
-        light, h_max, end = surfaces[row, 2], surfaces[row, 3], ends[row]
+        light, h_max = surfaces[row, 2], surfaces[row, 3]
         if u[n] >= h_max:
             out[0, n] = out[1, n] = out[2, n] = 0.0
-        elif u[n] <= 0.0:
+            continue
+        if u[n] <= 0.0:
             out[0, n], out[1, n], out[2, n] = np.inf, 1.0, np.inf
-        else:
-            value, rate = _log_gaussian(c, numbers, surfaces, lines, row, math.log(u[n]))
-            endless = math.exp(value)
-            excess = value - end
-            # where both are close their difference loses digits
-            force = endless - floors[row] if excess > 0.01 else -endless * math.expm1(-excess)
-            t = force / t0
-            out[0, n] = force
-            out[1, n] = math.erf(force * math.sqrt(2.0 * (1.0 + t) / (light + t)))
-            out[2, n] = rate * endless / u[n]
+            continue
+        if single:
+            log_u, log_end = math.log(u[n]), math.log(h_max)
+            value, slope, end = _log_gaussian_twice(c, numbers, surfaces[row, 0], surfaces[row, 1], log_u, log_end)
+            out[0, n], out[2, n] = _answer(value, slope, end, u[n])
+        elif not low < u[n] < high:
+            value, slope = _log_gaussian(c, numbers, surfaces, cells, row, math.log(u[n]))
+            out[0, n], out[2, n] = _answer(value, slope, ends[row], u[n])
+        t = out[0, n] / numbers[6]
+        out[1, n] = math.erf(out[0, n] * math.sqrt(2.0 * (1.0 + t) / (light + t)))
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
@@ -250,24 +388,24 @@ def fill_separation(
     c: FloatArray, numbers: FloatArray, surfaces: FloatArray, owner: Any, force: FloatArray, out: FloatArray
 ) -> None:
     """Mean separations [h_rms] at forces F/(A0 E* g) > 0: Newton's method in ln u, in a bracket; NaN if beyond it."""
-    lines, ends = _prepared(c, numbers, surfaces, force.size)
+    cells, ends = _prepared(c, numbers, surfaces, force.size)
     for n in range(force.size):
         row = owner[n]
         end, high, low = ends[row], math.log(surfaces[row, 3]), -MAX_LOG_SEPARATION
         wanted = force[n] * math.exp(-end)
-        if not end + math.log1p(wanted) <= _log_gaussian(c, numbers, surfaces, lines, row, low)[0]:
+        if not end + math.log1p(wanted) <= _log_gaussian(c, numbers, surfaces, cells, row, low)[0]:
             out[n] = np.nan
             continue
         x = high - 0.5
         for _ in range(MAX_STEPS):
-            value, rate = _log_gaussian(c, numbers, surfaces, lines, row, x)
+            value, rate = _log_gaussian(c, numbers, surfaces, cells, row, x)
             # in ln(F + F_G(h_max)), which is smooth to the end
             miss = math.log1p((math.expm1(value - end) - wanted) / (1.0 + wanted))
             if miss > 0.0:
                 low = x
             else:
                 high = x
-            following = x + miss / rate
+            following = x - miss / rate
             if not low < following < high:
                 following = 0.5 * (low + high)
             done = abs(following - x) <= 4e-16 * max(1.0, abs(x))

@@ -22,7 +22,7 @@ from numba.extending import intrinsic
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import CONTRACT, njit
-from mbma_tables.totals.profile_kernel import bits_of
+from mbma_tables.elementary import bits_of
 
 DEGREE = 8
 CENTRE, RATE, FORCE_AT, AREA_AT, ENERGY_AT = 0, 1, 2, 3 + DEGREE, 4 + 2 * DEGREE

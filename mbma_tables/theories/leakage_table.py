@@ -18,8 +18,16 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import Spectrum
 from mbma_tables.compiled import njit
 from mbma_tables.leakage import FlowConstants, contact_factor
-from mbma_tables.tablefiles.interpolate import cell, quintic, quintic_slope
-from mbma_tables.theories.calibrated_table import MIN_SHARED, covers, eight_of, lines_of, shipped_part
+from mbma_tables.tablefiles.interpolate import cell
+from mbma_tables.theories.calibrated_table import (
+    MIN_SHARED,
+    cells_of,
+    covers,
+    eight_of,
+    polynomial_of,
+    quintic_at,
+    shipped_part,
+)
 
 GROUP = "leakage"
 AXES = ("hurst", "log_zeta_1", "log_odds")
@@ -104,7 +112,7 @@ def fill_flow(
 ) -> None:
     """k of mean gaps [h_rms] and contact fractions; 0 where blocked. Rows of `surfaces` begin with H and ln zeta_1."""
     shared = u.size >= MIN_SHARED * surfaces.shape[0]
-    lines = lines_of(c, numbers, surfaces if shared else surfaces[:0])
+    cells = cells_of(c, numbers, surfaces if shared else surfaces[:0])
     nodes, threshold = c.shape[2] - 6, numbers[6]
     last = nodes - 1.0
     for n in range(u.size):
@@ -121,15 +129,11 @@ def fill_flow(
         k, z = cell(inside, nodes)
         row = owner[n]
         if shared:
-            line = lines[row]
-            c0, c1, c2, c3, c4, c5 = line[k], line[k + 1], line[k + 2], line[k + 3], line[k + 4], line[k + 5]
+            value, slope = quintic_at(cells[row, k], z)
         else:
-            c0, c1, c2, c3, c4, c5, _, _ = eight_of(c, numbers, surfaces[row, 0], surfaces[row, 1], k)
-        w0, w1, w2, w3, w4, w5 = quintic(z)
-        value = w0 * c0 + w1 * c1 + w2 * c2 + w3 * c3 + w4 * c4 + w5 * c5
+            value, slope = quintic_at(polynomial_of(eight_of(c, numbers, surfaces[row, 0], surfaces[row, 1], k), 0), z)
         if place > last:
-            w0, w1, w2, w3, w4, w5 = quintic_slope(z)
-            value += (place - last) * (w0 * c0 + w1 * c1 + w2 * c2 + w3 * c3 + w4 * c4 + w5 * c5)
+            value += (place - last) * slope
         elif place < 0.0:
             value *= math.exp(numbers[7] * place / numbers[5])
         out[n] = cube * math.exp(min(value, 0.0))

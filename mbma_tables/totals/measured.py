@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import REORDER, njit
+from mbma_tables.elementary import exp
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.islands.measured import floors_of, measured_islands, s_over_h_rms
 from mbma_tables.models import AnyModel, answer_islands
@@ -27,7 +28,6 @@ from mbma_tables.surfaces.power_laws import Place
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
 from mbma_tables.totals.kernel import island_density, jacobian_below
-from mbma_tables.totals.profile_kernel import exp_of_negative
 
 RATIO = 1.25  # between the ends of a panel
 STEP = 0.5  # of a panel, in the least standard deviation of islands' heights
@@ -298,7 +298,7 @@ def _add_nodes(
         a = b = c = d = e = slope_a = slope_b = 0.0
         for j in range(starts[k], stops[k]):
             height = shift[j] - rate[j] * depth[k]
-            share = exp_of_negative(-0.5 * height * height)
+            share = exp(-0.5 * height * height)
             turned = share * height * rate[j]
             a += share * columns[0, j]
             b += share * columns[1, j]

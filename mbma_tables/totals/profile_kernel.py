@@ -5,64 +5,15 @@ Sums run over nodes in one order whatever the batch, so that a gap has one answe
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import CONTRACT, Instruction, njit
+from mbma_tables.compiled import CONTRACT, njit
+from mbma_tables.elementary import exp
 
 ORDER = 16  # Gauss nodes of a panel
 ENDS = 12  # Gauss-Jacobi nodes of the panel at delta = 0
 WEIGHT_FORCE, WEIGHT_AREA, SHIFT, RATE = range(4)
-
-_ROUND = 6755399441055744.0  # 1.5 2^52: adding it rounds to a whole number
-_LOG2E = 1.4426950408889634
-_LN2_HIGH, _LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10
-_LEAST = -700.0  # below it an exponential counts as this one's
-
-
-def _reinterpret(made: str) -> Any:
-    """A compiled function that takes the bits of a number for one of another type."""
-
-    def define(typing: Any, value: Any) -> Any:
-        from numba import types
-
-        kind = getattr(types, made)
-        return kind(value), lambda context, builder, signature, given: builder.bitcast(
-            given[0], context.get_value_type(kind)
-        )
-
-    return Instruction(define)
-
-
-bits_of = _reinterpret("int64")
-float_of = _reinterpret("float64")
-
-
-@njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
-def exp_of_negative(y: float) -> float:
-    """exp(y) for y <= 0 within 3e-16, without a branch."""
-    held = max(y, _LEAST)
-    shifted = held * _LOG2E + _ROUND
-    power = shifted - _ROUND
-    r = (held - power * _LN2_HIGH) - power * _LN2_LOW
-    p = 1.0 / 6227020800.0
-    p = p * r + 1.0 / 479001600.0
-    p = p * r + 1.0 / 39916800.0
-    p = p * r + 1.0 / 3628800.0
-    p = p * r + 1.0 / 362880.0
-    p = p * r + 1.0 / 40320.0
-    p = p * r + 1.0 / 5040.0
-    p = p * r + 1.0 / 720.0
-    p = p * r + 1.0 / 120.0
-    p = p * r + 1.0 / 24.0
-    p = p * r + 1.0 / 6.0
-    p = p * r + 0.5
-    p = p * r + 1.0
-    p = p * r + 1.0
-    value: float = float_of(bits_of(p) + (bits_of(shifted) << 52))
-    return value
 
 
 @njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
@@ -89,7 +40,7 @@ def _add_node(
     """One node's share of force and area at gaps whose compression is beyond the panel."""  # fmt: skip
     for k in range(compression.size):
         height = shift - rate * compression[k]
-        share = exp_of_negative(-0.5 * height * height)
+        share = exp(-0.5 * height * height)
         force[k] += weight_F * share
         area[k] += weight_A * share
 
@@ -112,7 +63,7 @@ def _add_cut_node(
         width = compression[k] - low
         place = scale * width * node - 1.0
         height = _series_at(shift, place) - _series_at(rate, place) * compression[k]
-        share = width * exp_of_negative(-0.5 * height * height)
+        share = width * exp(-0.5 * height * height)
         force[k] += weight_F * share * _series_at(of_force, place)
         area[k] += weight_A * share * _series_at(of_area, place)
 

@@ -394,3 +394,27 @@ def test_what_is_told_of_a_measured_surface():
     assert any("anisotropy is 6, tested from 1 to 4.1" in told for told in contact(stretched, area=0.05).reasons)
     flat = Surface(hurst=0.8, q0=0.02, q1=1.28, h_rms=1.5, h_max=4.95)
     assert contact(flat.sampled(), area=0.05, theory="calibrated").valid
+
+
+def test_few_separations_in_numpy_are_those_of_compiled_loops():
+    table, rng, n = shipped(), np.random.default_rng(3), 250
+    rows = np.stack(
+        [
+            rng.uniform(0.1, 1, n),
+            rng.uniform(np.log(3), np.log(1e5), n),
+            rng.uniform(0.5, 0.9, n),
+            rng.uniform(2, 12, n),
+        ]
+    ).T
+    u = rows[:, 3] * np.concatenate([rng.uniform(0, 0.99, 150), 10 ** rng.uniform(-9, -1, 96), [0, 1, 1.5, 1e-300]])
+    few = table.fill(rows, np.arange(n), u)
+    # a surface at a time, with its cells made and without
+    for repeated in (2, 40):
+        many = table.fill(rows, np.repeat(np.arange(n), repeated), np.repeat(u, repeated))
+        np.testing.assert_allclose(few, many[:, ::repeated], rtol=1e-11)
+    known = np.flatnonzero((few[0] > 0) & (few[0] < 1e3))
+    found = table.separations(rows, known, few[0, known])
+    np.testing.assert_allclose(found, u[known], rtol=1e-9)
+    np.testing.assert_allclose(
+        found, table.separations(rows, np.tile(known, 3), np.tile(few[0, known], 3))[: known.size]
+    )
