@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import csv
 import ctypes
+import dataclasses
 import importlib.util
 import re
 import shutil
@@ -336,33 +337,36 @@ def test_a_page_of_a_spectrum_begins_with_it(opened, tmp_path):
     tab.context.close()
 
 
+def compiled_law(path):
+    """The functions of a law in C at many overclosures."""
+    strict = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O1", "-shared", "-fPIC")
+    library = path.with_suffix(".so")
+    subprocess.run(["gcc", *strict, str(path), "-lm", "-o", str(library)], check=True)
+    law = ctypes.CDLL(str(library))
+    functions = {name: law[f"law_{name}"] for name in ("pressure", "tangent", "area")}
+    for function in functions.values():
+        function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
+    return lambda name, c: np.array([functions[name](float(value)) for value in c])
+
+
 @pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
-def test_the_law_as_c_is_the_theory(theory, visit, tmp_path):
+def test_the_law_as_c_is_the_theory_and_names_the_librarys_own(theory, visit, tmp_path):
     if shutil.which("gcc") is None:
         pytest.skip("not installed: gcc")
-    path = tmp_path / "rough_law.c"
-    path.write_text(download(visit(f"theory={theory}"), "#law"), encoding="ascii")
-    strict = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O1", "-shared", "-fPIC")
-    subprocess.run(["gcc", *strict, str(path), "-lm", "-o", str(tmp_path / "law.so")], check=True)
-    law = ctypes.CDLL(str(tmp_path / "law.so")).rough_law
-    law.argtypes = [ctypes.c_double, *[ctypes.POINTER(ctypes.c_double)] * 3]
-
-    def at(c: float) -> tuple[int, list[float]]:
-        out = [ctypes.c_double() for _ in range(3)]
-        return law(c, *map(ctypes.byref, out)), [value.value for value in out]
-
-    surface = Surface.named("concrete")
-    c = float(surface.h_max) * np.exp(np.random.default_rng(3).uniform(np.log(1e-4), np.log(0.99), 400))
-    answers = [at(float(value)) for value in c]
-    assert not any(status for status, _ in answers)
-    pressure, tangent, area = np.array([values for _, values in answers]).T
+    path, own = tmp_path / "page.c", tmp_path / "own.c"
+    path.write_text(download(visit(f"theory={theory}&h_rms=0.25"), "#law"), encoding="ascii")
+    law, surface = compiled_law(path), dataclasses.replace(Surface.named("concrete"), h_rms=0.25)
+    c = float(surface.h_max) * np.exp(np.random.default_rng(3).uniform(np.log(1e-4), np.log(0.99), 300))
     known = contact(surface, mean_separation=surface.h_max - c, E_star=13.3, theory=theory)
-    np.testing.assert_allclose(pressure, known.force, rtol=3e-8)
-    np.testing.assert_allclose(area, known.area, rtol=3e-8)
-    np.testing.assert_allclose(tangent, known.stiffness, rtol=3e-6)
-    assert at(-0.1) == (0, [0.0, 0.0, 0.0])
-    assert at(2.0)[0] == 1
-    assert np.isnan(at(2.0)[1]).all()
+    np.testing.assert_allclose(law("pressure", c), known.force, rtol=3e-8)
+    np.testing.assert_allclose(law("area", c), known.area, rtol=3e-8)
+    np.testing.assert_allclose(law("tangent", c), known.stiffness, rtol=3e-6)
+    assert np.isnan(law("pressure", [1e-6, 2.0])).all()
+    # the command in its header writes a law of the same functions
+    command = re.search(r"mbma export (c-law .* --out) law.c", path.read_text())
+    run("export", *command[1].split(), str(own))
+    np.testing.assert_allclose(compiled_law(own)("pressure", c[c > 1e-3]), law("pressure", c[c > 1e-3]), rtol=1e-6)
+    assert law("pressure", [-0.1, 0.0]).tolist() == [0.0, 0.0]
 
 
 def test_numbers_under_the_cursor_by_keyboard(visit):

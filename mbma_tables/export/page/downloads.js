@@ -77,20 +77,35 @@ function piecesOf(state) {
   return { pieces, largest, endless };
 }
 
+// What writes the same law in the library, under the same names.
+function commandOf(state) {
+  const numbers = ["hurst", "q0", "q1", "h_rms", "h_max", "E_star"].map((name) => `--${name.replace("_", "-")} ${state[name]}`);
+  const units = `${LENGTH ? ` --length-unit ${LENGTH}` : ""}${STRESS && !OVER_E ? ` --stress-unit ${STRESS}` : ""}`;
+  return state.samples
+    ? "mbma_tables.export.law_code.law_text of Surface.from_spectrum(q, C, h_max)"
+    : `mbma export c-law ${numbers.join(" ")}${units} --theory ${state.theory}${state.theory === "mbma" ? ` --reading ${state.reading}` : ""} --out law.c`;
+}
+
 function lawOf(state) {
   const { pieces, largest, endless } = piecesOf(state), count = pieces.length, terms = LAW_DEGREE + 1;
   const rows = (name) => pieces.map((piece) => `    {${piece[name].join(", ")}},`).join("\n");
   const facts = [
     ...factsOf(state),
     `largest relative errors against the theory at nine points of each piece: pressure ${largest.pressure.toExponential(1)}, area ${largest.area.toExponential(1)}, tangent ${largest.tangent.toExponential(1)}`,
-    `range: overclosures c = h_max - u from ${LAW_FROM} to ${LAW_TO} of h_max; ${endless ? "c <= 0 is not contact, though this theory has a force there" : "no contact up to c = 0"}; elsewhere there is no answer, only a status`,
-    "use: double p, dp_dc, A; if (rough_law(c, &p, &dp_dc, &A) == 0) ...   compile with cc -std=c99 -O2 -c; link with -lm",
+    `range: overclosures c = h_max - u from ${LAW_FROM} to ${LAW_TO} of h_max; ${endless ? "c <= 0 is not contact, though this theory has a force there" : "no contact up to c = 0"}; elsewhere the answer is NaN`,
+    "pressure, tangent dp/dc and area A/A0 against overclosure c; compile with cc -std=c99 -O2 -c, link with -lm",
+    `the library's own, nearer to it, with energy and the overclosure at a pressure: ${commandOf(state)}`,
   ];
   const ascii = (line) => line.replace(/\*\//g, "* /").replace(/[^\x20-\x7e]/g, (letter) => `\\u${letter.charCodeAt(0).toString(16).padStart(4, "0")}`);
   return `/*
 ${facts.map((line) => ` * ${ascii(line)}`).join("\n")}
  */
 #include <math.h>
+
+double law_pressure(double c);
+double law_tangent(double c);
+double law_with_tangent(double c, double *tangent); /* pressure and tangent in one pass */
+double law_area(double c);
 
 enum { PIECES = ${count}, TERMS = ${terms} };
 
@@ -105,28 +120,53 @@ static const double AREA[PIECES][TERMS] = {
 ${rows("area")}
 };
 
-/* Pressure, its derivative by c, and A/A0 at an overclosure c = h_max - u. Returns 0, or 1 outside of the range. */
-int rough_law(double c, double *pressure, double *tangent, double *area) {
-    const double x = ${endless ? "c" : "c > 0.0 ? log(c) : 0.0"};
-    double p = 0.0, slope = 0.0, a = 0.0;
+/* Piece of an overclosure and the place in it; -1 outside of the range. */
+static int place(double c, double *t) {
+    const double x = ${endless ? "c" : "c > 0.0 ? log(c) : -INFINITY"};
     int k = 0;
-    *pressure = *tangent = *area = c <= 0.0 ? 0.0 : NAN;
-    if (!(c > 0.0 && x >= PLACES[0][1] - PLACES[0][2] && x <= PLACES[PIECES - 1][0])) {
-        return c <= 0.0 ? 0 : 1;
+    if (!(x >= PLACES[0][1] - PLACES[0][2] && x <= PLACES[PIECES - 1][0])) {
+        return -1;
     }
     while (k < PIECES - 1 && x > PLACES[k][0]) {
         ++k;
     }
-    const double t = (x - PLACES[k][1]) / PLACES[k][2];
-    for (int n = TERMS - 1; n >= 0; --n) {
-        slope = slope * t + p;
-        p = p * t + PRESSURE[k][n];
-        a = a * t + AREA[k][n];
+    *t = (x - PLACES[k][1]) / PLACES[k][2];
+    return k;
+}
+
+/* exp of a polynomial, and its derivative by c. */
+static double quantity(const double powers[PIECES][TERMS], double c, double *slope) {
+    double t = 0.0, value = 0.0, rate = 0.0;
+    const int k = place(c, &t);
+    *slope = k < 0 && !(c <= 0.0) ? NAN : 0.0;
+    if (k < 0) {
+        return *slope;
     }
-    *pressure = exp(p);
-    *tangent = exp(p) * slope / ${endless ? "PLACES[k][2]" : "(PLACES[k][2] * c)"};
-    *area = exp(a);
-    return 0;
+    for (int n = TERMS - 1; n >= 0; --n) {
+        rate = rate * t + value;
+        value = value * t + powers[k][n];
+    }
+    value = exp(value);
+    *slope = value * rate / ${endless ? "PLACES[k][2]" : "(PLACES[k][2] * c)"};
+    return value;
+}
+
+double law_with_tangent(double c, double *tangent) { return quantity(PRESSURE, c, tangent); }
+
+double law_pressure(double c) {
+    double slope;
+    return quantity(PRESSURE, c, &slope);
+}
+
+double law_tangent(double c) {
+    double slope;
+    quantity(PRESSURE, c, &slope);
+    return slope;
+}
+
+double law_area(double c) {
+    double slope;
+    return quantity(AREA, c, &slope);
 }
 `;
 }

@@ -114,7 +114,7 @@ const say = (text) => (by("note").textContent = text);
 by("csv").addEventListener("click", () => save("contact.csv", csvOf(state, drawn), "text/csv"));
 by("law").addEventListener("click", () => {
   try {
-    save("rough_law.c", lawOf(state), "text/x-c");
+    save("law.c", lawOf(state), "text/x-c");
     say("");
   } catch (fault) {
     say(`No law was written: ${fault.message}.`);
