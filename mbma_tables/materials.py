@@ -20,6 +20,8 @@ from numpy.typing import ArrayLike
 from mbma_tables.arguments import broadcast_shape, finite_array, require
 from mbma_tables.errors import InputError
 
+ELASTIC_PSI = 1.1  # plasticity index E* g/p_m up to which elastic areas are within 5% of those with a hardness
+
 
 def effective_modulus(E1: ArrayLike, nu1: ArrayLike, E2: ArrayLike, nu2: ArrayLike) -> Any:
     """Effective modulus of two elastic bodies, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.

@@ -120,7 +120,7 @@ def metals() -> str:
         metal = materials.get(name)
         modulus = float(materials.effective_modulus(metal.E, metal.nu, metal.E, metal.nu))
         psi = [modulus * GRADIENT / hardness for hardness in metal.hardness]
-        limit = [1.1 * hardness / modulus for hardness in metal.hardness]
+        limit = [materials.ELASTIC_PSI * hardness / modulus for hardness in metal.hardness]
         spans = (metal.hardness, "g"), (metal.conductivity, "g"), (psi[::-1], ".1f"), (limit, ".3f")
         cells = (" to ".join(dict.fromkeys(format(number, form) for number in span)) for span, form in spans)
         rows.append([f"`{name}`", f"{metal.E:g}", *cells])
@@ -159,7 +159,7 @@ def draw() -> bytes:
         axis.axhspan(0.95, 1.05, color="tab:green", alpha=0.2, label="within 5%")
         axis.semilogx(psi, points, ".", color="grey", alpha=0.6, label="boundary elements, 1% to 10% contact")
         axis.semilogx(INDICES, line, label="law at 3% contact")
-        axis.axvline(1.1, color="black", linestyle=":")
+        axis.axvline(materials.ELASTIC_PSI, color="black", linestyle=":")
         axis.set_ylabel(label)
         axis.grid(True, alpha=0.3)
     axes[1].set_yscale("log")
@@ -168,7 +168,7 @@ def draw() -> bytes:
         metal = materials.get(name)
         modulus = float(materials.effective_modulus(metal.E, metal.nu, metal.E, metal.nu))
         axes[2].plot([modulus * GRADIENT / hardness for hardness in metal.hardness], [place, place], linewidth=6)
-    axes[2].axvline(1.1, color="black", linestyle=":")
+    axes[2].axvline(materials.ELASTIC_PSI, color="black", linestyle=":")
     axes[2].set_yticks(range(len(SHOWN)), [f"{name} on itself" for name in SHOWN], fontsize=8)
     axes[2].set_xlabel(f"psi = E* g/p_m; metals at rms gradient {GRADIENT:g}, hard to soft")
     return png(figure, dpi=120)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
+from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.scenes.effects import CORRELATIONS
 from mbma_tables.scenes.plan import Plan
 from mbma_tables.scenes.problem import Problem
@@ -89,9 +90,12 @@ def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
         "E_star": float(problem.E_star),
         "table_hashes": json.dumps(_hashes(problem, set(run.tiers.values()))),
     }
-    if problem.hardness is not None:
-        psi = problem.E_star * problem.surface.rms_gradient / problem.hardness
-        facts |= {"hardness": float(problem.hardness), "psi": float(psi)}
+    # psi times the hardness
+    stress = float(problem.E_star * problem.surface.rms_gradient)
+    if problem.hardness is None:
+        facts["elastic_hardness"] = stress / ELASTIC_PSI
+    else:
+        facts |= {"hardness": float(problem.hardness), "psi": stress / float(problem.hardness)}
     if run.reasons is not None:
         facts["reasons"] = json.dumps(run.reasons)
     numbers = ("hurst", "q0", "q1", "h_rms", "h_max")

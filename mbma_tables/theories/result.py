@@ -13,6 +13,7 @@ from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, checked_
 from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
 from mbma_tables.labels import apply_to_surface
+from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.plots import Curve, draw_compression, force_label, theory_label
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
@@ -43,7 +44,6 @@ MEANINGS = {
     "area_scatter": "standard deviation of ln A at this force from simulation to simulation",
     "valid": "whether the theory was tested for contacts such as these",
 }
-ELASTIC_PSI = 1.1  # up to which elastic areas are within 5% of those with a hardness
 MAX_GRADIENT = 1.0  # rms gradient above which heights and wavenumbers are hardly in one unit
 
 
@@ -106,6 +106,10 @@ class Contact(Displayed):
         if self._source.surface.labelled or is_labelled(self.mean_separation) or np.size(self.error) > MOST_SHOWN:
             return facts
         more = {"error": self.error, "scatter": self.scatter, "valid": self.valid}
+        if self._source.yields:
+            more |= {"psi": self.psi, "yielded": self.yielded}
+        elif units["force"] != "1":
+            facts["elastic_hardness"] = shown(self.elastic_hardness, units["force"])
         return facts | {name: shown(value) for name, value in more.items()}
 
     def _variables(self) -> dict[str, Variable]:

@@ -50,6 +50,13 @@ def test_off_it_is_never_asked(monkeypatch):
         contact(SURFACE, pressure=1.0, theory=theory, E_star=100e3)
 
 
+def test_an_elastic_scene_says_from_which_hardness_on_it_holds():
+    found = Scene(**KNOWN, effects=["area"], theory="calibrated").run()
+    known = contact(SURFACE, pressure=1.0, E_star=100e3, theory="calibrated")
+    assert found.attrs["elastic_hardness"] == pytest.approx(known.elastic_hardness)
+    assert f"elastic_hardness {float(known.elastic_hardness):.4g}" in repr(known)
+
+
 def test_a_file_may_call_for_it():
     content = {
         "surface": {"hurst": 0.8, "q0": 0.01, "q1": 2.0, "h_rms": 1.0, "h_max": 3.0, "length_unit": "um"},
