@@ -103,10 +103,9 @@ class Table:
         places = np.clip(places / self.step[:, None], 0.0, sizes)
         (i, j, k) = cells = np.minimum(places.astype(np.intp), sizes - 1)
         x, y, z = places - cells
-        weights, six = [quintic(x), quintic(y)], np.zeros((6, log_u.size))
-        for a, across in enumerate(weights[0]):
-            for b, along in enumerate(weights[1]):
-                six += across * along * self.coefficients[i + a, j + b, k + np.arange(6)[:, None]]
+        a, b, c = np.ogrid[:6, :6, :6]
+        patch = self.coefficients[i + a[..., None], j + b[..., None], k + c[..., None]]
+        six = np.einsum("abcn,an,bn->cn", patch, quintic(x), quintic(y))
         value, rate = quintic_at(polynomial_of(six, 0), z)
         rate = rate / self.step[2]
         last = self.first[2] + sizes[2] * self.step[2]
