@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from mbma_tables.cli.format import Column, Report, shown_unit
+from mbma_tables.cli.format import Column, Report, shown_unit, to_columns
 from mbma_tables.cli.options import (
     Model,
     Output,
@@ -64,7 +64,7 @@ def sensitivity_command(
         Column("value", "-", list(found.parameters.values())),
         Column("unit", "-", [shown_unit(name, found.units) for name in parameters]),
     ]
-    columns += [Column(answer, "-", [found.slopes[name][answer] for name in parameters]) for answer in found.answers]
+    columns += to_columns({answer: [found.slopes[name][answer] for name in parameters] for answer in found.answers}, {})
 
     def with_unit(answer: str, text: str) -> str:
         return f"{answer} {text} {shown_unit(answer, found.units)}".removesuffix(" -")

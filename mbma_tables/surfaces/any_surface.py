@@ -138,6 +138,12 @@ class AnySurface(Displayed, abc.ABC):
         return self.scaled(factor(self.unit, unit), unit)
 
     @property
+    def resolution(self) -> str:
+        """Of a measured surface, down to which waves it is known and what shorter ones would change; else empty."""
+        told = [entry["told"] for entry in self.provenance if entry["step"] in ("resolution", "extrapolated")]
+        return "; ".join(told)
+
+    @property
     def zeta_1(self) -> Any:
         """Largest magnification q1/q0 (Eq. 13)."""
         return self.q1 / self.q0

@@ -292,23 +292,47 @@ class MeasuredSurface(AnySurface):
 
     def scaled(self, factor: float, unit: str | None) -> MeasuredSurface:
         """The same surface in another length unit, of which the old one is `factor`."""
-        known, bands = self.bearing, self.bands
+        return dataclasses.replace(self.resized(factor, factor), unit=unit)
+
+    def resized(self, up: float, along: float) -> MeasuredSurface:
+        """The surface with its heights `up` times as large, and its lengths along the plane `along` times."""
+        known, bands, slope = self.bearing, self.bands, up / along
         if known is not None:
-            lengths = {name: factor * getattr(known, name) for name in ("h_rms", "h_max", "quantiles", "mean_height")}
-            known = dataclasses.replace(known, **lengths)
+            moved = dict.fromkeys(("h_rms", "h_max", "quantiles", "mean_height"), up)
+            moved |= dict.fromkeys(("gradient", "tension_force", "tension"), slope)
+            known = dataclasses.replace(known, **{name: by * getattr(known, name) for name, by in moved.items()})
         if bands is not None:
-            q2, m0, m4 = factor**2 * bands.q2_mean_inverse, factor**2 * bands.variance, bands.curvature / factor**2
-            bands = dataclasses.replace(bands, q=bands.q / factor, q2_mean_inverse=q2, variance=m0, curvature=m4)
+            bands = dataclasses.replace(
+                bands,
+                q=bands.q / along,
+                q2_mean_inverse=bands.q2_mean_inverse * along**2,
+                variance=bands.variance * up**2,
+                gradient=bands.gradient * slope**2,
+                curvature=bands.curvature * (slope / along) ** 2,
+            )
         return dataclasses.replace(
             self,
-            q=self.q / factor,
-            C=self.C * factor**4,
-            h_max=self.h_max * factor,
-            heights=self.heights.scaled(factor),
+            q=self.q / along,
+            C=self.C * (up * along) ** 2,
+            h_max=self.h_max * up,
+            heights=self.heights.scaled(up),
             bearing=known,
             bands=bands,
-            unit=unit,
         )
+
+    def between(self, low: float, high: float) -> MeasuredSurface:
+        """The waves from one wavenumber to another, without the curves of a map; heights shrink in proportion."""
+        inside = (self.q > low) & (self.q < high)
+        q = np.concatenate([[low], self.q[inside], [high]])
+        less = dataclasses.replace(
+            self,
+            q=q,
+            C=np.concatenate([self.power_spectrum(q[:1]), self.C[inside], self.power_spectrum(q[-1:])]),
+            samples=None,
+            bearing=None,
+            bands=None,
+        )
+        return dataclasses.replace(less, heights=self.heights.scaled(float(less.h_rms / self.h_rms)))
 
 
 def combination(one: MeasuredSurface, other: MeasuredSurface) -> MeasuredSurface:
@@ -326,10 +350,34 @@ def combination(one: MeasuredSurface, other: MeasuredSurface) -> MeasuredSurface
     above, below = (one.laws.at(side) + other.laws.at(side) for side in (grid[:-1] * (1 + SIDE), grid[1:] * (1 - SIDE)))
     q, C = np.repeat(grid, 2)[1:-1], np.stack([above, below], axis=1).ravel()
     kept = np.append(True, (np.diff(q) > 0) | (np.abs(np.diff(C)) > 1e-9 * C[1:]))
-    return MeasuredSurface(
+    told = []
+    if one.bearing is not None or other.bearing is not None:
+        told = ["curves of a map's tops and valleys are left out, since how the two lie on each other is not known"]
+    if (stretch := _anisotropy(one, other)) is not None:
+        told.append(f"lays are taken to be parallel: anisotropy {stretch:.3g} at most")
+    record = {"step": "combined", "of": [list(one.provenance), list(other.provenance)]}
+    both = MeasuredSurface(
         q[kept],
         C[kept],
         heights=one.heights.convolved(other.heights),
+        anisotropy=stretch,
         unit=one.unit,
-        provenance=({"step": "combined", "of": [list(one.provenance), list(other.provenance)]},),
+        provenance=(record | ({"told": "two rough faces: " + "; ".join(told)} if told else {}),),
     )
+    if not one.resolution and not other.resolution:
+        return both
+    from mbma_tables.surfaces.resolution import resolution
+
+    return dataclasses.replace(both, provenance=(*both.provenance, resolution(both)))
+
+
+def _anisotropy(one: MeasuredSurface, other: MeasuredSurface) -> float | None:
+    """The largest anisotropy of a sum: parallel, their tensors of mean gradients have the same axes."""
+    if one.anisotropy is None and other.anisotropy is None:
+        return None
+    along = across = 0.0
+    for surface in (one, other):
+        square = (surface.anisotropy or 1.0) ** 2
+        along += float(surface.m2) * square / (1 + square)
+        across += float(surface.m2) / (1 + square)
+    return math.sqrt(along / across)

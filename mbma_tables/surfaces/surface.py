@@ -419,7 +419,7 @@ class Surface(AnySurface):
         """
         treatment = {name: value for name, value in locals().items() if name in TREATMENT}
         from mbma_tables.surfaces.maps import fit_map, measured_map, prepared
-        from mbma_tables.surfaces.resolution import finished
+        from mbma_tables.surfaces.resolution import finished, resolution
 
         _check_model(model, band)
         if model != "measured" and (extrapolate_to is not None or extrapolate_hurst is not None):
@@ -428,7 +428,8 @@ class Surface(AnySurface):
         if model == "measured":
             return finished(measured_map(treated, h_max), extrapolate_to, extrapolate_hurst)
         fitted = fit_map(treated, h_max, band)
-        return cls(**fitted._asdict(), unit=fitted.fit.length_unit)
+        surface = cls(**fitted._asdict(), unit=fitted.fit.length_unit)
+        return dataclasses.replace(surface, provenance=(*treated.provenance, resolution(surface.sampled())))
 
     @staticmethod
     @hinted
@@ -543,7 +544,7 @@ class Surface(AnySurface):
         if self.labelled or self.shape != ():
             raise InputError("a batch has no single spectrum: take one surface at a time")
         ends = np.array([self.q0, self.q1])
-        return MeasuredSurface(ends, self.power_spectrum(ends), self.h_max, unit=self.unit)
+        return MeasuredSurface(ends, self.power_spectrum(ends), self.h_max, unit=self.unit, provenance=self.provenance)
 
     def power_spectrum(self, q: ArrayLike) -> Any:
         """C(q) of Eq. (6) [length^4], zero outside [q0, q1]; for one surface or broadcasting against it."""

@@ -346,6 +346,7 @@ class ContactLaw(Displayed):
         unit, modulus = self.units.length or "1", unit_of("force", self.units)
         known = {"theory": self.theory, "reading": self.reading, "tier": self.tier}
         ends = np.array([max(self.lowest, -self.h_max), self.h_max if math.isinf(self.highest) else self.highest])
+        known["resolution"] = "" if self.surface is None else self.surface.resolution
         facts = {name: text for name, text in known.items() if text}
         facts |= {"d": shown(ends, unit), "E_star": shown(self.E_star, modulus), "error": shown(self.error)}
         return facts | {"size": f"{self.block.nbytes + self.errors.nbytes} bytes"}

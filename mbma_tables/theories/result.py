@@ -99,6 +99,7 @@ class Contact(Displayed):
     def _facts(self) -> dict[str, str]:
         units = self.units
         known = {"theory": self.theory, "reading": self.reading, "tier": self.tier}
+        known["resolution"] = self._source.surface.resolution
         facts = {name: text for name, text in known.items() if text}
         for name in ("mean_separation", "force", "area"):
             if getattr(self, name) is not None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -14,8 +16,12 @@ from mbma_tables.arguments import FloatArray, finite_array, hinted
 from mbma_tables.errors import InputError
 from mbma_tables.models import AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.heights import Heights
+from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading
+from mbma_tables.surfaces.resolution import extrapolated
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.contact import KNOWN, contact
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.units import Units, modulus_and_units, unit_of
@@ -23,6 +29,7 @@ from mbma_tables.units import Units, modulus_and_units, unit_of
 STEP = 0.02  # of the logarithm of a parameter
 RTOL = 1e-6
 MAX_HURST = 0.9  # from which its steps go down: two of them, and 1 is the end
+MAX_ERROR = 0.05  # of a slope that is told, over itself or 1
 POINTS = 33  # of a range, geometric
 ANSWERS = ("mean_separation", "force", "area", "stiffness", "conductance")
 
@@ -42,7 +49,8 @@ class Sensitivity:
     answers : dict of float
         What is asked, at these numbers; conductance over the mean conductivity of the bodies [1/length].
     slopes, errors : dict of dict of float
-        d ln(answer)/d ln(parameter) by parameter and answer, the other parameters held, and estimates of their errors.
+        d ln(answer)/d ln(parameter) by parameter and answer, the other parameters held, NaN where the answer jumps,
+        and estimates of their errors.
     ranges : dict of dict of tuple of float
         Smallest and largest answer while a parameter runs over its range, and, under "all", over the ends and the
         present values of all ranges together.
@@ -99,7 +107,11 @@ def sensitivity(
     ----------
     surface : Surface
         One surface. Its parameters are its five numbers, or those of the drawing that it was made from
-        (`Surface.from_roughness`).
+        (`Surface.from_roughness`). Those of one that is its own spectrum are "heights" and "lengths", factors of all
+        heights and of all lengths along the plane, which calibrations of an instrument are about; h_max alone; the
+        "shortest" and "longest" wavelengths, cut-offs that only take waves away, and with an extrapolated spectrum
+        its exponent "extrapolate_hurst". Where the calibrated law takes a map's own heights, tops and valleys, h_max
+        and cut-offs are left out: they are the map's.
     separation, mean_separation, pressure, area : float or str, one of them
         What is held, as for `contact`.
     E_star : float or str
@@ -135,12 +147,7 @@ def sensitivity(
     if len(held) != 1:
         raise InputError(f"give exactly one of {', '.join(KNOWN)}; got {' and '.join(held) or 'none'}")
     modulus, units = modulus_and_units(E_star, surface)
-    if not isinstance(surface, Surface):
-        raise InputError(
-            "sensitivity is to a surface's numbers, and this one is its own spectrum: take surface.fit(), or --model "
-            "self-affine; what its shortest waves are worth, `mbma fit` tells"
-        )
-    make, parameters = _parameters(surface)
+    make, parameters = _parameters(surface) if isinstance(surface, Surface) else _of_spectrum(surface, theory)
     (by, value), *_ = held.items()
     given = parameters | {"E_star": modulus, by: units.number(by, value)}
     numbers = {name: _one_number(name, number) for name, number in given.items()}
@@ -149,16 +156,28 @@ def sensitivity(
 
     def answers(moved: Mapping[str, Any]) -> Answers:
         own = {name: moved.get(name, number) for name, number in numbers.items()}
+        if isinstance(surface, Surface):
+            return of_contact(**own)
+        # there are no batches of spectra
+        places = np.broadcast(*own.values())
+        found = [one(*map(float, entry)) for entry in places]
+        return {name: np.reshape([each[name] for each in found], places.shape) for name in wanted}
+
+    def of_contact(**own: Any) -> Answers:
         modulus, place = own.pop("E_star"), own.pop(by)
         found = contact(make(**own), **{by: place}, E_star=modulus, **options)
         values = {name: getattr(found, name) for name in ANSWERS[:-1]} | {"conductance": found.stiffness / modulus}
         return {name: np.asarray(values[name]) for name in wanted}
 
+    @functools.cache
+    def one(*own: float) -> Answers:
+        return of_contact(**dict(zip(numbers, own, strict=True)))
+
     here = answers({})
     if not all(number > 0 for number in here.values()):
         raise InputError(f"there is no contact at this {by}, or full contact: nothing to take a logarithm of")
     varied = [name for name, number in numbers.items() if number != 0 and (name != "E_star" or units.stress != "1")]
-    slopes, errors = _slopes(answers, numbers, varied, wanted)
+    slopes, errors = _slopes(answers, numbers, varied, wanted, 4 if isinstance(surface, Surface) else 2)
     return Sensitivity(
         by,
         {name: numbers[name] for name in varied},
@@ -184,6 +203,36 @@ def _parameters(surface: Surface) -> tuple[Callable[..., Surface], dict[str, Any
     return Surface, own
 
 
+def _of_spectrum(surface: Any, theory: Any) -> tuple[Callable[..., MeasuredSurface], dict[str, Any]]:
+    """The same of a surface that is its own spectrum."""
+    steps = {record["step"]: record for record in surface.provenance}
+    own: dict[str, Any] = {"heights": 1.0, "lengths": 1.0}
+    known: MeasuredSurface = surface
+    # the calibrated law takes measured heights and tops, which have their own highest point and shortest waves
+    takes_map = getattr(theory, "name", theory) == Calibrated.name
+    if surface.heights.is_gaussian or not takes_map:
+        own["h_max"] = float(surface.h_max)
+    if "extrapolated" in steps:
+        known = surface.between(float(surface.q0), 2 * math.pi / steps["resolution"]["shortest"])
+        own["extrapolate_hurst"] = steps["extrapolated"]["hurst"]
+    elif surface.bearing is None or not takes_map:
+        own |= {"shortest": 2 * math.pi / float(surface.q1), "longest": 2 * math.pi / float(surface.q0)}
+
+    def make(heights: float, lengths: float, **others: float) -> MeasuredSurface:
+        moved: MeasuredSurface = known
+        if "shortest" in others and any(others[name] != own[name] for name in ("shortest", "longest")):
+            moved = known.between(2 * math.pi / others["longest"], 2 * math.pi / others["shortest"])
+        if "extrapolate_hurst" in others:
+            moved = extrapolated(known, steps["extrapolated"]["shortest"], others["extrapolate_hurst"])
+        if "h_max" in others:
+            gaussian, h_max = moved.heights.is_gaussian, others["h_max"]
+            kept = Heights.gaussian(float(moved.h_rms), h_max) if gaussian else moved.heights
+            moved = dataclasses.replace(moved, h_max=h_max, heights=kept)
+        return moved.resized(heights, lengths)
+
+    return make, own
+
+
 def _one_number(name: str, value: Any) -> float:
     number = finite_array(name, value)
     if number.ndim:
@@ -192,7 +241,11 @@ def _one_number(name: str, value: Any) -> float:
 
 
 def _slopes(
-    answers: Callable[[Mapping[str, Any]], Answers], numbers: Mapping[str, float], varied: list[str], wanted: list[str]
+    answers: Callable[[Mapping[str, Any]], Answers],
+    numbers: Mapping[str, float],
+    varied: list[str],
+    wanted: list[str],
+    rounds: int,
 ) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, float]]]:
     """Logarithmic derivatives and their errors, by Richardson extrapolation of differences."""
     from scipy.differentiate import derivative
@@ -207,19 +260,23 @@ def _slopes(
         found = answers(moved)
         return np.log(np.choose(answer.astype(int), [found[name] for name in wanted]))
 
-    down = np.array([[name == "hurst" and numbers[name] > MAX_HURST] * len(wanted) for name in varied])
+    # exponents near their end, and cut-offs, which only take waves away
+    ways = {name: -1.0 for name in ("hurst", "extrapolate_hurst") if numbers.get(name, 0.0) > MAX_HURST}
+    ways |= {"shortest": 1.0, "longest": -1.0}
     found = derivative(
         logarithm,
         np.zeros(of.shape),
         args=(of, what),
         initial_step=STEP,
-        step_direction=np.where(down, -1.0, 0.0),
+        step_direction=np.array([[ways.get(name, 0.0)] * len(wanted) for name in varied]),
         tolerances={"rtol": RTOL, "atol": RTOL},
-        maxiter=4,
+        maxiter=rounds,
     )
+    # an answer that jumps has no slope
+    df = np.where(found.error <= MAX_ERROR * np.maximum(1, np.abs(found.df)), found.df, np.nan)
     slopes, errors = (
         {name: dict(zip(wanted, row, strict=True)) for name, row in zip(varied, table.tolist(), strict=True)}
-        for table in (found.df, found.error)
+        for table in (df, found.error)
     )
     return slopes, errors
 

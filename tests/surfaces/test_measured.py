@@ -147,6 +147,19 @@ class TestCombined:
         assert found.skewness == pytest.approx(truth.skewness, abs=0.02)
         assert found.kurtosis == pytest.approx(truth.kurtosis, abs=0.1)
 
+    def test_what_two_maps_do_not_keep_is_told(self):
+        rng = np.random.default_rng(2)
+        one, other = (Surface.from_map(rng.normal(size=(40, 40)), 1.0, step, periodic=True) for step in (2.0, 3.0))
+        both = one.combined(other)
+        assert both.bearing is None
+        assert "how the two lie on each other is not known" in both.provenance[0]["told"]
+        # parallel lays: gradients' mean squares add along both axes
+        sums = [sum(float(s.m2) * share for s, share in zip((one, other), shares, strict=True)) for shares in zip(
+            *((a / (1 + a), 1 / (1 + a)) for a in (one.anisotropy**2, other.anisotropy**2)), strict=True)]  # fmt: skip
+        assert both.anisotropy == pytest.approx(np.sqrt(sums[0] / sums[1]))
+        assert one.combined(FIVE).anisotropy < one.anisotropy
+        assert FIVE.combined(FIVE).anisotropy is None
+
     def test_units_must_agree(self):
         one = Surface.from_spectrum(Q, C, h_max=9.0, unit="um")
         with pytest.raises(InputError, match="one surface is in 'um', the unit of the other is not known"):

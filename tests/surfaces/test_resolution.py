@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from mbma_tables import Surface
+from mbma_tables import Surface, contact, contact_law
 from mbma_tables.errors import InputError
+from mbma_tables.export.law_rows import describe_law
 from mbma_tables.surfaces.resolution import extrapolated, resolution
 
 WHOLE = Surface(0.7, 1.0, 400.0, 0.3, 1.0)
@@ -47,6 +48,27 @@ def test_as_options_of_a_map():
     assert [entry["step"] for entry in longer.provenance[-2:]] == ["resolution", "extrapolated"]
     with pytest.raises(InputError, match="both or neither"):
         Surface.from_map(heights, **options, extrapolate_to=0.1)
+
+
+def test_every_answer_of_a_map_says_so():
+    noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((64, 64)))
+    q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
+    heights = 0.05 * np.fft.irfft2(np.where((q > 0.02) & (q < 0.4), noise / np.maximum(q, 0.02) ** 1.8, 0))
+    told = "area is a matter of resolution: waves are known down to"
+    for model in ("measured", "self-affine"):
+        surface = Surface.from_map(heights, 1.0, periodic=True, unit="um", model=model)
+        rows = describe_law(surface, "1 GPa", rows=10, theory="calibrated")
+        assert any(told in line for line in rows.comments)
+        answers = [contact(surface, pressure=0.01), contact_law(surface, theory="persson")]
+        answers.append(contact(surface.combined(WHOLE.scaled(1.0, "um")), pressure=0.01))
+        for found in answers:
+            assert told in repr(found)
+            assert told in found.to_dataset().attrs["resolution"]
+    longer = Surface.from_map(
+        heights, 1.0, periodic=True, model="measured", extrapolate_to=0.5, extrapolate_hurst=0.8
+    )  # fmt: skip
+    assert "which was not measured" in repr(contact(longer, pressure=0.01))
+    assert "resolution" not in repr(contact(WHOLE, pressure=0.01))
 
 
 def test_what_was_measured_is_not_replaced():

@@ -128,7 +128,32 @@ def test_the_command():
     assert (bad.exit_code, bad.output) == (2, "mbma: --range must be like h_max=2um:4um, got 'h_max:2'\n")
 
 
-def test_a_spectrum_has_no_numbers():
-    q = np.geomspace(0.2, 50, 40)
-    with pytest.raises(InputError, match=r"take surface.fit\(\), or --model self-affine"):
-        sensitivity(Surface.from_spectrum(q, 1e-3 * q**-3.6, h_max=1.0), mean_separation=0.3)
+@pytest.mark.parametrize("theory", ["mbma", "calibrated"])
+def test_a_spectrum_in_samples_has_the_slopes_of_its_five_numbers(theory):
+    q = np.geomspace(SURFACE.q0, SURFACE.q1, 50)
+    sampled = Surface.from_spectrum(q, SURFACE.power_spectrum(q), h_max=SURFACE.h_max, unit="um")
+    found, five = (sensitivity(s, pressure=0.03, E_star="10 GPa", theory=theory).slopes for s in (sampled, SURFACE))
+    for answer, slope in found["heights"].items():
+        assert slope == pytest.approx(five["h_rms"][answer] + five["h_max"][answer], abs=1e-4)
+        assert found["lengths"][answer] == pytest.approx(-five["q0"][answer] - five["q1"][answer], abs=1e-4)
+        assert found["h_max"][answer] == pytest.approx(five["h_max"][answer], abs=1e-4)
+    # a cut takes height away, five numbers keep it
+    cut = 0.02
+    short = dataclasses.replace(SURFACE, q1=SURFACE.q1 * np.exp(-cut))
+    short = dataclasses.replace(short, h_rms=SURFACE.h_rms * float(short.s / short.h_rms * SURFACE.h_rms / SURFACE.s))
+    areas = [float(contact(s, pressure=0.03, E_star="10 GPa", theory=theory).area) for s in (short, SURFACE)]
+    assert found["shortest"]["area"] == pytest.approx(np.log(areas[0] / areas[1]) / cut, abs=5e-3)
+
+
+def test_unknowns_of_a_map_and_of_its_extrapolation():
+    heights = np.random.default_rng(1).normal(size=(64, 64))
+    q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
+    heights = 0.1 * np.fft.irfft2(np.where((q > 0.03) & (q < 0.25), np.fft.rfft2(heights), 0))
+    given = {"pressure": 0.01, "theory": "calibrated"}
+    found = sensitivity(Surface.from_map(heights, 1.0, periodic=True), **given)
+    assert set(found.slopes) == {"heights", "lengths", "pressure"}
+    # a force over E* and the gradient, whatever the size
+    assert found.slopes["heights"]["area"] == pytest.approx(-found.slopes["lengths"]["area"], abs=1e-3)
+    assert found.slopes["heights"]["area"] == pytest.approx(-found.slopes["pressure"]["area"], abs=1e-3)
+    longer = Surface.from_map(heights, 1.0, periodic=True, extrapolate_to=0.5, extrapolate_hurst=0.8)
+    assert sensitivity(longer, **given).slopes["extrapolate_hurst"]["area"] > 0
