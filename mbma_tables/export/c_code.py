@@ -39,6 +39,12 @@ TITLES = {
     "mbma.c": "mbma.c: the MBMA model in C99.",
     NUMBERS_FILE: "mbma_table.h: the numbers of the MBMA model in C99, for mbma.c alone.",
 }
+THEORIES_FILE = "mbma_theories_table.h"
+THEORY_TITLES = {
+    "mbma_theories.h": "mbma_theories.h: the calibrated law and Persson's theory in C99, declarations.",
+    "mbma_theories.c": "mbma_theories.c: the calibrated law and Persson's theory in C99, beside mbma.c.",
+    THEORIES_FILE: "mbma_theories_table.h: the numbers of the calibrated law in C99, for mbma_theories.c alone.",
+}
 LICENCE = (
     "SPDX-License-Identifier: BSD-3-Clause",
     "Copyright (c) 2026, mbma_tables contributors",
@@ -69,6 +75,32 @@ def c_texts(model: UniversalModel, reading: Reading) -> dict[str, str]:
         else:
             prototypes, forms = closed_forms()
             texts[name] = filled(name, HEADER=head, CLOSED_FORMS=forms, PROTOTYPES=prototypes)
+    return texts
+
+
+def theory_texts() -> dict[str, str]:
+    """The same of the calibrated law, by its table, and of theories by a spectrum."""
+    table, texts = calibrated_table.shipped(), {}
+    ranges = [
+        f"{name} in [{math.exp(low) if k else low:.4g}, {math.exp(high) if k else high:.4g}]"
+        for k, (name, (low, high)) in enumerate(zip(("H", "zeta_1", "u/h_rms"), table.covered, strict=True))
+    ]
+    lines = [
+        f"Written by mbma_tables {__version__}. Compile mbma_theories.c as mbma.c; it includes mbma_theories_table.h.",
+        "Law calibrated on boundary elements, by a table of force over Hurst exponent, q1/q0 and mean separation; the "
+        f"same law, and Persson's theory, of any spectrum, as a sum over waves. Range of the table: {', '.join(ranges)}; "
+        "other separations continue by the law's limits.",
+        f"Largest relative error of the table against the law: {table.error:.2g}. Simulations scatter about the law by "
+        "percents to tens of percents, which the documentation lists.",
+        CONVENTIONS[0],
+        *LICENCE,
+    ]
+    for name, title in THEORY_TITLES.items():
+        head = opening([title, *lines], "/*")
+        if name == THEORIES_FILE:
+            texts[name] = f"{head}\n{numbers_text(*theory_numbers(), what='THEORIES_TABLE')}"
+        else:
+            texts[name] = filled(name, HEADER=head)
     return texts
 
 

@@ -40,12 +40,13 @@ class Language(NamedTuple):
     run: tuple[str, ...]
 
 
+SOURCES = ("mbma", "mbma_theories", "mbma_selftest")
 C_SELFTEST = {"mbma_selftest.c": "mbma_selftest.c: replays the conformance points of the MBMA model."}
 LANGUAGES = {
     "c": Language(
         C_SELFTEST,
         c_code.USAGE,
-        ("cc", "-std=c99", "-O2", "{0}/mbma.c", "{0}/mbma_selftest.c", "-lm", "-o", "selftest"),
+        ("cc", "-std=c99", "-O2", *(f"{{0}}/{name}.c" for name in SOURCES), "-lm", "-o", "selftest"),
         ("{1}/selftest",),
     ),
     "fortran": Language(
@@ -54,11 +55,11 @@ LANGUAGES = {
             "mbma_selftest.f90": "mbma_selftest.f90: what mbma_selftest.c replays, in Fortran 2008.",
         }
         | C_SELFTEST,
-        "Compile it with mbma.c, in this order: gfortran -O2 mbma.c mbma.f90 program.f90. Every procedure may be "
-        "called from any thread.",
+        "Compile it with the C, in this order: gfortran -O2 mbma.c mbma_theories.c mbma.f90 program.f90. Every "
+        "procedure may be called from any thread.",
         (
-            *("gfortran", "-O2", "-DMBMA_OTHER_REPLAY", "{0}/mbma.c", "{0}/mbma_selftest.c", "{0}/mbma.f90"),
-            *("{0}/mbma_selftest.f90", "-o", "selftest"),
+            *("gfortran", "-O2", "-DMBMA_OTHER_REPLAY", *(f"{{0}}/{name}.c" for name in SOURCES)),
+            *("{0}/mbma.f90", "{0}/mbma_selftest.f90", "-o", "selftest"),
         ),
         ("{1}/selftest",),
     ),
@@ -112,8 +113,8 @@ def write_code(
     Examples
     --------
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     [path.name for path in write_code("c", folder)]
-    ['mbma.h', 'mbma.c', 'mbma_table.h', 'mbma_selftest.c', 'mbma_conformance.csv']
+    ...     [path.name for path in write_code("c", folder) if path.suffix == ".c"]
+    ['mbma.c', 'mbma_theories.c', 'mbma_selftest.c']
     """
     if target not in CODE:
         raise InputError(f"target must be one of {CODE}, got {target!r}")
@@ -121,7 +122,7 @@ def write_code(
     model = open_table(table)
     if not isinstance(model, UniversalModel):
         raise InputError(f"code is written from a universal table, and {os.fspath(table)} is not one")
-    texts = {**source_texts(target, model, rule), POINTS_FILE: points_text(model, rule)}
+    texts = {**source_texts(target, model, rule), POINTS_FILE: points_text(model, rule, target != "javascript")}
     for name, text in texts.items():
         write_file(pathlib.Path(folder, name), text.encode(), make_folders=True)
     return [pathlib.Path(folder, name) for name in texts]
@@ -131,7 +132,7 @@ def source_texts(target: str, model: UniversalModel, reading: Reading) -> dict[s
     """Names and texts of a target's source files."""
     language = LANGUAGES[target]
     c_texts = c_code.c_texts(model, reading)
-    texts = {} if target == "javascript" else dict(c_texts)
+    texts = {} if target == "javascript" else c_texts | c_code.theory_texts()
     for name, title in language.titles.items():
         lines = c_code.header(model, reading, title, language.usage)
         parts = {"HEADER": opening(lines, "!" if name.endswith(".f90") else "/*")}

@@ -28,6 +28,7 @@ KINDS = {
     "total": "hurst, q0, q1, h_rms, h_max, separation, E_star, rtol; force, area, stiffness",
     "status": "X, mu; the status",
     "formula": "X, mu; phi_F, phi_A by the closed form",
+    "calibrated": "hurst, q0, q1, h_rms, h_max, mean separation, E_star; force, area, stiffness, mean separation at it",
 }
 TOLERANCE = 1e-11
 INVALID = 5  # the exported code refuses by status what the library refuses by an error
@@ -38,6 +39,7 @@ SURFACES = (
     (1.0, 0.01, 3.0, 4.0, 12.0),
 )
 DEPTHS = (0.05, 0.3, 0.8, 1.4)  # (h_max - d)/h_max
+SHARES = (0.02, 0.3, 0.7, 0.99)  # u/h_max
 RTOL = 1e-8
 
 
@@ -90,6 +92,17 @@ def total_rows(surface: tuple[float, ...], separations: Any, reading: Reading, r
         yield row("total", (*surface, separation, 1.0, rtol), answers, scales)
 
 
+def calibrated_rows(surface: tuple[float, ...], shares: Any, E_star: float = 1.0) -> Iterator[str]:
+    """The calibrated law of one surface at shares of h_max by the library."""
+    from mbma_tables.surfaces.surface import Surface
+    from mbma_tables.theories.contact import contact
+
+    u = surface[4] * np.asarray(shares)
+    found = contact(Surface(*surface), mean_separation=u, theory="calibrated", E_star=E_star)
+    for gap, *answers in zip(u, *map(np.asarray, (found.force, found.area, found.stiffness)), strict=True):
+        yield row("calibrated", (*surface, gap, E_star), (*answers, gap), (*answers, gap))
+
+
 def status_rows(model: UniversalModel) -> Iterator[str]:
     """Points outside the table, and what is said of them."""
     X, mu = model.content.axes
@@ -128,8 +141,8 @@ def table_rows(model: UniversalModel) -> Iterator[str]:
         yield row("phi", (points["X"][k], points["mu"][k]), answers, answers, points["tolerance"][k])
 
 
-def points_text(model: UniversalModel, reading: Reading) -> str:
-    """The points' file: the table's own, and the runtime's slopes, islands, totals and refusals."""
+def points_text(model: UniversalModel, reading: Reading, theories: bool = False) -> str:
+    """The points' file: the table's own, and the runtime's slopes, islands, totals and refusals; of `theories` too."""
     points = model.content.conformance
     head = [
         f"conformance points of the MBMA model, reading {reading.name}",
@@ -150,4 +163,6 @@ def points_text(model: UniversalModel, reading: Reading) -> str:
         approach = np.geomspace(1e-3, 2 * surface[4] / surface[3], 8)
         lines += geometry_rows(approach, np.full(8, surface[0]), np.full(8, zeta_1), reading)
         lines += total_rows(surface, surface[4] * (1 - np.array(DEPTHS)), reading)
+        if theories:
+            lines += calibrated_rows(surface, SHARES)
     return comment(head, "#") + "\n".join(lines) + "\n"
