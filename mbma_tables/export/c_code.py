@@ -88,7 +88,7 @@ def theory_texts() -> dict[str, str]:
     lines = [
         f"Written by mbma_tables {__version__}. Compile mbma_theories.c as mbma.c; it includes mbma_theories_table.h.",
         "Law calibrated on boundary elements, by a table of force over Hurst exponent, q1/q0 and mean separation; the "
-        f"same law, and Persson's theory, of any spectrum, as a sum over waves. Range of the table: {', '.join(ranges)}; "
+        f"same law, and Persson's theory, of any spectrum, as a sum over waves. Table: {', '.join(ranges)}; "
         "other separations continue by the law's limits.",
         f"Largest relative error of the table against the law: {table.error:.2g}. Simulations scatter about the law by "
         "percents to tens of percents, which the documentation lists.",

@@ -19,6 +19,7 @@ from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.models import closed_form_functions, universal_kernel
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.readings import Reading
+from mbma_tables.totals.contact import FEW_SURFACES
 
 POINTS_FILE = "mbma_conformance.csv"
 KINDS = {
@@ -83,9 +84,11 @@ def total_rows(surface: tuple[float, ...], separations: Any, reading: Reading, r
     from mbma_tables.surfaces.surface import Surface
     from mbma_tables.theories.contact import contact
 
-    found = contact(Surface(*surface), separations, reading=reading, rtol=rtol)
+    # so many that islands are added gap by gap, as the exported code does, not by a profile of them
+    many = Surface(*np.tile(surface, (FEW_SURFACES + 1, 1)).T[..., None])
+    found = contact(many, separations, reading=reading, rtol=rtol)
     numbers = map(np.asarray, (found.separation, found.force, found.area, found.stiffness))
-    for separation, *answers in zip(*numbers, strict=True):
+    for separation, *answers in zip(*(of_many[0] for of_many in numbers), strict=True):
         # without contact all are exactly 0; at a maximum of force, stiffness is
         scales = [abs(answer) or 1.0 for answer in answers]
         scales[2] = max(scales[2], scales[0] / surface[4])
