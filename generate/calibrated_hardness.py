@@ -152,6 +152,22 @@ def weight_of_elastic(one: Capped, quantity: str, constants: cap.Constants) -> F
     return rate / force
 
 
+def by_magnification(seen: Sequence[Capped], constants: cap.Constants) -> dict[str, list[float]]:
+    """Mean errors of the parts by zeta_1, the elastic contact simulated, at the hardness where they are largest."""
+    told = {}
+    for zeta_1 in sorted({one.zeta_1 for one in seen}):
+        own = [one for one in seen if one.zeta_1 == zeta_1]
+        means = [
+            [
+                np.concatenate([errors(one, q, constants)[fitted(one)] for one in own if one.eta == eta]).mean()
+                for eta in sorted({one.eta for one in own})
+            ]
+            for q in QUANTITIES
+        ]
+        told[f"{zeta_1:g}"] = [float(max(row, key=abs)) for row in means]
+    return told
+
+
 def blind() -> dict[str, FloatArray]:
     """Errors of `contact` on surfaces of an independent code, which no fit and no choice of a form saw."""
     with open(ROOT / REFERENCE, encoding="utf-8") as stream:
@@ -271,6 +287,7 @@ def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[ca
             "and stiffness of the frozen contact at equal force, force at equal mean gap",
             "theories": " ".join(rms),
             "coverage": json.dumps(covered),
+            "drift": json.dumps(by_magnification([one for one in plain if one.kind == "self_affine"], constants)),
             "quantities": " ".join(QUANTITIES),
             "statistics": " ".join(STATISTICS),
             "sets": " ".join(groups),
@@ -307,5 +324,10 @@ def lines(constants: cap.Constants, data: xr.Dataset) -> list[str]:
     told += [
         f"  held-out errors of {name} within one and two standard deviations: {one:.1%}, {two:.1%}"
         for name, (one, two) in json.loads(data.attrs["coverage"]).items()
+    ]
+    told += [
+        f"  zeta_1 {zeta_1:4s} largest mean error: "
+        + ", ".join(f"{q} {e:+.3f}" for q, e in zip(QUANTITIES, row, strict=True))
+        for zeta_1, row in json.loads(data.attrs["drift"]).items()
     ]
     return told

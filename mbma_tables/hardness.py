@@ -59,17 +59,17 @@ class Constants:
         Of the gap between mean planes: mean interpenetration falls as exp(-(plane_eta - plane_load x) eta).
     """
 
-    area_power: float = 3.21
-    area_scale: float = 0.6328
-    yield_power: float = 2.412
-    yield_scale: float = 0.7177
-    force_light: float = 1.115
-    force_eta: float = 1.778
-    force_share: float = 0.4727
-    frozen: float = 0.3652
-    frozen_eta: float = 0.2439
-    plane_eta: float = 3.334
-    plane_load: float = 2.474
+    area_power: float = 3.196
+    area_scale: float = 0.6301
+    yield_power: float = 2.426
+    yield_scale: float = 0.7138
+    force_light: float = 1.117
+    force_eta: float = 1.772
+    force_share: float = 0.4851
+    frozen: float = 0.3685
+    frozen_eta: float = 0.2407
+    plane_eta: float = 3.375
+    plane_load: float = 2.505
 
     @property
     def exponent(self) -> tuple[float, float, float]:

@@ -113,6 +113,15 @@ def coverage() -> str:
     return table(["theory", "area at equal force", "force at equal u"], list(rows.values()))
 
 
+def drift() -> str:
+    """Mean errors of the parts by zeta_1."""
+    rows = [
+        [zeta_1, *(f"{100 * e:+.1f}" for e in row)]
+        for zeta_1, row in json.loads(shipped_part("hardness")[1]["drift"]).items()
+    ]
+    return table(["zeta_1", *(f"{name} [%]" for name in ("area", "yielded share", "force", "frozen stiffness"))], rows)
+
+
 def metals() -> str:
     """psi of metals pressed on themselves, and the gradient up to which they stay elastic."""
     rows = []
@@ -176,5 +185,12 @@ def draw() -> bytes:
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
     """The measured parts of the page, and its figure."""
-    parts = {"when": when(), "held_out": held_out(), "coverage": coverage(), "metals": metals(), "cost": cost()}
+    parts = {
+        "when": when(),
+        "held_out": held_out(),
+        "coverage": coverage(),
+        "drift": drift(),
+        "metals": metals(),
+        "cost": cost(),
+    }
     return parts, {"docs/figures/yield.png": draw()}
