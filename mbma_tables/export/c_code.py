@@ -25,7 +25,7 @@ from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
 from mbma_tables.theories import calibrated_curves, calibrated_table, persson
-from mbma_tables.totals import gauss_kronrod, intervals, island_sum, kernel
+from mbma_tables.totals import gauss_kronrod, intervals, island_sum
 
 FORM = "standard"  # that of tier "formula"
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # as `contact` allows
@@ -171,11 +171,11 @@ def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | fl
         "MIN_ZETA_1": max(MIN_ZETA_1, reading.floor_u),
         "MAX_ZETA_1": MAX_ZETA_1,
         "STRETCH": intervals.STRETCH,
-        "SMALL_ANGLE": intervals.SMALL_ANGLE,
+        "SMALL_ANGLE": 0.01,  # below it sinh goes through its own function
         "NARROW": intervals.NARROW,
         "SAFETY": intervals.SAFETY,
-        "SMALL_POWER": kernel.SMALL_POWER,
-        "SMALL_WIDTH": kernel.SMALL_WIDTH,
+        "SMALL_POWER": 0.01,  # below these, differences of exponentials go through expm1
+        "SMALL_WIDTH": 0.01,
         "QUADRATURE_SHARE": island_sum.QUADRATURE_SHARE,
         "FORMULA_X_LOW": form["X"][0],
         "FORMULA_X_HIGH": form["X"][1],

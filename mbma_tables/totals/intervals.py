@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import njit
+from mbma_tables.elementary import expm1
 from mbma_tables.models.universal_kernel import OK, UNRESOLVED
 from mbma_tables.totals.gauss_kronrod import GAUSS_21, GAUSS_31, KRONROD_21, KRONROD_31, NODES_21, NODES_31
 
 MAX_INTERVALS = 200
+WORK = 4  # rows of numbers at the nodes of a rule
 STRETCH = 8.0  # the map's scale in boundary layers zeta_1^(-H): fewest nodes over random surfaces
-SMALL_ANGLE = 0.01  # below it sinh goes through its own function
 NARROW = 2.5  # in h_rms: above the floor of zeta_d, the smaller rule resolves a Gaussian this wide to 1e-8
 SAFETY = 4.0  # a Kronrod sum errs by at most 3 (difference to Gauss)^1.5, seen over random surfaces: 4^1.5 = 8
 
@@ -84,16 +85,14 @@ def rule_for(interval: Interval) -> tuple[FloatArray, FloatArray, FloatArray]:
     return NODES_31, KRONROD_31, GAUSS_31
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def approach_at(t: float, straight: bool, scale: float) -> tuple[float, float]:
     """X = delta/h_rms and dx/dt at a node."""
-    if straight:
-        return t, 1.0
-    grown = math.exp(t)
-    shrunk = 1.0 / grown
-    # below SMALL_ANGLE the exponentials would cancel
-    rise = 0.5 * (grown - shrunk) if t > SMALL_ANGLE else math.sinh(t)
-    return scale * rise * rise, scale * rise * (grown + shrunk)
+    # sinh and cosh by expm1: exponentials would cancel at small t
+    more = expm1(t)
+    rise = 0.5 * (more + more / (more + 1.0))
+    steep = scale * rise * (more + 1.0 + 1.0 / (more + 1.0))
+    return (t, 1.0) if straight else (scale * rise * rise, steep)
 
 
 @njit(cache=True, error_model="numpy")
@@ -111,14 +110,14 @@ def refine(
 ) -> tuple[int, float, int]:
     """Integrate over the approaches at a gap to `rtol`; status, bound on the relative error, islands evaluated.
 
-    ``rule(which, interval, gap, surface, near, table, part)`` puts its Kronrod sums into `part`, shaped like `out`: a
-    row for force and one for area, whose first column is the integral with K1. It returns a status, the relative
-    error of the sums, that of the table, and the nodes.
+    ``rule(which, interval, gap, surface, near, table, work, part)`` puts its Kronrod sums into `part`, shaped like
+    `out`: a row for force and one for area, whose first column is the integral with K1. It may use `work`. It returns
+    a status, the relative error of the sums, that of the table, and the nodes.
     """
     islands = 0
     bounds = np.empty((MAX_INTERVALS, 2))
     parts = np.empty((MAX_INTERVALS, 2, out.shape[1]))
-    errors = np.empty(MAX_INTERVALS)
+    errors, work = np.empty(MAX_INTERVALS), np.empty((WORK, NODES_31.size))
     floors = np.empty((MAX_INTERVALS, 2), dtype=np.bool_)
     fresh = np.ones(MAX_INTERVALS, dtype=np.bool_)
     count = first_intervals(gap.compression, surface.kink_d, surface.kink_u, surface.map_scale, bounds, floors)
@@ -128,7 +127,7 @@ def refine(
         for k in range(count):
             if fresh[k]:
                 interval = Interval(bounds[k, 0], bounds[k, 1], floors[k, 0], floors[k, 1])
-                status, errors[k], own_error, nodes = rule(which, interval, gap, surface, near, table, parts[k])
+                status, errors[k], own_error, nodes = rule(which, interval, gap, surface, near, table, work, parts[k])
                 islands += nodes
                 if status != OK:
                     return status, math.nan, islands

@@ -1,7 +1,7 @@
 """One surface, one gap, in one compiled pass: islands from the universal table, Gauss-Kronrod over delta (Eqs. 44-50).
 
-An island costs a few logarithms and exponentials instead of a solution; what depends on the surface alone is computed
-once per surface. No work space is shared.
+An island costs a few logarithms and exponentials instead of a solution, over all nodes of a rule in one loop; what
+depends on the surface alone is computed once per surface. No work space is shared.
 """
 
 from __future__ import annotations
@@ -14,16 +14,18 @@ from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import REORDER, jitable, njit
+from mbma_tables.elementary import exp, expm1, log, log1p
 from mbma_tables.islands.geometry import floor_offset
-from mbma_tables.models.protocol import BOTH, FORCE
+from mbma_tables.models.protocol import BOTH
 from mbma_tables.models.universal_kernel import OK, Table, universal_one, universal_phi
 from mbma_tables.surfaces.readings import ReadingNumbers
 from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, m4_of, summit_rate
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.intervals import STRETCH, Gap, Interval, approach_at, error_of, refine, rule_for
 
-SMALL_POWER = 0.01  # below these, differences of exponentials go through expm1
-SMALL_WIDTH = 0.01
+TINY = 1e-100  # for a power of 0
+LEAST = -700.0  # of exponents: below it a Gaussian is nothing
+ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
 
 
 class Pairs(NamedTuple):
@@ -152,14 +154,13 @@ def surface_constants(
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy", forceinline=True)
-def island_node(x: float, floor_d: bool, floor_u: bool, surface: SurfaceConstants, which: int = BOTH) -> Node:
+def island_node(x: float, floor_d: bool, floor_u: bool, surface: SurfaceConstants) -> Node:
     """The island at delta = x h_rms; `floor_d`, `floor_u`: whether zeta_d (27), zeta_u (30) are at their floors.
 
-    The arithmetic of `islands.geometry`, rearranged: one logarithm and one exponential for each end of the band. The
-    area's factor is NaN where `which` is FORCE.
+    The arithmetic of `islands.geometry`, rearranged, without a branch but for the floors.
     """
     H, e = surface.hurst, surface.e
-    p2, p4, over_2H = 2.0 - 2.0 * H, 4.0 - 2.0 * H, 0.5 / H
+    p2, p4, over_2H = 2.0 - 2.0 * H if H != 1.0 else TINY, 4.0 - 2.0 * H, 0.5 / H
     root_a = surface.root_floor_d if floor_d else surface.slope_d * x
     root_b = surface.root_floor_u if floor_u else surface.slope_u * x
     a = root_a * root_a
@@ -167,24 +168,15 @@ def island_node(x: float, floor_d: bool, floor_u: bool, surface: SurfaceConstant
     # both shrink with x below the floors, where the difference of squares would cancel
     m0 = a - b if floor_u else (root_a - root_b) * (root_a + root_b)
     # only the width needs its relative digits
-    log_d = surface.log_floor_d if floor_d else -math.log(e + a) * over_2H
-    width = math.log1p(m0 / (e + b)) * over_2H
+    log_d = surface.log_floor_d if floor_d else -log(e + a) * over_2H
+    width = log1p(m0 / (e + b)) * over_2H
     # p (zeta^p - 1)/p over [1, zeta_d] and over the band, for p = 4 - 2H and p = 2 - 2H; zeta_d^(-2H) = e + a
-    square = math.exp(2.0 * log_d)
-    top2 = square * (e + a)
-    top4 = square * top2
+    square = exp(2.0 * log_d)
+    top4 = square * square * (e + a)
     below4 = top4 - 1.0
-    if p2 > SMALL_POWER and width > SMALL_WIDTH:
-        # zeta_u/zeta_d, squared, and to the power -2H
-        wider = math.exp(2.0 * width)
-        shrunk = (e + b) / (e + a)
-        below2 = (top2 - 1.0) / p2
-        band2 = top2 * (wider * shrunk - 1.0) / p2
-        band4 = top4 * (wider * wider * shrunk - 1.0)
-    else:
-        below2 = math.expm1(p2 * log_d) / p2 if p2 != 0.0 else log_d
-        band2 = (1.0 + p2 * below2) * (math.expm1(p2 * width) / p2 if p2 != 0.0 else width)
-        band4 = top4 * math.expm1(p4 * width)
+    below2 = expm1(p2 * log_d) / p2
+    band2 = (1.0 + p2 * below2) * expm1(p2 * width) / p2
+    band4 = top4 * expm1(p4 * width)
     # m2 = H below2, m4 = (3 H/4 p4) below4, alpha = m0 m4/m2^2
     rate = 0.75 / p4
     tilt = BROADENING * H / rate if surface.summit_sigma else 0.0
@@ -199,46 +191,68 @@ def island_node(x: float, floor_d: bool, floor_u: bool, surface: SurfaceConstant
     both = R_u * R_d
     force = sigma * math.sqrt(2.0 * R_d * sigma)
     mu = 8.0 / 3.0 * D * sigma * math.sqrt(2.0 * both)
-    area = math.nan
-    if which != FORCE:
-        area = 2.0 * math.pi * surface.eta_factor * np.cbrt(root_b / R_u) * D * both * sigma * sigma
+    eta = surface.eta_factor * exp(log(root_b / R_u) * (1.0 / 3.0))
+    area = 2.0 * math.pi * eta * D * both * sigma * sigma
     return Node((surface.rms_over_s * x - h_d) / sigma, mu, force, area, h_d, D_d, sigma_d)
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy")
-def _rule(
-    which: int, interval: Interval, gap: Gap, surface: SurfaceConstants, near: None, table: Table, part: FloatArray
-) -> tuple[int, float, float, int]:
-    """One Kronrod rule over an interval, see `refine`. Where `which` is FORCE or AREA, that one is both rows."""
+def fill_nodes(interval: Interval, gap: Gap, surface: SurfaceConstants, out: FloatArray) -> int:
+    """X, mu, and what force and area add per Phi_F and Phi_A, at the nodes of an interval; how many there are.
+
+    A loop that vectorises: no branch, no call.
+    """
     low, high, floor_d, floor_u = interval
-    nodes, kronrod, gauss = rule_for(interval)
+    nodes = rule_for(interval)[0]
     half, centre = 0.5 * (high - low), 0.5 * (high + low)
     rms_over_s = surface.rms_over_s
-    force = area = gauss_force = gauss_area = table_error = 0.0
     for k in range(nodes.size):
         x, stretch = approach_at(centre + half * nodes[k], floor_d, surface.map_scale)
-        node = island_node(x, floor_d, floor_u, surface, which)
+        node = island_node(x, floor_d, floor_u, surface)
         height = island_height(x, node.h_d, node.sigma_d, gap, rms_over_s)
+        share = -0.5 * height * height
         # d(delta/s) = rms_over_s dx
-        weight = island_density(height, node.D_d, node.sigma_d) * rms_over_s * stretch * half
+        weight = node.D_d / (ROOT_TWO_PI * node.sigma_d) * rms_over_s * stretch * half
+        weight *= exp(share) if share > LEAST else 0.0
+        out[0, k], out[1, k] = node.X, node.mu
+        out[2, k], out[3, k] = node.force * weight, node.area * weight
+    return nodes.size
+
+
+@njit(cache=True, fastmath=REORDER, error_model="numpy")
+def _rule(
+    which: int,
+    interval: Interval,
+    gap: Gap,
+    surface: SurfaceConstants,
+    near: None,
+    table: Table,
+    work: FloatArray,
+    part: FloatArray,
+) -> tuple[int, float, float, int]:
+    """One Kronrod rule over an interval, see `refine`. Where `which` is FORCE or AREA, that one is both rows."""
+    _, kronrod, gauss = rule_for(interval)
+    count = fill_nodes(interval, gap, surface, work)
+    force = area = gauss_force = gauss_area = table_error = 0.0
+    for k in range(count):
         if which == BOTH:
-            status, phi_F, phi_A, error = universal_phi(node.X, node.mu, table)
-            f, g = node.force * phi_F * weight, node.area * phi_A * weight
+            status, phi_F, phi_A, error = universal_phi(work[0, k], work[1, k], table)
+            f, g = work[2, k] * phi_F, work[3, k] * phi_A
         else:
-            status, phi, error = universal_one(which, node.X, node.mu, table)
-            f = g = (node.force if which == FORCE else node.area) * phi * weight
+            status, phi, error = universal_one(which, work[0, k], work[1, k], table)
+            f = g = work[2 + which, k] * phi
         if status != OK:
-            return status, math.nan, math.nan, nodes.size
+            return status, math.nan, math.nan, count
         force += kronrod[k] * f
         area += kronrod[k] * g
         gauss_force += gauss[k] * f
         gauss_area += gauss[k] * g
         table_error = max(table_error, error)
-    K1 = 1.0 if floor_d else surface.jacobian
+    K1 = 1.0 if interval.floor_d else surface.jacobian
     part[0, 0], part[1, 0] = K1 * force, K1 * area
     if not (force > 0.0 and area > 0.0):
-        return OK, 0.0, table_error, nodes.size
-    return OK, error_of(force, gauss_force, area, gauss_area), table_error, nodes.size
+        return OK, 0.0, table_error, count
+    return OK, error_of(force, gauss_force, area, gauss_area), table_error, count
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

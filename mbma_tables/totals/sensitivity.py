@@ -95,6 +95,7 @@ def _rule(
     surface: SurfaceConstants,
     near: Neighbours,
     table: Table,
+    work: FloatArray,
     part: FloatArray,
 ) -> tuple[int, float, float, int]:
     """Kronrod sums of force, area and their derivatives over an interval, see `refine`."""

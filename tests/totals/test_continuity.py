@@ -27,7 +27,6 @@ from mbma_tables.totals import island_sum
 from mbma_tables.totals import kernel as lookup
 from mbma_tables.totals.intervals import NARROW, STRETCH, Gap
 from mbma_tables.totals.island_sum import kinks
-from mbma_tables.totals.kernel import SMALL_POWER
 
 STEP = 1e-9
 WIDE = 1e-6
@@ -39,7 +38,7 @@ SOLVER_RTOL = 1e-10
 def surfaces(rng, count):
     hurst = rng.uniform(0.1, 1, count)
     # where differences of powers go over to expm1, and the end of the range
-    hurst[::10], hurst[5::10] = 1 - SMALL_POWER / 2, 1 - STEP / 2
+    hurst[::10], hurst[5::10] = 1 - 0.01 / 2, 1 - STEP / 2
     return hurst, 10 ** rng.uniform(0.5, 6, count), rng.uniform(2.5, 4.5, count)
 
 

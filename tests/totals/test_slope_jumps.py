@@ -21,7 +21,6 @@ from mbma_tables.surfaces.spectrum import band_moment
 from mbma_tables.theories.law_kernel import CENTRE, RATE
 from mbma_tables.totals.intervals import NARROW
 from mbma_tables.totals.island_sum import kinks
-from mbma_tables.totals.kernel import SMALL_POWER
 
 EVERY = [*READINGS.values(), OWN, LEVEL]
 PROMISED = 1e-6  # of derivatives
@@ -206,7 +205,7 @@ def test_totals_elsewhere(which, rule, record_property):
     count = 60 * SCALE
     rng = np.random.default_rng([5, INPUTS.index(which)])
     hurst, zeta_1, h_max = surfaces(rng, count)
-    hurst[::4] = 1 - SMALL_POWER / 2
+    hurst[::4] = 1 - 0.01 / 2
     kink_d, kink_u = kinks(hurst, zeta_1, rule)
     reach = rng.uniform(1e-4, 2, count) * h_max
     reach[1::4], reach[2::4], reach[3::4] = (kink_d + NARROW)[1::4], (kink_u + NARROW)[2::4], (0.01 * reach)[3::4]
