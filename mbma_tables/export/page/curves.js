@@ -1,26 +1,41 @@
 // Curves of a state: force, area, stiffness and conductance of each theory at common separations or pressures.
 
-const GAPS = 100, PRESSURES = 100;
-const LIGHTEST = 1e-5, HEAVIEST = 1; // pressures drawn, over E* times the rms gradient
+const GAPS = 100,
+  PRESSURES = 100;
+const LIGHTEST = 1e-5,
+  HEAVIEST = 1; // pressures drawn, over E* times the rms gradient
 const QUANTITIES = ["gap", "force", "area", "stiffness", "conductance"];
 const NAMES = { mbma: "MBMA", calibrated: "calibrated", persson: "Persson" };
 
 function curvesOf(state) {
-  const model = prepare(state), { status, h_rms, gradient } = model.moments();
-  if (status !== OK) return { fault: "no theory can be prepared for this surface: its numbers are too large or too small" };
-  const theories = [state.theory, ...state.beside.filter((name) => name !== state.theory && !(state.samples && name === "mbma"))];
-  const scale = state.E_star * gradient, byGap = state.against === "gap";
+  const model = prepare(state),
+    { status, h_rms, gradient } = model.moments();
+  if (status !== OK)
+    return { fault: "no theory can be prepared for this surface: its numbers are too large or too small" };
+  const theories = [
+    state.theory,
+    ...state.beside.filter((name) => name !== state.theory && !(state.samples && name === "mbma")),
+  ];
+  const scale = state.E_star * gradient,
+    byGap = state.against === "gap";
   const x = byGap
     ? Float64Array.from({ length: GAPS - 1 }, (_, k) => (state.h_max * (k + 1)) / GAPS)
-    : Float64Array.from({ length: PRESSURES }, (_, k) => scale * LIGHTEST * (HEAVIEST / LIGHTEST) ** (k / (PRESSURES - 1)));
+    : Float64Array.from(
+        { length: PRESSURES },
+        (_, k) => scale * LIGHTEST * (HEAVIEST / LIGHTEST) ** (k / (PRESSURES - 1)),
+      );
   const curves = theories.map((theory) => {
     const curve = { theory, ...Object.fromEntries(QUANTITIES.map((name) => [name, new Array(x.length).fill(null)])) };
     const gapAt = byGap ? (u) => u : separations(model, theory, state.h_max);
     x.forEach((value, k) => {
-      const u = gapAt(value), found = u > 0 ? model[theory](u) : null;
+      const u = gapAt(value),
+        found = u > 0 ? model[theory](u) : null;
       if (!found || !Number.isFinite(found.force)) return;
-      const { force, area, stiffness } = found, conductance = (state.k_s / state.E_star) * stiffness;
-      Object.entries({ gap: u, force, area, stiffness, conductance }).forEach(([name, number]) => (curve[name][k] = number));
+      const { force, area, stiffness } = found,
+        conductance = (state.k_s / state.E_star) * stiffness;
+      Object.entries({ gap: u, force, area, stiffness, conductance }).forEach(
+        ([name, number]) => (curve[name][k] = number),
+      );
     });
     curve.scatter = scatterOf(state, curve);
     curve.concerns = concernsOf(state, curve, h_rms, gradient);
@@ -36,7 +51,8 @@ function separations(model, theory, h_max) {
   const nodes = [];
   for (let k = 1; k <= 60; ++k) {
     const share = k <= 20 ? 10 ** ((k - 20) / 5) * 0.05 : 0.05 + (0.95 * (k - 20)) / 40;
-    const depth = h_max * (theory === "mbma" ? share : Math.min(share, 1 - 1e-6)), found = model[theory](h_max - depth);
+    const depth = h_max * (theory === "mbma" ? share : Math.min(share, 1 - 1e-6)),
+      found = model[theory](h_max - depth);
     if (!found || !(found.force > (nodes.at(-1)?.force ?? 0))) break;
     const { force, stiffness } = found;
     // x = ln depth against y = ln force
@@ -45,12 +61,17 @@ function separations(model, theory, h_max) {
   return (pressure) => {
     const last = nodes.findIndex(({ force }) => force >= pressure);
     if (last < 0) return NaN;
-    let low = last ? nodes[last - 1].x : -Infinity, high = nodes[last].x;
-    let at = last ? cubic(nodes[last - 1], nodes[last], Math.log(pressure)) : high + nodes[0].slope * Math.log(pressure / nodes[0].force);
+    let low = last ? nodes[last - 1].x : -Infinity,
+      high = nodes[last].x;
+    let at = last
+      ? cubic(nodes[last - 1], nodes[last], Math.log(pressure))
+      : high + nodes[0].slope * Math.log(pressure / nodes[0].force);
     for (let k = 0; k < 60; ++k) {
       if (!(at >= low && at <= high)) at = low > -Infinity ? (low + high) / 2 : high - 1;
-      const depth = Math.exp(at), { force, stiffness } = model[theory](h_max - depth) ?? { force: NaN };
-      const miss = Math.log(force / pressure), step = (miss * force) / (stiffness * depth);
+      const depth = Math.exp(at),
+        { force, stiffness } = model[theory](h_max - depth) ?? { force: NaN };
+      const miss = Math.log(force / pressure),
+        step = (miss * force) / (stiffness * depth);
       if (miss > 0) high = at;
       else low = at;
       at -= step;
@@ -63,17 +84,24 @@ function separations(model, theory, h_max) {
 
 // x at y by a cubic through two nodes with slopes dx/dy.
 function cubic(p, q, y) {
-  const h = q.y - p.y, s = (y - p.y) / h, d = q.x - p.x, a = h * p.slope - d, b = d - h * q.slope;
+  const h = q.y - p.y,
+    s = (y - p.y) / h,
+    d = q.x - p.x,
+    a = h * p.slope - d,
+    b = d - h * q.slope;
   return p.x + s * d + s * (1 - s) * (a * (1 - s) + b * s);
 }
 
 // Standard deviations of logarithms, as `Contact.scatter`: by contact fraction, null where not known.
 function scatterOf(state, curve) {
-  const rows = LIMITS.scatter[curve.theory], nodes = LIMITS.log_area, known = !(curve.theory === "mbma" && state.reading !== "reported");
+  const rows = LIMITS.scatter[curve.theory],
+    nodes = LIMITS.log_area,
+    known = !(curve.theory === "mbma" && state.reading !== "reported");
   const at = (quantity) => (area) => {
     const row = rows[quantity].map((value, k) => [nodes[k], value]).filter(([, value]) => value !== null);
     if (!known || area === null || !row.length) return null;
-    const x = Math.log(area), above = row.findIndex(([node]) => node >= x);
+    const x = Math.log(area),
+      above = row.findIndex(([node]) => node >= x);
     if (above < 0) return rows[quantity].at(-1) === null ? null : Math.exp(row.at(-1)[1]);
     if (above === 0) return Math.exp(row[0][1]);
     const [[x0, y0], [x1, y1]] = [row[above - 1], row[above]];
@@ -84,18 +112,29 @@ function scatterOf(state, curve) {
 
 // Reasons against a theory's answers, as `Contact.reasons`: each with whether it holds at a point.
 function concernsOf(state, curve, h_rms, gradient) {
-  const always = (holds) => () => holds, [low, high] = LIMITS.area, reasons = [];
-  reasons.push(["the rms gradient is above 1: are heights and wavenumbers in one unit?", always(gradient > LIMITS.gradient)]);
-  if (state.samples && state.spectrum === FIRST.spectrum) DATA.departures.forEach((text) => reasons.push([text, always(true)]));
+  const always = (holds) => () => holds,
+    [low, high] = LIMITS.area,
+    reasons = [];
+  reasons.push([
+    "the rms gradient is above 1: are heights and wavenumbers in one unit?",
+    always(gradient > LIMITS.gradient),
+  ]);
+  if (state.samples && state.spectrum === FIRST.spectrum)
+    DATA.departures.forEach((text) => reasons.push([text, always(true)]));
   if (curve.theory === "mbma") {
     const gap = softening(curve);
-    reasons.push([`areas of islands are added, A/A0 is above ${LIMITS.mbma_area}`, (k) => !DATA.model.readings[state.reading].cover && curve.area[k] > LIMITS.mbma_area]);
+    reasons.push([
+      `areas of islands are added, A/A0 is above ${LIMITS.mbma_area}`,
+      (k) => !DATA.model.readings[state.reading].cover && curve.area[k] > LIMITS.mbma_area,
+    ]);
     reasons.push(["stiffness falls with compression here, which no simulation shows", (k) => curve.gap[k] < gap]);
   } else if (curve.theory === "persson") {
     reasons.push(["u is above h_max, where the surface has no contact", (k) => curve.gap[k] > state.h_max]);
   } else {
     if (!state.samples) {
-      const ratio = state.h_max / h_rms, zeta_1 = state.q1 / state.q0, [flat, high_peaks] = LIMITS.heights;
+      const ratio = state.h_max / h_rms,
+        zeta_1 = state.q1 / state.q0,
+        [flat, high_peaks] = LIMITS.heights;
       reasons.push([`the Hurst exponent is below ${LIMITS.hurst}`, always(state.hurst < LIMITS.hurst * (1 - 1e-9))]);
       reasons.push([`q₁/q₀ is above ${LIMITS.zeta_1}`, always(zeta_1 > LIMITS.zeta_1 * (1 + 1e-9))]);
       reasons.push([`h_max/h_rms is outside ${flat} to ${high_peaks}`, always(ratio < flat || ratio > high_peaks)]);
@@ -108,7 +147,10 @@ function concernsOf(state, curve, h_rms, gradient) {
 
 // The separation of the first local maximum of stiffness under compression, by the drawn points.
 function softening(curve) {
-  const points = curve.gap.map((gap, k) => [gap, curve.stiffness[k]]).filter(([gap]) => gap !== null).sort((a, b) => b[0] - a[0]);
+  const points = curve.gap
+    .map((gap, k) => [gap, curve.stiffness[k]])
+    .filter(([gap]) => gap !== null)
+    .sort((a, b) => b[0] - a[0]);
   const peak = points.findIndex(([, stiffness], k) => k + 1 < points.length && stiffness > points[k + 1][1]);
   return peak < 0 ? -Infinity : points[peak][0];
 }

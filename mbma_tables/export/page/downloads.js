@@ -1,13 +1,21 @@
 // Files: the drawn curves as CSV, and the chosen theory's law as C.
 
-const LAW_RTOL = 1e-8, LAW_TANGENT = 1e-6, LAW_DEGREE = 11, LAW_MAX_PIECES = 400;
-const LAW_FROM = 1e-4, LAW_TO = 0.99; // overclosure over h_max
+const LAW_RTOL = 1e-8,
+  LAW_TANGENT = 1e-6,
+  LAW_DEGREE = 11,
+  LAW_MAX_PIECES = 400;
+const LAW_FROM = 1e-4,
+  LAW_TO = 0.99; // overclosure over h_max
 
 // What a file is of, one fact a line.
 function factsOf(state) {
   const surface = state.samples
-    ? [`surface: a spectrum of ${state.samples.q.length} samples from q = ${state.samples.q[0]} to ${state.samples.q.at(-1)}, h_max = ${state.h_max}`]
-    : [`surface: hurst = ${state.hurst}, q0 = ${state.q0}, q1 = ${state.q1}, h_rms = ${state.h_rms}, h_max = ${state.h_max}`];
+    ? [
+        `surface: a spectrum of ${state.samples.q.length} samples from q = ${state.samples.q[0]} to ${state.samples.q.at(-1)}, h_max = ${state.h_max}`,
+      ]
+    : [
+        `surface: hurst = ${state.hurst}, q0 = ${state.q0}, q1 = ${state.q1}, h_rms = ${state.h_rms}, h_max = ${state.h_max}`,
+      ];
   return [
     `mbma_tables ${DATA.version}, page of mbma explore: ${DATA.title}`,
     ...surface,
@@ -33,10 +41,14 @@ function csvOf(state, { x, curves }) {
 // Chebyshev nodes in [-1, 1], and the coefficients of powers of t through values at them.
 const LAW_NODES = Array.from({ length: LAW_DEGREE + 1 }, (_, k) => Math.cos((Math.PI * (k + 0.5)) / (LAW_DEGREE + 1)));
 function powersOf(values) {
-  const count = LAW_NODES.length, result = new Array(count).fill(0);
-  let before = [1], own = [0, 1]; // T_0 and T_1 by powers
+  const count = LAW_NODES.length,
+    result = new Array(count).fill(0);
+  let before = [1],
+    own = [0, 1]; // T_0 and T_1 by powers
   for (let n = 0; n < count; ++n) {
-    const weight = values.reduce((sum, value, k) => sum + value * Math.cos((n * Math.PI * (k + 0.5)) / count), 0) * ((n ? 2 : 1) / count);
+    const weight =
+      values.reduce((sum, value, k) => sum + value * Math.cos((n * Math.PI * (k + 0.5)) / count), 0) *
+      ((n ? 2 : 1) / count);
     before.forEach((coefficient, power) => (result[power] += weight * coefficient));
     const next = [0, ...own.map((coefficient) => 2 * coefficient)];
     before.forEach((coefficient, power) => (next[power] -= coefficient));
@@ -49,22 +61,35 @@ const atPowers = (powers, t) => powers.reduceRight((sum, coefficient) => sum * t
 // Polynomials of ln p and ln A over ln c, c = h_max - u the overclosure, or over c where pressure has no end at h_max:
 // pieces are halved until they are near enough.
 function piecesOf(state) {
-  const model = prepare(state), pieces = [], largest = { pressure: 0, area: 0, tangent: 0 };
-  const endless = state.theory === "persson", [to, from] = endless ? [(c) => c, (x) => x] : [Math.log, Math.exp];
+  const model = prepare(state),
+    pieces = [],
+    largest = { pressure: 0, area: 0, tangent: 0 };
+  const endless = state.theory === "persson",
+    [to, from] = endless ? [(c) => c, (x) => x] : [Math.log, Math.exp];
   const at = (x) => model[state.theory](state.h_max - from(x));
   const pending = [[to(LAW_FROM * state.h_max), to(LAW_TO * state.h_max)]];
   while (pending.length) {
-    const [low, high] = pending.pop(), middle = (low + high) / 2, half = (high - low) / 2;
+    const [low, high] = pending.pop(),
+      middle = (low + high) / 2,
+      half = (high - low) / 2;
     const found = LAW_NODES.map((t) => at(middle + half * t));
     if (!found.every((value) => value && value.force > 0)) throw new Error("the theory has no answer down to there");
-    const pressure = powersOf(found.map(({ force }) => Math.log(force))), area = powersOf(found.map((value) => Math.log(value.area)));
+    const pressure = powersOf(found.map(({ force }) => Math.log(force))),
+      area = powersOf(found.map((value) => Math.log(value.area)));
     const errors = { pressure: 0, area: 0, tangent: 0 };
     for (let k = 0; k < 9; ++k) {
-      const t = -1 + (2 * k) / 8, x = middle + half * t, known = at(x), scale = endless ? 1 : from(x);
-      const powers = pressure.map((coefficient, n) => n * coefficient).slice(1), p = Math.exp(atPowers(pressure, t));
+      const t = -1 + (2 * k) / 8,
+        x = middle + half * t,
+        known = at(x),
+        scale = endless ? 1 : from(x);
+      const powers = pressure.map((coefficient, n) => n * coefficient).slice(1),
+        p = Math.exp(atPowers(pressure, t));
       errors.pressure = Math.max(errors.pressure, Math.abs(p / known.force - 1));
       errors.area = Math.max(errors.area, Math.abs(Math.exp(atPowers(area, t)) / known.area - 1));
-      errors.tangent = Math.max(errors.tangent, Math.abs((p * atPowers(powers, t)) / (half * scale * known.stiffness) - 1));
+      errors.tangent = Math.max(
+        errors.tangent,
+        Math.abs((p * atPowers(powers, t)) / (half * scale * known.stiffness) - 1),
+      );
     }
     const near = errors.pressure <= LAW_RTOL && errors.area <= LAW_RTOL && errors.tangent <= LAW_TANGENT;
     if (!near && half > 1e-4 * (endless ? state.h_max : 1) && pieces.length + pending.length < LAW_MAX_PIECES) {
@@ -79,7 +104,9 @@ function piecesOf(state) {
 
 // What writes the same law in the library, under the same names.
 function commandOf(state) {
-  const numbers = ["hurst", "q0", "q1", "h_rms", "h_max", "E_star"].map((name) => `--${name.replace("_", "-")} ${state[name]}`);
+  const numbers = ["hurst", "q0", "q1", "h_rms", "h_max", "E_star"].map(
+    (name) => `--${name.replace("_", "-")} ${state[name]}`,
+  );
   const units = `${LENGTH ? ` --length-unit ${LENGTH}` : ""}${STRESS && !OVER_E ? ` --stress-unit ${STRESS}` : ""}`;
   return state.samples
     ? "mbma_tables.export.law_code.law_text of Surface.from_spectrum(q, C, h_max)"
@@ -87,7 +114,9 @@ function commandOf(state) {
 }
 
 function lawOf(state) {
-  const { pieces, largest, endless } = piecesOf(state), count = pieces.length, terms = LAW_DEGREE + 1;
+  const { pieces, largest, endless } = piecesOf(state),
+    count = pieces.length,
+    terms = LAW_DEGREE + 1;
   const rows = (name) => pieces.map((piece) => `    {${piece[name].join(", ")}},`).join("\n");
   const facts = [
     ...factsOf(state),
@@ -96,7 +125,10 @@ function lawOf(state) {
     "pressure, tangent dp/dc and area A/A0 against overclosure c; compile with cc -std=c99 -O2 -c, link with -lm",
     `the library's own, nearer to it, with energy and the overclosure at a pressure: ${commandOf(state)}`,
   ];
-  const ascii = (line) => line.replace(/\*\//g, "* /").replace(/[^\x20-\x7e]/g, (letter) => `\\u${letter.charCodeAt(0).toString(16).padStart(4, "0")}`);
+  const ascii = (line) =>
+    line
+      .replace(/\*\//g, "* /")
+      .replace(/[^\x20-\x7e]/g, (letter) => `\\u${letter.charCodeAt(0).toString(16).padStart(4, "0")}`);
   return `/*
 ${facts.map((line) => ` * ${ascii(line)}`).join("\n")}
  */

@@ -1,23 +1,40 @@
 // Controls, and what follows when one of them is moved.
 
-const form = document.getElementById("controls"), by = (id) => document.getElementById(id);
+const form = document.getElementById("controls"),
+  by = (id) => document.getElementById(id);
 let { state, errors: addressErrors } = stateOf(location.hash);
 let writing = null; // of the address, a moment after the last change
 
 // A number by a field and a slider: linear from low to high, or logarithmic about the first value.
 for (const [name, { label, unit, group, low, high, decades }] of Object.entries(NUMBERS)) {
-  const row = document.createElement("div"), centre = Math.log10(FIRST[name]);
+  const row = document.createElement("div"),
+    centre = Math.log10(FIRST[name]);
   row.className = "number";
-  const field = Object.assign(document.createElement("input"), { id: name, type: "text", inputMode: "decimal", spellcheck: false });
-  const slider = Object.assign(document.createElement("input"), { id: `slide-${name}`, type: "range", min: 0, max: 1000, step: 1 });
+  const field = Object.assign(document.createElement("input"), {
+    id: name,
+    type: "text",
+    inputMode: "decimal",
+    spellcheck: false,
+  });
+  const slider = Object.assign(document.createElement("input"), {
+    id: `slide-${name}`,
+    type: "range",
+    min: 0,
+    max: 1000,
+    step: 1,
+  });
   const fault = Object.assign(document.createElement("p"), { id: `error-${name}`, className: "error" });
-  const text = Object.assign(document.createElement("label"), { htmlFor: name, textContent: unit ? `${label} [${unit}]` : label });
+  const text = Object.assign(document.createElement("label"), {
+    htmlFor: name,
+    textContent: unit ? `${label} [${unit}]` : label,
+  });
   fault.setAttribute("role", "alert");
   field.setAttribute("aria-describedby", fault.id);
   slider.setAttribute("aria-label", label);
   row.append(text, field, slider, fault);
   by(group).append(row);
-  const toValue = (place) => (decades ? 10 ** (centre + decades * (place / 500 - 1)) : low + ((high - low) * place) / 1000);
+  const toValue = (place) =>
+    decades ? 10 ** (centre + decades * (place / 500 - 1)) : low + ((high - low) * place) / 1000;
   slider.addEventListener("input", () => {
     state[name] = Number(toValue(slider.valueAsNumber).toPrecision(6));
     field.value = state[name];
@@ -29,7 +46,9 @@ for (const [name, { label, unit, group, low, high, decades }] of Object.entries(
     update();
   });
   function placeSlider() {
-    const place = decades ? 500 * ((Math.log10(state[name]) - centre) / decades + 1) : (1000 * (state[name] - low)) / (high - low);
+    const place = decades
+      ? 500 * ((Math.log10(state[name]) - centre) / decades + 1)
+      : (1000 * (state[name] - low)) / (high - low);
     if (Number.isFinite(place)) slider.value = Math.round(place);
     slider.setAttribute("aria-valuetext", shown(state[name]));
   }
@@ -90,7 +109,11 @@ function show() {
 function update(extra = {}) {
   delete state.samples;
   const pasted = form.elements.source.value === "spectrum";
-  const errors = { ...extra, ...faultsOf(state), ...(pasted && state.spectrum === "" ? { spectrum: "paste two columns, q and C" } : {}) };
+  const errors = {
+    ...extra,
+    ...faultsOf(state),
+    ...(pasted && state.spectrum === "" ? { spectrum: "paste two columns, q and C" } : {}),
+  };
   let found = null;
   if (!Object.keys(errors).length) {
     found = curvesOf(state);
@@ -104,7 +127,8 @@ function update(extra = {}) {
   by("charts").parentElement.classList.toggle("stale", bad);
   for (const id of ["csv", "law", "link"]) by(id).disabled = bad;
   if (bad) return;
-  by("subtitle").textContent = `h_rms = ${shown(found.h_rms)} ${LENGTH ?? ""}, rms gradient ${shown(found.gradient)}${state.samples ? `, ${state.samples.q.length} samples of a spectrum` : `, q₁/q₀ = ${shown(state.q1 / state.q0)}`}`;
+  by("subtitle").textContent =
+    `h_rms = ${shown(found.h_rms)} ${LENGTH ?? ""}, rms gradient ${shown(found.gradient)}${state.samples ? `, ${state.samples.q.length} samples of a spectrum` : `, q₁/q₀ = ${shown(state.q1 / state.q0)}`}`;
   draw(state, { ...found, state });
   clearTimeout(writing);
   writing = setTimeout(() => history.replaceState(null, "", addressOf(state)), 200);
@@ -135,8 +159,9 @@ form.addEventListener("reset", (event) => {
   event.preventDefault();
   open({ ...FIRST });
 });
-addEventListener("hashchange", () => {
-  const asked = stateOf(location.hash);
+addEventListener("hashchange", ({ newURL }) => {
+  // not location.hash: the last change of a control may have been written there since
+  const asked = stateOf(new URL(newURL).hash);
   open(asked.state, asked.errors);
 });
 function open(next, errors = {}) {
@@ -146,7 +171,8 @@ function open(next, errors = {}) {
 }
 
 by("origin").textContent = DATA.note;
-by("version").textContent = `mbma_tables ${DATA.version}: its C as WebAssembly, with its tables. Nothing is sent anywhere.`;
+by("version").textContent =
+  `mbma_tables ${DATA.version}: its C as WebAssembly, with its tables. Nothing is sent anywhere.`;
 open(state, addressErrors);
 document.documentElement.dataset.ready = performance.now();
 // the browser compiles what runs often better: do that before the first slider moves

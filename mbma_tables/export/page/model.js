@@ -2,12 +2,14 @@
 
 const DATA = JSON.parse(document.getElementById("data").textContent);
 const LIMITS = DATA.limits;
-const OK = 0, OUTSIDE = 6; // as in mbma.h
+const OK = 0,
+  OUTSIDE = 6; // as in mbma.h
 const RTOL = 1e-11; // asked of MBMA's totals
 const LAW_BYTES = 1 << 19; // room for an mbma_law
 
 function bytesOf(text) {
-  const letters = atob(text), bytes = new Uint8Array(letters.length);
+  const letters = atob(text),
+    bytes = new Uint8Array(letters.length);
   for (let k = 0; k < letters.length; ++k) bytes[k] = letters.charCodeAt(k);
   return bytes;
 }
@@ -34,14 +36,18 @@ async function unpacked({ count, differences, bits, text }) {
   return values;
 }
 
-const tables = await Promise.all(Object.entries(DATA.model.tables).map(async ([name, table]) => [name, await unpacked(table)]));
+const tables = await Promise.all(
+  Object.entries(DATA.model.tables).map(async ([name, table]) => [name, await unpacked(table)]),
+);
 const C = (await WebAssembly.instantiate(bytesOf(DATA.model.module))).instance.exports;
 C._initialize();
 const at = (name) => C[`MBMA_${name}`].value;
 // memory that the module does not use: two laws, arguments, answers, a spectrum
 const OWN = 65536 * C.memory.grow(Math.ceil((2 * LAW_BYTES + 2048 + 16 * LIMITS.max_samples) / 65536));
 const LAWS = { persson: OWN, calibrated: OWN + LAW_BYTES };
-const ARGUMENTS = OWN + 2 * LAW_BYTES, ANSWER = ARGUMENTS + 1024, SAMPLES = ANSWER + 1024;
+const ARGUMENTS = OWN + 2 * LAW_BYTES,
+  ANSWER = ARGUMENTS + 1024,
+  SAMPLES = ANSWER + 1024;
 const numbersAt = (place, count) => new Float64Array(C.memory.buffer, place, count);
 for (const [name, values] of tables) numbersAt(at(name), values.length).set(values);
 for (const [name, value] of Object.entries(DATA.model.numbers)) numbersAt(at(name), 1)[0] = value;
@@ -63,7 +69,8 @@ function prepare(state) {
   }
   const held = {};
   const law = (theory) => {
-    const number = theory === "persson" ? 0 : 1, count = samples?.q.length;
+    const number = theory === "persson" ? 0 : 1,
+      count = samples?.q.length;
     held[theory] ??= samples
       ? C.mbma_law_of_spectrum(count, SAMPLES, SAMPLES + 8 * count, state.h_max, number, LAWS[theory])
       : C.mbma_law_of_surface(ARGUMENTS, number, LAWS[theory]);
@@ -93,7 +100,8 @@ function prepare(state) {
     },
     // mbma_law begins with h_rms, h_max, gradient
     moments() {
-      const status = law("persson"), [h_rms, , gradient] = numbersAt(LAWS.persson, 3);
+      const status = law("persson"),
+        [h_rms, , gradient] = numbersAt(LAWS.persson, 3);
       return { status, h_rms, gradient };
     },
   };

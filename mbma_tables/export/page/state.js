@@ -9,7 +9,7 @@ const NUMBERS = {
   q1: { label: "q₁, shortest wave", unit: per(LENGTH), group: "numbers", decades: 2 },
   h_rms: { label: "h_rms, rms height", unit: LENGTH ?? "length", group: "numbers", decades: 1.5 },
   h_max: { label: "h_max, highest point", unit: LENGTH ?? "length", group: "height", decades: 1 },
-  E_star: { label: "E*, effective modulus", unit: OVER_E ? "" : STRESS ?? "stress", group: "material", decades: 3 },
+  E_star: { label: "E*, effective modulus", unit: OVER_E ? "" : (STRESS ?? "stress"), group: "material", decades: 3 },
   k_s: { label: "k_s, mean conductivity", unit: "", group: "material", decades: 3 },
 };
 const WORDS = {
@@ -19,11 +19,20 @@ const WORDS = {
   log: ["yes", "no"],
   convention: ["paper", "isotropic"],
 };
-const FIRST = { against: "gap", log: "yes", beside: ["calibrated", "persson"], spectrum: "", convention: "paper", ...DATA.start };
+const FIRST = {
+  against: "gap",
+  log: "yes",
+  beside: ["calibrated", "persson"],
+  spectrum: "",
+  convention: "paper",
+  ...DATA.start,
+};
 
 // The state that an address asks for, and what is wrong with it.
 function stateOf(address) {
-  const asked = new URLSearchParams(address.replace(/^#/, "")), state = { ...FIRST }, errors = {};
+  const asked = new URLSearchParams(address.replace(/^#/, "")),
+    state = { ...FIRST },
+    errors = {};
   for (const [name, text] of asked) {
     if (name in NUMBERS) {
       state[name] = text.trim() === "" ? NaN : Number(text);
@@ -53,19 +62,24 @@ function addressOf(state) {
 
 // Columns of a pasted spectrum, with its fault in words; C as the paper has it.
 function samplesOf(text, convention) {
-  const q = [], C = [], unit = convention === "isotropic" ? 1 / (4 * Math.PI ** 2) : 1;
+  const q = [],
+    C = [],
+    unit = convention === "isotropic" ? 1 / (4 * Math.PI ** 2) : 1;
   for (const [k, line] of text.split("\n").entries()) {
     const row = line.replace(/#.*/, "").trim();
     if (row === "") continue;
-    const numbers = row.split(/[\s,]+/).map(Number), where = `line ${k + 1}, “${row.slice(0, 40)}”`;
-    if (numbers.length !== 2 || !numbers.every(Number.isFinite)) return { fault: `${where}: two numbers are needed, q and C` };
+    const numbers = row.split(/[\s,]+/).map(Number),
+      where = `line ${k + 1}, “${row.slice(0, 40)}”`;
+    if (numbers.length !== 2 || !numbers.every(Number.isFinite))
+      return { fault: `${where}: two numbers are needed, q and C` };
     if (!(numbers[0] > 0)) return { fault: `${where}: q must be positive; leave q = 0 out` };
     if (!(numbers[0] >= (q.at(-1) ?? 0))) return { fault: `${where}: q must rise from line to line` };
     if (!(numbers[1] >= 0)) return { fault: `${where}: C must not be negative` };
     q.push(numbers[0]);
     C.push(unit * numbers[1]);
   }
-  if (q.length > LIMITS.max_samples) return { fault: `${q.length} lines are given, ${LIMITS.max_samples} is the most here: thin them out` };
+  if (q.length > LIMITS.max_samples)
+    return { fault: `${q.length} lines are given, ${LIMITS.max_samples} is the most here: thin them out` };
   const held = q.filter((value, k) => C[k] > 0);
   if (!(held.at(-1) > 3 * held[0])) return { fault: "wavenumbers of positive C must span more than a factor 3" };
   return { q, C };
@@ -73,7 +87,8 @@ function samplesOf(text, convention) {
 
 // Faults of a state by control, in words.
 function faultsOf(state) {
-  const errors = {}, floor = DATA.model.readings[state.reading].changed.MIN_ZETA_1 ?? DATA.model.numbers.MIN_ZETA_1;
+  const errors = {},
+    floor = DATA.model.readings[state.reading].changed.MIN_ZETA_1 ?? DATA.model.numbers.MIN_ZETA_1;
   for (const name of Object.keys(NUMBERS)) {
     const value = state[name];
     if (!Number.isFinite(value)) errors[name] = `${name} must be a number`;
@@ -85,13 +100,16 @@ function faultsOf(state) {
     if (samples.fault) errors.spectrum = samples.fault;
     else state.samples = samples;
     if (state.theory === "mbma") {
-      errors.theory = "MBMA here needs five numbers: of a spectrum take the calibrated law or Persson's theory, or the Python library";
+      errors.theory =
+        "MBMA here needs five numbers: of a spectrum take the calibrated law or Persson's theory, or the Python library";
     }
     return errors;
   }
   if (!errors.hurst && state.hurst > 1) errors.hurst = `H must be in (0, 1], got ${state.hurst}`;
   if (!errors.q0 && !errors.q1) {
-    const zeta_1 = state.q1 / state.q0, mbma = state.theory === "mbma" || state.beside.includes("mbma"), least = mbma ? floor : 3;
+    const zeta_1 = state.q1 / state.q0,
+      mbma = state.theory === "mbma" || state.beside.includes("mbma"),
+      least = mbma ? floor : 3;
     const which = least > 3 ? `, as reading ${state.reading} needs` : "";
     if (!(zeta_1 > least)) errors.q1 = `q₁ must be more than ${least} q₀${which}; q₁/q₀ is ${shown(zeta_1)}`;
     else if (!(zeta_1 <= 1e8)) errors.q1 = `q₁ must be at most 1e8 q₀; q₁/q₀ is ${shown(zeta_1)}`;
@@ -102,5 +120,7 @@ function faultsOf(state) {
 function shown(value, digits = 4) {
   if (value === null || Number.isNaN(value)) return "–";
   const size = Math.abs(value);
-  return size !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(digits - 1) : String(Number(value.toPrecision(digits)));
+  return size !== 0 && (size < 1e-3 || size >= 1e5)
+    ? value.toExponential(digits - 1)
+    : String(Number(value.toPrecision(digits)));
 }
