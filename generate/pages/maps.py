@@ -22,6 +22,8 @@ KINDS = ("stretched", "peaks", "valleys", "patchy", "worn")
 GRADIENT = 0.1  # that surfaces are given: theories ask for a small one
 # contacts that are summed up: as far as islands do not lie on one another, and all
 RANGES = {"mbma": (0.01, 0.1), "calibrated": (0.01, 0.97)}
+EXTRAPOLATED = {"extrapolate_to": "2nm", "extrapolate_hurst": 0.8}
+PRESSURES = (1e-4, 1e-3, 1e-2)
 Seen = tuple[str, MeasuredSurface, FloatArray]
 
 
@@ -78,6 +80,32 @@ def summary(seen: list[Seen]) -> list[str]:
     return cells
 
 
+def extrapolation() -> str:
+    """A measured spectrum as it is and continued, by a theory that asks for nothing else."""
+    path, options = EXAMPLES[0].path(), EXAMPLES[0].options
+    assert path is not None
+    known, longer = (measured(path, options | more)[1] for more in ({}, EXTRAPOLATED))
+    rows = []
+    for pressure in PRESSURES:
+        one, other = (contact(s, pressure=pressure, theory="persson") for s in (known, longer))
+        # conductance over conductivity is stiffness over E*
+        cells = [
+            f"{x:.3g} | {y:.3g} | {y / x:.2f}" for x, y in ((one.area, other.area), (one.stiffness, other.stiffness))
+        ]
+        rows.append([f"{pressure:g}", *cells])
+    header = [
+        "pressure/E*",
+        "area",
+        "continued",
+        "ratio",
+        "stiffness/E* and conductance/k [1/nm]",
+        "continued",
+        "ratio",
+    ]
+    told = next(entry["told"] for entry in longer.provenance if entry["step"] == "extrapolated")
+    return table(header, rows) + f"\n\nTold of it: {told}."
+
+
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
     """Parts of the page; no other files."""
     groups: dict[str, list[Seen]] = {}
@@ -92,4 +120,4 @@ def measure() -> tuple[dict[str, str], dict[str, bytes]]:
         rows.append([f"{name} ({len(seen)})", f"{stretch:.1f}", f"{kurtosis:.1f}", f"{skewness:.1f}", *summary(seen)])
     header = ["surfaces (number)", "anisotropy", "kurtosis of slopes", "skewness"]
     header += [f"{name}: {what}" for name in ("MBMA", "calibrated") for what in ("area", "force", "valid")]
-    return {"shapes": table(header, rows)}, {}
+    return {"shapes": table(header, rows), "extrapolation": extrapolation()}, {}
