@@ -25,10 +25,11 @@ from mbma_tables.calibrated import CONSTANTS, YANG_PERSSON, Law, Spectrum
 from mbma_tables.calibrated_map import MAP_CONSTANTS
 from mbma_tables.errors import MbmaError
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.maps import matched
+from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import REPORTED, Reading
 
 DATA = ROOT / "docs" / "data"
-HURST, BANDS = 0.8, (3.0 * (1 + 1e-6), 1e8 * (1 - 1e-6))  # of the band that stands for another spectrum
 LOW, HIGH = 0.01, 0.97  # A/A0 of the simulations between which distances are summed up
 # u/h_max at which a theory's curve is known
 DEPTHS = np.concatenate([1 - np.geomspace(1e-4, 0.5, 150), np.geomspace(0.5, 1e-6, 151)[1:]])
@@ -76,14 +77,17 @@ class Curve:
         )
 
 
-def surface_of(one: Case) -> Surface:
-    """What theories of self-affine surfaces are given: its own numbers, or a band of the same moments."""
+def surface_of(one: Case) -> AnySurface:
+    """What theories are given: five numbers, or the surface's own spectrum by bands."""
     if one.kind == "self_affine":
         return Surface(float(one.node[1]), 1.0, float(one.node[2]), 1.0, one.h_max)
-    m2 = one.own_spectrum.gradient**2 / 2
-    alphas = [float(Surface(HURST, 1.0, zeta, 1.0, 1.0).alpha) for zeta in BANDS]
-    alpha = min(max(one.own_spectrum.alpha, alphas[0]), alphas[1])
-    return Surface.from_moments(hurst=HURST, m0=1.0, m2=m2, m4=alpha * m2**2, h_max=one.h_max)
+    x, variance = one.own_spectrum.x, one.own_spectrum.variance
+    middle = np.sqrt(x[1:] * x[:-1])
+    edges = np.concatenate([[x[0] ** 2 / middle[0]], middle, [x[-1] ** 2 / middle[-1]]])
+    level = variance / (np.pi * np.diff(edges**2))
+    q, C = np.repeat(edges, 2)[1:-1], np.repeat(level, 2)
+    # of the mean square wavenumber that it has
+    return MeasuredSurface(q, matched(q, C, 1.0, one.own_spectrum.gradient**2), one.h_max)
 
 
 def _mbma(reading: str | Reading, tier: str = "universal") -> Callable[[Case], Any]:

@@ -7,12 +7,14 @@ import dataclasses
 import io
 import os
 import pathlib
+import time
 from typing import Any
 
 import numpy as np
 from scipy.signal import resample
 
 from generate.pages.page import ROOT, table
+from mbma_tables import contact_law
 from mbma_tables.arguments import FloatArray
 from mbma_tables.boundary_elements import LOADS
 from mbma_tables.errors import MbmaError
@@ -27,6 +29,7 @@ from mbma_tables.theories.simulated import continued
 
 FOLDER = "docs/data/maps"
 ROWS = f"{FOLDER}/boundary_elements.csv"
+LAWS = ("mbma", "calibrated", "persson")
 COLUMNS = ("force", "area", "mean_separation", "energy")
 SHOWN = (0.002, 0.01, 0.1, 0.3, 0.6)  # contact
 GAPS = np.append(np.geomspace(1e-3, 0.1, 60)[:-1], np.linspace(0.1, 0.995, 300))  # u/h_max
@@ -148,14 +151,38 @@ def compared(surface: MeasuredSurface, rows: FloatArray) -> str:
     )
 
 
+def scattered() -> MeasuredSurface:
+    """A plateau and a power law in 2,000 samples that scatter, as single waves of a periodogram do."""
+    q = np.geomspace(0.2, 60, 2000)
+    C = np.minimum(1, q**-3.5) * np.random.default_rng(1).uniform(0.7, 1.4, q.size)
+    return MeasuredSurface(q, 1e-4 * C, h_max=0.07)
+
+
+def laws(surfaces: dict[str, MeasuredSurface]) -> str:
+    """What contact laws of surfaces cover, their bounds, and the time to make one."""
+    rows = []
+    for name, surface in surfaces.items():
+        for theory in LAWS:
+            own, times = contact_law(surface, theory=theory), []
+            # of another size each time, so that nothing is kept of it
+            for other in [surface.resized(up, 1.0) for up in (1.1, 1.2, 1.3)]:
+                started = time.process_time()
+                contact_law(other, theory=theory)
+                times.append(time.process_time() - started)
+            low = (own.h_max + max(own.lowest, -own.h_max)) / 2 / own.h_max
+            rows.append([name, theory, f"{low:.2g}", f"{own.error:.1e}", f"{min(times):.3f}"])
+    return table(["surface", "theory", "u/h_max from", "error", "made in [s]"], rows)
+
+
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
     """Parts of the page, and its figures and data."""
     rows = read_rows()
-    text, files = [], {}
+    text, files, surfaces = [], {}, {}
     for example in EXAMPLES:
         path = example.path()
         assert path is not None
         treated, surface = measured(path, example.options)
+        surfaces[example.name] = surface
         found = simulated(example, rows)
         stem = example.name.split(".")[0]
         points = None if found is None else dict(zip(COLUMNS, found, strict=True))
@@ -172,4 +199,5 @@ def measure() -> tuple[dict[str, str], dict[str, bytes]]:
         if example.name == REFINED and path is not None and f"{REFINED} refined" not in rows:
             rows[f"{REFINED} refined"] = refined(path, example.options)
     files[ROWS] = written(rows)
+    text += ["## Their contact laws", laws(surfaces | {"2,000 scattered samples": scattered()})]
     return {"maps": "\n\n".join(text)}, files
