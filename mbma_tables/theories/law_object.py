@@ -28,7 +28,7 @@ from mbma_tables.units import UNKNOWN, Units, unit_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mbma_tables.theories.leakage import LeakageLaw
+    from mbma_tables.theories.law_leakage import LeakageLaw
 
 BLOCK = 1 << 16  # gaps between two looks for Ctrl-C
 SHOWN_POINTS = 200  # separations of a law as a Dataset, and of its picture
@@ -300,7 +300,7 @@ class ContactLaw(Displayed):
 
     @functools.cached_property
     def leakage(self) -> LeakageLaw:
-        """Flow conductance of the gaps at d, ``u=`` or ``pressure=``, a `theories.leakage.LeakageLaw`; made when read.
+        """Flow conductance at d, ``u=`` or ``pressure=``, a `theories.law_leakage.LeakageLaw`; made when read.
 
         Examples
         --------
@@ -310,7 +310,7 @@ class ContactLaw(Displayed):
         >>> f"{law.leakage(pressure='0.05 MPa'):.1g} um^3"
         '0.001 um^3'
         """
-        from mbma_tables.theories.leakage import leakage_law
+        from mbma_tables.theories.law_leakage import leakage_law
 
         if self.surface is None:
             raise InputError("leakage needs the surface, which this law does not hold")

@@ -1,0 +1,111 @@
+"""Leakage of a contact law: flow conductance as polynomials of the gap, from that at which contact percolates."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.arguments import FloatArray, Numbers, is_labelled
+from mbma_tables.errors import InputError
+from mbma_tables.labels import apply
+from mbma_tables.leakage import wide_gap
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.theories.law_kernel import ENDS, HIGHEST, KINK_SIGN, KINK_SIGN_2, LOWEST, POWER_A, POWER_F, fill
+from mbma_tables.theories.law_pieces import Side, assemble, power_record, side_pieces, straight_record
+from mbma_tables.theories.leakage import flow
+from mbma_tables.theories.leakage_table import shipped_flow
+
+if TYPE_CHECKING:
+    from mbma_tables.theories.law_object import ContactLaw
+
+RTOL = 1e-4  # of the polynomials
+MOST_OCTAVES = 20  # of gaps, from the blocked one on, next to which the flow is a power
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LeakageLaw:
+    """Flow conductance k h_rms^3 [length^3] of one surface against its gap, as `ContactLaw.leakage` has it.
+
+    Attributes
+    ----------
+    law : ContactLaw
+        Whose area and mean separation it is of.
+    h_rms : float
+        Rms height [length].
+    blocked_at : float
+        Gap d at and below which contact percolates and the conductance is 0; -infinity where it never does.
+    error : float
+        Bound on the relative error of the polynomials, against the flow at the law's area.
+    block : ndarray
+        In the layout of `mbma_tables.theories.law_kernel`: the conductance in place of force, and its cube root, the
+        gap of parallel plates that pass as much, in place of area; of gaps from `blocked_at` to h_max, or to the end
+        of a law without last contact.
+    """
+
+    law: ContactLaw
+    h_rms: float
+    blocked_at: float
+    error: float
+    block: FloatArray
+
+    def __call__(
+        self,
+        separation: ArrayLike | str | None = None,
+        *,
+        u: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+    ) -> Numbers:
+        """Flow conductance at separations, at mean separations, or at pressures; exactly 0 where blocked."""
+        given = [known for known in (separation, u, pressure) if known is not None]
+        if len(given) != 1:
+            raise InputError("give one of separation, u and pressure")
+        if is_labelled(given[0]):
+            name = "pressure" if pressure is not None else "separation" if u is None else "u"
+            return apply(lambda known: self(**{name: known}), (given[0],), 1)  # type: ignore[no-any-return]
+        d = self.law.separation(force=pressure) if pressure is not None else self.law.gaps(separation, u)
+        flat = np.ascontiguousarray(d).reshape(-1)
+        found = np.empty(flat.size)
+        fill(int(self.block.ctypes.data), np.minimum(flat, self.block[HIGHEST]), found, None, None, None, None)
+        apart = flat > self.block[HIGHEST]
+        mean = (self.law.h_max + flat[apart]) / 2
+        found[apart] = mean**3 * wide_gap(mean / self.h_rms)
+        return found.reshape(np.shape(d))[()]
+
+
+def leakage_law(law: ContactLaw, surface: AnySurface) -> LeakageLaw:
+    """Leakage of a contact law's surface, as polynomials of the gap that begin where contact percolates."""
+    threshold, h_rms = shipped_flow().constants.threshold, float(surface.h_rms)
+    deepest = law.lowest if law.area_turning_point is None else law.area_turning_point
+    blocked = bool(law.area(deepest) >= threshold)
+    bottom = float(law.separation(area=threshold)) if blocked else deepest
+    top = min(law.h_max, law.highest) if law.block.view(np.int64)[ENDS] else law.highest
+    span = top - bottom
+
+    def values(x: FloatArray) -> FloatArray:
+        d = bottom + span * x
+        conductance = h_rms**3 * flow(surface, (law.h_max + d) / 2, np.asarray(law.area(d)))
+        return np.stack([conductance, np.cbrt(conductance)])
+
+    for octaves in range(MOST_OCTAVES if blocked else 6, MOST_OCTAVES + 1):
+        start = 2.0**-octaves
+        if blocked:
+            record, record_error, powers = straight_record(values, start)
+        else:
+            # gaps close as u under full compression
+            powers = (3.0, 1.0) if bottom == -law.h_max else (0.0, 0.0)
+            record, record_error = power_record(values, start, powers)
+        if record_error[0] <= RTOL:
+            break
+    head = law.block
+    kinks = [(head[at] * head[at + 1] - bottom) / span for at in (KINK_SIGN, KINK_SIGN_2) if head[at]]
+    side = Side(1, start, values, tuple(sorted(kink for kink in kinks if start < kink < 1)))
+    made = assemble(-bottom, 1 / span, [side], [side_pieces(side, RTOL)], record, record_error)
+    made.head[[POWER_F, POWER_A]] = powers
+    made.head[[LOWEST, HIGHEST]] = law.block[LOWEST], top
+    made.head.view(np.int64)[ENDS] = blocked
+    block = made.block
+    block.flags.writeable = False
+    return LeakageLaw(law, h_rms, bottom if blocked else -np.inf, float(made.errors[:, 0].max()), block)
