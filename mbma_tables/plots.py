@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 KINDS = ("png", "svg", "pdf")  # of files of pictures
 GAP_LABEL = "mean separation  u/h_rms"
 FORCE_LABEL = "force  F/(A0 E*)"
+LEAKAGE_LABEL = "flow conductance  k h_rms^3"
 LABELS = {"mbma": "MBMA", "greenwood_williamson": "Greenwood-Williamson", "persson_simplified": "Persson, simplified"}
 
 
@@ -49,6 +51,18 @@ def force_label(unit: str) -> str:
     return FORCE_LABEL if unit == "1" else f"force  F/A0 [{unit}]"
 
 
+def leakage_label(unit: str) -> str:
+    """The axis of flow conductance in a unit; "1" where that is not known.
+
+    Examples
+    --------
+    >>> from mbma_tables.plots import leakage_label
+    >>> leakage_label("um^3")
+    'flow conductance  k h_rms^3 [um^3]'
+    """
+    return LEAKAGE_LABEL if unit == "1" else f"{LEAKAGE_LABEL} [{unit}]"
+
+
 @dataclasses.dataclass(frozen=True)
 class Curve:
     """One line of a picture; three arrays of one length.
@@ -65,6 +79,8 @@ class Curve:
         A/A0.
     scatter, area_scatter : ndarray or None
         Standard deviations of ln F at the gap and of ln A at the force, drawn as bands; NaN where not known.
+    leakage, leakage_scatter : ndarray or None
+        Flow conductance of the gaps, zero where blocked, and standard deviations of its logarithm.
     """
 
     label: str
@@ -73,6 +89,8 @@ class Curve:
     area: FloatArray
     scatter: FloatArray | None = None
     area_scatter: FloatArray | None = None
+    leakage: FloatArray | None = None
+    leakage_scatter: FloatArray | None = None
 
     def __post_init__(self) -> None:
         shapes = set()
@@ -80,7 +98,8 @@ class Curve:
             array = finite_array(f"{name} of {self.label!r}", getattr(self, name))
             shapes.add(array.shape)
             object.__setattr__(self, name, array)
-        shapes |= {np.shape(band) for band in (self.scatter, self.area_scatter) if band is not None}
+        others = (self.scatter, self.area_scatter, self.leakage, self.leakage_scatter)
+        shapes |= {np.shape(other) for other in others if other is not None}
         if len(shapes) > 1 or self.gap.ndim != 1:
             raise InputError(f"{self.label!r}: gap, force and area must be 1-D and of one length")
         if not ((self.force > 0) & (self.area > 0)).any():
@@ -119,9 +138,15 @@ def draw_lines(lines: Mapping[str, tuple[Any, Any]], x_label: str, y_label: str,
 
 
 def draw_compression(
-    curves: Sequence[Curve], title: str = "", force_label: str = FORCE_LABEL, gap_label: str = GAP_LABEL
+    curves: Sequence[Curve],
+    title: str = "",
+    force_label: str = FORCE_LABEL,
+    gap_label: str = GAP_LABEL,
+    leakage_label: str = LEAKAGE_LABEL,
 ) -> Figure:
     """Two panels: force (logarithmic) against u/h_rms, and area against force (both logarithmic).
+
+    A third one, flow conductance against force, where a curve has leakage.
 
     Parameters
     ----------
@@ -132,8 +157,8 @@ def draw_compression(
         Printed above both panels.
     force_label : str
         What the force is, with its unit.
-    gap_label : str
-        What the gap is, likewise.
+    gap_label, leakage_label : str
+        What gap and leakage are, likewise.
 
     Returns
     -------
@@ -155,8 +180,10 @@ def draw_compression(
     """
     if not curves:
         raise InputError("no curves to draw: at least one is needed")
-    figure = new_figure(10, 4.5)
-    by_gap, by_force = figure.subplots(1, 2)
+    leaking = [curve for curve in curves if curve.leakage is not None]
+    panels = 3 if leaking else 2
+    figure = new_figure(5 * panels, 4.5)
+    by_gap, by_force, *flow = figure.subplots(1, panels)
     for curve in curves:
         marker = "." if curve is curves[0] else ""
         by_gap.plot(curve.gap, curve.force, marker=marker, label=curve.label)
@@ -170,7 +197,14 @@ def draw_compression(
     by_gap.set_ylabel(force_label)
     by_force.set_xlabel(force_label)
     by_force.set_ylabel("real contact area  A/A0")
-    for axes in (by_gap, by_force):
+    for axes, curve in itertools.product(flow, leaking):
+        # blocked contacts have no place on a logarithmic axis, nor have gaps before contact
+        k = np.asarray(curve.leakage, float)
+        k = np.where((k > 0) & (curve.force > 0), k, np.nan)
+        axes.loglog(curve.force, k, marker=".", label=curve.label)
+        _band(axes, curve.force, k, curve.leakage_scatter)
+        axes.set(xlabel=force_label, ylabel=leakage_label)
+    for axes in (by_gap, by_force, *flow):
         axes.grid(True, which="major", alpha=0.3)
     by_gap.legend()
     figure.suptitle(title)
@@ -181,9 +215,10 @@ def _band(axes: Axes, x: FloatArray, y: FloatArray, scatter: FloatArray | None) 
     """One standard deviation of ln y about a line, in its colour, where it is known."""
     if scatter is None or not np.isfinite(scatter).any():
         return
-    factor = np.exp(np.where(np.isfinite(scatter), scatter, 0.0))
+    known = np.isfinite(scatter) & (y > 0)
+    factor = np.exp(np.where(known, scatter, 0.0))
     colour = axes.lines[-1].get_color()
-    axes.fill_between(x, y / factor, y * factor, where=np.isfinite(scatter).tolist(), alpha=0.25, color=colour, lw=0)
+    axes.fill_between(x, y / factor, y * factor, where=known.tolist(), alpha=0.25, color=colour, lw=0)
 
 
 def to_picture(figure: Figure, kind: str = "png", dpi: float = 120) -> bytes:

@@ -58,7 +58,7 @@ DIMENSIONS = {
     "m0": (2, 0),
     **dict.fromkeys(("stiffness", "incremental_stiffness"), (-1, 1)),
     "plane_separation": (1, 0),
-    "conductance_of_flow": (3, 0),
+    "leakage": (3, 0),
     "conductance": (-1, 0),
     "energy": (1, 1),
     "island_force": (2, 1),

@@ -95,3 +95,15 @@ def test_missing_matplotlib_is_named_with_the_cure(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(MbmaError, match=r"pip install 'mbma_tables\[plot\]'"):
         draw_compression(two_curves())
+
+
+def test_a_third_panel_for_leakage_without_blocked_contacts():
+    force, k = np.array([0.0, 1e-3, 1e-2, 1e-1]), np.array([9.0, 1.0, 0.1, 0.0])
+    curve = Curve("seal", np.array([3.0, 2.0, 1.0, 0.5]), force, force, leakage=k, leakage_scatter=np.full(4, 0.2))
+    *_, flow = draw_compression([curve], leakage_label="K [um^3]").axes
+    x, y = flow.lines[0].get_data()
+    assert flow.get_ylabel() == "K [um^3]"
+    assert np.isfinite(y).tolist() == [False, True, True, False]
+    band = flow.collections[0].get_paths()[0].vertices
+    assert band[:, 1].max() == pytest.approx(np.exp(0.2))
+    assert len(draw_compression([Curve("no", [2.0, 1.0], [1e-3, 1e-2], [1e-3, 1e-2])]).axes) == 2

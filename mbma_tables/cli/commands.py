@@ -14,6 +14,7 @@ from mbma_tables.cli.options import (
     Model,
     Output,
     check_plot,
+    leakage_option,
     model_options,
     numbers_option,
     output_options,
@@ -63,6 +64,7 @@ def contact_keywords(model: Model, specimen: Specimen) -> dict[str, Any]:
 @numbers_option("--pressure", "-p", help="Instead: force over nominal area, over E* where none is given.")
 @numbers_option("--area", "-a", help="Instead: real over nominal contact area.")
 @over_h_rms
+@leakage_option
 @specimen_options
 @theory_options
 @output_options
@@ -72,6 +74,7 @@ def contact_command(
     pressure: list[float | str] | None,
     area: list[float | str] | None,
     over_h_rms: bool,
+    leakage: bool,
     specimen: Specimen,
     model: Model,
     output: Output,
@@ -100,7 +103,14 @@ def contact_command(
     answer = contact(specimen.surface, **{name: asked}, **contact_keywords(model, specimen))
     yields = ("yielded", "incremental_stiffness") if model.hardness != math.inf else ()
     values = {column: getattr(answer, column) for column in (*COLUMNS[:-1], "stiffness", *yields, COLUMNS[-1])}
+    values |= _leakage(answer) if leakage else {}
     report_answer("contact", specimen, model, answer, values).write(output)
+
+
+def _leakage(answer: Contact) -> dict[str, Any]:
+    """Columns of the flow conductance of the gaps."""
+    found = answer.leakage
+    return {"leakage": found.conductance, "leakage_scatter": found.scatter, "leakage_valid": found.valid}
 
 
 def curve_gaps(h_max: float, points: int) -> Any:
@@ -118,12 +128,13 @@ def curve_gaps(h_max: float, points: int) -> Any:
 @click.command("curve", short_help="Force and area from first contact to full compression.")
 @click.option("--points", type=click.IntRange(min=MIN_POINTS), default=41, show_default=True, help="How many gaps.")
 @click.option("--compare", is_flag=True, help="Add all other theories, and Persson's simplified form.")
+@leakage_option
 @plot_option
 @specimen_options
 @theory_options
 @output_options
 def curve_command(
-    points: int, compare: bool, plot: Path | None, specimen: Specimen, model: Model, output: Output
+    points: int, compare: bool, leakage: bool, plot: Path | None, specimen: Specimen, model: Model, output: Output
 ) -> None:
     """Force and area from first contact (d = h_max) to full compression (d = -h_max).
 
@@ -146,7 +157,7 @@ def curve_command(
     if model.theory != "mbma":
         gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).force)]
     answer = contact(surface, gap, **asked)
-    values = {name: getattr(answer, name) for name in COLUMNS}
+    values = {name: getattr(answer, name) for name in COLUMNS} | (_leakage(answer) if leakage else {})
     units = {}
     others = {
         name: other_theory(name, surface, gap, asked["E_star"])
@@ -157,22 +168,23 @@ def curve_command(
         for quantity in ("force", "area"):
             values[f"{theory}_{quantity}"] = getattr(line, quantity)
             units[f"{theory}_{quantity}"] = shown_unit(quantity, specimen.units)
-    picture = b"" if plot is None else _draw(specimen, answer, others, plot.suffix[1:])
+    picture = b"" if plot is None else _draw(specimen, answer, others, plot.suffix[1:], leakage)
     report_answer("curve", specimen, model, answer, values, units).write(output, plot, picture)
 
 
-def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory], kind: str) -> bytes:
+def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory], kind: str, leakage: bool) -> bytes:
     import numpy as np
 
-    from mbma_tables.plots import Curve, draw_compression, force_label, theory_label, to_picture
+    from mbma_tables.plots import Curve, draw_compression, force_label, leakage_label, theory_label, to_picture
 
-    gap = answer.mean_separation / specimen.surface.h_rms
-    label = theory_label(answer.theory) + (f", {answer.reading}" if answer.reading else "")
-    curves = [Curve(label, *map(np.asarray, (gap, answer.force, answer.area, answer.scatter, answer.area_scatter)))]
+    gap = np.asarray(answer.mean_separation / specimen.surface.h_rms)
+    curves = [answer.curve(leakage)]
     for name, line in others.items():
         known = np.isfinite(line.force)
         curves.append(Curve(theory_label(name), gap[known], *(field[known] for field in line)))
-    return to_picture(draw_compression(curves, specimen.title, force_label(unit_of("force", specimen.units))), kind)
+    labels = {"force_label": force_label(unit_of("force", specimen.units))}
+    labels["leakage_label"] = leakage_label(unit_of("leakage", specimen.units))
+    return to_picture(draw_compression(curves, specimen.title, **labels), kind)
 
 
 @click.command("island", short_help="Contact islands at given approaches.")

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from mbma_tables.export.law_rows import LawTable
 
 LAW_OPTIONS = frozenset({"specimen", "theory", "reading", "hardness", "conductivity", "conductivity_unit"})
-ROW_OPTIONS = {"rows", "rtol", "largest_overclosure", "pressures"}
+ROW_OPTIONS = {"rows", "rtol", "largest_overclosure", "pressures", "leakage"}
 OPTIONS = {
     **dict.fromkeys((*SOLVERS, *DATA), LAW_OPTIONS | ROW_OPTIONS),
     **dict.fromkeys(("calculix", "abaqus", "modelica"), LAW_OPTIONS | ROW_OPTIONS | {"name"}),
@@ -34,7 +34,7 @@ OPTIONS = {
     **dict.fromkeys(CODE, frozenset({"reading", "check"})),
     "calculix --exponential": frozenset({"specimen", "name", "exponential"}),
 }
-DEFAULTS = {"theory": "mbma", "reading": "reported", "exponential": False, "check": False}
+DEFAULTS = {"theory": "mbma", "reading": "reported", "exponential": False, "leakage": False, "check": False}
 
 
 @click.command("export", short_help="A contact law, or the whole model, for other codes.")
@@ -46,6 +46,7 @@ DEFAULTS = {"theory": "mbma", "reading": "reported", "exponential": False, "chec
 @quantity_option("--largest-overclosure", help="Where the rows end; else at full compression.")
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure, or as well.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
+@click.option("--leakage", is_flag=True, help="Flow conductance of the gaps against pressure instead.")
 @click.option(
     "--pressures", metavar="X:X", help="Smallest and largest pressure: where the error holds, and the rows end."
 )
@@ -106,7 +107,10 @@ def _law_files(target: str, out: Path, joint: dict[str, Any], given: dict[str, A
         return {out: solvers.exponential(**joint, **named).encode()}
     if "pressures" in given:
         given["pressures"] = _pressures(given["pressures"])
-    law = describe_law(**joint, quantity="pressure" if "conductivity" not in given else "conductance", **given)
+    quantity = (
+        "leakage" if given.pop("leakage", False) else "pressure" if "conductivity" not in given else "conductance"
+    )
+    law = describe_law(**joint, quantity=quantity, **given)
     if target in SOLVERS:
         return {out: getattr(solvers, target)(law, **named).encode()}
     return _data_files(target, out, law)

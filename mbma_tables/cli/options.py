@@ -277,6 +277,7 @@ output_options = _group(
     click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write to a file instead."),
 )
 
+leakage_option = click.option("--leakage", is_flag=True, help="Add the flow conductance of the gaps [length^3].")
 plot_option = click.option(
     "--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw force and area: FILE.png, .svg or .pdf."
 )

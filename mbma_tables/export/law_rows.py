@@ -16,6 +16,7 @@ from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
 from mbma_tables.export.chords import chosen_rows
 from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
+from mbma_tables.leakage import LARGEST_AREA
 from mbma_tables.plots import draw_lines
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
@@ -27,7 +28,7 @@ from mbma_tables.units import Units
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-QUANTITIES = ("pressure", "conductance")
+QUANTITIES = ("pressure", "conductance", "leakage")
 FLOOR = 1e-3  # of the largest value, where no range is given: below it, errors are relative to this, not to the value
 FINE = 20_001  # points at which the error of a choice of rows is measured
 
@@ -39,7 +40,8 @@ class LawTable(Displayed):
     Attributes
     ----------
     x, y : ndarray
-        Overclosure and pressure, or pressure and conductance; both start at zero and rise.
+        Overclosure and pressure, or pressure and conductance; both start at zero and rise. Or pressure and the flow
+        conductance of the gaps, which falls to zero where contact blocks them.
     x_name, y_name, x_unit, y_unit : str
     largest_error : float
         Largest relative error of linear interpolation between the rows as written against the model, where y
@@ -92,6 +94,11 @@ def _curve(joint: Joint, quantity: str, max_overclosure: float, k_s: float) -> t
     pressure[0] = stiffness[0] = 0.0
     if quantity == "pressure":
         return c, pressure
+    if quantity == "leakage":
+        flow = np.asarray(law.leakage(d))
+        # the first row that is blocked is the last
+        open_ = np.append(True, (np.diff(pressure) > 0) & (flow[:-1] > 0))
+        return pressure[open_], flow[open_]
     if joint.hardness < np.inf:
         stiffness[1:] = joint.answer(law.h_max - c[1:]).incremental_stiffness
     rises = np.concatenate([[True], np.diff(pressure) > 0])
@@ -127,13 +134,14 @@ def describe_law(
         Effective modulus in `stress_unit`, or with its unit: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
     length_unit, stress_unit : str, optional
         Units of the rows. A surface or modulus that has another one is converted; one that has none is in these.
-    quantity : {"pressure", "conductance"}
-        Pressure against overclosure, or conductance against pressure.
+    quantity : {"pressure", "conductance", "leakage"}
+        Pressure against overclosure, or conductance against pressure, or the flow conductance k h_rms^3 of the gaps
+        (`ContactLaw.leakage`) against pressure.
     rows : int, optional
         How many; else as few as `rtol` needs, 1e-3 where neither is given.
     rtol : float, optional
         Largest relative error of the interpolation where the result is above a thousandth of its largest, or
-        between `pressures`.
+        between `pressures`; of leakage from its largest down to that at 30% contact, or at the largest of `pressures`.
     largest_overclosure : float or str, optional
         Where the rows end, in the rows' unit or with its own; else at full compression, or where the force turns down.
     pressures : pair of float or str, optional
@@ -172,11 +180,18 @@ def describe_law(
     if quantity == "conductance":
         k_s, unit = checked_conductivity(conductivity, conductivity_unit)
         names = ("pressure", "conductance", joint.stress, f"{unit}/{joint.length}")
-    elif conductivity is not None or conductivity_unit is not None:
+    elif quantity == "leakage":
+        names = ("pressure", "leakage", joint.stress, f"{joint.length}^3")
+    if quantity != "conductance" and (conductivity is not None or conductivity_unit is not None):
         raise InputError("conductivity and conductivity_unit belong to quantity='conductance': leave them out")
     fine_x, fine_y = _curve(joint, quantity, end, k_s)
     floor = FLOOR * float(fine_y[-1])
-    if pressures is not None:
+    if quantity == "leakage":
+        floor = float(fine_y[-1])
+        if law.area(law.h_max - 2 * end) > LARGEST_AREA:
+            floor = float(law.leakage(law.separation(area=LARGEST_AREA)))
+        floor *= 1 - 1e-9
+    elif pressures is not None:
         floor = least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
     x, y, error = chosen_rows(fine_x, fine_y, floor, rows, rtol, evenly)
     behaviour = None
@@ -202,7 +217,28 @@ def describe_law(
         *(["the first row is zero, whatever the pressure of the theory is there"] if law.highest < np.inf else ()),
         end=end,
     )
+    if quantity == "leakage":
+        comments += _of_leakage(joint, x)
     return LawTable(x, y, *names, error, comments, law.theory, floor, behaviour)
+
+
+def _of_leakage(joint: Joint, pressure: FloatArray) -> tuple[str, ...]:
+    """What a reader of rows of leakage must know."""
+    blocked = joint.law.leakage.blocked_at
+    found = joint.answer((joint.law.h_max + np.asarray(joint.law.separation(force=pressure[1:]))) / 2).leakage
+    reasons = {reason: mask for reason, mask in found.reasons.items() if reason.startswith("leakage")}
+    scatter = np.asarray(found.scatter)
+    known = np.flatnonzero(np.isfinite(scatter))
+    places = known[np.linspace(0, known.size - 1, 5).astype(int)] if known.size else known
+    return (
+        "leakage is the flow conductance K of the gaps: flow per length of seal is K dp/(12 viscosity width)",
+        f"blocked, K = 0, from p = {float(joint.law.force(blocked)):.10g} {joint.stress} on"
+        if blocked > -np.inf
+        else "never blocked",
+        *(f"not valid from p = {pressure[1:][mask].min():.4g} {joint.stress} on: {r}" for r, mask in reasons.items()),
+        "one standard deviation of ln K from simulation to simulation: "
+        + (", ".join(f"{scatter[k]:.2g} at {pressure[k + 1]:.3g}" for k in places) or "not known"),
+    )
 
 
 def _why_there(law: ContactLaw, x_name: str) -> str:

@@ -27,6 +27,11 @@ def _is_pressure(law: LawTable, target: str) -> None:
         raise InputError(f"{target} takes pressure against overclosure here, got {law.y_name} against {law.x_name}")
 
 
+def _is_contact(law: LawTable, target: str) -> None:
+    if law.behaviour is None:
+        _is_pressure(law, target)
+
+
 def _interaction(name: str, *cards: str) -> str:
     return f"*SURFACE INTERACTION, NAME={checked_name(name, MAX_NAME)}\n{''.join(cards)}"
 
@@ -46,6 +51,7 @@ def calculix(law: LawTable, name: str = "ROUGH") -> str:
     InputError
         For more rows than its arrays hold, 200 of pressure or 20 of conductance, and for rows that it would move apart.
     """
+    _is_contact(law, "CalculiX")
     most = MAX_CALCULIX_ROWS if law.behaviour is None else MAX_CALCULIX_CONDUCTANCES
     if law.x.size > most:
         raise InputError(f"CalculiX holds {most} rows of {law.y_name}, this law has {law.x.size}: give fewer rows")
@@ -82,6 +88,7 @@ def _calculix_conductance(law: LawTable, behaviour: LawTable, name: str) -> str:
 
 def abaqus(law: LawTable, name: str = "ROUGH") -> str:
     """A surface interaction for Abaqus, which continues the last slope beyond the last row; pressure, or both."""
+    _is_contact(law, "Abaqus")
     notes = (*law.comments, "Abaqus continues the last slope beyond the last row: stay within the range.")
     cards = [_card("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", law.behaviour or law)]
     if law.behaviour is not None:

@@ -42,7 +42,7 @@ def _units(problem: Problem) -> dict[str, tuple[str, str]]:
         "plane_separation": ("separation", "gap between mean planes, u less what yielded points are flattened"),
         "incremental_stiffness": ("stiffness", "-dF/du per nominal area of a small unloading"),
         "leakage": (
-            "conductance_of_flow",
+            "leakage",
             "flow conductance k h_rms^3: flow per length of seal is it dp/(12 viscosity width)",
         ),
         "leakage_valid": ("valid", "whether flow through such contacts was simulated"),

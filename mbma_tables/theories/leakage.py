@@ -12,8 +12,10 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, require
 from mbma_tables.calibrated import Spectrum
+from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
 from mbma_tables.leakage import LARGEST_AREA
+from mbma_tables.plots import draw_compression, force_label, leakage_label
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.theories.calibrated_curves import spectrum_of
 from mbma_tables.theories.leakage_table import KEPT, fill_flow, flow_of_spectrum, self_affine, shipped_flow
@@ -22,6 +24,8 @@ from mbma_tables.theories.protocol import Theory
 from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbma_tables.theories.result import Contact, Source
 
 LARGEST_KNUDSEN = 0.1  # mean free path over the channel, to which slip of first order holds
@@ -29,8 +33,8 @@ SLIP = 6.0  # of a plane channel: flow is 1 + 6 Kn times that without slip
 SIMULATED = 64.0  # zeta_1 up to which flow was simulated
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Leakage:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Leakage(Displayed):
     """Flow through the gaps of a contact; arrays of the contact's shape.
 
     Reynolds' equation on the gaps: no flow where bodies touch, small slopes, isotropic roughness, and a fluid whose
@@ -51,6 +55,29 @@ class Leakage:
     _source: Source = dataclasses.field(repr=False)
     _contact: Contact = dataclasses.field(repr=False)
     _area: Any = dataclasses.field(repr=False)
+
+    def _facts(self) -> dict[str, str]:
+        known = {name: shown(value, unit) for name, (value, unit, *_) in self._variables().items()}
+        return {"theory": self._contact.theory, **known}
+
+    def _variables(self) -> dict[str, Variable]:
+        return {
+            "conductance": Variable(self.conductance, self.units["conductance"], "flow conductance k h_rms^3"),
+            "k": Variable(self.k, "1", "flow conductance over h_rms^3"),
+            "scatter": Variable(self.scatter, "1", "standard deviation of ln k from simulation to simulation"),
+            "valid": Variable(self.valid, "1", "whether flow through such contacts was simulated"),
+            "blocked": Variable(self.blocked, "1", "whether contact percolates"),
+        }
+
+    def _origin(self) -> dict[str, str]:
+        return self._contact._origin()
+
+    def _figure(self) -> Figure:
+        return draw_compression(
+            [self._contact.curve(leakage=True)],
+            force_label=force_label(self._contact.units["force"]),
+            leakage_label=leakage_label(self.units["conductance"]),
+        )
 
     @property
     def blocked(self) -> Any:
@@ -95,7 +122,7 @@ class Leakage:
     @property
     def units(self) -> dict[str, str]:
         """Units of the quantities that have one."""
-        return {"conductance": unit_of("conductance_of_flow", self._source.units)}
+        return {"conductance": unit_of("leakage", self._source.units)}
 
     def liquid(self, viscosity: ArrayLike | str, pressure_drop: ArrayLike | str, width: ArrayLike | str) -> Numbers:
         """Volume that leaks per time and length of seal [length^2/time].

@@ -129,13 +129,19 @@ class Contact(Displayed):
         return {"E_star": shown(source.E_star, unit_of("force", source.units)), "surface": repr(source.surface)}
 
     def _figure(self) -> Figure:
+        return draw_compression([self.curve()], force_label=force_label(self.units["force"]))
+
+    def curve(self, leakage: bool = False) -> Curve:
+        """A line of pictures, of one surface at several separations; with its leakage where that is asked for."""
         surface = self._source.surface
         if self.force is None or self.area is None or np.size(self.force) < 2 or surface.shape != ():
             raise InputError("one surface's force and area at several separations make a curve, and this has none")
         order = np.argsort(np.ravel(self.mean_separation))
-        fields = (self.mean_separation / surface.h_rms, self.force, self.area, self.scatter, self.area_scatter)
-        curve = Curve(theory_label(self.theory), *(np.ravel(field)[order] for field in fields))
-        return draw_compression([curve], force_label=force_label(self.units["force"]))
+        fields = [self.mean_separation / surface.h_rms, self.force, self.area, self.scatter, self.area_scatter]
+        if leakage:
+            fields += [self.leakage.conductance, self.leakage.scatter]
+        label = theory_label(self.theory) + (f", {self.reading}" if self.reading else "")
+        return Curve(label, *(np.ravel(field)[order] for field in fields))
 
     @functools.cached_property
     def _answer(self) -> TheoryAnswer:

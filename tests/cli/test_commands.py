@@ -130,7 +130,7 @@ def test_scatter_is_said_where_it_is_known(folder, monkeypatch):
     assert "scatter against simulations: ln force 0.31 to 0.4 at a separation, ln area 0.02 to 0.02 at a force" in text
     drawn = []
     original = mbma_tables.plots.draw_compression
-    monkeypatch.setattr(mbma_tables.plots, "draw_compression", lambda *given: drawn.append(given) or original(*given))
+    monkeypatch.setattr(mbma_tables.plots, "draw_compression", lambda *given, **named: drawn.append(given) or original(*given, **named))
     run("curve", "--surface", "concrete", "--points", "9", "--plot", "c.png")
     line = next(curve for curve in drawn[0][0] if curve.label == "Persson")
     assert line.scatter == pytest.approx(0.3 + line.area)
@@ -257,7 +257,7 @@ def test_the_picture_holds_the_table(monkeypatch):
 
     drawn = []
     original = mbma_tables.plots.draw_compression
-    monkeypatch.setattr(mbma_tables.plots, "draw_compression", lambda *given: drawn.append(given) or original(*given))
+    monkeypatch.setattr(mbma_tables.plots, "draw_compression", lambda *given, **named: drawn.append(given) or original(*given, **named))
     arguments = ("--surface", "concrete", "--points", "9", "--compare", "--plot", "c.png")
     columns = json.loads(run("curve", *arguments, "--json"))["columns"]
     curves, title, force_label = drawn[0]

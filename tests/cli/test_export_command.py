@@ -184,3 +184,13 @@ def test_an_option_has_an_effect(target, option, tmp_path, monkeypatch):
         for name in ("plain", "given")
     )
     assert wrote != changed or "largest relative difference" in given.output
+
+
+def test_leakage_against_pressure(tmp_path):
+    out = tmp_path / "seal.csv"
+    asked = ("--surface", "concrete", "--E-star", "13.3MPa", "--theory", "calibrated", "--rows", "30", "--leakage")
+    done = run("csv", *asked, "--out", out)
+    assert done.exit_code == 0, done.output
+    assert "leakage [mm^3] against pressure [MPa]" in out.read_text()
+    refused = run("calculix", *asked, "--out", tmp_path / "law.inp")
+    assert "takes pressure against overclosure" in refused.stderr

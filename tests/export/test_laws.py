@@ -318,3 +318,36 @@ def test_optistruct_has_its_keyword_on_a_line_of_its_own():
     # on the first line that field would be the friction coefficient
     assert lines[:2] == ["PCONT,3", "+,STFTAB,7"]
     assert (lines[2][:8], lines[2][8:24].strip()) == ("TABLES1*", "7")
+
+
+class TestLeakage:
+    def rows(self, **changed):
+        return law_of(**({"quantity": "leakage", "theory": "calibrated", "rows": None} | changed))
+
+    def test_rows_are_the_contacts_flow_to_the_blocked_pressure(self):
+        law = self.rows(rtol=1e-3)
+        assert (law.x_unit, law.y_name, law.y_unit) == ("MPa", "leakage", "mm^3")
+        assert law.x[0] == law.y[-1] == 0
+        assert (np.diff(law.y) < 0).all()
+        pressure = np.geomspace(law.x[1], law.x[-2], 400)
+        model = contact(CONCRETE, pressure=pressure, E_star=13.3, theory="calibrated")
+        kept = model.area < 0.3
+        error = np.interp(pressure, law.x, law.y) / np.where(kept, model.leakage.conductance, np.nan) - 1
+        assert np.nanmax(np.abs(error)) < 1.05e-3 + 1e-4
+        text = "\n".join(law.comments)
+        assert "blocked, K = 0, from p = " in text
+        assert "leakage: A/A0 is above 0.3" in text
+        assert "one standard deviation of ln K" in text
+
+    def test_a_range_of_pressures(self):
+        law = self.rows(pressures=("1 kPa", "0.1 MPa"), rtol=1e-2)
+        assert law.x[-1] == pytest.approx(0.1, rel=1e-6)
+        assert law.y[-1] > 0
+
+    def test_what_is_no_contact_law_is_refused(self):
+        for write in (calculix, solvers.abaqus, optistruct):
+            with pytest.raises(InputError, match="takes pressure against overclosure"):
+                write(self.rows(rows=50))
+        with pytest.raises(InputError, match="conductivity"):
+            self.rows(conductivity=50.0, conductivity_unit="mW/K")
+        assert data.from_json(data.to_json(self.rows(rows=50))).y_name == "leakage"
