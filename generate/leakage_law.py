@@ -197,11 +197,13 @@ def dataset(found: Sequence[Case], contact: Constants) -> xr.Dataset:
     text = {"units": "1"}
     data = xr.Dataset(
         {
-            "log_factor": (AXES, values, {"long_name": "ln R, k = u^3 (1 - 1.5/(u^2 + 4)) R", **text}),
             "spline": (
                 tuple(f"{name}_knot" for name in AXES),
-                coefficients(values, DEGREE, 3),
-                {"long_name": "coefficients of cardinal quintic B-splines that interpolate log_factor", **text},
+                coefficients(values, DEGREE, 3).astype("f4"),
+                {
+                    "long_name": "coefficients of cardinal quintic B-splines of ln R, k = u^3 (1 - 1.5/(u^2 + 4)) R",
+                    **text,
+                },
             ),
             "accuracy": (
                 ("set", "law", "contact", "statistic"),

@@ -101,7 +101,7 @@ def test_a_third_panel_for_leakage_without_blocked_contacts():
     force, k = np.array([0.0, 1e-3, 1e-2, 1e-1]), np.array([9.0, 1.0, 0.1, 0.0])
     curve = Curve("seal", np.array([3.0, 2.0, 1.0, 0.5]), force, force, leakage=k, leakage_scatter=np.full(4, 0.2))
     *_, flow = draw_compression([curve], leakage_label="K [um^3]").axes
-    x, y = flow.lines[0].get_data()
+    y = flow.lines[0].get_ydata()
     assert flow.get_ylabel() == "K [um^3]"
     assert np.isfinite(y).tolist() == [False, True, True, False]
     band = flow.collections[0].get_paths()[0].vertices

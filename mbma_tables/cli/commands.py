@@ -182,9 +182,8 @@ def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory]
     for name, line in others.items():
         known = np.isfinite(line.force)
         curves.append(Curve(theory_label(name), gap[known], *(field[known] for field in line)))
-    labels = {"force_label": force_label(unit_of("force", specimen.units))}
-    labels["leakage_label"] = leakage_label(unit_of("leakage", specimen.units))
-    return to_picture(draw_compression(curves, specimen.title, **labels), kind)
+    force, flow = force_label(unit_of("force", specimen.units)), leakage_label(unit_of("leakage", specimen.units))
+    return to_picture(draw_compression(curves, specimen.title, force, leakage_label=flow), kind)
 
 
 @click.command("island", short_help="Contact islands at given approaches.")

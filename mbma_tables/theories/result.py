@@ -136,7 +136,7 @@ class Contact(Displayed):
         surface = self._source.surface
         if self.force is None or self.area is None or np.size(self.force) < 2 or surface.shape != ():
             raise InputError("one surface's force and area at several separations make a curve, and this has none")
-        order = np.argsort(np.ravel(self.mean_separation))
+        order = np.argsort(-np.ravel(self.mean_separation), kind="stable")
         fields = [self.mean_separation / surface.h_rms, self.force, self.area, self.scatter, self.area_scatter]
         if leakage:
             fields += [self.leakage.conductance, self.leakage.scatter]

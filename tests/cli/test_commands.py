@@ -130,7 +130,9 @@ def test_scatter_is_said_where_it_is_known(folder, monkeypatch):
     assert "scatter against simulations: ln force 0.31 to 0.4 at a separation, ln area 0.02 to 0.02 at a force" in text
     drawn = []
     original = mbma_tables.plots.draw_compression
-    monkeypatch.setattr(mbma_tables.plots, "draw_compression", lambda *given, **named: drawn.append(given) or original(*given, **named))
+    monkeypatch.setattr(
+        mbma_tables.plots, "draw_compression", lambda *given, **named: drawn.append(given) or original(*given, **named)
+    )
     run("curve", "--surface", "concrete", "--points", "9", "--plot", "c.png")
     line = next(curve for curve in drawn[0][0] if curve.label == "Persson")
     assert line.scatter == pytest.approx(0.3 + line.area)
@@ -257,7 +259,9 @@ def test_the_picture_holds_the_table(monkeypatch):
 
     drawn = []
     original = mbma_tables.plots.draw_compression
-    monkeypatch.setattr(mbma_tables.plots, "draw_compression", lambda *given, **named: drawn.append(given) or original(*given, **named))
+    monkeypatch.setattr(
+        mbma_tables.plots, "draw_compression", lambda *given, **named: drawn.append(given) or original(*given, **named)
+    )
     arguments = ("--surface", "concrete", "--points", "9", "--compare", "--plot", "c.png")
     columns = json.loads(run("curve", *arguments, "--json"))["columns"]
     curves, title, force_label = drawn[0]
@@ -615,3 +619,16 @@ def test_contact_with_a_hardness():
     assert "psi 3.61, elastic up to 1.1" in text
     assert "yielded" in text
     assert "elastic: area within 5% for hardnesses from 4.922 GPa on" in run(*asked)
+
+
+def test_leakage_is_a_column_where_it_is_asked_for():
+    arguments = ("--surface", "concrete", "--theory", "calibrated")
+    found = json.loads(run("contact", *arguments, "-a", "0.1,0.5", "--leakage", "--json"))
+    own = contact(Surface.named("concrete"), area=[0.1, 0.5], theory="calibrated").leakage
+    assert found["columns"]["leakage"] == own.conductance.tolist()
+    assert found["columns"]["leakage"][1] == 0
+    assert found["units"]["leakage"] == "mm^3"
+    assert found["columns"]["leakage_valid"] == [bool(valid) for valid in own.valid]
+    assert "leakage" not in run("contact", *arguments, "-a", "0.1")
+    curve = json.loads(run("curve", *arguments, "--points", "9", "--leakage", "--json"))["columns"]
+    assert (np.diff(curve["leakage"]) < 0).all()
