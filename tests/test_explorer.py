@@ -390,6 +390,17 @@ def test_concerns_are_those_of_the_library(visit):
         assert reason.replace("zeta_1", "q₁/q₀").split(" (")[0] in said.replace(" to 5.5", "")
 
 
+def test_where_a_theory_has_no_answer_the_page_says_why(visit):
+    tab = visit(urllib.parse.urlencode({"hurst": 0.1, "q0": 1, "q1": 1e7, "h_rms": 1, "h_max": 3, "theory": "mbma"}))
+    tab.locator(".chart").first.focus()
+    tab.keyboard.press("Home")
+    assert "MBMA: has no answer here: mu is above the range." in tab.inner_text("#concerns")
+    tab = visit("theory=mbma&against=pressure")
+    tab.locator(".chart").first.focus()
+    tab.keyboard.press("End")
+    assert "MBMA: has no answer here: it does not reach such a pressure." in tab.inner_text("#concerns")
+
+
 def test_on_a_phone_and_in_the_dark(visit, tmp_path):
     from matplotlib import image
 

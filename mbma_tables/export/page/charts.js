@@ -187,7 +187,7 @@ function read(k) {
   const rows = drawn.curves.map((curve) => {
     const against =
       curve.area[k] === null
-        ? ["has no answer here"]
+        ? [`has no answer here: ${curve.silence[k]}`]
         : curve.concerns.filter(([, holds]) => holds(k)).map(([text]) => text);
     const texts = names.map((name) => {
       const sides = curve === drawn.curves[0] ? band(drawn.state, curve, name) : null;

@@ -26,11 +26,15 @@ function curvesOf(state) {
       );
   const curves = theories.map((theory) => {
     const curve = { theory, ...Object.fromEntries(QUANTITIES.map((name) => [name, new Array(x.length).fill(null)])) };
+    curve.silence = [];
     const gapAt = byGap ? (u) => u : separations(model, theory, state.h_max);
     x.forEach((value, k) => {
       const u = gapAt(value),
         found = u > 0 ? model[theory](u) : null;
-      if (!found || !Number.isFinite(found.force)) return;
+      if (!found || !Number.isFinite(found.force)) {
+        curve.silence[k] = u > 0 ? model.why() : "it does not reach such a pressure";
+        return;
+      }
       const { force, area, stiffness } = found,
         conductance = (state.k_s / state.E_star) * stiffness;
       Object.entries({ gap: u, force, area, stiffness, conductance }).forEach(

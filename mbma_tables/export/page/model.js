@@ -76,8 +76,12 @@ function prepare(state) {
       : C.mbma_law_of_surface(ARGUMENTS, number, LAWS[theory]);
     return held[theory];
   };
+  let fault = OK;
   const answer = (status) => {
-    if (status !== OK) return null;
+    if (status !== OK) {
+      fault = status;
+      return null;
+    }
     const [force, area, stiffness] = numbersAt(ANSWER, 3);
     return { force, area, stiffness };
   };
@@ -97,6 +101,11 @@ function prepare(state) {
     perssonSeparation(pressure) {
       const status = law("persson") || C.mbma_persson_separation(LAWS.persson, pressure, state.E_star, ANSWER);
       return status === OK ? numbersAt(ANSWER, 1)[0] : NaN;
+    },
+    // why the last answer that is missing is missing
+    why() {
+      const bytes = new Uint8Array(C.memory.buffer, C.mbma_message(fault));
+      return String.fromCharCode(...bytes.subarray(0, bytes.indexOf(0)));
     },
     // mbma_law begins with h_rms, h_max, gradient
     moments() {
