@@ -14,7 +14,7 @@ from generate.boundary_elements.evidence import Case
 from mbma_tables.arguments import FloatArray
 
 LARGE = 512  # points a side from which on surfaces are told apart
-MIN_SURFACES = 3  # of a spectrum, for what its surfaces differ by
+MIN_SURFACES = 2  # of a spectrum, for what its surfaces differ by
 NINE_IN_TEN = 0.9
 
 
@@ -80,8 +80,8 @@ def measure(
 ) -> list[dict[str, Any]]:
     """Of each bar: nine errors in ten, also of large grids alone, and nine in ten of a spectrum's own differences.
 
-    These are the errors' distances from the mean of their spectrum and load on the training surfaces, widened for the
-    mean's own scatter: no law of the same knowledge that is right in the mean does better.
+    These are the errors' distances from the mean of their spectrum and load on all surfaces, widened for the mean's own
+    scatter: no law of the same knowledge that is right in the mean does better.
     """
     laws = {name: {id(one): make(one) for one in found} for name, make in forms.items()}
     told = []
@@ -93,8 +93,8 @@ def measure(
             if not bar.holds(one):
                 continue
             error = errors(one, laws[bar.form][id(one)], bar.quantity)
+            groups[one.node].append((one, error))
             if one.split == TRAINING:
-                groups[one.node].append((one, error))
                 continue
             kept = np.expm1(error[bar.inside(one.area) & np.isfinite(error)])
             own["found"].append(kept)

@@ -28,6 +28,8 @@ SHOWN = {  # sets and forms of the accuracy table
     "held_out_spectrum, stretched, map": "new spectra, stretched 1:3 to 1:12, map",
     "held_out_spectrum, transformed, map": "new spectra, transformed heights, map",
     "self-affine, mbma": "self-affine: MBMA `reported`",
+    "self-affine, mbma_printed": "self-affine: MBMA `printed`",
+    "self-affine, mbma_fitted": "self-affine: MBMA `fitted`",
     "self-affine, persson": "self-affine: Persson",
     "self-affine, greenwood_williamson": "self-affine: Greenwood-Williamson",
 }

@@ -10,7 +10,6 @@ import numpy as np
 from mbma_tables.scenes.costs import Costs, shipped_costs
 from mbma_tables.scenes.plan import duration, make_plan, seconds_by_theory
 from mbma_tables.scenes.problem import INVERTED, Problem
-from mbma_tables.surfaces.readings import get_reading
 
 MAX_AREA = 0.99
 CANDIDATES = ("calibrated", "persson", "greenwood_williamson")
@@ -32,16 +31,15 @@ def advice(problem: Problem, costs: Costs | None = None) -> str:
         return ""
     from mbma_tables.theories.calibrated_table import shipped
     from mbma_tables.theories.contact import contact
+    from mbma_tables.theories.mbma import Mbma
 
     # stiffness first: it is the more telling where both are asked
     name, quantity = next((pair for pair in asked.items() if pair[1] == "stiffness"), next(iter(asked.items())))
     area = float(np.median(contacts))
+    rows = {"mbma": Mbma(reading=problem.reading).scatter_name(problem.surface), **{row: row for row in CANDIDATES}}
     spread = {
-        theory: float(shipped().standard_deviation(theory, quantity, np.asarray(area)))
-        for theory in ("mbma", *CANDIDATES)
+        theory: float(shipped().standard_deviation(row, quantity, np.asarray(area))) for theory, row in rows.items()
     }
-    if problem.reading != get_reading("reported"):
-        spread["mbma"] = math.nan
     # NaN: not compared, or no such contact is reached
     nearest = min(CANDIDATES, key=lambda theory: np.nan_to_num(spread[theory], nan=math.inf))
     if not spread[nearest] < np.nan_to_num(spread["mbma"], nan=math.inf):

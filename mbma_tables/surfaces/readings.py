@@ -118,13 +118,13 @@ REPORTED = Reading("reported", density_divisor=NAYAK / math.pi)
 # fitted to the area at equal force of 105 surfaces by boundary elements (docs/fidelity.md); effective, not physical
 FITTED = Reading("fitted", density_divisor=4.10, beta=0.656, phi=0.0274, floor_d=1.036, floor_u=5.14, addition="cover")
 READINGS = {reading.name: reading for reading in (REPORTED, PRINTED)}  # of the paper
+NAMED = READINGS | {FITTED.name: FITTED}
 
 
 def get_reading(reading: str | Reading) -> Reading:
     """The reading of that name, or the reading itself."""
     if isinstance(reading, Reading):
         return reading
-    named = READINGS | {FITTED.name: FITTED}
-    if not isinstance(reading, str) or reading not in named:
-        raise InputError(f"reading must be one of {sorted(named)} or a Reading, got {reading!r}")
-    return named[reading]
+    if not isinstance(reading, str) or reading not in NAMED:
+        raise InputError(f"reading must be one of {sorted(NAMED)} or a Reading, got {reading!r}")
+    return NAMED[reading]

@@ -13,7 +13,7 @@ from mbma_tables.models import TIERS, AnyModel, get_model, tier_name
 from mbma_tables.models.protocol import QUANTITIES
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
-from mbma_tables.surfaces.readings import Reading, get_reading
+from mbma_tables.surfaces.readings import NAMED, Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.protocol import SCAN, Theory, TheoryAnswer, select
 from mbma_tables.totals.contact import Totals, totals_at
@@ -126,10 +126,12 @@ class Mbma(Theory):
         # of the same islands by the table, whose derivatives are at hand
         return Mbma("universal", self.reading, outside="nan")._maximum(surface, "stiffness", unknown)
 
-    def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """As for any theory, of the reading that was compared with simulations; NaN for others."""
-        known = super().scatter(surface, area)
-        return known if self.reading == get_reading("reported") else (known[0] * np.nan, known[1] * np.nan)
+    def scatter_name(self, surface: AnySurface) -> str:
+        """That of the reading: those with a name were compared with boundary elements, no other was."""
+        name = self.reading.name
+        if self.reading not in NAMED.values():
+            return f"{self.name}, a reading of one's own"
+        return self.name if name == "reported" else f"{self.name}_{name}"
 
     def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Where the paper's own assumptions fail."""

@@ -361,6 +361,10 @@ class Persson(Theory):
     def __init__(self, method: Method = "full") -> None:
         self.method: Method = method
 
+    def scatter_name(self, surface: AnySurface) -> str:
+        """The two forms differ by more than their distance from boundary elements."""
+        return self.name if self.method == "full" else f"{self.name}_{self.method}"
+
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u > 0 [length]."""
         force = np.asarray(persson_force(surface, mean_separation, method=self.method))

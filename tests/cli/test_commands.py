@@ -115,7 +115,6 @@ def test_where_an_answer_is_not_valid_is_said_in_one_line():
     assert found["valid"] == [True, False]
     assert list(found["reasons"].values()) == [[1], [1]]
     assert found["scatter"] == pytest.approx(contact(Surface.named("concrete"), mean_separation=[0.8, 0.01]).scatter)
-    assert json.loads(run(*arguments, "--reading", "printed", "--json"))["scatter"] == [None, None]  # not compared
     assert any(line.startswith("# not valid") for line in run(*arguments, "--csv").splitlines())
     assert "not valid" not in run("contact", "--surface", "concrete", "-u", "0.8")
 
