@@ -53,13 +53,13 @@ class Constants:
         c of the Gaussian tail factor.
     """
 
-    area_s0: float = 0.5133
-    area_slope: float = 0.03055
-    area_t0: float = 0.3435
-    weight: float = 0.439
-    weight_slope: float = 0.08488
-    cubic: float = 0.4273
-    tail: float = 0.06524
+    area_s0: float = 0.5132
+    area_slope: float = 0.02965
+    area_t0: float = 0.3433
+    weight: float = 0.4384
+    weight_slope: float = 0.08644
+    cubic: float = 0.4278
+    tail: float = 0.06505
 
 
 CONSTANTS = Constants()

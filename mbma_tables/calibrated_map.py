@@ -58,14 +58,14 @@ class MapConstants:
         Further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces.
     """
 
-    breadth: float = 0.5945
-    breadth_onset: float = 1.493
-    gaussian_area: float = 0.295
-    valley_area: float = 0.6586
+    breadth: float = 0.5988
+    breadth_onset: float = 1.512
+    gaussian_area: float = 0.2892
+    valley_area: float = 0.6524
     tension_area: float = 0.6
-    merging_area: float = 0.007711
-    elliptic: float = 0.813
-    curvature: float = 0.08628
+    merging_area: float = 0.007612
+    elliptic: float = 0.7247
+    curvature: float = 0.09934
 
 
 MAP_CONSTANTS = MapConstants()

@@ -34,7 +34,16 @@ SHOWN = {  # sets and forms of the accuracy table
     "self-affine, greenwood_williamson": "self-affine: Greenwood-Williamson",
 }
 DATA = ROOT / "docs" / "data" / "bem_hurst0.8_zeta64.csv"
-COLOURS = {"mbma": "C0", "calibrated": "k", "calibrated_map": "0.5", "persson": "C3", "greenwood_williamson": "C2"}
+COLOURS = {
+    "calibrated": "k",
+    "calibrated_map": "0.5",
+    "mbma": "C0",
+    "mbma_printed": "C9",
+    "mbma_fitted": "C1",
+    "persson": "C3",
+    "persson_simplified": "C6",
+    "greenwood_williamson": "C2",
+}
 
 
 def accuracy(data: xr.Dataset, quantity: str) -> str:
