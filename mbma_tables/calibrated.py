@@ -53,13 +53,13 @@ class Constants:
         c of the Gaussian tail factor.
     """
 
-    area_s0: float = 0.5132
-    area_slope: float = 0.02965
-    area_t0: float = 0.3433
-    weight: float = 0.4384
-    weight_slope: float = 0.08644
-    cubic: float = 0.4278
-    tail: float = 0.06505
+    area_s0: float = 0.5131
+    area_slope: float = 0.02973
+    area_t0: float = 0.3428
+    weight: float = 0.438
+    weight_slope: float = 0.08577
+    cubic: float = 0.4279
+    tail: float = 0.06492
 
 
 CONSTANTS = Constants()

@@ -60,12 +60,12 @@ class MapConstants:
 
     breadth: float = 0.5988
     breadth_onset: float = 1.512
-    gaussian_area: float = 0.2892
-    valley_area: float = 0.6524
+    gaussian_area: float = 0.2897
+    valley_area: float = 0.6527
     tension_area: float = 0.6
-    merging_area: float = 0.007612
-    elliptic: float = 0.7247
-    curvature: float = 0.09934
+    merging_area: float = 0.00761
+    elliptic: float = 0.7245
+    curvature: float = 0.09953
 
 
 MAP_CONSTANTS = MapConstants()
