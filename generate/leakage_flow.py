@@ -18,7 +18,6 @@ from mbma_tables.theories.registry import get_theory
 from mbma_tables.theories.yielding import Yielding
 
 MIN_WAVES = 4  # longest waves a side: below, the cell's own scatter rules
-NEAREST = 1e-4  # of A/A0 to the threshold
 
 
 def log_odds(area: FloatArray, threshold: float) -> FloatArray:
@@ -78,8 +77,6 @@ class Flow:
         # gaps of contacts that yield are taken for those of elastic ones of equal area
         load = leakage.load_of(one.spectrum, self.area, constants) if one.kind == "yielded" else one.force
         self._gaps = leakage.gaps(one.spectrum, load, constants)
-        self._share, self._log_cube = leakage.quadrature(self._gaps)
-        self._mean = np.sum(self._share * np.exp(self._log_cube / 3), axis=1)
         self._known: dict[FlowConstants, FloatArray] = {}
 
     def medium(self, flow: FlowConstants, area: FloatArray | None = None, u: FloatArray | None = None) -> FloatArray:
@@ -91,24 +88,12 @@ class Flow:
     def _log_factor(self, flow: FlowConstants) -> FloatArray:
         """ln R at the loads, found once for each set of constants."""
         if flow not in self._known:
-            found = np.full(self.area.shape, -np.inf)
-            kept = self._gaps.area < flow.threshold - NEAREST
-            if kept.any():
-                log_k = leakage.effective_medium(
-                    self._share[kept], self._log_cube[kept], flow.obstructed(self._gaps.area[kept])
-                )
-                found[kept] = log_k - 3 * np.log(self._mean[kept]) - np.log(leakage.wide_gap(self.separation[kept]))
-            self._known[flow] = found
+            self._known[flow] = leakage.log_factor(self._gaps, flow)
         return self._known[flow]
-
-    @property
-    def separation(self) -> FloatArray:
-        """Mean gap of the endless Gaussian surface."""
-        return self._gaps.separation
 
     def factor(self, flow: FlowConstants, area: FloatArray) -> FloatArray:
         """ln R at any contact fractions, by interpolation between the loads."""
-        kept = self._gaps.area < flow.threshold - NEAREST
+        kept = self._gaps.area < flow.threshold - leakage.NEAREST
         odds = log_odds(self._gaps.area[kept], flow.threshold)
         inside = np.minimum(area, flow.threshold * (1 - 1e-9))
         found = np.interp(log_odds(inside, flow.threshold), odds, self._log_factor(flow)[kept])
@@ -141,7 +126,7 @@ class Flow:
 
     def bruggeman(self, flow: FlowConstants, n: float) -> FloatArray:
         """Bruggeman's medium of n dimensions on the same gaps: sum w (h^3 - k)/(h^3 + (n - 1) k) = A/(n - 1)."""
-        share, log_cube = self._share, self._log_cube
+        share, log_cube = self._gaps.quadrature
         # with K = (n - 1) k: h^3 - k = (1 + 1/(n-1)) (h^3 - K)/2 + ..., so the same balance at another right side
         total = share.sum(axis=1)
         ratio = 1 / (n - 1)

@@ -21,8 +21,8 @@ Mueser, PRL 108 (2012) 244301 take n = 1/(1 - Ac) dimensions so that k vanishes 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,6 +35,7 @@ BANDS = 64  # of a spectrum, graded towards both ends
 NODES, LOWEST_GAP, REACH = 80, 1e-6, 8.0  # quadrature in ln(h/s), from u1/s - 8 or 1e-6 to u1/s + 8
 ITERATIONS, TOLERANCE = 80, 1e-12
 NO_COVER = 1e-13  # share of the surface between two magnifications
+NEAREST = 1e-4  # of A/A0 to the threshold
 LOADS = 4000  # between which the load of a contact fraction is interpolated
 
 
@@ -92,9 +93,18 @@ class Gaps:
     area: FloatArray
     separation: FloatArray
 
-    def at(self, loads: Any) -> Gaps:
-        """Those of some of the loads."""
-        return Gaps(self.share[loads], self.mean[loads], self.spread, self.area[loads], self.separation[loads])
+    @functools.cached_property
+    def quadrature(self) -> tuple[FloatArray, FloatArray]:
+        """Shares of the surface and ln h^3 of gaps there [h_rms^3], shape (loads, points)."""
+        centre = self.mean / self.spread
+        low, high = np.log(np.maximum(centre - REACH, LOWEST_GAP)), np.log(centre + REACH)
+        node, weight = np.polynomial.legendre.leggauss(NODES)
+        half = (high - low)[..., None] / 2
+        t = np.exp(low[..., None] + half * (1 + node))
+        density = np.exp(-((t - centre[..., None]) ** 2) / 2) + np.exp(-((t + centre[..., None]) ** 2) / 2)
+        share = self.share[..., None] * density * t * half * weight / np.sqrt(2 * np.pi)
+        rows = len(self.area)
+        return share.reshape(rows, -1), 3 * np.log(t * self.spread[:, None]).reshape(rows, -1)
 
 
 def _shares(spectrum: Spectrum) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -174,24 +184,12 @@ def load_of(spectrum: Spectrum, contact: ArrayLike, constants: Constants = CONST
 
 
 def log_factor(found: Gaps, flow: FlowConstants) -> FloatArray:
-    """ln R of a spectrum's gaps, which are scaled to their mean."""
-    share, log_cube = quadrature(found)
+    """ln R of a spectrum's gaps, which are scaled to their mean; -infinity where blocked."""
+    share, log_cube = found.quadrature
     mean = np.sum(share * np.exp(log_cube / 3), axis=1)
-    log_k = effective_medium(share, log_cube, flow.obstructed(found.area))
-    return np.asarray(log_k - 3 * np.log(mean) - np.log(wide_gap(found.separation)))
-
-
-def quadrature(found: Gaps) -> tuple[FloatArray, FloatArray]:
-    """Shares of the surface and ln h^3 of gaps there [h_rms^3], shape (loads, points)."""
-    centre = found.mean / found.spread
-    low, high = np.log(np.maximum(centre - REACH, LOWEST_GAP)), np.log(centre + REACH)
-    node, weight = np.polynomial.legendre.leggauss(NODES)
-    half = (high - low)[..., None] / 2
-    t = np.exp(low[..., None] + half * (1 + node))
-    density = np.exp(-((t - centre[..., None]) ** 2) / 2) + np.exp(-((t + centre[..., None]) ** 2) / 2)
-    share = found.share[..., None] * density * t * half * weight / np.sqrt(2 * np.pi)
-    rows = len(found.area)
-    return share.reshape(rows, -1), 3 * np.log(t * found.spread[:, None]).reshape(rows, -1)
+    log_k = effective_medium(share, log_cube, flow.obstructed(np.minimum(found.area, flow.threshold - NEAREST)))
+    factor = log_k - 3 * np.log(mean) - np.log(wide_gap(found.separation))
+    return np.where(found.area < flow.threshold, factor, -np.inf)
 
 
 def effective_medium(share: FloatArray, log_cube: FloatArray, blocked: FloatArray) -> FloatArray:
