@@ -401,6 +401,14 @@ def test_where_a_theory_has_no_answer_the_page_says_why(visit):
     assert "MBMA: has no answer here: it does not reach such a pressure." in tab.inner_text("#concerns")
 
 
+def test_an_old_browser_is_told(opened, address):
+    tab = opened.new_page()
+    tab.add_init_script("delete window.DecompressionStream")
+    tab.goto(address)
+    tab.wait_for_selector("#subtitle:not(:empty) >> text=cannot run the page")
+    tab.close()
+
+
 def test_on_a_phone_and_in_the_dark(visit, tmp_path):
     from matplotlib import image
 

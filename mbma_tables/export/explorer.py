@@ -234,7 +234,7 @@ def explorer_page(
         "STYLE": page_file("uPlot.min.css").decode() + page_file("page.css").decode(),
         "LICENCE": html.escape(page_file("uPlot.LICENSE").decode()),
         "UPLOT": page_file("uPlot.iife.min.js").decode(),
-        "SCRIPT": f'(async () => {{\n"use strict";\n{scripts}\n}})();',
+        "SCRIPT": f'(async () => {{\n"use strict";\n{scripts}\n}})()',
         "DATA": text,
     }
     return re.sub("@([A-Z]+)@", lambda place: parts[place[1]], page_file("page.html").decode())
