@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import functools
+import importlib
 import inspect
 import sys
 from collections.abc import Callable, Iterable
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.errors import InputError, OutOfRangeError
+from mbma_tables.errors import InputError, MbmaError, OutOfRangeError
 
 SHOWN = 3  # offending entries quoted in a message
 
@@ -59,6 +60,20 @@ def hinted(function: Callable[P, R]) -> Callable[P, R]:
         return function(*given, **named)
 
     return checked
+
+
+def needed(module: str, extra: str) -> Any:
+    """A module of an extra.
+
+    Raises
+    ------
+    MbmaError
+        Where it is not installed, with what installs it.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        raise MbmaError(f"this needs {module}: pip install 'mbma_tables[{extra}]'") from None
 
 
 def is_labelled(value: Any) -> bool:

@@ -1,6 +1,7 @@
 """numba where it is needed: functions are compiled when they are first called, so that importing modules stays light.
 
-What is compiled is kept for later processes, and made in each where no folder can keep it.
+What is compiled is kept for later processes, and made in each where no folder can keep it. Where numba is not installed
+(the extra `fast`) the same functions run as plain Python, with the same answers, hundreds of times slower.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ import functools
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
+
+import numpy as np
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Answer = TypeVar("Answer")
@@ -29,9 +32,12 @@ class Compiled:
 
     @functools.cached_property
     def dispatcher(self) -> Any:
-        """numba's own object."""
-        import numba
-        from numba.extending import register_jitable
+        """numba's own object; the plain function where there is no numba."""
+        try:
+            import numba
+            from numba.extending import register_jitable
+        except ImportError:
+            return _uncompiled(self._function)
 
         while _plain:
             register_jitable(fastmath=CONTRACT, error_model="numpy")(_plain.pop())
@@ -52,11 +58,26 @@ class Compiled:
         raise AttributeError(name)
 
 
-class Instruction:
-    """An intrinsic of numba's, made when compiled code first names it."""
+def _uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function as Python runs it, silent as compiled code is."""
 
-    def __init__(self, define: Callable[..., Any]) -> None:
-        self._define = define
+    @functools.wraps(function)
+    def plain(*arguments: Any) -> Any:
+        with np.errstate(all="ignore"):
+            return function(*arguments)
+
+    return plain
+
+
+class Instruction:
+    """An intrinsic of numba's, made when compiled code first names it; `plain` does the same in Python."""
+
+    def __init__(self, define: Callable[..., Any], plain: Callable[..., Any]) -> None:
+        self._define, self._plain = define, plain
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it, uncompiled."""
+        return self._plain(*arguments)
 
     @functools.cached_property
     def _numba_type_(self) -> Any:

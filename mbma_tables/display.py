@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mbma_tables.arguments import is_labelled
+from mbma_tables.arguments import is_labelled, needed
 from mbma_tables.errors import MbmaError
 from mbma_tables.plots import to_picture
 
@@ -104,6 +104,7 @@ class Displayed:
 
     def to_dataset(self) -> xr.Dataset:
         """What it holds as an xarray Dataset, each variable with its unit and what it is."""
+        needed("xarray", "xarray")
         import xarray as xr
 
         variables = {}

@@ -5,6 +5,7 @@ Each errs by less than 1e-15, relative to its value. What lies beyond the range 
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
 from mbma_tables.compiled import CONTRACT, Instruction, njit
@@ -17,8 +18,8 @@ _ONE = 0x3FF0000000000000  # bits of 1.0
 _ROOT_HALF = 0x3FE6A09E667F3BCD  # and of sqrt(1/2)
 
 
-def _reinterpret(made: str) -> Any:
-    """A compiled function that takes the bits of a number for one of another type."""
+def _reinterpret(made: str, source: str, target: str) -> Any:
+    """A function that takes the bits of a number for one of another type; formats are those of `struct`."""
 
     def define(typing: Any, value: Any) -> Any:
         from numba import types
@@ -28,11 +29,14 @@ def _reinterpret(made: str) -> Any:
             given[0], context.get_value_type(kind)
         )
 
-    return Instruction(define)
+    def plain(value: Any) -> Any:
+        return struct.unpack(target, struct.pack(source, int(value) % 2**64 if source == "Q" else value))[0]
+
+    return Instruction(define, plain)
 
 
-bits_of = _reinterpret("int64")
-float_of = _reinterpret("float64")
+bits_of = _reinterpret("int64", "d", "q")
+float_of = _reinterpret("float64", "Q", "d")
 
 
 @njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)

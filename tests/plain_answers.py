@@ -1,10 +1,9 @@
 """Calls into the compiled functions and their answers; as a program, the same of the functions as plain Python."""
 
-import ctypes
 import dataclasses
+import functools
 import json
 import math
-import struct
 import sys
 
 import numpy as np
@@ -13,29 +12,11 @@ MAX_INTERVALS = 8
 
 
 def leave_plain():
-    """Keep numba from compiling; before anything that it would compile is imported."""
-    import numba
+    """As where numba is not installed."""
+    sys.modules["numba"] = sys.modules["llvmlite"] = None
 
-    numba.config.DISABLE_JIT = 1
-    numba.vectorize = lambda signatures, **options: lambda function: np.vectorize(function, otypes=[float])
-
-    from mbma_tables import elementary
-    from mbma_tables.tablefiles import interpolate
-    from mbma_tables.theories import law_kernel
     from mbma_tables.totals import intervals
 
-    def as_type(source, target):
-        return lambda value: struct.unpack(target, struct.pack(source, value % 2**64 if source == "Q" else value))[0]
-
-    # these are made of instructions
-    law_kernel.number = lambda address, word: ctypes.c_double.from_address(int(address) + 8 * int(word)).value
-    law_kernel.whole = lambda address, word: ctypes.c_int64.from_address(int(address) + 8 * int(word)).value
-    law_kernel.bits_of = elementary.bits_of = as_type("d", "q")
-    elementary.float_of = as_type("Q", "d")
-    interpolate.load_lanes = lambda array, offset: tuple(array[offset : offset + 8])
-    interpolate.add_lanes = lambda total, weight, lanes: tuple(
-        a + weight * b for a, b in zip(total, lanes, strict=True)
-    )
     # giving up takes long uncompiled
     intervals.MAX_INTERVALS = MAX_INTERVALS
 
@@ -170,6 +151,7 @@ class Bounded:
 
 def laws():
     from mbma_tables import Surface, contact_law
+    from mbma_tables.theories import law_kernel
 
     gaps = [5.0, 3.0, 2.9, 1.0, 0.0, -3.0]
     # turning, not turning, and turning for a hundredth of the range
@@ -189,7 +171,7 @@ def laws():
             yield f"law of {law.theory}, {name}", getattr(law, name)([-1.0, 2.0, 3.999999])
         yield f"inverse of {law.theory}", law.at_pressure(law.force([-1.0, 2.0]))[0]
     law = contact_law(Surface(0.8, 1.0, 30.0, 1.0, 4.0), reading="printed", rtol=1e-3)
-    own = law.compiled().energy
+    own = functools.partial(law_kernel.evaluate, law_kernel.ENERGY, law.block.ctypes.data)
     yield "bound", (own(1.0), own(5.0), math.isnan(own(-4.1)), math.isnan(own(math.nan)))
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-import xarray as xr
-
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.scenes.effects import CORRELATIONS
 from mbma_tables.scenes.plan import Plan
@@ -15,6 +13,8 @@ from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from mbma_tables.scenes.run import Run
 
 TABLES = ("universal", "island4d")
@@ -71,6 +71,8 @@ def _units(problem: Problem) -> dict[str, tuple[str, str]]:
 
 def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
     """Quantities that were found; coordinates are gaps and what was prescribed."""
+    import xarray as xr
+
     problem, units = run.problem, _units(run.problem)
     variables = {
         name: xr.Variable(dims, values, {"units": units[name][0], "long_name": units[name][1]})

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
@@ -18,6 +17,8 @@ from mbma_tables.scenes.plan import Plan, Step
 from mbma_tables.scenes.problem import INVERTED, Problem
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from mbma_tables.surfaces.any_surface import AnySurface
     from mbma_tables.theories.law_object import ContactLaw
     from mbma_tables.theories.protocol import Theory

@@ -8,7 +8,7 @@ import pathlib
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from mbma_tables.arguments import finite_array
+from mbma_tables.arguments import finite_array, needed
 from mbma_tables.errors import InputError
 from mbma_tables.scenes.plan import Plan, make_plan
 from mbma_tables.scenes.problem import INVERTED, PRESCRIBED, Problem
@@ -132,7 +132,7 @@ class Scene(Problem):
         ------
         InputError, OutOfRangeError, ConvergenceError
         """
-        # xarray comes in with the first result
+        needed("xarray", "xarray")
         from mbma_tables.scenes.run import run_plan
 
         return run_plan(self, self.plan(), progress)

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import Instruction, jitable, njit
 
@@ -124,10 +126,19 @@ def _to_tuple(context: Any, builder: Any, signature: Any, vector: Any) -> Any:
     return impl_ret_untracked(context, builder, signature.return_type, lanes)
 
 
-# compiled code calls these with fewer arguments than they are defined with
-load_lanes: Any = Instruction(_load_lanes)
-add_lanes: Any = Instruction(_add_lanes)
-patch_lanes: Any = Instruction(_patch_lanes)
+def _plain_patch(array: Any, start: int, row: int, step: int, across: Any, along: Any) -> tuple[float, ...]:
+    places = start + row * np.arange(len(across))[:, None] + step * np.arange(len(along))
+    lanes = array[places[:, :, None] + np.arange(LANES)].astype(float)
+    return tuple(np.einsum("i,j,ijk", across, along, lanes))
+
+
+# numba calls the definitions with a typing context in front
+load_lanes: Any = Instruction(_load_lanes, lambda array, offset: tuple(array[offset : offset + LANES]))
+add_lanes: Any = Instruction(
+    _add_lanes,
+    lambda total, weight, lanes: tuple(a + weight * b for a, b in zip(total, lanes, strict=True)),
+)
+patch_lanes: Any = Instruction(_patch_lanes, _plain_patch)
 
 
 @jitable

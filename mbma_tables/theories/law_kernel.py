@@ -13,15 +13,12 @@ Compiled code takes the block's address: a number is passed on faster than an ar
 
 from __future__ import annotations
 
+import ctypes
 import math
 from typing import Any, NamedTuple
 
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
-
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import CONTRACT, njit
+from mbma_tables.compiled import CONTRACT, Instruction, njit
 from mbma_tables.elementary import bits_of
 
 DEGREE = 8
@@ -46,10 +43,15 @@ STEPS = 200
 EPSILON = 5e-16
 
 
-def _loader(kind: Any, code: Any) -> Any:
-    @intrinsic
+def _loader(made: str, in_c: Any) -> Any:
+    """A function that reads a word of the block at an address."""
+
     def load(typing: Any, address: Any, word: Any) -> Any:
-        """A word of the block."""
+        from llvmlite import ir
+        from numba import types
+
+        kind = getattr(types, made)
+        code = ir.DoubleType() if made == "float64" else ir.IntType(64)
 
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             pointer = builder.inttoptr(given[0], code.as_pointer())
@@ -60,11 +62,11 @@ def _loader(kind: Any, code: Any) -> Any:
 
         return kind(types.int64, types.int64), generate
 
-    return load
+    return Instruction(load, lambda address, word: in_c.from_address(int(address) + 8 * int(word)).value)
 
 
-number = _loader(types.float64, ir.DoubleType())
-whole = _loader(types.int64, ir.IntType(64))
+number = _loader("float64", ctypes.c_double)
+whole = _loader("int64", ctypes.c_int64)
 
 
 class Place(NamedTuple):

@@ -16,11 +16,10 @@ from numpy.typing import ArrayLike
 from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, require
 from mbma_tables.compiled import in_blocks
 from mbma_tables.display import Displayed, Variable, shown
-from mbma_tables.errors import InputError
+from mbma_tables.errors import InputError, MbmaError
 from mbma_tables.plots import Curve, draw_compression, force_label, theory_label
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import law_kernel as kernel
-from mbma_tables.theories.law_compiled import CompiledLaw
 from mbma_tables.theories.law_kernel import AREA, FORCE, force_at
 from mbma_tables.theories.result import MEANINGS
 from mbma_tables.units import UNKNOWN, Units, unit_of
@@ -28,6 +27,7 @@ from mbma_tables.units import UNKNOWN, Units, unit_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from mbma_tables.theories.law_compiled import CompiledLaw
     from mbma_tables.theories.law_leakage import LeakageLaw
 
 BLOCK = 1 << 16  # gaps between two looks for Ctrl-C
@@ -386,6 +386,10 @@ class ContactLaw(Displayed):
         >>> bool(abs(found / law.energy(1.0) - 1) < 1e-4)
         True
         """
+        try:
+            from mbma_tables.theories.law_compiled import CompiledLaw
+        except ImportError:
+            raise MbmaError("compiled functions need numba: pip install 'mbma_tables[fast]'") from None
         return CompiledLaw(self.block)
 
     def __getstate__(self) -> dict[str, Any]:
