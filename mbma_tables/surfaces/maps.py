@@ -47,7 +47,7 @@ def radial_spectrum(
     inside = (q > 0) & (q <= math.pi / max(dx, dy) * (1 + 1e-12))
     measured = q[inside & (power > MIN_POWER * power.max())]
     if measured.size == 0:
-        raise NotSelfAffineError("every wave of the map is shorter than two sampling steps")
+        raise InputError("every wave of the map is shorter than two sampling steps")
     inside &= (q >= measured.min()) & (q <= measured.max())
     q, strength = q[inside], power[inside]
     ring = np.rint(RINGS * q / min(step_x, step_y)).astype(int)
@@ -165,7 +165,7 @@ def _within_band(treated: Treated, scale: float, spectrum: tuple[Any, ...]) -> t
     q = spectrum[0] / scale
     held = (q >= treated.waves[0] * (1 - 1e-9)) & (q <= treated.waves[1] * (1 + 1e-9))
     if not held.any():
-        raise NotSelfAffineError("no wave of the map lies between its cut-offs")
+        raise InputError("no wave of the map lies between its cut-offs")
     return tuple(part[..., held] for part in spectrum)
 
 

@@ -264,7 +264,8 @@ class MeasuredSurface(AnySurface):
             known["kurtosis of slopes"] = self.bearing.slope_kurtosis
         if self.anisotropy is not None:
             known["anisotropy"] = self.anisotropy
-        mend = "solve the map itself, theories.BoundaryElements" if by_map else "theory 'calibrated' takes a map's own"
+        beyond = "beyond, only 'calibrated' by a map was tested"
+        mend = "solve the map itself, theories.BoundaryElements" if by_map else beyond
         return tuple(
             f"{name} is {known[name]:.3g}, tested from {low:g} to {high:g}: {mend}"
             for name, (low, high) in tested.items()

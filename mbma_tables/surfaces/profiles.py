@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import NotSelfAffineError
+from mbma_tables.errors import InputError
 from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
@@ -77,7 +77,7 @@ class ProfileSpectrum:
         q, C = q[held], C[held]
         bins = math.ceil(PER_DECADE * math.log10(q[-1] / q[0])) if q.size > 1 else 0
         if bins < MIN_NODES:
-            raise NotSelfAffineError(f"the line scan holds {q.size} waves: too few for a spectrum")
+            raise InputError(f"the line scan holds {q.size} waves: too few for a spectrum")
         edges = np.geomspace(q[0] - unit / 2, q[-1] + unit / 2, bins + 1)
         filled = np.unique(np.searchsorted(edges, q, side="right") - 1)
         edges = np.append(edges[filled], edges[-1])

@@ -399,9 +399,9 @@ class Surface(AnySurface):
         Raises
         ------
         InputError, OutOfRangeError
-            For input that is no map: holes, a missing or negative step, an unknown trend.
+            For input that is no map: holes, a missing or negative step, an unknown trend, nothing but a plane.
         NotSelfAffineError
-            Where the map is no isotropic self-affine surface; the message has the reason and the numbers.
+            With model="self-affine", where the map is no such surface; the message has the reason and the numbers.
 
         Examples
         --------
@@ -475,9 +475,7 @@ class Surface(AnySurface):
         Raises
         ------
         InputError, OutOfRangeError
-            For input that is no line scan.
-        NotSelfAffineError
-            For one that holds too few waves, or is flat.
+            For input that is no line scan, holds too few waves, or is flat.
 
         Examples
         --------

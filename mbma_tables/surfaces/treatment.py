@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.arguments import FloatArray, number_in
-from mbma_tables.errors import InputError, NotSelfAffineError
+from mbma_tables.errors import InputError
 from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH, heights_of, wrapped
 
 DEGREES = {"mean": 0, "plane": 1, "quadratic": 2, "height": 1, "curvature": 2}  # of least-squares polynomials
@@ -149,7 +149,7 @@ def treat(
     record: list[dict[str, Any]] = []
     heights = heights_of(grid, len(steps))
     if min(heights.shape) < MIN_GRID:
-        raise NotSelfAffineError(
+        raise InputError(
             f"{' x '.join(map(str, heights.shape))} points hold too few scales; the least is "
             f"{' x '.join([str(MIN_GRID)] * heights.ndim)}"
         )
@@ -179,7 +179,7 @@ def _flattened(
         flat = _without_polynomial(heights, degree)
     size = float(np.abs(heights).max())
     if not float(np.abs(flat).max()) > max(1e3 * np.finfo(float).eps * size, MIN_LENGTH):
-        raise NotSelfAffineError(f"the map is flat: nothing is left once its {trend} is subtracted")
+        raise InputError(f"the map is flat: nothing is left once its {trend} is subtracted")
     before, after = float(np.std(heights)), float(np.std(flat))
     told = f"{trend} subtracted" + (f": h_rms {before:.4g} before, {after:.4g} after" if trend != "mean" else "")
     record.append({"step": "detrend", "mode": trend, "h_rms_before": before, "h_rms_after": after, "told": told})
