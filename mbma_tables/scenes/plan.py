@@ -29,7 +29,7 @@ AMPLIFICATION = {"inverse": 2.0, "slopes": 300.0, "profile": 10.0}
 MIN_LAW_GAPS = {"universal": 2000}
 MIN_LAW_GAPS_OF_OTHERS = 300
 MIN_THEORY_LAW_RTOL = 1e-9
-YIELDING_CALL, YIELDING_GAP = 2.6, 2.1  # times an elastic call and an elastic answer of many (docs/yield.md)
+YIELDING_CALL, YIELDING_GAP = 2.2, 2.6  # times an elastic call and an elastic answer of many (docs/yield.md)
 LADDER = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 
 

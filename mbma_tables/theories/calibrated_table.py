@@ -29,6 +29,7 @@ NAME = "calibrated.nc"
 AXES = ("hurst", "log_zeta_1", "log_separation")
 QUANTITIES = ("area", "force", "stiffness")
 MAX_STEPS = 100
+CLOSE = 1e-9  # of ln F: the next miss would be about the square of this one
 SMALL = 256  # separations up to which numpy answers, without a compiler
 MIN_SHARED = 32  # separations a surface from which its coefficients in ln u are worth summing
 TINY = 1e-300
@@ -103,9 +104,15 @@ class Table:
         places = np.clip(places / self.step[:, None], 0.0, sizes)
         (i, j, k) = cells = np.minimum(places.astype(np.intp), sizes - 1)
         x, y, z = places - cells
-        a, b, c = np.ogrid[:6, :6, :6]
-        patch = self.coefficients[i + a[..., None], j + b[..., None], k + c[..., None]]
-        six = np.einsum("abcn,an,bn->cn", patch, quintic(x), quintic(y))
+        if own.size and (own[:, :2] == own[0, :2]).all():
+            # one surface: its coefficients in ln u serve all
+            patch = self.coefficients[i[0] : i[0] + 6, j[0] : j[0] + 6]
+            line = np.einsum("abk,a,b->k", patch, quintic(x[0]), quintic(y[0]))
+            six = line[k + np.arange(6)[:, None]]
+        else:
+            a, b, c = np.ogrid[:6, :6, :6]
+            patch = self.coefficients[i + a[..., None], j + b[..., None], k + c[..., None]]
+            six = np.einsum("abcn,an,bn->cn", patch, quintic(x), quintic(y))
         value, rate = quintic_at(polynomial_of(six, 0), z)
         rate = rate / self.step[2]
         last = self.first[2] + sizes[2] * self.step[2]
@@ -135,16 +142,18 @@ class Table:
         end = self._log_gaussian(own, high)[0]
         wanted, x = force * np.exp(-end), high - 0.5
         beyond = end + np.log1p(wanted) > self._log_gaussian(own, low)[0]
+        done = beyond
         for _ in range(MAX_STEPS):
             value, rate = self._log_gaussian(own, x)
             # as there
             miss = np.log1p((np.expm1(value - end) - wanted) / (1.0 + wanted))
             low, high = np.where(miss > 0, x, low), np.where(miss > 0, high, x)
             following = x - miss / rate
-            following = np.where((low < following) & (following < high), following, 0.5 * (low + high))
-            done = np.abs(following - x) <= 4e-16 * np.maximum(1.0, np.abs(x))
-            x = following
-            if (done | (high - low <= 2e-16)).all():
+            near = np.abs(miss) <= CLOSE
+            inside = (low < following) & (following < high)
+            following = np.where(inside, following, np.where(near, x, 0.5 * (low + high)))
+            x, done = np.where(done, x, following), done | near | (high - low <= 2e-16)
+            if done.all():
                 break
         return np.where(beyond, np.nan, np.exp(x))
 
@@ -405,10 +414,10 @@ def fill_separation(
             else:
                 high = x
             following = x - miss / rate
+            near = abs(miss) <= CLOSE
             if not low < following < high:
-                following = 0.5 * (low + high)
-            done = abs(following - x) <= 4e-16 * max(1.0, abs(x))
+                following = x if near else 0.5 * (low + high)
             x = following
-            if done or high - low <= 2e-16:
+            if near or high - low <= 2e-16:
                 break
         out[n] = math.exp(x)
