@@ -64,7 +64,7 @@ def log_answers(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def simulate(best: Contact, x: np.ndarray, grid: int, seed: int) -> float:
     """Mean flow conductance of face and track by boundary elements and Reynolds' equation, of one random cell."""
     h_rms, hurst, zeta_1 = np.exp(x[0]), x[1], np.exp(x[2]) / Q0
-    waves = int(grid / 4 / zeta_1)  # four points on the shortest
+    waves = round(grid / 4 / zeta_1)  # four points on the shortest
     k = np.hypot(np.fft.fftfreq(grid, 1 / grid)[:, None], np.fft.rfftfreq(grid, 1 / grid))
     phases = np.exp(2j * np.pi * np.random.default_rng(seed).random(k.shape))
     inside = (k >= waves) & (k <= zeta_1 * waves * (1 + 1e-9))
