@@ -14,14 +14,12 @@ def built(request, tmp_path_factory):
     """(kind, its content) of a small table built here."""
     from small_builds import KINDS, small
 
-    from generate.tables.build import build
+    from generate.tables import commands
     from generate.tables.chunks import ChunkedSolver
     from generate.tables.configuration import load
 
-    path = small(tmp_path_factory.mktemp("built"), request.param)
-    configuration = load(request.param, path)
-    kind = KINDS[request.param](configuration)
-    return kind, build(kind, configuration, ChunkedSolver())
+    configuration = load(request.param, small(tmp_path_factory.mktemp("built"), request.param))
+    return KINDS[request.param](configuration), commands.built(configuration, ChunkedSolver())
 
 
 @pytest.fixture

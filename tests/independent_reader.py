@@ -13,6 +13,7 @@ import numpy as np
 SEAL = b"\nmbma-table sha256 "
 U = np.arange(-192, 273) / 64
 T = np.exp(U - np.exp(-U))
+ENDS = ("low", "high")
 
 
 def height_integral(n, x):
@@ -21,19 +22,15 @@ def height_integral(n, x):
     return float(np.sum(T ** (n + 1) * (1 + np.exp(-U)) * density)) / 64
 
 
-def weights(degree, u):
-    """B-spline weights of the coefficients i ... i + degree."""
+def weights(u):
+    """B-spline weights of the coefficients i ... i + 3."""
     v = 1 - u
-    if degree == 3:
-        return np.array([v**3 / 6, 2 / 3 - u**2 * (1 - u / 2), 2 / 3 - v**2 * (1 - v / 2), u**3 / 6])
+    return np.array([v**3 / 6, 2 / 3 - u**2 * (1 - u / 2), 2 / 3 - v**2 * (1 - v / 2), u**3 / 6])
 
-    def w1(t):
-        return (26 - 50 * t + 20 * t**2 + 20 * t**3 - 20 * t**4 + 5 * t**5) / 120
 
-    def w2(t):
-        return (66 - 60 * t**2 + 30 * t**4 - 10 * t**5) / 120
-
-    return np.array([v**5 / 120, w1(u), w2(u), w2(v), w1(v), u**5 / 120])
+def chebyshev(t):
+    """T_0 ... T_7 at t in [-1, 1]."""
+    return np.cos(np.arange(8) * math.acos(min(1.0, max(-1.0, t))))
 
 
 def seal_matches(path):
@@ -63,8 +60,7 @@ class Reader:
                 for name, variable in file.variables.items()
             }
             self.dimensions = {name: list(variable.dimensions) for name, variable in file.variables.items()}
-        self.axes = self.dimensions["log_ratio_F"]
-        self.degree = int(self.attributes["spline_degree"])
+        self.axes = self.dimensions.get("log_ratio_F")
 
     # hashes
 
@@ -102,12 +98,14 @@ class Reader:
             p = self.position(name, x)
             i = min(math.floor(p), self.variables[name].size - 2)
             # each step takes the first axis that is left
-            block = np.tensordot(weights(self.degree, p - i), block[i : i + self.degree + 1], axes=1)
+            block = np.tensordot(weights(p - i), block[i : i + 4], axes=1)
         return float(block)
 
     def error(self, function, point):
         """Bound on the relative error at coordinates of the axes."""
         field = self.variables[f"error_{function}"]
+        if field.ndim == 1:
+            return float(field[self.cell(*point)])
         cell = []
         for name, x, cells in zip(self.axes, point, field.shape, strict=True):
             nodes = self.variables[name].size
@@ -122,11 +120,28 @@ class Reader:
     def rigid(X, mu):
         return {"F": math.pi * mu * height_integral(2.5, -X) / 5, "A": math.pi * height_integral(2, -X) / 2}
 
+    def cell(self, X, mu):
+        """The cell of an island; on an edge, the first of its cells."""
+        X_low, X_high, mu_low, mu_high = (self.variables[f"{name}_{end}"] for name in ("X", "mu") for end in ENDS)
+        found = np.flatnonzero((X_low <= X) & (X_high >= X) & (mu_low <= mu) & (mu <= mu_high))
+        if found.size == 0:
+            raise ValueError(f"X = {X}, mu = {mu} is not covered")
+        return int(found[0])
+
     def universal(self, X, mu):
-        first = self.described["mu"]["first"]
-        inside, share = max(mu, first), min(mu, first) / first
-        rigid = self.rigid(X, mu)
-        return {f: math.exp(share * self.spline(f, (X, inside))) * rigid[f] for f in rigid}
+        cell = self.cell(X, mu)
+        X_low, X_high, low, high = (float(self.variables[f"{n}_{end}"][cell]) for n in ("X", "mu") for end in ENDS)
+        x = (2 * X - X_low - X_high) / (X_high - X_low)
+        if low == 0:
+            y = 2 * mu / high - 1
+        else:
+            middle, slope = (
+                math.sqrt(low * high),
+                (math.sqrt(high) + math.sqrt(low)) / (math.sqrt(high) - math.sqrt(low)),
+            )
+            y = slope * (mu - middle) / (mu + middle)
+        sums = {f: chebyshev(x) @ self.variables[f"chebyshev_{f}"][cell] @ chebyshev(y) for f in "FA"}
+        return {"F": mu * float(sums["F"]), "A": float(sums["A"])}
 
     def band(self, spread, sphere, hurst):
         """mu, sigma and rate of a band; sphere gives zeta_d."""

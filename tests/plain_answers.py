@@ -52,21 +52,15 @@ def tables():
     from mbma_tables.islands.geometry import geometry
     from mbma_tables.models.tables import island4d_model, universal_model
     from mbma_tables.surfaces.readings import REPORTED
-    from mbma_tables.tablefiles.interpolate import fill_2d, fill_gradient_2d
 
     model = universal_model()
-    lowest, highest = model.content.axes[1].low, model.content.axes[1].high
+    highest = model.content.axes[1].high
     X = np.array([-5.0, 0.3, 3.0, 9.0, 20.0, 40.0, 1.0, 1.0, -7.0, 42.0, 1.0])
-    mu = np.array([1e-4, 1.0, 30.0, 1e-6, 1e3, highest, 0.1 * lowest, 0.0, 1.0, 1.0, 2 * highest])
+    mu = np.array([1e-4, 1.0, 30.0, 1e-6, 1e3, highest, 1e-9, 0.0, 1.0, 1.0, 2 * highest])
     for parallel in (False, True):
         found = model.answer(X, mu, parallel=parallel, outside="nan")
         yield f"universal, parallel {parallel}", (found.phi_F, found.phi_A, found.error)
     yield "universal, slopes", [[part.phi_F, part.phi_A] for part in model.slopes(X[:8], mu[:8])]
-    places = np.array([30.0, 41.3, 57.0])
-    for fill, rows in ((fill_2d, 2), (fill_gradient_2d, 6)):
-        out = np.empty((rows, 3))
-        fill(model.content.coefficients, places, places[::-1].copy(), out)
-        yield fill.__name__, out
 
     model = island4d_model()
     hurst = np.array([0.8, 0.5, 0.95])
@@ -124,7 +118,7 @@ def statuses():
     surface = kernel.surface_constants(0.8, 200.0, REPORTED.numbers, True, 200.0)
     near = sensitivity.neighbours(0.8, 200.0, REPORTED.numbers, True)
     # the deepest island is just outside, the last node of the quadrature inside
-    outside = (1 + 1e-9) * table.axes.X_high
+    outside = (1 + 1e-9) * table.X_high
     last = brentq(lambda x: kernel.island_node(x, True, True, surface).X - outside, 2.0, 100.0)
     for name, compression, peak, rtol in (
         ("unresolved", 3.0, 4.0, 1e-30),

@@ -12,7 +12,6 @@ max_nodes = 5000
 low = 0.5
 high = 6.0
 [axes.mu]
-low = 1e-3
 high = 10.0
 """,
     "island4d": """

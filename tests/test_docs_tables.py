@@ -10,7 +10,7 @@ import pytest
 from generate.pages import tables as table_page
 from generate.pages.page import MARKED, ROOT, fill
 from mbma_tables.models.tables import shipped
-from mbma_tables.tablefiles.schema import FORMAT_VERSION, KINDS
+from mbma_tables.tablefiles.schema import FORMAT_VERSIONS, KINDS
 
 PAGE = (ROOT / "docs" / "tables.md").read_text(encoding="utf-8")
 PARTS = {match[2]: match[0] for match in MARKED.finditer(PAGE)}
@@ -22,7 +22,7 @@ def rows(text):
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
 
 
-@pytest.mark.parametrize("part", ["sizes", "axes", "universal", "island4d"])
+@pytest.mark.parametrize("part", ["sizes", "cells", "axes", "universal", "island4d"])
 def test_measured_parts_are_what_the_files_hold(part):
     fresh = getattr(table_page, f"example_{part}" if part in KINDS else part)()
     assert fresh in PARTS[part], "python -m generate pages tables"
@@ -70,7 +70,8 @@ def test_page_names_what_files_hold():
     quoted -= {"mbma_tables", "zeta_d", "zeta_1", "h_d", "g_F", "g_A"}
     assert len(quoted) > 15
     assert quoted <= names
-    assert f"format, {FORMAT_VERSION};" in PAGE
+    for kind, version in FORMAT_VERSIONS.items():
+        assert f"{version} of `{kind}.nc`" in PAGE
 
 
 def test_page_names_no_folder_of_a_machine():

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from generate.tables.chunks import log_ratio
+from generate.tables import chunks
 from generate.timing import measure, variant
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError
@@ -62,8 +62,8 @@ def held_out(count: int = ISLANDS) -> HeldOut:
     """Islands of random surfaces, reading reported."""
     hurst, log_zeta, log_approach = qmc.scale(qmc.Halton(3, seed=SEED).random(count), *RANGES).T
     fields = geometry(10**log_approach, hurst, 10**log_zeta, get_reading("reported"))
-    ratio = log_ratio(fields["X"], fields["mu"], REFERENCE_RTOL, 2)
-    return HeldOut(fields | {"hurst": hurst}, np.exp(ratio).T * greenwood_tripp.rigid_sphere(fields["X"], fields["mu"]))
+    found = chunks.phi(fields["X"], fields["mu"], REFERENCE_RTOL, 2)
+    return HeldOut(fields | {"hurst": hurst}, found.T)
 
 
 def classical(X: FloatArray, mu: FloatArray, matrix: FloatArray, tolerance: float) -> tuple[Any, ...]:

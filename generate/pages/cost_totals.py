@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from generate.tables.chunks import log_ratio
+from generate.tables import chunks
 from generate.timing import GAPS, held_out_surfaces, measure, measured_gaps, variant
 from mbma_tables import Scene, Surface, contact, contact_law, theories
 from mbma_tables.arguments import FloatArray
-from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models import TIERS
 from mbma_tables.models.protocol import IslandAnswer
 from mbma_tables.scenes.costs import Row
@@ -46,8 +45,7 @@ class Doubled:
     def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
         """Phi_F and Phi_A."""
         flat_X, flat_mu = X.ravel(), mu.ravel()
-        rigid = greenwood_tripp.rigid_sphere(flat_X, flat_mu)
-        phi = np.exp(log_ratio(flat_X, flat_mu, REFERENCE_ISLANDS, 2)).T * rigid
+        phi = chunks.phi(flat_X, flat_mu, REFERENCE_ISLANDS, 2).T
         force, area = phi.reshape(2, *X.shape)
         return IslandAnswer(force, area, np.full(X.shape, REFERENCE_ISLANDS))
 

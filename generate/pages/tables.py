@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
 from generate.pages.page import png, pyplot, table
 from generate.tables.build import evaluate
@@ -13,11 +14,13 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.islands.four_numbers import hat_scales, to_axes
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models.tables import shipped
+from mbma_tables.models.universal import fractions_of_mu
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.netcdf import read_table
-from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL, TableContent, error_cell
+from mbma_tables.tablefiles.schema import CELL_EDGES, ISLAND4D, KINDS, UNIVERSAL, TableContent, error_cell
 
 EXAMPLE = 40  # the conformance point that is worked through
+LEAST_DRAWN = 1e-3  # mu
 
 
 def sizes() -> str:
@@ -26,25 +29,39 @@ def sizes() -> str:
     for kind in KINDS:
         content = read_table(shipped(kind), kind)
         found = content.attributes
-        nodes = " x ".join(f"{axis.nodes} {axis.name}" for axis in content.axes)
-        total = math.prod(axis.nodes for axis in content.axes)
         for f in ("F", "A"):
             names = (f"largest_error_{f}", f"p99_error_{f}", f"median_error_{f}", f"visited_largest_error_{f}")
             size = f"{shipped(kind).stat().st_size / 1e6:.2f} MB"
-            rows.append([kind, f"{nodes} = {total}", size, f, *(f"{found[name]:.1e}" for name in names)])
-    header = ["table", "nodes", "file", "of", "largest error", "99% below", "half below", "largest at islands"]
+            rows.append([kind, content.size, size, f, *(f"{found[name]:.1e}" for name in names)])
+    header = ["table", "cells or nodes", "file", "of", "largest error", "99% below", "half below", "largest at islands"]
     return table(header, rows)
 
 
 def axes() -> str:
-    """The axes of the shipped files."""
+    """The axes of the four-parameter table."""
     rows = []
-    for kind in KINDS:
-        for axis in read_table(shipped(kind), kind).axes:
-            shifted = f"{axis.name} + {axis.offset:g}" if axis.offset else axis.name
-            t = f"log({shifted})" if axis.transform == "log" else shifted
-            rows.append([kind, axis.name, axis.long_name, t, f"{axis.low:g}", f"{axis.high:g}", str(axis.nodes)])
-    return table(["table", "axis", "what it is", "equally spaced in", "first", "last", "nodes"], rows)
+    for axis in read_table(shipped(ISLAND4D), ISLAND4D).axes:
+        shifted = f"{axis.name} + {axis.offset:g}" if axis.offset else axis.name
+        t = f"log({shifted})" if axis.transform == "log" else shifted
+        rows.append([axis.name, axis.long_name, t, f"{axis.low:g}", f"{axis.high:g}", str(axis.nodes)])
+    return table(["axis", "what it is", "equally spaced in", "first", "last", "nodes"], rows)
+
+
+def cells() -> str:
+    """The cells of the universal table."""
+    content = read_table(shipped(UNIVERSAL), UNIVERSAL)
+    X_low, X_high, mu_low, mu_high = (content.auxiliary[name][1] for name in CELL_EDGES)
+    first = mu_low == 0
+    X, mu = content.axes
+    widths, octaves = X_high - X_low, np.log2(mu_high[~first] / mu_low[~first])
+    most = np.diff(np.flatnonzero(np.append(first, True))).max()
+    rows = [
+        ["X", f"{X.low:g} to {X.high:g}", f"{first.sum()} strips, {widths.min():g} to {widths.max():g} wide"],
+        ["mu", f"{mu.low:g} to {mu.high:g}", f"1 to {most} cells a strip"],
+        ["first cell of a strip", "from 0", f"to {mu_high[first].min():g} at least"],
+        ["other cells", "", f"{np.median(octaves):.2g} octaves of mu, half of them longer"],
+    ]
+    return table(["", "range", "cells"], rows)
 
 
 def _example(content: TableContent, rows: list[list[str]], coordinates: Sequence[float], X: float, mu: float) -> str:
@@ -57,7 +74,6 @@ def _example(content: TableContent, rows: list[list[str]], coordinates: Sequence
     F_52, F_2 = (float(height_integral(n, -X)) for n in (2.5, 2.0))
     shape = content.local_error.shape[:-1]
     where = tuple(int(error_cell(a, c, p[0])) for a, c, p in zip(content.axes, shape, positions, strict=True))
-    points = content.conformance
     rows += [
         ["g_F, g_A", f"{g[0]:.12e}, {g[1]:.12e}"],
         ["F_5/2(-X), F_2(-X)", f"{F_52:.12e}, {F_2:.12e}"],
@@ -67,6 +83,13 @@ def _example(content: TableContent, rows: list[list[str]], coordinates: Sequence
             "cell of the error field, error_F, error_A there",
             f"{where}, " + ", ".join(f"{bound:.2e}" for bound in content.local_error[where]),
         ],
+    ]
+    return _with_stored(content, rows)
+
+
+def _with_stored(content: TableContent, rows: list[list[str]]) -> str:
+    points = content.conformance
+    rows += [
         ["stored table_F, table_A", ", ".join(f"{points[f'table_{f}'][EXAMPLE]:.12e}" for f in "FA")],
         ["stored exact_F, exact_A", ", ".join(f"{points[f'exact_{f}'][EXAMPLE]:.12e}" for f in "FA")],
         ["tolerance", f"{points['tolerance'][EXAMPLE]:.2e}"],
@@ -78,7 +101,25 @@ def example_universal() -> str:
     """One conformance point of the universal table, step by step."""
     content = read_table(shipped(UNIVERSAL), UNIVERSAL)
     X, mu = (float(content.conformance[name][EXAMPLE]) for name in ("X", "mu"))
-    return _example(content, [["X, mu", f"{X!r}, {mu!r}"]], (X, mu), X, mu)
+    edges = np.stack([content.auxiliary[name][1] for name in CELL_EDGES])
+    inside = (edges[0] <= X) & (edges[1] >= X) & (edges[2] <= mu) & (edges[3] >= mu)
+    cell = int(np.flatnonzero(inside)[0])
+    X_low, X_high, mu_low, mu_high = edges[:, cell]
+    x = (2 * X - X_low - X_high) / (X_high - X_low)
+    a, b, c, d = fractions_of_mu(mu_low, mu_high)
+    y = (a * mu + b) / (c * mu + d)
+    sums = chebyshev.chebval2d(x, y, content.coefficients[cell])
+    rows = [
+        ["X, mu", f"{X!r}, {mu!r}"],
+        ["cell", str(cell)],
+        ["X_low, X_high, mu_low, mu_high", ", ".join(f"{edge:.10g}" for edge in edges[:, cell])],
+        ["x, y", f"{x:.12f}, {y:.12f}"],
+        ["first row of chebyshev_F", ", ".join(f"{term:.6e}" for term in content.coefficients[cell, 0, :, 0])],
+        ["Phi_F = mu times the sum of chebyshev_F", f"{mu * sums[0]:.12e}"],
+        ["Phi_A = the sum of chebyshev_A", f"{sums[1]:.12e}"],
+        ["error_F, error_A", ", ".join(f"{bound:.2e}" for bound in content.local_error[cell])],
+    ]
+    return _with_stored(content, rows)
 
 
 def example_island4d() -> str:
@@ -102,18 +143,21 @@ def example_island4d() -> str:
 
 def figure() -> bytes:
     """Bound on the relative error of the universal table over X and mu, a PNG file."""
+    from matplotlib.collections import PolyCollection
     from matplotlib.colors import LogNorm
 
     content = read_table(shipped(UNIVERSAL), UNIVERSAL)
-    edges = [
-        axis.coordinate(np.linspace(0, axis.nodes - 1, cells + 1))
-        for axis, cells in zip(content.axes, content.local_error.shape, strict=False)
-    ]
+    X_low, X_high, mu_low, mu_high = (content.auxiliary[name][1] for name in CELL_EDGES)
+    bottom = np.maximum(mu_low, LEAST_DRAWN)
+    corners = [X_low, bottom, X_high, bottom, X_high, mu_high, X_low, mu_high]
     drawn, panels = pyplot().subplots(1, 2, figsize=(9, 3.6), dpi=100, layout="constrained", sharey=True)
     norm = LogNorm(content.local_error.min(), content.local_error.max())
     for panel, number, name in zip(panels, (0, 1), (r"$\Phi_F$", r"$\Phi_A$"), strict=True):
-        image = panel.pcolormesh(edges[0], edges[1], content.local_error[..., number].T, norm=norm, rasterized=True)
-        panel.set(yscale="log", xlabel="X", title=f"bound on the relative error of {name}")
+        image = PolyCollection(list(np.stack(corners, axis=-1).reshape(-1, 4, 2)), array=content.local_error[:, number])
+        image.set(norm=norm, edgecolor="white", linewidth=0.2)
+        panel.add_collection(image)
+        title = f"bound on the relative error of {name}"
+        panel.set(yscale="log", xlim=(X_low[0], 12), ylim=(LEAST_DRAWN, mu_high[-1]), xlabel="X", title=title)
     panels[0].set_ylabel(r"$\mu$")
     drawn.colorbar(image, ax=panels)
     return png(drawn)
@@ -121,5 +165,11 @@ def figure() -> bytes:
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
     """The measured parts of the page by name, and its figure by path."""
-    parts = {"sizes": sizes(), "axes": axes(), "universal": example_universal(), "island4d": example_island4d()}
+    parts = {
+        "sizes": sizes(),
+        "cells": cells(),
+        "axes": axes(),
+        "universal": example_universal(),
+        "island4d": example_island4d(),
+    }
     return parts, {"docs/figures/tables_universal_error.png": figure()}

@@ -1,4 +1,4 @@
-"""From a configuration to a certified table: resolution, solution, certificate, checks, file."""
+"""From a configuration to a certified table over nodes: resolution, solution, certificate, checks, file."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import MbmaError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.tablefiles.checks import check_content
-from mbma_tables.tablefiles.interpolate import cubic, fill_2d, fill_4d, quintic
+from mbma_tables.tablefiles.interpolate import cubic, fill_4d
 from mbma_tables.tablefiles.schema import (
-    DEGREES,
+    DEGREE,
     FUNCTIONS,
     Axis,
     TableContent,
     error_cell,
     error_cells,
+    labels_of_nodes,
 )
 from mbma_tables.tablefiles.splines import coefficients
 
@@ -36,8 +37,7 @@ TESTS = 2  # points between two nodes of a sample line
 GROWTH = 1.05  # least factor by which an axis is refined
 ROUNDS = 4  # certificates tried before giving up
 AXIS_SHARE = 0.4  # of the target, for one axis alone; the errors of axes add up in part
-# smallest bound, in units of the islands' tolerance: the middle of a four-dimensional cell represents it less well
-LOCAL_FLOOR = {"universal": 0.3, "island4d": 0.8}
+LOCAL_FLOOR = 0.8  # smallest bound, in units of the islands' tolerance
 LOCAL_FACTOR = 2.5  # bound over the largest error at the middles of the cells nearby
 CONFORMANCE_POINTS = 64
 CONFORMANCE_TOLERANCE = 1e-11
@@ -54,7 +54,7 @@ class UncertifiedError(MbmaError):
 
 
 class Kind(Protocol):
-    """What sets one kind of table apart."""
+    """What `build` asks of a table over nodes."""
 
     def axes(self, nodes: dict[str, int]) -> tuple[Axis, ...]:
         """Axes with these node counts."""
@@ -106,11 +106,7 @@ class ConformancePoints:
 def evaluate(coefs: FloatArray, positions: list[FloatArray]) -> FloatArray:
     """The table's spline at positions in node units, shape (entries, 2)."""
     out = np.empty((2, positions[0].size))
-    if len(positions) == 2:
-        x, y = (np.ascontiguousarray(p) for p in positions)
-        fill_2d(coefs, x, y, out)
-    else:
-        fill_4d(coefs, np.ascontiguousarray(positions), out)
+    fill_4d(coefs, np.ascontiguousarray(positions), out)
     return out.T
 
 
@@ -124,7 +120,7 @@ def line_errors(
     kind: Kind, axes: tuple[Axis, ...], number: int, solver: ChunkedSolver, configuration: Configuration
 ) -> FloatArray:
     """Largest error of F and A when interpolating along axis `number` alone, over sample lines."""
-    degree, seed = DEGREES[configuration.kind], configuration.seed
+    seed = configuration.seed
     others = [axis for k, axis in enumerate(axes) if k != number]
     # edges of the box first, where trouble sits
     edges = np.array(list(itertools.product((0.0, 1.0), repeat=len(others))))
@@ -138,18 +134,17 @@ def line_errors(
     X, mu = kind.arguments(*coordinates)
     values = solver.log_ratio(f"{axes[number].name} x {axes[number].nodes}", X, mu, rtol=rtol_for(configuration))
     nodes = axes[number].nodes
-    coefs = coefficients(np.moveaxis(values[:, :nodes], 1, 0), degree, 1)
-    fitted = _evaluate_1d(coefs, tests, degree)
+    coefs = coefficients(np.moveaxis(values[:, :nodes], 1, 0), DEGREE, 1)
+    fitted = _evaluate_1d(coefs, tests)
     worst: FloatArray = np.abs(fitted - np.moveaxis(values[:, nodes:], 1, 0)).max(axis=(0, 1))
     return worst
 
 
-def _evaluate_1d(coefs: FloatArray, positions: FloatArray, degree: int) -> FloatArray:
-    nodes = coefs.shape[0] - degree + 1
+def _evaluate_1d(coefs: FloatArray, positions: FloatArray) -> FloatArray:
+    nodes = coefs.shape[0] - DEGREE + 1
     first = np.minimum(positions.astype(int), nodes - 2)
-    rule = cubic if degree == 3 else quintic
-    weights = np.array([rule(u) for u in positions - first])
-    taps = np.stack([coefs[first + k] for k in range(degree + 1)])
+    weights = np.array([cubic(u) for u in positions - first])
+    taps = np.stack([coefs[first + k] for k in range(DEGREE + 1)])
     fitted: FloatArray = np.einsum("nk,kn...->n...", weights, taps)
     return fitted
 
@@ -177,7 +172,7 @@ def resolve(
             if fixed is not None or worst <= aim:
                 break
             # the error is of order h^(degree + 1)
-            predicted = nodes[name] * (worst / aim) ** (1 / (DEGREES[configuration.kind] + 1))
+            predicted = nodes[name] * (worst / aim) ** (1 / (DEGREE + 1))
             nodes[name] = int(max(nodes[name] * GROWTH, min(predicted, nodes[name] * 2))) + 1
             if np.prod([float(n) for n in nodes.values()]) > configuration.max_nodes:
                 raise UncertifiedError(
@@ -206,6 +201,11 @@ def certify(
     X, mu = kind.arguments(*places)
     truth = solver.log_ratio("certificate", X, mu, rtol=rtol_for(configuration), refinement=2)
     errors = np.abs(np.expm1(evaluate(coefs, positions) - truth))
+    return certificate(configuration, errors, {axis.name: x for axis, x in zip(axes, places, strict=True)})
+
+
+def certificate(configuration: Configuration, errors: FloatArray, places: dict[str, FloatArray]) -> dict[str, Any]:
+    """Errors (points, 2) at places by name as attributes; the second half of the points is visited by surfaces."""
     on_manifold = errors[configuration.certificate_points // 2 :]
     result: dict[str, Any] = {"certificate_points": configuration.certificate_points}
     for number, function in enumerate(FUNCTIONS):
@@ -217,7 +217,7 @@ def certify(
         result[f"visited_p99_error_{function}"] = float(np.percentile(on_manifold[:, number], 99))
         worst = int(own.argmax())
         result[f"largest_error_{function}_at"] = ", ".join(
-            f"{axis.name} = {float(x[worst]):.6g}" for axis, x in zip(axes, places, strict=True)
+            f"{name} = {float(x[worst]):.6g}" for name, x in places.items()
         )
     return result
 
@@ -239,7 +239,7 @@ def local_errors(
     np.maximum.at(field, where, error)
     # a neighbour's worst point may lie just across the border
     spread = scipy.ndimage.maximum_filter(field, size=(*(3 for _ in axes), 1), mode="nearest")
-    bound: FloatArray = LOCAL_FACTOR * spread + LOCAL_FLOOR[configuration.kind] * rtol_for(configuration)
+    bound: FloatArray = LOCAL_FACTOR * spread + LOCAL_FLOOR * rtol_for(configuration)
     return bound
 
 
@@ -247,7 +247,6 @@ def local_errors(
 @threadpool_limits.wrap(limits=BLAS_THREADS)
 def build(kind: Kind, configuration: Configuration, solver: ChunkedSolver) -> TableContent:
     """Make a table that meets its target, or raise UncertifiedError."""
-    degree = DEGREES[configuration.kind]
     start = {name: given.nodes or given.start for name, given in configuration.axes.items()}
     aim = AXIS_SHARE * configuration.target
     history = []
@@ -256,9 +255,9 @@ def build(kind: Kind, configuration: Configuration, solver: ChunkedSolver) -> Ta
         axes = kind.axes(resolution.nodes)
         grid = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
         values = solver.log_ratio(f"{configuration.kind} table", *kind.arguments(*grid), rtol=rtol_for(configuration))
-        coefs = coefficients(values, degree, len(axes))
-        certificate = certify(kind, axes, coefs, solver, configuration)
-        worst = max(certificate["largest_error_F"], certificate["largest_error_A"])
+        coefs = coefficients(values, DEGREE, len(axes))
+        certified = certify(kind, axes, coefs, solver, configuration)
+        worst = max(certified["largest_error_F"], certified["largest_error_A"])
         history.append({"nodes": resolution.nodes, "aim": aim, "largest_error": worst})
         if worst <= configuration.target:
             break
@@ -274,17 +273,20 @@ def build(kind: Kind, configuration: Configuration, solver: ChunkedSolver) -> Ta
             f"{configuration.kind}: the largest held-out error is still {worst:.2e} after {ROUNDS} refinements, "
             f"the target {configuration.target:.2e}"
         )
+    points = kind.conformance(held_out(kind, axes, CONFORMANCE_POINTS, configuration.seed + 303))
+    positions = [axis.position(x) for axis, x in zip(axes, points.places, strict=True)]
+    rigid = greenwood_tripp.rigid_sphere(points.X, points.mu)
+    by_table = points.scales * np.exp(evaluate(coefs, positions).T) * rigid
     content = TableContent(
         kind=configuration.kind,
         axes=axes,
-        log_ratio=values,
         coefficients=coefs,
         local_error=local_errors(kind, axes, coefs, solver, configuration),
-        auxiliary=kind.auxiliary(axes),
-        conformance=_conformance(kind, axes, coefs, configuration),
+        auxiliary=kind.auxiliary(axes) | labels_of_nodes(axes, values),
+        conformance=conformance(points, by_table),
         attributes={
             **kind.attributes(),
-            **certificate,
+            **certified,
             "target": configuration.target,
             "configuration": json.dumps(dataclasses.asdict(configuration), sort_keys=True),
             "configuration_sha256": configuration.digest(),
@@ -302,14 +304,9 @@ def build(kind: Kind, configuration: Configuration, solver: ChunkedSolver) -> Ta
     return content
 
 
-def _conformance(
-    kind: Kind, axes: tuple[Axis, ...], coefs: FloatArray, configuration: Configuration
-) -> dict[str, FloatArray]:
-    """Points to replay: arguments, the table's answers, the exact ones, and tolerances for both."""
-    points = kind.conformance(held_out(kind, axes, CONFORMANCE_POINTS, configuration.seed + 303))
-    positions = [axis.position(x) for axis, x in zip(axes, points.places, strict=True)]
+def conformance(points: ConformancePoints, table: FloatArray) -> dict[str, FloatArray]:
+    """Points to replay: arguments, the `table`'s answers, the exact ones, and tolerances for both."""
     solved = greenwood_tripp.solve(points.X, points.mu, rtol=greenwood_tripp.MIN_SOLVER_RTOL)
-    table = points.scales * np.exp(evaluate(coefs, positions).T) * greenwood_tripp.rigid_sphere(points.X, points.mu)
     exact = points.scales * np.stack([solved.phi_F, solved.phi_A])
     stored = dict(points.arguments)
     for number, function in enumerate(FUNCTIONS):

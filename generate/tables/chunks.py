@@ -9,7 +9,8 @@ from __future__ import annotations
 import concurrent.futures
 import io
 import pathlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -21,31 +22,31 @@ from mbma_tables.islands import greenwood_tripp
 from mbma_tables.tablefiles.provenance import SOLVER, digest_arrays, digest_json, processor, source_digest, versions
 
 CHUNK = 2000
-Chunk = tuple[FloatArray, FloatArray, float, int]  # the arguments of `log_ratio`
-CODE = (*SOLVER, "generate.tables.chunks")
+Work = Callable[..., FloatArray]
+Job = tuple[Any, ...]
+CODE = (*SOLVER, "generate.tables.chunks", "generate.tables.universal")
 
 
 class WorkerError(MbmaError, RuntimeError):
     """Worker processes that died, or that a scheduler lost."""
 
 
-def log_ratio(X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
-    """log(Phi/Phi_rigid) at flat (X, mu), shape (entries, 2), on `refinement` times the nodes that `rtol` asks."""
+def phi(X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
+    """Phi_F and Phi_A at flat (X, mu), shape (entries, 2), on `refinement` times the nodes that `rtol` asks."""
     solved = greenwood_tripp.solve(X, mu, rtol=rtol)
-    phi = np.stack([solved.phi_F, solved.phi_A], axis=-1)
+    found = np.stack([solved.phi_F, solved.phi_A], axis=-1)
     if refinement > 1:
         for nodes in np.unique(solved.nodes):
             same = solved.nodes == nodes
             finer = greenwood_tripp.solve(X[same], mu[same], rtol=rtol, nodes=refinement * int(nodes))
-            phi[same] = np.stack([finer.phi_F, finer.phi_A], axis=-1)
-    ratio: FloatArray = np.log(phi / greenwood_tripp.rigid_sphere(X, mu).T)
-    return ratio
+            found[same] = np.stack([finer.phi_F, finer.phi_A], axis=-1)
+    return found
 
 
-def chunk_key(X: FloatArray, mu: FloatArray, rtol: float, refinement: int) -> str:
+def chunk_key(work: Work, job: Job) -> str:
     """Name of a chunk's file."""
-    made_by = [source_digest(CODE), versions(), processor(), rtol, refinement]
-    return digest_json([made_by, digest_arrays({"X": X, "mu": mu})])
+    made_by = [source_digest(CODE), versions(), processor(), work.__name__]
+    return digest_json([made_by, digest_arrays({str(number): value for number, value in enumerate(job)})])
 
 
 class ChunkedSolver:
@@ -63,44 +64,54 @@ class ChunkedSolver:
         self.executor = executor
         self.folder = folder
 
-    def log_ratio(self, label: str, X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
-        """`log_ratio` of arrays of any one shape, shape (..., 2); `label` names the progress bar.
+    def map(self, label: str, work: Work, jobs: Sequence[Job]) -> list[FloatArray]:
+        """``work(*job)`` of each job, in order; `label` names the progress bar.
 
         Raises
         ------
         WorkerError
             Where a worker died; finished chunks are kept.
         """
-        flat = [np.ascontiguousarray(array, dtype=float).ravel() for array in (X, mu)]
-        chunks: list[Chunk] = [
-            (flat[0][k : k + CHUNK], flat[1][k : k + CHUNK], rtol, refinement) for k in range(0, flat[0].size, CHUNK)
-        ]
-        keys = [chunk_key(*chunk) for chunk in chunks]
+        keys = [chunk_key(work, job) for job in jobs]
         results = {number: found for number, key in enumerate(keys) if (found := self._load(key)) is not None}
-        missing = {number: chunk for number, chunk in enumerate(chunks) if number not in results}
+        missing = {number: job for number, job in enumerate(jobs) if number not in results}
         # silent where stderr is not a terminal
-        with tqdm(total=len(chunks), initial=len(results), desc=label, unit="chunk", disable=None) as bar:
-            for number, result in self._computed(missing):
+        with tqdm(total=len(jobs), initial=len(results), desc=label, unit="chunk", disable=None) as bar:
+            for number, result in self._computed(work, missing):
                 if self.folder is not None:
                     content = io.BytesIO()
                     np.save(content, result)
                     write_file(self.folder / keys[number], content.getvalue(), make_folders=True)
                 results[number] = result
                 bar.update()
-        return np.concatenate([results[number] for number in range(len(chunks))]).reshape((*np.shape(X), 2))
+        return [results[number] for number in range(len(jobs))]
+
+    def phi(self, label: str, X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
+        """`phi` of arrays of any one shape, shape (..., 2)."""
+        flat = [np.ascontiguousarray(array, dtype=float).ravel() for array in (X, mu)]
+        jobs = [
+            (flat[0][k : k + CHUNK], flat[1][k : k + CHUNK], rtol, refinement) for k in range(0, flat[0].size, CHUNK)
+        ]
+        return np.concatenate(self.map(label, phi, jobs)).reshape((*np.shape(X), 2))
+
+    def log_ratio(self, label: str, X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:
+        """log(Phi/Phi_rigid) of arrays of any one shape, shape (..., 2)."""
+        rigid = np.moveaxis(greenwood_tripp.rigid_sphere(X, mu), 0, -1)
+        ratio: FloatArray = np.log(self.phi(label, X, mu, rtol, refinement) / rigid)
+        return ratio
 
     def _load(self, key: str) -> FloatArray | None:
         """A kept chunk, which is written whole or not at all; None where there is none."""
         path = None if self.folder is None else self.folder / key
         return np.asarray(np.load(path)) if path is not None and path.exists() else None
 
-    def _computed(self, missing: dict[int, Chunk]) -> Iterator[tuple[int, FloatArray]]:
+    def _computed(self, work: Work, missing: dict[int, Job]) -> Iterator[tuple[int, FloatArray]]:
         """Numbers and results of chunks, as they finish."""
         if self.executor is None:
-            yield from ((number, log_ratio(*chunk)) for number, chunk in missing.items())
+            yield from ((number, work(*job)) for number, job in missing.items())
             return
         try:
-            waiting = {self.executor.submit(log_ratio, *chunk): number for number, chunk in missing.items()}
+            waiting = {self.executor.submit(work, *job): number for number, job in missing.items()}
             for future in concurrent.futures.as_completed(waiting):
                 yield waiting[future], future.result()
         except (concurrent.futures.BrokenExecutor, concurrent.futures.CancelledError) as fault:

@@ -20,7 +20,7 @@ from generate.tables.island4d import Island4d
 from generate.tables.universal import Universal
 from mbma_tables.errors import InputError
 from mbma_tables.tablefiles.netcdf import write_table
-from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL
+from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL, TableContent
 
 TABLES = pathlib.Path(__file__).parents[2] / "tables"
 
@@ -64,22 +64,27 @@ def destination(what: str, configuration: Configuration, out: pathlib.Path | Non
     return path
 
 
+def built(configuration: Configuration, solver: ChunkedSolver) -> TableContent:
+    """A table that meets its target."""
+    if configuration.kind == UNIVERSAL:
+        return Universal(configuration).build(solver)
+    content: TableContent = build(Island4d(configuration), configuration, solver)
+    return content
+
+
 def make_table(configuration: Configuration, target: pathlib.Path, pool: Pool) -> None:
     """Build, certify and write one table; finished chunks are kept beside it until then."""
     chunks = target.parent / f".{target.name}.chunks"
-    kind = Universal(configuration) if configuration.kind == UNIVERSAL else Island4d(configuration)
     try:
-        content = build(kind, configuration, ChunkedSolver(pool, chunks))
+        content = built(configuration, ChunkedSolver(pool, chunks))
     except UncertifiedError:
         # another resolution shares no chunks with this one
         shutil.rmtree(chunks, ignore_errors=True)
         raise
     write_table(target, content)
     shutil.rmtree(chunks, ignore_errors=True)
-    shape = " x ".join(f"{axis.nodes} {axis.name}" for axis in content.axes)
     errors = ", ".join(f"{f} {content.attributes[f'largest_error_{f}']:.2e}" for f in ("F", "A"))
-    click.echo(f"{target}: {shape}; largest held-out error {errors}; {target.stat().st_size} bytes")
-    click.echo(f"errors by axis (F, A): {content.attributes['axis_errors']}", err=True)
+    click.echo(f"{target}: {content.size}; largest held-out error {errors}; {target.stat().st_size} bytes")
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})

@@ -12,9 +12,8 @@ from mbma_tables.arguments import number_in, whole_number_in
 from mbma_tables.errors import InputError
 from mbma_tables.files import read_file
 from mbma_tables.surfaces.readings import get_reading
-from mbma_tables.tablefiles.checks import AXES
 from mbma_tables.tablefiles.provenance import digest_json
-from mbma_tables.tablefiles.schema import ISLAND4D, Axis
+from mbma_tables.tablefiles.schema import AXES, ISLAND4D, UNIVERSAL, Axis
 
 HERE = pathlib.Path(__file__).parent
 MAX_BYTES = 2**16  # of a configuration file
@@ -26,7 +25,7 @@ MIN_EXTENT = 1e-6  # of an axis, in its own transform: nodes must differ
 # where the solver reaches its tightest tolerance, whatever the other axes
 LIMITS = {
     "X": (-30.0, 200.0),
-    "mu": (1e-30, 1e10),
+    "mu": (0.0, 1e10),
     "spread": (1e-12, 1e6),
     "sphere": (0.0, 1.0),
     "hurst": (0.01, 1.0),
@@ -96,7 +95,7 @@ def _check_keys(given: Any, known: Any, where: str) -> None:
 
 def _axis(kind: str, name: str, entry: dict[str, Any]) -> AxisRange:
     bounds = LIMITS[name]
-    low, high = (number_in(f"axes.{name}.{end}", entry[end], *bounds) for end in ("low", "high"))
+    low, high = (number_in(f"axes.{name}.{end}", entry.get(end, 0.0), *bounds) for end in ("low", "high"))
     offset = number_in(f"axes.{name}.offset", entry.get("offset", 0.0), -1e12, 1e12)
     ends: tuple[float, ...] = (low + offset, high + offset)
     if offset and name != "X":
@@ -126,10 +125,12 @@ def _configuration(kind: str, own: dict[str, Any], target: float | None) -> Conf
     wanted = number_in("target", own.get("target", shipped) if target is None else target, 1e-11, 0.1)
     for name, entry in given["axes"].items():
         changes = changed.get(name, {})
-        _check_keys(changes, ["low", "high", "offset", "start", "nodes"], f"[axes.{name}]")
+        # cells are as small as they must be, where nodes are counted
+        known = [*entry] if kind == UNIVERSAL else ["low", "high", "offset", "start", "nodes"]
+        _check_keys(changes, known, f"[axes.{name}]")
         # where the target is looser or the range another one, the shipped start is too fine or means nothing
         if wanted > shipped or changes.keys() & {"low", "high", "offset"}:
-            entry["start"] = MIN_NODES
+            entry.pop("start", None)
         axes[name] = _axis(kind, name, entry | changes)
     given |= own
     if given["kind"] != kind:

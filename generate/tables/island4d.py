@@ -26,7 +26,7 @@ from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.surfaces.spectrum import BROADENING
-from mbma_tables.tablefiles.schema import DEGREES, ISLAND4D, SYMBOLS, Axis, TableContent, grid_labels, numbered
+from mbma_tables.tablefiles.schema import SYMBOLS, Axis, TableContent, numbered
 
 LOOKUP = (
     "given delta_over_h_rms, zeta_d, zeta_u, hurst; delta_over_h_rms is the approach read at zeta_1 without bound, "
@@ -140,7 +140,6 @@ class Island4d:
                 1 / zeta_d,
                 {"long_name": "1/zeta_d; zeta_u = zeta_d (1 + spread)", "units": "1"},
             ),
-            **grid_labels(axes, DEGREES[ISLAND4D]),
         }
 
     def attributes(self) -> dict[str, Any]:

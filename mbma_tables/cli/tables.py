@@ -40,7 +40,7 @@ def list_command(as_json: bool) -> None:
                 "kind": kind,
                 "path": str(path),
                 "bytes": path.stat().st_size,
-                "nodes": {axis.name: axis.nodes for axis in content.axes},
+                "size": content.size,
                 "reading": content.attributes["reading"],
                 "data_version": content.attributes["data_version"],
                 "largest_error": {f: content.attributes[f"largest_error_{f}"] for f in ("F", "A")},
@@ -50,10 +50,9 @@ def list_command(as_json: bool) -> None:
         echo(json.dumps({"tables": rows}, indent=2))
         return
     for row in rows:
-        nodes = " x ".join(f"{count} {name}" for name, count in row["nodes"].items())
         errors = ", ".join(f"{f} {error:.2g}" for f, error in row["largest_error"].items())
         echo(
-            f"{row['kind']}: {nodes}; reading {row['reading']}; largest held-out error {errors}; "
+            f"{row['kind']}: {row['size']}; reading {row['reading']}; largest held-out error {errors}; "
             f"{row['bytes']} bytes; data {row['data_version']}; {row['path']}"
         )
 

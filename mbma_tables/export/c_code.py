@@ -1,7 +1,7 @@
 """The model as C99: its numbers as a header file, the comment that opens each file, and the texts of the files.
 
 The table is text, in the shortest decimals that give back every bit, so that the files mean the same to any compiler on
-any machine; 120,000 numbers are 2.5 MB of text and a fraction of a second of compiling.
+any machine; 150,000 numbers are 3 MB of text and a fraction of a second of compiling.
 """
 
 from __future__ import annotations
@@ -18,17 +18,22 @@ from mbma_tables import __version__, calibrated
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError
 from mbma_tables.export.text import filled, opening
-from mbma_tables.islands import height_integrals as heights
 from mbma_tables.models import closed_form_functions, universal_kernel
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
+from mbma_tables.tablefiles.schema import BUCKET_BITS
 from mbma_tables.theories import calibrated_curves, calibrated_table, persson
 from mbma_tables.totals import gauss_kronrod, intervals, island_sum
 
 FORM = "standard"  # that of tier "formula"
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # as `contact` allows
+# what lies where in a record
+RECORD_NAMES = (
+    *("TERMS", "ERROR", "CENTRE", "RATE", "TOP_MU", "TOP", "BOTTOM_MU", "BOTTOM"),
+    *("FORCE_POWERS", "AREA_POWERS"),
+)
 NUMBERS_FILE = "mbma_table.h"
 USAGE = (
     "Compile mbma.c, which includes mbma_table.h, and link the C mathematics library: cc -std=c99 -O2 -c mbma.c -lm. "
@@ -57,8 +62,7 @@ CONVENTIONS = (
     "the mid-plane of the rough surface to the rigid plane, -h_max <= d; contact starts at d = h_max. The mean "
     "separation is u = (h_max + d)/2. Geometry and X, mu are as the table's documentation has them: heights in "
     "units of s = h_rms/sqrt(1 - zeta_1^(-2 H)), lengths in 1/q0, zeta_1 = q1/q0.",
-    "Outside the table there is no answer, only a status: nothing is clamped or extrapolated. Below the smallest mu "
-    "the logarithm of the ratio to a rigid sphere is proportional to mu, within the stated error.",
+    "Outside the table there is no answer, only a status: nothing is clamped or extrapolated.",
 )
 
 
@@ -135,32 +139,22 @@ def closed_forms() -> tuple[str, str]:
 
 def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | float], dict[str, FloatArray]]:
     """Constants and arrays of the model by their names in C, from the modules that use them here, in one list."""
-    X, mu = model.content.axes
-    coefficients = model.content.coefficients
-    errors = model.content.local_error.max(axis=-1)
+    table = model.kernel
     form, certificates = closed_form_functions.RANGES[FORM], closed_form_functions.CERTIFICATES[FORM]
     constants: dict[str, int | float] = {
-        "ROWS": coefficients.shape[0],
-        "COLUMNS": coefficients.shape[1],
-        "ERROR_ROWS": errors.shape[0],
-        "ERROR_COLUMNS": errors.shape[1],
         "OFFSET": int(reading.offset),
         "SUMMITS": int(reading.summit_sigma),
         "PRINTED_JACOBIAN": int(reading.jacobian == "printed"),
         "MAX_INTERVALS": intervals.MAX_INTERVALS,
         "PI": math.pi,
-        "X_LOW": X.low,
-        "X_HIGH": X.high,
-        "X_OFFSET": X.offset,
-        "X_START": X.start,
-        "X_RATE": 1 / X.step,
-        "MU_LOW": mu.low,
-        "MU_HIGH": mu.high,
-        "MU_START": mu.start,
-        "MU_RATE": 1 / mu.step,
-        "ERROR_CELLS_X": errors.shape[0] / (X.nodes - 1),
-        "ERROR_CELLS_MU": errors.shape[1] / (mu.nodes - 1),
-        "SECOND_ORDER": universal_kernel.SECOND_ORDER,
+        **{name: getattr(universal_kernel, name) for name in RECORD_NAMES},
+        "BUCKET_BITS": BUCKET_BITS,
+        "FIRST_BUCKET": table.first_bucket,
+        "BUCKETS": table.buckets,
+        "X_LOW": table.X_low,
+        "X_HIGH": table.X_high,
+        "X_RATE": table.X_rate,
+        "MU_HIGH": table.mu_high,
         "RADIUS": spectrum.RADIUS,
         "BROADENING": spectrum.BROADENING,
         "DIVISOR": reading.density_divisor,
@@ -191,14 +185,9 @@ def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | fl
         "NODES_31": gauss_kronrod.NODES_31,
         "KRONROD_31": gauss_kronrod.KRONROD_31,
         "GAUSS_31": gauss_kronrod.GAUSS_31,
-        # F_n: rows are the pieces, columns the powers
-        "F_ONE": heights._ONE,
-        "F_THREE_HALVES": heights._THREE_HALVES,
-        "F_TWO": heights._TWO,
-        "F_FIVE_HALVES": heights._FIVE_HALVES,
-        "ERRORS": errors,
-        # F and A side by side, mu before X
-        "COEFFICIENTS": np.ravel(coefficients),
+        # whole numbers, as all arrays are of doubles
+        "PLACES": table.places.astype(float),
+        "RECORDS": table.records.reshape(-1, universal_kernel.RECORD),
     }
     return constants, arrays
 
@@ -272,8 +261,8 @@ def header(model: UniversalModel, reading: Reading, title: str, usage: str) -> l
     return [
         title,
         f"Written by mbma_tables {__version__}. {usage}",
-        "MBMA model of rough contact (Guo, Ma and Zhu): Phi_F and Phi_A of a contact island over (X, mu) by a quintic "
-        "spline or a closed form, islands of a self-affine surface, and the surface's force and area at a gap.",
+        "MBMA model of rough contact (Guo, Ma and Zhu): Phi_F and Phi_A of a contact island over (X, mu) by local "
+        "polynomials or a closed form, islands of a self-affine surface, and the surface's force and area at a gap.",
         f"Reading: {reading.name} (density divisor {reading.density_divisor:.17g}, beta {reading.beta:.17g}, phi "
         f"{reading.phi:g}, floors {reading.floor_d:g} and {reading.floor_u:g}, Jacobian {reading.jacobian}, offset "
         f"{'on' if reading.offset else 'off'}, sigma of {'summits' if reading.summit_sigma else 'all heights'}).",

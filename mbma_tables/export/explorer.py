@@ -43,7 +43,7 @@ SCRIPTS = ("model.js", "state.js", "curves.js", "downloads.js", "charts.js", "ma
 SWITCHES = ("OFFSET", "SUMMITS", "PRINTED_JACOBIAN")  # whole numbers that depend on the reading
 MIN_FILLED = 1000  # numbers from which an array is a table, which the page fills in
 FRACTION_BITS, ORDER = 43, 3  # of packed tables: steps of 1e-13; times that differences are taken
-MAX_EXACT = 2**53
+MAX_EXACT, MAX_WHOLE = 2**53, 2.0**16  # of whole numbers in the page, and of numbers before they are scaled
 MAP_NOTE = (
     "By the map's spectrum and h_max alone: in Python the calibrated law goes by its heights, too, and is nearer."
 )
@@ -92,12 +92,13 @@ def digest_of(texts: dict[str, str]) -> bytes:
 def packed(values: FloatArray) -> dict[str, Any]:
     """Numbers as text: whole multiples of 2^-43, differenced, zigzag, by planes of bytes, deflated; or doubles."""
     flat = np.ravel(values)
-    whole = np.rint(np.ldexp(flat, FRACTION_BITS)).astype(np.int64)
+    largest = np.abs(flat).max()
+    whole = np.rint(np.ldexp(flat if largest < MAX_WHOLE else 0 * flat, FRACTION_BITS)).astype(np.int64)
     for _ in range(ORDER):
         whole = np.diff(whole, prepend=0)
     zigzag = (whole << 1) ^ (whole >> 63)
     # small numbers are errors, whose relative size counts
-    exact = np.abs(flat).max() < 1e-3 or int(zigzag.max()) >= MAX_EXACT
+    exact = largest < 1e-3 or largest >= MAX_WHOLE or int(zigzag.max()) >= MAX_EXACT
     planes = np.ascontiguousarray((flat if exact else zigzag).view(np.uint8).reshape(-1, 8).T[: 8 if exact else 7])
     text = base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
     return {"count": flat.size, "differences": 0 if exact else ORDER, "bits": FRACTION_BITS, "text": text}

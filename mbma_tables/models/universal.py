@@ -8,18 +8,17 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import InputError
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.height_integrals import integrals
 from mbma_tables.models import universal_kernel
 from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
-from mbma_tables.models.universal_kernel import Axes, Table
-from mbma_tables.tablefiles.interpolate import fill_2d, quintic
-from mbma_tables.tablefiles.schema import TableContent
+from mbma_tables.models.universal_kernel import RECORD, TERMS, Table
+from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
 
 TINY = 1e-200  # replaces mu = 0 where a slope is asked for
 BLOCK = 1 << 16  # islands between two looks for Ctrl-C
@@ -50,13 +49,6 @@ class UniversalModel:
     def __init__(self, content: TableContent) -> None:
         self.content = content
         self._X, self._mu = content.axes
-
-    def log_ratio(self, X: FloatArray, mu: FloatArray) -> FloatArray:
-        """log(Phi/Phi_rigid) at flat arguments inside the table or below its mu, shape (2, entries)."""
-        out = np.empty((2, X.size))
-        lowest = np.maximum(mu, self._mu.low)
-        fill_2d(self.content.coefficients, self._X.position(X), self._mu.position(lowest), out)
-        return out * (np.minimum(mu, self._mu.low) / self._mu.low)
 
     def answer(self, X: ArrayLike, mu: ArrayLike, parallel: bool = False, *, outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A with the error bound that the table states.
@@ -94,37 +86,21 @@ class UniversalModel:
         return IslandAnswer(*(column.reshape(shape)[()] for column in out.T))
 
     def _fill_small(self, X: FloatArray, mu: FloatArray, status: NDArray[np.int64], out: FloatArray) -> None:
-        """`universal_kernel.fill_phi` in numpy."""
-        axes, c, errors = self.kernel.axes, self.kernel.coefficients, self.kernel.errors
-        status[:] = np.select(
-            [axes.X_low > X, axes.X_high < X, mu > axes.mu_high],
-            [universal_kernel.X_BELOW, universal_kernel.X_ABOVE, universal_kernel.MU_ABOVE],
-        )
+        """`universal_kernel.fill_phi` in numpy, operation by operation."""
+        k, table = universal_kernel, self.kernel
+        ends = [table.X_low > X, table.X_high < X, mu > table.mu_high]
+        status[:] = np.select(ends, [k.X_BELOW, k.X_ABOVE, k.MU_ABOVE])
         out[:] = np.nan
-        good = status == universal_kernel.OK
-        x, m = X[good], mu[good]
-        inside = np.maximum(m, axes.mu_low)
-        cells, weights = [], []
-        places = (
-            (np.log(x + axes.X_offset) - axes.X_start) * axes.X_rate,
-            (np.log(inside) - axes.mu_start) * axes.mu_rate,
-        )
-        for place, size in zip(places, c.shape, strict=False):
-            first = np.minimum(place.astype(np.intp), size - 6)
-            cells.append(first)
-            weights.append(quintic(place - first))
-        logs = np.zeros((x.size, 2))
-        for a, across in enumerate(weights[0]):
-            row = sum(along[:, None] * c[cells[0] + a, cells[1] + b] for b, along in enumerate(weights[1]))
-            logs += across[:, None] * row
-        log_F, log_A = logs.T * (m / inside)
-        parts = (
-            np.clip((place * rate).astype(np.intp), 0, size - 1)
-            for place, rate, size in zip(places, (axes.X_cells, axes.mu_cells), errors.shape, strict=True)
-        )
-        phi_F = np.pi / 5 * m * integrals(2.5, -x) * np.exp(log_F)
-        phi_A = np.pi / 2 * integrals(2.0, -x) * np.exp(log_A)
-        out[good] = np.stack([phi_F, phi_A, errors[tuple(parts)] + universal_kernel.SECOND_ORDER], axis=-1)
+        good = status == k.OK
+        X, mu = X[good], mu[good]
+        strips = table.places[((X - table.X_low) * table.X_rate).astype(np.intp)]
+        buckets = np.clip((_bits(mu) >> BUCKET_BITS) - table.first_bucket, 0, table.buckets - 1)
+        r = table.records.reshape(-1, RECORD)[table.places[strips + buckets]]
+        x = (X - r[:, k.CENTRE]) * r[:, k.RATE]
+        y = (mu * r[:, k.TOP_MU] + r[:, k.TOP]) / (mu * r[:, k.BOTTOM_MU] + r[:, k.BOTTOM])
+        powers = r[:, k.FORCE_POWERS :].reshape(-1, 2, TERMS, TERMS)
+        force, area = k.polynomial(powers, x[:, None, None], y[:, None, None])[0].T
+        out[good] = np.stack([mu * force, area, r[:, k.ERROR]], axis=-1)
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
         """Phi_F and Phi_A of islands, both: one costs what both do."""
@@ -175,8 +151,57 @@ class UniversalModel:
     @functools.cached_property
     def kernel(self) -> Table:
         """The table as compiled code takes it."""
-        X, mu = self._X, self._mu
-        field = np.ascontiguousarray(self.content.local_error.max(axis=-1))
-        cells = (field.shape[0] / (X.nodes - 1), field.shape[1] / (mu.nodes - 1))
-        axes = Axes(X.low, X.high, X.offset, X.start, 1 / X.step, mu.low, mu.high, mu.start, 1 / mu.step, *cells)
-        return Table(self.content.coefficients, field, axes)
+        X_low, X_high, mu_low, mu_high = (self.content.auxiliary[name][1] for name in CELL_EDGES)
+        cells = X_low.size
+        # doubles on lines of the cache, eight each
+        memory = np.zeros(RECORD * cells + TERMS)
+        start = -(memory.ctypes.data // 8) % TERMS
+        records = memory[start : start + RECORD * cells].reshape(cells, RECORD)
+        records[:, universal_kernel.ERROR] = self.content.local_error.max(axis=-1)
+        records[:, universal_kernel.CENTRE] = 0.5 * (X_low + X_high)
+        records[:, universal_kernel.RATE] = 2 / (X_high - X_low)
+        records[:, universal_kernel.TOP_MU : universal_kernel.BOTTOM + 1] = fractions_of_mu(mu_low, mu_high).T
+        powers = np.zeros((TERMS, TERMS))
+        for order in range(TERMS):
+            powers[order, : order + 1] = chebyshev.cheb2poly(np.eye(TERMS)[order, : order + 1])
+        # the functions, then powers of mu, then of X
+        by_X = np.einsum("cijf,ip->cfjp", self.content.coefficients, powers)
+        by_power = np.einsum("cfjp,jq->cfqp", by_X, powers)
+        records[:, universal_kernel.FORCE_POWERS :] = by_power.reshape(cells, -1)
+
+        first, last = (int(bits >> BUCKET_BITS) for bits in _bits([mu_high.min(), self._mu.high]))
+        # the bucket below the first edge stands for all that is less
+        buckets = ((np.arange(first - 1, last + 1)) << BUCKET_BITS).view(float)
+        buckets[0] = 0.0
+        lows, firsts = np.unique(X_low, return_index=True)
+        steps = np.arange(int((self._X.high - self._X.low) * X_STEPS) + 1)
+        strips = np.searchsorted(lows, self._X.low + (steps + 0.5) / X_STEPS, side="right") - 1
+        places = [steps.size + buckets.size * np.minimum(strips, lows.size - 1)]
+        strip_cells = np.split(np.arange(cells), firsts[1:])
+        places += [own[np.searchsorted(mu_low[own], buckets, side="right") - 1] for own in strip_cells]
+        return Table(
+            records.reshape(-1),
+            np.concatenate(places).astype(np.int32),
+            self._X.low,
+            self._X.high,
+            float(X_STEPS),
+            self._mu.high,
+            first - 1,
+            buckets.size,
+        )
+
+
+def _bits(values: ArrayLike) -> NDArray[np.int64]:
+    return np.asarray(values, dtype=float).view(np.int64)
+
+
+def fractions_of_mu(low: FloatArray, high: FloatArray) -> FloatArray:
+    """(a, b, c, d) of y = (a mu + b)/(c mu + d), which goes from -1 at `low` to 1 at `high`, in the rows.
+
+    Between two powers of mu a fraction is nearly its logarithm; a cell that begins at 0 has y linear in mu.
+    """
+    middle = np.sqrt(low * high)
+    slope = (np.sqrt(high) + np.sqrt(low)) / (np.sqrt(high) - np.sqrt(low))
+    linear = low == 0
+    rows = [np.where(linear, 2 / high, slope), np.where(linear, -1.0, -slope * middle), ~linear, middle + linear]
+    return np.array(rows, dtype=float)

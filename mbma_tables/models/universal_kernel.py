@@ -1,145 +1,194 @@
-"""Compiled interpolation in the universal table: (X, mu) to Phi_F, Phi_A, derivatives, status and error bound.
+"""Compiled lookups in the universal table: (X, mu) to Phi_F, Phi_A, derivatives, status and error bound.
 
+A cell is a record: an error bound, the two maps from X and mu to [-1, 1], and the powers of both polynomials, so that
+a lookup is a few comparisons, one division and 16 additions of eight products at once. `Table` says what lies where.
 Nothing is shared or kept between calls; any thread may call any of these.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import REORDER, njit
-from mbma_tables.islands import height_integrals as heights
+from mbma_tables.compiled import Instruction, njit
+from mbma_tables.elementary import bits_of
 from mbma_tables.models.protocol import FORCE
-from mbma_tables.tablefiles.interpolate import gradient_2d, value_2d
+from mbma_tables.tablefiles.schema import BUCKET_BITS
 
 OK, X_BELOW, X_ABOVE, MU_ABOVE, UNRESOLVED = 0, 1, 2, 3, 4
 REASONS = {X_BELOW: "X below", X_ABOVE: "X above", MU_ABOVE: "mu above"}
-SECOND_ORDER = 1e-12  # what the expansion about the rigid sphere leaves below mu = 1e-8
 
-_ONE, _THREE_HALVES, _TWO, _FIVE_HALVES = heights._ONE, heights._THREE_HALVES, heights._TWO, heights._FIVE_HALVES
-
-
-class Axes(NamedTuple):
-    """Both axes: range, first node and 1/step of log(X + X_offset) and log(mu), error cells per node."""
-
-    X_low: float
-    X_high: float
-    X_offset: float
-    X_start: float
-    X_rate: float
-    mu_low: float
-    mu_high: float
-    mu_start: float
-    mu_rate: float
-    X_cells: float
-    mu_cells: float
+TERMS = 8  # of each polynomial along each axis
+# a record, in doubles: eight of the cell, then powers of X at each power of mu, of Phi_F/mu and of Phi_A
+ERROR, CENTRE, RATE, TOP_MU, TOP, BOTTOM_MU, BOTTOM = range(7)
+FORCE_POWERS, AREA_POWERS, RECORD = 8, 8 + TERMS**2, 8 + 2 * TERMS**2
 
 
 class Table(NamedTuple):
-    """The universal table as compiled code takes it."""
+    """The universal table as compiled code takes it.
 
-    coefficients: FloatArray
-    errors: FloatArray
-    axes: Axes
+    The cell of (X, mu) is ``places[places[int((X - X_low) X_rate)] + bits(mu) >> BUCKET_BITS - first_bucket]``; in it
+    x = (X - CENTRE) RATE and y = (mu TOP_MU + TOP)/(mu BOTTOM_MU + BOTTOM).
+    """
 
-
-@njit(cache=True, error_model="numpy")
-def _locate(X: float) -> tuple[int, float, float, float]:
-    """`height_integrals._locate` at -X, with one comparison where X lies in [0, 8]."""
-    if 0.0 <= X < 8.0:
-        pair = int(0.5 * X)
-        return 4 - pair, 2.0 * pair + 1.0 - X, 1.0, 1.0
-    return heights._locate(-X)
-
-
-@njit(cache=True, fastmath=REORDER, error_model="numpy")
-def _polynomial(row: FloatArray, t: float) -> float:
-    """`height_integrals._horner` in four chains that run side by side."""
-    t2 = t * t
-    t4 = t2 * t2
-    even = row[0] + t4 * (row[4] + t4 * (row[8] + t4 * (row[12] + t4 * row[16])))
-    odd = row[1] + t4 * (row[5] + t4 * (row[9] + t4 * (row[13] + t4 * row[17])))
-    second = row[2] + t4 * (row[6] + t4 * (row[10] + t4 * (row[14] + t4 * row[18])))
-    third = row[3] + t4 * (row[7] + t4 * (row[11] + t4 * row[15]))
-    value: float = even + t2 * second + t * (odd + t2 * third)
-    return value
+    records: FloatArray  # flat, RECORD doubles a cell, on lines of 64 bytes
+    places: NDArray[np.int32]  # where a strip's buckets begin, by equal steps of X; then the cells of the buckets
+    X_low: float
+    X_high: float
+    X_rate: float
+    mu_high: float
+    first_bucket: int
+    buckets: int
 
 
-@njit(cache=True, error_model="numpy")
-def _rigid_integrals(X: float) -> tuple[float, float]:
-    """(F_{5/2}(-X), F_2(-X)) in one pass."""
-    piece, t, base, weight = _locate(X)
-    common = base * base * weight
-    return _polynomial(_FIVE_HALVES[piece], t) * (math.sqrt(base) * common), _polynomial(_TWO[piece], t) * common
+class _Polynomial:
+    """Code for TERMS rows of powers of x from `offset` on, a row for each power of y; nothing is fused, as in numpy."""
+
+    def __init__(self, context: Any, builder: Any, signature: Any, arguments: Any) -> None:
+        from llvmlite import ir
+        from numba.np.arrayobj import make_array
+
+        array, self.offset, self.x, self.y = arguments
+        self.ir, self.builder = ir, builder
+        self.data = make_array(signature.args[0])(context, builder, array).data
+
+    def row(self, power: int) -> Any:
+        builder, ir = self.builder, self.ir
+        start = builder.gep(self.data, [builder.add(self.offset, ir.IntType(64)(TERMS * power))], inbounds=True)
+        vector = builder.load(builder.bitcast(start, ir.VectorType(ir.DoubleType(), TERMS).as_pointer()))
+        # doubles, not vectors, are what numpy aligns
+        vector.align = 8
+        return vector
+
+    def add(self, total: Any, factor: Any, vector: Any) -> Any:
+        """``total + factor * vector`` of vectors and a number."""
+        spread = self.ir.Constant(vector.type, self.ir.Undefined)
+        for k in range(vector.type.count):
+            spread = self.builder.insert_element(spread, factor, self.ir.IntType(32)(k))
+        return self.builder.fadd(total, self.builder.fmul(spread, vector))
+
+    def picked(self, vector: Any, lanes: range | list[int]) -> Any:
+        index = self.ir.IntType(32)
+        mask = self.ir.Constant(self.ir.VectorType(index, len(lanes)), [index(k) for k in lanes])
+        return self.builder.shuffle_vector(vector, self.ir.Constant(vector.type, self.ir.Undefined), mask)
+
+    def rows(self) -> tuple[Any, Any]:
+        """The sum over the rows, and its derivative by y."""
+        value, slope = self.row(TERMS - 1), None
+        for power in range(TERMS - 2, -1, -1):
+            slope = value if slope is None else self.add(value, self.y, slope)
+            value = self.add(self.row(power), self.y, value)
+        return value, slope
+
+    def along_x(self, row: Any) -> Any:
+        """The sum over one row, by halves."""
+        powers = [self.x]
+        while 2 ** len(powers) < TERMS:
+            powers.append(self.builder.fmul(powers[-1], powers[-1]))
+        for power in reversed(powers):
+            half = row.type.count // 2
+            low, high = (self.picked(row, range(k, k + half)) for k in (0, half))
+            row = self.add(low, power, high)
+        return self.builder.extract_element(row, self.ir.IntType(32)(0))
+
+    def slope_along_x(self, row: Any) -> Any:
+        powers = [*range(1, TERMS), 0]
+        factors = self.ir.Constant(row.type, [float(power) for power in powers])
+        return self.along_x(self.builder.fmul(self.picked(row, powers), factors))
 
 
-@njit(cache=True, error_model="numpy")
-def _rigid_slopes(X: float) -> tuple[float, float]:
-    """(F_{3/2}(-X), F_1(-X)), up to factors the derivatives of `_rigid_integrals`."""
-    piece, t, base, weight = _locate(X)
-    common = base * weight
-    return _polynomial(_THREE_HALVES[piece], t) * (math.sqrt(base) * common), _polynomial(_ONE[piece], t) * common
+def _value(typing: Any, array: Any, offset: Any, x: Any, y: Any) -> Any:
+    """A polynomial of `array` at (x, y), both in [-1, 1]."""
+    from numba import types
+
+    def generate(*given: Any) -> Any:
+        polynomial = _Polynomial(*given)
+        return polynomial.along_x(polynomial.rows()[0])
+
+    return types.float64(array, types.int64, x, y), generate
+
+
+def _gradient(typing: Any, array: Any, offset: Any, x: Any, y: Any) -> Any:
+    """The polynomial, and its derivatives by x and by y."""
+    from numba import types
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        polynomial = _Polynomial(context, builder, signature, arguments)
+        value, slope = polynomial.rows()
+        parts = polynomial.along_x(value), polynomial.slope_along_x(value), polynomial.along_x(slope)
+        return context.make_tuple(builder, signature.return_type, parts)
+
+    return types.UniTuple(types.float64, 3)(array, types.int64, x, y), generate
+
+
+def polynomial(powers: FloatArray, x: Any, y: Any) -> tuple[Any, Any, Any]:
+    """Polynomials (..., y, x) and their slopes in numpy, operation by operation; x and y end in an axis of length 1."""
+
+    def along_x(row: FloatArray) -> Any:
+        for power in ((x * x) * (x * x), x * x, x):
+            half = row.shape[-1] // 2
+            row = row[..., :half] + power * row[..., half:]
+        return row[..., 0]
+
+    value, slope = powers[..., -1, :], 0.0 * powers[..., -1, :]
+    for power in range(TERMS - 2, -1, -1):
+        slope = value + y * slope
+        value = powers[..., power, :] + y * value
+    by_x = np.roll(value * np.arange(TERMS), -1, axis=-1)
+    return along_x(value), along_x(by_x), along_x(slope)
+
+
+def _plain(array: FloatArray, offset: int, x: float, y: float) -> tuple[Any, Any, Any]:
+    return polynomial(array[offset : offset + TERMS**2].reshape(TERMS, TERMS), np.array([x]), np.array([y]))
+
+
+# compiled code calls these with fewer arguments than they are defined with
+value_at: Any = Instruction(_value, lambda *given: _plain(*given)[0])
+gradient_at: Any = Instruction(_gradient, _plain)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _error_at(place_X: float, place_mu: float, table: Table) -> float:
-    """Bound on the error in the cell of a position."""
-    errors, axes = table.errors, table.axes
-    row = max(min(int(place_X * axes.X_cells), errors.shape[0] - 1), 0)
-    column = max(min(int(place_mu * axes.mu_cells), errors.shape[1] - 1), 0)
-    bound: float = errors[row, column] + SECOND_ORDER
-    return bound
+def _find(X: float, mu: float, table: Table) -> tuple[int, int]:
+    """Status, and where the record of the cell begins."""
+    if not table.X_low <= X:
+        return X_BELOW, 0
+    if not table.X_high >= X:
+        return X_ABOVE, 0
+    if not mu <= table.mu_high:
+        return MU_ABOVE, 0
+    strip = table.places[int((X - table.X_low) * table.X_rate)]
+    bucket = min(max((bits_of(mu) >> BUCKET_BITS) - table.first_bucket, 0), table.buckets - 1)
+    return OK, RECORD * table.places[strip + bucket]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def _place(X: float, mu: float, axes: Axes) -> tuple[int, float, float, float]:
-    """Status, position on both axes in node units, and mu over the nearest mu that the table holds."""
-    if not axes.X_low <= X:
-        return X_BELOW, math.nan, math.nan, math.nan
-    if not axes.X_high >= X:
-        return X_ABOVE, math.nan, math.nan, math.nan
-    if not mu <= axes.mu_high:
-        return MU_ABOVE, math.nan, math.nan, math.nan
-    inside = max(mu, axes.mu_low)
-    place_X = (math.log(X + axes.X_offset) - axes.X_start) * axes.X_rate
-    # first order about the rigid sphere below the table
-    return OK, place_X, (math.log(inside) - axes.mu_start) * axes.mu_rate, mu / inside
-
-
-@njit(cache=True, fastmath=REORDER, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def universal_phi(X: float, mu: float, table: Table) -> tuple[int, float, float, float]:
     """Status, Phi_F, Phi_A and the bound on their relative error at (X, mu)."""
-    status, place_X, place_mu, share = _place(X, mu, table.axes)
+    status, cell = _find(X, mu, table)
     if status != OK:
         return status, math.nan, math.nan, math.nan
-    force, area = value_2d(table.coefficients, place_X, place_mu)
-    five, two = _rigid_integrals(X)
-    phi_F = math.pi / 5.0 * mu * five * math.exp(force * share)
-    phi_A = math.pi / 2.0 * two * math.exp(area * share)
-    return OK, phi_F, phi_A, _error_at(place_X, place_mu, table)
+    r = table.records
+    x = (X - r[cell + CENTRE]) * r[cell + RATE]
+    y = (mu * r[cell + TOP_MU] + r[cell + TOP]) / (mu * r[cell + BOTTOM_MU] + r[cell + BOTTOM])
+    force, area = value_at(r, cell + FORCE_POWERS, x, y), value_at(r, cell + AREA_POWERS, x, y)
+    return OK, mu * force, area, r[cell + ERROR]
 
 
-@njit(cache=True, fastmath=REORDER, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def universal_one(which: int, X: float, mu: float, table: Table) -> tuple[int, float, float]:
     """Status, Phi_F (`which` = 0) or Phi_A (1) alone, and the bound on its relative error."""
-    status, place_X, place_mu, share = _place(X, mu, table.axes)
+    status, cell = _find(X, mu, table)
     if status != OK:
         return status, math.nan, math.nan
-    # the spline of both costs what one does: their coefficients lie in pairs
-    force, area = value_2d(table.coefficients, place_X, place_mu)
-    piece, t, base, weight = _locate(X)
-    common = base * base * weight
-    if which == FORCE:
-        phi = math.pi / 5.0 * mu * _polynomial(_FIVE_HALVES[piece], t) * (math.sqrt(base) * common)
-        phi *= math.exp(force * share)
-    else:
-        phi = math.pi / 2.0 * _polynomial(_TWO[piece], t) * common * math.exp(area * share)
-    return OK, phi, _error_at(place_X, place_mu, table)
+    r = table.records
+    x = (X - r[cell + CENTRE]) * r[cell + RATE]
+    y = (mu * r[cell + TOP_MU] + r[cell + TOP]) / (mu * r[cell + BOTTOM_MU] + r[cell + BOTTOM])
+    value = value_at(r, cell + (FORCE_POWERS if which == FORCE else AREA_POWERS), x, y)
+    return OK, mu * value if which == FORCE else value, r[cell + ERROR]
 
 
 class Slopes(NamedTuple):
@@ -157,28 +206,22 @@ class Slopes(NamedTuple):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def universal_slopes(X: float, mu: float, table: Table) -> Slopes:
-    """Phi_F and d log Phi_F by X and by log(mu), the same of Phi_A, and the bound on the relative error."""
-    axes = table.axes
-    status, place_X, place_mu, share = _place(X, mu, axes)
+    """Both functions with their derivatives, and the bound on the relative error of the functions."""
+    status, cell = _find(X, mu, table)
     if status != OK:
         nan = math.nan
         return Slopes(status, nan, nan, nan, nan, nan, nan, nan)
-    f, f_X, f_mu, g, g_X, g_mu = gradient_2d(table.coefficients, place_X, place_mu)
-    by_X = axes.X_rate / (X + axes.X_offset) * share
-    five, two = _rigid_integrals(X)
-    three, one = _rigid_slopes(X)
-    inside = mu >= axes.mu_low
-    return Slopes(
-        OK,
-        math.pi / 5.0 * mu * five * math.exp(f * share),
-        f_X * by_X + 2.5 * three / five,
-        # below the table the logarithm is proportional to mu
-        1.0 + (f_mu * axes.mu_rate if inside else f * share),
-        math.pi / 2.0 * two * math.exp(g * share),
-        g_X * by_X + 2.0 * one / two,
-        g_mu * axes.mu_rate if inside else g * share,
-        _error_at(place_X, place_mu, table),
-    )
+    r = table.records
+    by_X = r[cell + RATE]
+    x = (X - r[cell + CENTRE]) * by_X
+    top, bottom = mu * r[cell + TOP_MU] + r[cell + TOP], mu * r[cell + BOTTOM_MU] + r[cell + BOTTOM]
+    y = top / bottom
+    by_mu = mu * (r[cell + TOP_MU] * r[cell + BOTTOM] - r[cell + TOP] * r[cell + BOTTOM_MU]) / (bottom * bottom)
+    F, F_x, F_y = gradient_at(r, cell + FORCE_POWERS, x, y)
+    A, A_x, A_y = gradient_at(r, cell + AREA_POWERS, x, y)
+    over_F, over_A = 1.0 / F, 1.0 / A
+    by_X_F, by_X_A = F_x * by_X * over_F, A_x * by_X * over_A
+    return Slopes(OK, mu * F, by_X_F, 1.0 + F_y * by_mu * over_F, A, by_X_A, A_y * by_mu * over_A, r[cell + ERROR])
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

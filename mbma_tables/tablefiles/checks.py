@@ -11,15 +11,26 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.tablefiles.schema import FUNCTIONS, ISLAND4D, UNIVERSAL, Axis, TableContent
+from mbma_tables.arguments import FloatArray
+from mbma_tables.tablefiles.schema import (
+    AXES,
+    BUCKET_BITS,
+    CELL_EDGES,
+    COEFFICIENTS,
+    DEGREE,
+    FUNCTIONS,
+    ISLAND4D,
+    UNIVERSAL,
+    X_STEPS,
+    Axis,
+    TableContent,
+)
 from mbma_tables.tablefiles.splines import padding
 
 MAX_LOG_RATIO = 100.0  # of a ratio to the rigid sphere; those of the shipped tables are below 20
-AXES = {
-    UNIVERSAL: (("X", "log"), ("mu", "log")),
-    ISLAND4D: (("X", "log"), ("spread", "log"), ("sphere", "linear"), ("hurst", "linear")),
-}
-LIMITS = {"spread": (0.0, np.inf), "sphere": (0.0, 1.0), "hurst": (0.0, 1.0)}
+MAX_BUCKETS, MAX_STEPS = 4096, 30_000  # of mu, eight an octave, and of X
+TERMS = 8  # of a Chebyshev series
+LIMITS = {"mu": (0.0, np.inf), "spread": (0.0, np.inf), "sphere": (0.0, 1.0), "hurst": (0.0, 1.0)}
 ARGUMENTS = {UNIVERSAL: ("X", "mu"), ISLAND4D: ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")}
 REQUIRED = (
     *("reading", "data_version", "values_sha256", "source_sha256", "certificate_points"),
@@ -62,6 +73,47 @@ def _check_axis(axis: Axis) -> None:
         raise ValueError(f"has axis {axis.name}, which does not increase")
 
 
+def _check_nodes(content: TableContent) -> None:
+    """Raise ValueError where the values of a table are not over the nodes of its axes."""
+    nodes = tuple(axis.nodes for axis in content.axes)
+    knots = tuple(count + 2 * padding(DEGREE) for count in nodes)
+    cells = content.local_error.shape[:-1]
+    values = [content.auxiliary[f"log_ratio_{function}"][1] for function in FUNCTIONS]
+    if any(array.shape != nodes for array in values) or content.coefficients.shape[:-1] != knots:
+        raise ValueError("has values or coefficients that are not over its axes")
+    if len(cells) != len(nodes) or not all(0 < count < most for count, most in zip(cells, nodes, strict=True)):
+        raise ValueError("has error bounds that are not over its axes")
+    if max(np.abs(array).max() for array in (*values, content.coefficients)) > MAX_LOG_RATIO:
+        raise ValueError("has values that are not logarithms of ratios")
+
+
+def _check_cells(content: TableContent) -> None:
+    """Raise ValueError unless the cells fill the range in strips of X, in order, each from mu = 0 upwards."""
+    X, mu = content.axes
+    edges: list[FloatArray] = [content.auxiliary[name][1] for name in CELL_EDGES]
+    cells = edges[0].size
+    shapes = {array.shape for array in edges}
+    if shapes != {(cells,)} or content.coefficients.shape != (cells, TERMS, TERMS, 2) or cells == 0:
+        raise ValueError(f"has {COEFFICIENTS[content.kind]} coefficients that are not over its cells")
+    if content.local_error.shape != (cells, 2):
+        raise ValueError("has error bounds that are not over its cells")
+    X_low, X_high, mu_low, mu_high = edges
+    starts = mu_low == 0
+    # each cell goes on where the one before it ends, up to the end of its strip
+    upwards = (mu_low[1:] == mu_high[:-1]) & (X_low[1:] == X_low[:-1]) & (X_high[1:] == X_high[:-1])
+    onwards = (mu_high[:-1] == mu.high) & (X_low[1:] == X_high[:-1])
+    ends = (X_low[0], X_high[-1], mu_high[-1]) == (X.low, X.high, mu.high) and starts[0] and mu.low == 0
+    grows = (X_high > X_low) & (mu_high > mu_low)
+    if not (ends and grows.all() and np.where(starts[1:], onwards, upwards).all()):
+        raise ValueError("has cells that do not fill its range one after the other")
+    steps = (X_low - X.low) * X_STEPS
+    lower = mu_low[~starts].view(np.int64)
+    if (steps != np.round(steps)).any() or (lower & ((1 << BUCKET_BITS) - 1)).any():
+        raise ValueError("has cells whose edges are not where they can be found by arithmetic")
+    if np.ptp(np.append(mu_high, mu.high).view(np.int64) >> BUCKET_BITS) >= MAX_BUCKETS or steps[-1] > MAX_STEPS:
+        raise ValueError("has cells over too wide a range")
+
+
 @np.errstate(all="ignore")
 def check_content(content: TableContent) -> None:
     """Raise ValueError where the parts of a table do not fit one another."""
@@ -70,13 +122,7 @@ def check_content(content: TableContent) -> None:
         raise ValueError(f"has axes {axes}, not {AXES[content.kind]}")
     for axis in content.axes:
         _check_axis(axis)
-    nodes = tuple(axis.nodes for axis in content.axes)
-    knots = tuple(count + 2 * padding(content.degree) for count in nodes)
-    cells = content.local_error.shape[:-1]
-    if content.log_ratio.shape[:-1] != nodes or content.coefficients.shape[:-1] != knots:
-        raise ValueError("has values or coefficients that are not over its axes")
-    if len(cells) != len(nodes) or not all(0 < count < most for count, most in zip(cells, nodes, strict=True)):
-        raise ValueError("has error bounds that are not over its axes")
+    (_check_cells if content.kind == UNIVERSAL else _check_nodes)(content)
     answers = {f"{which}_{function}" for which in ("table", "exact") for function in FUNCTIONS} | {"tolerance"}
     sizes = {values.shape for values in content.conformance.values()}
     if set(content.conformance) != answers | set(ARGUMENTS[content.kind]) or len(sizes) != 1 or len(*sizes) != 1:
@@ -84,7 +130,5 @@ def check_content(content: TableContent) -> None:
     for name, values in content.arrays().items():
         if not np.isfinite(values).all():
             raise ValueError(f"has variable {name}, which is not finite")
-    if max(np.abs(content.log_ratio).max(), np.abs(content.coefficients).max()) > MAX_LOG_RATIO:
-        raise ValueError("has values that are not logarithms of ratios")
     if (content.local_error < 0).any() or any((content.conformance[name] <= 0).any() for name in answers):
         raise ValueError("has an error bound below 0, or a conformance answer that is not positive")

@@ -189,72 +189,6 @@ def cell(position: float, nodes: int) -> tuple[int, float]:
     return first, position - first
 
 
-@njit(cache=True, fastmath=_FAST, error_model="numpy", inline="always")
-def _row_2d(
-    c: FloatArray, i: int, j: int, w0: float, w1: float, w2: float, w3: float, w4: float, w5: float
-) -> tuple[float, float]:
-    """Both functions' sums over one row of six coefficients; spelled out, for pairs of them to be vectors."""
-    first = w0 * c[i, j, 0] + w1 * c[i, j + 1, 0] + w2 * c[i, j + 2, 0]
-    first += w3 * c[i, j + 3, 0] + w4 * c[i, j + 4, 0] + w5 * c[i, j + 5, 0]
-    second = w0 * c[i, j, 1] + w1 * c[i, j + 1, 1] + w2 * c[i, j + 2, 1]
-    second += w3 * c[i, j + 3, 1] + w4 * c[i, j + 4, 1] + w5 * c[i, j + 5, 1]
-    return first, second
-
-
-@njit(cache=True, fastmath=_FAST, error_model="numpy")
-def value_2d(c: FloatArray, x: float, y: float) -> tuple[float, float]:
-    """Both functions of a quintic table, `c` of shape (nx + 4, ny + 4, 2)."""
-    i, u = cell(x, c.shape[0] - 4)
-    j, v = cell(y, c.shape[1] - 4)
-    a0, a1, a2, a3, a4, a5 = quintic(u)
-    w0, w1, w2, w3, w4, w5 = quintic(v)
-    f0, g0 = _row_2d(c, i, j, w0, w1, w2, w3, w4, w5)
-    f1, g1 = _row_2d(c, i + 1, j, w0, w1, w2, w3, w4, w5)
-    f2, g2 = _row_2d(c, i + 2, j, w0, w1, w2, w3, w4, w5)
-    f3, g3 = _row_2d(c, i + 3, j, w0, w1, w2, w3, w4, w5)
-    f4, g4 = _row_2d(c, i + 4, j, w0, w1, w2, w3, w4, w5)
-    f5, g5 = _row_2d(c, i + 5, j, w0, w1, w2, w3, w4, w5)
-    first = a0 * f0 + a1 * f1 + a2 * f2 + a3 * f3 + a4 * f4 + a5 * f5
-    second = a0 * g0 + a1 * g1 + a2 * g2 + a3 * g3 + a4 * g4 + a5 * g5
-    return first, second
-
-
-@njit(cache=True, fastmath=_FAST, error_model="numpy", inline="always")
-def _mix_six(w: Six, a: float, b: float, c: float, d: float, e: float, f: float) -> float:
-    value: float = w[0] * a + w[1] * b + w[2] * c + w[3] * d + w[4] * e + w[5] * f
-    return value
-
-
-@njit(cache=True, fastmath=_FAST, error_model="numpy")
-def _row_slopes_2d(c: FloatArray, i: int, j: int, w: Six, s: Six) -> Four:
-    """Both functions' sums over one row, with values and slopes as weights: f, f_y, g, g_y."""
-    f, g = _row_2d(c, i, j, w[0], w[1], w[2], w[3], w[4], w[5])
-    f_y, g_y = _row_2d(c, i, j, s[0], s[1], s[2], s[3], s[4], s[5])
-    return f, f_y, g, g_y
-
-
-@njit(cache=True, fastmath=_FAST, error_model="numpy")
-def gradient_2d(c: FloatArray, x: float, y: float) -> Six:
-    """Values and derivatives of both functions: f, f_x, f_y, g, g_x, g_y."""
-    i, u = cell(x, c.shape[0] - 4)
-    j, v = cell(y, c.shape[1] - 4)
-    wx, wy, sx, sy = quintic(u), quintic(v), quintic_slope(u), quintic_slope(v)
-    f0, p0, g0, q0 = _row_slopes_2d(c, i, j, wy, sy)
-    f1, p1, g1, q1 = _row_slopes_2d(c, i + 1, j, wy, sy)
-    f2, p2, g2, q2 = _row_slopes_2d(c, i + 2, j, wy, sy)
-    f3, p3, g3, q3 = _row_slopes_2d(c, i + 3, j, wy, sy)
-    f4, p4, g4, q4 = _row_slopes_2d(c, i + 4, j, wy, sy)
-    f5, p5, g5, q5 = _row_slopes_2d(c, i + 5, j, wy, sy)
-    return (
-        _mix_six(wx, f0, f1, f2, f3, f4, f5),
-        _mix_six(sx, f0, f1, f2, f3, f4, f5),
-        _mix_six(wx, p0, p1, p2, p3, p4, p5),
-        _mix_six(wx, g0, g1, g2, g3, g4, g5),
-        _mix_six(sx, g0, g1, g2, g3, g4, g5),
-        _mix_six(wx, q0, q1, q2, q3, q4, q5),
-    )
-
-
 @njit(cache=True, fastmath=_FAST, error_model="numpy")
 def _last_axis(w: Four, lanes: Eight) -> tuple[float, float]:
     """Both functions from the sums over the other axes: four coefficients of two functions each."""
@@ -317,22 +251,6 @@ def gradient_4d(c: FloatArray, x: float, y: float, z: float, t: float) -> Ten:
     fz, gz = _last_axis(wt, by_z)
     ft, gt = _last_axis(cubic_slope(s), total)
     return f, fx, fy, fz, ft, g, gx, gy, gz, gt
-
-
-@njit(cache=True, nogil=True)
-def fill_2d(c: FloatArray, x: FloatArray, y: FloatArray, out: FloatArray) -> None:
-    """`value_2d` of each entry into the columns of `out` (2, entries)."""
-    for k in range(x.size):
-        out[0, k], out[1, k] = value_2d(c, x[k], y[k])
-
-
-@njit(cache=True, nogil=True)
-def fill_gradient_2d(c: FloatArray, x: FloatArray, y: FloatArray, out: FloatArray) -> None:
-    """`gradient_2d` of each entry into the columns of `out` (6, entries)."""
-    for k in range(x.size):
-        both = gradient_2d(c, x[k], y[k])
-        for row in range(6):
-            out[row, k] = both[row]
 
 
 @njit(cache=True, nogil=True)

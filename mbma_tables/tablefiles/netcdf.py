@@ -23,27 +23,38 @@ from mbma_tables.tablefiles.checks import REQUIRED, check_attribute, check_conte
 from mbma_tables.tablefiles.provenance import MODULES, digest_arrays, digest_json, source_digest, versions
 from mbma_tables.tablefiles.schema import (
     ANSWERS,
+    AXES,
+    AXIS_ERRORS,
+    COEFFICIENTS,
     CONVENTIONS,
-    DEGREES,
+    DEGREE,
     DOCUMENTATION,
-    FORMAT_VERSION,
+    ERROR_FIELD,
+    FORMAT_VERSIONS,
     FUNCTIONS,
     HEIGHT_INTEGRALS,
+    ISLAND4D,
     KINDS,
     OUT_OF_RANGE,
     WEIGHTS,
     Axis,
     TableContent,
+    dimensions,
 )
-from mbma_tables.tablefiles.splines import padding
 
 SEAL = b"\nmbma-table sha256 "
 SEAL_LENGTH = len(SEAL) + 64 + 1
 MAX_BYTES = 256 * 2**20  # of a file, and of its values
 MEANING = {
-    "log_ratio": "natural logarithm of Phi_{f} over its value for a rigid sphere, at the nodes",
+    "chebyshev": "coefficients of Chebyshev polynomials of X and of mu in each cell, of {chebyshev}",
     "spline": "coefficients of cardinal B-splines that interpolate log_ratio_{f}",
     "error": "bound on the relative error of Phi_{f} in this part of the table",
+}
+OF_SPLINES = {
+    "spline_degree": DEGREE,
+    "spline_weights": WEIGHTS,
+    "height_integrals": HEIGHT_INTEGRALS,
+    "certificate": DOCUMENTATION["certificate"] + AXIS_ERRORS,
 }
 CONFORMANCE = {
     "table": "{answer} by this table, at the conformance points",
@@ -80,26 +91,24 @@ def _fill(dataset: netCDF4.Dataset, content: TableContent) -> None:
         variable.setncatts(attributes)
         variable[...] = values
 
-    pad = padding(content.degree)
+    over_coefficients, over_cells = dimensions(content.kind)
     names = tuple(axis.name for axis in content.axes)
-    beside = " ".join(name for name, entry in content.auxiliary.items() if set(entry[0]) <= set(names))
-    for axis, cells in zip(content.axes, content.local_error.shape, strict=False):
+    for axis in content.axes:
         dataset.createDimension(axis.name, axis.nodes)
-        dataset.createDimension(f"{axis.name}_knot", axis.nodes + 2 * pad)
-        dataset.createDimension(f"{axis.name}_cell", cells)
         add(axis.name, (axis.name,), axis.values, axis.attributes())
+    sizes = dict(zip(over_cells, content.local_error.shape, strict=False))
+    for name, size in (sizes | dict(zip(over_coefficients, content.coefficients.shape, strict=False))).items():
+        dataset.createDimension(name, size)
     for number, function in enumerate(FUNCTIONS):
-        for what, suffix, array in (
-            ("log_ratio", "", content.log_ratio),
-            ("spline", "_knot", content.coefficients),
-            ("error", "_cell", content.local_error),
+        for what, over, array in (
+            (COEFFICIENTS[content.kind], over_coefficients, content.coefficients),
+            ("error", over_cells, content.local_error),
         ):
-            meaning = {"long_name": MEANING[what].format(f=function), "units": "1"}
-            if what == "log_ratio" and beside:
-                meaning["coordinates"] = beside
-            add(f"{what}_{function}", tuple(name + suffix for name in names), array[..., number], meaning)
-    for name, (dimensions, values, attributes) in content.auxiliary.items():
-        add(name, dimensions, values, attributes)
+            text = MEANING[what].format(f=function, chebyshev=("Phi_F/mu", "Phi_A")[number])
+            add(f"{what}_{function}", over, array[..., number], {"long_name": text, "units": "1"})
+    beside = " ".join(n for n, entry in content.auxiliary.items() if set(entry[0]) < set(names))
+    for name, (over, values, attributes) in content.auxiliary.items():
+        add(name, over, values, attributes | ({"coordinates": beside} if over == names and beside else {}))
     points = next(iter(content.conformance.values())).size
     dataset.createDimension("conformance", points)
     for name, values in content.conformance.items():
@@ -130,13 +139,12 @@ def write_table(path: os.PathLike[str] | str, content: TableContent) -> pathlib.
         "versions": json.dumps(versions(), sort_keys=True),
         **{name: value for name, value in content.attributes.items() if name != "attributes_sha256"},
         "mbma_kind": content.kind,
-        "format_version": FORMAT_VERSION,
+        "format_version": FORMAT_VERSIONS[content.kind],
         "data_version": digest[:12],
-        "spline_degree": DEGREES[content.kind],
-        "spline_weights": WEIGHTS[content.degree],
-        "height_integrals": HEIGHT_INTEGRALS,
         "out_of_range": OUT_OF_RANGE[content.kind],
+        "error_field": ERROR_FIELD[content.kind],
         **DOCUMENTATION,
+        **(OF_SPLINES if content.kind == ISLAND4D else {}),
         "values_sha256": digest,
     }
 
@@ -193,20 +201,23 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> TableContent:
     # the stored axes, not recomputed ones: another processor's logarithm may differ in the last bit
     if digest_arrays(values) != own["values_sha256"]:
         raise ValueError("has values that do not match their hash")
-    names = dataset["log_ratio_F"].dimensions
+    names = [name for name, _ in AXES[kind]]
     axes = tuple(
         Axis(name, text["long_name"], text["transform"], text["offset"], text["first"], text["last"], values[name].size)
         for name, text in ((name, described[name]) for name in names)
     )
-    log_ratio, coefficients, local_error = (
-        np.stack([values[f"{what}_{function}"] for function in FUNCTIONS], axis=-1) for what in MEANING
+    fields = COEFFICIENTS[kind], "error"
+    for what, over in zip(fields, dimensions(kind), strict=True):
+        if any(dataset[f"{what}_{function}"].dimensions != over for function in FUNCTIONS):
+            raise ValueError(f"has {what} over other dimensions than {', '.join(over)}")
+    coefficients, local_error = (
+        np.stack([values[f"{what}_{function}"] for function in FUNCTIONS], axis=-1) for what in fields
     )
-    main = {f"{what}_{function}" for what in MEANING for function in FUNCTIONS} | set(names)
+    main = {f"{what}_{function}" for what in fields for function in FUNCTIONS} | set(names)
     beside = [name for name in values if name not in main and not name.startswith("conformance_")]
     return TableContent(
         kind=kind,
         axes=axes,
-        log_ratio=log_ratio,
         coefficients=coefficients,
         local_error=local_error,
         auxiliary={name: (dataset[name].dimensions, values[name], described[name]) for name in beside},
@@ -242,8 +253,8 @@ def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> TableCo
             if found not in KINDS or (kind is not None and found != kind):
                 raise ValueError(f"holds a table of kind {found!r}, not {kind or ' or '.join(KINDS)}")
             version = getattr(dataset, "format_version", None)
-            if version != FORMAT_VERSION:
-                raise ValueError(f"has format {version}, this library reads {FORMAT_VERSION}")
+            if version != FORMAT_VERSIONS[found]:
+                raise ValueError(f"has format {version}, this library reads {FORMAT_VERSIONS[found]}")
             content = _content(dataset, found)
         check_content(content)
     except ValueError as fault:

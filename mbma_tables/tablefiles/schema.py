@@ -1,8 +1,9 @@
 """What a table file holds: every name of the format in one place.
 
-A file holds, for functions F and A over some axes, the logarithm of the ratio to the rigid sphere at the nodes, the
-spline coefficients that interpolate it, a field of local error, conformance points, and attributes that say
-where all of it came from. `docs/tables.md` describes the format for readers in other languages.
+The universal table is a list of cells of (X, mu), each with a Chebyshev series of Phi_F/mu and of Phi_A. The
+four-parameter table holds the logarithm of the ratio to the rigid sphere at the nodes of four axes, and the spline
+coefficients that interpolate it. Both have bounds on the error, conformance points, and attributes that say where all
+of it came from. `docs/tables.md` describes the format for readers in other languages.
 """
 
 from __future__ import annotations
@@ -15,20 +16,22 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray
 
-FORMAT_VERSION = "1.0"
 CONVENTIONS = "CF-1.11"
 FUNCTIONS = ("F", "A")
 UNIVERSAL = "universal"
 ISLAND4D = "island4d"
 KINDS = (UNIVERSAL, ISLAND4D)
-DEGREES = {UNIVERSAL: 5, ISLAND4D: 3}
+FORMAT_VERSIONS = {UNIVERSAL: "2.0", ISLAND4D: "1.0"}
+COEFFICIENTS = {UNIVERSAL: "chebyshev", ISLAND4D: "spline"}
+DEGREE = 3  # of the splines of island4d
+AXES = {
+    UNIVERSAL: (("X", "linear"), ("mu", "linear")),
+    ISLAND4D: (("X", "log"), ("spread", "log"), ("sphere", "linear"), ("hurst", "linear")),
+}
 ANSWERS = {UNIVERSAL: "Phi_{f}", ISLAND4D: "{f}_hat"}
 
 OUT_OF_RANGE = {
-    UNIVERSAL: (
-        "below the smallest mu, g = g(X, first mu) mu/(first mu): first order about the rigid sphere, "
-        "within the stated error; anywhere else outside the axes there is no answer: never clamp, never extrapolate"
-    ),
+    UNIVERSAL: "outside the cells there is no answer: never clamp, never extrapolate",
     ISLAND4D: (
         "below the smallest spread, g = g(X, first spread, sphere, hurst) mu/mu(first spread, sphere, hurst): first "
         "order about the rigid sphere, within the stated error; anywhere else outside the axes there is no answer: "
@@ -36,14 +39,17 @@ OUT_OF_RANGE = {
     ),
 }
 
-# w0 ... w_degree of the coefficients i ... i + degree, at u in [0, 1] of cell i, with v = 1 - u
-WEIGHTS = {
-    3: "w0 = v^3/6, w1 = 2/3 - u^2 (1 - u/2), w2 = 2/3 - v^2 (1 - v/2), w3 = u^3/6",
-    5: (
-        "w0 = v^5/120, w1 = (26 - 50 u + 20 u^2 + 20 u^3 - 20 u^4 + 5 u^5)/120, "
-        "w2 = (66 - 60 u^2 + 30 u^4 - 10 u^5)/120, w3 and w4 as w2 and w1 with v for u, w5 = u^5/120"
-    ),
+# edges of cells: of X at whole multiples of 1/X_STEPS from the first, of mu where the last bits of a double are 0,
+# eight to an octave, so that a cell is found without a search; the last edge of each is the end of the range
+X_STEPS = 16
+BUCKET_BITS = 49
+CELL_EDGES = {
+    "X_low": "least X of a cell",
+    "X_high": "largest X of a cell",
+    "mu_low": "least mu of a cell",
+    "mu_high": "largest mu of a cell",
 }
+WEIGHTS = "w0 = v^3/6, w1 = 2/3 - u^2 (1 - u/2), w2 = 2/3 - v^2 (1 - v/2), w3 = u^3/6, with v = 1 - u"
 HEIGHT_INTEGRALS = (
     "F_n(x) = integral from x to infinity of (z - x)^n phi(z) dz, phi(z) = exp(-z^2/2)/sqrt(2 pi). To 1e-13 for "
     "-42 <= x <= 7 and n = 2 or 5/2: F_n(x) = h sum over k = -192 ... 272 of "
@@ -55,16 +61,20 @@ SYMBOLS = (
     "of its summits (band [zeta_d, zeta_u]); eta share of a summit's contact that is real; E* contact modulus; "
     "q0 smallest wave number; zeta_1 largest magnification"
 )
+ERROR_FIELD = {
+    UNIVERSAL: "error_F and error_A bound the relative error in each cell",
+    ISLAND4D: (
+        "error_F and error_A bound the relative error, each over one cell of a coarser grid: an axis of n nodes has "
+        "c equal cells in position, and cell k holds the positions with k = min(floor(position c/(n - 1)), c - 1)"
+    ),
+}
+AXIS_ERRORS = ". axis_errors: largest error (F, A) from interpolating along one axis alone"
 # what every file says about its parts
 DOCUMENTATION = {
     "certificate": (
         "largest_error, p99_error and median_error are relative errors of the table on certificate_points held-out "
         "points, solved on twice the nodes that made the table: half over the whole box, half (visited) at islands "
-        "of random surfaces. axis_errors: largest error (F, A) from interpolating along one axis alone"
-    ),
-    "error_field": (
-        "error_F and error_A bound the relative error, each over one cell of a coarser grid: an axis of n nodes has "
-        "c equal cells in position, and cell k holds the positions with k = min(floor(position c/(n - 1)), c - 1)"
+        "of random surfaces"
     ),
     "conformance": (
         "Points to replay in any language: conformance_ and the name of an argument; table_F, table_A: what this table "
@@ -175,16 +185,15 @@ class TableContent:
     kind : str
         One of `KINDS`.
     axes : tuple of Axis
-        In the order of the arrays' dimensions.
-    log_ratio : ndarray
-        log(Phi/Phi of the rigid sphere) at the nodes, last axis F, A.
+        In the order of the arrays' dimensions; of the universal table the ranges of X and mu, with two nodes each.
     coefficients : ndarray
-        B-spline coefficients of the same, each axis longer by degree - 1.
+        Of the universal table the Chebyshev coefficients of Phi_F/mu and Phi_A, (cells, 8 of X, 8 of mu, 2); else the
+        B-spline coefficients of log(Phi/Phi of the rigid sphere), each axis longer by degree - 1, last axis F, A.
     local_error : ndarray
-        Largest relative error found near each cell of a coarser grid, times its factor, last axis F, A.
+        Largest relative error found in each cell (of a coarser grid: near it), times its factor, last axis F, A.
     auxiliary : dict
-        Further variables, name -> (dimension names, values, attributes); those over the axes are CF's
-        auxiliary coordinates.
+        Further variables, name -> (dimension names, values, attributes): edges of the universal table's cells; the
+        values of log(Phi/Phi of the rigid sphere) at the nodes, and coordinates.
     conformance : dict
         Arguments and answers of the points to replay, name -> (points,) array.
     attributes : dict
@@ -193,7 +202,6 @@ class TableContent:
 
     kind: str
     axes: tuple[Axis, ...]
-    log_ratio: FloatArray
     coefficients: FloatArray
     local_error: FloatArray
     auxiliary: dict[str, tuple[tuple[str, ...], FloatArray, dict[str, Any]]]
@@ -201,27 +209,46 @@ class TableContent:
     attributes: dict[str, Any]
 
     @property
-    def degree(self) -> int:
-        """Spline degree."""
-        return DEGREES[self.kind]
+    def size(self) -> str:
+        """How many cells or nodes it has, in words."""
+        if self.kind == UNIVERSAL:
+            return f"{self.coefficients.shape[0]} cells"
+        return " x ".join(f"{axis.nodes} {axis.name}" for axis in self.axes)
 
     def arrays(self) -> dict[str, Any]:
         """Every array that the values' hash covers, by the name that it has in the file."""
         named: dict[str, Any] = {axis.name: axis.values for axis in self.axes}
         for number, function in enumerate(FUNCTIONS):
-            named[f"log_ratio_{function}"] = self.log_ratio[..., number]
-            named[f"spline_{function}"] = self.coefficients[..., number]
+            named[f"{COEFFICIENTS[self.kind]}_{function}"] = self.coefficients[..., number]
             named[f"error_{function}"] = self.local_error[..., number]
         named |= {name: entry[1] for name, entry in self.auxiliary.items()}
         named |= {f"conformance_{name}": values for name, values in self.conformance.items()}
         return named
 
 
-def grid_labels(axes: tuple[Axis, ...], degree: int) -> dict[str, Any]:
-    """Coordinates of the spline coefficients and of the error field's cells, as auxiliary variables."""
+def dimensions(kind: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the dimensions of the coefficients and of the error bounds, the functions apart."""
+    if kind == UNIVERSAL:
+        return ("cell", "degree_X", "degree_mu"), ("cell",)
+    names = [name for name, _ in AXES[kind]]
+    return tuple(f"{name}_knot" for name in names), tuple(f"{name}_cell" for name in names)
+
+
+def labels_of_cells(edges: FloatArray) -> dict[str, Any]:
+    """The edges of the universal table's cells, (4, cells) in the order of `CELL_EDGES`, as auxiliary variables."""
+    rows = zip(CELL_EDGES.items(), edges, strict=True)
+    return {name: (("cell",), row, _label(text)) for (name, text), row in rows}
+
+
+def labels_of_nodes(axes: tuple[Axis, ...], log_ratio: FloatArray) -> dict[str, Any]:
+    """Of a table over nodes: `log_ratio` there, and coordinates of coefficients and of the error field's cells."""
+    names = tuple(axis.name for axis in axes)
     labels: dict[str, Any] = {}
+    for number, f in enumerate(FUNCTIONS):
+        text = f"natural logarithm of Phi_{f} over its value for a rigid sphere, at the nodes"
+        labels[f"log_ratio_{f}"] = (names, log_ratio[..., number], _label(text))
     for axis in axes:
-        pad = (degree - 1) // 2
+        pad = (DEGREE - 1) // 2
         cells = error_cells(axis)
         middles = (np.arange(cells) + 0.5) * ((axis.nodes - 1) / cells)
         knots = np.arange(-pad, axis.nodes + pad, dtype=float)

@@ -31,12 +31,12 @@ TOLERANCES["calibrated"] = 1e-12  # whose logarithm is the table's
 
 
 def random_islands() -> tuple[np.ndarray, np.ndarray]:
-    """X and mu over the whole range: on both sides of the smallest mu, and at the ends."""
+    """X and mu over the whole range, ends included."""
     rng = np.random.default_rng(2008)
     axis_X, axis_mu = universal_model().content.axes
     X = rng.uniform(axis_X.low, axis_X.high, POINTS)
-    mu = np.exp(rng.uniform(np.log(1e-2 * axis_mu.low), np.log(axis_mu.high), POINTS))
-    X[:4], mu[:4] = (axis_X.low, axis_X.low, axis_X.high, axis_X.high), (axis_mu.low, axis_mu.high) * 2
+    mu = np.exp(rng.uniform(np.log(1e-10), np.log(axis_mu.high), POINTS))
+    X[:4], mu[:4] = (axis_X.low, axis_X.low, axis_X.high, axis_X.high), (1e-8, axis_mu.high) * 2
     return X, mu
 
 

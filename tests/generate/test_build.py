@@ -11,32 +11,49 @@ from small_builds import KINDS, SMALL, small
 
 from generate.__main__ import main
 from generate.tables import build as build_module
-from generate.tables.build import UncertifiedError, build, certify, evaluate, held_out, resolve
-from generate.tables.chunks import ChunkedSolver, log_ratio
+from generate.tables.build import UncertifiedError, certify, evaluate, held_out, resolve
+from generate.tables.chunks import ChunkedSolver, phi
+from generate.tables.commands import built as build_table
 from generate.tables.configuration import load
+from generate.tables.universal import AIM, Strip
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.models.universal import UniversalModel
 from mbma_tables.tablefiles.netcdf import read_table, write_table
-from mbma_tables.tablefiles.schema import error_cell
+from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, UNIVERSAL, error_cell
 
 FRESH = 4000
 # fresh points find other worst places than the few hundred of a small certificate
 STATED_FACTOR = 1.5
 
 
+@pytest.fixture(scope="module")
+def nodes(tmp_path_factory):
+    """(kind, its content) of a small table over nodes."""
+    configuration = load("island4d", small(tmp_path_factory.mktemp("nodes"), "island4d"))
+    return KINDS["island4d"](configuration), build_table(configuration, ChunkedSolver())
+
+
 def fresh(kind, content, count=FRESH, seed=5):
-    """Positions at random, and both functions' relative errors there against exact solutions at tight tolerance."""
+    """Both functions' relative errors and bounds at random points, against exact solutions at tight tolerance."""
     rng = np.random.default_rng(seed)
+    if content.kind == UNIVERSAL:
+        X, mu = kind.held_out(content, count, seed)
+        found = UniversalModel(content).answer(X, mu)
+        solved = greenwood_tripp.solve(X, mu, rtol=1e-10)
+        ratio = np.stack([found.phi_F / solved.phi_F, found.phi_A / solved.phi_A], axis=-1)
+        return np.abs(ratio - 1), found.error[:, None]
     positions = [rng.uniform(0, axis.nodes - 1, count) for axis in content.axes]
     X, mu = kind.arguments(*(axis.coordinate(p) for axis, p in zip(content.axes, positions, strict=True)))
     solved = greenwood_tripp.solve(X, mu, rtol=1e-10)
-    rigid = greenwood_tripp.rigid_sphere(X, mu)
-    table = np.exp(evaluate(content.coefficients, positions)).T * rigid
-    return positions, np.abs(table / np.stack([solved.phi_F, solved.phi_A]) - 1).T
+    table = np.exp(evaluate(content.coefficients, positions)).T * greenwood_tripp.rigid_sphere(X, mu)
+    cells = content.local_error.shape[:-1]
+    where = tuple(error_cell(a, c, p) for a, c, p in zip(content.axes, cells, positions, strict=True))
+    return np.abs(table / np.stack([solved.phi_F, solved.phi_A]) - 1).T, content.local_error[where]
 
 
 def test_fresh_points_confirm_the_certificate(built):
     kind, content = built
-    _, errors = fresh(kind, content)
+    errors, _ = fresh(kind, content)
     target = content.attributes["target"]
     for number, function in enumerate("FA"):
         stated = [content.attributes[f"{what}_error_{function}"] for what in ("median", "p99", "largest")]
@@ -49,16 +66,14 @@ def test_fresh_points_confirm_the_certificate(built):
 
 def test_the_local_bound_is_honest(built):
     kind, content = built
-    positions, errors = fresh(kind, content, seed=6)
-    cells = content.local_error.shape[:-1]
-    where = tuple(error_cell(a, c, p) for a, c, p in zip(content.axes, cells, positions, strict=True))
-    assert (errors > content.local_error[where]).any(axis=1).mean() < 1e-3
-    # and no idle talk: it follows the error down
-    assert np.median(content.local_error[where]) < 0.5 * content.local_error.max()
+    errors, bound = fresh(kind, content, seed=6)
+    assert (errors > bound).any(axis=1).mean() < 1e-3
+    # and no idle talk
+    assert np.median(bound / np.maximum(errors, 1e-300)) < 300
 
 
-def test_certificate_points_stand_off_the_nodes_and_half_of_them_where_surfaces_go(built):
-    kind, content = built
+def test_certificate_points_stand_off_the_nodes_and_half_of_them_where_surfaces_go(nodes):
+    kind, content = nodes
     count = 300
     places = held_out(kind, content.axes, count, 11)
     assert all(place.size == count for place in places)
@@ -70,8 +85,8 @@ def test_certificate_points_stand_off_the_nodes_and_half_of_them_where_surfaces_
         np.testing.assert_array_equal(place[count // 2 :], own)
 
 
-def test_a_held_out_point_on_a_node_is_refused(built, monkeypatch):
-    kind, content = built
+def test_a_held_out_point_on_a_node_is_refused(nodes, monkeypatch):
+    kind, content = nodes
     places = held_out(kind, content.axes, 100, 11)
     places[0][3] = content.axes[0].low
     monkeypatch.setattr(build_module, "held_out", lambda *_: places)
@@ -79,14 +94,14 @@ def test_a_held_out_point_on_a_node_is_refused(built, monkeypatch):
         certify(kind, content.axes, content.coefficients, ChunkedSolver(), kind.configuration)
 
 
-def test_the_certificate_is_solved_on_twice_the_nodes(built, monkeypatch):
-    kind, content = built
+def test_the_certificate_is_solved_on_twice_the_nodes(nodes, monkeypatch):
+    kind, content = nodes
     asked = []
 
     class Noting(ChunkedSolver):
-        def log_ratio(self, label, X, mu, rtol, refinement=1):
+        def phi(self, label, X, mu, rtol, refinement=1):
             asked.append((label, refinement))
-            return super().log_ratio(label, X, mu, rtol, refinement)
+            return super().phi(label, X, mu, rtol, refinement)
 
     certify(kind, content.axes, content.coefficients, Noting(), kind.configuration)
     assert asked == [("certificate", 2)]
@@ -100,12 +115,12 @@ def test_the_certificate_is_solved_on_twice_the_nodes(built, monkeypatch):
         return found
 
     monkeypatch.setattr(greenwood_tripp, "solve", watch)
-    log_ratio(X, mu, 1e-6, 2)
+    phi(X, mu, 1e-6, 2)
     assert sorted(n for (n,) in counts[1:]) == [2 * n for n in sorted(counts[0])]
 
 
-def test_the_file_tells_what_each_axis_cost(built):
-    kind, content = built
+def test_the_file_tells_what_each_axis_cost(nodes):
+    kind, content = nodes
     errors = json.loads(content.attributes["axis_errors"])
     history = json.loads(content.attributes["refinement"])
     names = [axis.name for axis in content.axes]
@@ -116,11 +131,11 @@ def test_the_file_tells_what_each_axis_cost(built):
     assert json.loads(content.attributes["configuration"]) == dataclasses.asdict(kind.configuration)
 
 
-def test_axis_errors_are_those_of_interpolation_along_that_axis(built):
+def test_axis_errors_are_those_of_interpolation_along_that_axis(nodes):
     """A line of exact solutions along each axis, fitted by scipy's spline instead of the table's own."""
     from scipy.interpolate import make_interp_spline
 
-    kind, content = built
+    kind, content = nodes
     errors = json.loads(content.attributes["axis_errors"])
     for number, axis in enumerate(content.axes):
         worst = 0.0
@@ -133,40 +148,51 @@ def test_axis_errors_are_those_of_interpolation_along_that_axis(built):
             def values(positions, axis=axis, fixed=fixed, number=number):
                 line = [np.full(positions.size, f) for f in fixed]
                 line.insert(number, axis.coordinate(positions))
-                return log_ratio(*kind.arguments(*line), 1e-10)
+                return ChunkedSolver().log_ratio("line", *kind.arguments(*line), 1e-10)
 
-            nodes = np.arange(float(axis.nodes))
-            spline = make_interp_spline(nodes, values(nodes), k=content.degree)
+            at = np.arange(float(axis.nodes))
+            spline = make_interp_spline(at, values(at), k=3)
             worst = max(worst, np.abs(spline(between) - values(between)).max())
         stated = max(errors[axis.name])
         # other lines than the generator's
         assert stated / 2 < worst < 2 * stated
 
 
-def test_a_tighter_target_takes_more_nodes_and_is_met(tmp_path):
-    nodes = []
-    for target in (1e-3, 1e-5, 1e-7):
-        path = tmp_path / f"{target}.toml"
-        # so far down that the first order in mu is within the tightest target
-        path.write_text(SMALL["universal"].replace("1e-4", str(target)).replace("1e-3\nhigh", "1e-6\nhigh"))
-        configuration = load("universal", path)
-        content = build(KINDS["universal"](configuration), configuration, ChunkedSolver())
+def test_a_tighter_target_takes_more_cells_and_is_met(tmp_path):
+    cells = []
+    for target in (1e-4, 1e-6, 1e-8):
+        configuration = load("universal", small(tmp_path, "universal"), target)
+        content = build_table(configuration, ChunkedSolver())
         assert max(content.attributes[f"largest_error_{f}"] for f in "FA") <= target
-        nodes.append([axis.nodes for axis in content.axes])
-    assert nodes[0] <= nodes[1] < nodes[2]
-    # sixth order: a hundredth of the error for about twice the nodes
-    assert np.prod(nodes[2]) < 8 * np.prod(nodes[1])
+        cells.append(len(content.coefficients))
+    assert cells[0] < cells[1] < cells[2]
+    # eighth order both ways: a hundredth of the error for about three times the cells
+    assert cells[2] < 6 * cells[1]
 
 
-def test_refinement_stops_at_the_target_not_far_beyond(tmp_path):
+def test_cells_end_where_they_must(tmp_path):
+    """A cell that were an eighth of an octave longer would miss its aim."""
     configuration = load("universal", small(tmp_path, "universal"))
-    kind = KINDS["universal"](configuration)
-    aim = 1e-7
-    found = resolve(kind, configuration, ChunkedSolver(), aim, {"X": 8, "mu": 8})
-    fewer = {name: int(count / 1.25) for name, count in found.nodes.items()}
-    coarser = resolve(kind, configuration, ChunkedSolver(), 1.0, fewer)
+    content = build_table(configuration, ChunkedSolver())
+    X_low, X_high, low, high = (content.auxiliary[name][1] for name in CELL_EDGES)
+    aim = AIM * configuration.target
+    for cell in np.flatnonzero(high < content.axes[1].high)[::3]:
+        strip = Strip(X_low[cell], X_high[cell], content.axes[1].high, aim, 1e-8)
+        longer = ((high[cell : cell + 1].view(np.int64) >> BUCKET_BITS) + 1 << BUCKET_BITS).view(float)[0]
+        assert strip.cell(low[cell], high[cell])[1].max() <= 1.01 * aim
+        assert strip.cell(low[cell], longer)[1].max() > 0.99 * aim
+
+
+def test_refinement_stops_at_the_target_not_far_beyond(nodes):
+    kind, content = nodes
+    aim = 1e-4
+    start = {axis.name: 8 for axis in content.axes}
+    found = resolve(kind, kind.configuration, ChunkedSolver(), aim, start)
+    fewer = {name: max(8, int(count / 1.25)) for name, count in found.nodes.items()}
+    coarser = resolve(kind, kind.configuration, ChunkedSolver(), 1.0, fewer)
     for name in fewer:
-        assert found.errors[name].max() <= aim < coarser.errors[name].max()
+        assert found.errors[name].max() <= aim
+        assert found.nodes[name] == 8 or aim < coarser.errors[name].max()
 
 
 def invoke(folder, text, kind="universal"):
@@ -178,22 +204,13 @@ def invoke(folder, text, kind="universal"):
 
 
 REFUSED = {
-    "too few nodes allowed": (
+    "too few coefficients allowed": (
         lambda text: text.replace("max_nodes = 5000", "max_nodes = 100"),
-        "needs more than the 100 nodes allowed; raise max_nodes or the target",
-    ),
-    "fixed axes that miss the target": (
-        lambda text: text.replace("= 0.5\n", "= 0.5\nnodes = 8\n").replace("= 1e-3\n", "= 1e-3\nnodes = 8\n"),
-        "the target 1.00e-04; the configuration fixes every axis",
+        "more than the 100 allowed; raise max_nodes or the target",
     ),
     "a range that no surface visits": (
         lambda text: text.replace("6.0", "100.0").replace("low = 0.5", "low = 90.0"),
         "hardly a surface visits these axes",
-    ),
-    # at mu of order one the answer below the table is no longer first order in mu
-    "a broken check": (
-        lambda text: text.replace("1e-3", "0.5"),
-        "universal: between its nodes the table breaks: rigid limit",
     ),
 }
 
@@ -218,21 +235,44 @@ def middle(content, function, spread=0):
     return (*(slice(n // 2 - spread, n // 2 + 1 + spread) for n in content.coefficients.shape[:-1]), function)
 
 
-def test_what_no_islands_can_do_breaks_a_rule(built):
-    kind, content = built
-    nodes, others = content.coefficients.shape[:2], (slice(None),) * (len(content.axes) - 2)
-    dips = (nodes[0] // 2, slice(None), *others), (slice(None), nodes[1] // 2, *others)
-    of_mu = "force increasing in mu" if content.kind == "universal" else "force increasing with the spread"
-    # at the smallest spread mu is about 0.01
-    limit = ((Ellipsis, 0), -0.01) if content.kind == "universal" else ((Ellipsis, 1), -5.0)
+def test_what_no_islands_can_do_breaks_a_rule(nodes):
+    kind, content = nodes
+    first, second, *others = content.coefficients.shape[:-1]
+    rest = (slice(None),) * len(others)
+    dips = (first // 2, slice(None), *rest), (slice(None), second // 2, *rest)
     spoilt = [("force increasing in X", (*dips[0], 0), -12.0), ("area increasing in X", (*dips[0], 1), -12.0)]
-    spoilt += [(of_mu, (*dips[1], 0), -12.0), ("rigid limit", *limit)]
+    # at the smallest spread mu is about 0.01
+    spoilt += [("force increasing with the spread", (*dips[1], 0), -12.0), ("rigid limit", (Ellipsis, 1), -5.0)]
     for number in (0, 1):
         spoilt.append(("force and area finite", middle(content, number), np.nan))
         spoilt.append(("no larger than a rigid sphere's", middle(content, number, 1), 20.0))
     for rule, place, height in spoilt:
         with pytest.raises(UncertifiedError, match=rule):
             kind.check(bump(content, place, height))
+
+
+def test_what_no_islands_can_do_breaks_a_rule_in_a_cell(tmp_path):
+    configuration = load("universal", small(tmp_path, "universal"))
+    kind, content = KINDS["universal"](configuration), build_table(configuration, ChunkedSolver())
+    last = len(content.coefficients) - 1
+    assert content.auxiliary["mu_low"][1][last] > 0
+    for number, cell, terms, rule in (
+        (0, last, {(0, 0): np.nan}, "finite and positive"),
+        (1, last, {(0, 0): -1.0}, "finite and positive"),
+        (1, last, {(0, 0): 30.0}, "no larger than a rigid sphere's"),
+        (0, last, {(0, 0): 0.5, (1, 0): -0.1}, "force increasing in X"),
+        (1, last, {(0, 0): 0.5, (1, 0): -0.1}, "area increasing in X"),
+        # Phi_F/mu falls faster than mu rises
+        (0, last, {(0, 0): 0.5, (1, 0): 0.1, (0, 1): -0.35}, "force increasing in mu"),
+        (1, 0, {(0, 0): 0.1, (1, 0): 0.01}, "rigid limit"),
+    ):
+        series = content.coefficients.copy()
+        mean = series[cell, 0, 0, number]
+        series[cell, ..., number] = 0.0
+        for place, share in terms.items():
+            series[(cell, *place, number)] = share * mean
+        with pytest.raises(UncertifiedError, match=rule):
+            kind.check(dataclasses.replace(content, coefficients=series))
 
 
 def test_an_unspoiled_table_passes_and_survives_its_file(built, tmp_path):

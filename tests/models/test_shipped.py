@@ -12,7 +12,7 @@ from mbma_tables.tablefiles.provenance import digest_json
 from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL
 
 LARGEST_BYTES = {UNIVERSAL: 2e6, ISLAND4D: 16e6}
-LARGEST_ERROR = {UNIVERSAL: 1e-8, ISLAND4D: 1e-3}
+LARGEST_ERROR = {UNIVERSAL: 1e-9, ISLAND4D: 1e-3}
 
 
 @pytest.fixture(scope="module", params=KINDS)

@@ -1,4 +1,4 @@
-"""The shipped tables' kernels: honest bounds on many fresh points, slopes, the continuation below, one bit pattern."""
+"""The shipped tables' kernels: honest bounds on many fresh points, slopes, one bit pattern."""
 
 import functools
 import math
@@ -14,12 +14,12 @@ from mbma_tables.models.tables import island4d_model, universal_model
 from mbma_tables.surfaces.readings import REPORTED
 
 
-def scattered(count, seed, low=None):
+def scattered(count, seed, low=1e-8):
     """Fresh points over the table: X even, mu even in its logarithm."""
     X_axis, mu_axis = universal_model().content.axes
     rng = np.random.default_rng(seed)
     X = rng.uniform(X_axis.low, X_axis.high, count)
-    return X, 10 ** rng.uniform(math.log10(low or mu_axis.low), math.log10(mu_axis.high), count)
+    return X, 10 ** rng.uniform(math.log10(low), math.log10(mu_axis.high), count)
 
 
 def error_of(found, solved):
@@ -37,8 +37,8 @@ def test_no_bound_is_exceeded_on_20000_points():
     error, bound = universal_errors()
     assert (error <= bound).all()
     # as promised in the certificate, and not by a bound that says nothing
-    assert error.max() <= 1e-8
-    assert bound.max() <= 1e-7
+    assert error.max() <= 1e-9
+    assert bound.max() <= 1e-9
 
 
 def test_the_bound_is_not_much_wider_than_the_error():
@@ -89,30 +89,6 @@ def test_slopes_against_the_solver():
     np.testing.assert_array_equal(value.error, plain.error)
 
 
-def test_slopes_below_the_table():
-    """First order in mu about the rigid sphere: slopes are those of what is answered, and meet at the edge."""
-    model = universal_model()
-    edge = model.content.axes[1].low
-    X = np.linspace(-6, 40, 50)
-    for factor in (1e-3, 0.3):
-        mu = np.full(50, factor * edge)
-        value, by_X, by_mu = model.slopes(X, mu)
-        up, down = model.answer(X, 1.01 * mu), model.answer(X, 0.99 * mu)
-        np.testing.assert_allclose(by_mu.phi_F, (up.phi_F - down.phi_F) / (0.02 * mu), rtol=1e-10)
-        right, left = model.answer(X + 1e-4, mu), model.answer(X - 1e-4, mu)
-        for name in ("phi_F", "phi_A"):
-            differences = (getattr(right, name) - getattr(left, name)) / 2e-4
-            np.testing.assert_allclose(getattr(by_X, name), differences, rtol=1e-6)
-            # area falls by a share of about mu: only against itself is that visible
-            assert (np.abs(getattr(by_mu, name)) <= 1e3 * getattr(value, name) / edge).all()
-    above = model.slopes(X, np.full(50, np.nextafter(edge, 1)))
-    below = model.slopes(X, np.full(50, np.nextafter(edge, 0)))
-    np.testing.assert_allclose(above[2].phi_F, below[2].phi_F, rtol=1e-9)
-    # at 1e-8 of the area, its loss has few digits in any table
-    touching = X > 1
-    np.testing.assert_allclose(above[2].phi_A[touching], below[2].phi_A[touching], rtol=1e-3)
-
-
 def test_parallel_gives_the_same_bits():
     X, mu = scattered(50_000, seed=63, low=1e-14)
     serial, parallel = universal_model().answer(X, mu), universal_model().answer(X, mu, parallel=True)
@@ -126,7 +102,7 @@ def test_parallel_gives_the_same_bits():
 
 
 def test_a_batch_gives_the_bits_of_single_lookups():
-    X, mu = scattered(200, seed=64)
+    X, mu = scattered(200, seed=64, low=1e-12)
     batch = universal_model().answer(X, mu)
     for k in range(200):
         one = universal_model().answer(X[k], mu[k])
@@ -169,7 +145,7 @@ def test_where_arguments_lie():
     X_axis, mu_axis = model.content.axes
     in_X, in_mu = model.status([X_axis.low - 1, 0.0, X_axis.high + 1], [[0.0], [1.0], [2 * mu_axis.high]])
     assert in_X.tolist() == [-1, 0, 1]
-    assert in_mu.tolist() == [[-1], [0], [1]]
+    assert in_mu.tolist() == [[0], [0], [1]]
     assert model.status(0.0, 1.0) == (0, 0)
     with pytest.raises(InputError, match="mu must be finite"):
         model.status(0.0, math.nan)

@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from numpy.polynomial.chebyshev import chebval2d
 from small_tables import small_table
 
 from mbma_tables import OutOfRangeError, greenwood_tripp
@@ -13,7 +14,7 @@ from mbma_tables.models import tables as tabulated
 from mbma_tables.models.tables import open_table, universal_model
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.tablefiles.netcdf import read_table, write_table
-from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL, error_cell
+from mbma_tables.tablefiles.schema import CELL_EDGES, ISLAND4D, UNIVERSAL
 
 
 @pytest.fixture(scope="module")
@@ -33,39 +34,30 @@ def largest_error(model, X, mu):
     return error, found.error
 
 
-def test_below_the_shipped_table_to_first_order():
+def test_the_smallest_mu_and_the_rigid_limit():
     model = shipped_model()
-    X_axis, mu_axis = model.content.axes
+    X_axis = model.content.axes[0]
     rng = np.random.default_rng(21)
     X = rng.uniform(X_axis.low, X_axis.high, 300)
-    mu = 10 ** rng.uniform(-30, np.log10(mu_axis.low), 300)
+    mu = 10 ** rng.uniform(-30, -8, 300)
     error, bound = largest_error(model, X, mu)
     assert (error <= bound).all()
-    assert error.max() < 1e-8
+    rigid = greenwood_tripp.rigid_sphere(X, np.ones(300))
+    value, _, by_mu = model.slopes(X, np.zeros(300))
+    assert (np.abs(np.stack([by_mu.phi_F, value.phi_A]) / rigid - 1) <= value.error).all()
+    np.testing.assert_array_equal(value.phi_F, 0)
+    np.testing.assert_array_equal(model.answer(X, np.zeros(300)).phi_F, 0)
 
 
 def test_a_small_table_keeps_its_word(small):
     X_axis, mu_axis = small.content.axes
     rng = np.random.default_rng(22)
     X = rng.uniform(X_axis.low, X_axis.high, 400)
-    mu = 10 ** rng.uniform(np.log10(mu_axis.low), np.log10(mu_axis.high), 400)
+    mu = 10 ** rng.uniform(-8, np.log10(mu_axis.high), 400)
     error, bound = largest_error(small, X, mu)
     assert (error <= bound).all()
     # a bound that is much too wide would say nothing
     assert np.median(bound / error) < 100
-
-
-def test_below_a_table_the_logarithm_is_proportional_to_mu(small):
-    X_axis, mu_axis = small.content.axes
-    X = np.linspace(X_axis.low, X_axis.high, 50)
-    edge = small.log_ratio(X, np.full(50, mu_axis.low))
-    for factor in (1.0, 0.5, 1e-3, 1e-24):
-        found = small.log_ratio(X, np.full(50, factor * mu_axis.low))
-        np.testing.assert_allclose(found, factor * edge, rtol=1e-14)
-    rigid = greenwood_tripp.rigid_sphere(X, np.zeros(50))
-    found = small.answer(X, np.zeros(50))
-    np.testing.assert_array_equal(found.phi_F, 0)
-    np.testing.assert_allclose(found.phi_A, rigid[1], rtol=2e-15)
 
 
 def test_edges_to_the_last_bit(small):
@@ -84,14 +76,6 @@ def test_edges_to_the_last_bit(small):
         small.answer(inside, np.array([np.nextafter(mu_axis.high, np.inf)]))
 
 
-def test_no_step_where_the_table_ends_below(small):
-    _, mu_axis = small.content.axes
-    X = np.linspace(-2, 6, 40)
-    above = small.log_ratio(X, np.full(40, np.nextafter(mu_axis.low, 1)))
-    below = small.log_ratio(X, np.full(40, np.nextafter(mu_axis.low, 0)))
-    np.testing.assert_allclose(above, below, rtol=1e-9)
-
-
 def test_shapes_and_input_are_kept(small):
     X = np.linspace(-2, 6, 12).reshape(3, 4)
     mu = np.logspace(-9, 2, 12).reshape(3, 4)
@@ -106,15 +90,22 @@ def test_shapes_and_input_are_kept(small):
     np.testing.assert_array_equal(turned.phi_F, found.phi_F.T)
 
 
-def test_the_error_is_that_of_the_cell(small):
-    X_axis, mu_axis = small.content.axes
-    field = small.content.local_error
-    for i in (0, 4, 10):
-        for j in (0, 3, 8):
-            X, mu = X_axis.coordinate(i + 0.5), mu_axis.coordinate(j + 0.5)
-            assert int(error_cell(X_axis, 11, i + 0.5)) == i
-            found = small.answer(np.array([X]), np.array([mu])).error[0]
-            assert found == pytest.approx(field[i, j].max(), rel=1e-10, abs=2e-12)
+def test_every_cell_answers_with_its_own_series_and_error(small):
+    """Against numpy's Chebyshev series, in the middle of each cell and next to its edges."""
+    content = small.content
+    edges = [content.auxiliary[name][1] for name in CELL_EDGES]
+    for cell, (X_low, X_high, mu_low, mu_high) in enumerate(zip(*edges, strict=True)):
+        middle = np.sqrt(mu_low * mu_high)
+        for share in (1e-9, 0.5, 1 - 1e-9):
+            X, mu = X_low + share * (X_high - X_low), mu_low + share * (mu_high - mu_low)
+            ratio = 2 * mu / mu_high - 1
+            if mu_low > 0:
+                slope = (np.sqrt(mu_high) + np.sqrt(mu_low)) / (np.sqrt(mu_high) - np.sqrt(mu_low))
+                ratio = slope * (mu - middle) / (mu + middle)
+            by_hand = chebval2d(2 * share - 1, ratio, content.coefficients[cell])
+            found = small.answer(X, mu)
+            np.testing.assert_allclose([found.phi_F, found.phi_A], by_hand * [mu, 1], rtol=1e-13)
+            assert found.error == content.local_error[cell].max()
 
 
 def test_shipped_tables_are_opened_once_and_files_by_their_kind(tmp_path):
@@ -152,18 +143,18 @@ def test_marks_have_the_shape_of_the_arguments(small, shape):
             np.testing.assert_array_equal(caught.value.mask, last)
 
 
-def test_slopes_at_mu_zero_are_the_rigid_spheres(small):
-    axis = small.content.axes[0]
-    X = np.linspace(axis.low, axis.high, 20)
-    value, by_X, by_mu = small.slopes(X, np.zeros(20))
-    rigid = greenwood_tripp.rigid_sphere(X, np.ones(20))
-    np.testing.assert_array_equal(value.phi_F, 0)
-    np.testing.assert_allclose(value.phi_A, rigid[1], rtol=1e-14)
-    np.testing.assert_allclose(by_mu.phi_F, rigid[0], rtol=1e-14)
-    # below the table the logarithm is proportional to mu
-    step = 1e-3 * small.content.axes[1].low
-    slope = small.log_ratio(X, np.full(20, step))[1] / step
-    np.testing.assert_allclose(by_mu.phi_A, slope * rigid[1], rtol=1e-12)
-    assert np.isfinite(by_X.phi_A).all()
-    assert (np.abs(by_X.phi_F) < 1e-150).all()
-    assert small.slopes(axis.low, 0.0)[0].phi_F == 0
+def test_slopes_are_those_of_the_answers(small):
+    """By differences inside cells, mu = 0 included."""
+    edges = [small.content.auxiliary[name][1] for name in CELL_EDGES]
+    X, mu = 0.7 * edges[0] + 0.3 * edges[1], 0.6 * edges[2] + 0.4 * edges[3]
+    value, by_X, by_mu = small.slopes(X, mu)
+    for name in ("phi_F", "phi_A"):
+        for slope, dX, dmu in ((by_X, 1e-5, 0.0), (by_mu, 0.0, 1e-5 * mu)):
+            above, below = (getattr(small.answer(X + sign * dX, mu + sign * dmu), name) for sign in (1, -1))
+            differences, natural = (above - below) / (2 * (dX + dmu)), getattr(value, name) / (dX or mu)
+            assert (np.abs(getattr(slope, name) - differences) <= 1e-9 * np.abs(natural)).all()
+    at_zero, above = small.slopes(X, 0 * X), small.slopes(X, np.full(X.size, 1e-100))
+    np.testing.assert_allclose(at_zero[2].phi_F, above[2].phi_F, rtol=1e-14)
+    np.testing.assert_allclose(at_zero[2].phi_A, above[2].phi_A, rtol=1e-14)
+    assert (np.abs(at_zero[1].phi_F) < 1e-150).all()
+    assert small.slopes(X[0], 0.0)[0].phi_F == 0

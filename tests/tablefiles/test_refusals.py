@@ -12,7 +12,7 @@ from small_tables import copied, edited, seal, small_table, unseal
 from mbma_tables.errors import TableFileError
 from mbma_tables.tablefiles.checks import check_content
 from mbma_tables.tablefiles.netcdf import MAX_BYTES, SEAL_LENGTH, attributes_digest, read_table, write_table
-from mbma_tables.tablefiles.schema import FORMAT_VERSION, ISLAND4D, KINDS, UNIVERSAL
+from mbma_tables.tablefiles.schema import FORMAT_VERSIONS, ISLAND4D, KINDS, UNIVERSAL
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +99,7 @@ def edits(content):
         )
         yield f"{name}:{key} {('deleted', 'renamed', 'of another type')[number % 3]}", ways[number % 3]
     yield "attribute added", lambda d: d.setncattr("other", 1)
-    yield "scale factor added", lambda d: d["log_ratio_F"].setncattr("scale_factor", 2.0)
+    yield "scale factor added", lambda d: d["error_F"].setncattr("scale_factor", 2.0)
     yield "variable added", lambda d: d.createVariable("other", "f8", ("X",))
     yield "kind of the other", lambda d: d.setncattr("mbma_kind", UNIVERSAL if d.mbma_kind == ISLAND4D else ISLAND4D)
 
@@ -137,11 +137,11 @@ def test_the_wrong_kind_under_a_right_name(sources, tmp_path):
         assert read_table(path).kind == other
 
 
-@pytest.mark.parametrize("version", ["0.9", "1.1", "2.0", 1.0, ""])
+@pytest.mark.parametrize("version", ["1.0", "1.9", "2.1", 2.0, ""])
 def test_another_format(version, sources, tmp_path):
     path = edited(tmp_path / "a.nc", sources[UNIVERSAL], lambda d: d.setncattr("format_version", version))
     message = refused(path)
-    assert f"has format {version}, this library reads {FORMAT_VERSION}" in message
+    assert f"has format {version}, this library reads {FORMAT_VERSIONS[UNIVERSAL]}" in message
 
 
 def test_no_table_at_all(tmp_path):
@@ -212,7 +212,7 @@ INJECTION = "5 */ int main(void) { system(0); } /*"
         ("X", "offset", "10"),
         ("X", "first", np.inf),
         ("X", "transform", "log; rm"),
-        ("spline_F", "units", 1),
+        ("chebyshev_F", "units", 1),
     ],
 )
 def test_an_attribute_of_another_type_is_refused_by_its_name(owner, name, value, sources, tmp_path):
@@ -243,24 +243,53 @@ def changed(content, name, values):
     return dataclasses.replace(content, **{name: values(getattr(content, name))})
 
 
+def with_edges(content, **changes):
+    """With the edges of cells changed."""
+    labels = dict(content.auxiliary)
+    for name, change in changes.items():
+        over, values, text = labels[name]
+        labels[name] = over, change(values), text
+    return dataclasses.replace(content, auxiliary=labels)
+
+
+def with_axis_and_edges(content, change):
+    moved = with_edges(content, X_low=change, X_high=change)
+    return with_axis(moved, 0, high=float(change(np.array(content.axes[0].high))))
+
+
 CHANGES = {
     "axes": (KINDS, lambda c: with_axis(c, 0, name="Y"), "has axes"),
     "order of axes": (KINDS, lambda c: dataclasses.replace(c, axes=c.axes[::-1]), "has axes"),
-    "transform": (KINDS, lambda c: with_axis(c, 0, transform="linear"), "has axes"),
+    "transform": ([ISLAND4D], lambda c: with_axis(c, 0, transform="linear"), "has axes"),
     "falling": (KINDS, lambda c: with_axis(c, 0, low=c.axes[0].high), "axis X from"),
     "no logarithm": (KINDS, lambda c: with_axis(c, 1, low=-1.0), "axis (mu|spread) from"),
-    "infinite": (KINDS, lambda c: with_axis(c, 0, high=np.inf), "axis X"),
+    "infinite": (KINDS, lambda c: with_axis(c, 0, high=np.inf), "axis X|one after the other"),
     "offset": (KINDS, lambda c: with_axis(c, 1, offset=1.0), "offset 1"),
     "no Hurst exponent": ([ISLAND4D], lambda c: with_axis(c, 3, high=1.1), "axis hurst"),
-    "nodes": (KINDS, lambda c: with_axis(c, 0, nodes=c.axes[0].nodes + 1), "not over its axes"),
-    "coefficients": (KINDS, lambda c: changed(c, "coefficients", lambda v: v[1:]), "not over its axes"),
+    "nodes": ([ISLAND4D], lambda c: with_axis(c, 0, nodes=c.axes[0].nodes + 1), "not over its axes"),
+    "coefficients": (KINDS, lambda c: changed(c, "coefficients", lambda v: v[1:]), "not over its (axes|cells)"),
     "errors": (KINDS, lambda c: changed(c, "local_error", lambda v: v[:0]), "error bounds that are not over"),
+    "cells": ([UNIVERSAL], lambda c: with_edges(c, X_low=lambda v: v[1:]), "not over its cells"),
+    "a gap": ([UNIVERSAL], lambda c: with_edges(c, mu_low=lambda v: v * 1.125), "one after the other"),
+    "an overlap": ([UNIVERSAL], lambda c: with_edges(c, X_high=lambda v: v + 1), "one after the other"),
+    "an open end": ([UNIVERSAL], lambda c: with_axis(c, 1, high=200.0), "one after the other"),
+    "an empty cell": ([UNIVERSAL], lambda c: with_edges(c, X_high=lambda v: v * np.nan), "one after the other"),
+    "odd strips": ([UNIVERSAL], lambda c: with_axis_and_edges(c, lambda v: v + 1e-3 * (v > -2)), "by arithmetic"),
+    "odd cells": (
+        [UNIVERSAL],
+        lambda c: with_edges(c, **dict.fromkeys(("mu_low", "mu_high"), lambda v: v * np.where(v < 100, 1 + 1e-9, 1))),
+        "by arithmetic",
+    ),
     "negative error": (KINDS, lambda c: changed(c, "local_error", np.negative), "error bound below 0"),
     "no points": (KINDS, lambda c: dataclasses.replace(c, conformance={}), "incomplete"),
     "fewer points": (KINDS, lambda c: with_points(c, tolerance=np.ones(3)), "incomplete"),
     "negative answer": (KINDS, lambda c: with_points(c, table_F=0 * c.conformance["table_F"]), "not positive"),
-    "not a ratio": (KINDS, lambda c: changed(c, "log_ratio", lambda v: v + 200), "not logarithms"),
-    "NaN": (KINDS, lambda c: changed(c, "coefficients", lambda v: v * np.nan), "spline_F, which is not finite"),
+    "not a ratio": ([ISLAND4D], lambda c: changed(c, "coefficients", lambda v: v + 200), "not logarithms"),
+    "NaN": (
+        KINDS,
+        lambda c: changed(c, "coefficients", lambda v: v * np.nan),
+        "(chebyshev|spline)_F, which is",
+    ),
 }
 
 

@@ -12,7 +12,7 @@ from small_tables import small_table
 from mbma_tables.errors import TableFileError
 from mbma_tables.tablefiles.netcdf import read_table, write_table
 from mbma_tables.tablefiles.provenance import MODULES, digest_arrays, source_digest, versions
-from mbma_tables.tablefiles.schema import DEGREES, FORMAT_VERSION, FUNCTIONS, KINDS, UNIVERSAL
+from mbma_tables.tablefiles.schema import COEFFICIENTS, FORMAT_VERSIONS, FUNCTIONS, KINDS, UNIVERSAL, dimensions
 
 
 @pytest.fixture(scope="module", params=KINDS)
@@ -40,10 +40,9 @@ def test_versions_and_hashes(written):
     content = small_table(written.stem)
     attributes = read_table(written).attributes
     digest = digest_arrays(content.arrays())
-    assert attributes["format_version"] == FORMAT_VERSION
+    assert attributes["format_version"] == FORMAT_VERSIONS[content.kind]
     assert attributes["values_sha256"] == digest
     assert attributes["data_version"] == digest[:12]
-    assert attributes["spline_degree"] == DEGREES[content.kind]
     assert attributes["source_sha256"] == source_digest(MODULES[content.kind])
     assert attributes["source_modules"].split() == list(MODULES[content.kind])
     assert json.loads(attributes["versions"]) == versions()
@@ -67,9 +66,9 @@ def test_plain_netcdf_reads_it(written):
         for name in ("title", "source", "references", "comment", "out_of_range", "versions"):
             assert dataset.getncattr(name)
         for number, function in enumerate(FUNCTIONS):
-            variable = dataset[f"log_ratio_{function}"]
-            assert variable.dimensions == tuple(axis.name for axis in content.axes)
-            np.testing.assert_array_equal(variable[...], content.log_ratio[..., number])
+            variable = dataset[f"{COEFFICIENTS[content.kind]}_{function}"]
+            assert variable.dimensions == dimensions(content.kind)[0]
+            np.testing.assert_array_equal(variable[...], content.coefficients[..., number])
         for name, variable in dataset.variables.items():
             assert variable.dtype == np.float64, name
             assert variable.units == "1", name

@@ -245,13 +245,14 @@ def level_changes(rng, count, rtol):
 
 
 def two_numbers(rng, count):
-    """X and mu at random, at the table's nodes, where the height integrals change their piece, and about 0 and 1."""
-    X_axis, mu_axis = universal_model().content.axes
+    """X and mu at random, at edges of the table's cells, where the height integrals change their piece, and at 1."""
+    X_axis = universal_model().content.axes[0]
     X, mu = rng.uniform(X_axis.low + 1e-3, X_axis.high - 1e-3, count), 10 ** rng.uniform(-12, 6, count)
-    X[1::6] = rng.choice(X_axis.values[1:-1], X[1::6].size)
-    mu[2::6] = rng.choice(mu_axis.values[1:-1], mu[2::6].size)
+    edges = universal_model().content.auxiliary
+    X[1::6] = rng.choice(np.setdiff1d(edges["X_low"][1], [0.0, X_axis.low]), X[1::6].size)
+    mu[2::6] = rng.choice(edges["mu_low"][1][edges["mu_low"][1] > 0], mu[2::6].size)
     X[3::6] = rng.choice([-4.0, -1.0, 2.0, 4.0, 6.0, 8.0], X[3::6].size)
-    mu[4::6] = mu_axis.low
+    mu[4::6] = 1e-8
     mu[5::6] = 1.0
     return X, mu
 
