@@ -105,11 +105,18 @@ def jitable(function: Function) -> Function:
     return function
 
 
-def in_blocks(fill: Callable[[slice], Answer], count: int, size: int, threads: int = 1) -> list[Answer]:
-    """``fill(slice)`` of each `size` of `count` entries, in order: Ctrl-C is honoured between two, not inside one."""
+def in_blocks(fill: Callable[[slice], Answer], count: int, size: int, workers: int = 1) -> list[Answer]:
+    """``fill(slice)`` of each `size` of `count` entries, in order: Ctrl-C is honoured between two, not inside one.
+
+    Blocks are the same whatever the number of threads, `workers`, and so are the bits of what they fill.
+    """
     blocks = [slice(first, min(first + size, count)) for first in range(0, count, size)]
-    if threads == 1 or len(blocks) == 1:
+    if workers == 1 or len(blocks) == 1:
         return [fill(block) for block in blocks]
     # threads end with the call, so that a process may fork after it
-    with ThreadPoolExecutor(threads) as pool:
+    pool = ThreadPoolExecutor(workers)
+    try:
         return list(pool.map(fill, blocks))
+    finally:
+        # after Ctrl-C, the blocks at work alone are waited for
+        pool.shutdown(cancel_futures=True)

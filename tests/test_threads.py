@@ -3,13 +3,15 @@
 import os
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
 
 import numpy as np
 import pytest
 
-from mbma_tables import Surface, contact, contact_law
+from mbma_tables import InputError, Surface, contact, contact_law
+from mbma_tables.compiled import in_blocks
 from mbma_tables.models.tables import universal_model
 
 THREADS = 16
@@ -123,3 +125,32 @@ print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), same)
 def test_a_fork_after_parallel_answers_goes_on():
     done = subprocess.run([sys.executable, "-c", FORK], capture_output=True, text=True, check=True)
     assert done.stdout == "0 True\n"
+
+
+@pytest.mark.parametrize("derivatives", [False, True])
+def test_workers_change_no_bit(derivatives):
+    rng, n = np.random.default_rng(5), 2000
+    surfaces = Surface(rng.uniform(0.4, 1, n), 1.0, 10 ** rng.uniform(1, 4, n), 1.0, rng.uniform(2.5, 5, n))
+    depth = surfaces.h_max * rng.uniform(0.3, 0.99, n)
+    one, two = (contact(surfaces, depth, rtol=1e-6, derivatives=derivatives, workers=workers) for workers in (1, 2))
+    np.testing.assert_array_equal([two.force, two.area, two.error], [one.force, one.area, one.error])
+    gaps = np.linspace(-2.9, 2.9, 40_000)
+    one, two = (contact(Surface(0.7, 0.2, 60.0, 1.0, 3.0), gaps, rtol=1e-6, workers=workers) for workers in (1, 2))
+    np.testing.assert_array_equal([two.force, two.area], [one.force, one.area])
+    with pytest.raises(InputError, match="workers must be a whole number"):
+        contact(surfaces, depth, workers=0)
+
+
+def test_workers_stop_at_an_interrupt():
+    """What waits is given up; only blocks at work are finished."""
+    begun = []
+
+    def fill(block):
+        begun.append(block.start)
+        if block.start == 0:
+            raise KeyboardInterrupt
+        time.sleep(0.01)
+
+    with pytest.raises(KeyboardInterrupt):
+        in_blocks(fill, 1000, 1, workers=2)
+    assert len(begun) < 100

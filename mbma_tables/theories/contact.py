@@ -59,6 +59,7 @@ def contact(
     area: ArrayLike | None = None,
     theory: str | Theory | UserTheory = "mbma",
     hardness: ArrayLike | str = np.inf,
+    workers: int = 1,
 ) -> Contact:
     """Force, real contact area and stiffness of a surface, by what is known: separation, pressure or area.
 
@@ -99,6 +100,8 @@ def contact(
         theories' by numerical differentiation, to 1e-6.
     quantities : iterable of {"force", "area"}
         What is wanted of MBMA. One alone costs less; the other is then None, and `error` is of the one.
+    workers : int
+        Threads that share MBMA's batches of surfaces, and of gaps; the bits are those of one.
 
     Returns
     -------
@@ -142,11 +145,12 @@ def contact(
     value, hardness = units.number(by, value), units.number("hardness", hardness)
     chosen = get_theory(theory)
     if theory == Mbma.name:
-        chosen = Mbma(tier, reading, rtol, outside)
+        chosen = Mbma(tier, reading, rtol, outside, workers)
     else:
         refuse_options_of_mbma(
-            tier=tier != "universal", reading=reading != "reported", rtol=rtol != 1e-8, outside=outside != "raise"
-        )
+            tier=tier != "universal", reading=reading != "reported", rtol=rtol != 1e-8, outside=outside != "raise",
+            workers=workers != 1,
+        )  # fmt: skip
     options: dict[str, Any] = {
         "by": by,
         "source": Source(chosen, surface, E_star, hardness, units),

@@ -30,7 +30,7 @@ class Mbma(Theory):
 
     Parameters
     ----------
-    tier, reading, rtol, outside
+    tier, reading, rtol, outside, workers
         As for `mbma_tables.contact`.
     """
 
@@ -42,8 +42,10 @@ class Mbma(Theory):
         reading: str | Reading = "reported",
         rtol: float = 1e-8,
         outside: str = "raise",
+        workers: int = 1,
     ) -> None:
         self.tier, self.reading, self.rtol, self.outside = tier, get_reading(reading), rtol, outside
+        self.workers = workers
 
     @property
     def tier_name(self) -> str:
@@ -60,8 +62,9 @@ class Mbma(Theory):
     ) -> Totals:
         """Force and area at separations d [length]."""
         return totals_at(
-            surface, separation, self.tier, self.reading, E_star, self.rtol, self.outside, derivatives, quantities
-        )
+            surface, separation, self.tier, self.reading, E_star, self.rtol, self.outside, derivatives, quantities,
+            self.workers,
+        )  # fmt: skip
 
     def _has_slopes(self, surface: AnySurface) -> bool:
         by_table = self.tier_name == "universal" and self.outside != "exact"

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require, whole_number_in
+from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import AnyModel, get_model
 from mbma_tables.models.protocol import AREA, BOTH, FORCE, OUTSIDE, QUANTITIES
@@ -31,12 +32,13 @@ from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.island_sum import QUADRATURE_SHARE, slopes_of, totals_of
 from mbma_tables.totals.kernel import Pairs
 from mbma_tables.totals.measured import measured_totals
-from mbma_tables.totals.profile import profile
+from mbma_tables.totals.profile import Profile, profile
 from mbma_tables.totals.sensitivity import BY_COMPRESSION
 
 # surfaces whose islands are kept as a profile, in numpy; of more, those with so many gaps each that it costs less
 FEW_SURFACES, MANY_GAPS = 16, 300
 BLOCK = 1 << 14  # gaps between two looks for Ctrl-C
+MOST_WORKERS = 1024
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -77,6 +79,7 @@ def totals_at(
     outside: str = "raise",
     derivatives: bool | str = False,
     quantities: Iterable[str] = QUANTITIES,
+    workers: int = 1,
 ) -> Totals:
     """Force and area of the MBMA model at separations d; what `mbma_tables.contact` says of them holds.
 
@@ -88,7 +91,7 @@ def totals_at(
     require("E_star", modulus, modulus > 0, "positive")
     if outside not in OUTSIDE:
         raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
-    model = get_model(tier, rtol, reading)
+    model, workers = get_model(tier, rtol, reading), whole_number_in("workers", workers, 1, MOST_WORKERS)
     which = BOTH if len(quantities) > 1 else QUANTITIES.index(quantities[0])
     shape = broadcast_shape(separation=gap, surface=surface.h_rms, E_star=modulus)
     gap = np.broadcast_to(gap, shape)
@@ -106,12 +109,12 @@ def totals_at(
             stress = modulus * surface.q0 * surface.s
             pairs = _pairs(surface, depth, reading)
             if derivatives is True:
-                sums, error, islands = slopes_of(model, pairs, reading, rtol, outside)
+                sums, error, islands = slopes_of(model, pairs, reading, rtol, outside, workers)
                 force, area = sums[:, 0, 0], sums[:, 1, 0]
                 force_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
             else:
                 (force, area, *slopes), error, islands = _totals(
-                    model, surface, pairs, reading, rtol, outside, which, bool(derivatives), shape
+                    model, surface, pairs, reading, rtol, outside, which, bool(derivatives), shape, workers
                 )
                 by_depth = tuple(slope.reshape(shape) / surface.h_rms for slope in slopes)
         if derivatives and by_depth:
@@ -146,7 +149,13 @@ def _pairs(surface: Surface, depth: FloatArray, reading: Reading) -> Pairs:
 
 
 def _by_profiles(
-    model: UniversalModel, pairs: Pairs, number: NDArray[np.intp], reading: Reading, rtol: float, slopes: bool
+    model: UniversalModel,
+    pairs: Pairs,
+    number: NDArray[np.intp],
+    reading: Reading,
+    rtol: float,
+    slopes: bool,
+    workers: int,
 ) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:
     """Sums of pairs of the surfaces `number`, perhaps their slopes by the compression, error and islands, by profiles.
 
@@ -168,15 +177,17 @@ def _by_profiles(
             continue
         islands += kept.islands
         error[places] = kept.error
-        for block in range(0, places.size, BLOCK):
-            some = places[block : block + BLOCK]
-            sums[:, some] = kept.totals(pairs.compression[some], slopes)
+
+        def fill(block: slice, own: NDArray[np.intp] = places, kept: Profile = kept) -> None:
+            sums[:, own[block]] = kept.totals(pairs.compression[own[block]], slopes)
+
+        in_blocks(fill, places.size, BLOCK, workers)
     return sums, error, islands, np.sort(np.concatenate(failed))
 
 
 def _totals(
     model: AnyModel, surface: Surface, pairs: Pairs, reading: Reading, rtol: float, outside: str, which: int,
-    slopes: bool, shape: tuple[int, ...],
+    slopes: bool, shape: tuple[int, ...], workers: int,
 ) -> tuple[FloatArray, FloatArray, int]:  # fmt: skip
     """Force, area and perhaps slopes of both by the compression as rows, their error, islands.
 
@@ -185,17 +196,17 @@ def _totals(
     count, size = math.prod(surface.shape), pairs.hurst.size
     if isinstance(model, UniversalModel) and count <= max(FEW_SURFACES, size // MANY_GAPS):
         number = np.broadcast_to(np.arange(count).reshape(surface.shape), shape).ravel()
-        sums, error, islands, left = _by_profiles(model, pairs, number, reading, rtol, slopes)
+        sums, error, islands, left = _by_profiles(model, pairs, number, reading, rtol, slopes, workers)
     else:
         sums, error, islands, left = np.empty((4 if slopes else 2, size)), np.empty(size), 0, np.arange(size)
     if left.size:
         # gap by gap, which also says what is wrong with which
         try:
             if slopes:
-                columns, error[left], more = slopes_of(model, pairs.some(left), reading, rtol, outside)
+                columns, error[left], more = slopes_of(model, pairs.some(left), reading, rtol, outside, workers)
                 sums[:, left] = columns[:, :, [0, BY_COMPRESSION]].T.reshape(4, -1)
             else:
-                found = totals_of(model, pairs.some(left), reading, rtol, outside, which)
+                found = totals_of(model, pairs.some(left), reading, rtol, outside, which, workers)
                 sums[0, left], sums[1, left], error[left], more = found
         except (ConvergenceError, OutOfRangeError) as fault:
             mask = np.zeros(size, dtype=bool)

@@ -25,7 +25,7 @@ from mbma_tables.totals.kernel import Pairs
 
 QUADRATURE_SHARE = 0.9  # of the tolerance asked for; a table's own error comes on top
 SUM_SHARE = 0.5  # where islands are solved to a share of it
-BLOCK, SLOPES_BLOCK = 2048, 256  # pairs between two looks for Ctrl-C
+BLOCK, SLOPES_BLOCK = 512, 256  # pairs between two looks for Ctrl-C
 
 
 class Totals(NamedTuple):
@@ -121,15 +121,24 @@ def sum_islands(
 
 @functools.singledispatch
 def totals_of(
-    model: Any, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", which: int = BOTH
+    model: Any, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", which: int = BOTH, workers: int = 1
 ) -> Totals:
-    """Totals by an island model, in the way that suits its class; errors carry a mask of the pairs."""
+    """Totals by an island model, in the way that suits its class; errors carry a mask of the pairs.
+
+    `workers` threads share the compiled pass.
+    """
     return sum_islands(pairs, reading, model, SUM_SHARE * rtol, outside, which)
 
 
 @totals_of.register
 def _(
-    model: UniversalModel, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", which: int = BOTH
+    model: UniversalModel,
+    pairs: Pairs,
+    reading: Reading,
+    rtol: float,
+    outside: str = "raise",
+    which: int = BOTH,
+    workers: int = 1,
 ) -> Totals:
     status = np.empty(pairs.compression.size, dtype=np.int64)
     out = np.empty((pairs.compression.size, 3))
@@ -140,7 +149,7 @@ def _(
             model.kernel, status[block], out[block],
         )  # fmt: skip
 
-    islands = sum(in_blocks(fill, status.size, BLOCK))
+    islands = sum(in_blocks(fill, status.size, BLOCK, workers))
     missing = _uncovered(status, pairs, model, outside)
     if missing.size and outside == "exact":
         try:
@@ -156,7 +165,7 @@ def _(
 
 @functools.singledispatch
 def slopes_of(
-    model: Any, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise"
+    model: Any, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", workers: int = 1
 ) -> tuple[FloatArray, FloatArray, int]:
     """Totals with their derivatives (pairs, 2, columns of `sensitivity`), the bound on their error, islands."""
     raise InputError(f"derivatives come from tier 'universal', {model.name!r} has none")
@@ -164,7 +173,7 @@ def slopes_of(
 
 @slopes_of.register
 def _(
-    model: UniversalModel, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise"
+    model: UniversalModel, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", workers: int = 1
 ) -> tuple[FloatArray, FloatArray, int]:
     from mbma_tables.totals import sensitivity
 
@@ -180,7 +189,7 @@ def _(
             model.kernel, status[block], out[block], bound[block],
         )  # fmt: skip
 
-    islands = sum(in_blocks(fill, count, SLOPES_BLOCK))
+    islands = sum(in_blocks(fill, count, SLOPES_BLOCK, workers))
     out[_uncovered(status, pairs, model, outside)] = np.nan
     return out, bound, islands
 
