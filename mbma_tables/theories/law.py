@@ -17,6 +17,7 @@ from mbma_tables.arguments import FloatArray, checked_hardness, hinted, number_i
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import AnyModel, get_model
 from mbma_tables.models.protocol import MAX_RTOL, MIN_RTOL
+from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading
@@ -207,7 +208,8 @@ def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float
     layer = h_rms * float(surface.zeta_1) ** -float(surface.hurst)
     try:
         made: Any = profile
-        kept = made(float(surface.hurst), float(surface.zeta_1), peak, 2 * peak, model, reading, rtol)
+        table = isinstance(model, UniversalModel)
+        kept = made(float(surface.hurst), float(surface.zeta_1), peak, 2 * peak, model, reading, rtol, table)
     except ConvergenceError:
         # a model that is rough between its nodes: gap by gap, where errors are relative to the whole sum
         one = surface

@@ -20,7 +20,7 @@ from mbma_tables.errors import InputError, MbmaError
 from mbma_tables.plots import Curve, draw_compression, force_label, theory_label
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import law_kernel as kernel
-from mbma_tables.theories.law_kernel import AREA, FORCE, force_at
+from mbma_tables.theories.law_kernel import AREA, FORCE
 from mbma_tables.theories.result import MEANINGS
 from mbma_tables.units import UNKNOWN, Units, unit_of
 
@@ -120,6 +120,12 @@ class ContactLaw(Displayed):
     surface: AnySurface | None = None
 
     @functools.cached_property
+    def _force_at(self) -> Any:
+        """numba's own object: a call through another would take as long again."""
+        compiled: Any = kernel.force_at
+        return compiled.dispatcher
+
+    @functools.cached_property
     def _address(self) -> int:
         return int(self.block.ctypes.data)
 
@@ -182,7 +188,7 @@ class ContactLaw(Displayed):
     def force(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
         """F/A0 in the unit of E_star at d; where contact ends at h_max, zero from there on."""
         if type(separation) is float and u is None:
-            value: np.float64 = force_at(self._address, separation)
+            value: np.float64 = self._force_at(self._address, separation)
             # NaN: refused below
             if value == value:
                 return value

@@ -32,7 +32,7 @@ from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.island_sum import QUADRATURE_SHARE, slopes_of, totals_of
 from mbma_tables.totals.kernel import Pairs
 from mbma_tables.totals.measured import measured_totals
-from mbma_tables.totals.profile import Profile, profile
+from mbma_tables.totals.profile import FEW, Profile, profile
 from mbma_tables.totals.sensitivity import BY_COMPRESSION
 
 # surfaces whose islands are kept as a profile, in numpy; of more, those with so many gaps each that it costs less
@@ -171,7 +171,8 @@ def _by_profiles(
         hurst, zeta_1, peak = (float(field[places[0]]) for field in (pairs.hurst, pairs.zeta_1, pairs.peak))
         try:
             # over the whole compression, so that a gap's bits do not depend on the others
-            kept = profile(hurst, zeta_1, peak, 2 * peak, model, reading, QUADRATURE_SHARE * rtol)
+            share = QUADRATURE_SHARE * rtol
+            kept = profile(hurst, zeta_1, peak, 2 * peak, model, reading, share, number.size > FEW)
         except (ConvergenceError, OutOfRangeError):
             failed.append(places)
             continue

@@ -219,6 +219,35 @@ def fill_nodes(interval: Interval, gap: Gap, surface: SurfaceConstants, out: Flo
     return nodes.size
 
 
+@njit(cache=True, fastmath=REORDER, error_model="numpy", nogil=True)
+def fill_fields(
+    x: FloatArray,
+    peak: float,
+    hurst: float,
+    zeta_1: float,
+    reading: ReadingNumbers,
+    printed: bool,
+    table: Table,
+    out: FloatArray,
+) -> tuple[int, float]:
+    """What `profile` keeps of islands at approaches: weights of force and area, shift and rate of heights, as rows.
+
+    Returns the status of the worst, and the largest error.
+    """
+    surface = surface_constants(hurst, zeta_1, reading, printed, zeta_1)
+    rms_over_s, worst, largest = surface.rms_over_s, OK, 0.0
+    for k in range(x.size):
+        floor_d = x[k] >= surface.kink_d
+        node = island_node(x[k], floor_d, x[k] > surface.kink_u, surface)
+        status, phi_F, phi_A, error = universal_phi(node.X, node.mu, table)
+        worst, largest = max(worst, status), max(largest, error)
+        each = (1.0 if floor_d else surface.jacobian) * rms_over_s * node.D_d / (ROOT_TWO_PI * node.sigma_d)
+        out[0, k], out[1, k] = node.force * phi_F * each, node.area * phi_A * each
+        out[2, k] = ((peak + x[k]) * rms_over_s - node.h_d) / node.sigma_d
+        out[3, k] = rms_over_s / node.sigma_d
+    return worst, largest
+
+
 @njit(cache=True, fastmath=REORDER, error_model="numpy")
 def _rule(
     which: int,

@@ -20,6 +20,7 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.models import answer_islands
+from mbma_tables.models.universal_kernel import OK, REASONS
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.totals import kernel
 from mbma_tables.totals.island import scale_area, scale_force
@@ -71,19 +72,22 @@ class Profile:
         Bound on the relative error of totals, of panels and islands together.
     islands : int
         Islands answered for it.
+    compiled : bool
+        Whether gaps are summed by compiled code; derivatives are always summed in numpy.
     """
 
     edges: FloatArray
     series: FloatArray
     error: float
     islands: int
+    compiled: bool
 
     def totals(self, compression: FloatArray, slopes: bool = False) -> FloatArray:
         """F/(A0 E* q0 s) and the sum of areas over A0 at (h_max - d)/h_rms > 0 within the profile, shape (2, gaps).
 
-        With their derivatives by the compression it is (4, gaps). `FEW` gaps, and derivatives, are summed in numpy.
+        With their derivatives by the compression it is (4, gaps).
         """
-        if slopes or compression.size <= FEW:
+        if slopes or not self.compiled:
             parts = [self._sums(compression[k : k + FEW]) for k in range(0, compression.size, FEW)]
             return np.concatenate(parts, axis=1)[: 4 if slopes else 2]
         order = np.argsort(compression, kind="stable")
@@ -175,11 +179,19 @@ class Profile:
 
 @functools.lru_cache(maxsize=KEPT)
 def profile(
-    hurst: float, zeta_1: float, peak: float, last: float, model: Any, reading: Reading, rtol: float
+    hurst: float,
+    zeta_1: float,
+    peak: float,
+    last: float,
+    model: Any,
+    reading: Reading,
+    rtol: float,
+    compiled: bool = False,
 ) -> Profile:
     """The profile of one surface with h_max/h_rms = `peak` up to compressions of `last` h_rms.
 
-    It is made to `rtol`, and the model's own error.
+    It is made to `rtol`, and the model's own error. `compiled` asks a universal table in one pass, for who compiles
+    anyway.
 
     Raises
     ------
@@ -194,6 +206,14 @@ def profile(
         nodes = _rules()[0]
         x = low[:, None] + (high - low)[:, None] * nodes
         flat = x.ravel()
+        if compiled:
+            found = np.empty((4, flat.size))
+            printed = reading.jacobian == "printed"
+            status, error = kernel.fill_fields(flat, peak, hurst, zeta_1, reading.numbers, printed, model.kernel, found)
+            if status != OK:
+                raise OutOfRangeError(f"islands of this surface lie outside the {model.name} table: {REASONS[status]}")
+            worst, islands = max(worst, error), islands + flat.size
+            return found.reshape(4, *x.shape)
         g = geometry(flat, np.full(flat.size, hurst), np.full(flat.size, zeta_1), reading)
         try:
             phi = answer_islands(model, g | {"hurst": np.full(flat.size, hurst)})
@@ -233,7 +253,7 @@ def profile(
     ordered = np.concatenate([part[2] for part in kept], axis=1)[:, order]
     _without_powers(ordered, high[order[0]] * _rules()[0], 0)
     series = np.einsum("kj,fpj->pfk", _rules()[4], ordered)
-    return Profile(np.append(low[order], last), np.ascontiguousarray(series), error + worst, islands)
+    return Profile(np.append(low[order], last), np.ascontiguousarray(series), error + worst, islands, compiled)
 
 
 def _first_edges(layer: float, last: float, at_d: float, at_u: float) -> FloatArray:
