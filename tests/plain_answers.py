@@ -115,8 +115,8 @@ def statuses():
     from mbma_tables.totals import intervals, kernel, sensitivity
 
     table = universal_model().kernel
-    surface = kernel.surface_constants(0.8, 200.0, REPORTED.numbers, True, 200.0)
-    near = sensitivity.neighbours(0.8, 200.0, REPORTED.numbers, True)
+    surface = kernel.surface_constants(0.8, 200.0, REPORTED.numbers, True)
+    near = sensitivity.both_changes(200.0, surface, REPORTED.numbers, True)
     # the deepest island is just outside, the last node of the quadrature inside
     outside = (1 + 1e-9) * table.X_high
     last = brentq(lambda x: kernel.island_node(x, True, True, surface).X - outside, 2.0, 100.0)

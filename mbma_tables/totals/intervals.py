@@ -19,7 +19,7 @@ from mbma_tables.models.universal_kernel import OK, UNRESOLVED
 from mbma_tables.totals.gauss_kronrod import GAUSS_21, GAUSS_31, KRONROD_21, KRONROD_31, NODES_21, NODES_31
 
 MAX_INTERVALS = 200
-WORK = 4  # rows of numbers at the nodes of a rule
+WORK = 13  # rows of numbers at the nodes of a rule
 STRETCH = 8.0  # the map's scale in boundary layers zeta_1^(-H): fewest nodes over random surfaces
 NARROW = 2.5  # in h_rms: above the floor of zeta_d, the smaller rule resolves a Gaussian this wide to 1e-8
 SAFETY = 4.0  # a Kronrod sum errs by at most 3 (difference to Gauss)^1.5, seen over random surfaces: 4^1.5 = 8

@@ -115,21 +115,15 @@ def jacobian_below(rms_over_s: Any, beta: float, printed: bool, offset: bool) ->
 
 
 @njit(cache=True, error_model="numpy")
-def surface_constants(
-    hurst: float, zeta_1: float, reading: ReadingNumbers, printed: bool, zeta_eta: float
-) -> SurfaceConstants:
-    """The constants of a surface; `printed` is of the reading's Jacobian.
-
-    At the floor of zeta_u, eta rises with the root of b of a surface with `zeta_eta`: another number than zeta_1 is
-    for derivatives, which take that root apart.
-    """
+def surface_constants(hurst: float, zeta_1: float, reading: ReadingNumbers, printed: bool) -> SurfaceConstants:
+    """The constants of a surface; `printed` is of the reading's Jacobian."""
     phi = reading.phi
     log_zeta_1 = math.log(zeta_1)
     rms_over_s = math.sqrt(-math.expm1(-2.0 * hurst * log_zeta_1))
     slope_d = 4.0 / 3.0 * reading.beta
     slope_u = phi / (1.0 + phi) * rms_over_s
     root_floor_d = math.sqrt(floor_offset(hurst, zeta_1, reading.floor_d))
-    root_floor_u = math.sqrt(floor_offset(hurst, zeta_eta, reading.floor_u))
+    root_floor_u = math.sqrt(floor_offset(hurst, zeta_1, reading.floor_u))
     D_top = summit_rate(hurst, 0.0, log_zeta_1) / reading.density_divisor
     R_top = RADIUS / math.sqrt(m4_of(hurst, 0.0, log_zeta_1))
     return SurfaceConstants(
@@ -198,8 +192,9 @@ def island_node(x: float, floor_d: bool, floor_u: bool, surface: SurfaceConstant
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy")
 def fill_nodes(interval: Interval, gap: Gap, surface: SurfaceConstants, out: FloatArray) -> int:
-    """X, mu, and what force and area add per Phi_F and Phi_A, at the nodes of an interval; how many there are.
+    """X, mu, what force and area add per Phi_F and Phi_A, and how both rise with the compression, as rows.
 
+    Of the nodes of an interval, whose number is returned.
     A loop that vectorises: no branch, no call.
     """
     low, high, floor_d, floor_u = interval
@@ -216,6 +211,7 @@ def fill_nodes(interval: Interval, gap: Gap, surface: SurfaceConstants, out: Flo
         weight *= exp(share) if share > LEAST else 0.0
         out[0, k], out[1, k] = node.X, node.mu
         out[2, k], out[3, k] = node.force * weight, node.area * weight
+        out[4, k] = height * rms_over_s / node.sigma_d
     return nodes.size
 
 
@@ -234,7 +230,7 @@ def fill_fields(
 
     Returns the status of the worst, and the largest error.
     """
-    surface = surface_constants(hurst, zeta_1, reading, printed, zeta_1)
+    surface = surface_constants(hurst, zeta_1, reading, printed)
     rms_over_s, worst, largest = surface.rms_over_s, OK, 0.0
     for k in range(x.size):
         floor_d = x[k] >= surface.kink_d
@@ -315,10 +311,10 @@ def fill_totals(
     # a plain tuple, which a call from Python passes on faster
     pairs = Pairs(*given)
     hurst, zeta_1 = pairs.hurst, pairs.zeta_1
-    surface = surface_constants(hurst[0], zeta_1[0], reading, printed, zeta_1[0])
+    surface = surface_constants(hurst[0], zeta_1[0], reading, printed)
     for k in range(hurst.size):
         if k > 0 and (hurst[k] != hurst[k - 1] or zeta_1[k] != zeta_1[k - 1]):
-            surface = surface_constants(hurst[k], zeta_1[k], reading, printed, zeta_1[k])
+            surface = surface_constants(hurst[k], zeta_1[k], reading, printed)
         gap = Gap(pairs.compression[k], pairs.peak[k])
         status[k], out[k, 0], out[k, 1], out[k, 2], count = total(which, gap, rtol, surface, table)
         islands += count

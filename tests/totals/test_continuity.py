@@ -145,7 +145,7 @@ def test_totals_do_not_depend_on_the_map(stretch, monkeypatch, record_property):
     compiled = totals_of(numbers, rtol=1e-9)
     for k in range(count):
         surface = Surface(*(numbers[name][k] for name in INPUTS[:-1]))
-        constants = lookup.surface_constants(surface.hurst, surface.zeta_1, REPORTED.numbers, True, surface.zeta_1)
+        constants = lookup.surface_constants(surface.hurst, surface.zeta_1, REPORTED.numbers, True)
         moved = constants._replace(map_scale=constants.map_scale * stretch / STRETCH)
         gap = Gap((surface.h_max - numbers["separation"][k]) / surface.h_rms, surface.h_max / surface.h_rms)
         status, force, area, error, _ = lookup.total(BOTH, gap, 1e-9, moved, universal_model().kernel)

@@ -51,7 +51,7 @@ def test_islands_are_those_of_geometry(reading):
                 x[k],
                 x[k] > at_d[k],
                 x[k] > at_u[k],
-                lookup.surface_constants(hurst[k], zeta_1[k], reading.numbers, True, zeta_1[k]),
+                lookup.surface_constants(hurst[k], zeta_1[k], reading.numbers, True),
             )
             for k in range(x.size)
         ]
@@ -65,7 +65,7 @@ def test_islands_are_those_of_geometry(reading):
 
 def totals(compression, rtol=1e-9, jacobian=5 / 9):
     """`kernel.total` of one surface."""
-    surface = lookup.surface_constants(0.8, 216.0, REPORTED.numbers, True, 216.0)._replace(jacobian=jacobian)
+    surface = lookup.surface_constants(0.8, 216.0, REPORTED.numbers, True)._replace(jacobian=jacobian)
     return lookup.total(BOTH, intervals.Gap(compression, 3.0), rtol, surface, universal_model().kernel)
 
 
