@@ -9,11 +9,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.ndimage import label
 from scipy.sparse import coo_array, diags_array
 from scipy.sparse.linalg import splu
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.arguments import FloatArray, finite_array, require
+from mbma_tables.errors import InputError
 
 
 def open_ways(gap: FloatArray) -> tuple[np.ndarray, tuple[bool, bool]]:
@@ -50,7 +52,7 @@ def open_ways(gap: FloatArray) -> tuple[np.ndarray, tuple[bool, bool]]:
     return component[labels], (bool(along[0]), bool(along[1]))
 
 
-def flow_conductance(gap: FloatArray, sizes: tuple[float, float] = (1.0, 1.0)) -> FloatArray:
+def flow_conductance(gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0)) -> FloatArray:
     """K [length^3] of flow per width K dp/(12 viscosity length) along both axes of a periodic cell; 0 where blocked.
 
     Parameters
@@ -59,7 +61,29 @@ def flow_conductance(gap: FloatArray, sizes: tuple[float, float] = (1.0, 1.0)) -
         Gaps [length], zero in contact.
     sizes : pair of float
         Sides of the cell.
+
+    Returns
+    -------
+    ndarray, shape (2,)
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        For gaps that are negative, not finite, or on no grid.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mbma_tables.reynolds import flow_conductance
+    >>> gap = np.full((8, 8), 2.0)
+    >>> gap[:, 3] = 0.0  # a ridge in contact, along the first axis
+    >>> flow_conductance(gap).round(3).tolist()
+    [7.0, 0.0]
     """
+    gap = finite_array("gap", gap)
+    if gap.ndim != 2:
+        raise InputError(f"gap must be a grid, got shape {gap.shape}")
+    require("gap", gap, gap >= 0, "at least 0")
     owner, along = open_ways(gap)
     if not any(along):
         return np.zeros(2)

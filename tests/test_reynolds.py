@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.reynolds import flow_conductance, open_ways
 
 POINTS = 96
@@ -76,3 +77,9 @@ def test_another_solver():
             kept, _, flux = transport.solve_fluid_problem(values, "scipy-spsolve", boundary_mode="periodic")
             theirs, _ = transport.compute_total_flux(kept, flux, 64, "periodic")
             assert flow_conductance(gap)[axis] == pytest.approx(theirs, rel=1e-6)
+
+
+@pytest.mark.parametrize("gap", [np.ones(4), np.full((4, 4), -1.0), np.full((4, 4), np.nan)])
+def test_no_gaps(gap):
+    with pytest.raises((InputError, OutOfRangeError), match="gap"):
+        flow_conductance(gap)

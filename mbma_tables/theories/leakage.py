@@ -147,8 +147,8 @@ class Leakage(Displayed):
         >>> from mbma_tables import Surface, contact
         >>> seal = Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5, unit="um")
         >>> found = contact(seal, area=0.1, E_star="10 MPa", theory="calibrated").leakage
-        >>> f"{found.liquid('1e-3 Pa s', '0.1 MPa', '2 mm'):.3g} um^2/s"
-        '296 um^2/s'
+        >>> f"{found.liquid('1e-3 Pa s', '0.1 MPa', '2 mm'):.1e} um^2/s"
+        '3.0e+02 um^2/s'
         """
         eta, drop, length = self._positive(viscosity=viscosity, pressure_drop=pressure_drop, width=width)
         broadcast_shape(k=self.k, viscosity=eta, pressure_drop=drop, width=length)
