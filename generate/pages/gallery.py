@@ -32,7 +32,7 @@ ROWS = f"{FOLDER}/boundary_elements.csv"
 LAWS = ("mbma", "calibrated", "persson")
 COLUMNS = ("force", "area", "mean_separation", "energy")
 SHOWN = (0.002, 0.01, 0.1, 0.3, 0.6)  # contact
-GAPS = np.append(np.geomspace(1e-3, 0.1, 60)[:-1], np.linspace(0.1, 0.995, 300))  # u/h_max
+GAPS = np.append(np.geomspace(1e-6, 0.1, 90)[:-1], np.linspace(0.1, 0.995, 300))  # u/h_max
 
 
 @dataclasses.dataclass(frozen=True)

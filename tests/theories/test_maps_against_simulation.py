@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from generate.pages.gallery import BARS, REFINED, read_rows
+from generate.pages import maps
+from generate.pages.gallery import BARS, REFINED, ratios, read_rows
 from mbma_tables import Surface, contact
-from mbma_tables.theories import BoundaryElements
+from mbma_tables.theories import BoundaryElements, Calibrated
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -89,6 +90,20 @@ def test_they_are_answered_without_options(example):
         assert found.force > 0
         assert found.area > 0
     assert any("area is a matter of resolution" in entry.get("told", "") for entry in surface.provenance)
+
+
+@pytest.mark.slow
+def test_held_out_maps_that_are_stretched_or_not_gaussian():
+    seen = set()
+    for name, surface, rows in maps.simulated():
+        force, area, u = rows[:, (rows[1] >= 0.01) & (rows[1] <= 0.97)]
+        by_force, by_gap = ratios(Calibrated(), surface, force, area, u)
+        assert np.abs(by_force - 1).max() < 0.12, name
+        if name.startswith("stretched"):
+            assert np.abs(by_gap - 1).max() < 0.15, name
+        assert contact(surface, mean_separation=u, theory="calibrated").valid.all()
+        seen.add(name)
+    assert len(seen) >= 18
 
 
 POINTS, STEP = 256, 50.0
