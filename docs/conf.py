@@ -5,7 +5,11 @@ from mbma_tables import __version__
 project = "mbma_tables"
 author = "mbma_tables contributors"
 release = __version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "numpydoc"]
+# pages of `tutorials` are notebooks: run anew at each build, a fault ends it
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 numpydoc_show_class_members = False
