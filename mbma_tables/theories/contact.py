@@ -135,7 +135,7 @@ def contact(
     '0.295%'
     >>> joint = contact(surface, pressure=10.0, E_star=100e3, theory="calibrated", hardness=1500.0)
     >>> f"psi = {joint.psi:.1f}, {joint.yielded:.0%} of {joint.area:.3%} yields"
-    'psi = 3.6, 87% of 0.702% yields'
+    'psi = 3.6, 87% of 0.701% yields'
     >>> joint = contact(Surface.named("challenge").to("mm"), pressure="100 kPa", E_star="25 MPa")
     >>> f"{joint.mean_separation:.3e} {joint.units['separation']}, {joint.stiffness:.1f} {joint.units['stiffness']}"
     '1.642e-03 mm, 471.9 MPa/mm'

@@ -8,6 +8,7 @@ from generate.boundary_elements.measured_maps import LARGEST, measured_maps, mid
 from generate.pages import distances
 from mbma_tables import Surface, contact
 from mbma_tables.surfaces.maps import prepared
+from mbma_tables.surfaces.measured import MeasuredSurface
 
 
 def test_the_middle_of_a_map_is_kept():
@@ -36,4 +37,4 @@ def test_a_file_of_heights_becomes_a_case(tmp_path, monkeypatch):
     force = one.force[one.area > 0.02] * surface.bearing.gradient
     mine = distances.THEORIES["calibrated, map"](one).area(one.force[one.area > 0.02])
     assert mine == pytest.approx(contact(surface, pressure=force, theory="calibrated").area, rel=0.02)
-    assert isinstance(distances.surface_of(one), Surface)
+    assert isinstance(distances.surface_of(one), MeasuredSurface)  # no self-affine surface stands in for it
