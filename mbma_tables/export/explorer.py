@@ -124,16 +124,14 @@ def _model(texts: dict[str, str], values: dict[str, FloatArray]) -> dict[str, An
 def _limits() -> dict[str, Any]:
     """What theories were tested for, in the words of `Contact.reasons`, and their scatter."""
     table = calibrated_table.shipped()
-    rows = {name: np.where(np.isfinite(table.scatter[name]), table.scatter[name], 0.0) for name in THEORIES}
-    known = {name: np.isfinite(table.scatter[name]) for name in THEORIES}
     return {
         "log_area": table.log_area.tolist(),
         "scatter": {
             name: {
-                quantity: [float(x) if ok else None for x, ok in zip(rows[name][k], known[name][k], strict=True)]
-                for k, quantity in enumerate(calibrated_table.QUANTITIES)
+                quantity: [float(x) if np.isfinite(x) else None for x in row]
+                for quantity, row in zip(calibrated_table.QUANTITIES, rows, strict=True)
             }
-            for name in THEORIES
+            for name, rows in table.scatter.items()
         },
         "gradient": result.MAX_GRADIENT,
         "mbma_area": mbma.MAX_AREA,

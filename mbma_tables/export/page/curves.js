@@ -98,12 +98,12 @@ function cubic(p, q, y) {
 
 // Standard deviations of logarithms, as `Contact.scatter`: by contact fraction, null where not known.
 function scatterOf(state, curve) {
-  const rows = LIMITS.scatter[curve.theory],
-    nodes = LIMITS.log_area,
-    known = !(curve.theory === "mbma" && state.reading !== "reported");
+  const other = curve.theory === "mbma" && state.reading !== "reported",
+    rows = LIMITS.scatter[other ? `mbma_${state.reading}` : curve.theory],
+    nodes = LIMITS.log_area;
   const at = (quantity) => (area) => {
     const row = rows[quantity].map((value, k) => [nodes[k], value]).filter(([, value]) => value !== null);
-    if (!known || area === null || !row.length) return null;
+    if (area === null || !row.length) return null;
     const x = Math.log(area),
       above = row.findIndex(([node]) => node >= x);
     if (above < 0) return rows[quantity].at(-1) === null ? null : Math.exp(row.at(-1)[1]);
