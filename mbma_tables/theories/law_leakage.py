@@ -21,7 +21,7 @@ from mbma_tables.theories.leakage_table import shipped_flow
 if TYPE_CHECKING:
     from mbma_tables.theories.law_object import ContactLaw
 
-RTOL = 1e-4  # of the polynomials
+RTOL, SHARE = 1e-4, 0.1  # of the polynomials, or this share of the law's own error
 MOST_OCTAVES = 20  # of gaps, from the blocked one on, next to which the flow is a power
 
 
@@ -78,6 +78,7 @@ class LeakageLaw:
 def leakage_law(law: ContactLaw, surface: AnySurface) -> LeakageLaw:
     """Leakage of a contact law's surface, as polynomials of the gap that begin where contact percolates."""
     threshold, h_rms = shipped_flow().constants.threshold, float(surface.h_rms)
+    rtol = max(RTOL, SHARE * law.error)
     deepest = law.lowest if law.area_turning_point is None else law.area_turning_point
     blocked = bool(law.area(deepest) >= threshold)
     bottom = float(law.separation(area=threshold)) if blocked else deepest
@@ -97,12 +98,12 @@ def leakage_law(law: ContactLaw, surface: AnySurface) -> LeakageLaw:
             # gaps close as u under full compression
             powers = (3.0, 1.0) if bottom == -law.h_max else (0.0, 0.0)
             record, record_error = power_record(values, start, powers)
-        if record_error[0] <= RTOL:
+        if record_error[0] <= rtol:
             break
     head = law.block
     kinks = [(head[at] * head[at + 1] - bottom) / span for at in (KINK_SIGN, KINK_SIGN_2) if head[at]]
     side = Side(1, start, values, tuple(sorted(kink for kink in kinks if start < kink < 1)))
-    made = assemble(-bottom, 1 / span, [side], [side_pieces(side, RTOL)], record, record_error)
+    made = assemble(-bottom, 1 / span, [side], [side_pieces(side, rtol)], record, record_error)
     made.head[[POWER_F, POWER_A]] = powers
     made.head[[LOWEST, HIGHEST]] = law.block[LOWEST], top
     made.head.view(np.int64)[ENDS] = blocked

@@ -64,7 +64,7 @@ def _plain(given: Any) -> bool:
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ContactLaw(Displayed):
-    """Force and area of one surface against its gap; made by `contact_law`, picklable, tens of kB.
+    """Force and area of one surface against its gap; made by `contact_law`, picklable, tens of kB with its surface.
 
     Every method takes the separation d, or the mean separation ``u=`` instead: numbers in the law's unit of length, or
     texts with their own, "0.8 um".

@@ -196,6 +196,17 @@ class TestLaw:
         k = law.leakage(-9.0 + np.array([1e-9, 1e-6]))
         assert k[1] / k[0] == pytest.approx(1e9, rel=1e-4)
 
+    def test_of_a_map(self):
+        noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((128, 128)))
+        k = np.hypot(np.fft.fftfreq(128)[:, None], np.fft.rfftfreq(128))
+        heights = np.fft.irfft2(np.where((k > 0.03) & (k < 0.25), noise * np.maximum(k, 0.01) ** -1.8, 0))
+        surface = Surface.from_map(heights, dx=1.0, periodic=True)
+        law = contact_law(surface, theory="calibrated")
+        d = np.linspace(law.leakage.blocked_at + 0.05 * surface.h_rms, 0.99 * surface.h_max, 50)
+        expected = contact(surface, d, theory="calibrated").leakage.conductance
+        np.testing.assert_allclose(law.leakage(d), expected, rtol=law.leakage.error)
+        assert law.leakage.error < 0.2 * law.error
+
     def test_one_of_three(self):
         law = contact_law(SEAL, theory="calibrated")
         for gaps in ({}, {"u": 1.0, "pressure": 1e-3}):
