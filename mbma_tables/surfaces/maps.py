@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from mbma_tables import bearing
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError, NotSelfAffineError
-from mbma_tables.surfaces.heights import Heights
+from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.measurements import grid_of, read_measurement
 from mbma_tables.surfaces.power_law import SCATTER, log_bins
 from mbma_tables.surfaces.power_laws import PowerLaws
-from mbma_tables.surfaces.psd import FittedSurface, check_band, check_height, fit_spectrum
+from mbma_tables.surfaces.psd import FittedSurface, check_band, fit_spectrum
 from mbma_tables.surfaces.treatment import LENGTHS, Treated, Treatment, treat
 from mbma_tables.units import Units, known, resolve
 
@@ -113,7 +113,7 @@ def prepared(
 
 def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | None) -> FittedSurface:
     """The self-affine surface fitted to a height map; see `Surface.from_map`."""
-    top = None if h_max is None else check_height(h_max)
+    top = None if h_max is None else one_height(h_max)
     _refuse_edges(treated.heights)
     # heights of order one, so that their squares neither underflow nor overflow
     scale = float(np.abs(treated.heights).max())
@@ -187,7 +187,7 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
     known = MeasuredSurface(
         bins.q,
         C_bins,
-        None if h_max is None else check_height(h_max) / scale,
+        None if h_max is None else one_height(h_max) / scale,
         own,
         curves,
         bearing.radial_spectrum(values, sizes),

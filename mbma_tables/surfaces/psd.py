@@ -12,6 +12,8 @@ from scipy.special import beta
 
 from mbma_tables.arguments import FloatArray, finite_array, require
 from mbma_tables.errors import InputError, NotSelfAffineError
+from mbma_tables.surfaces.heights import one_height
+from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH
 from mbma_tables.surfaces.power_law import (
     HURST_TOLERANCE,
     MIN_PIECE,
@@ -26,7 +28,6 @@ from mbma_tables.surfaces.power_law import (
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 
 CONVENTIONS = ("paper", "isotropic", "profile")
-MIN_LENGTH, MAX_LENGTH = 1e-30, 1e30  # lengths in their unit: fourth powers of them, which C has, keep their digits
 MAX_RESIDUAL = 0.2  # of log10 C, a factor 1.6: beyond it the law says little about any one scale
 MAX_HURST_ERROR = 0.1  # the model's answers at H and H +- 0.1 differ by tens of percent
 MAX_EXCESS = 10.0  # C over the law in a single bin; chance gives this less than once in 1e4
@@ -117,15 +118,6 @@ def check_band(band: Any, low: float, high: float) -> tuple[float, float] | None
     return float(pair[0]), float(pair[1])
 
 
-def check_height(h_max: Any) -> float:
-    """h_max as one positive number."""
-    height = finite_array("h_max", h_max)
-    if height.shape != ():
-        raise InputError(f"h_max must be one number, got shape {height.shape}")
-    require("h_max", height, height > 0, "positive")
-    return float(height)
-
-
 def fit_psd(
     q: ArrayLike, C: ArrayLike, h_max: float, convention: str, band: tuple[float, float] | None
 ) -> FittedSurface:
@@ -140,7 +132,7 @@ def fit_psd(
     """
     if convention not in CONVENTIONS:
         raise InputError(f"convention must be one of {', '.join(CONVENTIONS)}, got {convention!r}")
-    height = check_height(h_max)
+    height = one_height(h_max)
     wavenumber, spectrum = _positive_spectrum(q, C)
     if convention == "isotropic":
         spectrum = spectrum / (4 * math.pi**2)
