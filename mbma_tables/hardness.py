@@ -35,6 +35,8 @@ SHARPEST = 1e-200
 TERMS = 9  # of the series from there on
 LINEAR, LEAST = 8.3, 1e-300  # mean gaps from which u = d, and below which all heights lie above the level
 LOG_GAPS, NODES = (-12.0, math.log(8.3)), 16384  # of tabulated levels
+MOST_SHARE = 0.9  # of a map's heights up to which a node stands for its own
+DEPTH = 30.0  # of a map's valleys below the last node, in levels
 MIN_SPACING = 0.02  # relative, of mean gaps between nodes of a map's bearing curve
 CANCELS, FRACTION_TERMS = 3.0, 60
 NODE, WEIGHT = np.polynomial.legendre.leggauss(8)
@@ -63,9 +65,9 @@ class Constants:
     area_scale: float = 0.6301
     yield_power: float = 2.426
     yield_scale: float = 0.7138
-    force_light: float = 1.117
-    force_eta: float = 1.772
-    force_share: float = 0.4851
+    force_light: float = 1.119
+    force_eta: float = 1.767
+    force_share: float = 0.4736
     frozen: float = 0.3685
     frozen_eta: float = 0.2407
     plane_eta: float = 3.375
@@ -221,6 +223,19 @@ def _level(u: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _fill_levels(u: FloatArray, out: FloatArray) -> None:
+    for k in range(u.size):
+        out[k] = _level(u[k])
+
+
+def _levels_at(u: FloatArray) -> FloatArray:
+    """`_level` of an array."""
+    out = np.empty(u.size)
+    _fill_levels(u.ravel(), out)
+    return out.reshape(u.shape)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _fill_bearing(u: FloatArray, h_max: FloatArray, share: FloatArray, slope: FloatArray) -> None:
     last, end = -1.0, 0.0
     for k in range(u.size):
@@ -269,27 +284,27 @@ class BearingCurve:
         level = np.minimum.accumulate(np.diff(above) / np.diff(FRACTIONS))
         share = np.sqrt(FRACTIONS[1:] * FRACTIONS[:-1])
         gap = level * (1 - share) + np.interp(share, FRACTIONS, above)
-        # the highest shares are single points: nodes as close as theirs would make steps
+        # the smallest shares are single points: nodes as close as theirs would make steps; the last one ends at valleys
         kept, last = np.zeros(gap.size, bool), h_max
         for k, own in enumerate(gap):
-            if 0 < own < (1 - MIN_SPACING) * last:
+            if 0 < own < (1 - MIN_SPACING) * last and share[k] < MOST_SHARE:
                 kept[k], last = True, own
         self._top, self._lightest, self._h_max = float(gap[kept][0]), float(share[kept][0]), h_max
-        self._log_share = PchipInterpolator(
-            np.append(0.0, gap[kept][::-1]), np.append(0.0, np.log(share[kept][::-1])), extrapolate=False
-        )
-        self._rate = self._log_share.derivative()
+        # against Gaussian heights; valleys below the last node as deep as theirs
+        level, own = _levels_at(gap[kept][::-1]), -ndtri(share[kept][::-1])
+        self._deepest = float(level[0]) - DEPTH
+        self._level = PchipInterpolator(np.append(self._deepest, level), np.append(own[0] - DEPTH, own))
+        self._rate = self._level.derivative()
 
     def __call__(self, u: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Q and dQ/du at mean gaps [h_rms]; straight to zero at the highest point above the first share."""
         gap = np.asarray(u, float)
-        inside = np.clip(gap, 0.0, self._top)
-        share = np.exp(self._log_share(inside))
+        d = np.maximum(_levels_at(np.clip(gap, 0.0, self._top)), self._deepest)
+        own = self._level(d)
+        share, slope = ndtr(-own), -np.exp(-own * own / 2) / np.sqrt(2 * np.pi) * self._rate(d) / ndtr(d)
         steep = -self._lightest / (self._h_max - self._top)
         light, rest = gap > self._top, np.maximum(self._h_max - gap, 0.0)
-        return np.where(light, -steep * rest, share), np.where(
-            light, np.where(rest > 0, steep, 0.0), share * self._rate(inside)
-        )
+        return np.where(light, -steep * rest, share), np.where(light, np.where(rest > 0, steep, 0.0), slope)
 
 
 @njit(cache=True, error_model="numpy")
