@@ -53,12 +53,13 @@ LOOP = """
 #include <time.h>
 double law_loop(const double *c, int count, int times, double *sum) {
     clock_t start = clock();
+    double total = 0, tangent;
     for (int n = 0; n < times; ++n)
         for (int k = 0; k < count; ++k) {
-            double tangent;
-            *sum += law_with_tangent(c[k], &tangent);
-            *sum += tangent;
+            total += law_with_tangent(c[k], &tangent);
+            total += tangent;
         }
+    *sum = total;
     return 1e9 * (double)(clock() - start) / CLOCKS_PER_SEC / count / times;
 }
 """
@@ -95,8 +96,9 @@ def compiled() -> str:
             max(abs(getattr(library, f"law_{name}")(x) / y - 1) for x, y in zip(c, values, strict=True))
             for name, values in pairs.items()
         ]
-        address, total = c.ctypes.data_as(ctypes.c_void_p), ctypes.byref(ctypes.c_double())
-        time = min(library.law_loop(address, c.size, 100, total) for _ in range(5))
+        even = c[5000:].copy()
+        address, total = even.ctypes.data_as(ctypes.c_void_p), ctypes.byref(ctypes.c_double())
+        time = min(library.law_loop(address, even.size, 200, total) for _ in range(5))
         lines.append([theory, *(f"{found:.1e}" for found in differences), f"{time:.0f} ns"])
     return table(["theory", *pairs, "a value with its tangent"], lines)
 

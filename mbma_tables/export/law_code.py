@@ -16,7 +16,7 @@ from mbma_tables.surfaces.readings import Reading
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 MAX_NAME = 31  # letters, as Fortran and C99 read them
-SCALARS = ("h_max", "c_least", "c_turn", "c_most", "split", "scale", "power_p", "power_a")
+SCALARS = ("h_max", "c_least", "c_turn", "c_most", "scale", "power_p", "power_a")
 
 
 class Language(NamedTuple):
@@ -99,6 +99,7 @@ def law_text(
         "RECORDS": str(numbers.centre.size),
         "STEP": str(1 << (numbers.centre.size - 1).bit_length() - 1),
         "ENDS": str(int(numbers.ends)),
+        "SIDE": str(numbers.side),
         **dict.fromkeys(("CONDUCTANCE", "PROTOTYPE", "PUBLIC", "FLUX", "SUBROUTINE"), ""),
         **{scalar.upper(): language.number(getattr(numbers, scalar)) for scalar in SCALARS},
         **language.arrays(numbers),
@@ -159,6 +160,14 @@ def _lists(numbers: LawNumbers) -> dict[str, str]:
     return {
         **{name.upper(): f"[{wrapped(map(repr, getattr(numbers, name).tolist()))}]" for name in FLAT},
         **{place: f"[\n{_lines(rows, '[', '],')}\n]" for place, rows in (("P", numbers.force), ("A", numbers.area))},
+    }
+
+
+def _braces(numbers: LawNumbers) -> dict[str, str]:
+    """The same in braces, as Modelica has them."""
+    return {
+        place: text.replace("[", "{").replace("]", "}").replace(",\n}", "\n}")
+        for place, text in _lists(numbers).items()
     }
 
 
@@ -281,6 +290,19 @@ LANGUAGES = {
         _with_infinity("-Inf"),
         _matrices,
         {"CONDUCTANCE": "\n    kept.conductance = @(c) {ratio}*kept.tangent(c);"},
+    ),
+    "modelica-law": Language(
+        "law.mo",
+        "//",
+        "A Modelica package: p = {name}.pressure(c), with its derivative; where p is known a tool solves this for c. "
+        "Outside the range an assertion fails.",
+        "{name}.{what}({x})",
+        _with_infinity("-1e300"),
+        _braces,
+        {
+            "CONDUCTANCE": "\n  function conductance\n    input Real c;\n    output Real h;\n  algorithm\n"
+            "    h := {ratio}*tangent(c);\n  end conductance;\n"
+        },
     ),
     "abaqus-uinter": FORTRAN._replace(
         usage="*SURFACE INTERACTION, NAME=..., USER: abaqus job=... user={name}.f90. Place the bodies so that their "

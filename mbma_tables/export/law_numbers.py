@@ -1,7 +1,7 @@
 """A contact law as numbers for other languages: polynomials in order of rising overclosure, found by their edges.
 
-Record k, which holds where edges[k - 1] <= scale c < edges[k], is, with x = scale c up to c = split and x = scale
-(c - h_max) beyond it,
+Record k, which holds where edges[k - 1] <= scale c < edges[k], is, with x = scale c for the first
+`side` records and x = scale (c - h_max) for the rest,
 
     t = (x - centre) rate,   p = sum_j force[j] t^j,   A/A0 = sum_j area[j] t^j,   dp/dc = scale rate dp/dt,
     energy = energy_0 + t sum_j force[j] t^j/(j + 1)/(scale rate).
@@ -37,7 +37,9 @@ class LawNumbers:
         The law's range; inverses end at c_turn, where pressure turns down, or at c_most.
     ends : bool
         Whether contact ends at c = 0: pressure is zero below, and c_least is minus infinity.
-    split, scale : float
+    side : int
+        How many records count from first contact; the others count from full compression.
+    scale : float
     power_p, power_a : float
         Of pressure and area in the first record; zero where contact does not end.
     edges : ndarray, shape (records - 1,)
@@ -51,7 +53,7 @@ class LawNumbers:
     c_turn: float
     c_most: float
     ends: bool
-    split: float
+    side: int
     scale: float
     power_p: float
     power_a: float
@@ -75,7 +77,8 @@ def law_numbers(law: ContactLaw) -> LawNumbers:
     for sign in sides:
         x, records = _intervals(law, sign)
         if sign > 0:
-            x, records = (h_max * scale - x)[::-1], records[::-1]
+            # towards full compression an end belongs to the record of larger gaps, also where the sides meet
+            x, records = np.nextafter(h_max * scale - x[::-1], math.inf), records[::-1]
         edges.append(x[:-1] if edges else x[1:-1])
         numbers.append(records)
         signs.append(np.full(records.size, -sign))
@@ -87,7 +90,7 @@ def law_numbers(law: ContactLaw) -> LawNumbers:
         c_turn=(h_max - turn) / 2,
         c_most=(h_max - float(head[kernel.LOWEST])) / 2,
         ends=ends,
-        split=h_max / 2 if len(sides) > 1 else (2 * h_max if ends else -math.inf),
+        side=numbers[0].size if ends else 0,
         scale=scale,
         power_p=float(head[kernel.POWER_F]) if ends else 0.0,
         power_a=float(head[kernel.POWER_A]) if ends else 0.0,

@@ -49,8 +49,8 @@ class Points:
         assert np.abs((np.asarray(tangent) - self.tangent) / slope).max() <= max(TANGENTS, close)
 
     def pressures(self) -> np.ndarray:
-        """Pressures on the branch of first contact."""
-        return self.p[self.c < self.c_turn]
+        """Pressures on the branch of first contact, but where pieces meet: they do so within the law's error alone."""
+        return self.p[:POINTS][self.c[:POINTS] < self.c_turn]
 
     def assert_inverse(self, c: Any) -> None:
         """Overclosures at `pressures`: where the library has them, but for what pressure there leaves open."""
@@ -70,8 +70,10 @@ def points(name: str) -> Points:
     ends = math.isinf(law.highest)
     near = h - 2 * h * 10 ** rng.uniform(-12, -0.6, POINTS // 2)
     grid = 2.0**-30
+    # where pieces may meet, and beside
+    joints = h * np.array([0.5, 0.25, 0.125, 0.75, 0.375, 0.5 + 2.0**-30, 0.5 - 2.0**-30, 1 - 2.0**-9])
     rest = grid * np.floor(rng.uniform(law.lowest, h if ends else law.highest, POINTS // 2) / grid)
-    c = (h - np.concatenate([near, rest])) / 2
+    c = (h - np.concatenate([near, rest, h - 2 * joints])) / 2
     d = h - 2 * c
     assert ((h - d) / 2 == c).all()
     turn = law.lowest if law.turning_point is None else law.turning_point

@@ -377,3 +377,31 @@ def test_conductance_needs_a_conductivity(target: str) -> None:
         law_points.text("cobol-law", "mbma")
     with pytest.raises(InputError, match="a name must be a letter"):
         law_points.text("c-law", "mbma", name="1 x")
+
+
+MODELICA = """
+model Ask
+  Real c; Real p; Real k; Real a; Real e; Real h;
+equation
+  c = {begin} + {length}*time; p = road.pressure(c); k = road.tangent(c); a = road.area(c); e = road.energy(c);
+  h = road.conductance(c);
+end Ask;
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "begin", "length"), [("mbma", 0.001, 0.05), ("mbma", 0.1, 2.8), ("calibrated", 0.1, 2.8)]
+)
+def test_modelica(name: str, begin: float, length: float, tmp_path: pathlib.Path) -> None:
+    rumoca = pytest.importorskip("rumoca")
+    text = law_points.text("modelica-law", name, name="road", **HEAT)
+    (tmp_path / "ask.mo").write_text(text + MODELICA.format(begin=begin, length=length))
+    found = rumoca.Session().load(str(tmp_path / "ask.mo"), model="Ask").simulate(t=(0, 1), dt=0.02)
+    law = points(name).law
+    known = law.values(law.h_max - 2 * np.asarray(found["c"]))
+    slope = 2 * known.stiffness
+    pairs = {"p": known.force, "k": slope, "a": known.area, "e": known.energy / 2, "h": CONDUCTIVITY / 13.3 * slope}
+    for quantity, values in pairs.items():
+        np.testing.assert_allclose(found[quantity], values, rtol=1e-9, err_msg=quantity)
+    assert len(found["c"]) == 51
