@@ -6,6 +6,7 @@ import ctypes
 import pathlib
 import subprocess
 import tempfile
+from typing import Any
 
 import numpy as np
 
@@ -38,7 +39,7 @@ def errors() -> str:
 
 def sizes() -> str:
     """Characters of laws as code, in thousands."""
-    heat = {"conductivity": 1.0, "conductivity_unit": "W/(m K)", "stress_unit": "MPa"}
+    heat: dict[str, Any] = {"conductivity": 1.0, "conductivity_unit": "W/(m K)", "stress_unit": "MPa"}
     texts = {
         (target, theory): len(law_text(target, Surface.named(NAMES[0]), E_STAR, theory=theory, **heat))
         for target in LAWS
