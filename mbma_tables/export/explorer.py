@@ -41,7 +41,7 @@ FUNCTIONS = (
 )
 SCRIPTS = ("model.js", "state.js", "curves.js", "downloads.js", "charts.js", "main.js")
 SWITCHES = ("OFFSET", "SUMMITS", "PRINTED_JACOBIAN")  # whole numbers that depend on the reading
-MIN_FILLED = 1000  # numbers from which an array is a table, which the page fills in
+FEW = 1000  # numbers up to which they stay doubles
 FRACTION_BITS, ORDER = 43, 3  # of packed tables: steps of 1e-13; times that differences are taken
 MAX_EXACT, MAX_WHOLE = 2**53, 2.0**16  # of whole numbers in the page, and of numbers before they are scaled
 MAP_NOTE = (
@@ -71,7 +71,7 @@ def c_sources() -> tuple[dict[str, str], dict[str, FloatArray]]:
             name: np.asarray(value, float)
             for name, value in constants.items()
             if name not in fixed and (isinstance(value, float) or name in SWITCHES)
-        } | {name: array for name, array in arrays.items() if array.size >= MIN_FILLED}
+        } | arrays
         texts[f"mbma_{what.lower()}.h"] = c_code.numbers_text(constants, arrays, tuple(own), what)
         values |= own
     return texts, values
@@ -91,17 +91,18 @@ def digest_of(texts: dict[str, str]) -> bytes:
 
 def packed(values: FloatArray) -> dict[str, Any]:
     """Numbers as text: whole multiples of 2^-43, differenced, zigzag, by planes of bytes, deflated; or doubles."""
-    flat = np.ravel(values)
+    flat = np.ravel(values).astype(float)
     largest = np.abs(flat).max()
-    whole = np.rint(np.ldexp(flat if largest < MAX_WHOLE else 0 * flat, FRACTION_BITS)).astype(np.int64)
+    # small numbers are errors, whose relative size counts
+    doubles = flat.size < FEW or not 1e-3 <= largest < MAX_WHOLE
+    whole = np.rint(np.ldexp(0 * flat if doubles else flat, FRACTION_BITS)).astype(np.int64)
     for _ in range(ORDER):
         whole = np.diff(whole, prepend=0)
     zigzag = (whole << 1) ^ (whole >> 63)
-    # small numbers are errors, whose relative size counts
-    exact = largest < 1e-3 or largest >= MAX_WHOLE or int(zigzag.max()) >= MAX_EXACT
-    planes = np.ascontiguousarray((flat if exact else zigzag).view(np.uint8).reshape(-1, 8).T[: 8 if exact else 7])
+    doubles |= int(zigzag.max()) >= MAX_EXACT
+    planes = np.ascontiguousarray((flat if doubles else zigzag).view(np.uint8).reshape(-1, 8).T[: 8 if doubles else 7])
     text = base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
-    return {"count": flat.size, "differences": 0 if exact else ORDER, "bits": FRACTION_BITS, "text": text}
+    return {"count": flat.size, "differences": 0 if doubles else ORDER, "bits": FRACTION_BITS, "text": text}
 
 
 def _model(texts: dict[str, str], values: dict[str, FloatArray]) -> dict[str, Any]:
