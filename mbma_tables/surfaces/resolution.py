@@ -10,33 +10,10 @@ import numpy as np
 
 from mbma_tables.arguments import number_in
 from mbma_tables.errors import InputError
-from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.surfaces.measured import MeasuredSurface, resolution
 from mbma_tables.units import Units
 
 STEPS_PER_OCTAVE = 8  # of an extrapolated spectrum
-
-
-def resolution(surface: MeasuredSurface) -> dict[str, Any]:
-    """A record of how much the shortest octave of a measured spectrum matters.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mbma_tables import Surface
-    >>> from mbma_tables.surfaces.resolution import resolution
-    >>> q = np.geomspace(1, 100, 50)
-    >>> print(resolution(Surface.from_spectrum(q, q**-3.6, h_max=3.0, unit="um"))["told"])
-    area is a matter of resolution: waves are known down to 0.06283 um, and without the last octave of them area at light load would be 1.18 times larger
-    """  # noqa: E501
-    laws = surface.laws
-    below = float(laws.below(2, laws.place(np.asarray(surface.q1 / 2))))
-    factor = math.sqrt(laws.moment(2) / below) if below > 0 else math.inf
-    shortest = 2 * math.pi / float(surface.q1)
-    told = (
-        f"area is a matter of resolution: waves are known down to {shortest:.4g} {surface.unit or ''}".rstrip()
-        + f", and without the last octave of them area at light load would be {factor:.2f} times larger"
-    )
-    return {"step": "resolution", "shortest": shortest, "area_without_last_octave": factor, "told": told}
 
 
 def finished(surface: MeasuredSurface, shortest: Any = None, hurst: Any = None) -> MeasuredSurface:

@@ -419,7 +419,8 @@ class Surface(AnySurface):
         """
         treatment = {name: value for name, value in locals().items() if name in TREATMENT}
         from mbma_tables.surfaces.maps import fit_map, measured_map, prepared
-        from mbma_tables.surfaces.resolution import finished, resolution
+        from mbma_tables.surfaces.measured import resolution
+        from mbma_tables.surfaces.resolution import finished
 
         _check_model(model, band)
         if model != "measured" and (extrapolate_to is not None or extrapolate_hurst is not None):

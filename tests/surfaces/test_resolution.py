@@ -6,7 +6,8 @@ import pytest
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.errors import InputError
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.surfaces.resolution import extrapolated, resolution
+from mbma_tables.surfaces.measured import resolution
+from mbma_tables.surfaces.resolution import extrapolated
 
 WHOLE = Surface(0.7, 1.0, 400.0, 0.3, 1.0)
 
