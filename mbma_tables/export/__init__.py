@@ -10,6 +10,7 @@ LAWS = (
     "python-law",
     "jax-law",
     "matlab-law",
+    "modelica-law",
     "abaqus-uinter",
     "abaqus-gapcon",
     "calculix-gapcon",

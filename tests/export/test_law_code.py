@@ -17,6 +17,8 @@ import pytest
 from law_points import ASKED, CONDUCTIVITY, needs, points
 
 from mbma_tables import InputError
+from mbma_tables.export import LAWS
+from mbma_tables.export.law_code import LANGUAGES
 
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion", "-Wshadow")
 HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
@@ -87,6 +89,10 @@ def test_c_outside_its_range(name: str, compiled: dict[str, ctypes.CDLL]) -> Non
 def test_the_same_file_is_cpp(tmp_path: pathlib.Path) -> None:
     (tmp_path / "road.c").write_text(law_points.text("c-law", "mbma", **HEAT))
     run("g++", "-x", "c++", "-std=c++11", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-c", "road.c", folder=tmp_path)
+
+
+def test_the_targets_are_those_of_the_command() -> None:
+    assert tuple(LANGUAGES) == LAWS
 
 
 @pytest.mark.parametrize("name", ["mbma", "calibrated"])
