@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers import fresh
 
-from mbma_tables import InputError, MbmaError, Scene, Surface, contact, contact_law, island, sensitivity
+from mbma_tables import InputError, MbmaError, Scene, Surface, contact, contact_law, island, open_table, sensitivity
 from mbma_tables.arguments import hinted
 from mbma_tables.export.law_rows import describe_law
 
@@ -25,9 +25,11 @@ def displayed():
     yield contact_law(ROAD, E_star="13.3 MPa")
     yield contact_law(ROAD, theory="persson")
     yield describe_law(ROAD, "13.3 MPa", rows=20)
+    yield open_table("universal")
+    yield open_table("island4d")
 
 
-@pytest.fixture(scope="module", params=range(7), ids=lambda k: str(k))
+@pytest.fixture(scope="module", params=range(9), ids=lambda k: str(k))
 def thing(request):
     return list(displayed())[request.param]
 

@@ -29,6 +29,7 @@ def site(source, tmp_path_factory):
     pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
     run(*pip, "wheel", "--no-deps", "--no-build-isolation", "-w", str(folder), str(source))
     (wheel,) = folder.glob("*.whl")
+    assert wheel.stat().st_size < 8e6
     run(*pip, "install", "--no-deps", "--target", str(folder / "site"), str(wheel))
     return folder / "site"
 

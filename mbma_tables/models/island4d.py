@@ -6,21 +6,26 @@ import dataclasses
 import functools
 import os
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.compiled import in_blocks
+from mbma_tables.display import Displayed, Variable
 from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, Coordinates, band_fields, hat_scales, to_axes
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
+from mbma_tables.plots import draw_lines
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.interpolate import fill_4d, fill_gradient_4d
 from mbma_tables.tablefiles.schema import TableContent, error_cell
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 RAW = ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")
 STEP = 1e-5  # relative, of a raw number or of the spread: central differences of closed forms err by its square
@@ -49,7 +54,7 @@ class Lookup:
         return iter((self.F_hat, self.A_hat, self.error))
 
 
-class Island4dModel:
+class Island4dModel(Displayed):
     """F_hat and A_hat by the paper's four numbers, from a four-parameter table and nothing else.
 
     Parameters
@@ -71,6 +76,22 @@ class Island4dModel:
         self.content = content
         self.reading = get_reading(content.attributes["reading"])
         self._X, self._spread, self._sphere, self._hurst = content.axes
+
+    def _facts(self) -> dict[str, str]:
+        return self.content.facts()
+
+    def _variables(self) -> dict[str, Variable]:
+        names = tuple(axis.name for axis in self.content.axes)
+        axes = {axis.name: Variable(axis.values, "1", axis.long_name, (axis.name,)) for axis in self.content.axes}
+        for name, (dims, values, about) in self.content.auxiliary.items():
+            if dims == names:
+                axes[name] = Variable(values, "1", about["long_name"], names)
+        return axes
+
+    def _figure(self) -> Figure:
+        delta = np.geomspace(0.05, 2.0, 60)
+        found = {hurst: self.lookup(delta, 3.0, 20.0, hurst, outside="nan").F_hat for hurst in (0.5, 0.7, 0.9)}
+        return draw_lines({f"H = {hurst}": (delta, F) for hurst, F in found.items()}, "delta/h_rms", "F_hat")
 
     def lookup(
         self,

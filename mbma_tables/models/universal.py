@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import os
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -13,19 +13,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.compiled import in_blocks
+from mbma_tables.display import Displayed, Variable
 from mbma_tables.errors import InputError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models import universal_kernel
 from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
 from mbma_tables.models.universal_kernel import RECORD, TERMS, Table
+from mbma_tables.plots import draw_lines
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
 
 TINY = 1e-200  # replaces mu = 0 where a slope is asked for
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SHOWN = 65  # places along an axis of the table as a Dataset
 BLOCK = 1 << 16  # islands between two looks for Ctrl-C
 SMALL = 1 << 13  # islands up to which numpy answers, without a compiler
 
 
-class UniversalModel:
+class UniversalModel(Displayed):
     """Phi_F and Phi_A from a universal table.
 
     Parameters
@@ -49,6 +55,21 @@ class UniversalModel:
     def __init__(self, content: TableContent) -> None:
         self.content = content
         self._X, self._mu = content.axes
+
+    def _facts(self) -> dict[str, str]:
+        return self.content.facts()
+
+    def _variables(self) -> dict[str, Variable]:
+        X, mu = (axis.coordinate(np.linspace(0, axis.nodes - 1, SHOWN)) for axis in self.content.axes)
+        found = self.answer(X[:, None], mu)
+        held = {"Phi_F": found.phi_F, "Phi_A": found.phi_A, "error": found.error}
+        axes = {"X": Variable(X, "1", self._X.long_name, ("X",)), "mu": Variable(mu, "1", self._mu.long_name, ("mu",))}
+        return axes | {name: Variable(values, "1", "", ("X", "mu")) for name, values in held.items()}
+
+    def _figure(self) -> Figure:
+        X = np.linspace(0.0, 20.0, 60)
+        lines = {f"mu = {mu:g}": (X[1:], self.answer(X[1:], mu).phi_F) for mu in (1e-3, 1.0, 1e3)}
+        return draw_lines(lines, "X", "Phi_F")
 
     def answer(self, X: ArrayLike, mu: ArrayLike, parallel: bool = False, *, outside: str = "raise") -> IslandAnswer:
         """Phi_F and Phi_A with the error bound that the table states.

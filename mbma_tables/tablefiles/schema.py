@@ -215,6 +215,12 @@ class TableContent:
             return f"{self.coefficients.shape[0]} cells"
         return " x ".join(f"{axis.nodes} {axis.name}" for axis in self.axes)
 
+    def facts(self) -> dict[str, str]:
+        """What it covers and how right it is, for a line."""
+        ranges = ", ".join(f"{axis.name} {axis.low:g} to {axis.high:g}" for axis in self.axes)
+        errors = ", ".join(f"{f} {self.attributes[f'largest_error_{f}']:.2g}" for f in FUNCTIONS)
+        return {"covers": ranges, "size": self.size, "largest held-out error": errors}
+
     def arrays(self) -> dict[str, Any]:
         """Every array that the values' hash covers, by the name that it has in the file."""
         named: dict[str, Any] = {axis.name: axis.values for axis in self.axes}

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, finite_array
+from mbma_tables.arguments import FloatArray, finite_array, hinted
 from mbma_tables.errors import InputError
 from mbma_tables.models import AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -86,6 +86,7 @@ def _with_unit(name: str, value: float, units: Units) -> str:
     return f"{value:.5g}" + ("" if unit == "1" else f" {unit}")
 
 
+@hinted
 def sensitivity(
     surface: AnySurface,
     *,
