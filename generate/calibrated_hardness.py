@@ -47,7 +47,7 @@ TURN = 0.01  # of ln A_el, for derivatives
 FOLDS = 5
 REFERENCE = "docs/data/hardness.csv"  # another code's surfaces
 WAVES = 3  # longest waves a side: with fewer h_max says little of the highest heights
-MODULES = ("mbma_tables.hardness", "generate.calibrated_hardness")
+MODULES = ("mbma_tables.hardness", "mbma_tables.bearing_curve", "generate.calibrated_hardness")
 
 
 def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> FloatArray:
@@ -218,6 +218,56 @@ def coverage(seen: Sequence[Capped], constants: cap.Constants, scatter: Scatter)
     return told
 
 
+def stated(training: Sequence[Capped], constants: cap.Constants) -> Scatter:
+    """Root mean squares of errors by constants from other spectra, and how much of an elastic error is passed on."""
+    etas = sorted({one.eta for one in training})
+    left_out = list(zip(training, cross_validated(training), strict=True))
+    rms = {
+        form: np.array(
+            [
+                by_contact(training, [errors_of_law(one, form, own)[q] for one, own in left_out], etas)
+                for q in QUANTITIES
+            ]
+        )
+        for form in (*FORMS, ELASTIC)
+    }
+    weights = {
+        q: by_contact(training, [weight_of_elastic(one, q, constants) for one in training], etas)
+        for q in ("area", "force")
+    }
+    return Scatter(np.array(etas), np.log(np.sqrt(np.multiply(EDGES[1:], EDGES[:-1]))), rms, weights)
+
+
+def dataset(scatter: Scatter, told: FloatArray) -> xr.Dataset:
+    """Variables of the library's file."""
+    unit = {"units": "1"}
+    return xr.Dataset(
+        {
+            "accuracy": (
+                ("set", "form", "quantity", "statistic"),
+                told,
+                {"long_name": "statistics of ln(law/simulation), of the difference for the yielded share", **unit},
+            ),
+            "stated_scatter": (
+                ("theory", "quantity", "hardness", "contact"),
+                np.array([*scatter.rms.values()]),
+                {
+                    "long_name": "root mean square of ln(law/simulation) on the training set, by constants from other "
+                    "spectra; of the theory elastic with the simulated elastic contact",
+                    **unit,
+                },
+            ),
+            "elastic_weight": (
+                ("force_or_area", "hardness", "contact"),
+                np.array([*scatter.weight.values()]),
+                {"long_name": "root mean square of d ln(area, force) by d ln of the elastic one", **unit},
+            ),
+            "eta": ("hardness", scatter.eta, {"long_name": "p_m/(E* g)", **unit}),
+            "contact": ("contact", np.exp(scatter.log_area), {"long_name": "A/A0, middle of a bin", **unit}),
+        }
+    )
+
+
 def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[cap.Constants, xr.Dataset]:
     """Fit, test, and write the group of the library's file."""
     found = capped(evidence)
@@ -228,76 +278,27 @@ def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[ca
     groups["three_waves"] = [one for one in plain if one.split != TRAINING and one.waves >= WAVES]
     groups["stretched"] = [one for one in found if one.kind == "stretched"]
     groups = {name: own for name, own in groups.items() if own}
-    etas = sorted({one.eta for one in found})
-    unit = {"units": "1"}
-    left_out = cross_validated(training)
-    rms = {
-        form: np.array(
-            [
-                by_contact(
-                    training,
-                    [errors_of_law(one, form, own)[q] for one, own in zip(training, left_out, strict=True)],
-                    etas,
-                )
-                for q in QUANTITIES
-            ]
-        )
-        for form in (*FORMS, ELASTIC)
+    scatter = stated(training, constants)
+    covered = coverage([one for one in plain if one.split != TRAINING], constants, scatter)
+    data = dataset(scatter, accuracy(groups, constants))
+    data.attrs = {
+        "title": "Contact with a hardness: constants of mbma_tables.hardness, and errors against boundary elements",
+        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate calibrated --hardness",
+        "references": "docs/yield.md",
+        "comment": f"accuracy: contacts from {LIGHTEST:g} to {EDGES[-1]:g}; bars {json.dumps(BARS)}. area, yielded "
+        "and stiffness of the frozen contact at equal force, force at equal mean gap",
+        "theories": " ".join(scatter.rms),
+        "coverage": json.dumps(covered),
+        "drift": json.dumps(by_magnification([one for one in plain if one.kind == "self_affine"], constants)),
+        "quantities": " ".join(QUANTITIES),
+        "statistics": " ".join(STATISTICS),
+        "sets": " ".join(groups),
+        **{f"law_{name}": value for name, value in dataclasses.asdict(constants).items()},
+        "evidence": json.dumps({"code_sha256": evidence.attrs.get("code_sha256", ""), "contacts": len(found)}),
+        "versions": json.dumps(versions(), sort_keys=True),
+        "source_sha256": source_digest(MODULES),
+        "source_modules": " ".join(MODULES),
     }
-    weights = {
-        q: by_contact(training, [weight_of_elastic(one, q, constants) for one in training], etas)
-        for q in ("area", "force")
-    }
-    contact = np.sqrt(np.multiply(EDGES[1:], EDGES[:-1]))
-    held_out = [one for one in plain if one.split != TRAINING]
-    covered = coverage(held_out, constants, Scatter(np.array(etas), np.log(contact), rms, weights))
-    data = xr.Dataset(
-        {
-            "accuracy": (
-                ("set", "form", "quantity", "statistic"),
-                accuracy(groups, constants),
-                {"long_name": "statistics of ln(law/simulation), of the difference for the yielded share", **unit},
-            ),
-            "stated_scatter": (
-                ("theory", "quantity", "hardness", "contact"),
-                np.array([*rms.values()]),
-                {
-                    "long_name": "root mean square of ln(law/simulation) on the training set, by constants from other "
-                    "spectra; of the theory elastic with the simulated elastic contact",
-                    **unit,
-                },
-            ),
-            "elastic_weight": (
-                ("force_or_area", "hardness", "contact"),
-                np.array([*weights.values()]),
-                {"long_name": "root mean square of d ln(area, force) by d ln of the elastic one", **unit},
-            ),
-            "eta": ("hardness", etas, {"long_name": "p_m/(E* g)", **unit}),
-            "contact": (
-                "contact",
-                contact,
-                {"long_name": "A/A0, middle of a bin", **unit},
-            ),
-        },
-        attrs={
-            "title": "Contact with a hardness: constants of mbma_tables.hardness, and errors against boundary elements",
-            "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate calibrated --hardness",
-            "references": "docs/yield.md",
-            "comment": f"accuracy: contacts from {LIGHTEST:g} to {EDGES[-1]:g}; bars {json.dumps(BARS)}. area, yielded "
-            "and stiffness of the frozen contact at equal force, force at equal mean gap",
-            "theories": " ".join(rms),
-            "coverage": json.dumps(covered),
-            "drift": json.dumps(by_magnification([one for one in plain if one.kind == "self_affine"], constants)),
-            "quantities": " ".join(QUANTITIES),
-            "statistics": " ".join(STATISTICS),
-            "sets": " ".join(groups),
-            **{f"law_{name}": value for name, value in dataclasses.asdict(constants).items()},
-            "evidence": json.dumps({"code_sha256": evidence.attrs.get("code_sha256", ""), "contacts": len(found)}),
-            "versions": json.dumps(versions(), sort_keys=True),
-            "source_sha256": source_digest(MODULES),
-            "source_modules": " ".join(MODULES),
-        },
-    )
     if path is not None:
         write_part(path, data, GROUP)
     return constants, data
