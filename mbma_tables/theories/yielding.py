@@ -17,6 +17,7 @@ from scipy.special import ndtri
 
 from mbma_tables import hardness as law
 from mbma_tables.arguments import FloatArray, checked_hardness, describe_entries
+from mbma_tables.bearing_curve import rows
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.calibrated_table import at_contact, shipped_part
@@ -218,8 +219,8 @@ class Yielding(Theory):
         low, high = self.interval(surface)
         above = self.elastic.mean_separation_at(surface, "force", force)
         gradient, end = np.asarray(surface.rms_gradient), surface.h_max if self.ends_at_h_max else np.inf
-        known, _ = law.rows(force / gradient, self.hardness / gradient, end, surface.h_rms)
-        bracket, _ = law.rows(-ndtri(np.minimum(force / self.hardness, 1.0)), np.maximum(low, LOWEST), above)
+        known, _ = rows(force / gradient, self.hardness / gradient, end, surface.h_rms)
+        bracket, _ = rows(-ndtri(np.minimum(force / self.hardness, 1.0)), np.maximum(low, LOWEST), above)
         law.start(known, law.CONSTANTS.exponent, bracket)
         left = np.flatnonzero((force > 0) & (force < self.hardness) & np.isfinite(self.hardness))
         for _ in range(STEPS):
