@@ -87,6 +87,30 @@ def test_sixteen_threads_give_the_bits_of_one(questions):
     assert differing == [[]] * THREADS
 
 
+@pytest.mark.slow
+def test_ten_million_mixed_lookups_by_sixteen_threads_have_the_bits_of_one():
+    """Whole, in blocks of other sizes, one by one, and with slopes."""
+    model, each = universal_model(), 312_500
+    law = contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0))
+    rng = np.random.default_rng(9)
+    X, mu, gaps = rng.uniform(-6, 40, each), 10 ** rng.uniform(-12, 6, each), rng.uniform(-3, 3, each)
+
+    def answers(size):
+        blocks = [slice(k, k + size) for k in range(0, each, size)]
+        found = [model.answer(X[block], mu[block]) for block in blocks]
+        phi = [np.concatenate([getattr(part, name) for part in found]) for name in ("phi_F", "phi_A", "error")]
+        return [*phi, np.concatenate([law.force(gaps[block]) for block in blocks])]
+
+    whole = answers(each)
+    for k in range(0, each, each // 50):
+        one = model.answer(X[k], mu[k])
+        assert [one.phi_F, one.phi_A, one.error, law.force(gaps[k])] == [column[k] for column in whole]
+    with ThreadPoolExecutor(THREADS) as pool:
+        for found in pool.map(answers, 4 * [997, 8192, 50_000, each]):
+            for column, expected in zip(found, whole, strict=True):
+                np.testing.assert_array_equal(column, expected)
+
+
 def test_laws_made_by_many_threads_are_one_law():
     surfaces = [Surface(hurst, 0.2, 60.0, 1.0, 3.0) for hurst in (0.35, 0.6, 0.8, 1.0)]
     alone = [contact_law(surface, rtol=1e-7) for surface in surfaces]

@@ -120,7 +120,7 @@ class UniversalModel(Displayed):
         x = (X - r[:, k.CENTRE]) * r[:, k.RATE]
         y = (mu * r[:, k.TOP_MU] + r[:, k.TOP]) / (mu * r[:, k.BOTTOM_MU] + r[:, k.BOTTOM])
         powers = r[:, k.FORCE_POWERS :].reshape(-1, 2, TERMS, TERMS)
-        force, area = k.polynomial(powers, x[:, None, None], y[:, None, None])[0].T
+        force, area = k.polynomial(powers, x[:, None, None, None], y[:, None, None, None]).T
         out[good] = np.stack([mu * force, area, r[:, k.ERROR]], axis=-1)
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:

@@ -76,7 +76,15 @@ class _Polynomial:
         mask = self.ir.Constant(self.ir.VectorType(index, len(lanes)), [index(k) for k in lanes])
         return self.builder.shuffle_vector(vector, self.ir.Constant(vector.type, self.ir.Undefined), mask)
 
-    def rows(self) -> tuple[Any, Any]:
+    def sum(self) -> Any:
+        """The sum over the rows by pairs, which waits less than one after the other."""
+        rows, power = [self.row(k) for k in range(TERMS)], self.y
+        while len(rows) > 1:
+            rows = [self.add(even, power, odd) for even, odd in zip(rows[::2], rows[1::2], strict=True)]
+            power = self.builder.fmul(power, power)
+        return rows[0]
+
+    def sums(self) -> tuple[Any, Any]:
         """The sum over the rows, and its derivative by y."""
         value, slope = self.row(TERMS - 1), None
         for power in range(TERMS - 2, -1, -1):
@@ -107,7 +115,7 @@ def _value(typing: Any, array: Any, offset: Any, x: Any, y: Any) -> Any:
 
     def generate(*given: Any) -> Any:
         polynomial = _Polynomial(*given)
-        return polynomial.along_x(polynomial.rows()[0])
+        return polynomial.along_x(polynomial.sum())
 
     return types.float64(array, types.int64, x, y), generate
 
@@ -118,32 +126,31 @@ def _gradient(typing: Any, array: Any, offset: Any, x: Any, y: Any) -> Any:
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         polynomial = _Polynomial(context, builder, signature, arguments)
-        value, slope = polynomial.rows()
+        value, slope = polynomial.sums()
         parts = polynomial.along_x(value), polynomial.slope_along_x(value), polynomial.along_x(slope)
         return context.make_tuple(builder, signature.return_type, parts)
 
     return types.UniTuple(types.float64, 3)(array, types.int64, x, y), generate
 
 
-def polynomial(powers: FloatArray, x: Any, y: Any) -> tuple[Any, Any, Any]:
-    """Polynomials (..., y, x) and their slopes in numpy, operation by operation; x and y end in an axis of length 1."""
-
-    def along_x(row: FloatArray) -> Any:
-        for power in ((x * x) * (x * x), x * x, x):
-            half = row.shape[-1] // 2
-            row = row[..., :half] + power * row[..., half:]
-        return row[..., 0]
-
-    value, slope = powers[..., -1, :], 0.0 * powers[..., -1, :]
-    for power in range(TERMS - 2, -1, -1):
-        slope = value + y * slope
-        value = powers[..., power, :] + y * value
-    by_x = np.roll(value * np.arange(TERMS), -1, axis=-1)
-    return along_x(value), along_x(by_x), along_x(slope)
+def polynomial(powers: FloatArray, x: Any, y: Any) -> Any:
+    """Polynomials (..., y, x) in numpy, operation by operation as compiled; x and y have two axes of length 1 more."""
+    rows, power = powers, y
+    while rows.shape[-2] > 1:
+        rows, power = rows[..., ::2, :] + power * rows[..., 1::2, :], power * power
+    row = rows[..., 0, :]
+    for power in ((x * x) * (x * x), x * x, x):
+        half = row.shape[-1] // 2
+        row = row[..., :half] + power[..., 0] * row[..., half:]
+    return row[..., 0]
 
 
 def _plain(array: FloatArray, offset: int, x: float, y: float) -> tuple[Any, Any, Any]:
-    return polynomial(array[offset : offset + TERMS**2].reshape(TERMS, TERMS), np.array([x]), np.array([y]))
+    powers = array[offset : offset + TERMS**2].reshape(TERMS, TERMS)
+    by_x = np.pad(powers[:, 1:] * np.arange(1, TERMS), ((0, 0), (0, 1)))
+    by_y = np.pad(powers[1:] * np.arange(1, TERMS)[:, None], ((0, 1), (0, 0)))
+    value, slope_x, slope_y = polynomial(np.stack([powers, by_x, by_y]), np.array([[x]]), np.array([[y]]))
+    return value, slope_x, slope_y
 
 
 # compiled code calls these with fewer arguments than they are defined with

@@ -1,7 +1,8 @@
-"""Lookups timed: tables against scipy, totals against the solver, laws against numpy, the first call.
+"""Times of tables, totals, laws, the calibrated law and a fresh process, each beside a peer.
 
-Run with ``python benchmarks/lookup.py``. One core; every ratio is of two processor times taken in turn, the median
-over the rounds, so that what else the machine does falls on both. docs/cost.md has error against time of every tier.
+``python -m benchmarks`` prints them, ``--write`` puts them into docs/lookup.md too. One core; every ratio is of two
+processor times taken in turn, the median over the rounds, so that what else the machine does falls on both.
+docs/cost.md has error against time of every tier.
 """
 
 from __future__ import annotations
@@ -14,9 +15,8 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import dataclasses
 import functools
+import importlib.util
 import itertools
-import json
-import pathlib
 import statistics
 import subprocess
 import sys
@@ -27,20 +27,27 @@ from typing import Any
 
 import click
 import numpy as np
-from scipy.interpolate import RegularGridInterpolator
+from scipy.interpolate import NdBSpline, RegularGridInterpolator, make_interp_spline
 from scipy.special import erf
 
-from mbma_tables import Surface, contact, contact_law, open_table
+from generate.pages import page
+from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
 from mbma_tables.calibrated import Law, Spectrum, light_factor
+from mbma_tables.files import shipped_file
+from mbma_tables.islands.geometry import geometry
 from mbma_tables.models import universal_kernel
-from mbma_tables.tablefiles.interpolate import fill_4d, fill_gradient_4d, value_4d
-from mbma_tables.tablefiles.schema import FUNCTIONS, TableContent
+from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.tablefiles.interpolate import fill_4d, fill_gradient_4d
+from mbma_tables.tablefiles.schema import TableContent
 from mbma_tables.theories import Calibrated
 from mbma_tables.theories.calibrated_table import fill, shipped
 
 ROUNDS = 9
 POINTS = 20_000
 HELD_OUT = 500
+MANY, GRID = 100_000, 256
+# the spline of log(Phi/Phi_rigid) over 225 x 262 nodes, the table until its format 2.0, in evaluations of erf
+BEFORE = {"random": 7.33, "path": 5.79, "random slopes": 11.9, "path slopes": 9.78}
 SURFACES = 2_000
 GAPS, MANY_GAPS = 100_000, 1_000_000
 NOMINAL_EXACT = 15_000  # islands/s, a rate to compare with that is not measured here
@@ -96,67 +103,95 @@ def microseconds(taken: list[float], count: int) -> float:
     return 1e6 * statistics.median(taken) / count
 
 
-def reference(content: TableContent, functions: Any = 0) -> RegularGridInterpolator:
-    """Scipy's cubic interpolator of log_ratio, F or both, on the table's own nodes, in node units."""
-    nodes = [np.arange(axis.nodes, dtype=float) for axis in content.axes]
-    values = np.stack([content.auxiliary[f"log_ratio_{f}"][1] for f in FUNCTIONS], axis=-1)
-    return RegularGridInterpolator(nodes, values[..., functions], method="cubic")
-
-
 def random_places(content: TableContent, rng: np.random.Generator) -> np.ndarray:
     """Random points in node units, (points, axes)."""
     return rng.uniform(size=(POINTS, len(content.axes))) * [axis.nodes - 1 for axis in content.axes]
 
 
-def island_tables(rng: np.random.Generator) -> None:
-    """Both tables against RegularGridInterpolator."""
-    raw, universal = open_table("island4d"), open_table("universal")
-    four = raw.content
-    scipy_four, scipy_both = reference(four), reference(four, slice(None))
-    at_four = random_places(four, rng)
-    columns = np.ascontiguousarray(at_four.T)
-    X, mu = rng.uniform(-6.25, 41.0, POINTS), 10 ** rng.uniform(-8, 6, POINTS)
-    values, slopes = np.empty((2, POINTS)), np.empty((10, POINTS))
-    phi, phi_slopes = np.empty((POINTS, 3)), np.empty((POINTS, 7))
-    status = np.empty(POINTS, dtype=np.int64)
+def peers(X: np.ndarray, mu: np.ndarray) -> dict[str, Callable[[], Any]]:
+    """Other interpolators of log(Phi_F/mu) over (X, log mu), all on one grid."""
+    nodes = [np.linspace(-6.25, 41, GRID), np.linspace(np.log(1e-8), np.log(1e6), GRID)]
+    grid = np.meshgrid(nodes[0], np.exp(nodes[1]), indexing="ij")
+    values = np.log(open_table("universal").answer(*grid).phi_F / grid[1])
+    at = np.stack([X, np.log(mu)], axis=-1)
+    cubic = RegularGridInterpolator(nodes, values, method="cubic")
+    spline = NdBSpline(*_knots(nodes, values), 5)
+    found = {"scipy RGI, cubic": lambda: cubic(at), "scipy NdBSpline, quintic": lambda: spline(at)}
+    if importlib.util.find_spec("interpn"):
+        import interpn
+
+        starts, steps = np.array([n[0] for n in nodes]), np.array([n[1] - n[0] for n in nodes])
+        fast = interpn.MulticubicRegular.new([GRID, GRID], starts, steps, np.ascontiguousarray(values))
+        columns = [np.ascontiguousarray(column) for column in at.T]
+        found["interpn, cubic"] = lambda: fast.eval(columns)
+    return found
+
+
+def _knots(nodes: list[np.ndarray], values: np.ndarray) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+    knots = []
+    for axis, own in enumerate(nodes):
+        one = make_interp_spline(own, values, k=5, axis=axis)
+        knots.append(one.t)
+        values = np.moveaxis(one.c, 0, axis)
+    return tuple(knots), values
+
+
+def tables(rng: np.random.Generator) -> None:
+    """The universal table against its past and others' interpolators, the four-number table against scipy's."""
+    universal, four = open_table("universal"), open_table("island4d").content
+    X, mu = rng.uniform(-6.25, 41.0, MANY), 10 ** rng.uniform(-8, 6, MANY)
+    fields = geometry(np.linspace(1e-3, 4, MANY), np.full(MANY, 0.8), np.full(MANY, 200.0), get_reading("reported"))
+    path = [np.ascontiguousarray(fields[name]) for name in ("X", "mu")]
+    u = rng.uniform(0.01, 3.3, MANY)
+    phi, slopes, status = np.empty((MANY, 3)), np.empty((MANY, 7)), np.empty(MANY, dtype=np.int64)
+    kernel = universal.kernel
     taken = rounds(
         {
-            "scipy 4-D": lambda: scipy_four(at_four),
-            "scipy 4-D, F and A": lambda: scipy_both(at_four),
-            "island4d": lambda: fill_4d(four.coefficients, columns, values),
-            "island4d slopes": lambda: fill_gradient_4d(four.coefficients, columns, slopes),
-            "universal": lambda: universal_kernel.fill_phi(X, mu, universal.kernel, status, phi),
-            "universal slopes": lambda: universal_kernel.fill_slopes(X, mu, universal.kernel, status, phi_slopes),
+            "erf": lambda: erf(u),
+            "random": lambda: universal_kernel.fill_phi(X, mu, kernel, status, phi),
+            "path": lambda: universal_kernel.fill_phi(*path, kernel, status, phi),
+            "random slopes": lambda: universal_kernel.fill_slopes(X, mu, kernel, status, slopes),
+            "path slopes": lambda: universal_kernel.fill_slopes(*path, kernel, status, slopes),
         }
     )
-    one = at_four[0]
-    numbers = [float(x) for x in one]
-    scalar = rounds(
+    click.echo("\nUniversal table: Phi_F, Phi_A and the bound on their error at once")
+    for name, most in (("random", 0.35), ("path", 0.25), ("random slopes", None), ("path slopes", None)):
+        report(f"{name}, a lookup", 1e3 * microseconds(taken[name], MANY), "ns")
+        share = 1 / times_faster(taken, "erf", name) / BEFORE[name]
+        report("  of the spline of logarithms before it", share, "x", at_most=most)
+    for name in ("random", "path"):
+        share = times_faster(taken, f"{name} slopes", name)
+        report(f"{name}, slopes against values", share, "x", at_most=2)
+    some = slice(HELD_OUT)
+    exact = greenwood_tripp.solve(X[some], mu[some], rtol=1e-12)
+    found = universal.answer(X[some], mu[some])
+    error = max(np.abs(found.phi_F / exact.phi_F - 1).max(), np.abs(found.phi_A / exact.phi_A - 1).max())
+    report(f"largest error on {HELD_OUT} fresh points", error, "", at_most=1e-9)
+    report("file", shipped_file("universal.nc").stat().st_size / 1e6, "MB", at_most=6)
+    given = X[:POINTS], mu[:POINTS]
+    own = {"own": lambda: universal_kernel.fill_phi(*given, kernel, status[:POINTS], phi[:POINTS])}
+    others = peers(*given)
+    beside = rounds(own | others, 3)
+    for name in others:
+        report(f"faster than {name}, {GRID} x {GRID} nodes, one function", times_faster(beside, name, "own"), "x")
+
+    nodes = [np.arange(axis.nodes, dtype=float) for axis in four.axes]
+    cubic = RegularGridInterpolator(nodes, four.auxiliary["log_ratio_F"][1], method="cubic")
+    at_four = random_places(four, rng)
+    columns, value, by = np.ascontiguousarray(at_four.T), np.empty((2, POINTS)), np.empty((10, POINTS))
+    taken = rounds(
         {
-            "scipy": lambda: [scipy_four(one) for _ in range(200)],
-            "island4d": lambda: [value_4d(four.coefficients, *numbers) for _ in range(200)],
-        }
+            "scipy": lambda: cubic(at_four),
+            "value": lambda: fill_4d(four.coefficients, columns, value),
+            "slopes": lambda: fill_gradient_4d(four.coefficients, columns, by),
+        },
+        3,
     )
-    click.echo(
-        f"\nTables against scipy's RegularGridInterpolator, cubic, {POINTS} random points. Ours answer F and A at"
-    )
-    click.echo("once. Each ratio: against scipy's F alone; per function, twice that; against scipy's F and A at once")
-    for name, spent in taken.items():
-        report(f"time of {name}", microseconds(spent, POINTS), "us")
-
-    def against(text: str, name: str, bar: float) -> None:
-        strict = times_faster(taken, "scipy 4-D", name)
-        report(f"{text}, against F of scipy 4-D", strict, "x", bar)
-        report("  per function", 2 * strict, "x", bar)
-        report("  against F and A of scipy 4-D", times_faster(taken, "scipy 4-D, F and A", name), "x", bar)
-
-    against("island4d value", "island4d", 8)
-    against("island4d value and four derivatives", "island4d slopes", 3)
-    report("scalar call of value_4d from Python", times_faster(scalar, "scipy", "island4d"), "x", 20)
-    against("universal value with error", "universal", 20)
-    against("universal value, two derivatives, error", "universal slopes", 12)
-    far_four = np.abs(values[0] - scipy_four(at_four)).max()
-    report("largest |log_ratio_F - scipy's|, island4d, both cubic, not-a-knot", far_four, "")
+    click.echo("\nFour-number table: both functions at once")
+    for name in ("value", "slopes"):
+        report(f"{name}, a lookup", 1e3 * microseconds(taken[name], POINTS), "ns")
+        report("  faster than scipy RGI, cubic, one function", times_faster(taken, "scipy", name), "x")
+    report("largest |log_ratio_F - scipy's|", np.abs(value[0] - cubic(at_four)).max(), "")
 
 
 def held_out(count: int, rng: np.random.Generator) -> tuple[Surface, np.ndarray]:
@@ -165,6 +200,24 @@ def held_out(count: int, rng: np.random.Generator) -> tuple[Surface, np.ndarray]
     zeta_1 = np.exp(rng.uniform(np.log(3.01), np.log(1e4), count))
     h_max = rng.uniform(2.5, 4.7, count)
     return Surface(hurst, 1.0, zeta_1, 1.0, h_max), rng.uniform(-1, 0.9999, count) * h_max
+
+
+def one_step() -> dict[str, Callable[[], Any]]:
+    """From pressures to displacements on GRID x GRID points, once, in boundary-element programs that are installed."""
+    pressures = np.random.default_rng(SEED).uniform(0, 1, (GRID, GRID))
+    steps: dict[str, Callable[[], Any]] = {}
+    if importlib.util.find_spec("ContactMechanics"):
+        from ContactMechanics import PeriodicFFTElasticHalfSpace
+
+        half_space = PeriodicFFTElasticHalfSpace((GRID, GRID), 1.0, (1.0, 1.0))
+        steps["ContactMechanics"] = lambda: half_space.evaluate_disp(pressures)
+    if importlib.util.find_spec("tamaas"):
+        import tamaas
+
+        model = tamaas.ModelFactory.createModel(tamaas.model_type.basic_2d, [1.0, 1.0], [GRID, GRID])
+        model.traction[:] = pressures
+        steps["Tamaas"] = model.solveNeumann
+    return steps
 
 
 def totals(rng: np.random.Generator) -> None:
@@ -189,6 +242,12 @@ def totals(rng: np.random.Generator) -> None:
     nominal = exact / NOMINAL_EXACT / statistics.median(taken["value"])
     report(f"faster than a solver of {NOMINAL_EXACT} islands/s at exact's island count", nominal, "x")
     report("derivatives=True against the value alone", times_faster(taken, "slopes", "value"), "x", at_most=2)
+    steps = one_step()
+    if steps:
+        one = Surface.named("concrete")
+        both = rounds({"contact": lambda: contact(one, 0.4)} | steps)
+        for name in steps:
+            report(f"one contact is faster than one step of {name}", times_faster(both, name, "contact"), "x")
     one, fresh = Surface.named("asphalt"), itertools.count(1)
     some, many = (rng.uniform(-one.h_max, 0.9999 * one.h_max, count) for count in (1000, GAPS))
 
@@ -308,22 +367,22 @@ def fresh_process() -> None:
 
 
 @click.command()
-@click.option("--json", "json_path", type=click.Path(path_type=pathlib.Path, dir_okay=False), help="Write the table.")
-def main(json_path: pathlib.Path | None) -> None:
-    """Time the lookups."""
+@click.option("--write", is_flag=True, help="Put the table into docs/lookup.md.")
+def main(write: bool) -> None:
+    """Time the library beside its peers."""
     rng = np.random.default_rng(SEED)
     load = os.getloadavg()
     click.echo(f"{os.cpu_count()} cores, load average {load[0]:.2f} at the start; numpy {np.__version__}")
-    island_tables(rng)
-    totals(rng)
-    laws(rng)
-    calibrated(rng)
+    for section in (tables, totals, laws, calibrated):
+        section(rng)
     fresh_process()
-    end = os.getloadavg()
-    click.echo(f"\nload average {end[0]:.2f} at the end")
-    if json_path is not None:
-        rows = [dataclasses.asdict(line) for line in LINES]
-        json_path.write_text(json.dumps({"load": [load[0], end[0]], "lines": rows}, indent=1) + "\n", encoding="utf-8")
+    click.echo(f"\nload average {os.getloadavg()[0]:.2f} at the end")
+    if write:
+        marks = {None: "", True: "met", False: "missed"}
+        rows = [[x.name.strip(), f"{x.value:.3g} {x.unit}".strip(), x.wanted, marks[x.met]] for x in LINES]
+        measured = page.table(["what", "measured", "wanted", ""], rows)
+        machine = f"{os.cpu_count()} cores, load average {load[0]:.1f}."
+        page.write("lookup", {"times": f"{machine}\n\n{measured}"}, {}, page.ROOT)
 
 
 if __name__ == "__main__":
