@@ -45,8 +45,8 @@ def sensitivity_command(
     """d ln(answer)/d ln(parameter) of force, area, stiffness and conductance, what is given being held.
 
     Parameters are the surface's five numbers, or those of a drawing; of a map or a spectrum the scales of its heights
-    and lengths, h_max, cut-offs and the exponent of what is extrapolated. With --range also the smallest and largest answer
-    while one runs over its range, and over the ends of all ranges together.
+    and lengths, h_max, cut-offs and the exponent of what is extrapolated. With --range also the smallest and largest
+    answer while one runs over its range, and over the ends of all ranges together.
 
     Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa --range h_max=1:1.5 --range hurst=0.6:0.8
     """
