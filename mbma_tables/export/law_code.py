@@ -16,6 +16,7 @@ from mbma_tables.surfaces.readings import Reading
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 MAX_NAME = 31  # letters, as Fortran and C99 read them
+FUNCTIONS = ("pressure", "tangent", "with_tangent", "curvature", "area", "energy", "conductance", "overclosure")
 SCALARS = ("h_max", "c_least", "c_turn", "c_most", "scale", "power_p", "power_a")
 
 
@@ -86,6 +87,8 @@ def law_text(
     if target not in LANGUAGES:
         raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
     language, name = LANGUAGES[target], checked_name(name, MAX_NAME)
+    if name.lower() in FUNCTIONS:
+        raise InputError(f"name must not be that of a function of the law, {', '.join(FUNCTIONS)}")
     conducts = language.only_conductance or conductivity is not None or conductivity_unit is not None
     k_s, k_unit = checked_conductivity(conductivity, conductivity_unit) if conducts else (0.0, "")
     joint = frozen_joint(surface, E_star, length_unit, stress_unit, reading, theory, hardness)

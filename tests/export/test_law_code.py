@@ -383,6 +383,8 @@ def test_conductance_needs_a_conductivity(target: str) -> None:
         law_points.text("cobol-law", "mbma")
     with pytest.raises(InputError, match="a name must be a letter"):
         law_points.text("c-law", "mbma", name="1 x")
+    with pytest.raises(InputError, match="name must not be that of a function of the law"):
+        law_points.text("fortran-law", "mbma", name="Energy")
 
 
 MODELICA = """
@@ -411,3 +413,17 @@ def test_modelica(name: str, begin: float, length: float, tmp_path: pathlib.Path
     for quantity, values in pairs.items():
         np.testing.assert_allclose(found[quantity], values, rtol=1e-9, err_msg=quantity)
     assert len(found["c"]) == 51
+
+
+@pytest.mark.parametrize("target", LAWS)
+def test_a_unit_never_becomes_code(target: str) -> None:
+    hostile = 'W */ int evil(void); /* @NAME@ {name} """ system(\'evil\') <!-- %'
+    mark = LANGUAGES[target].mark
+    live = [
+        [line for line in text.splitlines() if not line.startswith((mark, " *") if mark == "/*" else mark)]
+        for text in (
+            law_points.text(target, "calibrated", conductivity=1.0, conductivity_unit=unit) for unit in (hostile, "W")
+        )
+    ]
+    assert live[0] == live[1]
+    assert len(live[0]) > 50
