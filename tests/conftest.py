@@ -4,6 +4,11 @@ import os
 import signal
 
 import pytest
+from hypothesis import settings
+
+# a busy machine is no fault
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 # parallel workers share the cores, and threads of BLAS that wait for each other cost more than the work itself
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
