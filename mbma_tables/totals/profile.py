@@ -31,6 +31,7 @@ KEPT = 64  # profiles, for whoever asks the same surface again
 WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
 MAX_ROUNDS, MAX_PANELS = 12, 400
 SEEN = 9  # gaps a panel is checked at
+BETWEEN = 2.0  # times more is missed at gaps between them
 FEW = 256  # gaps summed in numpy, without a compiler
 HIGH = 6.0  # of sigma_d: islands beyond carry less than 1e-7
 POWERS = (2.5, 7 / 3)  # of delta, in which weights of force and area start
@@ -291,8 +292,10 @@ def _disagreement(low: FloatArray, high: FloatArray, values: FloatArray, halves:
     turned = np.abs(missed[SHIFT]) + last * np.abs(missed[RATE])
     field = relative + HIGH * turned.max(axis=1)
     # sums over whole panels, relative to the largest node of the Gaussian there
-    c = low[:, None] + (last - low)[:, None] * np.linspace(0, 1, SEEN)
-    c = np.maximum(c, high[:, None])[..., None]
+    spread = low[:, None] + (last - low)[:, None] * np.linspace(0, 1, SEEN)
+    # where Gaussians are narrow no such gap may meet one: gaps at which one has its top in the panel
+    tops = (values[SHIFT] / values[RATE])[:, ::2]
+    c = np.clip(np.concatenate([spread, tops], axis=1), high[:, None], last)[..., None]
 
     def gaussian(v: FloatArray) -> FloatArray:
         return np.asarray(np.exp(-0.5 * (v[SHIFT][:, None, :] - v[RATE][:, None, :] * c) ** 2))
@@ -302,4 +305,4 @@ def _disagreement(low: FloatArray, high: FloatArray, values: FloatArray, halves:
     # what a panel adds is compared with what it adds at its best gap: others carry the load where it adds little
     most = fine.max(axis=1)
     summed = np.divide(np.abs(coarse - fine).max(axis=1), most, out=np.zeros_like(most), where=most > 0)
-    return np.asarray(np.maximum(field, summed))
+    return np.asarray(field + BETWEEN * summed)
