@@ -7,6 +7,7 @@ import datetime
 import functools
 import json
 import os
+import pathlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,7 +18,6 @@ from scipy.optimize import least_squares
 from generate.boundary_elements.design import SPLITS, TRAINING
 from generate.boundary_elements.evidence import GAUSSIAN, Capped, capped
 from generate.calibrated_file import write_part
-from generate.pages.page import ROOT
 from mbma_tables import Surface, contact
 from mbma_tables import hardness as cap
 from mbma_tables.arguments import FloatArray
@@ -45,7 +45,7 @@ OTHERS = ("mbma", "persson")  # theories of which what is said of their errors i
 LEAST = 1e-9  # mean separation at which theories end [h_rms]
 TURN = 0.01  # of ln A_el, for derivatives
 FOLDS = 5
-REFERENCE = "docs/data/hardness.csv"  # another code's surfaces
+REFERENCE = pathlib.Path(__file__).parents[1] / "docs" / "data" / "hardness.csv"  # another code's surfaces
 WAVES = 3  # longest waves a side: with fewer h_max says little of the highest heights
 MODULES = ("mbma_tables.hardness", "mbma_tables.bearing_curve", "generate.calibrated_hardness")
 
@@ -170,7 +170,7 @@ def by_magnification(seen: Sequence[Capped], constants: cap.Constants) -> dict[s
 
 def blind() -> dict[str, FloatArray]:
     """Errors of `contact` on surfaces of an independent code, which no fit and no choice of a form saw."""
-    with open(ROOT / REFERENCE, encoding="utf-8") as stream:
+    with open(REFERENCE, encoding="utf-8") as stream:
         table = np.genfromtxt((line for line in stream if not line.startswith("#")), delimiter=",", names=True)
     own = table[np.isfinite(table["eta"]) & (table["area"] > LIGHTEST) & (table["area"] < EDGES[-1])]
     surface = Surface(own["hurst"], 1.0, own["zeta_1"], 1.0, own["h_max_over_h_rms"])
