@@ -15,4 +15,5 @@ LAWS = (
     "abaqus-gapcon",
     "calculix-gapcon",
 )  # keys of `law_code.LANGUAGES`
+FMUS = ("fmu", "fmu3")  # of FMI 2.0 and 3.0, keys of `fmu.STANDARDS`
 CODE = ("c", "fortran", "javascript")  # keys of `code.LANGUAGES`

@@ -95,7 +95,8 @@ def law_text(
     if conducts and joint.hardness < math.inf:
         raise InputError("conductance of yielded contact is not a slope of its law: leave conductivity or hardness out")
     numbers = law_numbers(joint.law)
-    lines = [*_head(joint, numbers, f"{k_unit}/{joint.length}" if conducts else ""), language.usage]
+    said = head(joint, numbers, f"{k_unit}/{joint.length}" if conducts else "")
+    lines = [*(line.replace("{", "{{").replace("}", "}}") for line in said), language.usage]
     parts = {
         "HEADER": opening((line.format(name=name) for line in [*lines, _example(joint, language)]), language.mark),
         "NAME": name,
@@ -115,7 +116,7 @@ def law_text(
     return filled(language.template, **parts)
 
 
-def _head(joint: Joint, numbers: LawNumbers, conductance_unit: str) -> tuple[str, ...]:
+def head(joint: Joint, numbers: LawNumbers, conductance_unit: str) -> tuple[str, ...]:
     """The lines that every file has."""
     length, stress = joint.length, joint.stress
     what = f"pressure [{stress}], tangent dp/dc [{stress}/{length}], area A/A0, energy, the integral of pressure"
@@ -125,8 +126,7 @@ def _head(joint: Joint, numbers: LawNumbers, conductance_unit: str) -> tuple[str
     range_ = f"{begin}, to {numbers.c_most:.10g}; there is no answer outside"
     more = f"overclosure at a pressure: up to c = {numbers.c_turn:.10g}"
     more += ", where pressure turns down" if numbers.c_turn < numbers.c_most else ""
-    lines = joint.header(f"{what}, against overclosure c [{length}]", range_, more, end=numbers.c_turn)
-    return tuple(line.replace("{", "{{").replace("}", "}}") for line in lines)
+    return joint.header(f"{what}, against overclosure c [{length}]", range_, more, end=numbers.c_turn)
 
 
 def _example(joint: Joint, language: Language) -> str:

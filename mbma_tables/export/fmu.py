@@ -1,0 +1,192 @@
+"""A contact law as a Functional Mock-up Unit of sources, of FMI 2.0 or 3.0, for model exchange and co-simulation."""
+
+from __future__ import annotations
+
+import io
+import uuid
+import zipfile
+from typing import Any
+from xml.etree import ElementTree as ET
+
+from mbma_tables import __version__
+from mbma_tables.errors import InputError
+from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
+from mbma_tables.export.law_code import MAX_NAME, head, law_text
+from mbma_tables.export.law_numbers import LawNumbers, law_numbers
+from mbma_tables.export.text import checked_name, filled
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.units import factor
+
+# what the C of both standards calls by different names
+STANDARDS = {
+    "fmu": {"FMI": "fmi2", "INSTANCE": "fmi2Component", "REAL": "Real", "SIZE": "", "SEEDS": ""}
+    | {"LOGGER": "fmi2CallbackLogger", "NAMED": "m->name, ", "FORMAT": '"%s", '},
+    "fmu3": {"FMI": "fmi3", "INSTANCE": "fmi3Instance", "REAL": "Float64", "SIZE": ", size_t size"}
+    | {"LOGGER": "fmi3LogMessageCallback", "NAMED": "", "FORMAT": "", "SEEDS": ", size_t seeds"},
+}
+INPUT = 1  # value reference of overclosure, after time
+
+
+def fmu(
+    target: str,
+    surface: AnySurface,
+    E_star: float | str,
+    *,
+    name: str = "law",
+    conductivity: float | None = None,
+    conductivity_unit: str | None = None,
+    **asked: Any,
+) -> bytes:
+    """A contact law as an FMU of sources: overclosure in; pressure, tangent, area and energy out.
+
+    Parameters
+    ----------
+    target : str
+        "fmu" for FMI 2.0, "fmu3" for FMI 3.0.
+    surface, E_star, name, conductivity, conductivity_unit, **asked
+        As for `law_text`; a conductivity adds the output conductance.
+
+    Returns
+    -------
+    bytes
+        The file, the same for the same law.
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        As `law_text`.
+
+    Examples
+    --------
+    >>> import io, zipfile
+    >>> from mbma_tables import Surface
+    >>> file = fmu("fmu", Surface.named("concrete"), "13.3 MPa", name="road", theory="calibrated")
+    >>> zipfile.ZipFile(io.BytesIO(file)).namelist()
+    ['modelDescription.xml', 'sources/road.c']
+    """
+    if target not in STANDARDS:
+        raise InputError(f"target must be one of {tuple(STANDARDS)}, got {target!r}")
+    checked_name(name, MAX_NAME)
+    heat: dict[str, Any] = {"conductivity": conductivity, "conductivity_unit": conductivity_unit}
+    law = law_text("c-law", surface, E_star, name=name, **heat, **asked)
+    joint = frozen_joint(surface, E_star, **asked)
+    numbers, conductance, unit = law_numbers(joint.law), "", ""
+    if conductivity is not None:
+        k_s, k_unit = checked_conductivity(conductivity, conductivity_unit)
+        unit = f"{k_unit}/{joint.length}"
+        ratio = f"{k_s / joint.modulus!r}*second(c)"
+        conductance = f"\n    case CONDUCTANCE: *slope = {ratio}; return {name}_conductance(c);"
+    variables = _variables(joint, numbers, unit)
+    token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, f'{target} {law}')}}}"
+    parts = STANDARDS[target] | {"LAW": law, "NAME": name, "TOKEN": token, "CONDUCTANCE": conductance}
+    parts |= {"START": repr(_start(numbers)), "VARIABLES": str(len(variables))}
+    described = _description(target == "fmu3", name, token, "\n".join(head(joint, numbers, unit)), variables, joint)
+    files = {
+        "modelDescription.xml": described,
+        f"sources/{name}.c": filled("fmu.c", WRAPPER=filled(f"{parts['FMI']}.c"), **parts).encode(),
+    }
+    if target == "fmu3":
+        files["sources/buildDescription.xml"] = _build(name)
+    return _zipped(files)
+
+
+def _start(numbers: LawNumbers) -> float:
+    return 0.0 if numbers.ends else max(0.0, numbers.c_least)
+
+
+def _variables(joint: Joint, numbers: LawNumbers, conductance_unit: str) -> list[dict[str, str]]:
+    """What XML says of each variable, by value reference."""
+    length, stress = joint.length, joint.stress
+    ends = {"max": repr(numbers.c_most)} | ({} if numbers.ends else {"min": repr(numbers.c_least)})
+    asked = {"start": repr(_start(numbers)), **ends, "description": "h_max less the mean separation"}
+    outputs = {
+        "pressure": (stress, "force over nominal area"),
+        "tangent": (f"{stress}/{length}", "derivative of pressure by overclosure"),
+        "area": ("1", "area of contact over nominal area"),
+        "energy": (f"{stress} {length}", "integral of pressure over overclosure"),
+        **({"conductance": (conductance_unit, "through the contact, over nominal area")} if conductance_unit else {}),
+    }
+    return [
+        {"name": "time", "causality": "independent", "unit": "s"},
+        {"name": "overclosure", "causality": "input", "unit": length, **asked},
+        *({"name": n, "causality": "output", "unit": u, "description": said} for n, (u, said) in outputs.items()),
+    ]
+
+
+def _description(third: bool, name: str, token: str, text: str, variables: list[dict[str, str]], joint: Joint) -> bytes:
+    """modelDescription.xml of either standard."""
+    root = ET.Element(
+        "fmiModelDescription",
+        {"fmiVersion": "3.0" if third else "2.0", "modelName": name}
+        | {"instantiationToken" if third else "guid": token, "description": text}
+        | {"generationTool": f"mbma_tables {__version__}", "variableNamingConvention": "flat"},
+    )
+    derivatives = {f"providesDirectionalDerivative{'s' if third else ''}": "true"}
+    for kind, more in (("ModelExchange", {}), ("CoSimulation", {"canHandleVariableCommunicationStepSize": "true"})):
+        interface = ET.SubElement(root, kind, {"modelIdentifier": name} | derivatives | more)
+        if not third:
+            ET.SubElement(ET.SubElement(interface, "SourceFiles"), "File", {"name": f"{name}.c"})
+    units = ET.SubElement(root, "UnitDefinitions")
+    for unit, base in _units(joint).items():
+        ET.SubElement(ET.SubElement(units, "Unit", {"name": unit}), "BaseUnit", base)
+    if variables[-1]["name"] == "conductance" and variables[-1]["unit"] not in _units(joint):
+        ET.SubElement(units, "Unit", {"name": variables[-1]["unit"]})
+    ET.SubElement(ET.SubElement(root, "LogCategories"), "Category", {"name": "logStatusError"})
+    listed, structure = ET.SubElement(root, "ModelVariables"), ET.SubElement(root, "ModelStructure")
+    of_real = ("unit", "start", "min", "max")
+    for reference, all_of in enumerate(variables):
+        outer = {"valueReference": str(reference), "variability": "continuous"}
+        if third:
+            ET.SubElement(listed, "Float64", outer | all_of)
+            continue
+        outer |= {key: value for key, value in all_of.items() if key not in of_real}
+        inner = {key: all_of[key] for key in of_real if key in all_of}
+        ET.SubElement(ET.SubElement(listed, "ScalarVariable", outer), "Real", inner)
+    outputs = range(INPUT + 1, len(variables))
+    for kind, inner_kind in (("Outputs", "Output"), ("InitialUnknowns", "InitialUnknown")):
+        parent = structure if third else ET.SubElement(structure, kind)
+        for reference in outputs:
+            if third:
+                ET.SubElement(parent, inner_kind, {"valueReference": str(reference), "dependencies": str(INPUT)})
+            else:  # by places in the list, from 1
+                ET.SubElement(parent, "Unknown", {"index": str(reference + 1), "dependencies": str(INPUT + 1)})
+    return _xml(root)
+
+
+def _units(joint: Joint) -> dict[str, dict[str, str]]:
+    """Units of the law by those of SI."""
+    length, stress = factor(joint.length, "m"), factor(joint.stress, "Pa", "stress")
+    base = {
+        "s": ({"s": 1}, 1.0),
+        "1": ({}, 1.0),
+        joint.length: ({"m": 1}, length),
+        joint.stress: ({"kg": 1, "m": -1, "s": -2}, stress),
+        f"{joint.stress}/{joint.length}": ({"kg": 1, "m": -2, "s": -2}, stress / length),
+        f"{joint.stress} {joint.length}": ({"kg": 1, "s": -2}, stress * length),
+    }
+    return {
+        unit: {key: str(power) for key, power in powers.items()} | {"factor": repr(size)}
+        for unit, (powers, size) in base.items()
+    }
+
+
+def _build(name: str) -> bytes:
+    root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
+    files = ET.SubElement(ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": name}), "SourceFileSet")
+    files.set("language", "C99")
+    ET.SubElement(files, "SourceFile", {"name": f"{name}.c"})
+    return _xml(root)
+
+
+def _xml(root: ET.Element) -> bytes:
+    ET.indent(root)
+    return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
+
+
+def _zipped(files: dict[str, bytes]) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for path, content in files.items():
+            # without the time of writing: the same law is the same file
+            archive.writestr(zipfile.ZipInfo(path), content, zipfile.ZIP_DEFLATED)
+    return stream.getvalue()

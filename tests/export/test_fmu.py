@@ -1,0 +1,154 @@
+"""A law as an FMU: checked, built and simulated by FMPy."""
+
+from __future__ import annotations
+
+import io
+import pathlib
+import zipfile
+from typing import Any
+
+import numpy as np
+import pytest
+from law_points import ASKED, CONDUCTIVITY, needs, points
+
+from mbma_tables import InputError
+from mbma_tables.export import FMUS
+from mbma_tables.export.fmu import STANDARDS, fmu
+
+HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
+QUANTITIES = ["pressure", "tangent", "area", "energy", "conductance"]
+KINDS = ("ModelExchange", "CoSimulation")
+REFUSED = r"failed with status 3 \(error\)"  # as FMPy says it
+
+
+def made(target: str, law: str, **options: Any) -> bytes:
+    surface, asked = ASKED[law]
+    return fmu(target, surface, "13.3 MPa", **({"name": "road"} | asked | options))
+
+
+def built(target: str, name: str, folder: pathlib.Path) -> str:
+    """The FMU in a folder, without problems and with its binary."""
+    validation, build = pytest.importorskip("fmpy.validation"), pytest.importorskip("fmpy.build")
+    (folder / "build").mkdir()
+    (folder / "road.fmu").write_bytes(made(target, name, **HEAT))
+    assert validation.validate_fmu(str(folder / "road.fmu")) == []
+    with zipfile.ZipFile(folder / "road.fmu") as archive:
+        archive.extractall(folder / "road")
+    # at -O3 gcc 12 takes the unrolled bisection of pieces for an access beyond them
+    strict = {"CMAKE_C_FLAGS:STRING": "-Werror", "CMAKE_C_FLAGS_RELEASE:STRING": "-O2"}
+    build.build_platform_binary(folder / "road", folder / "build", all_warnings=True, cmake_options=strict)
+    return str(folder / "road")
+
+
+def simulated(path: str, kind: str, c: np.ndarray, logger: Any = None) -> np.ndarray:
+    """Answers at overclosures, one a second."""
+    times = np.arange(c.size, dtype=float)
+    given = np.array(list(zip(times, c, strict=True)), [("time", float), ("overclosure", float)])
+    fixed = {"stop_time": times[-1], "solver": "Euler", "step_size": 1.0, "output_interval": 1.0}
+    asked = {"fmi_type": kind, "input": given, "output": ["overclosure", *QUANTITIES], "logger": logger}
+    found: np.ndarray = pytest.importorskip("fmpy").simulate_fmu(path, **asked, **fixed)
+    return found
+
+
+@pytest.mark.slow
+@needs("cmake", "gcc")
+@pytest.mark.parametrize("target", FMUS)
+@pytest.mark.parametrize("name", ["mbma", "calibrated", "persson", "turning"])
+def test_simulation(target: str, name: str, tmp_path: pathlib.Path) -> None:
+    path, known = built(target, name, tmp_path), points(name)
+    for kind in KINDS:
+        found = simulated(path, kind, np.append(known.c, known.c[-1]))
+        # co-simulation answers after a step, by the input before it
+        answers = found[: known.c.size] if kind == "ModelExchange" else found[1:]
+        assert (answers["overclosure"] == known.c).all()
+        known.assert_equal(*(answers[quantity] for quantity in QUANTITIES[:4]))
+        np.testing.assert_allclose(answers["conductance"], CONDUCTIVITY / 13.3 * answers["tangent"], rtol=1e-15)
+        said: list[Any] = []
+        with pytest.raises(Exception, match=REFUSED):
+            simulated(path, kind, np.array([0.0, 1e9, 1e9]), lambda *words, said=said: said.append(words[-1]))
+        assert "overclosure = " in str(said[-1])
+        assert "must be from" in str(said[-1])
+
+
+@pytest.mark.slow
+@needs("cmake", "gcc")
+@pytest.mark.parametrize("target", FMUS)
+@pytest.mark.parametrize("name", ["mbma", "calibrated", "persson"])
+def test_directional_derivatives(target: str, name: str, tmp_path: pathlib.Path) -> None:
+    fmpy = pytest.importorskip("fmpy")
+    path, known = built(target, name, tmp_path), points(name)
+    said: list[Any] = []
+    # FMPy's own logger may call that of a model before, which is gone
+    description, logger = fmpy.read_model_description(path), lambda *words: said.append(words[-1])
+    model = fmpy.instantiate_fmu(path, description, "CoSimulation", logger=logger)
+    if target == "fmu":
+        model.setupExperiment()
+    model.enterInitializationMode()
+    model.exitInitializationMode()
+    put = model.setReal if target == "fmu" else model.setFloat64
+
+    def slopes(c: float) -> list[float]:
+        put([1], [c])
+        return list(model.getDirectionalDerivative([2, 3, 4, 5, 6], [1], [2.0]))
+
+    far = (known.c > 1e-3) & (known.c < 0.97 * known.law.h_max)
+    c = known.c[far]
+    by_p, by_tangent, by_area, by_energy, by_conductance = np.array([slopes(x) for x in c]).T / 2
+    assert np.abs(by_p - known.tangent[far]).max() <= 1e-11 * np.abs(known.tangent[far]).max()
+    np.testing.assert_allclose(by_energy, known.p[far], rtol=1e-13)
+    np.testing.assert_allclose(by_conductance, CONDUCTIVITY / 13.3 * by_tangent, rtol=1e-15)
+    # those of area and tangent by differences of the library's law, but where a piece of it ends
+    above, below = (known.law.values(known.law.h_max - 2 * c * (1 + by)) for by in (1e-5, -1e-5))
+    for slope, difference, size in (
+        (by_area, above.area - below.area, known.area),
+        (by_tangent, 2 * (above.stiffness - below.stiffness), known.tangent),
+    ):
+        error = np.abs(slope - difference / (2e-5 * c)) * c / np.abs(size[far])
+        assert np.quantile(error, 0.99) < 1e-5
+    with pytest.raises(Exception, match=REFUSED):
+        model.getDirectionalDerivative([2], [2], [1.0])
+    with pytest.raises(Exception, match=REFUSED):
+        slopes(1e9)
+    assert "by overclosure alone" in str(said[0])
+    assert "overclosure = 1000000000 must be from" in str(said[1])
+    model.terminate()
+    model.freeInstance()
+
+
+@pytest.mark.parametrize("target", FMUS)
+def test_description(target: str) -> None:
+    fmpy = pytest.importorskip("fmpy")
+    read = fmpy.read_model_description(io.BytesIO(made(target, "calibrated", **HEAT)), validate=True)
+    assert [variable.name for variable in read.modelVariables] == ["time", "overclosure", *QUANTITIES]
+    units = {variable.name: variable.unit for variable in read.modelVariables}
+    assert units["tangent"] == "MPa/mm"
+    assert units["conductance"] == "mW/(mm K)/mm"
+    size = {unit.name: unit.baseUnit.factor for unit in read.unitDefinitions if unit.baseUnit is not None}
+    expected = {"mm": 1e-3, "MPa": 1e6, "MPa/mm": 1e9, "MPa mm": 1e3, "1": 1.0, "s": 1.0}
+    assert {unit: float(factor) for unit, factor in size.items()} == pytest.approx(expected)
+    for words in ("theory 'calibrated'", "range:", "within", "scatter"):
+        assert words in read.description
+    # FMPy does not read the plural, which the schema of FMI 3 has
+    text = zipfile.ZipFile(io.BytesIO(made(target, "calibrated"))).read("modelDescription.xml").decode()
+    assert text.count(f'providesDirectionalDerivative{"s" if target == "fmu3" else ""}="true"') == 2
+
+
+def test_the_same_law_is_the_same_file() -> None:
+    assert made("fmu", "calibrated") == made("fmu", "calibrated")
+    tokens = set()
+    for target, options in (("fmu", {}), ("fmu3", {}), ("fmu", {"theory": "mbma"}), ("fmu", HEAT)):
+        text = zipfile.ZipFile(io.BytesIO(made(target, "calibrated", **options))).read("sources/road.c").decode()
+        tokens.add(text.split('TOKEN[] = "')[1][:38])
+    assert len(tokens) == 4
+
+
+def test_requests_that_are_refused() -> None:
+    assert tuple(STANDARDS) == FMUS
+    with pytest.raises(InputError, match="target must be one of"):
+        made("fmu4", "mbma")
+    with pytest.raises(InputError, match="a name must be a letter"):
+        made("fmu", "mbma", name="1 x")
+    with pytest.raises(InputError, match="conductance needs conductivity"):
+        made("fmu", "mbma", conductivity_unit="W")
+    with pytest.raises(InputError, match="leave conductivity or hardness out"):
+        made("fmu", "hardened", **HEAT)
