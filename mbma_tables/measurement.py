@@ -9,7 +9,7 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import MbmaError, NotSelfAffineError
-from mbma_tables.plots import theory_label
+from mbma_tables.plots import new_figure, theory_label
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories.protocol import Theory, answer_where_finite
@@ -121,11 +121,7 @@ def draw(
     MbmaError
         Where matplotlib is missing.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise MbmaError("a plot needs matplotlib: pip install 'mbma_tables[plot]'") from None
-    figure = Figure(figsize=(12, 7.5), layout="constrained")
+    figure = new_figure(12, 7.5)
     parts: Any = figure.subfigures(2, 1)
     above, below = parts
     panels = dict(zip("ABC", above.subplots(1, 3), strict=True)) | dict(zip("DE", below.subplots(1, 2), strict=True))

@@ -14,7 +14,7 @@ from scipy.interpolate import PchipInterpolator
 from generate.boundary_elements.grids import GRIDS, STARTS
 from generate.boundary_elements.surfaces import Recipe, heights
 from generate.pages.distances import COVER, DATA, HIGH, HUES, LOW, THEORIES, TIERS, distances, held_out, summed_up
-from generate.pages.page import png, pyplot, table
+from generate.pages.page import percent, png, pyplot, table
 from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.arguments import FloatArray
@@ -184,10 +184,6 @@ def to_csv(rows: Sequence[Distance]) -> str:
     return text.getvalue()
 
 
-def _percent(value: float) -> str:
-    return f"{float(f'{100 * value:.2g}'):g}%" if np.isfinite(value) else "—"
-
-
 def duration(seconds: float) -> str:
     """A time to two digits, in its unit."""
     unit, size = next(((u, s) for u, s in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)) if seconds >= s), ("ns", 1e-9))
@@ -202,7 +198,7 @@ def to_table(rows: Sequence[Distance], unit: float) -> str:
             row.way,
             duration(row.cost * unit),
             duration(row.once * unit) if row.once else "",
-            *(_percent(v) for v in (row.area_light, row.area_deep, row.force_light, row.force_deep)),
+            *(percent(v, "%") for v in (row.area_light, row.area_deep, row.force_light, row.force_deep)),
             "" if row.reached_deep > 0.995 else f"{row.reached_light:.0%}, {row.reached_deep:.0%}",
         ]
         for row in rows

@@ -18,6 +18,7 @@ from scipy.interpolate import PchipInterpolator
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case, cases
 from generate.calibrated import QUANTITIES, errors
+from generate.calibrated_table import DEPTHS
 from generate.pages.page import ROOT
 from mbma_tables import Surface, theories
 from mbma_tables.arguments import FloatArray
@@ -31,8 +32,6 @@ from mbma_tables.surfaces.readings import REPORTED, Reading
 
 DATA = ROOT / "docs" / "data"
 LOW, HIGH = 0.01, 0.97  # A/A0 of the simulations between which distances are summed up
-# u/h_max at which a theory's curve is known
-DEPTHS = np.concatenate([1 - np.geomspace(1e-4, 0.5, 150), np.geomspace(0.5, 1e-6, 151)[1:]])
 COVER = dataclasses.replace(REPORTED, name="reported, areas as a cover", addition="cover")
 MEASURED = {"al3d-1": "measured: optical map", "di-1": "measured: AFM map"}
 ROLLOFF = (0.041954782, 0.037331897)  # h_max of the maps

@@ -13,7 +13,7 @@ from generate.calibrated import QUANTITIES
 from generate.pages import distances
 from generate.pages.comparisons import AREA_THEORIES, PERSSON, READINGS, THEORIES, force_at, kappa
 from generate.pages.fidelity_figures import RESOLUTIONS, drawn
-from generate.pages.page import png, table
+from generate.pages.page import percent, png, table
 from mbma_tables import Surface
 
 STEEL = 200e3  # MPa, the E* at which the paper's 3.5e-4 E* is its 70 MPa
@@ -96,11 +96,6 @@ def quoted_table() -> str:
         cells = [show(values.get(t, np.nan), unit.get(t)) for t in THEORIES]
         rows.append([case, what, quoted if isinstance(quoted, str) else show(quoted), *cells])
     return table(["case", "what", "paper", *THEORIES], rows)
-
-
-def percent(value: float) -> str:
-    """A distance in percent, two digits."""
-    return f"{float(f'{100 * value:.2g}'):g}" if np.isfinite(value) else "—"
 
 
 def summary_table(sets: Iterable[distances.DataSet]) -> str:

@@ -8,6 +8,7 @@ name, and other files (figures, data) by their path in the checkout. ``python -m
 from __future__ import annotations
 
 import io
+import math
 import pathlib
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -64,6 +65,11 @@ def table(header: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
     names = list(header)
     lines = [names, ["---"] * len(names), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def percent(value: float, sign: str = "") -> str:
+    """A distance in percent, two digits; a dash where there is none."""
+    return f"{float(f'{100 * value:.2g}'):g}{sign}" if math.isfinite(value) else "—"
 
 
 def pyplot() -> Any:

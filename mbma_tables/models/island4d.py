@@ -75,7 +75,7 @@ class Island4dModel(Displayed):
     def __init__(self, content: TableContent) -> None:
         self.content = content
         self.reading = get_reading(content.attributes["reading"])
-        self._X, self._spread, self._sphere, self._hurst = content.axes
+        self._X, self._spread, _, self._hurst = content.axes
 
     def _facts(self) -> dict[str, str]:
         return self.content.facts()

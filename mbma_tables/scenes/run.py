@@ -110,13 +110,7 @@ def _law(run: Run, step: Step) -> None:
         if error <= run.rtol or asked <= MIN_LAW_RTOL:
             break
         asked = max(0.1 * asked, MIN_LAW_RTOL)
-    _keep_quantities(
-        run,
-        lambda: law.force(run.gap),
-        lambda: law.area(run.gap),
-        lambda: law.stiffness_mean(run.gap),
-        lambda: law.energy(run.gap),
-    )
+    _keep_law(run, law)
     run.close(step, error, dataclasses.replace(step, tier=tier).tier_name)
 
 
@@ -168,6 +162,17 @@ def _keep_quantities(
     run.found |= {name: (("gap",), array) for name, array in values.items()}
 
 
+def _keep_law(run: Run, law: ContactLaw) -> None:
+    """The quantities of a law at the gaps."""
+    _keep_quantities(
+        run,
+        lambda: law.force(run.gap),
+        lambda: law.area(run.gap),
+        lambda: law.stiffness_mean(run.gap),
+        lambda: law.energy(run.gap),
+    )
+
+
 def _by_theory(run: Run, step: Step) -> None:
     """Another theory: at the gaps themselves, or through its law."""
     problem = run.problem
@@ -177,13 +182,7 @@ def _by_theory(run: Run, step: Step) -> None:
         assert step.rtol is not None
         law = contact_law(run.surface, step.rtol, E_star=problem.E_star, theory=problem.theory)
         error = _find_gaps(run, law) if problem.prescribed in INVERTED else law.error
-        _keep_quantities(
-            run,
-            lambda: law.force(run.gap),
-            lambda: law.area(run.gap),
-            lambda: law.stiffness_mean(run.gap),
-            lambda: law.energy(run.gap),
-        )
+        _keep_law(run, law)
     else:
         from mbma_tables.theories.contact import contact
 

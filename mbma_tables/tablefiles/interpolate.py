@@ -156,18 +156,6 @@ def quintic(u: Any) -> Six:
 
 
 @jitable
-def quintic_slope(u: Any) -> Six:
-    """Derivatives of `quintic` by u."""
-    v = 1.0 - u
-    u2, v2 = u * u, v * v
-    s1 = (-50.0 + u * (40.0 + u * (60.0 + u * (-80.0 + 25.0 * u)))) / 120.0
-    s2 = u * (-120.0 + u2 * (120.0 - 50.0 * u)) / 120.0
-    s3 = -v * (-120.0 + v2 * (120.0 - 50.0 * v)) / 120.0
-    s4 = -(-50.0 + v * (40.0 + v * (60.0 + v * (-80.0 + 25.0 * v)))) / 120.0
-    return -v2 * v2 / 24.0, s1, s2, s3, s4, u2 * u2 / 24.0
-
-
-@jitable
 def cubic(u: Any) -> Four:
     """The four cardinal cubic B-splines that reach the cell, at u in [0, 1] of it."""
     v = 1.0 - u

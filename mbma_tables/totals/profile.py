@@ -29,7 +29,7 @@ from mbma_tables.totals.profile_kernel import ENDS, ORDER, RATE, SHIFT, WEIGHT_A
 
 KEPT = 64  # profiles, for whoever asks the same surface again
 WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
-MAX_ROUNDS, MAX_PANELS = 12, 400
+MAX_ROUNDS = 12
 SEEN = 9  # gaps a panel is checked at
 BETWEEN = 2.0  # times more is missed at gaps between them
 FEW = 256  # gaps summed in numpy, without a compiler
