@@ -25,9 +25,10 @@ ISLAND_SHARE = 0.5  # of a step's tolerance; the rest is asked of its quadrature
 # inverting a law adds the gap's error to that of the values; slopes of a law are rarely worse by more than 300;
 # p(r) at a point converges later than its integrals
 AMPLIFICATION = {"inverse": 2.0, "slopes": 300.0, "profile": 10.0}
-# gaps from which making a law costs less than the totals, by the measured costs
-MIN_LAW_GAPS = {"universal": 2000}
-MIN_LAW_GAPS_OF_OTHERS = 300
+# gaps from which a new law costs less processor time than `contact`, both timed in turns on new surfaces: the
+# universal table's profiles answer a further gap in half a microsecond, the others sum its islands
+MIN_LAW_GAPS = {"universal": 4000, "exact": 20}
+MIN_LAW_GAPS_OF_OTHERS = 150
 MIN_THEORY_LAW_RTOL = 1e-9
 YIELDING_CALL, YIELDING_GAP = 2.2, 2.6  # times an elastic call and an elastic answer of many (docs/yield.md)
 LADDER = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)

@@ -128,10 +128,12 @@ def test_explain_names_steps_and_what_is_left_out():
 
 
 def test_many_gaps_go_through_a_law():
+    for tier in ("universal", "exact", "rigid"):
+        fewest = plans.MIN_LAW_GAPS.get(tier, plans.MIN_LAW_GAPS_OF_OTHERS)
+        for count, name in ((fewest - 1, "totals"), (fewest, "law")):
+            (step,) = scene_of("force", separations=np.linspace(0, 1, count), rtol=1e-6, tier=tier).plan().steps
+            assert (step.name, step.tier) == (name, tier)
     fewest = plans.MIN_LAW_GAPS["universal"]
-    for count, name in ((fewest - 1, "totals"), (fewest, "law")):
-        (step,) = scene_of("force", separations=np.linspace(0, 1, count), rtol=1e-6).plan().steps
-        assert (step.name, step.tier) == (name, "universal")
     # closer than a law can be
     (step,) = scene_of("force", separations=np.linspace(0, 1, fewest), rtol=1.5e-10).plan().steps
     assert (step.name, step.tier) == ("totals", "exact")
