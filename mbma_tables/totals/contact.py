@@ -202,12 +202,13 @@ def _totals(
         sums, error, islands, left = np.empty((4 if slopes else 2, size)), np.empty(size), 0, np.arange(size)
     if left.size:
         # gap by gap, which also says what is wrong with which
+        rest = pairs if left.size == size else pairs.some(left)
         try:
             if slopes:
-                columns, error[left], more = slopes_of(model, pairs.some(left), reading, rtol, outside, workers)
+                columns, error[left], more = slopes_of(model, rest, reading, rtol, outside, workers)
                 sums[:, left] = columns[:, :, [0, BY_COMPRESSION]].T.reshape(4, -1)
             else:
-                found = totals_of(model, pairs.some(left), reading, rtol, outside, which, workers)
+                found = totals_of(model, rest, reading, rtol, outside, which, workers)
                 sums[0, left], sums[1, left], error[left], more = found
         except (ConvergenceError, OutOfRangeError) as fault:
             mask = np.zeros(size, dtype=bool)
