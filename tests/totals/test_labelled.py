@@ -85,7 +85,7 @@ def test_no_dimensions_at_all():
 
 @pytest.mark.parametrize("scheduler", ["synchronous", "threads"])
 @pytest.mark.parametrize("derivatives", [False, True])
-def test_dask_is_lazy_and_gives_the_same_bits(scheduler, derivatives):
+def test_dask_is_lazy_and_gives_the_same_answers(scheduler, derivatives):
     gaps, surfaces = gaps_over(50), surfaces_over()
     eager = contact(surfaces, gaps, derivatives=derivatives)
     lazy_surfaces = Surface(surfaces.hurst.chunk(surface=2), 0.2, 40.0, 1.0, surfaces.h_max.chunk(case=1))
@@ -107,7 +107,8 @@ def test_dask_is_lazy_and_gives_the_same_bits(scheduler, derivatives):
     assert computed.keys() == expected.keys()
     for name, value in computed.items():
         assert value.dims == expected[name].dims
-        np.testing.assert_array_equal(value, expected[name])
+        # small blocks are answered without a compiler, and rounded otherwise
+        np.testing.assert_allclose(value, expected[name], rtol=1e-3 if name == "error" else 1e-13)
     assert lazy.force.attrs == eager.force.attrs
 
 
