@@ -18,7 +18,7 @@ from mbma_tables.cli.options import (
 )
 from mbma_tables.cli.progress import echo
 from mbma_tables.errors import InputError
-from mbma_tables.export import CODE, DATA, FMUS, LAWS, SOLVERS
+from mbma_tables.export import CODE, DATA, FMUS, GRAPHS, LAWS, SOLVERS
 from mbma_tables.files import write_file
 from mbma_tables.scenes.specimen import Specimen
 
@@ -30,7 +30,7 @@ ROW_OPTIONS = {"rows", "rtol", "largest_overclosure", "pressures", "leakage"}
 OPTIONS = {
     **dict.fromkeys((*SOLVERS, *DATA), LAW_OPTIONS | ROW_OPTIONS),
     **dict.fromkeys(("calculix", "abaqus", "modelica"), LAW_OPTIONS | ROW_OPTIONS | {"name"}),
-    **dict.fromkeys((*LAWS, *FMUS), LAW_OPTIONS | {"name"}),
+    **dict.fromkeys((*LAWS, *FMUS, *GRAPHS), LAW_OPTIONS | {"name"}),
     **dict.fromkeys(CODE, frozenset({"reading", "check"})),
     "calculix --exponential": frozenset({"specimen", "name", "exponential"}),
 }
@@ -38,7 +38,7 @@ DEFAULTS = {"theory": "mbma", "reading": "reported", "exponential": False, "leak
 
 
 @click.command("export", short_help="A contact law, or the whole model, for other codes.")
-@click.argument("target", type=click.Choice([*SOLVERS, *DATA, *LAWS, *FMUS, *CODE]))
+@click.argument("target", type=click.Choice([*SOLVERS, *DATA, *LAWS, *FMUS, *GRAPHS, *CODE]))
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write; a folder for source code.")
 @optional_specimen_options
 @click.option("--rows", type=int, help="How many rows; else as few as --rtol needs.")
@@ -59,8 +59,8 @@ DEFAULTS = {"theory": "mbma", "reading": "reported", "exponential": False, "leak
 def export_command(target: str, out: Path, **options: Any) -> None:
     """Write TARGET to a file.
 
-    Solvers and data take a surface, a modulus and units, and so do laws as code, which end in -law, and as an FMU of
-    FMI 2 (fmu) or 3 (fmu3); c, fortran and javascript are the whole model as code.
+    Solvers and data take a surface, a modulus and units, and so do laws as code, which end in -law, an FMU of FMI 2
+    (fmu) or 3 (fmu3), and onnx; c, fortran and javascript are the whole model as code.
 
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
     """
@@ -97,13 +97,15 @@ def _refuse_unused(target: str, given: Mapping[str, Any]) -> None:
 
 def _law_files(target: str, out: Path, joint: dict[str, Any], given: dict[str, Any]) -> dict[Path, bytes]:
     """What is written of one surface's law, by its files."""
-    from mbma_tables.export import fmu, law_code, solvers
+    from mbma_tables.export import fmu, law_code, onnx, solvers
     from mbma_tables.export.law_rows import describe_law
 
     if target in LAWS:
         return {out: law_code.law_text(target, **joint, **given).encode()}
     if target in FMUS:
         return {out: fmu.fmu(target, **joint, **given)}
+    if target in GRAPHS:
+        return {out: onnx.onnx(**joint, **given)}
     named = {"name": given.pop("name")} if "name" in given else {}
     if given.pop("exponential", False):
         return {out: solvers.exponential(**joint, **named).encode()}

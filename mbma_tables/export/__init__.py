@@ -16,4 +16,5 @@ LAWS = (
     "calculix-gapcon",
 )  # keys of `law_code.LANGUAGES`
 FMUS = ("fmu", "fmu3")  # of FMI 2.0 and 3.0, keys of `fmu.STANDARDS`
+GRAPHS = ("onnx",)
 CODE = ("c", "fortran", "javascript")  # keys of `code.LANGUAGES`

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from mbma_tables.cli import export, main
-from mbma_tables.export import CODE, DATA, FMUS, LAWS, SOLVERS, code, data
+from mbma_tables.export import CODE, DATA, FMUS, GRAPHS, LAWS, SOLVERS, code, data
 
 LAW = ["--surface", "concrete", "--E-star", "13.3", "--length-unit", "mm", "--stress-unit", "MPa", "--rows", "20"]
 NUMBERS = ["--hurst", "0.8", "--q0", "0.1", "--zeta-1", "50", "--h-rms", "1", "--h-max", "3"]
@@ -147,7 +147,7 @@ ANY = {
 }
 
 
-EVERY = [*SOLVERS, *DATA, *LAWS, *FMUS, *CODE]
+EVERY = [*SOLVERS, *DATA, *LAWS, *FMUS, *GRAPHS, *CODE]
 
 
 @pytest.mark.parametrize("target", EVERY)

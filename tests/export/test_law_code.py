@@ -19,6 +19,7 @@ from law_points import ASKED, CONDUCTIVITY, needs, points
 from mbma_tables import InputError
 from mbma_tables.export import LAWS
 from mbma_tables.export.law_code import LANGUAGES
+from mbma_tables.export.onnx import onnx
 
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion", "-Wshadow")
 HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
@@ -385,6 +386,34 @@ def test_conductance_needs_a_conductivity(target: str) -> None:
         law_points.text("c-law", "mbma", name="1 x")
     with pytest.raises(InputError, match="name must not be that of a function of the law"):
         law_points.text("fortran-law", "mbma", name="Energy")
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_onnx(name: str) -> None:
+    runtime, checker = pytest.importorskip("onnxruntime"), pytest.importorskip("onnx.checker")
+    (surface, options), known = ASKED[name], points(name)
+    heat = {} if name == "hardened" else HEAT
+    file = onnx(surface, "13.3 MPa", **(options | heat))
+    checker.check_model(file, full_check=True)
+    session = runtime.InferenceSession(file, providers=["CPUExecutionProvider"])
+    found = session.run(None, {"overclosure": known.c})
+    known.assert_equal(*found[:4])
+    if heat:
+        np.testing.assert_allclose(found[4], CONDUCTIVITY / 13.3 * found[1], rtol=1e-15)
+    beyond = [math.nan, math.inf, 0.5 * (known.law.h_max - known.law.lowest) * (1 + 1e-9)]
+    assert np.isnan(session.run(None, {"overclosure": np.array(beyond)})).all()
+    if math.isinf(known.law.highest):
+        before = np.array([0.0, -0.0, -1.0, -math.inf])
+        assert (np.array(session.run(None, {"overclosure": before})) == 0).all()
+    assert file == onnx(surface, "13.3 MPa", **(options | heat))
+
+
+def test_onnx_refuses() -> None:
+    surface, options = ASKED["hardened"]
+    with pytest.raises(InputError, match="leave conductivity or hardness out"):
+        onnx(surface, "13.3 MPa", **(options | HEAT))
+    with pytest.raises(InputError, match="a name must be a letter"):
+        onnx(surface, "13.3 MPa", name="1 x")
 
 
 MODELICA = """

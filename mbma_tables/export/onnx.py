@@ -1,0 +1,143 @@
+"""A contact law as a graph of ONNX in float64, for batches in other languages."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mbma_tables import __version__
+from mbma_tables.arguments import FloatArray
+from mbma_tables.errors import InputError
+from mbma_tables.export.joint import checked_conductivity, frozen_joint
+from mbma_tables.export.law_code import MAX_NAME, head
+from mbma_tables.export.law_numbers import LawNumbers, law_numbers
+from mbma_tables.export.text import checked_name
+from mbma_tables.surfaces.any_surface import AnySurface
+
+OPSET, IR = 17, 8  # of 2022: what readers of that year and later know
+
+
+class _Graph:
+    """A graph under construction: nodes by their operator, which return the name of what they compute."""
+
+    def __init__(self, helper: Any) -> None:
+        self.helper = helper
+        self.nodes: list[Any] = []
+        self.constants: dict[str, np.ndarray[Any, Any]] = {}
+
+    def __call__(self, operator: str, *inputs: Any, name: str = "", **attributes: Any) -> str:
+        name = name or f"v{len(self.nodes)}"
+        named = [given if isinstance(given, str) else self._constant(given) for given in inputs]
+        self.nodes.append(self.helper.make_node(operator, named, [name], **attributes))
+        return name
+
+    def _constant(self, value: Any) -> str:
+        self.constants[f"k{len(self.constants)}"] = np.asarray(value)
+        return f"k{len(self.constants) - 1}"
+
+
+def onnx(
+    surface: AnySurface,
+    E_star: float | str,
+    *,
+    name: str = "law",
+    conductivity: float | None = None,
+    conductivity_unit: str | None = None,
+    **asked: Any,
+) -> bytes:
+    """A contact law as a file of ONNX: overclosure of shape (n,) in; pressure, tangent, area and energy out.
+
+    Outside the range answers are NaN. Everything is float64.
+
+    Parameters
+    ----------
+    surface, E_star, name, conductivity, conductivity_unit, **asked
+        As for `law_text`; a conductivity adds the output conductance.
+
+    Returns
+    -------
+    bytes
+        The file.
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        As `law_text`; and without the package onnx.
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface
+    >>> import onnx as library
+    >>> file = onnx(Surface.named("concrete"), "13.3 MPa", theory="calibrated")
+    >>> [output.name for output in library.load_from_string(file).graph.output]
+    ['pressure', 'tangent', 'area', 'energy']
+    """
+    try:
+        from onnx import TensorProto, helper, numpy_helper
+    except ImportError:
+        raise InputError("onnx needs a package: pip install 'mbma_tables[onnx]'") from None
+    conducts = conductivity is not None or conductivity_unit is not None
+    k_s, k_unit = checked_conductivity(conductivity, conductivity_unit) if conducts else (0.0, "")
+    joint = frozen_joint(surface, E_star, **asked)
+    if conducts and joint.hardness < np.inf:
+        raise InputError("conductance of yielded contact is not a slope of its law: leave conductivity or hardness out")
+    numbers, graph = law_numbers(joint.law), _Graph(helper)
+    outputs = _law(graph, numbers)
+    if conducts:
+        outputs.append(graph("Mul", "tangent", k_s / joint.modulus, name="conductance"))
+    made = helper.make_graph(
+        graph.nodes,
+        checked_name(name, MAX_NAME),
+        [helper.make_tensor_value_info("overclosure", TensorProto.DOUBLE, ["n"])],
+        [helper.make_tensor_value_info(output, TensorProto.DOUBLE, ["n"]) for output in outputs],
+        [numpy_helper.from_array(value, key) for key, value in graph.constants.items()],
+        doc_string="\n".join(head(joint, numbers, f"{k_unit}/{joint.length}" if conducts else "")),
+    )
+    known = {"opset_imports": [helper.make_opsetid("", OPSET)], "ir_version": IR}
+    model = helper.make_model(made, producer_name="mbma_tables", producer_version=__version__, **known)
+    return bytes(model.SerializeToString(deterministic=True))
+
+
+def _law(graph: _Graph, numbers: LawNumbers) -> list[str]:
+    """Nodes from overclosure to the quantities of a law, as `law_numbers` describes it."""
+    c = "overclosure"
+    reached = graph("GreaterOrEqual", graph("Unsqueeze", graph("Mul", c, numbers.scale), [-1]), numbers.edges)
+    # the record is the number of edges reached
+    k = graph("ReduceSum", graph("Cast", reached, to=7), [-1], keepdims=0)
+    near = graph("Less", k, numbers.side)
+    x = graph("Mul", graph("Where", near, c, graph("Sub", c, numbers.h_max)), numbers.scale)
+    rate = graph("Gather", numbers.rate, k)
+    t = graph("Mul", graph("Sub", x, graph("Gather", numbers.centre, k)), rate)
+    rate = graph("Mul", rate, numbers.scale)
+    powered = graph("And", graph("Equal", k, 0), bool(numbers.ends))
+    base = graph("Where", powered, t, 1.0)
+    below = graph("And", graph("LessOrEqual", c, 0.0), bool(numbers.ends))
+    above = graph("GreaterOrEqual", c, numbers.c_least)
+    outside = graph("Not", graph("And", above, graph("LessOrEqual", c, numbers.c_most)))
+
+    def ended(value: str, to: str) -> str:
+        return graph("Where", outside, np.nan, graph("Where", below, 0.0, value), name=to)
+
+    def horner(rows: FloatArray) -> tuple[str, str]:
+        value, slope = graph("Gather", rows[:, -1].copy(), k), ""
+        for column in rows.T[-2::-1]:
+            slope = graph("Add", graph("Mul", slope, t), value) if slope else value
+            value = graph("Add", graph("Mul", value, t), graph("Gather", column.copy(), k))
+        return value, slope
+
+    value, slope = horner(numbers.force)
+    power = graph("Where", powered, graph("Div", numbers.power_p, base), 0.0)
+    lead = graph("Pow", base, numbers.power_p)
+    slope = graph("Mul", lead, graph("Add", slope, graph("Mul", power, value)))
+    area = graph("Mul", graph("Pow", base, numbers.power_a), horner(numbers.area)[0])
+    powers = np.tile(np.arange(1.0, 10.0), (numbers.rate.size, 1))
+    powers[0] += numbers.power_p
+    sum_ = graph("Mul", graph("Mul", lead, t), horner(numbers.force / powers)[0])
+    energy = graph("Add", graph("Gather", numbers.energy, k), graph("Div", sum_, rate))
+    return [
+        ended(graph("Mul", lead, value), "pressure"),
+        ended(graph("Mul", slope, rate), "tangent"),
+        ended(area, "area"),
+        ended(energy, "energy"),
+    ]
