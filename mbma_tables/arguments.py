@@ -128,6 +128,11 @@ def finite_array(name: str, value: ArrayLike) -> FloatArray:
     return array
 
 
+def spread(array: Any, shape: tuple[int, ...]) -> Any:
+    """An array broadcast to a shape; itself where it has that, which numpy takes long to find out."""
+    return array if np.shape(array) == shape else np.broadcast_to(array, shape)
+
+
 def require(name: str, value: FloatArray, good: Any, allowed: str) -> None:
     """Refuse the entries of `value` where `good` is false; `allowed` says what would have been right."""
     bad = ~np.asarray(good, dtype=bool)

@@ -13,7 +13,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline, CubicHermiteSpline, CubicSpline, PchipInterpolator, make_interp_spline
 from scipy.special import erfc, erfinv, ndtri
 
-from mbma_tables.arguments import FloatArray, require
+from mbma_tables.arguments import FloatArray, require, spread
 from mbma_tables.bearing import FRACTIONS
 from mbma_tables.calibrated import (
     CLOSEST,
@@ -51,14 +51,14 @@ class Places:
 
     def __init__(self, surface: Surface, value: ArrayLike) -> None:
         self.shape = np.broadcast_shapes(np.shape(value), surface.shape)
-        self.flat = np.ascontiguousarray(np.broadcast_to(np.asarray(value, float), self.shape)).ravel()
+        self.flat = np.ascontiguousarray(spread(np.asarray(value, float), self.shape)).ravel()
         hurst = np.asarray(surface.hurst, float).ravel()
         zeta_1, h_rms = np.asarray(surface.zeta_1, float).ravel(), np.asarray(surface.h_rms, float).ravel()
         light = light_factor(np.asarray(surface.alpha).ravel())
         heights = np.asarray(surface.h_max, float).ravel() / h_rms
-        self.rows = np.ascontiguousarray(np.stack([hurst, np.log(zeta_1), light, heights], axis=1))
+        self.rows = np.ascontiguousarray(np.array([hurst, np.log(zeta_1), light, heights]).T)
         number = np.arange(hurst.size).reshape(surface.shape)
-        self.owner = np.ascontiguousarray(np.broadcast_to(number, self.shape)).ravel()
+        self.owner = np.ascontiguousarray(spread(number, self.shape)).ravel()
         self.h_rms = h_rms[self.owner] if hurst.size > 1 else h_rms
         gradient = np.asarray(surface.rms_gradient, float).ravel()
         self.gradient = gradient[self.owner] if hurst.size > 1 else gradient
@@ -173,6 +173,8 @@ def force_at_area(area: ArrayLike, light: ArrayLike) -> FloatArray:
             2 * y**2 * (1 + y / t0) - e**2 * (s0 + y / t0), slope, out=np.zeros(np.shape(slope)), where=slope > 0
         )
         y = np.maximum(y - step, 0.3 * y)
+        if (step <= 1e-15 * y).all():
+            break
     return np.asarray(y)
 
 

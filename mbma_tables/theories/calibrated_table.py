@@ -11,6 +11,7 @@ import dataclasses
 import functools
 import math
 import pathlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ AXES = ("hurst", "log_zeta_1", "log_separation")
 QUANTITIES = ("area", "force", "stiffness")
 MAX_STEPS = 100
 CLOSE = 1e-9  # of ln F: the next miss would be about the square of this one
+ONE_BY_ONE = 16  # forces up to which plain numbers cost less than numpy
 SMALL = 256  # separations up to which numpy answers, without a compiler
 MIN_SHARED = 32  # separations a surface from which its coefficients in ln u are worth summing
 TINY = 1e-300
@@ -92,59 +94,98 @@ class Table:
     def separations(self, surfaces: FloatArray, owner: NDArray[np.intp], force: FloatArray) -> FloatArray:
         """Mean separations [h_rms] at forces F/(A0 E* g) > 0; NaN where they lie beyond the table."""
         if force.size <= SMALL:
+            if force.size <= ONE_BY_ONE:
+                curves = {row: self._curve(surfaces[row]) for row in owner.tolist()}
+                each = zip(owner.tolist(), force.tolist(), strict=True)
+                return np.array([_separation(curves[row], math.log(surfaces[row, 3]), wanted) for row, wanted in each])
             return self._few_separations(surfaces[owner], force)
         out = np.empty(force.size)
         fill_separation(self.coefficients, self.numbers, surfaces, owner, force, out)
         return out
 
-    def _log_gaussian(self, own: FloatArray, log_u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """ln F_G and its derivative by ln u in numpy."""
-        places = np.stack([own[:, 0], own[:, 1], log_u]) - self.first[:, None]
-        sizes = np.array(self.coefficients.shape)[:, None] - np.array([[5], [5], [7]])
-        places = np.clip(places / self.step[:, None], 0.0, sizes)
-        (i, j, k) = cells = np.minimum(places.astype(np.intp), sizes - 1)
-        x, y, z = places - cells
-        if own.size and (own[:, :2] == own[0, :2]).all():
-            # one surface: its coefficients in ln u serve all
-            patch = self.coefficients[i[0] : i[0] + 6, j[0] : j[0] + 6]
-            line = np.einsum("abk,a,b->k", patch, quintic(x[0]), quintic(y[0]))
-            six = line[k + np.arange(6)[:, None]]
+    def _line(self, surface: FloatArray) -> FloatArray:
+        """Coefficients in ln u of one surface."""
+        (hurst, log_zeta, *_), numbers, shape = surface.tolist(), self.numbers.tolist(), self.coefficients.shape
+        i, x = _cell_of((hurst - numbers[0]) * numbers[3], shape[0] - 5)
+        j, y = _cell_of((log_zeta - numbers[1]) * numbers[4], shape[1] - 5)
+        patch = self.coefficients[i : i + 6, j : j + 6]
+        line: FloatArray = np.einsum("abk,a,b->k", patch, quintic(x), quintic(y))
+        return line
+
+    def _curve(self, surface: FloatArray) -> Callable[[float], tuple[float, float]]:
+        """ln F_G of one surface and its derivative as a function of ln u, one number: numpy takes longer."""
+        line, numbers, last = self._line(surface).tolist(), self.numbers.tolist(), self.coefficients.shape[2] - 7
+
+        def at(log_u: float) -> tuple[float, float]:
+            k, z = _cell_of((log_u - numbers[2]) * numbers[5], last)
+            value, rate = quintic_at(polynomial_of(line, k), z)
+            return beyond_of(value, rate * numbers[5], log_u, numbers, last)
+
+        return at
+
+    def _log_gaussian(self, own: FloatArray) -> Callable[[FloatArray], Any]:
+        """ln F_G and its derivative as a function of ln u in numpy."""
+        if len(own) == 1:
+            curve = self._curve(own[0])
+
+            def one(log_u: FloatArray) -> FloatArray:
+                return np.array(curve(float(log_u[0])))[:, None]
+
+            return one
+        if len(own) and (own[:, :2] == own[0, :2]).all():
+            line = self._line(own[0])
+
+            def six_at(k: NDArray[np.intp]) -> Any:
+                return line[k + np.arange(6)[:, None]]
         else:
-            a, b, c = np.ogrid[:6, :6, :6]
-            patch = self.coefficients[i + a[..., None], j + b[..., None], k + c[..., None]]
-            six = np.einsum("abcn,an,bn->cn", patch, quintic(x), quintic(y))
-        value, rate = quintic_at(polynomial_of(six, 0), z)
-        rate = rate / self.step[2]
-        last = self.first[2] + sizes[2] * self.step[2]
-        beyond, below = np.maximum(log_u - last, 0.0), np.minimum(log_u - self.first[2], 0.0)
-        growth, square = np.expm1(beyond), 1.0 + 2.0 * rate * below
-        value = value + rate * growth + 0.5 * np.log(np.where(below < 0, square, 1.0))
-        return value, rate * (growth + 1.0) / np.where(below < 0, square, 1.0)
+            sizes = np.array(self.coefficients.shape[:2]) - 5
+            places = np.clip((own[:, :2] - self.first[:2]) / self.step[:2], 0.0, sizes)
+            cells = np.minimum(places.astype(np.intp), sizes - 1)
+            (i, j), (x, y) = cells.T, map(quintic, (places - cells).T)
+            a, b, c = (n[..., None] for n in np.ogrid[:6, :6, :6])
+
+            def six_at(k: NDArray[np.intp]) -> Any:
+                return np.einsum("abcn,an,bn->cn", self.coefficients[i + a, j + b, k + c], x, y)
+
+        last = self.coefficients.shape[2] - 7
+        low, high = self.first[2], self.first[2] + last * self.step[2]
+
+        def at(log_u: FloatArray) -> tuple[FloatArray, FloatArray]:
+            place = np.clip((log_u - low) / self.step[2], 0.0, last)
+            k = np.minimum(place.astype(np.intp), last - 1)
+            value, rate = quintic_at(polynomial_of(six_at(k), 0), place - k)
+            rate = rate / self.step[2]
+            growth, below = np.expm1(np.maximum(log_u - high, 0.0)), np.minimum(log_u - low, 0.0)
+            square = np.where(below < 0, 1.0 + 2.0 * rate * below, 1.0)
+            return value + rate * growth + 0.5 * np.log(square), rate * (growth + 1.0) / square
+
+        return at
 
     def _few(self, own: FloatArray, u: FloatArray) -> FloatArray:
         """`fill` in numpy."""
         from scipy.special import erf
 
         light, h_max = own[:, 2], own[:, 3]
-        held = np.clip(u, TINY, h_max)
-        value, rate = self._log_gaussian(own, np.log(held))
-        endless, end = np.exp(value), self._log_gaussian(own, np.log(h_max))[0]
+        held, log_gaussian = np.minimum(np.maximum(u, TINY), h_max), self._log_gaussian(own)
+        value, rate = log_gaussian(np.log(held))
+        endless, end = np.exp(value), log_gaussian(np.log(h_max))[0]
         force = -endless * np.expm1(end - value)
         t = force / self.constants.area_t0
-        out = np.stack([force, erf(force * np.sqrt(2 * (1 + t) / (light + t))), -rate * endless / held])
+        out = np.array([force, erf(force * np.sqrt(2 * (1 + t) / (light + t))), -rate * endless / held])
         out[:, u >= h_max] = 0.0
         out[:, u <= 0] = np.array([[np.inf], [1.0], [np.inf]])
         return out
 
     def _few_separations(self, own: FloatArray, force: FloatArray) -> FloatArray:
         """`fill_separation` in numpy."""
+        log_gaussian = self._log_gaussian(own)
         high, low = np.log(own[:, 3]), np.full(force.size, -MAX_LOG_SEPARATION)
-        end = self._log_gaussian(own, high)[0]
+        end = log_gaussian(high)[0]
         wanted, x = force * np.exp(-end), high - 0.5
-        beyond = end + np.log1p(wanted) > self._log_gaussian(own, low)[0]
+        beyond = end + np.log1p(wanted) > log_gaussian(low)[0]
         done = beyond
         for _ in range(MAX_STEPS):
-            value, rate = self._log_gaussian(own, x)
+            value, rate = log_gaussian(x)
             # as there
             miss = np.log1p((np.expm1(value - end) - wanted) / (1.0 + wanted))
             low, high = np.where(miss > 0, x, low), np.where(miss > 0, high, x)
@@ -167,6 +208,26 @@ class Table:
         if theory not in self.scatter:
             return np.full(np.shape(area), np.nan)
         return np.asarray(np.exp(at_contact(self.log_area, self.scatter[theory][QUANTITIES.index(quantity)], area)))
+
+
+def _cell_of(place: float, cells: int) -> tuple[int, float]:
+    """Cell number and place in it, taken at the ends of the table beyond them."""
+    held = min(max(place, 0.0), float(cells))
+    first = min(int(held), cells - 1)
+    return first, held - first
+
+
+def _separation(curve: Callable[[float], tuple[float, float]], log_end: float, force: float) -> float:
+    """`fill_separation` of one number."""
+    x, low, high, end = log_end - 0.5, -MAX_LOG_SEPARATION, log_end, curve(log_end)[0]
+    wanted = force * math.exp(-end)
+    if end + math.log1p(wanted) > curve(low)[0]:
+        return math.nan
+    for _ in range(MAX_STEPS):
+        x, low, high, done = newton_step(x, low, high, *curve(x), end, wanted)
+        if done:
+            break
+    return math.exp(x)
 
 
 def at_contact(log_area: FloatArray, row: FloatArray, area: FloatArray) -> FloatArray:
@@ -276,8 +337,8 @@ def quintic_at(p: Any, z: Any) -> tuple[Any, Any]:
     return value, p[1] + z * (2.0 * p[2] + z * (3.0 * p[3] + z * (4.0 * p[4] + z * 5.0 * p[5])))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _beyond(value: float, rate: float, log_u: float, numbers: FloatArray, last: float) -> tuple[float, float]:
+@jitable
+def beyond_of(value: Any, rate: Any, log_u: Any, numbers: Any, last: Any) -> tuple[Any, Any]:
     """ln F_G and its derivative by ln u beyond an end of the table, from those at the end."""
     beyond, below = log_u - (numbers[2] + last / numbers[5]), log_u - numbers[2]
     if beyond > 0.0:
@@ -300,7 +361,7 @@ def _log_gaussian(
         value, rate = quintic_at(cells[row, k], z)
     else:
         value, rate = quintic_at(polynomial_of(eight_of(c, numbers, surfaces[row, 0], surfaces[row, 1], k), 0), z)
-    return _beyond(value, rate * numbers[5], log_u, numbers, last)
+    return beyond_of(value, rate * numbers[5], log_u, numbers, last)
 
 
 @njit(cache=True, fastmath=_FAST, error_model="numpy", forceinline=True)
@@ -319,8 +380,8 @@ def _log_gaussian_twice(
     far = patch_lanes(flat, start + m, row, c.shape[2], wx, wy)
     value, rate = quintic_at(polynomial_of(near, 0), z)
     end, end_rate = quintic_at(polynomial_of(far, 0), t)
-    value, rate = _beyond(value, rate * numbers[5], log_u, numbers, last)
-    return value, rate, _beyond(end, end_rate * numbers[5], log_end, numbers, last)[0]
+    value, rate = beyond_of(value, rate * numbers[5], log_u, numbers, last)
+    return value, rate, beyond_of(end, end_rate * numbers[5], log_end, numbers, last)[0]
 
 
 @njit(cache=True, error_model="numpy")
@@ -391,6 +452,22 @@ def fill(c: FloatArray, numbers: FloatArray, surfaces: FloatArray, owner: Any, u
         out[1, n] = math.erf(out[0, n] * math.sqrt(2.0 * (1.0 + t) / (light + t)))
 
 
+@jitable
+def newton_step(x: Any, low: Any, high: Any, value: Any, rate: Any, end: Any, wanted: Any) -> tuple[Any, Any, Any, Any]:
+    """The next ln u, its bracket, and whether it is the last, from ln F_G and its derivative at x."""
+    # in ln(F + F_G(h_max)), which is smooth to the end
+    miss = math.log1p((math.expm1(value - end) - wanted) / (1.0 + wanted))
+    if miss > 0.0:
+        low = x
+    else:
+        high = x
+    following = x - miss / rate
+    near = abs(miss) <= CLOSE
+    if not low < following < high:
+        following = x if near else 0.5 * (low + high)
+    return following, low, high, near or high - low <= 2e-16
+
+
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def fill_separation(
     c: FloatArray, numbers: FloatArray, surfaces: FloatArray, owner: Any, force: FloatArray, out: FloatArray
@@ -407,17 +484,7 @@ def fill_separation(
         x = high - 0.5
         for _ in range(MAX_STEPS):
             value, rate = _log_gaussian(c, numbers, surfaces, cells, row, x)
-            # in ln(F + F_G(h_max)), which is smooth to the end
-            miss = math.log1p((math.expm1(value - end) - wanted) / (1.0 + wanted))
-            if miss > 0.0:
-                low = x
-            else:
-                high = x
-            following = x - miss / rate
-            near = abs(miss) <= CLOSE
-            if not low < following < high:
-                following = x if near else 0.5 * (low + high)
-            x = following
-            if near or high - low <= 2e-16:
+            x, low, high, done = newton_step(x, low, high, value, rate, end, wanted)
+            if done:
                 break
         out[n] = math.exp(x)

@@ -17,6 +17,7 @@ from mbma_tables.arguments import (
     is_labelled,
     positive_modulus,
     require,
+    spread,
 )
 from mbma_tables.errors import InputError
 from mbma_tables.labels import apply_to_surface
@@ -196,10 +197,10 @@ def _contact(
     else:
         u = np.asarray(places["mean_separation"])
         capped: Any = theory
-        loaded = capped.loaded(surface, u) if source.yields else None
+        loaded = None if theory is source.theory else capped.loaded(surface, u)
         found = theory.answer(surface, u) if loaded is None else loaded.answer
         source = dataclasses.replace(source, answer=found, loaded=loaded)
-        error = np.broadcast_to(found.error, np.shape(found.force))[()]
+        error = spread(found.error, np.shape(found.force))[()]
         fields = {"force": (E_star * found.force)[()], "area": found.area[()], "error": error} | places
         fields |= {"reading": "", "tier": "", "islands": None}
         if derivatives:
@@ -221,7 +222,7 @@ def _places(
     """What is known, the modulus, and both separations, all of the broadcast shape."""
     asked, modulus = finite_array(by, value), positive_modulus(E_star)
     shape = broadcast_shape(**{by: asked, "surface": surface.h_rms, "E_star": modulus, "hardness": hardness})
-    asked, modulus = np.broadcast_to(asked, shape), np.broadcast_to(modulus, shape)
+    asked, modulus = spread(asked, shape), spread(modulus, shape)
     h_max = np.asarray(surface.h_max)
     if by == "separation":
         gap = asked
@@ -233,7 +234,7 @@ def _places(
         gap = 2 * theory.mean_separation_at(surface, quantity, wanted) - h_max
     average = asked if by == "mean_separation" else (h_max + gap) / 2
     both = {"separation": gap, "mean_separation": average}
-    return asked, modulus, {name: np.broadcast_to(place, shape)[()] for name, place in both.items()}
+    return asked, modulus, {name: spread(place, shape)[()] for name, place in both.items()}
 
 
 def _at_fixed(held: str, by: str, slopes: dict[str, Any], per_modulus: Any) -> dict[str, Any]:

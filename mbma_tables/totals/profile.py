@@ -25,7 +25,7 @@ from mbma_tables.surfaces.readings import Reading
 from mbma_tables.totals import kernel
 from mbma_tables.totals.island import scale_area, scale_force
 from mbma_tables.totals.island_sum import jacobian_of, kinks
-from mbma_tables.totals.profile_kernel import ENDS, ORDER, RATE, SHIFT, WEIGHT_AREA, WEIGHT_FORCE, fill_sums
+from mbma_tables.totals.profile_kernel import ENDS, ORDER, RATE, SHIFT, fill_sums
 
 KEPT = 64  # profiles, for whoever asks the same surface again
 WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
@@ -111,11 +111,10 @@ class Profile:
     def _first(self, width: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Weights of force and area, shift and rate at the nodes of [0, width] in the first panel, by rule."""
         end_nodes, end_weights = _rules()[2:4]
-        basis = chebyshev.chebvander(2 * width[:, None, None] / self.edges[1] * end_nodes - 1, ORDER - 1)
-        fields = np.einsum("fk,grnk->fgrn", self.series[0], basis)
-        powers = np.stack([width ** (power + 1) for power in POWERS], axis=-1)[:, :, None]
-        weights = np.stack([fields[row] for row in (WEIGHT_FORCE, WEIGHT_AREA)])[[0, 1], :, [0, 1]]
-        return np.moveaxis(weights, 0, 1) * end_weights * powers, fields[SHIFT], fields[RATE]
+        basis = chebyshev.chebvander(2 * width[:, None] / self.edges[1] * end_nodes[:, None] - 1, ORDER - 1)
+        fields = np.einsum("fk,rgnk->frgn", self.series[0], basis)
+        powers = np.array([width ** (power + 1) for power in POWERS])[:, :, None]
+        return fields[[0, 1], [0, 1]] * end_weights[:, None] * powers, fields[SHIFT], fields[RATE]
 
     @np.errstate(under="ignore")
     def _sums(self, c: FloatArray) -> FloatArray:
@@ -123,32 +122,34 @@ class Profile:
         nodes, weights = _rules()[:2]
         low_panel = np.clip(np.searchsorted(self.edges, c, side="right") - 1, 0, self.edges.size - 2)
 
-        def add(weight: Any, shift: Any, rate: Any, gap: FloatArray) -> tuple[FloatArray, FloatArray]:
+        def add(weight: Any, shift: Any, rate: Any, gap: FloatArray) -> FloatArray:
             height = shift - rate * gap
             terms = weight * np.exp(-0.5 * height * height)
-            return terms.sum(axis=-1), (terms * height * rate).sum(axis=-1)
+            return np.concatenate([terms.sum(axis=-1), (terms * height * rate).sum(axis=-1)])
 
-        force, area, shift, rate, ends = self._fields
+        *weight, shift, rate, ends = self._fields
         gap, low = c[:, None], self.edges[low_panel]
-        inside = ends <= low[:, None]
-        parts = [add(weight * inside, shift, rate, gap) for weight in (force, area)]
-        sums = np.stack([part[k] for k in (0, 1) for part in parts])
-        first = self._first(np.minimum(c, self.edges[1]))
-        sums += np.concatenate(add(*first, c[:, None, None]), axis=-1).T
+        sums = add(np.array(weight)[:, None] * (ends <= low[:, None]), shift, rate, gap)
+        whole = bool((c >= self.edges[1]).all())
+        first = self._whole_first if whole else self._first(np.minimum(c, self.edges[1]))
+        sums += add(*first, gap)
         # the panel that the gap cuts, and the island at the gap itself
-        width = np.diff(self.edges)[low_panel]
+        width = self.edges[low_panel + 1] - low
         place = np.append(nodes, 1.0) * (c - low)[:, None]
         basis = chebyshev.chebvander(2 * place / width[:, None] - 1, ORDER - 1)
         fields = np.einsum("gfk,gnk->fgn", self.series[low_panel], basis)
         cut = low_panel > 0
         shares = np.where(cut, c - low, 0.0)[:, None] * weights
-        for row in range(2):
-            value, slope = add(fields[row, :, :-1] * shares, fields[SHIFT, :, :-1], fields[RATE, :, :-1], gap)
-            sums[row] += value
-            power = np.where(cut, 1.0, c ** POWERS[row])
-            height = fields[SHIFT, :, -1] - fields[RATE, :, -1] * c
-            sums[2 + row] += slope + power * fields[row, :, -1] * np.exp(-0.5 * height * height)
+        sums += add(fields[:2, :, :-1] * shares, fields[SHIFT, :, :-1], fields[RATE, :, :-1], gap)
+        power = np.where(cut, 1.0, c ** np.array(POWERS)[:, None])
+        height = fields[SHIFT, :, -1] - fields[RATE, :, -1] * c
+        sums[2:] += power * fields[:2, :, -1] * np.exp(-0.5 * height * height)
         return sums
+
+    @functools.cached_property
+    def _whole_first(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """`_first` of gaps that reach beyond the first panel."""
+        return self._first(self.edges[1:2])
 
     @functools.cached_property
     def leverage(self) -> float:
