@@ -181,18 +181,17 @@ class Table:
         log_gaussian = self._log_gaussian(own)
         high, low = np.log(own[:, 3]), np.full(force.size, -MAX_LOG_SEPARATION)
         end = log_gaussian(high)[0]
-        wanted, x = force * np.exp(-end), high - 0.5
-        beyond = end + np.log1p(wanted) > log_gaussian(low)[0]
+        rise, x = np.logaddexp(0.0, np.log(force) - end), high - 0.5
+        beyond = end + rise > log_gaussian(low)[0]
         done = beyond
         for _ in range(MAX_STEPS):
             value, rate = log_gaussian(x)
-            # as there
-            miss = np.log1p((np.expm1(value - end) - wanted) / (1.0 + wanted))
+            miss = (value - end) - rise
             low, high = np.where(miss > 0, x, low), np.where(miss > 0, high, x)
             following = x - miss / rate
             near = np.abs(miss) <= CLOSE
             inside = (low < following) & (following < high)
-            following = np.where(inside, following, np.where(near, x, 0.5 * (low + high)))
+            following = np.where(inside, following, np.where(near, np.clip(following, low, high), 0.5 * (low + high)))
             x, done = np.where(done, x, following), done | near | (high - low <= 2e-16)
             if done.all():
                 break
@@ -220,11 +219,11 @@ def _cell_of(place: float, cells: int) -> tuple[int, float]:
 def _separation(curve: Callable[[float], tuple[float, float]], log_end: float, force: float) -> float:
     """`fill_separation` of one number."""
     x, low, high, end = log_end - 0.5, -MAX_LOG_SEPARATION, log_end, curve(log_end)[0]
-    wanted = force * math.exp(-end)
-    if end + math.log1p(wanted) > curve(low)[0]:
+    rise = rise_of(math.log(force) - end)
+    if end + rise > curve(low)[0]:
         return math.nan
     for _ in range(MAX_STEPS):
-        x, low, high, done = newton_step(x, low, high, *curve(x), end, wanted)
+        x, low, high, done = newton_step(x, low, high, *curve(x), end, rise)
         if done:
             break
     return math.exp(x)
@@ -453,10 +452,16 @@ def fill(c: FloatArray, numbers: FloatArray, surfaces: FloatArray, owner: Any, u
 
 
 @jitable
-def newton_step(x: Any, low: Any, high: Any, value: Any, rate: Any, end: Any, wanted: Any) -> tuple[Any, Any, Any, Any]:
+def rise_of(log_ratio: Any) -> Any:
+    """ln(1 + F/F_G(h_max)) by the logarithm of that ratio, which itself may be out of range."""
+    return max(log_ratio, 0.0) + math.log1p(math.exp(-abs(log_ratio)))
+
+
+@jitable
+def newton_step(x: Any, low: Any, high: Any, value: Any, rate: Any, end: Any, rise: Any) -> tuple[Any, Any, Any, Any]:
     """The next ln u, its bracket, and whether it is the last, from ln F_G and its derivative at x."""
     # in ln(F + F_G(h_max)), which is smooth to the end
-    miss = math.log1p((math.expm1(value - end) - wanted) / (1.0 + wanted))
+    miss = (value - end) - rise
     if miss > 0.0:
         low = x
     else:
@@ -464,7 +469,7 @@ def newton_step(x: Any, low: Any, high: Any, value: Any, rate: Any, end: Any, wa
     following = x - miss / rate
     near = abs(miss) <= CLOSE
     if not low < following < high:
-        following = x if near else 0.5 * (low + high)
+        following = min(max(following, low), high) if near else 0.5 * (low + high)
     return following, low, high, near or high - low <= 2e-16
 
 
@@ -477,14 +482,14 @@ def fill_separation(
     for n in range(force.size):
         row = owner[n]
         end, high, low = ends[row], math.log(surfaces[row, 3]), -MAX_LOG_SEPARATION
-        wanted = force[n] * math.exp(-end)
-        if not end + math.log1p(wanted) <= _log_gaussian(c, numbers, surfaces, cells, row, low)[0]:
+        rise = rise_of(math.log(force[n]) - end)
+        if not end + rise <= _log_gaussian(c, numbers, surfaces, cells, row, low)[0]:
             out[n] = np.nan
             continue
         x = high - 0.5
         for _ in range(MAX_STEPS):
             value, rate = _log_gaussian(c, numbers, surfaces, cells, row, x)
-            x, low, high, done = newton_step(x, low, high, value, rate, end, wanted)
+            x, low, high, done = newton_step(x, low, high, value, rate, end, rise)
             if done:
                 break
         out[n] = math.exp(x)

@@ -422,3 +422,16 @@ def test_few_separations_in_numpy_are_those_of_compiled_loops():
     np.testing.assert_allclose(
         found, table.separations(rows, np.tile(known, 3), np.tile(few[0, known], 3))[: known.size]
     )
+
+
+@pytest.mark.parametrize("h_max", [20.0, 200.0, 1e4])
+@pytest.mark.parametrize("entries", [(), 20, 300])
+def test_loads_of_surfaces_with_a_peak_far_out(h_max, entries):
+    # F_G(h_max) underflows; how far out the peak is changes nothing any more
+    surface, usual = (dataclasses.replace(SURFACE, h_max=h * SURFACE.h_rms) for h in (h_max, 15.0))
+    with np.errstate(all="raise"):
+        for force in (1e-10, 1e-2):
+            found = contact(surface, pressure=np.full(entries, force), theory="calibrated")
+            np.testing.assert_allclose(found.force, force, rtol=1e-10)
+            expected = contact(usual, pressure=force, theory="calibrated").mean_separation
+            np.testing.assert_allclose(found.mean_separation, expected, rtol=1e-9)
