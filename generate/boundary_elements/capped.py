@@ -15,7 +15,7 @@ import numpy as np
 import scipy.fft
 from scipy.special import erfinv
 
-from generate.boundary_elements.solve import prepared, simulate_to
+from generate.boundary_elements.solve import prepared
 from generate.boundary_elements.surfaces import Recipe, heights
 from mbma_tables.arguments import FloatArray
 from mbma_tables.bearing import wavevectors
@@ -217,8 +217,3 @@ def simulate_capped(recipe: Recipe) -> dict[str, Any]:
             result["frozen_stiffness"] = contact.frozen_stiffness()
             found[:, row, column] = [result[name] / units.get(name, 1.0) for name in QUANTITIES]
     return {**dict(zip(QUANTITIES, found, strict=True)), **known, "force": forces, "engine": "conjugate gradients here"}
-
-
-def simulate_capped_to(recipe: Recipe, folder: str) -> str:
-    """`simulate_capped` into a file of its own."""
-    return simulate_to(recipe, folder, simulate_capped)

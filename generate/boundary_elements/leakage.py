@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.metadata
 import pathlib
 from typing import Any
@@ -64,11 +65,6 @@ def solve_flow(recipe: Recipe) -> dict[str, Any]:
     }
 
 
-def solve_flow_to(recipe: Recipe, folder: str) -> str:
-    """`solve_flow` into a file of its own."""
-    return simulate_to(recipe, folder, solve_flow)
-
-
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--folder", type=click.Path(path_type=pathlib.Path), default=HERE, show_default=True, help="One file a surface."
@@ -89,4 +85,4 @@ def leakage(folder: pathlib.Path, target: pathlib.Path | None, points: int, work
         click.echo(f"{target}: {counted} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
         return
     with executor(workers, None) as pool:
-        run(tasks, folder, pool, solve_flow_to)
+        run(tasks, folder, pool, functools.partial(simulate_to, solve=solve_flow))

@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterator, Sequence
 import click
 from tqdm import tqdm
 
-from generate.boundary_elements.capped import simulate_capped_to
+from generate.boundary_elements.capped import simulate_capped
 from generate.boundary_elements.collect import collect, dataset, hardness_dataset
 from generate.boundary_elements.design import Task, campaign, hardness_tasks
-from generate.boundary_elements.solve import simulate_to
+from generate.boundary_elements.solve import simulate, simulate_to
 from generate.boundary_elements.surfaces import Recipe
 
 HERE = pathlib.Path("boundary_elements")
@@ -90,4 +90,4 @@ def boundary_elements(
         click.echo(f"{target}: {counted} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
         return
     with executor(workers, scheduler) as pool:
-        run(tasks, folder, pool, simulate_capped_to if hardness else simulate_to)
+        run(tasks, folder, pool, functools.partial(simulate_to, solve=simulate_capped if hardness else simulate))

@@ -120,20 +120,22 @@ def island_statistics(problem: Problem, surface: AnySurface, gap: FloatArray, st
         spread = density_of(pairs, np.arange(gap.size), approach, {k: field[None] for k, field in g.items()}, reading)
         density = np.where(approach <= pairs.compression[:, None], spread, 0.0) * q0**2 / s
         error = max(error, float(np.max(phi.error)))
-    fields: Fields = {
-        "island_number": (("gap",), number.value[:, 0] * q0**2),
-        "island_delta": (("approach",), grid * float(surface.h_rms)),
-        "island_force": (("approach",), force),
-        "island_area": (("approach",), area),
-        "island_density": (("gap", "approach"), density),
-    }
-    return fields, error
+    return _fields(number.value[:, 0] * q0**2, grid * float(surface.h_rms), force, area, density), error
 
 
 def _grid(problem: Problem, deepest: float, layer: float) -> FloatArray:
     """Approaches up to the deepest, graded towards first contact."""
     t = np.linspace(0, 1, problem.points + 1)[1:] * np.arcsinh(np.sqrt(max(deepest, 0.0) / layer))
     return np.asarray(layer * np.sinh(t) ** 2)
+
+
+def _fields(number: FloatArray, delta: FloatArray, force: FloatArray, area: FloatArray, density: FloatArray) -> Fields:
+    along = {"island_delta": delta, "island_force": force, "island_area": area}
+    return {
+        "island_number": (("gap",), number),
+        **{name: (("approach",), values) for name, values in along.items()},
+        "island_density": (("gap", "approach"), density),
+    }
 
 
 def _own_statistics(problem: Problem, surface: MeasuredSurface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
@@ -150,14 +152,7 @@ def _own_statistics(problem: Problem, surface: MeasuredSurface, gap: FloatArray,
         density = np.where(grid <= depth[:, None], curve.density(nodes, depth[:, None]), 0.0)
     else:
         force, area, density = np.zeros(grid.size), np.zeros(grid.size), np.zeros((gap.size, grid.size))
-    fields: Fields = {
-        "island_number": (("gap",), found.number),
-        "island_delta": (("approach",), grid),
-        "island_force": (("approach",), force),
-        "island_area": (("approach",), area),
-        "island_density": (("gap", "approach"), density),
-    }
-    return fields, float(found.error.max(initial=curve.island_error))
+    return _fields(found.number, grid, force, area, density), float(found.error.max(initial=curve.island_error))
 
 
 def profiles(problem: Problem, surface: AnySurface, gap: Any, step: Step) -> tuple[Fields, float]:

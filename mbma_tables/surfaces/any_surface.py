@@ -193,14 +193,10 @@ class AnySurface(Displayed, abc.ABC):
     def _figure(self) -> Figure:
         if self.labelled or self.shape != ():
             raise InputError("a batch has no single spectrum to draw: take one surface")
-        q = self._wavenumbers()
+        q = np.geomspace(self.q0, self.q1, 200)[1:-1]
         length = self.unit or "length"
         label = f"wavenumber q [1/{length}]"
         return draw_lines({"spectrum": (q, self.power_spectrum(q))}, label, f"spectrum C(q) [{length}^4]")
-
-    def _wavenumbers(self) -> Any:
-        """Where the spectrum is drawn."""
-        return np.geomspace(self.q0, self.q1, 200)[1:-1]
 
     def combined(self, other: AnySurface) -> MeasuredSurface:
         """The one rough surface that stands for two that touch: spectra add, heights convolve.

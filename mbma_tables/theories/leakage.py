@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, require
-from mbma_tables.calibrated import Spectrum
 from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
 from mbma_tables.leakage import LARGEST_AREA
@@ -252,10 +251,8 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
     return out.reshape(shape)
 
 
-@functools.lru_cache(KEPT)
-def _spectrum(surface: MeasuredSurface) -> Spectrum:
-    """A surface's own spectrum, as one object for one surface."""
-    return spectrum_of(surface)
+# one object for one surface
+_spectrum = functools.lru_cache(KEPT)(spectrum_of)
 
 
 def concerns(theory: Theory, surface: Any, area: FloatArray) -> dict[str, Any]:
