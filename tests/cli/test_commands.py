@@ -527,9 +527,12 @@ def test_a_terminal_sees_that_work_goes_on():
 def test_control_c_ends_it_with_130(folder, wait):
     command = [sys.executable, "-m", "mbma_tables", "curve", "--surface", "concrete", "--tier", "exact", "--points"]
     with subprocess.Popen([*command, "100000"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as program:
-        time.sleep(wait)
-        program.send_signal(signal.SIGINT)
-        said = program.communicate(timeout=20)
+        try:
+            time.sleep(wait)
+            program.send_signal(signal.SIGINT)
+            said = program.communicate(timeout=20)
+        finally:
+            program.kill()
     assert program.returncode == 130
     assert b"Traceback" not in said[1]
     assert said[0] == b""
