@@ -161,6 +161,7 @@ class Table:
 
         return at
 
+    @np.errstate(under="ignore")
     def _few(self, own: FloatArray, u: FloatArray) -> FloatArray:
         """`fill` in numpy."""
         from scipy.special import erf
@@ -176,6 +177,7 @@ class Table:
         out[:, u <= 0] = np.array([[np.inf], [1.0], [np.inf]])
         return out
 
+    @np.errstate(under="ignore")
     def _few_separations(self, own: FloatArray, force: FloatArray) -> FloatArray:
         """`fill_separation` in numpy."""
         log_gaussian = self._log_gaussian(own)
