@@ -177,7 +177,7 @@ def test_ratios_to_the_references(drawn):
 @pytest.mark.slow
 def test_the_page_on_tables():
     parts, files = table_page.measure()
-    assert set(parts) == {"sizes", "axes", "universal", "island4d"}
+    assert set(parts) == {"sizes", "cells", "axes", "universal", "island4d"}
     assert [content[:4] for content in files.values()] == [PNG]
 
 
