@@ -104,11 +104,9 @@ def test_ten_million_mixed_lookups_by_sixteen_threads_have_the_bits_of_one():
     whole = answers(each)
     for k in range(0, each, each // 50):
         one = model.answer(X[k], mu[k])
-        assert [one.error, law.force(gaps[k])] == [column[k] for column in whole[2:]]
-        # few are asked in numpy, which rounds products that compiled code adds unrounded
-        np.testing.assert_allclose([one.phi_F, one.phi_A], [column[k] for column in whole[:2]], rtol=1e-14)
+        assert [one.phi_F, one.phi_A, one.error, law.force(gaps[k])] == [column[k] for column in whole]
     with ThreadPoolExecutor(THREADS) as pool:
-        for found in pool.map(answers, 4 * [12_500, 15_625, 62_500, each]):
+        for found in pool.map(answers, 4 * [997, 8192, 50_000, each]):
             for column, expected in zip(found, whole, strict=True):
                 np.testing.assert_array_equal(column, expected)
 

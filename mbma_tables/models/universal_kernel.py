@@ -158,7 +158,8 @@ value_at: Any = Instruction(_value, lambda *given: _plain(*given)[0])
 gradient_at: Any = Instruction(_gradient, _plain)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+# fastmath=False is said because else numba takes that of whichever caller compiles these first, and bits depend on it
+@njit(cache=True, fastmath=False, error_model="numpy", forceinline=True)
 def _find(X: float, mu: float, table: Table) -> tuple[int, int]:
     """Status, and where the record of the cell begins."""
     if not table.X_low <= X:
@@ -172,7 +173,7 @@ def _find(X: float, mu: float, table: Table) -> tuple[int, int]:
     return OK, RECORD * table.places[strip + bucket]
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, fastmath=False, error_model="numpy", forceinline=True)
 def universal_phi(X: float, mu: float, table: Table) -> tuple[int, float, float, float]:
     """Status, Phi_F, Phi_A and the bound on their relative error at (X, mu)."""
     status, cell = _find(X, mu, table)
@@ -185,7 +186,7 @@ def universal_phi(X: float, mu: float, table: Table) -> tuple[int, float, float,
     return OK, mu * force, area, r[cell + ERROR]
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, fastmath=False, error_model="numpy", forceinline=True)
 def universal_one(which: int, X: float, mu: float, table: Table) -> tuple[int, float, float]:
     """Status, Phi_F (`which` = 0) or Phi_A (1) alone, and the bound on its relative error."""
     status, cell = _find(X, mu, table)
@@ -211,7 +212,7 @@ class Slopes(NamedTuple):
     error: float
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, fastmath=False, error_model="numpy", forceinline=True)
 def universal_slopes(X: float, mu: float, table: Table) -> Slopes:
     """Both functions with their derivatives, and the bound on the relative error of the functions."""
     status, cell = _find(X, mu, table)
@@ -231,14 +232,14 @@ def universal_slopes(X: float, mu: float, table: Table) -> Slopes:
     return Slopes(OK, mu * F, by_X_F, 1.0 + F_y * by_mu * over_F, A, by_X_A, A_y * by_mu * over_A, r[cell + ERROR])
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def fill_phi(X: FloatArray, mu: FloatArray, table: Table, status: NDArray[np.int64], out: FloatArray) -> None:
     """`universal_phi` of each entry: status, and Phi_F, Phi_A, error into the rows of `out` (entries, 3)."""
     for k in range(X.size):
         status[k], out[k, 0], out[k, 1], out[k, 2] = universal_phi(X[k], mu[k], table)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def fill_slopes(X: FloatArray, mu: FloatArray, table: Table, status: NDArray[np.int64], out: FloatArray) -> None:
     """`universal_slopes` of each entry: status, and the other seven into the rows of `out` (entries, 7)."""
     for k in range(X.size):
