@@ -10,10 +10,10 @@ from xml.etree import ElementTree as ET
 
 from mbma_tables import __version__
 from mbma_tables.errors import InputError
-from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
-from mbma_tables.export.law_code import MAX_NAME, head, law_text
-from mbma_tables.export.law_numbers import LawNumbers, law_numbers
-from mbma_tables.export.text import checked_name, filled
+from mbma_tables.export.joint import Joint
+from mbma_tables.export.law_code import asked_law, code_name, text_of
+from mbma_tables.export.law_numbers import LawNumbers
+from mbma_tables.export.text import filled
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.units import factor
 
@@ -66,21 +66,16 @@ def fmu(
     """
     if target not in STANDARDS:
         raise InputError(f"target must be one of {tuple(STANDARDS)}, got {target!r}")
-    checked_name(name, MAX_NAME)
-    heat: dict[str, Any] = {"conductivity": conductivity, "conductivity_unit": conductivity_unit}
-    law = law_text("c-law", surface, E_star, name=name, **heat, **asked)
-    joint = frozen_joint(surface, E_star, **asked)
-    numbers, conductance, unit = law_numbers(joint.law), "", ""
-    if conductivity is not None:
-        k_s, k_unit = checked_conductivity(conductivity, conductivity_unit)
-        unit = f"{k_unit}/{joint.length}"
-        ratio = f"{k_s / joint.modulus!r}*second(c)"
-        conductance = f"\n    case CONDUCTANCE: *slope = {ratio}; return {name}_conductance(c);"
-    variables = _variables(joint, numbers, unit)
+    code_name(name)
+    found = asked_law(surface, E_star, conductivity, conductivity_unit, **asked)
+    joint, numbers, law, conductance = found.joint, found.numbers, text_of("c-law", name, found), ""
+    if found.conductance_unit:
+        conductance = f"\n    case CONDUCTANCE: *slope = {found.ratio!r}*second(c); return {name}_conductance(c);"
+    variables = _variables(joint, numbers, found.conductance_unit)
     token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, f'{target} {law}')}}}"
     parts = STANDARDS[target] | {"LAW": law, "NAME": name, "TOKEN": token, "CONDUCTANCE": conductance}
     parts |= {"START": repr(_start(numbers)), "VARIABLES": str(len(variables))}
-    described = _description(target == "fmu3", name, token, "\n".join(head(joint, numbers, unit)), variables, joint)
+    described = _description(target == "fmu3", name, token, "\n".join(found.said), variables, joint)
     files = {
         "modelDescription.xml": described,
         f"sources/{name}.c": filled("fmu.c", WRAPPER=filled(f"{parts['FMI']}.c"), **parts).encode(),

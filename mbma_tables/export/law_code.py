@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError
@@ -86,19 +86,54 @@ def law_text(
     """
     if target not in LANGUAGES:
         raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
-    language, name = LANGUAGES[target], checked_name(name, MAX_NAME)
-    if name.lower() in FUNCTIONS:
+    name, heat = code_name(name), (conductivity, conductivity_unit, LANGUAGES[target].only_conductance)
+    units: dict[str, Any] = {"length_unit": length_unit, "stress_unit": stress_unit}
+    asked = asked_law(surface, E_star, *heat, **units, reading=reading, theory=theory, hardness=hardness)
+    return text_of(target, name, asked)
+
+
+class AskedLaw(NamedTuple):
+    """A law and what every file of it says; conductance is `ratio` times the tangent, NaN where it was not asked."""
+
+    joint: Joint
+    numbers: LawNumbers
+    ratio: float
+    conductance_unit: str
+    said: tuple[str, ...]
+
+
+def code_name(name: str) -> str:
+    """A name that functions of a law may begin with."""
+    if checked_name(name, MAX_NAME).lower() in FUNCTIONS:
         raise InputError(f"name must not be that of a function of the law, {', '.join(FUNCTIONS)}")
-    conducts = language.only_conductance or conductivity is not None or conductivity_unit is not None
-    k_s, k_unit = checked_conductivity(conductivity, conductivity_unit) if conducts else (0.0, "")
-    joint = frozen_joint(surface, E_star, length_unit, stress_unit, reading, theory, hardness)
+    return name
+
+
+def asked_law(
+    surface: AnySurface,
+    E_star: float | str,
+    conductivity: float | None = None,
+    conductivity_unit: str | None = None,
+    only_conductance: bool = False,
+    **options: Any,
+) -> AskedLaw:
+    """The law that a file is asked of, made once; arguments as for `law_text`."""
+    conducts = only_conductance or conductivity is not None or conductivity_unit is not None
+    k_s, k_unit = checked_conductivity(conductivity, conductivity_unit) if conducts else (math.nan, "")
+    joint = frozen_joint(surface, E_star, **options)
     if conducts and joint.hardness < math.inf:
         raise InputError("conductance of yielded contact is not a slope of its law: leave conductivity or hardness out")
-    numbers = law_numbers(joint.law)
-    said = head(joint, numbers, f"{k_unit}/{joint.length}" if conducts else "")
-    lines = [*(line.replace("{", "{{").replace("}", "}}") for line in said), language.usage]
+    numbers, unit = law_numbers(joint.law), f"{k_unit}/{joint.length}" if conducts else ""
+    return AskedLaw(joint, numbers, k_s / joint.modulus, unit, _head(joint, numbers, unit))
+
+
+def text_of(target: str, name: str, asked: AskedLaw) -> str:
+    """The text of one file."""
+    language, numbers = LANGUAGES[target], asked.numbers
+    lines = [*(line.replace("{", "{{").replace("}", "}}") for line in asked.said), language.usage]
+    lines.append(_example(asked.joint, language))
     parts = {
-        "HEADER": opening((line.format(name=name) for line in [*lines, _example(joint, language)]), language.mark),
+        "HEADER": opening((line.format(name=name) for line in lines), language.mark),
         "NAME": name,
         "RECORDS": str(numbers.centre.size),
         "STEP": str(1 << (numbers.centre.size - 1).bit_length() - 1),
@@ -108,15 +143,15 @@ def law_text(
         **{scalar.upper(): language.number(getattr(numbers, scalar)) for scalar in SCALARS},
         **language.arrays(numbers),
     }
-    if conducts:
-        ratio = language.number(k_s / joint.modulus)
+    if asked.conductance_unit:
+        ratio = language.number(asked.ratio)
         parts |= {place: text.format(name=name, ratio=ratio) for place, text in language.conductance.items()}
     if language.subroutine:
         parts["SUBROUTINE"] = filled(language.subroutine, **parts | dict(language.parts))
     return filled(language.template, **parts)
 
 
-def head(joint: Joint, numbers: LawNumbers, conductance_unit: str) -> tuple[str, ...]:
+def _head(joint: Joint, numbers: LawNumbers, conductance_unit: str) -> tuple[str, ...]:
     """The lines that every file has."""
     length, stress = joint.length, joint.stress
     what = f"pressure [{stress}], tangent dp/dc [{stress}/{length}], area A/A0, energy, the integral of pressure"

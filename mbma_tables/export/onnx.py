@@ -9,9 +9,8 @@ import numpy as np
 from mbma_tables import __version__
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError
-from mbma_tables.export.joint import checked_conductivity, frozen_joint
-from mbma_tables.export.law_code import MAX_NAME, head
-from mbma_tables.export.law_numbers import LawNumbers, law_numbers
+from mbma_tables.export.law_code import MAX_NAME, asked_law
+from mbma_tables.export.law_numbers import LawNumbers
 from mbma_tables.export.text import checked_name
 from mbma_tables.surfaces.any_surface import AnySurface
 
@@ -77,22 +76,17 @@ def onnx(
         from onnx import TensorProto, helper, numpy_helper
     except ImportError:
         raise InputError("onnx needs a package: pip install 'mbma_tables[onnx]'") from None
-    conducts = conductivity is not None or conductivity_unit is not None
-    k_s, k_unit = checked_conductivity(conductivity, conductivity_unit) if conducts else (0.0, "")
-    joint = frozen_joint(surface, E_star, **asked)
-    if conducts and joint.hardness < np.inf:
-        raise InputError("conductance of yielded contact is not a slope of its law: leave conductivity or hardness out")
-    numbers, graph = law_numbers(joint.law), _Graph(helper)
-    outputs = _law(graph, numbers)
-    if conducts:
-        outputs.append(graph("Mul", "tangent", k_s / joint.modulus, name="conductance"))
+    found, graph = asked_law(surface, E_star, conductivity, conductivity_unit, **asked), _Graph(helper)
+    outputs = _law(graph, found.numbers)
+    if found.conductance_unit:
+        outputs.append(graph("Mul", "tangent", found.ratio, name="conductance"))
     made = helper.make_graph(
         graph.nodes,
         checked_name(name, MAX_NAME),
         [helper.make_tensor_value_info("overclosure", TensorProto.DOUBLE, ["n"])],
         [helper.make_tensor_value_info(output, TensorProto.DOUBLE, ["n"]) for output in outputs],
         [numpy_helper.from_array(value, key) for key, value in graph.constants.items()],
-        doc_string="\n".join(head(joint, numbers, f"{k_unit}/{joint.length}" if conducts else "")),
+        doc_string="\n".join(found.said),
     )
     known = {"opset_imports": [helper.make_opsetid("", OPSET)], "ir_version": IR}
     model = helper.make_model(made, producer_name="mbma_tables", producer_version=__version__, **known)
