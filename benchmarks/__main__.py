@@ -1,4 +1,4 @@
-"""Times of tables, totals, laws, the calibrated law and a fresh process, each beside a peer.
+"""Times of tables, totals, laws, the calibrated law, exported C, scenes and a fresh process, each beside a peer.
 
 ``python -m benchmarks`` prints them, ``--write`` puts them into docs/lookup.md too. One core; every ratio is of two
 processor times taken in turn, the median over the rounds, so that what else the machine does falls on both.
@@ -30,6 +30,9 @@ import numpy as np
 from scipy.interpolate import NdBSpline, RegularGridInterpolator, make_interp_spline
 from scipy.special import erf
 
+from benchmarks.exports import exported
+from benchmarks.rows import LINES, held_out, microseconds, report, rounds, times_faster
+from benchmarks.scenes import scenes
 from generate.pages import page
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
 from mbma_tables.calibrated import Law, Spectrum, light_factor
@@ -42,7 +45,6 @@ from mbma_tables.tablefiles.schema import TableContent
 from mbma_tables.theories import Calibrated
 from mbma_tables.theories.calibrated_table import fill, shipped
 
-ROUNDS = 9
 POINTS = 20_000
 HELD_OUT = 500
 MANY, GRID = 100_000, 256
@@ -52,55 +54,6 @@ SURFACES = 2_000
 GAPS, MANY_GAPS = 100_000, 1_000_000
 NOMINAL_EXACT = 15_000  # islands/s, a rate to compare with that is not measured here
 SEED = 7
-
-
-@dataclasses.dataclass(frozen=True)
-class Line:
-    """One measured number; `wanted` as a sentence part, empty where nothing is asked."""
-
-    name: str
-    value: float
-    unit: str
-    wanted: str = ""
-    met: bool | None = None
-
-
-LINES: list[Line] = []
-
-
-def report(name: str, value: float, unit: str, at_least: float | None = None, at_most: float | None = None) -> None:
-    """Keep and print a number."""
-    wanted, met = "", None
-    if at_least is not None:
-        wanted, met = f">= {at_least:g}", value >= at_least
-    if at_most is not None:
-        wanted, met = f"<= {at_most:g}", value <= at_most
-    LINES.append(Line(name, float(value), unit, wanted, None if met is None else bool(met)))
-    mark = {None: "", True: "met", False: "MISSED"}[met]
-    click.echo(f"  {name:<72} {value:10.4g} {unit:<6} {wanted:>9} {mark}".rstrip())
-
-
-def rounds(runs: dict[str, Callable[[], Any]], count: int = ROUNDS) -> dict[str, list[float]]:
-    """Processor seconds of each run in every round; runs take turns, a first round, which compiles, is not counted."""
-    taken: dict[str, list[float]] = {name: [] for name in runs}
-    for number in range(count + 1):
-        for name, run in runs.items():
-            start = time.thread_time()
-            run()
-            spent = time.thread_time() - start
-            if number:
-                taken[name].append(spent)
-    return taken
-
-
-def times_faster(taken: dict[str, list[float]], slow: str, fast: str) -> float:
-    """Median over rounds of the ratio of two times."""
-    return statistics.median(a / b for a, b in zip(taken[slow], taken[fast], strict=True))
-
-
-def microseconds(taken: list[float], count: int) -> float:
-    """Median time of one of `count`."""
-    return 1e6 * statistics.median(taken) / count
 
 
 def random_places(content: TableContent, rng: np.random.Generator) -> np.ndarray:
@@ -192,14 +145,6 @@ def tables(rng: np.random.Generator) -> None:
         report(f"{name}, a lookup", 1e3 * microseconds(taken[name], POINTS), "ns")
         report("  faster than scipy RGI, cubic, one function", times_faster(taken, "scipy", name), "x")
     report("largest |log_ratio_F - scipy's|", np.abs(value[0] - cubic(at_four)).max(), "")
-
-
-def held_out(count: int, rng: np.random.Generator) -> tuple[Surface, np.ndarray]:
-    """Random surfaces, and a gap of each between -h_max and 0.9999 h_max."""
-    hurst = rng.uniform(0.3, 1, count)
-    zeta_1 = np.exp(rng.uniform(np.log(3.01), np.log(1e4), count))
-    h_max = rng.uniform(2.5, 4.7, count)
-    return Surface(hurst, 1.0, zeta_1, 1.0, h_max), rng.uniform(-1, 0.9999, count) * h_max
 
 
 def one_step() -> dict[str, Callable[[], Any]]:
@@ -346,15 +291,19 @@ def calibrated(rng: np.random.Generator) -> None:
 
 
 def fresh_process() -> None:
-    """Import, first lookup with compiled code at hand, and the very first one."""
+    """Import, first lookup and the command, and the command with nothing compiled."""
     lookup = (
         "import time; t = time.perf_counter(); import mbma_tables as m; a = time.perf_counter(); "
         "m.contact(m.Surface(0.8, 1.0, 200.0, 1.0, 3.0), 1.0); b = time.perf_counter(); print(a - t, b - a)"
     )
+    command = [sys.executable, "-m", "mbma_tables", "contact", "--surface", "concrete", "-d", "0.4"]
 
     def run(**environment: str) -> list[float]:
-        said = subprocess.check_output([sys.executable, "-c", lookup], env={**os.environ, **environment})
-        return [float(word) for word in said.split()]
+        found = {**os.environ, **environment}
+        said = subprocess.check_output([sys.executable, "-c", lookup], env=found)
+        start = time.perf_counter()
+        subprocess.check_output(command, env=found)
+        return [*(float(word) for word in said.split()), time.perf_counter() - start]
 
     run()
     warm = np.median([run() for _ in range(5)], axis=0)
@@ -363,7 +312,8 @@ def fresh_process() -> None:
     click.echo("\nA fresh process")
     report("import mbma_tables", warm[0], "s", at_most=0.5)
     report("first lookup after the import", warm[1], "s", at_most=0.8)
-    report("very first lookup, nothing compiled yet", cold[1], "s", at_most=1.5)
+    report("mbma contact --surface concrete -d 0.4", warm[2], "s", at_most=0.8)
+    report("the same with nothing compiled", cold[2], "s", at_most=1.5)
 
 
 @click.command()
@@ -373,7 +323,7 @@ def main(write: bool) -> None:
     rng = np.random.default_rng(SEED)
     load = os.getloadavg()
     click.echo(f"{os.cpu_count()} cores, load average {load[0]:.2f} at the start; numpy {np.__version__}")
-    for section in (tables, totals, laws, calibrated):
+    for section in (tables, totals, laws, calibrated, exported, scenes):
         section(rng)
     fresh_process()
     click.echo(f"\nload average {os.getloadavg()[0]:.2f} at the end")
