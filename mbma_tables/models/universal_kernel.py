@@ -46,14 +46,14 @@ class Table(NamedTuple):
 
 
 class _Polynomial:
-    """Code for TERMS rows of powers of x from `offset` on, a row for each power of y; nothing is fused, as in numpy."""
+    """Code for TERMS rows of powers of x from `offset` on, a row for each power of y; fused, or rounded as in numpy."""
 
-    def __init__(self, context: Any, builder: Any, signature: Any, arguments: Any) -> None:
+    def __init__(self, context: Any, builder: Any, signature: Any, arguments: Any, fused: bool = False) -> None:
         from llvmlite import ir
         from numba.np.arrayobj import make_array
 
         array, self.offset, self.x, self.y = arguments
-        self.ir, self.builder = ir, builder
+        self.ir, self.builder, self.flags = ir, builder, ("contract",) if fused else ()
         self.data = make_array(signature.args[0])(context, builder, array).data
 
     def row(self, power: int) -> Any:
@@ -69,7 +69,7 @@ class _Polynomial:
         spread = self.ir.Constant(vector.type, self.ir.Undefined)
         for k in range(vector.type.count):
             spread = self.builder.insert_element(spread, factor, self.ir.IntType(32)(k))
-        return self.builder.fadd(total, self.builder.fmul(spread, vector))
+        return self.builder.fadd(total, self.builder.fmul(spread, vector, flags=self.flags), flags=self.flags)
 
     def picked(self, vector: Any, lanes: range | list[int]) -> Any:
         index = self.ir.IntType(32)
@@ -125,7 +125,7 @@ def _gradient(typing: Any, array: Any, offset: Any, x: Any, y: Any) -> Any:
     from numba import types
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        polynomial = _Polynomial(context, builder, signature, arguments)
+        polynomial = _Polynomial(context, builder, signature, arguments, fused=True)
         value, slope = polynomial.sums()
         parts = polynomial.along_x(value), polynomial.slope_along_x(value), polynomial.along_x(slope)
         return context.make_tuple(builder, signature.return_type, parts)
