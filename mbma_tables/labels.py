@@ -5,10 +5,7 @@ Blocks are answered by the same functions as plain arrays; which block runs wher
 
 from __future__ import annotations
 
-import dataclasses
-import functools
-import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -16,8 +13,6 @@ import numpy as np
 from mbma_tables.arguments import is_labelled
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces.any_surface import AnySurface
-
-OPTIONS = ("method",)  # arguments that are no arrays
 
 
 def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
@@ -60,32 +55,3 @@ def apply_to_surface(answer: Any, surface: AnySurface, arrays: Mapping[str, Any]
 
     found = apply(block, tuple(arguments.values()), outputs)
     return (found,) if outputs == 1 else found
-
-
-def takes_labelled(result: type | None = None) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Let ``function(surface, array, ...)`` take DataArrays as well; it answers an array, or a `result` of arrays."""
-    fields = [] if result is None else [field.name for field in dataclasses.fields(result)]
-
-    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
-        signature = inspect.signature(function)
-
-        @functools.wraps(function)
-        def answer(*given: Any, **named: Any) -> Any:
-            bound = signature.bind(*given, **named)
-            bound.apply_defaults()
-            surface = bound.arguments["surface"]
-            options = {name: bound.arguments[name] for name in OPTIONS if name in bound.arguments}
-            arrays = {name: it for name, it in bound.arguments.items() if name not in ("surface", *OPTIONS)}
-            if not (surface.labelled or any(map(is_labelled, arrays.values()))):
-                return function(*given, **named)
-
-            def block(own: AnySurface, *numbers: Any) -> tuple[Any, ...]:
-                found = function(own, **dict(zip(arrays, numbers, strict=True)), **options)
-                return (found,) if result is None else tuple(getattr(found, name) for name in fields)
-
-            answers = apply_to_surface(block, surface, arrays, max(len(fields), 1))
-            return answers[0] if result is None else result(*answers)
-
-        return answer
-
-    return decorate

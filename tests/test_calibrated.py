@@ -12,8 +12,8 @@ from mbma_tables.bearing import FRACTIONS
 from mbma_tables.calibrated import PERSSON, YANG_PERSSON, Law, Spectrum, area, mean_top_height
 from mbma_tables.calibrated_map import MapLaw, convex, hertz_ellipse
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories import Persson
 from mbma_tables.theories.calibrated_table import shipped
-from mbma_tables.theories.persson import persson_separation
 
 HARD = [(0.1, 1e5), (0.3, 128.0), (0.8, 64.0), (1.0, 3.5)]
 FORCES = np.geomspace(1e-6, 2.0, 25)
@@ -49,7 +49,7 @@ def test_special_cases_are_perssons(constants, gamma):
     loads = np.array([0.003, 0.03, 0.3, 0.8])
     assert law.area(loads) == pytest.approx(erf(math.sqrt(2) * loads), rel=1e-12)
     if gamma == 0.42:
-        expected = persson_separation(surface, loads * surface.rms_gradient)
+        expected = Persson().mean_separation_at(surface, "force", loads * surface.rms_gradient)
         np.testing.assert_allclose(law.separation(loads), expected, rtol=1e-6)
 
 

@@ -9,9 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from mbma_tables import InputError, OutOfRangeError, Surface, theories
+from mbma_tables import InputError, OutOfRangeError, Surface, contact, theories
 
 YANG_PERSSON = Surface.named("yang-persson")
+SPHERES, FULL, LIGHT = theories.GreenwoodWilliamson(), theories.Persson(), theories.Persson("simplified")
+
+
+def separation(surface, load, theory=FULL):
+    return theory.mean_separation_at(surface, "force", np.asarray(load))
 
 
 def relative(value, expected):
@@ -74,18 +79,18 @@ PRINTED = [
 
 @pytest.mark.parametrize(("hurst", "zeta_1", "slope", "load", "expected"), PRINTED)
 def test_full_double_integral_equals_mpmath(hurst, zeta_1, slope, load, expected):
-    assert relative(theories.persson_separation(surface_of(hurst, zeta_1, slope), load), expected) < 1e-11
+    assert relative(separation(surface_of(hurst, zeta_1, slope), load), expected) < 1e-11
 
 
 @pytest.mark.parametrize(("hurst", "zeta_1", "slope", "load"), [(0.3, 4, 0.2, 2.0), (0.9, 10, 0.3, 1.0)])
 def test_full_double_integral_equals_mpmath_computed_here(hurst, zeta_1, slope, load):
     expected = printed_separation(hurst, zeta_1, slope, load, digits=16)
-    assert relative(theories.persson_separation(surface_of(hurst, zeta_1, slope), load), expected) < 1e-11
+    assert relative(separation(surface_of(hurst, zeta_1, slope), load), expected) < 1e-11
 
 
 def test_simplified_force_of_the_yang_persson_case():
     """The value that follows from Eqs. (20, 21); the paper reads 3.5e-4 off its figure."""
-    force = theories.persson_force(YANG_PERSSON, 3 * YANG_PERSSON.h_rms, method="simplified")
+    force = LIGHT.answer(YANG_PERSSON, 3 * YANG_PERSSON.h_rms).force
     assert force == pytest.approx(3.64e-4, rel=1e-3)
 
 
@@ -111,7 +116,7 @@ def test_simplified_constants_equal_their_printed_integrals(hurst):
         u0 = float(mpmath.sqrt(mpmath.pi) * mpmath.mpf("0.42") * total)
         scale = float(mpmath.mpf("4.047") * mpmath.exp(-moment(mpmath.log) / total))
     loads = np.array([1e-7, 1e-4, 1e-2])
-    found = theories.persson_separation(surface, loads, method="simplified")
+    found = separation(surface, loads, LIGHT)
     assert relative(found, -u0 * np.log(loads / scale)) < 1e-11
 
     n = 1 / (2 - 2 * hurst)
@@ -129,17 +134,17 @@ def test_simplified_is_the_light_load_limit_of_full(hurst):
     constant = math.exp(3 * 0.58 / 0.42 * expected - np.euler_gamma / 2)
     assert constant == pytest.approx(4.047, rel=1e-3)
     # the next term is of first order in the load
-    u = theories.persson_separation(surface, [1e-13, 1e-15], method="simplified")
-    full, simplified = (theories.persson_force(surface, u, method=m) for m in ("full", "simplified"))
+    u = separation(surface, [1e-13, 1e-15], LIGHT)
+    full, simplified = (theory.answer(surface, u).force for theory in (FULL, LIGHT))
     assert relative(full / simplified, constant / 4.047) < 1e-9
 
 
 def test_full_and_simplified_agree_within_one_per_cent_at_a_thousandth_of_contact():
     """And their difference is of first order in the load: about 7% at 1% contact, 40% at 10%."""
     light = 1e-9 * YANG_PERSSON.rms_gradient
-    force = np.array([1e-5, 1e-4, 1e-3]) * light / theories.persson_area(YANG_PERSSON, light)
-    u = theories.persson_separation(YANG_PERSSON, force)
-    simplified = theories.persson_force(YANG_PERSSON, u, method="simplified")
+    force = np.array([1e-5, 1e-4, 1e-3]) * light / FULL.area_at(YANG_PERSSON, light)
+    u = separation(YANG_PERSSON, force)
+    simplified = LIGHT.answer(YANG_PERSSON, u).force
     difference = simplified / force - 1
     assert np.all(np.abs(difference) < 0.01)
     # what is left at no load is the rounding of 4.047
@@ -151,18 +156,18 @@ def test_full_and_simplified_agree_within_one_per_cent_at_a_thousandth_of_contac
     st.floats(0.1, 1.0),
     st.floats(0.7, 6.0),
     st.floats(-8, 0.5),
-    st.sampled_from(["full", "simplified"]),
+    st.sampled_from([FULL, LIGHT]),
 )
-def test_force_and_separation_are_inverse(hurst, log_zeta_1, log_load, method):
+def test_force_and_separation_are_inverse(hurst, log_zeta_1, log_load, theory):
     surface = Surface(hurst, 1e4, 1e4 * 10**log_zeta_1, 1e-5, 3e-5)
     unit = np.sqrt(surface.m2)
     load = unit * 10**log_load
     try:
-        u = theories.persson_separation(surface, load, method=method)
+        u = separation(surface, load, theory)
     except OutOfRangeError:
-        assert method == "simplified"
+        assert theory is LIGHT
         return
-    again = theories.persson_force(surface, u, method=method)
+    again = theory.answer(surface, u).force
     assert relative(again, load) < 1e-10
 
 
@@ -171,27 +176,23 @@ def test_separation_falls_with_load_and_scales_with_the_units(hurst, log_load, u
     surface = Surface(hurst, 0.1, 10.0, 2.0, 6.0)
     scaled = Surface(hurst, 0.1 / unit, 10.0 / unit, 2.0 * unit, 6.0 * unit)
     load = 10**log_load
-    low, high = theories.persson_separation(surface, [load, 1.01 * load])
+    low, high = separation(surface, [load, 1.01 * load])
     assert low > high > 0
-    assert relative(theories.persson_separation(scaled, load * 7e9, E_star=7e9), unit * low) < 1e-10
+    assert relative(separation(scaled, load), unit * low) < 1e-10
 
 
 def test_full_near_hurst_one_is_continuous():
-    below, at = (
-        theories.persson_separation(Surface(H, 0.1, 100.0, 1.0, 3.0), [1e-6, 1e-2, 1]) for H in (1 - 1e-9, 1.0)
-    )
+    below, at = (separation(Surface(H, 0.1, 100.0, 1.0, 3.0), [1e-6, 1e-2, 1]) for H in (1 - 1e-9, 1.0))
     assert relative(below, at) < 1e-7
 
 
 def test_persson_area_limits():
     surface = Surface(np.array([0.4, 0.8, 1.0]), 0.1, 50.0, 1.0, 3.0)
     light = 1e-9 * surface.rms_gradient
-    kappa = theories.persson_area(surface, light) / light * surface.rms_gradient
+    kappa = FULL.area_at(surface, light) / light * surface.rms_gradient
     assert relative(kappa, math.sqrt(8 / math.pi)) < 1e-10
-    assert np.all(theories.persson_area(surface, 0.0) == 0)
-    assert relative(theories.persson_area(surface, 10 * surface.rms_gradient), 1.0) < 1e-10
-    E_star = 3e9
-    assert relative(theories.persson_area(surface, light * E_star, E_star), kappa * 1e-9) < 1e-14
+    assert np.all(FULL.area_at(surface, 0.0) == 0)
+    assert relative(FULL.area_at(surface, 10 * surface.rms_gradient), 1.0) < 1e-10
 
 
 def test_greenwood_williamson_equals_mpmath():
@@ -210,7 +211,7 @@ def test_greenwood_williamson_equals_mpmath():
 
         force = mpmath.mpf(4) / 3 * density * mpmath.sqrt(radius) * mean(1.5)
         area = mpmath.pi * density * radius * mean(1)
-    found = theories.greenwood_williamson(YANG_PERSSON, d, E_star=2.5)
+    found = contact(YANG_PERSSON, d, theory="greenwood_williamson", E_star=2.5)
     assert relative(found.force, 2.5 * float(force)) < 1e-11
     assert relative(found.area, float(area)) < 1e-11
     assert found.mean_separation == (3 + d) / 2
@@ -219,89 +220,59 @@ def test_greenwood_williamson_equals_mpmath():
 def test_greenwood_williamson_deep_and_far():
     """Deep, every summit is a Hertz contact of depth -d; far, A/F rises like sqrt(d)."""
     s = YANG_PERSSON
-    deep = theories.greenwood_williamson(s, -1e6)
+    deep = SPHERES.answer(s, (s.h_max - 1e6) / 2)
     expected = 4 / 3 * s.summit_density * math.sqrt(s.summit_radius) * 1e9
     assert relative(deep.force, expected) < 1e-10
     assert relative(deep.area, math.pi * s.summit_density * s.summit_radius * 1e6) < 1e-10
     x = 36.0
-    far = theories.greenwood_williamson(s, x * s.summit_sigma)
+    far = SPHERES.answer(s, (s.h_max + x * s.summit_sigma) / 2)
     # F_1/F_{3/2} -> sqrt(x)/Gamma(5/2), the next term below 3/x^2
     ratio = (far.area / far.force) * 4 / (3 * math.pi) / np.sqrt(s.summit_radius / s.summit_sigma)
     assert relative(ratio, math.sqrt(x) / math.gamma(2.5)) < 3 / x**2
-    assert theories.greenwood_williamson(s, 60.0).force == 0
+    assert SPHERES.answer(s, 31.5).force == 0
 
 
 def test_everything_broadcasts_and_keeps_scalars():
     surface = Surface(np.array([[0.5], [0.8]]), 0.1, 10.0, 1.0, 3.0)
     one = Surface(0.8, 0.1, 10.0, 1.0, 3.0)
     x = np.array([0.5, 1.0, 1.5])
-    calls = [
-        lambda s, v: theories.greenwood_williamson(s, v).force,
-        lambda s, v: theories.greenwood_williamson(s, v).area,
-        theories.persson_area,
-        theories.mean_separation,
-        theories.separation,
-    ]
-    for method in ("full", "simplified"):
-        calls.append(lambda s, v, m=method: theories.persson_separation(s, v / 1e3, method=m))
-        calls.append(lambda s, v, m=method: theories.persson_force(s, v, method=m))
-    for call in calls:
-        batch = call(surface, x)
-        assert batch.shape == (2, 3)
-        single = call(one, 1.0)
-        assert isinstance(single, np.float64)
-        assert relative(batch[1, 1], single) < 1e-12
+    for theory in (SPHERES, FULL, LIGHT):
+        batch, single = (contact(s, mean_separation=u, theory=theory) for s, u in ((surface, x), (one, 1.0)))
+        for name in ("force", "area", "stiffness", "separation"):
+            assert getattr(batch, name).shape == (2, 3)
+            assert isinstance(getattr(single, name), np.float64)
+            assert relative(getattr(batch, name)[1, 1], getattr(single, name)) < 1e-12
     assert np.all(x == [0.5, 1.0, 1.5])
 
 
-@given(st.floats(-5, 5))
-def test_the_two_separations_are_inverse(u):
-    d = theories.separation(YANG_PERSSON, u)
-    assert d == 2 * u - 3
-    assert theories.mean_separation(YANG_PERSSON, d) == pytest.approx(u, abs=1e-14)
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, [], "1", 1j, [1.0, np.nan]])
-def test_bad_numbers_are_refused(bad):
-    for call in (
-        theories.greenwood_williamson,
-        theories.persson_area,
-        theories.persson_separation,
-        theories.persson_force,
-        theories.mean_separation,
-        theories.separation,
-    ):
+@pytest.mark.parametrize("bad", [np.nan, np.inf, [], "x", 1j, [1.0, np.nan]])
+@pytest.mark.parametrize("theory", [SPHERES, FULL, LIGHT])
+def test_bad_numbers_are_refused(theory, bad):
+    for known in ("separation", "mean_separation", "pressure", "area"):
         with pytest.raises(InputError):
-            call(YANG_PERSSON, bad)
+            contact(YANG_PERSSON, **{known: bad}, theory=theory)
 
 
 def test_out_of_range_names_the_entries():
-    with pytest.raises(OutOfRangeError, match="zero or positive") as caught:
-        theories.persson_area(YANG_PERSSON, [1e-3, -1e-3])
-    assert caught.value.mask.tolist() == [False, True]
     with pytest.raises(OutOfRangeError, match="infinite at zero load"):
-        theories.persson_separation(YANG_PERSSON, 0.0)
+        separation(YANG_PERSSON, 0.0)
     with pytest.raises(OutOfRangeError, match="lambda") as caught:
-        theories.persson_separation(YANG_PERSSON, [1e-3, 3.0], method="simplified")
+        separation(YANG_PERSSON, [1e-3, 3.0], LIGHT)
     assert caught.value.mask.tolist() == [False, True]
-    for method, bad in (("full", 0.0), ("full", -1.0), ("simplified", -1e-3)):
+    for theory, bad in ((FULL, 0.0), (FULL, -1.0), (LIGHT, -1e-3)):
         with pytest.raises(OutOfRangeError, match="mean_separation"):
-            theories.persson_force(YANG_PERSSON, bad, method=method)
+            theory.answer(YANG_PERSSON, bad)
     with pytest.raises(OutOfRangeError, match="normal numbers") as caught:
-        theories.persson_force(YANG_PERSSON, [1.0, 1e4])
+        FULL.answer(YANG_PERSSON, [1.0, 1e4])
     assert caught.value.mask.tolist() == [False, True]
     with pytest.raises(InputError, match="method"):
-        theories.persson_force(YANG_PERSSON, 1.0, method="exact")
-    with pytest.raises(OutOfRangeError, match="E_star"):
-        theories.persson_area(YANG_PERSSON, 1.0, E_star=0.0)
-    with pytest.raises(InputError, match="broadcast"):
-        theories.persson_area(Surface([0.5, 0.8], 0.1, 10.0, 1.0, 3.0), [1.0, 2.0, 3.0])
+        theories.Persson("exact")
 
 
 def test_extreme_loads_stay_numbers():
-    light = theories.persson_separation(YANG_PERSSON, [1e-300, 1e-150])
-    assert relative(theories.persson_separation(YANG_PERSSON, [1e-300, 1e-150], method="simplified"), light) < 1e-4
-    assert theories.persson_separation(YANG_PERSSON, 1e300) == 0
+    light = separation(YANG_PERSSON, [1e-300, 1e-150])
+    assert relative(separation(YANG_PERSSON, [1e-300, 1e-150], LIGHT), light) < 1e-4
+    assert separation(YANG_PERSSON, 1e300) == 0
     loads = np.array([1e-290, 1e-100, 1e-10, 1.0, 10.0])
-    again = theories.persson_force(YANG_PERSSON, theories.persson_separation(YANG_PERSSON, loads))
+    again = FULL.answer(YANG_PERSSON, separation(YANG_PERSSON, loads)).force
     assert relative(again, loads) < 1e-9

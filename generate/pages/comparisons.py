@@ -39,7 +39,7 @@ def solve(surface: Surface, theory: str, kind: str, wanted: Any) -> tuple[FloatA
     targets = np.atleast_1d(np.asarray(wanted, dtype=float))
     if theory == "Persson":
         force = targets if kind == "force" else np.sqrt(surface.m2) * erfinv(targets)
-        return force, theories.persson_area(surface, force)
+        return force, theories.Persson().area_at(surface, force)
     result = np.full((2, targets.size), np.nan)
     reached = np.ones(targets.size, dtype=bool)
     try:

@@ -55,7 +55,7 @@ def by_force(ax: Any, surface: Surface, ordinate: Callable[[Any, Any], Any], **s
     for name in AREA_THEORIES:
         if name == "Persson":
             force = np.geomspace(1e-5, 3, GAPS) * np.sqrt(surface.m2)
-            area = theories.persson_area(surface, force)
+            area = theories.Persson().area_at(surface, force)
         else:
             _, force, area = sample(surface, name)
         shown = (area > 1e-5) & (area < 1.2)

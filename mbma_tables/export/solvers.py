@@ -108,7 +108,7 @@ def exponential(
 
     Abaqus has a card of that name for another curve, which ends at a clearance.
     """
-    from mbma_tables.theories import persson_force
+    from mbma_tables.theories import Persson
 
     surface = in_unit(surface, length_unit)
     modulus, units = modulus_and_units(E_star, surface, stress_unit)
@@ -116,7 +116,7 @@ def exponential(
         if getattr(units, kind) in (None, "1"):
             raise InputError(f"{kind}_unit is missing: a law without units is read wrongly sooner or later")
     h_rms = float(surface.h_rms)
-    near, far = (float(persson_force(surface, u * h_rms, modulus, method="simplified")) for u in (1.0, 2.0))
+    near, far = modulus * Persson("simplified").answer(surface, h_rms * np.array([1.0, 2.0])).force
     u0 = h_rms / math.log(near / far)
     p0 = near * math.exp((h_rms - float(surface.h_max)) / u0)
     numbers = ", ".join(f"{key} = {float(getattr(surface, key)):.10g}" for key in surface.parameters)

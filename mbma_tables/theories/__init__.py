@@ -8,22 +8,15 @@ from typing import TYPE_CHECKING, Any
 from mbma_tables.theories.registry import THEORIES, get_theory
 
 if TYPE_CHECKING:
-    from mbma_tables.theories.asperities import (
-        Asperities,
-        GreenwoodWilliamson,
-        greenwood_williamson,
-        mean_separation,
-        separation,
-    )
+    from mbma_tables.theories.asperities import GreenwoodWilliamson
     from mbma_tables.theories.calibrated import Calibrated
     from mbma_tables.theories.mbma import Mbma
-    from mbma_tables.theories.persson import Method, Persson, persson_area, persson_force, persson_separation
+    from mbma_tables.theories.persson import Method, Persson
     from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
     from mbma_tables.theories.simulated import BoundaryElements
 
 __all__ = [
     "THEORIES",
-    "Asperities",
     "BoundaryElements",
     "Calibrated",
     "GreenwoodWilliamson",
@@ -34,20 +27,14 @@ __all__ = [
     "TheoryAnswer",
     "UserTheory",
     "get_theory",
-    "greenwood_williamson",
-    "mean_separation",
-    "persson_area",
-    "persson_force",
-    "persson_separation",
-    "separation",
 ]
 
 # a theory's module is imported when it is first asked for
 _MODULES = {
-    "asperities": ("Asperities", "GreenwoodWilliamson", "greenwood_williamson", "mean_separation", "separation"),
+    "asperities": ("GreenwoodWilliamson",),
     "calibrated": ("Calibrated",),
     "mbma": ("Mbma",),
-    "persson": ("Method", "Persson", "persson_area", "persson_force", "persson_separation"),
+    "persson": ("Method", "Persson"),
     "protocol": ("Theory", "TheoryAnswer", "UserTheory"),
     "simulated": ("BoundaryElements",),
 }

@@ -16,13 +16,12 @@ import math
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.special import erf, erfinv, exp1
 
-from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, positive_modulus, require
+from mbma_tables.arguments import FloatArray, finite_array, require
 from mbma_tables.calibrated import YANG_PERSSON
 from mbma_tables.errors import ConvergenceError, InputError
-from mbma_tables.labels import takes_labelled
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
@@ -48,159 +47,6 @@ _T, _T_WEIGHTS = (
     DECAY / 2 * (np.polynomial.legendre.leggauss(64)[0] + 1),
     DECAY / 2 * np.polynomial.legendre.leggauss(64)[1],
 )
-
-
-@takes_labelled()
-def persson_area(surface: AnySurface, force: ArrayLike, E_star: ArrayLike = 1.0) -> Numbers:
-    """A/A0 = erf(p0/(2 sqrt(G))) at the largest magnification, G = E*^2 m2/4 (Eq. 18).
-
-    Parameters
-    ----------
-    surface : Surface
-        One surface or a batch; it broadcasts against `force`.
-    force : array_like
-        p0 = F/A0 in the unit of `E_star`, zero or positive.
-    E_star : array_like
-        Effective modulus.
-
-    Returns
-    -------
-    ndarray
-
-    Raises
-    ------
-    InputError, OutOfRangeError
-
-    Examples
-    --------
-    >>> from mbma_tables import Surface, theories
-    >>> theories.persson_area(Surface.named("concrete"), [0.01, 0.1, 1.0]).round(4)
-    array([0.0217, 0.2145, 0.9935])
-    """
-    pressure = finite_array("force", force)
-    require("force", pressure, pressure >= 0, "zero or positive")
-    modulus = positive_modulus(E_star)
-    broadcast_shape(force=pressure, surface=surface.h_rms, E_star=modulus)
-    area: FloatArray = erf(pressure / modulus / np.sqrt(surface.m2))
-    return area
-
-
-@takes_labelled()
-def persson_separation(
-    surface: AnySurface, force: ArrayLike, E_star: ArrayLike = 1.0, method: Method = "full"
-) -> Numbers:
-    """Average interfacial separation u of Persson's theory (Eqs. 19-21).
-
-    Parameters
-    ----------
-    surface : Surface
-        One surface or a batch; it broadcasts against `force`.
-    force : array_like
-        p0 = F/A0 in the unit of `E_star`, positive.
-    E_star : array_like
-        Effective modulus.
-    method : {"full", "simplified"}
-        The double integral (19), to 1e-11, or its light-load form (20), which ends at u = 0, where
-        p0 = lambda E*.
-
-    Returns
-    -------
-    ndarray
-        u [length]; h_max does not enter. Where p0 is so large that u underflows, zero.
-
-    Raises
-    ------
-    InputError, OutOfRangeError
-
-    Examples
-    --------
-    >>> from mbma_tables import Surface, theories
-    >>> theories.persson_separation(Surface.named("concrete"), [0.001, 0.01]).round(4)
-    array([0.6721, 0.3801])
-    """
-    pressure = finite_array("force", force)
-    require("force", pressure, pressure > 0, "positive: u is infinite at zero load")
-    modulus = positive_modulus(E_star)
-    shape = broadcast_shape(force=pressure, surface=surface.h_rms, E_star=modulus)
-    if isinstance(surface, MeasuredSurface):
-        return own_separation(surface, np.broadcast_to(pressure / modulus, shape), _is_full(method))[0][()]
-    assert isinstance(surface, Surface)
-    bands = _Bands.of(surface, shape)
-    log_load = np.log(pressure) - np.log(modulus)
-    log_p = (np.broadcast_to(log_load, shape) - _log_stress(surface)).ravel()
-    if _is_full(method):
-        average = _full(bands, log_p)[0]
-    else:
-        u0, log_lambda = _simplified(bands)
-        beyond = (log_p > log_lambda).reshape(shape)
-        require(
-            "force",
-            np.broadcast_to(pressure, shape),
-            ~beyond,
-            "at most lambda E*, where the simplified form (20) reaches u = 0",
-        )
-        average = u0 * (log_lambda - log_p)
-    length: FloatArray = average.reshape(shape) * surface.s
-    return length[()]
-
-
-@takes_labelled()
-def persson_force(
-    surface: AnySurface, mean_separation: ArrayLike, E_star: ArrayLike = 1.0, method: Method = "full"
-) -> Any:
-    """The load at which Persson's theory has the average separation u: the inverse of `persson_separation`.
-
-    Parameters
-    ----------
-    surface : Surface
-        One surface or a batch; it broadcasts against `mean_separation`.
-    mean_separation : array_like
-        u [length]: positive for the full form, which needs an infinite load at u = 0; zero or positive for
-        the simplified one. Beyond h_max there still is a load: the theory's heights have no end.
-    E_star : array_like
-        Effective modulus.
-    method : {"full", "simplified"}
-        (19), its root found to 1e-10, or (20), solved in closed form.
-
-    Returns
-    -------
-    ndarray
-        p0 = F/A0 in the unit of `E_star`.
-
-    Raises
-    ------
-    InputError, OutOfRangeError
-        Also where u is so small or so large that the load of the full form is no normal number.
-
-    Examples
-    --------
-    >>> from mbma_tables import Surface, theories
-    >>> print(f"{theories.persson_force(Surface.named('concrete'), 0.6, E_star=10.0):.4f}")
-    0.0179
-    """
-    average = finite_array("mean_separation", mean_separation)
-    modulus = positive_modulus(E_star)
-    shape = broadcast_shape(mean_separation=average, surface=surface.h_rms, E_star=modulus)
-    full = _is_full(method)
-    allowed = average > 0 if full else average >= 0
-    require("mean_separation", average, allowed, "positive" if full else "zero or positive")
-    if isinstance(surface, MeasuredSurface):
-        return (modulus * own_force(surface, np.broadcast_to(average, shape), full))[()]
-    assert isinstance(surface, Surface)
-    bands = _Bands.of(surface, shape)
-    target = np.broadcast_to(average / surface.s, shape)
-    if full:
-        log_p = _invert(bands, target)
-    else:
-        u0, log_lambda = _simplified(bands)
-        log_p = log_lambda - target.ravel() / u0
-    return (modulus * np.exp(log_p.reshape(shape) + _log_stress(surface)))[()]
-
-
-def _is_full(method: str) -> bool:
-    if method not in ("full", "simplified"):
-        raise InputError(f"method must be 'full' or 'simplified', got {method!r}")
-    return method == "full"
 
 
 def _log_stress(surface: Surface) -> Any:
@@ -353,23 +199,73 @@ def _guesses(band: _Bands, wanted: FloatArray, light: FloatArray) -> FloatArray:
 
 
 class Persson(Theory):
-    """Persson's theory, its separation by the full integral (19) or by the light-load form (20)."""
+    """Persson's theory: area by Eq. (18), average separation by Eqs. (19)-(21).
+
+    Parameters
+    ----------
+    method : {"full", "simplified"}
+        The double integral (19), to 1e-11, or its light-load form (20), which ends at u = 0, where the force is lambda.
+
+    Raises
+    ------
+    InputError
+        For another method.
+
+    Examples
+    --------
+    >>> from mbma_tables import Surface, contact, theories
+    >>> found = contact(Surface.named("concrete"), pressure=[0.001, 0.01], theory="persson")
+    >>> found.mean_separation.round(4), found.area.round(5)
+    (array([0.6721, 0.3801]), array([0.00217, 0.02171]))
+    >>> light = theories.Persson("simplified")
+    >>> print(f"{contact(Surface.named('concrete'), mean_separation=0.6, E_star=10.0, theory=light).force:.4f}")
+    0.0184
+    """
 
     name = "persson"
     ends_at_h_max = False
 
     def __init__(self, method: Method = "full") -> None:
+        if method not in ("full", "simplified"):
+            raise InputError(f"method must be 'full' or 'simplified', got {method!r}")
         self.method: Method = method
+
+    @property
+    def _is_full(self) -> bool:
+        return self.method == "full"
 
     def scatter_name(self, surface: AnySurface) -> str:
         """The two forms differ by more than their distance from boundary elements."""
-        return self.name if self.method == "full" else f"{self.name}_{self.method}"
+        return self.name if self._is_full else f"{self.name}_{self.method}"
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
-        """Force, area and stiffness at mean separations u > 0 [length]."""
-        force = np.asarray(persson_force(surface, mean_separation, method=self.method))
+        """Force, area and stiffness at mean separations u [length], positive for the full form.
+
+        Raises
+        ------
+        OutOfRangeError
+            Also where u is so small or so large that the force of the full form is no normal number.
+        """
+        force = self._force(surface, mean_separation)
         error = np.full(force.shape, LAW_ERROR if isinstance(surface, MeasuredSurface) else INVERSE_RTOL)
-        return TheoryAnswer(force, persson_area(surface, force), force / self._decay(surface, force), error)
+        return TheoryAnswer(force, self.area_at(surface, force), force / self._decay(surface, force), error)
+
+    def _force(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
+        """Force over A0 E* at mean separations u [length]."""
+        u = finite_array("mean_separation", mean_separation)
+        allowed = u > 0 if self._is_full else u >= 0
+        require("mean_separation", u, allowed, "positive" if self._is_full else "zero or positive")
+        u = np.broadcast_to(u, np.broadcast_shapes(u.shape, surface.shape))
+        if isinstance(surface, MeasuredSurface):
+            return own_force(surface, u, self._is_full)
+        assert isinstance(surface, Surface)
+        bands, target = _Bands.of(surface, u.shape), u / surface.s
+        if self._is_full:
+            log_p = _invert(bands, target)
+        else:
+            u0, log_lambda = _simplified(bands)
+            log_p = log_lambda - target.ravel() / u0
+        return np.asarray(np.exp(log_p.reshape(u.shape) + _log_stress(surface)))
 
     def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] of the theory, whose heights have no end."""
@@ -377,19 +273,33 @@ class Persson(Theory):
         return low, np.full_like(low, np.inf)
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
-        """Mean separation u [length] at a force over A0 E* (19, 20) or an area (18)."""
+        """Mean separation u [length] at a force over A0 E* (19, 20) or an area (18); zero where it underflows."""
         if quantity == "area":
             require("area", wanted, wanted < 1, "below 1, which Persson's theory reaches at infinite load")
             wanted = erfinv(wanted) * np.sqrt(surface.m2)
-        return np.asarray(persson_separation(surface, wanted, method=self.method))
+        force = finite_array("force", wanted)
+        require("force", force, force > 0, "positive: u is infinite at zero load")
+        force = np.broadcast_to(force, np.broadcast_shapes(force.shape, surface.shape))
+        if isinstance(surface, MeasuredSurface):
+            return own_separation(surface, force, self._is_full)[0]
+        assert isinstance(surface, Surface)
+        bands, log_p = _Bands.of(surface, force.shape), (np.log(force) - _log_stress(surface)).ravel()
+        if self._is_full:
+            average = _full(bands, log_p)[0]
+        else:
+            u0, log_lambda = _simplified(bands)
+            inside = (log_p <= log_lambda).reshape(force.shape)
+            require("force", force, inside, "at most lambda E*, where the simplified form (20) reaches u = 0")
+            average = u0 * (log_lambda - log_p)
+        return np.asarray(average.reshape(force.shape) * surface.s)
 
     def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
-        """A/A0 at a force over A0 E* (18)."""
-        return np.asarray(persson_area(surface, force))
+        """A/A0 = erf(p0/(2 sqrt(G))) at a force over A0 E*, G = E*^2 m2/4 at the largest magnification (18)."""
+        return np.asarray(erf(force / np.sqrt(surface.m2)))
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], from dU = -F du = F (-du/dlog F) dlog F."""
-        force = np.asarray(persson_force(surface, mean_separation, method=self.method))
+        force = self._force(surface, mean_separation)
         lighter = force[..., None] * np.exp(-_T)
         batch = select(surface, force.shape, np.arange(force.size).reshape(*force.shape, 1))
         return np.asarray((lighter * self._decay(batch, lighter)) @ _T_WEIGHTS)
@@ -402,10 +312,10 @@ class Persson(Theory):
     def _decay(self, surface: AnySurface, force: FloatArray) -> FloatArray:
         """-du/dlog F [length] at a load."""
         if isinstance(surface, MeasuredSurface):
-            return own_separation(surface, force, _is_full(self.method))[1]
+            return own_separation(surface, force, self._is_full)[1]
         assert isinstance(surface, Surface)
         bands = _Bands.of(surface, force.shape)
-        if not _is_full(self.method):
+        if not self._is_full:
             return np.asarray(_simplified(bands)[0].reshape(force.shape) * surface.s)
         log_p = (np.log(force) - _log_stress(surface)).ravel()
         return np.asarray(_full(bands, log_p)[1].reshape(force.shape) * surface.s)

@@ -238,16 +238,16 @@ def test_curve_beside_other_theories(folder):
     found = json.loads(run("curve", *arguments, "--json"))["columns"]
     surface = Surface.named("concrete")
     average, gap = np.array(found["mean_separation"]), np.array(found["separation"])
-    asperities = theories.greenwood_williamson(surface, gap, 3.0)
+    asperities = contact(surface, gap, theory="greenwood_williamson", E_star=3.0)
     np.testing.assert_allclose(found["greenwood_williamson_force"], asperities.force, rtol=1e-13)
     np.testing.assert_allclose(found["greenwood_williamson_area"], asperities.area, rtol=1e-13)
     assert found["persson_force"][-1] is None
     assert found["persson_area"][-1] is None
-    full = theories.persson_force(surface, average[:-1], 3.0)
-    np.testing.assert_allclose(found["persson_force"][:-1], full, rtol=1e-9)
-    np.testing.assert_allclose(found["persson_area"][:-1], theories.persson_area(surface, full, 3.0), rtol=1e-9)
-    simplified = theories.persson_force(surface, average, 3.0, method="simplified")
-    np.testing.assert_allclose(found["persson_simplified_force"], simplified, rtol=1e-12)
+    full = theories.Persson().answer(surface, average[:-1])
+    np.testing.assert_allclose(found["persson_force"][:-1], 3.0 * full.force, rtol=1e-9)
+    np.testing.assert_allclose(found["persson_area"][:-1], full.area, rtol=1e-9)
+    simplified = theories.Persson("simplified").answer(surface, average)
+    np.testing.assert_allclose(found["persson_simplified_force"], 3.0 * simplified.force, rtol=1e-12)
     assert (folder / "c.png").is_file()
     names, *_, last = table_rows(run("curve", *arguments))
     assert last[names.index("persson_force")] == last[names.index("persson_area")] == "-"

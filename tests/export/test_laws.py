@@ -181,7 +181,7 @@ def test_exponential_is_persson_for_light_loads():
     c0, p0 = numbers(text.splitlines()[-1])
     for u in (0.5, 1.0):
         p = p0 * np.exp((CONCRETE.h_max - u) / (c0 / np.log(100)))
-        assert p == pytest.approx(theories.persson_force(CONCRETE, u, 13.3, method="simplified"), rel=1e-8, abs=0)
+        assert p == pytest.approx(13.3 * theories.Persson("simplified").answer(CONCRETE, u).force, rel=1e-8, abs=0)
 
 
 @pytest.mark.parametrize(("target", "package"), [("hdf5", "h5py"), ("parquet", "pyarrow")])

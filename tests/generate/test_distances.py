@@ -12,7 +12,7 @@ from generate.boundary_elements.grids import PRESSED, surfaces
 from generate.pages import distances
 from mbma_tables import Surface, contact
 from mbma_tables.files import shipped_file
-from mbma_tables.theories.persson import persson_separation
+from mbma_tables.theories import Persson
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def test_perssons_theory_in_closed_form(bem):
     found = distances.distances([bem], distances.THEORIES["Persson"])
     assert found["area"] == pytest.approx(np.log(erf(np.sqrt(2) * bem.force) / bem.area), abs=1e-12)
     surface = Surface(0.8, 1.0, 64.0, 1.0, 3.3973)
-    back = persson_separation(surface, bem.force * np.exp(found["force"]) * surface.rms_gradient)
+    back = Persson().mean_separation_at(surface, "force", bem.force * np.exp(found["force"]) * surface.rms_gradient)
     assert back[1:] == pytest.approx(bem.u[1:], rel=1e-4)
 
 

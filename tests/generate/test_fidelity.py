@@ -121,7 +121,7 @@ def test_loads_beyond_a_theory_are_left_open():
     assert np.isnan(comparisons.solve(surface, "MBMA printed", "force", 1.0)).all()
     assert np.isnan(comparisons.force_at(surface, "Persson full", 0.0))
     assert comparisons.force_at(surface, "MBMA reported", 3.5) == 0
-    expected = theories.persson_force(surface, 0.0, method="simplified")
+    expected = theories.Persson("simplified").answer(surface, 0.0).force
     assert comparisons.force_at(surface, "Persson simplified", 0.0) == expected
 
 

@@ -143,14 +143,14 @@ def test_curves_are_the_librarys(drawn):
     assert axes.get_title() == "concrete"
     for reading in ("reported", "printed"):
         ratio, force = curve(axes, f"MBMA {reading}")
-        gap = theories.separation(surface, ratio * surface.h_rms)
+        gap = 2 * ratio * surface.h_rms - surface.h_max
         found = contact(surface, gap, reading=reading, rtol=1e-8).force
         assert force == pytest.approx(found, rel=1e-5, abs=0)
     ratio, force = curve(axes, "Persson simplified")
-    assert force == pytest.approx(theories.persson_force(surface, ratio * surface.h_rms, method="simplified"), rel=1e-9)
+    assert force == pytest.approx(theories.Persson("simplified").answer(surface, ratio * surface.h_rms).force, rel=1e-9)
     # area against force
     force, area = curve(drawn["fig14"].axes[0], "Persson")
-    assert area == pytest.approx(theories.persson_area(surface, force), rel=1e-12, abs=0)
+    assert area == pytest.approx(theories.Persson().area_at(surface, force), rel=1e-12, abs=0)
 
 
 @pytest.mark.slow

@@ -252,10 +252,12 @@ def test_slopes_of_one_quantity_of_labelled_surfaces(wanted, other):
 def test_theories_of_labelled_surfaces(method):
     h_rms = xr.DataArray(dask.array.from_array([1.0, 1.5, 2.0], chunks=2), dims="sample")
     gaps = xr.DataArray([0.4, 1.0], dims="gap")
-    lazy = theories.persson_force(Surface(0.8, 1.0, 100.0, h_rms, 6.0), gaps, method=method)
+    theory = theories.Persson(method)
+    lazy = contact(Surface(0.8, 1.0, 100.0, h_rms, 6.0), mean_separation=gaps, theory=theory).force
     assert lazy.dims == ("sample", "gap")
     assert lazy.chunks is not None
     plain = Surface(0.8, 1.0, 100.0, np.array([1.0, 1.5, 2.0])[:, None], 6.0)
-    np.testing.assert_array_equal(lazy.compute(), theories.persson_force(plain, gaps.values, method=method))
-    summits = theories.greenwood_williamson(Surface(0.8, 1.0, 100.0, h_rms, 6.0), gaps)
-    np.testing.assert_array_equal(summits.area.compute(), theories.greenwood_williamson(plain, gaps.values).area)
+    np.testing.assert_array_equal(lazy.compute(), contact(plain, mean_separation=gaps.values, theory=theory).force)
+    summits = contact(Surface(0.8, 1.0, 100.0, h_rms, 6.0), gaps, theory="greenwood_williamson")
+    expected = contact(plain, gaps.values, theory="greenwood_williamson")
+    np.testing.assert_array_equal(summits.area.compute(), expected.area)
