@@ -3,7 +3,7 @@
 Positions are in node units, 0 ... n - 1. Nothing is shared or kept: any thread may call any of these.
 
 Four axes are summed eight doubles at a time, four coefficients of two functions each. numba leaves LLVM's vectoriser
-of straight-line code off, so that a sum over eight neighbours would run one by one; two intrinsics spell it out.
+of straight-line code off, so that a sum over eight neighbours would run one by one; an intrinsic spells it out.
 """
 
 from __future__ import annotations
@@ -21,53 +21,9 @@ Eight = tuple[float, float, float, float, float, float, float, float]
 Ten = tuple[float, float, float, float, float, float, float, float, float, float]
 
 _FAST = {"contract", "reassoc"}
-ZERO = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 LANES = 8
 PART = 1.0 / 120.0  # of quintic B-splines; products are faster than quotients
-
-
-def _load_lanes(typing_context: Any, array: Any, offset: Any) -> Any:
-    """Eight neighbours of a flat, contiguous array of doubles, from `offset` on."""
-    from llvmlite import ir
-    from numba import types
-    from numba.np.arrayobj import make_array
-
-    vector = ir.VectorType(ir.DoubleType(), LANES)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        data = make_array(signature.args[0])(context, builder, arguments[0]).data
-        start = builder.gep(data, [arguments[1]], inbounds=True)
-        loaded = builder.load(builder.bitcast(start, vector.as_pointer()))
-        # doubles, not vectors, are what numpy aligns
-        loaded.align = 8
-        return _to_tuple(context, builder, signature, loaded)
-
-    return types.UniTuple(types.float64, LANES)(array, offset), generate
-
-
-def _add_lanes(typing_context: Any, total: Any, weight: Any, lanes: Any) -> Any:
-    """``total + weight * lanes``, lane by lane."""
-    from llvmlite import ir
-    from numba import types
-
-    width, place = ir.VectorType(ir.DoubleType(), LANES), ir.IntType(32)
-
-    def to_vector(builder: Any, values: Any) -> Any:
-        vector = ir.Constant(width, ir.Undefined)
-        for n in range(LANES):
-            vector = builder.insert_element(vector, builder.extract_value(values, n), place(n))
-        return vector
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        spread = ir.Constant(width, ir.Undefined)
-        for n in range(LANES):
-            spread = builder.insert_element(spread, arguments[1], place(n))
-        product = builder.fmul(spread, to_vector(builder, arguments[2]), flags=("contract",))
-        vector = builder.fadd(to_vector(builder, arguments[0]), product, flags=("contract",))
-        return _to_tuple(context, builder, signature, vector)
-
-    return types.UniTuple(types.float64, LANES)(total, weight, lanes), generate
 
 
 def _patch_lanes(
@@ -132,12 +88,6 @@ def _plain_patch(array: Any, start: int, row: int, step: int, across: Any, along
     return tuple(np.einsum("i,j,ijk", across, along, lanes))
 
 
-# numba calls the definitions with a typing context in front
-load_lanes: Any = Instruction(_load_lanes, lambda array, offset: tuple(array[offset : offset + LANES]))
-add_lanes: Any = Instruction(
-    _add_lanes,
-    lambda total, weight, lanes: tuple(a + weight * b for a, b in zip(total, lanes, strict=True)),
-)
 patch_lanes: Any = Instruction(_patch_lanes, _plain_patch)
 
 
@@ -193,19 +143,15 @@ def value_4d(c: FloatArray, x: float, y: float, z: float, t: float) -> tuple[flo
     j, v = cell(y, c.shape[1] - 2)
     k, w = cell(z, c.shape[2] - 2)
     m, s = cell(t, c.shape[3] - 2)
-    wx, wy, wz = cubic(u), cubic(v), cubic(w)
-    flat = c.reshape(-1)
-    row = 2 * c.shape[3]
-    total = ZERO
+    wx, wy, wz, wt = cubic(u), cubic(v), cubic(w), cubic(s)
+    flat, row = c.reshape(-1), 2 * c.shape[3]
+    f = g = 0.0
     for a in range(4):
-        for b in range(4):
-            start = 2 * ((((i + a) * c.shape[1] + j + b) * c.shape[2] + k) * c.shape[3] + m)
-            plane = add_lanes(ZERO, wz[0], load_lanes(flat, start))
-            plane = add_lanes(plane, wz[1], load_lanes(flat, start + row))
-            plane = add_lanes(plane, wz[2], load_lanes(flat, start + 2 * row))
-            plane = add_lanes(plane, wz[3], load_lanes(flat, start + 3 * row))
-            total = add_lanes(total, wx[a] * wy[b], plane)
-    return _last_axis(cubic(s), total)
+        start = 2 * ((((i + a) * c.shape[1] + j) * c.shape[2] + k) * c.shape[3] + m)
+        one, two = _last_axis(wt, patch_lanes(flat, start, c.shape[2] * row, row, wy, wz))
+        f += wx[a] * one
+        g += wx[a] * two
+    return f, g
 
 
 @njit(cache=True, fastmath=_FAST, error_model="numpy")
@@ -216,28 +162,21 @@ def gradient_4d(c: FloatArray, x: float, y: float, z: float, t: float) -> Ten:
     k, w = cell(z, c.shape[2] - 2)
     m, s = cell(t, c.shape[3] - 2)
     wx, wy, wz, wt = cubic(u), cubic(v), cubic(w), cubic(s)
-    sx, sy, sz = cubic_slope(u), cubic_slope(v), cubic_slope(w)
-    flat = c.reshape(-1)
-    row = 2 * c.shape[3]
-    total = by_x = by_y = by_z = ZERO
+    sx, sy, sz, st = cubic_slope(u), cubic_slope(v), cubic_slope(w), cubic_slope(s)
+    flat, row = c.reshape(-1), 2 * c.shape[3]
+    plane = c.shape[2] * row
+    f = fx = fy = fz = ft = g = gx = gy = gz = gt = 0.0
     for a in range(4):
-        for b in range(4):
-            start = 2 * ((((i + a) * c.shape[1] + j + b) * c.shape[2] + k) * c.shape[3] + m)
-            l0, l1 = load_lanes(flat, start), load_lanes(flat, start + row)
-            l2, l3 = load_lanes(flat, start + 2 * row), load_lanes(flat, start + 3 * row)
-            plane = add_lanes(add_lanes(ZERO, wz[0], l0), wz[1], l1)
-            plane = add_lanes(add_lanes(plane, wz[2], l2), wz[3], l3)
-            slope = add_lanes(add_lanes(ZERO, sz[0], l0), sz[1], l1)
-            slope = add_lanes(add_lanes(slope, sz[2], l2), sz[3], l3)
-            total = add_lanes(total, wx[a] * wy[b], plane)
-            by_x = add_lanes(by_x, sx[a] * wy[b], plane)
-            by_y = add_lanes(by_y, wx[a] * sy[b], plane)
-            by_z = add_lanes(by_z, wx[a] * wy[b], slope)
-    f, g = _last_axis(wt, total)
-    fx, gx = _last_axis(wt, by_x)
-    fy, gy = _last_axis(wt, by_y)
-    fz, gz = _last_axis(wt, by_z)
-    ft, gt = _last_axis(cubic_slope(s), total)
+        start = 2 * ((((i + a) * c.shape[1] + j) * c.shape[2] + k) * c.shape[3] + m)
+        lanes = patch_lanes(flat, start, plane, row, wy, wz)
+        one, two = _last_axis(wt, lanes)
+        f, fx, g, gx = f + wx[a] * one, fx + sx[a] * one, g + wx[a] * two, gx + sx[a] * two
+        one, two = _last_axis(wt, patch_lanes(flat, start, plane, row, sy, wz))
+        fy, gy = fy + wx[a] * one, gy + wx[a] * two
+        one, two = _last_axis(wt, patch_lanes(flat, start, plane, row, wy, sz))
+        fz, gz = fz + wx[a] * one, gz + wx[a] * two
+        one, two = _last_axis(st, lanes)
+        ft, gt = ft + wx[a] * one, gt + wx[a] * two
     return f, fx, fy, fz, ft, g, gx, gy, gz, gt
 
 
