@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers import Springs
-from scipy.integrate import quad
 
-from mbma_tables import InputError, OutOfRangeError, Surface, contact_law, theories
-from mbma_tables.theories import GreenwoodWilliamson, Mbma, Persson, Theory, get_theory
+from mbma_tables import InputError, OutOfRangeError, Surface, contact_law
+from mbma_tables.theories import GreenwoodWilliamson, Mbma, Persson, get_theory
 
 SURFACE = Surface(hurst=0.8, q0=0.2, q1=20.0, h_rms=1.5, h_max=4.8)
 BATCH = Surface(hurst=[0.3, 0.7, 0.9], q0=1.0, q1=[1000.0, 60.0, 216.0], h_rms=1.0, h_max=[3.0, 3.0, 3.5])
@@ -26,25 +25,6 @@ def test_stiffness_is_the_slope_of_force(theory):
         (theory.answer(SURFACE, u - h).force - theory.answer(SURFACE, u + h).force) / (2 * h) for h in (step, step / 2)
     )
     assert theory.answer(SURFACE, u).stiffness == pytest.approx((4 * fine - coarse) / 3, rel=1e-5)
-
-
-@each
-def test_energy_is_the_work_of_force(theory):
-    u = 0.6 * SURFACE.h_max
-    high = min(float(theory.interval(SURFACE)[1]), 60 * SURFACE.h_rms)
-    work = quad(lambda x: float(theory.answer(SURFACE, np.array(x)).force), u, high, epsrel=1e-9, limit=400)[0]
-    assert theory.energy(SURFACE, np.array(u)) == pytest.approx(work, rel=1e-7)
-
-
-@each
-@pytest.mark.parametrize("quantity", ["force", "area"])
-def test_separation_at_a_quantity_gives_that_quantity(theory, quantity):
-    u = SHARES[:, None] * BATCH.h_max
-    u = np.maximum(u, theory.interval(BATCH, quantity)[0])
-    wanted = getattr(theory.answer(BATCH, u), quantity)
-    found = theory.mean_separation_at(BATCH, quantity, wanted)
-    assert getattr(theory.answer(BATCH, found), quantity) == pytest.approx(wanted, rel=1e-9)
-    assert found == pytest.approx(u, rel=1e-6)
 
 
 def test_mbma_inverts_and_integrates_as_its_law_does():
@@ -96,9 +76,3 @@ def test_a_users_own_object_is_a_theory():
 def test_what_is_no_theory_is_refused(wrong):
     with pytest.raises(InputError, match="theory must be one of"):
         get_theory(wrong)
-
-
-@pytest.mark.parametrize("name", theories.THEORIES)
-def test_theories_have_names(name):
-    assert isinstance(get_theory(name), Theory)
-    assert get_theory(name).name == name

@@ -10,7 +10,7 @@ from catalogue import LEVEL, OWN, random_gaps, random_surfaces
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, greenwood_tripp
 from mbma_tables import contact as contact_by_tier
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.surfaces.readings import READINGS, get_reading
+from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.totals.contact import totals_at
 from mbma_tables.totals.island_sum import kinks
 
@@ -119,17 +119,6 @@ def test_the_papers_yang_persson_case():
     assert (found.reading, found.tier) == ("printed", "exact")
 
 
-@pytest.mark.parametrize("reading", READINGS)
-@pytest.mark.parametrize(("hurst", "zeta_1"), [(0.3, 100.0), (0.8, 216.0), (1.0, 1e4), (1.0, 3.01)])
-def test_power_laws_at_first_contact(reading, hurst, zeta_1):
-    surface = Surface(hurst, 0.2, 0.2 * zeta_1, 1.0, 4.0)
-    depth = zeta_1**-hurst * 2.0 ** np.array([-22, -23])
-    depth = 2.0 ** np.round(np.log2(depth))  # 4 - depth is exact
-    found = contact(surface, 4.0 - depth, reading=reading, rtol=1e-10)
-    assert found.force[0] / found.force[1] == pytest.approx(2**3.5, rel=1e-5, abs=0)
-    assert found.area[0] / found.area[1] == pytest.approx(2 ** (10 / 3), rel=1e-5, abs=0)
-
-
 def test_no_cancellation_next_to_first_contact():
     # the law holds where the depth is a few units in the last place of the separation
     surface = one_surface(0.8, 216.0, h_max=4.0)
@@ -146,29 +135,6 @@ def test_no_contact_is_exactly_zero(tier):
     assert found.area.tolist() == [0.0] * 4
     assert found.error.tolist() == [0.0] * 4
     assert contact(surface, math.nextafter(3, 2), tier=tier).force > 0
-
-
-def test_force_is_proportional_to_slope():
-    # at equal h_max/h_rms force over E* q0 h_rms, and the area, are the same
-    flat, steep = (contact(Surface(0.8, 0.2, 40.0, h, 3 * h), 1.5 * h) for h in (0.01, 1.0))
-    assert steep.force == pytest.approx(100 * flat.force, rel=2e-8, abs=0)
-    assert steep.area == pytest.approx(flat.area, rel=2e-8, abs=0)
-
-
-def test_batches_equal_loops():
-    surfaces = Surface([[0.4], [0.8]], 0.2, 40.0, 1.0, [[3.0], [3.5]])
-    separation = np.array([-1.0, 1.5, 2.9999, 3.2, 4.0])
-    modulus = np.array([1.0, 2.0, 1.0, 3.0, 1.0])
-    batch = contact(surfaces, separation, E_star=modulus)
-    for name in ("separation", "mean_separation", "force", "area", "error"):
-        assert getattr(batch, name).shape == (2, 5)
-    for i, (hurst, h_max) in enumerate(((0.4, 3.0), (0.8, 3.5))):
-        for j, d in enumerate(separation):
-            one = contact(Surface(hurst, 0.2, 40.0, 1.0, h_max), d, E_star=modulus[j])
-            assert np.shape(one.force) == np.shape(one.area) == np.shape(one.error) == ()
-            assert batch.force[i, j] == pytest.approx(one.force, rel=1e-14, abs=0)
-            assert batch.area[i, j] == pytest.approx(one.area, rel=1e-14, abs=0)
-            assert batch.mean_separation[i, j] == (h_max + d) / 2
 
 
 def test_the_argument_stays():
@@ -269,12 +235,6 @@ def test_layout_does_not_matter(kind):
     found, expected = contact_by_tier(ROUGH, KINDS[kind]), contact_by_tier(ROUGH, GAPS)
     np.testing.assert_array_equal(np.ravel(found.force), expected.force)
     np.testing.assert_array_equal(np.ravel(found.area), expected.area)
-
-
-@pytest.mark.parametrize("dtype", [np.float32, int])
-def test_other_numbers_are_the_doubles_that_they_are(dtype):
-    gaps = GAPS.astype(dtype)
-    np.testing.assert_array_equal(contact_by_tier(ROUGH, gaps).force, contact_by_tier(ROUGH, gaps.astype(float)).force)
 
 
 @pytest.mark.parametrize(

@@ -13,19 +13,15 @@ from helpers import SCALE
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island
 from mbma_tables.islands import newton
 from mbma_tables.islands.four_numbers import band_fields, from_axes, to_axes
-from mbma_tables.islands.geometry import geometry
-from mbma_tables.islands.height_integrals import ORDERS, f_half, height_integral
+from mbma_tables.islands.height_integrals import f_half
 from mbma_tables.models import answer_islands
 from mbma_tables.models.closed_form_functions import RANGES
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.island4d import RAW
-from mbma_tables.models.protocol import BOTH
 from mbma_tables.models.tables import island4d_model, universal_model
 from mbma_tables.surfaces.readings import READINGS, REPORTED, get_reading
 from mbma_tables.theories.law_kernel import CENTRE, RATE
-from mbma_tables.totals import island_sum
-from mbma_tables.totals import kernel as lookup
-from mbma_tables.totals.intervals import NARROW, STRETCH, Gap
+from mbma_tables.totals.intervals import NARROW
 from mbma_tables.totals.island_sum import kinks
 
 STEP = 1e-9
@@ -133,40 +129,6 @@ def test_totals_of_other_tiers_do_not_jump(tier, which, record_property):
     record_property("pairs compared", count)
 
 
-@pytest.mark.parametrize("stretch", [STRETCH / 7, STRETCH * (1 + 1e-9), 4 * STRETCH])
-def test_totals_do_not_depend_on_the_map(stretch, monkeypatch, record_property):
-    """The integration variable's scale decides where nodes lie and what is halved, and no more."""
-    rng, count = np.random.default_rng(18), 60 * SCALE
-    numbers = pressed(rng, count, REPORTED)
-    numbers["hurst"] = np.maximum(numbers["hurst"], 0.31)
-    before = totals_of(numbers, tier="rigid", rtol=1e-9)
-    monkeypatch.setattr(island_sum, "STRETCH", stretch)
-    after = totals_of(numbers, tier="rigid", rtol=1e-9)
-    compiled = totals_of(numbers, rtol=1e-9)
-    for k in range(count):
-        surface = Surface(*(numbers[name][k] for name in INPUTS[:-1]))
-        constants = lookup.surface_constants(surface.hurst, surface.zeta_1, REPORTED.numbers, True)
-        moved = constants._replace(map_scale=constants.map_scale * stretch / STRETCH)
-        gap = Gap((surface.h_max - numbers["separation"][k]) / surface.h_rms, surface.h_max / surface.h_rms)
-        status, force, area, error, _ = lookup.total(BOTH, gap, 1e-9, moved, universal_model().kernel)
-        assert status == lookup.OK
-        assert abs(force * surface.q0 * surface.s / compiled.force[k] - 1) <= error + compiled.error[k]
-        assert abs(area / compiled.area[k] - 1) <= error + compiled.error[k]
-    for name in ("force", "area"):
-        off = np.abs(getattr(after, name) / getattr(before, name) - 1)
-        assert (off <= before.error + after.error).all()
-        assert off.max() > 0
-    record_property("pairs compared", 2 * count)
-
-
-@pytest.mark.parametrize("tier", ["universal", "exact", "rigid"])
-def test_totals_are_straight_in_the_modulus(tier):
-    surface, modulus = Surface(0.7, 1.0, 60.0, 0.02, 0.06), 10 ** np.linspace(0, 12, 13)
-    one, other = (contact(surface, 0.03, tier=tier, E_star=modulus * (1 + sign * STEP)) for sign in (-0.5, 0.5))
-    np.testing.assert_allclose(other.force / one.force - 1, STEP, rtol=0, atol=4 * EPS)
-    np.testing.assert_array_equal(other.area, one.area)
-
-
 def test_totals_do_not_jump_where_the_solver_takes_over(record_property):
     """Surfaces that leave the universal table as they are pressed: gaps on both sides of that, by bisection."""
     count = 3 * SCALE
@@ -216,18 +178,6 @@ def test_islands_do_not_jump(which, tier, rtol, record_property):
         off = np.abs(getattr(other, name) / getattr(one, name) - 1)
         assert (off <= stated + 2 * own_motion(answer, name)).all(), name
     record_property("pairs compared", count)
-
-
-def test_geometry_does_not_jump_at_the_floors(record_property):
-    count = 500 * SCALE
-    rng = np.random.default_rng(6)
-    hurst, zeta_1, _ = surfaces(rng, count)
-    for reading in READINGS.values():
-        for kink in kinks(hurst, zeta_1, reading):
-            below, above = (geometry(kink * (1 + side * STEP), hurst, zeta_1, reading) for side in (-1, 1))
-            for name in ("X", "mu", "eta", "D_d", "sigma_d", "R_d", "R_u"):
-                assert np.abs(above[name] / below[name] - 1).max() < 1e3 * STEP, name
-    record_property("pairs compared", 4 * count)
 
 
 def level_changes(rng, count, rtol):
@@ -418,13 +368,3 @@ def test_laws_do_not_jump_at_their_breaks(rtol, record_property):
             assert (np.abs(b / a - 1) <= 2 * law.error + own).all()
         compared += depth.size
     record_property("pairs compared", compared)
-
-
-@pytest.mark.parametrize("X", [-8.0, -6.0, -4.0, -2.0, -1.0, 0.0, 2.0, 4.0, 6.0, 8.0])
-def test_height_integrals_join(X):
-    """The polynomial pieces of the rigid sphere meet where they switch."""
-    for order in ORDERS:
-        below, above = (float(height_integral(order, -X * (1 + side * 1e-12) - side * 1e-13)) for side in (-1, 1))
-        assert above == pytest.approx(below, rel=1e-9, abs=0)
-        exact = float(height_integral(order, np.nextafter(-X, 1)))
-        assert exact == pytest.approx(float(height_integral(order, np.nextafter(-X, -50))), rel=1e-14, abs=0)

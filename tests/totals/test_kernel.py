@@ -69,14 +69,6 @@ def totals(compression, rtol=1e-9, jacobian=5 / 9):
     return lookup.total(BOTH, intervals.Gap(compression, 3.0), rtol, surface, universal_model().kernel)
 
 
-def test_the_first_moment_of_the_jacobian():
-    """K1 weighs everything below the kink, which at small reach is everything."""
-    whole, half = totals(1.0, jacobian=1.0), totals(1.0, jacobian=0.5)
-    assert half[1] == pytest.approx(whole[1] / 2, rel=1e-14, abs=0)
-    assert half[2] == pytest.approx(whole[2] / 2, rel=1e-14, abs=0)
-    assert totals(4.0, jacobian=1.0)[1] < 2 * totals(4.0, jacobian=0.5)[1] * (1 - 1e-3)
-
-
 def test_what_cannot_be_resolved_is_said(monkeypatch):
     """A tolerance below rounding ends in a status, never in a number that looks right."""
     assert totals(4.0, rtol=1e-9)[0] == lookup.OK

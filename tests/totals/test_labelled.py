@@ -133,20 +133,6 @@ def test_chunks_without_entries():
         contact(surface, xr.DataArray(np.zeros(0), dims="gap"))
 
 
-def test_laws_of_dask_arrays():
-    law = contact_law(Surface(0.8, 0.2, 40.0, 1.0, 3.0))
-    gaps = gaps_over(60)
-    for name in ("force", "area", "stiffness", "energy"):
-        function = getattr(law, name)
-        with Tasks() as tasks:
-            lazy = function(gaps.chunk(gap=7))
-            assert dask.is_dask_collection(lazy)
-            assert tasks.ran == 0
-        assert lazy.dims == ("gap",)
-        with dask.config.set(scheduler="threads", num_workers=4):
-            np.testing.assert_array_equal(lazy.compute(), function(gaps.values))
-
-
 def test_outside_and_tiers_go_through():
     surfaces = Surface(xr.DataArray([0.05, 0.8], dims="s"), 0.2, 0.2e8, 1.0, 3.0)
     gaps = gaps_over(3)

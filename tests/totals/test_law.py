@@ -67,15 +67,6 @@ def test_within_its_tolerance_and_its_bound(case, rtol):
     assert (law.reading, law.tier) == (case[3], "universal")
 
 
-@pytest.mark.parametrize("case", [CASES[0], CASES[3]])
-def test_against_the_solver(case):
-    law = law_of(case)
-    gaps = law.h_max * (1 - np.array([1e-9, 1e-4, 0.03, 0.6, 1.3, 2.0]))
-    true = contact(surface_of(*case[:3]), gaps, tier="exact", rtol=1e-11, reading=case[3])
-    np.testing.assert_allclose(law.force(gaps), true.force, rtol=law.error)
-    np.testing.assert_allclose(law.area(gaps), true.area, rtol=law.error)
-
-
 @pytest.mark.parametrize("tier", ["exact", "rigid", "island4d"])
 def test_of_any_tier(tier):
     surface = surface_of(*CASES[0][:3])
@@ -85,33 +76,6 @@ def test_of_any_tier(tier):
     np.testing.assert_allclose(law.force(gaps), true.force, rtol=1.1e-5)
     np.testing.assert_allclose(law.area(gaps), true.area, rtol=1.1e-5)
     assert law.tier == tier
-
-
-def slopes_of_totals(case, gaps, span):
-    """-dF/dd and -dA/dd by seven-point differences of tight totals."""
-    offsets = np.arange(-3.0, 4)
-    weights = difference_weights(offsets)
-    found = contact(surface_of(*case[:3]), gaps[:, None] + span[:, None] * offsets, rtol=1e-11, reading=case[3])
-    return [-(values @ weights) / span for values in (found.force, found.area)]
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_slopes_against_differences(case):
-    law = law_of(case, 1e-9)
-    depth = depths(law, 51, least=1e-4)
-    depth = depth[depth < 1.95 * law.h_max]
-    breaks = np.array([0.7 * k for k in kinks(*case[:2], get_reading(case[3]))])
-    # differences must not reach across a kink
-    depth = depth[(np.abs(depth[:, None] / breaks - 1) > 0.02).all(axis=1)]
-    gaps = law.h_max - depth
-    by_force, by_area = slopes_of_totals(case, gaps, 4e-3 * depth)
-    for found, true, value in (
-        (law.stiffness(gaps), by_force, law.force(gaps)),
-        (law.area_slope(gaps), by_area, law.area(gaps)),
-    ):
-        # where a slope passes through zero the secant sets the scale
-        assert (np.abs(found - true) <= 1e-6 * np.maximum(np.abs(true), value / depth)).all()
-    np.testing.assert_array_equal(law.stiffness_mean(gaps), 2 * law.stiffness(gaps))
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -144,21 +108,6 @@ def test_energy_is_the_integral_of_force(case):
         gap = law.h_max - depth
         rounded = np.finfo(float).eps * law.h_max / depth
         assert law.energy(gap) == pytest.approx(math.fsum(parts), rel=1e-8 + 10 * rounded, abs=0)
-
-
-def test_energy_against_totals():
-    """Not through the law: Gauss points of the totals themselves."""
-    case = CASES[0]
-    law, surface = law_of(case), surface_of(*case[:3])
-    x, weights = np.polynomial.legendre.leggauss(40)
-    ends = [0.0, *(math.sqrt(0.7 * k) for k in kinks(*case[:2], get_reading(case[3]))), math.sqrt(1.5 * law.h_max)]
-    ends = sorted(e for e in ends if e <= math.sqrt(1.5 * law.h_max))
-    true = 0.0
-    for a, b in itertools.pairwise(ends):
-        root = (a + b) / 2 + (b - a) / 2 * x
-        force = contact(surface, law.h_max - root**2, rtol=1e-11).force
-        true += (b - a) / 2 * np.dot(weights, force * 2 * root)
-    assert law.energy(-0.5 * law.h_max) == pytest.approx(true, rel=1.1e-8, abs=0)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -314,31 +263,6 @@ def test_a_pickle_is_the_same_law_and_small():
         assert pickle.dumps(pickle.loads(again)) == again
 
 
-def test_inside_other_solvers():
-    law = law_of(CASES[0])
-    # spring and rough contact in series
-    gap = scipy.optimize.brentq(lambda d: law.force(d) - 1e-3 * (2.0 - d), -1.0, 1.9, xtol=1e-14, rtol=1e-14)
-    assert law(gap) == pytest.approx(1e-3 * (2.0 - gap), rel=1e-9, abs=0)
-    work = scipy.integrate.quad(law, 0.5, 1.5, epsabs=0, epsrel=1e-10, limit=200)[0]
-    assert work == pytest.approx(law.energy(0.5) - law.energy(1.5), rel=1e-8, abs=0)
-    # a mass thrown at the surface turns where its energy is the law's
-    start, speed, mass = law.h_max, 0.05, 2.0
-
-    def turned(t, state):
-        return state[1]
-
-    turned.terminal = True
-    path = scipy.integrate.solve_ivp(
-        lambda t, state: [state[1], law.force(state[0]) / mass],
-        (0, 1e3),
-        [start, -speed],
-        events=turned,
-        rtol=1e-10,
-        atol=1e-12,
-    )
-    assert law.energy(path.y_events[0][0, 0]) == pytest.approx(0.5 * mass * speed**2, rel=1e-7, abs=0)
-
-
 @njit
 def added_up(law, gaps):
     force = area = stiffness = area_slope = energy = 0.0
@@ -403,15 +327,6 @@ def test_many_gaps_agree_with_single_ones(case, rtol):
         assert (np.abs(getattr(many, name) - single) <= (many.error + 1e-11) * single).all()
     assert (many.error <= rtol + 2e-9).all()
     assert many.error[-2:].tolist() == [0.0, 0.0]
-
-
-def test_pieces_join():
-    """Polynomials of neighbours meet at their ends, whatever the tolerance, so that inverses have no holes."""
-    for case in CASES:
-        law = law_of(case, 1e-4)
-        value, slope = law.records[1:-1, FORCE_AT : FORCE_AT + DEGREE + 1].sum(axis=1), law.records[2:]
-        start = (slope[:, FORCE_AT : FORCE_AT + DEGREE + 1] * (-1.0) ** np.arange(DEGREE + 1)).sum(axis=1)
-        np.testing.assert_allclose(value, start, rtol=1e-8)
 
 
 @pytest.mark.slow

@@ -128,15 +128,6 @@ def test_first_contact_is_a_power_of_depth():
     assert nothing.force.tolist() == nothing.area.tolist() == nothing.error.tolist() == [0, 0]
 
 
-def test_lengths_scale():
-    surface = rough()
-    other = surface.scaled(1e-9, None)
-    d = surface.h_max * (1 - DEPTHS[2:])
-    one, two = contact(surface, d), contact(other, 1e-9 * d)
-    np.testing.assert_allclose(two.force, one.force, rtol=1e-9)
-    np.testing.assert_allclose(two.stiffness, 1e9 * one.stiffness, rtol=1e-8)
-
-
 @pytest.mark.parametrize(("count", "h_max"), [(60, 3.5), (2000, 3.5), (60, 13.0)])
 def test_a_law_is_the_contacts(count, h_max):
     surface = rough(count=count, h_max=h_max)
@@ -218,18 +209,3 @@ class TestRollOff:
         ratio = contact(surface, pressure=force[tested]).area / area[tested]
         assert (ratio > 0.85).all()
         assert (ratio < 1.1).all()
-
-    @pytest.mark.parametrize("number", [0, 1])
-    def test_floors_at_the_roll_off_are_nearer_to_boundary_elements_than_at_the_lowest_wave(self, number):
-        surface, _ = self.surface(number)
-        force, area = np.loadtxt(DATA / f"rolloff_{number}.csv", delimiter=",", usecols=(0, 1), unpack=True)
-        tested = (area > 0.002) & (area < 0.25)
-        lowest = dataclasses.replace(surface)
-        lowest.__dict__["longest"] = float(surface.q0)
-        far, near = (
-            np.sqrt(np.mean(np.log(contact(s, pressure=force[tested]).area / area[tested]) ** 2))
-            for s in (lowest, surface)
-        )
-        assert near < far
-        # and they let force rise further
-        assert contact(lowest, -lowest.h_max).force < contact(surface, -surface.h_max).force

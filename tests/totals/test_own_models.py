@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from mbma_tables import InputError, OutOfRangeError, Scene, Surface, contact, contact_law, greenwood_tripp, island
-from mbma_tables.models import GeometryModel, IslandModel, get_model
 from mbma_tables.models.tables import island4d_model, open_table, shipped
-from mbma_tables.surfaces.readings import REPORTED
 
 ROOT = pathlib.Path(__file__).parents[2]
 SURFACE = Surface(0.8, 0.3, 60.0, 0.7, 2.1)
@@ -82,13 +80,6 @@ def test_derivatives_and_readings_that_a_model_does_not_have():
         contact(SURFACE, 1.0, tier=Own(), derivatives=True)
     with pytest.raises(InputError, match="made for the reading 'reported', not for 'printed'"):
         contact(SURFACE, 1.0, tier=island4d_model(), reading="printed")
-
-
-def test_shipped_models_keep_the_protocol():
-    for tier, protocol in {"exact": IslandModel, "universal": IslandModel, "island4d": GeometryModel}.items():
-        model = get_model(tier, 1e-6, REPORTED)
-        assert isinstance(model, protocol)
-        assert get_model(model, 1e-6, REPORTED) is model
 
 
 @pytest.mark.slow

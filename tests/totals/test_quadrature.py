@@ -66,26 +66,12 @@ def test_several_intervals_of_one_owner_and_none():
     assert (found.error[1] == 0).all()
 
 
-def test_no_interval_at_all():
-    found = integrate(lambda who, x: np.ones((*x.shape, 2)), np.zeros(0, dtype=int), np.zeros(0), np.zeros(0), 2, 1e-8)
-    assert found.value.tolist() == [[0.0], [0.0]]
-
-
 def test_more_intervals_than_a_batch():
     count = quadrature.BATCH + 7
     high = np.linspace(1, 2, count)
     found = run(lambda who, x: 3 * x**2, np.zeros(count), high)
     assert np.abs(found.value[:, 0] / high**3 - 1).max() <= 1e-14
     assert found.evaluations == 21 * count
-
-
-def test_only_what_needs_it_is_refined():
-    smooth = run(lambda who, x: np.exp(x), 0.0, 1.0)
-    both = run(lambda who, x: np.where(who == 0, np.exp(x), np.sqrt(np.abs(x - 0.3))), [0, 0], [1, 1])
-    rough = run(lambda who, x: np.sqrt(np.abs(x - 0.3)), 0.0, 1.0)
-    assert both.evaluations == smooth.evaluations + rough.evaluations
-    assert both.value[0, 0] == smooth.value[0, 0]
-    assert both.value[1, 0] == rough.value[0, 0]
 
 
 def test_failure_says_which():

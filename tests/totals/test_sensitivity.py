@@ -130,20 +130,6 @@ def test_slopes_scale_out():
         assert (np.abs(waves - degree * value) <= 1e-12 * size).all()
 
 
-def test_values_are_those_without_derivatives():
-    rng = np.random.default_rng(71)
-    surface = Surface(rng.uniform(0.3, 1, 40), 0.3, 0.3 * 10 ** rng.uniform(0.5, 4, 40), 0.7, 2.4)
-    gap = rng.uniform(-2.4, 2.4, 40)
-    plain, more = contact(surface, gap), contact(surface, gap, derivatives=True)
-    assert plain.force_by is None
-    assert plain.area_by is None
-    np.testing.assert_allclose(more.force, plain.force, rtol=2e-8)
-    np.testing.assert_allclose(more.area, plain.area, rtol=2e-8)
-    tight = contact(surface, gap, rtol=1e-11)
-    assert (np.abs(more.force / tight.force - 1) <= more.error + tight.error).all()
-    assert (np.abs(more.area / tight.area - 1) <= more.error + tight.error).all()
-
-
 def by_zeta_1(hurst, zeta_1, h_max, depth):
     """dF/dq1 and dA/dq1 at h_rms = q0 = 1, islands by their formulas at 60 digits, Phi and its slopes by the table."""
     near = [zeta_1 + sign * 1e-4 * (zeta_1 - 3) for sign in (-1, 1)]
@@ -220,16 +206,6 @@ def test_units_shapes_and_no_contact():
     for name in NAMES:
         assert np.shape(one.force_by[name]) == ()
         assert one.force_by[name] == found.force_by[name][0, 0]
-
-
-def test_a_gradient_descends():
-    """What a design loop does: Newton's method in h_rms to a wanted force."""
-    wanted, h_rms = 1e-4, 0.5
-    for _ in range(12):
-        found = contact(Surface(0.8, 0.3, 60.0, h_rms, 2.0), 1.2, derivatives=True)
-        h_rms *= math.exp(-math.log(found.force / wanted) * found.force / (h_rms * found.force_by["h_rms"]))
-    assert contact(Surface(0.8, 0.3, 60.0, h_rms, 2.0), 1.2).force == pytest.approx(wanted, rel=1e-8, abs=0)
-    assert found.force == pytest.approx(wanted, rel=1e-12, abs=0)
 
 
 @pytest.mark.parametrize("rtol", [1e-2, 1e-6, 1e-9, 1e-11])

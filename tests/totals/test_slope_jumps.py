@@ -91,30 +91,6 @@ def test_numbers_of_islands_elsewhere(rule, record_property):
     record_property("pairs compared", at.size)
 
 
-def test_forces_and_areas_of_islands(record_property):
-    """They jump at both floors, by the chain rule from X, mu and the scales; elsewhere they are smooth."""
-    count = 30 * SCALE
-    rng = np.random.default_rng(3)
-    hurst, zeta_1, _ = surfaces(rng, count)
-    surface = Surface(hurst[:, None], 1.0, zeta_1[:, None], 1.0, 30.0)
-    random = 10 ** rng.uniform(-4, 0, count)
-    at_d, at_u = kinks(hurst, zeta_1, REPORTED)
-    random = np.where(np.abs(random / at_d - 1) > 0.03, random, 0.5 * random)
-    for name in ("force", "area"):
-        jumps = []
-        for at in (at_d, at_u, random):
-
-            def value(delta, name=name):
-                return getattr(island(surface, delta, tier="exact", rtol=1e-11), name)
-
-            left, right = one_sided(value, at, 3e-3 * at)
-            jumps.append(np.abs(right - left) / (value(at[:, None])[:, 0] / at))
-        assert (jumps[0] > 1e-4).all()
-        assert (jumps[1] > 1e-4).all()
-        assert (jumps[2] < 1e-7).all()
-    record_property("pairs compared", 3 * count)
-
-
 def changed(numbers, which, value):
     """Numbers as columns, with one of them replaced by rows of values."""
     own = {name: np.broadcast_to(given[:, None], value.shape) for name, given in numbers.items()}
