@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mbma_tables.errors import InputError, MbmaError
-from mbma_tables.plots import Curve, draw_compression, to_picture
+from mbma_tables.plots import Curve, draw_compression
 
 GAP = np.array([3.0, 2.0, 1.0, 0.0])
 FORCE = np.array([0.0, 2e-5, 3e-4, 2e-2])
@@ -37,38 +37,6 @@ def test_scatter_is_a_band_of_one_standard_deviation():
     assert not unknown.axes[0].collections
     with pytest.raises(InputError, match="one length"):
         Curve("law", GAP, FORCE, AREA, scatter[:2])
-
-
-def test_axes_say_what_they_show():
-    figure = draw_compression(two_curves(), "a title", "force  F/A0 [MPa]")
-    by_gap, by_force = figure.axes
-    assert figure.get_suptitle() == "a title"
-    assert [text.get_text() for text in by_gap.get_legend().get_texts()] == ["first", "second"]
-    assert (by_gap.get_xscale(), by_gap.get_yscale()) == ("linear", "log")
-    assert (by_force.get_xscale(), by_force.get_yscale()) == ("log", "log")
-    assert by_gap.get_xlabel() == "mean separation  u/h_rms"
-    assert by_gap.get_ylabel() == by_force.get_xlabel() == "force  F/A0 [MPa]"
-    assert by_force.get_ylabel() == "real contact area  A/A0"
-
-
-def test_every_point_with_contact_is_in_view():
-    by_gap, by_force = draw_compression(two_curves()).axes
-    for axes, values in ((by_gap, FORCE), (by_force, AREA)):
-        low, high = axes.get_ylim()
-        assert 0 < low < values[1]
-        assert values[-1] < high
-
-
-def test_png_is_one_and_repeats():
-    first, second = (to_picture(draw_compression(two_curves(), "title")) for _ in range(2))
-    assert first.startswith(b"\x89PNG\r\n\x1a\n")
-    assert first == second
-
-
-def test_pyplot_stays_out():
-    before = "matplotlib.pyplot" in sys.modules
-    to_picture(draw_compression(two_curves()))
-    assert ("matplotlib.pyplot" in sys.modules) == before
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,6 @@
 """Certified tables: the certificate against fresh exact solutions, refinement by error, physical checks."""
 
 import dataclasses
-import itertools
-import json
 
 import numpy as np
 import pytest
@@ -117,45 +115,6 @@ def test_the_certificate_is_solved_on_twice_the_nodes(nodes, monkeypatch):
     monkeypatch.setattr(greenwood_tripp, "solve", watch)
     phi(X, mu, 1e-6, 2)
     assert sorted(n for (n,) in counts[1:]) == [2 * n for n in sorted(counts[0])]
-
-
-def test_the_file_tells_what_each_axis_cost(nodes):
-    kind, content = nodes
-    errors = json.loads(content.attributes["axis_errors"])
-    history = json.loads(content.attributes["refinement"])
-    names = [axis.name for axis in content.axes]
-    assert list(errors) == names
-    assert history[-1]["nodes"] == {axis.name: axis.nodes for axis in content.axes}
-    assert history[-1]["largest_error"] == max(content.attributes[f"largest_error_{f}"] for f in "FA")
-    assert all(0 < e <= history[-1]["aim"] for pair in errors.values() for e in pair)
-    assert json.loads(content.attributes["configuration"]) == dataclasses.asdict(kind.configuration)
-
-
-def test_axis_errors_are_those_of_interpolation_along_that_axis(nodes):
-    """A line of exact solutions along each axis, fitted by scipy's spline instead of the table's own."""
-    from scipy.interpolate import make_interp_spline
-
-    kind, content = nodes
-    errors = json.loads(content.attributes["axis_errors"])
-    for number, axis in enumerate(content.axes):
-        worst = 0.0
-        others = [a for k, a in enumerate(content.axes) if k != number]
-        cells = np.arange(axis.nodes - 1)
-        between = np.concatenate([cells + 0.25, cells + 0.75])
-        for place in itertools.product((0.0, 0.35, 0.7, 1.0), repeat=len(others)):
-            fixed = [a.coordinate(p * (a.nodes - 1)) for a, p in zip(others, place, strict=True)]
-
-            def values(positions, axis=axis, fixed=fixed, number=number):
-                line = [np.full(positions.size, f) for f in fixed]
-                line.insert(number, axis.coordinate(positions))
-                return ChunkedSolver().log_ratio("line", *kind.arguments(*line), 1e-10)
-
-            at = np.arange(float(axis.nodes))
-            spline = make_interp_spline(at, values(at), k=3)
-            worst = max(worst, np.abs(spline(between) - values(between)).max())
-        stated = max(errors[axis.name])
-        # other lines than the generator's
-        assert stated / 2 < worst < 2 * stated
 
 
 def test_a_tighter_target_takes_more_cells_and_is_met(tmp_path):
@@ -279,11 +238,3 @@ def test_an_unspoiled_table_passes_and_survives_its_file(built, tmp_path):
     kind, content = built
     kind.check(content)
     kind.check(read_table(write_table(tmp_path / "table.nc", content)))
-
-
-def test_island4d_says_when_it_covers_a_part_only(tmp_path):
-    narrow = KINDS["island4d"](load("island4d", small(tmp_path, "island4d")))
-    shipped = KINDS["island4d"](load("island4d"))
-    assert narrow.attributes()["covers"].startswith("the islands within the axes, of those that the model visits")
-    assert "0.6 <= H <= 0.9" in narrow.attributes()["covers"]
-    assert shipped.attributes()["covers"].startswith("every island that the model visits for 0.3 <= H <= 1,")

@@ -104,11 +104,6 @@ def test_a_dead_worker_ends_the_run_with_the_others_kept(tmp_path):
         run(ChunkedSolver(Dying(), tmp_path))
 
 
-def test_progress_is_silent_in_a_pipe(capfd):
-    run(ChunkedSolver())
-    assert tuple(capfd.readouterr()) == ("", "")
-
-
 def command(config, out, *arguments):
     name = [sys.executable, "-m", "generate", "tables", "universal"]
     return [*name, "--config", str(config), "--out", str(out), *arguments]

@@ -80,11 +80,6 @@ def test_a_bad_configuration_is_refused(kind, text, message, tmp_path):
     assert message in refused_file(kind, tmp_path, text)
 
 
-@pytest.mark.parametrize("target", ["nan", "0", "-1e-6", "1e-300", "tight"])
-def test_a_bad_target_is_refused_by_its_name(tmp_path, target):
-    assert "target" in refused("universal", tmp_path, "--target", target, "--out", str(tmp_path / "table.nc"))
-
-
 def test_misuse_of_the_command_line_is_refused(tmp_path):
     assert "--config and --target belong to one table" in refused("all", tmp_path, "--target", "1e-6")
     assert "'--workers'" in refused("universal", tmp_path, "--workers", "0")

@@ -12,8 +12,7 @@ from generate import timing
 from generate.pages import cost, cost_distances, cost_islands, cost_totals, distances, page
 from mbma_tables import contact
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.classical import ring_matrix
-from mbma_tables.scenes.costs import Distance, Row, read_costs, read_distances, shipped_costs, shipped_distances
+from mbma_tables.scenes.costs import Row, read_costs, shipped_costs, shipped_distances
 from mbma_tables.theories import THEORIES
 
 COST, SECONDS = 2.0, 1e-3
@@ -28,15 +27,6 @@ def once(run, budget=0.5):
 
 def by_variant(rows):
     return {(row.tier, row.variant, row.quantity): row for row in rows}
-
-
-def test_fixed_work_is_the_integral_of_erfcx_over_its_step():
-    mpmath = pytest.importorskip("mpmath")
-    integral = mpmath.quad(lambda x: mpmath.exp(x * x) * mpmath.erfc(x), [-5, -4, -2, 0, 2, 5])
-    ends = mpmath.exp(25) * (mpmath.erfc(5) + mpmath.erfc(-5)) / 2
-    step = mpmath.mpf(10) / (timing.WORK_SIZE - 1)
-    # the trapezoidal rule errs by step^2/12 (f'(5) - f'(-5)), 8e-8 of the sum
-    assert timing.fixed_work() == pytest.approx(float(integral / step + ends), rel=1e-6, abs=0)
 
 
 def test_references_agree_with_the_solver():
@@ -54,18 +44,6 @@ def test_references_agree_with_the_solver():
     solved = greenwood_tripp.solve(held.islands["X"], held.islands["mu"], rtol=1e-11)
     assert held.error(solved.phi_F, solved.phi_A) < 1e-11
     assert held.error(1.01 * solved.phi_F, solved.phi_A) == pytest.approx(0.01, rel=1e-6, abs=0)
-
-
-def test_the_classical_iteration_converges_to_newton_with_its_mesh():
-    X, mu = np.array([1.5, 3.0]), np.array([0.5, 2.0])
-    exact = greenwood_tripp.solve(X, mu)
-    errors = []
-    for rings in (50, 100):
-        _, converged, force, _ = cost_islands.classical(X, mu, ring_matrix(rings), 1e-9)
-        assert converged.all()
-        errors.append(np.abs(force / exact.phi_F - 1).max())
-    # the meshes are of second order
-    assert errors[0] / errors[1] == pytest.approx(4, rel=0.3, abs=0)
 
 
 @pytest.fixture
@@ -172,12 +150,6 @@ def test_a_study_becomes_data_page_and_figure(tmp_path, monkeypatch):
         assert files[f"docs/figures/{name}.png"].startswith(b"\x89PNG\r\n\x1a\n")
 
 
-def test_rows_come_back_from_the_file(tmp_path):
-    rows = (Row("unit", "seconds", "both", None, 2.5e-4), Row("exact", "gap rtol=1e-03", "force", 1.5e-6, 3.25, 71.0))
-    (tmp_path / "cost.csv").write_text(cost.to_csv(rows), encoding="utf-8")
-    assert read_costs(tmp_path / "cost.csv").rows == rows
-
-
 def test_the_pareto_front_is_what_nothing_dominates():
     rng = np.random.default_rng(0)
     for _ in range(50):
@@ -190,12 +162,6 @@ def test_the_pareto_front_is_what_nothing_dominates():
 
         assert not any(dominated(row, by) for row in front for by in rows)
         assert all(any(by.cost <= row.cost and by.error <= row.error for by in front) for row in rows)
-
-
-def test_distances_become_data_and_come_back(tmp_path):
-    rows = (Distance("calibrated", "table", 1.5, 0.0, 0.04, 0.01, 0.12, 0.018, 1.0, 1.0), *shipped_distances()[1:3])
-    (tmp_path / "distance.csv").write_text(cost_distances.to_csv(rows), encoding="utf-8")
-    assert read_distances(tmp_path / "distance.csv") == rows
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import pytest
 
 from generate.pages import comparisons, distances, fidelity
 from generate.pages.page import MARKED, ROOT
-from mbma_tables import Surface, contact, theories
+from mbma_tables import Surface, theories
 
 PAGE = (ROOT / "docs" / "fidelity.md").read_text(encoding="utf-8")
 PARTS = {match[2]: match[0] for match in MARKED.finditer(PAGE)}
@@ -61,50 +61,6 @@ def test_tables_are_rectangular_and_name_every_theory(fresh):
         for cell in bracketed:
             value, ratio = re.fullmatch(r"(\S+) \((\S+)\)", cell).groups()
             assert float(value) / float(row[2]) == pytest.approx(float(ratio), rel=0.06)
-
-
-def test_quoted_rows_equal_the_library(fresh):
-    ((header, rows),) = fresh["quoted"]
-    surface = Surface.named("yang-persson")
-    cells = {(row[0], row[1]): dict(zip(header, row, strict=True)) for row in rows}
-    row = cells["yang-persson", "F/(A0 E*), u = 2.5 h_rms: MBMA"]
-    assert float(row["paper"]) == 2.2e-4
-    for reading in ("reported", "printed"):
-        force = contact(surface, 2.0 * surface.h_rms, reading=reading).force
-        assert number(row[f"MBMA {reading}"]) == pytest.approx(force, rel=LAST_DIGIT)
-    row = cells["yang-persson", "F/(A0 E*), u = 3 h_rms: Persson"]
-    assert number(row["Persson simplified"]) == pytest.approx(3.64e-4, rel=LAST_DIGIT)
-    assert number(row["MBMA reported"]) == 0
-
-
-def test_rows_of_the_challenge_are_distances(fresh):
-    ((header, rows),) = fresh["challenge"]
-    one = distances.older("challenge")
-    cells = {(row[0], row[1]): dict(zip(header, row, strict=True)) for row in rows}
-    assert len(cells) == 3 * one.area.size
-    force, area = one.force[1], one.area[1]
-    persson = math.erf(math.sqrt(2) * force) / area
-    assert number(cells[f"{area:.2g}", "area"]["Persson"]) == pytest.approx(persson, rel=LAST_DIGIT)
-    # no map, no value
-    assert "calibrated, map" not in header
-
-
-def test_cells_of_the_summary_are_root_mean_squares(fresh):
-    ((header, rows),) = fresh["summary"]
-    cells = dict(zip(header, rows[PICKED.index("bem")], strict=True))
-    one = distances.older("bem")
-    inside = (one.area >= 0.01) & (one.area <= 0.97)
-    errors = np.log(np.array([math.erf(math.sqrt(2) * f) for f in one.force[inside]]) / one.area[inside])
-    first = float(cells["Persson"].split(" / ")[0])
-    assert first == pytest.approx(100 * math.sqrt(np.mean(errors**2)), rel=0.03)
-    assert cells["MBMA reported"].endswith("†")
-    assert cells["calibrated, map"] == "—"
-
-
-def test_stars_stand_where_a_theory_was_fitted():
-    one = distances.DataSet("few", distances.earlier()[:2], ("MBMA fitted",))
-    ((header, (row,)),) = tables(fidelity.summary_table([one]))
-    assert [name for name, cell in zip(header, row, strict=True) if "*" in cell] == ["MBMA fitted"]
 
 
 @pytest.mark.parametrize("theory", ["MBMA reported", "MBMA printed", "G-W", "Persson"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 
 import numpy as np
@@ -10,19 +9,15 @@ import pytest
 from click.testing import CliRunner
 
 from generate.__main__ import main
-from generate.pages import distances, fidelity_figures, maps
-from generate.pages import export as export_page
+from generate.pages import fidelity_figures, maps
 from generate.pages import tables as table_page
 from generate.pages import theories as theories_page
 from generate.pages.gallery import ratios
 from generate.pages.page import MARKED, ROOT
 from generate.tables import height_coefficients
 from mbma_tables import InputError, Surface, contact, theories
-from mbma_tables.export.law_rows import describe_law
-from mbma_tables.files import shipped_file
 from mbma_tables.islands import height_integrals
 
-DATA = ROOT / "docs" / "data"
 PNG = b"\x89PNG"
 
 
@@ -100,78 +95,11 @@ def test_the_page_of_theories_lists_them_all():
 
 
 @pytest.mark.slow
-def test_the_export_page(monkeypatch):
-    monkeypatch.setattr(export_page, "NAMES", ("asphalt",))
-    monkeypatch.setattr(export_page, "ROWS", (10, 40))
-    parts, files = export_page.measure()
-    found = re.findall(r"\| asphalt \| (\d+) \| (\S+) \| (\S+) \| (\S+) \|", parts["errors"])
-    assert [int(count) for count, *_ in found] == [10, 40]
-    road = Surface.named("asphalt")
-    for count, *numbers in found:
-        chosen, even = (
-            describe_law(road, 13.3, length_unit="mm", stress_unit="MPa", rows=int(count), evenly=evenly).largest_error
-            for evenly in (False, True)
-        )
-        # two digits are printed
-        assert list(map(float, numbers)) == pytest.approx([chosen, even, even / chosen], rel=0.06, abs=0)
-    (figure,) = files.values()
-    assert figure.startswith(PNG)
-
-
-@pytest.fixture(scope="module")
-def drawn():
-    """The fidelity figures by name, as matplotlib holds them."""
-    yield dict(fidelity_figures.drawn())
+def test_every_figure_of_the_fidelity_page():
+    drawn = dict(fidelity_figures.drawn())
     fidelity_figures.pyplot().close("all")
-
-
-def curve(axes, label):
-    (line,) = (line for line in axes.lines if line.get_label() == label)
-    return line.get_xdata(), line.get_ydata()
-
-
-@pytest.mark.slow
-def test_every_figure_of_the_fidelity_page(drawn):
     shown = re.findall(r"figures/(\w+)\.png", (ROOT / "docs" / "fidelity.md").read_text(encoding="utf-8"))
     assert set(drawn) == set(shown)
-
-
-@pytest.mark.slow
-def test_curves_are_the_librarys(drawn):
-    surface = Surface.named("concrete")
-    axes = drawn["fig13"].axes[0]
-    assert axes.get_title() == "concrete"
-    for reading in ("reported", "printed"):
-        ratio, force = curve(axes, f"MBMA {reading}")
-        gap = 2 * ratio * surface.h_rms - surface.h_max
-        found = contact(surface, gap, reading=reading, rtol=1e-8).force
-        assert force == pytest.approx(found, rel=1e-5, abs=0)
-    ratio, force = curve(axes, "Persson simplified")
-    assert force == pytest.approx(theories.Persson("simplified").answer(surface, ratio * surface.h_rms).force, rel=1e-9)
-    # area against force
-    force, area = curve(drawn["fig14"].axes[0], "Persson")
-    assert area == pytest.approx(theories.Persson().area_at(surface, force), rel=1e-12, abs=0)
-
-
-@pytest.mark.slow
-def test_points_are_the_published_ones(drawn):
-    data, surface = np.loadtxt(DATA / "challenge.csv", delimiter=",", skiprows=4, usecols=(0, 1, 2)), "challenge"
-    place, force = curve(drawn["fig15"].axes[0], "boundary elements")
-    assert place == pytest.approx(data[:, 2], rel=1e-15, abs=0)
-    # of rms gradient 1
-    assert force == pytest.approx(data[:, 0] * Surface.named(surface).rms_gradient, rel=1e-14, abs=0)
-
-
-@pytest.mark.slow
-def test_ratios_to_the_references(drawn):
-    one = distances.older("bem")
-    area, ratio = curve(drawn["reference"].axes[0], "Persson")
-    assert area == pytest.approx(one.area, rel=1e-15, abs=0)
-    assert ratio == pytest.approx([math.erf(math.sqrt(2) * f) / a for f, a in zip(one.force, one.area, strict=True)])
-    # on a measured map with its curves at hand the law is nearer than without
-    maps = drawn["maps"].axes[0]
-    near, far = (np.abs(np.log(curve(maps, name)[1])).mean() for name in ("calibrated, map", "Persson"))
-    assert near < far
 
 
 @pytest.mark.slow
@@ -187,12 +115,3 @@ def test_pieces_of_a_height_integral_are_the_shipped_ones():
     with mpmath.workdps(height_coefficients.DIGITS):
         found = [[float(value) for value in row] for row in height_coefficients.pieces(2)]
     np.testing.assert_array_equal(found, height_integrals._ONE)
-
-
-def test_the_file_of_coefficients_is_written_as_it_is(tmp_path, monkeypatch):
-    target = tmp_path / "made.csv"
-    monkeypatch.setattr(height_coefficients, "TARGET", target)
-    shipped = np.loadtxt(shipped_file("height_coefficients.csv"), delimiter=",").reshape(5, 8, 19)
-    monkeypatch.setattr(height_coefficients, "pieces", lambda twice: shipped[twice - 1])
-    height_coefficients.main()
-    assert target.read_bytes() == shipped_file("height_coefficients.csv").read_bytes()

@@ -35,21 +35,6 @@ def scatter(count, low_X, high_X, low_mu, high_mu, seed):
     return rng.uniform(low_X, high_X, count), 10 ** rng.uniform(low_mu, high_mu, count)
 
 
-def test_twice_the_nodes():
-    X, mu = scatter(400, -6, 40, -14, 8, seed=1)
-    X[:4], mu[:4] = [-6, -6, 40, 40], [1e-14, 1e8, 1e-14, 1e8]
-    solved = greenwood_tripp.solve(X, mu)
-    error = np.empty_like(X)
-    for count in np.unique(solved.nodes):
-        here = solved.nodes == count
-        twice = greenwood_tripp.solve(X[here], mu[here], rtol=1e-13, nodes=2 * int(count))
-        error[here] = np.maximum(
-            np.abs(solved.phi_F[here] / twice.phi_F - 1), np.abs(solved.phi_A[here] / twice.phi_A - 1)
-        )
-    assert error.max() <= 1e-10
-    assert solved.error.max() <= 1e-10
-
-
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9, 1e-11])
 def test_estimate_covers_the_true_error(rtol):
     X, mu = scatter(2000, -12, 60, -20, 10, seed=round(-math.log10(rtol)))

@@ -6,9 +6,6 @@ import warnings
 import mpmath as mp
 import numpy as np
 import pytest
-import scipy.special
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numba import njit
 
 from mbma_tables import InputError
@@ -37,13 +34,6 @@ def reference(n: float, x: float) -> mp.mpf:
 def relative_errors(n: float, x: np.ndarray, values: np.ndarray) -> np.ndarray:
     with mp.workdps(40):
         return np.array([float(abs(mp.mpf(float(v)) / reference(n, a) - 1)) for a, v in zip(x, values, strict=True)])
-
-
-def scipy_route(n: float, x: np.ndarray) -> np.ndarray:
-    """The textbook formula in double precision, F_n = Gamma(n+1)/sqrt(2 pi) exp(-x^2/4) D_{-n-1}(x)."""
-    cylinder = scipy.special.pbdv(-n - 1, x)[0]
-    with np.errstate(all="ignore"):
-        return scipy.special.gamma(n + 1) / math.sqrt(2 * math.pi) * np.exp(-x * x / 4) * cylinder
 
 
 def test_reference_is_the_integral():
@@ -123,52 +113,6 @@ def test_the_pair_of_pressure_integrals():
     x = np.concatenate([np.random.default_rng(1).uniform(-15, 41, 5000), EDGES])
     pairs = np.array([pressure_integrals(at) for at in x])
     np.testing.assert_allclose(pairs.T, [height_integral(1.5, x), height_integral(0.5, x)], rtol=2e-15, atol=1e-307)
-
-
-@pytest.mark.parametrize("n", [1.5, 2.0, 2.5])
-@settings(deadline=None)
-@given(x=st.floats(-40, 12))
-def test_derivative(n, x):
-    # five points; truncation h^4/30 F^(5), rounding a few 1e-15/h
-    h = 2e-3 / max(1.0, abs(x) / 4)
-    at = height_integral(n, x + h * np.array([-2, -1, 1, 2]))
-    slope = (at[0] - 8 * at[1] + 8 * at[2] - at[3]) / (12 * h)
-    assert slope == pytest.approx(-n * height_integral(n - 1, x), rel=2e-9, abs=0)
-
-
-@settings(deadline=None)
-@given(x=st.floats(-30, 5))
-def test_recurrence(x):
-    # F_0 is the normal distribution's upper tail
-    lower = {1: scipy.special.ndtr(-x), 1.5: height_integral(0.5, x)}
-    for n, below in lower.items():
-        terms = np.array([n * below, -x * height_integral(n, x)])
-        assert abs(terms.sum() - height_integral(n + 1, x)) <= 1e-14 * np.abs(terms).sum()
-
-
-@settings(deadline=None)
-@given(x=st.floats(-1e3, 37))
-def test_positive_and_falling(x):
-    for n in ORDERS:
-        right, left = height_integral(n, [x, x - 1e-3 * max(1, abs(x))])
-        assert 0 < right < left
-
-
-@pytest.mark.parametrize("n", [0.5, 1.5, 2.5])
-def test_scipy_loses_digits_where_this_does_not(n):
-    x = np.array([-6.0, 5.0, 6.0, 10.0])
-    theirs = relative_errors(n, x, scipy_route(n, x))
-    ours = relative_errors(n, x, height_integral(n, x))
-    assert theirs[0] > 1e-12
-    assert theirs[2] > 1e-10
-    assert ours.max() <= 1e-14
-
-
-@pytest.mark.parametrize("n", ORDERS)
-def test_scipy_ends_in_nan_where_this_does_not(n):
-    x = np.array([-1e4, -100.0])
-    assert np.isnan(scipy_route(n, x)).all()
-    assert relative_errors(n, x, height_integral(n, x)).max() <= 1e-14
 
 
 def test_shapes():

@@ -5,14 +5,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from generate.tables.exact_geometry import divisor, exact_island
 from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, height_integral, island
 from mbma_tables.surfaces.readings import PRINTED
 
-LENGTHS = {"R_d": 1, "R_u": 1, "D": -2, "sigma": 1, "h_d": 1, "delta": 1}
 NUMBERS = ("zeta_d", "zeta_u", "eta", "X", "mu")
 
 
@@ -58,45 +55,6 @@ def test_rigid_tier(surface):
     assert (rigid.force >= exact.force).all()
     assert (rigid.area >= exact.area).all()
     assert rigid.force[0] == pytest.approx(exact.force[0], rel=1e-4, abs=0)
-
-
-@settings(deadline=None, max_examples=40)
-@given(
-    hurst=st.floats(0.1, 1),
-    zeta_1=st.floats(3.01, 1e5),
-    approach=st.floats(1e-9, 5),
-    power=st.floats(-9, 9),
-    modulus=st.floats(1e-3, 1e12),
-)
-def test_any_unit_of_length_and_stress(hurst, zeta_1, approach, power, modulus):
-    unit = 10**power
-    one = island(Surface(hurst, 1.0, zeta_1, 0.3, 1.0), 0.3 * approach)
-    other = island(Surface(hurst, 1 / unit, zeta_1 / unit, 0.3 * unit, unit), 0.3 * approach * unit, E_star=modulus)
-    for name in NUMBERS:
-        assert getattr(other, name) == pytest.approx(getattr(one, name), rel=1e-11, abs=1e-11)
-    for name, dimension in LENGTHS.items():
-        assert getattr(other, name) == pytest.approx(getattr(one, name) * unit**dimension, rel=1e-11, abs=0)
-    assert other.area == pytest.approx(one.area * unit**2, rel=1e-8, abs=0)
-    assert other.force == pytest.approx(one.force * unit**2 * modulus, rel=1e-8, abs=0)
-
-
-def test_batches_equal_loops():
-    surfaces = Surface([[0.4], [0.9]], 1.0, 500.0, [[0.1], [0.2]], 0.5)
-    delta = np.array([1e-5, 0.02, 0.3])
-    batch = island(surfaces, delta)
-    assert batch.force.shape == batch.delta.shape == batch.error.shape == (2, 3)
-    for i, (hurst, h_rms) in enumerate(((0.4, 0.1), (0.9, 0.2))):
-        for j in range(3):
-            one = island(Surface(hurst, 1.0, 500.0, h_rms, 0.5), delta[j])
-            assert np.shape(one.force) == ()
-            for name in (*NUMBERS, *LENGTHS, "force", "area"):
-                assert np.broadcast_to(getattr(batch, name), (2, 3))[i, j] == getattr(one, name), name
-
-
-def test_the_argument_stays(surface):
-    delta = np.array([0.1, 1.0])
-    island(surface, delta)
-    assert delta.tolist() == [0.1, 1.0]
 
 
 @pytest.mark.parametrize("delta", [0.0, -1.0, [1.0, -0.5]])

@@ -92,26 +92,6 @@ def test_alpha_of_a_band_without_width():
         assert excess == pytest.approx(1e-6 / 3, rel=1e-3, abs=0)
 
 
-@settings(deadline=None)
-@given(
-    hurst=st.floats(0.01, 1),
-    start=st.floats(1, 1e4),
-    first=st.floats(1e-6, 8),
-    second=st.floats(1e-6, 8),
-)
-def test_moments_of_adjoining_bands_add(hurst, start, first, second):
-    log_za = math.log(start)
-    for moment in (spectrum.m0_of, spectrum.m2_of, spectrum.m4_of):
-        parts = moment(hurst, log_za, first) + moment(hurst, log_za + first, second)
-        assert moment(hurst, log_za, first + second) == pytest.approx(parts, rel=1e-12, abs=0)
-
-
-@settings(deadline=None)
-@given(hurst=st.floats(0.01, 1), width=st.floats(1e-3, 18), step=st.floats(1e-3, 1))
-def test_alpha_rises_with_the_band(hurst, width, step):
-    assert 1.5 <= spectrum.alpha_of(hurst, width) < spectrum.alpha_of(hurst, width + step)
-
-
 def test_shapes():
     assert np.shape(spectrum.band_moment(2, 0.8, 1.0, 200.0)) == ()
     found = spectrum.band_moment(2, np.array([[0.5], [0.8]]), 1.0, [10.0, 100.0, 200.0])

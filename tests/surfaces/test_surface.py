@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 import scipy.integrate
 import xarray as xr
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from mbma_tables import OutOfRangeError, Surface
 
@@ -65,34 +63,6 @@ def test_power_spectrum_ends_with_the_band():
     assert ratio == pytest.approx(2**3.6, rel=1e-14, abs=0)
     batch = Surface([0.5, 0.8], 0.5, 100.0, 0.2, 0.6)
     assert batch.power_spectrum([[1.0], [2.0], [3.0]]).shape == (3, 2)
-
-
-@settings(deadline=None)
-@given(
-    hurst=st.floats(0.05, 1),
-    zeta_1=st.floats(3.01, 1e7),
-    h_rms=st.floats(1e-3, 1e3),
-    power=st.floats(-12, 12),
-)
-def test_any_unit_of_length(hurst, zeta_1, h_rms, power):
-    unit = 10**power
-    one = Surface(hurst, 1.0, zeta_1, h_rms, 3 * h_rms)
-    other = Surface(hurst, 1 / unit, zeta_1 / unit, h_rms * unit, 3 * h_rms * unit)
-    dimensions = {
-        "s": 1,
-        "m0": 2,
-        "m2": 0,
-        "m4": -2,
-        "alpha": 0,
-        "rms_gradient": 0,
-        "summit_density": -2,
-        "summit_radius": 1,
-        "summit_sigma": 1,
-    }
-    for name, dimension in dimensions.items():
-        assert getattr(other, name) == pytest.approx(getattr(one, name) * unit**dimension, rel=1e-12, abs=0), name
-    spectrum = one.power_spectrum(math.sqrt(zeta_1)) * unit**4
-    assert other.power_spectrum(math.sqrt(zeta_1) / unit) == pytest.approx(spectrum, rel=1e-12, abs=0)
 
 
 def test_batches_equal_loops():
