@@ -41,6 +41,7 @@ Y_LEAST, Y_LOW, Y_HIGH, Y_TURN, FIRST_BUCKET, END = range(INVERSE_HEAD)
 SURE = 3e-6  # steps, in halves of a record, after which another would change nothing
 STEPS = 200
 EPSILON = 5e-16
+FINITE = CONTRACT | {"nnan", "nsz"}  # arguments are clamped: a product with the first 0.0 is none
 
 
 def _loader(made: str, in_c: Any) -> Any:
@@ -113,7 +114,7 @@ def _value(address: int, word: int, t: float) -> float:
     return result
 
 
-@njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
+@njit(cache=True, fastmath=FINITE, error_model="numpy", forceinline=True)
 def _with_slope(address: int, word: int, t: float) -> tuple[float, float]:
     """It and its derivative, of one pass."""
     value, slope = number(address, word + DEGREE), 0.0
@@ -123,7 +124,7 @@ def _with_slope(address: int, word: int, t: float) -> tuple[float, float]:
     return value, slope
 
 
-@njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
+@njit(cache=True, fastmath=FINITE, error_model="numpy", forceinline=True)
 def _with_slopes(address: int, word: int, t: float) -> tuple[float, float, float]:
     """It, its derivative, and half of the second."""
     value, slope, bend = number(address, word + DEGREE), 0.0, 0.0
@@ -331,8 +332,7 @@ def _fill_inverse(
         unsure += not sure
         out[k] = gap if sure else math.nan
         if area is not None:
-            value, slope = _with_slope(address, place.word + AREA_AT, place.t)
-            area[k] = value + slope * step
+            area[k] = _value(address, place.word + AREA_AT, place.t + step)
         if stiffness is not None:
             value, slope, bend = _with_slopes(address, place.word + FORCE_AT, place.t)
             stiffness[k] = 2.0 * (slope + 2.0 * bend * step) * place.q
