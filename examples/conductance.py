@@ -24,6 +24,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mbma_tables import Surface, contact, materials
+from mbma_tables.plots import to_picture
 from mbma_tables.totals.conductance import conductance, cooper_mikic_yovanovich, mean_conductivity, mikic
 
 # both faces' roughness in one
@@ -107,7 +108,7 @@ def main(out: pathlib.Path | None = None, points: int = 200) -> Curve:
         numbers = "   ".join(f"{getattr(curve, name)[at]:<8.3g}" for name in columns)
         click.echo(f"{curve.pressure[at] / 1e6:7.2f}   {numbers}".rstrip())
     if out is not None:
-        draw(curve).savefig(out, dpi=120)
+        out.write_bytes(to_picture(draw(curve), out.suffix[1:], outlines=True))
     return curve
 
 

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from scipy.special import ndtr, ndtri
 
 from mbma_tables import Surface, contact
+from mbma_tables.plots import to_picture
 
 BLOCK = 10_000
 SEED = 20260101
@@ -79,8 +80,9 @@ def draw(spread: Spread, nominal: float) -> Figure:
     axes.hist(spread.force, bins=bins, color="tab:blue", alpha=0.7)
     axes.axvline(nominal, color="black", label="nominal surface")
     for level, value in zip(QUANTILES, spread.quantiles, strict=True):
-        axes.axvline(value, color="tab:red", linestyle=":", label=f"{level:.0%} at {value:.3g}")
-    axes.set(xscale="log", xlabel=f"force F/(A0 E*) at d = {GAP} um", ylabel=f"of {spread.force.size} samples")
+        axes.axvline(value, color="tab:red", linestyle=":")
+        axes.text(value, 1.01, f"{level:.0%}", color="tab:red", ha="center", transform=axes.get_xaxis_transform())
+    axes.set(xscale="log", xlabel=f"force F/(A0 E*) at d = {GAP} um", ylabel=f"number of {spread.force.size} samples")
     axes.legend()
     return figure
 
@@ -96,7 +98,7 @@ def main(out: pathlib.Path | None = None, samples: int = 200_000) -> Spread:
     for level, value, error in zip(QUANTILES, spread.quantiles, spread.standard_errors, strict=True):
         click.echo(f"{level:4.0%} below {value:.4e} +- {error:.1e}")
     if out is not None:
-        draw(spread, nominal).savefig(out, dpi=120)
+        out.write_bytes(to_picture(draw(spread, nominal), out.suffix[1:], outlines=True))
     return spread
 
 

@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 from scipy.optimize import OptimizeResult, minimize
 
 from mbma_tables import Contact, Surface, boundary_elements, contact
+from mbma_tables.plots import to_picture
 from mbma_tables.reynolds import flow_conductance
 
 LONGEST = 500.0  # um
@@ -141,7 +142,7 @@ def main(out: pathlib.Path | None = None, cells: int = 3, grid: int = 256) -> Fo
     for conductance in found.simulated:
         click.echo(f"boundary elements {conductance:.4g} um^3: ln(law/simulation) = {np.log(law / conductance):+.2f}")
     if out is not None:
-        draw(found).savefig(out, dpi=120)
+        out.write_bytes(to_picture(draw(found), out.suffix[1:], outlines=True))
     return found
 
 

@@ -221,14 +221,17 @@ def _band(axes: Axes, x: FloatArray, y: FloatArray, scatter: FloatArray | None) 
     axes.fill_between(x, y / factor, y * factor, where=known.tolist(), alpha=0.25, color=colour, lw=0)
 
 
-def to_picture(figure: Figure, kind: str = "png", dpi: float = 120) -> bytes:
-    """The figure as the content of a file of a `kind` of `KINDS`, the same bytes for the same figure."""
+def to_picture(figure: Figure, kind: str = "png", dpi: float = 120, outlines: bool = False) -> bytes:
+    """The figure as the content of a file of a `kind` of `KINDS`, the same bytes for the same figure.
+
+    Text stays text in SVG; with `outlines` its letters are drawn, and look the same without their font.
+    """
     import matplotlib as mpl
 
     content = io.BytesIO()
-    # text stays text in SVG; nothing of the time or of chance goes into a file
-    stable: Any = {"svg.fonttype": "none", "svg.hashsalt": "mbma_tables"}
-    undated: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    # nothing of the time or of chance goes into a file
+    stable: Any = {"svg.fonttype": "path" if outlines else "none", "svg.hashsalt": "mbma_tables"}
+    undated: dict[str, Any] = {"svg": {"Date": None, "Creator": None}, "pdf": {"CreationDate": None}}
     with mpl.rc_context(stable):
         figure.savefig(content, format=kind, dpi=dpi, metadata=undated.get(kind))
     return content.getvalue()

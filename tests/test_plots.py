@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mbma_tables.errors import InputError, MbmaError
-from mbma_tables.plots import Curve, draw_compression
+from mbma_tables.plots import Curve, draw_compression, to_picture
 
 GAP = np.array([3.0, 2.0, 1.0, 0.0])
 FORCE = np.array([0.0, 2e-5, 3e-4, 2e-2])
@@ -37,6 +37,13 @@ def test_scatter_is_a_band_of_one_standard_deviation():
     assert not unknown.axes[0].collections
     with pytest.raises(InputError, match="one length"):
         Curve("law", GAP, FORCE, AREA, scatter[:2])
+
+
+@pytest.mark.parametrize("outlines", [False, True])
+def test_drawings_repeat_with_letters_as_asked(outlines):
+    first, second = (to_picture(draw_compression(two_curves()), "svg", outlines=outlines) for _ in range(2))
+    assert first == second
+    assert (b"<text" in first) != outlines
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from generate.boundary_elements.design import REFINEMENT, SPLITS
-from generate.pages.page import ROOT, png, pyplot, table
+from generate.pages.page import ROOT, pyplot, svg, table
 from mbma_tables import Surface
 from mbma_tables.calibrated import CONSTANTS
 from mbma_tables.files import shipped_file
@@ -127,7 +127,7 @@ def refinement(data: xr.Dataset) -> str:
 
 def draw(data: xr.Dataset) -> bytes:
     """One surface's curves with the stated scatter as a band, and every theory's scatter of force."""
-    figure, (left, right) = pyplot().subplots(1, 2, figsize=(9, 3.6), dpi=100, layout="constrained")
+    figure, (left, right) = pyplot().subplots(1, 2, figsize=(10, 3.6), layout="constrained")
     force, _, _, u = np.loadtxt(DATA, delimiter=",", skiprows=4).T[:4]
     surface = Surface(0.8, 1.0, 64.0, 1.0, 3.3973)
     gap = np.linspace(0.01, 3.38, 200)
@@ -137,7 +137,7 @@ def draw(data: xr.Dataset) -> bytes:
         left.semilogy(gap, found.force / g, color=COLOURS[name], label=name)
         if name == "calibrated":
             spread = np.exp(get_theory(name).scatter(surface, found.area)[0])
-            left.fill_between(gap, found.force / g / spread, found.force / g * spread, color="0.8")
+            left.fill_between(gap, found.force / g / spread, found.force / g * spread, color="0.8", label="its scatter")
     left.semilogy(u, force, "ko", mfc="none", label="boundary elements")
     left.set(xlabel="u/h_rms", ylabel="F/(A0 E* g)", ylim=(1e-5, 3), title="H 0.8, zeta_1 64, h_max 3.4 h_rms")
     left.legend(fontsize="small")
@@ -145,8 +145,8 @@ def draw(data: xr.Dataset) -> bytes:
     for k, name in enumerate(data.attrs["theories"].split()):
         right.loglog(data.contact, data.stated_scatter.values[k, number], "o-", color=COLOURS[name], label=name)
     right.set(xlabel="A/A0", ylabel="rms of ln(F/simulated) at equal u", title="Stated scatter of force")
-    right.legend(fontsize="small")
-    return png(figure)
+    figure.legend(*right.get_legend_handles_labels(), fontsize="small", loc="outside right center")
+    return svg(figure)
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
@@ -157,4 +157,4 @@ def measure() -> tuple[dict[str, str], dict[str, bytes]]:
         evidence: Any = opened.load()
     parts = {name: accuracy(data, name) for name in ("area", "force", "stiffness")}
     parts |= {"numbers": numbers(data), "bars": bars(data), "refinement": refinement(evidence)}
-    return parts, {"docs/figures/calibrated.png": draw(data)}
+    return parts, {"docs/figures/calibrated.svg": draw(data)}

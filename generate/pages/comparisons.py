@@ -26,10 +26,10 @@ GAPS = 60  # a curve
 
 @functools.cache
 def sample(surface: Surface, theory: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Mean separation, force and area from first contact to full compression, geometrically spaced."""
+    """Mean separation, force and area from first contact to full compression, closer at first contact."""
     # G-W's Gaussian has no end, and three more h_rms are sampled
     first = surface.h_max + (0.0 if theory in READINGS else 1.5 * surface.h_rms)
-    u = first * (1 - np.geomspace(0.005, 1, GAPS))
+    u = first * (1 - np.append(np.geomspace(0.005, 0.1, GAPS // 2)[:-1], np.linspace(0.1, 1, GAPS)))
     found = SEPARATIONS[theory].answer(surface, u)
     return u, found.force, found.area
 

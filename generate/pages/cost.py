@@ -17,7 +17,7 @@ from generate import timing
 from generate.pages import cost_distances
 from generate.pages.cost_islands import island_rows
 from generate.pages.cost_totals import total_rows
-from generate.pages.page import png, table
+from generate.pages.page import svg, table
 from mbma_tables.scenes.costs import COLUMNS, UNIT, Costs, Distance, Row, read_costs, read_distances
 from mbma_tables.theories import THEORIES
 
@@ -139,7 +139,7 @@ def parts_of(costs: Costs, distances: Sequence[Distance]) -> dict[str, str]:
 
 
 def draw(costs: Costs) -> bytes:
-    """The figure: error against cost, islands and totals, as a PNG file."""
+    """The figure: error against cost, islands and totals, as an SVG file."""
     from matplotlib.figure import Figure
 
     groups = {"one island": islands_of(costs), "one gap of a surface": totals_of(costs)}
@@ -163,7 +163,7 @@ def draw(costs: Costs) -> bytes:
         panel.grid(alpha=0.3)
     panels[0].set_ylabel("largest relative error")
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=8)
-    return png(figure)
+    return svg(figure)
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
@@ -177,6 +177,6 @@ def measure() -> tuple[dict[str, str], dict[str, bytes]]:
         costs = read_costs(pathlib.Path(folder) / "cost.csv")
         distances = read_distances(pathlib.Path(folder) / "distance.csv")
     files = {f"tables/{name}": content for name, content in data.items()}
-    files |= {"docs/figures/cost.png": draw(costs)}
-    files |= {"docs/figures/distance.png": cost_distances.draw(distances, costs.seconds)}
+    files |= {"docs/figures/cost.svg": draw(costs)}
+    files |= {"docs/figures/distance.svg": cost_distances.draw(distances, costs.seconds)}
     return parts_of(costs, distances), files

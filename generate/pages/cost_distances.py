@@ -14,7 +14,7 @@ from scipy.interpolate import PchipInterpolator
 from generate.boundary_elements.grids import GRIDS, STARTS
 from generate.boundary_elements.surfaces import Recipe, heights
 from generate.pages.distances import COVER, DATA, HIGH, HUES, LOW, THEORIES, TIERS, distances, held_out, summed_up
-from generate.pages.page import percent, png, pyplot, table
+from generate.pages.page import percent, pyplot, svg, table
 from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.arguments import FloatArray
@@ -229,4 +229,4 @@ def draw(rows: Sequence[Distance], unit: float) -> bytes:
     for panel in axes[1]:
         panel.set(xlabel="processor time a point [s]", xlim=(1e-8, 1e3))
     figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
-    return png(figure)
+    return svg(figure)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from generate.pages.page import png, pyplot, table
+from generate.pages.page import pyplot, svg, table
 from mbma_tables import Surface, contact_law
 from mbma_tables.export import LAWS
 from mbma_tables.export.law_code import law_text
@@ -115,9 +115,9 @@ def draw() -> bytes:
     axes.set(xlabel="overclosure [mm]", ylabel="pressure [MPa]", ylim=(1e-4, 5))
     axes.grid(True, alpha=0.3)
     axes.legend()
-    return png(figure, dpi=130)
+    return svg(figure)
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
     """The measured part of the page, and its figure."""
-    return {"errors": errors(), "sizes": sizes(), "compiled": compiled()}, {"docs/figures/export.png": draw()}
+    return {"errors": errors(), "sizes": sizes(), "compiled": compiled()}, {"docs/figures/export.svg": draw()}

@@ -13,7 +13,7 @@ from generate.calibrated import QUANTITIES
 from generate.pages import distances
 from generate.pages.comparisons import AREA_THEORIES, PERSSON, READINGS, THEORIES, force_at, kappa
 from generate.pages.fidelity_figures import RESOLUTIONS, drawn
-from generate.pages.page import percent, png, table
+from generate.pages.page import percent, svg, table
 from mbma_tables import Surface
 
 STEEL = 200e3  # MPa, the E* at which the paper's 3.5e-4 E* is its 70 MPa
@@ -147,4 +147,4 @@ def measure() -> tuple[dict[str, str], dict[str, bytes]]:
         "heights": heights_table(),
         "quoted": quoted_table(),
     }
-    return parts, {f"docs/figures/{name}.png": png(figure) for name, figure in drawn()}
+    return parts, {f"docs/figures/{name}.svg": svg(figure) for name, figure in drawn()}

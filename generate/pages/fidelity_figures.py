@@ -74,8 +74,8 @@ def simulations() -> Iterator[tuple[str, Any]]:
     by_gap(axes[1], Surface.named("yang-persson"), 1e-6)
     axes[1].set(xlim=(1.8, 3.1), ylim=(1e-6, 1e-2))
     for ax in axes:
-        ax.plot([2.0, 2.5], [2.9e-3, 2.2e-4], "kx")
-        ax.plot([2.5, 3.0], [1e-3, 3.5e-4], "k+")
+        ax.plot([2.0, 2.5], [2.9e-3, 2.2e-4], "kx", label="quoted: MBMA")
+        ax.plot([2.5, 3.0], [1e-3, 3.5e-4], "k+", label="quoted: Persson")
     axes[0].legend(fontsize="small")
     yield "fig11", figure
 
@@ -182,6 +182,8 @@ def by_data_set() -> Iterator[tuple[str, Any]]:
                         label = theory if one is sets[key].seen[0] else "_"
                         ax.plot(one.area, np.exp(values), ".-", color=distances.HUES[theory], label=label, lw=1, ms=4)
         _ratio_axes(axes, [sets[key].title for key in keys])
+        for ax in axes.flat:
+            ax.minorticks_off()
         # below the panels, where it hides no curve
         figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
         yield name, figure

@@ -13,14 +13,13 @@ from typing import Any
 import numpy as np
 from scipy.signal import resample
 
-from generate.pages.page import ROOT, table
+from generate.pages.page import ROOT, svg, table
 from mbma_tables import contact_law
 from mbma_tables.arguments import FloatArray
 from mbma_tables.boundary_elements import LOADS
 from mbma_tables.errors import MbmaError
 from mbma_tables.files import write_file
 from mbma_tables.measurement import curves, described, draw, drawn_theory
-from mbma_tables.plots import to_picture
 from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.theories import BoundaryElements
@@ -187,7 +186,7 @@ def measure() -> tuple[dict[str, str], dict[str, bytes]]:
         stem = example.name.split(".")[0]
         points = None if found is None else dict(zip(COLUMNS, found, strict=True))
         picture = draw(treated, surface, curves(surface), example.name, "pressure  F/(A0 E*)", points)
-        files[f"docs/figures/gallery_{stem}.png"] = to_picture(picture)
+        files[f"docs/figures/gallery_{stem}.svg"] = svg(picture)
         said = "\n".join(described(surface))
         text += [f"## {example.name}", example.about, f"```\n$ {example.command} --plot {stem}.png\n{said}\n```"]
         text += [f"![{example.name}](figures/gallery_{stem}.png)"]

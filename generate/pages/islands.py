@@ -14,7 +14,7 @@ import numpy as np
 from scipy.integrate import simpson
 from scipy.interpolate import BarycentricInterpolator
 
-from generate.pages.page import png, pyplot, table
+from generate.pages.page import pyplot, svg, table
 from mbma_tables import greenwood_tripp
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands.greenwood_tripp import IslandSolution
@@ -51,9 +51,11 @@ def draw(profiles: list[tuple[IslandSolution, FloatArray, FloatArray]], differen
     right.loglog(POINTS, np.abs(differences).max() * (POINTS[0] / np.array(POINTS)) ** 3, "k:", label="third order")
     left.set(xlabel="radius  rho/L", ylabel="pressure  p/p(0)", title="lines: this library; dots: ContactMechanics")
     right.set(xlabel="points of ContactMechanics", ylabel="relative difference of force")
+    right.set_xticks(POINTS, [f"{points}" for points in POINTS], minor=False)
+    right.minorticks_off()
     left.legend()
     right.legend()
-    return png(figure, dpi=110)
+    return svg(figure)
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
@@ -76,4 +78,4 @@ def measure() -> tuple[dict[str, str], dict[str, bytes]]:
         )
     header = ["X", "mu", "Phi_F", "its error", *(f"{points} points" for points in POINTS), "extrapolated"]
     parts = {"comparison": table(header, rows)}
-    return parts, {"docs/figures/islands.png": draw(profiles, differences)}
+    return parts, {"docs/figures/islands.svg": draw(profiles, differences)}

@@ -10,7 +10,7 @@ import xarray as xr
 from generate.boundary_elements.design import TRAINING
 from generate.leakage_flow import Flow, cases
 from generate.leakage_law import EDGES, EVIDENCE, LARGE, errors, noise_floor, summary
-from generate.pages.page import png, pyplot, table
+from generate.pages.page import pyplot, svg, table
 from mbma_tables import Surface, contact
 from mbma_tables.theories.calibrated_table import shipped, shipped_part
 from mbma_tables.theories.leakage_table import GROUP, shipped_flow
@@ -110,26 +110,28 @@ def draw() -> bytes:
     for axes, hurst in zip(panels, DRAWN, strict=True):
         for one in found:
             if one.kind == "self_affine" and one.node[1] == hurst and (one.isotropic or one.zeta_1 >= 64):
-                colour = "k" if one.zeta_1 < 64 else "r"
-                axes.plot(one.area, np.exp(one.log_k), ".", color=colour, ms=4, alpha=0.6)
+                colour, label = ("k", "simulated, zeta_1 < 64") if one.zeta_1 < 64 else ("r", "simulated, zeta_1 >= 64")
+                axes.plot(one.area, np.exp(one.log_k), ".", color=colour, ms=4, alpha=0.6, label=label)
         for zeta, style in ((16.0, "-"), (64.0, "--"), (1024.0, ":")):
             answer = contact(Surface(hurst, 1.0, zeta, 1.0, 4.0), area=area, theory="calibrated")
             k = np.where(answer.leakage.blocked, np.nan, answer.leakage.k)
             axes.plot(area, k, f"C0{style}", label=f"calibrated, zeta_1 {zeta:g}")
             if zeta == 16:
                 spread = np.exp(answer.leakage.scatter)
-                axes.fill_between(area, k / spread, k * spread, color="C0", alpha=0.2, lw=0)
+                axes.fill_between(area, k / spread, k * spread, color="C0", alpha=0.2, lw=0, label="its scatter")
                 u = answer.mean_separation
                 closed = flow.closed_form(u, area)
                 axes.plot(area, np.where(closed > 0, closed, np.nan), "C1-", lw=1, label="closed form, zeta_1 16")
                 axes.plot(area, u**3, "C2-", lw=1, label="u^3, zeta_1 16")
         axes.set(xlabel="real contact area  A/A0", yscale="log", ylim=(1e-7, 20), title=f"H = {hurst:g}")
         axes.grid(alpha=0.3)
-    panels[0].set_ylabel("flow conductance  k")
-    panels[0].legend()
-    return png(figure, dpi=110)
+    panels[0].set_ylabel("flow conductance over h_rms^3,  k")
+    # one entry for all simulations of a colour
+    entries = {text: handle for handle, text in zip(*panels[0].get_legend_handles_labels(), strict=True)}
+    panels[0].legend(entries.values(), entries.keys(), fontsize="small")
+    return svg(figure)
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
     """The measured parts of the page, and its figure."""
-    return {"accuracy": accuracy(), "cells": of_cells(), "floor": floor()}, {"docs/figures/leakage.png": draw()}
+    return {"accuracy": accuracy(), "cells": of_cells(), "floor": floor()}, {"docs/figures/leakage.svg": draw()}

@@ -7,7 +7,6 @@ name, and other files (figures, data) by their path in the checkout. ``python -m
 
 from __future__ import annotations
 
-import io
 import math
 import pathlib
 import re
@@ -82,22 +81,12 @@ def pyplot() -> Any:
     return plt
 
 
-def picture(figure: Any) -> bytes:
-    """A pyplot figure as the content of an SVG file, the same bytes for the same figure; closes it."""
+def svg(figure: Any) -> bytes:
+    """A figure as the content of an SVG file, the same bytes for the same figure; closes it."""
     from matplotlib import pyplot
 
     from mbma_tables.plots import to_picture
 
-    content = to_picture(figure, "svg")
+    content = to_picture(figure, "svg", dpi=100, outlines=True)
     pyplot.close(figure)
     return content
-
-
-def png(figure: Any, **options: Any) -> bytes:
-    """A pyplot figure as the content of a PNG file, the same bytes for the same figure; closes it."""
-    from matplotlib import pyplot
-
-    content = io.BytesIO()
-    figure.savefig(content, format="png", metadata={"Software": None}, pil_kwargs={"optimize": True}, **options)
-    pyplot.close(figure)
-    return content.getvalue()

@@ -10,9 +10,9 @@ import xarray as xr
 
 from generate.boundary_elements.evidence import cases
 from generate.pages import formula
-from generate.pages.page import ROOT, table
+from generate.pages.page import ROOT, svg, table
 from mbma_tables import Surface, contact
-from mbma_tables.plots import Curve, draw_compression, theory_label, to_picture
+from mbma_tables.plots import Curve, draw_compression, theory_label
 from mbma_tables.scenes.costs import shipped_costs, shipped_distances
 
 SHOWN = ("self_affine", 0.7, 24.0, 5, 0.0)  # a spectrum that no fit saw: H, zeta_1, waves a side
@@ -82,7 +82,7 @@ def picture() -> bytes:
         by_gap.plot(one.u, force, "k.", label="_" if number else "boundary elements")
         by_force.plot(force, one.area, "k.")
     by_gap.legend()
-    return to_picture(figure, "svg")
+    return svg(figure)
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:

@@ -16,7 +16,7 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 
-from generate.pages.page import png, pyplot, table
+from generate.pages.page import pyplot, svg, table
 from generate.tables.exact_geometry import DOUBLES, divisor, exact_island
 from mbma_tables import Surface, contact, greenwood_tripp
 from mbma_tables.arguments import FloatArray
@@ -208,17 +208,17 @@ def draw(geometry_maps: dict[str, FloatArray], island_maps: dict[str, FloatArray
     mesh: Any = None
     for panel, (name, title) in zip(axes[0], titles.items(), strict=True):
         field = np.maximum(geometry_maps[name], MIN_ERROR)
-        mesh = panel.pcolormesh(BANDS, APPROACHES, field, norm=norm, cmap=colormap, shading="nearest")
+        mesh = panel.pcolormesh(BANDS, APPROACHES, field, norm=norm, cmap=colormap, shading="nearest", rasterized=True)
         panel.set(xscale="log", yscale="log", xlabel="zeta_1", ylabel="delta/h_rms", title=title)
     places = np.arange(MU_CORNERS.size), np.arange(X_CORNERS.size)
     for panel, tier in zip(axes[1], ("exact", "universal"), strict=True):
         field = np.maximum(island_maps[tier], MIN_ERROR)
-        mesh = panel.pcolormesh(*places, field, norm=norm, cmap=colormap, shading="nearest")
+        mesh = panel.pcolormesh(*places, field, norm=norm, cmap=colormap, shading="nearest", rasterized=True)
         panel.set(xlabel="mu", ylabel="X", title=f"islands: tier {tier} (white: refused)")
         panel.set_xticks(places[0][::4], [f"{mu:.0e}" for mu in MU_CORNERS[::4]], rotation=45)
         panel.set_yticks(places[1][::4], [f"{X:.3g}" for X in X_CORNERS[::4]])
     figure.colorbar(mesh, ax=axes, label="largest relative error")
-    return png(figure, dpi=110)
+    return svg(figure)
 
 
 def corners(tallies: Sequence[Tally]) -> str:
@@ -237,4 +237,4 @@ def measure() -> tuple[dict[str, str], dict[str, bytes]]:
     island_tallies, island_maps = islands()
     geometry_tallies, geometry_maps = island_geometry()
     parts = {"corners": corners([*island_tallies, *geometry_tallies, *totals()])}
-    return parts, {"docs/figures/stability.png": draw(geometry_maps, island_maps)}
+    return parts, {"docs/figures/stability.svg": draw(geometry_maps, island_maps)}

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from generate.pages.page import png, pyplot, table
+from generate.pages.page import pyplot, svg, table
 from generate.tables.build import evaluate
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands.four_numbers import hat_scales, to_axes
@@ -142,7 +142,7 @@ def example_island4d() -> str:
 
 
 def figure() -> bytes:
-    """Bound on the relative error of the universal table over X and mu, a PNG file."""
+    """Bound on the relative error of the universal table over X and mu, an SVG file."""
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import LogNorm
 
@@ -154,13 +154,13 @@ def figure() -> bytes:
     norm = LogNorm(content.local_error.min(), content.local_error.max())
     for panel, number, name in zip(panels, (0, 1), (r"$\Phi_F$", r"$\Phi_A$"), strict=True):
         image = PolyCollection(list(np.stack(corners, axis=-1).reshape(-1, 4, 2)), array=content.local_error[:, number])
-        image.set(norm=norm, edgecolor="white", linewidth=0.2)
+        image.set(norm=norm, edgecolor="white", linewidth=0.2, rasterized=True)
         panel.add_collection(image)
         title = f"bound on the relative error of {name}"
         panel.set(yscale="log", xlim=(X_low[0], 12), ylim=(LEAST_DRAWN, mu_high[-1]), xlabel="X", title=title)
     panels[0].set_ylabel(r"$\mu$")
     drawn.colorbar(image, ax=panels)
-    return png(drawn)
+    return svg(drawn)
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
@@ -172,4 +172,4 @@ def measure() -> tuple[dict[str, str], dict[str, bytes]]:
         "universal": example_universal(),
         "island4d": example_island4d(),
     }
-    return parts, {"docs/figures/tables_universal_error.png": figure()}
+    return parts, {"docs/figures/tables_universal_error.svg": figure()}

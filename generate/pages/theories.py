@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from generate.pages.page import table
+from generate.pages.page import svg, table
 from mbma_tables import Surface, contact
-from mbma_tables.plots import Curve, draw_compression, theory_label, to_picture
+from mbma_tables.plots import Curve, draw_compression, theory_label
 from mbma_tables.theories import THEORIES, get_theory
 from mbma_tables.theories.protocol import answer_where_finite
 
@@ -40,9 +40,16 @@ def draw() -> bytes:
         scatter, area_scatter = theory.scatter(road, found.area[known])
         gap = u[known] / road.h_rms
         curves.append(Curve(theory_label(name), gap, found.force[known], found.area[known], scatter, area_scatter))
-    return to_picture(draw_compression(curves, "concrete road of Lorenz, by every theory"))
+    figure = draw_compression(curves, "concrete road of Lorenz, by every theory")
+    by_gap, by_force = figure.axes
+    for line in (*by_gap.lines, *by_force.lines):
+        line.set_marker("")
+    by_gap.legend()
+    by_gap.set_ylim(1e-8, 20)
+    by_force.set(xlim=(1e-6, 10), ylim=(1e-6, 5))
+    return svg(figure)
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
     """The measured part of the page, and its figure."""
-    return {"answers": answers()}, {"docs/figures/theories.png": draw()}
+    return {"answers": answers()}, {"docs/figures/theories.svg": draw()}

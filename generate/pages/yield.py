@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from generate.calibrated_hardness import BARS, blind
-from generate.pages.page import ROOT, png, pyplot, table
+from generate.pages.page import ROOT, pyplot, svg, table
 from mbma_tables import Surface, contact, materials
 from mbma_tables.arguments import FloatArray
 from mbma_tables.theories.calibrated_table import shipped_part
@@ -172,7 +172,7 @@ def draw() -> bytes:
         axis.set_ylabel(label)
         axis.grid(True, alpha=0.3)
     axes[1].set_yscale("log")
-    axes[0].legend(fontsize=8)
+    axes[0].legend(fontsize=8, loc="lower left")
     for place, name in enumerate(SHOWN):
         metal = materials.get(name)
         modulus = float(materials.effective_modulus(metal.E, metal.nu, metal.E, metal.nu))
@@ -180,7 +180,7 @@ def draw() -> bytes:
     axes[2].axvline(materials.ELASTIC_PSI, color="black", linestyle=":")
     axes[2].set_yticks(range(len(SHOWN)), [f"{name} on itself" for name in SHOWN], fontsize=8)
     axes[2].set_xlabel(f"psi = E* g/p_m; metals at rms gradient {GRADIENT:g}, hard to soft")
-    return png(figure, dpi=120)
+    return svg(figure)
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
@@ -193,4 +193,4 @@ def measure() -> tuple[dict[str, str], dict[str, bytes]]:
         "metals": metals(),
         "cost": cost(),
     }
-    return parts, {"docs/figures/yield.png": draw()}
+    return parts, {"docs/figures/yield.svg": draw()}

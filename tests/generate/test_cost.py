@@ -147,7 +147,7 @@ def test_a_study_becomes_data_page_and_figure(tmp_path, monkeypatch):
     assert page.fill(text, parts).count("|") == text.count("|")
     assert page.fill(text, cost.parts_of(shipped, shipped_distances())) == text
     for name in ("cost", "distance"):
-        assert files[f"docs/figures/{name}.png"].startswith(b"\x89PNG\r\n\x1a\n")
+        assert files[f"docs/figures/{name}.svg"].startswith(b"<?xml")
 
 
 def test_the_pareto_front_is_what_nothing_dominates():

@@ -95,12 +95,3 @@ def test_committed_page_is_what_the_code_computes(fresh):
                     found, expected = ([float(text) for text in part] for part in numbers)
                     # two digits are printed where a distance is told
                     assert found == pytest.approx(expected, rel=LAST_DIGIT if name == "quoted" else 0.06), (name, row)
-
-
-def test_committed_figures_are_there():
-    shown = re.findall(r"\((figures/\w+\.png)\)", PAGE)
-    assert len(shown) == 10
-    for name in shown:
-        content = (ROOT / "docs" / name).read_bytes()
-        assert content.startswith(b"\x89PNG")
-        assert len(content) < 250_000

@@ -18,7 +18,7 @@ from generate.tables import height_coefficients
 from mbma_tables import InputError, Surface, contact, theories
 from mbma_tables.islands import height_integrals
 
-PNG = b"\x89PNG"
+SVG = b"<?xml"
 
 
 def run(command, *arguments):
@@ -54,17 +54,29 @@ def test_shapes_are_told_with_extremes_and_validity():
 
 
 def test_a_page_is_written_with_its_figures(tmp_path, monkeypatch):
-    monkeypatch.setattr("generate.pages.stability.measure", lambda: ({"corners": "of corners"}, {"docs/a/b.png": PNG}))
+    monkeypatch.setattr("generate.pages.stability.measure", lambda: ({"corners": "of corners"}, {"docs/a/b.svg": SVG}))
     place = tmp_path / "docs"
     assert run(main, "pages", "stability", "--out", tmp_path).split() == [
         str(place / "stability.md"),
-        str(place / "a" / "b.png"),
+        str(place / "a" / "b.svg"),
     ]
     text = (place / "stability.md").read_text(encoding="utf-8")
     (match,) = MARKED.finditer(text)
     assert match[0] == f"{match[1]}\nof corners\n\n{match[3]}"
     assert MARKED.sub("", text) == MARKED.sub("", (ROOT / "docs" / "stability.md").read_text(encoding="utf-8"))
-    assert (place / "a" / "b.png").read_bytes() == PNG
+    assert (place / "a" / "b.svg").read_bytes() == SVG
+
+
+def test_figures_are_small_drawings_each_shown_by_a_page():
+    pages = [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md"]
+    shown = {name for page in pages for name in re.findall(r"\]\((?:docs/)?figures/([^)]+)\)", page.read_text("utf-8"))}
+    assert shown == {path.name for path in (ROOT / "docs" / "figures").iterdir()}
+    # a photograph of the screen
+    for name in shown - {"explorer.png"}:
+        content = (ROOT / "docs" / "figures" / name).read_bytes()
+        assert content.startswith(SVG)
+        assert b"<text" not in content
+        assert len(content) < 300_000
 
 
 @pytest.mark.parametrize(
@@ -91,14 +103,14 @@ def test_the_page_of_theories_lists_them_all():
         assert f"\n| `{name}`" in text
     parts, files = theories_page.measure()
     assert f"<!-- measured: answers -->\n\n{parts['answers']}\n\n<!-- end -->" in text
-    assert files["docs/figures/theories.png"].startswith(PNG[:8])
+    assert files["docs/figures/theories.svg"].startswith(SVG)
 
 
 @pytest.mark.slow
 def test_every_figure_of_the_fidelity_page():
     drawn = dict(fidelity_figures.drawn())
     fidelity_figures.pyplot().close("all")
-    shown = re.findall(r"figures/(\w+)\.png", (ROOT / "docs" / "fidelity.md").read_text(encoding="utf-8"))
+    shown = re.findall(r"figures/(\w+)\.svg", (ROOT / "docs" / "fidelity.md").read_text(encoding="utf-8"))
     assert set(drawn) == set(shown)
 
 
@@ -106,7 +118,7 @@ def test_every_figure_of_the_fidelity_page():
 def test_the_page_on_tables():
     parts, files = table_page.measure()
     assert set(parts) == {"sizes", "cells", "axes", "universal", "island4d"}
-    assert [content[:4] for content in files.values()] == [PNG]
+    assert [content[:5] for content in files.values()] == [SVG]
 
 
 def test_pieces_of_a_height_integral_are_the_shipped_ones():
