@@ -156,6 +156,14 @@ def checked_hardness(hardness: ArrayLike) -> FloatArray:
     return np.where(infinite, np.inf, given)
 
 
+def one_number(name: str, value: Any) -> Any:
+    """`value` as one number, not an array of them."""
+    number = finite_array(name, value)
+    if number.ndim:
+        raise InputError(f"{name} must be one number, got shape {number.shape}")
+    return np.float64(number)
+
+
 def number_in(name: str, value: Any, low: float, high: float) -> float:
     """`value` as a float within [low, high]."""
     number = finite_array(name, value)

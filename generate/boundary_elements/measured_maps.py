@@ -31,7 +31,7 @@ def middle(treated: Treated) -> Treated:
 def measured_maps(maps: tuple[pathlib.Path, ...], folder: pathlib.Path) -> None:
     """Press measured maps, read by SurfaceTopography, flat: a few minutes each."""
     for path in maps:
-        treated = middle(prepared(path, None, None, False, {}))
+        treated = middle(prepared(path, {"periodic": False}))
         surface, sizes = continued(treated)
         # in units of the shorter side, as random surfaces are
         unit = min(sizes)

@@ -12,7 +12,7 @@ import click
 
 from mbma_tables.cli.commands import COLUMNS, contact_keywords
 from mbma_tables.cli.format import Report, shown_unit, to_columns
-from mbma_tables.cli.options import Model, Output, output_options, quantity_option, theory_options
+from mbma_tables.cli.options import Model, Output, load_options, output_options, quantity_option, theory_options
 from mbma_tables.cli.progress import doing
 from mbma_tables.errors import InputError
 from mbma_tables.files import read_file
@@ -24,10 +24,7 @@ LOADS = ("separation", "mean_separation", "pressure", "area")
 
 @click.command("batch", short_help="Many surfaces from a CSV file.")
 @click.argument("file", metavar="SURFACES.csv", type=click.Path(path_type=Path))
-@quantity_option("--separation", "-d", help="Gap d from the mid-plane [length], for every line.")
-@quantity_option("--mean-separation", "-u", help="Instead: mean separation u = (h_max + d)/2 [length].")
-@quantity_option("--pressure", "-p", help="Instead: force over nominal area, over E* where none is given.")
-@quantity_option("--area", "-a", help="Instead: real over nominal contact area.")
+@load_options(quantity_option)
 @quantity_option(
     "--E-star", "E_star", help="Effective modulus of lines that name none; without one forces are over E*."
 )
@@ -37,12 +34,12 @@ LOADS = ("separation", "mean_separation", "pressure", "area")
 @output_options
 def batch_command(
     file: Path,
+    loads: dict[str, Any],
     E_star: Any,
     length_unit: str | None,
     stress_unit: str | None,
     model: Model,
     output: Output,
-    **loads: Any,
 ) -> None:
     """A row of the answer for each line of SURFACES.csv.
 
@@ -55,9 +52,8 @@ def batch_command(
     from mbma_tables.surfaces.surface import PARAMETERS, Surface
     from mbma_tables.theories.contact import contact
 
-    common = {name: value for name, value in loads.items() if value is not None}
     lines = list(_lines(file))
-    given = {name for _, row in lines for name in row if name in LOADS} | set(common)
+    given = {name for _, row in lines for name in row if name in LOADS} | set(loads)
     if len(given) != 1:
         raise InputError("one of separation, mean_separation, pressure and area is needed, as an option or a column")
     (load,) = given
@@ -68,9 +64,9 @@ def batch_command(
         try:
             specimen = _specimen(row, E_star, *units)
             units = units[0] or specimen.surface.unit, units[1] or specimen.stress_unit
-            if load not in common and load not in row:
+            if load not in loads and load not in row:
                 raise InputError(f"{load} is missing")
-            values.append(specimen.units.number(load, row.get(load, common.get(load))))
+            values.append(specimen.units.number(load, row.get(load, loads.get(load))))
         except InputError as fault:
             raise InputError(f"{file}, line {number}: {fault}") from None
         names.append(row.get("name", row.get("surface", f"line {number}")))

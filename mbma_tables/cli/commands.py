@@ -15,6 +15,7 @@ from mbma_tables.cli.options import (
     Output,
     check_plot,
     leakage_option,
+    load_options,
     model_options,
     numbers_option,
     output_options,
@@ -59,20 +60,14 @@ def contact_keywords(model: Model, specimen: Specimen) -> dict[str, Any]:
 
 
 @click.command("contact", short_help="Force and area at given gaps, pressures or areas.")
-@numbers_option("--separation", "-d", help="Gap d from the mid-plane [length]; may be repeated.")
-@numbers_option("--mean-separation", "-u", help="Instead: mean separation u = (h_max + d)/2 [length].")
-@numbers_option("--pressure", "-p", help="Instead: force over nominal area, over E* where none is given.")
-@numbers_option("--area", "-a", help="Instead: real over nominal contact area.")
+@load_options(numbers_option)
 @over_h_rms
 @leakage_option
 @specimen_options
 @theory_options
 @output_options
 def contact_command(
-    separation: list[float | str] | None,
-    mean_separation: list[float | str] | None,
-    pressure: list[float | str] | None,
-    area: list[float | str] | None,
+    loads: dict[str, list[float | str]],
     over_h_rms: bool,
     leakage: bool,
     specimen: Specimen,
@@ -86,13 +81,10 @@ def contact_command(
 
     Example: mbma contact --surface challenge --E-star 25MPa --length-unit mm -p 100kPa
     """
-    lengths = {"separation": separation, "mean_separation": mean_separation}
-    known = lengths | {"pressure": pressure, "area": area}
-    given = {name: numbers for name, numbers in known.items() if numbers is not None}
-    if len(given) != 1:
+    if len(loads) != 1:
         raise InputError("one of --separation, --mean-separation, --pressure and --area is needed")
-    (name, numbers), *_ = given.items()
-    if over_h_rms and name not in lengths:
+    (name, numbers), *_ = loads.items()
+    if over_h_rms and name in ("pressure", "area"):
         raise InputError(f"--over-h-rms is about lengths: leave it out with --{name}")
     from mbma_tables.arguments import require
     from mbma_tables.theories.contact import contact

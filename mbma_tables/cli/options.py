@@ -86,27 +86,28 @@ def numbers_option(*names: str, help: str) -> Decorator:
     return click.option(*names, multiple=True, callback=_parse_numbers, metavar="X[UNIT][,X...]", help=help)
 
 
-def _group(
-    argument: str, names: tuple[str, ...], build: Callable[[Mapping[str, Any]], Any], *options: Any
-) -> Decorator:
+def _group(argument: str, build: Callable[[dict[str, Any]], Any], *options: Any) -> Decorator:
     """Options that reach a command as one argument, built from their values by name."""
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        before = len(getattr(function, "__click_params__", ()))
+
         @functools.wraps(function)
         def grouped(**given: Any) -> Any:
             values = {name: given.pop(name) for name in names}
             return function(**given, **{argument: build(values)})
 
-        result: Callable[..., Any] = grouped
+        result: Any = grouped
         for option in reversed(options):
             result = option(result)
-        return result
+        names = [parameter.name for parameter in result.__click_params__[before:]]
+        return result  # type: ignore[no-any-return]
 
     return decorate
 
 
-def _treatment(given: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in given.items() if value is not None}
+def _given(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def _specimen(given: Mapping[str, Any]) -> Specimen:
@@ -122,7 +123,7 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
             "one surface is needed: --surface NAME, --file TOML, --map MAP, --hurst --q0 --q1 (or --zeta-1) "
             f"--h-rms --h-max, or --hurst --m0 --m2 --m4 --h-max; got {' and '.join(used) or 'none'}"
         )
-    treatment = _treatment({name: given[name] for name in (*MAP_OPTIONS, "model")})
+    treatment = _given({name: given[name] for name in (*MAP_OPTIONS, "model")})
     if treatment and given["map"] is None:
         raise InputError(f"--{next(iter(treatment)).replace('_', '-')} is about a measured map: it goes with --map")
     if given["file"] is not None:
@@ -214,17 +215,25 @@ _SPECIMEN_OPTIONS = (
     click.option("--length-unit", metavar="UNIT", help="Unit of plain lengths and of the answer, such as mm."),
     click.option("--stress-unit", metavar="UNIT", help="Unit of a plain modulus and of the answer, such as MPa."),
 )
-_SPECIMEN_NAMES = ("surface", "file", "map", *MAP_OPTIONS, "model", *NUMBERS, *MATERIAL, "length_unit", "stress_unit")
-
-map_options = _group("treatment", MAP_OPTIONS, _treatment, *_MAP_OPTIONS)
-specimen_options = _group("specimen", _SPECIMEN_NAMES, _specimen, *_SPECIMEN_OPTIONS)
+map_options = _group("treatment", _given, *_MAP_OPTIONS)
+specimen_options = _group("specimen", _specimen, *_SPECIMEN_OPTIONS)
 # None where none of them is given
 optional_specimen_options = _group(
-    "specimen",
-    _SPECIMEN_NAMES,
-    lambda given: None if all(value is None for value in given.values()) else _specimen(given),
-    *_SPECIMEN_OPTIONS,
+    "specimen", lambda given: _specimen(given) if _given(given) else None, *_SPECIMEN_OPTIONS
 )
+
+
+def load_options(option: Callable[..., Decorator]) -> Decorator:
+    """What a contact is known by, each an `option` of numbers; those given reach a command as `loads`."""
+    return _group(
+        "loads",
+        _given,
+        option("--separation", "-d", help="Gap d from the mid-plane [length]."),
+        option("--mean-separation", "-u", help="Instead: mean separation u = (h_max + d)/2 [length]."),
+        option("--pressure", "-p", help="Instead: force over nominal area, over E* where none is given."),
+        option("--area", "-a", help="Instead: real over nominal contact area."),
+    )
+
 
 reading_option = click.option(
     "--reading",
@@ -256,21 +265,13 @@ theory_option = click.option(
     help="Theory; the others have no tier.",
 )
 # of islands, which MBMA alone has
-model_options = _group("model", ("tier", "reading", "rtol"), lambda given: Model(**given), *_MODEL_OPTIONS)
+model_options = _group("model", lambda given: Model(**given), *_MODEL_OPTIONS)
 hardness_option = quantity_option("--hardness", help="Largest pressure that the softer body bears; none: elastic.")
 
-
-def _model(given: Mapping[str, Any]) -> Model:
-    return Model(**{name: value for name, value in given.items() if value is not None})
-
-
-theory_options = _group(
-    "model", ("theory", "tier", "reading", "rtol", "hardness"), _model, theory_option, *_MODEL_OPTIONS, hardness_option
-)
+theory_options = _group("model", lambda given: Model(**_given(given)), theory_option, *_MODEL_OPTIONS, hardness_option)
 
 output_options = _group(
     "output",
-    ("as_json", "as_csv", "out"),
     lambda given: Output(**given),
     click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table."),
     click.option("--csv", "as_csv", is_flag=True, help="Print CSV with '#' comments instead of a table."),

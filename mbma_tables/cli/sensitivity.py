@@ -11,6 +11,7 @@ from mbma_tables.cli.format import Column, Report, shown_unit, to_columns
 from mbma_tables.cli.options import (
     Model,
     Output,
+    load_options,
     output_options,
     quantity_option,
     specimen_options,
@@ -29,10 +30,7 @@ def _pair(text: str) -> tuple[str, tuple[str, str]]:
 
 
 @click.command("sensitivity", short_help="How much each unknown matters.")
-@quantity_option("--separation", "-d", help="Held: gap d from the mid-plane [length].")
-@quantity_option("--mean-separation", "-u", help="Instead: mean separation u = (h_max + d)/2 [length].")
-@quantity_option("--pressure", "-p", help="Instead: force over nominal area, over E* where none is given.")
-@quantity_option("--area", "-a", help="Instead: real over nominal contact area.")
+@load_options(quantity_option)
 @click.option(
     "--range", "ranges", multiple=True, metavar="NAME=X:X", help="Where a parameter may lie; may be repeated."
 )
@@ -40,7 +38,7 @@ def _pair(text: str) -> tuple[str, tuple[str, str]]:
 @theory_options
 @output_options
 def sensitivity_command(
-    ranges: tuple[str, ...], specimen: Specimen, model: Model, output: Output, **known: Any
+    loads: dict[str, Any], ranges: tuple[str, ...], specimen: Specimen, model: Model, output: Output
 ) -> None:
     """d ln(answer)/d ln(parameter) of force, area, stiffness and conductance, what is given being held.
 
@@ -58,7 +56,7 @@ def sensitivity_command(
     modulus: Any = 1.0 if specimen.E_star is None else specimen.E_star
     if specimen.stress_unit is not None:
         modulus = f"{modulus!r} {specimen.stress_unit}"
-    found = sensitivity(specimen.surface, **known, E_star=modulus, ranges=dict(map(_pair, ranges)), **options)
+    found = sensitivity(specimen.surface, **loads, E_star=modulus, ranges=dict(map(_pair, ranges)), **options)
     parameters = list(found.parameters)
     columns = [
         Column("parameter", "-", parameters),

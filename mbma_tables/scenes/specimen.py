@@ -85,15 +85,13 @@ def from_map(path: pathlib.Path, treatment: Mapping[str, Any]) -> Specimen:
 
 def measured(path: pathlib.Path, treatment: Mapping[str, Any]) -> tuple[Treated, MeasuredSurface]:
     """Treated heights of a map or line scan, and the surface that they are."""
-    from mbma_tables.surfaces.maps import measured_map, opened, prepared
-    from mbma_tables.surfaces.profiles import measured_profile
-    from mbma_tables.surfaces.resolution import finished
+    from mbma_tables.surfaces.maps import prepared
+    from mbma_tables.surfaces.resolution import measured_surface
 
-    scan, options = opened(path, treatment)
-    further = options.pop("extrapolate_to", None), options.pop("extrapolate_hurst", None)
-    treated = prepared(scan, None, None, options.pop("periodic", None), options, scan.dim)
-    surface = measured_profile(treated, None) if scan.dim == 1 else measured_map(treated, None)
-    return treated, finished(surface, *further)
+    options = dict(treatment)
+    further = [options.pop(name, None) for name in ("extrapolate_to", "extrapolate_hurst")]
+    treated = prepared(path, options, None)
+    return treated, measured_surface(treated, None, *further)
 
 
 def _printable(path: pathlib.Path) -> str:
@@ -105,7 +103,7 @@ def from_numbers(
     given: Mapping[str, Any], unit: str | None = None, title: str = "surface given by numbers"
 ) -> Specimen:
     """The surface with one complete set of numbers, plain ones in `unit`."""
-    from mbma_tables.arguments import require
+    from mbma_tables.arguments import one_number, require
     from mbma_tables.surfaces.spectrum import MIN_ZETA_1
     from mbma_tables.surfaces.surface import Surface
 
@@ -122,7 +120,7 @@ def from_numbers(
             f"roughness (Rq, ...); got {', '.join(given) or 'none of them'}"
         )
     plain, unit = resolve(given, unit)
-    numbers = {key: _one_number(key, value) for key, value in plain.items()}
+    numbers = {key: one_number(key, value) for key, value in plain.items()}
     if "m0" in numbers:
         return Specimen(Surface.from_moments(**numbers, unit=unit), title)
     if "zeta_1" in numbers:
@@ -132,24 +130,15 @@ def from_numbers(
     return Specimen(Surface(**numbers, unit=unit), title)
 
 
-def _one_number(name: str, value: Any) -> Any:
-    from mbma_tables.arguments import finite_array
-
-    array = finite_array(name, value)
-    if array.ndim:
-        raise InputError(f"{name} must be one number, got {array.size}")
-    return array
-
-
 def effective_modulus_of(given: Mapping[str, Any], unit: str | None = None) -> tuple[float | None, str | None]:
     """E* from a material's numbers, None if there are none, and its unit: the one given, or the first named."""
-    from mbma_tables.arguments import require
+    from mbma_tables.arguments import one_number, require
     from mbma_tables.materials import effective_modulus
 
     plain, unit = resolve(given, unit, "stress")
     if not given:
         return None, unit
-    numbers = {key: _one_number(key, value) for key, value in plain.items()}
+    numbers = {key: one_number(key, value) for key, value in plain.items()}
     if set(numbers) == {"E_star"}:
         require("E_star", numbers["E_star"], numbers["E_star"] > 0, "positive")
         return float(numbers["E_star"]), unit

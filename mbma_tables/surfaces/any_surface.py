@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import functools
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -58,7 +58,11 @@ class AnySurface(Displayed, abc.ABC):
         The unit of length; None where it is not known.
     provenance : tuple of mapping
         Where it comes from, a plain record each step.
+    parameters : tuple of str
+        Names of the numbers that make it; none where it is its own spectrum.
     """
+
+    parameters: ClassVar[tuple[str, ...]] = ()
 
     # plain fields of one class, properties of the other
     q0: Any
@@ -79,27 +83,22 @@ class AnySurface(Displayed, abc.ABC):
         """Variance of a profile's second derivative [1/length^2], Eq. (7)."""
 
     @property
-    @abc.abstractmethod
     def shape(self) -> tuple[int, ...]:
         """Shape of the batch; () for one surface."""
+        return ()
 
     @property
-    @abc.abstractmethod
     def labelled(self) -> bool:
         """Whether any parameter is an xarray DataArray."""
+        return False
 
     def departures(self, by_map: bool = False) -> tuple[str, ...]:
         """Why it is not the isotropic Gaussian surface that theories are of, nor one like those simulated."""
         return ()
 
-    @property
-    @abc.abstractmethod
-    def parameters(self) -> tuple[str, ...]:
-        """Names of the numbers that make it; none where it is its own spectrum."""
-
-    @abc.abstractmethod
     def with_numbers(self, *numbers: Any) -> Self:
         """The same kind of surface of other `parameters`, in their order."""
+        return self
 
     @abc.abstractmethod
     def power_spectrum(self, q: ArrayLike) -> Any:

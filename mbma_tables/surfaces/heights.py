@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, finite_array, require
+from mbma_tables.arguments import FloatArray, finite_array, one_number, require
 from mbma_tables.errors import InputError
 
 _TAIL = np.logspace(-6, -1, 61)[:-1]
@@ -115,8 +115,6 @@ class Heights:
 
 def one_height(h_max: Any) -> float:
     """h_max as one positive number."""
-    height = finite_array("h_max", h_max)
-    if height.shape != ():
-        raise InputError(f"h_max must be one number, got shape {height.shape}")
+    height = one_number("h_max", h_max)
     require("h_max", height, height > 0, "positive")
     return float(height)

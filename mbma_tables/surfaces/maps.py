@@ -20,7 +20,7 @@ from mbma_tables.surfaces.measurements import grid_of, read_measurement
 from mbma_tables.surfaces.power_law import SCATTER, log_bins
 from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.psd import FittedSurface, check_band, fit_spectrum
-from mbma_tables.surfaces.treatment import LENGTHS, Treated, Treatment, treat
+from mbma_tables.surfaces.treatment import LENGTHS, Treated, Treatment, mirrored, treat
 from mbma_tables.units import Units, known, resolve
 
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
@@ -75,40 +75,29 @@ def _refuse_edges(heights: FloatArray) -> None:
         )
 
 
-def opened(path: str | os.PathLike[str], options: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:
-    """The topography or line scan in a file, and the options that are left for its treatment."""
-    rest = dict(options)
-    given = {name: rest.pop(name, None) for name in ("dx", "dy")}
-    lengths, unit = resolve({name: step for name, step in given.items() if step is not None}, rest.pop("unit", None))
-    scan = read_measurement(path, lengths.get("dx"), lengths.get("dy"), unit, rest.pop("channel", None))
-    return scan, rest if unit is None else rest | {"unit": unit}
+def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2) -> Treated:
+    """A map, or a line scan, of a file, an array or a topography, treated; options as of `Surface.from_map`.
 
-
-def prepared(
-    source: Any, dx: Any, dy: Any, periodic: bool | None, options: Mapping[str, Any], dimensions: int = 2
-) -> Treated:
-    """A map, or a line scan, of a file, an array or a topography, treated; arguments as of `Surface.from_map`."""
-    options = dict(options)
+    Without a number of `dimensions`, a file decides.
+    """
+    given = {name: value for name, value in options.items() if value is not None}
+    lengths, unit = resolve({name: given.pop(name) for name in ("dx", "dy") if name in given}, given.pop("unit", None))
+    channel, periodic = given.pop("channel", None), given.pop("periodic", None)
     if isinstance(source, str | os.PathLike):
-        source, options = opened(source, options | {"dx": dx, "dy": dy})
-        dx = dy = None
-    if options.pop("channel", None) is not None:
+        source, lengths = read_measurement(source, **lengths, unit=unit, channel=channel), {}
+    elif channel is not None:
         raise InputError("channel belongs to a file")
-    lengths, unit = resolve(
-        {name: step for name, step in (("dx", dx), ("dy", dy)) if step is not None}, options.pop("unit", None)
-    )
-    dx, dy = lengths.get("dx"), lengths.get("dy")
-    unknown = options.keys() - {field.name for field in dataclasses.fields(Treatment)}
+    unknown = given.keys() - {field.name for field in dataclasses.fields(Treatment)}
     if unknown:
         raise TypeError(f"there is no option {', '.join(sorted(unknown))}: see mbma_tables.surfaces.treatment")
-    grid, steps, whole, own, info = grid_of(source, dx, dy, periodic, dimensions)
+    dimensions = source.dim if dimensions is None else dimensions
+    grid, steps, whole, own, info = grid_of(source, lengths.get("dx"), lengths.get("dy"), periodic, dimensions)
     own = unit if own is None else known(own)
     if unit is not None and unit != own:
         raise InputError(f"lengths are in {own}, not in {unit}: leave the unit out")
     units = Units(own)
-    options |= {name: units.number(name, options[name]) for name in options.keys() & {*LENGTHS, "outliers"}}
-    treatment = Treatment(**options)
-    return treat(grid, steps, whole, treatment, own, info)
+    given |= {name: units.number(name, given[name]) for name in given.keys() & {*LENGTHS, "outliers"}}
+    return treat(grid, steps, whole, Treatment(**given), own, info)
 
 
 def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | None) -> FittedSurface:
@@ -179,9 +168,7 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
     own = Heights.of(values)
     C_bins = matched(bins.q, np.exp(bins.log_c), own.h_rms**2, float((C * waves) @ q**2 / (C @ waves)))
     if not treated.periodic:
-        # its mirror images continue it
-        values = np.concatenate([values, values[::-1]])
-        values = np.concatenate([values, values[:, ::-1]], axis=1)
+        values = mirrored(values)
     sizes = values.shape[0] * unit_x, values.shape[1] * unit_y
     curves = bearing.bearing(values, sizes)
     known = MeasuredSurface(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import finite_array, require
+from mbma_tables.arguments import FloatArray, finite_array, require
 from mbma_tables.bearing import Bearing, RadialSpectrum
 from mbma_tables.display import Variable
 from mbma_tables.errors import InputError, OutOfRangeError
@@ -92,9 +92,7 @@ class MeasuredSurface(AnySurface):
     provenance: tuple[Mapping[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
-        q, C = finite_array("q", self.q), finite_array("C", self.C)
-        if q.ndim != 1 or q.shape != C.shape or q.size < 2:
-            raise InputError(f"q and C must be two columns of one length, got shapes {q.shape} and {C.shape}")
+        q, C = two_columns(self.q, self.C)
         require("q", q, q > 0, "positive (leave q = 0 out)")
         require("q", q, np.diff(q, prepend=q[0]) >= 0, "rising")
         require("C", C, C >= 0, "zero or positive")
@@ -165,16 +163,6 @@ class MeasuredSurface(AnySurface):
     def m4(self) -> Any:
         """Variance of a profile's second derivative [1/length^2], Eq. (1)."""
         return np.float64(self.laws.moment(4))
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Of one surface, ()."""
-        return ()
-
-    @property
-    def labelled(self) -> bool:
-        """False: there are no parameters to be DataArrays."""
-        return False
 
     @property
     def skewness(self) -> float:
@@ -278,15 +266,6 @@ class MeasuredSurface(AnySurface):
         require("q", wavenumber, wavenumber > 0, "positive")
         return self.laws.at(wavenumber)[()]
 
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """None."""
-        return ()
-
-    def with_numbers(self, *numbers: Any) -> MeasuredSurface:
-        """Itself."""
-        return self
-
     def sampled(self) -> MeasuredSurface:
         """Itself."""
         return self
@@ -334,6 +313,16 @@ class MeasuredSurface(AnySurface):
             bands=None,
         )
         return dataclasses.replace(less, heights=self.heights.scaled(float(less.h_rms / self.h_rms)))
+
+
+def two_columns(q: ArrayLike, C: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Wavenumbers and spectrum as arrays of one length."""
+    wavenumber, spectrum = finite_array("q", q), finite_array("C", C)
+    if wavenumber.ndim != 1 or wavenumber.shape != spectrum.shape:
+        raise InputError(
+            f"q and C must be two columns of one length, got shapes {wavenumber.shape} and {spectrum.shape}"
+        )
+    return wavenumber, spectrum
 
 
 def resolution(surface: MeasuredSurface) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import finite_array, number_in, require
+from mbma_tables.arguments import finite_array, number_in, one_number, require
 from mbma_tables.errors import InputError, MbmaError
 from mbma_tables.files import read_file
 
@@ -131,9 +131,7 @@ def grid_of(
         given = {"dx": dx, "dy": dx if dy is None else dy} if dimensions == 2 else {"dx": dx}
         steps = []
         for name, value in given.items():
-            step = finite_array(name, value)
-            if step.shape != ():
-                raise InputError(f"{name} must be one number, got shape {step.shape}")
+            step = one_number(name, value)
             require(name, step, (step >= MIN_LENGTH) & (step <= MAX_LENGTH), "in [1e-30, 1e30]")
             steps.append(float(step))
         return source, tuple(steps), bool(periodic), None, {}

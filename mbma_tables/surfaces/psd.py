@@ -13,6 +13,7 @@ from scipy.special import beta
 from mbma_tables.arguments import FloatArray, finite_array, require
 from mbma_tables.errors import InputError, NotSelfAffineError
 from mbma_tables.surfaces.heights import one_height
+from mbma_tables.surfaces.measured import two_columns
 from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH
 from mbma_tables.surfaces.power_law import (
     HURST_TOLERANCE,
@@ -161,11 +162,7 @@ def _positive_spectrum(q: ArrayLike, C: ArrayLike) -> tuple[FloatArray, FloatArr
             raise InputError(f"q and C must be of one length, got shapes {np.shape(q)} and {np.shape(C)}")
         shown = ~(np.ma.getmaskarray(np.ma.asanyarray(q)) | np.ma.getmaskarray(np.ma.asanyarray(C)))
         q, C = np.asarray(q)[shown], np.asarray(C)[shown]
-    wavenumber, spectrum = finite_array("q", q), finite_array("C", C)
-    if wavenumber.ndim != 1 or wavenumber.shape != spectrum.shape:
-        raise InputError(
-            f"q and C must be one-dimensional and of one length, got {wavenumber.shape} and {spectrum.shape}"
-        )
+    wavenumber, spectrum = two_columns(q, C)
     require("q", wavenumber, wavenumber > 0, "positive (leave q = 0 out)")
     require("q", wavenumber, (wavenumber >= MIN_LENGTH) & (wavenumber <= MAX_LENGTH), "in [1e-30, 1e30]")
     require("C", spectrum, spectrum >= 0, "zero or positive")

@@ -10,16 +10,22 @@ import numpy as np
 
 from mbma_tables.arguments import number_in
 from mbma_tables.errors import InputError
+from mbma_tables.surfaces.maps import measured_map
 from mbma_tables.surfaces.measured import MeasuredSurface, resolution
+from mbma_tables.surfaces.profiles import measured_profile
+from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.units import Units
 
 STEPS_PER_OCTAVE = 8  # of an extrapolated spectrum
 
 
-def finished(surface: MeasuredSurface, shortest: Any = None, hurst: Any = None) -> MeasuredSurface:
-    """A measured surface with that record, and continued to a shorter wavelength where that is asked for."""
+def measured_surface(
+    treated: Treated, h_max: float | None = None, shortest: Any = None, hurst: Any = None
+) -> MeasuredSurface:
+    """The surface of a treated map or line scan, continued to a shorter wavelength where that is asked for."""
     if (shortest is None) != (hurst is None):
         raise InputError("extrapolate_to and extrapolate_hurst: give both or neither")
+    surface = (measured_profile if treated.heights.ndim == 1 else measured_map)(treated, h_max)
     known = dataclasses.replace(surface, provenance=(*surface.provenance, resolution(surface)))
     return known if shortest is None else extrapolated(known, shortest, hurst)
 

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from mbma_tables.surfaces.psd import SpectrumFit
 
 TREATMENT = (
+    *("dx", "dy", "periodic", "unit", "channel"),
     *("detrend", "outliers", "fill", "short_cutoff", "long_cutoff", "tip_radius", "reliable", "window"),
-    *("unit", "channel"),
 )  # arguments of `from_map` and `from_profile` that are handed on
 SHOWN = 6  # entries of a batch that are printed
 PARAMETERS = ("hurst", "q0", "q1", "h_rms", "h_max")
@@ -78,6 +78,7 @@ class Surface(AnySurface):
     q1: Any
     h_rms: Any
     h_max: Any
+    parameters = PARAMETERS
     unit: str | None = dataclasses.field(default=None, kw_only=True)
     fit: SpectrumFit | None = dataclasses.field(default=None, repr=False, kw_only=True)
     provenance: tuple[Mapping[str, Any], ...] = dataclasses.field(default=(), repr=False, kw_only=True)
@@ -306,7 +307,7 @@ class Surface(AnySurface):
         h_rms = 0.0669, rms gradient 0.394, alpha = 106.5
         """
         from mbma_tables.surfaces.heights import Heights
-        from mbma_tables.surfaces.measured import MeasuredSurface
+        from mbma_tables.surfaces.measured import MeasuredSurface, two_columns
 
         _check_model(model, band)
         if model == "self-affine":
@@ -321,11 +322,7 @@ class Surface(AnySurface):
                 f"convention must be 'paper' or 'isotropic', got {convention!r}: a profile's spectrum can be fitted, "
                 "with model='self-affine'"
             )
-        wavenumber, spectrum = finite_array("q", q), finite_array("C", C)
-        if wavenumber.ndim != 1 or wavenumber.shape != spectrum.shape:
-            raise InputError(
-                f"q and C must be two columns of one length, got shapes {wavenumber.shape} and {spectrum.shape}"
-            )
+        wavenumber, spectrum = two_columns(q, C)
         order = np.argsort(wavenumber, kind="stable")
         scale = 1.0 if convention == "paper" else 1 / (4 * math.pi**2)
         known = None if heights is None else Heights.of(heights)
@@ -418,16 +415,16 @@ class Surface(AnySurface):
         H = 0.80, q0 = 6.283, fitted at 32 points
         """
         treatment = {name: value for name, value in locals().items() if name in TREATMENT}
-        from mbma_tables.surfaces.maps import fit_map, measured_map, prepared
+        from mbma_tables.surfaces.maps import fit_map, prepared
         from mbma_tables.surfaces.measured import resolution
-        from mbma_tables.surfaces.resolution import finished
+        from mbma_tables.surfaces.resolution import measured_surface
 
         _check_model(model, band)
         if model != "measured" and (extrapolate_to is not None or extrapolate_hurst is not None):
             raise InputError("extrapolate_to and extrapolate_hurst belong to model='measured'")
-        treated = prepared(heights, dx, dy, periodic, treatment)
+        treated = prepared(heights, treatment)
         if model == "measured":
-            return finished(measured_map(treated, h_max), extrapolate_to, extrapolate_hurst)
+            return measured_surface(treated, h_max, extrapolate_to, extrapolate_hurst)
         fitted = fit_map(treated, h_max, band)
         surface = cls(**fitted._asdict(), unit=fitted.fit.length_unit)
         return dataclasses.replace(surface, provenance=(*treated.provenance, resolution(surface.sampled())))
@@ -490,11 +487,9 @@ class Surface(AnySurface):
         """
         treatment = {name: value for name, value in locals().items() if name in TREATMENT}
         from mbma_tables.surfaces.maps import prepared
-        from mbma_tables.surfaces.profiles import measured_profile
-        from mbma_tables.surfaces.resolution import finished
+        from mbma_tables.surfaces.resolution import measured_surface
 
-        treated = prepared(heights, dx, None, periodic, treatment, dimensions=1)
-        return finished(measured_profile(treated, h_max), extrapolate_to, extrapolate_hurst)
+        return measured_surface(prepared(heights, treatment, 1), h_max, extrapolate_to, extrapolate_hurst)
 
     @property
     def labelled(self) -> bool:
@@ -520,11 +515,6 @@ class Surface(AnySurface):
     def m4(self) -> Any:
         """Variance of a profile's second derivative [1/length^2], Eq. (7)."""
         return (self.s * self.q0**2) ** 2 * spectrum.band_moment(4, self.hurst, 1.0, self.zeta_1)
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """The five numbers' names."""
-        return PARAMETERS
 
     def with_numbers(self, *numbers: Any) -> Surface:
         """Another surface, in the same unit."""

@@ -297,8 +297,8 @@ def _within(
         return values
     if short is not None and long is not None and not long > short:
         raise InputError(f"long_cutoff must be larger than short_cutoff, got {long:g} and {short:g}")
-    for axis in range(values.ndim if not periodic else 0):
-        values = np.concatenate([values, np.flip(values, axis)], axis)
+    if not periodic:
+        values = mirrored(values)
     for method, name, wavelength in cuts:
         before = _squares(values, steps)
         scan = wrapped(values, steps, True, unit)
@@ -308,6 +308,13 @@ def _within(
             raise InputError(f"{name} {wavelength:g} leaves no wave of the measurement")
         record.append(_told_of_cutoff(name, wavelength, unit, before, after))
     return values if periodic else values[tuple(slice(count // 2) for count in values.shape)]
+
+
+def mirrored(values: FloatArray) -> FloatArray:
+    """Heights and their mirror images along each axis, which continue them periodically."""
+    for axis in range(values.ndim):
+        values = np.concatenate([values, np.flip(values, axis)], axis)
+    return values
 
 
 def _told_of_cutoff(

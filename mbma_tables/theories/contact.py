@@ -141,7 +141,7 @@ def contact(
     >>> f"{joint.mean_separation:.3e} {joint.units['separation']}, {joint.stiffness:.1f} {joint.units['stiffness']}"
     '1.642e-03 mm, 471.9 MPa/mm'
     """
-    by, value = _known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
+    by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
     E_star, units = modulus_and_units(E_star, surface)
     value, hardness = units.number(by, value), units.number("hardness", hardness)
     chosen = get_theory(theory)
@@ -163,7 +163,7 @@ def contact(
     return _contact(surface, value, E_star, hardness, **options)
 
 
-def _known(**given: Any) -> tuple[str, Any]:
+def one_known(**given: Any) -> tuple[str, Any]:
     """The one of `KNOWN` that is given."""
     known = {name: value for name, value in given.items() if value is not None}
     if len(known) != 1:

@@ -13,7 +13,7 @@ from mbma_tables.boundary_elements import LOADS, Contact
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import measured_map, prepared
-from mbma_tables.surfaces.treatment import Treated
+from mbma_tables.surfaces.treatment import Treated, mirrored
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
 MIN_LOADS = 4
@@ -23,10 +23,7 @@ MATCHED = 1e-6  # relative, of the surface that is asked about
 
 def continued(treated: Treated) -> tuple[FloatArray, tuple[float, float]]:
     """A map of mean zero whose edges meet, by its mirror images where it is not periodic, and its sides [length]."""
-    values = treated.heights
-    if not treated.periodic:
-        values = np.concatenate([values, values[::-1]])
-        values = np.concatenate([values, values[:, ::-1]], axis=1)
+    values = treated.heights if treated.periodic else mirrored(treated.heights)
     sizes = values.shape[0] * treated.steps[0], values.shape[1] * treated.steps[1]
     return values - values.mean(), sizes
 
@@ -121,7 +118,7 @@ class BoundaryElements(Theory):
         >>> f"u = {found.mean_separation / truth.surface.h_rms:.2f} h_rms"
         'u = 0.71 h_rms'
         """
-        treated = prepared(heights, dx, dy, periodic, {"detrend": detrend, **treatment})
+        treated = prepared(heights, {"dx": dx, "dy": dy, "periodic": periodic, "detrend": detrend, **treatment})
         surface = measured_map(treated, None)
         values, sizes = continued(treated)
         wanted = finite_array("loads", loads)

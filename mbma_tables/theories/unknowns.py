@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, finite_array, hinted
+from mbma_tables.arguments import FloatArray, hinted, one_number
 from mbma_tables.errors import InputError
 from mbma_tables.models import AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -22,7 +22,7 @@ from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.resolution import extrapolated
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.theories.calibrated import Calibrated
-from mbma_tables.theories.contact import KNOWN, contact
+from mbma_tables.theories.contact import contact, one_known
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.units import Units, modulus_and_units, unit_of
 
@@ -142,15 +142,11 @@ def sensitivity(
     'stiffness 0.0885 to 0.094 GPa/um'
     """
     options: Any = {"theory": theory, "tier": tier, "reading": reading, "rtol": rtol}
-    known = {"separation": separation, "mean_separation": mean_separation, "pressure": pressure, "area": area}
-    held = {name: value for name, value in known.items() if value is not None}
-    if len(held) != 1:
-        raise InputError(f"give exactly one of {', '.join(KNOWN)}; got {' and '.join(held) or 'none'}")
+    by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
     modulus, units = modulus_and_units(E_star, surface)
     make, parameters = _parameters(surface) if isinstance(surface, Surface) else _of_spectrum(surface, theory)
-    (by, value), *_ = held.items()
     given = parameters | {"E_star": modulus, by: units.number(by, value)}
-    numbers = {name: _one_number(name, number) for name, number in given.items()}
+    numbers = {name: float(one_number(name, number)) for name, number in given.items()}
     same = {"pressure": "force", "separation": "mean_separation"}.get(by, by)
     wanted = [name for name in ANSWERS if name != same]
 
@@ -233,13 +229,6 @@ def _of_spectrum(surface: Any, theory: Any) -> tuple[Callable[..., MeasuredSurfa
     return make, own
 
 
-def _one_number(name: str, value: Any) -> float:
-    number = finite_array(name, value)
-    if number.ndim:
-        raise InputError(f"{name} must be one number here, got shape {number.shape}")
-    return float(number)
-
-
 def _slopes(
     answers: Callable[[Mapping[str, Any]], Answers],
     numbers: Mapping[str, float],
@@ -294,7 +283,7 @@ def _ranges(
             raise InputError(f"ranges: there is no {name!r}; there are {', '.join(numbers)}")
         if isinstance(pair, str) or np.size(pair) != 2:
             raise InputError(f"ranges: {name} needs two numbers, from and to, got {pair!r}")
-        low, high = (_one_number(name, units.number(name, end)) for end in pair)
+        low, high = (float(one_number(name, units.number(name, end))) for end in pair)
         if not 0 < low < high:
             raise InputError(f"ranges: {name} must be two rising positive numbers, got {low:g} and {high:g}")
         ends[name] = (low, high)

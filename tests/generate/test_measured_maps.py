@@ -13,7 +13,7 @@ from mbma_tables.surfaces.measured import MeasuredSurface
 
 def test_the_middle_of_a_map_is_kept():
     heights = np.random.default_rng(0).standard_normal((40, LARGEST + 10))
-    kept = middle(prepared(heights, 1.0, 1.0, False, {"detrend": "mean"})).heights
+    kept = middle(prepared(heights, {"dx": 1.0, "periodic": False, "detrend": "mean"})).heights
     assert kept.shape == (40, LARGEST)
     assert kept - kept[0, 0] == pytest.approx(heights[:, 5:-5] - heights[0, 5], abs=1e-12)
 

@@ -408,7 +408,7 @@ class TestRefused:
             ({"q": SLOPED - 1}, OutOfRangeError, "leave q = 0 out"),
             ({"q": SLOPED[:5]}, InputError, "of one length"),
             ({"q": []}, InputError, "q is empty"),
-            ({"q": SLOPED.reshape(2, 20), "C": SLOPED.reshape(2, 20)}, InputError, "one-dimensional"),
+            ({"q": SLOPED.reshape(2, 20), "C": SLOPED.reshape(2, 20)}, InputError, "two columns"),
             ({"C": -SLOPED}, OutOfRangeError, "zero or positive"),
             ({"C": np.where(SLOPED > 50, np.nan, SLOPED)}, InputError, "C must be finite"),
             ({"C": np.where(np.arange(40) == 9, 0, SLOPED**-3)}, OutOfRangeError, "between its first and last"),

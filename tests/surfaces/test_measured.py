@@ -104,7 +104,7 @@ class TestMeasuredSurface:
             (Q, np.where(Q == 1, np.nan, C), {"h_max": 1.0}, r"C must be finite, got nan at \(1,\)"),
             (Q - 0.5, C, {"h_max": 1.0}, "q must be positive"),
             (Q[:3], C[:2], {"h_max": 1.0}, "two columns of one length"),
-            (Q[:1], C[:1], {"h_max": 1.0}, "two columns of one length"),
+            (Q[:1], C[:1], {"h_max": 1.0}, "no two neighbours"),
             ([1.0, 2.0], [1.0, 1.0], {"h_max": 1.0}, "greater than 3"),
             ([1.0, 9.0], [0.0, 0.0], {"h_max": 1.0}, "holds no height"),
             ([1.0, 9.0, 99.0], [1.0, 0.0, 1.0], {"h_max": 1.0}, "holds no height"),
