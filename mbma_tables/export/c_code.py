@@ -25,7 +25,7 @@ from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
 from mbma_tables.tablefiles.schema import BUCKET_BITS
 from mbma_tables.theories import calibrated_curves, calibrated_table, persson
-from mbma_tables.totals import gauss_kronrod, intervals, island_sum
+from mbma_tables.totals import gauss_kronrod, intervals, island_sum, kernel
 
 FORM = "standard"  # that of tier "formula"
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # as `contact` allows
@@ -164,7 +164,7 @@ def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | fl
         "FLOOR_U": reading.floor_u,
         "MIN_ZETA_1": max(MIN_ZETA_1, reading.floor_u),
         "MAX_ZETA_1": MAX_ZETA_1,
-        "STRETCH": intervals.STRETCH,
+        "STRETCH": kernel.STRETCH,
         "SMALL_ANGLE": 0.01,  # below it sinh goes through its own function
         "NARROW": intervals.NARROW,
         "SAFETY": intervals.SAFETY,

@@ -29,11 +29,11 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.totals.intervals import BY_COMPRESSION
 from mbma_tables.totals.island_sum import QUADRATURE_SHARE, slopes_of, totals_of
 from mbma_tables.totals.kernel import Pairs
 from mbma_tables.totals.measured import measured_totals
 from mbma_tables.totals.profile import FEW, Profile, profile
-from mbma_tables.totals.sensitivity import BY_COMPRESSION
 
 # surfaces whose islands are kept as a profile, in numpy; of more, those with so many gaps each that it costs less
 FEW_SURFACES, MANY_GAPS = 16, 300

@@ -1,4 +1,7 @@
-"""Adaptive Gauss-Kronrod quadrature of one compiled total: its intervals, their map, and how they are refined.
+"""One surface, one gap, in one compiled pass: adaptive Gauss-Kronrod quadrature over delta (Eqs. 44-50).
+
+F/(A0 E* q0 s) and A/A0 are functions of H, log(zeta_1), (h_max - d)/h_rms and h_max/h_rms, and so are their
+derivatives. The last two enter through the Gaussian and the upper limit, in closed form. No work space is shared.
 
 Below the floor of zeta_d the approach is mapped by x = scale sinh(t)^2, a power at 0 and geometric beyond the boundary
 layer; above it the integrand is little more than a Gaussian of x, and x itself serves.
@@ -13,16 +16,44 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import njit
-from mbma_tables.elementary import expm1
-from mbma_tables.models.universal_kernel import OK, UNRESOLVED
+from mbma_tables.compiled import REORDER, njit
+from mbma_tables.elementary import exp, expm1
+from mbma_tables.models.protocol import BOTH
+from mbma_tables.models.universal_kernel import (
+    OK,
+    UNRESOLVED,
+    Table,
+    universal_one,
+    universal_phi,
+    universal_slopes,
+)
+from mbma_tables.surfaces.readings import ReadingNumbers
 from mbma_tables.totals.gauss_kronrod import GAUSS_21, GAUSS_31, KRONROD_21, KRONROD_31, NODES_21, NODES_31
+from mbma_tables.totals.kernel import (
+    ROOT_TWO_PI,
+    Pairs,
+    SurfaceConstants,
+    island_density,
+    island_height,
+    island_node,
+    m2_slopes,
+    node_slopes,
+    surface_constants,
+)
 
 MAX_INTERVALS = 200
 WORK = 13  # rows of numbers at the nodes of a rule
-STRETCH = 8.0  # the map's scale in boundary layers zeta_1^(-H): fewest nodes over random surfaces
 NARROW = 2.5  # in h_rms: above the floor of zeta_d, the smaller rule resolves a Gaussian this wide to 1e-8
+LEAST = -700.0  # of exponents: below it a Gaussian is nothing
 SAFETY = 4.0  # a Kronrod sum errs by at most 3 (difference to Gauss)^1.5, seen over random surfaces: 4^1.5 = 8
+
+# columns of force and area: the total, its derivatives, and what of it lies below the floor of zeta_d; over nodes,
+# derivatives are by H at given e = zeta_1^(-2H), and by log(e)
+BY_HURST, BY_LOG_ZETA, BY_COMPRESSION, BY_PEAK, BELOW_KINK = range(1, 6)
+COLUMNS, BY_LOG_E = 6, BY_LOG_ZETA
+
+# one node more than the rule has, so that loops over them end with a whole vector
+PADDED_31 = np.append(NODES_31, 0.0)
 
 Bools = NDArray[np.bool_]
 
@@ -79,10 +110,10 @@ def halve(interval: int, count: int, bounds: FloatArray, floors: Bools) -> None:
 
 @njit(cache=True, error_model="numpy")
 def rule_for(interval: Interval) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Nodes, Kronrod weights and Gauss weights on [-1, 1] for an interval."""
+    """Nodes, perhaps one too many, Kronrod weights and Gauss weights on [-1, 1] for an interval."""
     if interval.floor_d and interval.high - interval.low < NARROW:
         return NODES_21, KRONROD_21, GAUSS_21
-    return NODES_31, KRONROD_31, GAUSS_31
+    return PADDED_31, KRONROD_31, GAUSS_31
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -103,21 +134,105 @@ def error_of(force: float, gauss_force: float, area: float, gauss_area: float) -
     return error
 
 
-# compiled as part of its callers: `rule` is one of their functions
-@njit(inline="always", error_model="numpy")
+@njit(cache=True, fastmath=REORDER, error_model="numpy")
+def fill_nodes(interval: Interval, gap: Gap, surface: SurfaceConstants, slopes: Any, out: FloatArray) -> None:
+    """X, mu, what force and area add per Phi_F and Phi_A, and how both rise with the compression, as rows.
+
+    Then, with `slopes`, `node_slopes` by H and by log(e). A loop over the nodes of an interval that vectorises: no
+    branch, no call.
+    """
+    low, high, floor_d, floor_u = interval
+    nodes = rule_for(interval)[0]
+    half, centre = 0.5 * (high - low), 0.5 * (high + low)
+    rms_over_s = surface.rms_over_s
+    for k in range(nodes.size):
+        x, stretch = approach_at(centre + half * nodes[k], floor_d, surface.map_scale)
+        node = island_node(x, floor_d, floor_u, surface)
+        height = island_height(x, node.h_d, node.sigma_d, gap, rms_over_s)
+        share = -0.5 * height * height
+        # d(delta/s) = rms_over_s dx
+        weight = node.D_d / (ROOT_TWO_PI * node.sigma_d) * rms_over_s * stretch * half
+        weight *= exp(share) if share > LEAST else 0.0
+        out[0, k], out[1, k] = node.X, node.mu
+        out[2, k], out[3, k] = node.force * weight, node.area * weight
+        out[4, k] = height * rms_over_s / node.sigma_d
+        if slopes is not None:
+            by_hurst = node_slopes(True, height, floor_d, floor_u, node, surface)
+            by_log_e = node_slopes(False, height, floor_d, floor_u, node, surface)
+            out[5, k], out[6, k], out[7, k], out[8, k] = by_hurst
+            out[9, k], out[10, k], out[11, k], out[12, k] = by_log_e
+
+
+@njit(cache=True, fastmath=REORDER, error_model="numpy")
+def _rule(
+    which: int,
+    interval: Interval,
+    gap: Gap,
+    surface: SurfaceConstants,
+    slopes: Any,
+    table: Table,
+    work: FloatArray,
+    part: FloatArray,
+) -> tuple[int, float, float, int]:
+    """One Kronrod rule over an interval: its sums, with K1, into `part`, see `refine`; `work` is written over.
+
+    Returns a status, the relative error of the sums, that of the table, and the nodes.
+    """
+    _, kronrod, gauss = rule_for(interval)
+    count = kronrod.size
+    fill_nodes(interval, gap, surface, slopes, work)
+    force = area = gauss_force = gauss_area = table_error = 0.0
+    F_steep = A_steep = F_by_hurst = A_by_hurst = F_by_e = A_by_e = 0.0
+    for k in range(count):
+        if slopes is not None:
+            status, phi_F, F_X, F_mu, phi_A, A_X, A_mu, error = universal_slopes(work[0, k], work[1, k], table)
+            f, g = work[2, k] * phi_F, work[3, k] * phi_A
+        elif which == BOTH:
+            status, phi_F, phi_A, error = universal_phi(work[0, k], work[1, k], table)
+            f, g = work[2, k] * phi_F, work[3, k] * phi_A
+        else:
+            status, phi_F, error = universal_one(which, work[0, k], work[1, k], table)
+            f = g = work[2 + which, k] * phi_F
+        if status != OK:
+            return status, math.nan, math.nan, count
+        force += kronrod[k] * f
+        area += kronrod[k] * g
+        gauss_force += gauss[k] * f
+        gauss_area += gauss[k] * g
+        table_error = max(table_error, error)
+        if slopes is not None:
+            f *= kronrod[k]
+            g *= kronrod[k]
+            F_steep += f * work[4, k]
+            A_steep += g * work[4, k]
+            F_by_hurst += f * (work[7, k] + F_X * work[5, k] + F_mu * work[6, k])
+            A_by_hurst += g * (work[8, k] + A_X * work[5, k] + A_mu * work[6, k])
+            F_by_e += f * (work[11, k] + F_X * work[9, k] + F_mu * work[10, k])
+            A_by_e += g * (work[12, k] + A_X * work[9, k] + A_mu * work[10, k])
+    K1 = 1.0 if interval.floor_d else surface.jacobian
+    part[0, 0], part[1, 0] = K1 * force, K1 * area
+    if slopes is not None:
+        part[0, BY_HURST], part[0, BY_LOG_E], part[0, BY_COMPRESSION] = K1 * F_by_hurst, K1 * F_by_e, K1 * F_steep
+        part[1, BY_HURST], part[1, BY_LOG_E], part[1, BY_COMPRESSION] = K1 * A_by_hurst, K1 * A_by_e, K1 * A_steep
+        part[:, BY_PEAK], below = 0.0, 0.0 if interval.floor_d else 1.0
+        part[0, BELOW_KINK], part[1, BELOW_KINK] = below * part[0, 0], below * part[1, 0]
+    if not (force > 0.0 and area > 0.0):
+        return OK, 0.0, table_error, count
+    return OK, error_of(force, gauss_force, area, gauss_area), table_error, count
+
+
+@njit(cache=True, error_model="numpy")
 def refine(
-    rule: Any, which: int, gap: Gap, rtol: float, surface: Any, near: Any, table: Any, out: FloatArray
+    which: int, gap: Gap, rtol: float, surface: SurfaceConstants, slopes: Any, table: Table, out: FloatArray
 ) -> tuple[int, float, int]:
     """Integrate over the approaches at a gap to `rtol`; status, bound on the relative error, islands evaluated.
 
-    ``rule(which, interval, gap, surface, near, table, work, part)`` puts its Kronrod sums into `part`, shaped like
-    `out`: a row for force and one for area, whose first column is the integral with K1. It may use `work`. It returns
-    a status, the relative error of the sums, that of the table, and the nodes.
+    `out` has a row for force and one for area, of which the first column is the integral and the others are summed too.
     """
     islands = 0
     bounds = np.empty((MAX_INTERVALS, 2))
     parts = np.empty((MAX_INTERVALS, 2, out.shape[1]))
-    errors, work = np.empty(MAX_INTERVALS), np.empty((WORK, NODES_31.size))
+    errors, work = np.empty(MAX_INTERVALS), np.empty((WORK, PADDED_31.size))
     floors = np.empty((MAX_INTERVALS, 2), dtype=np.bool_)
     fresh = np.ones(MAX_INTERVALS, dtype=np.bool_)
     count = first_intervals(gap.compression, surface.kink_d, surface.kink_u, surface.map_scale, bounds, floors)
@@ -127,7 +242,9 @@ def refine(
         for k in range(count):
             if fresh[k]:
                 interval = Interval(bounds[k, 0], bounds[k, 1], floors[k, 0], floors[k, 1])
-                status, errors[k], own_error, nodes = rule(which, interval, gap, surface, near, table, work, parts[k])
+                status, errors[k], own_error, nodes = _rule(
+                    which, interval, gap, surface, slopes, table, work, parts[k]
+                )
                 islands += nodes
                 if status != OK:
                     return status, math.nan, islands
@@ -158,3 +275,87 @@ def refine(
     if empty:
         return OK, 0.0, islands
     return OK, max(force_error / force, area_error / area) + table_error, islands
+
+
+@njit(cache=True, error_model="numpy")
+def _integrand(x: float, gap: Gap, surface: SurfaceConstants, table: Table) -> tuple[int, tuple[float, float]]:
+    """Status and the integrands of force and area over x = delta/h_rms, at the floor of zeta_d or next to it."""
+    floor_d = x >= surface.kink_d
+    node = island_node(x, floor_d, x > surface.kink_u, surface)
+    status, phi_F, phi_A, _ = universal_phi(node.X, node.mu, table)
+    height = island_height(x, node.h_d, node.sigma_d, gap, surface.rms_over_s)
+    weight = island_density(height, node.D_d, node.sigma_d) * surface.rms_over_s
+    return status, (node.force * phi_F * weight, node.area * phi_A * weight)
+
+
+@njit(cache=True, error_model="numpy")
+def _end_slopes(gap: Gap, surface: SurfaceConstants, table: Table, out: FloatArray) -> int:
+    """Turn sums over nodes into derivatives: the ends of the integral move, as do K1 and `eta_factor`; a status."""
+    H, e, L = surface.hurst, surface.e, surface.log_zeta_1
+    # the upper limit moves with the compression, the kink with H and zeta_1
+    status, edge = _integrand(gap.compression, gap, surface, table)
+    at_kink = (0.0, 0.0)
+    K1 = 1.0 if gap.compression > surface.kink_d else surface.jacobian
+    if status == OK and surface.kink_d < gap.compression:
+        status, at_kink = _integrand(surface.kink_d, gap, surface, table)
+    jump = 0.5 * (surface.jacobian - 1.0) / (surface.root_floor_d * surface.slope_d)
+    kink_by_hurst = -2.0 * surface.log_floor_d * (e + surface.root_floor_d * surface.root_floor_d)
+    # eta_factor goes with m2^(-1/3)
+    m2_by_hurst, m2_by_log_zeta = m2_slopes(H, L)
+    for row in range(2):
+        by_hurst = out[row, BY_HURST] + jump * kink_by_hurst * at_kink[row]
+        by_log_e = out[row, BY_LOG_E] - jump * e * at_kink[row] + surface.jacobian_by_e * out[row, BELOW_KINK]
+        share = out[row, 0] / 3.0 if row == 1 else 0.0
+        out[row, BY_HURST] = by_hurst - 2.0 * L * by_log_e - share * m2_by_hurst
+        out[row, BY_LOG_ZETA] = -2.0 * H * by_log_e - share * m2_by_log_zeta
+        out[row, BY_PEAK] = -out[row, BY_COMPRESSION]
+        out[row, BY_COMPRESSION] += K1 * edge[row]
+    return status
+
+
+@njit(cache=True, error_model="numpy")
+def total(
+    which: int, gap: Gap, rtol: float, surface: SurfaceConstants, slopes: Any, table: Table, out: FloatArray
+) -> tuple[int, float, int]:
+    """Status, the bound on the relative error, and the islands evaluated.
+
+    `out` receives F/(A0 E* q0 s) and A/A0, one row each, with their derivatives (2, COLUMNS) where `slopes` is True,
+    without (2, 1) where it is None: the code of each is compiled by itself. Where `which` is FORCE or AREA, that one is
+    given as both.
+    """
+    out[:] = math.nan
+    if not gap.compression > 0.0:
+        out[:] = 0.0
+        return OK, 0.0, 0
+    status, error, islands = refine(which, gap, rtol, surface, slopes, table, out)
+    if slopes is not None and status == OK and out[0, 0] > 0.0 and out[1, 0] > 0.0:
+        status = _end_slopes(gap, surface, table, out)
+    return status, error, islands
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def fill_totals(
+    which: int,
+    given: Any,
+    rtol: float,
+    reading: ReadingNumbers,
+    printed: bool,
+    table: Table,
+    slopes: Any,
+    status: NDArray[np.int64],
+    out: FloatArray,
+    bound: FloatArray,
+) -> int:
+    """`total` of each of the `Pairs` given into `out` (pairs, 2, columns) and `bound`; returns the islands."""
+    islands = 0
+    # a plain tuple, which a call from Python passes on faster
+    pairs = Pairs(*given)
+    hurst, zeta_1 = pairs.hurst, pairs.zeta_1
+    surface = surface_constants(hurst[0], zeta_1[0], reading, printed)
+    for k in range(hurst.size):
+        if k > 0 and (hurst[k] != hurst[k - 1] or zeta_1[k] != zeta_1[k - 1]):
+            surface = surface_constants(hurst[k], zeta_1[k], reading, printed)
+        gap = Gap(pairs.compression[k], pairs.peak[k])
+        status[k], bound[k], count = total(which, gap, rtol, surface, slopes, table, out[k])
+        islands += count
+    return islands

@@ -17,15 +17,14 @@ from mbma_tables.models.protocol import AREA, BOTH, FORCE
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.models.universal_kernel import OK, REASONS, UNRESOLVED
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.totals import kernel
+from mbma_tables.totals import intervals, kernel
 from mbma_tables.totals.gauss_kronrod import integrate
-from mbma_tables.totals.intervals import STRETCH
 from mbma_tables.totals.island import scale_area, scale_force
-from mbma_tables.totals.kernel import Pairs
+from mbma_tables.totals.kernel import STRETCH, Pairs
 
 QUADRATURE_SHARE = 0.9  # of the tolerance asked for; a table's own error comes on top
 SUM_SHARE = 0.5  # where islands are solved to a share of it
-BLOCK, SLOPES_BLOCK = 512, 256  # pairs between two looks for Ctrl-C
+BLOCK = 512  # pairs between two looks for Ctrl-C
 
 
 class Totals(NamedTuple):
@@ -140,34 +139,25 @@ def _(
     which: int = BOTH,
     workers: int = 1,
 ) -> Totals:
-    status = np.empty(pairs.compression.size, dtype=np.int64)
-    out = np.empty((pairs.compression.size, 3))
-
-    def fill(block: slice) -> int:
-        return kernel.fill_totals(
-            which, tuple(pairs.some(block)), QUADRATURE_SHARE * rtol, reading.numbers, reading.jacobian == "printed",
-            model.kernel, status[block], out[block],
-        )  # fmt: skip
-
-    islands = sum(in_blocks(fill, status.size, BLOCK, workers))
-    missing = _uncovered(status, pairs, model, outside)
+    out, error, islands, missing = _by_table(model, pairs, reading, rtol, outside, which, workers, None)
+    force, area = out[:, :, 0].T
     if missing.size and outside == "exact":
         try:
             found = sum_islands(pairs.some(missing), reading, exact_model(rtol), SUM_SHARE * rtol, which=which)
         except ConvergenceError as fault:
-            mask = np.zeros(status.size, dtype=bool)
+            mask = np.zeros(error.size, dtype=bool)
             mask[missing[fault.mask]] = True
             raise ConvergenceError(str(fault), mask) from fault
-        out[missing] = np.stack(found[:3], axis=-1)
+        force[missing], area[missing], error[missing] = found[:3]
         islands += found.islands
-    return Totals(out[:, 0], out[:, 1], out[:, 2], islands)
+    return Totals(force, area, error, islands)
 
 
 @functools.singledispatch
 def slopes_of(
     model: Any, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", workers: int = 1
 ) -> tuple[FloatArray, FloatArray, int]:
-    """Totals with their derivatives (pairs, 2, columns of `sensitivity`), the bound on their error, islands."""
+    """Totals with their derivatives (pairs, 2, columns of `intervals`), the bound on their error, islands."""
     raise InputError(f"derivatives come from tier 'universal', {model.name!r} has none")
 
 
@@ -175,23 +165,30 @@ def slopes_of(
 def _(
     model: UniversalModel, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", workers: int = 1
 ) -> tuple[FloatArray, FloatArray, int]:
-    from mbma_tables.totals import sensitivity
-
     if outside == "exact":
         raise InputError("derivatives come from the universal table: outside must be 'raise' or 'nan' with them")
+    return _by_table(model, pairs, reading, rtol, outside, BOTH, workers, True)[:3]
+
+
+def _by_table(
+    model: UniversalModel, pairs: Pairs, reading: Reading, rtol: float, outside: str, which: int, workers: int,
+    slopes: bool | None,
+) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:  # fmt: skip
+    """What `intervals.fill_totals` fills, islands, and the pairs that the table does not cover, which are NaN."""
     count = pairs.compression.size
     status, bound = np.empty(count, dtype=np.int64), np.empty(count)
-    out = np.empty((count, 2, sensitivity.COLUMNS))
+    out = np.empty((count, 2, intervals.COLUMNS if slopes else 1))
 
     def fill(block: slice) -> int:
-        return sensitivity.fill_totals_with_slopes(
-            tuple(pairs.some(block)), QUADRATURE_SHARE * rtol, reading.numbers, reading.jacobian == "printed",
-            model.kernel, status[block], out[block], bound[block],
+        return intervals.fill_totals(
+            which, tuple(pairs.some(block)), QUADRATURE_SHARE * rtol, reading.numbers, reading.jacobian == "printed",
+            model.kernel, slopes, status[block], out[block], bound[block],
         )  # fmt: skip
 
-    islands = sum(in_blocks(fill, count, SLOPES_BLOCK, workers))
-    out[_uncovered(status, pairs, model, outside)] = np.nan
-    return out, bound, islands
+    islands = sum(in_blocks(fill, count, BLOCK, workers))
+    missing = _uncovered(status, pairs, model, outside)
+    out[missing] = bound[missing] = np.nan
+    return out, bound, islands, missing
 
 
 def _uncovered(status: NDArray[np.int64], pairs: Pairs, model: UniversalModel, outside: str) -> NDArray[np.intp]:

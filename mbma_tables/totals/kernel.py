@@ -1,7 +1,7 @@
-"""One surface, one gap, in one compiled pass: islands from the universal table, Gauss-Kronrod over delta (Eqs. 44-50).
+"""Islands of a surface as compiled code takes them: at a node, with their derivatives in H and zeta_1 where asked for.
 
-An island costs a few logarithms and exponentials instead of a solution, over all nodes of a rule in one loop; what
-depends on the surface alone is computed once per surface. No work space is shared.
+What depends on the surface alone is computed once per surface; a node costs a few logarithms and exponentials instead
+of a solution. `intervals` sums over the nodes.
 """
 
 from __future__ import annotations
@@ -10,21 +10,19 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import REORDER, jitable, njit
 from mbma_tables.elementary import exp, expm1, log, log1p
 from mbma_tables.islands.geometry import floor_offset
-from mbma_tables.models.protocol import BOTH
-from mbma_tables.models.universal_kernel import OK, Table, universal_one, universal_phi
+from mbma_tables.models.universal_kernel import OK, Table, universal_phi
 from mbma_tables.surfaces.readings import ReadingNumbers
 from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, m4_of, summit_rate
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.totals.intervals import STRETCH, Gap, Interval, approach_at, error_of, refine, rule_for
 
 TINY = 1e-100  # for a power of 0
-LEAST = -700.0  # of exponents: below it a Gaussian is nothing
+STRETCH = 8.0  # scale of the approach's map, in boundary layers zeta_1^(-H): fewest nodes over random surfaces
+NEAR_ONE = 0.1  # p l below which a difference goes by its series
 ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
 
 
@@ -66,6 +64,7 @@ class SurfaceConstants(NamedTuple):
     """What islands need of their surface, in units of h_rms, s and 1/q0; a and b are zeta^(-2H) - zeta_1^(-2H)."""
 
     hurst: float
+    log_zeta_1: float
     e: float  # zeta_1^(-2H)
     rms_over_s: float  # h_rms/s = sqrt(1 - e)
     slope_d: float  # sqrt(a) per x = delta/h_rms below the floor of zeta_d (27)
@@ -74,18 +73,20 @@ class SurfaceConstants(NamedTuple):
     root_floor_u: float  # sqrt(b) at the floor of zeta_u
     offset_floor_u: float  # b there
     log_floor_d: float
+    log_floor_u: float
     density_divisor: float
     eta_factor: float
     kink_d: float  # x at which zeta_d reaches its floor
     kink_u: float  # x at which zeta_u reaches its floor
     map_scale: float
     jacobian: float  # K1 (47) below kink_d
+    jacobian_by_e: float  # derivative of its logarithm by log(e)
     offset: bool
     summit_sigma: bool
 
 
 class Node(NamedTuple):
-    """An island at a node of the quadrature."""
+    """An island at a node of the quadrature; from `m0` on, what its derivatives need."""
 
     X: float
     mu: float
@@ -94,6 +95,18 @@ class Node(NamedTuple):
     h_d: float
     D_d: float
     sigma_d: float
+    m0: float
+    sigma: float
+    b: float
+    top: float  # zeta_d^(-2H)
+    log_d: float
+    width: float
+    top2: float  # zeta_d^p
+    below2: float  # (zeta_d^p - 1)/p and (zeta_u^p - zeta_d^p)/p, p = 2 - 2H
+    band2: float
+    top4: float  # for p = 4 - 2H, without the division by p
+    below4: float
+    band4: float
 
 
 @jitable
@@ -120,6 +133,8 @@ def surface_constants(hurst: float, zeta_1: float, reading: ReadingNumbers, prin
     phi = reading.phi
     log_zeta_1 = math.log(zeta_1)
     rms_over_s = math.sqrt(-math.expm1(-2.0 * hurst * log_zeta_1))
+    e = math.exp(-2.0 * hurst * log_zeta_1)
+    jacobian = jacobian_below(rms_over_s, reading.beta, printed, reading.offset)
     slope_d = 4.0 / 3.0 * reading.beta
     slope_u = phi / (1.0 + phi) * rms_over_s
     root_floor_d = math.sqrt(floor_offset(hurst, zeta_1, reading.floor_d))
@@ -128,7 +143,8 @@ def surface_constants(hurst: float, zeta_1: float, reading: ReadingNumbers, prin
     R_top = RADIUS / math.sqrt(m4_of(hurst, 0.0, log_zeta_1))
     return SurfaceConstants(
         hurst,
-        math.exp(-2.0 * hurst * log_zeta_1),
+        log_zeta_1,
+        e,
         rms_over_s,
         slope_d,
         slope_u,
@@ -136,12 +152,14 @@ def surface_constants(hurst: float, zeta_1: float, reading: ReadingNumbers, prin
         root_floor_u,
         floor_offset(hurst, zeta_1, reading.floor_u),
         math.log(reading.floor_d),
+        math.log(reading.floor_u),
         reading.density_divisor,
         0.75 * (math.pi * D_top) ** (1.0 / 3.0) * (1.5 * R_top) ** (2.0 / 3.0) * phi ** (-1.0 / 3.0),
         root_floor_d / slope_d,
         root_floor_u / slope_u,
         STRETCH * math.exp(-hurst * log_zeta_1),
-        jacobian_below(rms_over_s, reading.beta, printed, reading.offset),
+        jacobian,
+        0.0 if printed else 0.5 * (1.0 - 1.0 / jacobian) * e / (rms_over_s * rms_over_s),
         reading.offset,
         reading.summit_sigma,
     )
@@ -169,7 +187,8 @@ def island_node(x: float, floor_d: bool, floor_u: bool, surface: SurfaceConstant
     top4 = square * square * (e + a)
     below4 = top4 - 1.0
     below2 = expm1(p2 * log_d) / p2
-    band2 = (1.0 + p2 * below2) * expm1(p2 * width) / p2
+    top2 = 1.0 + p2 * below2
+    band2 = top2 * expm1(p2 * width) / p2
     band4 = top4 * expm1(p4 * width)
     # m2 = H below2, m4 = (3 H/4 p4) below4, alpha = m0 m4/m2^2
     rate = 0.75 / p4
@@ -187,32 +206,81 @@ def island_node(x: float, floor_d: bool, floor_u: bool, surface: SurfaceConstant
     mu = 8.0 / 3.0 * D * sigma * math.sqrt(2.0 * both)
     eta = surface.eta_factor * exp(log(root_b / R_u) * (1.0 / 3.0))
     area = 2.0 * math.pi * eta * D * both * sigma * sigma
-    return Node((surface.rms_over_s * x - h_d) / sigma, mu, force, area, h_d, D_d, sigma_d)
+    return Node(
+        (surface.rms_over_s * x - h_d) / sigma, mu, force, area, h_d, D_d, sigma_d,
+        m0, sigma, b, e + a, log_d, width, top2, below2, band2, top4, below4, band4,
+    )  # fmt: skip
 
 
-@njit(cache=True, fastmath=REORDER, error_model="numpy")
-def fill_nodes(interval: Interval, gap: Gap, surface: SurfaceConstants, out: FloatArray) -> int:
-    """X, mu, what force and area add per Phi_F and Phi_A, and how both rise with the compression, as rows.
+@njit(cache=True, fastmath=REORDER, error_model="numpy", forceinline=True)
+def _moment(p: float, length: float, growth: float) -> float:
+    """Integral of l e^(p l) from 0 to `length`, the derivative by p of that of e^(p l), which is `growth`."""
+    y = p * length
+    series = 1.0 / 8.0 + y * (1.0 / 30.0 + y * (1.0 / 144.0 + y * (1.0 / 840.0 + y * (1.0 / 5760.0 + y / 45360.0))))
+    series = 0.5 + y * (1.0 / 3.0 + y * series)
+    return length * length * series if y < NEAR_ONE else (length + (y - 1.0) * growth) / p
 
-    Of the nodes of an interval, whose number is returned.
-    A loop that vectorises: no branch, no call.
+
+@njit(cache=True, error_model="numpy")
+def m2_slopes(H: float, log_zeta: float) -> tuple[float, float]:
+    """Derivatives by H and by log(zeta) of log(m2) over [1, zeta]."""
+    p2 = 2.0 - 2.0 * H if H != 1.0 else TINY
+    growth = math.expm1(p2 * log_zeta) / p2
+    return 1.0 / H - 2.0 * _moment(p2, log_zeta, growth) / growth, p2 + 1.0 / growth
+
+
+@njit(cache=True, fastmath=REORDER, error_model="numpy", forceinline=True)
+def node_slopes(
+    by_hurst: bool, height: float, floor_d: bool, floor_u: bool, node: Node, surface: SurfaceConstants
+) -> tuple[float, float, float, float]:
+    """Derivatives of X, log(mu) and log(force), log(area) with their weights in the totals, the node being held.
+
+    By H at given e = zeta_1^(-2H), or by log(e) at given H; `eta_factor` and K1 are held. Here ``d_D`` is of
+    log(D), and so on, but those of e, a, b, m0, h_d, X, height and of logarithms are what they say.
     """
-    low, high, floor_d, floor_u = interval
-    nodes = rule_for(interval)[0]
-    half, centre = 0.5 * (high - low), 0.5 * (high + low)
-    rms_over_s = surface.rms_over_s
-    for k in range(nodes.size):
-        x, stretch = approach_at(centre + half * nodes[k], floor_d, surface.map_scale)
-        node = island_node(x, floor_d, floor_u, surface)
-        height = island_height(x, node.h_d, node.sigma_d, gap, rms_over_s)
-        share = -0.5 * height * height
-        # d(delta/s) = rms_over_s dx
-        weight = node.D_d / (ROOT_TWO_PI * node.sigma_d) * rms_over_s * stretch * half
-        weight *= exp(share) if share > LEAST else 0.0
-        out[0, k], out[1, k] = node.X, node.mu
-        out[2, k], out[3, k] = node.force * weight, node.area * weight
-        out[4, k] = height * rms_over_s / node.sigma_d
-    return nodes.size
+    H, h = surface.hurst, 1.0 if by_hurst else 0.0
+    p2, p4, over_2H = 2.0 - 2.0 * H if H != 1.0 else TINY, 4.0 - 2.0 * H, 0.5 / H
+    d_e = 0.0 if by_hurst else surface.e
+    d_rms = -0.5 * d_e / (surface.rms_over_s * surface.rms_over_s)
+    low = surface.e + node.b
+    floor_a = -2.0 * surface.log_floor_d * node.top if by_hurst else -d_e
+    floor_b = -2.0 * surface.log_floor_u * low if by_hurst else -d_e
+    d_a = floor_a if floor_d else 0.0
+    d_b = floor_b if floor_u else 2.0 * node.b * d_rms
+    d_m0 = d_a - d_b
+    log_d, width = node.log_d, node.width
+    d_log_d = 0.0 if floor_d else -d_e / node.top * over_2H - h * log_d / H
+    d_width = (d_m0 - node.m0 * (d_e + d_b) / low) / node.top * over_2H - h * width / H
+    # of the p-th powers at the lower end; of what the band adds, and of what lies below it
+    d_end2, d_end4 = p2 * d_log_d - 2.0 * h * log_d, p4 * d_log_d - 2.0 * h * log_d
+    grown2, grown4 = node.band2 / node.top2, node.band4 / node.top4
+    d_band2 = d_end2 + (1.0 + p2 * grown2) * d_width / grown2
+    d_band4 = d_end4 + (1.0 + grown4) * (p4 * d_width - 2.0 * h * width) / grown4
+    d_below2 = node.top2 * d_log_d / node.below2
+    d_below4 = node.top4 * d_end4 / node.below4
+    if by_hurst:
+        d_band2 -= 2.0 * _moment(p2, width, grown2) / grown2
+        d_below2 -= 2.0 * _moment(p2, log_d, node.below2) / node.below2
+    # of summit densities, standard deviations, radii, as in `island_node`
+    rate, d_rate = 0.75 / p4, 2.0 * h / p4
+    tilt, d_tilt = BROADENING * H / rate if surface.summit_sigma else 0.0, h / H - d_rate
+    part, part_d = tilt * node.band2 * node.band2 / node.band4, tilt * node.below2 * node.below2 / node.below4
+    d_D, d_D_d = d_rate + d_band4 - d_band2, d_rate + d_below4 - d_below2
+    d_sigma = 0.5 * (d_m0 - part * (d_tilt + 2.0 * d_band2 - d_band4)) / (node.sigma * node.sigma)
+    d_sigma_d = d_e + d_a + part_d * (d_tilt + 2.0 * d_below2 - d_below4)
+    d_sigma_d *= -0.5 / (node.sigma_d * node.sigma_d)
+    below4, band4 = node.below4, node.band4
+    d_R_d = -0.5 * (d_rate + h / H + d_below4)
+    d_R_u = -0.5 * (d_rate + h / H + (below4 * d_below4 + band4 * d_band4) / (below4 + band4))
+    d_h_d = 0.5 * d_a / surface.root_floor_d if surface.offset else 0.0
+    d_root_b = 0.5 * floor_b / node.b if floor_u else d_rms
+    d_X = ((node.X * node.sigma + node.h_d) * d_rms - d_h_d) / node.sigma - node.X * d_sigma
+    d_height = ((height * node.sigma_d + node.h_d) * d_rms - d_h_d) / node.sigma_d - height * d_sigma_d
+    # delta/h_rms is held, so the density is per h_rms: h_rms/s is part of it
+    common = d_D_d - d_sigma_d + d_rms - height * d_height
+    d_mu = d_D + d_sigma + 0.5 * (d_R_d + d_R_u)
+    d_area = (d_root_b - d_R_u) / 3.0 + d_D + d_R_u + d_R_d + 2.0 * d_sigma
+    return d_X, d_mu, 1.5 * d_sigma + 0.5 * d_R_d + common, d_area + common
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy", nogil=True)
@@ -242,80 +310,3 @@ def fill_fields(
         out[2, k] = ((peak + x[k]) * rms_over_s - node.h_d) / node.sigma_d
         out[3, k] = rms_over_s / node.sigma_d
     return worst, largest
-
-
-@njit(cache=True, fastmath=REORDER, error_model="numpy")
-def _rule(
-    which: int,
-    interval: Interval,
-    gap: Gap,
-    surface: SurfaceConstants,
-    near: None,
-    table: Table,
-    work: FloatArray,
-    part: FloatArray,
-) -> tuple[int, float, float, int]:
-    """One Kronrod rule over an interval, see `refine`. Where `which` is FORCE or AREA, that one is both rows."""
-    _, kronrod, gauss = rule_for(interval)
-    count = fill_nodes(interval, gap, surface, work)
-    force = area = gauss_force = gauss_area = table_error = 0.0
-    for k in range(count):
-        if which == BOTH:
-            status, phi_F, phi_A, error = universal_phi(work[0, k], work[1, k], table)
-            f, g = work[2, k] * phi_F, work[3, k] * phi_A
-        else:
-            status, phi, error = universal_one(which, work[0, k], work[1, k], table)
-            f = g = work[2 + which, k] * phi
-        if status != OK:
-            return status, math.nan, math.nan, count
-        force += kronrod[k] * f
-        area += kronrod[k] * g
-        gauss_force += gauss[k] * f
-        gauss_area += gauss[k] * g
-        table_error = max(table_error, error)
-    K1 = 1.0 if interval.floor_d else surface.jacobian
-    part[0, 0], part[1, 0] = K1 * force, K1 * area
-    if not (force > 0.0 and area > 0.0):
-        return OK, 0.0, table_error, count
-    return OK, error_of(force, gauss_force, area, gauss_area), table_error, count
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def total(
-    which: int, gap: Gap, rtol: float, surface: SurfaceConstants, table: Table
-) -> tuple[int, float, float, float, int]:
-    """Status, F/(A0 E* q0 s), A/A0, the bound on their relative error, and the islands evaluated.
-
-    Where `which` is FORCE or AREA, that one is given as both.
-    """
-    if not gap.compression > 0.0:
-        return OK, 0.0, 0.0, 0.0, 0
-    out = np.full((2, 1), math.nan)
-    status, error, islands = refine(_rule, which, gap, rtol, surface, None, table, out)
-    return status, out[0, 0], out[1, 0], error, islands
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def fill_totals(
-    which: int,
-    given: Any,
-    rtol: float,
-    reading: ReadingNumbers,
-    printed: bool,
-    table: Table,
-    status: NDArray[np.int64],
-    out: FloatArray,
-) -> int:
-    """`total` of each of the `Pairs` given into the rows of `out` (pairs, 3); returns the islands evaluated."""
-    islands = 0
-    # a plain tuple, which a call from Python passes on faster
-    pairs = Pairs(*given)
-    hurst, zeta_1 = pairs.hurst, pairs.zeta_1
-    surface = surface_constants(hurst[0], zeta_1[0], reading, printed)
-    for k in range(hurst.size):
-        if k > 0 and (hurst[k] != hurst[k - 1] or zeta_1[k] != zeta_1[k - 1]):
-            surface = surface_constants(hurst[k], zeta_1[k], reading, printed)
-        gap = Gap(pairs.compression[k], pairs.peak[k])
-        status[k], out[k, 0], out[k, 1], out[k, 2], count = total(which, gap, rtol, surface, table)
-        islands += count
-    return islands

@@ -11,7 +11,7 @@ from helpers import fresh
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact
 from mbma_tables.surfaces.readings import READINGS, REPORTED
-from mbma_tables.totals import island_sum, kernel, sensitivity
+from mbma_tables.totals import intervals, island_sum
 
 OPEN = dataclasses.replace(REPORTED, name="open", floor_d=1.3, floor_u=2.2, density_divisor=11.0)
 
@@ -224,10 +224,9 @@ def test_one_gap_more_changes_no_bit():
 def test_long_batches_run_in_blocks(monkeypatch, derivatives):
     """Between two blocks Ctrl-C is honoured; the bits are those of one block."""
     surfaces = Surface(0.8, 0.3, 60.0, 0.7, np.linspace(2.1, 2.2, 50))
-    module, name = (sensitivity, "fill_totals_with_slopes") if derivatives else (kernel, "fill_totals")
-    whole, calls, fill = contact(surfaces, 1.0, derivatives=derivatives), [], getattr(module, name)
-    monkeypatch.setattr(module, name, lambda *given: calls.append(given) or fill(*given))
-    monkeypatch.setattr(island_sum, "SLOPES_BLOCK" if derivatives else "BLOCK", 16)
+    whole, calls, fill = contact(surfaces, 1.0, derivatives=derivatives), [], intervals.fill_totals
+    monkeypatch.setattr(intervals, "fill_totals", lambda *given: calls.append(given) or fill(*given))
+    monkeypatch.setattr(island_sum, "BLOCK", 16)
     cut = contact(surfaces, 1.0, derivatives=derivatives)
     assert len(calls) == 4
     np.testing.assert_array_equal(cut.force, whole.force)
@@ -236,6 +235,6 @@ def test_long_batches_run_in_blocks(monkeypatch, derivatives):
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(module, name, interrupt)
+    monkeypatch.setattr(intervals, "fill_totals", interrupt)
     with pytest.raises(KeyboardInterrupt):
         contact(surfaces, 1.0, derivatives=derivatives)
