@@ -41,7 +41,7 @@ DEFAULTS = {"theory": "mbma", "reading": "reported", "exponential": False, "leak
 @click.argument("target", type=click.Choice([*SOLVERS, *DATA, *LAWS, *FMUS, *GRAPHS, *CODE]))
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write; a folder for source code.")
 @optional_specimen_options
-@click.option("--rows", type=int, help="How many rows; else as few as --rtol needs.")
+@click.option("--rows", type=int, help="How many rows of a table; else as few as --rtol needs.")
 @click.option("--rtol", type=float, help="Largest relative error of linear interpolation; 1e-3 by default.")
 @quantity_option("--largest-overclosure", help="Where the rows end; else at full compression.")
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure, or as well.")
@@ -59,8 +59,9 @@ DEFAULTS = {"theory": "mbma", "reading": "reported", "exponential": False, "leak
 def export_command(target: str, out: Path, **options: Any) -> None:
     """Write TARGET to a file.
 
-    Solvers and data take a surface, a modulus and units, and so do laws as code, which end in -law, an FMU of FMI 2
-    (fmu) or 3 (fmu3), and onnx; c, fortran and javascript are the whole model as code.
+    Solvers and data take a surface, a modulus and units, and so do laws as code (-law), subroutines of solvers
+    (abaqus-uinter, abaqus-gapcon, calculix-gapcon), an FMU of FMI 2 (fmu) or 3 (fmu3), and onnx; c, fortran and
+    javascript are the whole model as code, of the paper's readings reported and printed.
 
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
     """

@@ -23,6 +23,7 @@ from mbma_tables.scenes.specimen import (
     from_numbers,
     read_specimen,
 )
+from mbma_tables.surfaces.readings import NAMED
 from mbma_tables.theories.registry import THEORIES
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -239,9 +240,9 @@ reading_option = click.option(
     "--reading",
     default="reported",
     show_default=True,
-    metavar="reported|printed",
-    shell_complete=_among("reported", "printed"),
-    help="Reading of the paper's equations.",
+    metavar="|".join(NAMED),
+    shell_complete=_among(*NAMED),
+    help="Reading of the paper's equations, of mbma.",
 )
 
 _MODEL_OPTIONS = (
@@ -254,7 +255,9 @@ _MODEL_OPTIONS = (
         shell_complete=_among(*TIERS),
         help="Island model.",
     ),
-    click.option("--rtol", type=float, default=DEFAULT_RTOL, show_default=True, help="Relative error asked for."),
+    click.option(
+        "--rtol", type=float, default=DEFAULT_RTOL, show_default=True, help="Numerical relative error asked for."
+    ),
 )
 theory_option = click.option(
     "--theory",
@@ -262,7 +265,7 @@ theory_option = click.option(
     show_default=True,
     metavar="|".join(THEORIES),
     shell_complete=_among(*THEORIES),
-    help="Theory; the others have no tier.",
+    help="Theory; the others have no tier, reading or rtol.",
 )
 # of islands, which MBMA alone has
 model_options = _group("model", lambda given: Model(**given), *_MODEL_OPTIONS)
@@ -280,7 +283,7 @@ output_options = _group(
 
 leakage_option = click.option("--leakage", is_flag=True, help="Add the flow conductance of the gaps [length^3].")
 plot_option = click.option(
-    "--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw force and area: FILE.png, .svg or .pdf."
+    "--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw a picture: FILE.png, .svg or .pdf."
 )
 
 
