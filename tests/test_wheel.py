@@ -2,6 +2,7 @@
 
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tarfile
@@ -42,6 +43,15 @@ def test_installed_wheel_runs_the_readme_command(site, tmp_path):
     shown = run(sys.executable, *curve, cwd=tmp_path, env=environment)
     assert "reading" in shown.stdout
     assert (tmp_path / "concrete.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_readme_of_an_index_has_no_links_into_a_checkout(site):
+    (metadata,) = site.glob("mbma_tables-*.dist-info/METADATA")
+    text = metadata.read_text(encoding="utf-8")
+    links = re.findall(r"\]\(([^)]*)\)", text)
+    assert len(links) >= 4
+    assert all(link.startswith("https://") for link in links)
+    assert "## Three recipes" in text
 
 
 def test_source_distribution_holds_what_the_checkout_holds(source, tmp_path):
