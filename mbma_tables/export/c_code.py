@@ -164,12 +164,10 @@ def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | fl
         "FLOOR_U": reading.floor_u,
         "MIN_ZETA_1": max(MIN_ZETA_1, reading.floor_u),
         "MAX_ZETA_1": MAX_ZETA_1,
+        "MIN_APPROACH": 1e-140,  # squares of what is of its order do not underflow
         "STRETCH": kernel.STRETCH,
-        "SMALL_ANGLE": 0.01,  # below it sinh goes through its own function
         "NARROW": intervals.NARROW,
         "SAFETY": intervals.SAFETY,
-        "SMALL_POWER": 0.01,  # below these, differences of exponentials go through expm1
-        "SMALL_WIDTH": 0.01,
         "QUADRATURE_SHARE": island_sum.QUADRATURE_SHARE,
         "FORMULA_X_LOW": form["X"][0],
         "FORMULA_X_HIGH": form["X"][1],
@@ -231,17 +229,19 @@ def numbers_text(
         text = value if isinstance(value, int) else f"({float(value)!r})"
         lines.append(f"double MBMA_{name};" if name in later else f"#define MBMA_{name} {text}")
     for name, values in arrays.items():
-        shape = "".join(f"[{extent}]" for extent in values.shape)
-        if name in later:
-            lines += ["", f"double MBMA_{name}{shape};"]
-        else:
-            lines += ["", f"static const double MBMA_{name}{shape} = {{", *_initializer(values, "  "), "};"]
+        kind = "float" if values.dtype == np.float32 else "double"
+        what = f"{kind} MBMA_{name}{''.join(f'[{extent}]' for extent in values.shape)}"
+        lines += [
+            "",
+            *([f"{what};"] if name in later else [f"static const {what} = {{", *_initializer(values, "  "), "};"]),
+        ]
     return "\n".join([*lines, "", "#endif", ""])
 
 
 def _initializer(values: FloatArray, indent: str) -> Iterator[str]:
     if values.ndim == 1:
-        text = ", ".join(map(repr, values.tolist()))
+        # in the shortest decimals of its precision
+        text = ", ".join(values.astype(str).tolist())
         yield from textwrap.wrap(text, 120, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
         return
     for row in values:

@@ -24,7 +24,10 @@ from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.readings import Reading, get_reading
 
 TIMEOUT = 300.0  # seconds, of a build or a replay
-WASM_FUNCTIONS = ("mbma_phi", "mbma_phi_slopes", "mbma_formula", "mbma_island_geometry", "mbma_total")
+WASM_FUNCTIONS = (
+    *("mbma_phi", "mbma_phi_slopes", "mbma_formula", "mbma_island_geometry", "mbma_total", "mbma_total_slopes"),
+    *("mbma_calibrated", "mbma_calibrated_slopes", "mbma_calibrated_separation"),
+)
 ZIG = ("-m", "ziglang", "cc", "-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-O2", "-s")
 
 
@@ -65,12 +68,12 @@ LANGUAGES = {
     ),
     "javascript": Language(
         {
-            "mbma.mjs": "mbma.mjs: the MBMA model for JavaScript, mbma.c as WebAssembly.",
+            "mbma.mjs": "mbma.mjs: the MBMA model for JavaScript, mbma.c and mbma_theories.c as WebAssembly.",
             "mbma_selftest.mjs": "mbma_selftest.mjs: replays the conformance points of the MBMA model in JavaScript.",
         },
-        "import { phi, phiSlopes, formula, islandGeometry, total } from './mbma.mjs', in any browser since 2021 and in "
-        "node: one file, no dependency, nothing to fetch. Answers are objects with a status, which is STATUS.OK where "
-        "they hold numbers; an argument that is not a number, or is NaN, throws a TypeError.",
+        "import { total, totalSlopes, calibrated, phi } from './mbma.mjs', in any browser since 2021 "
+        "and in node: one file, no dependency, nothing to fetch. Answers are objects with a status, which is STATUS.OK "
+        "where they hold numbers; an argument that is not a number, or is NaN, throws a TypeError.",
         (),
         ("node", "{0}/mbma_selftest.mjs"),
     ),
@@ -122,7 +125,7 @@ def write_code(
     model = open_table(table)
     if not isinstance(model, UniversalModel):
         raise InputError(f"code is written from a universal table, and {os.fspath(table)} is not one")
-    texts = {**source_texts(target, model, rule), POINTS_FILE: points_text(model, rule, target != "javascript")}
+    texts = {**source_texts(target, model, rule), POINTS_FILE: points_text(model, rule)}
     for name, text in texts.items():
         write_file(pathlib.Path(folder, name), text.encode(), make_folders=True)
     return [pathlib.Path(folder, name) for name in texts]
@@ -131,8 +134,8 @@ def write_code(
 def source_texts(target: str, model: UniversalModel, reading: Reading) -> dict[str, str]:
     """Names and texts of a target's source files."""
     language = LANGUAGES[target]
-    c_texts = c_code.c_texts(model, reading)
-    texts = {} if target == "javascript" else c_texts | c_code.theory_texts()
+    c_texts = c_code.c_texts(model, reading) | c_code.theory_texts()
+    texts = {} if target == "javascript" else c_texts
     for name, title in language.titles.items():
         lines = c_code.header(model, reading, title, language.usage)
         parts = {"HEADER": opening(lines, "!" if name.endswith(".f90") else "/*")}

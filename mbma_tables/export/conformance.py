@@ -19,19 +19,24 @@ from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.models import closed_form_functions, universal_kernel
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.totals.contact import FEW_SURFACES
+from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories.contact import contact
+from mbma_tables.theories.result import Contact
 
 POINTS_FILE = "mbma_conformance.csv"
+BY = ("separation", "hurst", "q0", "q1", "h_rms", "h_max")
 KINDS = {
     "phi": "X, mu; phi_F, phi_A, the bound on their error",
     "slopes": "X, mu; phi_F by X, phi_A by X, phi_F by mu, phi_A by mu, relative to themselves or |phi/argument|",
     "geometry": f"approach, hurst, zeta_1; {', '.join(FIELDS)}",
     "total": "hurst, q0, q1, h_rms, h_max, separation, E_star, rtol; force, area, stiffness",
+    "total_by": f"the same; derivatives of force, then of area, by {', '.join(BY)}",
     "status": "X, mu; the status",
     "formula": "X, mu; phi_F, phi_A by the closed form",
     "calibrated": "hurst, q0, q1, h_rms, h_max, mean separation, E_star; force, area, stiffness, mean separation at it",
+    "calibrated_by": "the same; derivatives of force, then of area, by mean separation, hurst, q0, q1, h_rms, h_max",
 }
-TOLERANCE = 1e-11
+TOLERANCE, SLOPE_TOLERANCE = 1e-11, 1e-8
 INVALID = 5  # the exported code refuses by status what the library refuses by an error
 SURFACES = (
     # hurst, q0, q1, h_rms, h_max
@@ -80,30 +85,42 @@ def geometry_rows(approach: FloatArray, hurst: FloatArray, zeta_1: FloatArray, r
 
 
 def total_rows(surface: tuple[float, ...], separations: Any, reading: Reading, rtol: float = RTOL) -> Iterator[str]:
-    """Totals of one surface by the compiled runtime."""
-    from mbma_tables.surfaces.surface import Surface
-    from mbma_tables.theories.contact import contact
-
-    # so many that islands are added gap by gap, as the exported code does, not by a profile of them
-    many = Surface(*np.tile(surface, (FEW_SURFACES + 1, 1)).T[..., None])
-    found = contact(many, separations, reading=reading, rtol=rtol)
-    numbers = map(np.asarray, (found.separation, found.force, found.area, found.stiffness))
-    for separation, *answers in zip(*(of_many[0] for of_many in numbers), strict=True):
-        # without contact all are exactly 0; at a maximum of force, stiffness is
-        scales = [abs(answer) or 1.0 for answer in answers]
-        scales[2] = max(scales[2], scales[0] / surface[4])
-        yield row("total", (*surface, separation, 1.0, rtol), answers, scales)
+    """Totals of one surface and their derivatives by the compiled runtime."""
+    gaps = np.asarray(separations)
+    found = contact(Surface(*surface), gaps, reading=reading, rtol=rtol, derivatives=True)
+    slopes = _slopes_of(found)
+    values = np.array([found.force, found.area, -2 * slopes[0, 0]])
+    # without contact all are exactly 0; at a maximum of force, stiffness is
+    scales = np.where(values == 0, 1.0, np.abs(values))
+    scales[2] = np.maximum(scales[2], scales[0] / surface[4])
+    for k, gap in enumerate(gaps):
+        given = (*surface, gap, 1.0, rtol)
+        yield row("total", given, values[:, k], scales[:, k])
+        yield _slopes_row("total_by", given, values[:2, k], slopes[:, :, k])
 
 
 def calibrated_rows(surface: tuple[float, ...], shares: Any, E_star: float = 1.0) -> Iterator[str]:
-    """The calibrated law of one surface at shares of h_max by the library."""
-    from mbma_tables.surfaces.surface import Surface
-    from mbma_tables.theories.contact import contact
-
+    """The calibrated law of one surface at shares of h_max by the library, and its derivatives at given u."""
     u = surface[4] * np.asarray(shares)
-    found = contact(Surface(*surface), mean_separation=u, theory="calibrated", E_star=E_star)
-    for gap, *answers in zip(u, *map(np.asarray, (found.force, found.area, found.stiffness)), strict=True):
-        yield row("calibrated", (*surface, gap, E_star), (*answers, gap), (*answers, gap))
+    found = contact(Surface(*surface), mean_separation=u, theory="calibrated", E_star=E_star, derivatives=True)
+    slopes = _slopes_of(found)
+    slopes[:, 5] -= slopes[:, 0]  # h_max at given u = (h_max + d)/2
+    slopes[:, 0] *= 2
+    for k, *values in zip(range(u.size), *map(np.asarray, (found.force, found.area, found.stiffness, u)), strict=True):
+        given = (*surface, u[k], E_star)
+        yield row("calibrated", given, values, values)
+        yield _slopes_row("calibrated_by", given, values[:2], slopes[:, :, k])
+
+
+def _slopes_of(found: Contact) -> FloatArray:
+    """Derivatives of force and area by `BY`."""
+    return np.array([[slopes[name] for name in BY] for slopes in (found.force_by, found.area_by) if slopes])
+
+
+def _slopes_row(kind: str, given: tuple[float, ...], values: Iterable[float], slopes: FloatArray) -> str:
+    """Derivatives relative to themselves or the value over the parameter; by the gap over h_rms."""
+    scales = np.maximum(np.abs(slopes), np.divide.outer(np.array(values), [given[3], *given[:5]]))
+    return row(kind, given, slopes.ravel(), np.where(scales == 0, 1.0, scales).ravel(), SLOPE_TOLERANCE)
 
 
 def status_rows(model: UniversalModel) -> Iterator[str]:
@@ -144,8 +161,8 @@ def table_rows(model: UniversalModel) -> Iterator[str]:
         yield row("phi", (points["X"][k], points["mu"][k]), answers, answers, points["tolerance"][k])
 
 
-def points_text(model: UniversalModel, reading: Reading, theories: bool = False) -> str:
-    """The points' file: the table's own, and the runtime's slopes, islands, totals and refusals; of `theories` too."""
+def points_text(model: UniversalModel, reading: Reading) -> str:
+    """The points' file: the table's own, and the runtime's slopes, islands, totals, refusals and calibrated law."""
     points = model.content.conformance
     head = [
         f"conformance points of the MBMA model, reading {reading.name}",
@@ -166,6 +183,5 @@ def points_text(model: UniversalModel, reading: Reading, theories: bool = False)
         approach = np.geomspace(1e-3, 2 * surface[4] / surface[3], 8)
         lines += geometry_rows(approach, np.full(8, surface[0]), np.full(8, zeta_1), reading)
         lines += total_rows(surface, surface[4] * (1 - np.array(DEPTHS)), reading)
-        if theories:
-            lines += calibrated_rows(surface, SHARES)
+        lines += calibrated_rows(surface, SHARES)
     return comment(head, "#") + "\n".join(lines) + "\n"

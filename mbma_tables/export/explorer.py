@@ -102,7 +102,8 @@ def packed(values: FloatArray) -> dict[str, Any]:
     doubles |= int(zigzag.max()) >= MAX_EXACT
     planes = np.ascontiguousarray((flat if doubles else zigzag).view(np.uint8).reshape(-1, 8).T[: 8 if doubles else 7])
     text = base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
-    return {"count": flat.size, "differences": 0 if doubles else ORDER, "bits": FRACTION_BITS, "text": text}
+    differences, single = 0 if doubles else ORDER, values.dtype == np.float32
+    return {"count": flat.size, "single": single, "differences": differences, "bits": FRACTION_BITS, "text": text}
 
 
 def _model(texts: dict[str, str], values: dict[str, FloatArray]) -> dict[str, Any]:

@@ -62,7 +62,16 @@ def c_command(compiler: str, options: tuple[str, ...], folder: pathlib.Path) -> 
 def test_c_replays_its_points(c_folder: pathlib.Path) -> None:
     found = check("c", c_folder)
     assert found.reason == ""
-    fixed = {"phi": 64, "slopes": 64, "geometry": 24, "total": 12, "status": 10, "calibrated": 12}
+    fixed = {
+        "phi": 64,
+        "slopes": 64,
+        "geometry": 24,
+        "total": 12,
+        "status": 10,
+        "calibrated": 12,
+        "total_by": 12,
+        "calibrated_by": 12,
+    }
     assert found.points == fixed | {"formula": found.points["formula"]}
     assert found.points["formula"] > 5
 
@@ -122,8 +131,7 @@ def test_fortran_equals_the_runtime(tmp_path: pathlib.Path) -> None:
 @pytest.mark.slow
 @needs("node")
 def test_javascript_equals_the_runtime(js_folder: pathlib.Path, tmp_path: pathlib.Path) -> None:
-    points = code_points.write_points(tmp_path, theories=False)
-    code_points.assert_equal_to_runtime(check("javascript", js_folder, points), theories=False)
+    code_points.assert_equal_to_runtime(check("javascript", js_folder, code_points.write_points(tmp_path)))
 
 
 @pytest.mark.slow
@@ -143,7 +151,7 @@ def test_nothing_is_allocated_or_kept(c_folder: pathlib.Path, tmp_path: pathlib.
     kinds = {line.split()[-1]: line.split()[-2] for line in listed.splitlines()}
     outside = {name for name, kind in kinds.items() if kind == "U"} - {"_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}
     # C's own mathematics and block copies
-    mathematics = {"asinh", "cbrt", "exp", "expm1", "log", "log1p", "pow", "sinh", "sqrt"}
+    mathematics = {"asinh", "cbrt", "exp", "expm1", "log", "log1p", "pow", "sqrt"}
     assert outside <= {*mathematics, "memcpy", "memset"}
     assert not [name for name, kind in kinds.items() if kind in "BbDdC"]
 
@@ -158,7 +166,8 @@ def library(c_folder: pathlib.Path, tmp_path_factory: pytest.TempPathFactory) ->
         pytest.skip("not installed: gcc")
     target = tmp_path_factory.mktemp("library") / "mbma.so"
     options = ("-std=c99", "-O2", "-shared", "-fPIC")
-    subprocess.run(["gcc", *options, str(c_folder / "mbma.c"), "-lm", "-o", str(target)], check=True)
+    sources = [str(c_folder / f"{name}.c") for name in ("mbma", "mbma_theories")]
+    subprocess.run(["gcc", *options, *sources, "-lm", "-o", str(target)], check=True)
     found = ctypes.CDLL(str(target))
     found.mbma_message.restype = ctypes.c_char_p
     return found
@@ -217,6 +226,18 @@ def test_no_contact_from_h_max_on(library: ctypes.CDLL) -> None:
     assert not answers.any()
 
 
+@pytest.mark.parametrize(("call", "more"), [("mbma_total_slopes", (1.0, 1e-8)), ("mbma_calibrated_slopes", (1.0,))])
+def test_slopes_past_the_ends(call: str, more: tuple[float, ...], library: ctypes.CDLL) -> None:
+    """Beyond first contact nothing changes; beyond full compression nothing is said."""
+    for gap, ok, known in ((3.5, True, 0.0), (-3.1, False, math.nan)):
+        answers = np.ones((3, 6))
+        places = (ctypes.c_void_p(row.ctypes.data) for row in answers)
+        status = library[call](ctypes.byref(Surface(*SOUND)), *map(ctypes.c_double, (gap, *more)), *places)
+        assert (status == 0) == ok
+        assert np.array_equal(answers[1:], np.full((2, 6), known), equal_nan=True)
+        assert np.array_equal(answers[0, :3], np.full(3, known), equal_nan=True)
+
+
 def test_threads_answer_as_one_does(library: ctypes.CDLL) -> None:
     surfaces = code_points.random_surfaces()[:16]
 
@@ -239,7 +260,7 @@ def test_the_other_closed_forms(form: str, given: tuple[float, ...], library: ct
 
 
 ASK = """
-import { STATUS, formula, islandGeometry, phi, phiSlopes, total } from "./mbma.mjs";
+import { STATUS, calibrated, formula, islandGeometry, phi, phiSlopes, total, totalSlopes } from "./mbma.mjs";
 const surface = { hurst: 0.8, q0: 1, q1: 100, h_rms: 1, h_max: 3 };
 function outcome(ask) {
   try {
@@ -256,13 +277,21 @@ TYPE_ERRORS = (
     *("phi('3', '10')", "phi(3, '10')", "phi('a', 1)", "phi(NaN, 1)", "phi(1)", "phi(null, 1)", "phi([3], 1)"),
     *("phi(3n, 1)", "phi(true, 1)", "formula('3', '10')", "phiSlopes(1, NaN)", "islandGeometry(1, 0.8, '100')"),
     *("total(null, 1)", "total(surface, '1')", "total({ ...surface, hurst: '0.8' }, 1)", "total({}, 1)"),
-    "total(surface, 1, 1, null)",
+    *("total(surface, 1, 1, null)", "totalSlopes(surface, '1')", "calibrated(null, 1)", "calibrated(surface, '1')"),
 )
 INVALIDS = (
     *("phi(1, -1)", "phiSlopes(1, -1)", "islandGeometry(0, 0.8, 100)", "total(surface, -3.1)", "total(surface, 1, 0)"),
     *("total(surface, 1, 1, 1)", "total(surface, Infinity)", "total({ ...surface, hurst: 2 }, 1)", "formula(1, -1)"),
+    "calibrated(surface, -1)",
 )
-VALID = ("phi(3, 10)", "phiSlopes(3, 10)", "formula(3, 10)", "islandGeometry(1, 0.8, 100)", "total(surface, 1)")
+VALID = (
+    "phi(3, 10)",
+    "phiSlopes(3, 10)",
+    "formula(3, 10)",
+    "islandGeometry(1, 0.8, 100)",
+    "total(surface, 1)",
+    "calibrated(surface, 1)",
+)
 
 
 @pytest.mark.slow

@@ -49,7 +49,10 @@ const ARGUMENTS = OWN + 2 * LAW_BYTES,
   ANSWER = ARGUMENTS + 1024,
   SAMPLES = ANSWER + 1024;
 const numbersAt = (place, count) => new Float64Array(C.memory.buffer, place, count);
-for (const [name, values] of tables) numbersAt(at(name), values.length).set(values);
+for (const [name, values] of tables) {
+  const kind = DATA.model.tables[name].single ? Float32Array : Float64Array;
+  new kind(C.memory.buffer, at(name), values.length).set(values);
+}
 for (const [name, value] of Object.entries(DATA.model.numbers)) numbersAt(at(name), 1)[0] = value;
 
 // One surface, reading and modulus as functions of the mean separation, by theory.
