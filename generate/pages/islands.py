@@ -1,4 +1,4 @@
-"""The measured part of docs/islands.md: the island solver beside `GreenwoodTripp` of the package ContactMechanics.
+"""The second measured part of docs/stability.md: the island solver beside `GreenwoodTripp` of ContactMechanics.
 
 Both solve (34), (36), (37). Theirs takes the gap in the middle, d(0), instead of X, and counts pressure in
 E* sqrt(sigma/8B), which is half of E* sigma/L.
@@ -59,7 +59,7 @@ def draw(profiles: list[tuple[IslandSolution, FloatArray, FloatArray]], differen
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
-    """The measured part of the page, and its figure."""
+    """The part of the page, and its figure."""
     rows: list[list[str]] = []
     profiles: list[Any] = []
     differences = np.empty((len(CASES), len(POINTS)))

@@ -26,7 +26,6 @@ PAGES = (
     "fidelity",
     "formula",
     "gallery",
-    "islands",
     "leakage",
     "maps",
     "readme",

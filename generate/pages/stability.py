@@ -1,4 +1,4 @@
-"""The measured part of docs/stability.md, the stability atlas: corners of parameter space, counted and drawn.
+"""The measured parts of docs/stability.md, the stability atlas: corners of parameter space, counted and drawn.
 
 Truth is mpmath at 40 digits or more where a closed form exists, else the exact tier at a tighter tolerance.
 """
@@ -16,6 +16,7 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 
+from generate.pages import islands as another_program
 from generate.pages.page import pyplot, svg, table
 from generate.tables.exact_geometry import DOUBLES, divisor, exact_island
 from mbma_tables import Surface, contact, greenwood_tripp
@@ -233,8 +234,9 @@ def corners(tallies: Sequence[Tally]) -> str:
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
-    """The measured part of the page, and its figure."""
+    """The measured parts of the page, and its figures."""
     island_tallies, island_maps = islands()
     geometry_tallies, geometry_maps = island_geometry()
-    parts = {"corners": corners([*island_tallies, *geometry_tallies, *totals()])}
-    return parts, {"docs/figures/stability.svg": draw(geometry_maps, island_maps)}
+    parts, files = another_program.measure()
+    parts |= {"corners": corners([*island_tallies, *geometry_tallies, *totals()])}
+    return parts, files | {"docs/figures/stability.svg": draw(geometry_maps, island_maps)}

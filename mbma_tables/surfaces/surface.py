@@ -181,7 +181,7 @@ class Surface(AnySurface):
 
         One height, one highest point, a Hurst exponent, and two of slope, longest wave and shortest wave (or slope and
         density of summits). What a drawing does not tell is to be given: nothing is filled in. `provenance` holds
-        what each number was taken to mean; docs/roughness.md has typical values. Lengths are numbers in one unit, or
+        what each number was taken to mean; docs/surfaces.md has typical values. Lengths are numbers in one unit, or
         texts with theirs.
 
         Parameters

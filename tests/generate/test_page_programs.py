@@ -54,15 +54,17 @@ def test_shapes_are_told_with_extremes_and_validity():
 
 
 def test_a_page_is_written_with_its_figures(tmp_path, monkeypatch):
-    monkeypatch.setattr("generate.pages.stability.measure", lambda: ({"corners": "of corners"}, {"docs/a/b.svg": SVG}))
+    parts = {"corners": "of corners", "comparison": "of programs"}
+    monkeypatch.setattr("generate.pages.stability.measure", lambda: (parts, {"docs/a/b.svg": SVG}))
     place = tmp_path / "docs"
     assert run(main, "pages", "stability", "--out", tmp_path).split() == [
         str(place / "stability.md"),
         str(place / "a" / "b.svg"),
     ]
     text = (place / "stability.md").read_text(encoding="utf-8")
-    (match,) = MARKED.finditer(text)
-    assert match[0] == f"{match[1]}\nof corners\n\n{match[3]}"
+    assert [match[0] for match in MARKED.finditer(text)] == [
+        f"<!-- measured: {name} -->\n\n{part}\n\n<!-- end -->" for name, part in parts.items()
+    ]
     assert MARKED.sub("", text) == MARKED.sub("", (ROOT / "docs" / "stability.md").read_text(encoding="utf-8"))
     assert (place / "a" / "b.svg").read_bytes() == SVG
 
