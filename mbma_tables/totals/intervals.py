@@ -55,8 +55,6 @@ COLUMNS, BY_LOG_E = 6, BY_LOG_ZETA
 # one node more than the rule has, so that loops over them end with a whole vector
 PADDED_31 = np.append(NODES_31, 0.0)
 
-Bools = NDArray[np.bool_]
-
 
 class Gap(NamedTuple):
     """A gap of a surface in units of h_rms."""
@@ -75,37 +73,21 @@ class Interval(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def to_angle(x: float, scale: float) -> float:
-    """The t at which scale sinh(t)^2 is x."""
-    return math.asinh(math.sqrt(x / scale))
-
-
-@njit(cache=True, error_model="numpy")
-def first_intervals(
-    compression: float, kink_d: float, kink_u: float, scale: float, bounds: FloatArray, floors: Bools
-) -> int:
-    """Fill `bounds` and `floors` (of zeta_d, zeta_u) with the pieces of [0, compression] between the kinks; count."""
+def first_intervals(compression: float, surface: SurfaceConstants, bounds: FloatArray) -> int:
+    """Fill rows of `bounds`, as `Interval`, with the pieces of [0, compression] between the kinks; count."""
+    kink_d, kink_u, scale = surface.kink_d, surface.kink_u, surface.map_scale
     edges = (0.0, min(kink_d, kink_u, compression), min(max(kink_d, kink_u), compression), compression)
     count = 0
     for piece in range(3):
         low, high = edges[piece], edges[piece + 1]
         if high > low:
             middle = 0.5 * (low + high)
-            floors[count, 0], floors[count, 1] = middle > kink_d, middle > kink_u
-            if not floors[count, 0]:
-                low, high = to_angle(low, scale), to_angle(high, scale)
+            if not middle > kink_d:
+                low, high = math.asinh(math.sqrt(low / scale)), math.asinh(math.sqrt(high / scale))
             bounds[count, 0], bounds[count, 1] = low, high
+            bounds[count, 2], bounds[count, 3] = middle > kink_d, middle > kink_u
             count += 1
     return count
-
-
-@njit(cache=True, error_model="numpy")
-def halve(interval: int, count: int, bounds: FloatArray, floors: Bools) -> None:
-    """Cut an interval in two; the second half becomes number `count`."""
-    middle = 0.5 * (bounds[interval, 0] + bounds[interval, 1])
-    bounds[count, 0], bounds[count, 1] = middle, bounds[interval, 1]
-    bounds[interval, 1] = middle
-    floors[count, 0], floors[count, 1] = floors[interval, 0], floors[interval, 1]
 
 
 @njit(cache=True, error_model="numpy")
@@ -214,7 +196,7 @@ def _rule(
     if slopes is not None:
         part[0, BY_HURST], part[0, BY_LOG_E], part[0, BY_COMPRESSION] = K1 * F_by_hurst, K1 * F_by_e, K1 * F_steep
         part[1, BY_HURST], part[1, BY_LOG_E], part[1, BY_COMPRESSION] = K1 * A_by_hurst, K1 * A_by_e, K1 * A_steep
-        part[:, BY_PEAK], below = 0.0, 0.0 if interval.floor_d else 1.0
+        part[0, BY_PEAK], part[1, BY_PEAK], below = 0.0, 0.0, 0.0 if interval.floor_d else 1.0
         part[0, BELOW_KINK], part[1, BELOW_KINK] = below * part[0, 0], below * part[1, 0]
     if not (force > 0.0 and area > 0.0):
         return OK, 0.0, table_error, count
@@ -230,18 +212,17 @@ def refine(
     `out` has a row for force and one for area, of which the first column is the integral and the others are summed too.
     """
     islands = 0
-    bounds = np.empty((MAX_INTERVALS, 2))
+    bounds = np.empty((MAX_INTERVALS, 4))
     parts = np.empty((MAX_INTERVALS, 2, out.shape[1]))
     errors, work = np.empty(MAX_INTERVALS), np.empty((WORK, PADDED_31.size))
-    floors = np.empty((MAX_INTERVALS, 2), dtype=np.bool_)
     fresh = np.ones(MAX_INTERVALS, dtype=np.bool_)
-    count = first_intervals(gap.compression, surface.kink_d, surface.kink_u, surface.map_scale, bounds, floors)
+    count = first_intervals(gap.compression, surface, bounds)
     table_error = 0.0
     while True:
         force = area = force_error = area_error = 0.0
         for k in range(count):
             if fresh[k]:
-                interval = Interval(bounds[k, 0], bounds[k, 1], floors[k, 0], floors[k, 1])
+                interval = Interval(bounds[k, 0], bounds[k, 1], bounds[k, 2] > 0.0, bounds[k, 3] > 0.0)
                 status, errors[k], own_error, nodes = _rule(
                     which, interval, gap, surface, slopes, table, work, parts[k]
                 )
@@ -263,7 +244,10 @@ def refine(
             if parts[k, 0, 0] * share > rtol * force or parts[k, 1, 0] * share > rtol * area:
                 if count == MAX_INTERVALS:
                     return UNRESOLVED, math.nan, islands
-                halve(k, count, bounds, floors)
+                # the second half becomes number `count`
+                for column in range(1, 4):
+                    bounds[count, column] = bounds[k, column]
+                bounds[k, 1] = bounds[count, 0] = 0.5 * (bounds[k, 0] + bounds[k, 1])
                 fresh[k] = True
                 count += 1
     for row in range(2):
@@ -323,9 +307,8 @@ def total(
     without (2, 1) where it is None: the code of each is compiled by itself. Where `which` is FORCE or AREA, that one is
     given as both.
     """
-    out[:] = math.nan
+    out.fill(0.0)
     if not gap.compression > 0.0:
-        out[:] = 0.0
         return OK, 0.0, 0
     status, error, islands = refine(which, gap, rtol, surface, slopes, table, out)
     if slopes is not None and status == OK and out[0, 0] > 0.0 and out[1, 0] > 0.0:

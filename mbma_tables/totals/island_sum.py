@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -118,27 +117,16 @@ def sum_islands(
     return Totals(found.value[:, 0], found.value[:, -1], error, found.evaluations)
 
 
-@functools.singledispatch
 def totals_of(
-    model: Any, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", which: int = BOTH, workers: int = 1
-) -> Totals:
+    model: AnyModel, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", which: int = BOTH,
+    workers: int = 1,
+) -> Totals:  # fmt: skip
     """Totals by an island model, in the way that suits its class; errors carry a mask of the pairs.
 
     `workers` threads share the compiled pass.
     """
-    return sum_islands(pairs, reading, model, SUM_SHARE * rtol, outside, which)
-
-
-@totals_of.register
-def _(
-    model: UniversalModel,
-    pairs: Pairs,
-    reading: Reading,
-    rtol: float,
-    outside: str = "raise",
-    which: int = BOTH,
-    workers: int = 1,
-) -> Totals:
+    if not isinstance(model, UniversalModel):
+        return sum_islands(pairs, reading, model, SUM_SHARE * rtol, outside, which)
     out, error, islands, missing = _by_table(model, pairs, reading, rtol, outside, which, workers, None)
     force, area = out[:, :, 0].T
     if missing.size and outside == "exact":
@@ -147,24 +135,19 @@ def _(
         except ConvergenceError as fault:
             mask = np.zeros(error.size, dtype=bool)
             mask[missing[fault.mask]] = True
-            raise ConvergenceError(str(fault), mask) from fault
+            fault.mask = mask
+            raise
         force[missing], area[missing], error[missing] = found[:3]
         islands += found.islands
     return Totals(force, area, error, islands)
 
 
-@functools.singledispatch
 def slopes_of(
-    model: Any, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", workers: int = 1
+    model: AnyModel, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", workers: int = 1
 ) -> tuple[FloatArray, FloatArray, int]:
     """Totals with their derivatives (pairs, 2, columns of `intervals`), the bound on their error, islands."""
-    raise InputError(f"derivatives come from tier 'universal', {model.name!r} has none")
-
-
-@slopes_of.register
-def _(
-    model: UniversalModel, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", workers: int = 1
-) -> tuple[FloatArray, FloatArray, int]:
+    if not isinstance(model, UniversalModel):
+        raise InputError(f"derivatives come from tier 'universal', {model.name!r} has none")
     if outside == "exact":
         raise InputError("derivatives come from the universal table: outside must be 'raise' or 'nan' with them")
     return _by_table(model, pairs, reading, rtol, outside, BOTH, workers, True)[:3]

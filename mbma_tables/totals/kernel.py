@@ -74,15 +74,13 @@ class SurfaceConstants(NamedTuple):
     offset_floor_u: float  # b there
     log_floor_d: float
     log_floor_u: float
-    density_divisor: float
     eta_factor: float
     kink_d: float  # x at which zeta_d reaches its floor
     kink_u: float  # x at which zeta_u reaches its floor
     map_scale: float
     jacobian: float  # K1 (47) below kink_d
     jacobian_by_e: float  # derivative of its logarithm by log(e)
-    offset: bool
-    summit_sigma: bool
+    reading: ReadingNumbers
 
 
 class Node(NamedTuple):
@@ -153,15 +151,13 @@ def surface_constants(hurst: float, zeta_1: float, reading: ReadingNumbers, prin
         floor_offset(hurst, zeta_1, reading.floor_u),
         math.log(reading.floor_d),
         math.log(reading.floor_u),
-        reading.density_divisor,
         0.75 * (math.pi * D_top) ** (1.0 / 3.0) * (1.5 * R_top) ** (2.0 / 3.0) * phi ** (-1.0 / 3.0),
         root_floor_d / slope_d,
         root_floor_u / slope_u,
         STRETCH * math.exp(-hurst * log_zeta_1),
         jacobian,
         0.0 if printed else 0.5 * (1.0 - 1.0 / jacobian) * e / (rms_over_s * rms_over_s),
-        reading.offset,
-        reading.summit_sigma,
+        reading,
     )
 
 
@@ -192,15 +188,15 @@ def island_node(x: float, floor_d: bool, floor_u: bool, surface: SurfaceConstant
     band4 = top4 * expm1(p4 * width)
     # m2 = H below2, m4 = (3 H/4 p4) below4, alpha = m0 m4/m2^2
     rate = 0.75 / p4
-    tilt = BROADENING * H / rate if surface.summit_sigma else 0.0
-    D = rate / surface.density_divisor * (band4 / band2)
-    D_d = rate / surface.density_divisor * (below4 / below2)
+    tilt = BROADENING * H / rate if surface.reading.summit_sigma else 0.0
+    D = rate / surface.reading.density_divisor * (band4 / band2)
+    D_d = rate / surface.reading.density_divisor * (below4 / below2)
     sigma = math.sqrt(m0 - tilt * band2 * band2 / band4)
     sigma_d = math.sqrt(1.0 - (e + a) - tilt * below2 * below2 / below4)
     radius = RADIUS / math.sqrt(rate * H)
     R_d = radius / math.sqrt(below4)
     R_u = radius / math.sqrt(below4 + band4)
-    h_d = root_a if surface.offset else 0.0
+    h_d = root_a if surface.reading.offset else 0.0
     both = R_u * R_d
     force = sigma * math.sqrt(2.0 * R_d * sigma)
     mu = 8.0 / 3.0 * D * sigma * math.sqrt(2.0 * both)
@@ -263,7 +259,7 @@ def node_slopes(
         d_below2 -= 2.0 * _moment(p2, log_d, node.below2) / node.below2
     # of summit densities, standard deviations, radii, as in `island_node`
     rate, d_rate = 0.75 / p4, 2.0 * h / p4
-    tilt, d_tilt = BROADENING * H / rate if surface.summit_sigma else 0.0, h / H - d_rate
+    tilt, d_tilt = BROADENING * H / rate if surface.reading.summit_sigma else 0.0, h / H - d_rate
     part, part_d = tilt * node.band2 * node.band2 / node.band4, tilt * node.below2 * node.below2 / node.below4
     d_D, d_D_d = d_rate + d_band4 - d_band2, d_rate + d_below4 - d_below2
     d_sigma = 0.5 * (d_m0 - part * (d_tilt + 2.0 * d_band2 - d_band4)) / (node.sigma * node.sigma)
@@ -272,7 +268,7 @@ def node_slopes(
     below4, band4 = node.below4, node.band4
     d_R_d = -0.5 * (d_rate + h / H + d_below4)
     d_R_u = -0.5 * (d_rate + h / H + (below4 * d_below4 + band4 * d_band4) / (below4 + band4))
-    d_h_d = 0.5 * d_a / surface.root_floor_d if surface.offset else 0.0
+    d_h_d = 0.5 * d_a / surface.root_floor_d if surface.reading.offset else 0.0
     d_root_b = 0.5 * floor_b / node.b if floor_u else d_rms
     d_X = ((node.X * node.sigma + node.h_d) * d_rms - d_h_d) / node.sigma - node.X * d_sigma
     d_height = ((height * node.sigma_d + node.h_d) * d_rms - d_h_d) / node.sigma_d - height * d_sigma_d
