@@ -34,21 +34,18 @@ RECORD_NAMES = (
     *("TERMS", "ERROR", "CENTRE", "RATE", "TOP_MU", "TOP", "BOTTOM_MU", "BOTTOM"),
     *("FORCE_POWERS", "AREA_POWERS"),
 )
-NUMBERS_FILE = "mbma_table.h"
 USAGE = (
-    "Compile mbma.c, which includes mbma_table.h, and link the C mathematics library: cc -std=c99 -O2 -c mbma.c -lm. "
-    "Every function may be called from any thread; nothing is allocated and nothing is kept between calls."
+    "Compile mbma.c and, for the calibrated law and Persson's theory, mbma_theories.c, each with its table beside it, "
+    "and link the C mathematics library: cc -std=c99 -O2 -c mbma.c mbma_theories.c. Every function may be called from "
+    "any thread; nothing is allocated and nothing is kept between calls."
 )
 TITLES = {
-    "mbma.h": "mbma.h: the MBMA model in C99, declarations.",
-    "mbma.c": "mbma.c: the MBMA model in C99.",
-    NUMBERS_FILE: "mbma_table.h: the numbers of the MBMA model in C99, for mbma.c alone.",
-}
-THEORIES_FILE = "mbma_theories_table.h"
-THEORY_TITLES = {
-    "mbma_theories.h": "mbma_theories.h: the calibrated law and Persson's theory in C99, declarations.",
-    "mbma_theories.c": "mbma_theories.c: the calibrated law and Persson's theory in C99, beside mbma.c.",
-    THEORIES_FILE: "mbma_theories_table.h: the numbers of the calibrated law in C99, for mbma_theories.c alone.",
+    "mbma.h": "the MBMA model in C99, declarations.",
+    "mbma.c": "the MBMA model in C99.",
+    "mbma_table.h": "the numbers of the MBMA model in C99, for mbma.c alone.",
+    "mbma_theories.h": "the calibrated law and Persson's theory in C99, declarations.",
+    "mbma_theories.c": "the calibrated law and Persson's theory in C99, beside mbma.c.",
+    "mbma_theories_table.h": "the numbers of the calibrated law in C99, for mbma_theories.c alone.",
 }
 LICENCE = (
     "SPDX-License-Identifier: BSD-3-Clause",
@@ -61,8 +58,7 @@ CONVENTIONS = (
     "(1 - nu1^2)/E1 + (1 - nu2^2)/E2; area is A/A0. Any consistent unit of length. The gap is the separation d from "
     "the mid-plane of the rough surface to the rigid plane, -h_max <= d; contact starts at d = h_max. The mean "
     "separation is u = (h_max + d)/2. Geometry and X, mu are as the table's documentation has them: heights in "
-    "units of s = h_rms/sqrt(1 - zeta_1^(-2 H)), lengths in 1/q0, zeta_1 = q1/q0.",
-    "Outside the table there is no answer, only a status: nothing is clamped or extrapolated.",
+    "units of s = h_rms/sqrt(1 - zeta_1^(-2 H)), lengths in 1/q0, zeta_1 = q1/q0."
 )
 
 
@@ -70,41 +66,17 @@ def c_texts(model: UniversalModel, reading: Reading) -> dict[str, str]:
     """Names and texts of the C sources, the self-test apart."""
     if reading.addition != "sum":
         raise InputError(f"exported code adds the areas of islands: reading {reading.name!r} takes their cover")
-    constants, arrays = numbers(model, reading)
+    tables = {
+        "mbma_table.h": numbers_text(*numbers(model, reading)),
+        "mbma_theories_table.h": numbers_text(*theory_numbers(), what="THEORIES_TABLE"),
+    }
+    prototypes, forms = closed_forms()
     texts = {}
     for name, title in TITLES.items():
-        head = opening(header(model, reading, title, USAGE), "/*")
-        if name == NUMBERS_FILE:
-            texts[name] = f"{head}\n{numbers_text(constants, arrays)}"
-        else:
-            prototypes, forms = closed_forms()
-            texts[name] = filled(name, HEADER=head, CLOSED_FORMS=forms, PROTOTYPES=prototypes)
-    return texts
-
-
-def theory_texts() -> dict[str, str]:
-    """The same of the calibrated law, by its table, and of theories by a spectrum."""
-    table, texts = calibrated_table.shipped(), {}
-    ranges = [
-        f"{name} in [{math.exp(low) if k else low:.4g}, {math.exp(high) if k else high:.4g}]"
-        for k, (name, (low, high)) in enumerate(zip(("H", "zeta_1", "u/h_rms"), table.covered, strict=True))
-    ]
-    lines = [
-        f"Written by mbma_tables {__version__}. Compile mbma_theories.c as mbma.c; it includes mbma_theories_table.h.",
-        "Law calibrated on boundary elements, by a table of force over Hurst exponent, q1/q0 and mean separation; the "
-        f"same law, and Persson's theory, of any spectrum, as a sum over waves. Table: {', '.join(ranges)}; "
-        "other separations continue by the law's limits.",
-        f"Largest relative error of the table against the law: {table.error:.2g}. Simulations scatter about the law by "
-        "percents to tens of percents, which the documentation lists.",
-        CONVENTIONS[0],
-        *LICENCE,
-    ]
-    for name, title in THEORY_TITLES.items():
-        head = opening([title, *lines], "/*")
-        if name == THEORIES_FILE:
-            texts[name] = f"{head}\n{numbers_text(*theory_numbers(), what='THEORIES_TABLE')}"
-        else:
-            texts[name] = filled(name, HEADER=head)
+        about = about_theories() if name.startswith("mbma_theories") else about_model(model, reading)
+        head = opening(header(f"{name}: {title}", USAGE, about), "/*")
+        parts = {"HEADER": head, "CLOSED_FORMS": forms, "PROTOTYPES": prototypes}
+        texts[name] = f"{head}\n{tables[name]}" if name in tables else filled(name, **parts)
     return texts
 
 
@@ -250,8 +222,13 @@ def _initializer(values: FloatArray, indent: str) -> Iterator[str]:
         yield f"{indent}}},"
 
 
-def header(model: UniversalModel, reading: Reading, title: str, usage: str) -> list[str]:
-    """Paragraphs of a file's opening comment: what it is and what made it, range, error, conventions, licence."""
+def header(title: str, usage: str, about: list[str]) -> list[str]:
+    """Paragraphs of a file's opening comment: what it is and what made it, what it holds, conventions, licence."""
+    return [title, f"Written by mbma_tables {__version__}. {usage}", *about, CONVENTIONS, *LICENCE]
+
+
+def about_model(model: UniversalModel, reading: Reading) -> list[str]:
+    """The MBMA model, its reading, range and error."""
     content = model.content
     found, (X, mu) = content.attributes, content.axes
     worst, visited = (
@@ -259,8 +236,6 @@ def header(model: UniversalModel, reading: Reading, title: str, usage: str) -> l
     )
     form, certificates = closed_form_functions.RANGES[FORM], closed_form_functions.CERTIFICATES[FORM]
     return [
-        title,
-        f"Written by mbma_tables {__version__}. {usage}",
         "MBMA model of rough contact (Guo, Ma and Zhu): Phi_F and Phi_A of a contact island over (X, mu) by local "
         "polynomials or a closed form, islands of a self-affine surface, and the surface's force and area at a gap.",
         f"Reading: {reading.name} (density divisor {reading.density_divisor:.17g}, beta {reading.beta:.17g}, phi "
@@ -272,6 +247,21 @@ def header(model: UniversalModel, reading: Reading, title: str, usage: str) -> l
         f"held-out points, {visited:.2g} at islands of random surfaces; each answer carries its own bound.",
         f"Closed form, {FORM}: for {form['X'][0]:g} <= X <= {form['X'][1]:g} and mu <= {form['mu'][1]:g}; largest "
         f"relative error {certificates['phi_F'].largest:.2g} of Phi_F, {certificates['phi_A'].largest:.2g} of Phi_A.",
-        *CONVENTIONS,
-        *LICENCE,
+        "Outside the table there is no answer, only a status: nothing is clamped or extrapolated.",
+    ]
+
+
+def about_theories() -> list[str]:
+    """The calibrated law by its table, and theories by a spectrum."""
+    table = calibrated_table.shipped()
+    ranges = [
+        f"{name} in [{math.exp(low) if k else low:.4g}, {math.exp(high) if k else high:.4g}]"
+        for k, (name, (low, high)) in enumerate(zip(("H", "zeta_1", "u/h_rms"), table.covered, strict=True))
+    ]
+    return [
+        "Law calibrated on boundary elements, by a table of force over Hurst exponent, q1/q0 and mean separation, in C "
+        f"also of any spectrum, as Persson's theory, by a sum over waves. Table: {', '.join(ranges)}; other "
+        "separations continue by the law's limits.",
+        f"Largest relative error of the table against the law: {table.error:.2g}. Simulations scatter about the law by "
+        "percents to tens of percents, which the documentation lists.",
     ]

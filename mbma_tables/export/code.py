@@ -44,7 +44,7 @@ class Language(NamedTuple):
 
 
 SOURCES = ("mbma", "mbma_theories", "mbma_selftest")
-C_SELFTEST = {"mbma_selftest.c": "mbma_selftest.c: replays the conformance points of the MBMA model."}
+C_SELFTEST = {"mbma_selftest.c": "replays the conformance points of the MBMA model."}
 LANGUAGES = {
     "c": Language(
         C_SELFTEST,
@@ -54,8 +54,8 @@ LANGUAGES = {
     ),
     "fortran": Language(
         {
-            "mbma.f90": "mbma.f90: the MBMA model for Fortran 2008, an interface to mbma.c.",
-            "mbma_selftest.f90": "mbma_selftest.f90: what mbma_selftest.c replays, in Fortran 2008.",
+            "mbma.f90": "the MBMA model for Fortran 2008, an interface to mbma.c.",
+            "mbma_selftest.f90": "what mbma_selftest.c replays, in Fortran 2008.",
         }
         | C_SELFTEST,
         "Compile it with the C, in this order: gfortran -O2 mbma.c mbma_theories.c mbma.f90 program.f90. Every "
@@ -68,8 +68,8 @@ LANGUAGES = {
     ),
     "javascript": Language(
         {
-            "mbma.mjs": "mbma.mjs: the MBMA model for JavaScript, mbma.c and mbma_theories.c as WebAssembly.",
-            "mbma_selftest.mjs": "mbma_selftest.mjs: replays the conformance points of the MBMA model in JavaScript.",
+            "mbma.mjs": "the MBMA model for JavaScript, mbma.c and mbma_theories.c as WebAssembly.",
+            "mbma_selftest.mjs": "replays the conformance points of the MBMA model in JavaScript.",
         },
         "import { total, totalSlopes, calibrated, phi } from './mbma.mjs', in any browser since 2021 "
         "and in node: one file, no dependency, nothing to fetch. Answers are objects with a status, which is STATUS.OK "
@@ -134,10 +134,11 @@ def write_code(
 def source_texts(target: str, model: UniversalModel, reading: Reading) -> dict[str, str]:
     """Names and texts of a target's source files."""
     language = LANGUAGES[target]
-    c_texts = c_code.c_texts(model, reading) | c_code.theory_texts()
+    c_texts = c_code.c_texts(model, reading)
     texts = {} if target == "javascript" else c_texts
+    about = c_code.about_model(model, reading) + c_code.about_theories()
     for name, title in language.titles.items():
-        lines = c_code.header(model, reading, title, language.usage)
+        lines = c_code.header(f"{name}: {title}", language.usage, about)
         parts = {"HEADER": opening(lines, "!" if name.endswith(".f90") else "/*")}
         if name == "mbma.mjs":
             parts["WASM"] = base64.encodebytes(web_assembly(c_texts, WASM_FUNCTIONS)).decode("ascii")
