@@ -85,22 +85,7 @@ def is_labelled(value: Any) -> bool:
 def finite_array(name: str, value: ArrayLike) -> FloatArray:
     """`value` as a float64 array; empty, masked, complex, non-numeric, NaN or infinite input is refused.
 
-    Raises
-    ------
-    InputError
-        For what is not an array of real numbers. An array without hidden entries is taken though it is a masked one.
-    OutOfRangeError
-        For NaN and infinity.
-
-    Examples
-    --------
-    >>> from mbma_tables.arguments import finite_array
-    >>> finite_array("x", [1, 2])
-    array([1., 2.])
-    >>> finite_array("x", [1, float("nan")])
-    Traceback (most recent call last):
-        ...
-    mbma_tables.errors.OutOfRangeError: x must be finite, got nan at (1,)
+    An array without hidden entries is taken though it is a masked one.
     """
     # xarray's other containers, and HDF5's: an array with names that would be lost here
     if hasattr(value, "dims") and not is_labelled(value):

@@ -17,62 +17,32 @@ BANDS = 40
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RadialSpectrum:
-    """Height variance by bands of wavenumber.
+    """Height variance by bands of wavenumber; arrays of shape (BANDS,) but for `band`."""
 
-    Attributes
-    ----------
-    q : numpy.ndarray, shape (BANDS,)
-        Wavenumber of each band, the root of mean q^2 weighted by variance [1/length]; NaN for an empty band.
-    q2_mean_inverse : numpy.ndarray, shape (BANDS,)
-        Mean q^-2 of each band, weighted by variance [length^2].
-    variance, gradient, curvature : numpy.ndarray, shape (BANDS,)
-        What the band adds to m0 [length^2], to 2 m2, and to m4 [1/length^2].
-    band : numpy.ndarray, shape (n, n // 2 + 1)
-        Number of the band of every wavevector of the real transform; -1 below the longest wave, BANDS above the
-        shortest.
-    """
-
-    q: FloatArray
-    q2_mean_inverse: FloatArray
-    variance: FloatArray
-    gradient: FloatArray
-    curvature: FloatArray
+    q: FloatArray  # of each band, the root of mean q^2 weighted by variance [1/length]; NaN for an empty band
+    q2_mean_inverse: FloatArray  # mean q^-2 of each band, weighted by variance [length^2]
+    variance: FloatArray  # what the band adds to m0 [length^2],
+    gradient: FloatArray  # to 2 m2,
+    curvature: FloatArray  # and to m4 [1/length^2]
+    # of every wavevector of the real transform, (n, n // 2 + 1): -1 below the longest wave, BANDS above the shortest
     band: NDArray[np.intp]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Bearing:
-    """Curves and numbers of a map that contact depends on; lengths in the map's unit.
-
-    Attributes
-    ----------
-    h_rms, h_max, gradient : float
-        Root-mean-square height, highest point above the mean, rms gradient in two dimensions.
-    quantiles : numpy.ndarray, shape (200,)
-        Heights below which shares `QUANTILES` of the map lie, highest first.
-    mean_height : numpy.ndarray, shape (91,)
-        M(a), mean height of the highest share a of the map, a = `FRACTIONS`.
-    top_gradient : numpy.ndarray, shape (91,)
-        (2/sqrt(pi)) <|w|>/sqrt(2) over the same tops, w the gradient whitened by its own tensor: 1 if Gaussian.
-    tension_force, tension : numpy.ndarray, shape (91,)
-        Mean pressures F at which full contact would pull on shares `FRACTIONS` of the map, and the mean pull then,
-        <max(-p, 0)> over the whole map [E*].
-    anisotropy : float
-        Root of the ratio of the gradient tensor's eigenvalues, at least 1.
-    slope_kurtosis : float
-        (3/8) <|w|^4>: 3 if Gaussian.
-    """
+    """Curves, shape (91,), and numbers of a map that contact depends on; lengths in the map's unit."""
 
     h_rms: float
-    h_max: float
-    gradient: float
-    quantiles: FloatArray
-    mean_height: FloatArray
+    h_max: float  # above the mean
+    gradient: float  # rms in two dimensions
+    quantiles: FloatArray  # heights below which shares `QUANTILES` of the map lie, highest first, shape (200,)
+    mean_height: FloatArray  # M(a), mean height of the highest share a of the map, a = `FRACTIONS`
+    # (2/sqrt(pi)) <|w|>/sqrt(2) over the same tops, w the gradient whitened by its own tensor: 1 if Gaussian
     top_gradient: FloatArray
-    tension_force: FloatArray
-    tension: FloatArray
-    anisotropy: float
-    slope_kurtosis: float
+    tension_force: FloatArray  # mean pressures F at which full contact would pull on shares `FRACTIONS` of the map,
+    tension: FloatArray  # and the mean pull then, <max(-p, 0)> over the whole map [E*]
+    anisotropy: float  # root of the ratio of the gradient tensor's eigenvalues, at least 1
+    slope_kurtosis: float  # (3/8) <|w|^4>: 3 if Gaussian
 
 
 def wavevectors(shape: tuple[int, ...], sizes: tuple[float, float]) -> tuple[FloatArray, FloatArray]:

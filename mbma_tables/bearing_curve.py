@@ -129,15 +129,7 @@ def bearing_share(u: ArrayLike, h_max: ArrayLike | None = None) -> tuple[FloatAr
 
 
 class BearingCurve:
-    """Q(u) of a map's own heights.
-
-    Parameters
-    ----------
-    mean_height : numpy.ndarray, shape (91,)
-        M(a) of `mbma_tables.bearing` [h_rms], a = `FRACTIONS`.
-    h_max : float
-        Highest point [h_rms].
-    """
+    """Q(u) of a map's own heights: of M(a) [h_rms] of `mbma_tables.bearing`, a = `FRACTIONS`, and its highest point."""
 
     def __init__(self, mean_height: FloatArray, h_max: float) -> None:
         above = FRACTIONS * mean_height

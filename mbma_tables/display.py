@@ -34,15 +34,7 @@ class Variable(NamedTuple):
 
 
 def shown(value: Any, unit: str = "1") -> str:
-    """A number, or the range of an array, with its unit; of a DataArray, which may be lazy, its sizes.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mbma_tables.display import shown
-    >>> shown(0.25, "mm"), shown(np.array([1.0, 3.0]))
-    ('0.25 mm', '1 to 3')
-    """
+    """A number, or the range of an array, with its unit; of a DataArray, which may be lazy, its sizes."""
     if is_labelled(value):
         return f"<DataArray {dict(value.sizes)}>"
     numbers = np.asarray(value)

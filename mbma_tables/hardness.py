@@ -42,30 +42,18 @@ NARROW = 0.05  # half-width over which a difference of complementary error funct
 
 @dataclasses.dataclass(frozen=True)
 class Constants:
-    """The law's constants, fitted to boundary elements.
+    """The law's constants, fitted to boundary elements."""
 
-    Attributes
-    ----------
-    area_power, area_scale, yield_power, yield_scale : float
-        a and b of S, for the contact area and for its yielded part.
-    force_light, force_eta, force_share : float
-        n0, c and d of the exponent n.
-    frozen, frozen_eta : float
-        e and f of the frozen contact's stiffness.
-    plane_eta, plane_load : float
-        Of the gap between mean planes: mean interpenetration falls as exp(-(plane_eta - plane_load x) eta).
-    """
-
-    area_power: float = 3.196
+    area_power: float = 3.196  # a and b of S for the contact area,
     area_scale: float = 0.6301
-    yield_power: float = 2.426
+    yield_power: float = 2.426  # and for its yielded part
     yield_scale: float = 0.7138
-    force_light: float = 1.119
+    force_light: float = 1.119  # n0, c and d of the exponent n
     force_eta: float = 1.767
     force_share: float = 0.4736
-    frozen: float = 0.3685
+    frozen: float = 0.3685  # e and f of the frozen contact's stiffness
     frozen_eta: float = 0.2407
-    plane_eta: float = 3.375
+    plane_eta: float = 3.375  # between mean planes interpenetration falls as exp(-(plane_eta - plane_load x) eta)
     plane_load: float = 2.505
 
     @property

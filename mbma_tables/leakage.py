@@ -46,21 +46,11 @@ def wide_gap(u: ArrayLike) -> FloatArray:
 
 @dataclasses.dataclass(frozen=True)
 class FlowConstants:
-    """Constants of the flow.
+    """Constants of the flow."""
 
-    Attributes
-    ----------
-    threshold : float
-        Ac, the contact fraction at which gaps no longer percolate.
-    obstruction : float
-        m, of contact below it.
-    prefactor, exponent : float
-        Of the closed form prefactor u^3 (1 - A/Ac)^exponent.
-    """
-
-    threshold: float = 0.415
-    obstruction: float = 0.89
-    prefactor: float = 0.77
+    threshold: float = 0.415  # Ac, the contact fraction at which gaps no longer percolate
+    obstruction: float = 0.89  # m, of contact below it
+    prefactor: float = 0.77  # of the closed form prefactor u^3 (1 - A/Ac)^exponent
     exponent: float = 3.04
 
     def closed_form(self, u: ArrayLike, area: ArrayLike) -> FloatArray:
@@ -75,23 +65,13 @@ class FlowConstants:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Gaps:
-    """Gaps of the endless Gaussian surface by the calibrated law, at a row of loads.
+    """Gaps of the endless Gaussian surface by the calibrated law, at a row of loads."""
 
-    Attributes
-    ----------
-    share, mean : numpy.ndarray, shape (loads, bands)
-        Share of the surface that leaves contact within a band of magnification, and u1 of it [h_rms].
-    spread : numpy.ndarray, shape (bands,)
-        Rms height of the waves above the band [h_rms].
-    area, separation : numpy.ndarray, shape (loads,)
-        A/A0 and mean gap [h_rms].
-    """
-
-    share: FloatArray
-    mean: FloatArray
-    spread: FloatArray
-    area: FloatArray
-    separation: FloatArray
+    share: FloatArray  # of the surface that leaves contact within a band of magnification, (loads, bands),
+    mean: FloatArray  # and u1 of it [h_rms]
+    spread: FloatArray  # rms height of the waves above each band [h_rms]
+    area: FloatArray  # A/A0 at each load,
+    separation: FloatArray  # and mean gap [h_rms]
 
     @functools.cached_property
     def quadrature(self) -> tuple[FloatArray, FloatArray]:

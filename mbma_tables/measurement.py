@@ -27,19 +27,7 @@ GAPS = np.append(np.geomspace(2e-3, 0.1, 20)[:-1], np.linspace(0.1, 0.98, 60))  
 
 
 def described(surface: MeasuredSurface) -> list[str]:
-    """Lines on what was found in a measurement, what was done to it, and what follows for theories.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mbma_tables import Surface
-    >>> from mbma_tables.measurement import described
-    >>> q = np.geomspace(1, 100, 50)
-    >>> for line in described(Surface.from_spectrum(q, 0.001 * q**-3.6, h_max=0.2, unit="um"))[:2]:
-    ...     print(line)
-    h_rms 0.06265 um, highest point 0.2 um (3.19 h_rms), rms gradient 0.2888
-    waves from 0.06283 to 6.283 um
-    """
+    """Lines on what was found in a measurement, what was done to it, and what follows for theories."""
     unit = surface.unit or "length"
     h_rms, shortest, longest = float(surface.h_rms), 2 * np.pi / float(surface.q1), 2 * np.pi / float(surface.q0)
     lines = [
@@ -105,21 +93,7 @@ def draw(
 ) -> Figure:
     """One picture: heights, spectrum with fit and cut-offs, heights' distribution, area and separation by pressure.
 
-    Parameters
-    ----------
-    treated : Treated
-        The heights themselves.
-    surface : MeasuredSurface
-    answers : mapping
-        Of `curves`.
-    title, pressure_label : str
-    simulated : mapping, optional
-        force, area and mean_separation of boundary elements, drawn as points.
-
-    Raises
-    ------
-    MbmaError
-        Where matplotlib is missing.
+    `answers` are those of `curves`; `simulated` has force, area and mean_separation of boundary elements, as points.
     """
     figure = new_figure(12, 7.5)
     parts: Any = figure.subfigures(2, 1)

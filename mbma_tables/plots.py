@@ -28,38 +28,17 @@ LABELS = {"mbma": "MBMA", "greenwood_williamson": "Greenwood-Williamson", "perss
 
 
 def theory_label(name: str) -> str:
-    """A theory's name in a legend.
-
-    Examples
-    --------
-    >>> from mbma_tables.plots import theory_label
-    >>> theory_label("mbma"), theory_label("persson")
-    ('MBMA', 'Persson')
-    """
+    """A theory's name in a legend."""
     return LABELS.get(name, name.replace("_", " ").capitalize())
 
 
 def force_label(unit: str) -> str:
-    """The axis of force in a unit; "1" where it is over the modulus.
-
-    Examples
-    --------
-    >>> from mbma_tables.plots import force_label
-    >>> force_label("MPa"), force_label("1")
-    ('force  F/A0 [MPa]', 'force  F/(A0 E*)')
-    """
+    """The axis of force in a unit; "1" where it is over the modulus."""
     return FORCE_LABEL if unit == "1" else f"force  F/A0 [{unit}]"
 
 
 def leakage_label(unit: str) -> str:
-    """The axis of flow conductance in a unit; "1" where that is not known.
-
-    Examples
-    --------
-    >>> from mbma_tables.plots import leakage_label
-    >>> leakage_label("um^3")
-    'flow conductance  k h_rms^3 [um^3]'
-    """
+    """The axis of flow conductance in a unit; "1" where that is not known."""
     return LEAKAGE_LABEL if unit == "1" else f"{LEAKAGE_LABEL} [{unit}]"
 
 

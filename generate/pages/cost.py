@@ -18,7 +18,7 @@ from generate.pages import cost_distances
 from generate.pages.cost_islands import island_rows
 from generate.pages.cost_totals import total_rows
 from generate.pages.page import svg, table
-from mbma_tables.scenes.costs import COLUMNS, UNIT, Costs, Distance, Row, read_costs, read_distances
+from mbma_tables.scenes.costs import UNIT, Costs, Distance, Row, read_costs, read_distances
 from mbma_tables.theories import THEORIES
 
 METHODS = {"classical": "classical iteration", "exact": "Newton (exact)"}
@@ -37,7 +37,7 @@ def to_csv(rows: Sequence[Row]) -> str:
     text.write(HEAD)
     text.write(f"# {json.dumps({'machine': platform.machine()} | versions)}\n")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    writer.writerow(Row._fields)
     for row in rows:
         numbers = ("" if number is None else f"{number:.4g}" for number in (row.error, row.cost, row.evaluations))
         writer.writerow((row.tier, row.variant, row.quantity, *numbers))

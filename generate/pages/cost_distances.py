@@ -19,7 +19,7 @@ from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import Law, Spectrum, area
-from mbma_tables.scenes.costs import DISTANCE_COLUMNS, Distance
+from mbma_tables.scenes.costs import Distance
 from mbma_tables.theories import Persson
 
 DEEP = 0.1  # A/A0: distances are told from LOW to DEEP and from DEEP to HIGH
@@ -178,9 +178,9 @@ def to_csv(rows: Sequence[Distance]) -> str:
     text = io.StringIO()
     text.write(HEAD)
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(DISTANCE_COLUMNS)
+    writer.writerow(Distance._fields)
     for row in rows:
-        writer.writerow(f"{v:.4g}" if isinstance(v, float | int) else v for v in vars(row).values())
+        writer.writerow(f"{v:.4g}" if isinstance(v, float | int) else v for v in row)
     return text.getvalue()
 
 

@@ -110,17 +110,10 @@ def _lines(file: Path) -> Any:
 
 
 def _specimen(row: Mapping[str, str], E_star: Any, length: str | None, stress: str | None) -> Specimen:
-    numbers: dict[str, Any] = {name: _number(row[name]) for name in NUMBERS if name in row}
+    numbers: dict[str, Any] = {name: row[name] for name in NUMBERS if name in row}
     if "surface" in row and numbers:
         raise InputError("a named surface and numbers: one of them")
     specimen = from_name(row["surface"]) if "surface" in row else from_numbers(numbers, length)
-    material = {name: _number(row[name]) for name in MATERIAL if name in row}
+    material = {name: row[name] for name in MATERIAL if name in row}
     modulus, unit = effective_modulus_of(material or ({} if E_star is None else {"E_star": E_star}), stress)
     return Specimen(specimen.surface, specimen.title, modulus, unit).in_units(length, stress)
-
-
-def _number(text: str) -> Any:
-    try:
-        return float(text)
-    except ValueError:
-        return text

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import click
 
-from mbma_tables.cli.format import Column, Report, to_json
+from mbma_tables.cli.format import Report, to_columns, to_json
 from mbma_tables.cli.progress import echo
 from mbma_tables.errors import InputError
 
@@ -30,8 +31,7 @@ def cost_command(tier: str | None, distance: bool, as_json: bool) -> None:
     if distance:
         if tier is not None:
             raise InputError("--tier is about numerical error: leave it or --distance out")
-        near = [vars(row) | {"seconds": row.cost * costs.seconds} for row in shipped_distances()]
-        _show("distance", near, costs.seconds, as_json)
+        _show("distance", shipped_distances(), costs.seconds, as_json)
         return
     rows = [row for row in costs.rows if row.tier != UNIT]
     if tier is not None:
@@ -39,16 +39,13 @@ def cost_command(tier: str | None, distance: bool, as_json: bool) -> None:
         rows = [row for row in rows if row.tier == tier]
         if not rows:
             raise InputError(f"--tier must be one of {known}, got {tier!r}")
-    names = ("tier", "variant", "quantity", "error", "cost", "seconds", "evaluations")
-    full = [vars(row) | {"seconds": row.cost * costs.seconds} for row in rows]
-    records = [{name: record[name] for name in names} for record in full]
-    _show("cost", records, costs.seconds, as_json)
+    _show("cost", rows, costs.seconds, as_json)
 
 
-def _show(title: str, records: list[dict[str, Any]], unit: float, as_json: bool) -> None:
+def _show(title: str, rows: Sequence[Any], unit: float, as_json: bool) -> None:
+    records = [row._asdict() | {"seconds": row.cost * unit} for row in rows]
     if as_json:
         echo(to_json({"unit_seconds": unit, "rows": records}))
         return
-    known = [{name: None if value != value else value for name, value in record.items()} for record in records]
-    columns = [Column(name, "-", [record[name] for record in known]) for name in records[0]]
+    columns = to_columns({name: [record[name] for record in records] for name in records[0]}, {})
     echo(Report(title, f"fixed piece of work {unit:.3g} s", [], {}, columns).to_table(), nl=False)

@@ -79,7 +79,12 @@ def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) 
     if plot is not None:
         write_file(plot, _picture(found, plot.suffix[1:]))
     if out is not None:
-        write_file(out, _to_netcdf(found) if out.suffix == ".nc" else _report(found).to_csv().encode())
+        write_file(
+            out,
+            written_bytes("scene.nc", lambda path: found.to_netcdf(path, engine="netcdf4"))
+            if out.suffix == ".nc"
+            else _report(found).to_csv().encode(),
+        )
     if as_json:
         variables = {
             str(name): {"dims": list(field.dims), "units": field.attrs["units"], "values": field.values.tolist()}
@@ -103,10 +108,6 @@ def _report(found: xarray.Dataset) -> Report:
     error = f"error at most {facts['error']:.2g}" if math.isfinite(facts["error"]) else "error not known"
     notes = [f"{made}, rtol {facts['rtol']:.3g}, {error}"]
     return Report("run", str(facts["title"]), notes, dict(facts), columns)
-
-
-def _to_netcdf(found: xarray.Dataset) -> bytes:
-    return written_bytes("scene.nc", lambda path: found.to_netcdf(path, engine="netcdf4"))
 
 
 def _picture(found: xarray.Dataset, kind: str) -> bytes:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.scenes.costs import Costs, shipped_costs
+from mbma_tables.scenes.costs import shipped_costs
 from mbma_tables.scenes.plan import duration, make_plan, seconds_by_theory
 from mbma_tables.scenes.problem import INVERTED, Problem
 
@@ -17,7 +17,7 @@ CANDIDATES = ("calibrated", "persson", "greenwood_williamson")
 QUANTITIES = {"stiffness": "stiffness", "conductance": "stiffness", "force": "force", "energy": "force"}
 
 
-def advice(problem: Problem, costs: Costs | None = None) -> str:
+def advice(problem: Problem) -> str:
     """One line about a gap, stiffness or conductance asked of MBMA; empty where there is nothing to say.
 
     Distances are those of `tables/calibrated.nc` at the contact that the calibrated law expects, in the middle of what
@@ -44,7 +44,7 @@ def advice(problem: Problem, costs: Costs | None = None) -> str:
     nearest = min(CANDIDATES, key=lambda theory: np.nan_to_num(spread[theory], nan=math.inf))
     if not spread[nearest] < np.nan_to_num(spread["mbma"], nan=math.inf):
         return ""
-    measured = shipped_costs() if costs is None else costs
+    measured = shipped_costs()
     price = seconds_by_theory(measured, nearest, problem.gaps.size, problem.prescribed in INVERTED)
     reasons = contact(problem.surface, area=min(area, MAX_AREA), theory=nearest).reasons
     return (

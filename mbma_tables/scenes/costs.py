@@ -7,20 +7,18 @@ of that work on the machine that measured. `python -m generate pages cost` measu
 from __future__ import annotations
 
 import csv
-import dataclasses
 import functools
 import math
 import pathlib
+from typing import Any, NamedTuple
 
 from mbma_tables.files import shipped_file
 
-COLUMNS = ("tier", "variant", "quantity", "error", "cost", "evaluations")
 UNIT = "unit"
-NAMES = ("theory", "way")  # of a distance; its other fields are numbers
+TEXTS = ("tier", "variant", "quantity", "theory", "way")  # fields that are no numbers
 
 
-@dataclasses.dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """One measurement: what answered, what was asked of it, largest relative error found, time and evaluations."""
 
     tier: str
@@ -30,20 +28,19 @@ class Row:
     cost: float  # time over that of the fixed work; seconds in the row of tier `UNIT`
     evaluations: float | None = None  # islands for a gap, pressures for an exact island, height integrals for a table
 
-    @functools.cached_property
+    @property
     def what(self) -> str:
         """The variant without its tolerance."""
         return self.variant.partition(" rtol=")[0]
 
-    @functools.cached_property
+    @property
     def rtol(self) -> float | None:
         """The tolerance asked for, where the variant names one."""
         _, found, text = self.variant.partition(" rtol=")
         return float(text) if found else None
 
 
-@dataclasses.dataclass(frozen=True)
-class Costs:
+class Costs(NamedTuple):
     """All measurements of a file, and the seconds of the fixed piece of work where they were made."""
 
     rows: tuple[Row, ...]
@@ -65,8 +62,7 @@ class Costs:
         return self.seconds * row.cost
 
 
-@dataclasses.dataclass(frozen=True)
-class Distance:
+class Distance(NamedTuple):
     """A way to a theory's answers: its cost, and the theory's distance from boundary elements on held-out surfaces.
 
     Distances are root mean squares of ln(theory/simulation), of area at equal force and of force at equal mean
@@ -85,20 +81,19 @@ class Distance:
     reached_deep: float
 
 
-DISTANCE_COLUMNS = tuple(field.name for field in dataclasses.fields(Distance))
-
-
-def _records(path: pathlib.Path) -> list[dict[str, str]]:
+def _records(kind: Any, path: pathlib.Path) -> tuple[Any, ...]:
+    """Rows of a CSV file whose columns are the fields of a kind; an empty cell is no number."""
     with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+        records = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    return tuple(
+        kind(**{n: text if n in TEXTS else float(text) if text else None for n, text in record.items()})
+        for record in records
+    )
 
 
 def read_distances(path: pathlib.Path) -> tuple[Distance, ...]:
-    """Distances from a CSV file with `DISTANCE_COLUMNS`."""
-    return tuple(
-        Distance(*(text if name in NAMES else float(text) for name, text in record.items()))  # type: ignore[arg-type]
-        for record in _records(path)
-    )
+    """Distances from a CSV file."""
+    return _records(Distance, path)
 
 
 @functools.cache
@@ -108,15 +103,8 @@ def shipped_distances() -> tuple[Distance, ...]:
 
 
 def read_costs(path: pathlib.Path) -> Costs:
-    """Costs from a CSV file with `COLUMNS`."""
-
-    def number(text: str) -> float | None:
-        return float(text) if text else None
-
-    rows = tuple(
-        Row(r["tier"], r["variant"], r["quantity"], number(r["error"]), float(r["cost"]), number(r["evaluations"]))
-        for r in _records(path)
-    )
+    """Costs from a CSV file."""
+    rows = _records(Row, path)
     (seconds,) = (row.cost for row in rows if row.tier == UNIT)
     return Costs(rows, seconds)
 

@@ -10,6 +10,7 @@ from mbma_tables.scenes.effects import CORRELATIONS
 from mbma_tables.scenes.plan import Plan
 from mbma_tables.scenes.problem import Problem
 from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.theories.result import MEANINGS
 from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
@@ -24,32 +25,15 @@ def _units(problem: Problem) -> dict[str, tuple[str, str]]:
     """Unit and meaning of every quantity that a scene can hold."""
     hertz = "subscale_area" in problem.dropped
     # the name that has its unit, and what it is
-    quantities = {
-        "separation": ("separation", "d, rigid plane to mid-plane"),
-        "mean_separation": ("separation", "u = (h_max + d)/2 (Eq. 50)"),
+    quantities = {name: (name, text) for name, text in MEANINGS.items()} | {
         "nominal_pressure": ("pressure", "F/A0 as prescribed"),
         "prescribed_area": ("area", "A/A0 as prescribed"),
-        "valid": ("valid", "whether the theory was tested for contacts such as these"),
-        "scatter": ("scatter", "standard deviation of ln F at this gap from simulation to simulation"),
-        "area_scatter": ("scatter", "standard deviation of ln A at this force from simulation to simulation"),
-        "force": ("force", "nominal pressure F/A0"),
         "area": ("area", "Hertz area of the summits over A0 (eta = 1)" if hertz else "real contact area A/A0"),
         "stiffness": ("stiffness", "-dF/dd per nominal area"),
         "stiffness_mean": ("stiffness", "-dF/du per nominal area"),
-        "energy": ("energy", "elastic energy per nominal area"),
-        "yielded": ("area", "share of the contact area at the hardness"),
-        "mean_pressure": ("pressure", "mean pressure in the contact"),
-        "plane_separation": ("separation", "gap between mean planes, u less what yielded points are flattened"),
-        "incremental_stiffness": ("stiffness", "-dF/du per nominal area of a small unloading"),
-        "leakage": (
-            "leakage",
-            "flow conductance k h_rms^3: flow per length of seal is it dp/(12 viscosity width)",
-        ),
+        "leakage": ("leakage", "flow conductance k h_rms^3: flow per length of seal is it dp/(12 viscosity width)"),
         "leakage_valid": ("valid", "whether flow through such contacts was simulated"),
-        "leakage_scatter": (
-            "scatter",
-            "standard deviation of ln of the flow conductance from simulation to simulation",
-        ),
+        "leakage_scatter": ("scatter", "standard deviation of ln of the flow conductance between simulations"),
         "leakage_blocked": ("valid", "whether contact percolates"),
         "island_number": ("D", "islands in contact per nominal area (Eq. 42)"),
         "island_delta": ("delta", "approach of an island"),

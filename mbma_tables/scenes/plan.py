@@ -110,10 +110,6 @@ class Plan:
         """Largest error of a step of the scene's theory; those compared state their own."""
         return max((step.error for step in self.steps if step.tier is not None or step.theory), default=0.0)
 
-    def step(self, name: str) -> Step | None:
-        """The step with that name."""
-        return next((step for step in self.steps if step.name == name), None)
-
     def text(self) -> str:
         """As a database prints a query plan."""
         times = f"time={duration(self.seconds)}, first use in a process {duration(self.first_use)} more"
@@ -163,16 +159,13 @@ def make_plan(problem: Problem, costs: Costs | None = None) -> Plan:
         if plan.error > rtol:
             continue  # too tight for the theory
         if math.isnan(plan.seconds):
-            raise InputError(f"the cost of {_unpriced(plan)} is not known: give rtol instead of seconds")
+            step = next(step for step in plan.steps if math.isnan(step.seconds))
+            unpriced = f"theory {step.theory!r}" if step.theory else f"step {step.name!r}"
+            raise InputError(f"the cost of {unpriced} is not known: give rtol instead of seconds")
         if plan.seconds <= problem.seconds:
             return plan
         least = plan.seconds
     raise InputError(f"seconds = {problem.seconds:g} is too little: the cheapest plan takes about {least:.3g} s")
-
-
-def _unpriced(plan: Plan) -> str:
-    step = next(step for step in plan.steps if math.isnan(step.seconds))
-    return f"theory {step.theory!r}" if step.theory else f"step {step.name!r}"
 
 
 def seconds_by_theory(costs: Costs, theory: str, count: int, inverse: bool, energy: bool = False) -> float:

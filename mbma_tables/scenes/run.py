@@ -67,7 +67,7 @@ def run_plan(problem: Problem, plan: Plan, progress: Progress | None = None) -> 
         run.gap = problem.gaps if problem.prescribed == "separations" else 2 * problem.gaps - h_max
     for step in plan.steps:
         run.progress(step.name, 0, step.count)
-        (_by_theory if step.theory else _STEPS.get(step.name, _comparison))(run, step)
+        _STEPS.get(step.name, _comparison)(run, step)
         run.progress(step.name, step.count, step.count)
     error = max(run.errors.values(), default=0.0)
     if error > plan.rtol:
@@ -89,16 +89,17 @@ def height_without_end(problem: Problem, rtol: float) -> float:
 
 
 def _law(run: Run, step: Step) -> None:
+    """Through a law, for MBMA one tight enough for the slopes and gaps that are asked."""
     from mbma_tables.theories.law import MIN_LAW_RTOL, contact_law
 
     problem, wanted = run.problem, run.problem.outputs
     assert step.rtol is not None
-    assert step.tier is not None
     inverse = problem.prescribed in INVERTED
     tier, asked = step.tier, step.rtol
     while True:
+        own: dict[str, Any] = {"theory": problem.theory} if step.theory else {"tier": tier, "reading": problem.reading}
         try:
-            law = contact_law(run.surface, asked, tier, problem.reading, problem.E_star)
+            law = contact_law(run.surface, asked, E_star=problem.E_star, **own)
         except OutOfRangeError:
             if not isinstance(tier, str) or tier not in TABLES:
                 raise
@@ -107,10 +108,10 @@ def _law(run: Run, step: Step) -> None:
         error = _find_gaps(run, law) if inverse else law.error
         if wanted & {"stiffness", "conductance"}:
             error = max(error, _slope_error(law, run.gap, inverse))
-        if error <= run.rtol or asked <= MIN_LAW_RTOL:
+        if step.theory or error <= run.rtol or asked <= MIN_LAW_RTOL:
             break
         asked = max(0.1 * asked, MIN_LAW_RTOL)
-    _keep_law(run, law)
+    _keep(run, lambda name: getattr(law, {"stiffness": "stiffness_mean"}.get(name, name))(run.gap))
     run.close(step, error, dataclasses.replace(step, tier=tier).tier_name)
 
 
@@ -126,87 +127,50 @@ def _find_gaps(run: Run, law: ContactLaw) -> float:
     return (1 + max(1.0, float(ratio.max(initial=0.0)))) * law.error
 
 
-Quantity = Callable[[], Any]
-
-
-def _keep_quantities(
-    run: Run,
-    force: Quantity,
-    area: Quantity,
-    stiffness_mean: Quantity,
-    energy: Quantity,
-    incremental: Quantity | None = None,
-) -> None:
-    """The quantities at gaps that were asked for, and what was prescribed; conductance by the incremental stiffness."""
+def _keep(run: Run, quantity: Callable[[str], Any]) -> None:
+    """What was prescribed, and the quantities at gaps that were asked for, by name; stiffness is by u, energy by d."""
     problem, wanted = run.problem, run.problem.outputs
     values: dict[str, Any] = {}
     if problem.prescribed in INVERTED:
         values["nominal_pressure" if problem.prescribed == "pressures" else "prescribed_area"] = problem.gaps
     if "force" in wanted:
-        values["force"] = force()
+        values["force"] = quantity("force")
     if "area" in wanted and "subscale_area" not in problem.dropped:
-        values["area"] = area()
-    if wanted & {"stiffness", "conductance"}:
-        slope = stiffness_mean()
-        if "stiffness" in wanted:
-            values |= {"stiffness": slope / 2, "stiffness_mean": slope}
-        if "conductance" in wanted:
-            from mbma_tables.totals.conductance import conductance, mean_conductivity
+        values["area"] = quantity("area")
+    if "stiffness" in wanted:
+        slope = quantity("stiffness")
+        values |= {"stiffness": slope / 2, "stiffness_mean": slope}
+    if "conductance" in wanted:
+        from mbma_tables.totals.conductance import conductance, mean_conductivity
 
-            assert problem.conductivities is not None
-            if incremental is not None:
-                slope = incremental()
-            values["conductance"] = conductance(slope, mean_conductivity(*problem.conductivities), problem.E_star)
+        assert problem.conductivities is not None
+        # yielded points unload elastically
+        slope = quantity("stiffness" if problem.hardness is None else "incremental_stiffness")
+        values["conductance"] = conductance(slope, mean_conductivity(*problem.conductivities), problem.E_star)
     if "energy" in wanted:
-        values["energy"] = energy()
+        values["energy"] = quantity("energy")
     run.found |= {name: (("gap",), array) for name, array in values.items()}
 
 
-def _keep_law(run: Run, law: ContactLaw) -> None:
-    """The quantities of a law at the gaps."""
-    _keep_quantities(
-        run,
-        lambda: law.force(run.gap),
-        lambda: law.area(run.gap),
-        lambda: law.stiffness_mean(run.gap),
-        lambda: law.energy(run.gap),
-    )
+def _contact(run: Run, step: Step) -> None:
+    """Another theory, or one with a hardness, at the gaps themselves."""
+    from mbma_tables.theories.contact import contact
 
-
-def _by_theory(run: Run, step: Step) -> None:
-    """Another theory: at the gaps themselves, or through its law."""
     problem = run.problem
-    if step.name == "law":
-        from mbma_tables.theories.law import contact_law
-
-        assert step.rtol is not None
-        law = contact_law(run.surface, step.rtol, E_star=problem.E_star, theory=problem.theory)
-        error = _find_gaps(run, law) if problem.prescribed in INVERTED else law.error
-        _keep_law(run, law)
-    else:
-        from mbma_tables.theories.contact import contact
-
-        assert problem.prescribed is not None
-        known: dict[str, Any] = {problem.prescribed[:-1]: problem.gaps}
-        if problem.hardness is not None:
-            known["hardness"] = problem.hardness
-            if problem.theory == "mbma":
-                known |= {"reading": problem.reading, "rtol": step.rtol, "tier": problem.tier or "universal"}
-        found = contact(run.surface, E_star=problem.E_star, theory=problem.theory, **known)
-        run.gap, error = found.separation, float(found.error.max())
-        # over d, which moves twice as far as u
-        _keep_quantities(
-            run,
-            lambda: found.force,
-            lambda: found.area,
-            lambda: found.stiffness,
-            lambda: 2 * found.energy,
-            lambda: found.incremental_stiffness,
-        )
-        if problem.hardness is not None:
-            names = ("yielded", "mean_pressure", "plane_separation", "incremental_stiffness")
-            run.found |= {name: (("gap",), getattr(found, name)) for name in names}
-    run.close(step, error, None)
+    assert problem.prescribed is not None
+    known: dict[str, Any] = {problem.prescribed[:-1]: problem.gaps}
+    if problem.hardness is not None:
+        known["hardness"] = problem.hardness
+        if problem.theory == "mbma":
+            known |= {"reading": problem.reading, "rtol": step.rtol, "tier": problem.tier or "universal"}
+    found = contact(run.surface, E_star=problem.E_star, theory=problem.theory, **known)
+    run.gap = found.separation
+    # over d, which moves twice as far as u
+    _keep(run, lambda name: 2 * found.energy if name == "energy" else getattr(found, name))
+    if problem.hardness is not None:
+        names = ("yielded", "mean_pressure", "plane_separation", "incremental_stiffness")
+        run.found |= {name: (("gap",), getattr(found, name)) for name in names}
+    run.close(step, float(found.error.max()), None)
 
 
 def _asked(run: Run) -> Contact:
@@ -327,6 +291,7 @@ def _comparison(run: Run, step: Step) -> None:
 
 _STEPS = {
     "law": _law,
+    "contact": _contact,
     "totals": _totals,
     "hertz area": _islands,
     "island statistics": _islands,

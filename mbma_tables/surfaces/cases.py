@@ -30,26 +30,27 @@ def _moments(hurst: float, m0: float, m2: float, m4: float, h_max: float) -> dic
     return {"hurst": hurst, "m0": m0, "m2": m2, "m4": m4, "h_max": h_max}
 
 
-_YANG_PERSSON = _band(0.8, 6 * math.pi / 1040 * 10, 216, 1.0, 3.0)
-_PAPANGELO = _band(0.8, 2 * math.pi / 100, 64, 5.0, 3.0)
-_CONCRETE = _moments(0.7, 0.071, 0.27, 62.0, 1.1)
-_ASPHALT = _moments(0.85, 0.091, 2.67, 21000.0, 1.37)
-_CHALLENGE = _band(0.8, 2 * math.pi / 20, 200, 0.762, 3.7)
-_RESOLUTIONS = {zeta_1: _band(0.7, 0.1, zeta_1, 1.0, 3.0) for zeta_1 in (125, 250, 500, 1000)}
-
 CASES = {
     case.name: case
     for case in (
-        Case("yang-persson", "Yang-Persson molecular dynamics (Fig. 11)", "nm", _YANG_PERSSON),
-        Case("papangelo", "Papangelo Green's function simulation (Fig. 12)", "um", _PAPANGELO),
-        Case("concrete", "concrete road of Lorenz (Figs. 13a, 14a)", "mm", _CONCRETE),
-        Case("asphalt", "asphalt road of Lorenz (Figs. 13b, 14b)", "mm", _ASPHALT),
-        Case("challenge", "contact-mechanics challenge (Fig. 15)", "um", _CHALLENGE),
+        Case(
+            "yang-persson",
+            "Yang-Persson molecular dynamics (Fig. 11)",
+            "nm",
+            _band(0.8, 6 * math.pi / 1040 * 10, 216, 1.0, 3.0),
+        ),
+        Case(
+            "papangelo",
+            "Papangelo Green's function simulation (Fig. 12)",
+            "um",
+            _band(0.8, 2 * math.pi / 100, 64, 5.0, 3.0),
+        ),
+        Case("concrete", "concrete road of Lorenz (Figs. 13a, 14a)", "mm", _moments(0.7, 0.071, 0.27, 62.0, 1.1)),
+        Case("asphalt", "asphalt road of Lorenz (Figs. 13b, 14b)", "mm", _moments(0.85, 0.091, 2.67, 21000.0, 1.37)),
+        Case("challenge", "contact-mechanics challenge (Fig. 15)", "um", _band(0.8, 2 * math.pi / 20, 200, 0.762, 3.7)),
         *(
-            Case(
-                f"resolution-{zeta_1}", f"resolution study over h_rms, zeta_1 = {zeta_1} (Figs. 16, 17)", None, numbers
-            )
-            for zeta_1, numbers in _RESOLUTIONS.items()
+            Case(f"resolution-{z}", f"resolution study over h_rms, zeta_1 = {z} (Figs. 16, 17)", None, numbers)
+            for z, numbers in ((z, _band(0.7, 0.1, z, 1.0, 3.0)) for z in (125, 250, 500, 1000))
         ),
     )
 }

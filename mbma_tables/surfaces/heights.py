@@ -20,26 +20,14 @@ TAIL_NODES = 400  # shares at which heights are convolved
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Heights:
-    """The distribution of a surface's heights about their mean.
+    """The distribution of a surface's heights about their mean."""
 
-    Attributes
-    ----------
-    quantiles : numpy.ndarray, shape (203,)
-        Heights above which `SHARES` of the surface lie, highest first [length].
-    h_rms, h_max : float
-        Root mean square, and highest point [length].
-    skewness, kurtosis : float
-        0 and 3 if Gaussian.
-    top : float
-        Share of the surface that its highest point stands for.
-    """
-
-    quantiles: FloatArray
+    quantiles: FloatArray  # above which `SHARES` of the surface lie, highest first [length]
     h_rms: float
     h_max: float
-    skewness: float
-    kurtosis: float
-    top: float
+    skewness: float  # 0 if Gaussian
+    kurtosis: float  # 3 if Gaussian
+    top: float  # share of the surface that its highest point stands for
 
     @classmethod
     def of(cls, heights: ArrayLike) -> Heights:

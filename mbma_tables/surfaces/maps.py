@@ -19,7 +19,8 @@ from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.measurements import grid_of, read_measurement
 from mbma_tables.surfaces.power_law import SCATTER, log_bins
 from mbma_tables.surfaces.power_laws import PowerLaws
-from mbma_tables.surfaces.psd import FittedSurface, check_band, fit_spectrum
+from mbma_tables.surfaces.psd import check_band, fit_spectrum
+from mbma_tables.surfaces.surface import Surface
 from mbma_tables.surfaces.treatment import LENGTHS, Treated, Treatment, mirrored, treat
 from mbma_tables.units import Units, known, resolve
 
@@ -100,7 +101,7 @@ def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2
     return treat(grid, steps, whole, Treatment(**given), own, info)
 
 
-def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | None) -> FittedSurface:
+def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | None) -> Surface:
     """The self-affine surface fitted to a height map; see `Surface.from_map`."""
     top = None if h_max is None else one_height(h_max)
     _refuse_edges(treated.heights)
@@ -187,10 +188,11 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
 
 
 def _with_anisotropy(
-    fitted: FittedSurface, q: FloatArray, strength: FloatArray, directions: NDArray[np.complex128]
-) -> FittedSurface:
+    fitted: Surface, q: FloatArray, strength: FloatArray, directions: NDArray[np.complex128]
+) -> Surface:
     """The same with its anisotropy noted; refused where its fitted waves favour a direction."""
     fit = fitted.fit
+    assert fit is not None
     inside = (q >= fit.q_low) & (q <= fit.q_high)
     # whitened by the law, and between every wave alike (the shortest decide) and every octave alike (the longest)
     weight = strength[inside] * q[inside] ** (1 + 2 * fitted.hurst)
@@ -200,4 +202,4 @@ def _with_anisotropy(
             f"the map is not isotropic: an anisotropy of {anisotropy:.2g} between q = {fit.q_low:.4g} and "
             f"{fit.q_high:.4g}, more than {MAX_ANISOTROPY} (1: all power in one direction)"
         )
-    return fitted._replace(fit=dataclasses.replace(fit, anisotropy=anisotropy))
+    return dataclasses.replace(fitted, fit=dataclasses.replace(fit, anisotropy=anisotropy), unit=fit.length_unit)

@@ -236,7 +236,7 @@ class MeasuredSurface(AnySurface):
             power=float(self.m0),
             convention="paper",
         )
-        return Surface(**fitted._asdict(), unit=self.unit)
+        return dataclasses.replace(fitted, unit=self.unit)
 
     def departures(self, by_map: bool = False) -> tuple[str, ...]:
         """Why it lies outside of the surfaces that boundary elements were compared with.
@@ -326,17 +326,7 @@ def two_columns(q: ArrayLike, C: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 def resolution(surface: MeasuredSurface) -> dict[str, Any]:
-    """A record of how much the shortest octave of a measured spectrum matters.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from mbma_tables import Surface
-    >>> from mbma_tables.surfaces.measured import resolution
-    >>> q = np.geomspace(1, 100, 50)
-    >>> print(resolution(Surface.from_spectrum(q, q**-3.6, h_max=3.0, unit="um"))["told"])
-    area is a matter of resolution: waves are known down to 0.06283 um, and without the last octave of them area at light load would be 1.18 times larger
-    """  # noqa: E501
+    """A record of how much the shortest octave of a measured spectrum matters."""
     laws = surface.laws
     below = float(laws.below(2, laws.place(np.asarray(surface.q1 / 2))))
     factor = math.sqrt(laws.moment(2) / below) if below > 0 else math.inf

@@ -38,25 +38,9 @@ def read_measurement(
     unit: str | None = None,
     channel: int | None = None,
 ) -> Any:
-    """The topography or line scan in a file: any format of SurfaceTopography, and text with commas.
+    """The topography or line scan in a file: any format of SurfaceTopography, and text with commas; "-" is stdin.
 
-    Parameters
-    ----------
-    path : path
-        "-" is standard input.
-    dx, dy : float, optional
-        Sampling steps [length], where the file has none.
-    unit : str, optional
-        Length unit, where the file has none.
-    channel : int, optional
-        Number of the channel; the file's own default if not given.
-
-    Raises
-    ------
-    MbmaError
-        Where SurfaceTopography is not installed.
-    InputError
-        Where there is no such file, that library cannot read it, or steps are missing or given twice.
+    Sampling steps [length] and unit are of files that have none; without a channel it is the file's own default.
     """
     module, place = library(), pathlib.Path(path)
     piped = os.fspath(path) == "-"

@@ -31,14 +31,9 @@ def growth(x: FloatArray) -> FloatArray:
 
 
 class PowerLaws:
-    """Power laws between samples; where the spectrum is zero at one of them, nothing lies between.
+    """Power laws between samples of C(q) [length^4], h_rms^2 = 2 pi integral C q dq, not negative.
 
-    Parameters
-    ----------
-    q : ndarray, shape (n,)
-        Wavenumber [1/length], rising; a repeated one is a jump.
-    C : ndarray, shape (n,)
-        Spectrum [length^4] as h_rms^2 = 2 pi integral C q dq, not negative.
+    q [1/length] rises; a repeated one is a jump. Where C is zero at a sample, nothing lies on either side of it.
     """
 
     def __init__(self, q: FloatArray, C: FloatArray) -> None:

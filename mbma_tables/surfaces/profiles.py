@@ -32,31 +32,17 @@ MIN_NODES = 5
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ProfileSpectrum:
-    """A line scan's spectrum in bins, and what follows from it.
+    """A line scan's spectrum in n bins, and what follows from it."""
 
-    Attributes
-    ----------
-    edges, mean, count : numpy.ndarray
-        Wavenumbers between bins, shape (n + 1,) [1/length]; mean C_1D [length^3] and number of waves, shape (n,).
-    kernel : numpy.ndarray, shape (n, PANELS n)
-        C_1D of each bin for C = 1 on each panel.
-    h_rms, gradient : float
-        Of the surface, if isotropic [length], [-].
-    h_rms_error, gradient_error : float
-        Relative standard errors, of a Gaussian surface.
-    longest : float
-        Share of the height variance in the LONGEST longest waves.
-    """
-
-    edges: FloatArray
-    mean: FloatArray
-    count: FloatArray
-    kernel: FloatArray
-    h_rms: float
+    edges: FloatArray  # wavenumbers between bins, shape (n + 1,) [1/length]
+    mean: FloatArray  # C_1D of each bin [length^3],
+    count: FloatArray  # and its number of waves
+    kernel: FloatArray  # C_1D of each bin for C = 1 on each panel, shape (n, PANELS n)
+    h_rms: float  # of the surface, if isotropic [length],
     gradient: float
-    h_rms_error: float
+    h_rms_error: float  # and relative standard errors, if Gaussian
     gradient_error: float
-    longest: float
+    longest: float  # share of the height variance in the LONGEST longest waves
 
     @classmethod
     def of(cls, treated: Treated) -> ProfileSpectrum:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +27,7 @@ from mbma_tables.surfaces.power_law import (
     with_end_of_profile,
 )
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
+from mbma_tables.surfaces.surface import Surface
 
 CONVENTIONS = ("paper", "isotropic", "profile")
 MAX_RESIDUAL = 0.2  # of log10 C, a factor 1.6: beyond it the law says little about any one scale
@@ -96,17 +97,6 @@ class SpectrumFit:
         return f"SpectrumFit({', '.join(fields)})"
 
 
-class FittedSurface(NamedTuple):
-    """The five numbers of the fitted surface, and how well they fit."""
-
-    hurst: float
-    q0: float
-    q1: float
-    h_rms: float
-    h_max: float
-    fit: SpectrumFit
-
-
 def check_band(band: Any, low: float, high: float) -> tuple[float, float] | None:
     """A forced band as two numbers inside [low, high], the range that the measurement holds."""
     if band is None:
@@ -119,9 +109,7 @@ def check_band(band: Any, low: float, high: float) -> tuple[float, float] | None
     return float(pair[0]), float(pair[1])
 
 
-def fit_psd(
-    q: ArrayLike, C: ArrayLike, h_max: float, convention: str, band: tuple[float, float] | None
-) -> FittedSurface:
+def fit_psd(q: ArrayLike, C: ArrayLike, h_max: float, convention: str, band: tuple[float, float] | None) -> Surface:
     """The self-affine surface fitted to a measured spectrum; see `Surface.from_spectrum`.
 
     Notes
@@ -190,7 +178,7 @@ def fit_spectrum(
     power: float,
     convention: str,
     **known: Any,
-) -> FittedSurface:
+) -> Surface:
     """The surface whose band fits C, in the paper's convention or a profile's; for spectra and maps alike.
 
     `counts` and `variances` are independent samples and variance of height of each entry; `power` is the sum of all
@@ -228,7 +216,7 @@ def fit_spectrum(
     scale = math.exp(law.log_k) / (2 * math.pi * beta(exponent + 0.5, 0.5) * unit if profile else 1.0)
     z0, z1 = q0 / unit, q1 / unit
     growth = -math.expm1(-2 * exponent * math.log(z1 / z0)) * z0 ** (-2 * exponent)
-    return FittedSurface(exponent, q0, q1, unit * math.sqrt(math.pi * scale * growth / exponent), h_max, fit)
+    return Surface(exponent, q0, q1, unit * math.sqrt(math.pi * scale * growth / exponent), h_max, fit=fit)
 
 
 def _law_of(bins: Bins, unit: float, profile: bool, breaks: bool) -> tuple[PowerLaw, float, float]:

@@ -102,15 +102,8 @@ class Reading:
     @property
     def numbers(self) -> ReadingNumbers:
         """What compiled code needs; the Jacobian goes beside it."""
-        return ReadingNumbers(
-            float(self.density_divisor),
-            float(self.beta),
-            float(self.phi),
-            float(self.floor_d),
-            float(self.floor_u),
-            bool(self.offset),
-            bool(self.summit_sigma),
-        )
+        values = [getattr(self, name) for name in ReadingNumbers._fields]
+        return ReadingNumbers._make([*map(float, values[:5]), *map(bool, values[5:])])
 
 
 PRINTED = Reading("printed")

@@ -31,26 +31,10 @@ def measured_surface(
 
 
 def extrapolated(surface: MeasuredSurface, shortest: Any, hurst: Any) -> MeasuredSurface:
-    """A measured spectrum continued to a shorter wavelength by a power law that is stated, not measured.
+    """A measured spectrum continued to a shorter wavelength [length] by a power law that is stated, not measured.
 
-    Parameters
-    ----------
-    surface : MeasuredSurface
-    shortest : float
-        Wavelength down to which it is continued [length].
-    hurst : float
-        C goes like q^(-2-2H), from the mean level of the last measured octave.
-
-    Returns
-    -------
-    MeasuredSurface
-        Its record says what that changes. Curves of the map's tops and valleys are left out: they are not known of
-        the waves added.
-
-    Raises
-    ------
-    InputError
-        Where that wavelength was measured.
+    C goes like q^(-2-2H), from the mean level of the last measured octave; the record says what that changes. Curves of
+    the map's tops and valleys are left out: they are not known of the waves added.
     """
     wave, exponent = (
         number_in("extrapolate_to", Units(surface.unit).number("extrapolate_to", shortest), 1e-30, 1e30),

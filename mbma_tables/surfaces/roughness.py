@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -42,18 +42,6 @@ SAID = {
 }
 
 
-class Drawn(NamedTuple):
-    """The five numbers of a surface, its unit, and what was given and assumed."""
-
-    hurst: Any
-    q0: Any
-    q1: Any
-    h_rms: Any
-    h_max: Any
-    unit: str | None
-    provenance: tuple[Mapping[str, Any], ...]
-
-
 def _one_of(names: tuple[str, ...], given: Mapping[str, Any], what: str, needed: bool = True) -> str | None:
     """Which of the names is given, at most one."""
     found = [name for name in names if name in given]
@@ -62,8 +50,8 @@ def _one_of(names: tuple[str, ...], given: Mapping[str, Any], what: str, needed:
     return found[0] if found else None
 
 
-def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> Drawn:
-    """The surface that numbers of a drawing describe; see `Surface.from_roughness`."""
+def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of `Surface` from numbers of a drawing; see `Surface.from_roughness`."""
     given, unit = resolve({name: value for name, value in numbers.items() if value is not None}, unit)
     height = _one_of(HEIGHTS, given, "the height of roughness")
     slope = _one_of(SLOPES, given, "the slope of roughness", needed=False)
@@ -92,7 +80,8 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> Drawn:
     used = ("hurst", height, top, *band)
     shown = {name: given[name].tolist() if hasattr(given[name], "tolist") else given[name] for name in used}
     record = {"step": "from_roughness", "given": shown, "unit": unit, "assumed": [SAID[name] for name in used]}
-    return Drawn(at["hurst"], q0, q1, h_rms, at[top], unit, (record,))
+    surface = {"hurst": at["hurst"], "q0": q0, "q1": q1, "h_rms": h_rms, "h_max": at[top]}
+    return surface | {"unit": unit, "provenance": (record,)}
 
 
 def _band(

@@ -222,7 +222,7 @@ class Surface(AnySurface):
         given = {name: value for name, value in locals().items() if name not in ("cls", "unit")}
         from mbma_tables.surfaces.roughness import surface_of_roughness
 
-        return cls(**surface_of_roughness(unit, given)._asdict())
+        return cls(**surface_of_roughness(unit, given))
 
     @classmethod
     def named(cls, name: str) -> Surface:
@@ -316,7 +316,7 @@ class Surface(AnySurface):
             top = Heights.of(heights).h_max if h_max is None and heights is not None else h_max
             if top is None:
                 raise InputError("h_max is missing: the highest point above the mid-plane, or heights= of the surface")
-            return cls(**fit_psd(q, C, top, convention, band)._asdict(), unit=unit)
+            return dataclasses.replace(fit_psd(q, C, top, convention, band), unit=unit)
         if convention not in ("paper", "isotropic"):
             raise InputError(
                 f"convention must be 'paper' or 'isotropic', got {convention!r}: a profile's spectrum can be fitted, "
@@ -425,8 +425,7 @@ class Surface(AnySurface):
         treated = prepared(heights, treatment)
         if model == "measured":
             return measured_surface(treated, h_max, extrapolate_to, extrapolate_hurst)
-        fitted = fit_map(treated, h_max, band)
-        surface = cls(**fitted._asdict(), unit=fitted.fit.length_unit)
+        surface = fit_map(treated, h_max, band)
         return dataclasses.replace(surface, provenance=(*treated.provenance, resolution(surface.sampled())))
 
     @staticmethod

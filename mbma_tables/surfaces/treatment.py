@@ -75,30 +75,14 @@ class Treatment:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Treated:
-    """Heights as they go into a spectrum, and how they came about.
+    """Heights as they go into a spectrum, and how they came about."""
 
-    Attributes
-    ----------
-    heights : numpy.ndarray, shape (nx, ny) or (n,)
-        [length]; none undefined.
-    steps : tuple of float
-        Sampling step along each axis [length].
-    periodic : bool
-        Whether they continue periodically; else by their mirror images where that is needed.
-    unit : str or None
-        Length unit that the file names.
-    waves : tuple of float
-        Wavenumbers between which the waves are that were kept: (0, inf) if all.
-    provenance : tuple of mapping
-        Each step: its name ("step"), its numbers, and a sentence ("told").
-    """
-
-    heights: FloatArray
-    steps: tuple[float, ...]
-    periodic: bool
-    unit: str | None
-    waves: tuple[float, float]
-    provenance: Provenance
+    heights: FloatArray  # [length], shape (nx, ny) or (n,); none undefined
+    steps: tuple[float, ...]  # sampling step along each axis [length]
+    periodic: bool  # else they continue by their mirror images where that is needed
+    unit: str | None  # of length, that the file names
+    waves: tuple[float, float]  # wavenumbers between which the waves are that were kept: (0, inf) if all
+    provenance: Provenance  # each step: its name ("step"), its numbers, and a sentence ("told")
     window: str | None = None
 
     def windowed(self) -> FloatArray:
@@ -125,26 +109,9 @@ def treat(
     unit: str | None = None,
     info: Mapping[str, Any] | None = None,
 ) -> Treated:
-    """Heights made ready for their spectrum, of a map or a line scan.
+    """Heights [length] made ready for their spectrum, of a map or a line scan; NaN and masked points are undefined.
 
-    Parameters
-    ----------
-    grid : array_like, shape (nx, ny) or (n,)
-        Heights [length]; NaN and masked points are undefined.
-    steps : tuple of float
-        Sampling step along each axis [length].
-    periodic : bool
-    treatment : Treatment
-    unit : str, optional
-    info : mapping, optional
-        What the file says of its instrument, as in SurfaceTopography.
-
-    Raises
-    ------
-    InputError
-        Where the heights are no numbers, too much is undefined, or nothing is left.
-    MbmaError
-        Where SurfaceTopography is needed and not installed.
+    `info` is what the file says of its instrument, as in SurfaceTopography.
     """
     record: list[dict[str, Any]] = []
     heights = heights_of(grid, len(steps))

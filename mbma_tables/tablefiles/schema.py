@@ -101,27 +101,13 @@ Transform = Literal["linear", "log"]
 
 @dataclasses.dataclass(frozen=True)
 class Axis:
-    """An axis of equally spaced nodes in t = x + offset or t = log(x + offset).
-
-    Attributes
-    ----------
-    name, long_name : str
-        Coordinate name and what it is.
-    transform : {"linear", "log"}
-        Whether t is the coordinate itself or its logarithm, after the offset.
-    offset : float
-        Added to the coordinate first.
-    low, high : float
-        First and last coordinate that is covered, both included.
-    nodes : int
-        Number of nodes.
-    """
+    """An axis of equally spaced nodes in t = x + offset or t = log(x + offset)."""
 
     name: str
     long_name: str
     transform: Transform
     offset: float
-    low: float
+    low: float  # first and last coordinate that is covered, both included
     high: float
     nodes: int
 
@@ -178,35 +164,18 @@ class Axis:
 
 @dataclasses.dataclass(frozen=True)
 class TableContent:
-    """A table in memory, as written and as read.
-
-    Attributes
-    ----------
-    kind : str
-        One of `KINDS`.
-    axes : tuple of Axis
-        In the order of the arrays' dimensions; of the universal table the ranges of X and mu, with two nodes each.
-    coefficients : ndarray
-        Of the universal table the Chebyshev coefficients of Phi_F/mu and Phi_A, (cells, 8 of X, 8 of mu, 2); else the
-        B-spline coefficients of log(Phi/Phi of the rigid sphere), each axis longer by degree - 1, last axis F, A.
-    local_error : ndarray
-        Largest relative error found in each cell (of a coarser grid: near it), times its factor, last axis F, A.
-    auxiliary : dict
-        Further variables, name -> (dimension names, values, attributes): edges of the universal table's cells; the
-        values of log(Phi/Phi of the rigid sphere) at the nodes, and coordinates.
-    conformance : dict
-        Arguments and answers of the points to replay, name -> (points,) array.
-    attributes : dict
-        Global attributes beyond those that follow from the rest.
-    """
+    """A table in memory, as written and as read."""
 
     kind: str
-    axes: tuple[Axis, ...]
+    axes: tuple[Axis, ...]  # in the order of dimensions; of the universal table the ranges of X and mu, two nodes each
+    # Chebyshev coefficients of Phi_F/mu and Phi_A, (cells, 8 of X, 8 of mu, 2), of the universal table; else B-spline
+    # coefficients of log(Phi/Phi of the rigid sphere), each axis longer by degree - 1, last axis F, A
     coefficients: FloatArray
-    local_error: FloatArray
+    local_error: FloatArray  # largest relative error in each cell (of a coarser grid: near it), times its factor; F, A
+    # name -> (dimensions, values, attributes): edges of cells; log(Phi/Phi of the rigid sphere) at nodes, coordinates
     auxiliary: dict[str, tuple[tuple[str, ...], FloatArray, dict[str, Any]]]
-    conformance: dict[str, FloatArray]
-    attributes: dict[str, Any]
+    conformance: dict[str, FloatArray]  # arguments and answers of the points to replay, shape (points,)
+    attributes: dict[str, Any]  # beyond those that follow from the rest
 
     @property
     def size(self) -> str:

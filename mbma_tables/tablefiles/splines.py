@@ -41,22 +41,7 @@ def _factors(nodes: int, degree: int) -> tuple[FloatArray, FloatArray]:
 
 
 def coefficients(values: FloatArray, degree: int, axes: int) -> FloatArray:
-    """B-spline coefficients of `values` over its first `axes` axes.
-
-    Parameters
-    ----------
-    values : ndarray
-        Node values; axes beyond the first `axes` are components.
-    degree : {3, 5}
-        Spline degree; each axis needs at least ``degree + 2`` nodes.
-    axes : int
-        Number of interpolated axes.
-
-    Returns
-    -------
-    ndarray
-        Each interpolated axis longer by ``degree - 1``.
-    """
+    """B-spline coefficients over the first axes of `values`, each longer by ``degree - 1``; others are components."""
     import scipy.linalg
 
     result = np.asarray(values, dtype=np.float64)

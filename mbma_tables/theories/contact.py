@@ -28,19 +28,12 @@ from mbma_tables.surfaces.readings import Reading
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma
-from mbma_tables.theories.result import Contact, Source
+from mbma_tables.theories.result import MEANINGS, Contact, Source
 from mbma_tables.theories.sensitivity import differentiate
 from mbma_tables.totals.contact import wanted_quantities
 from mbma_tables.units import modulus_and_units, unit_of
 
 KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by
-MEANING = {
-    "separation": "separation from the mid-plane",
-    "mean_separation": "mean separation",
-    "force": "force over nominal area",
-    "area": "real over nominal contact area",
-    "error": "bound on the relative error of force and area",
-}
 
 
 @hinted
@@ -272,7 +265,7 @@ def _of_labelled(surface: AnySurface, value: Any, E_star: Any, hardness: Any, op
     arrays = {by: value, "E_star": E_star, "hardness": hardness}
     outputs = apply_to_surface(answer, surface, arrays, len(names) + len(slopes))
     for found, name in zip(outputs, names, strict=False):
-        fields[name] = found.rename(name).assign_attrs(long_name=MEANING[name], units=unit_of(name, units))
+        fields[name] = found.rename(name).assign_attrs(long_name=MEANINGS[name], units=unit_of(name, units))
     for (kind, name), found in zip(slopes, outputs[len(names) :], strict=True):
         fields.setdefault(kind, {})[name] = found
     # what was given is kept, with its name and attributes

@@ -180,12 +180,6 @@ def own_separation(surface: MeasuredSurface, force: FloatArray, full: bool) -> t
     return u * surface.h_rms, -slope * surface.h_rms
 
 
-def own_force(surface: MeasuredSurface, mean_separation: FloatArray, full: bool) -> FloatArray:
-    """Load over A0 E* at mean separations u [length]."""
-    force = _own_law(surface, full).gaussian(mean_separation / surface.h_rms)[0]
-    return np.asarray(np.exp(force) * surface.rms_gradient)
-
-
 def _guesses(band: _Bands, wanted: FloatArray, light: FloatArray) -> FloatArray:
     """Log of the loads at which one surface has u/s = `wanted`, by a spline; `light` is Eq. (20)'s answer."""
     from scipy.interpolate import CubicSpline
@@ -257,7 +251,8 @@ class Persson(Theory):
         require("mean_separation", u, allowed, "positive" if self._is_full else "zero or positive")
         u = np.broadcast_to(u, np.broadcast_shapes(u.shape, surface.shape))
         if isinstance(surface, MeasuredSurface):
-            return own_force(surface, u, self._is_full)
+            log_force = _own_law(surface, self._is_full).gaussian(u / surface.h_rms)[0]
+            return np.asarray(np.exp(log_force) * surface.rms_gradient)
         assert isinstance(surface, Surface)
         bands, target = _Bands.of(surface, u.shape), u / surface.s
         if self._is_full:

@@ -70,20 +70,14 @@ class Sensitivity:
         width = max(map(len, self.parameters)) + 2
         lines = [f"d ln(answer)/d ln(parameter) at given {self.by}", f"{'':{width}}{'value':>22}"]
         lines[1] += "".join(f"{name:>17}" for name in self.answers)
-        lines += [
-            f"{name:{width}}{_with_unit(name, value, self.units):>22}"
-            + "".join(f"{round(self.slopes[name][answer], 3) + 0.0:>17.3f}" for answer in self.answers)
-            for name, value in self.parameters.items()
-        ]
+        for name, value in self.parameters.items():
+            slopes = "".join(f"{round(self.slopes[name][answer], 3) + 0.0:>17.3f}" for answer in self.answers)
+            number = f"{value:.5g} {unit_of(name, self.units)}".removesuffix(" 1")
+            lines.append(f"{name:{width}}{number:>22}{slopes}")
         for name, found in self.ranges.items():
             ends = "; ".join(f"{a} {low:.4g} to {high:.4g}" for a, (low, high) in found.items())
             lines.append(f"range of {name}: {ends}")
         return "\n".join(lines)
-
-
-def _with_unit(name: str, value: float, units: Units) -> str:
-    unit = unit_of(name, units)
-    return f"{value:.5g}" + ("" if unit == "1" else f" {unit}")
 
 
 @hinted

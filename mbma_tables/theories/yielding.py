@@ -72,31 +72,15 @@ def shipped() -> Scatter:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Loaded:
-    """A loaded contact that yields: its answer, and what follows from it and from the elastic contact.
+    """A loaded contact that yields: its answer, and what follows from it and from the elastic contact."""
 
-    Attributes
-    ----------
-    u, h_rms : numpy.ndarray
-        Mean separation and rms height [length].
-    eta : numpy.ndarray
-        p_m/(E* g).
-    load : numpy.ndarray
-        F/(A0 E* g).
-    answer : TheoryAnswer
-        Force, area and stiffness of loading.
-    elastic : TheoryAnswer
-        Of the elastic contact at u.
-    elastic_area : numpy.ndarray
-        A/A0 of the elastic contact at equal force.
-    """
-
-    u: FloatArray
+    u: FloatArray  # [length]
     h_rms: FloatArray
-    eta: FloatArray
-    load: FloatArray
-    answer: TheoryAnswer
-    elastic: TheoryAnswer
-    elastic_area: FloatArray
+    eta: FloatArray  # p_m/(E* g)
+    load: FloatArray  # F/(A0 E* g)
+    answer: TheoryAnswer  # of loading
+    elastic: TheoryAnswer  # of the elastic contact at u
+    elastic_area: FloatArray  # A/A0 of the elastic contact at equal force
 
     @property
     def yielded(self) -> FloatArray:

@@ -5,14 +5,14 @@ import json
 import pytest
 from helpers import refused, run
 
-from mbma_tables.scenes.costs import DISTANCE_COLUMNS, shipped_costs, shipped_distances
+from mbma_tables.scenes.costs import Distance, shipped_costs, shipped_distances
 
 
 def test_the_table_has_a_line_for_each_row():
     title, _, header, *lines = run("cost", "--tier", "universal").splitlines()
     assert len(lines) == sum(row.tier == "universal" for row in shipped_costs().rows)
     assert "fixed piece of work" in title
-    assert header.split() == ["tier", "variant", "quantity", "error", "cost", "seconds", "evaluations"]
+    assert header.split() == ["tier", "variant", "quantity", "error", "cost", "evaluations", "seconds"]
     assert all(line.startswith("universal") for line in lines)
 
 
@@ -23,7 +23,7 @@ def test_an_unknown_tier_is_refused():
 def test_distances_are_told_beside_times():
     title, _, header, *lines = run("cost", "--distance").splitlines()
     assert title.endswith("s")
-    assert header.split() == [*DISTANCE_COLUMNS, "seconds"]
+    assert header.split() == [*Distance._fields, "seconds"]
     assert len(lines) == len(shipped_distances())
     # no force is known of an area alone
     assert lines[0].split()[-5:-3] == ["-", "-"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 
 import numpy as np
@@ -141,7 +140,7 @@ def test_a_study_becomes_data_page_and_figure(tmp_path, monkeypatch):
     (tmp_path / "cost.csv").write_bytes(files["tables/cost.csv"])
     # the fastest fixed work seen is the unit
     for row, expected in zip(read_costs(tmp_path / "cost.csv").rows, shipped.rows, strict=True):
-        assert dataclasses.replace(row, cost=expected.cost) == expected
+        assert row._replace(cost=expected.cost) == expected
         assert row.cost == pytest.approx(expected.cost, rel=1e-3, abs=0)
     text = (page.ROOT / "docs" / "cost.md").read_text(encoding="utf-8")
     assert page.fill(text, parts).count("|") == text.count("|")

@@ -5,10 +5,10 @@ import math
 import pytest
 
 from mbma_tables.files import shipped_file
-from mbma_tables.scenes.costs import COLUMNS, read_costs, shipped_costs
+from mbma_tables.scenes.costs import Row, read_costs, shipped_costs
 from mbma_tables.theories import THEORIES
 
-HEADER = ",".join(COLUMNS)
+HEADER = ",".join(Row._fields)
 SOME = f"""# a comment
 {HEADER}
 unit,seconds,both,,0.002,

@@ -49,12 +49,12 @@ def test_beyond_a_table_totals_are_solved(tier):
 def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
     made = []
 
-    def law(surface, rtol, tier, *rest):
+    def law(surface, rtol, tier, **rest):
         made.append(tier)
         if tier != "exact":
             raise OutOfRangeError("islands outside", True)
         # as good, and quicker
-        return contact_law(surface, rtol, "universal", *rest)
+        return contact_law(surface, rtol, "universal", **rest)
 
     monkeypatch.setattr("mbma_tables.theories.law.contact_law", law)
     scene = scene_of(effects=("energy",), rtol=1e-2)

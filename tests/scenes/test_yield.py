@@ -17,7 +17,7 @@ KNOWN = {"surface": SURFACE, "pressures": [1.0, 30.0], "E_star": 100e3}
 def test_a_scene_yields_as_contact_does(theory):
     effects = ["force", "area", "stiffness", "conductance", "validity", "yield"]
     scene = Scene(**KNOWN, effects=effects, hardness=1500.0, theory=theory, conductivities=(16.0, 167.0))
-    step = scene.plan().step("contact")
+    step = scene.plan().steps[0]
     assert step.why.endswith("yield")
     assert step.error < 1e-4
     found = scene.run()
@@ -34,7 +34,7 @@ def test_a_scene_yields_as_contact_does(theory):
 
 def test_what_a_yielding_scene_costs_is_stated():
     prices = [
-        Scene(**KNOWN, effects=["area", *more], theory="calibrated", **given).plan().step("contact").seconds
+        Scene(**KNOWN, effects=["area", *more], theory="calibrated", **given).plan().steps[0].seconds
         for more, given in (([], {}), (["yield"], {"hardness": 1500.0}))
     ]
     assert 2 * prices[0] <= prices[1] <= 3 * prices[0]
