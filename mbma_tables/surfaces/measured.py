@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, finite_array, require
+from mbma_tables.arguments import finite_array, require
 from mbma_tables.bearing import Bearing, RadialSpectrum
 from mbma_tables.display import Variable
 from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights, one_height
-from mbma_tables.surfaces.power_laws import PowerLaws
+from mbma_tables.surfaces.power_laws import PowerLaws, two_columns
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.units import Units
@@ -313,16 +313,6 @@ class MeasuredSurface(AnySurface):
             bands=None,
         )
         return dataclasses.replace(less, heights=self.heights.scaled(float(less.h_rms / self.h_rms)))
-
-
-def two_columns(q: ArrayLike, C: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Wavenumbers and spectrum as arrays of one length."""
-    wavenumber, spectrum = finite_array("q", q), finite_array("C", C)
-    if wavenumber.ndim != 1 or wavenumber.shape != spectrum.shape:
-        raise InputError(
-            f"q and C must be two columns of one length, got shapes {wavenumber.shape} and {spectrum.shape}"
-        )
-    return wavenumber, spectrum
 
 
 def resolution(surface: MeasuredSurface) -> dict[str, Any]:

@@ -10,9 +10,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.arguments import FloatArray, finite_array
+from mbma_tables.errors import InputError
 
 SHARES = {0: 1.0, 2: 1 / 2, 4: 3 / 8}  # m_n = share 2 pi integral C q^(n + 1) dq, Eq. (7)
 
@@ -22,6 +23,16 @@ class Place(NamedTuple):
 
     piece: NDArray[np.intp]
     rest: FloatArray
+
+
+def two_columns(q: ArrayLike, C: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Wavenumbers and spectrum as arrays of one length."""
+    wavenumber, spectrum = finite_array("q", q), finite_array("C", C)
+    if wavenumber.ndim != 1 or wavenumber.shape != spectrum.shape:
+        raise InputError(
+            f"q and C must be two columns of one length, got shapes {wavenumber.shape} and {spectrum.shape}"
+        )
+    return wavenumber, spectrum
 
 
 def growth(x: FloatArray) -> FloatArray:

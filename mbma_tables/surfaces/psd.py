@@ -13,7 +13,6 @@ from scipy.special import beta
 from mbma_tables.arguments import FloatArray, finite_array, require
 from mbma_tables.errors import InputError, NotSelfAffineError
 from mbma_tables.surfaces.heights import one_height
-from mbma_tables.surfaces.measured import two_columns
 from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH
 from mbma_tables.surfaces.power_law import (
     HURST_TOLERANCE,
@@ -26,6 +25,7 @@ from mbma_tables.surfaces.power_law import (
     log_bins,
     with_end_of_profile,
 )
+from mbma_tables.surfaces.power_laws import two_columns
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.surface import Surface
 

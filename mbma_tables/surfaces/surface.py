@@ -307,7 +307,8 @@ class Surface(AnySurface):
         h_rms = 0.0669, rms gradient 0.394, alpha = 106.5
         """
         from mbma_tables.surfaces.heights import Heights
-        from mbma_tables.surfaces.measured import MeasuredSurface, two_columns
+        from mbma_tables.surfaces.measured import MeasuredSurface
+        from mbma_tables.surfaces.power_laws import two_columns
 
         _check_model(model, band)
         if model == "self-affine":
