@@ -22,7 +22,6 @@ from mbma_tables.models.universal_kernel import RECORD, TERMS, Table
 from mbma_tables.plots import draw_lines
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
 
-TINY = 1e-200  # replaces mu = 0 where a slope is asked for
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -132,20 +131,13 @@ class UniversalModel(Displayed):
         flat_X, flat_mu, shape = self._inside(X, mu)
         out = np.empty((flat_X.size, 7))
         status = np.empty(flat_X.size, dtype=np.int64)
-        # the kernel's slopes are by log(mu): at mu = 0, those just above it
-        flat_mu = np.where(flat_mu == 0, TINY, flat_mu)
 
         def fill(block: slice) -> None:
             universal_kernel.fill_slopes(flat_X[block], flat_mu[block], self.kernel, status[block], out[block])
 
         in_blocks(fill, flat_X.size, BLOCK)
         force, F_X, F_mu, area, A_X, A_mu, error = (column.reshape(shape)[()] for column in out.T)
-        by_mu = 1 / flat_mu.reshape(shape)[()]
-        return (
-            IslandAnswer(np.where(flat_mu.reshape(shape) == TINY, 0.0, force)[()], area, error),
-            IslandAnswer(force * F_X, area * A_X, error),
-            IslandAnswer(force * F_mu * by_mu, area * A_mu * by_mu, error),
-        )
+        return IslandAnswer(force, area, error), IslandAnswer(F_X, A_X, error), IslandAnswer(F_mu, A_mu, error)
 
     def status(self, X: ArrayLike, mu: ArrayLike) -> tuple[Any, Any]:
         """Where arguments lie on each axis: -1 below, 0 inside, 1 above. Below in mu is answered, to first order."""

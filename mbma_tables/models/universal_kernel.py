@@ -160,28 +160,28 @@ gradient_at: Any = Instruction(_gradient, _plain)
 
 # fastmath=False is said because else numba takes that of whichever caller compiles these first, and bits depend on it
 @njit(cache=True, fastmath=False, error_model="numpy", forceinline=True)
-def _find(X: float, mu: float, table: Table) -> tuple[int, int]:
-    """Status, and where the record of the cell begins."""
+def _find(X: float, mu: float, table: Table) -> tuple[int, int, float, float]:
+    """Status, where the record of the cell begins, and x and y in it."""
     if not table.X_low <= X:
-        return X_BELOW, 0
+        return X_BELOW, 0, math.nan, math.nan
     if not table.X_high >= X:
-        return X_ABOVE, 0
+        return X_ABOVE, 0, math.nan, math.nan
     if not mu <= table.mu_high:
-        return MU_ABOVE, 0
+        return MU_ABOVE, 0, math.nan, math.nan
     strip = table.places[int((X - table.X_low) * table.X_rate)]
     bucket = min(max((bits_of(mu) >> BUCKET_BITS) - table.first_bucket, 0), table.buckets - 1)
-    return OK, RECORD * table.places[strip + bucket]
+    r, cell = table.records, RECORD * table.places[strip + bucket]
+    y = (mu * r[cell + TOP_MU] + r[cell + TOP]) / (mu * r[cell + BOTTOM_MU] + r[cell + BOTTOM])
+    return OK, cell, (X - r[cell + CENTRE]) * r[cell + RATE], y
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", forceinline=True)
 def universal_phi(X: float, mu: float, table: Table) -> tuple[int, float, float, float]:
     """Status, Phi_F, Phi_A and the bound on their relative error at (X, mu)."""
-    status, cell = _find(X, mu, table)
+    status, cell, x, y = _find(X, mu, table)
     if status != OK:
         return status, math.nan, math.nan, math.nan
     r = table.records
-    x = (X - r[cell + CENTRE]) * r[cell + RATE]
-    y = (mu * r[cell + TOP_MU] + r[cell + TOP]) / (mu * r[cell + BOTTOM_MU] + r[cell + BOTTOM])
     force, area = value_at(r, cell + FORCE_POWERS, x, y), value_at(r, cell + AREA_POWERS, x, y)
     return OK, mu * force, area, r[cell + ERROR]
 
@@ -189,47 +189,26 @@ def universal_phi(X: float, mu: float, table: Table) -> tuple[int, float, float,
 @njit(cache=True, fastmath=False, error_model="numpy", forceinline=True)
 def universal_one(which: int, X: float, mu: float, table: Table) -> tuple[int, float, float]:
     """Status, Phi_F (`which` = 0) or Phi_A (1) alone, and the bound on its relative error."""
-    status, cell = _find(X, mu, table)
+    status, cell, x, y = _find(X, mu, table)
     if status != OK:
         return status, math.nan, math.nan
-    r = table.records
-    x = (X - r[cell + CENTRE]) * r[cell + RATE]
-    y = (mu * r[cell + TOP_MU] + r[cell + TOP]) / (mu * r[cell + BOTTOM_MU] + r[cell + BOTTOM])
-    value = value_at(r, cell + (FORCE_POWERS if which == FORCE else AREA_POWERS), x, y)
-    return OK, mu * value if which == FORCE else value, r[cell + ERROR]
-
-
-class Slopes(NamedTuple):
-    """Phi_F and Phi_A with their logarithmic derivatives by X and by log(mu)."""
-
-    status: int
-    phi_F: float
-    F_by_X: float
-    F_by_mu: float
-    phi_A: float
-    A_by_X: float
-    A_by_mu: float
-    error: float
+    value = value_at(table.records, cell + (FORCE_POWERS if which == FORCE else AREA_POWERS), x, y)
+    return OK, mu * value if which == FORCE else value, table.records[cell + ERROR]
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", forceinline=True)
-def universal_slopes(X: float, mu: float, table: Table) -> Slopes:
-    """Both functions with their derivatives, and the bound on the relative error of the functions."""
-    status, cell = _find(X, mu, table)
+def universal_slopes(X: float, mu: float, table: Table) -> tuple[int, float, float, float, float, float, float, float]:
+    """Status, Phi_F and its derivatives by X and by mu, Phi_A and its, and the bound on the error of the functions."""
+    status, cell, x, y = _find(X, mu, table)
     if status != OK:
         nan = math.nan
-        return Slopes(status, nan, nan, nan, nan, nan, nan, nan)
+        return status, nan, nan, nan, nan, nan, nan, nan
     r = table.records
-    by_X = r[cell + RATE]
-    x = (X - r[cell + CENTRE]) * by_X
-    top, bottom = mu * r[cell + TOP_MU] + r[cell + TOP], mu * r[cell + BOTTOM_MU] + r[cell + BOTTOM]
-    y = top / bottom
-    by_mu = mu * (r[cell + TOP_MU] * r[cell + BOTTOM] - r[cell + TOP] * r[cell + BOTTOM_MU]) / (bottom * bottom)
+    by_X, bottom = r[cell + RATE], mu * r[cell + BOTTOM_MU] + r[cell + BOTTOM]
+    by_mu = (r[cell + TOP_MU] * r[cell + BOTTOM] - r[cell + TOP] * r[cell + BOTTOM_MU]) / (bottom * bottom)
     F, F_x, F_y = gradient_at(r, cell + FORCE_POWERS, x, y)
     A, A_x, A_y = gradient_at(r, cell + AREA_POWERS, x, y)
-    over_F, over_A = 1.0 / F, 1.0 / A
-    by_X_F, by_X_A = F_x * by_X * over_F, A_x * by_X * over_A
-    return Slopes(OK, mu * F, by_X_F, 1.0 + F_y * by_mu * over_F, A, by_X_A, A_y * by_mu * over_A, r[cell + ERROR])
+    return OK, mu * F, mu * F_x * by_X, F + mu * F_y * by_mu, A, A_x * by_X, A_y * by_mu, r[cell + ERROR]
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
@@ -243,8 +222,5 @@ def fill_phi(X: FloatArray, mu: FloatArray, table: Table, status: NDArray[np.int
 def fill_slopes(X: FloatArray, mu: FloatArray, table: Table, status: NDArray[np.int64], out: FloatArray) -> None:
     """`universal_slopes` of each entry: status, and the other seven into the rows of `out` (entries, 7)."""
     for k in range(X.size):
-        found = universal_slopes(X[k], mu[k], table)
-        status[k] = found.status
-        out[k, 0], out[k, 1], out[k, 2] = found.phi_F, found.F_by_X, found.F_by_mu
-        out[k, 3], out[k, 4], out[k, 5] = found.phi_A, found.A_by_X, found.A_by_mu
-        out[k, 6] = found.error
+        row = out[k]
+        status[k], row[0], row[1], row[2], row[3], row[4], row[5], row[6] = universal_slopes(X[k], mu[k], table)

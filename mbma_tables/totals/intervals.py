@@ -183,14 +183,13 @@ def _rule(
         gauss_area += gauss[k] * g
         table_error = max(table_error, error)
         if slopes is not None:
-            f *= kronrod[k]
-            g *= kronrod[k]
-            F_steep += f * work[4, k]
-            A_steep += g * work[4, k]
-            F_by_hurst += f * (work[7, k] + F_X * work[5, k] + F_mu * work[6, k])
-            A_by_hurst += g * (work[8, k] + A_X * work[5, k] + A_mu * work[6, k])
-            F_by_e += f * (work[11, k] + F_X * work[9, k] + F_mu * work[10, k])
-            A_by_e += g * (work[12, k] + A_X * work[9, k] + A_mu * work[10, k])
+            f, g = kronrod[k] * work[2, k], kronrod[k] * work[3, k]
+            F_steep += f * phi_F * work[4, k]
+            A_steep += g * phi_A * work[4, k]
+            F_by_hurst += f * (phi_F * work[7, k] + F_X * work[5, k] + F_mu * work[6, k])
+            A_by_hurst += g * (phi_A * work[8, k] + A_X * work[5, k] + A_mu * work[6, k])
+            F_by_e += f * (phi_F * work[11, k] + F_X * work[9, k] + F_mu * work[10, k])
+            A_by_e += g * (phi_A * work[12, k] + A_X * work[9, k] + A_mu * work[10, k])
     K1 = 1.0 if interval.floor_d else surface.jacobian
     part[0, 0], part[1, 0] = K1 * force, K1 * area
     if slopes is not None:

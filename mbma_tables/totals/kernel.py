@@ -229,7 +229,7 @@ def m2_slopes(H: float, log_zeta: float) -> tuple[float, float]:
 def node_slopes(
     by_hurst: bool, height: float, floor_d: bool, floor_u: bool, node: Node, surface: SurfaceConstants
 ) -> tuple[float, float, float, float]:
-    """Derivatives of X, log(mu) and log(force), log(area) with their weights in the totals, the node being held.
+    """Derivatives of X, mu and log(force), log(area) with their weights in the totals, the node being held.
 
     By H at given e = zeta_1^(-2H), or by log(e) at given H; `eta_factor` and K1 are held. Here ``d_D`` is of
     log(D), and so on, but those of e, a, b, m0, h_d, X, height and of logarithms are what they say.
@@ -276,7 +276,7 @@ def node_slopes(
     common = d_D_d - d_sigma_d + d_rms - height * d_height
     d_mu = d_D + d_sigma + 0.5 * (d_R_d + d_R_u)
     d_area = (d_root_b - d_R_u) / 3.0 + d_D + d_R_u + d_R_d + 2.0 * d_sigma
-    return d_X, d_mu, 1.5 * d_sigma + 0.5 * d_R_d + common, d_area + common
+    return d_X, node.mu * d_mu, 1.5 * d_sigma + 0.5 * d_R_d + common, d_area + common
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy", nogil=True)
