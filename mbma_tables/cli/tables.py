@@ -89,7 +89,7 @@ def verify_command(tables: tuple[str, ...], as_json: bool) -> None:
     """
     import dataclasses
 
-    from mbma_tables.models.verify import verify
+    from mbma_tables.models.tables import verify
     from mbma_tables.tablefiles.schema import KINDS
 
     verdicts = [verify(_path(t), t if t in KINDS else None) for t in tables or KINDS]

@@ -5,14 +5,15 @@ from __future__ import annotations
 from mbma_tables.arguments import number_in
 from mbma_tables.errors import InputError
 from mbma_tables.islands.greenwood_tripp import MIN_SOLVER_RTOL
-from mbma_tables.models.exact import ExactModel, RigidModel
 from mbma_tables.models.protocol import (
     MAX_RTOL,
     MIN_RTOL,
     AnyModel,
+    ExactModel,
     GeometryModel,
     IslandAnswer,
     IslandModel,
+    RigidModel,
     answer_islands,
 )
 from mbma_tables.surfaces.readings import Reading

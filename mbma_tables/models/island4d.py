@@ -32,6 +32,13 @@ STEP = 1e-5  # relative, of a raw number or of the spread: central differences o
 BLOCK = 1 << 15  # islands between two looks for Ctrl-C
 
 
+def _broadcast(*values: ArrayLike) -> tuple[tuple[int, ...], list[FloatArray]]:
+    """The shape of the four raw numbers, and they in it."""
+    given = {name: finite_array(name, value) for name, value in zip(RAW, values, strict=True)}
+    shape = broadcast_shape(**given)
+    return shape, [np.ascontiguousarray(np.broadcast_to(array, shape)) for array in given.values()]
+
+
 def _some(place: Coordinates, chosen: NDArray[np.bool_]) -> Coordinates:
     """The islands at these places."""
     return Coordinates(*(getattr(place, field.name)[chosen] for field in dataclasses.fields(place)))
@@ -128,10 +135,7 @@ class Island4dModel(Displayed):
             raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
         if derivatives and outside == "exact":
             raise InputError("derivatives come from the table: outside must be 'raise' or 'nan' with them")
-        values = (delta_over_h_rms, zeta_d, zeta_u, hurst)
-        given = {name: finite_array(name, value) for name, value in zip(RAW, values, strict=True)}
-        shape = broadcast_shape(**given)
-        raw = [np.ascontiguousarray(np.broadcast_to(array, shape)) for array in given.values()]
+        shape, raw = _broadcast(delta_over_h_rms, zeta_d, zeta_u, hurst)
         if outside != "raise":
             require("hurst", raw[3], (raw[3] > 0) & (raw[3] <= 1), "in (0, 1]")
             require("zeta_d", raw[1], raw[1] > 1, "above 1")
@@ -163,15 +167,10 @@ class Island4dModel(Displayed):
 
         Below in spread is answered, to first order in mu; below in sphere there is nothing.
         """
-        values = (delta_over_h_rms, zeta_d, zeta_u, hurst)
-        given = {name: finite_array(name, v) for name, v in zip(RAW, values, strict=True)}
-        shape = broadcast_shape(**given)
-        delta, low, high, H = (np.ascontiguousarray(np.broadcast_to(a, shape)).ravel() for a in given.values())
+        shape, raw = _broadcast(delta_over_h_rms, zeta_d, zeta_u, hurst)
+        delta, low, high, H = (array.ravel() for array in raw)
         place = to_axes(delta, low, high, H, self.reading)
-        return tuple(
-            ((x > axis.high).astype(np.int8) - (x < axis.low).astype(np.int8)).reshape(shape)[()]
-            for axis, x in zip(self.content.axes, place.axes, strict=True)
-        )
+        return tuple(axis.side(x.reshape(shape)) for axis, x in zip(self.content.axes, place.axes, strict=True))
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
         """Phi_F and Phi_A of islands, through their band and not through mu; `outside` as in `lookup`."""

@@ -1,7 +1,12 @@
-"""What an island model is: anything that answers (X, mu) with force, area and a bound on its own error."""
+"""What an island model is: anything that answers (X, mu) with force, area and a bound on its own error.
+
+Two need no table: the exact solver and the rigid sphere.
+"""
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -9,12 +14,15 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError, OutOfRangeError
+from mbma_tables.islands import greenwood_tripp
+from mbma_tables.islands.height_integrals import height_integral
 
 OUTSIDE = ("raise", "exact", "nan")  # what to do about islands that a table does not cover
 QUANTITIES = ("force", "area")
 FORCE, AREA, BOTH = 0, 1, 2  # which of them is asked for
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # that totals and islands may be asked for
 EXACT_RTOL = 1e-10  # of the exact solver, where it replaces a table
+CLOSED_FORM_ERROR = 1e-14
 
 
 class IslandAnswer(NamedTuple):
@@ -84,3 +92,38 @@ def answer_islands(
     if outside != "nan" and bad.any():
         raise OutOfRangeError(f"island model {model.name!r} has no answer for {int(bad.sum())} islands", bad)
     return IslandAnswer(phi_F, phi_A, error)
+
+
+@dataclasses.dataclass(frozen=True)
+class ExactModel:
+    """The island problem solved for each island (Newton's method), to a relative error of `rtol`."""
+
+    rtol: float
+    name: str = "exact"
+
+    def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
+        """Phi_F and Phi_A by `greenwood_tripp.solve`."""
+        solved = greenwood_tripp.solve(X, mu, rtol=self.rtol)
+        return IslandAnswer(solved.phi_F, solved.phi_A, solved.error)
+
+
+@dataclasses.dataclass(frozen=True)
+class RigidModel:
+    """The sphere does not deform (w = 0 in Eq. 34): closed form, exact as mu goes to 0."""
+
+    name: str = "rigid"
+
+    def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
+        """Phi_F = (mu/2) pi F_{5/2}(-X)/(5/2), Phi_A = pi F_2(-X)/2."""
+        force, area = greenwood_tripp.rigid_sphere(X, mu)
+        return IslandAnswer(force, area, np.full(force.shape, CLOSED_FORM_ERROR))
+
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
+        """Phi_F and Phi_A of islands, or the one asked for."""
+        X, mu = islands["X"], islands["mu"]
+        if which == BOTH:
+            return self.answer(X, mu)
+        none, error = np.full(X.shape, np.nan), np.full(X.shape, CLOSED_FORM_ERROR)
+        if which == FORCE:
+            return IslandAnswer(math.pi / 5 * mu * height_integral(2.5, -X), none, error)
+        return IslandAnswer(none, math.pi / 2 * height_integral(2.0, -X), error)

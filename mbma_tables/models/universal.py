@@ -141,11 +141,7 @@ class UniversalModel(Displayed):
 
     def status(self, X: ArrayLike, mu: ArrayLike) -> tuple[Any, Any]:
         """Where arguments lie on each axis: -1 below, 0 inside, 1 above. Below in mu is answered, to first order."""
-        places = []
-        for axis, value in zip((self._X, self._mu), (X, mu), strict=True):
-            x = finite_array(axis.name, value)
-            places.append(((x > axis.high).astype(np.int8) - (x < axis.low).astype(np.int8))[()])
-        return places[0], places[1]
+        return self._X.side(finite_array("X", X)), self._mu.side(finite_array("mu", mu))
 
     def _inside(
         self, X: ArrayLike, mu: ArrayLike, refuse: bool = True

@@ -7,8 +7,8 @@ from helpers import SCALE
 from small_tables import edited, small_table
 
 from mbma_tables.models.island4d import Island4dModel
+from mbma_tables.models.tables import verify
 from mbma_tables.models.universal import UniversalModel
-from mbma_tables.models.verify import verify
 from mbma_tables.tablefiles.netcdf import attributes_digest, read_table, write_table
 from mbma_tables.tablefiles.provenance import digest_arrays
 from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL

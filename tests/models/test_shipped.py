@@ -4,8 +4,7 @@ import json
 
 import pytest
 
-from mbma_tables.models.tables import shipped
-from mbma_tables.models.verify import verify
+from mbma_tables.models.tables import shipped, verify
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.provenance import digest_json
