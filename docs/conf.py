@@ -3,7 +3,7 @@
 from mbma_tables import __version__
 
 project = "mbma_tables"
-author = "mbma_tables contributors"
+author = copyright = "mbma_tables contributors"
 release = __version__
 extensions = ["myst_nb", "sphinx.ext.autodoc", "numpydoc"]
 # pages of `tutorials` are notebooks: run anew at each build, a fault ends it
@@ -16,3 +16,5 @@ numpydoc_show_class_members = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 html_theme = "furo"
+html_static_path = ["_static"]
+html_css_files = ["wide.css"]
