@@ -18,7 +18,7 @@ from mbma_tables.cli.options import (
 )
 from mbma_tables.cli.progress import echo
 from mbma_tables.errors import InputError
-from mbma_tables.export import CODE, DATA, FMUS, GRAPHS, LAWS, SOLVERS
+from mbma_tables.export import CODE, DATA, FMUS, GRAPHS, LAWS, SOLVERS, SUBROUTINES
 from mbma_tables.files import write_file
 from mbma_tables.scenes.specimen import Specimen
 
@@ -30,7 +30,8 @@ ROW_OPTIONS = {"rows", "rtol", "largest_overclosure", "pressures", "leakage"}
 OPTIONS = {
     **dict.fromkeys((*SOLVERS, *DATA), LAW_OPTIONS | ROW_OPTIONS),
     **dict.fromkeys(("calculix", "abaqus", "modelica"), LAW_OPTIONS | ROW_OPTIONS | {"name"}),
-    **dict.fromkeys((*LAWS, *FMUS, *GRAPHS), LAW_OPTIONS | {"name"}),
+    **dict.fromkeys((*LAWS, *FMUS, *GRAPHS), LAW_OPTIONS | {"name", "leakage"}),
+    **dict.fromkeys(SUBROUTINES, LAW_OPTIONS | {"name"}),
     **dict.fromkeys(CODE, frozenset({"reading", "check"})),
     "calculix --exponential": frozenset({"specimen", "name", "exponential"}),
 }
@@ -46,7 +47,7 @@ DEFAULTS = {"theory": "mbma", "reading": "reported", "exponential": False, "leak
 @quantity_option("--largest-overclosure", help="Where the rows end; else at full compression.")
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure, or as well.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
-@click.option("--leakage", is_flag=True, help="Flow conductance of the gaps against pressure instead.")
+@click.option("--leakage", is_flag=True, help="Flow conductance of the gaps: rows instead, of a law as well.")
 @click.option(
     "--pressures", metavar="X:X", help="Smallest and largest pressure: where the error holds, and the rows end."
 )

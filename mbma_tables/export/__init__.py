@@ -3,6 +3,7 @@
 # the targets, in the order in which help lists them
 SOLVERS = ("calculix", "abaqus", "lsdyna", "optistruct", "comsol", "moose", "modelica")  # functions of `solvers`
 DATA = ("csv", "json", "matlab", "netcdf", "hdf5", "parquet")  # functions of `data`, named to_csv and so on
+SUBROUTINES = ("abaqus-uinter", "abaqus-gapcon", "calculix-gapcon")
 LAWS = (
     "c-law",
     "fortran-law",
@@ -11,9 +12,7 @@ LAWS = (
     "jax-law",
     "matlab-law",
     "modelica-law",
-    "abaqus-uinter",
-    "abaqus-gapcon",
-    "calculix-gapcon",
+    *SUBROUTINES,
 )  # keys of `law_code.LANGUAGES`
 FMUS = ("fmu", "fmu3")  # of FMI 2.0 and 3.0, keys of `fmu.STANDARDS`
 GRAPHS = ("onnx",)

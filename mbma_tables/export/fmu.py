@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 from mbma_tables import __version__
 from mbma_tables.errors import InputError
 from mbma_tables.export.joint import Joint
-from mbma_tables.export.law_code import asked_law, code_name, text_of
+from mbma_tables.export.law_code import MORE, AskedLaw, asked_law, code_name, text_of
 from mbma_tables.export.law_numbers import LawNumbers
 from mbma_tables.export.text import filled
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -24,6 +24,10 @@ STANDARDS = {
     "fmu3": {"FMI": "fmi3", "INSTANCE": "fmi3Instance", "REAL": "Float64", "SIZE": ", size_t size"}
     | {"LOGGER": "fmi3LogMessageCallback", "NAMED": "", "FORMAT": "", "SEEDS": ", size_t seeds"},
 }
+SAID = {
+    "conductance": "through the contact, over nominal area",
+    "leakage": "flow conductance K: flow per length of seal is K dp/(12 viscosity width)",
+}
 INPUT = 1  # value reference of overclosure, after time
 
 
@@ -33,8 +37,6 @@ def fmu(
     E_star: float | str,
     *,
     name: str = "law",
-    conductivity: float | None = None,
-    conductivity_unit: str | None = None,
     **asked: Any,
 ) -> bytes:
     """A contact law as an FMU of sources: overclosure in; pressure, tangent, area and energy out.
@@ -43,8 +45,8 @@ def fmu(
     ----------
     target : str
         "fmu" for FMI 2.0, "fmu3" for FMI 3.0.
-    surface, E_star, name, conductivity, conductivity_unit, **asked
-        As for `law_text`; a conductivity adds the output conductance.
+    surface, E_star, name, **asked
+        As for `law_text`; a conductivity adds the output conductance, leakage the output leakage.
 
     Returns
     -------
@@ -67,15 +69,12 @@ def fmu(
     if target not in STANDARDS:
         raise InputError(f"target must be one of {tuple(STANDARDS)}, got {target!r}")
     code_name(name)
-    found = asked_law(surface, E_star, conductivity, conductivity_unit, **asked)
-    joint, numbers, law, conductance = found.joint, found.numbers, text_of("c-law", name, found), ""
-    if found.conductance_unit:
-        conductance = f"\n    case CONDUCTANCE: *slope = {found.ratio!r}*second(c); return {name}_conductance(c);"
-    variables = _variables(joint, numbers, found.conductance_unit)
+    found = asked_law(surface, E_star, **asked)
+    law, variables = text_of("c-law", name, found), _variables(found)
     token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, f'{target} {law}')}}}"
-    parts = STANDARDS[target] | {"LAW": law, "NAME": name, "TOKEN": token, "CONDUCTANCE": conductance}
-    parts |= {"START": repr(_start(numbers)), "VARIABLES": str(len(variables))}
-    described = _description(target == "fmu3", name, token, "\n".join(found.said), variables, joint)
+    parts = STANDARDS[target] | {"LAW": law, "NAME": name, "TOKEN": token, "START": repr(_start(found.numbers))}
+    parts |= {name.upper(): found.more.get(name, "") and repr(found.ratio) for name in MORE}
+    described = _description(target == "fmu3", name, token, "\n".join(found.said), variables, found.joint)
     files = {
         "modelDescription.xml": described,
         f"sources/{name}.c": filled("fmu.c", WRAPPER=filled(f"{parts['FMI']}.c"), **parts).encode(),
@@ -89,9 +88,9 @@ def _start(numbers: LawNumbers) -> float:
     return 0.0 if numbers.ends else max(0.0, numbers.c_least)
 
 
-def _variables(joint: Joint, numbers: LawNumbers, conductance_unit: str) -> list[dict[str, str]]:
+def _variables(found: AskedLaw) -> list[dict[str, str]]:
     """What XML says of each variable, by value reference."""
-    length, stress = joint.length, joint.stress
+    length, stress, numbers = found.joint.length, found.joint.stress, found.numbers
     ends = {"max": repr(numbers.c_most)} | ({} if numbers.ends else {"min": repr(numbers.c_least)})
     asked = {"start": repr(_start(numbers)), **ends, "description": "h_max less the mean separation"}
     outputs = {
@@ -99,7 +98,7 @@ def _variables(joint: Joint, numbers: LawNumbers, conductance_unit: str) -> list
         "tangent": (f"{stress}/{length}", "derivative of pressure by overclosure"),
         "area": ("1", "area of contact over nominal area"),
         "energy": (f"{stress} {length}", "integral of pressure over overclosure"),
-        **({"conductance": (conductance_unit, "through the contact, over nominal area")} if conductance_unit else {}),
+        **{name: (unit, SAID[name]) for name, unit in found.more.items()},
     }
     return [
         {"name": "time", "causality": "independent", "unit": "s"},
@@ -122,10 +121,11 @@ def _description(third: bool, name: str, token: str, text: str, variables: list[
         if not third:
             ET.SubElement(ET.SubElement(interface, "SourceFiles"), "File", {"name": f"{name}.c"})
     units = ET.SubElement(root, "UnitDefinitions")
-    for unit, base in _units(joint).items():
-        ET.SubElement(ET.SubElement(units, "Unit", {"name": unit}), "BaseUnit", base)
-    if variables[-1]["name"] == "conductance" and variables[-1]["unit"] not in _units(joint):
-        ET.SubElement(units, "Unit", {"name": variables[-1]["unit"]})
+    bases = _units(joint)
+    for unit in dict.fromkeys(variable["unit"] for variable in variables):
+        named = ET.SubElement(units, "Unit", {"name": unit})
+        if unit in bases:
+            ET.SubElement(named, "BaseUnit", bases[unit])
     ET.SubElement(ET.SubElement(root, "LogCategories"), "Category", {"name": "logStatusError"})
     listed, structure = ET.SubElement(root, "ModelVariables"), ET.SubElement(root, "ModelStructure")
     of_real = ("unit", "start", "min", "max")
@@ -158,6 +158,7 @@ def _units(joint: Joint) -> dict[str, dict[str, str]]:
         joint.stress: ({"kg": 1, "m": -1, "s": -2}, stress),
         f"{joint.stress}/{joint.length}": ({"kg": 1, "m": -2, "s": -2}, stress / length),
         f"{joint.stress} {joint.length}": ({"kg": 1, "s": -2}, stress * length),
+        f"{joint.length}^3": ({"m": 3}, length**3),
     }
     return {
         unit: {key: str(power) for key, power in powers.items()} | {"factor": repr(size)}

@@ -11,7 +11,7 @@ import dataclasses
 import numpy as np
 
 from mbma_tables import __version__
-from mbma_tables.arguments import FloatArray, number_in
+from mbma_tables.arguments import FloatArray, Numbers, number_in
 from mbma_tables.errors import InputError
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -66,8 +66,11 @@ class Joint:
         """The theory itself at mean separations."""
         return contact(self.surface, mean_separation=u, E_star=self.modulus, theory=self.theory, hardness=self.hardness)
 
-    def header(self, what: str, range_: str, *more: str, end: float) -> tuple[str, ...]:
-        """Lines at the head of a file: what is in it, its range, its own error; validity up to an overclosure `end`."""
+    def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
+        """Lines at the head of a file: what is in it, its range, its own error; validity up to an overclosure `end`.
+
+        With `leakage` those of the flow conductance, too.
+        """
         law, stress = self.law, self.stress
         names = self.surface.parameters or OWN_NUMBERS
         numbers = ", ".join(f"{name} = {float(getattr(self.surface, name)):.10g}" for name in names)
@@ -92,17 +95,17 @@ class Joint:
             *more,
             f"the law is within {law.error:.1e} of its theory, in pressure and area",
             plastic,
-            *self._validity(end),
+            *self._validity(end, leakage),
         )
 
-    def _validity(self, end: float) -> tuple[str, ...]:
+    def _validity(self, end: float, leakage: bool) -> tuple[str, ...]:
         """Lines that say where the law holds, how far simulations scatter about it, and where its numbers are from."""
         law, stress_unit = self.law, self.stress
         u = np.linspace(law.h_max, law.h_max - end, LOOKED_AT + 1)[1:]
         found = self.answer(u)
         pressure = np.asarray(law.force(u=u))
         lines = []
-        for reason, mask in found.reasons.items():
+        for reason, mask in (found.leakage if leakage else found).reasons.items():
             first, last = pressure[mask].min(), pressure[mask].max()
             lines.append(f"not valid from p = {first:.4g} to {last:.4g} {stress_unit}: {reason}")
         if law.softening is not None:
@@ -112,17 +115,38 @@ class Joint:
             )
         if law.highest < np.inf:
             lines.append(f"no last contact: pressure is {float(law.force(law.h_max)):.4g} {stress_unit} at c = 0")
-        scatter = np.asarray(found.scatter)
-        known = np.flatnonzero(np.isfinite(scatter))
-        places = known[np.linspace(0, known.size - 1, 5).astype(int)] if known.size else known
-        listed = ", ".join(f"{scatter[k]:.2g} at {pressure[k]:.3g}" for k in places)
-        spread = f"one standard deviation of ln p at a given c: {listed} {stress_unit}" if listed else "not known"
+        spread = self._spread("one standard deviation of ln p at a given c", found.scatter, pressure)
         lines.append(f"scatter of simulations about the theory, {spread}")
+        if leakage:
+            lines += self._of_leakage(found.leakage.scatter, pressure)
         if isinstance(self.theory, Mbma):
             from mbma_tables.models.tables import universal_model
 
             lines.append(f"table: data {str(universal_model().content.attributes['values_sha256'])[:16]}")
         return tuple(lines)
+
+    def _spread(self, what: str, scatter: Numbers, pressure: FloatArray) -> str:
+        """A scatter at five pressures where it is known."""
+        sizes = np.asarray(scatter)
+        known = np.flatnonzero(np.isfinite(sizes))
+        places = known[np.linspace(0, known.size - 1, 5).astype(int)] if known.size else known
+        listed = ", ".join(f"{sizes[k]:.2g} at {pressure[k]:.3g}" for k in places)
+        return f"{what}: {listed} {self.stress}" if listed else "not known"
+
+    def _of_leakage(self, scatter: Numbers, pressure: FloatArray) -> tuple[str, ...]:
+        """What a reader of leakage must know."""
+        blocked, least = self.law.leakage.blocked_at, "never blocked"
+        if blocked > -np.inf:
+            c = (self.law.h_max - blocked) / 2
+            least = f"blocked, K = 0, from p = {float(self.law.force(blocked)):.10g} {self.stress}, c = {c:.10g} on"
+        return (
+            f"leakage is the flow conductance K [{self.length}^3] of the gaps: flow per length of seal is "
+            "K dp/(12 viscosity width)",
+            least,
+            f"K is within {self.law.leakage.error:.1e} of that at the law's area",
+            "scatter of K from simulation to simulation, "
+            + self._spread("one standard deviation of ln K", scatter, pressure),
+        )
 
 
 def frozen_joint(

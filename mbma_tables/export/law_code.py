@@ -2,30 +2,35 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError
 from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
-from mbma_tables.export.law_numbers import DIGITS, LawNumbers, law_numbers
+from mbma_tables.export.law_numbers import DIGITS, FlowNumbers, LawNumbers, flow_numbers, law_numbers
 from mbma_tables.export.text import checked_name, filled, opening, wrapped
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 MAX_NAME = 31  # letters, as Fortran and C99 read them
-FUNCTIONS = ("pressure", "tangent", "with_tangent", "curvature", "area", "energy", "conductance", "overclosure")
-SCALARS = ("h_max", "c_least", "c_turn", "c_most", "scale", "power_p", "power_a")
+MORE = ("conductance", "leakage")  # asked for
+FUNCTIONS = ("pressure", "tangent", "with_tangent", "curvature", "area", "energy", "overclosure", *MORE)
+
+Columns = dict[str, FloatArray]
 
 
 class Language(NamedTuple):
     """How a law is written in one language.
 
-    `call` is a function's call with {name}, {what} and {x}; `number` writes a float, `arrays` the polynomials by the
-    names of their places in the template, `conductance` the function of that name with {ratio}, also by places.
-    `subroutine` is the template of a solver's user subroutine that calls the law, `parts` what is filled in there.
+    `call` is a function's call with {name}, {what} and {x}; `number` writes a float, `arrays` columns of numbers and
+    rows of polynomials by their places in the template, whose names begin with a prefix. `subroutine` is the template
+    of a solver's user subroutine that calls the law, `parts` what is filled in there.
     """
 
     template: str
@@ -33,8 +38,7 @@ class Language(NamedTuple):
     usage: str
     call: str
     number: Callable[[float], str]
-    arrays: Callable[[LawNumbers], dict[str, str]]
-    conductance: dict[str, str]
+    arrays: Callable[[str, Columns, Columns], dict[str, str]]
     subroutine: str = ""
     parts: tuple[tuple[str, str], ...] = ()
     only_conductance: bool = False
@@ -53,6 +57,7 @@ def law_text(
     reading: str | Reading = "reported",
     theory: str | Theory | UserTheory = "mbma",
     hardness: float | str = math.inf,
+    leakage: bool = False,
 ) -> str:
     """A contact law as source code: pressure, tangent, area, energy and the overclosure at a pressure.
 
@@ -66,6 +71,8 @@ def law_text(
         What functions, modules or packages are called, or begin with.
     conductivity, conductivity_unit
         k_s = 2 k1 k2/(k1 + k2) with its unit, for the function `conductance` as well.
+    leakage : bool
+        The function `leakage` as well, the flow conductance K of the gaps [length^3], as `ContactLaw.leakage`.
 
     Returns
     -------
@@ -75,7 +82,8 @@ def law_text(
     Raises
     ------
     InputError, OutOfRangeError
-        As `describe_law`; and for conductance with a hardness, which is not the slope of the law.
+        As `describe_law`; for conductance with a hardness, which is not the slope of the law, and for leakage of a
+        target that is a user subroutine.
 
     Examples
     --------
@@ -86,19 +94,25 @@ def law_text(
     """
     if target not in LANGUAGES:
         raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
-    name, heat = code_name(name), (conductivity, conductivity_unit, LANGUAGES[target].only_conductance)
+    name, heat = code_name(name), (conductivity, conductivity_unit, leakage, LANGUAGES[target].only_conductance)
+    if leakage and LANGUAGES[target].subroutine:
+        raise InputError(f"{target} has no place for leakage: leave it out")
     units: dict[str, Any] = {"length_unit": length_unit, "stress_unit": stress_unit}
     asked = asked_law(surface, E_star, *heat, **units, reading=reading, theory=theory, hardness=hardness)
     return text_of(target, name, asked)
 
 
 class AskedLaw(NamedTuple):
-    """A law and what every file of it says; conductance is `ratio` times the tangent, NaN where it was not asked."""
+    """A law and what every file of it says; conductance is `ratio` times the tangent, NaN where it was not asked.
+
+    `more` has the units of what was asked of `MORE`.
+    """
 
     joint: Joint
     numbers: LawNumbers
+    flow: FlowNumbers | None
     ratio: float
-    conductance_unit: str
+    more: dict[str, str]
     said: tuple[str, ...]
 
 
@@ -114,6 +128,7 @@ def asked_law(
     E_star: float | str,
     conductivity: float | None = None,
     conductivity_unit: str | None = None,
+    leakage: bool = False,
     only_conductance: bool = False,
     **options: Any,
 ) -> AskedLaw:
@@ -123,45 +138,54 @@ def asked_law(
     joint = frozen_joint(surface, E_star, **options)
     if conducts and joint.hardness < math.inf:
         raise InputError("conductance of yielded contact is not a slope of its law: leave conductivity or hardness out")
-    numbers, unit = law_numbers(joint.law), f"{k_unit}/{joint.length}" if conducts else ""
-    return AskedLaw(joint, numbers, k_s / joint.modulus, unit, _head(joint, numbers, unit))
+    more = {"conductance": f"{k_unit}/{joint.length}"} if conducts else {}
+    more |= {"leakage": f"{joint.length}^3"} if leakage else {}
+    numbers, flow = law_numbers(joint.law), flow_numbers(joint.law.leakage) if leakage else None
+    return AskedLaw(joint, numbers, flow, k_s / joint.modulus, more, _head(joint, numbers, more))
 
 
 def text_of(target: str, name: str, asked: AskedLaw) -> str:
     """The text of one file."""
-    language, numbers = LANGUAGES[target], asked.numbers
+    language, numbers, flow = LANGUAGES[target], asked.numbers, asked.flow
     lines = [*(line.replace("{", "{{").replace("}", "}}") for line in asked.said), language.usage]
     lines.append(_example(asked.joint, language))
     parts = {
         "HEADER": opening((line.format(name=name) for line in lines), language.mark),
         "NAME": name,
-        "RECORDS": str(numbers.centre.size),
-        "STEP": str(1 << (numbers.centre.size - 1).bit_length() - 1),
-        "ENDS": str(int(numbers.ends)),
-        "SIDE": str(numbers.side),
-        **dict.fromkeys(("CONDUCTANCE", "PROTOTYPE", "PUBLIC", "FLUX", "SUBROUTINE"), ""),
-        **{scalar.upper(): language.number(getattr(numbers, scalar)) for scalar in SCALARS},
-        **language.arrays(numbers),
+        "SUBROUTINE": "",
+        **{quantity.upper(): asked.more.get(quantity, "") and language.number(asked.ratio) for quantity in MORE},
+        **_numbers("", numbers, {"p": numbers.force, "a": numbers.area}, language),
     }
-    if asked.conductance_unit:
-        ratio = language.number(asked.ratio)
-        parts |= {place: text.format(name=name, ratio=ratio) for place, text in language.conductance.items()}
+    if flow:
+        parts |= _numbers("flow_", flow, {"p": flow.force}, language)
     if language.subroutine:
         parts["SUBROUTINE"] = filled(language.subroutine, **parts | dict(language.parts))
     return filled(language.template, **parts)
 
 
-def _head(joint: Joint, numbers: LawNumbers, conductance_unit: str) -> tuple[str, ...]:
+def _numbers(prefix: str, numbers: LawNumbers | FlowNumbers, rows: Columns, language: Language) -> dict[str, str]:
+    """All numbers by their places, flags and counts as whole ones."""
+    known = {field.name: getattr(numbers, field.name) for field in dataclasses.fields(numbers)}
+    places = {"RECORDS": str(numbers.centre.size)}
+    for name, value in known.items():
+        if isinstance(value, int | float):
+            places[name.upper()] = str(int(value)) if isinstance(value, int) else language.number(value)
+    columns = {name: column for name, column in known.items() if name in ("edges", "centre", "rate", "energies")}
+    return {f"{prefix}{place}".upper(): text for place, text in places.items()} | language.arrays(prefix, columns, rows)
+
+
+def _head(joint: Joint, numbers: LawNumbers, more: dict[str, str]) -> tuple[str, ...]:
     """The lines that every file has."""
     length, stress = joint.length, joint.stress
     what = f"pressure [{stress}], tangent dp/dc [{stress}/{length}], area A/A0, energy, the integral of pressure"
     what += f" [{stress} {length}]"
-    what += f", and conductance [{conductance_unit}]" if conductance_unit else ""
+    what += "".join(f", {quantity} [{unit}]" for quantity, unit in more.items())
     begin = "no contact below c = 0" if numbers.ends else f"c from {numbers.c_least:.10g}"
     range_ = f"{begin}, to {numbers.c_most:.10g}; there is no answer outside"
-    more = f"overclosure at a pressure: up to c = {numbers.c_turn:.10g}"
-    more += ", where pressure turns down" if numbers.c_turn < numbers.c_most else ""
-    return joint.header(f"{what}, against overclosure c [{length}]", range_, more, end=numbers.c_turn)
+    inverse = f"overclosure at a pressure: up to c = {numbers.c_turn:.10g}"
+    inverse += ", where pressure turns down" if numbers.c_turn < numbers.c_most else ""
+    what += f", against overclosure c [{length}]"
+    return joint.header(what, range_, inverse, end=numbers.c_turn, leakage="leakage" in more)
 
 
 def _example(joint: Joint, language: Language) -> str:
@@ -177,62 +201,60 @@ def _example(joint: Joint, language: Language) -> str:
     return f"Example: {said}"
 
 
-def _rows_of_c(numbers: LawNumbers) -> dict[str, str]:
-    """Coefficients as whole numbers in units of their own, which is shortest."""
+def _c(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
+    """A structure a record; coefficients as whole numbers in units of their own, which is shortest."""
 
     def polynomial(row: FloatArray) -> str:
         place = math.floor(math.log10(abs(row).max())) + round(math.log10(DIGITS))
         return f"Q(1e{place},{','.join(f'{value * 10.0**-place:.0f}' for value in row)})"
 
-    rows = [
-        f"{{{centre:.17g},{rate:.17g},{energy:.16g},{polynomial(force)},{polynomial(area)}}},"
-        for centre, rate, energy, force, area in zip(
-            numbers.centre, numbers.rate, numbers.energy, numbers.force, numbers.area, strict=True
-        )
-    ]
-    return {"ROWS": "\n".join(rows), "EDGES": wrapped(map(repr, numbers.edges.tolist()))}
+    heads = zip(*(columns[name].tolist() for name in columns if name != "edges"), strict=True)
+    rows = zip(heads, *polynomials.values(), strict=True)
+    lines = [f"{{{','.join((*map(_shortest, head), *map(polynomial, parts)))}}}," for head, *parts in rows]
+    place = prefix.upper()
+    return {f"{place}ROWS": "\n".join(lines), f"{place}EDGES": wrapped(map(_shortest, columns["edges"].tolist()))}
 
 
-def _lists(numbers: LawNumbers) -> dict[str, str]:
+def _lists(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
     """Arrays in brackets, as Python and JavaScript have them."""
-    return {
-        **{name.upper(): f"[{wrapped(map(repr, getattr(numbers, name).tolist()))}]" for name in FLAT},
-        **{place: f"[\n{_lines(rows, '[', '],')}\n]" for place, rows in (("P", numbers.force), ("A", numbers.area))},
-    }
+    flat = {name: f"[{wrapped(map(repr, column.tolist()))}]" for name, column in columns.items()}
+    rows = {name: f"[\n{_lines(rows, '[', '],')}\n]" for name, rows in polynomials.items()}
+    return {f"{prefix}{name}".upper(): text for name, text in (flat | rows).items()}
 
 
-def _braces(numbers: LawNumbers) -> dict[str, str]:
+def _braces(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
     """The same in braces, as Modelica has them."""
     return {
         place: text.replace("[", "{").replace("]", "}").replace(",\n}", "\n}")
-        for place, text in _lists(numbers).items()
+        for place, text in _lists(prefix, columns, polynomials).items()
     }
 
 
-def _matrices(numbers: LawNumbers) -> dict[str, str]:
+def _matrices(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
     """Columns and matrices of MATLAB."""
-    return {
-        **{name.upper(): f"[\n{_lines(getattr(numbers, name)[:, None], '', ';')}]" for name in FLAT},
-        **{place: f"[\n{_lines(rows, '', ';')}]" for place, rows in (("P", numbers.force), ("A", numbers.area))},
-    }
+    matrices = {name: column[:, None] for name, column in columns.items()} | dict(polynomials)
+    return {f"{prefix}{name}".upper(): f"[\n{_lines(rows, '', ';')}]" for name, rows in matrices.items()}
 
 
-def _data(numbers: LawNumbers) -> dict[str, str]:
+def _data(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
     """Statements of Fortran, one a record: no statement grows with the law."""
-    edges = [*numbers.edges, math.inf]
-    columns = zip(edges, numbers.centre, numbers.rate, numbers.energy, numbers.force, numbers.area, strict=True)
-    lines = []
-    for k, (edge, centre, rate, energy, force, area) in enumerate(columns, 1):
-        heads = wrapped(map(_fortran_number, (edge, centre, rate, energy)))
-        lines.append(f"  data edges({k}), centre({k}), rate({k}), energies({k}) &\n    / {heads} /")
-        for name, row in (("p_", force), ("a_", area)):
-            text = wrapped(map(_fortran_number, row), "    ", " &")
-            lines.append(f"  data ({name}(k_, {k}), k_ = 0, 8) / &\n{text} /")
-    return {"DATA": "\n".join(lines)}
+    lines, columns = [], columns | {"edges": np.append(columns["edges"], math.inf)}
+    for k, head in enumerate(zip(*columns.values(), strict=True)):
+        names = ", ".join(f"{prefix}{name}({k + 1})" for name in columns)
+        lines.append(f"  data {names} &\n    / {wrapped(map(_fortran_number, head))} /")
+        for name, rows in polynomials.items():
+            text = wrapped(map(_fortran_number, rows[k]), "    ", " &")
+            lines.append(f"  data ({prefix}{name}_(k_, {k + 1}), k_ = 0, 8) / &\n{text} /")
+    return {f"{prefix}data".upper(): "\n".join(lines)}
 
 
 def _lines(rows: FloatArray, begin: str, end: str) -> str:
     return "\n".join(f"{begin}{', '.join(map(repr, row))}{end}" for row in rows.tolist())
+
+
+def _shortest(value: float) -> str:
+    """The shortest text of a number."""
+    return repr(value).removesuffix(".0")
 
 
 def _fortran_number(value: float) -> str:
@@ -246,13 +268,6 @@ def _with_infinity(text: str) -> Callable[[float], str]:
     return lambda value: text if value == -math.inf else repr(float(value))
 
 
-FLAT = ("edges", "centre", "rate", "energy")
-PYTHON_CONDUCTANCE = """
-
-def conductance(c{given}):
-    return {{ratio}} * tangent(c{passed})
-
-"""
 NAN = "Outside the range: NaN."
 FORTRAN = Language(
     "law.f90",
@@ -261,18 +276,7 @@ FORTRAN = Language(
     "{what}({x})",
     _fortran_number,
     _data,
-    {
-        "PUBLIC": ", conductance",
-        "CONDUCTANCE": "\n  elemental function conductance(c) result(h)\n    real(dp), intent(in) :: c\n"
-        "    real(dp) :: h\n    h = {ratio}*tangent(c)\n  end function conductance\n",
-    },
 )
-FLUX = """  if (p > 0) then
-    flux = [1, -1]*conductance(c)*(temp(2) - temp(1))
-    ddfddt = conductance(c)*reshape([1, -1, -1, 1], [2, 2])
-    ddfddr(:, 1) = flux/slope*curvature(c)
-  end if
-"""
 READ = (
     "Written from the manual's list of arguments and called with it by a program of the tests; not run in the solver."
 )
@@ -284,11 +288,7 @@ LANGUAGES = {
         f"C99, also C++11: cc -O2 -c {{name}}.c, link with -lm; declare what you call as below. {NAN}",
         "{name}_{what}({x})",
         _with_infinity("-INFINITY"),
-        _rows_of_c,
-        {
-            "PROTOTYPE": "\ndouble {name}_conductance(double c);",
-            "CONDUCTANCE": "\ndouble {name}_conductance(double c) {{ return {ratio}*{name}_tangent(c); }}\n",
-        },
+        _c,
     ),
     "fortran-law": FORTRAN,
     "javascript-law": Language(
@@ -299,7 +299,6 @@ LANGUAGES = {
         "{what}({x})",
         _with_infinity("-Infinity"),
         _lists,
-        {"CONDUCTANCE": "\nexport function conductance(c) {{\n  return {ratio} * tangent(c);\n}}\n"},
     ),
     "python-law": Language(
         "law.py",
@@ -308,7 +307,6 @@ LANGUAGES = {
         "{name}.{what}({x})",
         _with_infinity("-np.inf"),
         _lists,
-        {"CONDUCTANCE": PYTHON_CONDUCTANCE.format(given="", passed="")},
     ),
     "jax-law": Language(
         "law.jax.py",
@@ -318,7 +316,6 @@ LANGUAGES = {
         "{name}.{what}({x})",
         _with_infinity("-jnp.inf"),
         _lists,
-        {"CONDUCTANCE": PYTHON_CONDUCTANCE.format(given=", law=LAW", passed=", law")},
     ),
     "matlab-law": Language(
         "law.m",
@@ -327,7 +324,6 @@ LANGUAGES = {
         "law.{what}({x})",
         _with_infinity("-Inf"),
         _matrices,
-        {"CONDUCTANCE": "\n    kept.conductance = @(c) {ratio}*kept.tangent(c);"},
     ),
     "modelica-law": Language(
         "law.mo",
@@ -337,16 +333,11 @@ LANGUAGES = {
         "{name}.{what}({x})",
         _with_infinity("-1e300"),
         _braces,
-        {
-            "CONDUCTANCE": "\n  function conductance\n    input Real c;\n    output Real h;\n  algorithm\n"
-            "    h := {ratio}*tangent(c);\n  end conductance;\n"
-        },
     ),
     "abaqus-uinter": FORTRAN._replace(
         usage="*SURFACE INTERACTION, NAME=..., USER: abaqus job=... user={name}.f90. Place the bodies so that their "
         "surfaces touch where the mean planes are h_max apart. Beyond the law's range the increment is tried again "
         f"with a smaller step. Without friction. {READ} Arguments: Abaqus 2017, user subroutines, UINTER.",
-        conductance=FORTRAN.conductance | {"FLUX": FLUX},
         subroutine="uinter.f90",
     ),
     "abaqus-gapcon": GAPCON._replace(

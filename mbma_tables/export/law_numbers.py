@@ -6,8 +6,9 @@ Record k, which holds where edges[k - 1] <= scale c < edges[k], is, with x = sca
     t = (x - centre) rate,   p = sum_j force[j] t^j,   A/A0 = sum_j area[j] t^j,   dp/dc = scale rate dp/dt,
     energy = energy_0 + t sum_j force[j] t^j/(j + 1)/(scale rate).
 
-Where contact ends at c = 0 the first record's polynomials are multiplied by t^power. These are the numbers of
-`ContactLaw`, but for digits that do not matter; each language's template is a reader of them.
+Where contact ends at c = 0 the first record's polynomials are multiplied by t^power. Leakage has records of its own,
+over the gap d = h_max - 2 c (`FlowNumbers`). These are the numbers of `ContactLaw`, but for digits that do not matter;
+each language's template is a reader of them.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.theories import law_kernel as kernel
-from mbma_tables.theories.law_kernel import AREA_AT, CENTRE, ENERGY_AT, FORCE_AT, RATE
+from mbma_tables.theories.law_kernel import AREA_AT, CENTRE, ENERGY_AT, FORCE_AT, POWER_F, RATE, SCALE
+from mbma_tables.theories.law_leakage import LeakageLaw
 from mbma_tables.theories.law_object import ROUNDING, ContactLaw
 
 DIGITS = 1e-15  # of a record's largest coefficient: what is left out of each
@@ -44,7 +46,7 @@ class LawNumbers:
         Of pressure and area in the first record; zero where contact does not end.
     edges : ndarray, shape (records - 1,)
         Of scale c.
-    centre, rate, energy : ndarray, shape (records,)
+    centre, rate, energies : ndarray, shape (records,)
     force, area : ndarray, shape (records, 9)
     """
 
@@ -60,16 +62,67 @@ class LawNumbers:
     edges: FloatArray
     centre: FloatArray
     rate: FloatArray
-    energy: FloatArray
+    energies: FloatArray
     force: FloatArray
     area: FloatArray
+
+
+@dataclasses.dataclass(frozen=True)
+class FlowNumbers:
+    """Numbers of a law's leakage against x = scale (d - blocked): K = sum_j force[j] t^j, t = (x - centre) rate.
+
+    The first record, x < edges[0], is multiplied by t^power. Where bodies are apart, d > h_max of a law that ends
+    there, K is u^3 (1 - 1.5/((u/h_rms)^2 + 4)).
+
+    Attributes
+    ----------
+    blocked : float
+        Gap d from which x counts.
+    blocks : bool
+        Whether K is zero at and below it.
+    scale, power, h_rms : float
+    edges : ndarray, shape (records - 1,)
+    centre, rate : ndarray, shape (records,)
+    force : ndarray, shape (records, 9)
+    """
+
+    blocked: float
+    blocks: bool
+    scale: float
+    power: float
+    h_rms: float
+    edges: FloatArray
+    centre: FloatArray
+    rate: FloatArray
+    force: FloatArray
+
+
+def flow_numbers(leakage: LeakageLaw) -> FlowNumbers:
+    """The numbers of a law's leakage."""
+    head = leakage.block
+    blocked, power = -float(head[kernel.H_MAX]), float(head[POWER_F])
+    # in the layout of a law that counts from full compression
+    as_law = dataclasses.replace(leakage.law, block=head, h_max=-blocked, lowest=blocked)
+    x, which = _intervals(as_law, 1.0)
+    records = as_law.records[which]
+    return FlowNumbers(
+        blocked=blocked,
+        blocks=power > 0,
+        scale=float(head[SCALE]),
+        power=power,
+        h_rms=leakage.h_rms,
+        edges=x[1:-1],
+        centre=records[:, CENTRE],
+        rate=records[:, RATE],
+        force=_rounded(records[:, FORCE_AT:AREA_AT]),
+    )
 
 
 def law_numbers(law: ContactLaw) -> LawNumbers:
     """The numbers of a law."""
     head = law.block
     h_max, ends = law.h_max, bool(head.view(np.int64)[kernel.ENDS])
-    scale = 2 * float(head[kernel.SCALE])
+    scale = 2 * float(head[SCALE])
     # sides in order of rising c: by the depth below h_max, then by the height above full compression
     sides = ([-1.0] if ends else []) + ([1.0] if head[kernel.MINUS] > 0 else [])
     edges: list[FloatArray] = []
@@ -92,12 +145,12 @@ def law_numbers(law: ContactLaw) -> LawNumbers:
         ends=ends,
         side=numbers[0].size if ends else 0,
         scale=scale,
-        power_p=float(head[kernel.POWER_F]) if ends else 0.0,
+        power_p=float(head[POWER_F]) if ends else 0.0,
         power_a=float(head[kernel.POWER_A]) if ends else 0.0,
         edges=np.concatenate(edges),
         centre=of_side * records[:, CENTRE],
         rate=of_side * records[:, RATE],
-        energy=records[:, ENERGY_AT] / 2,
+        energies=records[:, ENERGY_AT] / 2,
         force=_rounded(records[:, FORCE_AT:AREA_AT]),
         area=_rounded(records[:, AREA_AT:ENERGY_AT]),
     )
@@ -116,12 +169,12 @@ def _intervals(law: ContactLaw, sign: float) -> tuple[FloatArray, Any]:
         edges.append(2.0 ** (int(whole[kernel.EXPONENT]) - 1023 + k) * (1 + np.arange(buckets) / buckets))
     for kink_sign, kink in ((kernel.KINK_SIGN, kernel.KINK), (kernel.KINK_SIGN_2, kernel.KINK_2)):
         if head[kink_sign] == sign:
-            edges.append(np.array([(head[kink] + law.h_max) * head[kernel.SCALE]]))
-    least = (law.h_max + law.lowest) * head[kernel.SCALE] if sign > 0 else 0.0
+            edges.append(np.array([(head[kink] + law.h_max) * head[SCALE]]))
+    least = (law.h_max + law.lowest) * head[SCALE] if sign > 0 else 0.0
     x = np.unique(np.concatenate(edges))
     x = np.concatenate([[least], x[x > least * (1 + ROUNDING)]])
     middle = (x[1:] + x[:-1]) / 2
-    records = law._records_at(sign * (middle / head[kernel.SCALE] - law.h_max), middle)
+    records = law._records_at(sign * (middle / head[SCALE] - law.h_max), middle)
     begins = np.concatenate([[True], np.diff(records) != 0])
     return np.append(x[:-1][begins], x[-1]), records[begins]
 

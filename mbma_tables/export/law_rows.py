@@ -216,29 +216,9 @@ def describe_law(
         f"above {names[1]} {floor:.4g} {names[3]}",
         *(["the first row is zero, whatever the pressure of the theory is there"] if law.highest < np.inf else ()),
         end=end,
+        leakage=quantity == "leakage",
     )
-    if quantity == "leakage":
-        comments += _of_leakage(joint, x)
     return LawTable(x, y, *names, error, comments, law.theory, floor, behaviour)
-
-
-def _of_leakage(joint: Joint, pressure: FloatArray) -> tuple[str, ...]:
-    """What a reader of rows of leakage must know."""
-    blocked = joint.law.leakage.blocked_at
-    found = joint.answer((joint.law.h_max + np.asarray(joint.law.separation(force=pressure[1:]))) / 2).leakage
-    reasons = {reason: mask for reason, mask in found.reasons.items() if reason.startswith("leakage")}
-    scatter = np.asarray(found.scatter)
-    known = np.flatnonzero(np.isfinite(scatter))
-    places = known[np.linspace(0, known.size - 1, 5).astype(int)] if known.size else known
-    return (
-        "leakage is the flow conductance K of the gaps: flow per length of seal is K dp/(12 viscosity width)",
-        f"blocked, K = 0, from p = {float(joint.law.force(blocked)):.10g} {joint.stress} on"
-        if blocked > -np.inf
-        else "never blocked",
-        *(f"not valid from p = {pressure[1:][mask].min():.4g} {joint.stress} on: {r}" for r, mask in reasons.items()),
-        "one standard deviation of ln K from simulation to simulation: "
-        + (", ".join(f"{scatter[k]:.2g} at {pressure[k + 1]:.3g}" for k in places) or "not known"),
-    )
 
 
 def _why_there(law: ContactLaw, x_name: str) -> str:

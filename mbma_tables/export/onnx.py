@@ -9,8 +9,8 @@ import numpy as np
 from mbma_tables import __version__
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError
-from mbma_tables.export.law_code import MAX_NAME, asked_law
-from mbma_tables.export.law_numbers import LawNumbers
+from mbma_tables.export.law_code import MAX_NAME, AskedLaw, asked_law
+from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers
 from mbma_tables.export.text import checked_name
 from mbma_tables.surfaces.any_surface import AnySurface
 
@@ -41,8 +41,6 @@ def onnx(
     E_star: float | str,
     *,
     name: str = "law",
-    conductivity: float | None = None,
-    conductivity_unit: str | None = None,
     **asked: Any,
 ) -> bytes:
     """A contact law as a file of ONNX: overclosure of shape (n,) in; pressure, tangent, area and energy out.
@@ -51,8 +49,8 @@ def onnx(
 
     Parameters
     ----------
-    surface, E_star, name, conductivity, conductivity_unit, **asked
-        As for `law_text`; a conductivity adds the output conductance.
+    surface, E_star, name, **asked
+        As for `law_text`; a conductivity adds the output conductance, leakage the output leakage.
 
     Returns
     -------
@@ -76,10 +74,8 @@ def onnx(
         from onnx import TensorProto, helper, numpy_helper
     except ImportError:
         raise InputError("onnx needs a package: pip install 'mbma_tables[onnx]'") from None
-    found, graph = asked_law(surface, E_star, conductivity, conductivity_unit, **asked), _Graph(helper)
-    outputs = _law(graph, found.numbers)
-    if found.conductance_unit:
-        outputs.append(graph("Mul", "tangent", found.ratio, name="conductance"))
+    found, graph = asked_law(surface, E_star, **asked), _Graph(helper)
+    outputs = _law(graph, found)
     made = helper.make_graph(
         graph.nodes,
         checked_name(name, MAX_NAME),
@@ -93,12 +89,10 @@ def onnx(
     return bytes(model.SerializeToString(deterministic=True))
 
 
-def _law(graph: _Graph, numbers: LawNumbers) -> list[str]:
+def _law(graph: _Graph, found: AskedLaw) -> list[str]:
     """Nodes from overclosure to the quantities of a law, as `law_numbers` describes it."""
-    c = "overclosure"
-    reached = graph("GreaterOrEqual", graph("Unsqueeze", graph("Mul", c, numbers.scale), [-1]), numbers.edges)
-    # the record is the number of edges reached
-    k = graph("ReduceSum", graph("Cast", reached, to=7), [-1], keepdims=0)
+    c, numbers = "overclosure", found.numbers
+    k = _record(graph, graph("Mul", c, numbers.scale), numbers.edges)
     near = graph("Less", k, numbers.side)
     x = graph("Mul", graph("Where", near, c, graph("Sub", c, numbers.h_max)), numbers.scale)
     rate = graph("Gather", numbers.rate, k)
@@ -113,25 +107,55 @@ def _law(graph: _Graph, numbers: LawNumbers) -> list[str]:
     def ended(value: str, to: str) -> str:
         return graph("Where", outside, np.nan, graph("Where", below, 0.0, value), name=to)
 
-    def horner(rows: FloatArray) -> tuple[str, str]:
-        value, slope = graph("Gather", rows[:, -1].copy(), k), ""
-        for column in rows.T[-2::-1]:
-            slope = graph("Add", graph("Mul", slope, t), value) if slope else value
-            value = graph("Add", graph("Mul", value, t), graph("Gather", column.copy(), k))
-        return value, slope
-
-    value, slope = horner(numbers.force)
+    value, slope = _polynomial(graph, numbers.force, k, t)
     power = graph("Where", powered, graph("Div", numbers.power_p, base), 0.0)
     lead = graph("Pow", base, numbers.power_p)
     slope = graph("Mul", lead, graph("Add", slope, graph("Mul", power, value)))
-    area = graph("Mul", graph("Pow", base, numbers.power_a), horner(numbers.area)[0])
+    area = graph("Mul", graph("Pow", base, numbers.power_a), _polynomial(graph, numbers.area, k, t)[0])
     powers = np.tile(np.arange(1.0, 10.0), (numbers.rate.size, 1))
     powers[0] += numbers.power_p
-    sum_ = graph("Mul", graph("Mul", lead, t), horner(numbers.force / powers)[0])
-    energy = graph("Add", graph("Gather", numbers.energy, k), graph("Div", sum_, rate))
-    return [
+    sum_ = graph("Mul", graph("Mul", lead, t), _polynomial(graph, numbers.force / powers, k, t)[0])
+    energy = graph("Add", graph("Gather", numbers.energies, k), graph("Div", sum_, rate))
+    outputs = [
         ended(graph("Mul", lead, value), "pressure"),
         ended(graph("Mul", slope, rate), "tangent"),
         ended(area, "area"),
         ended(energy, "energy"),
     ]
+    if "conductance" in found.more:
+        outputs.append(graph("Mul", "tangent", found.ratio, name="conductance"))
+    if found.flow:
+        outputs.append(graph("Where", outside, np.nan, _flow(graph, numbers, found.flow), name="leakage"))
+    return outputs
+
+
+def _flow(graph: _Graph, numbers: LawNumbers, flow: FlowNumbers) -> str:
+    """Nodes from overclosure to the flow conductance within the law's range."""
+    c = "overclosure"
+    d = graph("Sub", numbers.h_max, graph("Mul", c, 2.0))
+    x = graph("Mul", graph("Sub", d, flow.blocked), flow.scale)
+    k = _record(graph, x, flow.edges)
+    t = graph("Mul", graph("Sub", x, graph("Gather", flow.centre, k)), graph("Gather", flow.rate, k))
+    blocked = graph("And", graph("LessOrEqual", x, 0.0), flow.blocks)
+    base = graph("Where", graph("And", graph("Equal", k, 0), graph("Not", blocked)), t, 1.0)
+    value = graph("Mul", graph("Pow", base, flow.power), _polynomial(graph, flow.force, k, t)[0])
+    u = graph("Sub", numbers.h_max, c)
+    wide = graph("Div", -1.5, graph("Add", graph("Pow", graph("Div", u, flow.h_rms), 2.0), 4.0))
+    apart = graph("Mul", graph("Pow", u, 3.0), graph("Add", wide, 1.0))
+    value = graph("Where", graph("And", graph("Less", c, 0.0), numbers.ends), apart, value)
+    return graph("Where", blocked, 0.0, value)
+
+
+def _record(graph: _Graph, x: str, edges: FloatArray) -> str:
+    """The number of edges reached."""
+    reached = graph("GreaterOrEqual", graph("Unsqueeze", x, [-1]), edges)
+    return graph("ReduceSum", graph("Cast", reached, to=7), [-1], keepdims=0)
+
+
+def _polynomial(graph: _Graph, rows: FloatArray, k: str, t: str) -> tuple[str, str]:
+    """The polynomial of row k, and its derivative."""
+    value, slope = graph("Gather", rows[:, -1].copy(), k), ""
+    for column in rows.T[-2::-1]:
+        slope = graph("Add", graph("Mul", slope, t), value) if slope else value
+        value = graph("Add", graph("Mul", value, t), graph("Gather", column.copy(), k))
+    return value, slope

@@ -64,8 +64,9 @@ def wrapped(items: Iterable[str], indent: str = "", end: str = "") -> str:
 
 
 def filled(name: str, **parts: str) -> str:
-    """A template with its places, such as @HEADER@, filled in."""
+    """A template with its places, such as @HEADER@, filled in; @IF PLACE@ ... @END@ stays where that is not empty."""
     text = (importlib.resources.files("mbma_tables.export") / "templates" / f"{name}.in").read_text(encoding="utf-8")
+    text = re.sub(r"@IF ([A-Z]+)@(\n)?(.*?)@END@(?(2)\n)", lambda found: parts[found[1]] and found[3], text, flags=re.S)
     # in one pass: a header may hold such a name itself
     return re.sub("@([A-Z_]+)@", lambda place: parts[place[1]], text)
 

@@ -39,11 +39,13 @@ class Points:
     tangent: np.ndarray
     area: np.ndarray
     energy: np.ndarray
+    leakage: np.ndarray
     c_turn: float
 
-    def assert_equal(self, p: Any, tangent: Any, area: Any, energy: Any, close: float = VALUES) -> None:
+    def assert_equal(self, p: Any, tangent: Any, area: Any, energy: Any, leakage: Any, close: float = VALUES) -> None:
         """Values as the law's, tangents as its slopes, of which those about a maximum are relative to p/c."""
-        for found, known in ((p, self.p), (area, self.area), (energy, self.energy)):
+        pairs = (p, self.p), (area, self.area), (energy, self.energy), (leakage, self.leakage)
+        for found, known in pairs:
             np.testing.assert_allclose(found, known, rtol=close, atol=0)
         slope = np.maximum(np.abs(self.tangent), 1e-2 * self.p / np.abs(self.c))
         assert np.abs((np.asarray(tangent) - self.tangent) / slope).max() <= max(TANGENTS, close)
@@ -78,7 +80,8 @@ def points(name: str) -> Points:
     assert ((h - d) / 2 == c).all()
     turn = law.lowest if law.turning_point is None else law.turning_point
     found = law.values(d)
-    return Points(law, c, found.force, 2 * found.stiffness, found.area, found.energy / 2, (h - turn) / 2)
+    flow = np.asarray(law.leakage(d))
+    return Points(law, c, found.force, 2 * found.stiffness, found.area, found.energy / 2, flow, (h - turn) / 2)
 
 
 def text(target: str, law: str, **options: Any) -> str:
