@@ -14,19 +14,6 @@ settings.load_profile("untimed")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
-@pytest.fixture(scope="session", params=["universal", "island4d"])
-def built(request, tmp_path_factory):
-    """(kind, its content) of a small table built here."""
-    from small_builds import KINDS, small
-
-    from generate.tables import commands
-    from generate.tables.chunks import ChunkedSolver
-    from generate.tables.configuration import load
-
-    configuration = load(request.param, small(tmp_path_factory.mktemp("built"), request.param))
-    return KINDS[request.param](configuration), commands.built(configuration, ChunkedSolver())
-
-
 @pytest.fixture
 def tally(record_property):
     """Reads inputs one by one, each under a watch, and counts what it tried."""

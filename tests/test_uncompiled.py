@@ -1,4 +1,4 @@
-"""Tests of every layer without numba: as plain Python, compiled functions neither read past an end nor reorder a sum."""
+"""Tests of every layer without numba: as plain Python, loops neither read past an end nor reorder a sum."""
 
 import subprocess
 import sys

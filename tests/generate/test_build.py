@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from small_builds import KINDS, SMALL, small
+from small_tables import KINDS, SMALL, small, small_build
 
 from generate.__main__ import main
 from generate.tables import build as build_module
@@ -24,11 +24,16 @@ FRESH = 4000
 STATED_FACTOR = 1.5
 
 
-@pytest.fixture(scope="module")
-def nodes(tmp_path_factory):
-    """(kind, its content) of a small table over nodes."""
-    configuration = load("island4d", small(tmp_path_factory.mktemp("nodes"), "island4d"))
-    return KINDS["island4d"](configuration), build_table(configuration, ChunkedSolver())
+@pytest.fixture(params=KINDS)
+def built(request):
+    """(kind, its content) of a small table."""
+    return small_build(request.param)
+
+
+@pytest.fixture
+def nodes():
+    """The same over nodes."""
+    return small_build("island4d")
 
 
 def fresh(kind, content, count=FRESH, seed=5):
@@ -168,7 +173,7 @@ REFUSED = {
         "more than the 100 allowed; raise max_nodes or the target",
     ),
     "a range that no surface visits": (
-        lambda text: text.replace("6.0", "100.0").replace("low = 0.5", "low = 90.0"),
+        lambda text: text.replace("6.0", "100.0").replace("low = -2.0", "low = 90.0"),
         "hardly a surface visits these axes",
     ),
 }

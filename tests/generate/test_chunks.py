@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 import pytest
-from small_builds import SMALL
+from small_tables import SMALL
 
 from generate.tables import chunks, commands
 from generate.tables.chunks import ChunkedSolver, WorkerError, phi

@@ -50,32 +50,6 @@ def test_tensor_splines_are_those_of_scipy():
     np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11 * np.abs(values).max())
 
 
-def test_nodes_are_met():
-    degree, shape = 3, SHAPE
-    values = node_values(shape, seed=5)
-    coefs = coefficients(values, degree, len(shape))
-    positions = [g.ravel().astype(float) for g in np.meshgrid(*(np.arange(n) for n in shape), indexing="ij")]
-    found = at_positions(coefs, positions).T.reshape(values.shape)
-    np.testing.assert_allclose(found, values, rtol=0, atol=1e-13 * np.abs(values).max())
-
-
-def test_polynomials_of_the_degree_are_exact():
-    degree, shape = 3, SHAPE
-    rng = np.random.default_rng(6)
-    factors = [np.polynomial.Polynomial(rng.standard_normal(degree + 1), domain=[0, n - 1]) for n in shape]
-    others = [np.polynomial.Polynomial(rng.standard_normal(degree + 1), domain=[0, n - 1]) for n in shape]
-
-    def both(positions):
-        product = [np.prod([f(p) for f, p in zip(fs, positions, strict=True)], axis=0) for fs in (factors, others)]
-        return np.stack(product, axis=-1)
-
-    values = both(np.meshgrid(*(np.arange(n, dtype=float) for n in shape), indexing="ij"))
-    coefs = coefficients(values, degree, len(shape))
-    positions = random_positions(shape, 300)
-    found = at_positions(coefs, positions).T
-    np.testing.assert_allclose(found, both(positions), rtol=0, atol=1e-12 * np.abs(values).max())
-
-
 @pytest.mark.parametrize("degree", [3, 5])
 @pytest.mark.parametrize("nodes", [7, 12, 300])
 def test_one_axis_against_scipy_and_more_components(degree, nodes):
@@ -118,21 +92,6 @@ def test_weights_at_fifty_digits(degree):
         assert sum(value(u)) == pytest.approx(1, rel=4e-16, abs=0)
         assert sum(interpolate.cubic_slope(u)) == pytest.approx(0, abs=4e-16)
     np.testing.assert_allclose(value(0.0)[:-1], TAPS[degree], rtol=2e-16)
-
-
-@pytest.mark.parametrize("degree", [3, 5])
-def test_smooth_across_the_borders_of_cells(degree):
-    value = WEIGHTS[degree]
-    with mpmath.workdps(60):
-        one, zero = mpmath.mpf(1), mpmath.mpf(0)
-        for order in range(degree):
-            for number in range(degree + 2):
-                # the same B-spline seen from the cell before the border and from that behind it
-                before, behind = (
-                    mpmath.diff(lambda u, k=k: value(u)[k], at, order) if 0 <= k <= degree else zero
-                    for k, at in ((number, one), (number - 1, zero))
-                )
-                assert abs(before - behind) < 1e-16
 
 
 def test_the_last_node_belongs_to_the_table():
