@@ -63,13 +63,7 @@ def hinted(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def needed(module: str, extra: str) -> Any:
-    """A module of an extra.
-
-    Raises
-    ------
-    MbmaError
-        Where it is not installed, with what installs it.
-    """
+    """A module of an extra; where it is not installed, the error says what installs it."""
     try:
         return importlib.import_module(module)
     except ImportError:

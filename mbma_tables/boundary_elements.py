@@ -42,13 +42,7 @@ class Contact:
         self._tolerance = tolerance
 
     def press(self, force: float) -> dict[str, float]:
-        """Contact under a mean pressure F/(A0 E*); areas as shares of A0, lengths as those of the map.
-
-        Raises
-        ------
-        ConvergenceError
-            Where the conjugate gradients end before the tolerance.
-        """
+        """Contact under a mean pressure F/(A0 E*); areas as shares of A0, lengths as those of the map."""
         started = time.process_time()
         residual = self._solver.solve(force)
         if not residual <= self._tolerance:

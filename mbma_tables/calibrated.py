@@ -41,25 +41,15 @@ NARROWNESS = 0.65  # that W's slope refers to
 
 @dataclasses.dataclass(frozen=True)
 class Constants:
-    """The law's constants.
+    """The law's constants."""
 
-    Attributes
-    ----------
-    area_s0, area_slope, area_t0 : float
-        S of the area: s0 = area_s0 + area_slope ln(alpha/10), at most Persson's 1.
-    weight, weight_slope, cubic : float
-        W's coefficients a, with its slope in the narrowness less 0.65, and b.
-    tail : float
-        c of the Gaussian tail factor.
-    """
-
-    area_s0: float = 0.5131
+    area_s0: float = 0.5131  # S of the area: s0 = area_s0 + area_slope ln(alpha/10), at most Persson's 1
     area_slope: float = 0.02973
     area_t0: float = 0.3428
-    weight: float = 0.438
-    weight_slope: float = 0.08577
-    cubic: float = 0.4279
-    tail: float = 0.06492
+    weight: float = 0.438  # W's coefficient a,
+    weight_slope: float = 0.08577  # its slope in the narrowness less 0.65,
+    cubic: float = 0.4279  # and b
+    tail: float = 0.06492  # c of the Gaussian tail factor
 
 
 CONSTANTS = Constants()
@@ -121,27 +111,13 @@ def inner_integral(y: FloatArray, coefficients: FloatArray) -> FloatArray:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Spectrum:
-    """An isotropic spectrum as a quadrature rule.
+    """An isotropic spectrum as a quadrature rule, arrays of shape (n,)."""
 
-    Attributes
-    ----------
-    x : numpy.ndarray, shape (n,)
-        Wavenumbers over a reference q0 (any: it cancels), rising.
-    variance : numpy.ndarray, shape (n,)
-        Shares of h_rms^2, their sum 1.
-    below : numpy.ndarray, shape (n,)
-        Shares of g^2 of the waves below each x.
-    gradient : float
-        g/(q0 h_rms).
-    alpha : float
-        m0 m4/m2^2.
-    """
-
-    x: FloatArray
-    variance: FloatArray
-    below: FloatArray
-    gradient: float
-    alpha: float
+    x: FloatArray  # wavenumbers over a reference q0 (any: it cancels), rising
+    variance: FloatArray  # shares of h_rms^2, their sum 1
+    below: FloatArray  # shares of g^2 of the waves below each x
+    gradient: float  # g/(q0 h_rms)
+    alpha: float  # m0 m4/m2^2
 
     @functools.cached_property
     def narrowness(self) -> float:
@@ -191,15 +167,7 @@ class Spectrum:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Law:
-    """The curve of a spectrum, of a Gaussian surface without end or, with `h_max`, of one that ends there.
-
-    Parameters
-    ----------
-    spectrum : Spectrum
-    h_max : float, optional
-        Highest point [h_rms].
-    constants : Constants
-    """
+    """The curve of a spectrum, of a Gaussian surface without end or, with `h_max` [h_rms], of one that ends there."""
 
     spectrum: Spectrum
     h_max: float | None = None

@@ -43,28 +43,19 @@ ERF_INVERSE = (1e-7, 3.9)  # erfinv(A) over which F(A) is tabulated
 class MapConstants:
     """Constants of the map's law.
 
-    Attributes
-    ----------
-    breadth, breadth_onset, curvature : float
-        c = 0.8 max(1, b (alpha/2)^(curvature/2)/breadth_onset)^breadth for an isotropic map, once contacts have merged,
-        b the root mean square over the geometric mean wavenumber, alpha = m0 m4/m2^2.
-    gaussian_area, valley_area : float
-        Contact where the deviation of a Gaussian surface from M(c A), and then the valleys, take over.
-    tension_area : float
-        Contact where the area pulled on in full contact takes over from the tops'.
-    merging_area : float
-        Contact over which c grows from a single contact's.
-    elliptic : float
-        Further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces.
+    c = 0.8 max(1, b (alpha/2)^(curvature/2)/breadth_onset)^breadth for an isotropic map, once contacts have merged,
+    b the root mean square over the geometric mean wavenumber, alpha = m0 m4/m2^2.
     """
 
     breadth: float = 0.5988
     breadth_onset: float = 1.512
-    gaussian_area: float = 0.2897
-    valley_area: float = 0.6527
-    tension_area: float = 0.6
-    merging_area: float = 0.00761
-    elliptic: float = 0.7245
+    gaussian_area: float = 0.2897  # contact where the deviation of a Gaussian surface from M(c A) takes over,
+    valley_area: float = 0.6527  # and then the valleys
+    tension_area: float = 0.6  # contact where the area pulled on in full contact takes over from the tops'
+    merging_area: float = 0.00761  # contact over which c grows from a single contact's
+    elliptic: float = (
+        0.7245  # further exponent of Hertz's elliptic factor at the lightest contact of stretched surfaces
+    )
     curvature: float = 0.09953
 
 
@@ -107,16 +98,7 @@ def convex(force: FloatArray, u: FloatArray) -> FloatArray:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class MapLaw:
-    """The curve of a map.
-
-    Parameters
-    ----------
-    spectrum : Spectrum
-        The map's own.
-    mean_height, top_gradient, tension_force, tension : numpy.ndarray, shape (91,)
-        Of `bearing`: M(a) [h_rms], the tops' gradient, and the pulls of full contact [E* g].
-    anisotropy : float
-    """
+    """The curve of a map, by its own spectrum and what `bearing` has; M(a) [h_rms], pulls of full contact [E* g]."""
 
     spectrum: Spectrum
     mean_height: FloatArray

@@ -23,13 +23,7 @@ def shipped_file(name: str) -> pathlib.Path:
 
 
 def read_file(path: os.PathLike[str] | str, max_bytes: int) -> bytes:
-    """The content of a regular file of at most `max_bytes`; links are followed, "-" is standard input.
-
-    Raises
-    ------
-    InputError
-        Where it cannot be read, is a folder, a device or a pipe, or is larger.
-    """
+    """The content of a regular file of at most `max_bytes`; links are followed, "-" is standard input."""
     try:
         # a pipe would wait for a writer, a device may have no end
         if os.fspath(path) != "-" and not stat.S_ISREG(os.stat(path).st_mode):
@@ -46,19 +40,7 @@ def read_file(path: os.PathLike[str] | str, max_bytes: int) -> bytes:
 def write_file(path: os.PathLike[str] | str, content: bytes, make_folders: bool = False) -> None:
     """Write a file whole or not at all: under a temporary name beside it, which then replaces it.
 
-    Parameters
-    ----------
-    path : path
-        Where to write; links are followed, "-" is standard output.
-    content : bytes
-        What to write.
-    make_folders : bool, optional
-        Whether to make missing folders.
-
-    Raises
-    ------
-    InputError
-        Where it cannot be written, or is a folder, a device or a pipe; what was there before is unchanged.
+    Links are followed, "-" is standard output. Where it cannot be written, what was there before is unchanged.
     """
     if os.fspath(path) == "-":
         sys.stdout.buffer.write(content)
@@ -89,13 +71,7 @@ def write_file(path: os.PathLike[str] | str, content: bytes, make_folders: bool 
 
 
 def written_bytes(name: str, write: Callable[[str], object]) -> bytes:
-    """The bytes that a library writes where it takes only a path, by way of the system's temporary folder.
-
-    Raises
-    ------
-    OSError
-        Where that folder cannot be written or is full.
-    """
+    """The bytes that a library writes where it takes only a path, by way of the system's temporary folder."""
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, name)
         try:

@@ -44,32 +44,16 @@ def leakage_label(unit: str) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class Curve:
-    """One line of a picture; three arrays of one length.
+    """One line of a picture; arrays of one length, NaN where a scatter is not known."""
 
-    Attributes
-    ----------
-    label : str
-        Its name in the legend.
-    gap : ndarray
-        Mean separation u/h_rms (50).
-    force : ndarray
-        F/A0, or F/(A0 E*).
-    area : ndarray
-        A/A0.
-    scatter, area_scatter : ndarray or None
-        Standard deviations of ln F at the gap and of ln A at the force, drawn as bands; NaN where not known.
-    leakage, leakage_scatter : ndarray or None
-        Flow conductance of the gaps, zero where blocked, and standard deviations of its logarithm.
-    """
-
-    label: str
-    gap: FloatArray
-    force: FloatArray
-    area: FloatArray
-    scatter: FloatArray | None = None
-    area_scatter: FloatArray | None = None
-    leakage: FloatArray | None = None
-    leakage_scatter: FloatArray | None = None
+    label: str  # in the legend
+    gap: FloatArray  # mean separation u/h_rms (50)
+    force: FloatArray  # F/A0, or F/(A0 E*)
+    area: FloatArray  # A/A0
+    scatter: FloatArray | None = None  # standard deviation of ln F at the gap, drawn as a band,
+    area_scatter: FloatArray | None = None  # and of ln A at the force
+    leakage: FloatArray | None = None  # flow conductance of the gaps, zero where blocked,
+    leakage_scatter: FloatArray | None = None  # and standard deviation of its logarithm
 
     def __post_init__(self) -> None:
         shapes = set()
@@ -86,13 +70,7 @@ class Curve:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """A figure [inches] that is none of pyplot's, and that notebooks show.
-
-    Raises
-    ------
-    MbmaError
-        Where matplotlib is missing.
-    """
+    """A figure [inches] that is none of pyplot's, and that notebooks show."""
     try:
         from matplotlib.figure import Figure
     except ImportError:

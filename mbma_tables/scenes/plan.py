@@ -36,35 +36,17 @@ LADDER = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-
 
 @dataclasses.dataclass(frozen=True)
 class Step:
-    """One step of a plan.
-
-    Attributes
-    ----------
-    name, why, what : str
-        What it is called, which effects asked for it, what it evaluates.
-    tier : str, AnyModel or None
-        Island model.
-    rtol : float or None
-        Asked of the totals, the law or the solver.
-    count : int
-        Gaps, islands or points evaluated.
-    error : float
-        Certified beforehand; NaN where only the answers can say.
-    seconds : float
-        By the measured costs, without first use; NaN where nothing was measured.
-    theory : str or None
-        The scene's theory where it is not MBMA, in a step that asks it.
-    """
+    """One step of a plan."""
 
     name: str
-    why: str
-    what: str
+    why: str  # which effects asked for it
+    what: str  # what it evaluates
     tier: str | AnyModel | None
-    rtol: float | None
-    count: int
-    error: float
-    seconds: float
-    theory: str | None = None
+    rtol: float | None  # asked of the totals, the law or the solver
+    count: int  # gaps, islands or points evaluated
+    error: float  # certified beforehand; NaN where only the answers can say
+    seconds: float  # by the measured costs, without first use; NaN where nothing was measured
+    theory: str | None = None  # the scene's, where it is not MBMA, in a step that asks it
 
     @property
     def tier_name(self) -> str | None:
@@ -74,30 +56,14 @@ class Step:
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """Steps in the order in which they run.
-
-    Attributes
-    ----------
-    steps : tuple of Step
-        What is computed.
-    left_out, switched_off : tuple of str
-        Effects that were not asked for, and refinements of the model that are off.
-    rtol : float
-        Tolerance of the whole.
-    overhead : float
-        Seconds that every scene takes.
-    first_use : float
-        Seconds that the first scene of a process takes besides, for imports and tables; no choice depends on it.
-    theory : str
-        Whose answers these are.
-    """
+    """Steps in the order in which they run."""
 
     steps: tuple[Step, ...]
-    left_out: tuple[str, ...]
-    switched_off: tuple[str, ...]
-    rtol: float
-    overhead: float
-    first_use: float
+    left_out: tuple[str, ...]  # effects that were not asked for
+    switched_off: tuple[str, ...]  # refinements of the model that are off
+    rtol: float  # of the whole
+    overhead: float  # seconds that every scene takes
+    first_use: float  # seconds that the first scene of a process takes besides; no choice depends on it
     theory: str = "mbma"
 
     @property
@@ -139,13 +105,7 @@ def duration(seconds: float) -> str:
 
 
 def make_plan(problem: Problem, costs: Costs | None = None) -> Plan:
-    """The steps that meet the tolerance, or the tightest tolerance of `LADDER` whose steps fit the time budget.
-
-    Raises
-    ------
-    InputError
-        Where the tolerance is too tight for a law that the effects need, or no plan fits the time budget.
-    """
+    """The steps that meet the tolerance, or the tightest tolerance of `LADDER` whose steps fit the time budget."""
     measured = shipped_costs() if costs is None else costs
     if problem.rtol is not None:
         return _Planner(problem, problem.rtol, measured).plan()

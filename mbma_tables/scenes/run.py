@@ -53,10 +53,7 @@ class Run:
 def run_plan(problem: Problem, plan: Plan, progress: Progress | None = None) -> xr.Dataset:
     """The quantities of a problem, each with its unit; what made them in the attributes.
 
-    Raises
-    ------
-    InputError, OutOfRangeError, ConvergenceError
-        The last also where a step's error bound exceeds the tolerance.
+    A step whose error bound exceeds the tolerance is a ConvergenceError.
     """
     surface, h_max = problem.surface, float(problem.surface.h_max)
     if "finite_height" in problem.dropped:

@@ -31,13 +31,7 @@ class Heights:
 
     @classmethod
     def of(cls, heights: ArrayLike) -> Heights:
-        """Of sampled heights, of any shape and mean.
-
-        Raises
-        ------
-        InputError, OutOfRangeError
-            For heights that are no numbers, or all the same.
-        """
+        """Of sampled heights, of any shape and mean."""
         values = np.sort(finite_array("heights", heights), axis=None)
         values = values - values.mean()
         size = float(np.abs(values).max())

@@ -119,15 +119,7 @@ def _fill(dataset: netCDF4.Dataset, content: TableContent) -> None:
 
 
 def write_table(path: os.PathLike[str] | str, content: TableContent) -> pathlib.Path:
-    """Write a table file, whole or not at all.
-
-    Raises
-    ------
-    TableFileError
-        Where the file cannot be written; what was there before is unchanged.
-    ValueError
-        Where the parts of the table do not fit one another.
-    """
+    """Write a table file, whole or not at all."""
     target = pathlib.Path(path)
     check_content(content)
     digest = digest_arrays(content.arrays())
@@ -231,20 +223,7 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> TableContent:
 
 
 def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> TableContent:
-    """Open and check a table file.
-
-    Parameters
-    ----------
-    path : path
-        The file.
-    kind : str, optional
-        The kind that it must be.
-
-    Raises
-    ------
-    TableFileError
-        Where it is unreadable, damaged, edited, of another format or of another kind.
-    """
+    """Open and check a table file, which must be of a `kind` where one is given."""
     source = pathlib.Path(path)
     body = read_sealed(source)
     try:

@@ -30,10 +30,7 @@ def differentiate(
 ) -> tuple[dict[str, FloatArray], ...]:
     """Derivatives of F/(A0 E*) and A/A0 by "separation" d and each of the surface's parameters, the others held.
 
-    Raises
-    ------
-    ConvergenceError
-        Where differences do not settle on a derivative: at corners of a theory, or where force has no bound.
+    Where differences do not settle, at corners of a theory or where force has no bound, it is a ConvergenceError.
     """
     shape = np.broadcast_shapes(np.shape(mean_separation), surface.shape)
     names = (GAP, *surface.parameters)

@@ -176,13 +176,7 @@ class Yielding(Theory):
         return low, np.minimum(high, MAX_LEVEL * np.asarray(surface.h_rms))
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
-        """Mean separation u [length] at which "force" (over A0 E*) or "area" has a wanted value.
-
-        Raises
-        ------
-        OutOfRangeError
-            For pressures above the hardness, or that the elastic theory does not reach.
-        """
+        """Mean separation u [length] at which "force" (over A0 E*, below the hardness) or "area" has a wanted value."""
         if np.isinf(self.hardness).all():
             return self.elastic.mean_separation_at(surface, quantity, wanted)
         shape = np.broadcast_shapes(np.shape(wanted), surface.shape, self.hardness.shape)
