@@ -7,17 +7,19 @@ import dataclasses
 import importlib.util
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
+import textwrap
 from collections.abc import Iterable
 from typing import NamedTuple
 
 from mbma_tables.errors import InputError
 from mbma_tables.export import CODE, c_code
 from mbma_tables.export.conformance import KINDS, POINTS_FILE, points_text
-from mbma_tables.export.text import filled, opening
+from mbma_tables.export.text import filled, opening, wrapped
 from mbma_tables.files import write_file
 from mbma_tables.models.tables import open_table
 from mbma_tables.models.universal import UniversalModel
@@ -140,10 +142,47 @@ def source_texts(target: str, model: UniversalModel, reading: Reading) -> dict[s
     for name, title in language.titles.items():
         lines = c_code.header(f"{name}: {title}", language.usage, about)
         parts = {"HEADER": opening(lines, "!" if name.endswith(".f90") else "/*")}
+        if name == "mbma.f90":
+            parts |= fortran_interface(c_texts["mbma.h"] + c_texts["mbma_theories.h"])
         if name == "mbma.mjs":
             parts["WASM"] = base64.encodebytes(web_assembly(c_texts, WASM_FUNCTIONS)).decode("ascii")
         texts[name] = filled(name, **parts)
     return texts
+
+
+def fortran_interface(declarations: str) -> dict[str, str]:
+    """What C headers declare for Fortran: numbers of a status, structures of doubles, functions that take no others."""
+    types: dict[str, list[str]] = {}
+    functions: dict[str, list[str]] = {}
+    for paragraph in declarations.split("\n\n"):
+        note, _, code = paragraph.removeprefix("/* ").partition(" */\n")
+        lines = [f"! {line}" for line in textwrap.wrap(" ".join(note.split()), 110)]
+        struct = re.fullmatch(r"typedef struct \{\s*double ([^;[]*);\s*\} (\w+);", code)
+        call = re.fullmatch(r"int (\w+)\((.*)\);", " ".join(code.split()))
+        if struct:
+            fields, name = struct.groups()
+            types[name] = [*lines, f"type, bind(c), public :: {name}", f"  real(c_double) :: {fields}", "end type", ""]
+        elif call:
+            arguments = re.findall(r"(const )?(\w+) (\*?)(\w+)(?:, |$)", call[2])
+            kinds = {kind for _, kind, _, _ in arguments}
+            if not kinds <= {"double", *types}:
+                continue
+            names = ", ".join(name for *_, name in arguments)
+            lines += [f"function {call[1]}({names}) bind(c) result(status)"]
+            lines += [f"  import :: {', '.join(sorted(kinds - {'double'} | {'c_double', 'c_int'}))}"]
+            for const, kind, pointer, name in arguments:
+                passed = "value" if not pointer else "intent(in)" if const else "intent(out)"
+                lines += [f"  {'real(c_double)' if kind == 'double' else f'type({kind})'}, {passed} :: {name}"]
+            functions[call[1]] = [*lines, "  integer(c_int) :: status", "end function", ""]
+    status = re.findall(r"(MBMA_\w+) = (\d+),? +/\* (.*?) \*/", declarations)
+    return {
+        "NAMES": wrapped(functions, indent="    ", end=" &"),
+        "STATUS": "\n".join(
+            f"  integer(c_int), parameter, public :: {name} = {k}  ! {what}" for name, k, what in status
+        ),
+        "TYPES": textwrap.indent("\n".join(line for lines in types.values() for line in lines), "  "),
+        "FUNCTIONS": textwrap.indent("\n".join(line for lines in functions.values() for line in lines), "    "),
+    }
 
 
 def web_assembly(c_texts: dict[str, str], names: Iterable[str]) -> bytes:
