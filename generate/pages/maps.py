@@ -103,7 +103,7 @@ def extrapolation() -> str:
         "ratio",
     ]
     told = next(entry["told"] for entry in longer.provenance if entry["step"] == "extrapolated")
-    return table(header, rows) + f"\n\nTold of it: {told}."
+    return table(header, rows) + f"\n\nReported with it: {told}."
 
 
 def measure() -> tuple[dict[str, str], dict[str, bytes]]:
