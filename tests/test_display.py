@@ -8,7 +8,6 @@ import pytest
 from helpers import fresh
 
 from mbma_tables import InputError, MbmaError, Scene, Surface, contact, contact_law, island, open_table, sensitivity
-from mbma_tables.arguments import hinted
 from mbma_tables.export.law_rows import describe_law
 
 ROAD = Surface.named("concrete")
@@ -157,18 +156,3 @@ def test_batches_are_summed_up():
 def test_misspelt_arguments_get_a_hint(call, hint):
     with pytest.raises(TypeError, match=re.escape(hint)):
         call()
-
-
-def test_a_hinted_function_keeps_its_signature():
-    import inspect
-
-    def plain(a, *, b=2):
-        """Doc."""
-        return a + b
-
-    checked = hinted(plain)
-    assert inspect.signature(checked) == inspect.signature(plain)
-    assert (checked(1, b=3), checked.__doc__) == (4, "Doc.")
-    for name in ("from_map", "from_profile"):
-        kinds = {p.kind for p in inspect.signature(getattr(Surface, name)).parameters.values()}
-        assert inspect.Parameter.VAR_KEYWORD not in kinds

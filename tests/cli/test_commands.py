@@ -108,22 +108,11 @@ def test_where_an_answer_is_not_valid_is_said_in_one_line():
 
 
 def test_scatter_is_said_where_it_is_known(folder, monkeypatch):
-    """Of a theory that states it, in the table, as JSON, and as a band in the picture beside MBMA."""
-    import mbma_tables.plots
     from mbma_tables.theories.persson import Persson
 
     monkeypatch.setattr(Persson, "scatter", lambda self, surface, area: (0.3 + area, 0.02 + 0 * area))
     text = run("contact", "--surface", "concrete", "--theory", "persson", "-a", "0.01,0.1")
     assert "scatter against simulations: ln force 0.31 to 0.4 at a separation, ln area 0.02 to 0.02 at a force" in text
-    drawn = []
-    original = mbma_tables.plots.draw_compression
-    monkeypatch.setattr(
-        mbma_tables.plots, "draw_compression", lambda *given, **named: drawn.append(given) or original(*given, **named)
-    )
-    run("curve", "--surface", "concrete", "--points", "9", "--plot", "c.png")
-    line = next(curve for curve in drawn[0][0] if curve.label == "Persson")
-    assert line.scatter == pytest.approx(0.3 + line.area)
-    assert line.area_scatter == pytest.approx(np.full(line.gap.size, 0.02))
 
 
 @pytest.mark.parametrize("theory", THEORIES)
@@ -256,11 +245,7 @@ def test_out_holds_what_stdout_would(folder):
     ("arguments", "message"),
     [
         (options(YANG_PERSSON | {"h_rms": -1.0}), "h_rms must be positive, got -1"),
-        (options(YANG_PERSSON | {"zeta_1": 3.0}), "zeta_1 must be greater than 3"),
-        (options(YANG_PERSSON | {"hurst": 1.2}), "hurst must be in (0, 1], got 1.2"),
-        (options(YANG_PERSSON | {"q0": float("nan")}), "q0 must be finite, got nan"),
         (options(YANG_PERSSON | {"q1": 10.0}), "a surface needs"),
-        (options({"hurst": 0.8, "q0": 1.0}), "a surface needs"),
         (options(CONCRETE | {"m4": 0.5}), "alpha = m0 m4/m2^2 must be in"),
         (["--surface", "granite"], "no surface is named 'granite'; there are yang-persson"),
         ([], "one surface is needed"),
@@ -269,15 +254,9 @@ def test_out_holds_what_stdout_would(folder):
         (["--file", "missing.toml"], "missing.toml cannot be read: No such file"),
         (["--file", "."], "not a regular file"),
         (["--surface", "concrete", "--reading", "mine"], "reading must be one of"),
-        (["--surface", "concrete", "--tier", "fast"], "tier must be"),
         (["--surface", "concrete", "--rtol", "0"], "rtol must be a number in"),
         (["--surface", "concrete", "--E-star", "0"], "E_star must be positive"),
         (["--surface", "concrete", "--E-star", "1", "--E1", "1"], "a material is E_star alone"),
-        (["--surface", "concrete", "--E1", "1", "--nu1", "0"], "a material is E_star alone"),
-        (
-            ["--surface", "concrete", *["--E1", "1", "--nu1", "0.6", "--E2", "1", "--nu2", "0"]],
-            "nu1 must be in (-1, 0.5]",
-        ),
         (["--surface", "concrete", "--json", "--csv"], "--json and --csv"),
         (["--surface", "concrete", "--surfce", "x"], "No such option"),
         (["--surface", "concrete", "--rtol", "small"], "not a valid float"),
@@ -295,11 +274,8 @@ def test_bad_input_of_every_command(folder, arguments, message):
     [
         (["contact", "-d", "-1.2"], "separation must be at least -h_max"),
         (["contact", "-d", "0,nan"], "separation must be finite, got nan at (1,)"),
-        (["contact", "-d", "inf"], "separation must be finite"),
         (["contact", "-d", ""], "separation is empty"),
         (["contact", "-d", "1;2"], "';2' is no known unit of length"),
-        (["contact", "-u", "-0.1"], "mean_separation must be at least 0"),
-        (["contact", "-p", "-1"], "pressure must be at least 0"),
         (["contact", "-p", "9"], "force must be at most what theory 'mbma' reaches"),
         (["contact", "-a", "0.01", "--over-h-rms"], "--over-h-rms is about lengths"),
         (["contact", "-d", "1", "--theory", "person"], "theory must be one of ('mbma', "),
@@ -313,8 +289,6 @@ def test_bad_input_of_every_command(folder, arguments, message):
         (["curve", "--plot", "no/such/c.png"], "cannot be written"),
         (["island"], "--delta"),
         (["island", "--delta", "0"], "delta must be positive, got 0"),
-        (["island", "--delta", "nan"], "delta must be finite"),
-        (["island", "--delta", ""], "delta is empty"),
     ],
 )
 def test_bad_input_of_one_command(folder, arguments, message):
@@ -325,21 +299,10 @@ def test_bad_input_of_one_command(folder, arguments, message):
     ("content", "message"),
     [
         ("[surface\n", "is not a TOML file"),
-        ("[surfaces]\nname = 'concrete'\n", "unknown key 'surfaces'; did you mean 'surface'?"),
         ("[surface]\nhrust = 0.7\n", "unknown key 'hrust'; did you mean 'hurst'?"),
-        ("[surface]\nname = 'concrete'\n[material]\nEstar = 1\n", "did you mean 'E_star'?"),
         ("[surface]\nname = 'concrete'\nxyz = 1\n", "unknown key 'xyz'; known are name, map"),
-        ("surface = 3\n", "3 is not of type 'object'; write [surface]"),
-        ("", "'surface' is a required property"),
-        ("[surface]\nname = 'concrete'\nhurst = 0.7\n", "leave one of them out"),
-        ("[surface]\nname = 7\n", "surface.name: 7 is not of type 'string'"),
-        ("[surface]\nname = 'granite'\n", "no surface is named"),
-        ("[surface]\nname = 'concrete'\nlength_unit = 'MPa'\n", "'MPa' is no known unit of length"),
         (toml(CONCRETE).replace("0.7", "'0.7'"), "surface.hurst: '0.7' is not of type 'number'"),
-        (toml(CONCRETE).replace("0.7", "true"), "surface.hurst: True is not of type 'number'"),
         (toml(CONCRETE).replace("0.7", "[0.7, 0.8]"), "surface.hurst: [0.7, 0.8] is not of type 'number'"),
-        (toml(CONCRETE).replace("0.7", "nan"), "hurst must be finite"),
-        (toml(CONCRETE).replace("0.7", "1" + 400 * "0"), "hurst must be real numbers"),
         (toml(CONCRETE) + "[material]\nE1 = 1\n", "a material is E_star alone"),
         ("[surface]\nmap = 'missing.nc'\n", "missing.nc"),
     ],
@@ -493,21 +456,6 @@ def test_missing_matplotlib_leaves_nothing(folder, monkeypatch):
 
 def test_unknown_commands(folder):
     assert "No such command 'plan9'" in refused(folder, "plan9")
-
-
-def test_the_module_runs_and_reports(folder):
-    def start(*arguments: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-W", "error", "-m", "mbma_tables", *arguments]
-        return subprocess.run(command, capture_output=True, text=True, check=False)
-
-    good = start("contact", "--surface", "yang-persson", "-d", "2", "--reading", "printed", "--json")
-    assert (good.returncode, good.stderr) == (0, "")
-    assert json.loads(good.stdout)["columns"]["force"] == pytest.approx([2.5114e-5], rel=2e-5)
-    bad = start("contact", "--surface", "yang-persson", "-d", "-4")
-    assert (bad.returncode, bad.stdout) == (2, "")
-    assert bad.stderr.startswith("mbma: separation must be at least -h_max")
-    assert len(bad.stderr.splitlines()) == 1
-    assert list(folder.iterdir()) == []
 
 
 @pytest.mark.slow

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import concurrent.futures
 import ctypes
 import importlib.util
 import json
@@ -17,7 +16,6 @@ import numpy as np
 import pytest
 
 from mbma_tables.export.code import SOURCES, Replay, check, read_report, write_code
-from mbma_tables.models import closed_form_functions
 
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
 SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
@@ -236,27 +234,6 @@ def test_slopes_past_the_ends(call: str, more: tuple[float, ...], library: ctype
         assert (status == 0) == ok
         assert np.array_equal(answers[1:], np.full((2, 6), known), equal_nan=True)
         assert np.array_equal(answers[0, :3], np.full(3, known), equal_nan=True)
-
-
-def test_threads_answer_as_one_does(library: ctypes.CDLL) -> None:
-    surfaces = code_points.random_surfaces()[:16]
-
-    def answer(surface: tuple[float, ...]) -> np.ndarray:
-        return totals(library, surface, surface[4] * np.linspace(-0.9, 0.9, 50))[0]
-
-    alone = [answer(surface) for surface in surfaces]
-    with concurrent.futures.ThreadPoolExecutor(8) as pool:
-        together = list(pool.map(answer, surfaces))
-    assert np.array_equal(alone, together)
-
-
-@pytest.mark.parametrize(("form", "given"), [("totals", (1.5, 3.5, 100.0, 0.8)), ("pocket", (5.0, 2.0))])
-def test_the_other_closed_forms(form: str, given: tuple[float, ...], library: ctypes.CDLL) -> None:
-    for name, known in closed_form_functions.FUNCTIONS[form].items():
-        function = library[f"mbma_{form}_{name}"]
-        function.restype = ctypes.c_double
-        found = function(*map(ctypes.c_double, given))
-        assert found == pytest.approx(float(known(*map(np.array, given))), rel=1e-12, abs=0)
 
 
 ASK = """

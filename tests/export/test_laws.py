@@ -52,17 +52,6 @@ def test_the_header_says_where_a_law_is_not_valid():
     assert any("scatter" in line and "not known" in line for line in law_of(reading=own).comments)
 
 
-def test_the_header_lists_the_scatter_where_it_is_known(monkeypatch):
-    from mbma_tables.theories import Persson
-
-    monkeypatch.setattr(Persson, "scatter", lambda self, surface, area: (0.1 + area, area))
-    (line,) = (line for line in law_of(theory="persson").comments if line.startswith("scatter"))
-    spreads = [float(part.split()[0]) for part in line.split(": ")[1].split(", ")]
-    assert len(spreads) == 5
-    assert spreads == sorted(spreads)
-    assert "ln p at a given c" in line
-
-
 @pytest.mark.parametrize("name", ["concrete", "asphalt", "challenge"])
 @pytest.mark.parametrize("rows", [20, 50, 200])
 def test_the_stated_error_and_better_than_even_rows(name, rows):

@@ -11,8 +11,6 @@ from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import band_fields
 from mbma_tables.surfaces.readings import READINGS
 
-LARGE = "1" + "0" * 400
-
 
 def refused(kind, folder, *arguments):
     """What a refusal says; it is one line and leaves the folder as it was."""
@@ -40,35 +38,24 @@ UNIVERSAL = [
     ("zzz = 1", "unknown key 'zzz'; known are "),
     ("[axes.Y]\nlow = 1", "unknown key 'Y'; known are X, mu"),
     ("[axes.X]\nlwo = 1e-3", "[axes.X]: unknown key 'lwo'; known are low, high"),
-    ("axes = 3", "[axes] must be a table of X, mu, got 3"),
     ("[axes]\nX = [1, 2]", "[axes.X] must be a table of low, high, got [1, 2]"),
     ("kind = 'island4d'", "kind must be 'universal', got 'island4d'"),
-    ("target = '1e-4'", "target must be real numbers"),
     ("target = 1e-12", "target must be a number in [1e-11, 0.1], got 1e-12"),
-    (f"target = {LARGE}", "target must be real numbers"),
     ("max_nodes = 1e5", "max_nodes must be a whole number in"),
     ("certificate_points = 99", "certificate_points must be a whole number in [100, "),
-    ("seed = -1", "seed must be a whole number in [0, "),
     ("reading = 'rubbed'", "reading must be one of ['fitted', 'printed', 'reported']"),
-    ("[axes.mu]\nlow = 1e-3", "[axes.mu]: unknown key 'low'; known are high"),
-    ("[axes.mu]\nhigh = 0.0", "axes.mu must have low < high"),
     ("[axes.mu]\nhigh = 1e11", "axes.mu.high must be a number in [0, 1e+10]"),
     ("[axes.X]\nlow = 5.0\nhigh = 2.0", "axes.X must have low < high"),
-    ("[axes.X]\nlow = -31.0", "axes.X.low must be a number in [-30, 200]"),
-    ("target = ", "is not a TOML file"),
     (b"reading = '\xff'", "is not a TOML file"),
     ("#" * 100_000, "has more than 65536 bytes"),
 ]
 ISLAND4D = [
     ("[axes.hurst]\nhigh = 1.1", "axes.hurst.high must be a number in [0.01, 1], got 1.1"),
-    ("[axes.sphere]\nlow = -0.1", "axes.sphere.low must be a number in [0, 1]"),
     ("[axes.hurst]\noffset = 1.0", "axes.hurst takes no offset"),
-    ("[axes.mu]\nlow = 1e-3", "unknown key 'mu'; known are X, spread, sphere, hurst"),
     ("[axes.X]\noffset = -0.5", "axes.X is logarithmic and needs low + offset > 0, got 0.5 and -0.5"),
     ("[axes.X]\noffset = 1e12", "axes.X must have low < high, far enough apart for its nodes to differ"),
     ("[axes.X]\nnodes = 7", "axes.X.nodes must be a whole number in [8, "),
     ("[axes.X]\nnodes = 50000", "nodes to begin with, max_nodes allows"),
-    ("max_nodes = 63", "nodes to begin with, max_nodes allows 63"),
 ]
 
 

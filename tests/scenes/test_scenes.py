@@ -149,20 +149,6 @@ def test_the_certificate_decides_between_table_and_solver(monkeypatch):
     assert scene_of("force", rtol=1e-4).plan().steps[0].tier == "exact"
 
 
-def test_the_tolerance_is_split_in_one_way():
-    """Half of a step's tolerance is for its islands; the step's is the scene's over its amplification of errors."""
-    asked = {
-        "totals": scene_of("force", rtol=1e-4),
-        "law": scene_of("energy", rtol=1e-4),
-        "inverse": scene_of("force", pressures=[1e-3], rtol=1e-4),
-        "slopes": scene_of("stiffness", rtol=1e-4),
-        "profile": scene_of("pressure_profile", rtol=1e-4),
-    }
-    for name, scene in asked.items():
-        (step,) = scene.plan().steps
-        assert step.rtol == pytest.approx(0.5e-4 / plans.AMPLIFICATION.get(name, 1), rel=1e-12)
-
-
 HISTORY = """
 import sys
 import numpy as np

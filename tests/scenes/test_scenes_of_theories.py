@@ -43,21 +43,6 @@ def test_quantities_at_a_pressure_are_the_contacts(theory):
 
 
 @each
-def test_the_four_ways_to_ask_meet(theory):
-    by_pressure = scene_of(theory, pressures=PRESSURES).run()
-    known = {
-        "areas": by_pressure["area"].values,
-        "separations": by_pressure["separation"].values,
-        "mean_separations": by_pressure["mean_separation"].values,
-    }
-    for name, values in known.items():
-        again = scene_of(theory, **{name: values}).run()
-        assert again["force"].values == pytest.approx(PRESSURES, rel=1e-5), name
-        assert again.attrs["error"] <= 1e-4
-    assert "prescribed_area" in scene_of(theory, areas=known["areas"]).run().coords
-
-
-@each
 @pytest.mark.parametrize("prescribed", [{"pressures": PRESSURES}, {"mean_separations": np.linspace(0.3, 1.0, 50)}])
 def test_time_budgets(theory, prescribed):
     ample = scene_of(theory, rtol=None, seconds=60.0, **prescribed)

@@ -61,8 +61,3 @@ def test_unknown(name):
 def test_nonsense_is_refused(field, value):
     with pytest.raises(InputError, match="reading 'own'"):
         dataclasses.replace(PRINTED, name="own", **{field: value})
-
-
-def test_a_reading_does_not_change():
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        PRINTED.beta = 0.5

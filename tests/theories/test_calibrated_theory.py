@@ -22,7 +22,7 @@ from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.theories import Calibrated, Mbma, Persson, get_theory
-from mbma_tables.theories.calibrated_curves import LAW_ERROR, TabulatedLaw, force_at_area, spectrum_of
+from mbma_tables.theories.calibrated_curves import LAW_ERROR, TabulatedLaw, spectrum_of
 from mbma_tables.theories.calibrated_table import NAME, QUANTITIES, load, shipped
 
 DATA = pathlib.Path(__file__).parents[2] / "docs" / "data"
@@ -161,17 +161,6 @@ class TestAnswers:
             "the Hurst exponent", "zeta_1", "h_max/h_rms"]  # fmt: skip
         gentle = Surface(0.8, 0.01, 0.64, 1.0, 3.3)
         assert contact(gentle, area=[0.0005, 0.02, 0.98], theory="calibrated").valid.tolist() == [False, True, False]
-
-
-def test_force_at_area_inverts_the_area():
-    force = np.array([0, 1e-8, 0.01, 0.3, 1.2])
-    np.testing.assert_allclose(force_at_area(Law(Spectrum.self_affine(0.8, 64)).area(force), shipped_s0()), force,
-                               rtol=1e-9)  # fmt: skip
-
-
-def shipped_s0():
-    alpha = Spectrum.self_affine(0.8, 64).alpha
-    return CONSTANTS.area_s0 + CONSTANTS.area_slope * np.log(alpha / 10)
 
 
 class TestScatter:
