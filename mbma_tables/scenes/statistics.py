@@ -7,13 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.geometry import geometry
-from mbma_tables.islands.measured import measured_islands
-from mbma_tables.models import AnyModel, IslandAnswer, answer_islands, get_model, tier_name
+from mbma_tables.models import AnyModel, IslandAnswer, RigidModel, answer_islands, get_model, tier_name
 from mbma_tables.models.protocol import AREA, BOTH
 from mbma_tables.scenes.plan import Step
 from mbma_tables.scenes.problem import Problem
@@ -21,11 +18,10 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.totals.gauss_kronrod import Integrals, integrate
 from mbma_tables.totals.island import islands_of, scale_area, scale_force
-from mbma_tables.totals.island_sum import density_of, kinks, sum_islands
+from mbma_tables.totals.island_sum import sum_islands
 from mbma_tables.totals.kernel import Pairs
-from mbma_tables.totals.measured import IslandCurve
+from mbma_tables.totals.profile import profile, source_of
 
 Fields = dict[str, tuple[tuple[str, ...], Any]]
 
@@ -60,36 +56,13 @@ def hertz_area(problem: Problem, surface: AnySurface, gap: FloatArray, step: Ste
     reading, rtol, tier = _asked(problem, step)
     model, depth = HertzArea(get_model(tier, rtol, reading)), np.asarray(surface.h_max - gap)
     if isinstance(surface, MeasuredSurface):
-        own = IslandCurve(surface, model, reading, rtol, _outside(tier)).totals(depth)
-        return {"area": (("gap",), own.area)}, float(own.error.max())
+        kept, at = profile(surface, model, reading, rtol, _outside(tier)), depth / surface.h_rms
+        area = np.zeros(depth.shape)
+        area[at > 0] = kept.totals(at[at > 0])[1]
+        return {"area": (("gap",), area)}, kept.error
     assert isinstance(surface, Surface)
     found = sum_islands(Pairs.of(surface, depth), reading, model, rtol, _outside(tier), AREA)
     return {"area": (("gap",), found.area)}, float(found.error.max())
-
-
-def _to_angle(approach: FloatArray, layer: FloatArray) -> FloatArray:
-    """The integration variable: approach = layer sinh(t)^2."""
-    return np.arcsinh(np.sqrt(approach / layer))
-
-
-def _number_of_islands(pairs: Pairs, reading: Reading, rtol: float) -> Integrals:
-    """Islands in contact per nominal area of every pair, over q0^2 (Eq. 42)."""
-
-    def integrand(owner: NDArray[np.intp], t: FloatArray) -> FloatArray:
-        layer = pairs.layer[owner, None]
-        approach = layer * np.sinh(t) ** 2
-        hurst, zeta_1 = (np.broadcast_to(field[owner, None], t.shape).copy() for field in (pairs.hurst, pairs.zeta_1))
-        g = geometry(approach, hurst, zeta_1, reading)
-        weight = density_of(pairs, owner, approach, g, reading)
-        return np.asarray(weight * pairs.rms_over_s[owner, None] * layer * np.sinh(2 * t))[..., None]
-
-    end = np.maximum(pairs.compression, 0)
-    floors = (np.minimum(kink, end) for kink in kinks(pairs.hurst, pairs.zeta_1, reading))
-    breaks = np.sort(np.stack([np.zeros(end.size), *floors, end]), axis=0)
-    low, high = _to_angle(breaks[:-1], pairs.layer), _to_angle(breaks[1:], pairs.layer)
-    owner = np.broadcast_to(np.arange(end.size), low.shape)
-    touching = high > low
-    return integrate(integrand, owner[touching], low[touching], high[touching], end.size, rtol)
 
 
 def island_statistics(problem: Problem, surface: AnySurface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
@@ -97,62 +70,39 @@ def island_statistics(problem: Problem, surface: AnySurface, gap: FloatArray, st
 
     The density is zero beyond h_max - d. Also returns the bound on the relative error.
     """
-    if isinstance(surface, MeasuredSurface):
-        return _own_statistics(problem, surface, gap, step)
-    assert isinstance(surface, Surface)
     reading, rtol, tier = _asked(problem, step)
-    pairs = Pairs.of(surface, surface.h_max - gap)
-    s, q0 = float(surface.s), float(surface.q0)
-    number = _number_of_islands(pairs, reading, rtol)
-    error = float(number.error.max(initial=0.0))
-    grid = _grid(problem, float(pairs.compression.max()), float(pairs.layer[0]))
-    deepest = np.maximum(pairs.compression.max(), 0)
+    model, h_rms = get_model(tier, rtol, reading), float(surface.h_rms)
+    depth = np.asarray(surface.h_max - gap) / h_rms
+    shape: Any = surface
+    if isinstance(surface, Surface):
+        shape = float(surface.hurst), float(surface.zeta_1), float(surface.h_max) / h_rms
+    source, deepest = source_of(shape, reading), max(float(depth.max()), 0.0)
+    # approaches up to the deepest, graded towards first contact
+    t = np.linspace(0, 1, problem.points + 1)[1:] * np.arcsinh(np.sqrt(deepest / source.layer))
+    grid = source.layer * np.sinh(t) ** 2
+    number, density = np.zeros(depth.size), np.zeros((depth.size, grid.size))
     # where no gap touches there is no distribution
-    force, area, density = np.zeros(grid.size), np.zeros(grid.size), np.zeros((gap.size, grid.size))
+    force, area, error = np.zeros(grid.size), np.zeros(grid.size), 0.0
     if deepest > 0:
-        hurst, zeta_1 = np.full(grid.size, float(surface.hurst)), np.full(grid.size, float(surface.zeta_1))
-        g = geometry(grid, hurst, zeta_1, reading)
-        phi = answer_islands(get_model(tier, rtol, reading), g | {"hurst": hurst}, _outside(tier))
+        # islands are counted without an island model
+        kept = profile(shape, RigidModel(), reading, rtol, rows=3)
+        number[depth > 0] = kept.totals(depth[depth > 0])[2]
+        g, s, q0 = islands_of(surface, grid * h_rms, reading)
+        phi = answer_islands(model, g, _outside(tier))
         force = problem.E_star * s / q0 * scale_force(g) * phi.phi_F
         share = g["eta"] if "subscale_area" in problem.dropped else 1.0
         area = scale_area(g) * phi.phi_A / share / q0**2
-        approach = np.broadcast_to(grid, density.shape)
-        spread = density_of(pairs, np.arange(gap.size), approach, {k: field[None] for k, field in g.items()}, reading)
-        density = np.where(approach <= pairs.compression[:, None], spread, 0.0) * q0**2 / s
-        error = max(error, float(np.max(phi.error)))
-    return _fields(number.value[:, 0] * q0**2, grid * float(surface.h_rms), force, area, density), error
-
-
-def _grid(problem: Problem, deepest: float, layer: float) -> FloatArray:
-    """Approaches up to the deepest, graded towards first contact."""
-    t = np.linspace(0, 1, problem.points + 1)[1:] * np.arcsinh(np.sqrt(max(deepest, 0.0) / layer))
-    return np.asarray(layer * np.sinh(t) ** 2)
-
-
-def _fields(number: FloatArray, delta: FloatArray, force: FloatArray, area: FloatArray, density: FloatArray) -> Fields:
-    along = {"island_delta": delta, "island_force": force, "island_area": area}
-    return {
+        shift, rate = source.heights(g, grid)
+        spread = source.density(g, grid, shift - rate * depth[:, None])
+        number, density = number * q0**2, np.where(grid <= depth[:, None], spread, 0.0) * q0**2 / s
+        error = max(kept.error, float(np.max(phi.error)))
+    along = {"island_delta": grid * h_rms, "island_force": force, "island_area": area}
+    fields: Fields = {
         "island_number": (("gap",), number),
         **{name: (("approach",), values) for name, values in along.items()},
         "island_density": (("gap", "approach"), density),
     }
-
-
-def _own_statistics(problem: Problem, surface: MeasuredSurface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
-    """`island_statistics` of a surface that is its own spectrum."""
-    reading, rtol, tier = _asked(problem, step)
-    curve = IslandCurve(surface, get_model(tier, rtol, reading), reading, rtol, _outside(tier))
-    depth = float(surface.h_max) - gap
-    found = curve.totals(depth)
-    grid = _grid(problem, float(depth.max()), curve.layer)
-    if depth.max() > 0:
-        nodes = curve.nodes(grid)
-        eta = measured_islands(surface, grid, reading)["eta"] if "subscale_area" in problem.dropped else 1.0
-        force, area = problem.E_star * nodes.force, nodes.area / eta
-        density = np.where(grid <= depth[:, None], curve.density(nodes, depth[:, None]), 0.0)
-    else:
-        force, area, density = np.zeros(grid.size), np.zeros(grid.size), np.zeros((gap.size, grid.size))
-    return _fields(found.number, grid, force, area, density), float(found.error.max(initial=curve.island_error))
+    return fields, error
 
 
 def profiles(problem: Problem, surface: AnySurface, gap: Any, step: Step) -> tuple[Fields, float]:

@@ -17,9 +17,7 @@ from mbma_tables.arguments import FloatArray, checked_hardness, hinted, number_i
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import AnyModel, get_model
 from mbma_tables.models.protocol import MAX_RTOL, MIN_RTOL
-from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import law_kernel as kernel
@@ -39,10 +37,9 @@ from mbma_tables.theories.law_pieces import (
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma
-from mbma_tables.totals.island_sum import kinks, totals_of
+from mbma_tables.totals.island_sum import totals_of
 from mbma_tables.totals.kernel import Pairs
-from mbma_tables.totals.measured import island_curve, measured_totals
-from mbma_tables.totals.profile import profile
+from mbma_tables.totals.profile import profile, source_of
 from mbma_tables.units import modulus_and_units
 
 MIN_LAW_RTOL = 1e-9
@@ -191,26 +188,20 @@ class Islands(NamedTuple):
 
 
 def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float) -> Islands:
-    if isinstance(surface, MeasuredSurface):
-        curve = island_curve(surface, model, reading, rtol, "raise")
-        own = surface
-
-        def of_curve(depth: FloatArray) -> tuple[FloatArray, ...]:
-            return measured_totals(own, depth, model, reading, rtol, "raise")[:3]
-
-        return Islands(curve.end, curve.layer, list(curve.kinks), ROUGH_LEVERAGE, of_curve)
-    assert isinstance(surface, Surface)
-    if not surface.zeta_1 > reading.floor_u:
-        raise OutOfRangeError(f"q1/q0 must be greater than {reading.floor_u:g}, the reading's floor of zeta_u")
-    h_rms, stress = float(surface.h_rms), float(surface.q0 * surface.s)
-    peak = float(surface.h_max) / h_rms
-    ends = [float(kink) * h_rms for kink in kinks(surface.hurst, surface.zeta_1, reading)]
-    layer = h_rms * float(surface.zeta_1) ** -float(surface.hurst)
+    h_rms, stress = float(surface.h_rms), 1.0
+    shape: Any = surface
+    if isinstance(surface, Surface):
+        if not surface.zeta_1 > reading.floor_u:
+            raise OutOfRangeError(f"q1/q0 must be greater than {reading.floor_u:g}, the reading's floor of zeta_u")
+        stress = float(surface.q0 * surface.s)
+        shape = float(surface.hurst), float(surface.zeta_1), float(surface.h_max) / h_rms
+    source = source_of(shape, reading)
+    known = source.layer * h_rms, [float(place) * h_rms for place in source.breaks[-2:]]
     try:
-        made: Any = profile
-        table = isinstance(model, UniversalModel)
-        kept = made(float(surface.hurst), float(surface.zeta_1), peak, 2 * peak, model, reading, rtol, table)
+        kept = profile(shape, model, reading, rtol, compiled=True)
     except ConvergenceError:
+        if not isinstance(surface, Surface):
+            raise
         # a model that is rough between its nodes: gap by gap, where errors are relative to the whole sum
         one = surface
 
@@ -218,13 +209,13 @@ def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float
             found = totals_of(model, Pairs.of(one, depth), reading, max(0.03 * rtol, MIN_RTOL))
             return found.force * stress, found.area, found.error
 
-        return Islands(2 * float(surface.h_max), layer, ends, ROUGH_LEVERAGE, of_gaps)
+        return Islands(2 * float(surface.h_max), *known, ROUGH_LEVERAGE, of_gaps)
 
     def of_profile(depth: FloatArray) -> tuple[FloatArray, ...]:
         force, area = kept.totals(depth / h_rms)
         return force * stress, area, np.array(kept.error)
 
-    return Islands(2 * float(surface.h_max), layer, ends, kept.leverage, of_profile)
+    return Islands(kept.edges[-1] * h_rms, *known, kept.leverage, of_profile)
 
 
 def _theory_law(surface: AnySurface, theory: Theory, rtol: float, E_star: float) -> ContactLaw:

@@ -17,8 +17,8 @@ from mbma_tables.surfaces.readings import NAMED, Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.protocol import SCAN, Theory, TheoryAnswer, select
 from mbma_tables.totals.contact import Totals, totals_at
-from mbma_tables.totals.island_sum import kinks
-from mbma_tables.totals.measured import island_curve
+from mbma_tables.totals.island_sum import QUADRATURE_SHARE, kinks
+from mbma_tables.totals.profile import profile
 
 GOLDEN = (5**0.5 - 1) / 2
 SECTIONS = 24  # of a scan's step, to 1e-6
@@ -117,8 +117,9 @@ class Mbma(Theory):
         if isinstance(surface, MeasuredSurface):
             model = get_model(self.tier, self.rtol, self.reading)
             # islands up to an approach of 2 h_max make u = 0
-            end = island_curve(surface, model, self.reading, self.rtol, self.outside).end
-            lowest = np.asarray(surface.h_max - end / 2)
+            kept = profile(surface, model, self.reading, QUADRATURE_SHARE * self.rtol, self.outside)
+            end = float(kept.edges[-1]) / (2 * kept.source.peak)
+            lowest = np.asarray(surface.h_max * (1 - end))
         return self._maximum(surface, quantity, lowest), np.asarray(surface.h_max, dtype=float)
 
     def softening(self, surface: AnySurface) -> FloatArray:

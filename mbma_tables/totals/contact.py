@@ -26,17 +26,16 @@ from mbma_tables.models import AnyModel, get_model
 from mbma_tables.models.protocol import AREA, BOTH, FORCE, OUTSIDE, QUANTITIES
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.intervals import BY_COMPRESSION
 from mbma_tables.totals.island_sum import QUADRATURE_SHARE, slopes_of, totals_of
 from mbma_tables.totals.kernel import Pairs
-from mbma_tables.totals.measured import measured_totals
-from mbma_tables.totals.profile import FEW, Profile, profile
+from mbma_tables.totals.profile import Profile, profile
 
 # surfaces whose islands are kept as a profile, in numpy; of more, those with so many gaps each that it costs less
 FEW_SURFACES, MANY_GAPS = 16, 300
+FEW = 256  # gaps up to which no compiler is asked
 BLOCK = 1 << 14  # gaps between two looks for Ctrl-C
 MOST_WORKERS = 1024
 
@@ -101,22 +100,18 @@ def totals_at(
     force_by = area_by = None
     by_depth: tuple[FloatArray, ...] = ()
     try:
-        if isinstance(surface, MeasuredSurface):
-            stress = modulus
-            force, area, error, islands, by_depth = measured_totals(surface, depth, model, reading, rtol, outside)
+        stress, pairs = modulus, None
+        if isinstance(surface, Surface):
+            stress, pairs = modulus * surface.q0 * surface.s, _pairs(surface, depth, reading)
+        if isinstance(surface, Surface) and pairs is not None and derivatives is True:
+            sums, error, islands = slopes_of(model, pairs, reading, rtol, outside, workers)
+            force, area = sums[:, 0, 0], sums[:, 1, 0]
+            force_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
         else:
-            assert isinstance(surface, Surface)
-            stress = modulus * surface.q0 * surface.s
-            pairs = _pairs(surface, depth, reading)
-            if derivatives is True:
-                sums, error, islands = slopes_of(model, pairs, reading, rtol, outside, workers)
-                force, area = sums[:, 0, 0], sums[:, 1, 0]
-                force_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
-            else:
-                (force, area, *slopes), error, islands = _totals(
-                    model, surface, pairs, reading, rtol, outside, which, bool(derivatives), shape, workers
-                )
-                by_depth = tuple(slope.reshape(shape) / surface.h_rms for slope in slopes)
+            (force, area, *slopes), error, islands = _totals(
+                model, surface, depth, pairs, reading, rtol, outside, which, bool(derivatives), workers
+            )
+            by_depth = tuple(slope.reshape(shape) / surface.h_rms for slope in slopes)
         if derivatives and by_depth:
             force_by, area_by = {"separation": -stress * by_depth[0]}, {"separation": -by_depth[1]}
         if area_by is not None and reading.addition == "cover":
@@ -149,74 +144,86 @@ def _pairs(surface: Surface, depth: FloatArray, reading: Reading) -> Pairs:
 
 
 def _by_profiles(
-    model: UniversalModel,
-    pairs: Pairs,
-    number: NDArray[np.intp],
-    reading: Reading,
-    rtol: float,
-    slopes: bool,
+    model: AnyModel, surface: AnySurface, depth: FloatArray, reading: Reading, rtol: float, outside: str, slopes: bool,
     workers: int,
-) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:
-    """Sums of pairs of the surfaces `number`, perhaps their slopes by the compression, error and islands, by profiles.
+) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:  # fmt: skip
+    """Sums, perhaps their slopes by the compression, error and islands, by profiles of the surfaces.
 
-    The last are the pairs whose surface has no profile.
+    The last are the gaps that no profile answers.
     """
+    number = np.broadcast_to(np.arange(math.prod(surface.shape)).reshape(surface.shape), depth.shape).ravel()
+    compression = np.asarray(depth / surface.h_rms).ravel()
     sums, error, islands = np.zeros((4 if slopes else 2, number.size)), np.zeros(number.size), 0
-    touching = np.flatnonzero(pairs.compression > 0)
+    touching = np.flatnonzero(compression > 0)
     touching = touching[np.argsort(number[touching], kind="stable")]
-    failed = [touching[:0]]
+    left = [touching[:0]]
     for places in np.split(touching, np.flatnonzero(np.diff(number[touching])) + 1):
         if not places.size:
             continue
-        hurst, zeta_1, peak = (float(field[places[0]]) for field in (pairs.hurst, pairs.zeta_1, pairs.peak))
+        shape: Any = surface
+        if isinstance(surface, Surface):
+            # what lies outside of the table is solved gap by gap
+            outside = "nan"
+            numbers = surface.hurst, surface.zeta_1, surface.h_max / surface.h_rms
+            shape = tuple(float(np.broadcast_to(field, depth.shape).flat[places[0]]) for field in numbers)
         try:
-            # over the whole compression, so that a gap's bits do not depend on the others
-            share = QUADRATURE_SHARE * rtol
-            kept = profile(hurst, zeta_1, peak, 2 * peak, model, reading, share, number.size > FEW)
+            kept = profile(shape, model, reading, QUADRATURE_SHARE * rtol, outside, number.size > FEW)
         except (ConvergenceError, OutOfRangeError):
-            failed.append(places)
+            if not isinstance(surface, Surface):
+                raise
+            left.append(places)
             continue
-        islands += kept.islands
+        inside = compression[places] <= kept.end
+        left.append(places[~inside])
+        islands, places = islands + kept.islands, places[inside]
         error[places] = kept.error
 
         def fill(block: slice, own: NDArray[np.intp] = places, kept: Profile = kept) -> None:
-            sums[:, own[block]] = kept.totals(pairs.compression[own[block]], slopes)
+            sums[:, own[block]] = kept.totals(compression[own[block]], slopes)
 
         in_blocks(fill, places.size, BLOCK, workers)
-    return sums, error, islands, np.sort(np.concatenate(failed))
+    return sums, error, islands, np.sort(np.concatenate(left))
 
 
 def _totals(
-    model: AnyModel, surface: Surface, pairs: Pairs, reading: Reading, rtol: float, outside: str, which: int,
-    slopes: bool, shape: tuple[int, ...], workers: int,
+    model: AnyModel, surface: AnySurface, depth: FloatArray, pairs: Pairs | None, reading: Reading, rtol: float,
+    outside: str, which: int, slopes: bool, workers: int,
 ) -> tuple[FloatArray, FloatArray, int]:  # fmt: skip
     """Force, area and perhaps slopes of both by the compression as rows, their error, islands.
 
     By profiles of islands where surfaces are few or have many gaps each, else gap by gap.
     """
-    count, size = math.prod(surface.shape), pairs.hurst.size
-    if isinstance(model, UniversalModel) and count <= max(FEW_SURFACES, size // MANY_GAPS):
-        number = np.broadcast_to(np.arange(count).reshape(surface.shape), shape).ravel()
-        sums, error, islands, left = _by_profiles(model, pairs, number, reading, rtol, slopes, workers)
+    count, size = math.prod(surface.shape), depth.size
+    if pairs is None or (isinstance(model, UniversalModel) and count <= max(FEW_SURFACES, size // MANY_GAPS)):
+        sums, error, islands, left = _by_profiles(model, surface, depth, reading, rtol, outside, slopes, workers)
     else:
         sums, error, islands, left = np.empty((4 if slopes else 2, size)), np.empty(size), 0, np.arange(size)
-    if left.size:
-        # gap by gap, which also says what is wrong with which
-        rest = pairs if left.size == size else pairs.some(left)
-        try:
-            if slopes:
-                columns, error[left], more = slopes_of(model, rest, reading, rtol, outside, workers)
-                sums[:, left] = columns[:, :, [0, BY_COMPRESSION]].T.reshape(4, -1)
-            else:
-                found = totals_of(model, rest, reading, rtol, outside, which, workers)
-                sums[0, left], sums[1, left], error[left], more = found
-        except (ConvergenceError, OutOfRangeError) as fault:
-            mask = np.zeros(size, dtype=bool)
-            mask[left] = True if fault.mask is None else fault.mask
-            fault.mask, fault.args = mask, (str(fault).replace(f"of {left.size} entries", f"of {size} entries"),)
-            raise
-        islands += more
-    return sums, error, islands
+    if not left.size:
+        return sums, error, islands
+    if pairs is None:
+        sums[:, left] = error[left] = np.nan
+        if outside == "raise":
+            raise OutOfRangeError(
+                f"islands of {left.size} of {size} entries lie outside of tier {model.name!r}, the first at "
+                f"h_max - d = {depth.ravel()[left[0]]:g}; outside='exact' solves these",
+                np.isin(np.arange(size), left),
+            )
+        return sums, error, islands
+    # gap by gap, which also says what is wrong with which
+    rest = pairs if left.size == size else pairs.some(left)
+    try:
+        if slopes:
+            columns, error[left], more = slopes_of(model, rest, reading, rtol, outside, workers)
+            sums[:, left] = columns[:, :, [0, BY_COMPRESSION]].T.reshape(4, -1)
+        else:
+            found = totals_of(model, rest, reading, rtol, outside, which, workers)
+            sums[0, left], sums[1, left], error[left], more = found
+    except (ConvergenceError, OutOfRangeError) as fault:
+        mask = np.zeros(size, dtype=bool)
+        mask[left] = True if fault.mask is None else fault.mask
+        fault.mask, fault.args = mask, (str(fault).replace(f"of {left.size} entries", f"of {size} entries"),)
+        raise
+    return sums, error, islands + more
 
 
 def _by_parameter(

@@ -53,16 +53,6 @@ def jacobian_of(reading: Reading, rms_over_s: FloatArray, below_kink: NDArray[np
     return np.where(below_kink, below, 1.0)
 
 
-def density_of(
-    pairs: Pairs, owner: Any, approach: FloatArray, g: dict[str, FloatArray], reading: Reading
-) -> FloatArray:
-    """Islands of the pairs `owner` per nominal area and delta/s (42, 46), in q0^2, at `approach` (owners, points)."""
-    own = pairs.some((owner, None))
-    height = kernel.island_height(approach, g["h_d"], g["sigma_d"], own, own.rms_over_s)
-    density: FloatArray = kernel.island_density(height, g["D_d"], g["sigma_d"])
-    return density * jacobian_of(reading, own.rms_over_s, approach < kinks(own.hurst, own.zeta_1, reading)[0])
-
-
 def sum_islands(
     pairs: Pairs, reading: Reading, model: AnyModel, rtol: float, outside: str = "raise", which: int = BOTH
 ) -> Totals:

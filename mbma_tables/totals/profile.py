@@ -1,155 +1,164 @@
-"""A surface's islands as functions of their approach delta, and the totals of many gaps from them.
+"""Totals of one surface at any gap from its islands, answered once (Eqs. 44-49).
 
-Everything of an island depends on delta alone; the gap enters through the Gaussian of its height and the upper limit
-(Eqs. 44-49). So densities, forces and areas are kept as polynomials in panels of delta, and a gap costs one
-exponential a node. Panels are halved until halves of their own agree with them.
+Everything of an island depends on its approach delta alone; a gap enters through the Gaussian of its height and the
+upper limit h_max - d. So islands are answered once, at Gauss nodes of panels of delta, and summed at some gaps of each
+panel. These sums make polynomials of ln(F) and ln(A), and any other gap costs no more than their values.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-import itertools
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.models import answer_islands
-from mbma_tables.models.universal_kernel import OK, REASONS
+from mbma_tables.islands.measured import floors_of, measured_islands, s_over_h_rms
+from mbma_tables.models import AnyModel, answer_islands
+from mbma_tables.models.universal import UniversalModel
+from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.surfaces.power_laws import Place
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.totals import kernel
-from mbma_tables.totals.island import scale_area, scale_force
-from mbma_tables.totals.island_sum import jacobian_of, kinks
-from mbma_tables.totals.profile_kernel import ENDS, ORDER, RATE, SHIFT, fill_sums
+from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
+from mbma_tables.totals.island_sum import kinks
+from mbma_tables.totals.panels import (
+    BLOCK,
+    CHECKS,
+    COUNTS,
+    MORE,
+    POWERS,
+    SEEN,
+    TAIL_SHARE,
+    Nodes,
+    Panels,
+    below_by_halves,
+    cut_sums,
+    joined,
+    missed_by,
+    rule_of,
+)
 
 KEPT = 64  # profiles, for whoever asks the same surface again
 WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
-MAX_ROUNDS = 12
-SEEN = 9  # gaps a panel is checked at
-BETWEEN = 2.0  # times more is missed at gaps between them
-FEW = 256  # gaps summed in numpy, without a compiler
-HIGH = 6.0  # of sigma_d: islands beyond carry less than 1e-7
-POWERS = (2.5, 7 / 3)  # of delta, in which weights of force and area start
+SLOPES = 0.1  # of their relative error counts
+MAX_ROUNDS = 14
+NARROWED = 4  # times 32 is the end of a table found closer
+MOST = 1000  # panels to be answered anew at a time
 
 
-def _rule_with_power(power: float) -> tuple[FloatArray, FloatArray]:
-    """Gauss nodes and weights for integrals of x^power times a smooth function over [0, 1] (Golub and Welsch)."""
-    n = np.arange(ENDS)
-    diagonal = power**2 / ((2 * n + power) * (2 * n + power + 2))
-    k = n[1:]
-    beside = 2 * k * (k + power) / (2 * k + power) / np.sqrt((2 * k + power) ** 2 - 1)
-    nodes, vectors = np.linalg.eigh(np.diag((1 + diagonal) / 2) + np.diag(beside / 2, 1) + np.diag(beside / 2, -1))
-    return nodes, vectors[0] ** 2 / (power + 1)
+class Source(NamedTuple):
+    """The islands of one surface at approaches in h_rms."""
+
+    islands: Callable[[FloatArray], dict[str, FloatArray]]  # `geometry.FIELDS`
+    h_rms: float  # in their unit of height
+    peak: float  # h_max/h_rms
+    layer: float  # where a band leaves the shortest wave
+    at_d: float  # where zeta_d reaches its floor
+    breaks: FloatArray  # where anything changes
+    jacobian: float  # K1 (47) below at_d
+
+    def density(self, g: dict[str, FloatArray], x: FloatArray, height: Any = 0.0) -> FloatArray:
+        """Islands per area and approach (42, 46) in the units of `g`; but for the Gaussian without a height."""
+        K1 = np.where(x < self.at_d, self.jacobian, 1.0)
+        return np.asarray(kernel.island_density(height, g["D_d"], g["sigma_d"]) * K1)
+
+    def heights(self, g: dict[str, FloatArray], x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Shift and rate of z'/sigma_d (41) = shift - rate compression; nothing cancels at first contact."""
+        return ((self.peak + x) * self.h_rms - g["h_d"]) / g["sigma_d"], self.h_rms / g["sigma_d"]
 
 
-@functools.cache
-def _rules() -> tuple[FloatArray, ...]:
-    """Gauss nodes and weights on [0, 1], those with the powers of delta, and values at the nodes to a series."""
-    x, w = np.polynomial.legendre.leggauss(ORDER)
-    jacobi = [_rule_with_power(power) for power in POWERS]
-    transform = np.linalg.inv(chebyshev.chebvander(x, ORDER - 1))
-    halves = np.concatenate([(x - 1) / 2, (x + 1) / 2])
-    between = chebyshev.chebvander(halves, ORDER - 1) @ transform
-    ends = (np.array([pair[k] for pair in jacobi]) for k in (0, 1))
-    return ((1 + x) / 2, w / 2, *ends, transform, between)
+def source_of(surface: tuple[float, float, float] | MeasuredSurface, reading: Reading) -> Source:
+    """The islands of a surface; of a self-affine one by hurst, zeta_1 and h_max/h_rms.
+
+    Raises
+    ------
+    OutOfRangeError
+        Where a spectrum ends below the floor of zeta_u.
+    """
+    printed = reading.jacobian == "printed"
+    if not isinstance(surface, MeasuredSurface):
+        hurst, zeta_1, peak = surface
+        h_rms = math.sqrt(-math.expm1(-2 * hurst * math.log(zeta_1)))
+        breaks = np.array(kinks(hurst, zeta_1, reading))
+
+        def islands(x: FloatArray) -> dict[str, FloatArray]:
+            return geometry(x, hurst, zeta_1, reading) | {"hurst": np.full(x.size, hurst)}
+
+        jacobian = float(kernel.jacobian_below(h_rms, reading.beta, printed, reading.offset))
+        return Source(islands, h_rms, peak, zeta_1**-hurst, float(breaks[0]), breaks, jacobian)
+    own, h_rms, laws, floors = surface, float(surface.h_rms), surface.laws, floors_of(surface, reading)
+    roots = np.sqrt(laws.above(Place(np.arange(laws.width.size), laws.width)))
+    samples = [roots[roots < floors.root_d] / floors.slope_d, roots[roots < floors.root_u] / floors.slope_u]
+    # T is a straight line up to a part of it
+    layer = math.sqrt(2 * math.pi * surface.C[-1]) * float(surface.q1) / floors.slope_d
+    jacobian = float(kernel.jacobian_below(1 / s_over_h_rms(surface), reading.beta, printed, reading.offset))
+    return Source(
+        lambda x: measured_islands(own, x * h_rms, reading), h_rms, float(surface.h_max) / h_rms, layer / h_rms,
+        floors.kinks[0] / h_rms, np.concatenate([*samples, floors.kinks]) / h_rms, jacobian,
+    )  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True)
 class Profile:
-    """Islands of one surface up to an approach: totals of any gaps within it.
+    """Totals of one surface at any gap.
 
     Attributes
     ----------
+    source : Source
+        The surface's islands.
     edges : ndarray, shape (panels + 1,)
-        Ends of the panels, delta/h_rms.
-    series : ndarray, shape (panels, 4, ORDER)
-        Weights of force and area, shift and rate of the height, as Chebyshev series (`profile_kernel.fill_sums`).
+        Ends of the panels, delta/h_rms; the last is 2 h_max/h_rms, or less where a table ends.
+    series : ndarray, shape (panels, 2 rows, n)
+        ln(F), ln(A) and so on, then their slopes by ln(compression), as Chebyshev series of the compression. In the
+        first panel the logarithms lack those of the powers that they begin with.
     error : float
         Bound on the relative error of totals, of panels and islands together.
     islands : int
         Islands answered for it.
-    compiled : bool
-        Whether gaps are summed by compiled code; derivatives are always summed in numpy.
+    nodes : Nodes
+        The islands.
     """
 
+    source: Source
     edges: FloatArray
     series: FloatArray
     error: float
     islands: int
-    compiled: bool
+    nodes: Nodes
 
-    def totals(self, compression: FloatArray, slopes: bool = False) -> FloatArray:
-        """F/(A0 E* q0 s) and the sum of areas over A0 at (h_max - d)/h_rms > 0 within the profile, shape (2, gaps).
-
-        With their derivatives by the compression it is (4, gaps).
-        """
-        if slopes or not self.compiled:
-            parts = [self._sums(compression[k : k + FEW]) for k in range(0, compression.size, FEW)]
-            return np.concatenate(parts, axis=1)[: 4 if slopes else 2]
-        order = np.argsort(compression, kind="stable")
-        sums, out = np.empty((2, compression.size)), np.empty((2, compression.size))
-        nodes, weights, end_nodes, end_weights, *_ = _rules()
-        fill_sums(compression[order], self.edges, self.series, nodes, weights, end_nodes, end_weights, sums)
-        out[:, order] = sums
-        return out
-
-    @functools.cached_property
-    def _fields(self) -> FloatArray:
-        """Fields of the panels but the first at their Gauss nodes, weights times the nodes' own, and ends of panels."""
-        nodes, weights = _rules()[:2]
-        basis = chebyshev.chebvander(2 * nodes - 1, ORDER - 1)
-        fields = np.moveaxis(self.series[1:] @ basis.T, 0, 1)
-        fields[:2] *= np.diff(self.edges)[1:, None] * weights
-        ends = np.broadcast_to(self.edges[2:, None], fields.shape[1:])
-        return np.concatenate([fields, ends[None]]).reshape(5, -1)
-
-    def _first(self, width: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Weights of force and area, shift and rate at the nodes of [0, width] in the first panel, by rule."""
-        end_nodes, end_weights = _rules()[2:4]
-        basis = chebyshev.chebvander(2 * width[:, None] / self.edges[1] * end_nodes[:, None] - 1, ORDER - 1)
-        fields = np.einsum("fk,rgnk->frgn", self.series[0], basis)
-        powers = np.array([width ** (power + 1) for power in POWERS])[:, :, None]
-        return fields[[0, 1], [0, 1]] * end_weights[:, None] * powers, fields[SHIFT], fields[RATE]
+    @property
+    def end(self) -> float:
+        """The largest compression that it answers."""
+        return float(self.edges[-1]) * (1 + 1e-14)
 
     @np.errstate(under="ignore")
-    def _sums(self, c: FloatArray) -> FloatArray:
-        """`fill_sums` in numpy, with derivatives by the compression: shape (4, gaps)."""
-        nodes, weights = _rules()[:2]
-        low_panel = np.clip(np.searchsorted(self.edges, c, side="right") - 1, 0, self.edges.size - 2)
+    def totals(self, compression: FloatArray, slopes: bool = False) -> FloatArray:
+        """Totals at (h_max - d)/h_rms > 0 within the profile, shape (rows, gaps), and slopes by the compression below.
 
-        def add(weight: Any, shift: Any, rate: Any, gap: FloatArray) -> FloatArray:
-            height = shift - rate * gap
-            terms = weight * np.exp(-0.5 * height * height)
-            return np.concatenate([terms.sum(axis=-1), (terms * height * rate).sum(axis=-1)])
-
-        *weight, shift, rate, ends = self._fields
-        gap, low = c[:, None], self.edges[low_panel]
-        sums = add(np.array(weight)[:, None] * (ends <= low[:, None]), shift, rate, gap)
-        whole = bool((c >= self.edges[1]).all())
-        first = self._whole_first if whole else self._first(np.minimum(c, self.edges[1]))
-        sums += add(*first, gap)
-        # the panel that the gap cuts, and the island at the gap itself
-        width = self.edges[low_panel + 1] - low
-        place = np.append(nodes, 1.0) * (c - low)[:, None]
-        basis = chebyshev.chebvander(2 * place / width[:, None] - 1, ORDER - 1)
-        fields = np.einsum("gfk,gnk->fgn", self.series[low_panel], basis)
-        cut = low_panel > 0
-        shares = np.where(cut, c - low, 0.0)[:, None] * weights
-        sums += add(fields[:2, :, :-1] * shares, fields[SHIFT, :, :-1], fields[RATE, :, :-1], gap)
-        power = np.where(cut, 1.0, c ** np.array(POWERS)[:, None])
-        height = fields[SHIFT, :, -1] - fields[RATE, :, -1] * c
-        sums[2:] += power * fields[:2, :, -1] * np.exp(-0.5 * height * height)
-        return sums
-
-    @functools.cached_property
-    def _whole_first(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """`_first` of gaps that reach beyond the first panel."""
-        return self._first(self.edges[1:2])
+        F/(A0 E* q0 s) and the sum of areas over A0, perhaps the number of islands per area; of a measured surface
+        F/(A0 E*).
+        """
+        count = self.series.shape[1] // 2
+        panel = np.clip(np.searchsorted(self.edges, compression, side="right") - 1, 0, self.edges.size - 2)
+        low, high = self.edges[panel], self.edges[panel + 1]
+        basis = chebyshev.chebvander((2 * compression - low - high) / (high - low), self.series.shape[-1] - 1)
+        # sums whose order does not depend on the number of gaps
+        found: FloatArray = (self.series[panel, : 2 * count if slopes else count] * basis[:, None]).sum(axis=-1).T
+        found[:count] = np.exp(found[:count])
+        begun = panel == 0
+        if begun.any():
+            found[:count, begun] *= compression[begun] ** (POWERS[:count, 0] + 1)
+        if slopes:
+            found[count:] *= found[:count] / compression
+        return found
 
     @functools.cached_property
     def leverage(self) -> float:
@@ -157,153 +166,240 @@ class Profile:
 
         An error e of f in F = integral of f G up to l changes l dF/dl by at most e (l f G + integral of f |l dG/dl|).
         """
-        nodes, weights = _rules()[:2]
-        at = np.append(2 * nodes - 1, 1.0)
-        fields = chebyshev.chebval(at, np.moveaxis(self.series, -1, 0), tensor=True)
-        delta = self.edges[:-1, None] + np.diff(self.edges)[:, None] * np.append(nodes, 1.0)
-        fields[0, :2] *= np.stack([delta[0] ** power for power in POWERS])
         ends = np.unique(np.linspace(0, self.edges.size - 2, SEEN).astype(int))
-        c = self.edges[1 + ends, None, None]
-        heights = fields[:, SHIFT] - fields[:, RATE] * c
-        gaussian = np.exp(-0.5 * heights**2) * (delta <= c)
-        shares = np.diff(self.edges)[:, None] * weights
-        worst = 0.0
-        for row in range(2):
-            density = gaussian * fields[:, row]
-            total = (density[..., :-1] * shares).sum(axis=(1, 2))
-            turned = (density * np.abs(heights * fields[:, RATE]))[..., :-1] * shares
-            at_end = density[np.arange(ends.size), ends, -1]
-            carried = total > 0
-            ratio = c[carried, 0, 0] * (turned.sum(axis=(1, 2)) + at_end)[carried] / total[carried]
-            worst = max(worst, float(ratio.max(initial=0.0)))
-        return worst
+        c, count = self.edges[1 + ends], self.series.shape[1] // 2
+        found = self.totals(c, slopes=True)
+        heights = self.nodes.shift - self.nodes.rate * c[:, None]
+        negative = np.exp(-0.5 * heights**2) * np.minimum(heights, 0) * (self.nodes.panel <= ends[:, None])
+        turned = found[count:] - 2 * (negative @ (self.nodes.weights * self.nodes.rate[:, None])).T
+        own = found[:count]
+        return float(np.divide(c * turned, own, out=np.zeros_like(own), where=own > 0).max())
 
 
-@functools.lru_cache(maxsize=KEPT)
-def profile(
-    hurst: float,
-    zeta_1: float,
-    peak: float,
-    last: float,
-    model: Any,
-    reading: Reading,
-    rtol: float,
-    compiled: bool = False,
-) -> Profile:
-    """The profile of one surface with h_max/h_rms = `peak` up to compressions of `last` h_rms.
+def _edges(source: Source, last: float) -> FloatArray:
+    """Panels that double from the first on, with ends where anything changes, and equal ones above zeta_d's floor."""
+    breaks = source.breaks[source.breaks < last]
+    first, top = min(source.layer, float(breaks.min(initial=last))), min(source.at_d, last)
+    graded = np.geomspace(first, top, math.ceil(math.log2(top / first)) + 1)
+    equal = np.linspace(top, last, math.ceil((last - top) / WIDEST) + 1)
+    edges = np.unique(np.concatenate([[0.0], graded, breaks, equal]))
+    # breaks that coincide but for rounding
+    return np.append(edges[:-1][np.diff(edges) > 1e-12 * edges[:-1]], last)
 
-    It is made to `rtol`, and the model's own error. `compiled` asks a universal table in one pass, for who compiles
-    anyway.
+
+def _count(low: FloatArray, high: FloatArray) -> NDArray[np.intp]:
+    """Numbers of nodes of panels."""
+    # above delta = h_rms/2 it is the Gaussian that bends
+    ratio = np.divide(high - low, np.minimum(low, 0.5), out=np.full(low.size, math.inf), where=low > 0)
+    counts: NDArray[np.intp] = np.array([n for _, n in COUNTS])[np.searchsorted([bound for bound, _ in COUNTS], ratio)]
+    return counts
+
+
+class _EndOfTable(Exception):
+    """Islands beyond the approach given are not known."""
+
+
+class Part(NamedTuple):
+    """Panels that were answered at once, and what is known of them."""
+
+    panels: Panels
+    errors: FloatArray
+    series: Any = None  # (2 rows, panels, gaps), see `Profile`
+    tails: Any = None  # errors of the series
+
+    def some(self, chosen: Any) -> Part:
+        """Those at these places."""
+        known = (None, None) if self.series is None else (self.series[:, chosen], self.tails[chosen])
+        return Part(self.panels.some(chosen), self.errors[chosen], *known)
+
+
+def _nodes(parts: list[Part]) -> tuple[FloatArray, list[NDArray[np.intp]], Nodes]:
+    """Ends of all panels, the places of each part's among them, and their islands."""
+    low = np.concatenate([part.panels.low for part in parts])
+    order = np.argsort(low)
+    ranks = np.split(np.argsort(order), np.cumsum([part.errors.size for part in parts])[:-1])
+    panel, weights, turns = [], [], []
+    for (rule, start, end, fields), rank in zip((part.panels for part in parts), ranks, strict=True):
+        rows = len(fields) - 2
+        panel.append(rank.repeat(rule.nodes.size))
+        weights.append((fields[:-2] * rule.measure(start, end, rule.nodes, rows) * rule.weights).reshape(rows, -1))
+        turns.append(fields[-2:].reshape(2, -1))
+    shift, rate = np.concatenate(turns, axis=1)
+    return low[order], ranks, Nodes(np.concatenate(panel), np.concatenate(weights, axis=1).T, shift, rate)
+
+
+def _summed(
+    parts: list[Part], last: float, rtol: float
+) -> tuple[list[Part], FloatArray, list[NDArray[np.intp]], Nodes]:
+    """Parts with the series that they lacked; ends of panels, places of each part's among them, islands."""
+    low, ranks, nodes = _nodes(parts)
+    edges, fresh = np.append(low, last), [k for k, part in enumerate(parts) if part.series is None]
+    cuts = [cut_sums(parts[k].panels) for k in fresh]
+    own = np.concatenate([ranks[k].repeat(parts[k].panels.rule.reach.size) for k in fresh])
+    c = np.concatenate([cut[0] for cut in cuts])
+    inner = np.concatenate([np.array(cut[1]) for cut in cuts], axis=-1)
+    by_gap, by_node = np.argsort(own, kind="stable"), np.argsort(nodes.panel, kind="stable")
+    below = np.empty_like(inner)
+    far = 0.1 * rtol / math.log2(edges.size)
+    below[..., by_gap] = below_by_halves(c[by_gap], own[by_gap], nodes.some(by_node), edges, 0, low.size, far)
+    logs, slopes = joined((inner[0], inner[1]), (below[0], below[1]))
+    missed = 0.1 * rtol if low.size > BLOCK else 0.0
+    rows, begun, full, begin = len(logs), own == 0, list(parts), 0
+    logs[:, begun] -= (POWERS[:rows, 0] + 1) * np.log(c[begun])
+    values = np.concatenate([logs, c * slopes])
+    for k, cut in zip(fresh, cuts, strict=True):
+        part = values[:, begin : begin + cut[0].size].reshape(2 * rows, ranks[k].size, -1)
+        begin += cut[0].size
+        series = part @ parts[k].panels.rule.series.T
+        tails = np.abs(series[:, :, -2:]).sum(axis=-1)
+        tails[rows:] *= SLOPES / np.abs(part[rows:]).max(axis=-1)
+        full[k] = parts[k]._replace(series=series, tails=missed + TAIL_SHARE * tails.max(axis=0))
+    return full, edges, ranks, nodes
+
+
+Fields = Callable[[FloatArray], tuple[FloatArray, float]]  # rows of `Panels.fields` at approaches, and their error
+
+
+def _fields(source: Source, model: AnyModel, outside: str, rows: int) -> Fields:
+    def fields(x: FloatArray) -> tuple[FloatArray, float]:
+        g = source.islands(x)
+        phi = answer_islands(model, g, outside)
+        weights = [scale_force(g) * phi.phi_F, scale_area(g) * phi.phi_A, np.ones(x.size)]
+        density = source.density(g, x) * source.h_rms
+        return np.stack([*(weight * density for weight in weights[:rows]), *source.heights(g, x)]), float(
+            np.nanmax(phi.error, initial=0.0)
+        )
+
+    return fields
+
+
+def _compiled_fields(shape: tuple[float, float, float], model: Any, reading: Reading) -> Fields:
+    """The same of a self-affine surface and the universal table in one pass, for who compiles anyway."""
+    hurst, zeta_1, peak = shape
+    printed = reading.jacobian == "printed"
+
+    def fields(x: FloatArray) -> tuple[FloatArray, float]:
+        found = np.empty((4, x.size))
+        _, error = kernel.fill_fields(x, peak, hurst, zeta_1, reading.numbers, printed, model.kernel, found)
+        return found, error
+
+    return fields
+
+
+def _covered(fields: Fields, x: FloatArray, unknown: NDArray[np.bool_]) -> float:
+    """The largest approach up to which islands are known."""
+    high = float(x[unknown].min())
+    low = float(x[x < high].max(initial=0.0))
+    for _ in range(NARROWED):
+        between = np.linspace(low, high, 34)
+        lost = np.isnan(fields(between[1:-1])[0]).any(axis=0)
+        first = int(np.append(lost, True).argmax())
+        low, high = float(between[first]), float(between[first + 1])
+    if not low > 0:
+        raise OutOfRangeError("no island of this surface lies inside the table")
+    return low
+
+
+def _answered(
+    fields: Fields, low: FloatArray, high: FloatArray, counts: NDArray[np.intp], last: float
+) -> tuple[list[Part], int, float]:
+    """Panels of so many nodes, the number of islands, and their error.
 
     Raises
     ------
-    ConvergenceError, OutOfRangeError
+    _EndOfTable
     """
-    worst, islands = 0.0, 0
-    at = tuple(float(kink) for kink in kinks(hurst, zeta_1, reading))
+    kinds = counts + (low == 0)
+    groups = [(rule_of(int(kind) // 2 * 2, 1 + int(kind) % 2), kinds == kind) for kind in np.unique(kinds)]
+    places = [rule.approach(low[own], high[own], np.append(rule.nodes, CHECKS)) for rule, own in groups]
+    x = np.concatenate([part.ravel() for part in places])
+    found, error = fields(x)
+    unknown = np.asarray(np.isnan(found).any(axis=0))
+    if unknown.any():
+        raise _EndOfTable(_covered(fields, x, unknown))
+    if (found[:-2] < 0).any():
+        raise ConvergenceError("K1 (47) is negative", np.array(True))
+    parts, begin = [], 0
+    for (rule, own), at in zip(groups, places, strict=True):
+        values = found[:, begin : begin + at.size].reshape(-1, *at.shape)
+        begin += at.size
+        if rule.power > 1:
+            values[:-2] /= at ** POWERS[: len(values) - 2]
+        panels = Panels(rule, low[own], high[own], values[..., : rule.nodes.size])
+        parts.append(Part(panels, missed_by(panels, values[..., rule.nodes.size :], last)))
+    return parts, x.size, error
 
-    def fields(low: FloatArray, high: FloatArray) -> FloatArray:
-        """Weights, shift and rate at the nodes of panels, shape (4, panels, ORDER)."""
-        nonlocal worst, islands
-        nodes = _rules()[0]
-        x = low[:, None] + (high - low)[:, None] * nodes
-        flat = x.ravel()
-        if compiled:
-            found = np.empty((4, flat.size))
-            printed = reading.jacobian == "printed"
-            status, error = kernel.fill_fields(flat, peak, hurst, zeta_1, reading.numbers, printed, model.kernel, found)
-            if status != OK:
-                raise OutOfRangeError(f"islands of this surface lie outside the {model.name} table: {REASONS[status]}")
-            worst, islands = max(worst, error), islands + flat.size
-            return found.reshape(4, *x.shape)
-        g = geometry(flat, np.full(flat.size, hurst), np.full(flat.size, zeta_1), reading)
-        try:
-            phi = answer_islands(model, g | {"hurst": np.full(flat.size, hurst)})
-        except OutOfRangeError as fault:
-            raise OutOfRangeError(f"islands of this surface lie outside the {model.name} table: {fault}") from None
-        worst, islands = max(worst, float(np.max(phi.error))), islands + flat.size
-        rms = np.full(flat.size, math.sqrt(-math.expm1(-2 * hurst * math.log(zeta_1))))
-        each = jacobian_of(reading, rms, flat < at[0]) * rms * kernel.island_density(0.0, g["D_d"], g["sigma_d"])
-        rate = rms / g["sigma_d"]
-        shift = ((peak + flat) * rms - g["h_d"]) / g["sigma_d"]
-        found = np.stack([scale_force(g) * phi.phi_F * each, scale_area(g) * phi.phi_A * each, shift, rate])
-        return found.reshape(4, *x.shape)
 
-    edges = _first_edges(zeta_1**-hurst, last, *at)
-    low, high = edges[:-1], edges[1:]
-    values = fields(low, high)
-    kept: list[tuple[FloatArray, FloatArray, FloatArray]] = []
-    error = 0.0
+def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float) -> Profile:
+    """Panels, halved until polynomials through their islands and through their sums are good to `rtol`."""
+    low, high, last = edges[:-1], edges[1:], float(edges[-1])
+    counts, islands, worst = _count(low, high), 0, 0.0
+    parts: list[Part] = []
     for _ in range(MAX_ROUNDS):
-        middle = (low + high) / 2
-        ends = np.stack([low, middle, middle, high], axis=-1).reshape(-1, 2).T
-        halves = fields(*ends)
-        seen = _disagreement(low, high, values, halves, last)
+        fresh, count, error = _answered(fields, low, high, counts, last)
+        parts, islands, worst = parts + fresh, islands + count, max(worst, error)
         # no nearer than islands themselves are known
-        good = seen <= max(rtol, worst)
-        if good.any():
-            error = max(error, float(seen[good].max()))
-            kept.append((low[good], high[good], values[:, good]))
-        if good.all():
+        limit = max(0.5 * rtol, worst)
+        good = [part.errors <= limit for part in parts]
+        if all(own.all() for own in good):
+            parts, ends, ranks, nodes = _summed(parts, last, limit)
+            good = [part.tails <= limit for part in parts]
+            if all(own.all() for own in good):
+                series = np.zeros((ends.size - 1, len(parts[0].series), COUNTS[-1][1] + MORE))
+                for part, rank in zip(parts, ranks, strict=True):
+                    series[rank, :, : part.series.shape[-1]] = np.moveaxis(part.series, 0, 1)
+                error = worst + max(part.errors.max() for part in parts) + max(part.tails.max() for part in parts)
+                return Profile(source, ends, series, float(error), islands, nodes)
+        bad = [part.panels.some(~own) for part, own in zip(parts, good, strict=True)]
+        parts = [part.some(own) for part, own in zip(parts, good, strict=True) if own.any()]
+        low, high = (np.concatenate([getattr(panels, end) for panels in bad]) for end in ("low", "high"))
+        counts = np.tile(np.repeat([p.rule.nodes.size for p in bad], [p.low.size for p in bad]), 2)
+        middle = (low + high) / 2
+        low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
+        if low.size > MOST + edges.size:
             break
-        again = np.repeat(~good, 2)
-        low, high, values = ends[0][again], ends[1][again], halves[:, again]
+    raise ConvergenceError(f"a profile of islands did not reach {rtol:.1e}", np.array(True))
+
+
+@functools.lru_cache(maxsize=KEPT)
+def _profile(
+    surface: Any, model: Any, reading: Reading, rtol: float, exact: bool, compiled: bool, rows: int
+) -> Profile:
+    source = source_of(surface, reading)
+    if compiled and isinstance(surface, tuple) and isinstance(model, UniversalModel):
+        fields = _compiled_fields(surface, model, reading)
     else:
-        raise ConvergenceError(f"a profile of islands did not reach {rtol:.1e}", np.array(True))
-    low, high = (np.concatenate([part[k] for part in kept]) for k in (0, 1))
-    order = np.argsort(low)
-    ordered = np.concatenate([part[2] for part in kept], axis=1)[:, order]
-    _without_powers(ordered, high[order[0]] * _rules()[0], 0)
-    series = np.einsum("kj,fpj->pfk", _rules()[4], ordered)
-    return Profile(np.append(low[order], last), np.ascontiguousarray(series), error + worst, islands, compiled)
-
-
-def _first_edges(layer: float, last: float, at_d: float, at_u: float) -> FloatArray:
-    """Panels that double from the boundary layer on, with ends at the kinks, and equal ones above zeta_d's floor."""
-    start = min(layer, at_d, at_u, last)
-    breaks = sorted({start, *(kink for kink in (at_d, at_u) if kink < last), last})
-    edges = [0.0, start]
-    for a, b in itertools.pairwise(breaks):
-        if a >= at_d:
-            edges += np.linspace(a, b, math.ceil((b - a) / WIDEST) + 1)[1:].tolist()
-        else:
-            edges += np.geomspace(a, b, math.ceil(math.log2(b / a)) + 1)[1:].tolist()
-            edges[-1] = b
-    return np.array(edges)
-
-
-def _without_powers(values: FloatArray, x: FloatArray, panel: int) -> None:
-    """Divide the weights of a panel that begins at zero by what they rise with, in place."""
-    for row, power in enumerate(POWERS):
-        values[row, panel] /= x**power
-
-
-def _disagreement(low: FloatArray, high: FloatArray, values: FloatArray, halves: FloatArray, last: float) -> FloatArray:
-    """Relative error of panels against their halves: of what they interpolate, and of their sums at some gaps."""
-    nodes, weights, _, _, _, between = _rules()
-    true = halves.reshape(4, low.size, 2 * ORDER).copy()
-    if low[0] == 0:
-        values = values.copy()
-        _without_powers(values, high[0] * nodes, 0)
-        _without_powers(true, high[0] * np.concatenate([nodes / 2, (1 + nodes) / 2]), 0)
-    missed = np.einsum("jk,fpk->fpj", between, values) - true
+        fields = _fields(source, model, "exact" if exact else "nan", rows)
+    edges = _edges(source, 2 * source.peak)
     # what underflows is right
-    relative = np.abs(np.divide(missed[:2], true[:2], out=np.zeros_like(true[:2]), where=true[:2] > 0)).max(axis=(0, 2))
-    # heights count where the Gaussian does
-    turned = np.abs(missed[SHIFT]) + last * np.abs(missed[RATE])
-    field = relative + HIGH * turned.max(axis=1)
-    # sums over whole panels, relative to the largest node of the Gaussian there
-    spread = low[:, None] + (last - low)[:, None] * np.linspace(0, 1, SEEN)
-    # where Gaussians are narrow no such gap may meet one: gaps at which one has its top in the panel
-    tops = (values[SHIFT] / values[RATE])[:, ::2]
-    c = np.clip(np.concatenate([spread, tops], axis=1), high[:, None], last)[..., None]
+    with np.errstate(under="ignore"):
+        try:
+            return _built(source, fields, edges, rtol)
+        except _EndOfTable as fault:
+            end = fault.args[0]
+            return _built(source, fields, np.append(edges[edges < end * (1 - 1e-12)], end), rtol)
 
-    def gaussian(v: FloatArray) -> FloatArray:
-        return np.asarray(np.exp(-0.5 * (v[SHIFT][:, None, :] - v[RATE][:, None, :] * c) ** 2))
 
-    coarse = (gaussian(values) * values[0][:, None, :]) @ weights
-    fine = (gaussian(true) * true[0][:, None, :]) @ np.tile(weights / 2, 2)
-    # what a panel adds is compared with what it adds at its best gap: others carry the load where it adds little
-    most = fine.max(axis=1)
-    summed = np.divide(np.abs(coarse - fine).max(axis=1), most, out=np.zeros_like(most), where=most > 0)
-    return np.asarray(field + BETWEEN * summed)
+def profile(
+    surface: tuple[float, float, float] | MeasuredSurface,
+    model: AnyModel,
+    reading: Reading,
+    rtol: float,
+    outside: str = "nan",
+    compiled: bool = False,
+    rows: int = 2,
+) -> Profile:
+    """The profile of one surface, (hurst, zeta_1, h_max/h_rms) or a `MeasuredSurface`, to `rtol` and the model's error.
+
+    `outside` is "exact" to solve islands that a table does not cover; else the profile ends with the table. `compiled`
+    is for who compiles anyway. With three `rows` it has the number of islands.
+
+    Raises
+    ------
+    InputError, OutOfRangeError, ConvergenceError
+    """
+    if isinstance(surface, MeasuredSurface):
+        refuse_bands(model)
+    make: Any = _profile
+    kept: Profile = make(surface, model, reading, rtol, outside == "exact", compiled and rows == 2, rows)
+    return kept

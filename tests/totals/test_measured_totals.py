@@ -14,7 +14,7 @@ from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_l
 from mbma_tables.islands.measured import floors_of, measured_islands
 from mbma_tables.models import answer_islands, get_model
 from mbma_tables.surfaces.readings import FITTED, PRINTED, REPORTED, get_reading
-from mbma_tables.totals.measured import IslandCurve
+from mbma_tables.totals.profile import profile
 
 DATA = pathlib.Path(__file__).parents[1] / "data"
 DEPTHS = np.array([1e-9, 1e-4, 0.02, 0.3, 1.0, 1.5, 2.0])  # (h_max - d)/h_max
@@ -80,7 +80,7 @@ def test_totals_are_the_integral_over_islands(reading, gap, rtol):
     # ten thousand panels that know nothing of samples, nor of the jump that a gap in the spectrum makes
     surface, rule = rough(gap=gap), get_reading(reading)
     model = get_model("rigid", 1e-8, rule)
-    curve = IslandCurve(surface, model, rule, 1e-8)
+    kept = profile(surface, model, rule, 1e-8, rows=3)
     kink = floors_of(surface, rule).kinks[0]
     node, weight = np.polynomial.legendre.leggauss(4)
     for depth in (0.05, 1.0, 5.0):
@@ -95,10 +95,9 @@ def test_totals_are_the_integral_over_islands(reading, gap, rtol):
         density *= np.where(delta < kink, 1 - 4 / 3 * rule.beta, 1.0)
         force = g["sigma"] * np.sqrt(2 * g["R_d"] * g["sigma"]) * phi.phi_F
         area = 2 * np.pi * g["eta"] * g["D"] * g["R_u"] * g["R_d"] * g["sigma"] ** 2 * phi.phi_A
-        found = curve.totals(np.array([depth]))
-        assert found.force[0] == pytest.approx(float(np.sum(force * density * half * weight)), rel=rtol)
-        assert found.area[0] == pytest.approx(float(np.sum(area * density * half * weight)), rel=rtol)
-        assert found.number[0] == pytest.approx(float(np.sum(density * half * weight)), rel=rtol)
+        found = kept.totals(np.array([depth]) / surface.h_rms)[:, 0]
+        for each, own in zip((force, area, 1.0), found, strict=True):
+            assert own == pytest.approx(float(np.sum(each * density * half * weight)), rel=rtol)
 
 
 @settings(max_examples=15, deadline=None)
@@ -106,25 +105,21 @@ def test_totals_are_the_integral_over_islands(reading, gap, rtol):
 def test_errors_hold_and_slopes_are_slopes(seed, share):
     surface = rough(seed)
     model = get_model("universal", 1e-8, REPORTED)
-    coarse, fine = (IslandCurve(surface, model, REPORTED, rtol) for rtol in (1e-5, 1e-10))
-    depth = surface.h_rms * share * np.array([1e-5, 0.1, 1.0])
-    one, two = coarse.totals(depth), fine.totals(depth)
-    assert (np.abs(one.force / two.force - 1) <= one.error + two.error).all()
-    assert (np.abs(one.area / two.area - 1) <= one.error + two.error).all()
-    step = 1e-4 * depth
-    ends = [fine.totals(depth + sign * step) for sign in (1, -1)]
-    for name in ("force", "area"):
-        slope = (getattr(ends[0], name) - getattr(ends[1], name)) / (2 * step)
-        assert getattr(two, f"{name}_slope") == pytest.approx(slope, rel=2e-5)
+    coarse, fine = (profile(surface, model, REPORTED, rtol) for rtol in (1e-5, 1e-10))
+    c = share * np.array([1e-5, 0.1, 1.0])
+    one, two = coarse.totals(c), fine.totals(c, slopes=True)
+    assert (np.abs(one / two[:2] - 1) <= coarse.error + fine.error).all()
+    step = 1e-4 * c
+    slopes = (fine.totals(c + step) - fine.totals(c - step)) / (2 * step)
+    assert two[2:] == pytest.approx(slopes, rel=2e-5)
 
 
 def test_first_contact_is_a_power_of_depth():
-    curve = IslandCurve(rough(), get_model("universal", 1e-8, REPORTED), REPORTED, 1e-8)
-    depth = np.array([1e-12, 2e-12])
-    found = curve.totals(depth)
+    surface = rough()
+    found = contact(surface, surface.h_max - np.array([2**-44, 2**-43]))
     assert np.log2(found.force[1] / found.force[0]) == pytest.approx(7 / 2, rel=1e-6)
     assert np.log2(found.area[1] / found.area[0]) == pytest.approx(10 / 3, rel=1e-6)
-    nothing = curve.totals(np.array([0.0, -1.0]))
+    nothing = contact(surface, surface.h_max + np.array([0.0, 1.0]))
     assert nothing.force.tolist() == nothing.area.tolist() == nothing.error.tolist() == [0, 0]
 
 

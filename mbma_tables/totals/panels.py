@@ -1,0 +1,208 @@
+"""Panels of islands' approaches: polynomials through their islands, the errors of these, and sums over islands at gaps.
+
+Of an island at a gap of compression c = (h_max - d)/h_rms, force and area count as weight exp(-(shift - rate c)^2/2).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from mbma_tables.arguments import FloatArray
+
+COUNTS = ((0.3, 8), (math.inf, 16))  # nodes of a panel by its width over delta
+MORE = 4  # gaps of a panel than nodes
+CHECKS = np.array([0.0025, 0.5, 0.9975])  # places where polynomials miss most
+SEEN, TOPS = 9, 8  # gaps that a panel is checked at, and those at which a Gaussian has its top in it
+BETWEEN = 2.0  # times more is missed at gaps between them
+HIGH = 6.0  # of sigma_d: islands beyond carry less than 1e-7
+FAR = 1e150  # height of an island that is not there
+POWERS = np.array([5 / 2, 7 / 3, 0])[:, None, None]  # of delta, in which force, area and number of islands begin
+BLOCK, TERMS = 24, 24  # panels whose islands are summed one by one, and terms of the series of those below
+TAIL_SHARE = 2.0  # of the last two coefficients, for all that follow: they fall by 2 at least, and count twice
+
+
+class Rule(NamedTuple):
+    """Of panels with n nodes at places in [0, 1]: from the low to the high end delta rises like place^power.
+
+    Matrices take values at the nodes to those at other places.
+    """
+
+    power: int
+    nodes: FloatArray
+    weights: FloatArray
+    reach: FloatArray  # places of gaps, which are Chebyshev points of the panel
+    checks: FloatArray  # (3, n)
+    halves: FloatArray  # (2 n, n), at the nodes of both halves
+    inside: FloatArray  # (gaps n, n), at the nodes of the part below each of the gaps
+    ends: FloatArray  # (gaps, n), at the gaps
+    series: FloatArray  # (gaps, gaps), values at the gaps to a Chebyshev series
+
+    def approach(self, low: FloatArray, high: FloatArray, places: FloatArray) -> FloatArray:
+        """Approaches at places, (panels, places)."""
+        return np.asarray(low[:, None] + (high - low)[:, None] * places**self.power)
+
+    def measure(self, low: FloatArray, high: FloatArray, places: FloatArray, rows: int) -> FloatArray:
+        """What weights are multiplied by in integrals over places, (rows, panels, places)."""
+        width = (high - low)[:, None]
+        if self.power == 1:
+            return np.broadcast_to(width, (rows, low.size, places.size))
+        lead = (width * places**self.power) ** POWERS[:rows]
+        return np.asarray(self.power * width * places ** (self.power - 1) * lead)
+
+
+@functools.cache
+def rule_of(n: int, power: int) -> Rule:
+    """The rule with n nodes; power is 2 in the panel from 0, and 1 else."""
+    x, weights = np.polynomial.legendre.leggauss(n)
+    nodes, points = (1 + x) / 2, chebyshev.chebpts1(n + MORE)
+    to_series = np.linalg.inv(chebyshev.chebvander(x, n - 1))
+    reach = ((1 + points) / 2) ** (1 / power)
+    halves = np.concatenate([nodes, 1 + nodes]) / 2
+    places = (CHECKS, halves, np.outer(reach, nodes).ravel(), reach)
+    checks, halves, inside, ends = (chebyshev.chebvander(2 * at - 1, n - 1) @ to_series for at in places)
+    series: Any = np.linalg.inv(chebyshev.chebvander(points, points.size - 1))
+    return Rule(power, nodes, weights / 2, reach, checks, halves, inside, ends, series)
+
+
+class Panels(NamedTuple):
+    """Panels of one rule; in the one from 0, weights lack the powers of delta that they begin with."""
+
+    rule: Rule
+    low: FloatArray
+    high: FloatArray
+    fields: FloatArray  # weights of force, area and so on, shift and rate of heights at the nodes, (rows, panels, n)
+
+    def some(self, chosen: Any) -> Panels:
+        """Those at these places."""
+        return Panels(self.rule, self.low[chosen], self.high[chosen], self.fields[:, chosen])
+
+
+class Nodes(NamedTuple):
+    """Islands at the nodes of panels."""
+
+    panel: NDArray[np.intp]
+    weights: FloatArray  # (nodes, rows)
+    shift: FloatArray
+    rate: FloatArray
+
+    def some(self, chosen: Any) -> Nodes:
+        """Those at these places."""
+        return Nodes(*(field[chosen] for field in self))
+
+
+def missed_by(panels: Panels, true: FloatArray, last: float) -> FloatArray:
+    """Bound on the relative error of panels: of what they interpolate, against islands, and of their sums."""
+    rule, low, high, fields = panels
+    missed = fields @ rule.checks.T - true
+    # what underflows is right
+    own = true[:-2]
+    relative = np.abs(np.divide(missed[:-2], own, out=np.zeros_like(own), where=own > 0)).max(axis=(0, 2))
+    # heights count where the Gaussian does: near the gap of its top
+    at = np.clip(true[-2] / true[-1], high[:, None], last)
+    turned = (np.abs(missed[-2] - missed[-1] * at) + HIGH * np.abs(missed[-1]) / true[-1]).max(axis=1)
+    # sums over whole panels, relative to the largest of the panel
+    spread = low[:, None] + (last - low)[:, None] * np.linspace(0, 1, SEEN)
+    # where Gaussians are narrow no such gap may meet one: gaps at which one has its top in the panel
+    tops = (fields[-2] / fields[-1])[:, :: max(1, rule.nodes.size // TOPS)]
+    c = np.clip(np.concatenate([spread, tops], axis=1), high[:, None], last)[..., None]
+
+    def squares(at: FloatArray) -> FloatArray:
+        heights = at[-2][:, None, :] - at[-1][:, None, :] * c
+        return np.asarray(heights * heights)
+
+    def sums(at: FloatArray, far: FloatArray, places: FloatArray, weights: FloatArray) -> FloatArray:
+        force = at[0] * rule.measure(low, high, places, 1)[0] * weights
+        # in units of the panel's largest, so that nothing underflows
+        return np.asarray((np.exp(0.5 * (least - far)) @ force[..., None])[..., 0])
+
+    finer = fields @ rule.halves.T
+    coarse_far, fine_far = squares(fields), squares(finer)
+    least = fine_far.min(axis=(1, 2), keepdims=True)
+    fine = sums(finer, fine_far, np.concatenate([rule.nodes, 1 + rule.nodes]) / 2, np.tile(rule.weights / 2, 2))
+    off = np.abs(sums(fields, coarse_far, rule.nodes, rule.weights) - fine).max(axis=1)
+    return np.asarray(relative + HIGH * turned + BETWEEN * off / fine.max(axis=1))
+
+
+def _sums(heights: FloatArray, weights: FloatArray, turned: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """ln of sums over islands at each gap, and of weights times heights over it, (rows, gaps).
+
+    `weights` and `turned`, weights times rates, are (nodes, rows) or (rows, gaps, nodes).
+    """
+    squares = heights * heights
+    least = squares.min(axis=-1)
+    # the least of all is taken out, so that sums cannot underflow
+    gaussian = np.exp(0.5 * (least[:, None] - squares))
+    sides = (gaussian, weights), (gaussian * heights, turned)
+    found, slopes = [(g @ w).T if w.ndim == 2 else np.einsum("gn,rgn->rg", g, w) for g, w in sides]
+    return np.log(found) - least / 2, slopes / found
+
+
+def joined(one: tuple[FloatArray, FloatArray], two: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """`_sums` of both."""
+    both = np.logaddexp(one[0], two[0])
+    return both, one[1] * np.exp(one[0] - both) + two[1] * np.exp(two[0] - both)
+
+
+def _below(c: FloatArray, own: NDArray[np.intp], nodes: Nodes) -> tuple[FloatArray, FloatArray]:
+    """`_sums` over the panels below those of gaps, `own`, at compressions c."""
+    heights = np.where(nodes.panel < own[:, None], nodes.shift - nodes.rate * c[:, None], FAR)
+    return _sums(heights, nodes.weights, nodes.weights * nodes.rate[:, None])
+
+
+def _far_below(
+    c: FloatArray, low: float, high: float, first: int, nodes: Nodes, rtol: float
+) -> tuple[FloatArray, FloatArray]:
+    """`_sums` over the panels before the `first` at many c in [low, high], by a series that is good to `rtol`."""
+    if c.size <= TERMS:
+        return _below(c, np.full(c.size, first), nodes)
+    points, rows = chebyshev.chebpts1(TERMS), nodes.weights.shape[1]
+    found = np.concatenate(_below((low + high + (high - low) * points) / 2, np.full(TERMS, first), nodes))
+    series: Any = found @ np.linalg.inv(chebyshev.chebvander(points, TERMS - 1)).T
+    if TAIL_SHARE * np.abs(series[:rows, -2:]).sum(axis=1).max() <= rtol:
+        values = series @ chebyshev.chebvander((2 * c - low - high) / (high - low), TERMS - 1).T
+        return values[:rows], values[rows:]
+    middle, out = (low + high) / 2, np.empty((2, rows, c.size))
+    for chosen, ends in ((c < middle, (low, middle)), (c >= middle, (middle, high))):
+        out[:, :, chosen] = _far_below(c[chosen], *ends, first, nodes, rtol)
+    return out[0], out[1]
+
+
+def below_by_halves(
+    c: FloatArray, own: NDArray[np.intp], nodes: Nodes, edges: FloatArray, first: int, last: int, rtol: float
+) -> tuple[FloatArray, FloatArray]:
+    """`_below` to `rtol`, of gaps and nodes in order of panels from `first` to before the `last`, of those alone."""
+    if last - first <= BLOCK or not c.size:
+        return _below(c, own, nodes)
+    middle = (first + last) // 2
+    gap, node = np.searchsorted(own, middle), np.searchsorted(nodes.panel, middle)
+    left, right = nodes.some(slice(node)), nodes.some(slice(node, None))
+    lower = below_by_halves(c[:gap], own[:gap], left, edges, first, middle, rtol)
+    upper = below_by_halves(c[gap:], own[gap:], right, edges, middle, last, rtol)
+    upper = joined(upper, _far_below(c[gap:], float(edges[middle]), float(edges[last]), middle, left, rtol))
+    return np.concatenate([lower[0], upper[0]], axis=1), np.concatenate([lower[1], upper[1]], axis=1)
+
+
+def cut_sums(panels: Panels) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
+    """Gaps of panels, and `_sums` over the part of its panel that is below each."""
+    rule, low, high, fields = panels
+    count, rows = rule.nodes.size, len(fields) - 2
+    c = rule.approach(low, high, rule.reach).ravel()
+    inside = (fields @ rule.inside.T).reshape(-1, c.size, count)
+    measure = rule.measure(low, high, np.outer(rule.reach, rule.nodes).ravel(), rows)
+    measure = np.broadcast_to(measure, (rows, low.size, rule.reach.size * count))
+    measure = measure.reshape(rows, low.size, rule.reach.size, count)
+    shares = (measure * np.outer(rule.reach, rule.weights)).reshape(rows, c.size, count)
+    weights = inside[:-2] * shares
+    logs, slopes = _sums(inside[-2] - inside[-1] * c[:, None], weights, weights * inside[-1])
+    # the island at the gap itself
+    ends = (fields @ rule.ends.T).reshape(-1, c.size)
+    if rule.power > 1:
+        ends[:-2] *= c ** POWERS[:rows, 0]
+    height = ends[-2] - ends[-1] * c
+    return c, (logs, slopes + ends[:-2] * np.exp(-0.5 * height * height - logs))
