@@ -8,16 +8,17 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from mbma_tables.errors import (
+    ConvergenceError,
+    InputError,
+    MbmaError,
+    NotSelfAffineError,
+    OutOfRangeError,
+    TableFileError,
+)
+
 if TYPE_CHECKING:
     from mbma_tables import theories
-    from mbma_tables.errors import (
-        ConvergenceError,
-        InputError,
-        MbmaError,
-        NotSelfAffineError,
-        OutOfRangeError,
-        TableFileError,
-    )
     from mbma_tables.islands import greenwood_tripp
     from mbma_tables.islands.height_integrals import height_integral
     from mbma_tables.models.tables import open_table
@@ -35,17 +36,11 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "Contact": "mbma_tables.theories.result",
-    "ConvergenceError": "mbma_tables.errors",
-    "InputError": "mbma_tables.errors",
     "Island": "mbma_tables.totals.island",
-    "MbmaError": "mbma_tables.errors",
-    "NotSelfAffineError": "mbma_tables.errors",
-    "OutOfRangeError": "mbma_tables.errors",
     "Reading": "mbma_tables.surfaces.readings",
     "Surface": "mbma_tables.surfaces.surface",
     "ContactLaw": "mbma_tables.theories.law_object",
     "Scene": "mbma_tables.scenes.scene",
-    "TableFileError": "mbma_tables.errors",
     "contact": "mbma_tables.theories.contact",
     "contact_law": "mbma_tables.theories.law",
     "height_integral": "mbma_tables.islands.height_integrals",

@@ -26,7 +26,7 @@ from scipy.optimize import brentq, isotonic_regression
 from scipy.special import ellipe, ellipk, erf, expit, ndtr, ndtri
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.bearing import FRACTIONS, Bearing, RadialSpectrum, bearing, radial_spectrum
+from mbma_tables.bearing import FRACTIONS, Bearing, RadialSpectrum
 from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, area, light_factor, mean_top_height
 
 LIGHTEST, HEAVIEST = -16.0, 1.4  # ln F^ of a map's curve
@@ -108,14 +108,6 @@ class MapLaw:
     anisotropy: float = 1.0
     constants: Constants = CONSTANTS
     map_constants: MapConstants = MAP_CONSTANTS
-
-    @classmethod
-    def from_heights(cls, heights: FloatArray, sizes: tuple[float, float]) -> MapLaw:
-        """The law of a periodic map of these sides; mirror any other first, so that its edges meet.
-
-        Lengths of its answers are in the map's own h_rms, forces over A0 E* g with its own rms gradient.
-        """
-        return cls.from_curves(bearing(heights, sizes), radial_spectrum(heights, sizes))
 
     @classmethod
     def from_curves(cls, known: Bearing, bands: RadialSpectrum) -> MapLaw:

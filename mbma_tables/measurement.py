@@ -98,7 +98,7 @@ def draw(
     figure = new_figure(12, 7.5)
     parts: Any = figure.subfigures(2, 1)
     above, below = parts
-    panels = dict(zip("ABC", above.subplots(1, 3), strict=True)) | dict(zip("DE", below.subplots(1, 2), strict=True))
+    panels = dict(zip("ABCDE", [*above.subplots(1, 3), *below.subplots(1, 2)], strict=True))
     unit = surface.unit or "length"
     _heights(above, panels["A"], treated, unit)
     _spectrum(panels["B"], surface, unit)

@@ -69,18 +69,10 @@ class AnySurface(Displayed, abc.ABC):
     q1: Any
     h_rms: Any
     h_max: Any
+    m2: Any
+    m4: Any
     unit: str | None
     provenance: tuple[Mapping[str, Any], ...]
-
-    @property
-    @abc.abstractmethod
-    def m2(self) -> Any:
-        """Variance of a profile's slope, Eq. (7)."""
-
-    @property
-    @abc.abstractmethod
-    def m4(self) -> Any:
-        """Variance of a profile's second derivative [1/length^2], Eq. (7)."""
 
     @property
     def shape(self) -> tuple[int, ...]:

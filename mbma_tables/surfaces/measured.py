@@ -108,6 +108,10 @@ class MeasuredSurface(AnySurface):
             object.__setattr__(self, name, array)
         if held.size < 2 or not self.laws.width.size:
             raise InputError("the spectrum holds no height: no two neighbours in q have positive C")
+        numbers = {"q0": self.q[0], "q1": self.q[-1], "h_rms": math.sqrt(self.laws.moment(0))}
+        numbers |= {f"m{order}": self.laws.moment(order) for order in (2, 4)}
+        for name, number in numbers.items():
+            object.__setattr__(self, name, np.float64(number))
         require(
             "largest q over smallest", np.asarray(self.zeta_1), self.zeta_1 > MIN_ZETA_1, "greater than 3 (more waves)"
         )
@@ -138,31 +142,6 @@ class MeasuredSurface(AnySurface):
     def laws(self) -> PowerLaws:
         """The power laws between samples."""
         return PowerLaws(self.q, self.C)
-
-    @property
-    def q0(self) -> Any:
-        """Smallest wavenumber [1/length]."""
-        return self.q[0]
-
-    @property
-    def q1(self) -> Any:
-        """Largest wavenumber [1/length]."""
-        return self.q[-1]
-
-    @property
-    def h_rms(self) -> Any:
-        """Root-mean-square height of the spectrum [length]."""
-        return np.float64(math.sqrt(self.laws.moment(0)))
-
-    @property
-    def m2(self) -> Any:
-        """Variance of a profile's slope, Eq. (1)."""
-        return np.float64(self.laws.moment(2))
-
-    @property
-    def m4(self) -> Any:
-        """Variance of a profile's second derivative [1/length^2], Eq. (1)."""
-        return np.float64(self.laws.moment(4))
 
     @property
     def skewness(self) -> float:
