@@ -52,5 +52,6 @@ def get_theory(theory: str | Theory | UserTheory) -> Theory:
 
 def refuse_options_of_mbma(**given: bool) -> None:
     """Refuse MBMA's own options where the theory is another, or an object that has its own."""
-    if any(given.values()):
-        raise InputError(f"{', '.join(name for name, it in given.items() if it)}: options of theory 'mbma', by name")
+    names = ", ".join(name for name, it in given.items() if it)
+    if names:
+        raise InputError(f"{names}: options of theory 'mbma' alone, asked for by its name")

@@ -175,7 +175,7 @@ def test_units_that_do_not_fit_are_noticed(theory):
         ({"separation": 1.0, "pressure": 1.0}, "got separation and pressure"),
         ({"pressure": 1.0, "theory": "hertz"}, "theory must be one of"),
         ({"pressure": 1.0, "theory": "persson", "tier": "exact"}, "tier: options of theory 'mbma'"),
-        ({"separation": 1.0, "theory": Mbma(), "reading": "printed"}, "reading: options of theory 'mbma', by name"),
+        ({"separation": 1.0, "theory": Mbma(), "reading": "printed"}, "reading: options of theory 'mbma' alone"),
         ({"pressure": np.nan}, "pressure must be finite"),
         ({"pressure": -1.0}, "pressure must be at least 0"),
         ({"area": 0.9}, "area must be at most what theory 'mbma' reaches"),

@@ -215,7 +215,7 @@ class Negative:
     [
         ({"theory": "hertz"}, "theory must be one of"),
         ({"theory": "persson", "tier": "exact"}, "tier: options of theory 'mbma'"),
-        ({"theory": Mbma(), "reading": "printed"}, "reading: options of theory 'mbma', by name"),
+        ({"theory": Mbma(), "reading": "printed"}, "reading: options of theory 'mbma' alone"),
         ({"theory": "persson", "rtol": 1e-10}, "rtol"),
         ({"theory": "persson", "surface": Surface([0.5, 0.8], 0.2, 40.0, 1.0, 3.0)}, "one surface, got a batch"),
         ({"theory": Negative()}, "no positive force and area"),
