@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import Instruction, njit
 from mbma_tables.elementary import bits_of
-from mbma_tables.models.protocol import FORCE
 from mbma_tables.tablefiles.schema import BUCKET_BITS
 
 OK, X_BELOW, X_ABOVE, MU_ABOVE, UNRESOLVED = 0, 1, 2, 3, 4
@@ -109,30 +108,6 @@ class _Polynomial:
         return self.along_x(self.builder.fmul(self.picked(row, powers), factors))
 
 
-def _value(typing: Any, array: Any, offset: Any, x: Any, y: Any) -> Any:
-    """A polynomial of `array` at (x, y), both in [-1, 1]."""
-    from numba import types
-
-    def generate(*given: Any) -> Any:
-        polynomial = _Polynomial(*given)
-        return polynomial.along_x(polynomial.sum())
-
-    return types.float64(array, types.int64, x, y), generate
-
-
-def _gradient(typing: Any, array: Any, offset: Any, x: Any, y: Any) -> Any:
-    """The polynomial, and its derivatives by x and by y."""
-    from numba import types
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        polynomial = _Polynomial(context, builder, signature, arguments, fused=True)
-        value, slope = polynomial.sums()
-        parts = polynomial.along_x(value), polynomial.slope_along_x(value), polynomial.along_x(slope)
-        return context.make_tuple(builder, signature.return_type, parts)
-
-    return types.UniTuple(types.float64, 3)(array, types.int64, x, y), generate
-
-
 def polynomial(powers: FloatArray, x: Any, y: Any) -> Any:
     """Polynomials (..., y, x) in numpy, operation by operation as compiled; x and y have two axes of length 1 more."""
     rows, power = powers, y
@@ -153,9 +128,27 @@ def _plain(array: FloatArray, offset: int, x: float, y: float) -> tuple[Any, Any
     return value, slope_x, slope_y
 
 
-# compiled code calls these with fewer arguments than they are defined with
-value_at: Any = Instruction(_value, lambda *given: _plain(*given)[0])
-gradient_at: Any = Instruction(_gradient, _plain)
+def _instruction(slopes: bool) -> Any:
+    """A polynomial of an array from an offset on, at x and y in [-1, 1], perhaps with its derivatives by both."""
+
+    def define(typing: Any, array: Any, offset: Any, x: Any, y: Any) -> Any:
+        from numba import types
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            polynomial = _Polynomial(context, builder, signature, arguments, fused=slopes)
+            if not slopes:
+                return polynomial.along_x(polynomial.sum())
+            value, slope = polynomial.sums()
+            parts = polynomial.along_x(value), polynomial.slope_along_x(value), polynomial.along_x(slope)
+            return context.make_tuple(builder, signature.return_type, parts)
+
+        made = types.UniTuple(types.float64, 3) if slopes else types.float64
+        return made(array, types.int64, x, y), generate
+
+    return Instruction(define, _plain if slopes else lambda *given: _plain(*given)[0])
+
+
+value_at, gradient_at = _instruction(False), _instruction(True)
 
 
 # fastmath=False is said because else numba takes that of whichever caller compiles these first, and bits depend on it
@@ -184,16 +177,6 @@ def universal_phi(X: float, mu: float, table: Table) -> tuple[int, float, float,
     r = table.records
     force, area = value_at(r, cell + FORCE_POWERS, x, y), value_at(r, cell + AREA_POWERS, x, y)
     return OK, mu * force, area, r[cell + ERROR]
-
-
-@njit(cache=True, fastmath=False, error_model="numpy", forceinline=True)
-def universal_one(which: int, X: float, mu: float, table: Table) -> tuple[int, float, float]:
-    """Status, Phi_F (`which` = 0) or Phi_A (1) alone, and the bound on its relative error."""
-    status, cell, x, y = _find(X, mu, table)
-    if status != OK:
-        return status, math.nan, math.nan
-    value = value_at(table.records, cell + (FORCE_POWERS if which == FORCE else AREA_POWERS), x, y)
-    return OK, mu * value if which == FORCE else value, table.records[cell + ERROR]
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", forceinline=True)

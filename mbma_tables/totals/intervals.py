@@ -18,12 +18,10 @@ from numpy.typing import NDArray
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import REORDER, njit
 from mbma_tables.elementary import exp, expm1
-from mbma_tables.models.protocol import BOTH
 from mbma_tables.models.universal_kernel import (
     OK,
     UNRESOLVED,
     Table,
-    universal_one,
     universal_phi,
     universal_slopes,
 )
@@ -147,7 +145,6 @@ def fill_nodes(interval: Interval, gap: Gap, surface: SurfaceConstants, slopes: 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy")
 def _rule(
-    which: int,
     interval: Interval,
     gap: Gap,
     surface: SurfaceConstants,
@@ -168,15 +165,11 @@ def _rule(
     for k in range(count):
         if slopes is not None:
             status, phi_F, F_X, F_mu, phi_A, A_X, A_mu, error = universal_slopes(work[0, k], work[1, k], table)
-            f, g = work[2, k] * phi_F, work[3, k] * phi_A
-        elif which == BOTH:
-            status, phi_F, phi_A, error = universal_phi(work[0, k], work[1, k], table)
-            f, g = work[2, k] * phi_F, work[3, k] * phi_A
         else:
-            status, phi_F, error = universal_one(which, work[0, k], work[1, k], table)
-            f = g = work[2 + which, k] * phi_F
+            status, phi_F, phi_A, error = universal_phi(work[0, k], work[1, k], table)
         if status != OK:
             return status, math.nan, math.nan, count
+        f, g = work[2, k] * phi_F, work[3, k] * phi_A
         force += kronrod[k] * f
         area += kronrod[k] * g
         gauss_force += gauss[k] * f
@@ -204,7 +197,7 @@ def _rule(
 
 @njit(cache=True, error_model="numpy")
 def refine(
-    which: int, gap: Gap, rtol: float, surface: SurfaceConstants, slopes: Any, table: Table, out: FloatArray
+    gap: Gap, rtol: float, surface: SurfaceConstants, slopes: Any, table: Table, out: FloatArray
 ) -> tuple[int, float, int]:
     """Integrate over the approaches at a gap to `rtol`; status, bound on the relative error, islands evaluated.
 
@@ -222,9 +215,7 @@ def refine(
         for k in range(count):
             if fresh[k]:
                 interval = Interval(bounds[k, 0], bounds[k, 1], bounds[k, 2] > 0.0, bounds[k, 3] > 0.0)
-                status, errors[k], own_error, nodes = _rule(
-                    which, interval, gap, surface, slopes, table, work, parts[k]
-                )
+                status, errors[k], own_error, nodes = _rule(interval, gap, surface, slopes, table, work, parts[k])
                 islands += nodes
                 if status != OK:
                     return status, math.nan, islands
@@ -298,18 +289,17 @@ def _end_slopes(gap: Gap, surface: SurfaceConstants, table: Table, out: FloatArr
 
 @njit(cache=True, error_model="numpy")
 def total(
-    which: int, gap: Gap, rtol: float, surface: SurfaceConstants, slopes: Any, table: Table, out: FloatArray
+    gap: Gap, rtol: float, surface: SurfaceConstants, slopes: Any, table: Table, out: FloatArray
 ) -> tuple[int, float, int]:
     """Status, the bound on the relative error, and the islands evaluated.
 
     `out` receives F/(A0 E* q0 s) and A/A0, one row each, with their derivatives (2, COLUMNS) where `slopes` is True,
-    without (2, 1) where it is None: the code of each is compiled by itself. Where `which` is FORCE or AREA, that one is
-    given as both.
+    without (2, 1) where it is None: the code of each is compiled by itself.
     """
     out.fill(0.0)
     if not gap.compression > 0.0:
         return OK, 0.0, 0
-    status, error, islands = refine(which, gap, rtol, surface, slopes, table, out)
+    status, error, islands = refine(gap, rtol, surface, slopes, table, out)
     if slopes is not None and status == OK and out[0, 0] > 0.0 and out[1, 0] > 0.0:
         status = _end_slopes(gap, surface, table, out)
     return status, error, islands
@@ -317,7 +307,6 @@ def total(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def fill_totals(
-    which: int,
     given: Any,
     rtol: float,
     reading: ReadingNumbers,
@@ -338,6 +327,6 @@ def fill_totals(
         if k > 0 and (hurst[k] != hurst[k - 1] or zeta_1[k] != zeta_1[k - 1]):
             surface = surface_constants(hurst[k], zeta_1[k], reading, printed)
         gap = Gap(pairs.compression[k], pairs.peak[k])
-        status[k], bound[k], count = total(which, gap, rtol, surface, slopes, table, out[k])
+        status[k], bound[k], count = total(gap, rtol, surface, slopes, table, out[k])
         islands += count
     return islands

@@ -117,7 +117,7 @@ def totals_of(
     """
     if not isinstance(model, UniversalModel):
         return sum_islands(pairs, reading, model, SUM_SHARE * rtol, outside, which)
-    out, error, islands, missing = _by_table(model, pairs, reading, rtol, outside, which, workers, None)
+    out, error, islands, missing = _by_table(model, pairs, reading, rtol, outside, workers, None)
     force, area = out[:, :, 0].T
     if missing.size and outside == "exact":
         try:
@@ -140,11 +140,11 @@ def slopes_of(
         raise InputError(f"derivatives come from tier 'universal', {model.name!r} has none")
     if outside == "exact":
         raise InputError("derivatives come from the universal table: outside must be 'raise' or 'nan' with them")
-    return _by_table(model, pairs, reading, rtol, outside, BOTH, workers, True)[:3]
+    return _by_table(model, pairs, reading, rtol, outside, workers, True)[:3]
 
 
 def _by_table(
-    model: UniversalModel, pairs: Pairs, reading: Reading, rtol: float, outside: str, which: int, workers: int,
+    model: UniversalModel, pairs: Pairs, reading: Reading, rtol: float, outside: str, workers: int,
     slopes: bool | None,
 ) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:  # fmt: skip
     """What `intervals.fill_totals` fills, islands, and the pairs that the table does not cover, which are NaN."""
@@ -154,7 +154,7 @@ def _by_table(
 
     def fill(block: slice) -> int:
         return intervals.fill_totals(
-            which, tuple(pairs.some(block)), QUADRATURE_SHARE * rtol, reading.numbers, reading.jacobian == "printed",
+            tuple(pairs.some(block)), QUADRATURE_SHARE * rtol, reading.numbers, reading.jacobian == "printed",
             model.kernel, slopes, status[block], out[block], bound[block],
         )  # fmt: skip
 

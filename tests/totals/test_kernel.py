@@ -9,7 +9,6 @@ from numpy.polynomial import legendre
 
 from mbma_tables import ConvergenceError, Surface, contact
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.models.protocol import BOTH
 from mbma_tables.models.tables import universal_model
 from mbma_tables.models.universal_kernel import UNRESOLVED
 from mbma_tables.surfaces.readings import PRINTED, REPORTED
@@ -67,7 +66,7 @@ def totals(compression, rtol=1e-9, jacobian=5 / 9):
     """Status, force, area and error of `intervals.total` of one surface."""
     surface = lookup.surface_constants(0.8, 216.0, REPORTED.numbers, True)._replace(jacobian=jacobian)
     gap, out = intervals.Gap(compression, 3.0), np.empty((2, 1))
-    status, error, _ = intervals.total(BOTH, gap, rtol, surface, None, universal_model().kernel, out)
+    status, error, _ = intervals.total(gap, rtol, surface, None, universal_model().kernel, out)
     return status, *out[:, 0], error
 
 
