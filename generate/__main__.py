@@ -16,7 +16,6 @@ from mbma_tables.errors import MbmaError
 GROUPS = {
     "boundary_elements": "generate.boundary_elements.run",
     "calibrated": "generate.calibrated",
-    "leakage": "generate.boundary_elements.leakage",
     "leakage_law": "generate.leakage_law",
     "explorer": "generate.explorer",
     "formulas": "generate.formulas.commands",

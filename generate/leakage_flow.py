@@ -52,7 +52,7 @@ class Case(Simulated):
 
 
 def cases(data: xr.Dataset) -> list[Case]:
-    """Surfaces of a file by `python -m generate leakage`."""
+    """Surfaces of a file by `python -m generate boundary_elements --of leakage`."""
     found = []
     for one, fields in simulated(data):
         flow, known = one.flow.values, np.isfinite(one.force.values)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import datetime
 import json
 import pathlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -115,14 +116,6 @@ def _stacked(
     return xr.Variable(dims, values.astype(kind), {"long_name": meaning, "units": unit})
 
 
-def _read_all(tasks: Sequence[Task], folder: pathlib.Path) -> tuple[list[Task], list[dict[str, Any]]]:
-    """Tasks that are solved, and what was found."""
-    read = [(task, content) for task in tasks if (content := _read(task, folder)) is not None]
-    if not read:
-        raise InputError(f"no surface of this campaign is in {folder}")
-    return [task for task, _ in read], [content for _, content in read]
-
-
 def _described(
     tasks: Sequence[Task], found: Sequence[dict[str, Any]], names: Mapping[str, tuple[str | None, str]]
 ) -> xr.Dataset:
@@ -148,95 +141,82 @@ def _described(
     return data
 
 
-def _attributes(
-    found: Sequence[dict[str, Any]], planned: int, command: str, title: str, comment: str, modules: Iterable[str]
-) -> dict[str, Any]:
-    engines = sorted({str(content["engine"]) for content in found})
-    numpys = sorted({str(content["numpy"]) for content in found})
-    return {
-        "Conventions": "CF-1.11",
-        "title": title,
-        "institution": "mbma_tables contributors",
-        "source": f"{', '.join(engines)}: conjugate gradients of Polonsky and Keer, force control, "
-        f"tolerance {TOLERANCE:g}; periodic, frictionless, without adhesion",
-        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate {command} --collect",
-        "references": "area correction: Yastrebov, Anciaux, Molinari, arXiv:1701.02727",
-        "comment": "A surface is made anew by generate.boundary_elements.surfaces.heights from kind, hurst, zeta_1, "
-        f"waves, shape, seed and points. split: no fit sees anything but training{comment}",
-        "versions": json.dumps(versions() | {"engine": ", ".join(engines), "numpy": ", ".join(numpys)}),
-        "code_sha256": source_digest(tuple(modules)),
-        "surfaces_planned": planned,
-        "surfaces_solved": len(found),
-    }
+@dataclasses.dataclass(frozen=True)
+class Kept:
+    """What a campaign keeps of each surface, and what its file says of itself."""
+
+    numbers: Mapping[str, tuple[str | None, str]]
+    title: str
+    comment: str
+    modules: tuple[str, ...]
 
 
-def dataset(tasks: Sequence[Task], folder: pathlib.Path) -> xr.Dataset:
-    """All solved surfaces of these tasks."""
-    solved, found = _read_all(tasks, folder)
-    data = _described(solved, found, NUMBERS)
-    _add_shares(data)
-    data.attrs = _attributes(
-        found,
-        len(tasks),
-        "boundary_elements",
+KEPT = {
+    "elastic": Kept(
+        NUMBERS,
         "Random rough surfaces pressed flat, by boundary elements",
         "; refine repeats surfaces on grids. "
         "band_energy has the waves longer than the surface's first and those shorter than its last at its ends.",
         MODULES,
-    )
-    return data
-
-
-def _add_shares(data: xr.Dataset) -> None:
-    """Coordinates of the curves of heights."""
-    data["quantile"] = (
-        "quantile",
-        bearing.QUANTILES,
-        {"long_name": "share of the surface below a height", "units": "1"},
-    )
-    data["top"] = (
-        "top",
-        bearing.FRACTIONS,
-        {"long_name": "share of the surface, from the highest point down", "units": "1"},
-    )
-
-
-def hardness_dataset(tasks: Sequence[Task], folder: pathlib.Path) -> xr.Dataset:
-    """All surfaces of these tasks solved with capped pressures."""
-    solved, found = _read_all(tasks, folder)
-    data = _described(solved, found, OF_HARDNESS)
-    _add_shares(data)
-    data["eta"] = (
-        "hardness",
-        np.array(capped.HARDNESSES),
-        {"long_name": "p_m/(E* g), hardness over effective modulus and rms gradient; infinite: elastic", "units": "1"},
-    )
-    data.attrs = _attributes(
-        found,
-        len(tasks),
-        "boundary_elements --hardness",
+    ),
+    "hardness": Kept(
+        OF_HARDNESS,
         "Random rough surfaces pressed flat with pressures capped at a hardness, by boundary elements",
         "; refine repeats surfaces on grids. Loading only.",
         (*MODULES, "generate.boundary_elements.capped"),
-    ) | {
-        "source": f"generate.boundary_elements.capped: projected conjugate gradients, force control, tolerance "
-        f"{capped.TOLERANCE:g}; periodic, frictionless, without adhesion"
-    }
-    return data
-
-
-def leakage_dataset(tasks: Sequence[Task], folder: pathlib.Path) -> xr.Dataset:
-    """Contact and flow of all solved surfaces of these tasks."""
-    solved, found = _read_all(tasks, folder)
-    data = _described(solved, found, OF_LEAKAGE)
-    data.attrs = _attributes(
-        found,
-        len(tasks),
-        "leakage",
+    ),
+    "leakage": Kept(
+        OF_LEAKAGE,
         "Flow through the gaps of random rough surfaces pressed flat, by boundary elements and Reynolds' equation",
         ". Loads end where both axes are blocked.",
         (*MODULES, "mbma_tables.reynolds"),
-    )
+    ),
+}
+
+
+def dataset(tasks: Sequence[Task], folder: pathlib.Path, kind: str = "elastic") -> xr.Dataset:
+    """All solved surfaces of these tasks of a campaign."""
+    kept = KEPT[kind]
+    read = [(task, content) for task in tasks if (content := _read(task, folder)) is not None]
+    if not read:
+        raise InputError(f"no surface of this campaign is in {folder}")
+    found = [content for _, content in read]
+    data = _described([task for task, _ in read], found, kept.numbers)
+    shares = {
+        "quantile": (bearing.QUANTILES, "share of the surface below a height"),
+        "top": (bearing.FRACTIONS, "share of the surface, from the highest point down"),
+        "hardness": (
+            capped.HARDNESSES,
+            "p_m/(E* g), hardness over modulus and rms gradient; infinite: elastic",
+        ),
+    }
+    for name, (values, meaning) in shares.items():
+        if name in data.dims:
+            attributes = {"long_name": meaning, "units": "1"}
+            data["eta" if name == "hardness" else name] = (name, np.array(values), attributes)
+    engine = ", ".join(sorted({str(content["engine"]) for content in found}))
+    source = f"{engine}: conjugate gradients of Polonsky and Keer, force control, tolerance {TOLERANCE:g}"
+    if kind == "hardness":
+        source = (
+            f"generate.boundary_elements.capped: projected conjugate gradients, force control, tolerance "
+            f"{capped.TOLERANCE:g}"
+        )
+    made_by = {"engine": engine, "numpy": ", ".join(sorted({str(content["numpy"]) for content in found}))}
+    data.attrs = {
+        "Conventions": "CF-1.11",
+        "title": kept.title,
+        "institution": "mbma_tables contributors",
+        "source": f"{source}; periodic, frictionless, without adhesion",
+        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate boundary_elements --of {kind} "
+        "--collect",
+        "references": "area correction: Yastrebov, Anciaux, Molinari, arXiv:1701.02727",
+        "comment": "A surface is made anew by generate.boundary_elements.surfaces.heights from kind, hurst, zeta_1, "
+        f"waves, shape, seed and points. split: no fit sees anything but training{kept.comment}",
+        "versions": json.dumps(versions() | made_by),
+        "code_sha256": source_digest(kept.modules),
+        "surfaces_planned": len(tasks),
+        "surfaces_solved": len(found),
+    }
     return data
 
 

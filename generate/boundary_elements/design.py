@@ -110,19 +110,6 @@ def hardness_nodes() -> list[Node]:
     ]
 
 
-def hardness_tasks() -> list[Task]:
-    """Their surfaces, and three of 16 waves a side on grids of 4 to 32 points a shortest wave."""
-    refined = [
-        Recipe("self_affine", 0.3, 8, 2, 911, 0),
-        Recipe("self_affine", 0.8, 8, 2, 912, 0),
-        Recipe("plateau", 0.6, 4, 4, 913, 0),
-    ]
-    repeated = [
-        Task(dataclasses.replace(r, points=points), REFINEMENT) for points in (64, 128, 256, 512) for r in refined
-    ]
-    return sorted(repeated + tasks_of(hardness_nodes()), key=lambda task: task.recipe.points)
-
-
 def leakage_nodes() -> list[Node]:
     """Nodes whose gaps are solved for flow: four surfaces tell how far cells of one spectrum differ."""
     return [
@@ -142,21 +129,29 @@ def leakage_nodes() -> list[Node]:
     ]
 
 
-def refinement() -> list[Recipe]:
+def refinement(kind: str = "elastic") -> list[Recipe]:
     """The same surfaces on grids of 2 to 32 points a shortest wave, at most 512 points a side."""
-    surfaces = [
-        Recipe("self_affine", 0.3, 8, 2, 901, 0),
-        Recipe("self_affine", 0.8, 8, 2, 902, 0),
-        Recipe("self_affine", 0.8, 16, 2, 903, 0),
-        Recipe("plateau", 0.6, 4, 4, 904, 0),
-        Recipe("stretched", 0.8, 8, 2, 905, 0, 4.0),
-        Recipe("peaks", 0.8, 8, 2, 906, 0, 0.5),
-        Recipe("worn", 0.8, 8, 2, 907, 0, 0.001),
-    ]
+    surfaces = {
+        "elastic": [
+            Recipe("self_affine", 0.3, 8, 2, 901, 0),
+            Recipe("self_affine", 0.8, 8, 2, 902, 0),
+            Recipe("self_affine", 0.8, 16, 2, 903, 0),
+            Recipe("plateau", 0.6, 4, 4, 904, 0),
+            Recipe("stretched", 0.8, 8, 2, 905, 0, 4.0),
+            Recipe("peaks", 0.8, 8, 2, 906, 0, 0.5),
+            Recipe("worn", 0.8, 8, 2, 907, 0, 0.001),
+        ],
+        "hardness": [
+            Recipe("self_affine", 0.3, 8, 2, 911, 0),
+            Recipe("self_affine", 0.8, 8, 2, 912, 0),
+            Recipe("plateau", 0.6, 4, 4, 913, 0),
+        ],
+        "leakage": [],
+    }
     return [
         dataclasses.replace(surface, points=points)
         for points in (64, 128, 256, 512)
-        for surface in surfaces
+        for surface in surfaces[kind]
         if points > 2 * surface.band[1]
     ]
 
@@ -166,20 +161,21 @@ def cost(recipe: Recipe) -> float:
     return recipe.points * (max(1.0, recipe.shape / 4) if recipe.kind == "stretched" else 1.0)
 
 
-def campaign(scale: float = 1.0) -> list[Task]:
+def campaign(kind: str = "elastic") -> list[Task]:
     """Every surface to solve, cheap ones first and kinds in turn, so that stopping early leaves a balanced set.
 
-    `scale` multiplies the number of surfaces of every node (at least 1; below 1 the last nodes keep one).
+    `kind` is elastic, hardness (pressures are capped) or leakage (gaps are solved for flow).
     """
-    repeated = [Task(recipe, REFINEMENT) for recipe in refinement()]
-    return sorted(repeated + tasks_of(nodes(), scale), key=lambda task: cost(task.recipe))
+    chosen = {"elastic": nodes, "hardness": hardness_nodes, "leakage": leakage_nodes}[kind]
+    repeated = [Task(recipe, REFINEMENT) for recipe in refinement(kind)]
+    return sorted(repeated + tasks_of(chosen()), key=lambda task: cost(task.recipe))
 
 
-def tasks_of(chosen: Iterable[Node], scale: float = 1.0) -> list[Task]:
+def tasks_of(chosen: Iterable[Node]) -> list[Task]:
     """Surfaces of nodes, cheap ones first."""
     tasks = []
     for node in chosen:
-        for turn in range(max(1, round(node.surfaces * scale))):
+        for turn in range(node.surfaces):
             split = HELD_OUT_SPECTRUM if node.held_out else HELD_OUT_SURFACE if turn == 1 else TRAINING
             # of the spectrum alone, so that a longer list moves no seed; its order mixes the kinds
             seed = zlib.crc32(node.recipe.name.encode()) % 10_000_000 * 100 + turn

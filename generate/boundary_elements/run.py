@@ -12,12 +12,13 @@ import click
 from tqdm import tqdm
 
 from generate.boundary_elements.capped import simulate_capped
-from generate.boundary_elements.collect import collect, dataset, hardness_dataset
-from generate.boundary_elements.design import Task, campaign, hardness_tasks
+from generate.boundary_elements.collect import collect, dataset
+from generate.boundary_elements.design import Task, campaign
+from generate.boundary_elements.leakage import solve_flow
 from generate.boundary_elements.solve import simulate, simulate_to
 from generate.boundary_elements.surfaces import Recipe
 
-HERE = pathlib.Path("boundary_elements")
+SOLVERS = {"elastic": simulate, "hardness": simulate_capped, "leakage": solve_flow}
 
 
 def run(
@@ -58,36 +59,34 @@ def run(
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
-@click.option(
-    "--folder", type=click.Path(path_type=pathlib.Path), default=HERE, show_default=True, help="One file a surface."
-)
+@click.option("--of", "kind", type=click.Choice(list(SOLVERS)), default="elastic", show_default=True)
+@click.option("--folder", type=click.Path(path_type=pathlib.Path), help="One file a surface.  [default: its kind]")
 @click.option("--collect", "target", type=click.Path(path_type=pathlib.Path), help="Write this netCDF file, no runs.")
-@click.option("--scale", type=click.FloatRange(0, min_open=True), default=1.0, help="Times the surfaces of a node.")
 @click.option("--points", type=click.IntRange(64), default=1024, show_default=True, help="Largest grid to run.")
 @click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
-@click.option("--hardness", is_flag=True, help="A smaller campaign, with pressures capped at several hardnesses.")
 @click.option("--scheduler", help="Address of a dask scheduler, whose workers see this checkout and the folder.")
 def boundary_elements(
-    folder: pathlib.Path,
+    kind: str,
+    folder: pathlib.Path | None,
     target: pathlib.Path | None,
-    scale: float,
     points: int,
     workers: int,
-    hardness: bool,
     scheduler: str | None,
 ) -> None:
     """Solve random surfaces by boundary elements (Tamaas, the extra `simulate`): four hours on two cores.
 
-    With --hardness a solver of its own caps pressures at seven hardnesses: half an hour on two cores, no Tamaas.
+    Of hardness, a solver of its own caps pressures at seven hardnesses: half an hour, no Tamaas. Of leakage, Reynolds'
+    equation is solved on the gaps: half an hour.
 
     Stopped and called again, it goes on where it was. Small grids come first, every kind of surface in turn.
     """
     from generate.tables.commands import executor
 
-    tasks = [task for task in (hardness_tasks() if hardness else campaign(scale)) if task.recipe.points <= points]
+    folder = folder or pathlib.Path("boundary_elements", kind)
+    tasks = [task for task in campaign(kind) if task.recipe.points <= points]
     if target is not None:
-        counted = collect((hardness_dataset if hardness else dataset)(tasks, folder), target)
+        counted = collect(dataset(tasks, folder, kind), target)
         click.echo(f"{target}: {counted} of {len(tasks)} surfaces, {target.stat().st_size} bytes")
         return
     with executor(workers, scheduler) as pool:
-        run(tasks, folder, pool, functools.partial(simulate_to, solve=simulate_capped if hardness else simulate))
+        run(tasks, folder, pool, functools.partial(simulate_to, solve=SOLVERS[kind]))

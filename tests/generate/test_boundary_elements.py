@@ -1,6 +1,7 @@
 """The boundary-element campaign: its engine against closed forms and others' results, its surfaces, its file."""
 
 import dataclasses
+import functools
 import os
 import pathlib
 
@@ -11,9 +12,10 @@ from click.testing import CliRunner
 
 from generate.boundary_elements.collect import collect, dataset
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, SPLITS, TRAINING, Task, campaign, nodes
-from generate.boundary_elements.run import boundary_elements, run
-from generate.boundary_elements.solve import Contact, simulate
+from generate.boundary_elements.run import SOLVERS, boundary_elements, run
+from generate.boundary_elements.solve import Contact, simulate, simulate_to
 from generate.boundary_elements.surfaces import Recipe, heights
+from generate.pages.page import ROOT
 from mbma_tables.bearing import FRACTIONS, bearing
 
 pytest.importorskip("tamaas")
@@ -155,6 +157,14 @@ class TestCampaign:
             np.testing.assert_allclose(data.band_energy[0, :15].sum("band_or_end"), own["energy"][:15], rtol=1e-6)
             identity = data.mean_separation + 2 * data.energy / data.force
             np.testing.assert_allclose(data.pressure_weighted_height, identity, atol=1e-6)
+
+    @pytest.mark.parametrize("kind", ["hardness", "leakage"])
+    def test_other_campaigns_keep_what_their_files_hold(self, kind, tmp_path):
+        tasks = [Task(Recipe("self_affine", 0.8, 4, 2, 5, 32), "training")]
+        run(tasks, tmp_path, solve=functools.partial(simulate_to, solve=SOLVERS[kind]))
+        with xr.open_dataset(ROOT / "docs" / "data" / f"{kind}.nc") as shipped:
+            assert set(dataset(tasks, tmp_path, kind).variables) == set(shipped.variables)
+            assert len(campaign(kind)) == shipped.sizes["surface"]
 
     def test_failures_come_last_and_are_named(self, tmp_path, monkeypatch):
         monkeypatch.setattr("mbma_tables.boundary_elements.MAX_ITERATIONS", 2)
