@@ -43,7 +43,7 @@ from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.interpolate import fill_4d, fill_gradient_4d
 from mbma_tables.tablefiles.schema import TableContent
 from mbma_tables.theories import Calibrated
-from mbma_tables.theories.calibrated_table import fill, shipped
+from mbma_tables.theories.calibrated_table import shipped
 
 POINTS = 20_000
 HELD_OUT = 500
@@ -276,10 +276,9 @@ def calibrated(rng: np.random.Generator) -> None:
     report("the same in evaluations of scipy.special.erf", spent / microseconds(taken["erf"], GAPS), "")
     surfaces, gaps = held_out(SURFACES, rng)
     light = np.asarray(light_factor(surfaces.alpha))
-    rows = np.stack([surfaces.hurst, np.log(surfaces.zeta_1), light, surfaces.h_max], axis=1)
-    at, out = np.arange(SURFACES), np.empty((3, SURFACES))
-    table = shipped()
-    alone = rounds({"fill": lambda: fill(table.coefficients, table.numbers, rows, at, (gaps + rows[:, 3]) / 2, out)})
+    columns = np.stack([surfaces.hurst, np.log(surfaces.zeta_1), light, surfaces.h_max])
+    table, at = shipped(), np.arange(SURFACES)
+    alone = rounds({"fill": lambda: table.fill(columns, at, (gaps + columns[3]) / 2)})
     report(
         "the same with a new surface each, table alone", 1e3 * microseconds(alone["fill"], SURFACES), "ns", at_most=100
     )

@@ -24,7 +24,7 @@ from mbma_tables.surfaces.surface import Surface
 from mbma_tables.tablefiles.provenance import source_digest, versions
 from mbma_tables.tablefiles.splines import coefficients
 from mbma_tables.theories.asperities import GreenwoodWilliamson
-from mbma_tables.theories.calibrated_table import AXES, QUANTITIES, fill, load
+from mbma_tables.theories.calibrated_table import AXES, QUANTITIES, load
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.persson import Persson
 from mbma_tables.theories.protocol import Theory
@@ -155,9 +155,8 @@ def certificate(path: pathlib.Path) -> dict[str, float]:
                 np.exp(rng.uniform(COVERED["log_separation"][0], np.log(far), points // 2)),
             ]
         )
-        out = np.empty((3, u.size))
-        row = np.array([[hurst, log_zeta, float(light_factor(spectrum.alpha, table.constants)), top]])
-        fill(table.coefficients, table.numbers, row, np.zeros(u.size, np.intp), u, out)
+        column = np.array([[hurst], [log_zeta], [float(light_factor(spectrum.alpha, table.constants))], [top]])
+        out = table.fill(column, np.zeros(u.size, np.intp), u)
         law = Law(spectrum, top, table.constants)
         force, stiffness = law.force_and_stiffness(u)
         exact = (force, stiffness, law.area(force))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import Instruction, jitable, njit
+from mbma_tables.compiled import CONTRACT, Instruction, jitable, njit
 
 Six = tuple[Any, Any, Any, Any, Any, Any]
 Four = tuple[Any, Any, Any, Any]
@@ -23,6 +23,7 @@ Ten = tuple[float, float, float, float, float, float, float, float, float, float
 _FAST = {"contract", "reassoc"}
 
 LANES = 8
+CHUNK = 128  # entries whose sums are kept, so that the loop over their polynomials vectorises
 PART = 1.0 / 120.0  # of quintic B-splines; products are faster than quotients
 
 
@@ -103,6 +104,27 @@ def quintic(u: Any) -> Six:
     w3 = (66.0 + v2 * (-60.0 + v2 * (30.0 - 10.0 * v))) * PART
     w4 = (26.0 + v * (-50.0 + v * (20.0 + v * (20.0 + v * (-20.0 + 5.0 * v))))) * PART
     return v5 * PART, w1, w2, w3, w4, u5 * PART
+
+
+@jitable
+def polynomial_of(c: Any, first: int) -> Six:
+    """The quintic in a cell from its six coefficients of B-splines, which begin at `first`."""
+    c0, c1, c2, c3, c4, c5 = c[first], c[first + 1], c[first + 2], c[first + 3], c[first + 4], c[first + 5]
+    return (
+        (c0 + 26.0 * c1 + 66.0 * c2 + 26.0 * c3 + c4) * PART,
+        (-c0 - 10.0 * c1 + 10.0 * c3 + c4) * (5.0 * PART),
+        (c0 + 2.0 * c1 - 6.0 * c2 + 2.0 * c3 + c4) * (10.0 * PART),
+        (-c0 + 2.0 * c1 - 2.0 * c3 + c4) * (10.0 * PART),
+        (c0 - 4.0 * c1 + 6.0 * c2 - 4.0 * c3 + c4) * (5.0 * PART),
+        (-c0 + 5.0 * c1 - 10.0 * c2 + 10.0 * c3 - 5.0 * c4 + c5) * PART,
+    )
+
+
+@jitable
+def quintic_at(p: Any, z: Any) -> tuple[Any, Any]:
+    """A quintic and its derivative."""
+    value = p[0] + z * (p[1] + z * (p[2] + z * (p[3] + z * (p[4] + z * p[5]))))
+    return value, p[1] + z * (2.0 * p[2] + z * (3.0 * p[3] + z * (4.0 * p[4] + z * 5.0 * p[5])))
 
 
 @jitable
@@ -194,3 +216,51 @@ def fill_gradient_4d(c: FloatArray, places: FloatArray, out: FloatArray) -> None
         both = gradient_4d(c, places[0, k], places[1, k], places[2, k], places[3, k])
         for row in range(10):
             out[row, k] = both[row]
+
+
+@njit(cache=True, error_model="numpy")
+def _held(x: float, first: float, rate: float, cells: int) -> tuple[int, float]:
+    """Cell number and place in it, of what lies beyond an axis those of its end."""
+    return cell(min(max((x - first) * rate, 0.0), float(cells)), cells + 1)
+
+
+@njit(cache=True, nogil=True, fastmath=CONTRACT, error_model="numpy")
+def fill_along(
+    c: Any, first: FloatArray, rate: FloatArray, others: FloatArray, owner: Any, x: FloatArray, out: FloatArray
+) -> None:
+    """Values and derivatives along the last axis of a quintic table, into `out` (2, places, entries).
+
+    Entries have places x (places, entries) there, and on the other axes those in the column `owner` of `others`. `c`
+    has two zeros more along its last axis. A loop of its own for each step keeps more entries in flight.
+    """
+    flat, row, step, places = c.reshape(-1), c.shape[1] * c.shape[2], c.shape[2], x.shape[0]
+    at, start, lanes = np.empty((2, CHUNK)), np.empty((places, CHUNK), np.int64), np.empty((places, CHUNK, LANES))
+    for begin in range(0, x.shape[1], CHUNK):
+        count = min(CHUNK, x.shape[1] - begin)
+        for n in range(count):
+            own = owner[begin + n]
+            i, at[0, n] = _held(others[0, own], first[0], rate[0], c.shape[0] - 5)
+            j, at[1, n] = _held(others[1, own], first[1], rate[1], c.shape[1] - 5)
+            for p in range(places):
+                start[p, n] = i * row + j * step + _held(x[p, begin + n], first[2], rate[2], c.shape[2] - 7)[0]
+        for n in range(count):
+            across, along = quintic(at[0, n]), quintic(at[1, n])
+            for p in range(places):
+                eight = patch_lanes(flat, start[p, n], row, step, across, along)
+                for m in range(LANES):
+                    lanes[p, n, m] = eight[m]
+        for p in range(places):
+            for n in range(count):
+                z = _held(x[p, begin + n], first[2], rate[2], c.shape[2] - 7)[1]
+                value, slope = quintic_at(polynomial_of(lanes[p, n], 0), z)
+                out[0, p, begin + n], out[1, p, begin + n] = value, slope * rate[2]
+
+
+@njit(cache=True, nogil=True, fastmath=CONTRACT, error_model="numpy")
+def fill_pieces(pieces: FloatArray, first: float, rate: float, owner: Any, x: FloatArray, out: FloatArray) -> None:
+    """The same of the quintics of owners, shape (owners, cells, 6)."""
+    for p in range(x.shape[0]):
+        for n in range(x.shape[1]):
+            k, z = _held(x[p, n], first, rate, pieces.shape[1])
+            value, slope = quintic_at(pieces[owner[n], k], z)
+            out[0, p, n], out[1, p, n] = value, slope * rate

@@ -62,10 +62,10 @@ class Calibrated(Theory):
         require("mean_separation", places.flat.reshape(places.shape), u.reshape(places.shape) >= 0, "at least 0")
         covered = places.covered(table)[places.owner]
         if covered.all():
-            out = table.fill(places.rows, places.owner, u)
+            out = table.fill(places.columns, places.owner, u)
         else:
             out, some = np.empty((3, u.size)), np.flatnonzero(covered)
-            out[:, some] = table.fill(places.rows, places.owner[some], u[some])
+            out[:, some] = table.fill(places.columns, places.owner[some], u[some])
             for row, mine in places.outside(~covered):
                 out[:, mine] = by_law(places.law(row), u[mine])
         force, area, stiffness = out
@@ -84,14 +84,16 @@ class Calibrated(Theory):
         assert isinstance(surface, Surface)
         table, places = calibrated_table.shipped(), Places(surface, wanted)
         if quantity == "area":
-            force = force_at_area(places.flat.reshape(places.shape), places.rows[places.owner, 2].reshape(places.shape))
+            force = force_at_area(
+                places.flat.reshape(places.shape), places.columns[2][places.owner].reshape(places.shape)
+            )
         else:
             force = (places.flat / places.gradient).reshape(places.shape)
         loads = force.ravel()
         u = np.empty(loads.size)
         covered = places.covered(table)[places.owner] & (loads > 0)
         some = np.flatnonzero(covered)
-        u[some] = table.separations(places.rows, places.owner[some], loads[some])
+        u[some] = table.separations(places.columns, places.owner[some], loads[some])
         for row, mine in places.outside(~covered):
             u[mine] = np.where(loads[mine] > 0, places.law(row).separation(np.maximum(loads[mine], 1e-300)), np.inf)
         require(quantity, np.broadcast_to(wanted, places.shape), ~np.isnan(u).reshape(places.shape), "less: u is 0")

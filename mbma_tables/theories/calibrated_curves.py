@@ -56,7 +56,7 @@ class Places:
         zeta_1, h_rms = np.asarray(surface.zeta_1, float).ravel(), np.asarray(surface.h_rms, float).ravel()
         light = light_factor(np.asarray(surface.alpha).ravel())
         heights = np.asarray(surface.h_max, float).ravel() / h_rms
-        self.rows = np.ascontiguousarray(np.array([hurst, np.log(zeta_1), light, heights]).T)
+        self.columns = np.array([hurst, np.log(zeta_1), light, heights])
         number = np.arange(hurst.size).reshape(surface.shape)
         self.owner = np.ascontiguousarray(spread(number, self.shape)).ravel()
         self.h_rms = h_rms[self.owner] if hurst.size > 1 else h_rms
@@ -65,7 +65,7 @@ class Places:
 
     def covered(self, table: calibrated_table.Table) -> Any:
         """Whether the table holds each surface."""
-        return table.covers(self.rows[:, 0], self.rows[:, 1])
+        return table.covers(*self.columns[:2])
 
     def outside(self, mask: Any) -> list[tuple[int, Any]]:
         """Surfaces that have entries under a mask, with these."""
@@ -73,7 +73,7 @@ class Places:
 
     def law(self, row: int) -> Law:
         """The law of one surface."""
-        hurst, log_zeta, _, heights = self.rows[row]
+        hurst, log_zeta, _, heights = self.columns[:, row]
         return Law(Spectrum.self_affine(float(hurst), float(np.exp(log_zeta))), float(heights))
 
 

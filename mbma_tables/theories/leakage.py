@@ -17,7 +17,7 @@ from mbma_tables.leakage import LARGEST_AREA
 from mbma_tables.plots import draw_compression, force_label, leakage_label
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.theories.calibrated_curves import spectrum_of
-from mbma_tables.theories.leakage_table import KEPT, fill_flow, flow_of_spectrum, self_affine, shipped_flow
+from mbma_tables.theories.leakage_table import KEPT, flow_of_spectrum, self_affine, shipped_flow
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory
 from mbma_tables.units import unit_of
@@ -237,17 +237,17 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
     u = np.ascontiguousarray(gap, float).ravel()
     if isinstance(surface, MeasuredSurface):
         return flow_of_spectrum(_spectrum(surface), u, contact).reshape(shape)
-    table, out = shipped_flow(), np.empty(u.size)
-    given = np.stack([np.ravel(surface.hurst), np.log(np.ravel(surface.zeta_1))], axis=1)
-    number = np.arange(len(given)).reshape(surface.shape)
+    table = shipped_flow()
+    given = np.stack([np.ravel(surface.hurst), np.log(np.ravel(surface.zeta_1))])
+    number = np.arange(given.shape[1]).reshape(surface.shape)
     owner = np.ascontiguousarray(np.broadcast_to(number, shape)).ravel()
-    inside = table.covers(*given.T)
+    inside = table.covers(*given)
     # what the table does not cover is answered below
-    rows = np.where(inside[:, None], given, table.covered.mean(axis=1))
-    fill_flow(table.coefficients, table.numbers, rows, owner, u, contact, out)
+    held = np.where(inside, given, table.covered.mean(axis=1)[:, None])
+    out = table.flow(held, owner, u, contact)
     for row in np.flatnonzero(~inside):
         mine = owner == row
-        out[mine] = flow_of_spectrum(self_affine(*map(float, given[row])), u[mine], contact[mine])
+        out[mine] = flow_of_spectrum(self_affine(*map(float, given[:, row])), u[mine], contact[mine])
     return out.reshape(shape)
 
 

@@ -23,7 +23,7 @@ from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.theories import Calibrated, Mbma, Persson, get_theory
 from mbma_tables.theories.calibrated_curves import LAW_ERROR, TabulatedLaw, spectrum_of
-from mbma_tables.theories.calibrated_table import NAME, QUANTITIES, load, shipped
+from mbma_tables.theories.calibrated_table import MIN_SHARED, NAME, QUANTITIES, load, shipped
 
 DATA = pathlib.Path(__file__).parents[2] / "docs" / "data"
 THEORY = Calibrated()
@@ -391,25 +391,19 @@ def test_what_is_told_of_a_measured_surface():
 
 def test_few_separations_in_numpy_are_those_of_compiled_loops():
     table, rng, n = shipped(), np.random.default_rng(3), 250
-    rows = np.stack(
-        [
-            rng.uniform(0.1, 1, n),
-            rng.uniform(np.log(3), np.log(1e5), n),
-            rng.uniform(0.5, 0.9, n),
-            rng.uniform(2, 12, n),
-        ]
-    ).T
-    u = rows[:, 3] * np.concatenate([rng.uniform(0, 0.99, 150), 10 ** rng.uniform(-9, -1, 96), [0, 1, 1.5, 1e-300]])
-    few = table.fill(rows, np.arange(n), u)
-    # a surface at a time, with its cells made and without
-    for repeated in (2, 40):
-        many = table.fill(rows, np.repeat(np.arange(n), repeated), np.repeat(u, repeated))
+    low, high = (0.1, np.log(3), 0.5, 2), (1, np.log(1e5), 0.9, 12)
+    surfaces = rng.uniform(low, high, (n, 4)).T
+    u = surfaces[3] * np.concatenate([rng.uniform(0, 0.99, 150), 10 ** rng.uniform(-9, -1, 96), [0, 1, 1.5, 1e-300]])
+    few = table.fill(surfaces, np.arange(n), u)
+    # a surface at a time, and with its polynomials made
+    for repeated in (2, MIN_SHARED):
+        many = table.fill(surfaces, np.repeat(np.arange(n), repeated), np.repeat(u, repeated))
         np.testing.assert_allclose(few, many[:, ::repeated], rtol=1e-11)
     known = np.flatnonzero((few[0] > 0) & (few[0] < 1e3))
-    found = table.separations(rows, known, few[0, known])
+    found = table.separations(surfaces, known, few[0, known])
     np.testing.assert_allclose(found, u[known], rtol=1e-9)
     np.testing.assert_allclose(
-        found, table.separations(rows, np.tile(known, 3), np.tile(few[0, known], 3))[: known.size]
+        found, table.separations(surfaces, np.tile(known, 3), np.tile(few[0, known], 3))[: known.size]
     )
 
 
