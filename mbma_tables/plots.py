@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import io
 import itertools
+import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -181,7 +182,8 @@ def _band(axes: Axes, x: FloatArray, y: FloatArray, scatter: FloatArray | None) 
 def to_picture(figure: Figure, kind: str = "png", dpi: float = 120, outlines: bool = False) -> bytes:
     """The figure as the content of a file of a `kind` of `KINDS`, the same bytes for the same figure.
 
-    Text stays text in SVG; with `outlines` its letters are drawn, and look the same without their font.
+    Text stays text in SVG; with `outlines` its letters are drawn and look the same without their font, and numbers have
+    two decimals, so that others' last digits do not change the file.
     """
     import matplotlib as mpl
 
@@ -191,4 +193,5 @@ def to_picture(figure: Figure, kind: str = "png", dpi: float = 120, outlines: bo
     undated: dict[str, Any] = {"svg": {"Date": None, "Creator": None}, "pdf": {"CreationDate": None}}
     with mpl.rc_context(stable):
         figure.savefig(content, format=kind, dpi=dpi, metadata=undated.get(kind))
-    return content.getvalue()
+    drawn = content.getvalue()
+    return re.sub(rb'(\.\d\d)\d+(?=[ \n"])', rb"\1", drawn) if kind == "svg" and outlines else drawn
