@@ -104,7 +104,7 @@ def test_totals(few_totals):
         assert row.error < 1e-2
         # a call's cost is taken off, down to next to nothing, and the rest is shared by the gaps
         assert row.cost == pytest.approx(1e-9 / 50, rel=1e-12, abs=0)
-        assert row.evaluations > 5  # gaps share islands
+        assert 1 < row.evaluations < 10  # gaps share islands
         assert rows["universal", "call", what].cost == pytest.approx(COST / 6, rel=1e-12, abs=0)
         # spheres that do not deform are not the model
         assert rows["rigid", "gap rtol=1e-02", what].error > 1
