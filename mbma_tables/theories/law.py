@@ -221,8 +221,8 @@ def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float
 def _theory_law(surface: AnySurface, theory: Theory, rtol: float, E_star: float) -> ContactLaw:
     """A law fitted to a theory's answers: x from first contact, from u = 0, or from both where force has no bound."""
     h_max, ends = float(surface.h_max), theory.ends_at_h_max
-    # below the elastic theory's end force depends on the logarithm of u
-    lowest = _lowest(surface, theory.elastic)
+    # below the elastic theory's end, and with a hardness towards u = 0, force depends on the logarithm of u
+    lowest = _lowest(surface, theory.elastic, LOWEST if theory.elastic is theory else LOWEST[1:])
     highest = h_max if ends else min(float(theory.interval(surface)[1]), MAX_SPAN * h_max)
     own = 0.0
 
@@ -329,8 +329,8 @@ def _finish(
     )
 
 
-def _lowest(surface: AnySurface, theory: Theory) -> float:
-    """Mean separation from which a theory has finite force: zero, the least of `LOWEST`, or where its answers begin."""
+def _lowest(surface: AnySurface, theory: Theory, shares: tuple[float, ...]) -> float:
+    """Mean separation from which a theory has finite force: the least of `shares`, or where its answers begin."""
 
     def answers(u: float) -> bool:
         try:
@@ -340,7 +340,7 @@ def _lowest(surface: AnySurface, theory: Theory) -> float:
             return False
         return math.isfinite(force) and force > 0
 
-    for share in LOWEST:
+    for share in shares:
         if answers(u := share * float(surface.h_max)):
             return u
     if answers(u := float(theory.interval(surface)[0])):

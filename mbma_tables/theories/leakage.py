@@ -243,7 +243,7 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
     owner = np.ascontiguousarray(np.broadcast_to(number, shape)).ravel()
     inside = table.covers(*given)
     # what the table does not cover is answered below
-    held = np.where(inside, given, table.covered.mean(axis=1)[:, None])
+    held = given if inside.all() else np.where(inside, given, table.covered.mean(axis=1)[:, None])
     out = table.flow(held, owner, u, contact)
     for row in np.flatnonzero(~inside):
         mine = owner == row

@@ -114,6 +114,17 @@ def test_a_law_with_a_hardness_is_a_law():
         contact_law(SURFACE, theory="calibrated", hardness=[0.01, 0.02])
 
 
+def test_a_law_of_mbma_with_a_hardness_ends_before_full_compression():
+    # where the elastic force is finite, the share of heights is not smooth
+    surface = Surface(0.8, 1.0, 64.0, 1.0, 3.3)
+    law = contact_law(surface, rtol=1e-7, hardness=0.5)
+    assert law.lowest == pytest.approx((2e-6 - 1) * surface.h_max)
+    u = np.geomspace(1e-6, 0.999, 200) * surface.h_max
+    found = contact(surface, mean_separation=u, hardness=0.5)
+    np.testing.assert_allclose(law.force(u=u), found.force, rtol=1e-7)
+    np.testing.assert_allclose(law.area(u=u), found.area, rtol=1e-7)
+
+
 def test_batches_labels_and_units():
     caps = np.array([500.0, 1500.0, np.inf])
     plain = contact(SURFACE, pressure=[[1.0], [30.0]], E_star=MODULUS, hardness=caps, theory="calibrated")
