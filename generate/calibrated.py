@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import pathlib
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
@@ -158,18 +157,15 @@ def summary(seen: Sequence[Case], make: Callable[[Case], Law | MapLaw]) -> dict[
     return told
 
 
-def cross_validate(training: Sequence[Case]) -> dict[str, Any]:
-    """Constants without a fifth of the spectra at a time: their spread, and errors on the spectra left out."""
+def cross_validate(training: Sequence[Case]) -> dict[str, list[list[float]]]:
+    """Errors on spectra that were left out, a fifth of them at a time."""
     seen = [one for one in training if one.gaussian]
     order = sorted({one.node for one in seen})
     own: dict[tuple[float | str, ...], Constants] = {}
     for fold in range(FOLDS):
         out = set(order[fold::FOLDS])
         own |= dict.fromkeys(out, fit([one for one in seen if one.node not in out]))
-    spread = np.std([dataclasses.astuple(constants) for constants in set(own.values())], axis=0)
-    names = [field.name for field in dataclasses.fields(Constants)]
-    told = summary(seen, lambda one: one.law(own[one.node]))
-    return {"spread": dict(zip(names, spread.tolist(), strict=True)), "errors": told}
+    return summary(seen, lambda one: one.law(own[one.node]))
 
 
 def coverage(
@@ -209,24 +205,23 @@ def report(evidence: Sequence[Case], forms: dict[str, Callable[[Case], Law | Map
 
 @click.command()
 @click.argument("evidence", type=click.Path(path_type=pathlib.Path, exists=True))
-@click.option("--out", type=click.Path(path_type=pathlib.Path), help="JSON file of constants and errors.")
 @click.option("--table", type=click.Path(path_type=pathlib.Path), help="The library's file: table and errors.")
-@click.option("--maps/--no-maps", default=True, help="Whether to fit the map's law too: minutes.")
 @click.option("--hardness", is_flag=True, help="EVIDENCE has capped pressures: fit what a hardness adds.")
-def calibrated(
-    evidence: pathlib.Path, out: pathlib.Path | None, table: pathlib.Path | None, maps: bool, hardness: bool
-) -> None:
-    """Fit the calibrated law to the training set of EVIDENCE; tell its errors there and on held-out surfaces."""
+def calibrated(evidence: pathlib.Path, table: pathlib.Path | None, hardness: bool) -> None:
+    """Fit the calibrated law to the training set of EVIDENCE; its errors there and elsewhere go into the table."""
     if hardness:
         with xr.open_dataset(evidence) as data:
-            click.echo("\n".join(calibrated_hardness.lines(*calibrated_hardness.write(data.load(), table))))
+            of_hardness, written = calibrated_hardness.write(data.load(), table)
+        click.echo(
+            f"{of_hardness}\nheld-out errors within one and two standard deviations: {written.attrs['coverage']}"
+        )
         return
     with xr.open_dataset(evidence) as data:
         found = cases(data.load())
         source = data.attrs.get("code_sha256", "")
     training = [one for one in found if one.split == TRAINING]
     constants = _rounded(fit(training))
-    map_constants = _rounded(fit_map(training, constants)) if maps else MAP_CONSTANTS
+    map_constants = _rounded(fit_map(training, constants))
     checked = cross_validate(training)
     forms: dict[str, Callable[[Case], Law | MapLaw]] = {
         "spectrum": lambda one: one.law(constants),
@@ -239,7 +234,7 @@ def calibrated(
         "map_constants": dataclasses.asdict(map_constants),
         "cross_validation": checked,
         "by_map": by_map,
-        "coverage": coverage(held_out, forms["spectrum"], checked["errors"])
+        "coverage": coverage(held_out, forms["spectrum"], checked)
         | {f"{name} (map)": shares for name, shares in coverage(held_out, forms["map"], by_map).items()},
         "contact_edges": EDGES,
         "errors": report(found, forms),
@@ -249,18 +244,6 @@ def calibrated(
     for name in ("constants", "map_constants"):
         click.echo(f"{name}: " + ", ".join(f"{k} {v:.4g}" for k, v in told[name].items()))
     click.echo(f"held-out errors within one and two standard deviations: {told['coverage']}")
-    for quantity in QUANTITIES:
-        click.echo(f"{quantity}: mean and standard deviation of ln(law/simulation) [%] between contacts {EDGES}")
-        for name, by_form in told["errors"].items():
-            for form, values in by_form.items():
-                cells = [f"{100 * p[0]:+4.0f}±{100 * p[1]:<3.0f}" if p else "    -   " for p in values[quantity]]
-                click.echo(f"  {name:32s} {form:9s} " + " ".join(cells))
-    for bar in told["bars"]:
-        click.echo(
-            f"{bar['what']}: {100 * bar['found']:.1f}% ({100 * bar['limit']:g}%), noise {100 * bar['noise']:.1f}%"
-        )
-    if out is not None:
-        out.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
     if table is not None:
         click.echo(f"{table}: {write_table(table, told, found, summary)}")
         # its gaps have changed with the constants

@@ -302,33 +302,3 @@ def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[ca
     if path is not None:
         write_part(path, data, GROUP)
     return constants, data
-
-
-def lines(constants: cap.Constants, data: xr.Dataset) -> list[str]:
-    """What was found, to print."""
-    told: list[str] = [", ".join(f"{name} {value:.4g}" for name, value in dataclasses.asdict(constants).items())]
-    numbers: Any = data.accuracy.values
-    for row, name in enumerate(data.attrs["sets"].split()):
-        for column, form in enumerate(FORMS.values()):
-            for k, quantity in enumerate(QUANTITIES):
-                bias, spread, share, largest, count = numbers[row, column, k]
-                told.append(
-                    f"  {name:18s} {form:8s} {quantity:9s} {bias:+.3f} ± {spread:.3f}, {share:.1%} of {count:.0f} "
-                    f"within {BARS[quantity]:.2f}, largest {largest:.2f}"
-                )
-    for quantity, e in blind().items():
-        size = np.abs(e)
-        told.append(
-            f"  {'another code':18s} h_max    {quantity:9s} {e.mean():+.3f} ± {e.std():.3f}, "
-            f"{np.mean(size < BARS[quantity]):.1%} of {e.size} within {BARS[quantity]:.2f}, largest {size.max():.2f}"
-        )
-    told += [
-        f"  held-out errors of {name} within one and two standard deviations: {one:.1%}, {two:.1%}"
-        for name, (one, two) in json.loads(data.attrs["coverage"]).items()
-    ]
-    told += [
-        f"  zeta_1 {zeta_1:4s} largest mean error: "
-        + ", ".join(f"{q} {e:+.3f}" for q, e in zip(QUANTITIES, row, strict=True))
-        for zeta_1, row in json.loads(data.attrs["drift"]).items()
-    ]
-    return told

@@ -218,7 +218,7 @@ def dataset(told: dict[str, Any], found: Sequence[Case], summary: Summary) -> xr
     bins = edges.size - 1
     known = others(found, summary)
     stated = {
-        "calibrated": _cells(told["cross_validation"]["errors"], bins),
+        "calibrated": _cells(told["cross_validation"], bins),
         "calibrated_map": _cells(told["by_map"], bins),
         **{name: _cells(content, bins) for name, content in known.items()},
     }

@@ -298,12 +298,7 @@ def write(path: pathlib.Path, evidence: pathlib.Path = EVIDENCE) -> xr.Dataset:
     "--table", type=click.Path(path_type=pathlib.Path, exists=True), default=TABLE, help="The library's file."
 )
 def leakage_law(evidence: pathlib.Path, table: pathlib.Path) -> None:
-    """Fit the law of leakage to the training set of EVIDENCE, write it beside the calibrated law; tell its errors."""
+    """Fit the law of leakage to the training set of EVIDENCE, write it beside the calibrated law."""
     made = write(table, evidence)
     click.echo(", ".join(f"{name} {made.attrs[f'flow_{name}']:g}" for name in dataclasses.asdict(FlowConstants())))
     click.echo(f"held-out errors within one and two standard deviations: {made.attrs['coverage']}")
-    click.echo(f"bias and root mean square of ln(law/simulation) between contacts {EDGES}")
-    for name, laws in zip(made.attrs["sets"].split("; "), made.accuracy.values, strict=True):
-        for label, bins in zip(made.attrs["laws"].split("; "), laws, strict=True):
-            click.echo(f"  {name:22s} {label:32s} " + " ".join(f"{b:+.2f} {r:.2f} " for b, r, _ in bins))
-    click.echo(f"  cells of one spectrum {made.noise.values.round(2)}, blocked {made.share_blocked.values.round(2)}")

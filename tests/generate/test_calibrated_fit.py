@@ -52,14 +52,13 @@ def test_cross_validation_states_errors_that_cover(monkeypatch):
     rng = np.random.default_rng(1)
     seen = [case(h, z, factor=np.exp(0.05 * rng.normal())) for h in (0.3, 0.6, 0.9) for z in (16.0, 24.0)]
     told = cross_validate(seen)
-    assert set(told["spread"]) == set(dataclasses.asdict(CONSTANTS))
-    covered = coverage(seen, lambda one: one.law(TRUE), told["errors"])
+    covered = coverage(seen, lambda one: one.law(TRUE), told)
     assert all(0 <= one <= two <= 1 for one, two in covered.values())
     # areas are exact but for what half of the spectra leave open, forces are off by 5% each
-    assert all(np.hypot(*part[:2]) < 0.01 for part in told["errors"]["area"] if part)
-    assert 0.02 < np.hypot(*told["errors"]["force"][4][:2]) < 0.1
+    assert all(np.hypot(*part[:2]) < 0.01 for part in told["area"] if part)
+    assert 0.02 < np.hypot(*told["force"][4][:2]) < 0.1
     assert summary(seen, lambda one: one.law(TRUE))["area"][4][:2] == pytest.approx([0, 0], abs=1e-12)
-    assert len(told["errors"][QUANTITIES[1]]) == len(EDGES) - 1
+    assert len(told[QUANTITIES[1]]) == len(EDGES) - 1
 
 
 def test_floor_is_what_surfaces_of_one_spectrum_differ_by():
