@@ -100,16 +100,18 @@ def totals_at(
     force_by = area_by = None
     by_depth: tuple[FloatArray, ...] = ()
     try:
-        stress, pairs = modulus, None
+        stress = modulus * surface.q0 * surface.s if isinstance(surface, Surface) else modulus
         if isinstance(surface, Surface):
-            stress, pairs = modulus * surface.q0 * surface.s, _pairs(surface, depth, reading)
-        if isinstance(surface, Surface) and pairs is not None and derivatives is True:
+            allowed = f"greater than {reading.floor_u:g}, the reading's floor of zeta_u"
+            require("q1/q0", np.asarray(surface.zeta_1), surface.zeta_1 > reading.floor_u, allowed)
+        if isinstance(surface, Surface) and derivatives is True:
+            pairs = Pairs.of(surface, depth)
             sums, error, islands = slopes_of(model, pairs, reading, rtol, outside, workers)
             force, area = sums[:, 0, 0], sums[:, 1, 0]
             force_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
         else:
             (force, area, *slopes), error, islands = _totals(
-                model, surface, depth, pairs, reading, rtol, outside, which, bool(derivatives), workers
+                model, surface, depth, reading, rtol, outside, which, bool(derivatives), workers
             )
             by_depth = tuple(slope.reshape(shape) / surface.h_rms for slope in slopes)
         if derivatives and by_depth:
@@ -135,14 +137,6 @@ def totals_at(
     )
 
 
-def _pairs(surface: Surface, depth: FloatArray, reading: Reading) -> Pairs:
-    zeta_1 = np.asarray(surface.zeta_1)
-    require(
-        "q1/q0", zeta_1, zeta_1 > reading.floor_u, f"greater than {reading.floor_u:g}, the reading's floor of zeta_u"
-    )
-    return Pairs.of(surface, depth)
-
-
 def _by_profiles(
     model: AnyModel, surface: AnySurface, depth: FloatArray, reading: Reading, rtol: float, outside: str, slopes: bool,
     workers: int,
@@ -151,23 +145,24 @@ def _by_profiles(
 
     The last are the gaps that no profile answers.
     """
-    number = np.broadcast_to(np.arange(math.prod(surface.shape)).reshape(surface.shape), depth.shape).ravel()
     compression = np.asarray(depth / surface.h_rms).ravel()
-    sums, error, islands = np.zeros((4 if slopes else 2, number.size)), np.zeros(number.size), 0
+    sums, error, islands = np.zeros((4 if slopes else 2, depth.size)), np.zeros(depth.size), 0
     touching = np.flatnonzero(compression > 0)
-    touching = touching[np.argsort(number[touching], kind="stable")]
-    left = [touching[:0]]
-    for places in np.split(touching, np.flatnonzero(np.diff(number[touching])) + 1):
+    left, groups = [touching[:0]], {0: touching}
+    shapes: list[Any] = [surface]
+    if isinstance(surface, Surface):
+        # what lies outside of the table is solved gap by gap
+        outside = "nan"
+        numbers = np.broadcast_arrays(surface.hurst, surface.zeta_1, surface.h_max / surface.h_rms)
+        shapes = list(zip(*(field.ravel().tolist() for field in numbers), strict=True))
+    if len(shapes) > 1:
+        number = np.broadcast_to(np.arange(len(shapes)).reshape(surface.shape), depth.shape).ravel()[touching]
+        groups = {k: touching[number == k] for k in np.unique(number)}
+    for k, places in groups.items():
         if not places.size:
             continue
-        shape: Any = surface
-        if isinstance(surface, Surface):
-            # what lies outside of the table is solved gap by gap
-            outside = "nan"
-            numbers = surface.hurst, surface.zeta_1, surface.h_max / surface.h_rms
-            shape = tuple(float(np.broadcast_to(field, depth.shape).flat[places[0]]) for field in numbers)
         try:
-            kept = profile(shape, model, reading, QUADRATURE_SHARE * rtol, outside, number.size > FEW)
+            kept = profile(shapes[k], model, reading, QUADRATURE_SHARE * rtol, outside, depth.size > FEW)
         except (ConvergenceError, OutOfRangeError):
             if not isinstance(surface, Surface):
                 raise
@@ -186,21 +181,22 @@ def _by_profiles(
 
 
 def _totals(
-    model: AnyModel, surface: AnySurface, depth: FloatArray, pairs: Pairs | None, reading: Reading, rtol: float,
-    outside: str, which: int, slopes: bool, workers: int,
+    model: AnyModel, surface: AnySurface, depth: FloatArray, reading: Reading, rtol: float, outside: str, which: int,
+    slopes: bool, workers: int,
 ) -> tuple[FloatArray, FloatArray, int]:  # fmt: skip
     """Force, area and perhaps slopes of both by the compression as rows, their error, islands.
 
     By profiles of islands where surfaces are few or have many gaps each, else gap by gap.
     """
     count, size = math.prod(surface.shape), depth.size
-    if pairs is None or (isinstance(model, UniversalModel) and count <= max(FEW_SURFACES, size // MANY_GAPS)):
+    own = not isinstance(surface, Surface)
+    if own or (isinstance(model, UniversalModel) and count <= max(FEW_SURFACES, size // MANY_GAPS)):
         sums, error, islands, left = _by_profiles(model, surface, depth, reading, rtol, outside, slopes, workers)
     else:
         sums, error, islands, left = np.empty((4 if slopes else 2, size)), np.empty(size), 0, np.arange(size)
     if not left.size:
         return sums, error, islands
-    if pairs is None:
+    if not isinstance(surface, Surface):
         sums[:, left] = error[left] = np.nan
         if outside == "raise":
             raise OutOfRangeError(
@@ -210,7 +206,8 @@ def _totals(
             )
         return sums, error, islands
     # gap by gap, which also says what is wrong with which
-    rest = pairs if left.size == size else pairs.some(left)
+    rest = Pairs.of(surface, depth)
+    rest = rest if left.size == size else rest.some(left)
     try:
         if slopes:
             columns, error[left], more = slopes_of(model, rest, reading, rtol, outside, workers)

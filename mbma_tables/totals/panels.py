@@ -206,3 +206,21 @@ def cut_sums(panels: Panels) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]
         ends[:-2] *= c ** POWERS[:rows, 0]
     height = ends[-2] - ends[-1] * c
     return c, (logs, slopes + ends[:-2] * np.exp(-0.5 * height * height - logs))
+
+
+def sums_of(
+    fresh: list[tuple[Panels, NDArray[np.intp]]], nodes: Nodes, edges: FloatArray, rtol: float
+) -> list[FloatArray]:
+    """What series go through, (2 rows, panels, gaps), of panels at places among all, with sums good to `rtol`."""
+    c, inner = zip(*(cut_sums(panels) for panels, _ in fresh), strict=True)
+    gaps, logs = np.concatenate(c), np.concatenate([np.array(sums) for sums in inner], axis=-1)
+    own = np.concatenate([rank.repeat(panels.rule.reach.size) for panels, rank in fresh])
+    order, count, rows = np.argsort(own, kind="stable"), edges.size - 1, logs.shape[1]
+    below = np.empty_like(logs)
+    below[..., order] = below_by_halves(gaps[order], own[order], nodes, edges, 0, count, rtol)
+    values = np.concatenate(joined((logs[0], logs[1]), (below[0], below[1])))
+    begun = own == 0
+    values[:rows, begun] -= (POWERS[:rows, 0] + 1) * np.log(gaps[begun])
+    values[rows:] *= gaps
+    parts = np.split(values, np.cumsum([at.size for at in c])[:-1], axis=1)
+    return [part.reshape(2 * rows, rank.size, -1) for part, (_, rank) in zip(parts, fresh, strict=True)]

@@ -26,29 +26,16 @@ from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.power_laws import Place
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.totals import kernel
+from mbma_tables.totals import kernel, panels, panels_kernel
 from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
 from mbma_tables.totals.island_sum import kinks
-from mbma_tables.totals.panels import (
-    BLOCK,
-    CHECKS,
-    COUNTS,
-    MORE,
-    POWERS,
-    SEEN,
-    TAIL_SHARE,
-    Nodes,
-    Panels,
-    below_by_halves,
-    cut_sums,
-    joined,
-    missed_by,
-    rule_of,
-)
+from mbma_tables.totals.panels import BLOCK, CHECKS, COUNTS, MORE, POWERS, SEEN, TAIL_SHARE, Nodes, Panels, rule_of
 
 KEPT = 64  # profiles, for whoever asks the same surface again
 WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
 SLOPES = 0.1  # of their relative error counts
+FAR_SHARE = 0.1  # of the tolerance, for sums over islands far below
+ONE_BY_ONE = 64  # panels up to which compiled code sums every island
 MAX_ROUNDS = 14
 NARROWED = 4  # times 32 is the end of a table found closer
 MOST = 1000  # panels to be answered anew at a time
@@ -125,6 +112,8 @@ class Profile:
         Islands answered for it.
     nodes : Nodes
         The islands.
+    compiled : bool
+        Whether totals are asked of compiled code; slopes never are.
     """
 
     source: Source
@@ -133,6 +122,7 @@ class Profile:
     error: float
     islands: int
     nodes: Nodes
+    compiled: bool
 
     @property
     def end(self) -> float:
@@ -147,6 +137,10 @@ class Profile:
         F/(A0 E*).
         """
         count = self.series.shape[1] // 2
+        if self.compiled and not slopes and count == 2:
+            out = np.empty((2, compression.size))
+            panels_kernel.fill_totals(compression, self.edges, self.series, out)
+            return out
         panel = np.clip(np.searchsorted(self.edges, compression, side="right") - 1, 0, self.edges.size - 2)
         low, high = self.edges[panel], self.edges[panel + 1]
         basis = chebyshev.chebvander((2 * compression - low - high) / (high - low), self.series.shape[-1] - 1)
@@ -180,9 +174,10 @@ def _edges(source: Source, last: float) -> FloatArray:
     """Panels that double from the first on, with ends where anything changes, and equal ones above zeta_d's floor."""
     breaks = source.breaks[source.breaks < last]
     first, top = min(source.layer, float(breaks.min(initial=last))), min(source.at_d, last)
-    graded = np.geomspace(first, top, math.ceil(math.log2(top / first)) + 1)
-    equal = np.linspace(top, last, math.ceil((last - top) / WIDEST) + 1)
-    edges = np.unique(np.concatenate([[0.0], graded, breaks, equal]))
+    doubled, count = math.ceil(math.log2(top / first)), math.ceil((last - top) / WIDEST)
+    graded = first * (top / first) ** (np.arange(doubled) / doubled) if doubled else np.array([first])
+    equal = top + (last - top) * (np.arange(count) / max(count, 1))
+    edges = np.sort(np.concatenate([[0.0], graded, breaks, equal, [last]]))
     # breaks that coincide but for rounding
     return np.append(edges[:-1][np.diff(edges) > 1e-12 * edges[:-1]], last)
 
@@ -225,31 +220,25 @@ def _nodes(parts: list[Part]) -> tuple[FloatArray, list[NDArray[np.intp]], Nodes
         weights.append((fields[:-2] * rule.measure(start, end, rule.nodes, rows) * rule.weights).reshape(rows, -1))
         turns.append(fields[-2:].reshape(2, -1))
     shift, rate = np.concatenate(turns, axis=1)
-    return low[order], ranks, Nodes(np.concatenate(panel), np.concatenate(weights, axis=1).T, shift, rate)
+    nodes = Nodes(np.concatenate(panel), np.concatenate(weights, axis=1).T, shift, rate)
+    return low[order], ranks, nodes.some(np.argsort(nodes.panel, kind="stable"))
 
 
 def _summed(
-    parts: list[Part], last: float, rtol: float
+    parts: list[Part], last: float, rtol: float, compiled: bool
 ) -> tuple[list[Part], FloatArray, list[NDArray[np.intp]], Nodes]:
-    """Parts with the series that they lacked; ends of panels, places of each part's among them, islands."""
+    """Parts with the series that they lacked; ends of panels, places of each part's among them, islands in order."""
     low, ranks, nodes = _nodes(parts)
-    edges, fresh = np.append(low, last), [k for k, part in enumerate(parts) if part.series is None]
-    cuts = [cut_sums(parts[k].panels) for k in fresh]
-    own = np.concatenate([ranks[k].repeat(parts[k].panels.rule.reach.size) for k in fresh])
-    c = np.concatenate([cut[0] for cut in cuts])
-    inner = np.concatenate([np.array(cut[1]) for cut in cuts], axis=-1)
-    by_gap, by_node = np.argsort(own, kind="stable"), np.argsort(nodes.panel, kind="stable")
-    below = np.empty_like(inner)
-    far = 0.1 * rtol / math.log2(edges.size)
-    below[..., by_gap] = below_by_halves(c[by_gap], own[by_gap], nodes.some(by_node), edges, 0, low.size, far)
-    logs, slopes = joined((inner[0], inner[1]), (below[0], below[1]))
-    missed = 0.1 * rtol if low.size > BLOCK else 0.0
-    rows, begun, full, begin = len(logs), own == 0, list(parts), 0
-    logs[:, begun] -= (POWERS[:rows, 0] + 1) * np.log(c[begun])
-    values = np.concatenate([logs, c * slopes])
-    for k, cut in zip(fresh, cuts, strict=True):
-        part = values[:, begin : begin + cut[0].size].reshape(2 * rows, ranks[k].size, -1)
-        begin += cut[0].size
+    edges, full, missed = np.append(low, last), list(parts), 0.0
+    places = [k for k, part in enumerate(parts) if part.series is None]
+    fresh = [(parts[k].panels, ranks[k]) for k in places]
+    if compiled and low.size <= ONE_BY_ONE:
+        values = panels_kernel.sums_of(fresh, nodes)
+    else:
+        missed = FAR_SHARE * rtol if low.size > BLOCK else 0.0
+        values = panels.sums_of(fresh, nodes, edges, FAR_SHARE * rtol / math.log2(edges.size))
+    for k, part in zip(places, values, strict=True):
+        rows = len(part) // 2
         series = part @ parts[k].panels.rule.series.T
         tails = np.abs(series[:, :, -2:]).sum(axis=-1)
         tails[rows:] *= SLOPES / np.abs(part[rows:]).max(axis=-1)
@@ -301,7 +290,7 @@ def _covered(fields: Fields, x: FloatArray, unknown: NDArray[np.bool_]) -> float
 
 
 def _answered(
-    fields: Fields, low: FloatArray, high: FloatArray, counts: NDArray[np.intp], last: float
+    fields: Fields, low: FloatArray, high: FloatArray, counts: NDArray[np.intp], last: float, compiled: bool
 ) -> tuple[list[Part], int, float]:
     """Panels of so many nodes, the number of islands, and their error.
 
@@ -325,34 +314,36 @@ def _answered(
         begin += at.size
         if rule.power > 1:
             values[:-2] /= at ** POWERS[: len(values) - 2]
-        panels = Panels(rule, low[own], high[own], values[..., : rule.nodes.size])
-        parts.append(Part(panels, missed_by(panels, values[..., rule.nodes.size :], last)))
+        count = rule.nodes.size
+        made = Panels(rule, low[own], high[own], np.ascontiguousarray(values[..., :count]))
+        missed_by = panels_kernel.missed_by if compiled else panels.missed_by
+        parts.append(Part(made, missed_by(made, values[..., count:], last)))
     return parts, x.size, error
 
 
-def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float) -> Profile:
+def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float, compiled: bool) -> Profile:
     """Panels, halved until polynomials through their islands and through their sums are good to `rtol`."""
     low, high, last = edges[:-1], edges[1:], float(edges[-1])
     counts, islands, worst = _count(low, high), 0, 0.0
     parts: list[Part] = []
     for _ in range(MAX_ROUNDS):
-        fresh, count, error = _answered(fields, low, high, counts, last)
+        fresh, count, error = _answered(fields, low, high, counts, last, compiled)
         parts, islands, worst = parts + fresh, islands + count, max(worst, error)
         # no nearer than islands themselves are known
         limit = max(0.5 * rtol, worst)
         good = [part.errors <= limit for part in parts]
         if all(own.all() for own in good):
-            parts, ends, ranks, nodes = _summed(parts, last, limit)
+            parts, ends, ranks, nodes = _summed(parts, last, limit, compiled)
             good = [part.tails <= limit for part in parts]
             if all(own.all() for own in good):
                 series = np.zeros((ends.size - 1, len(parts[0].series), COUNTS[-1][1] + MORE))
                 for part, rank in zip(parts, ranks, strict=True):
                     series[rank, :, : part.series.shape[-1]] = np.moveaxis(part.series, 0, 1)
                 error = worst + max(part.errors.max() for part in parts) + max(part.tails.max() for part in parts)
-                return Profile(source, ends, series, float(error), islands, nodes)
+                return Profile(source, ends, series, float(error), islands, nodes, compiled)
         bad = [part.panels.some(~own) for part, own in zip(parts, good, strict=True)]
         parts = [part.some(own) for part, own in zip(parts, good, strict=True) if own.any()]
-        low, high = (np.concatenate([getattr(panels, end) for panels in bad]) for end in ("low", "high"))
+        low, high = (np.concatenate([getattr(lost, end) for lost in bad]) for end in ("low", "high"))
         counts = np.tile(np.repeat([p.rule.nodes.size for p in bad], [p.low.size for p in bad]), 2)
         middle = (low + high) / 2
         low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
@@ -374,10 +365,10 @@ def _profile(
     # what underflows is right
     with np.errstate(under="ignore"):
         try:
-            return _built(source, fields, edges, rtol)
+            return _built(source, fields, edges, rtol, compiled)
         except _EndOfTable as fault:
             end = fault.args[0]
-            return _built(source, fields, np.append(edges[edges < end * (1 - 1e-12)], end), rtol)
+            return _built(source, fields, np.append(edges[edges < end * (1 - 1e-12)], end), rtol, compiled)
 
 
 def profile(
