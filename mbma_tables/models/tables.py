@@ -70,13 +70,6 @@ def universal_model() -> UniversalModel:
     return model
 
 
-def island4d_model() -> Island4dModel:
-    """The model of the shipped four-parameter table."""
-    model = open_table(ISLAND4D)
-    assert isinstance(model, Island4dModel)
-    return model
-
-
 @dataclasses.dataclass(frozen=True)
 class Verdict:
     """What a check found.

@@ -228,7 +228,7 @@ def _by_parameter(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Chain rule from H, log(zeta_1), compression and peak to the gap and the surface's own parameters."""
     shape = sums.shape[:-2]
-    hurst, zeta_1, rms_over_s, compression, peak, _ = (field.reshape(shape) for field in pairs)
+    hurst, zeta_1, compression, peak, rms_over_s, _ = (field.reshape(shape) for field in pairs)
     h_rms, q0, q1 = surface.h_rms, surface.q0, surface.q1
     # log(s/h_rms) by H and by log(zeta_1): (h_rms/s)^2 = 1 - zeta_1^(-2H)
     lift = -(1 - rms_over_s**2) / rms_over_s**2

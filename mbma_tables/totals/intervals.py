@@ -18,18 +18,11 @@ from numpy.typing import NDArray
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import REORDER, njit
 from mbma_tables.elementary import exp, expm1
-from mbma_tables.models.universal_kernel import (
-    OK,
-    UNRESOLVED,
-    Table,
-    universal_phi,
-    universal_slopes,
-)
+from mbma_tables.models.universal_kernel import OK, UNRESOLVED, Table, universal_phi, universal_slopes
 from mbma_tables.surfaces.readings import ReadingNumbers
 from mbma_tables.totals.gauss_kronrod import GAUSS_21, GAUSS_31, KRONROD_21, KRONROD_31, NODES_21, NODES_31
 from mbma_tables.totals.kernel import (
     ROOT_TWO_PI,
-    Pairs,
     SurfaceConstants,
     island_density,
     island_height,
@@ -40,6 +33,7 @@ from mbma_tables.totals.kernel import (
 )
 
 MAX_INTERVALS = 200
+ERROR, NOT_YET = 4, -1.0  # of an interval's row: where its relative error stands, and what stands there before
 WORK = 13  # rows of numbers at the nodes of a rule
 NARROW = 2.5  # in h_rms: above the floor of zeta_d, the smaller rule resolves a Gaussian this wide to 1e-8
 LEAST = -700.0  # of exponents: below it a Gaussian is nothing
@@ -71,8 +65,8 @@ class Interval(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def first_intervals(compression: float, surface: SurfaceConstants, bounds: FloatArray) -> int:
-    """Fill rows of `bounds`, as `Interval`, with the pieces of [0, compression] between the kinks; count."""
+def first_intervals(compression: float, surface: SurfaceConstants, pieces: FloatArray) -> int:
+    """Fill rows, as `Interval` and NOT_YET, with the pieces of [0, compression] between the kinks; count."""
     kink_d, kink_u, scale = surface.kink_d, surface.kink_u, surface.map_scale
     edges = (0.0, min(kink_d, kink_u, compression), min(max(kink_d, kink_u), compression), compression)
     count = 0
@@ -82,8 +76,8 @@ def first_intervals(compression: float, surface: SurfaceConstants, bounds: Float
             middle = 0.5 * (low + high)
             if not middle > kink_d:
                 low, high = math.asinh(math.sqrt(low / scale)), math.asinh(math.sqrt(high / scale))
-            bounds[count, 0], bounds[count, 1] = low, high
-            bounds[count, 2], bounds[count, 3] = middle > kink_d, middle > kink_u
+            pieces[count, 0], pieces[count, 1], pieces[count, ERROR] = low, high, NOT_YET
+            pieces[count, 2], pieces[count, 3] = middle > kink_d, middle > kink_u
             count += 1
     return count
 
@@ -153,7 +147,7 @@ def _rule(
     work: FloatArray,
     part: FloatArray,
 ) -> tuple[int, float, float, int]:
-    """One Kronrod rule over an interval: its sums, with K1, into `part`, see `refine`; `work` is written over.
+    """One Kronrod rule over an interval: its sums, with K1, into `part`, see `total`; `work` is written over.
 
     Returns a status, the relative error of the sums, that of the table, and the nodes.
     """
@@ -196,56 +190,55 @@ def _rule(
 
 
 @njit(cache=True, error_model="numpy")
-def refine(
+def total(
     gap: Gap, rtol: float, surface: SurfaceConstants, slopes: Any, table: Table, out: FloatArray
 ) -> tuple[int, float, int]:
     """Integrate over the approaches at a gap to `rtol`; status, bound on the relative error, islands evaluated.
 
-    `out` has a row for force and one for area, of which the first column is the integral and the others are summed too.
+    `out` receives F/(A0 E* q0 s) and A/A0, one row each, with sums for their derivatives (2, COLUMNS) where `slopes` is
+    True, without (2, 1) where it is None: the code of each is compiled by itself.
     """
     islands = 0
-    bounds = np.empty((MAX_INTERVALS, 4))
-    parts = np.empty((MAX_INTERVALS, 2, out.shape[1]))
-    errors, work = np.empty(MAX_INTERVALS), np.empty((WORK, PADDED_31.size))
-    fresh = np.ones(MAX_INTERVALS, dtype=np.bool_)
-    count = first_intervals(gap.compression, surface, bounds)
+    pieces, parts = np.empty((MAX_INTERVALS, 5)), np.empty((MAX_INTERVALS, 2, out.shape[1]))
+    work = np.empty((WORK, PADDED_31.size))
+    count = first_intervals(gap.compression, surface, pieces)
     table_error = 0.0
     while True:
         force = area = force_error = area_error = 0.0
         for k in range(count):
-            if fresh[k]:
-                interval = Interval(bounds[k, 0], bounds[k, 1], bounds[k, 2] > 0.0, bounds[k, 3] > 0.0)
-                status, errors[k], own_error, nodes = _rule(interval, gap, surface, slopes, table, work, parts[k])
+            if pieces[k, ERROR] == NOT_YET:
+                interval = Interval(pieces[k, 0], pieces[k, 1], pieces[k, 2] > 0.0, pieces[k, 3] > 0.0)
+                status, pieces[k, ERROR], own_error, nodes = _rule(
+                    interval, gap, surface, slopes, table, work, parts[k]
+                )
                 islands += nodes
                 if status != OK:
                     return status, math.nan, islands
                 table_error = max(table_error, own_error)
-                fresh[k] = False
             force += parts[k, 0, 0]
             area += parts[k, 1, 0]
-            force_error += parts[k, 0, 0] * errors[k]
-            area_error += parts[k, 1, 0] * errors[k]
+            force_error += parts[k, 0, 0] * pieces[k, ERROR]
+            area_error += parts[k, 1, 0] * pieces[k, ERROR]
         empty = not (force > 0.0 and area > 0.0)
         if empty or (force_error <= rtol * force and area_error <= rtol * area):
             break
         present = count
         for k in range(present):
-            share = present * errors[k]
+            share = present * pieces[k, ERROR]
             if parts[k, 0, 0] * share > rtol * force or parts[k, 1, 0] * share > rtol * area:
                 if count == MAX_INTERVALS:
                     return UNRESOLVED, math.nan, islands
                 # the second half becomes number `count`
-                for column in range(1, 4):
-                    bounds[count, column] = bounds[k, column]
-                bounds[k, 1] = bounds[count, 0] = 0.5 * (bounds[k, 0] + bounds[k, 1])
-                fresh[k] = True
+                middle = 0.5 * (pieces[k, 0] + pieces[k, 1])
+                pieces[count, 0], pieces[count, 1], pieces[k, 1] = middle, pieces[k, 1], middle
+                pieces[count, 2], pieces[count, 3] = pieces[k, 2], pieces[k, 3]
+                pieces[k, ERROR] = pieces[count, ERROR] = NOT_YET
                 count += 1
     for row in range(2):
         for column in range(out.shape[1]):
-            total = 0.0
+            out[row, column] = 0.0
             for k in range(count):
-                total += parts[k, row, column]
-            out[row, column] = total
+                out[row, column] += parts[k, row, column]
     if empty:
         return OK, 0.0, islands
     return OK, max(force_error / force, area_error / area) + table_error, islands
@@ -287,24 +280,6 @@ def _end_slopes(gap: Gap, surface: SurfaceConstants, table: Table, out: FloatArr
     return status
 
 
-@njit(cache=True, error_model="numpy")
-def total(
-    gap: Gap, rtol: float, surface: SurfaceConstants, slopes: Any, table: Table, out: FloatArray
-) -> tuple[int, float, int]:
-    """Status, the bound on the relative error, and the islands evaluated.
-
-    `out` receives F/(A0 E* q0 s) and A/A0, one row each, with their derivatives (2, COLUMNS) where `slopes` is True,
-    without (2, 1) where it is None: the code of each is compiled by itself.
-    """
-    out.fill(0.0)
-    if not gap.compression > 0.0:
-        return OK, 0.0, 0
-    status, error, islands = refine(gap, rtol, surface, slopes, table, out)
-    if slopes is not None and status == OK and out[0, 0] > 0.0 and out[1, 0] > 0.0:
-        status = _end_slopes(gap, surface, table, out)
-    return status, error, islands
-
-
 @njit(cache=True, error_model="numpy", nogil=True)
 def fill_totals(
     given: Any,
@@ -317,16 +292,22 @@ def fill_totals(
     out: FloatArray,
     bound: FloatArray,
 ) -> int:
-    """`total` of each of the `Pairs` given into `out` (pairs, 2, columns) and `bound`; returns the islands."""
+    """`total`, with derivatives where `slopes` is True, of each of the pairs given; returns the islands.
+
+    Given are the first four of `Pairs`; filled `status`, `out` (pairs, 2, columns), the `bound` on the relative error.
+    """
     islands = 0
-    # a plain tuple, which a call from Python passes on faster
-    pairs = Pairs(*given)
-    hurst, zeta_1 = pairs.hurst, pairs.zeta_1
+    hurst, zeta_1, compression, peak = given
     surface = surface_constants(hurst[0], zeta_1[0], reading, printed)
     for k in range(hurst.size):
         if k > 0 and (hurst[k] != hurst[k - 1] or zeta_1[k] != zeta_1[k - 1]):
             surface = surface_constants(hurst[k], zeta_1[k], reading, printed)
-        gap = Gap(pairs.compression[k], pairs.peak[k])
-        status[k], bound[k], count = total(gap, rtol, surface, slopes, table, out[k])
-        islands += count
+        gap, sums = Gap(compression[k], peak[k]), out[k]
+        sums.fill(0.0)
+        status[k], bound[k] = OK, 0.0
+        if gap.compression > 0.0:
+            status[k], bound[k], count = total(gap, rtol, surface, slopes, table, sums)
+            islands += count
+            if slopes is not None and sums[0, 0] > 0.0 and sums[1, 0] > 0.0:
+                status[k] = _end_slopes(gap, surface, table, sums)
     return islands

@@ -137,13 +137,7 @@ def island(
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)
     phi = answer_islands(model, g)
-    sizes = {
-        "R_d": 1 / (s * q0**2),
-        "R_u": 1 / (s * q0**2),
-        "D": q0**2,
-        "sigma": s,
-        "h_d": s,
-    }
+    sizes = {"R_d": 1 / (s * q0**2), "R_u": 1 / (s * q0**2), "D": q0**2, "sigma": s, "h_d": s}
     values = {name: (g[name] * sizes.get(name, 1.0))[()] for name in GEOMETRY}
     return Island(
         delta=np.broadcast_to(np.asarray(delta, dtype=float), shape)[()],

@@ -47,12 +47,6 @@ def kinks(hurst: Any, zeta_1: Any, reading: Reading) -> tuple[Any, Any]:
     return (at_d / slope_d)[()], (at_u / slope_u)[()]
 
 
-def jacobian_of(reading: Reading, rms_over_s: FloatArray, below_kink: NDArray[np.bool_]) -> FloatArray:
-    """K1 (47), or what (46) gives."""
-    below = kernel.jacobian_below(rms_over_s, reading.beta, reading.jacobian == "printed", reading.offset)
-    return np.where(below_kink, below, 1.0)
-
-
 def sum_islands(
     pairs: Pairs, reading: Reading, model: AnyModel, rtol: float, outside: str = "raise", which: int = BOTH
 ) -> Totals:
@@ -88,7 +82,8 @@ def sum_islands(
             np.maximum.at(worst_island, owner, phi.error.max(axis=1))
         height = kernel.island_height(approach, g["h_d"], g["sigma_d"], own, own.rms_over_s)
         weight = kernel.island_density(height, g["D_d"], g["sigma_d"]) * own.rms_over_s * stretch
-        weight *= jacobian_of(reading, own.rms_over_s, approach < own_kink)
+        K1 = kernel.jacobian_below(own.rms_over_s, reading.beta, reading.jacobian == "printed", reading.offset)
+        weight *= np.where(approach < own_kink, K1, 1.0)
         parts = []
         if which != AREA:
             parts.append(scale_force(g) * phi.phi_F * weight)
@@ -154,7 +149,7 @@ def _by_table(
 
     def fill(block: slice) -> int:
         return intervals.fill_totals(
-            tuple(pairs.some(block)), QUADRATURE_SHARE * rtol, reading.numbers, reading.jacobian == "printed",
+            pairs.some(block)[:4], QUADRATURE_SHARE * rtol, reading.numbers, reading.jacobian == "printed",
             model.kernel, slopes, status[block], out[block], bound[block],
         )  # fmt: skip
 

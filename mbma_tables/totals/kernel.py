@@ -31,9 +31,9 @@ class Pairs(NamedTuple):
 
     hurst: FloatArray
     zeta_1: FloatArray
-    rms_over_s: FloatArray  # h_rms/s = sqrt(1 - zeta_1^(-2H))
     compression: FloatArray  # (h_max - d)/h_rms
     peak: FloatArray  # h_max/h_rms
+    rms_over_s: FloatArray  # h_rms/s = sqrt(1 - zeta_1^(-2H))
     layer: FloatArray  # approach at which zeta_d leaves zeta_1, zeta_1^(-H)
 
     @classmethod
@@ -49,9 +49,9 @@ class Pairs(NamedTuple):
         return cls(
             hurst=hurst,
             zeta_1=zeta_1,
-            rms_over_s=flat(surface.h_rms / surface.s),
             compression=flat(depth / surface.h_rms),
             peak=flat(surface.h_max / surface.h_rms),
+            rms_over_s=flat(surface.h_rms / surface.s),
             layer=np.exp(-hurst * np.log(zeta_1)),
         )
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mbma_tables.islands.four_numbers import to_axes
-from mbma_tables.models.tables import island4d_model, universal_model
+from mbma_tables.models.tables import open_table, universal_model
 from mbma_tables.surfaces.readings import REPORTED
 
 ZETA_D, HURST, X = 3.7, 0.8, 3.0
@@ -20,7 +20,7 @@ def island(spread):
 @pytest.mark.parametrize("power", range(-12, -1))
 def test_narrow_bands(power):
     raw, place = island(10.0**power)
-    found = island4d_model().lookup(*raw, derivatives=True)
+    found = open_table("island4d").lookup(*raw, derivatives=True)
     value, by_X, _ = universal_model().slopes(place.X, place.mu)
     for name in ("F", "A"):
         hat, own = getattr(found, f"{name}_hat"), getattr(found, f"{name}_by")
@@ -32,7 +32,7 @@ def test_narrow_bands(power):
             for sign in (1, -1):
                 ends = [field.copy() for field in raw]
                 ends[number] += sign * 0.01 * (raw[2] - raw[1])
-                moved.append((ends[number], np.log(getattr(island4d_model().lookup(*ends), f"{name}_hat"))))
+                moved.append((ends[number], np.log(getattr(open_table("island4d").lookup(*ends), f"{name}_hat"))))
             (high, most), (low, least) = moved
             # a hundredth, squared
             assert own[end] / hat == pytest.approx((most - least) / (high - low), rel=3e-4, abs=0)
@@ -43,8 +43,8 @@ def test_islands_outside_warn_of_nothing():
     deep = [np.concatenate([field, field]) for field in raw]
     # X = -9, which the axis cannot even place
     deep[0][1] = ZETA_D**-HURST - 3 * (raw[0][0] - ZETA_D**-HURST)
-    found = island4d_model().lookup(*deep, outside="nan", derivatives=True)
-    alone = island4d_model().lookup(*raw, derivatives=True)
+    found = open_table("island4d").lookup(*deep, outside="nan", derivatives=True)
+    alone = open_table("island4d").lookup(*raw, derivatives=True)
     for name, values in found.F_by.items():
         assert values[0] == alone.F_by[name][0]
         assert np.isnan(values[1])

@@ -5,7 +5,7 @@ import pytest
 
 from mbma_tables import InputError, OutOfRangeError, TableFileError, greenwood_tripp
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.models.tables import island4d_model, open_table, universal_model
+from mbma_tables.models.tables import open_table
 from mbma_tables.surfaces.readings import REPORTED
 from mbma_tables.totals.island import scale_area, scale_force
 
@@ -27,7 +27,7 @@ RAW, FORCE, AREA = islands([1.0, 0.5, 3.0, 60.0], [0.8, 0.12, 0.5, 0.8], [30.0, 
 
 
 def test_outside_the_solver_answers_where_asked():
-    found = island4d_model().lookup(*RAW, outside="exact")
+    found = open_table("island4d").lookup(*RAW, outside="exact")
     bound = np.where(INSIDE, 1e-3, 1e-8)
     assert (np.abs(found.F_hat / FORCE - 1) < bound).all()
     assert (np.abs(found.A_hat / AREA - 1) < bound).all()
@@ -36,40 +36,41 @@ def test_outside_the_solver_answers_where_asked():
 
 
 def test_outside_nothing_is_said_where_asked():
-    found = island4d_model().lookup(*RAW, outside="nan", derivatives=True)
+    found = open_table("island4d").lookup(*RAW, outside="nan", derivatives=True)
     for field in (found.F_hat, found.A_hat, found.error, *found.F_by.values(), *found.A_by.values()):
         np.testing.assert_array_equal(np.isfinite(field), INSIDE)
-    inside = island4d_model().lookup(*RAW[:, INSIDE])
+    inside = open_table("island4d").lookup(*RAW[:, INSIDE])
     np.testing.assert_array_equal(found.F_hat[INSIDE], inside.F_hat)
-    everywhere = island4d_model().lookup(*RAW[:, [1, 3]], outside="nan")
+    everywhere = open_table("island4d").lookup(*RAW[:, [1, 3]], outside="nan")
     assert np.isnan(everywhere.F_hat).all()
 
 
 def test_outside_is_an_error_otherwise():
     with pytest.raises(OutOfRangeError, match="hurst must be in") as caught:
-        island4d_model().lookup(*RAW)
+        open_table("island4d").lookup(*RAW)
     np.testing.assert_array_equal(caught.value.mask, [False, True, False, False])
 
 
-@pytest.mark.parametrize("model", [island4d_model, universal_model])
-def test_words_for_outside(model):
-    asked = model().lookup if model is island4d_model else model().answer
+@pytest.mark.parametrize("kind", ["island4d", "universal"])
+def test_words_for_outside(kind):
+    model = open_table(kind)
+    asked, given = (model.lookup, RAW) if kind == "island4d" else (model.answer, RAW[:2])
     with pytest.raises(InputError, match="outside must be one of"):
-        asked(*(RAW if model is island4d_model else RAW[:2]), outside="clamp")
+        asked(*given, outside="clamp")
 
 
 def test_derivatives_come_from_the_table_alone():
     with pytest.raises(InputError, match="derivatives come from the table"):
-        island4d_model().lookup(*RAW, outside="exact", derivatives=True)
+        open_table("island4d").lookup(*RAW, outside="exact", derivatives=True)
 
 
 def test_where_islands_lie():
-    X, spread, sphere, hurst = island4d_model().status(*RAW)
+    X, spread, sphere, hurst = open_table("island4d").status(*RAW)
     assert hurst.tolist() == [0, -1, 0, 0]
     assert X.tolist() == [0, 0, 0, 1]
     narrow = RAW[:, 0].copy()
     narrow[2] = narrow[1] * (1 + 1e-10)
-    assert [int(place) for place in island4d_model().status(*narrow)[1:]] == [-1, 0, 0]
+    assert [int(place) for place in open_table("island4d").status(*narrow)[1:]] == [-1, 0, 0]
     assert {spread[0], sphere[0]} == {0}
 
 
@@ -79,14 +80,14 @@ def test_derivatives_are_those_of_the_lookup(number):
     count = 60
     approach, zeta_1 = 10 ** rng.uniform(-2, 0.6, count), 10 ** rng.uniform(0.8, 3, count)
     raw, _, _ = islands(approach, rng.uniform(0.4, 0.95, count), zeta_1)
-    found = island4d_model().lookup(*raw, outside="nan", derivatives=True)
+    found = open_table("island4d").lookup(*raw, outside="nan", derivatives=True)
     # the ends of a narrow band move little against each other
     step = 1e-5 * (np.minimum(raw[number], raw[2] - raw[1]) if number in (1, 2) else raw[number])
     ends = []
     for sign in (1, -1):
         moved = raw.copy()
         moved[number] += sign * step
-        ends.append(island4d_model().lookup(*moved, outside="nan"))
+        ends.append(open_table("island4d").lookup(*moved, outside="nan"))
     seen = np.isfinite(found.F_hat) & np.isfinite(ends[0].F_hat) & np.isfinite(ends[1].F_hat)
     assert seen.sum() > count / 2
     for name in ("F", "A"):

@@ -10,7 +10,7 @@ from helpers import difference_weights
 from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.models import universal_kernel
-from mbma_tables.models.tables import island4d_model, universal_model
+from mbma_tables.models.tables import open_table, universal_model
 from mbma_tables.surfaces.readings import REPORTED
 
 
@@ -57,7 +57,7 @@ def test_island4d_over_what_surfaces_visit():
     hurst = rng.uniform(0.3, 1, count)
     zeta_1 = 10 ** rng.uniform(math.log10(3.001), 4, count)
     g = geometry(10 ** rng.uniform(-6, 1, count), hurst, zeta_1, REPORTED)
-    found = island4d_model().of_islands(g | {"hurst": hurst})
+    found = open_table("island4d").of_islands(g | {"hurst": hurst})
     error = error_of(found, greenwood_tripp.solve(g["X"], g["mu"], rtol=1e-10))
     assert (error > found.error).mean() < 1e-3
     assert error.max() <= 1e-3

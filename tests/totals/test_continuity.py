@@ -18,7 +18,7 @@ from mbma_tables.models import answer_islands
 from mbma_tables.models.closed_form_functions import RANGES
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.island4d import RAW
-from mbma_tables.models.tables import island4d_model, universal_model
+from mbma_tables.models.tables import open_table, universal_model
 from mbma_tables.surfaces.readings import READINGS, REPORTED, get_reading
 from mbma_tables.theories.law_kernel import CENTRE, RATE
 from mbma_tables.totals.intervals import NARROW
@@ -293,7 +293,7 @@ def test_the_solver_takes_over_from_the_universal_table(side, record_property):
 
 def raw_numbers(rng, count):
     """The paper's four numbers of islands inside the four-parameter table, some at the ends of its axes."""
-    X_axis, _, _, hurst_axis = island4d_model().content.axes
+    X_axis, _, _, hurst_axis = open_table("island4d").content.axes
     hurst = rng.uniform(hurst_axis.low, hurst_axis.high - 1e-6, count)
     hurst[::5] = rng.choice(hurst_axis.values[:-1], hurst[::5].size)
     zeta_d = from_axes(rng.uniform(1e-6, 1, count), hurst)
@@ -313,7 +313,7 @@ def raw_numbers(rng, count):
 @pytest.mark.parametrize("which", RAW)
 def test_the_four_parameter_table_does_not_jump(which, record_property):
     """And where the solver takes over from it, at the ends of its axes."""
-    count, model = 200 * SCALE, island4d_model()
+    count, model = 200 * SCALE, open_table("island4d")
     raw = raw_numbers(np.random.default_rng(14), count)
     below, above = (raw | {which: raw[which] * (1 + sign * STEP / 2)} for sign in (-1, 1))
     one, other = (model.lookup(**side, outside="exact") for side in (below, above))
@@ -332,7 +332,7 @@ def test_the_four_parameter_table_does_not_jump(which, record_property):
 
 
 def test_the_four_parameter_table_joins_its_expansion(record_property):
-    count, model = 200 * SCALE, island4d_model()
+    count, model = 200 * SCALE, open_table("island4d")
     rng = np.random.default_rng(15)
     X_axis, spread_axis, _, hurst_axis = model.content.axes
     hurst = rng.uniform(hurst_axis.low, hurst_axis.high, count)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mbma_tables import InputError, OutOfRangeError, Scene, Surface, contact, contact_law, greenwood_tripp, island
-from mbma_tables.models.tables import island4d_model, open_table, shipped
+from mbma_tables.models.tables import open_table, shipped
 
 ROOT = pathlib.Path(__file__).parents[2]
 SURFACE = Surface(0.8, 0.3, 60.0, 0.7, 2.1)
@@ -79,7 +79,7 @@ def test_derivatives_and_readings_that_a_model_does_not_have():
     with pytest.raises(InputError, match="derivatives come from tier 'universal', 'own' has none"):
         contact(SURFACE, 1.0, tier=Own(), derivatives=True)
     with pytest.raises(InputError, match="made for the reading 'reported', not for 'printed'"):
-        contact(SURFACE, 1.0, tier=island4d_model(), reading="printed")
+        contact(SURFACE, 1.0, tier=open_table("island4d"), reading="printed")
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island
 from mbma_tables.islands.four_numbers import from_axes, to_axes
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.models.island4d import RAW
-from mbma_tables.models.tables import island4d_model, universal_model
+from mbma_tables.models.tables import open_table, universal_model
 from mbma_tables.surfaces.readings import READINGS, REPORTED
 from mbma_tables.surfaces.spectrum import band_moment
 from mbma_tables.theories.law_kernel import CENTRE, RATE
@@ -241,7 +241,7 @@ def test_the_solver_where_its_nodes_change(record_property):
 
 @pytest.mark.parametrize("which", RAW)
 def test_the_four_parameter_table_at_its_nodes(which, record_property):
-    count, model = 60 * SCALE, island4d_model()
+    count, model = 60 * SCALE, open_table("island4d")
     rng = np.random.default_rng([8, RAW.index(which)])
     X_axis, spread_axis, sphere_axis, hurst_axis = model.content.axes
     hurst = rng.choice(hurst_axis.values[1:-1], count)
