@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from mbma_tables import ConvergenceError, greenwood_tripp
-from mbma_tables.islands import classical
 
 CASES = [(5.0, 0.01), (5.0, 1.0), (2.0, 0.5), (5.0, 3.0), (0.0, 4.0)]
 
@@ -57,19 +56,6 @@ def test_smaller_damping_reaches_further():
         greenwood_tripp.solve(5.0, 10.0, method="classical", nodes=60, damping=0.3)
     found = greenwood_tripp.solve(5.0, 10.0, method="classical", nodes=60, damping=0.1)
     assert abs(found.phi_F / greenwood_tripp.solve(5.0, 10.0).phi_F - 1) <= found.error
-
-
-def test_too_few_iterations_is_an_error():
-    with pytest.raises(ConvergenceError):
-        greenwood_tripp.solve(2.0, 0.5, method="classical", nodes=60, max_iterations=5)
-
-
-def test_blocks_of_iterations_do_not_show(monkeypatch):
-    whole = classical.solve_classical(5.0, 1.0, 40, 0.3, 1e-10, 2000)
-    monkeypatch.setattr(classical, "BLOCK", 1)
-    for one, other in zip(classical.solve_classical(5.0, 1.0, 40, 0.3, 1e-10, 2000), whole, strict=True):
-        np.testing.assert_array_equal(one, other)
-    assert whole[0] > 20
 
 
 def test_a_signal_is_heard_within_a_long_iteration():

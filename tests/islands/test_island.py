@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from generate.tables.exact_geometry import divisor, exact_island
-from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, height_integral, island
+from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, island
 from mbma_tables.surfaces.readings import PRINTED
 
 NUMBERS = ("zeta_d", "zeta_u", "eta", "X", "mu")
@@ -44,17 +44,6 @@ def test_force_and_area(surface, reading):
     assert (np.abs(found.force / force - 1) <= found.error).all()
     assert found.reading == reading
     assert found.tier == "universal"
-
-
-def test_rigid_tier(surface):
-    delta = np.array([1e-6, 0.1, 1.0, 6.0])
-    exact, rigid = island(surface, delta), island(surface, delta, tier="rigid")
-    L = np.sqrt(2 * rigid.R_d * rigid.sigma)
-    known = rigid.sigma * L * rigid.mu * math.pi / 5 * height_integral(2.5, -rigid.X)
-    assert np.abs(rigid.force / known - 1).max() <= 1e-14
-    assert (rigid.force >= exact.force).all()
-    assert (rigid.area >= exact.area).all()
-    assert rigid.force[0] == pytest.approx(exact.force[0], rel=1e-4, abs=0)
 
 
 @pytest.mark.parametrize("delta", [0.0, -1.0, [1.0, -0.5]])

@@ -72,28 +72,6 @@ def inside(small, count, seed):
     return (X * sigma + 1) * zeta_d**-hurst, zeta_d, zeta_u, hurst
 
 
-def test_scales_by_the_paper(small):
-    """F_hat and A_hat of a nearly rigid sphere, from radii and density by their own formulas."""
-    H, zeta_d, zeta_u = 0.6, 4.0, 4.0 * (1 + 1e-5)
-
-    def moment(order, low, high):
-        power = order - 2 * H
-        shape = {0: 2.0, 2: 1.0, 4: 0.75}[order]
-        return shape * H * (high**power - low**power) / power
-
-    m0, m2, m4 = (moment(order, zeta_d, zeta_u) for order in (0, 2, 4))
-    sigma = math.sqrt((1 - 0.8968 * m2**2 / (m0 * m4)) * m0)
-    D = math.pi * m4 / m2 / (6 * math.pi * math.sqrt(3))
-    R_d, R_u = (3 * math.sqrt(math.pi) / 8 / math.sqrt(moment(4, 1.0, zeta)) for zeta in (zeta_d, zeta_u))
-    mu = 8 / 3 * D * sigma * math.sqrt(2 * R_u * R_d)
-    X = 3.0
-    solved = greenwood_tripp.solve(X, mu)
-    F_hat, A_hat, bound = small.lookup(X * sigma + zeta_d**-H, zeta_d, zeta_u, H)
-    # sigma from differences of moments keeps six digits
-    assert F_hat == pytest.approx(sigma * math.sqrt(2 * R_d * sigma) * solved.phi_F, rel=1e-4 + bound, abs=0)
-    assert A_hat == pytest.approx(2 * math.pi * D * R_u * R_d * sigma**2 * solved.phi_A, rel=1e-4 + bound, abs=0)
-
-
 def test_broadcasting_scalars_and_input(small):
     raw = inside(small, 6, 33)
     one = small.lookup(*(float(a[0]) for a in raw))
@@ -132,25 +110,6 @@ def test_edges_to_the_last_bit(small):
             small.lookup(delta, 2.0, top, 0.7)
 
 
-def test_the_range_of_X_to_the_last_bit_that_delta_has(small):
-    X_axis = small.content.axes[0]
-    for end, outward in ((X_axis.low, -np.inf), (X_axis.high, np.inf)):
-        sigma = to_axes(*(np.array([v]) for v in (1.0, 2.0, 20.0, 0.7)), REPORTED).sigma[0]
-        # walk to the last delta that is inside
-        delta = (end * sigma + 1) * 2.0**-0.7
-        X = [delta]
-        for _ in range(40):
-            X.append(np.nextafter(X[-1], -outward))
-            X.insert(0, np.nextafter(X[0], outward))
-        approach = to_axes(np.array(X), *(np.full(len(X), v) for v in (2.0, 20.0, 0.7)), REPORTED).X
-        good = (approach >= X_axis.low) & (approach <= X_axis.high)
-        assert 0 < good.sum() < good.size
-        small.lookup(np.array(X)[good], 2.0, 20.0, 0.7)
-        for value in np.array(X)[~good]:
-            with pytest.raises(OutOfRangeError, match="X must be in"):
-                small.lookup(value, 2.0, 20.0, 0.7)
-
-
 @pytest.mark.parametrize("position", range(4))
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_no_numbers_are_refused(small, position, bad):
@@ -177,17 +136,3 @@ def test_empty_and_unlike_shapes(small):
         small.lookup(1.5, [], 20.0, 0.7)
     with pytest.raises(InputError, match="do not broadcast"):
         small.lookup([1.5, 1.6], [2.0, 2.1, 2.2], 20.0, 0.7)
-
-
-def test_below_the_least_spread_to_first_order(small):
-    spread_axis = small.content.axes[1]
-    spread = spread_axis.low * np.array([1.0, 0.5, 1e-2])
-    zeta_d, hurst = np.full(3, 2.0), np.full(3, 0.7)
-    place = to_axes(np.ones(3), zeta_d, zeta_d * (1 + spread), hurst, REPORTED)
-    sigma = place.sigma
-    raw = (4.0 * sigma + 1) * zeta_d**-hurst, zeta_d, zeta_d * (1 + spread), hurst
-    place = to_axes(*raw, REPORTED)
-    ratio = small.log_ratio(place)
-    X_change = place.X / 4 - 1
-    assert np.abs(X_change).max() < 1e-6
-    np.testing.assert_allclose(ratio / place.mu, (ratio / place.mu)[:, :1] * np.ones(3), rtol=1e-4)

@@ -1,8 +1,6 @@
 """`UniversalModel` against the solver within the error that it states, and at every edge."""
 
 import dataclasses
-import threading
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -47,17 +45,6 @@ def test_the_smallest_mu_and_the_rigid_limit():
     assert (np.abs(np.stack([by_mu.phi_F, value.phi_A]) / rigid - 1) <= value.error).all()
     np.testing.assert_array_equal(value.phi_F, 0)
     np.testing.assert_array_equal(model.answer(X, np.zeros(300)).phi_F, 0)
-
-
-def test_a_small_table_keeps_its_word(small):
-    X_axis, mu_axis = small.content.axes
-    rng = np.random.default_rng(22)
-    X = rng.uniform(X_axis.low, X_axis.high, 400)
-    mu = 10 ** rng.uniform(-8, np.log10(mu_axis.high), 400)
-    error, bound = largest_error(small, X, mu)
-    assert (error <= bound).all()
-    # a bound that is much too wide would say nothing
-    assert np.median(bound / error) < 100
 
 
 def test_edges_to_the_last_bit(small):
@@ -120,18 +107,6 @@ def test_shipped_tables_are_opened_once_and_files_by_their_kind(tmp_path):
     assert open_table(path).content.attributes["history"] == "another"
 
 
-def test_threads_that_open_one_table_at_once():
-    gate = threading.Barrier(16)
-
-    def opened(_):
-        gate.wait()
-        return open_table("universal")
-
-    tabulated._opened.cache_clear()
-    with ThreadPoolExecutor(16) as threads:
-        assert len({id(model) for model in threads.map(opened, range(16))}) == 1
-
-
 @pytest.mark.parametrize("shape", [(2, 3), (1, 2, 2)])
 def test_marks_have_the_shape_of_the_arguments(small, shape):
     last = np.zeros(shape, dtype=bool)
@@ -141,20 +116,3 @@ def test_marks_have_the_shape_of_the_arguments(small, shape):
             with pytest.raises(OutOfRangeError) as caught:
                 small.answer(*given)
             np.testing.assert_array_equal(caught.value.mask, last)
-
-
-def test_slopes_are_those_of_the_answers(small):
-    """By differences inside cells, mu = 0 included."""
-    edges = [small.content.auxiliary[name][1] for name in CELL_EDGES]
-    X, mu = 0.7 * edges[0] + 0.3 * edges[1], 0.6 * edges[2] + 0.4 * edges[3]
-    value, by_X, by_mu = small.slopes(X, mu)
-    for name in ("phi_F", "phi_A"):
-        for slope, dX, dmu in ((by_X, 1e-5, 0.0), (by_mu, 0.0, 1e-5 * mu)):
-            above, below = (getattr(small.answer(X + sign * dX, mu + sign * dmu), name) for sign in (1, -1))
-            differences, natural = (above - below) / (2 * (dX + dmu)), getattr(value, name) / (dX or mu)
-            assert (np.abs(getattr(slope, name) - differences) <= 1e-9 * np.abs(natural)).all()
-    at_zero, above = small.slopes(X, 0 * X), small.slopes(X, np.full(X.size, 1e-100))
-    np.testing.assert_allclose(at_zero[2].phi_F, above[2].phi_F, rtol=1e-14)
-    np.testing.assert_allclose(at_zero[2].phi_A, above[2].phi_A, rtol=1e-14)
-    assert (np.abs(at_zero[1].phi_F) < 1e-150).all()
-    assert small.slopes(X[0], 0.0)[0].phi_F == 0

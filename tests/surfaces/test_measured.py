@@ -79,15 +79,6 @@ class TestMeasuredSurface:
         other = Surface.from_spectrum(q, 4 * np.pi**2 * FIVE.power_spectrum(q), h_max=4.0, convention="isotropic")
         assert other.h_rms == pytest.approx(one.h_rms, rel=1e-14)
 
-    def test_lengths_scale_with_the_unit(self):
-        heights = np.random.default_rng(3).normal(size=1000)
-        one = Surface.from_spectrum(Q, C, heights=heights, unit="um")
-        other = one.scaled(1e-6, "m")
-        assert other.h_rms == pytest.approx(1e-6 * one.h_rms, rel=1e-14)
-        assert other.m2 == pytest.approx(one.m2, rel=1e-13)
-        assert other.heights.quantiles == pytest.approx(1e-6 * one.heights.quantiles)
-        assert (other.h_max, other.unit) == (pytest.approx(1e-6 * one.h_max), "m")
-
     def test_nothing_given_is_changed(self):
         q, c = Q.copy(), C.copy()
         found = Surface.from_spectrum(q, c, h_max=9.0)
@@ -159,11 +150,6 @@ class TestCombined:
         assert both.anisotropy == pytest.approx(np.sqrt(sums[0] / sums[1]))
         assert one.combined(FIVE).anisotropy < one.anisotropy
         assert FIVE.combined(FIVE).anisotropy is None
-
-    def test_units_must_agree(self):
-        one = Surface.from_spectrum(Q, C, h_max=9.0, unit="um")
-        with pytest.raises(InputError, match="one surface is in 'um', the unit of the other is not known"):
-            one.combined(FIVE)
 
     def test_a_batch_is_refused(self):
         with pytest.raises(InputError, match="one surface at a time"):

@@ -92,13 +92,6 @@ def test_alpha_of_a_band_without_width():
         assert excess == pytest.approx(1e-6 / 3, rel=1e-3, abs=0)
 
 
-def test_shapes():
-    assert np.shape(spectrum.band_moment(2, 0.8, 1.0, 200.0)) == ()
-    found = spectrum.band_moment(2, np.array([[0.5], [0.8]]), 1.0, [10.0, 100.0, 200.0])
-    assert found.shape == (2, 3)
-    assert found[1, 2] == spectrum.band_moment(2, 0.8, 1.0, 200.0)
-
-
 @settings(deadline=None)
 @given(
     hurst=st.floats(0.05, 1),
@@ -115,17 +108,6 @@ def test_moments_give_the_surface_back(hurst, log_zeta, q0, h_rms):
     assert again.zeta_1 == pytest.approx(first.zeta_1, rel=1e-11, abs=0)
     assert again.q0 == pytest.approx(first.q0, rel=1e-11, abs=0)
     assert again.h_rms == pytest.approx(first.h_rms, rel=1e-14, abs=0)
-
-
-def test_batches_of_moments_equal_loops():
-    hurst, m4 = np.array([[0.6], [0.7]]), np.array([40.0, 62.0, 90.0])
-    batch = Surface.from_moments(hurst=hurst, m0=0.071, m2=0.27, m4=m4, h_max=1.1)
-    assert batch.shape == (2, 3)
-    for i in range(2):
-        for j in range(3):
-            one = Surface.from_moments(**{**MOMENTS, "hurst": hurst[i, 0], "m4": m4[j]})
-            assert batch.q0[i, j] == one.q0
-            assert batch.q1[i, j] == one.q1
 
 
 def test_no_band_has_this_alpha():

@@ -65,17 +65,6 @@ def test_power_spectrum_ends_with_the_band():
     assert batch.power_spectrum([[1.0], [2.0], [3.0]]).shape == (3, 2)
 
 
-def test_batches_equal_loops():
-    batch = Surface([[0.3], [1.0]], 0.5, [50.0, 100.0, 1e6], 0.2, 0.6)
-    assert batch.shape == (2, 3)
-    for name in ("zeta_1", "s", "m2", "m4", "alpha", "rms_gradient", "summit_radius", "summit_sigma"):
-        values = getattr(batch, name)
-        assert values.shape == (2, 3)
-        for i, hurst in enumerate((0.3, 1.0)):
-            for j, q1 in enumerate((50.0, 100.0, 1e6)):
-                assert values[i, j] == getattr(Surface(hurst, 0.5, q1, 0.2, 0.6), name)
-
-
 def test_one_surface_has_scalars():
     surface = Surface(**GOOD)
     assert surface.shape == ()

@@ -15,10 +15,10 @@ from numba import njit
 
 from mbma_tables import ContactLaw, ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.models import get_model
-from mbma_tables.surfaces.readings import NAMED, get_reading
+from mbma_tables.surfaces.readings import NAMED
 from mbma_tables.theories import law_pieces
 from mbma_tables.theories.law_kernel import CENTRE, DEGREE, FORCE_AT, RATE, RECORD
-from mbma_tables.totals.island_sum import kinks, totals_of
+from mbma_tables.totals.island_sum import totals_of
 from mbma_tables.totals.kernel import Pairs
 from mbma_tables.totals.profile import profile
 
@@ -230,22 +230,6 @@ def test_no_turning_point_where_height_dominates(case):
     assert law.turning_point is None
     assert law.area_turning_point is None
     assert (np.diff(law.force(np.linspace(law.h_max, -law.h_max, 400))) > 0).all()
-
-
-@pytest.mark.parametrize("case", [CASES[0], (0.8, 1e3, 3.0, "printed")])
-def test_slopes_jump_where_K1_does(case):
-    """Of d/dd the upper limit's share, in which K1 goes from 5/9 to 1, jumps and nothing else does."""
-    law, surface = law_of(case, 1e-9), surface_of(*case[:3])
-    gap = law.h_max - 0.7 * kinks(*case[:2], get_reading(case[3]))[0]
-    sides = gap + np.array([1e-9, -1e-9]) * law.h_max
-    totals = contact(surface, sides, reading=case[3], rtol=1e-11, derivatives=True)
-    for slope, by in ((law.stiffness, totals.force_by), (law.area_slope, totals.area_by)):
-        larger, smaller = slope(sides)
-        model = -by["separation"]
-        # a slope of the law is right to 1e-7, the jump is hundreds of times that
-        assert abs((smaller - larger) - (model[1] - model[0])) <= 1e-7 * larger
-        assert model[1] - model[0] > 2e-5 * larger
-    np.testing.assert_allclose(*law.force(sides), rtol=1e-7)
 
 
 def test_a_pickle_is_the_same_law_and_small():

@@ -54,18 +54,6 @@ def test_a_sampled_power_law_has_the_totals_of_its_five_numbers(reading, hurst, 
         np.testing.assert_allclose(*slopes, rtol=10 * bound)
 
 
-def test_printed_samples_lose_what_their_digits_lose():
-    surface = five_numbers()
-    d = surface.h_max * (1 - DEPTHS[1:])
-    plain = contact(surface, d)
-    q = np.geomspace(surface.q0, surface.q1, 2000)
-    for digits, bound in ((4, 1e-3), (7, 1e-5)):
-        rounded = [np.array([float(f"{x:.{digits}g}") for x in column]) for column in (q, surface.power_spectrum(q))]
-        found = contact(Surface.from_spectrum(*rounded, h_max=3.0), d)
-        np.testing.assert_allclose(found.force, plain.force, rtol=bound)
-        np.testing.assert_allclose(found.area, plain.area, rtol=bound)
-
-
 def test_exact_and_universal_tiers_agree():
     surface = rough(count=24)
     d = surface.h_max * (1 - DEPTHS[1:])

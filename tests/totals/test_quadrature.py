@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbma_tables import ConvergenceError
-from mbma_tables.totals import gauss_kronrod as quadrature
 from mbma_tables.totals.gauss_kronrod import GAUSS_21, KRONROD_21, NODES_21, integrate
 
 
@@ -64,14 +63,6 @@ def test_several_intervals_of_one_owner_and_none():
     )
     assert found.value == pytest.approx(np.array([[2.0, 8 / 3], [0, 0], [4.5, 9.0]]), rel=1e-14, abs=0)
     assert (found.error[1] == 0).all()
-
-
-def test_more_intervals_than_a_batch():
-    count = quadrature.BATCH + 7
-    high = np.linspace(1, 2, count)
-    found = run(lambda who, x: 3 * x**2, np.zeros(count), high)
-    assert np.abs(found.value[:, 0] / high**3 - 1).max() <= 1e-14
-    assert found.evaluations == 21 * count
 
 
 def test_failure_says_which():

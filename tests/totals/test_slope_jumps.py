@@ -11,7 +11,7 @@ import pytest
 from catalogue import LEVEL, OWN
 from helpers import SCALE, difference_weights
 
-from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island
+from mbma_tables import Surface, contact, contact_law, island
 from mbma_tables.islands.four_numbers import from_axes, to_axes
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.models.island4d import RAW
@@ -214,29 +214,6 @@ def test_the_universal_table(record_property):
                 scale = np.maximum(np.abs(lower), np.abs(getattr(sides[0][0], name)))
                 assert (np.abs(upper - lower) <= PROMISED * scale).all()
     record_property("pairs compared", 2 * count)
-
-
-def test_the_solver_where_its_nodes_change(record_property):
-    """One-sided slopes in X across each change of the node count."""
-    count, rtol = 20 * SCALE, 1e-12
-    rng = np.random.default_rng(7)
-    mu = 10 ** rng.uniform(-6, 5, count)
-    level = rng.choice(greenwood_tripp.LEVELS[(greenwood_tripp.LEVELS > 28) & (greenwood_tripp.LEVELS < 80)], count)
-    X = (level / (12 * (1 + np.log10(np.maximum(mu, 1)) / 12))) ** 2 - 5
-    X, mu = X[X > 0.5], mu[X > 0.5]
-    counts = []
-
-    def solved(at):
-        found = greenwood_tripp.solve(at, mu[:, None], rtol=rtol)
-        counts.append(found.nodes)
-        return found
-
-    for name in ("phi_F", "phi_A"):
-        left, right = one_sided(lambda at, name=name: getattr(solved(at), name), X, np.full(X.size, 2e-3))
-        value = getattr(solved(X[:, None]), name)[:, 0]
-        assert (np.abs(right - left) <= 1e-7 * np.maximum(left, value)).all()
-    assert np.mean(counts[0][:, -1] < counts[1][:, -1]) > 0.5
-    record_property("pairs compared", X.size)
 
 
 @pytest.mark.parametrize("which", RAW)

@@ -28,14 +28,14 @@ def apart(found, true):
 
 
 @pytest.mark.parametrize("reading", READINGS)
-@pytest.mark.parametrize("rtol", [1e-8, 1e-10])
-def test_universal_within_1e7_of_exact(reading, rtol):
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-8, 1e-10])
+def test_universal_within_1e7_and_its_tolerance_of_exact(reading, rtol):
     surfaces, gaps, true = solved(reading)
     found = contact(surfaces, gaps, reading=reading, rtol=rtol)
     assert found.tier == "universal"
     error = apart(found, true)
     assert (error <= found.error).all()
-    assert found.error.max() <= 1e-7
+    assert found.error.max() <= rtol + 1e-7
     assert true.error.max() <= 1e-10
 
 
@@ -47,14 +47,6 @@ def test_island4d_within_1e3_of_exact():
     assert found.error.max() <= 1e-3
     # a coarser table than the other
     assert np.median(apart(found, true)) > 1e-8
-
-
-@pytest.mark.parametrize("rtol", [1e-3, 1e-5, 1e-7])
-def test_the_bound_is_true_at_any_tolerance(rtol):
-    surfaces, gaps, true = solved("reported")
-    found = contact(surfaces, gaps, rtol=rtol)
-    assert (apart(found, true) <= found.error).all()
-    assert found.error.max() <= rtol + 1e-7
 
 
 @pytest.mark.parametrize("reading", [OWN, LEVEL, OPEN], ids=lambda reading: reading.name)
