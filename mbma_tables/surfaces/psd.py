@@ -39,55 +39,25 @@ MIN_VARIANCE_SHARE = 0.1  # of the variance; a flat roll-off leaves 1/(1 + H) > 
 
 @dataclasses.dataclass(frozen=True)
 class SpectrumFit:
-    """How well a self-affine band describes a measured spectrum. Units follow the measurement's length unit.
+    """How well a self-affine band describes a measured spectrum. Units follow the measurement's length unit."""
 
-    Attributes
-    ----------
-    hurst, hurst_error : float
-        Fitted Hurst exponent and its standard error.
-    hurst_held : bool
-        True where `hurst` lies above 1 within its uncertainty and the surface therefore has 1.
-    q0, q1 : float
-        The surface's band.
-    q_low, q_high : float
-        Least and largest wavenumber of the points that the line was fitted to.
-    points : int
-        How many spectral points (logarithmic bins) those are.
-    residual : float
-        Root-mean-square deviation of log10 C from the law, bins weighted by what they average.
-    roll_off, cut_off : float or None
-        Where the spectrum turns flat below the law, and where it leaves the law above; None where it does not.
-    variance_share : float
-        Share of the measured variance of height inside [q0, q1].
-    convention : str
-        Of the spectrum given; 'paper' for a map.
-    windowed : bool
-        Whether a window was applied.
-    detrend : str or None
-        What was subtracted from the map; None for a spectrum.
-    anisotropy : float or None
-        0 where all directions carry the same power, 1 where one carries all; None for a spectrum.
-    length_unit : str or None
-        The map's, where it named one.
-    """
-
-    hurst: float
-    hurst_error: float
-    hurst_held: bool
-    q0: float
+    hurst: float  # fitted,
+    hurst_error: float  # and its standard error
+    hurst_held: bool  # whether `hurst` lies above 1 within its uncertainty and the surface therefore has 1
+    q0: float  # the surface's band
     q1: float
-    q_low: float
+    q_low: float  # least and largest wavenumber of the points that the line was fitted to
     q_high: float
-    points: int
-    residual: float
-    roll_off: float | None
-    cut_off: float | None
-    variance_share: float
-    convention: str
+    points: int  # how many spectral points (logarithmic bins) those are
+    residual: float  # rms deviation of log10 C from the law, bins weighted by what they average
+    roll_off: float | None  # where the spectrum turns flat below the law; None where it does not
+    cut_off: float | None  # where it leaves the law above, likewise
+    variance_share: float  # of the measured variance of height, inside [q0, q1]
+    convention: str  # of the spectrum given; 'paper' for a map
     windowed: bool = False
-    detrend: str | None = None
-    anisotropy: float | None = None
-    length_unit: str | None = None
+    detrend: str | None = None  # what was subtracted from the map; None for a spectrum
+    anisotropy: float | None = None  # 0: all directions carry the same power, 1: one carries all; None for a spectrum
+    length_unit: str | None = None  # the map's, where it named one
 
     def __repr__(self) -> str:
         def shown(value: Any) -> str:
