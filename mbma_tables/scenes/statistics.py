@@ -2,41 +2,22 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models import AnyModel, IslandAnswer, RigidModel, answer_islands, get_model, tier_name
-from mbma_tables.models.protocol import AREA, BOTH
+from mbma_tables.models import AnyModel, RigidModel, answer_islands, get_model, tier_name
 from mbma_tables.scenes.plan import Step
 from mbma_tables.scenes.problem import Problem
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.island import islands_of, scale_area, scale_force
-from mbma_tables.totals.island_sum import sum_islands
-from mbma_tables.totals.kernel import Pairs
 from mbma_tables.totals.profile import profile, source_of
 
 Fields = dict[str, tuple[tuple[str, ...], Any]]
-
-
-@dataclasses.dataclass(frozen=True)
-class HertzArea:
-    """An island model whose summits touch on their whole Hertz area: eta = 1 in Eq. 38 (C.1)."""
-
-    model: AnyModel
-    name: str = "hertz area"
-
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
-        """Phi_F and Phi_A/eta of islands."""
-        found = answer_islands(self.model, islands, outside, which)
-        return found._replace(phi_A=found.phi_A / islands["eta"])
 
 
 def _asked(problem: Problem, step: Step) -> tuple[Reading, float, str | AnyModel]:
@@ -51,18 +32,21 @@ def _outside(tier: str | AnyModel) -> str:
     return "exact" if tier_name(tier) in ("universal", "island4d") else "raise"
 
 
+def _shape(surface: AnySurface) -> Any:
+    """What profiles ask of a surface."""
+    if not isinstance(surface, Surface):
+        return surface
+    return float(surface.hurst), float(surface.zeta_1), float(surface.h_max / surface.h_rms)
+
+
 def hertz_area(problem: Problem, surface: AnySurface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
-    """A/A0 with eta = 1, and the bound on its relative error."""
+    """A/A0 with eta = 1 in Eq. 38 (C.1), and the bound on its relative error."""
     reading, rtol, tier = _asked(problem, step)
-    model, depth = HertzArea(get_model(tier, rtol, reading)), np.asarray(surface.h_max - gap)
-    if isinstance(surface, MeasuredSurface):
-        kept, at = profile(surface, model, reading, rtol, _outside(tier)), depth / surface.h_rms
-        area = np.zeros(depth.shape)
-        area[at > 0] = kept.totals(at[at > 0])[1]
-        return {"area": (("gap",), area)}, kept.error
-    assert isinstance(surface, Surface)
-    found = sum_islands(Pairs.of(surface, depth), reading, model, rtol, _outside(tier), AREA)
-    return {"area": (("gap",), found.area)}, float(found.error.max())
+    kept = profile(_shape(surface), get_model(tier, rtol, reading), reading, rtol, _outside(tier), rows=4)
+    depth = (float(surface.h_max) - gap) / float(surface.h_rms)
+    area = np.zeros(depth.shape)
+    area[depth > 0] = kept.totals(depth[depth > 0])[3]
+    return {"area": (("gap",), area)}, kept.error
 
 
 def island_statistics(problem: Problem, surface: AnySurface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
@@ -73,9 +57,7 @@ def island_statistics(problem: Problem, surface: AnySurface, gap: FloatArray, st
     reading, rtol, tier = _asked(problem, step)
     model, h_rms = get_model(tier, rtol, reading), float(surface.h_rms)
     depth = np.asarray(surface.h_max - gap) / h_rms
-    shape: Any = surface
-    if isinstance(surface, Surface):
-        shape = float(surface.hurst), float(surface.zeta_1), float(surface.h_max) / h_rms
+    shape = _shape(surface)
     source, deepest = source_of(shape, reading), max(float(depth.max()), 0.0)
     # approaches up to the deepest, graded towards first contact
     t = np.linspace(0, 1, problem.points + 1)[1:] * np.arcsinh(np.sqrt(deepest / source.layer))

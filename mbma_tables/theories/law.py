@@ -215,7 +215,8 @@ def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float
         force, area = kept.totals(depth / h_rms)
         return force * stress, area, np.array(kept.error)
 
-    return Islands(kept.edges[-1] * h_rms, *known, kept.leverage, of_profile)
+    # rounding may pass full compression
+    return Islands(min(kept.edges[-1] * h_rms, 2 * float(surface.h_max)), *known, kept.leverage, of_profile)
 
 
 def _theory_law(surface: AnySurface, theory: Theory, rtol: float, E_star: float) -> ContactLaw:

@@ -22,7 +22,8 @@ SEEN, TOPS = 9, 8  # gaps that a panel is checked at, and those at which a Gauss
 BETWEEN = 2.0  # times more is missed at gaps between them
 HIGH = 6.0  # of sigma_d: islands beyond carry less than 1e-7
 FAR = 1e150  # height of an island that is not there
-POWERS = np.array([5 / 2, 7 / 3, 0])[:, None, None]  # of delta, in which force, area and number of islands begin
+# of delta, in which force, area, number of islands and Hertz area begin
+POWERS = np.array([5 / 2, 7 / 3, 0, 2])[:, None, None]
 BLOCK, TERMS = 24, 24  # panels whose islands are summed one by one, and terms of the series of those below
 TAIL_SHARE = 2.0  # of the last two coefficients, for all that follow: they fall by 2 at least, and count twice
 

@@ -253,7 +253,8 @@ def _fields(source: Source, model: AnyModel, outside: str, rows: int) -> Fields:
     def fields(x: FloatArray) -> tuple[FloatArray, float]:
         g = source.islands(x)
         phi = answer_islands(model, g, outside)
-        weights = [scale_force(g) * phi.phi_F, scale_area(g) * phi.phi_A, np.ones(x.size)]
+        area = scale_area(g) * phi.phi_A
+        weights = [scale_force(g) * phi.phi_F, area, np.ones(x.size), area / g["eta"]]
         density = source.density(g, x) * source.h_rms
         return np.stack([*(weight * density for weight in weights[:rows]), *source.heights(g, x)]), float(
             np.nanmax(phi.error, initial=0.0)
@@ -383,7 +384,8 @@ def profile(
     """The profile of one surface, (hurst, zeta_1, h_max/h_rms) or a `MeasuredSurface`, to `rtol` and the model's error.
 
     `outside` is "exact" to solve islands that a table does not cover; else the profile ends with the table. `compiled`
-    is for who compiles anyway. With three `rows` it has the number of islands.
+    is for who compiles anyway. With three `rows` it has the number of islands, with four
+    their Hertz area.
 
     Raises
     ------
