@@ -55,10 +55,8 @@ def conductance(stiffness_mean: ArrayLike, k_s: ArrayLike, E_star: ArrayLike) ->
     >>> float(conductance(1e14, k_s, 1e11))  # Pa/m and Pa give W/(m^2 K)
     80000.0
     """
-    slope, mean, modulus = (
-        finite_array(name, value)
-        for name, value in {"stiffness_mean": stiffness_mean, "k_s": k_s, "E_star": E_star}.items()
-    )
+    slope = finite_array("stiffness_mean", stiffness_mean)
+    mean, modulus = finite_array("k_s", k_s), finite_array("E_star", E_star)
     require("k_s", mean, mean > 0, "positive")
     require("E_star", modulus, modulus > 0, "positive")
     broadcast_shape(stiffness_mean=slope, k_s=mean, E_star=modulus)

@@ -91,12 +91,7 @@ def _apply_rule(
 
 
 def integrate(
-    integrand: Integrand,
-    owner: NDArray[np.intp],
-    low: FloatArray,
-    high: FloatArray,
-    count: int,
-    rtol: float,
+    integrand: Integrand, owner: NDArray[np.intp], low: FloatArray, high: FloatArray, count: int, rtol: float
 ) -> Integrals:
     """Integrate `count` positive integrands, each over the intervals that it owns.
 
@@ -151,8 +146,7 @@ def integrate(
         value = np.concatenate([value[keep], new_value])
         error = np.concatenate([error[keep], new_error])
     raise ConvergenceError(
-        f"quadrature did not reach {rtol:.1e} for {int(unfinished.sum())} of {count} integrals",
-        unfinished,
+        f"quadrature did not reach {rtol:.1e} for {int(unfinished.sum())} of {count} integrals", unfinished
     )
 
 

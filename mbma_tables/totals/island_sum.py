@@ -84,12 +84,8 @@ def sum_islands(
         weight = kernel.island_density(height, g["D_d"], g["sigma_d"]) * own.rms_over_s * stretch
         K1 = kernel.jacobian_below(own.rms_over_s, reading.beta, reading.jacobian == "printed", reading.offset)
         weight *= np.where(approach < own_kink, K1, 1.0)
-        parts = []
-        if which != AREA:
-            parts.append(scale_force(g) * phi.phi_F * weight)
-        if which != FORCE:
-            parts.append(scale_area(g) * phi.phi_A * weight)
-        return np.stack(parts, axis=-1)
+        parts = {FORCE: scale_force(g) * phi.phi_F, AREA: scale_area(g) * phi.phi_A}
+        return np.stack([part * weight for name, part in parts.items() if which in (name, BOTH)], axis=-1)
 
     compression = np.maximum(pairs.compression, 0)
     edges = [np.minimum(k, compression) for k in (kink_d, kink_u)]
@@ -154,13 +150,6 @@ def _by_table(
         )  # fmt: skip
 
     islands = sum(in_blocks(fill, count, BLOCK, workers))
-    missing = _uncovered(status, pairs, model, outside)
-    out[missing] = bound[missing] = np.nan
-    return out, bound, islands, missing
-
-
-def _uncovered(status: NDArray[np.int64], pairs: Pairs, model: UniversalModel, outside: str) -> NDArray[np.intp]:
-    """Pairs that the table does not cover, or an error about them."""
     if (status == UNRESOLVED).any():
         raise ConvergenceError("quadrature did not reach its tolerance", status == UNRESOLVED)
     missing = np.flatnonzero(status != OK)
@@ -168,10 +157,11 @@ def _uncovered(status: NDArray[np.int64], pairs: Pairs, model: UniversalModel, o
         first = int(missing[0])
         X, mu = model.content.axes
         raise OutOfRangeError(
-            f"islands of {missing.size} of {status.size} entries lie outside the universal table "
+            f"islands of {missing.size} of {count} entries lie outside the universal table "
             f"({X.low:g} <= X <= {X.high:g}, mu <= {mu.high:g}), the first at hurst = {pairs.hurst[first]:g}, "
             f"zeta_1 = {pairs.zeta_1[first]:g}, (h_max - d)/h_rms = {pairs.compression[first]:g} "
             f"({REASONS[status[first]]}); outside='exact' solves these",
             status != OK,
         )
-    return missing
+    out[missing] = bound[missing] = np.nan
+    return out, bound, islands, missing
