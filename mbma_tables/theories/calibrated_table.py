@@ -30,6 +30,7 @@ QUANTITIES = ("area", "force", "stiffness")
 BLOCK = 4096  # numbers answered at a time, which a processor's cache holds
 SMALL = 256  # places up to which numpy answers, without a compiler
 FEW, MIN_SHARED = 8, 256  # surfaces up to which, and places a surface from which, its polynomials are worth making
+KEPT = 64  # surfaces whose polynomials are kept
 MAX_STEPS = 100
 CLOSE = 1e-9  # of ln F: the next miss would be about the square of this one
 TINY = 1e-300
@@ -95,10 +96,10 @@ class SurfaceSpline:
             return found.reshape(2, *x.shape)
 
         def plain(owner: Owners, x: FloatArray) -> Any:
-            place = np.clip((x - low) * rate[2], 0.0, number)
+            place = np.minimum(np.maximum((x - low) * rate[2], 0.0), number)
             k = np.minimum(place.astype(np.intp), number - 1)
             six = pieces[0 if alike else owner, k] if shared else self._piece(own[:, owner], k)
-            value, slope = quintic_at(np.moveaxis(six, -1, 0), place - k)
+            value, slope = quintic_at([six[..., m] for m in range(6)], place - k)
             return value, slope * rate[2]
 
         return plain if count <= SMALL else compiled
@@ -119,11 +120,15 @@ class SurfaceSpline:
 
     def _pieces(self, surfaces: FloatArray) -> FloatArray:
         """Quintics in all cells of the last axis, shape (surfaces, cells, 6)."""
-        lines = []
-        for i, j, x, y in np.concatenate(self._placed(surfaces)).T.tolist():
-            patch = self.coefficients[int(i) : int(i) + 6, int(j) : int(j) + 6]
-            lines.append(np.einsum("abk,a,b->k", patch, quintic(x), quintic(y)))
-        return np.asarray(np.stack(lines)[:, np.arange(self.cells[2])[:, None] + np.arange(6)] @ TO_POWERS)
+        return np.stack([_pieces_of(self, *one) for one in surfaces[:2].T.tolist()])
+
+
+@functools.lru_cache(KEPT)
+def _pieces_of(table: SurfaceSpline, hurst: float, log_zeta_1: float) -> FloatArray:
+    """Those of one surface, kept for calls one by one."""
+    (i, j), (x, y) = (part[:, 0].tolist() for part in table._placed(np.array([[hurst], [log_zeta_1]])))
+    line = np.einsum("abk,a,b->k", table.coefficients[i : i + 6, j : j + 6], quintic(x), quintic(y))
+    return np.asarray(line[np.arange(table.cells[2])[:, None] + np.arange(6)] @ TO_POWERS)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -193,8 +198,7 @@ class Table(SurfaceSpline):
     def separations(self, surfaces: FloatArray, owner: Owners, force: FloatArray) -> FloatArray:
         """Mean separations [h_rms] at forces F/(A0 E* g) > 0; NaN where they lie beyond the table."""
         curve, out = self._log_gaussian(surfaces, force.size), np.empty(force.size)
-        nodes = np.linspace(self.first[2], self.last, self.cells[2] + 1)
-        values = curve(np.zeros(nodes.size, np.intp), nodes)[0] if surfaces.shape[1] == 1 else nodes
+        nodes = self.first[2] + self.step[2] * np.arange(self.cells[2])
 
         def fill(block: slice) -> None:
             own = owner[block]
@@ -203,7 +207,7 @@ class Table(SurfaceSpline):
             # Newton's method in ln(F + F_G(h_max)), which is smooth to the end, in a bracket
             rise, x = np.logaddexp(0.0, np.log(force[block]) - end), high - 0.5
             if surfaces.shape[1] == 1:
-                x = np.minimum(np.interp(-(end + rise), -values, nodes), high)
+                x = np.minimum(np.interp(-(end + rise), -self._pieces(surfaces)[0, :, 0], nodes), high)
             beyond = done = end + rise > most
             for _ in range(MAX_STEPS):
                 value, rate = curve(own, x)
