@@ -125,8 +125,8 @@ def _full(bands: _Bands, log_p: FloatArray) -> FloatArray:
     return np.asarray(2 / math.sqrt(math.pi) * found.value.T)
 
 
-def _invert(bands: _Bands, target: FloatArray) -> FloatArray:
-    """Log of p0/(E* q0 s) at which (19) gives u/s = `target`: Newton's method on log u, in a bracket."""
+def _invert(bands: _Bands, target: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Log of p0/(E* q0 s) at which (19) gives u/s = `target`, and -d(u/s)/d of it: Newton's method on log u."""
     low = np.full(bands.hurst.size, MIN_LOG_FORCE)
     high = bands.log_top + math.log(MAX_RATIO)
     wanted = target.ravel()
@@ -145,9 +145,8 @@ def _invert(bands: _Bands, target: FloatArray) -> FloatArray:
     guess = np.clip(log_lambda - wanted / u0, low, high)
     if one and guess.size > MANY:
         guess = np.clip(_guesses(few, wanted, guess), low, high)
-    active = np.ones(guess.size, dtype=bool)
+    active, (value, slope) = np.ones(guess.size, dtype=bool), np.zeros((2, guess.size))
     for _ in range(MAX_STEPS):
-        value, slope = np.zeros((2, guess.size))
         own = _Bands(bands.hurst[active], bands.log_top[active], bands.log_bottom[active])
         value[active], slope[active] = _full(own, guess[active])
         low = np.where(active & (value >= wanted), guess, low)
@@ -161,7 +160,7 @@ def _invert(bands: _Bands, target: FloatArray) -> FloatArray:
         active &= np.abs(following - guess) > 1e-12 * np.maximum(1, np.abs(guess))
         guess = following
         if not active.any():
-            return guess
+            return guess, slope
     mask = active.reshape(target.shape)
     raise ConvergenceError(f"no load found for {int(mask.sum())} separations in {MAX_STEPS} steps", mask)
 
@@ -240,27 +239,27 @@ class Persson(Theory):
         OutOfRangeError
             Also where u is so small or so large that the force of the full form is no normal number.
         """
-        force = self._force(surface, mean_separation)
+        force, decay = self._force(surface, mean_separation)
         error = np.full(force.shape, LAW_ERROR if isinstance(surface, MeasuredSurface) else INVERSE_RTOL)
-        return TheoryAnswer(force, self.area_at(surface, force), force / self._decay(surface, force), error)
+        return TheoryAnswer(force, self.area_at(surface, force), force / decay, error)
 
-    def _force(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
-        """Force over A0 E* at mean separations u [length]."""
+    def _force(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Force over A0 E* at mean separations u [length], and -du/dlog F [length]."""
         u = finite_array("mean_separation", mean_separation)
         allowed = u > 0 if self._is_full else u >= 0
         require("mean_separation", u, allowed, "positive" if self._is_full else "zero or positive")
         u = np.broadcast_to(u, np.broadcast_shapes(u.shape, surface.shape))
         if isinstance(surface, MeasuredSurface):
-            log_force = _own_law(surface, self._is_full).gaussian(u / surface.h_rms)[0]
-            return np.asarray(np.exp(log_force) * surface.rms_gradient)
+            log_force, rate = _own_law(surface, self._is_full).gaussian(u / surface.h_rms)
+            return np.exp(log_force) * surface.rms_gradient, surface.h_rms / rate
         assert isinstance(surface, Surface)
         bands, target = _Bands.of(surface, u.shape), u / surface.s
         if self._is_full:
-            log_p = _invert(bands, target)
+            log_p, decay = _invert(bands, target)
         else:
-            u0, log_lambda = _simplified(bands)
-            log_p = log_lambda - target.ravel() / u0
-        return np.asarray(np.exp(log_p.reshape(u.shape) + _log_stress(surface)))
+            decay, log_lambda = _simplified(bands)
+            log_p = log_lambda - target.ravel() / decay
+        return np.exp(log_p.reshape(u.shape) + _log_stress(surface)), decay.reshape(u.shape) * surface.s
 
     def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] of the theory, whose heights have no end."""
@@ -294,7 +293,7 @@ class Persson(Theory):
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], from dU = -F du = F (-du/dlog F) dlog F."""
-        force = self._force(surface, mean_separation)
+        force, _ = self._force(surface, mean_separation)
         lighter = force[..., None] * np.exp(-_T)
         batch = select(surface, force.shape, np.arange(force.size).reshape(*force.shape, 1))
         return np.asarray((lighter * self._decay(batch, lighter)) @ _T_WEIGHTS)
