@@ -149,6 +149,7 @@ def test_batches_are_summed_up():
         (lambda: describe_law(ROAD, 1.0, row=3), "did you mean 'rows'?"),
         (lambda: Surface.from_map("x", detrnd="plane"), "Surface.from_map has no argument 'detrnd': did you mean"),
         (lambda: Surface.from_profile("x", tipradius=1), "did you mean 'tip_radius'?"),
+        (lambda: Surface(0.8, 0.5, 100.0, hrms=0.2), "Surface has no argument 'hrms': did you mean 'h_rms'?"),
         (lambda: Surface.from_moments(H=0.7), "did you mean 'hurst'?"),
         (lambda: Surface.from_roughness(rq=0.7), "did you mean 'Rq'?"),
         (lambda: Surface.from_spectrum([1], [1], hmax=1), "did you mean 'h_max'?"),

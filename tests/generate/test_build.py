@@ -10,7 +10,7 @@ from small_tables import KINDS, SMALL, small, small_build
 from generate.__main__ import main
 from generate.tables import build as build_module
 from generate.tables.build import UncertifiedError, certify, evaluate, held_out, resolve
-from generate.tables.chunks import ChunkedSolver, phi
+from generate.tables.chunks import ChunkedSolver
 from generate.tables.commands import built as build_table
 from generate.tables.configuration import load
 from generate.tables.universal import AIM, Strip
@@ -95,31 +95,6 @@ def test_a_held_out_point_on_a_node_is_refused(nodes, monkeypatch):
     monkeypatch.setattr(build_module, "held_out", lambda *_: places)
     with pytest.raises(UncertifiedError, match="a held-out point lies on a node"):
         certify(kind, content.axes, content.coefficients, ChunkedSolver(), kind.configuration)
-
-
-def test_the_certificate_is_solved_on_twice_the_nodes(nodes, monkeypatch):
-    kind, content = nodes
-    asked = []
-
-    class Noting(ChunkedSolver):
-        def phi(self, label, X, mu, rtol, refinement=1):
-            asked.append((label, refinement))
-            return super().phi(label, X, mu, rtol, refinement)
-
-    certify(kind, content.axes, content.coefficients, Noting(), kind.configuration)
-    assert asked == [("certificate", 2)]
-    X, mu = np.array([0.7, 4.0]), np.array([1e-2, 3.0])
-    counts = []
-    solve = greenwood_tripp.solve
-
-    def watch(X, mu, rtol, nodes=None):
-        found = solve(X, mu, rtol=rtol, nodes=nodes)
-        counts.append(np.unique(found.nodes).tolist())
-        return found
-
-    monkeypatch.setattr(greenwood_tripp, "solve", watch)
-    phi(X, mu, 1e-6, 2)
-    assert sorted(n for (n,) in counts[1:]) == [2 * n for n in sorted(counts[0])]
 
 
 def test_a_tighter_target_takes_more_cells_and_is_met(tmp_path):

@@ -46,43 +46,6 @@ def test_references_agree_with_the_solver():
 
 
 @pytest.fixture
-def few_islands(monkeypatch):
-    held = cost_islands.held_out(40)
-    small = {
-        "held_out": lambda: held,
-        "ISLANDS": 40,
-        "HARD": 4,
-        "PROFILES": 2,
-        "MESHES": {25: (1e-2,), 50: (1e-4,)},
-        "NEWTON_RTOLS": (1e-2, 1e-8),
-        "NEWTON_NODES": (8, 24),
-        "measure": once,
-    }
-    for name, value in small.items():
-        monkeypatch.setattr(cost_islands, name, value)
-
-
-@pytest.mark.slow
-def test_islands(few_islands):
-    rows = by_variant(cost_islands.island_rows())
-    assert {tier for tier, _, _ in rows} == {"universal", "island4d", "formula", "rigid", "exact", "classical"}
-    for rtol in ("1e-02", "1e-08"):
-        assert rows["exact", f"island rtol={rtol}", "both"].error < float(rtol)
-        assert rows["exact", f"island rtol={rtol}", "both"].cost == COST / 10
-    coarse, fine = (rows["exact", f"nodes={nodes}", "both"] for nodes in (8, 24))
-    assert fine.error < coarse.error
-    assert fine.evaluations > coarse.evaluations
-    assert rows["exact", "profile rtol=1e-04", "both"].cost == COST / 2
-    assert rows["universal", "island", "both"].error < 1e-8
-    assert rows["island4d", "island", "both"].error < 1e-3
-    forms = [rows["formula", f"island form={name}", "both"].error for name in cost_islands.FORMS]
-    assert forms == sorted(forms, reverse=True)
-    meshes = {name: row for (tier, name, _), row in rows.items() if tier == "classical"}
-    assert meshes["rings=50 rtol=1e-04"].error < meshes["rings=25 rtol=1e-02"].error
-    assert meshes["rings=50 rtol=1e-04"].cost == COST / 4
-
-
-@pytest.fixture
 def few_totals(monkeypatch):
     small = {
         "TIERS": ("universal", "rigid"),

@@ -8,7 +8,6 @@ import xarray as xr
 from scipy.optimize import brentq
 from scipy.special import erf
 
-from generate.boundary_elements.grids import PRESSED, surfaces
 from generate.pages import distances
 from mbma_tables import Surface, contact
 from mbma_tables.files import shipped_file
@@ -68,31 +67,9 @@ def test_held_out_distances_are_those_of_the_shipped_file():
             assert rms == pytest.approx(np.hypot(row[k, 0], row[k, 1]), rel=0.02), (quantity, k)
 
 
-def test_data_sets():
-    sets = distances.data_sets()
-    assert len(sets["earlier"].seen) == 105
-    assert {one.split for one in sets["training"].seen} == {"training"}
-    assert sets["training"].fitted == ("calibrated", "calibrated, map")
-    for name in ("spectra", "surfaces", "plateau", "stretched", "transformed"):
-        assert sets[name].seen
-        assert "training" not in {one.split for one in sets[name].seen}
-    # a surface of another spectrum enters by its bands
-    one = sets["rolloff"].seen[0]
-    stands = distances.surface_of(one)
-    assert stands.rms_gradient == pytest.approx(one.own_spectrum.gradient, rel=1e-12)
-    assert stands.h_rms == pytest.approx(1, rel=1e-12)
-    assert stands.alpha == pytest.approx(one.own_spectrum.alpha, rel=0.02)
-
-
 def test_theories_that_do_not_take_a_surface_are_left_out():
     # a band below the floors of `fitted`
     narrow = distances._self_affine(0.8, 4.0, 3.0, ([0.01, 0.02, 0.05], [0.02, 0.04, 0.1], [1.5, 1.2, 0.8]))
     found = distances.distances([narrow], distances.THEORIES["MBMA fitted"])
     assert all(np.isnan(values).all() for values in found.values())
     assert distances.summed_up([narrow], found["area"])[2] == 0
-
-
-def test_grids_are_of_held_out_surfaces():
-    names = {one.node[1:4] for one in distances.held_out() if one.split == "held_out_spectrum"}
-    assert {(one.hurst, one.zeta_1, one.waves) for one in surfaces()} <= names
-    assert len(PRESSED) == 8

@@ -51,13 +51,6 @@ def test_divergence_is_an_error_with_its_mask():
     assert abs(reached.phi_F[0] / exact.phi_F - 1) <= reached.error[0]
 
 
-def test_smaller_damping_reaches_further():
-    with pytest.raises(ConvergenceError):
-        greenwood_tripp.solve(5.0, 10.0, method="classical", nodes=60, damping=0.3)
-    found = greenwood_tripp.solve(5.0, 10.0, method="classical", nodes=60, damping=0.1)
-    assert abs(found.phi_F / greenwood_tripp.solve(5.0, 10.0).phi_F - 1) <= found.error
-
-
 def test_a_signal_is_heard_within_a_long_iteration():
     class Rung(Exception):
         pass

@@ -9,7 +9,6 @@ from helpers import difference_weights
 
 from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.models import universal_kernel
 from mbma_tables.models.tables import open_table, universal_model
 from mbma_tables.surfaces.readings import REPORTED
 
@@ -99,45 +98,6 @@ def test_parallel_gives_the_same_bits():
         universal_model().answer(X, mu, parallel=True)
     assert caught.value.mask.sum() == 1
     assert caught.value.mask[77]
-
-
-def test_a_batch_gives_the_bits_of_single_lookups():
-    X, mu = scattered(200, seed=64, low=1e-12)
-    batch = universal_model().answer(X, mu)
-    for k in range(200):
-        one = universal_model().answer(X[k], mu[k])
-        assert np.shape(one.phi_F) == ()
-        assert (one.phi_F, one.phi_A, one.error) == (batch.phi_F[k], batch.phi_A[k], batch.error[k])
-    swapped = universal_model().answer(X[:, None], mu[:3])
-    assert swapped.phi_F.shape == (200, 3)
-    assert swapped.phi_A[1, 1] == batch.phi_A[1]
-
-
-def test_codes_of_the_kernel():
-    """Out of range is a code and NaN, to the last bit of each end; never the value of the edge."""
-    model = universal_model()
-    X_axis, mu_axis = model.content.axes
-    cases = [
-        (X_axis.low, 1.0, universal_kernel.OK),
-        (np.nextafter(X_axis.low, -99), 1.0, universal_kernel.X_BELOW),
-        (X_axis.high, 1.0, universal_kernel.OK),
-        (np.nextafter(X_axis.high, 99), 1.0, universal_kernel.X_ABOVE),
-        (1.0, mu_axis.high, universal_kernel.OK),
-        (1.0, np.nextafter(mu_axis.high, np.inf), universal_kernel.MU_ABOVE),
-        (1.0, 0.0, universal_kernel.OK),
-        (math.nan, 1.0, universal_kernel.X_BELOW),
-        (1.0, math.nan, universal_kernel.MU_ABOVE),
-    ]
-    X, mu, expected = (np.array(column) for column in zip(*cases, strict=True))
-    for fill, rows in (
-        (universal_kernel.fill_phi, 3),
-        (universal_kernel.fill_slopes, 7),
-    ):
-        status, out = np.empty(X.size, dtype=np.int64), np.empty((X.size, rows))
-        fill(X, mu, model.kernel, status, out)
-        np.testing.assert_array_equal(status, expected)
-        assert np.isnan(out[expected != universal_kernel.OK]).all()
-        assert np.isfinite(out[expected == universal_kernel.OK]).all()
 
 
 def test_where_arguments_lie():

@@ -1,7 +1,6 @@
 """Scenes beyond tables, without contact, with units; contradictions between arguments."""
 
 import dataclasses
-import math
 
 import numpy as np
 import pytest
@@ -18,7 +17,7 @@ from mbma_tables import (
 )
 from mbma_tables.errors import InputError
 from mbma_tables.models import IslandAnswer
-from mbma_tables.scenes.run import height_without_end, run_plan
+from mbma_tables.scenes.run import run_plan
 
 CONCRETE = Surface.named("concrete")
 # its islands at full compression lie beyond X = 41, where the tables end
@@ -76,28 +75,6 @@ def test_progress_in_blocks():
     scene = scene_of(separations=gaps, rtol=1e-2)
     run_plan(scene, tiered(scene, "exact"), lambda *step: calls.append(step))
     assert calls == [("totals", done, 130) for done in (0, 64, 128, 130, 130)]
-
-
-@pytest.mark.parametrize(
-    ("given", "units"),
-    [
-        ({"surface": dataclasses.replace(CONCRETE, unit=None)}, ("1", "1/length", "length")),
-        ({"E_star": 2.0}, ("stress", "stress/mm", "stress mm")),
-        ({"E_star": 2.0, "stress_unit": "MPa"}, ("MPa", "MPa/mm", "MPa mm")),
-        ({"E_star": "2 MPa", "surface": CONCRETE.to("m")}, ("MPa", "MPa/m", "MPa m")),
-    ],
-)
-def test_units(given, units):
-    found = scene_of(effects=("force", "stiffness", "energy"), rtol=1e-3, **given).run()
-    assert tuple(found[name].attrs["units"] for name in ("force", "stiffness", "energy")) == units
-
-
-def test_the_top_of_a_whole_gaussian_by_mean_separations():
-    own = scene_of(separations=(0.5,), without=("finite_height",))
-    average = scene_of(separations=None, mean_separations=((CONCRETE.h_max + 0.5) / 2,), without=("finite_height",))
-    assert height_without_end(average, 1e-6) == pytest.approx(height_without_end(own, 1e-6), rel=1e-14, abs=0)
-    tail = (math.sqrt(2 * (10 - math.log(1e-6))) + 1) * float(CONCRETE.s)
-    assert height_without_end(own, 1e-6) == pytest.approx(0.5 + tail, rel=1e-14, abs=0)
 
 
 @pytest.mark.parametrize(

@@ -90,20 +90,6 @@ def test_prints_plain_numbers():
     assert repr(labelled).startswith("Surface(hurst=<DataArray {'site': 2}>, q0=0.5,")
 
 
-@pytest.mark.parametrize(
-    ("name", "hint"),
-    [
-        ("H", "did you mean 'hurst'"),
-        ("hrms", "mean 'h_rms'"),
-        ("Q0", "mean 'q0'"),
-        ("rough", "known are hurst, q0, q1"),
-    ],
-)
-def test_an_unknown_argument_gets_a_hint(name, hint):
-    with pytest.raises(TypeError, match=f"no argument '{name}': .*{hint}"):
-        Surface(q0=0.5, q1=100.0, h_rms=0.2, h_max=0.6, **{name: 0.8})
-
-
 def test_constructors_show_their_options():
     assert {"periodic", "detrend", "h_max", "band"} <= set(inspect.signature(Surface.from_map).parameters)
     assert list(inspect.signature(Surface).parameters) == [*GOOD, "unit", "fit", "provenance"]
