@@ -198,7 +198,7 @@ def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float
     source = source_of(shape, reading)
     known = source.layer * h_rms, [float(place) * h_rms for place in source.breaks[-2:]]
     try:
-        kept = profile(shape, model, reading, rtol, compiled=True)
+        kept = profile(shape, model, reading, rtol)
     except ConvergenceError:
         if not isinstance(surface, Surface):
             raise

@@ -35,7 +35,6 @@ from mbma_tables.totals.profile import Profile, profile
 
 # surfaces whose islands are kept as a profile, in numpy; of more, those with so many gaps each that it costs less
 FEW_SURFACES, MANY_GAPS = 16, 300
-FEW = 256  # gaps up to which no compiler is asked
 BLOCK = 1 << 14  # gaps between two looks for Ctrl-C
 MOST_WORKERS = 1024
 
@@ -162,7 +161,7 @@ def _by_profiles(
         if not places.size:
             continue
         try:
-            kept = profile(shapes[k], model, reading, QUADRATURE_SHARE * rtol, outside, depth.size > FEW)
+            kept = profile(shapes[k], model, reading, QUADRATURE_SHARE * rtol, outside, depth.size)
         except (ConvergenceError, OutOfRangeError):
             if not isinstance(surface, Surface):
                 raise

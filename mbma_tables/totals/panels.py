@@ -17,15 +17,18 @@ from mbma_tables.arguments import FloatArray
 
 COUNTS = ((0.3, 8), (math.inf, 16))  # nodes of a panel by its width over delta
 MORE = 4  # gaps of a panel than nodes
-CHECKS = np.array([0.0025, 0.5, 0.9975])  # places where polynomials miss most
+CHECKS = np.array([1e-4, 0.5, 1 - 1e-4])  # places where polynomials miss most
 SEEN, TOPS = 9, 8  # gaps that a panel is checked at, and those at which a Gaussian has its top in it
 BETWEEN = 2.0  # times more is missed at gaps between them
 HIGH = 6.0  # of sigma_d: islands beyond carry less than 1e-7
+LEAST = 1e-100  # share of a panel that a gap cuts
 FAR = 1e150  # height of an island that is not there
 # of delta, in which force, area, number of islands and Hertz area begin
 POWERS = np.array([5 / 2, 7 / 3, 0, 2])[:, None, None]
 BLOCK, TERMS = 24, 24  # panels whose islands are summed one by one, and terms of the series of those below
 TAIL_SHARE = 2.0  # of the last two coefficients, for all that follow: they fall by 2 at least, and count twice
+
+Sums = tuple[FloatArray, FloatArray]  # what `_sums` gives
 
 
 class Rule(NamedTuple):
@@ -43,18 +46,18 @@ class Rule(NamedTuple):
     inside: FloatArray  # (gaps n, n), at the nodes of the part below each of the gaps
     ends: FloatArray  # (gaps, n), at the gaps
     series: FloatArray  # (gaps, gaps), values at the gaps to a Chebyshev series
+    to_series: FloatArray  # (n, n), values at the nodes to one
 
     def approach(self, low: FloatArray, high: FloatArray, places: FloatArray) -> FloatArray:
         """Approaches at places, (panels, places)."""
         return np.asarray(low[:, None] + (high - low)[:, None] * places**self.power)
 
-    def measure(self, low: FloatArray, high: FloatArray, places: FloatArray, rows: int) -> FloatArray:
-        """What weights are multiplied by in integrals over places, (rows, panels, places)."""
-        width = (high - low)[:, None]
+    def measure(self, width: FloatArray, places: FloatArray, rows: int) -> FloatArray:
+        """What weights are multiplied by in integrals over places of panels so wide, (rows or 1, panels, places)."""
         if self.power == 1:
-            return np.broadcast_to(width, (rows, low.size, places.size))
-        lead = (width * places**self.power) ** POWERS[:rows]
-        return np.asarray(self.power * width * places ** (self.power - 1) * lead)
+            return width[None, :, None]
+        lead = (width[:, None] * places**self.power) ** POWERS[:rows]
+        return np.asarray(self.power * width[:, None] * places ** (self.power - 1) * lead)
 
 
 @functools.cache
@@ -62,13 +65,13 @@ def rule_of(n: int, power: int) -> Rule:
     """The rule with n nodes; power is 2 in the panel from 0, and 1 else."""
     x, weights = np.polynomial.legendre.leggauss(n)
     nodes, points = (1 + x) / 2, chebyshev.chebpts1(n + MORE)
-    to_series = np.linalg.inv(chebyshev.chebvander(x, n - 1))
+    to_series: Any = np.linalg.inv(chebyshev.chebvander(x, n - 1))
     reach = ((1 + points) / 2) ** (1 / power)
     halves = np.concatenate([nodes, 1 + nodes]) / 2
     places = (CHECKS, halves, np.outer(reach, nodes).ravel(), reach)
     checks, halves, inside, ends = (chebyshev.chebvander(2 * at - 1, n - 1) @ to_series for at in places)
     series: Any = np.linalg.inv(chebyshev.chebvander(points, points.size - 1))
-    return Rule(power, nodes, weights / 2, reach, checks, halves, inside, ends, series)
+    return Rule(power, nodes, weights / 2, reach, checks, halves, inside, ends, series, to_series)
 
 
 class Panels(NamedTuple):
@@ -118,7 +121,7 @@ def missed_by(panels: Panels, true: FloatArray, last: float) -> FloatArray:
         return np.asarray(heights * heights)
 
     def sums(at: FloatArray, far: FloatArray, places: FloatArray, weights: FloatArray) -> FloatArray:
-        force = at[0] * rule.measure(low, high, places, 1)[0] * weights
+        force = at[0] * rule.measure(high - low, places, 1)[0] * weights
         # in units of the panel's largest, so that nothing underflows
         return np.asarray((np.exp(0.5 * (least - far)) @ force[..., None])[..., 0])
 
@@ -130,7 +133,7 @@ def missed_by(panels: Panels, true: FloatArray, last: float) -> FloatArray:
     return np.asarray(relative + HIGH * turned + BETWEEN * off / fine.max(axis=1))
 
 
-def _sums(heights: FloatArray, weights: FloatArray, turned: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _sums(heights: FloatArray, weights: FloatArray, turned: FloatArray) -> Sums:
     """ln of sums over islands at each gap, and of weights times heights over it, (rows, gaps).
 
     `weights` and `turned`, weights times rates, are (nodes, rows) or (rows, gaps, nodes).
@@ -144,21 +147,19 @@ def _sums(heights: FloatArray, weights: FloatArray, turned: FloatArray) -> tuple
     return np.log(found) - least / 2, slopes / found
 
 
-def joined(one: tuple[FloatArray, FloatArray], two: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
+def joined(one: Sums, two: Sums) -> Sums:
     """`_sums` of both."""
     both = np.logaddexp(one[0], two[0])
     return both, one[1] * np.exp(one[0] - both) + two[1] * np.exp(two[0] - both)
 
 
-def _below(c: FloatArray, own: NDArray[np.intp], nodes: Nodes) -> tuple[FloatArray, FloatArray]:
+def _below(c: FloatArray, own: NDArray[np.intp], nodes: Nodes) -> Sums:
     """`_sums` over the panels below those of gaps, `own`, at compressions c."""
     heights = np.where(nodes.panel < own[:, None], nodes.shift - nodes.rate * c[:, None], FAR)
     return _sums(heights, nodes.weights, nodes.weights * nodes.rate[:, None])
 
 
-def _far_below(
-    c: FloatArray, low: float, high: float, first: int, nodes: Nodes, rtol: float
-) -> tuple[FloatArray, FloatArray]:
+def _far_below(c: FloatArray, low: float, high: float, first: int, nodes: Nodes, rtol: float) -> Sums:
     """`_sums` over the panels before the `first` at many c in [low, high], by a series that is good to `rtol`."""
     if c.size <= TERMS:
         return _below(c, np.full(c.size, first), nodes)
@@ -176,7 +177,7 @@ def _far_below(
 
 def below_by_halves(
     c: FloatArray, own: NDArray[np.intp], nodes: Nodes, edges: FloatArray, first: int, last: int, rtol: float
-) -> tuple[FloatArray, FloatArray]:
+) -> Sums:
     """`_below` to `rtol`, of gaps and nodes in order of panels from `first` to before the `last`, of those alone."""
     if last - first <= BLOCK or not c.size:
         return _below(c, own, nodes)
@@ -189,31 +190,48 @@ def below_by_halves(
     return np.concatenate([lower[0], upper[0]], axis=1), np.concatenate([lower[1], upper[1]], axis=1)
 
 
-def cut_sums(panels: Panels) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
-    """Gaps of panels, and `_sums` over the part of its panel that is below each."""
-    rule, low, high, fields = panels
-    count, rows = rule.nodes.size, len(fields) - 2
-    c = rule.approach(low, high, rule.reach).ravel()
-    inside = (fields @ rule.inside.T).reshape(-1, c.size, count)
-    measure = rule.measure(low, high, np.outer(rule.reach, rule.nodes).ravel(), rows)
-    measure = np.broadcast_to(measure, (rows, low.size, rule.reach.size * count))
-    measure = measure.reshape(rows, low.size, rule.reach.size, count)
-    shares = (measure * np.outer(rule.reach, rule.weights)).reshape(rows, c.size, count)
+def _cut(rule: Rule, width: FloatArray, c: FloatArray, reach: FloatArray, inside: FloatArray, ends: FloatArray) -> Sums:
+    """`_sums` over the part of a panel so wide that is below each gap, by the fields inside and at the gap."""
+    rows = len(ends) - 2
+    shares = rule.measure(width, reach[:, None] * rule.nodes, rows) * (reach[:, None] * rule.weights)
     weights = inside[:-2] * shares
     logs, slopes = _sums(inside[-2] - inside[-1] * c[:, None], weights, weights * inside[-1])
     # the island at the gap itself
-    ends = (fields @ rule.ends.T).reshape(-1, c.size)
-    if rule.power > 1:
-        ends[:-2] *= c ** POWERS[:rows, 0]
+    own = ends[:-2] if rule.power == 1 else ends[:-2] * c ** POWERS[:rows, 0]
     height = ends[-2] - ends[-1] * c
-    return c, (logs, slopes + ends[:-2] * np.exp(-0.5 * height * height - logs))
+    return logs, slopes + own * np.exp(-0.5 * height * height - logs)
+
+
+def _cut_all(panels: Panels) -> tuple[FloatArray, Sums]:
+    """The gaps of panels, and `_cut` there."""
+    rule, low, high, fields = panels
+    c = rule.approach(low, high, rule.reach).ravel()
+    inside, ends = (fields @ rule.inside.T).reshape(-1, c.size, rule.nodes.size), (fields @ rule.ends.T)
+    count, width = rule.reach.size, (high - low).repeat(rule.reach.size)
+    return c, _cut(rule, width, c, np.tile(rule.reach, low.size), inside, ends.reshape(-1, low.size * count))
+
+
+def sums_at(c: FloatArray, own: NDArray[np.intp], groups: list[tuple[Panels, NDArray[np.intp]]], nodes: Nodes) -> Sums:
+    """`_sums` at a few gaps in panels `own`; groups of panels are at places among all."""
+    found = np.empty((2, nodes.weights.shape[1], c.size))
+    for (rule, low, high, fields), rank in groups:
+        mine, which = np.nonzero(own[:, None] == rank)
+        if mine.size:
+            width = (high - low)[which]
+            # at a panel's end the island at the gap counts, and nothing else
+            reach = np.maximum((c[mine] - low[which]) / width, LEAST) ** (1 / rule.power)
+            places = reach[:, None] * np.append(rule.nodes, 1.0)
+            basis = chebyshev.chebvander(2 * places - 1, rule.nodes.size - 1) @ rule.to_series
+            at = np.einsum("gji,rgi->rgj", basis, fields[:, which])
+            found[..., mine] = _cut(rule, width, c[mine], reach, at[..., :-1], at[..., -1])
+    return joined((found[0], found[1]), _below(c, own, nodes))
 
 
 def sums_of(
     fresh: list[tuple[Panels, NDArray[np.intp]]], nodes: Nodes, edges: FloatArray, rtol: float
 ) -> list[FloatArray]:
     """What series go through, (2 rows, panels, gaps), of panels at places among all, with sums good to `rtol`."""
-    c, inner = zip(*(cut_sums(panels) for panels, _ in fresh), strict=True)
+    c, inner = zip(*(_cut_all(panels) for panels, _ in fresh), strict=True)
     gaps, logs = np.concatenate(c), np.concatenate([np.array(sums) for sums in inner], axis=-1)
     own = np.concatenate([rank.repeat(panels.rule.reach.size) for panels, rank in fresh])
     order, count, rows = np.argsort(own, kind="stable"), edges.size - 1, logs.shape[1]

@@ -31,6 +31,7 @@ from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
 from mbma_tables.totals.island_sum import kinks
 from mbma_tables.totals.panels import BLOCK, CHECKS, COUNTS, MORE, POWERS, SEEN, TAIL_SHARE, Nodes, Panels, rule_of
 
+FEW = 256  # gaps that are asked of numpy, one by one
 KEPT = 64  # profiles, for whoever asks the same surface again
 WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
 SLOPES = 0.1  # of their relative error counts
@@ -103,25 +104,28 @@ class Profile:
         The surface's islands.
     edges : ndarray, shape (panels + 1,)
         Ends of the panels, delta/h_rms; the last is 2 h_max/h_rms, or less where a table ends.
-    series : ndarray, shape (panels, 2 rows, n)
+    series : ndarray, shape (panels, 2 rows, n), or None
         ln(F), ln(A) and so on, then their slopes by ln(compression), as Chebyshev series of the compression. In the
-        first panel the logarithms lack those of the powers that they begin with.
+        first panel the logarithms lack those of the powers that they begin with. For few gaps there is none.
     error : float
         Bound on the relative error of totals, of panels and islands together.
     islands : int
         Islands answered for it.
     nodes : Nodes
         The islands.
+    groups : list of (Panels, ndarray)
+        Panels of one rule, and their places among all.
     compiled : bool
         Whether totals are asked of compiled code; slopes never are.
     """
 
     source: Source
     edges: FloatArray
-    series: FloatArray
+    series: Any
     error: float
     islands: int
     nodes: Nodes
+    groups: list[tuple[Panels, NDArray[np.intp]]]
     compiled: bool
 
     @property
@@ -136,12 +140,15 @@ class Profile:
         F/(A0 E* q0 s) and the sum of areas over A0, perhaps the number of islands per area; of a measured surface
         F/(A0 E*).
         """
-        count = self.series.shape[1] // 2
+        count = self.nodes.weights.shape[1]
         if self.compiled and not slopes and count == 2:
             out = np.empty((2, compression.size))
             panels_kernel.fill_totals(compression, self.edges, self.series, out)
             return out
         panel = np.clip(np.searchsorted(self.edges, compression, side="right") - 1, 0, self.edges.size - 2)
+        if self.series is None:
+            logs, by_gap = panels.sums_at(compression, panel, self.groups, self.nodes)
+            return np.concatenate([np.exp(logs), np.exp(logs) * by_gap])[: 2 * count if slopes else count]
         low, high = self.edges[panel], self.edges[panel + 1]
         basis = chebyshev.chebvander((2 * compression - low - high) / (high - low), self.series.shape[-1] - 1)
         # sums whose order does not depend on the number of gaps
@@ -161,7 +168,7 @@ class Profile:
         An error e of f in F = integral of f G up to l changes l dF/dl by at most e (l f G + integral of f |l dG/dl|).
         """
         ends = np.unique(np.linspace(0, self.edges.size - 2, SEEN).astype(int))
-        c, count = self.edges[1 + ends], self.series.shape[1] // 2
+        c, count = self.edges[1 + ends], self.nodes.weights.shape[1]
         found = self.totals(c, slopes=True)
         heights = self.nodes.shift - self.nodes.rate * c[:, None]
         negative = np.exp(-0.5 * heights**2) * np.minimum(heights, 0) * (self.nodes.panel <= ends[:, None])
@@ -217,7 +224,7 @@ def _nodes(parts: list[Part]) -> tuple[FloatArray, list[NDArray[np.intp]], Nodes
     for (rule, start, end, fields), rank in zip((part.panels for part in parts), ranks, strict=True):
         rows = len(fields) - 2
         panel.append(rank.repeat(rule.nodes.size))
-        weights.append((fields[:-2] * rule.measure(start, end, rule.nodes, rows) * rule.weights).reshape(rows, -1))
+        weights.append((fields[:-2] * rule.measure(end - start, rule.nodes, rows) * rule.weights).reshape(rows, -1))
         turns.append(fields[-2:].reshape(2, -1))
     shift, rate = np.concatenate(turns, axis=1)
     nodes = Nodes(np.concatenate(panel), np.concatenate(weights, axis=1).T, shift, rate)
@@ -225,12 +232,14 @@ def _nodes(parts: list[Part]) -> tuple[FloatArray, list[NDArray[np.intp]], Nodes
 
 
 def _summed(
-    parts: list[Part], last: float, rtol: float, compiled: bool
+    parts: list[Part], last: float, rtol: float, compiled: bool, few: bool
 ) -> tuple[list[Part], FloatArray, list[NDArray[np.intp]], Nodes]:
     """Parts with the series that they lacked; ends of panels, places of each part's among them, islands in order."""
     low, ranks, nodes = _nodes(parts)
     edges, full, missed = np.append(low, last), list(parts), 0.0
-    places = [k for k, part in enumerate(parts) if part.series is None]
+    places = [k for k, part in enumerate(parts) if part.series is None and not few]
+    if not places:
+        return full, edges, ranks, nodes
     fresh = [(parts[k].panels, ranks[k]) for k in places]
     if compiled and low.size <= ONE_BY_ONE:
         values = panels_kernel.sums_of(fresh, nodes)
@@ -322,7 +331,7 @@ def _answered(
     return parts, x.size, error
 
 
-def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float, compiled: bool) -> Profile:
+def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float, compiled: bool, few: bool) -> Profile:
     """Panels, halved until polynomials through their islands and through their sums are good to `rtol`."""
     low, high, last = edges[:-1], edges[1:], float(edges[-1])
     counts, islands, worst = _count(low, high), 0, 0.0
@@ -334,14 +343,18 @@ def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float, compi
         limit = max(0.5 * rtol, worst)
         good = [part.errors <= limit for part in parts]
         if all(own.all() for own in good):
-            parts, ends, ranks, nodes = _summed(parts, last, limit, compiled)
+            parts, ends, ranks, nodes = _summed(parts, last, limit, compiled, few)
+            error = worst + max(part.errors.max() for part in parts)
+            groups = [(part.panels, rank) for part, rank in zip(parts, ranks, strict=True)]
+            if few:
+                return Profile(source, ends, None, float(error), islands, nodes, groups, False)
             good = [part.tails <= limit for part in parts]
             if all(own.all() for own in good):
                 series = np.zeros((ends.size - 1, len(parts[0].series), COUNTS[-1][1] + MORE))
                 for part, rank in zip(parts, ranks, strict=True):
                     series[rank, :, : part.series.shape[-1]] = np.moveaxis(part.series, 0, 1)
-                error = worst + max(part.errors.max() for part in parts) + max(part.tails.max() for part in parts)
-                return Profile(source, ends, series, float(error), islands, nodes, compiled)
+                error += max(part.tails.max() for part in parts)
+                return Profile(source, ends, series, float(error), islands, nodes, groups, compiled)
         bad = [part.panels.some(~own) for part, own in zip(parts, good, strict=True)]
         parts = [part.some(own) for part, own in zip(parts, good, strict=True) if own.any()]
         low, high = (np.concatenate([getattr(lost, end) for lost in bad]) for end in ("low", "high"))
@@ -355,7 +368,7 @@ def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float, compi
 
 @functools.lru_cache(maxsize=KEPT)
 def _profile(
-    surface: Any, model: Any, reading: Reading, rtol: float, exact: bool, compiled: bool, rows: int
+    surface: Any, model: Any, reading: Reading, rtol: float, exact: bool, compiled: bool, few: bool, rows: int
 ) -> Profile:
     source = source_of(surface, reading)
     if compiled and isinstance(surface, tuple) and isinstance(model, UniversalModel):
@@ -366,10 +379,10 @@ def _profile(
     # what underflows is right
     with np.errstate(under="ignore"):
         try:
-            return _built(source, fields, edges, rtol, compiled)
+            return _built(source, fields, edges, rtol, compiled, few)
         except _EndOfTable as fault:
             end = fault.args[0]
-            return _built(source, fields, np.append(edges[edges < end * (1 - 1e-12)], end), rtol, compiled)
+            return _built(source, fields, np.append(edges[edges < end * (1 - 1e-12)], end), rtol, compiled, few)
 
 
 def profile(
@@ -378,14 +391,14 @@ def profile(
     reading: Reading,
     rtol: float,
     outside: str = "nan",
-    compiled: bool = False,
+    size: int | None = None,
     rows: int = 2,
 ) -> Profile:
-    """The profile of one surface, (hurst, zeta_1, h_max/h_rms) or a `MeasuredSurface`, to `rtol` and the model's error.
+    """The profile of a surface, (hurst, zeta_1, h_max/h_rms) or a `MeasuredSurface`, to `rtol` and the model's error.
 
-    `outside` is "exact" to solve islands that a table does not cover; else the profile ends with the table. `compiled`
-    is for who compiles anyway. With three `rows` it has the number of islands, with four
-    their Hertz area.
+    `outside` is "exact" to solve islands that a table does not cover; else the profile ends with the table. For a
+    `size` of up to FEW gaps islands are summed at each, in numpy. Else there are series, asked of compiled code but
+    where the number of islands, or their Hertz area, is wanted, as the third and fourth of `rows`.
 
     Raises
     ------
@@ -394,5 +407,6 @@ def profile(
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)
     make: Any = _profile
-    kept: Profile = make(surface, model, reading, rtol, outside == "exact", compiled and rows == 2, rows)
+    few = size is not None and size <= FEW
+    kept: Profile = make(surface, model, reading, rtol, outside == "exact", rows == 2 and not few, few, rows)
     return kept

@@ -325,7 +325,7 @@ def test_no_bound_of_a_profile_is_exceeded_on_300_surfaces():
         surface = Surface(rng.uniform(0.2, 1.0), 1.0, zeta_1, 1.0, top)
         shape = float(surface.hurst), zeta_1, top
         model = get_model("universal", 1e-8, reading)
-        kept = profile(shape, model, reading, 10 ** rng.uniform(-10, -3), compiled=number % 2 > 0)
+        kept = profile(shape, model, reading, 10 ** rng.uniform(-10, -3), size=(40, None)[number % 2])
         c = np.append(2 * top * 10 ** rng.uniform(-8, 0, 20), rng.uniform(0, 2 * top, 20))
         c = c[c < kept.end]
         single = totals_of(model, Pairs.of(surface, c), reading, 1e-11)
