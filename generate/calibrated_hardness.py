@@ -22,8 +22,7 @@ from mbma_tables import Surface, contact
 from mbma_tables import hardness as cap
 from mbma_tables.arguments import FloatArray
 from mbma_tables.tablefiles.provenance import source_digest, versions
-from mbma_tables.theories import calibrated_table
-from mbma_tables.theories.registry import get_theory
+from mbma_tables.theories import calibrated_table, get_theory
 from mbma_tables.theories.yielding import GROUP, QUANTITIES, Scatter, Yielding
 
 LIGHTEST, HEAVIEST = 0.01, 0.97  # A/A0 that constants are fitted to

@@ -14,7 +14,7 @@ from mbma_tables import leakage
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import Constants, Law
 from mbma_tables.leakage import FlowConstants
-from mbma_tables.theories.registry import get_theory
+from mbma_tables.theories import get_theory
 from mbma_tables.theories.yielding import Yielding
 
 MIN_WAVES = 4  # longest waves a side: below, the cell's own scatter rules

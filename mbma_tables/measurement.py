@@ -12,8 +12,8 @@ from mbma_tables.errors import MbmaError, NotSelfAffineError
 from mbma_tables.plots import new_figure, theory_label
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
+from mbma_tables.theories import get_theory
 from mbma_tables.theories.protocol import Theory, answer_where_finite
-from mbma_tables.theories.registry import get_theory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,6 +17,7 @@ from mbma_tables.cli.progress import doing
 from mbma_tables.errors import InputError
 from mbma_tables.files import read_file
 from mbma_tables.scenes.specimen import MATERIAL, NUMBERS, Specimen, effective_modulus_of, from_name, from_numbers
+from mbma_tables.surfaces.surface import PARAMETERS, Surface
 
 MAX_BYTES = 64 * 2**20
 LOADS = ("separation", "mean_separation", "pressure", "area")
@@ -49,7 +50,6 @@ def batch_command(
 
     Example: mbma batch surfaces.csv --pressure 1MPa --theory calibrated --csv --out answers.csv
     """
-    from mbma_tables.surfaces.surface import PARAMETERS, Surface
     from mbma_tables.theories.contact import contact
 
     lines = list(_lines(file))

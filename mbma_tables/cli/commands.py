@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
 
+from mbma_tables.arguments import finite_array, require
 from mbma_tables.cli.format import SURFACE_NUMBERS, Report, report_answer, shown_unit, to_columns
 from mbma_tables.cli.options import (
     Model,
@@ -26,6 +28,8 @@ from mbma_tables.cli.options import (
 )
 from mbma_tables.errors import InputError
 from mbma_tables.scenes.specimen import Specimen
+from mbma_tables.surfaces.cases import CASES
+from mbma_tables.surfaces.surface import Surface
 from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
@@ -42,8 +46,6 @@ ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "
 
 def _numbers(name: str, given: list[float | str], specimen: Specimen, over_h_rms: bool) -> Any:
     """The numbers of an option in the specimen's units."""
-    from mbma_tables.arguments import finite_array
-
     if not over_h_rms:
         return finite_array(name, specimen.units.number(name, given))
     named = [text for text in given if isinstance(text, str)]
@@ -86,7 +88,6 @@ def contact_command(
     (name, numbers), *_ = loads.items()
     if over_h_rms and name in ("pressure", "area"):
         raise InputError(f"--over-h-rms is about lengths: leave it out with --{name}")
-    from mbma_tables.arguments import require
     from mbma_tables.theories.contact import contact
 
     asked = _numbers(name, numbers, specimen, over_h_rms)
@@ -107,8 +108,6 @@ def _leakage(answer: Contact) -> dict[str, Any]:
 
 def curve_gaps(h_max: float, points: int) -> Any:
     """Separations from h_max to -h_max: the first, then half geometric in h_max - d, then half even."""
-    import numpy as np
-
     light = (points - 1) // 2
     deep = points - 1 - light
     approach = np.concatenate(
@@ -138,8 +137,6 @@ def curve_command(
     Example: mbma curve --surface concrete --plot concrete.png
     """
     check_plot(plot, output.out)
-    import numpy as np
-
     from mbma_tables.scenes.effects import COMPARED
     from mbma_tables.scenes.run import other_theory
     from mbma_tables.theories.contact import contact
@@ -165,8 +162,6 @@ def curve_command(
 
 
 def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory], kind: str, leakage: bool) -> bytes:
-    import numpy as np
-
     from mbma_tables.plots import Curve, draw_compression, force_label, leakage_label, theory_label, to_picture
 
     gap = np.asarray(answer.mean_separation / specimen.surface.h_rms)
@@ -209,9 +204,6 @@ def island_command(
 @output_options
 def surfaces_command(output: Output) -> None:
     """The paper's surfaces by name, with their numbers, each in its own unit of length."""
-    from mbma_tables.surfaces.cases import CASES
-    from mbma_tables.surfaces.surface import Surface
-
     cases, surfaces = CASES.values(), [Surface.named(name) for name in CASES]
     values: dict[str, Any] = {"name": list(CASES), "length_unit": [case.length_unit for case in cases]}
     values |= {name: [getattr(surface, name) for surface in surfaces] for name in SURFACE_NUMBERS}

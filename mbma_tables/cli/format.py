@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
 
 from mbma_tables import __version__
 from mbma_tables.cli.options import Model, Output
@@ -122,8 +123,6 @@ def shown_unit(name: str, units: Units) -> str:
 
 def to_columns(values: Mapping[str, Any], units: Mapping[str, str]) -> list[Column]:
     """One column for each array, scalars being arrays of one entry; NaN says that there is no number."""
-    import numpy as np
-
     columns = []
     for name, array in values.items():
         entries = np.atleast_1d(array).ravel().tolist()
@@ -156,8 +155,6 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
 
 def _validity(answer: Contact) -> tuple[list[str], dict[str, Any]]:
     """Where a contact's theory is tested, and its scatter: lines for a reader, and facts for a program."""
-    import numpy as np
-
     valid = np.atleast_1d(answer.valid)
     reasons = {reason: np.atleast_1d(mask) for reason, mask in answer.reasons.items()}
     notes = []

@@ -23,8 +23,9 @@ from mbma_tables.scenes.specimen import (
     from_numbers,
     read_specimen,
 )
+from mbma_tables.surfaces.cases import CASES
 from mbma_tables.surfaces.readings import NAMED
-from mbma_tables.theories.registry import THEORIES
+from mbma_tables.theories import THEORIES
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -148,8 +149,6 @@ def _among(*names: str) -> Callable[[click.Context, click.Parameter, str], list[
 
 
 def _surface_names(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
-    from mbma_tables.surfaces.cases import CASES
-
     return _among(*CASES)(ctx, param, incomplete)
 
 

@@ -16,12 +16,12 @@ from mbma_tables.errors import InputError
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
+from mbma_tables.theories import get_theory
 from mbma_tables.theories.contact import contact
 from mbma_tables.theories.law import contact_law
 from mbma_tables.theories.law_object import ContactLaw
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
-from mbma_tables.theories.registry import get_theory
 from mbma_tables.theories.result import Contact
 from mbma_tables.units import Units, in_unit, resolve
 

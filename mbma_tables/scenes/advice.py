@@ -65,7 +65,7 @@ def _size(spread: float) -> str:
 def _contacts(problem: Problem) -> Any:
     """Contact fractions that the calibrated law expects where surfaces touch."""
     from mbma_tables.calibrated import area
-    from mbma_tables.theories.registry import get_theory
+    from mbma_tables.theories import get_theory
 
     surface, known = problem.surface, problem.gaps
     if problem.prescribed == "areas":

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from mbma_tables.arguments import nearest
 from mbma_tables.errors import InputError
-from mbma_tables.theories.registry import THEORIES
+from mbma_tables.theories import THEORIES
 
 OUTPUTS = (
     "force",

@@ -13,6 +13,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from mbma_tables.errors import InputError
 from mbma_tables.scenes.costs import Costs, shipped_costs
 from mbma_tables.scenes.effects import OF_LAW, OUTPUTS, REFINEMENTS
@@ -245,8 +247,6 @@ class _Planner:
         return Step(name, why, what, tier, asked, self.count, asked + certified_error(tier, asked), seconds)
 
     def profiles(self) -> Step:
-        import numpy as np
-
         islands, asked = int(np.size(self.problem.deltas)), ISLAND_SHARE * self.rtol / AMPLIFICATION["profile"]
         seconds = islands * self.costs.of("exact", "profile", asked)
         what = "the island problem solved with p(r) and d(r)"
@@ -283,7 +283,7 @@ class _Planner:
 
     def own_error(self) -> float:
         """The numerical error that the scene's theory states of an answer."""
-        from mbma_tables.theories.registry import get_theory
+        from mbma_tables.theories import get_theory
 
         surface = self.problem.surface
         return float(get_theory(self.problem.theory).answer(surface, 0.5 * surface.h_max).error)

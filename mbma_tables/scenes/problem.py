@@ -6,11 +6,13 @@ import dataclasses
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from mbma_tables.arguments import nearest
+import numpy as np
+
+from mbma_tables.arguments import finite_array, nearest, number_in, require, whole_number_in
 from mbma_tables.errors import InputError
 from mbma_tables.scenes.effects import COMPARED, CORRELATIONS, OF_ISLANDS, chosen
 from mbma_tables.surfaces.readings import get_reading
-from mbma_tables.theories.registry import THEORIES, get_theory
+from mbma_tables.theories import THEORIES, get_theory
 from mbma_tables.units import Units, in_unit, known, modulus_and_units
 
 if TYPE_CHECKING:
@@ -58,8 +60,6 @@ class Problem:
     units: Units = dataclasses.field(init=False)
 
     def __post_init__(self) -> None:
-        from mbma_tables.arguments import number_in, whole_number_in
-
         for name in ("effects", "without", "theories"):
             if isinstance(getattr(self, name), str):
                 raise InputError(f"{name} must be a list of names: write [{getattr(self, name)!r}]")
@@ -108,10 +108,6 @@ class Problem:
 
     def _checked_gaps(self, at_gaps: frozenset[str]) -> Any:
         """The prescribed numbers; None where nothing asks for gaps."""
-        import numpy as np
-
-        from mbma_tables.arguments import finite_array, require
-
         given = [name for name in PRESCRIBED if getattr(self, name) is not None]
         if len(given) > 1:
             raise InputError(f"{' and '.join(given)} are given: prescribe one of {', '.join(PRESCRIBED)}")
@@ -139,8 +135,6 @@ class Problem:
 
     def _check_parameters_of_effects(self) -> None:
         """Parameters that one effect needs and no other uses."""
-        from mbma_tables.arguments import finite_array, number_in, require
-
         needs = (
             ("yield", "hardness", self.hardness is not None, "the largest pressure that the softer body bears"),
             ("conductance", "conductivities", self.conductivities is not None, "k1 and k2 of the two bodies"),

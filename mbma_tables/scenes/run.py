@@ -258,8 +258,8 @@ class OtherTheory(NamedTuple):
 
 def other_theory(name: str, surface: AnySurface, gap: FloatArray, E_star: float) -> OtherTheory:
     """A theory, one of `effects.COMPARED`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
+    from mbma_tables.theories import get_theory
     from mbma_tables.theories.protocol import answer_where_finite
-    from mbma_tables.theories.registry import get_theory
 
     if name == "persson_simplified":
         from mbma_tables.theories.persson import Persson

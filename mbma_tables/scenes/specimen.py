@@ -9,9 +9,16 @@ import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from mbma_tables.arguments import one_number, require
 from mbma_tables.errors import InputError
 from mbma_tables.files import read_file
+from mbma_tables.materials import effective_modulus
 from mbma_tables.scenes.toml_file import check, read_toml, schema
+from mbma_tables.surfaces.cases import get_case
+from mbma_tables.surfaces.spectrum import MIN_ZETA_1
+from mbma_tables.surfaces.surface import Surface
 from mbma_tables.units import Units, factor, in_unit, known, resolve
 
 if TYPE_CHECKING:
@@ -65,17 +72,12 @@ class Specimen:
 
 def from_name(name: str) -> Specimen:
     """A case of the paper."""
-    from mbma_tables.surfaces.cases import get_case
-    from mbma_tables.surfaces.surface import Surface
-
     case = get_case(name)
     return Specimen(Surface.named(name), case.title)
 
 
 def from_map(path: pathlib.Path, treatment: Mapping[str, Any]) -> Specimen:
     """The surface of a measured map or line scan, with options of `Surface.from_map`."""
-    from mbma_tables.surfaces.surface import Surface
-
     options = dict(treatment)
     if options.pop("model", "measured") == "measured":
         return Specimen(measured(path, options)[1], f"measured: {_printable(path)}")
@@ -103,10 +105,6 @@ def from_numbers(
     given: Mapping[str, Any], unit: str | None = None, title: str = "surface given by numbers"
 ) -> Specimen:
     """The surface with one complete set of numbers, plain ones in `unit`."""
-    from mbma_tables.arguments import one_number, require
-    from mbma_tables.surfaces.spectrum import MIN_ZETA_1
-    from mbma_tables.surfaces.surface import Surface
-
     if set(given) & set(ROUGHNESS):
         alien = set(given) - {*ROUGHNESS, "hurst", "h_max"}
         if alien:
@@ -132,9 +130,6 @@ def from_numbers(
 
 def effective_modulus_of(given: Mapping[str, Any], unit: str | None = None) -> tuple[float | None, str | None]:
     """E* from a material's numbers, None if there are none, and its unit: the one given, or the first named."""
-    from mbma_tables.arguments import one_number, require
-    from mbma_tables.materials import effective_modulus
-
     plain, unit = resolve(given, unit, "stress")
     if not given:
         return None, unit
@@ -200,10 +195,6 @@ def _file(folder: pathlib.Path, name: str, key: str) -> pathlib.Path:
 
 def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str, unit: str | None) -> Specimen:
     """The surface of two columns of text, q and C, in a unit of length."""
-    import numpy as np
-
-    from mbma_tables.surfaces.surface import Surface
-
     if set(numbers) != {"h_max"}:
         raise InputError(f"[surface]: a psd needs h_max = ... and no other number, got {', '.join(numbers) or 'none'}")
     # not by its name: numpy would unpack .gz, .bz2 and .xz, whatever they grow to

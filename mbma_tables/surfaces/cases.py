@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
+from math import pi
 
 from mbma_tables.errors import InputError
 
@@ -37,17 +37,14 @@ CASES = {
             "yang-persson",
             "Yang-Persson molecular dynamics (Fig. 11)",
             "nm",
-            _band(0.8, 6 * math.pi / 1040 * 10, 216, 1.0, 3.0),
+            _band(0.8, 6 * pi / 1040 * 10, 216, 1.0, 3.0),
         ),
         Case(
-            "papangelo",
-            "Papangelo Green's function simulation (Fig. 12)",
-            "um",
-            _band(0.8, 2 * math.pi / 100, 64, 5.0, 3.0),
+            "papangelo", "Papangelo Green's function simulation (Fig. 12)", "um", _band(0.8, 2 * pi / 100, 64, 5.0, 3.0)
         ),
         Case("concrete", "concrete road of Lorenz (Figs. 13a, 14a)", "mm", _moments(0.7, 0.071, 0.27, 62.0, 1.1)),
         Case("asphalt", "asphalt road of Lorenz (Figs. 13b, 14b)", "mm", _moments(0.85, 0.091, 2.67, 21000.0, 1.37)),
-        Case("challenge", "contact-mechanics challenge (Fig. 15)", "um", _band(0.8, 2 * math.pi / 20, 200, 0.762, 3.7)),
+        Case("challenge", "contact-mechanics challenge (Fig. 15)", "um", _band(0.8, 2 * pi / 20, 200, 0.762, 3.7)),
         *(
             Case(f"resolution-{z}", f"resolution study over h_rms, zeta_1 = {z} (Figs. 16, 17)", None, numbers)
             for z, numbers in ((z, _band(0.7, 0.1, z, 1.0, 3.0)) for z in (125, 250, 500, 1000))

@@ -77,18 +77,23 @@ class Treatment:
 class Treated:
     """Heights as they go into a spectrum, and how they came about."""
 
-    heights: FloatArray  # [length], shape (nx, ny) or (n,); none undefined
+    heights: Any  # [length], shape (nx, ny) or (n,); none undefined in the end
     steps: tuple[float, ...]  # sampling step along each axis [length]
     periodic: bool  # else they continue by their mirror images where that is needed
     unit: str | None  # of length, that the file names
-    waves: tuple[float, float]  # wavenumbers between which the waves are that were kept: (0, inf) if all
-    provenance: Provenance  # each step: its name ("step"), its numbers, and a sentence ("told")
+    waves: tuple[float, float] = (0.0, math.inf)  # wavenumbers between which the waves are that were kept
+    provenance: Provenance = ()  # each step: its name ("step"), its numbers, and a sentence ("told")
     window: str | None = None
+
+    def after(self, heights: Any, step: str, told: str, **numbers: Any) -> Treated:
+        """The same after a step, which is recorded."""
+        record = {"step": step, **numbers, "told": told}
+        return dataclasses.replace(self, heights=heights, provenance=(*self.provenance, record))
 
     def windowed(self) -> FloatArray:
         """Heights under a window of unit mean square, their mean under it removed; as they are where periodic."""
         if self.window is None and self.periodic:
-            return self.heights
+            return np.asarray(self.heights)
         if self.window is None:
             windows = [np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2 for count in self.heights.shape]
         else:
@@ -113,35 +118,31 @@ def treat(
 
     `info` is what the file says of its instrument, as in SurfaceTopography.
     """
-    record: list[dict[str, Any]] = []
     heights = heights_of(grid, len(steps))
     if min(heights.shape) < MIN_GRID:
         raise InputError(
             f"{' x '.join(map(str, heights.shape))} points hold too few scales; the least is "
             f"{' x '.join([str(MIN_GRID)] * heights.ndim)}"
         )
+    known = Treated(heights, steps, periodic, unit, window=treatment.window)
     with warnings.catch_warnings():
         # that library's calls of numpy are its own affair
         warnings.simplefilter("ignore")
         if treatment.outliers is not None:
-            heights = _without_outliers(heights, steps, periodic, treatment.outliers, record)
-        whole = _filled(heights, steps, periodic, treatment, record)
-        values = _flattened(whole, steps, periodic, treatment.detrend, record)
-        short = _resolution(values, steps, treatment, unit, info or {}, record)
-        values = _within(values, steps, periodic, unit, short, treatment.long_cutoff, record)
-    longest, shortest = treatment.long_cutoff or math.inf, short or 0.0
-    waves = (2 * math.pi / longest, 2 * math.pi / shortest if shortest else math.inf)
-    return Treated(values, steps, periodic, unit, waves, tuple(record), treatment.window)
+            known = _without_outliers(known, treatment.outliers)
+        known = _flattened(_filled(known, treatment.fill), treatment.detrend)
+        known, short = _resolution(known, treatment, info or {})
+        known = _within(known, short, treatment.long_cutoff)
+    shortest = 2 * math.pi / short if short else math.inf
+    return dataclasses.replace(known, waves=(2 * math.pi / (treatment.long_cutoff or math.inf), shortest))
 
 
-def _flattened(
-    heights: FloatArray, steps: tuple[float, ...], periodic: bool, mode: str | None, record: list[dict[str, Any]]
-) -> FloatArray:
+def _flattened(known: Treated, mode: str | None) -> Treated:
     """Heights less their trend."""
-    trend = mode or ("mean" if periodic else "plane")
+    heights, trend = known.heights, mode or ("mean" if known.periodic else "plane")
     degree = DEGREES.get(trend)
     if degree is None:
-        flat = np.asarray(wrapped(heights, steps, periodic).detrend(trend).heights(), float)
+        flat = np.asarray(wrapped(heights, known.steps, known.periodic).detrend(trend).heights(), float)
     else:
         flat = _without_polynomial(heights, degree)
     size = float(np.abs(heights).max())
@@ -149,8 +150,7 @@ def _flattened(
         raise InputError(f"the map is flat: nothing is left once its {trend} is subtracted")
     before, after = float(np.std(heights)), float(np.std(flat))
     told = f"{trend} subtracted" + (f": h_rms {before:.4g} before, {after:.4g} after" if trend != "mean" else "")
-    record.append({"step": "detrend", "mode": trend, "h_rms_before": before, "h_rms_after": after, "told": told})
-    return flat
+    return known.after(flat, "detrend", told, mode=trend, h_rms_before=before, h_rms_after=after)
 
 
 def _without_polynomial(heights: FloatArray, degree: int) -> FloatArray:
@@ -169,112 +169,94 @@ def _counted(count: int, size: int) -> str:
     return f"{count} of {size} points ({count / size:.2g} of all)"
 
 
-def _harmonic(heights: Any, steps: tuple[float, ...], periodic: bool) -> FloatArray:
-    if not np.ma.getmaskarray(heights).any():
-        return np.asarray(np.ma.getdata(heights), float)
-    filled = wrapped(heights, steps, periodic).interpolate_undefined_data(method="harmonic").heights()
-    return np.asarray(np.ma.getdata(filled), float)
+def _harmonic(known: Treated) -> FloatArray:
+    """Heights, where they are undefined smooth."""
+    heights = known.heights
+    if np.ma.getmaskarray(heights).any():
+        scan = wrapped(heights, known.steps, known.periodic)
+        heights = scan.interpolate_undefined_data(method="harmonic").heights()
+    return np.asarray(np.ma.getdata(heights), float)
 
 
-def _without_outliers(
-    heights: Any, steps: tuple[float, ...], periodic: bool, limit: float, record: list[dict[str, Any]]
-) -> Any:
+def _without_outliers(known: Treated, limit: float) -> Treated:
     """Heights with what stands out of its neighbourhood undefined."""
     from scipy.ndimage import median_filter
 
-    whole = _harmonic(heights, steps, periodic)
+    heights, whole = known.heights, _harmonic(known)
     # far outliers bend what their neighbours are filled with, not their median
-    difference = whole - median_filter(whole, MEDIAN_POINTS, mode="wrap" if periodic else "mirror")
-    known = ~np.ma.getmaskarray(heights)
-    scale = float(np.quantile(np.abs(difference[known]), USUAL)) / USUAL_DEVIATES
-    found = known & (np.abs(difference) > limit * scale)
+    difference = whole - median_filter(whole, MEDIAN_POINTS, mode="wrap" if known.periodic else "mirror")
+    measured = ~np.ma.getmaskarray(heights)
+    scale = float(np.quantile(np.abs(difference[measured]), USUAL)) / USUAL_DEVIATES
+    found = measured & (np.abs(difference) > limit * scale)
     count = int(found.sum())
     told = f"{_counted(count, heights.size)} stood out by more than {limit:g} standard deviations: taken out"
-    record.append({"step": "outliers", "limit": limit, "points": count, "told": told})
-    return np.ma.masked_array(np.ma.getdata(heights), np.ma.getmaskarray(heights) | found)
+    left = np.ma.masked_array(np.ma.getdata(heights), ~measured | found)
+    return known.after(left, "outliers", told, limit=limit, points=count)
 
 
-def _filled(
-    heights: Any, steps: tuple[float, ...], periodic: bool, treatment: Treatment, record: list[dict[str, Any]]
-) -> FloatArray:
+def _filled(known: Treated, fill: str | None) -> Treated:
     """Heights without undefined points."""
-    holes = np.ma.getmaskarray(heights)
-    count = int(holes.sum())
+    size, count = known.heights.size, int(np.ma.getmaskarray(known.heights).sum())
     if count == 0:
-        return np.asarray(np.ma.getdata(heights), float)
-    share = count / heights.size
-    if share > FREE_HOLES and treatment.fill is None:
+        return dataclasses.replace(known, heights=_harmonic(known))
+    share = count / size
+    if share > FREE_HOLES and fill is None:
         raise InputError(
-            f"the map has {count} holes among {heights.size} points, more than {FREE_HOLES:.0%}: fill them, smooth, "
+            f"the map has {count} holes among {size} points, more than {FREE_HOLES:.0%}: fill them, smooth, "
             "with fill='harmonic', or cut them out"
         )
     told = (
-        f"{_counted(count, heights.size)} were undefined and are filled harmonically: smooth there, the map lacks "
+        f"{_counted(count, size)} were undefined and are filled harmonically: smooth there, the map lacks "
         "about as large a share of its mean squared gradient"
     )
-    record.append({"step": "fill", "method": "harmonic", "points": count, "share": share, "told": told})
-    return _harmonic(heights, steps, periodic)
+    return known.after(_harmonic(known), "fill", told, method="harmonic", points=count, share=share)
 
 
-def _resolution(
-    values: FloatArray,
-    steps: tuple[float, ...],
-    treatment: Treatment,
-    unit: str | None,
-    info: Mapping[str, Any],
-    record: list[dict[str, Any]],
-) -> float | None:
+def _resolution(known: Treated, treatment: Treatment, info: Mapping[str, Any]) -> tuple[Treated, float | None]:
     """Shortest wavelength that is kept: the largest of what is given, the tip follows, the file states; None: all."""
     found = [(treatment.short_cutoff, "as given")] if treatment.short_cutoff is not None else []
     tip, stated = treatment.tip_radius, (info.get("instrument") or {}).get("parameters") or {}
-    if tip is None and not (treatment.reliable and unit and {"tip_radius", "resolution"} & set(stated)):
-        return found[0][0] if found else None
+    if tip is None and not (treatment.reliable and known.unit and {"tip_radius", "resolution"} & set(stated)):
+        return known, found[0][0] if found else None
     origin = "the file's instrument" if tip is None else f"a tip of radius {tip:g}"
+    own = {"instrument": info["instrument"]} if tip is None else {}
     try:
-        scan = wrapped(values, steps, False, unit, **({"instrument": info["instrument"]} if tip is None else {}))
+        scan = wrapped(known.heights, known.steps, False, known.unit, **own)
         limit = scan.short_reliability_cutoff() if tip is None else scan.scanning_probe_reliability_cutoff(tip)
     except (ValueError, KeyError, TypeError) as fault:
         raise InputError(f"the reliability cut-off by {origin} cannot be found: {fault}") from None
-    if limit is None or limit <= 2 * max(steps):
-        told = f"{origin} follows every wave that was sampled"
-        record.append({"step": "reliability", "told": told})
+    if limit is None or limit <= 2 * max(known.steps):
+        known = known.after(known.heights, "reliability", f"{origin} follows every wave that was sampled")
     else:
-        told = f"{origin} follows no wave below {limit:.4g} {unit or ''}".rstrip()
-        record.append({"step": "reliability", "wavelength": float(limit), "told": told})
+        told = f"{origin} follows no wave below {limit:.4g} {known.unit or ''}".rstrip()
+        known = known.after(known.heights, "reliability", told, wavelength=float(limit))
         found.append((float(limit), origin))
-    return max(found)[0] if found else None
+    return known, max(found)[0] if found else None
 
 
-def _within(
-    values: FloatArray,
-    steps: tuple[float, ...],
-    periodic: bool,
-    unit: str | None,
-    short: float | None,
-    long: float | None,
-    record: list[dict[str, Any]],
-) -> FloatArray:
+def _within(known: Treated, short: float | None, long: float | None) -> Treated:
     """Heights whose waves lie between both cut-offs."""
-    cuts: list[tuple[str, str, float]] = []
-    if long is not None:
-        cuts.append(("longcut", "long_cutoff", long))
-    if short is not None:
-        cuts.append(("shortcut", "short_cutoff", short))
-    if not cuts:
-        return values
     if short is not None and long is not None and not long > short:
         raise InputError(f"long_cutoff must be larger than short_cutoff, got {long:g} and {short:g}")
-    if not periodic:
-        values = mirrored(values)
-    for method, name, wavelength in cuts:
-        before = _squares(values, steps)
-        scan = wrapped(values, steps, True, unit)
+    values = known.heights if known.periodic or short is long is None else mirrored(known.heights)
+    for name, method, wavelength in (("long_cutoff", "longcut", long), ("short_cutoff", "shortcut", short)):
+        if wavelength is None:
+            continue
+        before = _squares(values, known.steps)
+        scan = wrapped(values, known.steps, True, known.unit)
         values = np.asarray(getattr(scan, method)(cutoff_wavelength=wavelength).heights(), float)
-        after = _squares(values, steps)
+        after = _squares(values, known.steps)
         if not after[0] > 1e-24 * before[0]:
             raise InputError(f"{name} {wavelength:g} leaves no wave of the measurement")
-        record.append(_told_of_cutoff(name, wavelength, unit, before, after))
-    return values if periodic else values[tuple(slice(count // 2) for count in values.shape)]
+        of_variance, of_gradient = (1 - b / a for a, b in zip(before, after, strict=True))
+        length = f"{wavelength:.4g} {known.unit or ''}".rstrip()
+        told = f"a {name.replace('_cutoff', ' cut-off')} at {length} removes {of_gradient:.0%} of the squared gradient"
+        if name == "short_cutoff":
+            told += f": area at light load is {math.sqrt(before[1] / after[1]):.2f} times larger than without"
+        told += f"; it removes {of_variance:.0%} of the height variance"
+        known = known.after(values, name, told, wavelength=wavelength, of_gradient=of_gradient, of_variance=of_variance)
+    whole = tuple(slice(count if known.periodic else count // 2) for count in values.shape)
+    return known if short is long is None else dataclasses.replace(known, heights=values[whole])
 
 
 def mirrored(values: FloatArray) -> FloatArray:
@@ -282,18 +264,6 @@ def mirrored(values: FloatArray) -> FloatArray:
     for axis in range(values.ndim):
         values = np.concatenate([values, np.flip(values, axis)], axis)
     return values
-
-
-def _told_of_cutoff(
-    name: str, wavelength: float, unit: str | None, before: tuple[float, float], after: tuple[float, float]
-) -> dict[str, Any]:
-    lost = tuple(1 - b / a for a, b in zip(before, after, strict=True))
-    length = f"{wavelength:.4g} {unit or ''}".rstrip()
-    text = f"a {name.replace('_cutoff', ' cut-off')} at {length} removes {lost[1]:.0%} of the squared gradient"
-    if name == "short_cutoff":
-        text += f": area at light load is {math.sqrt(before[1] / after[1]):.2f} times larger than without"
-    text += f"; it removes {lost[0]:.0%} of the height variance"
-    return {"step": name, "wavelength": wavelength, "of_gradient": lost[1], "of_variance": lost[0], "told": text}
 
 
 def _squares(values: FloatArray, steps: tuple[float, ...]) -> tuple[float, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from mbma_tables.theories.registry import THEORIES, get_theory
+from mbma_tables.errors import InputError
 
 if TYPE_CHECKING:
     from mbma_tables.theories.asperities import GreenwoodWilliamson
@@ -39,9 +39,42 @@ _MODULES = {
     "simulated": ("BoundaryElements",),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}
+_NAMED = {
+    "mbma": "Mbma",
+    "calibrated": "Calibrated",
+    "persson": "Persson",
+    "greenwood_williamson": "GreenwoodWilliamson",
+}
+THEORIES = tuple(_NAMED)
 
 
 def __getattr__(name: str) -> Any:
     if name in _HOMES:
         return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def get_theory(theory: str | Theory | UserTheory) -> Theory:
+    """A theory by name, or as an object: one of this package's, or any with a `name` and an `answer`.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, or an object that is no theory.
+
+    Examples
+    --------
+    >>> from mbma_tables.theories import get_theory
+    >>> get_theory("persson").name
+    'persson'
+    """
+    from mbma_tables.theories.protocol import Theory, UserTheory, Wrapped
+
+    found: Any = __getattr__(_NAMED[theory])() if isinstance(theory, str) and theory in _NAMED else theory
+    if isinstance(found, Theory):
+        return found
+    if isinstance(found, UserTheory) and not isinstance(found, type):
+        return Wrapped(found)
+    raise InputError(
+        f"theory must be one of {THEORIES} or an object with a name and answer(surface, u), got {theory!r}"
+    )

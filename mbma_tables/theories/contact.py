@@ -25,9 +25,9 @@ from mbma_tables.models import AnyModel
 from mbma_tables.models.protocol import QUANTITIES
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.theories.mbma import Mbma
+from mbma_tables.theories import get_theory
+from mbma_tables.theories.mbma import Mbma, refuse_options_of_mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
-from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma
 from mbma_tables.theories.result import MEANINGS, Contact, Source
 from mbma_tables.theories.sensitivity import differentiate
 from mbma_tables.totals.contact import wanted_quantities

@@ -20,6 +20,7 @@ from mbma_tables.models.protocol import MAX_RTOL, MIN_RTOL
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories import get_theory
 from mbma_tables.theories import law_kernel as kernel
 from mbma_tables.theories.law_kernel import AREA_AT, FORCE_AT
 from mbma_tables.theories.law_object import ROUNDING, ContactLaw
@@ -34,9 +35,8 @@ from mbma_tables.theories.law_pieces import (
     side_pieces,
     straight_record,
 )
-from mbma_tables.theories.mbma import Mbma
+from mbma_tables.theories.mbma import Mbma, refuse_options_of_mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
-from mbma_tables.theories.registry import get_theory, refuse_options_of_mbma
 from mbma_tables.totals.island_sum import totals_of
 from mbma_tables.totals.kernel import Pairs
 from mbma_tables.totals.profile import profile, source_of

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.errors import InputError
 from mbma_tables.models import TIERS, AnyModel, get_model, tier_name
 from mbma_tables.models.protocol import QUANTITIES
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -182,3 +183,10 @@ def _highest(value: Callable[[FloatArray], FloatArray], low: FloatArray, high: F
         fresh = value(np.where(below, inner, outer))
         at_inner, at_outer = np.where(below, fresh, at_kept), np.where(below, at_kept, fresh)
     return (low + high) / 2
+
+
+def refuse_options_of_mbma(**given: bool) -> None:
+    """Refuse MBMA's own options where the theory is another, or an object that has its own."""
+    names = ", ".join(name for name, it in given.items() if it)
+    if names:
+        raise InputError(f"{names}: options of theory 'mbma' alone, asked for by its name")
