@@ -8,17 +8,20 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError
 from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
-from mbma_tables.export.law_numbers import DIGITS, FlowNumbers, LawNumbers, flow_numbers, law_numbers
+from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers, flow_numbers, law_numbers
 from mbma_tables.export.text import checked_name, filled, opening, wrapped
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 MAX_NAME = 31  # letters, as Fortran and C99 read them
+# steps of coefficients over the least value and the least slope of a polynomial; flatter ones count as so steep
+VALUES, SLOPES, FLAT = 2e-14, 8e-13, 1e-4
 MORE = ("conductance", "leakage")  # asked for
 FUNCTIONS = ("pressure", "tangent", "with_tangent", "curvature", "area", "energy", "overclosure", *MORE)
 
@@ -205,20 +208,20 @@ def _c(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
     """A structure a record; coefficients as whole numbers in units of their own, which is shortest."""
 
     def polynomial(row: FloatArray) -> str:
-        place = math.floor(math.log10(abs(row).max())) + round(math.log10(DIGITS))
-        return f"Q(1e{place},{','.join(f'{value * 10.0**-place:.0f}' for value in row)})"
+        unit = f"{_step(row):.0e}"
+        return f"Q({unit},{','.join(f'{value / float(unit):.0f}' for value in row)})"
 
-    heads = zip(*(columns[name].tolist() for name in columns if name != "edges"), strict=True)
-    rows = zip(heads, *polynomials.values(), strict=True)
-    lines = [f"{{{','.join((*map(_shortest, head), *map(polynomial, parts)))}}}," for head, *parts in rows]
+    heads = [[f"{value:.16g}" for value in column] for name, column in columns.items() if name != "edges"]
+    rows = [list(map(polynomial, row)) for row in polynomials.values()]
+    lines = [f"{{{','.join(parts)}}}," for parts in zip(*heads, *rows, strict=True)]
     place = prefix.upper()
-    return {f"{place}ROWS": "\n".join(lines), f"{place}EDGES": wrapped(map(_shortest, columns["edges"].tolist()))}
+    return {f"{place}ROWS": "\n".join(lines), f"{place}EDGES": wrapped(map(repr, columns["edges"].tolist()))}
 
 
 def _lists(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
     """Arrays in brackets, as Python and JavaScript have them."""
     flat = {name: f"[{wrapped(map(repr, column.tolist()))}]" for name, column in columns.items()}
-    rows = {name: f"[\n{_lines(rows, '[', '],')}\n]" for name, rows in polynomials.items()}
+    rows = {name: f"[\n{_lines(_decimals(rows), '[', '],')}\n]" for name, rows in polynomials.items()}
     return {f"{prefix}{name}".upper(): text for name, text in (flat | rows).items()}
 
 
@@ -232,7 +235,8 @@ def _braces(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, st
 
 def _matrices(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
     """Columns and matrices of MATLAB."""
-    matrices = {name: column[:, None] for name, column in columns.items()} | dict(polynomials)
+    matrices = {name: column[:, None] for name, column in columns.items()}
+    matrices |= {name: _decimals(rows) for name, rows in polynomials.items()}
     return {f"{prefix}{name}".upper(): f"[\n{_lines(rows, '', ';')}]" for name, rows in matrices.items()}
 
 
@@ -243,7 +247,7 @@ def _data(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]
         names = ", ".join(f"{prefix}{name}({k + 1})" for name in columns)
         lines.append(f"  data {names} &\n    / {wrapped(map(_fortran_number, head))} /")
         for name, rows in polynomials.items():
-            text = wrapped(map(_fortran_number, rows[k]), "    ", " &")
+            text = wrapped(map(_fortran_number, _decimals(rows[k : k + 1])[0]), "    ", " &")
             lines.append(f"  data ({prefix}{name}_(k_, {k + 1}), k_ = 0, 8) / &\n{text} /")
     return {f"{prefix}data".upper(): "\n".join(lines)}
 
@@ -252,9 +256,16 @@ def _lines(rows: FloatArray, begin: str, end: str) -> str:
     return "\n".join(f"{begin}{', '.join(map(repr, row))}{end}" for row in rows.tolist())
 
 
-def _shortest(value: float) -> str:
-    """The shortest text of a number."""
-    return repr(value).removesuffix(".0")
+def _step(row: FloatArray) -> float:
+    """The step in which coefficients are written: values are then right to 1e-13, slopes to about 1e-11."""
+    value, slope = (float(np.abs(polyval([-1, 0, 1], a)).min()) for a in (row, polyder(row)))
+    return min(VALUES * value, SLOPES * max(slope, FLAT * value))
+
+
+def _decimals(rows: FloatArray) -> FloatArray:
+    """Coefficients in decimal steps."""
+    places = [-math.floor(math.log10(_step(row))) for row in rows]
+    return np.array([[round(value, k) for value in row.tolist()] for row, k in zip(rows, places, strict=True)])
 
 
 def _fortran_number(value: float) -> str:

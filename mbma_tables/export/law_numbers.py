@@ -7,8 +7,8 @@ Record k, which holds where edges[k - 1] <= scale c < edges[k], is, with x = sca
     energy = energy_0 + t sum_j force[j] t^j/(j + 1)/(scale rate).
 
 Where contact ends at c = 0 the first record's polynomials are multiplied by t^power. Leakage has records of its own,
-over the gap d = h_max - 2 c (`FlowNumbers`). These are the numbers of `ContactLaw`, but for digits that do not matter;
-each language's template is a reader of them.
+over the gap d = h_max - 2 c (`FlowNumbers`). These are the numbers of `ContactLaw`; each language's template
+is a reader of them.
 """
 
 from __future__ import annotations
@@ -24,8 +24,6 @@ from mbma_tables.theories import law_kernel as kernel
 from mbma_tables.theories.law_kernel import AREA_AT, CENTRE, ENERGY_AT, FORCE_AT, POWER_F, RATE, SCALE
 from mbma_tables.theories.law_leakage import LeakageLaw
 from mbma_tables.theories.law_object import ROUNDING, ContactLaw
-
-DIGITS = 1e-15  # of a record's largest coefficient: what is left out of each
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,7 +112,7 @@ def flow_numbers(leakage: LeakageLaw) -> FlowNumbers:
         edges=x[1:-1],
         centre=records[:, CENTRE],
         rate=records[:, RATE],
-        force=_rounded(records[:, FORCE_AT:AREA_AT]),
+        force=records[:, FORCE_AT:AREA_AT],
     )
 
 
@@ -151,8 +149,8 @@ def law_numbers(law: ContactLaw) -> LawNumbers:
         centre=of_side * records[:, CENTRE],
         rate=of_side * records[:, RATE],
         energies=records[:, ENERGY_AT] / 2,
-        force=_rounded(records[:, FORCE_AT:AREA_AT]),
-        area=_rounded(records[:, AREA_AT:ENERGY_AT]),
+        force=records[:, FORCE_AT:AREA_AT],
+        area=records[:, AREA_AT:ENERGY_AT],
     )
 
 
@@ -177,16 +175,3 @@ def _intervals(law: ContactLaw, sign: float) -> tuple[FloatArray, Any]:
     records = law._records_at(sign * (middle / head[SCALE] - law.h_max), middle)
     begins = np.concatenate([[True], np.diff(records) != 0])
     return np.append(x[:-1][begins], x[-1]), records[begins]
-
-
-def _rounded(rows: FloatArray) -> FloatArray:
-    """Rows without the digits that add nothing to their largest entry."""
-    unit = 10.0 ** np.floor(np.log10(np.abs(rows).max(axis=1))) * DIGITS
-    return np.array([[_decimal(value, step) for value in row] for row, step in zip(rows, unit, strict=True)])
-
-
-def _decimal(value: float, unit: float) -> float:
-    """The shortest number within half a unit."""
-    if abs(value) < unit / 2:
-        return 0.0
-    return float(f"{value:.{min(max(math.ceil(math.log10(abs(value) / unit)), 1), 17)}g}")
