@@ -33,7 +33,7 @@ class Language(NamedTuple):
 
     `call` is a function's call with {name}, {what} and {x}; `number` writes a float, `arrays` columns of numbers and
     rows of polynomials by their places in the template, whose names begin with a prefix. `subroutine` is the template
-    of a solver's user subroutine that calls the law, `parts` what is filled in there.
+    of a solver's user subroutine that calls the law, `parts` what else is filled in.
     """
 
     template: str
@@ -156,13 +156,14 @@ def text_of(target: str, name: str, asked: AskedLaw) -> str:
         "HEADER": opening((line.format(name=name) for line in lines), language.mark),
         "NAME": name,
         "SUBROUTINE": "",
+        **dict(language.parts),
         **{quantity.upper(): asked.more.get(quantity, "") and language.number(asked.ratio) for quantity in MORE},
         **_numbers("", numbers, {"p": numbers.force, "a": numbers.area}, language),
     }
     if flow:
         parts |= _numbers("flow_", flow, {"p": flow.force}, language)
     if language.subroutine:
-        parts["SUBROUTINE"] = filled(language.subroutine, **parts | dict(language.parts))
+        parts["SUBROUTINE"] = filled(language.subroutine, **parts)
     return filled(language.template, **parts)
 
 
@@ -318,15 +319,17 @@ LANGUAGES = {
         "{name}.{what}({x})",
         _with_infinity("-np.inf"),
         _lists,
+        parts=(("NP", "np"), ("NUMPY", "asked"), ("JAX", "")),
     ),
     "jax-law": Language(
-        "law.jax.py",
+        "law.py",
         "#",
         "Python with jax alone, differentiable by c, p and the pytree LAW. Set jax_enable_x64 before the import, or "
         f"answers are in single precision. {NAN}",
         "{name}.{what}({x})",
         _with_infinity("-jnp.inf"),
         _lists,
+        parts=(("NP", "jnp"), ("NUMPY", ""), ("JAX", "asked")),
     ),
     "matlab-law": Language(
         "law.m",

@@ -225,7 +225,7 @@ def test_python(name: str) -> None:
     known.assert_inverse(road.overclosure(known.pressures()))
     assert road.pressure(known.c[:6].reshape(2, 3)).shape == (2, 3)
     assert float(road.pressure(float(known.c[0]))) == road.pressure(known.c)[0]
-    for bad in ([1.0, 1e9], math.nan):
+    for bad in ([1.0, 1e9], math.nan, math.inf):
         with pytest.raises(ValueError, match="overclosure must be in"):
             road.pressure(bad)
     with pytest.raises(ValueError, match="pressure must be in"):
