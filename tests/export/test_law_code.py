@@ -131,19 +131,19 @@ def test_c_is_short(theory: str, zeta_1: float) -> None:
     assert len(law_text("c-law", surface, "13.3 MPa", theory=theory, **HEAT)) <= 20_000
 
 
-def asked(name: str, folder: pathlib.Path) -> pathlib.Path:
-    """A folder with overclosures and pressures as text, one a line, which a program of the target reads."""
+def answered(
+    name: str, text: str, program: str, end: str, *commands: str, folder: pathlib.Path, words: str = ""
+) -> str:
+    """What a program in the law's language says, which answers overclosures by `QUANTITIES`, and pressures."""
     known = points(name)
+    (folder / f"road.{end}").write_text(text)
+    (folder / f"ask.{end}").write_text(program)
     np.savetxt(folder / "c.txt", known.c, "%.17g")
     np.savetxt(folder / "p.txt", known.pressures(), "%.17g")
-    return folder
-
-
-def assert_answers(name: str, folder: pathlib.Path) -> None:
-    """What the program wrote: `QUANTITIES` by columns, and overclosures."""
-    known = points(name)
+    said = [run(*command.split(), folder=folder, last_words=words) for command in commands]
     known.assert_equal(*np.loadtxt(folder / "values.txt", ndmin=2).T)
     known.assert_inverse(np.loadtxt(folder / "inverse.txt"))
+    return said[-1]
 
 
 FORTRAN = """program ask
@@ -180,12 +180,8 @@ def test_fortran(name: str, tmp_path: pathlib.Path) -> None:
     heat = {"conductivity": 1.0, "conductivity_unit": "W/(m K)"} if name == "mbma" else {}
     text = law_points.text("fortran-law", name, name="road", leakage=True, **heat)
     assert max(map(len, text.splitlines())) <= 132
-    (tmp_path / "road.f90").write_text(text)
-    (tmp_path / "ask.f90").write_text(FORTRAN)
-    strict = ("-std=f2008", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fcheck=all", "-O1")
-    run("gfortran", *strict, "road.f90", "ask.f90", "-o", "ask", folder=tmp_path)
-    run("./ask", folder=asked(name, tmp_path))
-    assert_answers(name, tmp_path)
+    build = "gfortran -std=f2008 -Wall -Wextra -Wpedantic -Werror -fcheck=all -O1 road.f90 ask.f90 -o ask"
+    answered(name, text, FORTRAN, "f90", build, "./ask", folder=tmp_path)
 
 
 NODE = """
@@ -205,11 +201,9 @@ console.log(both(1e-3), ...asks.map(fault));
 @needs("node")
 @pytest.mark.parametrize("name", ["mbma", "calibrated", "persson"])
 def test_javascript(name: str, tmp_path: pathlib.Path) -> None:
-    (tmp_path / "road.mjs").write_text(law_points.text("javascript-law", name, leakage=True))
-    (tmp_path / "ask.mjs").write_text(NODE)
-    said = run("node", "ask.mjs", folder=asked(name, tmp_path))
+    text = law_points.text("javascript-law", name, leakage=True)
+    said = answered(name, text, NODE, "mjs", "node ask.mjs", folder=tmp_path)
     assert said == "true TypeError TypeError RangeError RangeError TypeError\n"
-    assert_answers(name, tmp_path)
 
 
 def module(target: str, name: str, **options: object) -> types.ModuleType:
@@ -264,9 +258,8 @@ print(float(jnp.abs(inverse * road.tangent(road.overclosure(p[:100])) - 1).max()
 @pytest.mark.skipif(importlib.util.find_spec("jax") is None, reason="not installed: jax")
 @pytest.mark.parametrize("name", ["mbma", "calibrated", "persson"])
 def test_jax(name: str, tmp_path: pathlib.Path) -> None:
-    (tmp_path / "road.py").write_text(law_points.text("jax-law", name, leakage=True))
-    said = run(sys.executable, "-c", JAX, folder=asked(name, tmp_path)).split()
-    assert_answers(name, tmp_path)
+    text = law_points.text("jax-law", name, leakage=True)
+    said = answered(name, text, JAX, "py", f"{sys.executable} ask.py", folder=tmp_path).split()
     assert float(said[0]) < 1e-9
     assert said[1] == "True"
     assert float(said[2]) < 1e-9
@@ -290,11 +283,9 @@ OCTAVE_ENDS = "error: ignoring const execution_exception& while preparing to exi
 @needs("octave-cli")
 @pytest.mark.parametrize("name", ["mbma", "calibrated", "persson"])
 def test_matlab(name: str, tmp_path: pathlib.Path) -> None:
-    (tmp_path / "road.m").write_text(law_points.text("matlab-law", name, name="road", leakage=True))
-    (tmp_path / "ask.m").write_text(OCTAVE)
-    said = run("octave-cli", "--quiet", "--no-init-file", "ask.m", folder=asked(name, tmp_path), last_words=OCTAVE_ENDS)
+    text, command = law_points.text("matlab-law", name, name="road", leakage=True), "octave-cli --no-init-file ask.m"
+    said = answered(name, text, OCTAVE, "m", command, folder=tmp_path, words=OCTAVE_ENDS)
     assert said.startswith("road: overclosure must be in [")
-    assert_answers(name, tmp_path)
 
 
 UINTER = """program ask
