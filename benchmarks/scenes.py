@@ -30,12 +30,12 @@ def truth(surface: Surface, gaps: np.ndarray, name: str) -> np.ndarray:
     if name in ("force", "area"):
         return np.asarray(getattr(contact(surface, gaps, tier="exact", rtol=1e-10), name))
     if name == "stiffness":
-        return -contact(surface, gaps, rtol=1e-10, derivatives=True).force_by["separation"]
+        return -2 * contact(surface, gaps, rtol=1e-10, derivatives=True).force_by["separation"]
     span = surface.h_max - gaps
 
     def integrand(t: float) -> np.ndarray:
         # t^2 for the power at first contact
-        return 2 * t * span * contact(surface, surface.h_max - span * t**2, rtol=1e-10).force
+        return t * span * contact(surface, surface.h_max - span * t**2, rtol=1e-10).force
 
     return np.asarray(quad_vec(integrand, 0, 1, epsrel=1e-9, norm="max")[0])
 

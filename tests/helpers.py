@@ -16,6 +16,11 @@ def difference_weights(offsets):
     return np.linalg.solve(np.vander(offsets, increasing=True).T, np.eye(offsets.size)[1])
 
 
+def with_slopes(law):
+    """Force and area of a law, each with its slope by -d."""
+    return (law.force, lambda d: law.stiffness(d) / 2), (law.area, law.area_slope)
+
+
 def fresh(code, *arguments):
     """What `code` prints as JSON in a new interpreter."""
     command = [sys.executable, "-W", "error", "-c", code, *arguments]

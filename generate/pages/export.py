@@ -90,8 +90,8 @@ def compiled() -> str:
         pairs = {
             "pressure": known.force,
             "area": known.area,
-            "energy": known.energy / 2,
-            "tangent": 2 * known.stiffness,
+            "energy": known.energy,
+            "tangent": known.stiffness,
         }
         differences = [
             max(abs(getattr(library, f"law_{name}")(x) / y - 1) for x, y in zip(c, values, strict=True))

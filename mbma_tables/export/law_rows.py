@@ -90,7 +90,7 @@ def _curve(joint: Joint, quantity: str, max_overclosure: float, k_s: float) -> t
     # squares: fine where p is a high power of the overclosure
     c = max_overclosure * np.linspace(0, 1, FINE) ** 2
     d = law.h_max - 2 * c
-    pressure, stiffness = np.asarray(law.force(d)), np.asarray(law.stiffness_mean(d))
+    pressure, stiffness = np.asarray(law.force(d)), np.asarray(law.stiffness(d))
     pressure[0] = stiffness[0] = 0.0
     if quantity == "pressure":
         return c, pressure

@@ -29,8 +29,6 @@ def _units(problem: Problem) -> dict[str, tuple[str, str]]:
         "nominal_pressure": ("pressure", "F/A0 as prescribed"),
         "prescribed_area": ("area", "A/A0 as prescribed"),
         "area": ("area", "Hertz area of the summits over A0 (eta = 1)" if hertz else "real contact area A/A0"),
-        "stiffness": ("stiffness", "-dF/dd per nominal area"),
-        "stiffness_mean": ("stiffness", "-dF/du per nominal area"),
         "leakage": ("leakage", "flow conductance k h_rms^3: flow per length of seal is it dp/(12 viscosity width)"),
         "leakage_valid": ("valid", "whether flow through such contacts was simulated"),
         "leakage_scatter": ("scatter", "standard deviation of ln of the flow conductance between simulations"),

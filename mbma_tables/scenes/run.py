@@ -108,7 +108,7 @@ def _law(run: Run, step: Step) -> None:
         if step.theory or error <= run.rtol or asked <= MIN_LAW_RTOL:
             break
         asked = max(0.1 * asked, MIN_LAW_RTOL)
-    _keep(run, lambda name: getattr(law, {"stiffness": "stiffness_mean"}.get(name, name))(run.gap))
+    _keep(run, lambda name: getattr(law, name)(run.gap))
     run.close(step, error, dataclasses.replace(step, tier=tier).tier_name)
 
 
@@ -120,12 +120,13 @@ def _find_gaps(run: Run, law: ContactLaw) -> float:
         return 2 * law.error
     run.gap = law.separation(area=run.problem.gaps)
     gap = run.gap[law.area(run.gap) > 0]
-    ratio = law.stiffness(gap) * law.area(gap) / (law.force(gap) * law.area_slope(gap))
+    # area falls by d, half as fast as by u
+    ratio = law.stiffness(gap) / 2 * law.area(gap) / (law.force(gap) * law.area_slope(gap))
     return (1 + max(1.0, float(ratio.max(initial=0.0)))) * law.error
 
 
 def _keep(run: Run, quantity: Callable[[str], Any]) -> None:
-    """What was prescribed, and the quantities at gaps that were asked for, by name; stiffness is by u, energy by d."""
+    """What was prescribed, and the quantities at gaps that were asked for, by name."""
     problem, wanted = run.problem, run.problem.outputs
     values: dict[str, Any] = {}
     if problem.prescribed in INVERTED:
@@ -135,8 +136,7 @@ def _keep(run: Run, quantity: Callable[[str], Any]) -> None:
     if "area" in wanted and "subscale_area" not in problem.dropped:
         values["area"] = quantity("area")
     if "stiffness" in wanted:
-        slope = quantity("stiffness")
-        values |= {"stiffness": slope / 2, "stiffness_mean": slope}
+        values["stiffness"] = quantity("stiffness")
     if "conductance" in wanted:
         from mbma_tables.totals.conductance import conductance, mean_conductivity
 
@@ -162,8 +162,7 @@ def _contact(run: Run, step: Step) -> None:
             known |= {"reading": problem.reading, "rtol": step.rtol, "tier": problem.tier or "universal"}
     found = contact(run.surface, E_star=problem.E_star, theory=problem.theory, **known)
     run.gap = found.separation
-    # over d, which moves twice as far as u
-    _keep(run, lambda name: 2 * found.energy if name == "energy" else getattr(found, name))
+    _keep(run, lambda name: getattr(found, name))
     if problem.hardness is not None:
         names = ("yielded", "mean_pressure", "plane_separation", "incremental_stiffness")
         run.found |= {name: (("gap",), getattr(found, name)) for name in names}
@@ -200,7 +199,7 @@ def _slope_error(law: ContactLaw, gap: Any, inverted: bool) -> float:
     if touching.size == 0:
         return law.error
     # F/l over the stiffness: large only next to a turning point
-    ratio = law.force(touching) / ((law.h_max - touching) * np.abs(law.stiffness(touching)))
+    ratio = 2 * law.force(touching) / ((law.h_max - touching) * np.abs(law.stiffness(touching)))
     moved = MAX_SLOPE_OF_STIFFNESS * law.error if inverted else 0.0
     return max(2 * law.error, float(((law.slope_error(touching) + moved) * ratio).max()))
 

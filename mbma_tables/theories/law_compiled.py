@@ -19,7 +19,7 @@ from numba.extending import (
 )
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.theories.law_kernel import AREA, AREA_SLOPE, ENERGY, FORCE, STIFFNESS, evaluate
+from mbma_tables.theories.law_kernel import AREA, AREA_SLOPE, ENERGY, FORCE, FORCE_SLOPE, evaluate
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -37,16 +37,16 @@ class CompiledLaw:
         return evaluate(AREA, self.block.ctypes.data, d)
 
     def stiffness(self, d: float) -> float:
-        """-dF/dd."""
-        return evaluate(STIFFNESS, self.block.ctypes.data, d)
+        """-dF/du, which is twice -dF/dd."""
+        return 2.0 * evaluate(FORCE_SLOPE, self.block.ctypes.data, d)
 
     def area_slope(self, d: float) -> float:
         """-d(A/A0)/dd."""
         return evaluate(AREA_SLOPE, self.block.ctypes.data, d)
 
     def energy(self, d: float) -> float:
-        """Integral of force from d to last contact."""
-        return evaluate(ENERGY, self.block.ctypes.data, d)
+        """Integral of force over u, from d to last contact."""
+        return 0.5 * evaluate(ENERGY, self.block.ctypes.data, d)
 
 
 class _LawType(types.Type):
@@ -83,13 +83,16 @@ def _unbox(kind: Any, law: Any, context: Any) -> Any:
     return NativeValue(proxy._getvalue(), is_error=native.is_error, cleanup=native.cleanup)
 
 
-def _offer(name: str, what: int) -> None:
+def _offer(name: str, what: int, factor: float = 1.0) -> None:
     """A method of `CompiledLaw` in compiled code."""
 
     @overload_method(_LawType, name)
     def offered(law, d):  # type: ignore[no-untyped-def]
-        return lambda law, d: evaluate(what, np.int64(law.block.ctypes.data), d)  # type: ignore[arg-type]
+        return lambda law, d: factor * evaluate(what, np.int64(law.block.ctypes.data), d)  # type: ignore[arg-type]
 
 
-for _what, _name in enumerate(("force", "area", "stiffness", "area_slope", "energy")):
-    _offer(_name, _what)
+_offer("force", FORCE)
+_offer("area", AREA)
+_offer("stiffness", FORCE_SLOPE, 2.0)
+_offer("area_slope", AREA_SLOPE)
+_offer("energy", ENERGY, 0.5)

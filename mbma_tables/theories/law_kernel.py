@@ -24,7 +24,7 @@ from mbma_tables.elementary import bits_of
 DEGREE = 8
 CENTRE, RATE, FORCE_AT, AREA_AT, ENERGY_AT = 0, 1, 2, 3 + DEGREE, 4 + 2 * DEGREE
 RECORD = 5 + 2 * DEGREE
-FORCE, AREA, STIFFNESS, AREA_SLOPE, ENERGY = range(5)
+FORCE, AREA, FORCE_SLOPE, AREA_SLOPE, ENERGY = range(5)  # slopes against -d, energy over d
 
 # words of the head
 (
@@ -147,13 +147,13 @@ def _integral(address: int, word: int, t: float, power: float) -> float:
 
 @njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
 def _inside(what: int, address: int, place: Place) -> float:
-    """One of FORCE, AREA, STIFFNESS and AREA_SLOPE (both against -d), ENERGY (over d) at a place."""
+    """One of FORCE, AREA, FORCE_SLOPE, AREA_SLOPE and ENERGY at a place."""
     word, t = place.word, place.t
     if what == FORCE:
         return _value(address, word + FORCE_AT, t)
     if what == AREA:
         return _value(address, word + AREA_AT, t)
-    if what == STIFFNESS:
+    if what == FORCE_SLOPE:
         return _with_slope(address, word + FORCE_AT, t)[1] * place.q
     if what == AREA_SLOPE:
         return _with_slope(address, word + AREA_AT, t)[1] * place.q
@@ -201,7 +201,10 @@ def force_at(address: int, d: float) -> float:
 
 @njit(cache=True, fastmath=CONTRACT, error_model="numpy", nogil=True)
 def fill(address: int, d: FloatArray, force: Any, area: Any, stiffness: Any, area_slope: Any, energy: Any) -> bool:
-    """The quantities whose arrays are given, not None, at each gap; whether all gaps are in the law."""
+    """The quantities whose arrays are given, not None, at each gap; whether all are in the law.
+
+    Stiffness and energy are by u, which moves half as far as d.
+    """
     low, lowest, highest = number(address, LOW), number(address, LOWEST), number(address, HIGHEST)
     below = bad = 0
     for k in range(d.size):
@@ -215,11 +218,11 @@ def fill(address: int, d: FloatArray, force: Any, area: Any, stiffness: Any, are
         if area is not None:
             area[k] = _inside(AREA, address, place)
         if stiffness is not None:
-            stiffness[k] = _inside(STIFFNESS, address, place)
+            stiffness[k] = 2.0 * _inside(FORCE_SLOPE, address, place)
         if area_slope is not None:
             area_slope[k] = _inside(AREA_SLOPE, address, place)
         if energy is not None:
-            energy[k] = _inside(ENERGY, address, place)
+            energy[k] = 0.5 * _inside(ENERGY, address, place)
     # no branch above: entries of the first record are mended here
     if below:
         for k in range(d.size):
@@ -230,18 +233,18 @@ def fill(address: int, d: FloatArray, force: Any, area: Any, stiffness: Any, are
                 if area is not None:
                     area[k] = _first_record(AREA, address, x)
                 if stiffness is not None:
-                    stiffness[k] = _first_record(STIFFNESS, address, x)
+                    stiffness[k] = 2.0 * _first_record(FORCE_SLOPE, address, x)
                 if area_slope is not None:
                     area_slope[k] = _first_record(AREA_SLOPE, address, x)
                 if energy is not None:
-                    energy[k] = _first_record(ENERGY, address, x)
+                    energy[k] = 0.5 * _first_record(ENERGY, address, x)
     return bad == 0
 
 
 @njit(cache=True, error_model="numpy")
 def _towards(which: int, address: int, gap: float, wanted: float) -> float:
     """A Newton step from a gap, on the logarithm of force or area: loads range over many decades."""
-    value, slope = evaluate(which, address, gap), evaluate(which + STIFFNESS, address, gap)
+    value, slope = evaluate(which, address, gap), evaluate(which + FORCE_SLOPE, address, gap)
     if not (value > 0.0 and slope > 0.0):
         return math.nan
     step = value * math.log(value / wanted) / slope
@@ -344,7 +347,7 @@ def _fill_inverse(
                 if area is not None:
                     area[k] = evaluate(AREA, address, out[k])
                 if stiffness is not None:
-                    stiffness[k] = 2.0 * evaluate(STIFFNESS, address, out[k])
+                    stiffness[k] = 2.0 * evaluate(FORCE_SLOPE, address, out[k])
     return bad == 0
 
 

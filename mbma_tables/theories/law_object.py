@@ -49,7 +49,7 @@ class LawPoint(NamedTuple):
 
 
 class LawValues(NamedTuple):
-    """What a law answers at separations: F/A0, A/A0, -dF/dd and the energy, of their shape."""
+    """What a law answers at separations: F/A0, A/A0, -dF/du and the energy, of their shape."""
 
     force: Any
     area: Any
@@ -98,7 +98,7 @@ class ContactLaw(Displayed):
     >>> law = contact_law(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0), E_star=100e3)  # um, MPa
     >>> round(float(law.force(1.0)), 4), round(float(law.separation(force=7.9825)), 4)
     (7.9825, 1.0)
-    >>> round(float(law.stiffness_mean(u=2.0)), 3)  # -dF/du [MPa/um]
+    >>> round(float(law.stiffness(u=2.0)), 3)  # -dF/du [MPa/um]
     31.809
     >>> round(float(law.at_pressure(7.9825).area), 5), round(law.softening, 3)
     (0.00287, 1.06)
@@ -199,17 +199,16 @@ class ContactLaw(Displayed):
         return self._values(("area",), separation, u)[0]  # type: ignore[no-any-return]
 
     def stiffness(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
-        """-dF/dd per nominal area; MBMA's jumps where zeta_d reaches its floor, and belongs to the larger gap there."""
-        return self._values(("stiffness",), separation, u)[0]  # type: ignore[no-any-return]
+        """-dF/du per nominal area, against the mean separation u = (h_max + d)/2: -2 dF/dd.
 
-    def stiffness_mean(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
-        """-dF/du per nominal area, against the mean separation u = (h_max + d)/2: twice `stiffness`."""
-        return 2 * self.stiffness(separation, u=u)
+        MBMA's jumps where zeta_d reaches its floor, and belongs to the larger gap there.
+        """
+        return self._values(("stiffness",), separation, u)[0]  # type: ignore[no-any-return]
 
     def force_and_stiffness(
         self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None
     ) -> tuple[Numbers, Numbers]:
-        """F/A0 and -dF/dd in one pass, as iterations need them."""
+        """F/A0 and -dF/du in one pass, as iterations need them."""
         force, stiffness = self._values(("force", "stiffness"), separation, u)
         return force, stiffness
 
@@ -218,11 +217,11 @@ class ContactLaw(Displayed):
         return self._values(("area_slope",), separation, u)[0]  # type: ignore[no-any-return]
 
     def energy(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
-        """Elastic energy per nominal area, the integral of force from d to last contact."""
+        """Elastic energy per nominal area, the integral of F/A0 over u to last contact."""
         return self._values(("energy",), separation, u)[0]  # type: ignore[no-any-return]
 
     def values(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> LawValues:
-        """Force, area, stiffness -dF/dd and energy in one pass."""
+        """Force, area, stiffness -dF/du and energy in one pass."""
         return LawValues(*self._values(("force", "area", "stiffness", "energy"), separation, u))
 
     def separation(self, *, force: ArrayLike | None = None, area: ArrayLike | None = None) -> Numbers:
@@ -293,14 +292,14 @@ class ContactLaw(Displayed):
         step = (self.h_max - max(self.lowest, -self.h_max)) / 2 / SCAN
         u = self.h_max - step * np.arange(1, SCAN + 1)
         u[-1] = max(u[-1], (self.h_max + self.lowest) / 2)
-        values = np.asarray(self.stiffness_mean(u=u))
+        values = np.asarray(self.stiffness(u=u))
         falls = values[1:] < values[:-1] * (1 - DIGITS * self.error)
         if not falls.any():
             return None
         peak = int(falls.argmax())
         low, high = u[peak + 1], min(u[peak] + step, self.h_max)
         found = minimize_scalar(
-            lambda x: -self.stiffness_mean(u=x), bounds=(low, high), method="bounded", options={"xatol": 1e-7 * high}
+            lambda x: -self.stiffness(u=x), bounds=(low, high), method="bounded", options={"xatol": 1e-7 * high}
         )
         return float(found.x)
 
@@ -323,7 +322,7 @@ class ContactLaw(Displayed):
         return leakage_law(self, self.surface)
 
     def slope_error(self, separation: ArrayLike) -> Any:
-        """Bound on the error of `stiffness` over F/l, and of `area_slope` over A/l, against those of the theory.
+        """Bound on the error of `stiffness` over 2F/l, and of `area_slope` over A/l, against those of the theory.
 
         l = h_max - d where contact ends there, else h_max + d. It covers what the polynomials leave out, and for MBMA
         the error of the islands, which the sum over them passes on to slopes; not the own error of another theory.
@@ -364,7 +363,7 @@ class ContactLaw(Displayed):
         d = np.maximum(d, ends[1])
         names = ("separation", "mean_separation", "force", "area", "stiffness", "energy")
         force, area, stiffness, energy = self.values(d)
-        values = (d, (d + self.h_max) / 2, force, area, 2 * stiffness, energy)
+        values = (d, (d + self.h_max) / 2, force, area, stiffness, energy)
         return {n: Variable(v, unit_of(n, self.units), MEANINGS[n]) for n, v in zip(names, values, strict=True)}
 
     def _figure(self) -> Figure:
@@ -386,7 +385,7 @@ class ContactLaw(Displayed):
         ...     total = 0.0
         ...     for k in range(steps):
         ...         total += law.force(first + (last - first) * (k + 0.5) / steps) * (first - last) / steps
-        ...     return total
+        ...     return total / 2  # u moves half as far as d
         >>> law = contact_law(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0))
         >>> found = work(law.compiled(), 3.0, 1.0, 1000)
         >>> bool(abs(found / law.energy(1.0) - 1) < 1e-4)

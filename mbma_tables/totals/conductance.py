@@ -24,7 +24,7 @@ def mean_conductivity(k1: ArrayLike, k2: ArrayLike) -> Numbers:
     return (2 / (1 / first + 1 / second))[()]
 
 
-def conductance(stiffness_mean: ArrayLike, k_s: ArrayLike, E_star: ArrayLike) -> Numbers:
+def conductance(stiffness: ArrayLike, k_s: ArrayLike, E_star: ArrayLike) -> Numbers:
     """Conductance per nominal area, h = -(k_s/E*) dp/du.
 
     J. R. Barber, "Bounds on the electrical resistance between contacting elastic rough bodies", Proc. R. Soc. A 459
@@ -32,7 +32,7 @@ def conductance(stiffness_mean: ArrayLike, k_s: ArrayLike, E_star: ArrayLike) ->
 
     Parameters
     ----------
-    stiffness_mean : array_like
+    stiffness : array_like
         -dp/du against the mean separation [stress/length], zero or positive; incremental where the contact yields.
     k_s : array_like
         Mean conductivity of the bodies, `mean_conductivity`; thermal or electrical.
@@ -55,11 +55,11 @@ def conductance(stiffness_mean: ArrayLike, k_s: ArrayLike, E_star: ArrayLike) ->
     >>> float(conductance(1e14, k_s, 1e11))  # Pa/m and Pa give W/(m^2 K)
     80000.0
     """
-    slope = finite_array("stiffness_mean", stiffness_mean)
+    slope = finite_array("stiffness", stiffness)
     mean, modulus = finite_array("k_s", k_s), finite_array("E_star", E_star)
     require("k_s", mean, mean > 0, "positive")
     require("E_star", modulus, modulus > 0, "positive")
-    broadcast_shape(stiffness_mean=slope, k_s=mean, E_star=modulus)
+    broadcast_shape(stiffness=slope, k_s=mean, E_star=modulus)
     return (mean / modulus * slope)[()]
 
 

@@ -81,7 +81,7 @@ def points(name: str) -> Points:
     turn = law.lowest if law.turning_point is None else law.turning_point
     found = law.values(d)
     flow = np.asarray(law.leakage(d))
-    return Points(law, c, found.force, 2 * found.stiffness, found.area, found.energy / 2, flow, (h - turn) / 2)
+    return Points(law, c, found.force, found.stiffness, found.area, found.energy, flow, (h - turn) / 2)
 
 
 def text(target: str, law: str, **options: Any) -> str:

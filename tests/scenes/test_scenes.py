@@ -57,11 +57,11 @@ def test_pressures_stiffness_and_energy(rtol):
     # central differences of fresh totals, with an error of h^2
     h = 1e-4
     ends = [contact(CONCRETE, np.array(GAPS) + s * h, E_star=2.0, rtol=1e-10).force for s in (1, -1)]
-    slope = (ends[1] - ends[0]) / (2 * h)
+    slope = (ends[1] - ends[0]) / h  # by u, which moves half as far
     np.testing.assert_allclose(found["stiffness"], slope, rtol=rtol + 2e-6)
-    np.testing.assert_allclose(found["conductance"], 1.5 / 2 * 2 * slope, rtol=rtol + 2e-6)
+    np.testing.assert_allclose(found["conductance"], 1.5 / 2 * slope, rtol=rtol + 2e-6)
     for gap, energy in zip(GAPS, found["energy"].values, strict=True):
-        assert energy == pytest.approx(quad(exact.force, gap, exact.h_max, epsrel=1e-9)[0], rel=rtol + 1e-8, abs=0)
+        assert energy == pytest.approx(quad(exact.force, gap, exact.h_max, epsrel=1e-9)[0] / 2, rel=rtol + 1e-8, abs=0)
 
 
 def test_mean_separations_are_gaps():
@@ -333,7 +333,7 @@ def test_tables_are_not_read_where_nothing_looks_up(name, monkeypatch):
 )
 def test_stiffness_at_the_end_of_a_laws_piece(surface, gap, rtol):
     found = Scene(surface, effects=("stiffness",), separations=[gap], rtol=rtol).run()
-    truth = -contact(surface, gap, rtol=1e-11, derivatives=True).force_by["separation"]
+    truth = -2 * contact(surface, gap, rtol=1e-11, derivatives=True).force_by["separation"]
     assert abs(float(found["stiffness"][0]) / truth - 1) <= found.attrs["error"] <= rtol
 
 

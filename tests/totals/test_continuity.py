@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers import SCALE
+from helpers import SCALE, with_slopes
 
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island
 from mbma_tables.islands import newton
@@ -362,7 +362,7 @@ def test_laws_do_not_jump_at_their_breaks(rtol, record_property):
         depth = 2 * law.h_max * (law.records[1:, CENTRE] - 1 / law.records[1:, RATE])
         gaps = law.h_max - depth
         sides = [gaps - sign * STEP * depth for sign in (-0.5, 0.5)]
-        for value, slope in ((law.force, law.stiffness), (law.area, law.area_slope)):
+        for value, slope in with_slopes(law):
             a, b = (value(side) for side in sides)
             own = np.abs([slope(side) for side in sides]).max(axis=0) * 2 * np.abs(sides[1] - sides[0]) / a
             assert (np.abs(b / a - 1) <= 2 * law.error + own).all()

@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pytest
 from catalogue import LEVEL, OWN
-from helpers import SCALE, difference_weights
+from helpers import SCALE, difference_weights, with_slopes
 
 from mbma_tables import Surface, contact, contact_law, island
 from mbma_tables.islands.four_numbers import from_axes, to_axes
@@ -249,7 +249,7 @@ def test_laws_at_their_breaks(rtol, record_property):
         clear = np.abs(depth / kinks(hurst, zeta_1, rule)[0] - 1) > 1e-9
         gaps = law.h_max - depth
         room = law.slope_error(gaps + STEP * depth) + law.slope_error(gaps - STEP * depth)
-        for value, slope in ((law.force, law.stiffness), (law.area, law.area_slope)):
+        for value, slope in with_slopes(law):
             larger, smaller = (slope(gaps + sign * STEP * depth) for sign in (1, -1))
             # what the slope itself changes by over two steps
             further = [slope(gaps + sign * 1e-4 * depth) for sign in (1, -1)]
