@@ -15,7 +15,7 @@ import zlib
 
 import numpy as np
 import pytest
-from helpers import refused, run
+from helpers import random_map, refused, run
 
 from mbma_tables import InputError, Surface, contact
 from mbma_tables.export.explorer import MODULE, c_sources, digest_of, explorer_page, packed, page_file
@@ -280,10 +280,8 @@ def test_bad_spectra_are_told(visit):
 def test_a_map_is_taken_by_its_spectrum_which_the_page_says(opened, tmp_path):
     from generate.pages.explorer import visit
 
-    path, heights = tmp_path / "map.html", np.random.default_rng(8).normal(size=(64, 64))
-    q = np.hypot(*np.meshgrid(*2 * [2 * np.pi * np.fft.fftfreq(64)]))
-    spectrum = np.where((q > 0.15) & (q < 1.5), np.maximum(q, 0.15) ** -1.8, 0.0)
-    surface = Surface.from_map(np.fft.ifft2(np.fft.fft2(heights) * spectrum).real ** 3, 1.0, periodic=True)
+    path = tmp_path / "map.html"
+    surface = Surface.from_map((0.04 * random_map(64, 0.024, 0.239, seed=8)) ** 3, 1.0, periodic=True)
     path.write_text(explorer_page(surface), encoding="utf-8")
     tab = visit(opened, path.as_uri())
     assert "goes by its heights" in tab.inner_text("#origin")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers import random_map
 
 from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.reynolds import flow_conductance, open_ways
@@ -66,9 +67,7 @@ def test_dead_ends_carry_nothing():
 @pytest.mark.slow
 def test_another_solver():
     transport = pytest.importorskip("reynoldsflow.transport")
-    rng = np.random.default_rng(3)
-    q = np.hypot(np.fft.fftfreq(64, 1 / 64)[:, None], np.fft.rfftfreq(64, 1 / 64))
-    field = np.fft.irfft2(np.where((q >= 2) & (q <= 12), np.fft.rfft2(rng.standard_normal((64, 64))), 0))
+    field = random_map(64, 1.99 / 64, 12.01 / 64, power=0, seed=3)
     # 5% and 30% of the points touch
     for level, touching in ((1.6, 0.055), (0.5, 0.31)):
         gap = np.maximum(field / field.std() + level, 0)

@@ -7,6 +7,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from helpers import random_map
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -157,10 +158,7 @@ class TestCombined:
 
 
 def test_a_map_is_its_own_spectrum():
-    noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((128, 128)))
-    q = np.hypot(np.fft.fftfreq(128)[:, None], np.fft.rfftfreq(128))
-    q[0, 0] = np.inf
-    heights = np.fft.irfft2(noise * q**-1.8)
+    heights = random_map(128, 0, 1)
     found = Surface.from_map(heights, dx=0.5, periodic=True, model="measured")
     assert isinstance(found, MeasuredSurface)
     assert found.h_rms == pytest.approx(heights.std(), rel=1e-12)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers import random_map
 
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.errors import InputError
@@ -37,10 +38,7 @@ def test_the_true_power_law_gives_the_whole_surface_back():
 
 
 def test_as_options_of_a_map():
-    noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((64, 64)))
-    q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
-    q[0, 0] = np.inf
-    heights = np.fft.irfft2(noise * q**-1.8)
+    heights = random_map(64, 0, 1)
     options = {"dx": 1.0, "periodic": True, "unit": "um", "model": "measured"}
     plain = Surface.from_map(heights, **options)
     longer = Surface.from_map(heights, **options, extrapolate_to="100 nm", extrapolate_hurst=0.8)
@@ -52,9 +50,7 @@ def test_as_options_of_a_map():
 
 
 def test_every_answer_of_a_map_says_so():
-    noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((64, 64)))
-    q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
-    heights = 0.05 * np.fft.irfft2(np.where((q > 0.02) & (q < 0.4), noise / np.maximum(q, 0.02) ** 1.8, 0))
+    heights = 0.05 * random_map(64, 0.02, 0.4)
     told = "area is a matter of resolution: waves are known down to"
     for model in ("measured", "self-affine"):
         surface = Surface.from_map(heights, 1.0, periodic=True, unit="um", model=model)

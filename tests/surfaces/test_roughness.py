@@ -5,12 +5,11 @@ import math
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from helpers import refused, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbma_tables import InputError, OutOfRangeError, Surface
-from mbma_tables.cli import main
 
 SURFACE = Surface(0.75, 0.02, 5.0, 0.6, 2.1, unit="um")
 
@@ -122,7 +121,7 @@ GOOD = {"Rq": 0.6, "Rdq": 0.2, "longest": 300.0, "hurst": 0.8, "h_max": 2.0}
         ({"longest": None, "Sds": 1e-12}, "alpha = m0 m4/m2"),
     ],
 )
-def test_refused(changed, said):
+def test_numbers_that_are_refused(changed, said):
     with pytest.raises(InputError, match=said):
         Surface.from_roughness(**(GOOD | changed))
 
@@ -146,14 +145,9 @@ def test_on_the_command_line_and_in_toml(tmp_path):
     (tmp_path / "s.toml").write_text("[surface]\n" + "".join(f"{k} = {v!r}\n" for k, v in DRAWING.items()))
     surface = Surface.from_roughness(**DRAWING)
     for source in (options, ["--file", str(tmp_path / "s.toml")]):
-        found = CliRunner().invoke(main, ["contact", *source, "--E-star=100GPa", "-p", "10MPa", "--json"])
-        assert found.exit_code == 0, found.output
-        answer = json.loads(found.output)
+        answer = json.loads(run("contact", *source, "--E-star=100GPa", "-p", "10MPa", "--json"))
         assert answer["surface"]["q1"] == surface.q1
         assert answer["surface"]["assumed"] == surface.provenance[0]["assumed"]
         assert answer["units"]["separation"] == "um"
-    text = CliRunner().invoke(main, ["contact", *options, "-d", "1"]).output
-    assert text.count("\nassumed: ") == 5
-    refused = CliRunner().invoke(main, ["contact", *options, "--q0", "1/mm", "-d", "1"])
-    assert (refused.exit_code, refused.output.count("\n")) == (2, 1)
-    assert "q0 beside numbers of a drawing" in refused.output
+    assert run("contact", *options, "-d", "1").count("\nassumed: ") == 5
+    assert "q0 beside numbers of a drawing" in refused("contact", *options, "--q0", "1/mm", "-d", "1")

@@ -7,6 +7,7 @@ import types
 import numpy as np
 import pytest
 import xarray as xr
+from helpers import random_map
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -265,9 +266,7 @@ class TestMap:
     @example(1, 2.80859375, 3.0, 0.0)
     def test_force_area_and_stiffness_rise_with_compression(self, seed, power, sides, skew):
         # steep or flat spectra, stretched, of skewed heights: few points touch first
-        noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((48, 48)))
-        q = np.hypot(np.fft.fftfreq(48)[:, None], np.fft.rfftfreq(48))
-        heights = np.fft.irfft2(np.where((q > 0.04) & (q < 0.3), noise / np.maximum(q, 0.01) ** power, 0), s=(48, 48))
+        heights = random_map(48, 0.04, 0.3, power, seed)
         heights /= heights.std()
         if skew:
             heights = np.expm1(skew * heights) / skew

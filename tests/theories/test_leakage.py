@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+from helpers import random_map
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -197,10 +198,7 @@ class TestLaw:
         assert k[1] / k[0] == pytest.approx(1e9, rel=1e-4)
 
     def test_of_a_map(self):
-        noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((128, 128)))
-        k = np.hypot(np.fft.fftfreq(128)[:, None], np.fft.rfftfreq(128))
-        heights = np.fft.irfft2(np.where((k > 0.03) & (k < 0.25), noise * np.maximum(k, 0.01) ** -1.8, 0))
-        surface = Surface.from_map(heights, dx=1.0, periodic=True)
+        surface = Surface.from_map(random_map(128, 0.03, 0.25), dx=1.0, periodic=True)
         law = contact_law(surface, theory="calibrated")
         d = np.linspace(law.leakage.blocked_at + 0.05 * surface.h_rms, 0.99 * surface.h_max, 50)
         expected = contact(surface, d, theory="calibrated").leakage.conductance

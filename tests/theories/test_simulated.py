@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers import random_map
 
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.errors import InputError, MbmaError, OutOfRangeError
@@ -12,9 +13,7 @@ LOADS = (4e-3, 0.01, 0.025, 0.06, 0.12, 0.25, 0.5, 0.9)
 
 
 def heights(points=64, seed=3):
-    noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((points, points)))
-    q = np.hypot(np.fft.fftfreq(points)[:, None], np.fft.rfftfreq(points))
-    return 0.02 * np.fft.irfft2(np.where((q > 1.5 / points) & (q <= 0.25), noise / np.maximum(q, 0.01) ** 1.5, 0))
+    return 0.02 * random_map(points, 1.5 / points, 0.2501, 1.5, seed)
 
 
 @pytest.fixture(scope="module")

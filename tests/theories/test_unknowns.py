@@ -5,10 +5,9 @@ import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from helpers import random_map, refused, run
 
 from mbma_tables import InputError, Surface, contact, sensitivity
-from mbma_tables.cli import main
 from mbma_tables.theories import THEORIES
 
 SURFACE = Surface(0.8, 0.06, 12.0, 0.5, 1.7, unit="um")
@@ -106,7 +105,7 @@ def test_a_hurst_exponent_of_one_is_stepped_down_from():
         ({"pressure": 0.1, "surface": Surface([0.7, 0.8], 0.06, 12.0, 0.5, 1.7)}, "not of a batch"),
     ],
 )
-def test_refused(changed, said):
+def test_what_is_refused(changed, said):
     given = {"surface": SURFACE, "E_star": 10.0} | changed
     with pytest.raises(InputError, match=said):
         sensitivity(given.pop("surface"), **given)
@@ -114,18 +113,16 @@ def test_refused(changed, said):
 
 def test_the_command():
     arguments = ["--surface", "challenge", "--E-star", "25MPa", "-p", "100kPa", "--range", "h-max=2um:4um"]
-    result = CliRunner().invoke(main, ["sensitivity", *arguments, "--json"])
-    assert result.exit_code == 0, result.output
-    answer = json.loads(result.output)
+    answer = json.loads(run("sensitivity", *arguments, "--json"))
     found = sensitivity(Surface.named("challenge"), pressure=0.1, E_star="25 MPa", ranges={"h_max": (2.0, 4.0)})
     assert answer["columns"]["area"] == [row["area"] for row in found.slopes.values()]
     assert answer["columns"]["unit"] == ["-", "1/um", "1/um", "um", "um", "MPa", "MPa"]
     assert answer["ranges"]["h_max"]["stiffness"] == list(found.ranges["h_max"]["stiffness"])
-    text = CliRunner().invoke(main, ["sensitivity", *arguments]).output
+    text = run("sensitivity", *arguments)
     assert "range of h_max: mean_separation" in text
     assert "MPa/um" in text
-    bad = CliRunner().invoke(main, ["sensitivity", *arguments[:-1], "h_max:2"])
-    assert (bad.exit_code, bad.output) == (2, "mbma: --range must be like h_max=2um:4um, got 'h_max:2'\n")
+    bad = refused("sensitivity", *arguments[:-1], "h_max:2")
+    assert bad == "mbma: --range must be like h_max=2um:4um, got 'h_max:2'\n"
 
 
 @pytest.mark.parametrize("theory", ["mbma", "calibrated"])
@@ -146,9 +143,7 @@ def test_a_spectrum_in_samples_has_the_slopes_of_its_five_numbers(theory):
 
 
 def test_unknowns_of_a_map_and_of_its_extrapolation():
-    heights = np.random.default_rng(1).normal(size=(64, 64))
-    q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
-    heights = 0.1 * np.fft.irfft2(np.where((q > 0.03) & (q < 0.25), np.fft.rfft2(heights), 0))
+    heights = 0.1 * random_map(64, 0.03, 0.25, power=0)
     given = {"pressure": 0.01, "theory": "calibrated"}
     found = sensitivity(Surface.from_map(heights, 1.0, periodic=True), **given)
     assert set(found.slopes) == {"heights", "lengths", "pressure"}

@@ -7,6 +7,7 @@ import pickle
 import numpy as np
 import pytest
 import xarray as xr
+from helpers import random_map
 
 from mbma_tables import InputError, Surface, contact, contact_law, hardness
 from mbma_tables.theories import THEORIES, get_theory
@@ -151,9 +152,7 @@ def test_batches_labels_and_units():
 
 
 def test_a_map_yields_by_its_own_heights():
-    noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((64, 64)))
-    q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
-    heights = np.fft.irfft2(np.where((q > 0.05) & (q < 0.25), noise, 0))
+    heights = random_map(64, 0.05, 0.25, power=0)
     surface = Surface.from_map(heights, dx=1.0, periodic=True)
     soft = 1e-5 * float(surface.rms_gradient)
     level = np.quantile(heights - heights.mean(), 0.8)
