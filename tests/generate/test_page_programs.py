@@ -10,7 +10,6 @@ from click.testing import CliRunner
 
 from generate.__main__ import main
 from generate.pages import fidelity_figures, maps
-from generate.pages import tables as table_page
 from generate.pages import theories as theories_page
 from generate.pages.gallery import ratios
 from generate.pages.page import MARKED, ROOT
@@ -114,13 +113,6 @@ def test_every_figure_of_the_fidelity_page():
     fidelity_figures.pyplot().close("all")
     shown = re.findall(r"figures/(\w+)\.svg", (ROOT / "docs" / "fidelity.md").read_text(encoding="utf-8"))
     assert set(drawn) == set(shown)
-
-
-@pytest.mark.slow
-def test_the_page_on_tables():
-    parts, files = table_page.measure()
-    assert set(parts) == {"sizes", "cells", "axes", "universal", "island4d"}
-    assert [content[:5] for content in files.values()] == [SVG]
 
 
 def test_pieces_of_a_height_integral_are_the_shipped_ones():

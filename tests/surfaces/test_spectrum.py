@@ -64,17 +64,6 @@ def test_band_moment_between_any_ends(order):
 
 
 @pytest.mark.parametrize("hurst", HURSTS)
-@pytest.mark.parametrize("width", [1e-300, 1e-12, 1e-6, 0.1, 3.0, math.log(1e8)])
-def test_bands_by_their_log_ratio(hurst, width):
-    log_za = math.log(1.7)
-    with mp.workdps(50):
-        start = mp.exp(mp.mpf(log_za))
-    for order, moment in ((0, spectrum.m0_of), (2, spectrum.m2_of), (4, spectrum.m4_of)):
-        exact = exact_moment(order, hurst, start, width)
-        assert relative(moment(hurst, log_za, width), exact) <= 1e-14
-
-
-@pytest.mark.parametrize("hurst", HURSTS)
 def test_alpha(hurst):
     for width in (1e-12, 1e-6, 0.01, 0.1, 1.0, 3.0, 10.0, math.log(1e8)):
         with mp.workdps(50):

@@ -228,11 +228,6 @@ def test_a_window_is_the_librarys(window):
     np.testing.assert_allclose(found.windowed(), expected, atol=1e-12)
 
 
-def test_an_unknown_option_is_named():
-    with pytest.raises(TypeError, match="no argument 'cutoff': did you mean"):
-        Surface.from_map(MAP, STEP, cutoff=2.0)
-
-
 def test_lengths_with_their_unit():
     plain = Surface.from_map(MAP, STEP, unit="um", short_cutoff=3.0, model="measured")
     named = Surface.from_map(MAP, "250 nm", unit="um", short_cutoff="3e-6 m", model="measured")

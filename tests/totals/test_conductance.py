@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from mbma_tables import InputError, OutOfRangeError, Surface
+from mbma_tables import OutOfRangeError, Surface
 from mbma_tables.totals.conductance import conductance, cooper_mikic_yovanovich, mean_conductivity, mikic
 
 
@@ -39,13 +39,6 @@ def test_conductivities_and_moduli_are_positive(bad):
             call()
         assert caught.value.mask.shape == np.shape(bad)
         assert caught.value.mask.sum() == 1
-
-
-def test_conductivities_that_do_not_broadcast():
-    with pytest.raises(InputError, match="broadcast"):
-        mean_conductivity([1.0, 2.0], [1.0, 2.0, 3.0])
-    with pytest.raises(InputError, match="broadcast"):
-        conductance([1.0, 2.0], [1.0, 2.0, 3.0], 1.0)
 
 
 def test_correlations_follow_the_models_they_were_fitted_to():

@@ -187,11 +187,6 @@ def test_bad_options(option, value):
         contact(one_surface(0.8, 216.0), 1.0, **{option: value})
 
 
-def test_shapes_that_do_not_broadcast():
-    with pytest.raises(InputError, match="do not broadcast"):
-        contact(Surface([0.5, 0.6], 0.2, 40.0, 1.0, 3.0), [0.1, 0.2, 0.3])
-
-
 @pytest.mark.parametrize("tier", ["universal", "exact", "rigid", "island4d"])
 @pytest.mark.parametrize("wanted", ["force", "area"])
 def test_one_quantity_alone(tier, wanted):
