@@ -25,11 +25,13 @@ from mbma_tables.theories import law_kernel as kernel
 from mbma_tables.theories.law_kernel import AREA_AT, FORCE_AT
 from mbma_tables.theories.law_object import ROUNDING, ContactLaw
 from mbma_tables.theories.law_pieces import (
+    First,
     Pieces,
     Side,
     assemble,
     fill_energies,
     first_fall,
+    first_record,
     order_of,
     power_record,
     side_pieces,
@@ -117,7 +119,11 @@ def contact_law(
         from mbma_tables.theories.yielding import Yielding
 
         chosen = Yielding(chosen, float(cap) / modulus)
-    one = one_surface(surface)
+    one = surface
+    if one.labelled:
+        one = one.with_numbers(*(np.asarray(getattr(one, name)) for name in one.parameters))
+    if one.shape != ():
+        raise InputError(f"a law is of one surface, got a batch of shape {one.shape}")
     asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
     if isinstance(chosen, Mbma):
         return dataclasses.replace(_mbma_law(one, asked, chosen.tier, chosen.reading, modulus), units=units)
@@ -125,21 +131,6 @@ def contact_law(
         return dataclasses.replace(_theory_law(one, chosen, asked, modulus), units=units)
     except ConvergenceError as fault:
         raise ConvergenceError(f"theory {chosen.name!r}: {fault}; ask for a larger rtol", fault.mask) from None
-
-
-def one_surface(surface: AnySurface) -> AnySurface:
-    """A surface of plain numbers.
-
-    Raises
-    ------
-    InputError
-        For a batch.
-    """
-    if surface.labelled:
-        surface = surface.with_numbers(*(np.asarray(getattr(surface, name)) for name in surface.parameters))
-    if surface.shape != ():
-        raise InputError(f"a law is of one surface, got a batch of shape {surface.shape}")
-    return surface
 
 
 def _mbma_law(surface: AnySurface, rtol: float, tier: Any, reading: Reading, E_star: float) -> ContactLaw:
@@ -164,15 +155,11 @@ def _mbma_law(surface: AnySurface, rtol: float, tier: Any, reading: Reading, E_s
 
     places = [kink / end for kink in islands.kinks]
     tolerance = min(rtol, RESOLVED)
-    for octaves in range(math.ceil(-math.log2(min(LAYER_SHARE * islands.layer / end, *places))), 1100):
-        first, first_error = power_record(values, 2.0**-octaves, POWERS)
-        if first_error[0] <= tolerance:
-            break
-    side = Side(-1, 2.0**-octaves, values, tuple(place for place in places if 2.0**-octaves < place < 1))
-    made = _finish(
-        surface, 1 / end, [side], tolerance, (first, first_error, POWERS), E_star, h_max - end, math.inf, 0.0,
-        model.name, reading.name, "mbma",
-    )  # fmt: skip
+    octaves = range(math.ceil(-math.log2(min(LAYER_SHARE * islands.layer / end, *places))), 1100)
+    start, first = first_record(lambda start: power_record(values, start, POWERS), octaves, tolerance)
+    facts = {"surface": surface, "E_star": E_star, "theory": "mbma", "reading": reading.name, "tier": model.name}
+    side = Side(-1, start, values, tuple(places))
+    made = _finish(1 / end, [side], tolerance, first, h_max - end, math.inf, 0.0, facts)
     own = np.array([0.0, islands.leverage * worst])
     return dataclasses.replace(made, error=made.error + worst, errors=made.errors + own)
 
@@ -242,51 +229,32 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, E_star: float)
     tolerance = max(min(rtol, RESOLVED), SHARE * own)
     bends = np.asarray(theory.bends(surface), dtype=float)
 
-    def below(width: float) -> Any:
-        return lambda x: answer(h_max - width * x)
-
-    def above(width: float) -> Any:
-        return lambda x: answer(width * x)
-
-    start = 2.0**-FIRST_OCTAVES
-    if ends and lowest == 0:
-        width = h_max
-        sides = [Side(-1, start, below(width), tuple((h_max - bends) / width))]
-    elif ends:
-        width = h_max / 2
-        sides = [
-            Side(-1, start, below(width), tuple((h_max - bends[bends >= width]) / width)),
-            Side(1, lowest / width, above(width), tuple(bends[bends < width] / width)),
-        ]
-    else:
-        width = highest
-        sides = [Side(1, lowest / width or 0.125, above(width), tuple(bends / width))]
+    width = highest if not ends else h_max / 2 if lowest else h_max
+    above = Side(1, lowest / width, lambda x: answer(width * x), tuple(bends / width))
     if ends:
-        first = straight_record(sides[0].values, start)
+        start = 2.0**-FIRST_OCTAVES
+        below = Side(-1, start, lambda x: answer(h_max - width * x), tuple((h_max - bends) / width))
+        sides, first = [below, above] if lowest else [below], straight_record(below.values, start)
     elif lowest > 0:
-        first = np.zeros(kernel.RECORD), np.zeros(2), (0.0, 0.0)
+        sides, first = [above], (np.zeros(kernel.RECORD), np.zeros(2), (0.0, 0.0))
     else:
-        for octaves in range(3, MOST_OCTAVES):
-            record, error = power_record(sides[0].values, 2.0**-octaves, (0.0, 0.0))
-            if error[0] <= tolerance:
-                break
-        sides[0] = sides[0]._replace(start=2.0**-octaves)
-        first = record, error, (0.0, 0.0)
-    sides = [side._replace(kinks=tuple(k for k in side.kinks if side.start < k < 1)) for side in sides]
+        octaves = range(3, MOST_OCTAVES)
+        start, first = first_record(lambda start: power_record(above.values, start, (0.0, 0.0)), octaves, tolerance)
+        sides = [above._replace(start=start)]
     beyond = 0.0 if ends else 2 * float(theory.energy(surface, np.array(highest)))
-    made = _finish(
-        surface, 1 / (2 * width), sides, tolerance, first, E_star, 2 * lowest - h_max,
-        math.inf if ends else 2 * highest - h_max, beyond, "", "", theory.name,
-    )  # fmt: skip
+    limits = 2 * lowest - h_max, math.inf if ends else 2 * highest - h_max
+    facts = {"surface": surface, "E_star": E_star, "theory": theory.name, "reading": "", "tier": ""}
+    made = _finish(1 / (2 * width), sides, tolerance, first, *limits, beyond, facts)
     return dataclasses.replace(made, error=made.error + own)
 
 
 def _finish(
-    surface: AnySurface, scale: float, sides: list[Side], tolerance: float, first: Any, E_star: float,
-    lowest: float, highest: float, beyond: float, tier: str, reading: str, theory: str,
+    scale: float, sides: list[Side], tolerance: float, first: First, lowest: float, highest: float, beyond: float,
+    facts: dict[str, Any],
 ) -> ContactLaw:  # fmt: skip
     """Fit the sides, put the block together, and look for turning points."""
-    h_max = float(surface.h_max)
+    h_max = float(facts["surface"].h_max)
+    sides = [side._replace(kinks=tuple(kink for kink in side.kinks if side.start < kink < 1)) for side in sides]
     pieces: list[Pieces] = [side_pieces(side, tolerance) for side in sides]
     record, record_error, powers = first
     made = assemble(h_max, scale, sides, pieces, record, record_error)
@@ -303,8 +271,8 @@ def _finish(
         return float(side_of[number] * (x / scale - h_max))
 
     # forces carry the modulus
-    made.records[:, FORCE_AT:AREA_AT] *= E_star
-    made.records[:, kernel.ENERGY_AT] *= E_star
+    made.records[:, FORCE_AT:AREA_AT] *= facts["E_star"]
+    made.records[:, kernel.ENERGY_AT] *= facts["E_star"]
     slack = ROUNDING * h_max
     head = made.head
     head[[kernel.POWER_F, kernel.POWER_A]] = powers
@@ -314,19 +282,15 @@ def _finish(
     block = made.block
     block.flags.writeable = False
     return ContactLaw(
+        **facts,
         h_max=h_max,
-        E_star=E_star,
         lowest=lowest,
         highest=highest,
         error=float(made.errors[:, 0].max()),
         turning_point=gap(turns[0]),
         area_turning_point=gap(turns[1]),
-        theory=theory,
-        reading=reading,
-        tier=tier,
         block=block,
         errors=made.errors,
-        surface=surface,
     )
 
 

@@ -14,7 +14,7 @@ from mbma_tables.labels import apply
 from mbma_tables.leakage import wide_gap
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.law_kernel import ENDS, HIGHEST, KINK_SIGN, KINK_SIGN_2, LOWEST, POWER_A, POWER_F, fill
-from mbma_tables.theories.law_pieces import Side, assemble, power_record, side_pieces, straight_record
+from mbma_tables.theories.law_pieces import Side, assemble, first_record, power_record, side_pieces, straight_record
 from mbma_tables.theories.leakage import flow
 from mbma_tables.theories.leakage_table import shipped_flow
 
@@ -90,16 +90,13 @@ def leakage_law(law: ContactLaw, surface: AnySurface) -> LeakageLaw:
         conductance = h_rms**3 * flow(surface, (law.h_max + d) / 2, np.asarray(law.area(d)))
         return np.stack([conductance, np.cbrt(conductance)])
 
-    for octaves in range(MOST_OCTAVES if blocked else 6, MOST_OCTAVES + 1):
-        start = 2.0**-octaves
-        if blocked:
-            record, record_error, powers = straight_record(values, start)
-        else:
-            # gaps close as u under full compression
-            powers = (3.0, 1.0) if bottom == -law.h_max else (0.0, 0.0)
-            record, record_error = power_record(values, start, powers)
-        if record_error[0] <= rtol:
-            break
+    # gaps close as u under full compression
+    known = (3.0, 1.0) if bottom == -law.h_max else (0.0, 0.0)
+    start, (record, record_error, powers) = first_record(
+        lambda start: straight_record(values, start) if blocked else power_record(values, start, known),
+        range(MOST_OCTAVES if blocked else 6, MOST_OCTAVES + 1),
+        rtol,
+    )
     head = law.block
     kinks = [(head[at] * head[at + 1] - bottom) / span for at in (KINK_SIGN, KINK_SIGN_2) if head[at]]
     side = Side(1, start, values, tuple(sorted(kink for kink in kinks if start < kink < 1)))

@@ -11,7 +11,7 @@ import dataclasses
 import functools
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,6 +33,7 @@ FOR_SLOPES = 4  # times more buckets are tried for the sake of slopes
 KEPT = DEGREE + 1
 
 Values = Callable[[FloatArray], FloatArray]
+First = tuple[FloatArray, FloatArray, tuple[float, float]]  # record below where x begins, its errors, its powers
 
 
 class Side(NamedTuple):
@@ -158,15 +159,26 @@ def positive(found: FloatArray) -> FloatArray:
     return found
 
 
-def power_record(values: Values, start: float, powers: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """The record below `start` where force and area are these powers of x times polynomials; bounds on its errors."""
+def first_record(make: Callable[[float], First], octaves: Iterable[int], rtol: float) -> tuple[float, First]:
+    """The first of some powers of 1/2 below which a record meets a tolerance, or the last; and the record."""
+    for number in octaves:
+        start = 2.0**-number
+        first = make(start)
+        if first[1][0] <= rtol:
+            break
+    return start, first
+
+
+def power_record(values: Values, start: float, powers: tuple[float, float]) -> First:
+    """The record below `start` where force and area are these powers of x times polynomials."""
     t = (1 + _transforms()[0]) / 2
     lead = np.stack([t**power for power in powers])
     rest = positive(values(t * start)) / lead
     monomials, value, slope = fit(rest)
     # from [-1, 1] to [0, 1]: (2 t - 1)^k
     shift = np.array([[math.comb(k, j) * 2.0**j * (-1.0) ** (k - j) for j in range(KEPT)] for k in range(KEPT)])
-    return _first(monomials @ shift, start), _first_errors(value / rest.min(axis=-1), slope / rest.min(axis=-1), powers)
+    least = rest.min(axis=-1)
+    return _first(monomials @ shift, start), _first_errors(value / least, slope / least, powers), powers
 
 
 def _first_errors(value: FloatArray, slope: FloatArray, powers: tuple[float, float]) -> FloatArray:
@@ -181,8 +193,8 @@ def _first(monomials: FloatArray, start: float) -> FloatArray:
     return record
 
 
-def straight_record(values: Values, start: float) -> tuple[FloatArray, FloatArray, tuple[float, float]]:
-    """The record below `start` where the power is not known: it and a slope by least squares; also errors, powers."""
+def straight_record(values: Values, start: float) -> First:
+    """The record below `start` where the powers are not known: they and a slope by least squares."""
     t = (1 + _transforms()[0]) / 2
     t = t[t > 1 / SAMPLES]
     logs = np.log(positive(values(t * start)))
