@@ -154,7 +154,7 @@ class Capped(Simulated):
 
 
 def capped(data: xr.Dataset) -> list[Capped]:
-    """Surfaces of a file by `python -m generate boundary_elements --hardness`, refinements left out."""
+    """Surfaces of a file by `python -m generate boundary_elements --of hardness`, refinements left out."""
     found = []
     names = ("force", "area", "area_yielded", "mean_separation", "plane_separation", "frozen_stiffness")
     for one, known in simulated(data):
