@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, finite_array
-from mbma_tables.errors import InputError, MbmaError
+from mbma_tables.arguments import FloatArray, finite_array, needed
+from mbma_tables.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,11 +72,7 @@ class Curve:
 
 def new_figure(width: float, height: float) -> Figure:
     """A figure [inches] that is none of pyplot's, and that notebooks show."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise MbmaError("a plot needs matplotlib: pip install 'mbma_tables[plot]'") from None
-    figure: Any = Figure(figsize=(width, height), layout="constrained")
+    figure: Any = needed("matplotlib.figure", "plot").Figure(figsize=(width, height), layout="constrained")
     figure._repr_png_ = lambda: to_picture(figure, dpi=72)
     made: Figure = figure
     return made

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import finite_array
+from mbma_tables.arguments import finite_array, needed
 from mbma_tables.errors import InputError
 from mbma_tables.export.law_rows import LawTable
 from mbma_tables.export.text import checked_name, comment, csv_cell
@@ -79,19 +79,10 @@ def _law_of(held: dict[str, Any]) -> LawTable:
     x, y = (finite_array(held[axis], held["columns"][held[axis]]) for axis in ("x", "y"))
     if x.ndim != 1 or x.shape != y.shape or not (np.diff(x) > 0).all():
         raise ValueError("two columns of one length are needed, the first of them rising")
-    return LawTable(
-        x=x,
-        y=y,
-        x_name=str(held["x"]),
-        y_name=str(held["y"]),
-        x_unit=str(held["x_unit"]),
-        y_unit=str(held["y_unit"]),
-        largest_error=float(held["largest_error"]),
-        comments=tuple(map(str, held["comments"])),
-        theory=str(held["theory"]),
-        floor=float(held["floor"]),
-        behaviour=_law_of(held["behaviour"]) if "behaviour" in held else None,
-    )
+    x_name, y_name, x_unit, y_unit = (str(held[name]) for name in ("x", "y", "x_unit", "y_unit"))
+    comments, behaviour = tuple(map(str, held["comments"])), _law_of(held["behaviour"]) if "behaviour" in held else None
+    error, theory, floor = float(held["largest_error"]), str(held["theory"]), float(held["floor"])
+    return LawTable(x, y, x_name, y_name, x_unit, y_unit, error, comments, theory, floor, behaviour)
 
 
 def to_matlab(law: LawTable) -> bytes:
@@ -130,10 +121,7 @@ def to_netcdf(law: LawTable) -> bytes:
 
 def to_hdf5(law: LawTable) -> bytes:
     """A plain HDF5 file: two datasets with units, the header as attributes."""
-    try:
-        import h5py
-    except ImportError:
-        raise InputError("HDF5 needs h5py: pip install 'mbma_tables[hdf5]'") from None
+    h5py = needed("h5py", "hdf5")
     stream = io.BytesIO()
     with h5py.File(stream, "w") as file:
         for name, values, unit in ((law.x_name, law.x, law.x_unit), (law.y_name, law.y, law.y_unit)):
@@ -147,12 +135,8 @@ def to_hdf5(law: LawTable) -> bytes:
 
 def to_parquet(law: LawTable) -> bytes:
     """A Parquet file: two columns, the header as metadata of the schema."""
-    try:
-        import pyarrow as pa
-        from pyarrow import parquet
-    except ImportError:
-        raise InputError("Parquet needs pyarrow: pip install 'mbma_tables[parquet]'") from None
-    table = pa.table({law.x_name: law.x, law.y_name: law.y})
+    pyarrow, parquet = (needed(module, "parquet") for module in ("pyarrow", "pyarrow.parquet"))
+    table = pyarrow.table({law.x_name: law.x, law.y_name: law.y})
     table = table.replace_schema_metadata({name: json.dumps(value) for name, value in _header(law).items()})
     stream = io.BytesIO()
     parquet.write_table(table, stream)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder
 
 from mbma_tables import __version__
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import InputError
+from mbma_tables.arguments import FloatArray, needed
 from mbma_tables.export.law_code import MAX_NAME, AskedLaw, asked_law
 from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers
 from mbma_tables.export.text import checked_name
@@ -59,8 +59,8 @@ def onnx(
 
     Raises
     ------
-    InputError, OutOfRangeError
-        As `law_text`; and without the package onnx.
+    InputError, OutOfRangeError, MbmaError
+        As `law_text`; MbmaError without the package onnx.
 
     Examples
     --------
@@ -70,18 +70,16 @@ def onnx(
     >>> [output.name for output in library.load_from_string(file).graph.output]
     ['pressure', 'tangent', 'area', 'energy']
     """
-    try:
-        from onnx import TensorProto, helper, numpy_helper
-    except ImportError:
-        raise InputError("onnx needs a package: pip install 'mbma_tables[onnx]'") from None
+    library = needed("onnx", "onnx")
+    helper, double = library.helper, library.TensorProto.DOUBLE
     found, graph = asked_law(surface, E_star, **asked), _Graph(helper)
     outputs = _law(graph, found)
     made = helper.make_graph(
         graph.nodes,
         checked_name(name, MAX_NAME),
-        [helper.make_tensor_value_info("overclosure", TensorProto.DOUBLE, ["n"])],
-        [helper.make_tensor_value_info(output, TensorProto.DOUBLE, ["n"]) for output in outputs],
-        [numpy_helper.from_array(value, key) for key, value in graph.constants.items()],
+        [helper.make_tensor_value_info("overclosure", double, ["n"])],
+        [helper.make_tensor_value_info(output, double, ["n"]) for output in outputs],
+        [library.numpy_helper.from_array(value, key) for key, value in graph.constants.items()],
         doc_string="\n".join(found.said),
     )
     known = {"opset_imports": [helper.make_opsetid("", OPSET)], "ir_version": IR}
@@ -107,14 +105,15 @@ def _law(graph: _Graph, found: AskedLaw) -> list[str]:
     def ended(value: str, to: str) -> str:
         return graph("Where", outside, np.nan, graph("Where", below, 0.0, value), name=to)
 
-    value, slope = _polynomial(graph, numbers.force, k, t)
+    value = _polynomial(graph, numbers.force, k, t)
+    slope = _polynomial(graph, np.asarray(polyder(numbers.force, axis=1), float), k, t)
     power = graph("Where", powered, graph("Div", numbers.power_p, base), 0.0)
     lead = graph("Pow", base, numbers.power_p)
     slope = graph("Mul", lead, graph("Add", slope, graph("Mul", power, value)))
-    area = graph("Mul", graph("Pow", base, numbers.power_a), _polynomial(graph, numbers.area, k, t)[0])
+    area = graph("Mul", graph("Pow", base, numbers.power_a), _polynomial(graph, numbers.area, k, t))
     powers = np.tile(np.arange(1.0, 10.0), (numbers.rate.size, 1))
     powers[0] += numbers.power_p
-    sum_ = graph("Mul", graph("Mul", lead, t), _polynomial(graph, numbers.force / powers, k, t)[0])
+    sum_ = graph("Mul", graph("Mul", lead, t), _polynomial(graph, numbers.force / powers, k, t))
     energy = graph("Add", graph("Gather", numbers.energies, k), graph("Div", sum_, rate))
     outputs = [
         ended(graph("Mul", lead, value), "pressure"),
@@ -138,7 +137,7 @@ def _flow(graph: _Graph, numbers: LawNumbers, flow: FlowNumbers) -> str:
     t = graph("Mul", graph("Sub", x, graph("Gather", flow.centre, k)), graph("Gather", flow.rate, k))
     blocked = graph("And", graph("LessOrEqual", x, 0.0), flow.blocks)
     base = graph("Where", graph("And", graph("Equal", k, 0), graph("Not", blocked)), t, 1.0)
-    value = graph("Mul", graph("Pow", base, flow.power), _polynomial(graph, flow.force, k, t)[0])
+    value = graph("Mul", graph("Pow", base, flow.power), _polynomial(graph, flow.force, k, t))
     u = graph("Sub", numbers.h_max, c)
     wide = graph("Div", -1.5, graph("Add", graph("Pow", graph("Div", u, flow.h_rms), 2.0), 4.0))
     apart = graph("Mul", graph("Pow", u, 3.0), graph("Add", wide, 1.0))
@@ -152,10 +151,7 @@ def _record(graph: _Graph, x: str, edges: FloatArray) -> str:
     return graph("ReduceSum", graph("Cast", reached, to=7), [-1], keepdims=0)
 
 
-def _polynomial(graph: _Graph, rows: FloatArray, k: str, t: str) -> tuple[str, str]:
-    """The polynomial of row k, and its derivative."""
-    value, slope = graph("Gather", rows[:, -1].copy(), k), ""
-    for column in rows.T[-2::-1]:
-        slope = graph("Add", graph("Mul", slope, t), value) if slope else value
-        value = graph("Add", graph("Mul", value, t), graph("Gather", column.copy(), k))
-    return value, slope
+def _polynomial(graph: _Graph, rows: FloatArray, k: str, t: str) -> str:
+    """The polynomial of row k."""
+    powers = graph("Pow", graph("Unsqueeze", t, [-1]), np.arange(float(rows.shape[1])))
+    return graph("ReduceSum", graph("Mul", graph("Gather", rows.copy(), k), powers), [-1], keepdims=0)

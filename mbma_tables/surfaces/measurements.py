@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import finite_array, number_in, one_number, require
+from mbma_tables.arguments import finite_array, needed, number_in, one_number, require
 from mbma_tables.errors import InputError, MbmaError
 from mbma_tables.files import read_file
 
@@ -24,11 +24,7 @@ def library() -> Any:
     """SurfaceTopography, without its remarks on its own optional parts."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        try:
-            import SurfaceTopography
-        except ImportError:
-            raise MbmaError("measured maps need SurfaceTopography: pip install 'mbma_tables[maps]'") from None
-    return SurfaceTopography
+        return needed("SurfaceTopography", "maps")
 
 
 def read_measurement(

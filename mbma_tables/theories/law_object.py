@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, require
+from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, needed, require
 from mbma_tables.compiled import in_blocks
 from mbma_tables.display import Displayed, Variable, shown
-from mbma_tables.errors import InputError, MbmaError
+from mbma_tables.errors import InputError
 from mbma_tables.plots import Curve, draw_compression, force_label, theory_label
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import law_kernel as kernel
@@ -391,10 +391,9 @@ class ContactLaw(Displayed):
         >>> bool(abs(found / law.energy(1.0) - 1) < 1e-4)
         True
         """
-        try:
-            from mbma_tables.theories.law_compiled import CompiledLaw
-        except ImportError:
-            raise MbmaError("compiled functions need numba: pip install 'mbma_tables[fast]'") from None
+        needed("numba", "fast")
+        from mbma_tables.theories.law_compiled import CompiledLaw
+
         return CompiledLaw(self.block)
 
     def __getstate__(self) -> dict[str, Any]:

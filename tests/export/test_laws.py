@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from mbma_tables import InputError, Surface, contact
+from mbma_tables import InputError, MbmaError, Surface, contact
 from mbma_tables.export import DATA, SOLVERS, chords, data, solvers
 from mbma_tables.export.law_rows import FLOOR, describe_law
 from mbma_tables.export.solvers import calculix, exponential, optistruct
@@ -176,7 +176,7 @@ def test_exponential_is_persson_for_light_loads():
 @pytest.mark.parametrize(("target", "package"), [("hdf5", "h5py"), ("parquet", "pyarrow")])
 def test_a_missing_package_is_named(target, package, monkeypatch):
     monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(InputError, match=rf"mbma_tables\[{target}\]"):
+    with pytest.raises(MbmaError, match=rf"mbma_tables\[{target}\]"):
         getattr(data, f"to_{target}")(law_of())
 
 
