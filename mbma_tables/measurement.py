@@ -13,14 +13,13 @@ from mbma_tables.plots import new_figure, theory_label
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories import get_theory
-from mbma_tables.theories.protocol import Theory, answer_where_finite
+from mbma_tables.theories.protocol import answer_where_finite
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 DRAWN = ("calibrated", "mbma")
-DRAWN_RTOL = 1e-4
 AREAS = np.array([0.002, 0.01, 0.03, 0.1, 0.3, 0.6])  # contact of a table of loads
 REACHED = 0.05  # relative, of a contact that was asked for
 GAPS = np.append(np.geomspace(2e-3, 0.1, 20)[:-1], np.linspace(0.1, 0.98, 60))  # u/h_max of curves
@@ -55,21 +54,12 @@ def described(surface: MeasuredSurface) -> list[str]:
     return lines + [entry["told"] for entry in surface.provenance if "told" in entry]
 
 
-def drawn_theory(name: str) -> Theory:
-    """A theory as exact as a line in a picture."""
-    if name == "mbma":
-        from mbma_tables.theories.mbma import Mbma
-
-        return Mbma("universal", "reported", DRAWN_RTOL, "raise")
-    return get_theory(name)
-
-
 def curves(surface: MeasuredSurface, E_star: float = 1.0) -> dict[str, dict[str, FloatArray]]:
     """Force, area, mean separation and their scatter by the theories of the picture."""
     u = float(surface.h_max) * GAPS
     found = {}
     for name in DRAWN:
-        theory = drawn_theory(name)
+        theory = get_theory(name)
         try:
             answer = answer_where_finite(theory, surface, u)
         except MbmaError:

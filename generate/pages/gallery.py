@@ -19,10 +19,10 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.boundary_elements import LOADS
 from mbma_tables.errors import MbmaError
 from mbma_tables.files import write_file
-from mbma_tables.measurement import curves, described, draw, drawn_theory
+from mbma_tables.measurement import curves, described, draw
 from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.measured import MeasuredSurface
-from mbma_tables.theories import BoundaryElements
+from mbma_tables.theories import BoundaryElements, get_theory
 from mbma_tables.theories.protocol import Theory, answer_where_finite
 from mbma_tables.theories.simulated import continued
 
@@ -138,7 +138,7 @@ def compared(surface: MeasuredSurface, rows: FloatArray) -> str:
     """The calibrated law and MBMA over boundary elements, as a table."""
     force, area, u, _ = rows[:, [int(np.argmin(np.abs(np.log(rows[1] / share)))) for share in SHOWN]]
     columns = [[f"{share:.2%}" for share in area]]
-    for theory in map(drawn_theory, ("calibrated", "mbma")):
+    for theory in map(get_theory, ("calibrated", "mbma")):
         try:
             found = ratios(theory, surface, force, area, u)
         except MbmaError:
@@ -189,7 +189,7 @@ def measure() -> tuple[dict[str, str], dict[str, bytes]]:
         files[f"docs/figures/gallery_{stem}.svg"] = svg(picture)
         said = "\n".join(described(surface))
         text += [f"## {example.name}", example.about, f"```\n$ {example.command} --plot {stem}.png\n{said}\n```"]
-        text += [f"![{example.name}](figures/gallery_{stem}.png)"]
+        text += [f"![{example.name}](figures/gallery_{stem}.svg)"]
         if found is not None:
             text += ["Over boundary elements on this map:", compared(surface, found)]
     for example in BARS:

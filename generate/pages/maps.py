@@ -14,9 +14,9 @@ from generate.pages.page import ROOT, table
 from mbma_tables import Surface, contact
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import MbmaError
-from mbma_tables.measurement import drawn_theory
 from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.theories import get_theory
 
 KINDS = ("stretched", "peaks", "valleys", "patchy", "worn")
 GRADIENT = 0.1  # that surfaces are given: theories ask for a small one
@@ -62,7 +62,7 @@ def summary(seen: list[Seen]) -> list[str]:
     """Cells of one row: area and force of both theories over simulation, and how many answers are valid."""
     cells = []
     for name, (low, high) in RANGES.items():
-        theory, found = drawn_theory(name), []
+        theory, found = get_theory(name), []
         for _, surface, rows in seen:
             force, area, u = rows[:, (rows[1] >= low) & (rows[1] <= high)]
             try:

@@ -210,9 +210,8 @@ def _totals(run: Run, step: Step) -> None:
     problem = run.problem
     assert step.rtol is not None
     assert step.tier is not None
-    wanted = tuple(name for name in ("force", "area") if name in problem.outputs)
-    if "subscale_area" in problem.dropped:
-        wanted = tuple(name for name in wanted if name != "area")
+    own = {"force"} if "subscale_area" in problem.dropped else {"force", "area"}
+    wanted = sorted(problem.outputs & own, reverse=True)
     block = run.gap.size if step.tier_name in ("universal", "rigid") else BLOCK
     answers = []
     for first in range(0, run.gap.size, block):
