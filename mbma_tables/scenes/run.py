@@ -211,7 +211,7 @@ def _totals(run: Run, step: Step) -> None:
     assert step.rtol is not None
     assert step.tier is not None
     own = {"force"} if "subscale_area" in problem.dropped else {"force", "area"}
-    wanted = sorted(problem.outputs & own, reverse=True)
+    wanted = tuple(sorted(problem.outputs & own, reverse=True))
     block = run.gap.size if step.tier_name in ("universal", "rigid") else BLOCK
     answers = []
     for first in range(0, run.gap.size, block):
