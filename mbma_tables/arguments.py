@@ -54,6 +54,8 @@ def hinted(function: Callable[P, R]) -> Callable[P, R]:
     @functools.wraps(function)
     def checked(*given: P.args, **named: P.kwargs) -> R:
         for name in named.keys() - parameters.keys():
+            if name in ("E1", "nu1", "E2", "nu2") and "E_star" in names:
+                raise TypeError(f"{called} has no argument {name!r}: E_star=materials.effective_modulus(E1, nu1, E2, nu2)")
             meant = SYMBOLS.get(name)
             hint = f"did you mean {meant!r}?" if meant in names else nearest(name, names)
             raise TypeError(f"{called} has no argument {name!r}: {hint}")
@@ -67,7 +69,7 @@ def needed(module: str, extra: str) -> Any:
     try:
         return importlib.import_module(module)
     except ImportError:
-        raise MbmaError(f"this needs {module}: pip install 'mbma_tables[{extra}]'") from None
+        raise MbmaError(f"this needs {module.partition('.')[0]}: pip install 'mbma_tables[{extra}]'") from None
 
 
 def is_labelled(value: Any) -> bool:

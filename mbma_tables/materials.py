@@ -15,28 +15,29 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import broadcast_shape, finite_array, require
+from mbma_tables.arguments import broadcast_shape, finite_array, one_number, require
 from mbma_tables.errors import InputError
 from mbma_tables.files import shipped_file
+from mbma_tables.units import resolve
 
 ELASTIC_PSI = 1.1  # plasticity index E* g/p_m up to which elastic areas are within 5% of those with a hardness
 
 
-def effective_modulus(E1: ArrayLike, nu1: ArrayLike, E2: ArrayLike, nu2: ArrayLike) -> Any:
+def effective_modulus(E1: ArrayLike | str, nu1: ArrayLike, E2: ArrayLike | str, nu2: ArrayLike) -> Any:
     """Effective modulus of two elastic bodies, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
 
     Parameters
     ----------
-    E1, E2 : array_like
-        Young's moduli, positive, in one unit of stress.
+    E1, E2 : array_like or str
+        Young's moduli, positive, in one unit of stress; or texts with theirs, "210 GPa".
     nu1, nu2 : array_like
         Poisson's ratios, in (-1, 0.5].
 
     Returns
     -------
-    float or ndarray
-        E*, in the unit of E1 and E2; the arguments broadcast. Against a rigid body it is E1/(1 - nu1^2), the
-        limit of large E2.
+    float, ndarray or str
+        E*, in the unit of E1 and E2; the arguments broadcast. A text with that unit where texts were given, which
+        `E_star=` takes as it is. Against a rigid body it is E1/(1 - nu1^2), the limit of large E2.
 
     Raises
     ------
@@ -50,15 +51,19 @@ def effective_modulus(E1: ArrayLike, nu1: ArrayLike, E2: ArrayLike, nu2: ArrayLi
     >>> from mbma_tables.materials import effective_modulus
     >>> round(float(effective_modulus(210.0, 0.3, 210.0, 0.3)), 2)
     115.38
+    >>> effective_modulus("200 GPa", 0.0, "50 GPa", 0.0)
+    '40.0 GPa'
     """
-    given = {name: finite_array(name, value) for name, value in {"E1": E1, "nu1": nu1, "E2": E2, "nu2": nu2}.items()}
+    plain, unit = resolve({"E1": E1, "nu1": nu1, "E2": E2, "nu2": nu2}, kind="stress")
+    given = {name: finite_array(name, value) for name, value in plain.items()}
     for name in ("E1", "E2"):
         require(name, given[name], given[name] > 0, "positive")
     for name in ("nu1", "nu2"):
         require(name, given[name], (given[name] > -1) & (given[name] <= 0.5), "in (-1, 0.5]")
     broadcast_shape(**given)
     a, b = ((1 - nu) * (1 + nu) / E for nu, E in ((given["nu1"], given["E1"]), (given["nu2"], given["E2"])))
-    return (1 / (a + b))[()]
+    found = (1 / (a + b))[()]
+    return found if unit is None else f"{one_number('E_star', found)} {unit}"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -73,8 +74,8 @@ def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) 
     from mbma_tables.scenes.scene import Scene
 
     scene = Scene.from_toml(file)
-    if plot is not None and not {"force", "area"} <= scene.outputs:
-        raise InputError("--plot draws force and area: ask for both in [effects] on")
+    if plot is not None:
+        scene = dataclasses.replace(scene, effects=(*scene.effects, "force", "area"))  # what is drawn
     found = scene.run(lambda step, done, total: doing(f"{step}: {done} of {total}"))
     if plot is not None:
         write_file(plot, _picture(found, plot.suffix[1:]))

@@ -185,8 +185,10 @@ def _known(name: str, unit: str | None) -> str:
 
 def checked_conductivity(conductivity: float | None, unit: str | None) -> tuple[float, str]:
     """k_s = 2 k1 k2/(k1 + k2) and its unit, both needed for a conductance."""
-    if conductivity is None or not unit:
-        raise InputError("conductance needs conductivity, k_s = 2 k1 k2/(k1 + k2), and conductivity_unit")
+    if conductivity is None:
+        raise InputError("conductance needs conductivity, which is missing: k_s = 2 k1 k2/(k1 + k2)")
+    if not unit:
+        raise InputError("conductance needs conductivity_unit, which is missing: that of k_s, such as 'W/(m K)'")
     if not unit.isprintable():
         raise InputError(f"conductivity_unit is not printable: {unit!r}")
     return number_in("conductivity", conductivity, 1e-300, 1e300), unit

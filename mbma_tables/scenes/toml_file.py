@@ -53,7 +53,9 @@ def check(entries: Mapping[str, Any], rules: Mapping[str, Any]) -> None:
     if fault.validator == "additionalProperties":
         known = fault.schema["properties"]
         unknown = next(name for name in fault.instance if name not in known)
-        raise InputError(f"{table}: unknown key {unknown!r}; {nearest(unknown, known)}")
+        tables = [name for name, entry in schema()["properties"].items() if unknown in entry.get("properties", ())]
+        hint = f"it belongs to [{' or ['.join(f'{name}]' for name in tables)}" if tables else nearest(unknown, known)
+        raise InputError(f"{table}: unknown key {unknown!r}; {hint}")
     if fault.validator == "enum":
         raise InputError(
             f"{place}: {fault.instance!r} is not known; {nearest(str(fault.instance), fault.schema['enum'])}"

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.arguments import FloatArray, broadcast_shape, describe_entries, finite_array, require
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces import spectrum
 from mbma_tables.units import resolve
@@ -40,6 +40,7 @@ SAID = {
     "h_max": "contact begins at h_max above the mid-plane",
     "Sp": "h_max = Sp: contact begins at the highest point of the map, which a larger one would exceed",
 }
+TYPICAL = "of Gaussian heights 3 to 4.5 h_rms, near h_rms sqrt(2 ln N) of N independent points"
 
 
 def _one_of(names: tuple[str, ...], given: Mapping[str, Any], what: str, needed: bool = True) -> str | None:
@@ -56,7 +57,7 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
     height = _one_of(HEIGHTS, given, "the height of roughness")
     slope = _one_of(SLOPES, given, "the slope of roughness", needed=False)
     summits = _one_of(SUMMITS, given, "the density of summits", needed=False)
-    top = _one_of(("h_max", "Sp"), given, "the highest point, which Rq and Ra do not tell")
+    top = _one_of(("h_max", "Sp"), given, f"the highest point, which Rq and Ra do not tell ({TYPICAL})")
     if "hurst" not in given:
         raise InputError(
             "hurst is missing: a drawing does not tell it; 0.8 is common, and `sensitivity` says what it costs"
@@ -76,6 +77,12 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
     assert height is not None
     assert top is not None
     h_rms = at[height] * (math.sqrt(math.pi / 2) if height in ("Ra", "Sa") else 1.0)
+    said = f" [{unit}]" if unit else ""
+    require(f"{top}{said}", at[top], at[top] > h_rms, f"above h_rms; {TYPICAL}")
+    if slope is None:
+        long, short = at["longest"], at["shortest"]
+        few = long <= spectrum.MIN_ZETA_1 * short
+        require(f"longest{said}", long, ~few, f"more than 3 times shortest, {describe_entries(short, few)}")
     q0, q1 = _band(at, h_rms, slope, summits)
     used = ("hurst", height, top, *band)
     shown = {name: given[name].tolist() if hasattr(given[name], "tolist") else given[name] for name in used}

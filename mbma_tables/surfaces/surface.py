@@ -98,9 +98,7 @@ class Surface(AnySurface):
             kept.setflags(write=False)
             object.__setattr__(self, name, kept[()])
         zeta_1 = np.asarray(self.zeta_1)
-        require(
-            "q1/q0", zeta_1, zeta_1 > spectrum.MIN_ZETA_1, "greater than 3 (the floors of zeta_d and zeta_u lie below)"
-        )
+        require("q1/q0", zeta_1, zeta_1 > spectrum.MIN_ZETA_1, "greater than 3: q1 is the largest wavenumber")
         require("q1/q0", zeta_1, zeta_1 <= spectrum.MAX_ZETA_1, "at most 1e8")
 
     def __repr__(self) -> str:
