@@ -55,7 +55,9 @@ def hinted(function: Callable[P, R]) -> Callable[P, R]:
     def checked(*given: P.args, **named: P.kwargs) -> R:
         for name in named.keys() - parameters.keys():
             if name in ("E1", "nu1", "E2", "nu2") and "E_star" in names:
-                raise TypeError(f"{called} has no argument {name!r}: E_star=materials.effective_modulus(E1, nu1, E2, nu2)")
+                raise TypeError(
+                    f"{called} has no argument {name!r}: E_star=materials.effective_modulus(E1, nu1, E2, nu2)"
+                )
             meant = SYMBOLS.get(name)
             hint = f"did you mean {meant!r}?" if meant in names else nearest(name, names)
             raise TypeError(f"{called} has no argument {name!r}: {hint}")

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mbma_tables import materials
+from mbma_tables import Surface, contact, materials
 from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.materials import effective_modulus
 
@@ -22,6 +22,17 @@ def test_bodies_may_be_exchanged_and_compliances_add(E1, nu1, E2, nu2):
     together = effective_modulus(E1, nu1, E2, nu2)
     assert together == effective_modulus(E2, nu2, E1, nu1)
     assert 1 / together == pytest.approx((1 - nu1**2) / E1 + (1 - nu2**2) / E2, rel=1e-13)
+
+
+def test_texts_give_a_text_that_contact_takes():
+    found = effective_modulus("210 GPa", 0.3, "7e4 MPa", 0.33)
+    assert found == f"{effective_modulus(210.0, 0.3, 70.0, 0.33)} GPa"
+    pressed = contact(Surface.named("challenge"), pressure="1 MPa", E_star=found)
+    assert pressed.units["force"] == "GPa"
+    with pytest.raises(InputError, match="E2 without a unit beside numbers in GPa"):
+        effective_modulus("210 GPa", 0.3, 70.0, 0.33)
+    with pytest.raises(TypeError, match=r"E_star=materials\.effective_modulus"):
+        contact(Surface.named("challenge"), pressure="1 MPa", E1="210 GPa")
 
 
 def test_arrays_broadcast_and_scalars_stay_scalars():

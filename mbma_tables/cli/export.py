@@ -113,9 +113,8 @@ def _law_files(target: str, out: Path, joint: dict[str, Any], given: dict[str, A
         return {out: solvers.exponential(**joint, **named).encode()}
     if "pressures" in given:
         given["pressures"] = _pressures(given["pressures"])
-    quantity = (
-        "leakage" if given.pop("leakage", False) else "pressure" if "conductivity" not in given else "conductance"
-    )
+    heat = "conductance" if given.keys() & {"conductivity", "conductivity_unit"} else "pressure"
+    quantity = "leakage" if given.pop("leakage", False) else heat
     law = describe_law(**joint, quantity=quantity, **given)
     if target in SOLVERS:
         return {out: getattr(solvers, target)(law, **named).encode()}

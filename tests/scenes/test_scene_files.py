@@ -21,6 +21,7 @@ MISTAKES = {
     "unknown key of prescribed": (SURFACE + ON + "[prescribed]\nseparation = 1\n", "did you mean 'separations'"),
     "unknown key of accuracy": (SURFACE + ON + AT + "[accuracy]\nrtoll = 1e-3\n", "did you mean 'rtol'"),
     "unknown key of material": (SURFACE + ON + AT + "[material]\nE = 3.0\n", "did you mean 'E[12]'"),
+    "key of another table": (SURFACE + ON + AT + "[material]\nhardness = 3.0\n", r"it belongs to \[yield\]"),
     "unknown effect": (SURFACE + '[effects]\non = ["forse"]\n' + AT, "did you mean 'force'"),
     "unknown refinement": (SURFACE + '[effects]\non = ["force"]\noff = ["subscale"]\n' + AT, "subscale_area"),
     "unknown surface": ('[surface]\nname = "concret"\n' + ON + AT, "there are yang-persson"),
