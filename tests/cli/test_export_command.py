@@ -113,7 +113,7 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
         (["calculix", "--out", "law", *LAW, "--pressures", "1"], "--pressures must be like 0.1:100"),
         (["calculix", "--out", "law", *LAW, "--pressures", "2:1"], "pressures must be two rising numbers"),
         (["calculix", "--out", "law", *LAW, "--pressures", "1:1e9"], "force must be at most"),
-        (["calculix", "--out", "law", *LAW, "--conductivity-unit", "W/K"], "conductance needs conductivity, which is missing"),
+        (["calculix", "--out", "law", *LAW, "--conductivity-unit", "W/K"], "needs conductivity, which is missing"),
     ],
 )
 def test_bad_requests(arguments, said, tmp_path, monkeypatch):
