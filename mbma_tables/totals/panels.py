@@ -18,15 +18,14 @@ from mbma_tables.arguments import FloatArray
 COUNTS = ((0.3, 8), (math.inf, 16))  # nodes of a panel by its width over delta
 MORE = 4  # gaps of a panel than nodes
 CHECKS = np.array([1e-4, 0.5, 1 - 1e-4])  # places where polynomials miss most
-SEEN, TOPS = 9, 8  # gaps that a panel is checked at, and those at which a Gaussian has its top in it
+SPREAD = np.linspace(0, 1, 9)  # gaps that a panel is checked at, from it to the last
+TOPS = 8  # and those at which a Gaussian has its top in it
 BETWEEN = 2.0  # times more is missed at gaps between them
 HIGH = 6.0  # of sigma_d: islands beyond carry less than 1e-7
 LEAST = 1e-100  # share of a panel that a gap cuts
 FAR = 1e150  # height of an island that is not there
 # of delta, in which force, area, number of islands and Hertz area begin
 POWERS = np.array([5 / 2, 7 / 3, 0, 2])[:, None, None]
-BLOCK, TERMS = 24, 24  # panels whose islands are summed one by one, and terms of the series of those below
-TAIL_SHARE = 2.0  # of the last two coefficients, for all that follow: they fall by 2 at least, and count twice
 
 Sums = tuple[FloatArray, FloatArray]  # what `_sums` gives
 
@@ -43,7 +42,7 @@ class Rule(NamedTuple):
     reach: FloatArray  # places of gaps, which are Chebyshev points of the panel
     checks: FloatArray  # (3, n)
     halves: FloatArray  # (2 n, n), at the nodes of both halves
-    inside: FloatArray  # (gaps n, n), at the nodes of the part below each of the gaps
+    inside: FloatArray  # (gaps n, n), at the nodes of the part below each gap
     ends: FloatArray  # (gaps, n), at the gaps
     series: FloatArray  # (gaps, gaps), values at the gaps to a Chebyshev series
     to_series: FloatArray  # (n, n), values at the nodes to one
@@ -84,7 +83,10 @@ class Panels(NamedTuple):
 
     def some(self, chosen: Any) -> Panels:
         """Those at these places."""
-        return Panels(self.rule, self.low[chosen], self.high[chosen], self.fields[:, chosen])
+        return Panels(self.rule, self.low[chosen], self.high[chosen], np.ascontiguousarray(self.fields[:, chosen]))
+
+
+Group = tuple[Panels, NDArray[np.intp]]  # panels of one rule, and their places among all
 
 
 class Nodes(NamedTuple):
@@ -111,7 +113,7 @@ def missed_by(panels: Panels, true: FloatArray, last: float) -> FloatArray:
     at = np.clip(true[-2] / true[-1], high[:, None], last)
     turned = (np.abs(missed[-2] - missed[-1] * at) + HIGH * np.abs(missed[-1]) / true[-1]).max(axis=1)
     # sums over whole panels, relative to the largest of the panel
-    spread = low[:, None] + (last - low)[:, None] * np.linspace(0, 1, SEEN)
+    spread = low[:, None] + (last - low)[:, None] * SPREAD
     # where Gaussians are narrow no such gap may meet one: gaps at which one has its top in the panel
     tops = (fields[-2] / fields[-1])[:, :: max(1, rule.nodes.size // TOPS)]
     c = np.clip(np.concatenate([spread, tops], axis=1), high[:, None], last)[..., None]
@@ -147,49 +149,6 @@ def _sums(heights: FloatArray, weights: FloatArray, turned: FloatArray) -> Sums:
     return np.log(found) - least / 2, slopes / found
 
 
-def joined(one: Sums, two: Sums) -> Sums:
-    """`_sums` of both."""
-    both = np.logaddexp(one[0], two[0])
-    return both, one[1] * np.exp(one[0] - both) + two[1] * np.exp(two[0] - both)
-
-
-def _below(c: FloatArray, own: NDArray[np.intp], nodes: Nodes) -> Sums:
-    """`_sums` over the panels below those of gaps, `own`, at compressions c."""
-    heights = np.where(nodes.panel < own[:, None], nodes.shift - nodes.rate * c[:, None], FAR)
-    return _sums(heights, nodes.weights, nodes.weights * nodes.rate[:, None])
-
-
-def _far_below(c: FloatArray, low: float, high: float, first: int, nodes: Nodes, rtol: float) -> Sums:
-    """`_sums` over the panels before the `first` at many c in [low, high], by a series that is good to `rtol`."""
-    if c.size <= TERMS:
-        return _below(c, np.full(c.size, first), nodes)
-    points, rows = chebyshev.chebpts1(TERMS), nodes.weights.shape[1]
-    found = np.concatenate(_below((low + high + (high - low) * points) / 2, np.full(TERMS, first), nodes))
-    series: Any = found @ np.linalg.inv(chebyshev.chebvander(points, TERMS - 1)).T
-    if TAIL_SHARE * np.abs(series[:rows, -2:]).sum(axis=1).max() <= rtol:
-        values = series @ chebyshev.chebvander((2 * c - low - high) / (high - low), TERMS - 1).T
-        return values[:rows], values[rows:]
-    middle, out = (low + high) / 2, np.empty((2, rows, c.size))
-    for chosen, ends in ((c < middle, (low, middle)), (c >= middle, (middle, high))):
-        out[:, :, chosen] = _far_below(c[chosen], *ends, first, nodes, rtol)
-    return out[0], out[1]
-
-
-def below_by_halves(
-    c: FloatArray, own: NDArray[np.intp], nodes: Nodes, edges: FloatArray, first: int, last: int, rtol: float
-) -> Sums:
-    """`_below` to `rtol`, of gaps and nodes in order of panels from `first` to before the `last`, of those alone."""
-    if last - first <= BLOCK or not c.size:
-        return _below(c, own, nodes)
-    middle = (first + last) // 2
-    gap, node = np.searchsorted(own, middle), np.searchsorted(nodes.panel, middle)
-    left, right = nodes.some(slice(node)), nodes.some(slice(node, None))
-    lower = below_by_halves(c[:gap], own[:gap], left, edges, first, middle, rtol)
-    upper = below_by_halves(c[gap:], own[gap:], right, edges, middle, last, rtol)
-    upper = joined(upper, _far_below(c[gap:], float(edges[middle]), float(edges[last]), middle, left, rtol))
-    return np.concatenate([lower[0], upper[0]], axis=1), np.concatenate([lower[1], upper[1]], axis=1)
-
-
 def _cut(rule: Rule, width: FloatArray, c: FloatArray, reach: FloatArray, inside: FloatArray, ends: FloatArray) -> Sums:
     """`_sums` over the part of a panel so wide that is below each gap, by the fields inside and at the gap."""
     rows = len(ends) - 2
@@ -202,16 +161,7 @@ def _cut(rule: Rule, width: FloatArray, c: FloatArray, reach: FloatArray, inside
     return logs, slopes + own * np.exp(-0.5 * height * height - logs)
 
 
-def _cut_all(panels: Panels) -> tuple[FloatArray, Sums]:
-    """The gaps of panels, and `_cut` there."""
-    rule, low, high, fields = panels
-    c = rule.approach(low, high, rule.reach).ravel()
-    inside, ends = (fields @ rule.inside.T).reshape(-1, c.size, rule.nodes.size), (fields @ rule.ends.T)
-    count, width = rule.reach.size, (high - low).repeat(rule.reach.size)
-    return c, _cut(rule, width, c, np.tile(rule.reach, low.size), inside, ends.reshape(-1, low.size * count))
-
-
-def sums_at(c: FloatArray, own: NDArray[np.intp], groups: list[tuple[Panels, NDArray[np.intp]]], nodes: Nodes) -> Sums:
+def sums_at(c: FloatArray, own: NDArray[np.intp], groups: list[Group], nodes: Nodes) -> Sums:
     """`_sums` at a few gaps in panels `own`; groups of panels are at places among all."""
     found = np.empty((2, nodes.weights.shape[1], c.size))
     for (rule, low, high, fields), rank in groups:
@@ -224,22 +174,8 @@ def sums_at(c: FloatArray, own: NDArray[np.intp], groups: list[tuple[Panels, NDA
             basis = chebyshev.chebvander(2 * places - 1, rule.nodes.size - 1) @ rule.to_series
             at = np.einsum("gji,rgi->rgj", basis, fields[:, which])
             found[..., mine] = _cut(rule, width, c[mine], reach, at[..., :-1], at[..., -1])
-    return joined((found[0], found[1]), _below(c, own, nodes))
-
-
-def sums_of(
-    fresh: list[tuple[Panels, NDArray[np.intp]]], nodes: Nodes, edges: FloatArray, rtol: float
-) -> list[FloatArray]:
-    """What series go through, (2 rows, panels, gaps), of panels at places among all, with sums good to `rtol`."""
-    c, inner = zip(*(_cut_all(panels) for panels, _ in fresh), strict=True)
-    gaps, logs = np.concatenate(c), np.concatenate([np.array(sums) for sums in inner], axis=-1)
-    own = np.concatenate([rank.repeat(panels.rule.reach.size) for panels, rank in fresh])
-    order, count, rows = np.argsort(own, kind="stable"), edges.size - 1, logs.shape[1]
-    below = np.empty_like(logs)
-    below[..., order] = below_by_halves(gaps[order], own[order], nodes, edges, 0, count, rtol)
-    values = np.concatenate(joined((logs[0], logs[1]), (below[0], below[1])))
-    begun = own == 0
-    values[:rows, begun] -= (POWERS[:rows, 0] + 1) * np.log(gaps[begun])
-    values[rows:] *= gaps
-    parts = np.split(values, np.cumsum([at.size for at in c])[:-1], axis=1)
-    return [part.reshape(2 * rows, rank.size, -1) for part, (_, rank) in zip(parts, fresh, strict=True)]
+    # and over all panels below
+    heights = np.where(nodes.panel < own[:, None], nodes.shift - nodes.rate * c[:, None], FAR)
+    below, by_gap = _sums(heights, nodes.weights, nodes.weights * nodes.rate[:, None])
+    logs = np.logaddexp(found[0], below)
+    return logs, found[1] * np.exp(found[0] - logs) + by_gap * np.exp(below - logs)

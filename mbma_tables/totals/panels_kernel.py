@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from typing import Any
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import REORDER, njit
 from mbma_tables.elementary import exp
-from mbma_tables.totals.panels import BETWEEN, HIGH, SEEN, TOPS, Nodes, Panels
+from mbma_tables.totals.panels import BETWEEN, COUNTS, HIGH, MORE, SPREAD, TOPS, Group, Nodes, Panels, Rule
+
+TAIL_SHARE = 2.0  # of the last two coefficients, for all that follow: they fall by 2 at least, and count twice
+SLOPES = 0.1  # of their relative error counts
+MANY = 1000  # islands below, from which those far below are summed by series of TERMS
+STRETCH, TERMS = 0.1, 12  # of the compression, or of h_rms, that one such series covers
+
+
+Below = tuple[FloatArray, FloatArray, FloatArray]  # weights, shift and rate of islands
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy", forceinline=True)
@@ -29,12 +40,11 @@ def _leads(delta: float, power: int) -> tuple[float, float]:
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy")
-def _sum_at(
-    gap: float, least: float, weights: FloatArray, shift: FloatArray, rate: FloatArray, stop: int, out: FloatArray
-) -> None:
-    """Add to `out` force, area and their slopes by the gap of the first `stop` islands, times exp(least/2)."""
+def _sum_at(gap: float, least: float, islands: Below, begin: int, stop: int, out: FloatArray) -> None:
+    """Add to `out` force, area and their slopes by the gap of islands begin:stop, times exp(least/2)."""
+    weights, shift, rate = islands
     force = area = by_force = by_area = 0.0
-    for k in range(stop):
+    for k in range(begin, stop):
         height = shift[k] - rate[k] * gap
         share = exp(0.5 * (least - height * height))
         turned = share * height * rate[k]
@@ -49,53 +59,100 @@ def _sum_at(
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy", forceinline=True)
-def _least(gap: float, shift: FloatArray, rate: FloatArray, stop: int, least: float) -> float:
-    """About the least square of a height of the first `stop` islands at a gap, at most `least`."""
+def _least(gap: float, islands: Below, begin: int, stop: int, least: float) -> float:
+    """About the least square of a height of islands begin:stop at a gap, at most `least`."""
+    _, shift, rate = islands
     # neighbours differ by far less than exponentials reach
-    for k in range(0, stop, 4):
+    for k in range(begin, stop, 4):
         height = shift[k] - rate[k] * gap
         least = min(least, height * height)
     return least
+
+
+@njit(cache=True, fastmath=REORDER, error_model="numpy")
+def _fill_far(
+    low: float, high: float, below: Below, stop: int, points: FloatArray, series: FloatArray, out: FloatArray
+) -> float:
+    """Series of ln(F), ln(A) and their slopes over compressions in [low, high], of islands below; their error."""
+    values, sums = np.empty((4, points.size)), np.empty(4)
+    for k in range(points.size):
+        c = 0.5 * (low + high + (high - low) * points[k])
+        least = _least(c, below, 0, stop, math.inf)
+        sums[:] = 0.0
+        _sum_at(c, least, below, 0, stop, sums)
+        values[0, k], values[1, k] = math.log(sums[0]) - 0.5 * least, math.log(sums[1]) - 0.5 * least
+        values[2, k], values[3, k] = sums[2] / sums[0], sums[3] / sums[1]
+    for row in range(4):
+        for k in range(points.size):
+            out[row, k] = _times(series, k, values[row])
+    last = points.size - 1
+    error: float = TAIL_SHARE * max(
+        abs(out[0, last]) + abs(out[0, last - 1]), abs(out[1, last]) + abs(out[1, last - 1])
+    )
+    return error
+
+
+@njit(cache=True, fastmath=REORDER, error_model="numpy", forceinline=True)
+def _series_at(series: FloatArray, x: float) -> float:
+    """A Chebyshev series at x in [-1, 1]."""
+    before, term = 1.0, x
+    total: float = series[0]
+    for k in range(1, series.size):
+        total += series[k] * term
+        before, term = term, 2.0 * x * term - before
+    return total
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy", nogil=True)
 def fill_sums(
     low: FloatArray,
     high: FloatArray,
-    power: int,
-    reach: FloatArray,
-    nodes: FloatArray,
-    weights: FloatArray,
+    rule: Rule,
     inside: FloatArray,
     ends: FloatArray,
-    below: tuple[FloatArray, FloatArray, FloatArray],
+    below: Below,
     stops: NDArray[np.intp],
+    points: FloatArray,
+    series: FloatArray,
     out: FloatArray,
-) -> None:
-    """`panels.sums_of`: of fields `inside` panels below each gap and at the gap (`ends`), and of the islands below.
+) -> float:
+    """ln(F), ln(A) and slopes by ln(c) at the gaps of panels, (4, panels, gaps), by fields `inside` and at the gaps.
 
-    These are weights, shift and rate of all islands in order, of which the first `stops` lie below each panel.
+    `below` are weights, shift and rate of all islands in order, of which the first `stops` lie below each panel. Those
+    far below many narrow panels are summed by a series in c, whose error is returned.
     """  # fmt: skip
-    count = nodes.size
-    own_weights, own, sums = np.empty((2, count)), np.empty((2, count)), np.empty(4)
+    power, count = rule.power, rule.nodes.size
+    own, sums = (np.empty((2, count)), np.empty(count), np.empty(count)), np.empty(4)
+    far, error, begin, start, until = np.zeros((4, points.size)), 0.0, 0, 0.0, 0.0
     for panel in range(low.size):
         width, stop = high[panel] - low[panel], stops[panel]
-        for gap in range(reach.size):
-            c = low[panel] + width * reach[gap] ** power
+        if high[panel] > until:
+            # as many panels as make both sums equal work
+            many = min(panel + int(math.sqrt(low.size)), low.size - 1)
+            begin, start, until = 0, low[panel], min(low[panel] + STRETCH * min(low[panel], 1.0), high[many])
+            if stop > MANY and high[panel] <= until:
+                begin = stop
+                error = max(error, _fill_far(start, until, below, begin, points, series, far))
+        for gap in range(rule.reach.size):
+            reach = rule.reach[gap]
+            c = low[panel] + width * reach**power
             for k in range(count):
-                node = gap * count + k
-                place = reach[gap] * nodes[k]
-                measure = reach[gap] * weights[k] * width * (2.0 * place if power > 1 else 1.0)
+                node, place = gap * count + k, reach * rule.nodes[k]
+                measure = reach * rule.weights[k] * width * (2.0 * place if power > 1 else 1.0)
                 lead_F, lead_A = _leads(width * place * place, power)
-                own_weights[0, k] = measure * lead_F * inside[0, panel, node]
-                own_weights[1, k] = measure * lead_A * inside[1, panel, node]
-                own[0, k] = inside[2, panel, node]
-                own[1, k] = inside[3, panel, node]
-            least = _least(c, own[0], own[1], count, math.inf)
-            least = _least(c, below[1], below[2], stop, least)
+                own[0][0, k] = measure * lead_F * inside[0, panel, node]
+                own[0][1, k] = measure * lead_A * inside[1, panel, node]
+                own[1][k], own[2][k] = inside[2, panel, node], inside[3, panel, node]
+            least = _least(c, below, begin, stop, _least(c, own, 0, count, math.inf))
             sums[:] = 0.0
-            _sum_at(c, least, own_weights, own[0], own[1], count, sums)
-            _sum_at(c, least, below[0], below[1], below[2], stop, sums)
+            if begin > 0:
+                x = (2.0 * c - start - until) / (until - start)
+                log_F, log_A = _series_at(far[0], x), _series_at(far[1], x)
+                least = min(least, -2.0 * log_F)
+                sums[0], sums[1] = math.exp(log_F + 0.5 * least), math.exp(log_A + 0.5 * least)
+                sums[2], sums[3] = sums[0] * _series_at(far[2], x), sums[1] * _series_at(far[3], x)
+            _sum_at(c, least, own, 0, count, sums)
+            _sum_at(c, least, below, begin, stop, sums)
             # the island at the gap itself
             height = ends[2, panel, gap] - ends[3, panel, gap] * c
             share = exp(0.5 * (least - height * height))
@@ -107,12 +164,12 @@ def fill_sums(
             out[1, panel, gap] = math.log(sums[1]) - 0.5 * least - 10.0 / 3.0 * begun
             out[2, panel, gap] = c * sums[2] / sums[0]
             out[3, panel, gap] = c * sums[3] / sums[1]
+    return error
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy", nogil=True)
 def fill_totals(compression: FloatArray, edges: FloatArray, series: FloatArray, out: FloatArray) -> None:
     """`Profile.totals` of force and area."""
-    terms = series.shape[2]
     for k in range(compression.size):
         c = compression[k]
         first, last = 0, edges.size - 1
@@ -121,12 +178,7 @@ def fill_totals(compression: FloatArray, edges: FloatArray, series: FloatArray, 
             first, last = (middle, last) if edges[middle] <= c else (first, middle)
         low, high = edges[first], edges[first + 1]
         x = (2.0 * c - low - high) / (high - low)
-        before, term = 1.0, x
-        force, area = series[first, 0, 0], series[first, 1, 0]
-        for j in range(1, terms):
-            force += series[first, 0, j] * term
-            area += series[first, 1, j] * term
-            before, term = term, 2.0 * x * term - before
+        force, area = _series_at(series[first, 0], x), _series_at(series[first, 1], x)
         lead = c * c * c if first == 0 else 1.0
         out[0, k] = math.exp(force) * (lead * math.sqrt(c) if first == 0 else 1.0)
         out[1, k] = math.exp(area) * (lead * np.cbrt(c) if first == 0 else 1.0)
@@ -182,7 +234,7 @@ def fill_missed(
                     c = fields[2, panel, node] / fields[3, panel, node]
                 c = min(max(c, high[panel]), last)
                 if turn == 0:
-                    least = _least(c, finer[1], finer[2], 2 * count, least)
+                    least = _least(c, (finer, finer[1], finer[2]), 0, 2 * count, least)
                     continue
                 fine = rough = 0.0
                 for j in range(2 * count):
@@ -195,20 +247,36 @@ def fill_missed(
         out[panel] = relative + HIGH * turned + BETWEEN * off / most
 
 
-def sums_of(fresh: list[tuple[Panels, NDArray[np.intp]]], nodes: Nodes) -> list[FloatArray]:
-    """`panels.sums_of`."""
-    found, below = [], (np.ascontiguousarray(nodes.weights.T), nodes.shift, nodes.rate)
-    for (rule, low, high, fields), rank in fresh:
-        out, stops = np.empty((4, rank.size, rule.reach.size)), np.searchsorted(nodes.panel, rank)
+@functools.cache
+def _far_rule() -> tuple[FloatArray, FloatArray]:
+    points = chebyshev.chebpts1(TERMS)
+    to_series: Any = np.linalg.inv(chebyshev.chebvander(points, TERMS - 1))
+    return points, to_series
+
+
+def series_of(groups: list[Group], nodes: Nodes) -> tuple[FloatArray, FloatArray]:
+    """`Profile.series` of panels, and their errors."""
+    points, to_series = _far_rule()
+    count, below = (
+        sum(rank.size for _, rank in groups),
+        (np.ascontiguousarray(nodes.weights.T), nodes.shift, nodes.rate),
+    )
+    made, tails = np.zeros((count, 4, COUNTS[-1][1] + MORE)), np.empty(count)
+    for (rule, low, high, fields), rank in groups:
+        values, stops = np.empty((4, rank.size, rule.reach.size)), np.searchsorted(nodes.panel, rank)
         inside, ends = fields @ rule.inside.T, fields @ rule.ends.T
-        fill_sums(low, high, rule.power, rule.reach, rule.nodes, rule.weights, inside, ends, below, stops, out)
-        found.append(out)
-    return found
+        missed = fill_sums(low, high, rule, inside, ends, below, stops, points, to_series, values)
+        found = values @ rule.series.T
+        made[rank, :, : rule.reach.size] = np.moveaxis(found, 0, 1)
+        own = np.abs(found[:, :, -2:]).sum(axis=-1)
+        own[2:] *= SLOPES / np.abs(values[2:]).max(axis=-1)
+        tails[rank] = missed + TAIL_SHARE * own.max(axis=0)
+    return made, tails
 
 
 def missed_by(panels: Panels, true: FloatArray, last: float) -> FloatArray:
     """`panels.missed_by`."""
     rule, low, high, fields = panels
     out, given = np.empty(low.size), (rule.power, rule.nodes, rule.weights, rule.checks, rule.halves)
-    fill_missed(fields, np.ascontiguousarray(true), low, high, last, *given, np.linspace(0, 1, SEEN), out)
+    fill_missed(fields, np.ascontiguousarray(true), low, high, last, *given, SPREAD, out)
     return out

@@ -29,17 +29,16 @@ from mbma_tables.surfaces.readings import Reading
 from mbma_tables.totals import kernel, panels, panels_kernel
 from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
 from mbma_tables.totals.island_sum import kinks
-from mbma_tables.totals.panels import BLOCK, CHECKS, COUNTS, MORE, POWERS, SEEN, TAIL_SHARE, Nodes, Panels, rule_of
+from mbma_tables.totals.panels import CHECKS, COUNTS, POWERS, Group, Nodes, Panels, rule_of
 
 FEW = 256  # gaps that are asked of numpy, one by one
 KEPT = 64  # profiles, for whoever asks the same surface again
 WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
-SLOPES = 0.1  # of their relative error counts
-FAR_SHARE = 0.1  # of the tolerance, for sums over islands far below
-ONE_BY_ONE = 64  # panels up to which compiled code sums every island
 MAX_ROUNDS = 14
-NARROWED = 4  # times 32 is the end of a table found closer
 MOST = 1000  # panels to be answered anew at a time
+
+Fields = Callable[[FloatArray], tuple[FloatArray, float]]  # rows of `Panels.fields` at approaches, and their error
+Part = tuple[Panels, FloatArray]  # panels that were answered at once, and their errors
 
 
 class Source(NamedTuple):
@@ -115,8 +114,6 @@ class Profile:
         The islands.
     groups : list of (Panels, ndarray)
         Panels of one rule, and their places among all.
-    compiled : bool
-        Whether totals are asked of compiled code; slopes never are.
     """
 
     source: Source
@@ -125,8 +122,7 @@ class Profile:
     error: float
     islands: int
     nodes: Nodes
-    groups: list[tuple[Panels, NDArray[np.intp]]]
-    compiled: bool
+    groups: list[Group]
 
     @property
     def end(self) -> float:
@@ -141,25 +137,30 @@ class Profile:
         F/(A0 E*).
         """
         count = self.nodes.weights.shape[1]
-        if self.compiled and not slopes and count == 2:
+        if self.series is None:
+            parts = [self._summed(compression[k : k + FEW]) for k in range(0, compression.size, FEW)]
+            return np.concatenate(parts, axis=1)[: 2 * count if slopes else count]
+        if not slopes:
             out = np.empty((2, compression.size))
             panels_kernel.fill_totals(compression, self.edges, self.series, out)
             return out
-        panel = np.clip(np.searchsorted(self.edges, compression, side="right") - 1, 0, self.edges.size - 2)
-        if self.series is None:
-            logs, by_gap = panels.sums_at(compression, panel, self.groups, self.nodes)
-            return np.concatenate([np.exp(logs), np.exp(logs) * by_gap])[: 2 * count if slopes else count]
+        panel = self._panel(compression)
         low, high = self.edges[panel], self.edges[panel + 1]
         basis = chebyshev.chebvander((2 * compression - low - high) / (high - low), self.series.shape[-1] - 1)
         # sums whose order does not depend on the number of gaps
-        found: FloatArray = (self.series[panel, : 2 * count if slopes else count] * basis[:, None]).sum(axis=-1).T
-        found[:count] = np.exp(found[:count])
-        begun = panel == 0
-        if begun.any():
-            found[:count, begun] *= compression[begun] ** (POWERS[:count, 0] + 1)
-        if slopes:
-            found[count:] *= found[:count] / compression
+        found: FloatArray = (self.series[panel] * basis[:, None]).sum(axis=-1).T
+        found[:count] = np.exp(found[:count]) * np.where(panel > 0, 1.0, compression ** (POWERS[:count, 0] + 1))
+        found[count:] *= found[:count] / compression
         return found
+
+    def _panel(self, compression: FloatArray) -> NDArray[np.intp]:
+        places = np.searchsorted(self.edges, compression, side="right") - 1
+        return np.clip(places, 0, self.edges.size - 2)
+
+    @np.errstate(under="ignore")
+    def _summed(self, compression: FloatArray) -> FloatArray:
+        logs, by_gap = panels.sums_at(compression, self._panel(compression), self.groups, self.nodes)
+        return np.concatenate([np.exp(logs), np.exp(logs) * by_gap])
 
     @functools.cached_property
     def leverage(self) -> float:
@@ -167,7 +168,7 @@ class Profile:
 
         An error e of f in F = integral of f G up to l changes l dF/dl by at most e (l f G + integral of f |l dG/dl|).
         """
-        ends = np.unique(np.linspace(0, self.edges.size - 2, SEEN).astype(int))
+        ends = np.unique(np.linspace(0, self.edges.size - 2, 9).astype(int))
         c, count = self.edges[1 + ends], self.nodes.weights.shape[1]
         found = self.totals(c, slopes=True)
         heights = self.nodes.shift - self.nodes.rate * c[:, None]
@@ -201,63 +202,6 @@ class _EndOfTable(Exception):
     """Islands beyond the approach given are not known."""
 
 
-class Part(NamedTuple):
-    """Panels that were answered at once, and what is known of them."""
-
-    panels: Panels
-    errors: FloatArray
-    series: Any = None  # (2 rows, panels, gaps), see `Profile`
-    tails: Any = None  # errors of the series
-
-    def some(self, chosen: Any) -> Part:
-        """Those at these places."""
-        known = (None, None) if self.series is None else (self.series[:, chosen], self.tails[chosen])
-        return Part(self.panels.some(chosen), self.errors[chosen], *known)
-
-
-def _nodes(parts: list[Part]) -> tuple[FloatArray, list[NDArray[np.intp]], Nodes]:
-    """Ends of all panels, the places of each part's among them, and their islands."""
-    low = np.concatenate([part.panels.low for part in parts])
-    order = np.argsort(low)
-    ranks = np.split(np.argsort(order), np.cumsum([part.errors.size for part in parts])[:-1])
-    panel, weights, turns = [], [], []
-    for (rule, start, end, fields), rank in zip((part.panels for part in parts), ranks, strict=True):
-        rows = len(fields) - 2
-        panel.append(rank.repeat(rule.nodes.size))
-        weights.append((fields[:-2] * rule.measure(end - start, rule.nodes, rows) * rule.weights).reshape(rows, -1))
-        turns.append(fields[-2:].reshape(2, -1))
-    shift, rate = np.concatenate(turns, axis=1)
-    nodes = Nodes(np.concatenate(panel), np.concatenate(weights, axis=1).T, shift, rate)
-    return low[order], ranks, nodes.some(np.argsort(nodes.panel, kind="stable"))
-
-
-def _summed(
-    parts: list[Part], last: float, rtol: float, compiled: bool, few: bool
-) -> tuple[list[Part], FloatArray, list[NDArray[np.intp]], Nodes]:
-    """Parts with the series that they lacked; ends of panels, places of each part's among them, islands in order."""
-    low, ranks, nodes = _nodes(parts)
-    edges, full, missed = np.append(low, last), list(parts), 0.0
-    places = [k for k, part in enumerate(parts) if part.series is None and not few]
-    if not places:
-        return full, edges, ranks, nodes
-    fresh = [(parts[k].panels, ranks[k]) for k in places]
-    if compiled and low.size <= ONE_BY_ONE:
-        values = panels_kernel.sums_of(fresh, nodes)
-    else:
-        missed = FAR_SHARE * rtol if low.size > BLOCK else 0.0
-        values = panels.sums_of(fresh, nodes, edges, FAR_SHARE * rtol / math.log2(edges.size))
-    for k, part in zip(places, values, strict=True):
-        rows = len(part) // 2
-        series = part @ parts[k].panels.rule.series.T
-        tails = np.abs(series[:, :, -2:]).sum(axis=-1)
-        tails[rows:] *= SLOPES / np.abs(part[rows:]).max(axis=-1)
-        full[k] = parts[k]._replace(series=series, tails=missed + TAIL_SHARE * tails.max(axis=0))
-    return full, edges, ranks, nodes
-
-
-Fields = Callable[[FloatArray], tuple[FloatArray, float]]  # rows of `Panels.fields` at approaches, and their error
-
-
 def _fields(source: Source, model: AnyModel, outside: str, rows: int) -> Fields:
     def fields(x: FloatArray) -> tuple[FloatArray, float]:
         g = source.islands(x)
@@ -285,81 +229,83 @@ def _compiled_fields(shape: tuple[float, float, float], model: Any, reading: Rea
     return fields
 
 
-def _covered(fields: Fields, x: FloatArray, unknown: NDArray[np.bool_]) -> float:
-    """The largest approach up to which islands are known."""
-    high = float(x[unknown].min())
-    low = float(x[x < high].max(initial=0.0))
-    for _ in range(NARROWED):
-        between = np.linspace(low, high, 34)
-        lost = np.isnan(fields(between[1:-1])[0]).any(axis=0)
-        first = int(np.append(lost, True).argmax())
-        low, high = float(between[first]), float(between[first + 1])
-    if not low > 0:
-        raise OutOfRangeError("no island of this surface lies inside the table")
-    return low
-
-
 def _answered(
-    fields: Fields, low: FloatArray, high: FloatArray, counts: NDArray[np.intp], last: float, compiled: bool
+    fields: Fields, low: FloatArray, high: FloatArray, counts: NDArray[np.intp], last: float, few: bool
 ) -> tuple[list[Part], int, float]:
-    """Panels of so many nodes, the number of islands, and their error.
+    """Panels of so many nodes and their errors, the number of islands, and their own error.
 
     Raises
     ------
     _EndOfTable
     """
-    kinds = counts + (low == 0)
-    groups = [(rule_of(int(kind) // 2 * 2, 1 + int(kind) % 2), kinds == kind) for kind in np.unique(kinds)]
+    kinds = 2 * counts + (low == 0)
+    groups = [(rule_of(int(kind) // 2, 1 + int(kind) % 2), kinds == kind) for kind in np.unique(kinds)]
     places = [rule.approach(low[own], high[own], np.append(rule.nodes, CHECKS)) for rule, own in groups]
     x = np.concatenate([part.ravel() for part in places])
     found, error = fields(x)
     unknown = np.asarray(np.isnan(found).any(axis=0))
     if unknown.any():
-        raise _EndOfTable(_covered(fields, x, unknown))
+        known = x[x < x[unknown].min()]
+        if not known.size:
+            raise OutOfRangeError("no island of this surface lies inside the table")
+        raise _EndOfTable(float(known.max()))
     if (found[:-2] < 0).any():
         raise ConvergenceError("K1 (47) is negative", np.array(True))
-    parts, begin = [], 0
-    for (rule, own), at in zip(groups, places, strict=True):
-        values = found[:, begin : begin + at.size].reshape(-1, *at.shape)
-        begin += at.size
+    parts, missed_by = [], panels.missed_by if few else panels_kernel.missed_by
+    for (rule, own), at, end in zip(groups, places, np.cumsum([part.size for part in places]), strict=True):
+        values = found[:, end - at.size : end].reshape(-1, *at.shape)
         if rule.power > 1:
             values[:-2] /= at ** POWERS[: len(values) - 2]
-        count = rule.nodes.size
-        made = Panels(rule, low[own], high[own], np.ascontiguousarray(values[..., :count]))
-        missed_by = panels_kernel.missed_by if compiled else panels.missed_by
-        parts.append(Part(made, missed_by(made, values[..., count:], last)))
+        made = Panels(rule, low[own], high[own], np.ascontiguousarray(values[..., : -CHECKS.size]))
+        parts.append((made, missed_by(made, values[..., -CHECKS.size :], last)))
     return parts, x.size, error
 
 
-def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float, compiled: bool, few: bool) -> Profile:
-    """Panels, halved until polynomials through their islands and through their sums are good to `rtol`."""
+def _merged(parts: list[Part]) -> tuple[FloatArray, list[Group], Nodes]:
+    """Low ends of panels, panels of each rule with their places among all, and islands, all in order."""
+    made = []
+    for rule in {id(own.rule): own.rule for own, _ in parts}.values():
+        low, high, fields = zip(*(own[1:] for own, _ in parts if own.rule is rule), strict=True)
+        every = Panels(rule, np.concatenate(low), np.concatenate(high), np.concatenate(fields, axis=1))
+        made.append(every.some(np.argsort(every.low)))
+    starts = np.sort(np.concatenate([own.low for own in made]))
+    groups = [(own, np.searchsorted(starts, own.low)) for own in made]
+    panel, weights, turns = [], [], []
+    for (rule, low, high, fields), rank in groups:
+        rows = len(fields) - 2
+        panel.append(rank.repeat(rule.nodes.size))
+        weights.append((fields[:-2] * rule.measure(high - low, rule.nodes, rows) * rule.weights).reshape(rows, -1))
+        turns.append(fields[-2:].reshape(2, -1))
+    nodes = Nodes(np.concatenate(panel), np.concatenate(weights, axis=1).T, *np.concatenate(turns, axis=1))
+    return starts, groups, nodes.some(np.argsort(nodes.panel, kind="stable"))
+
+
+def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float, few: bool) -> Profile:
+    """Panels, halved until polynomials through their islands, and those of their sums, are good to `rtol`."""
     low, high, last = edges[:-1], edges[1:], float(edges[-1])
-    counts, islands, worst = _count(low, high), 0, 0.0
+    counts, islands, worst, seen = _count(low, high), 0, 0.0, 0.0
     parts: list[Part] = []
     for _ in range(MAX_ROUNDS):
-        fresh, count, error = _answered(fields, low, high, counts, last, compiled)
-        parts, islands, worst = parts + fresh, islands + count, max(worst, error)
+        fresh, count, error = _answered(fields, low, high, counts, last, few)
+        islands, worst = islands + count, max(worst, error)
         # no nearer than islands themselves are known
         limit = max(0.5 * rtol, worst)
-        good = [part.errors <= limit for part in parts]
-        if all(own.all() for own in good):
-            parts, ends, ranks, nodes = _summed(parts, last, limit, compiled, few)
-            error = worst + max(part.errors.max() for part in parts)
-            groups = [(part.panels, rank) for part, rank in zip(parts, ranks, strict=True)]
+        seen = max([seen, *(float(errors[errors <= limit].max(initial=0.0)) for _, errors in fresh)])
+        parts += fresh
+        if all((errors <= limit).all() for _, errors in parts):
+            starts, groups, nodes = _merged(parts)
+            ends = np.append(starts, last)
             if few:
-                return Profile(source, ends, None, float(error), islands, nodes, groups, False)
-            good = [part.tails <= limit for part in parts]
-            if all(own.all() for own in good):
-                series = np.zeros((ends.size - 1, len(parts[0].series), COUNTS[-1][1] + MORE))
-                for part, rank in zip(parts, ranks, strict=True):
-                    series[rank, :, : part.series.shape[-1]] = np.moveaxis(part.series, 0, 1)
-                error += max(part.tails.max() for part in parts)
-                return Profile(source, ends, series, float(error), islands, nodes, groups, compiled)
-        bad = [part.panels.some(~own) for part, own in zip(parts, good, strict=True)]
-        parts = [part.some(own) for part, own in zip(parts, good, strict=True) if own.any()]
-        low, high = (np.concatenate([getattr(lost, end) for lost in bad]) for end in ("low", "high"))
-        counts = np.tile(np.repeat([p.rule.nodes.size for p in bad], [p.low.size for p in bad]), 2)
+                return Profile(source, ends, None, seen + worst, islands, nodes, groups)
+            series, tails = panels_kernel.series_of(groups, nodes)
+            if (tails <= limit).all():
+                return Profile(source, ends, series, seen + worst + float(tails.max()), islands, nodes, groups)
+            parts = [(own, tails[rank]) for own, rank in groups]
+        bad = [(own.some(~(errors <= limit)), own.rule.nodes.size) for own, errors in parts]
+        parts = [(own.some(errors <= limit), errors[errors <= limit]) for own, errors in parts]
+        low, high = (np.concatenate([getattr(own, end) for own, _ in bad]) for end in ("low", "high"))
         middle = (low + high) / 2
+        counts = np.tile(np.concatenate([np.full(own.low.size, count) for own, count in bad]), 2)
         low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
         if low.size > MOST + edges.size:
             break
@@ -367,11 +313,9 @@ def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float, compi
 
 
 @functools.lru_cache(maxsize=KEPT)
-def _profile(
-    surface: Any, model: Any, reading: Reading, rtol: float, exact: bool, compiled: bool, few: bool, rows: int
-) -> Profile:
+def _profile(surface: Any, model: Any, reading: Reading, rtol: float, exact: bool, few: bool, rows: int) -> Profile:
     source = source_of(surface, reading)
-    if compiled and isinstance(surface, tuple) and isinstance(model, UniversalModel):
+    if not few and isinstance(surface, tuple) and isinstance(model, UniversalModel):
         fields = _compiled_fields(surface, model, reading)
     else:
         fields = _fields(source, model, "exact" if exact else "nan", rows)
@@ -379,10 +323,10 @@ def _profile(
     # what underflows is right
     with np.errstate(under="ignore"):
         try:
-            return _built(source, fields, edges, rtol, compiled, few)
+            return _built(source, fields, edges, rtol, few)
         except _EndOfTable as fault:
             end = fault.args[0]
-            return _built(source, fields, np.append(edges[edges < end * (1 - 1e-12)], end), rtol, compiled, few)
+            return _built(source, fields, np.append(edges[edges < end * (1 - 1e-12)], end), rtol, few)
 
 
 def profile(
@@ -397,8 +341,8 @@ def profile(
     """The profile of a surface, (hurst, zeta_1, h_max/h_rms) or a `MeasuredSurface`, to `rtol` and the model's error.
 
     `outside` is "exact" to solve islands that a table does not cover; else the profile ends with the table. For a
-    `size` of up to FEW gaps islands are summed at each, in numpy. Else there are series, asked of compiled code but
-    where the number of islands, or their Hertz area, is wanted, as the third and fourth of `rows`.
+    `size` of up to FEW gaps, or where the number of islands or their Hertz area is wanted as the third and fourth of
+    `rows`, islands are summed at each gap in numpy. Else there are series, made and asked by compiled code.
 
     Raises
     ------
@@ -407,6 +351,6 @@ def profile(
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)
     make: Any = _profile
-    few = size is not None and size <= FEW
-    kept: Profile = make(surface, model, reading, rtol, outside == "exact", rows == 2 and not few, few, rows)
+    few = rows > 2 or (size is not None and size <= FEW)
+    kept: Profile = make(surface, model, reading, rtol, outside == "exact", few, rows)
     return kept
