@@ -100,37 +100,8 @@ def draw_compression(
 ) -> Figure:
     """Two panels: force (logarithmic) against u/h_rms, and area against force (both logarithmic).
 
-    A third one, flow conductance against force, where a curve has leakage.
-
-    Parameters
-    ----------
-    curves : sequence of Curve
-        At least one; each is one line in both panels, with its points as they are. Points without contact
-        have no place on a logarithmic axis and are left out by it.
-    title : str
-        Printed above both panels.
-    force_label : str
-        What the force is, with its unit.
-    gap_label, leakage_label : str
-        What gap and leakage are, likewise.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    InputError
-        For no curves.
-    MbmaError
-        Where matplotlib is missing.
-
-    Examples
-    --------
-    >>> from mbma_tables.plots import Curve, draw_compression
-    >>> figure = draw_compression([Curve("road", [2.0, 1.0], [1e-4, 1e-2], [2e-4, 2e-2])], "a title")
-    >>> len(figure.axes)
-    2
+    A third one, flow conductance against force, where a curve has leakage. Each curve is a line with its points as they
+    are; those without contact have no place on a logarithmic axis and are left out by it.
     """
     if not curves:
         raise InputError("no curves to draw: at least one is needed")
@@ -147,10 +118,8 @@ def draw_compression(
     by_gap.set_yscale("log", nonpositive="mask")
     by_force.set_xscale("log", nonpositive="mask")
     by_force.set_yscale("log", nonpositive="mask")
-    by_gap.set_xlabel(gap_label)
-    by_gap.set_ylabel(force_label)
-    by_force.set_xlabel(force_label)
-    by_force.set_ylabel("real contact area  A/A0")
+    by_gap.set(xlabel=gap_label, ylabel=force_label)
+    by_force.set(xlabel=force_label, ylabel="real contact area  A/A0")
     for axes, curve in itertools.product(flow, leaking):
         # blocked contacts have no place on a logarithmic axis, nor have gaps before contact
         k = np.asarray(curve.leakage, float)

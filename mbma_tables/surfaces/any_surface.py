@@ -98,13 +98,7 @@ class AnySurface(Displayed, abc.ABC):
 
     @abc.abstractmethod
     def sampled(self) -> MeasuredSurface:
-        """The same surface by samples of its spectrum.
-
-        Raises
-        ------
-        InputError
-            For a batch.
-        """
+        """The same surface by samples of its spectrum; of a batch there are none."""
 
     @abc.abstractmethod
     def scaled(self, factor: float, unit: str | None) -> Self:
