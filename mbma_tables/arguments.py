@@ -30,11 +30,15 @@ Numbers: TypeAlias = "np.float64 | FloatArray | xr.DataArray"  # what answers ho
 def describe_entries(values: FloatArray, mask: NDArray[np.bool_]) -> str:
     """The first few entries under `mask`, with their index where the array is not a scalar."""
     if values.ndim == 0:
-        return f"{values[()]:.17g}"
+        return _shortest(values[()])
     places = np.argwhere(mask)
-    quoted = [f"{values[tuple(p)]:.17g} at {tuple(int(i) for i in p)}" for p in places[:SHOWN]]
+    quoted = [f"{_shortest(values[tuple(p)])} at {tuple(int(i) for i in p)}" for p in places[:SHOWN]]
     more = len(places) - SHOWN
     return ", ".join(quoted) + (f" and {more} more" if more > 0 else "")
+
+
+def _shortest(number: Any) -> str:
+    return repr(float(number)).removesuffix(".0")
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -165,7 +165,8 @@ def _by_pressure(
 ) -> None:
     for name, found in answers.items():
         force, value, width = found["force"], found[what], found[scatter]
-        held = np.isfinite(force) & (found["area"] > 1e-4) & (force > 0)
+        # areas of MBMA's islands, which are added, may pass 1
+        held = np.isfinite(force) & (found["area"] > 1e-4) & (found["area"] <= 1) & (force > 0)
         (line,) = axes.plot(force[held], value[held], label=theory_label(name))
         band = held & np.isfinite(width)
         low, high = (

@@ -149,7 +149,7 @@ def curve_command(
     values = {name: getattr(answer, name) for name in COLUMNS} | (_leakage(answer) if leakage else {})
     units = {}
     others = {
-        name: other_theory(name, surface, gap, asked["E_star"])
+        name: other_theory(name, surface, gap, asked["E_star"], asked.get("hardness", math.inf))
         for name in COMPARED
         if name != model.theory and (compare or (plot is not None and name in DRAWN))
     }
@@ -157,11 +157,18 @@ def curve_command(
         for quantity in ("force", "area"):
             values[f"{theory}_{quantity}"] = getattr(line, quantity)
             units[f"{theory}_{quantity}"] = shown_unit(quantity, specimen.units)
-    picture = b"" if plot is None else _draw(specimen, answer, others, plot.suffix[1:], leakage)
+    picture = b"" if plot is None else _draw(specimen, answer, others, plot.suffix[1:], leakage, model.hardness)
     report_answer("curve", specimen, model, answer, values, units).write(output, plot, picture)
 
 
-def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory], kind: str, leakage: bool) -> bytes:
+def _draw(
+    specimen: Specimen,
+    answer: Contact,
+    others: Mapping[str, OtherTheory],
+    kind: str,
+    leakage: bool,
+    hardness: float | str,
+) -> bytes:
     from mbma_tables.plots import Curve, draw_compression, force_label, leakage_label, theory_label, to_picture
 
     gap = np.asarray(answer.mean_separation / specimen.surface.h_rms)
@@ -170,7 +177,8 @@ def _draw(specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory]
         known = np.isfinite(line.force)
         curves.append(Curve(theory_label(name), gap[known], *(field[known] for field in line)))
     force, flow = force_label(unit_of("force", specimen.units)), leakage_label(unit_of("leakage", specimen.units))
-    return to_picture(draw_compression(curves, specimen.title, force, leakage_label=flow), kind)
+    title = specimen.title if hardness == math.inf else f"{specimen.title}, hardness {hardness}"
+    return to_picture(draw_compression(curves, title, force, leakage_label=flow), kind)
 
 
 @click.command("island", short_help="Contact islands at given approaches.")

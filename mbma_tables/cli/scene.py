@@ -119,5 +119,7 @@ def _picture(found: xarray.Dataset, kind: str) -> bytes:
     label = theory_label(found.attrs["theory"]) + (f", {reading}" if reading else "")
     bands = [found[name].values if name in found else None for name in ("scatter", "area_scatter")]
     curves: list[Any] = [Curve(label, gap, found["force"].values, found["area"].values, *bands)]
-    drawn = draw_compression(curves, str(found.attrs["title"]), force_label(found["force"].attrs["units"]))
+    unit = found["force"].attrs["units"]
+    hardness = f", hardness {found.attrs['hardness']:.4g} {unit}" if "hardness" in found.attrs else ""
+    drawn = draw_compression(curves, found.attrs["title"] + hardness, force_label(unit))
     return to_picture(drawn, kind)

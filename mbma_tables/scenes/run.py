@@ -254,7 +254,9 @@ class OtherTheory(NamedTuple):
     area_scatter: FloatArray
 
 
-def other_theory(name: str, surface: AnySurface, gap: FloatArray, E_star: float) -> OtherTheory:
+def other_theory(
+    name: str, surface: AnySurface, gap: FloatArray, E_star: float, hardness: float = math.inf
+) -> OtherTheory:
     """A theory, one of `effects.COMPARED`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
     from mbma_tables.theories import get_theory
     from mbma_tables.theories.protocol import answer_where_finite
@@ -265,6 +267,10 @@ def other_theory(name: str, surface: AnySurface, gap: FloatArray, E_star: float)
         theory: Theory = Persson("simplified")
     else:
         theory = get_theory(name)
+    if hardness < math.inf:
+        from mbma_tables.theories.yielding import Yielding
+
+        theory = Yielding(theory, hardness / E_star)
     found = answer_where_finite(theory, surface, (float(surface.h_max) + gap) / 2)
     return OtherTheory(E_star * found.force, found.area, *theory.scatter(surface, found.area))
 
@@ -280,7 +286,8 @@ def _comparison(run: Run, step: Step) -> None:
         found = conductance.CORRELATIONS[step.name](problem.surface, pressure, k_s, problem.E_star, cap)
         run.found[f"{step.name}_conductance"] = (("gap",), found)
         return
-    other = other_theory(step.name, run.problem.surface, run.gap, run.problem.E_star)
+    cap = math.inf if run.problem.hardness is None else run.problem.hardness
+    other = other_theory(step.name, run.problem.surface, run.gap, run.problem.E_star, cap)
     run.found |= {f"{step.name}_force": (("gap",), other.force), f"{step.name}_area": (("gap",), other.area)}
 
 

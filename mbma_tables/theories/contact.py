@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.arguments import (
     FloatArray,
     broadcast_shape,
+    describe_entries,
     finite_array,
     hinted,
     is_labelled,
@@ -19,7 +20,7 @@ from mbma_tables.arguments import (
     require,
     spread,
 )
-from mbma_tables.errors import InputError
+from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.labels import apply_to_surface
 from mbma_tables.models import AnyModel
 from mbma_tables.models.protocol import QUANTITIES
@@ -179,7 +180,8 @@ def _contact(
     theory = source.theory_at(E_star, hardness)
     places: dict[str, Any] = {}
     if by != "separation" or not isinstance(theory, Mbma):
-        value, E_star, places = _places(surface, value, E_star, hardness, by, theory)
+        unit = source.units.stress
+        value, E_star, places = _places(surface, value, E_star, hardness, by, theory, unit)
     held = {"pressure": "force", "area": "area"}.get(by)
     if derivatives and held:
         require(by, value, np.asarray(value) > 0, "positive where derivatives are asked for: a gap has no slope there")
@@ -210,7 +212,13 @@ def _contact(
 
 
 def _places(
-    surface: AnySurface, value: ArrayLike, E_star: ArrayLike, hardness: ArrayLike, by: str, theory: Theory
+    surface: AnySurface,
+    value: ArrayLike,
+    E_star: ArrayLike,
+    hardness: ArrayLike,
+    by: str,
+    theory: Theory,
+    unit: str | None,
 ) -> tuple[FloatArray, FloatArray, dict[str, Any]]:
     """What is known, the modulus, and both separations, all of the broadcast shape."""
     asked, modulus = finite_array(by, value), positive_modulus(E_star)
@@ -224,10 +232,26 @@ def _places(
     else:
         require(by, asked, asked >= 0, "at least 0")
         quantity, wanted = ("force", asked / modulus) if by == "pressure" else ("area", asked)
-        gap = 2 * theory.mean_separation_at(surface, quantity, wanted) - h_max
+        try:
+            gap = 2 * theory.mean_separation_at(surface, quantity, wanted) - h_max
+        except OutOfRangeError:
+            if by == "pressure":
+                _refuse_pressures(surface, asked, modulus, hardness, theory, unit)
+            raise
     average = asked if by == "mean_separation" else (h_max + gap) / 2
     both = {"separation": gap, "mean_separation": average}
     return asked, modulus, {name: spread(place, shape)[()] for name, place in both.items()}
+
+
+def _refuse_pressures(
+    surface: AnySurface, asked: FloatArray, modulus: FloatArray, hardness: ArrayLike, theory: Theory, unit: str | None
+) -> None:
+    """Refuse pressures beyond the hardness or the theory's end, in the unit in which they were asked for."""
+    largest = modulus * theory.answer(surface, theory.interval(surface)[0]).force
+    name = "pressure" if unit in (None, "1") else f"pressure [{unit}]"
+    for limit, what in ((hardness, "the hardness"), (largest, f"what theory {theory.name!r} reaches on this surface")):
+        end = spread(np.asarray(limit), asked.shape)
+        require(name, asked, asked <= end, f"at most {what}, {describe_entries(end, asked > end)}")
 
 
 def _at_fixed(held: str, by: str, slopes: dict[str, Any], per_modulus: Any) -> dict[str, Any]:

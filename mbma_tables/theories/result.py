@@ -129,7 +129,9 @@ class Contact(Displayed):
         return {"E_star": shown(source.E_star, unit_of("force", source.units)), "surface": repr(source.surface)}
 
     def _figure(self) -> Figure:
-        return draw_compression([self.curve()], force_label=force_label(self.units["force"]))
+        source, unit = self._source, self.units["force"]
+        title = f"hardness {shown(source.hardness, unit)}" if source.yields else ""
+        return draw_compression([self.curve()], title, force_label(unit))
 
     def curve(self, leakage: bool = False) -> Curve:
         """A line of pictures, of one surface at several separations; with its leakage where that is asked for."""

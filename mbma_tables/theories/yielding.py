@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
 from mbma_tables import hardness as law
-from mbma_tables.arguments import FloatArray, checked_hardness, describe_entries
+from mbma_tables.arguments import FloatArray, checked_hardness
 from mbma_tables.bearing_curve import rows
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -185,11 +185,7 @@ class Yielding(Theory):
             return super().mean_separation_at(surface, quantity, given)
         cap = np.broadcast_to(self.hardness, shape)
         if (given > cap).any():
-            raise OutOfRangeError(
-                f"pressure must be at most the hardness, F/(A0 E*) at most {describe_entries(cap, given > cap)}; got "
-                f"{describe_entries(given, given > cap)}",
-                given > cap,
-            )
+            raise OutOfRangeError("pressure must be at most the hardness", given > cap)
         return self._separation(surface, given)
 
     def _separation(self, surface: AnySurface, force: FloatArray) -> FloatArray:

@@ -276,7 +276,7 @@ def test_bad_input_of_every_command(folder, arguments, message):
         (["contact", "-d", "0,nan"], "separation must be finite, got nan at (1,)"),
         (["contact", "-d", ""], "separation is empty"),
         (["contact", "-d", "1;2"], "';2' is no known unit of length"),
-        (["contact", "-p", "9"], "force must be at most what theory 'mbma' reaches"),
+        (["contact", "-p", "9"], "pressure must be at most what theory 'mbma' reaches"),
         (["contact", "-a", "0.01", "--over-h-rms"], "--over-h-rms is about lengths"),
         (["contact", "-d", "1", "--theory", "person"], "theory must be one of ('mbma', "),
         (["contact", "-d", "1", "--theory", "persson", "--tier", "exact"], "tier: options of theory 'mbma'"),
@@ -487,13 +487,15 @@ def test_help_answers_without_heavy_imports(command):
     assert found.stdout.startswith(f"Usage: mbma {command}".rstrip())
 
 
-def test_contact_with_a_hardness():
+def test_contact_with_a_hardness(tmp_path):
     named = ["contact", "--hurst", "0.8", "--q0", "0.01/um", "--q1", "2/um", "--h-rms", "1um", "--h-max", "3um"]
     asked = [*named, "--E-star", "100GPa", "-p", "30MPa", "--theory", "calibrated"]
     text = run(*asked, "--hardness", "1500MPa")
     assert "psi 3.61, elastic up to 1.1" in text
     assert "yielded" in text
     assert "elastic: area within 5% for hardnesses from 4.922 GPa on" in run(*asked)
+    run("curve", *asked[1:-4], "--points", "5", "--hardness", "1500MPa", "--plot", tmp_path / "c.svg")
+    assert "hardness 1500MPa<" in (tmp_path / "c.svg").read_text()
 
 
 def test_leakage_is_a_column_where_it_is_asked_for():

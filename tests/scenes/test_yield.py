@@ -40,6 +40,16 @@ def test_what_a_yielding_scene_costs_is_stated():
     assert 2 * prices[0] <= prices[1] <= 3 * prices[0]
 
 
+def test_theories_compared_yield_too():
+    asked = {"mean_separations": [0.5, 1.5], "E_star": 100e3, "hardness": 1500.0}
+    effects, others = ["force", "area", "comparison", "yield"], ["persson", "calibrated"]
+    found = Scene(SURFACE, effects, theories=others, **asked).run()
+    for name in others:
+        known = contact(SURFACE, mean_separation=[0.5, 1.5], E_star=100e3, hardness=1500.0, theory=name)
+        for quantity in ("force", "area"):
+            assert found[f"{name}_{quantity}"].values == pytest.approx(getattr(known, quantity), rel=1e-9)
+
+
 def test_off_it_is_never_asked(monkeypatch):
     def refuse(*given):
         raise AssertionError("yielding was asked")

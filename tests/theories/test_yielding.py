@@ -168,7 +168,8 @@ def test_a_map_yields_by_its_own_heights():
 @pytest.mark.parametrize(
     ("asked", "match"),
     [
-        ({"pressure": 2000.0}, "pressure must be at most the hardness"),
+        ({"pressure": 2000.0}, "pressure must be at most the hardness, 1500, got 2000"),
+        ({"pressure": "2 GPa", "E_star": "100 GPa", "hardness": "1.5 GPa"}, r"pressure \[GPa\] .* 1.5, got 2"),
         ({"pressure": 1.0, "hardness": 0.0}, "hardness must be positive, or infinite"),
         ({"pressure": 1.0, "hardness": np.nan}, "hardness must be finite"),
         ({"pressure": 1.0, "hardness": "hard"}, "hardness must be a number"),
