@@ -34,9 +34,9 @@ def _times(matrix: FloatArray, row: int, values: FloatArray) -> float:
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy", forceinline=True)
-def _leads(delta: float, power: int) -> tuple[float, float]:
-    """Powers of delta that weights of force and area lack in a panel that begins at 0."""
-    return (delta * delta * math.sqrt(delta), delta * delta * np.cbrt(delta)) if power > 1 else (1.0, 1.0)
+def _leads(delta: float) -> tuple[float, float]:
+    """Powers of delta that weights of force and area lack in the panel that begins at 0."""
+    return delta * delta * math.sqrt(delta), delta * delta * np.cbrt(delta)
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy")
@@ -136,13 +136,17 @@ def fill_sums(
         for gap in range(rule.reach.size):
             reach = rule.reach[gap]
             c = low[panel] + width * reach**power
+            share, first = reach * width, gap * count
             for k in range(count):
-                node, place = gap * count + k, reach * rule.nodes[k]
-                measure = reach * rule.weights[k] * width * (2.0 * place if power > 1 else 1.0)
-                lead_F, lead_A = _leads(width * place * place, power)
-                own[0][0, k] = measure * lead_F * inside[0, panel, node]
-                own[0][1, k] = measure * lead_A * inside[1, panel, node]
-                own[1][k], own[2][k] = inside[2, panel, node], inside[3, panel, node]
+                weight = share * rule.weights[k]
+                own[0][0, k], own[0][1, k] = weight * inside[0, panel, first + k], weight * inside[1, panel, first + k]
+                own[1][k], own[2][k] = inside[2, panel, first + k], inside[3, panel, first + k]
+            if power > 1:
+                for k in range(count):
+                    place = reach * rule.nodes[k]
+                    lead_F, lead_A = _leads(width * place * place)
+                    own[0][0, k] *= 2.0 * place * lead_F
+                    own[0][1, k] *= 2.0 * place * lead_A
             least = _least(c, below, begin, stop, _least(c, own, 0, count, math.inf))
             sums[:] = 0.0
             if begin > 0:
@@ -156,7 +160,7 @@ def fill_sums(
             # the island at the gap itself
             height = ends[2, panel, gap] - ends[3, panel, gap] * c
             share = exp(0.5 * (least - height * height))
-            lead_F, lead_A = _leads(c, power)
+            lead_F, lead_A = _leads(c) if power > 1 else (1.0, 1.0)
             sums[2] += share * lead_F * ends[0, panel, gap]
             sums[3] += share * lead_A * ends[1, panel, gap]
             begun = math.log(c) if power > 1 else 0.0
@@ -216,13 +220,15 @@ def fill_missed(
             off_rate = _times(checks, k, fields[3, panel]) - rate
             turned = max(turned, abs(off_shift - off_rate * at) + HIGH * abs(off_rate) / rate)
         for k in range(2 * count):
-            place = 0.5 * (nodes[k] if k < count else 1.0 + nodes[k - count])
-            measure = 0.5 * weights[k % count] * (2.0 * place if power > 1 else 1.0)
-            finer[0, k] = measure * _leads(width * place * place, power)[0] * _times(halves, k, fields[0, panel])
+            finer[0, k] = 0.5 * weights[k % count] * _times(halves, k, fields[0, panel])
             finer[1, k], finer[2, k] = _times(halves, k, fields[2, panel]), _times(halves, k, fields[3, panel])
-        for k in range(count):
-            measure = weights[k] * (2.0 * nodes[k] if power > 1 else 1.0)
-            coarse[k] = measure * _leads(width * nodes[k] * nodes[k], power)[0] * fields[0, panel, k]
+        coarse[:] = weights * fields[0, panel]
+        if power > 1:
+            for k in range(2 * count):
+                place = 0.5 * (nodes[k] if k < count else 1.0 + nodes[k - count])
+                finer[0, k] *= 2.0 * place * _leads(width * place * place)[0]
+            for k in range(count):
+                coarse[k] *= 2.0 * nodes[k] * _leads(width * nodes[k] * nodes[k])[0]
         most, off = 0.0, 0.0
         least = math.inf
         for turn in range(2):
@@ -257,10 +263,8 @@ def _far_rule() -> tuple[FloatArray, FloatArray]:
 def series_of(groups: list[Group], nodes: Nodes) -> tuple[FloatArray, FloatArray]:
     """`Profile.series` of panels, and their errors."""
     points, to_series = _far_rule()
-    count, below = (
-        sum(rank.size for _, rank in groups),
-        (np.ascontiguousarray(nodes.weights.T), nodes.shift, nodes.rate),
-    )
+    below = np.ascontiguousarray(nodes.weights.T), nodes.shift, nodes.rate
+    count = sum(rank.size for _, rank in groups)
     made, tails = np.zeros((count, 4, COUNTS[-1][1] + MORE)), np.empty(count)
     for (rule, low, high, fields), rank in groups:
         values, stops = np.empty((4, rank.size, rule.reach.size)), np.searchsorted(nodes.panel, rank)
