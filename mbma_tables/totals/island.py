@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, hinted, is_labelled, require
 from mbma_tables.errors import InputError
-from mbma_tables.islands.geometry import geometry
-from mbma_tables.islands.measured import measured_islands
+from mbma_tables.islands.geometry import geometry, measured_islands
 from mbma_tables.models import AnyModel, answer_islands, get_model, tier_name
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.islands.geometry import geometry
-from mbma_tables.islands.measured import floors_of, measured_islands, s_over_h_rms
+from mbma_tables.islands.geometry import floors_of, geometry, measured_islands, s_over_h_rms
 from mbma_tables.models import AnyModel, answer_islands
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.measured import MeasuredSurface

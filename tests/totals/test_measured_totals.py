@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law, island
-from mbma_tables.islands.measured import floors_of, measured_islands
+from mbma_tables.islands.geometry import floors_of, measured_islands
 from mbma_tables.models import answer_islands, get_model
 from mbma_tables.surfaces.readings import FITTED, PRINTED, REPORTED, get_reading
 from mbma_tables.totals.profile import profile
