@@ -7,6 +7,8 @@ approach, so that -dp/du = dp/dc.
 from __future__ import annotations
 
 import dataclasses
+import functools
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -176,7 +178,7 @@ def describe_law(
     joint = frozen_joint(surface, E_star, length_unit, stress_unit, reading, theory, hardness)
     law, units = joint.law, joint.units
     least, end = _range(law, units.number("overclosure", largest_overclosure), pressures, units)
-    k_s, names = 1.0, ("overclosure", "pressure", joint.length, joint.stress)
+    k_s, names = 1.0, (own := ("overclosure", "pressure", joint.length, joint.stress))
     if quantity == "conductance":
         k_s, unit = checked_conductivity(conductivity, conductivity_unit)
         names = ("pressure", "conductance", joint.stress, f"{unit}/{joint.length}")
@@ -184,6 +186,23 @@ def describe_law(
         names = ("pressure", "leakage", joint.stress, f"{joint.length}^3")
     if quantity != "conductance" and (conductivity is not None or conductivity_unit is not None):
         raise InputError("conductivity and conductivity_unit belong to quantity='conductance': leave them out")
+    choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly)
+    behaviour = _table(joint, "pressure", own, least, end, choose) if quantity == "conductance" else None
+    return _table(joint, quantity, names, least, end, choose, k_s, behaviour)
+
+
+def _table(
+    joint: Joint,
+    quantity: str,
+    names: tuple[str, str, str, str],
+    least: float | None,
+    end: float,
+    choose: Callable[..., tuple[FloatArray, FloatArray, float]],
+    k_s: float = 1.0,
+    behaviour: LawTable | None = None,
+) -> LawTable:
+    """Rows up to an overclosure, whose error holds from the `least` pressure on, or above `FLOOR`."""
+    law = joint.law
     fine_x, fine_y = _curve(joint, quantity, end, k_s)
     floor = FLOOR * float(fine_y[-1])
     if quantity == "leakage":
@@ -191,24 +210,9 @@ def describe_law(
         if law.area(law.h_max - 2 * end) > LARGEST_AREA:
             floor = float(law.leakage(law.separation(area=LARGEST_AREA)))
         floor *= 1 - 1e-9
-    elif pressures is not None:
+    elif least is not None:
         floor = least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
-    x, y, error = chosen_rows(fine_x, fine_y, floor, rows, rtol, evenly)
-    behaviour = None
-    if quantity == "conductance":
-        behaviour = describe_law(
-            joint.surface,
-            joint.modulus,
-            stress_unit=joint.stress,
-            rows=rows,
-            rtol=rtol,
-            largest_overclosure=end if pressures is None else None,
-            pressures=pressures,
-            reading=reading,
-            theory=theory,
-            hardness=joint.hardness,
-            evenly=evenly,
-        )
+    x, y, error = choose(fine_x, fine_y, floor)
     comments = joint.header(
         f"{names[1]} [{names[3]}] against {names[0]} [{names[2]}]",
         f"{names[0]} from 0 to {x[-1]:.10g}, {_why_there(law, names[0])}",
@@ -232,10 +236,10 @@ def _why_there(law: ContactLaw, x_name: str) -> str:
 
 def _range(
     law: ContactLaw, end: float | None, pressures: tuple[float | str, float | str] | None, units: Units
-) -> tuple[float, float]:
+) -> tuple[float | None, float]:
     """Smallest pressure whose error counts, and largest overclosure, by a range of pressures or by an overclosure."""
     if pressures is None:
-        return 0.0, _range_end(law, end)
+        return None, _range_end(law, end)
     if end is not None:
         raise InputError("largest_overclosure and pressures are both given: give one of them")
     low, high = (number_in("pressures", units.number("pressure", p), 1e-300, 1e300) for p in pressures)
