@@ -81,7 +81,7 @@ def leakage_law(law: ContactLaw, surface: AnySurface) -> LeakageLaw:
     rtol = max(RTOL, SHARE * law.error)
     deepest = law.lowest if law.area_turning_point is None else law.area_turning_point
     blocked = bool(law.area(deepest) >= threshold)
-    bottom = float(law.separation(area=threshold)) if blocked else deepest
+    bottom = float(law.separation(area=threshold)) if blocked else law.lowest
     top = min(law.h_max, law.highest) if law.block.view(np.int64)[ENDS] else law.highest
     span = top - bottom
 

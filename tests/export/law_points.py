@@ -24,6 +24,8 @@ ASKED: dict[str, tuple[Surface, dict[str, Any]]] = {
     "calibrated": (ROAD, {"theory": "calibrated"}),
     "hardened": (ROAD, {"theory": "calibrated", "hardness": 2.0}),
     "persson": (ROAD, {"theory": "persson"}),
+    # its area turns down without blocking, and its slopes are flat where coefficients are rounded
+    "flat": (Surface(0.23, 1.0, 1.5e4, 0.125, 0.1875, unit="mm"), {}),
     # its force turns down
     "turning": (Surface(0.35, 1.0, 1e4, 0.125, 0.375, unit="mm"), {}),
 }

@@ -157,7 +157,11 @@ class TestRates:
 
 class TestLaw:
     @pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson", "greenwood_williamson"])
-    @pytest.mark.parametrize("surface", [SEAL, Surface(0.3, 0.02, 160.0, 3.0, 9.0)], ids=["seal", "fine"])
+    @pytest.mark.parametrize(
+        "surface",
+        [SEAL, Surface(0.3, 0.02, 160.0, 3.0, 9.0), Surface(0.23, 1.0, 1.5e4, 2.0, 3.0)],
+        ids=["seal", "fine", "its area turns down by mbma"],
+    )
     def test_is_the_contact_of_its_theory(self, theory, surface):
         law = contact_law(surface, theory=theory)
         low, high = max(law.leakage.blocked_at, law.lowest), min(law.h_max, law.highest)
