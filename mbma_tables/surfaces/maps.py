@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from mbma_tables.surfaces.power_law import SCATTER, log_bins
 from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.psd import check_band, fit_spectrum
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.surfaces.treatment import LENGTHS, Treated, Treatment, mirrored, treat
+from mbma_tables.surfaces.treatment import LENGTHS, Treated, Treatment, mirrored, squares, treat
 from mbma_tables.units import Units, known, resolve
 
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
@@ -129,6 +129,9 @@ def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | N
     return _with_anisotropy(fitted, q, C * waves, directions)
 
 
+LONG = 4.0  # grid steps in wavenumber: waves up to there are few, and a window weighs them by chance
+RAISED, MET = 6.0, 1e-6  # of ln C, by which the strongest waves under a window may change; sums that are met
+TOLD = 0.05  # relative difference of rms gradients that is told, and half of that of h_rms
 STEEPEST = 4.0  # by which `matched` may tilt a spectrum
 
 
@@ -150,6 +153,57 @@ def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> Flo
     return np.asarray(tilted * (variance / PowerLaws(q, tilted).moment(0)))
 
 
+def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> FloatArray:
+    """C with another variance and mean squared gradient, by waves that are few: the longest, of a rough surface.
+
+    The likeliest change, where ln C is known as the inverse of the number of waves: it goes like C times 1 and q^2.
+    """
+    from scipy.optimize import least_squares
+
+    ways = np.stack([C / C.max(), C * q**2 / (C * q**2).max()])
+
+    def misses(by: FloatArray) -> FloatArray:
+        laws = PowerLaws(q, C * np.exp(by @ ways))
+        return np.log([laws.moment(0) / variance, 2 * laws.moment(2) / slopes])
+
+    found = least_squares(misses, np.zeros(2), bounds=(-RAISED, RAISED), xtol=1e-12)
+    # not where heights are of a trend, of which the window shows no wave
+    return np.asarray(C * np.exp(found.x @ ways)) if np.abs(found.fun).max() < MET else C
+
+
+def _unwindowed(
+    q: FloatArray, C: FloatArray, variance: float, seen: Callable[[float], float], own: Callable[[float], float]
+) -> tuple[FloatArray, dict[str, Any]]:
+    """C under a window as that of the whole map, and what was done.
+
+    Short waves are scaled to their own mean squared gradient, of which `seen` and `own` tell the part from a wavenumber
+    on under the window and of the map; what is left of h_rms and of the gradient is up to the longest waves.
+    """
+    parts = [find(LONG) for find in (seen, own)]
+    rougher = parts[1] / parts[0] if min(parts) > 0 else 1.0
+    under = math.sqrt(PowerLaws(q, C).moment(0) / variance)
+    C = raised(q, C * rougher, variance, own(0.0))
+    laws = PowerLaws(q, C)
+    h_rms, gradient = math.sqrt(laws.moment(0) / variance), math.sqrt(2 * laws.moment(2) / own(0.0))
+    record = {"step": "window", "h_rms": under, "rms_gradient": math.sqrt(seen(0.0) / own(0.0))}
+    told = []
+    if abs(math.sqrt(rougher) - 1) > TOLD:
+        told.append(
+            f"roughness differs from place to place: the rms gradient of short waves is {math.sqrt(rougher):.2f} times "
+            "that under the window of the spectrum, which is scaled to it"
+        )
+    if abs(under - 1) > 2 * TOLD:
+        told.append(
+            f"few long waves carry the heights: under the window of the spectrum h_rms is {under:.2f} times the map's"
+        )
+    if max(abs(h_rms - 1), abs(gradient - 1)) > TOLD:
+        told.append(
+            f"spectrum and heights disagree, as where a trend is left: h_rms of the spectrum is {h_rms:.2f} times the "
+            f"map's, its rms gradient {gradient:.2f} times"
+        )
+    return C, record | ({"told": "; ".join(told)} if told else {})
+
+
 def _within_band(treated: Treated, scale: float, spectrum: tuple[Any, ...]) -> tuple[Any, ...]:
     """Entries of a radial spectrum, lengths over `scale`, whose waves were kept: a window smears some beyond."""
     q = spectrum[0] / scale
@@ -167,9 +221,20 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
     q, C, waves, _ = _within_band(treated, scale, radial_spectrum(treated.windowed() / scale, unit_x, unit_y))
     bins = log_bins(q, C, waves / (2.0 if treated.periodic else 2.0 * WINDOW_OVERLAP))
     own = Heights.of(values)
-    C_bins = matched(bins.q, np.exp(bins.log_c), own.h_rms**2, float((C * waves) @ q**2 / (C @ waves)))
-    if not treated.periodic:
-        values = mirrored(values)
+    C_bins, notes = np.exp(bins.log_c), []
+    if treated.periodic:
+        C_bins = matched(bins.q, C_bins, own.h_rms**2, float((C * waves) @ q**2 / (C @ waves)))
+    else:
+        grid = [2 * math.pi / (count * step) for count, step in zip(values.shape, (unit_x, unit_y), strict=True)]
+        slopes, values = C * waves * q**2 * grid[0] * grid[1], mirrored(values)
+        C_bins, note = _unwindowed(
+            bins.q,
+            C_bins,
+            own.h_rms**2,
+            lambda low: float(slopes[q >= low * max(grid)].sum()),
+            lambda low: squares(values, (unit_x, unit_y), (low * max(grid), float(q[-1]) * (1 + 1e-9)))[1],
+        )
+        notes.append(note)
     sizes = values.shape[0] * unit_x, values.shape[1] * unit_y
     curves = bearing.bearing(values, sizes)
     known = MeasuredSurface(
@@ -184,7 +249,7 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
     ).scaled(scale, treated.unit)
     read = {"step": "read", "points": list(treated.heights.shape), "steps": list(treated.steps), "unit": treated.unit}
     edges = "periodic" if treated.periodic else "under a window for the spectrum, mirrored for the curves"
-    return dataclasses.replace(known, provenance=(read, *treated.provenance, {"step": "edges", "kind": edges}))
+    return dataclasses.replace(known, provenance=(read, *treated.provenance, {"step": "edges", "kind": edges}, *notes))
 
 
 def _with_anisotropy(

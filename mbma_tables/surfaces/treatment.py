@@ -242,10 +242,10 @@ def _within(known: Treated, short: float | None, long: float | None) -> Treated:
     for name, method, wavelength in (("long_cutoff", "longcut", long), ("short_cutoff", "shortcut", short)):
         if wavelength is None:
             continue
-        before = _squares(values, known.steps)
+        before = squares(values, known.steps)
         scan = wrapped(values, known.steps, True, known.unit)
         values = np.asarray(getattr(scan, method)(cutoff_wavelength=wavelength).heights(), float)
-        after = _squares(values, known.steps)
+        after = squares(values, known.steps)
         if not after[0] > 1e-24 * before[0]:
             raise InputError(f"{name} {wavelength:g} leaves no wave of the measurement")
         of_variance, of_gradient = (1 - b / a for a, b in zip(before, after, strict=True))
@@ -266,11 +266,14 @@ def mirrored(values: FloatArray) -> FloatArray:
     return values
 
 
-def _squares(values: FloatArray, steps: tuple[float, ...]) -> tuple[float, float]:
-    """Mean squares of periodic heights and of their gradient."""
+def squares(
+    values: FloatArray, steps: tuple[float, ...], band: tuple[float, float] = (0.0, math.inf)
+) -> tuple[float, float]:
+    """Mean squares of periodic heights and of their gradient, of the waves between two wavenumbers."""
     power = np.abs(np.fft.fftn(values) / values.size) ** 2
     power.flat[0] = 0.0
     waves = [2 * np.pi * np.fft.fftfreq(count, step) for count, step in zip(values.shape, steps, strict=True)]
     squared: Callable[..., FloatArray] = np.add.outer
     q2 = squared(waves[0] ** 2, waves[1] ** 2) if values.ndim == 2 else waves[0] ** 2
+    power = power * ((q2 >= band[0] ** 2) & (q2 <= band[1] ** 2))
     return float(power.sum()), float((power * q2).sum())

@@ -426,3 +426,41 @@ class TestFiles:
             pytest.skip("no reference maps: set MBMA_REFERENCE_MAPS to their folder")
         with pytest.raises(NotSelfAffineError, match=reason):
             from_map(read_measurement(folder / name))
+
+
+def cut_out(seed, roll_off, points=128, tiles=4):
+    """A part of a larger periodic map with H = 0.8 and its own mean squared gradient; 1 wide, six points a wave."""
+    count = tiles * points
+    k = np.hypot(*np.meshgrid(np.fft.fftfreq(count, 1 / points), np.fft.rfftfreq(count, 1 / points), indexing="ij"))
+    amplitude = np.where((k > 0) & (k <= points / 6), np.maximum(k, 1 / roll_off) ** -1.8, 0)
+    transform = amplitude * np.fft.rfft2(np.random.default_rng(seed).standard_normal((count, count)))
+    slopes = [
+        np.fft.irfft2(2j * np.pi * axis * transform)
+        for axis in (np.fft.fftfreq(count, 1 / points)[:, None], np.fft.rfftfreq(count, 1 / points))
+    ]
+    part = (slice(points), slice(points))
+    gradient = math.sqrt(sum(np.mean(slope[part] ** 2) for slope in slopes))
+    return np.fft.irfft2(transform)[part], gradient
+
+
+@pytest.mark.parametrize("roll_off", [1.0, 0.5, 0.25])
+def test_the_gradient_of_a_map_that_is_not_periodic_is_that_of_its_heights(roll_off):
+    ratios = []
+    for seed in range(8):
+        heights, gradient = cut_out(seed, roll_off)
+        surface = Surface.from_map(heights, 1 / 128)
+        assert surface.h_rms == pytest.approx(surface.heights.h_rms, rel=1e-5)
+        ratios.append(surface.rms_gradient / gradient)
+    assert np.abs(np.array(ratios) - 1).max() < 0.05
+    assert np.mean(ratios) == pytest.approx(1, abs=0.02)
+
+
+def test_a_trend_that_is_left_is_told_and_short_waves_stay():
+    heights, _ = cut_out(0, 0.25)
+    x = np.linspace(0, 1, 128)
+    clean = Surface.from_map(heights, 1 / 128)
+    tilted = Surface.from_map(heights + 40 * heights.std() * x[:, None], 1 / 128, detrend="mean")
+    q = np.geomspace(60, 120, 20)
+    np.testing.assert_allclose(tilted.power_spectrum(q), clean.power_spectrum(q), rtol=0.1)
+    assert not any("a trend is left" in entry.get("told", "") for entry in clean.provenance)
+    assert any("a trend is left" in entry.get("told", "") for entry in tilted.provenance)
