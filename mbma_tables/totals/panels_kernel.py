@@ -18,6 +18,7 @@ from mbma_tables.totals.panels import BETWEEN, COUNTS, HIGH, MORE, SPREAD, TOPS,
 TAIL_SHARE = 2.0  # of the last two coefficients, for all that follow: they fall by 2 at least, and count twice
 SLOPES = 0.1  # of their relative error counts
 MANY = 1000  # islands below, from which those far below are summed by series of TERMS
+FAR_ERROR = 5e-11  # of such a series, or they are summed after all
 STRETCH, TERMS = 0.1, 12  # of the compression, or of h_rms, that one such series covers
 
 
@@ -132,7 +133,8 @@ def fill_sums(
             begin, start, until = 0, low[panel], min(low[panel] + STRETCH * min(low[panel], 1.0), high[many])
             if stop > MANY and high[panel] <= until:
                 begin = stop
-                error = max(error, _fill_far(start, until, below, begin, points, series, far))
+                missed = _fill_far(start, until, below, begin, points, series, far)
+                begin, error = (begin, max(error, missed)) if missed <= FAR_ERROR else (0, error)
         for gap in range(rule.reach.size):
             reach = rule.reach[gap]
             c = low[panel] + width * reach**power

@@ -33,7 +33,7 @@ from mbma_tables.totals.panels import CHECKS, COUNTS, POWERS, Group, Nodes, Pane
 FEW = 256  # gaps that are asked of numpy, one by one
 KEPT = 64  # profiles, for whoever asks the same surface again
 WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
-MAX_ROUNDS = 14
+MAX_ROUNDS = 30
 MOST = 1000  # panels to be answered anew at a time
 
 Fields = Callable[[FloatArray], tuple[FloatArray, float]]  # rows of `Panels.fields` at approaches, and their error
