@@ -54,10 +54,11 @@ DIMENSIONS = {
     **dict.fromkeys(("dx", "dy", "short_cutoff", "long_cutoff", "tip_radius", "extrapolate_to"), (1, 0)),
     **dict.fromkeys(("q0", "q1"), (-1, 0)),
     **dict.fromkeys(("D", "m4", "Sds", "Spd"), (-2, 0)),
-    **dict.fromkeys(("E_star", "E1", "E2", "hardness", "pressure", "pressures", "mean_pressure", "force"), (0, 1)),
+    **dict.fromkeys(("E_star", "E1", "E2", "hardness", "elastic_hardness"), (0, 1)),
+    **dict.fromkeys(("pressure", "pressures", "mean_pressure", "force"), (0, 1)),
     "m0": (2, 0),
     **dict.fromkeys(("stiffness", "incremental_stiffness"), (-1, 1)),
-    "plane_separation": (1, 0),
+    **dict.fromkeys(("plane_separation", "separation_scatter"), (1, 0)),
     "leakage": (3, 0),
     "conductance": (-1, 0),
     "energy": (1, 1),
@@ -65,6 +66,7 @@ DIMENSIONS = {
     "island_area": (2, 0),
     "island_density": (-3, 0),
 }
+CONDUCTIVITIES = {"W/mK": "W/(m^2 K)", "S/m": "S/m^2"}  # and the unit of conductance, over a length in metres
 _ASCII = str.maketrans({"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "²": "2"})
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(.*)", re.DOTALL)
 
@@ -191,6 +193,35 @@ class Units:
             mend = "give the surface its unit" if length else "give E* with its unit, such as '100 GPa'"
             raise InputError(f"{name} = {value!r} beside numbers whose unit of {kind} is not known: {mend}")
         return number * factor(unit, own, kind, length or power)
+
+    def conductivities(self, *given: Any) -> tuple[list[Any], str]:
+        """Conductivities and the unit that they have over this unit of length, which is an SI unit of texts.
+
+        Examples
+        --------
+        >>> from mbma_tables.units import Units
+        >>> Units("mm").conductivities(45.0, 167.0), Units("mm").conductivities("45 W/(m K)", "167 W/(m K)")
+        (([45.0, 167.0], 'conductivity/mm'), ([45000.0, 167000.0], 'W/(m^2 K)'))
+        """
+        if not any(isinstance(value, str) for value in given):
+            return list(given), f"conductivity/{unit_of('separation', self)}"
+        numbers, units = [], set()
+        for value in given:
+            found = _NUMBER.fullmatch(str(value))
+            unit = None if found is None else re.sub(r"[\s()*]", "", found[2]).replace("/m/K", "/mK")
+            if found is None or unit not in CONDUCTIVITIES:
+                raise InputError(
+                    f"a conductivity is a number, or a text such as '45 W/(m K)' or '6e7 S/m', got {value!r}"
+                )
+            numbers.append(float(found[1]))
+            units.add(CONDUCTIVITIES[unit])
+        if len(units) > 1:
+            raise InputError(f"conductivities must be in one unit, got {' and '.join(map(repr, given))}")
+        if self.length is None:
+            raise InputError(
+                f"conductivity {given[0]!r} beside lengths whose unit is not known: give the surface its unit"
+            )
+        return [number * factor("m", self.length) for number in numbers], units.pop()
 
 
 UNKNOWN = Units()

@@ -37,7 +37,7 @@ def thing(request):
 def test_a_line_is_short_and_plain(thing):
     line = repr(thing)
     assert "\n" not in line
-    assert len(line) < 320
+    assert len(line) < 360
     assert line.startswith(type(thing).__name__)
     assert not re.search(r"np\.|array|object at", line)
 
@@ -131,7 +131,7 @@ def test_batches_are_summed_up():
     assert "hurst=<100 numbers, 0.2 to 0.9>" in repr(batch)
     answer = contact(batch, 1.0)
     assert "valid 0 of 100" in repr(answer)
-    assert len(repr(answer)) < 320
+    assert len(repr(answer)) < 360
     for single in (batch, answer, contact(ROAD, 0.1)):
         assert "<img" not in single._repr_html_()
         with pytest.raises(InputError):

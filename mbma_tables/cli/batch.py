@@ -83,7 +83,10 @@ def batch_command(
     answer = contact(surface, **keywords)
     found: dict[str, Any] = {"name": names}
     found |= {name: getattr(answer, name) for name in (*COLUMNS[:-1], "stiffness", "scatter", "valid", "error")}
-    notes = [f"theory {answer.theory}, rtol {model.rtol:g}", "scatter: of ln force at a separation, by simulations"]
+    notes = [
+        f"theory {answer.theory}" + (f", rtol {model.rtol:g}" if answer.reading else ""),
+        "scatter: of ln force at a separation, by simulations",
+    ]
     shown = {name: shown_unit(name, first.units) for name in found}
     facts = {"theory": answer.theory, "reading": answer.reading or None, "tier": answer.tier or None}
     Report("batch", file.name, notes, facts, to_columns(found, shown)).write(output)

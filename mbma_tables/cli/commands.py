@@ -40,7 +40,7 @@ MIN_DEPTH = 1e-3  # (h_max - d)/h_max at a curve's second point
 EVEN_FROM = 0.2  # and where its points, geometric so far, become evenly spaced
 MIN_POINTS = 5
 DRAWN = ("calibrated", "persson")  # theories beside the chosen one in a picture, where they are there
-COLUMNS = ("separation", "mean_separation", "force", "area", "error")
+COLUMNS = ("mean_separation", "separation", "force", "area", "error")
 ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
 
 

@@ -20,6 +20,8 @@ from mbma_tables.cli.options import Model, Output
 from mbma_tables.cli.progress import echo
 from mbma_tables.files import write_file
 from mbma_tables.scenes.specimen import Specimen
+from mbma_tables.surfaces.roughness import ASSUMED
+from mbma_tables.surfaces.surface import Surface
 from mbma_tables.units import Units, unit_of
 
 if TYPE_CHECKING:
@@ -141,6 +143,8 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     shown = [f"{name} {value:.6g} {units[name]}".rstrip() for name, value in numbers.items()]
     notes = ["surface: " + ", ".join(shown)]
     assumed = [line for record in surface.provenance for line in record.get("assumed", ())]
+    if isinstance(surface, Surface) and ASSUMED not in assumed:
+        assumed.insert(0, ASSUMED)
     notes += [f"assumed: {line}" for line in assumed]
     facts["assumed"] = assumed
     notes += [record["told"] for record in surface.provenance if "told" in record]
@@ -161,11 +165,22 @@ def _validity(answer: Contact) -> tuple[list[str], dict[str, Any]]:
     if reasons:
         listed = "; ".join(f"{reason} ({int(mask.sum())})" for reason, mask in reasons.items())
         notes.append(f"not valid at {int((~valid).sum())} of {valid.size}: {listed}")
-    scatter = {"scatter": np.atleast_1d(answer.scatter), "area_scatter": np.atleast_1d(answer.area_scatter)}
+    names = ("scatter", "area_scatter", "stiffness_scatter", "separation_scatter")
+    scatter = {name: np.atleast_1d(getattr(answer, name)) for name in names}
     known = {name: values[np.isfinite(values)] for name, values in scatter.items()}
-    if all(values.size for values in known.values()):
-        force, area = (f"{values.min():.2g} to {values.max():.2g}" for values in known.values())
-        notes.append(f"scatter against simulations: ln force {force} at a separation, ln area {area} at a force")
+    what = (
+        "ln force {} at a separation",
+        "ln area {} at a force",
+        "ln stiffness {}",
+        f"u {{}} {answer.units['separation']}",
+    )
+    said = [
+        text.format(f"{values.min():.2g} to {values.max():.2g}")
+        for text, values in zip(what, known.values(), strict=True)
+        if values.size
+    ]
+    if said:
+        notes.append(f"scatter against simulations: {', '.join(said)}")
     facts: dict[str, Any] = {
         "valid": valid.tolist(),
         "reasons": {reason: np.flatnonzero(mask).tolist() for reason, mask in reasons.items()},
@@ -205,7 +220,7 @@ def report_answer(
         "theory": model.theory,
         "reading": answer.reading or None,
         "tier": answer.tier or None,
-        "rtol": model.rtol,
+        "rtol": model.rtol if answer.reading else None,
         "hardness": None if model.hardness == math.inf else model.hardness,
         "E_star": specimen.E_star,
         "stress_unit": specimen.stress_unit,

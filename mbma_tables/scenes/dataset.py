@@ -46,9 +46,9 @@ def _units(problem: Problem) -> dict[str, tuple[str, str]]:
     for name in problem.theories:
         quantities |= {f"{name}_force": ("force", f"F/A0 by {name}"), f"{name}_area": ("area", f"A/A0 by {name}")}
     units = {name: (unit_of(like, problem.units), meaning) for name, (like, meaning) in quantities.items()}
-    per_length = f"conductivity/{unit_of('separation', problem.units)}"
-    correlations = {f"{name}_conductance": (per_length, f"conductance by {name}") for name in CORRELATIONS}
-    return units | correlations | {"conductance": (per_length, "conductance per nominal area")}
+    unit = problem.conductance_unit
+    correlations = {f"{name}_conductance": (unit, f"conductance by {name}") for name in CORRELATIONS}
+    return units | correlations | {"conductance": (unit, "conductance per nominal area")}
 
 
 def to_dataset(run: Run, plan: Plan) -> xr.Dataset:

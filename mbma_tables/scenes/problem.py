@@ -47,7 +47,7 @@ class Problem:
     reading: str | Reading = "reported"
     tier: str | AnyModel | None = None
     theory: str | Theory | UserTheory = "mbma"
-    conductivities: tuple[float, float] | None = None
+    conductivities: tuple[float | str, float | str] | None = None
     deltas: Any = None
     theories: Sequence[str] = ()
     points: int = 64
@@ -58,6 +58,7 @@ class Problem:
     dropped: frozenset[str] = dataclasses.field(init=False)
     gaps: Any = dataclasses.field(init=False)
     units: Units = dataclasses.field(init=False)
+    conductance_unit: str = dataclasses.field(init=False, default="")
 
     def __post_init__(self) -> None:
         for name in ("effects", "without", "theories"):
@@ -103,6 +104,8 @@ class Problem:
         derived = {"surface": surface, "E_star": E_star, "units": units, "length_unit": surface.unit}
         for name in ("separations", "mean_separations", "pressures", "deltas", "hardness"):
             derived[name] = units.number(name, getattr(self, name))
+        if self.conductivities is not None:
+            derived["conductivities"], derived["conductance_unit"] = units.conductivities(*self.conductivities)
         for name, value in derived.items():
             object.__setattr__(self, name, value)
 

@@ -188,8 +188,8 @@ def _leakage(run: Run, step: Step) -> None:
 
 def _validity(run: Run, step: Step) -> None:
     found = _asked(run)
-    fields = {"valid": found.valid, "scatter": found.scatter, "area_scatter": found.area_scatter}
-    run.found |= {name: (("gap",), values) for name, values in fields.items()}
+    names = ("valid", "scatter", "area_scatter", "stiffness_scatter", "separation_scatter")
+    run.found |= {name: (("gap",), getattr(found, name)) for name in names}
     run.reasons = {reason: np.flatnonzero(mask).tolist() for reason, mask in found.reasons.items()}
 
 

@@ -50,8 +50,8 @@ class Scene(Problem):
     theory : str or theory
         "mbma", another one of `mbma_tables.theories.THEORIES`, or an object, as for `contact`. Refinements, tier,
         reading and islands are MBMA's.
-    conductivities : pair of float, optional
-        Of the two bodies, thermal or electrical, for "conductance".
+    conductivities : pair of float or str, optional
+        Of the two bodies, thermal or electrical, for "conductance", as for `Contact.conductance`.
     deltas : array_like, optional
         Approaches [length] of the islands of "pressure_profile".
     theories : sequence of str

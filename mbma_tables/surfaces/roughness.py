@@ -22,6 +22,7 @@ SLOPES = ("Rdq", "Sdq", "Rsm")
 SUMMITS = ("Sds", "Spd")
 WAVES = ("longest", "shortest")
 ROUGHNESS = (*HEIGHTS, *SLOPES, *SUMMITS, *WAVES, "Sp")
+ASSUMED = "heights are Gaussian and the surface is isotropic: measure a map of a ground, milled or worn face"
 SAID = {
     "Rq": "h_rms = Rq: the profile is long and held no filter that takes out waves of the surface",
     "Ra": "h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered",
@@ -86,7 +87,12 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
     q0, q1 = _band(at, h_rms, slope, summits)
     used = ("hurst", height, top, *band)
     shown = {name: given[name].tolist() if hasattr(given[name], "tolist") else given[name] for name in used}
-    record = {"step": "from_roughness", "given": shown, "unit": unit, "assumed": [SAID[name] for name in used]}
+    record = {
+        "step": "from_roughness",
+        "given": shown,
+        "unit": unit,
+        "assumed": [ASSUMED, *(SAID[name] for name in used)],
+    }
     surface = {"hurst": at["hurst"], "q0": q0, "q1": q1, "h_rms": h_rms, "h_max": at[top]}
     return surface | {"unit": unit, "provenance": (record,)}
 

@@ -214,7 +214,7 @@ class Surface(AnySurface):
         >>> ground = Surface.from_roughness(Ra="0.4 um", Rdq=0.1, longest="100 um", hurst=0.8, h_max="1.8 um")
         >>> print(f"h_rms = {ground.h_rms:.3f} {ground.unit}, shortest wave {6.2832 / ground.q1:.2f} {ground.unit}")
         h_rms = 0.501 um, shortest wave 1.12 um
-        >>> ground.provenance[0]["assumed"][1]
+        >>> ground.provenance[0]["assumed"][2]
         'h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered'
         """
         given = {name: value for name, value in locals().items() if name not in ("cls", "unit")}

@@ -40,12 +40,22 @@ QUANTITIES = ("force", "area", "stiffness", "area_slope", "energy")
 
 
 class LawPoint(NamedTuple):
-    """Where a law has a given pressure: separation d, mean separation u, A/A0 and -dF/du, of the pressure's shape."""
+    """Where a law has a given pressure: separation d, mean separation u, A/A0, -dF/du and F/A0, of its shape.
+
+    What yields, and the incremental stiffness with it, no law holds: `contact` answers that.
+    """
 
     separation: Any
     mean_separation: Any
     area: Any
     stiffness: Any
+    force: Any
+
+    @property
+    def mean_pressure(self) -> Any:
+        """Mean pressure in the contact, F/A; NaN where there is none."""
+        with np.errstate(invalid="ignore"):
+            return self.force / self.area
 
 
 class LawValues(NamedTuple):
@@ -239,10 +249,11 @@ class ContactLaw(Displayed):
 
     def at_pressure(self, pressure: ArrayLike) -> LawPoint:
         """Separations, area and stiffness -dF/du where F/A0 is `pressure`, on the branch of first contact."""
-        d, area, stiffness = self._inverse("force", self.units.number("force", pressure), 3)
+        force = self.units.number("force", pressure)
+        d, area, stiffness = self._inverse("force", force, 3)
         mean = d + self.h_max
         mean *= 0.5
-        return LawPoint(d, mean, area, stiffness)
+        return LawPoint(d, mean, area, stiffness, force if is_labelled(force) else np.asarray(force, float)[()])
 
     def _inverse(self, name: str, given: Any, count: int = 1) -> tuple[Any, ...]:
         """Gaps of forces or areas, and with a `count` of 3 area and -dF/du there."""

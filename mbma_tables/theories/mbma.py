@@ -36,6 +36,7 @@ class Mbma(Theory):
     """
 
     name = "mbma"
+    advice = "theory='calibrated' for stiffness or separation"
 
     def __init__(
         self,

@@ -49,6 +49,7 @@ class Theory(abc.ABC):
     """A theory, and what follows from its forces."""
 
     name: str
+    advice = ""  # one line beside each answer
     ends_at_h_max = True  # whether force vanishes at u = h_max; else its Gaussian heights have no end
 
     @abc.abstractmethod
@@ -105,12 +106,16 @@ class Theory(abc.ABC):
         Root mean squares of ln(theory/simulation), of the boundary elements in the calibrated law's file; NaN where
         they are not known, as on surfaces unlike those.
         """
+        return self._stated(surface, "force", area), self._stated(surface, "area", area)
+
+    def stiffness_scatter(self, surface: AnySurface, area: FloatArray) -> FloatArray:
+        """Standard deviation of ln(-dF/du) at given F, likewise; with a hardness that of the frozen contact."""
+        return self._stated(surface, "stiffness", area)
+
+    def _stated(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         if self.departures(surface):
-            unknown = np.full(np.broadcast_shapes(np.shape(area), surface.shape), np.nan)
-            return unknown, unknown
-        table = calibrated_table.shipped()
-        known = [table.standard_deviation(self.scatter_name(surface), quantity, area) for quantity in ("force", "area")]
-        return known[0], known[1]
+            return np.full(np.broadcast_shapes(np.shape(area), surface.shape), np.nan)
+        return calibrated_table.shipped().standard_deviation(self.scatter_name(surface), quantity, area)
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], the integral of F/(A0 E*) from u to last contact."""

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, checked_hardness, is_labelled
 from mbma_tables.display import Displayed, Variable, shown
@@ -25,8 +26,7 @@ if TYPE_CHECKING:
     from mbma_tables.theories.leakage import Leakage
     from mbma_tables.theories.yielding import Loaded
 
-WITH_UNITS = ("separation", "mean_separation", "force", "area", "stiffness", "energy", "mean_pressure")
-OF_HARDNESS = ("incremental_stiffness", "plane_separation")
+OF_HARDNESS = ("yielded", "incremental_stiffness", "plane_separation")
 MOST_SHOWN = 10_000  # entries up to which a line says how far to trust them
 MEANINGS = {
     "separation": "d, rigid plane to mid-plane",
@@ -42,6 +42,8 @@ MEANINGS = {
     "error": "bound on the relative numerical error against the theory",
     "scatter": "standard deviation of ln F at this mean separation from simulation to simulation",
     "area_scatter": "standard deviation of ln A at this force from simulation to simulation",
+    "stiffness_scatter": "standard deviation of ln of the incremental stiffness at this force, likewise",
+    "separation_scatter": "standard deviation of the mean separation at this force, likewise",
     "valid": "whether the theory was tested for contacts such as these",
 }
 MAX_GRADIENT = 1.0  # rms gradient above which heights and wavenumbers are hardly in one unit
@@ -91,31 +93,32 @@ class Contact(Displayed):
     @property
     def units(self) -> dict[str, str]:
         """The unit of each quantity; "1" where it has none, and stresses are over E* where no modulus was given."""
-        return {
-            name: unit_of(name, self._source.units)
-            for name in (*WITH_UNITS, *(OF_HARDNESS if self._source.yields else ()))
-        }
+        names = {*MEANINGS, "elastic_hardness"} - {"valid"}
+        return {name: unit_of(name, self._source.units) for name in sorted(names)}
 
     def _facts(self) -> dict[str, str]:
-        units = self.units
+        units, source = self.units, self._source
         known = {"theory": self.theory, "reading": self.reading, "tier": self.tier}
-        known["resolution"] = self._source.surface.resolution
+        known["resolution"] = source.surface.resolution
         facts = {name: text for name, text in known.items() if text}
         for name in ("mean_separation", "force", "area"):
             if getattr(self, name) is not None:
                 facts[name] = shown(getattr(self, name), units[name])
-        if self._source.surface.labelled or is_labelled(self.mean_separation) or np.size(self.error) > MOST_SHOWN:
+        if source.surface.labelled or is_labelled(self.mean_separation) or np.size(self.error) > MOST_SHOWN:
             return facts
-        more = {"error": self.error, "scatter": self.scatter, "valid": self.valid}
-        if self._source.yields:
+        facts["separation_scatter"] = shown(self.separation_scatter, units["separation_scatter"])
+        more = {name: getattr(self, name) for name in ("error", "scatter", "stiffness_scatter", "valid")}
+        if source.yields:
             more |= {"psi": self.psi, "yielded": self.yielded}
         elif units["force"] != "1":
             facts["elastic_hardness"] = shown(self.elastic_hardness, units["force"])
+        if source.theory.advice:
+            facts["advice"] = source.theory.advice
         return facts | {name: shown(value) for name, value in more.items()}
 
     def _variables(self) -> dict[str, Variable]:
         source = self._source
-        names = [name for name in MEANINGS if name not in (*OF_HARDNESS, "yielded") or source.yields]
+        names = [name for name in MEANINGS if name not in OF_HARDNESS or source.yields]
         names = [name for name in names if name != "energy" or not source.yields]
         known = {name: getattr(self, name) for name in names}
         return {
@@ -170,6 +173,38 @@ class Contact(Displayed):
                 "unloading starts with"
             )
         found: Numbers = self._source.map(lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1)[0]
+        return found
+
+    def conductance(self, k1: ArrayLike | str, k2: ArrayLike | str | None = None) -> Numbers:
+        """Conductance per nominal area of two bodies in contact, thermal or electrical, h = (k_s/E*) (-dF/du).
+
+        By the incremental stiffness (Barber 2003), with a hardness that of the frozen contact.
+
+        Parameters
+        ----------
+        k1, k2 : array_like or str
+            Conductivities of the bodies, k_s = 2 k1 k2/(k1 + k2); without k2 both have k1.
+
+        Returns
+        -------
+        ndarray or DataArray
+            [unit of k/length of the surface], such as W/(m K um); in W/(m^2 K) for "45 W/(m K)", in S/m^2 for
+            "6e6 S/m", where the surface knows its unit. Its scatter is `stiffness_scatter`.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact
+        >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
+        >>> joint = contact(face, pressure="10 MPa", E_star="100 GPa", theory="calibrated", hardness="1.5 GPa")
+        >>> f"{joint.conductance('45 W/(m K)', '167 W/(m K)'):.3g} W/(m^2 K)"
+        '2.36e+04 W/(m^2 K)'
+        """
+        from mbma_tables.totals.conductance import conductance, mean_conductivity
+
+        source = self._source
+        (k1, k2), _ = source.units.conductivities(k1, k1 if k2 is None else k2)
+        # linear in the stiffness, which may be NaN or a DataArray
+        found: Numbers = conductance(1.0, mean_conductivity(k1, k2), 1.0) / source.E_star * self.incremental_stiffness
         return found
 
     def _of_loading(self, name: str) -> Numbers:
@@ -228,6 +263,20 @@ class Contact(Displayed):
     def area_scatter(self) -> Numbers:
         """Standard deviation of ln A at this force, likewise."""
         return self._scatter[1]
+
+    @functools.cached_property
+    def stiffness_scatter(self) -> Numbers:
+        """Standard deviation of ln of `incremental_stiffness` at this force, likewise: of conductance, too."""
+        area = self._answer.area if self.area is None else self.area
+        return self._source.map(lambda theory, s, u, E, A: (theory.stiffness_scatter(s, A),), self, 1, {"area": area})[
+            0
+        ]
+
+    @property
+    def separation_scatter(self) -> Numbers:
+        """Standard deviation of the mean separation at this force [length], `scatter` times F/(-dF/du)."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return self.scatter * self._answer.force / np.abs(self._answer.stiffness)
 
     @functools.cached_property
     def _scatter(self) -> tuple[Numbers, ...]:

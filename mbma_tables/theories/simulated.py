@@ -174,6 +174,10 @@ class BoundaryElements(Theory):
         """Zero: this is the simulation."""
         return np.zeros(np.shape(area)), np.zeros(np.shape(area))
 
+    def stiffness_scatter(self, surface: AnySurface, area: FloatArray) -> FloatArray:
+        """Not known: it is a slope between simulated loads."""
+        return np.full(np.shape(area), np.nan)
+
     def _within(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         for name in ("h_rms", "h_max"):
             own, given = float(getattr(self.surface, name)), np.asarray(getattr(surface, name))

@@ -51,14 +51,19 @@ class Scatter(NamedTuple):
     def standard_deviation(
         self, theory: str, quantity: str, eta: FloatArray, area: FloatArray, elastic: FloatArray
     ) -> FloatArray:
-        """Of ln of the theory over simulation; where not measured, from that of the `elastic` theory and the law's."""
+        """Of ln of the theory over simulation; where not measured, from that of the `elastic` theory and the law's.
+
+        NaN where neither is known: how much of an error of stiffness a hardness lets through was not measured.
+        """
         row = QUANTITIES.index(quantity)
         if theory in self.rms:
             found = self._at(self.rms[theory][row], eta, area)
+        elif quantity not in self.weight:
+            found = np.full(np.broadcast_shapes(np.shape(eta), np.shape(area)), np.nan)
         else:
             passed_on = elastic * self._at(self.weight[quantity], eta, area)
             found = np.hypot(passed_on, self._at(self.rms["elastic"][row], eta, area))
-        return np.where(eta > self.eta[-1], elastic, found)
+        return np.where((eta > self.eta[-1]) | np.isnan(elastic), elastic, found)
 
 
 @functools.cache
@@ -222,6 +227,11 @@ class Yielding(Theory):
         force, contact = self.elastic.scatter(surface, area)
         found = table.standard_deviation(name, "force", eta, area, force)
         return found, table.standard_deviation(name, "area", eta, area, contact)
+
+    def stiffness_scatter(self, surface: AnySurface, area: FloatArray) -> FloatArray:
+        """Standard deviation of ln of the frozen contact's stiffness at given F, likewise."""
+        eta, elastic = self.hardness / np.asarray(surface.rms_gradient), self.elastic.stiffness_scatter(surface, area)
+        return shipped().standard_deviation(self.scatter_name(surface), "stiffness", eta, area, elastic)
 
     def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """The elastic theory's reasons, and hardnesses below those that were simulated."""

@@ -29,6 +29,7 @@ def test_a_scene_yields_as_contact_does(theory):
     # not by the loading curve's slope
     own = conductance(known.incremental_stiffness, mean_conductivity(16.0, 167.0), 100e3)
     assert found.conductance.values == pytest.approx(own, rel=1e-6)
+    assert found.separation_scatter.values == pytest.approx(known.separation_scatter, rel=1e-6)
     assert (found.conductance.values > 1.05 * conductance(known.stiffness, mean_conductivity(16.0, 167.0), 100e3)).all()
 
 
@@ -72,14 +73,17 @@ def test_a_file_may_call_for_it():
         "surface": {"hurst": 0.8, "q0": 0.01, "q1": 2.0, "h_rms": 1.0, "h_max": 3.0, "length_unit": "um"},
         "material": {"E_star": "100 GPa"},
         "theory": "calibrated",
-        "effects": {"on": ["area", "yield"]},
+        "effects": {"on": ["area", "yield", "conductance"]},
         "yield": {"hardness": "1500 MPa"},
+        "conductance": {"k1": "16 W/(m K)", "k2": "167 W/(m K)"},
         "prescribed": {"pressures": ["30 MPa"]},
     }
     found = Scene.from_mapping(content).run()
     known = contact(SURFACE, pressure=30.0, E_star=100e3, hardness=1500.0, theory="calibrated")
     assert found.area.values == pytest.approx([known.area], rel=1e-9)
     assert found.incremental_stiffness.units == "GPa/um"
+    assert found.conductance.units == "W/(m^2 K)"
+    assert found.conductance.values == pytest.approx([1e6 * known.conductance(16.0, 167.0)], rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -53,7 +53,8 @@ def test_numbers_lead_back_to_their_surface(names):
     (record,) = found.provenance
     assert set(record["given"]) == set(numbers)
     # each number has its assumption, in words
-    assert len(record["assumed"]) == len(numbers)
+    assert record["assumed"][0].startswith("heights are Gaussian and the surface is isotropic")
+    assert len(record["assumed"]) == len(numbers) + 1
     assert all(":" in line or "h_max" in line or "Hurst" in line for line in record["assumed"])
 
 
@@ -154,5 +155,5 @@ def test_on_the_command_line_and_in_toml(tmp_path):
         assert answer["surface"]["q1"] == surface.q1
         assert answer["surface"]["assumed"] == surface.provenance[0]["assumed"]
         assert answer["units"]["separation"] == "um"
-    assert run("contact", *options, "-d", "1").count("\nassumed: ") == 5
+    assert run("contact", *options, "-d", "1").count("\nassumed: ") == 6
     assert "q0 beside numbers of a drawing" in refused("contact", *options, "--q0", "1/mm", "-d", "1")

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
+import re
+
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
+from mbma_tables.files import shipped_file
 from mbma_tables.surfaces.surface import PARAMETERS
 from mbma_tables.theories import THEORIES, Calibrated, Mbma
 
@@ -113,6 +118,70 @@ def test_a_surface_that_is_its_own_spectrum_has_derivatives_by_what_is_known(the
     found = contact(surface, pressure=[0.01, 0.03], theory=theory, derivatives=True)
     assert set(found.area_by) == {"pressure", "E_star"}
     assert found.separation_by["pressure"] == pytest.approx(-2 / found.stiffness, rel=1e-5)
+
+
+def test_scatter_of_stiffness_and_separation():
+    pressure = np.array([100.0, 400.0, 1500.0])
+    found = contact(SURFACE, pressure=pressure, E_star=MODULUS, theory="calibrated")
+    # a force that is off by its scatter moves the separation by this, to first order
+    small = 1e-4
+    u = [
+        contact(SURFACE, pressure=pressure * f, E_star=MODULUS, theory="calibrated").mean_separation
+        for f in (1, 1 + small)
+    ]
+    assert found.separation_scatter == pytest.approx(found.scatter * (u[0] - u[1]) / small, rel=1e-3)
+    # what was stated for stiffness at equal force, in the middle of a bin
+    with netCDF4.Dataset(shipped_file("calibrated.nc")) as data:
+        theories, middle = data.theories.split(), float(data["contact"][3])
+        row = data["stated_scatter"][:, data.quantities.split().index("stiffness"), 3]
+        hard = data["hardness"]
+        eta, cap = float(hard["eta"][2]), hard["stated_scatter"][0, hard.quantities.split().index("stiffness"), 2]
+        contacts = hard["contact"][:]
+    for theory in ("calibrated", "mbma", "persson"):
+        stated = contact(SURFACE, area=middle, theory=theory).stiffness_scatter
+        assert stated == pytest.approx(row[theories.index(theory)], rel=1e-6)
+    caps = {"hardness": eta * float(SURFACE.rms_gradient), "area": contacts[:-1]}
+    assert contact(SURFACE, theory="calibrated", **caps).stiffness_scatter == pytest.approx(cap[:-1], rel=1e-6)
+    # with a hardness that of other theories was not measured
+    assert np.isnan(contact(SURFACE, theory="mbma", **caps).stiffness_scatter).all()
+    # nor anything on surfaces unlike those simulated
+    heights = np.minimum(np.random.default_rng(1).normal(size=(64, 64)), 0)
+    worn = Surface.from_spectrum(*(np.geomspace(1, 30, 40) ** power for power in (1, -3.6)), heights=heights)
+    for given in ({}, {"hardness": 0.1 * float(worn.rms_gradient)}):
+        off = contact(worn, mean_separation=0.5 * worn.h_max, theory="calibrated", **given)
+        assert np.isnan([off.scatter, off.area_scatter, off.stiffness_scatter, off.separation_scatter]).all()
+
+
+def test_an_answer_of_mbma_points_to_the_theory_that_is_nearer():
+    for theory in THEORIES:
+        said = "advice theory='calibrated' for stiffness or separation" in repr(
+            contact(SURFACE, area=0.01, theory=theory)
+        )
+        assert said == (theory == "mbma")
+
+
+def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
+    face, bodies = dataclasses.replace(SURFACE, unit="um"), ("45 W/(m K)", "167 W/m/K")
+    asked = {"pressure": [10.0, 30.0], "theory": "calibrated"}
+    for modulus, given in ((100e3, {}), ("100 GPa", {"hardness": "1.5 GPa", "pressure": ["10 MPa", "30 MPa"]})):
+        found = contact(face, E_star=modulus, **(asked | given))
+        k_s = 2 / (1 / 45 + 1 / 167)
+        stiffness = np.asarray(found.incremental_stiffness) / (100e3 if modulus == 100e3 else 100)
+        assert found.conductance(45.0, 167.0) == pytest.approx(k_s * stiffness, rel=1e-14)
+        assert found.conductance(*bodies) == pytest.approx(1e6 * k_s * stiffness, rel=1e-14)
+        assert found.conductance("6e7 S/m") == pytest.approx(1e6 * found.conductance(6e7), rel=1e-14)
+    labelled = contact(face, pressure=xr.DataArray([10.0, 30.0], dims="load"), E_star=MODULUS).conductance(45.0)
+    assert labelled.dims == ("load",)
+    for bad, says in (
+        ((45.0, "167 W/(m K)"), "got 45.0"),
+        (("45 W/K",), "or a text such as '45 W/"),
+        (("45 W/(m K)", "6e7 S/m"), "in one unit"),
+        ((-1.0,), "k1 must be positive"),
+    ):
+        with pytest.raises(InputError, match=re.escape(says)):
+            found.conductance(*bad)
+    with pytest.raises(InputError, match="give the surface its unit"):
+        contact(SURFACE, area=0.01).conductance("45 W/(m K)")
 
 
 def test_a_theory_is_asked_once(monkeypatch):

@@ -160,6 +160,8 @@ def test_mbma_by_object_and_by_mean_separation():
     d = np.array([0.5, 2.0])
     assert law.force(d).tolist() == same.force(d).tolist() == law.force(u=(law.h_max + d) / 2).tolist()
     point = law.at_pressure(law.force(d))
+    assert point.force.tolist() == law.force(d).tolist()
+    assert point.mean_pressure == pytest.approx(law.force(d) / law.area(d), rel=1e-9)
     assert point.separation == pytest.approx(d, rel=1e-12)
     assert point.stiffness == pytest.approx(law.stiffness(d), rel=1e-9)
     with pytest.raises(InputError, match="give one of them"):
