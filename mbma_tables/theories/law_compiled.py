@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import Any
 
 import numpy as np
@@ -24,29 +25,16 @@ from mbma_tables.theories.law_kernel import AREA, AREA_SLOPE, ENERGY, FORCE, FOR
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CompiledLaw:
-    """A law for functions that numba compiles: pass it as an argument, and ask it as below. NaN outside the law."""
+    """A law for functions that numba compiles: pass it as an argument, and ask it for numbers at a separation d.
+
+    Methods `force` (F/A0), `area` (A/A0), `stiffness` (-dF/du), `area_slope` (-d(A/A0)/dd) and `energy` (the integral
+    of force over u, to last contact). NaN outside the law.
+    """
 
     block: FloatArray
 
-    def force(self, d: float) -> float:
-        """F/A0 at a separation d."""
-        return evaluate(FORCE, self.block.ctypes.data, d)
-
-    def area(self, d: float) -> float:
-        """A/A0."""
-        return evaluate(AREA, self.block.ctypes.data, d)
-
-    def stiffness(self, d: float) -> float:
-        """-dF/du, which is twice -dF/dd."""
-        return 2.0 * evaluate(FORCE_SLOPE, self.block.ctypes.data, d)
-
-    def area_slope(self, d: float) -> float:
-        """-d(A/A0)/dd."""
-        return evaluate(AREA_SLOPE, self.block.ctypes.data, d)
-
-    def energy(self, d: float) -> float:
-        """Integral of force over u, from d to last contact."""
-        return 0.5 * evaluate(ENERGY, self.block.ctypes.data, d)
+    def _at(self, what: int, factor: float, d: float) -> float:
+        return factor * evaluate(what, self.block.ctypes.data, d)
 
 
 class _LawType(types.Type):
@@ -84,7 +72,8 @@ def _unbox(kind: Any, law: Any, context: Any) -> Any:
 
 
 def _offer(name: str, what: int, factor: float = 1.0) -> None:
-    """A method of `CompiledLaw` in compiled code."""
+    """A method of `CompiledLaw`, in Python and in compiled code."""
+    setattr(CompiledLaw, name, functools.partialmethod(CompiledLaw._at, what, factor))
 
     @overload_method(_LawType, name)
     def offered(law, d):  # type: ignore[no-untyped-def]

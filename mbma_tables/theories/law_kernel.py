@@ -71,11 +71,12 @@ whole = _loader("int64", ctypes.c_int64)
 
 
 class Place(NamedTuple):
-    """Where a gap is in a law: its record's first word, t, and q = -s scale rate."""
+    """Where a gap is in a law: its record's first word, t, q = -s scale rate, and t/q."""
 
     word: int
     t: float
     q: float
+    beyond: float
 
 
 @njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
@@ -85,6 +86,13 @@ def _depth(address: int, d: float) -> float:
     side = minus if d < 0.0 else plus
     x: float = (number(address, H_MAX) + side * d) * number(address, SCALE)
     return x
+
+
+@njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
+def _place(address: int, word: int, x: float, side: float) -> Place:
+    """The place of x in the record at a word."""
+    beyond, rate, scale = x - number(address, word + CENTRE), number(address, word + RATE), number(address, SCALE)
+    return Place(word, beyond * rate, -side * scale * rate, -side * beyond * (1.0 / scale))
 
 
 @njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
@@ -100,8 +108,7 @@ def _record_of(address: int, x: float, d: float) -> Place:
     record += d * number(address, KINK_SIGN) > number(address, KINK)
     record += d * number(address, KINK_SIGN_2) > number(address, KINK_2)
     word = whole(address, RECORDS) + record * RECORD
-    rate = number(address, word + RATE)
-    return Place(word, (held - number(address, word + CENTRE)) * rate, -side * number(address, SCALE) * rate)
+    return _place(address, word, held, side)
 
 
 @njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
@@ -146,19 +153,16 @@ def _integral(address: int, word: int, t: float, power: float) -> float:
 
 
 @njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
-def _inside(what: int, address: int, place: Place) -> float:
-    """One of FORCE, AREA, FORCE_SLOPE, AREA_SLOPE and ENERGY at a place."""
-    word, t = place.word, place.t
-    if what == FORCE:
-        return _value(address, word + FORCE_AT, t)
-    if what == AREA:
-        return _value(address, word + AREA_AT, t)
-    if what == FORCE_SLOPE:
-        return _with_slope(address, word + FORCE_AT, t)[1] * place.q
-    if what == AREA_SLOPE:
-        return _with_slope(address, word + AREA_AT, t)[1] * place.q
-    energy: float = number(address, word + ENERGY_AT) + t * _integral(address, word + FORCE_AT, t, 1.0) / place.q
-    return energy
+def _inside(what: int, address: int, place: Place, power: float = 0.0) -> Any:
+    """One of FORCE, AREA, FORCE_SLOPE, AREA_SLOPE and ENERGY at a place, of t^power times the polynomial."""
+    t, start = place.t, place.word + (AREA_AT if what in (AREA, AREA_SLOPE) else FORCE_AT)
+    lead = t**power if power != 0.0 else 1.0
+    if what in (FORCE, AREA):
+        return lead * _value(address, start, t)
+    if what == ENERGY:
+        return number(address, place.word + ENERGY_AT) + lead * place.beyond * _integral(address, start, t, 1.0 + power)
+    value, slope = _with_slope(address, start, t)
+    return (slope if power == 0.0 else lead * (slope + power / t * value)) * place.q
 
 
 @njit(cache=True, fastmath=CONTRACT, error_model="numpy")
@@ -166,19 +170,8 @@ def _first_record(what: int, address: int, x: float) -> Any:
     """The same below LOW."""
     if x <= 0.0 and whole(address, ENDS):
         return 0.0
-    word = whole(address, RECORDS)
-    t = (x - number(address, word + CENTRE)) * number(address, word + RATE)
-    q = -number(address, PLUS) * number(address, SCALE) * number(address, word + RATE)
-    of_area = what in (AREA, AREA_SLOPE)
-    power = number(address, POWER_A) if of_area else number(address, POWER_F)
-    start = word + (AREA_AT if of_area else FORCE_AT)
-    lead = t**power if power != 0.0 else 1.0
-    if what in (FORCE, AREA):
-        return lead * _value(address, start, t)
-    if what == ENERGY:
-        return number(address, word + ENERGY_AT) + lead * t * _integral(address, start, t, 1.0 + power) / q
-    value, slope = _with_slope(address, start, t)
-    return (lead * slope + (power * lead / t * value if power != 0.0 else 0.0)) * q
+    place = _place(address, whole(address, RECORDS), x, number(address, PLUS))
+    return _inside(what, address, place, number(address, POWER_A if what in (AREA, AREA_SLOPE) else POWER_F))
 
 
 @njit(cache=True, error_model="numpy")
@@ -187,10 +180,9 @@ def evaluate(what: int, address: int, d: float) -> float:
     if not number(address, LOWEST) <= d <= number(address, HIGHEST):
         return math.nan
     x = _depth(address, d)
-    if x < number(address, LOW):
-        value: float = _first_record(what, address, x)
-        return value
-    return _inside(what, address, _record_of(address, x, d))
+    first = x < number(address, LOW)
+    value: float = _first_record(what, address, x) if first else _inside(what, address, _record_of(address, x, d))
+    return value
 
 
 @njit(cache=True, error_model="numpy")

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -65,11 +66,6 @@ class LawValues(NamedTuple):
     area: Any
     stiffness: Any
     energy: Any
-
-
-def _plain(given: Any) -> bool:
-    """Whether input is a plain array, whose entries are checked as they are answered."""
-    return type(given) is np.ndarray and given.dtype == np.float64 and given.size > 0
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -167,29 +163,41 @@ class ContactLaw(Displayed):
             require("separation", d, good, f"at most {self.highest:.17g}, where the law ends")
         return d
 
-    def _values(self, wanted: tuple[str, ...], separation: Any, u: Any) -> tuple[Any, ...]:
-        """The quantities wanted, in the order of `QUANTITIES`, in one pass."""
-        given = separation if u is None else u
+    def _ask(
+        self, given: Any, count: int, check: Callable[[Any], FloatArray], fill: Callable[..., bool], plain: bool = True
+    ) -> tuple[Any, ...]:
+        """What `fill` writes of checked input, in blocks, where it says that all is in range; else `check` refuses."""
         if is_labelled(given):
             from mbma_tables.labels import apply
 
             def answer(block: Any) -> Any:
-                found = self._values(wanted, block, None) if u is None else self._values(wanted, None, block)
-                return found if len(wanted) > 1 else found[0]
+                found = self._ask(block, count, check, fill, plain)
+                return found if count > 1 else found[0]
 
-            found = apply(answer, (given,), len(wanted))
-            return found if len(wanted) > 1 else (found,)
-        d = given if u is None and _plain(given) else self.gaps(separation, u)
-        flat = np.ascontiguousarray(d).reshape(-1)
-        out = dict(zip(wanted, np.empty((len(wanted), flat.size)), strict=True))
+            found = apply(answer, (given,), count)
+            return found if count > 1 else (found,)
+        # entries of plain arrays are checked as they are answered
+        plain = plain and type(given) is np.ndarray and given.dtype == np.float64 and given.size > 0
+        known = given if plain else check(given)
+        flat = np.ascontiguousarray(known).reshape(-1)
+        out = np.empty((count, flat.size))
+        if not all(in_blocks(lambda block: fill(flat[block], *out[:, block]), flat.size, BLOCK)):
+            check(given)
+        return tuple(values.reshape(known.shape)[()] for values in out)
 
-        def fill(block: slice) -> bool:
-            parts = (out[name][block] if name in out else None for name in QUANTITIES)
-            return bool(kernel.fill(self._address, flat[block], *parts))
+    def _values(self, wanted: tuple[str, ...], separation: Any, u: Any) -> tuple[Any, ...]:
+        """The quantities wanted, in the order of `QUANTITIES`, in one pass."""
+        if separation is not None and u is not None:
+            raise InputError("separation and u: give one of them")
 
-        if not all(in_blocks(fill, flat.size, BLOCK)):
-            self.gaps(separation, u)
-        return tuple(values.reshape(d.shape)[()] for values in out.values())
+        def check(given: Any) -> FloatArray:
+            return self.gaps(given, None) if u is None else self.gaps(None, given)
+
+        def fill(d: FloatArray, *out: FloatArray) -> bool:
+            found = dict(zip(wanted, out, strict=True))
+            return bool(kernel.fill(self._address, d, *map(found.get, QUANTITIES)))
+
+        return self._ask(separation if u is None else u, len(wanted), check, fill, plain=u is None)
 
     def __call__(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
         """The same as `force`."""
@@ -257,32 +265,21 @@ class ContactLaw(Displayed):
 
     def _inverse(self, name: str, given: Any, count: int = 1) -> tuple[Any, ...]:
         """Gaps of forces or areas, and with a `count` of 3 area and -dF/du there."""
-        if is_labelled(given):
-            from mbma_tables.labels import apply
-
-            if count == 1:
-                return (apply(lambda block: self._inverse(name, block)[0], (given,), 1),)
-            found: tuple[Any, ...] = apply(lambda block: self._inverse(name, block, count), (given,), count)
-            return found
-        wanted = given if _plain(given) else finite_array(name, given)
-        flat = np.ascontiguousarray(wanted).reshape(-1)
-        out = np.empty((count, flat.size))
         which, inverse = (FORCE if name == "force" else AREA), self._inverse_block(name)
-        address = int(inverse.ctypes.data)
-
-        def fill(block: slice) -> bool:
-            also = (out[1, block], out[2, block]) if count > 1 else (None, None)
-            return bool(kernel.fill_inverse(which, self._address, address, flat[block], out[0, block], *also))
-
-        if not all(in_blocks(fill, flat.size, BLOCK)):
-            self._refuse(name, wanted, inverse)
-        return tuple(values.reshape(wanted.shape)[()] for values in out)
-
-    def _refuse(self, name: str, wanted: FloatArray, inverse: FloatArray) -> None:
-        require(name, wanted, wanted >= 0, "at least 0")
         least, most, end = inverse[kernel.Y_LEAST], inverse[kernel.Y_HIGH], inverse[kernel.END]
-        require(name, wanted, wanted >= least, f"at least {least:.6g}, where the law of {self.theory!r} ends")
-        require(name, wanted, wanted <= most, f"at most {most:.6g}, at d = {end:.6g} where the branch ends")
+
+        def check(given: Any) -> FloatArray:
+            wanted = finite_array(name, given)
+            require(name, wanted, wanted >= 0, "at least 0")
+            require(name, wanted, wanted >= least, f"at least {least:.6g}, where the law of {self.theory!r} ends")
+            require(name, wanted, wanted <= most, f"at most {most:.6g}, at d = {end:.6g} where the branch ends")
+            return wanted
+
+        def fill(wanted: FloatArray, gap: FloatArray, *also: FloatArray) -> bool:
+            address = int(inverse.ctypes.data)
+            return bool(kernel.fill_inverse(which, self._address, address, wanted, gap, *(also or (None, None))))
+
+        return self._ask(given, count, check, fill)
 
     def _inverse_block(self, name: str) -> FloatArray:
         """Polynomials of x over force or area, made when first asked for."""
