@@ -69,15 +69,13 @@ class LawNumbers:
 class FlowNumbers:
     """Numbers of a law's leakage against x = scale (d - blocked): K = sum_j force[j] t^j, t = (x - centre) rate.
 
-    The first record, x < edges[0], is multiplied by t^power. Where bodies are apart, d > h_max of a law that ends
-    there, K is u^3 (1 - 1.5/((u/h_rms)^2 + 4)).
+    The first record, x < edges[0], is multiplied by t^power; with a power K is zero at and below x = 0. Where bodies
+    are apart, d > h_max of a law that ends there, K is u^3 (1 - 1.5/((u/h_rms)^2 + 4)).
 
     Attributes
     ----------
     blocked : float
         Gap d from which x counts.
-    blocks : bool
-        Whether K is zero at and below it.
     scale, power, h_rms : float
     edges : ndarray, shape (records - 1,)
     centre, rate : ndarray, shape (records,)
@@ -85,7 +83,6 @@ class FlowNumbers:
     """
 
     blocked: float
-    blocks: bool
     scale: float
     power: float
     h_rms: float
@@ -98,16 +95,15 @@ class FlowNumbers:
 def flow_numbers(leakage: LeakageLaw) -> FlowNumbers:
     """The numbers of a law's leakage."""
     head = leakage.block
-    blocked, power = -float(head[kernel.H_MAX]), float(head[POWER_F])
+    blocked = -float(head[kernel.H_MAX])
     # in the layout of a law that counts from full compression
     as_law = dataclasses.replace(leakage.law, block=head, h_max=-blocked, lowest=blocked)
     x, which = _intervals(as_law, 1.0)
     records = as_law.records[which]
     return FlowNumbers(
         blocked=blocked,
-        blocks=power > 0,
         scale=float(head[SCALE]),
-        power=power,
+        power=float(head[POWER_F]),
         h_rms=leakage.h_rms,
         edges=x[1:-1],
         centre=records[:, CENTRE],

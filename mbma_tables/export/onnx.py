@@ -135,7 +135,7 @@ def _flow(graph: _Graph, numbers: LawNumbers, flow: FlowNumbers) -> str:
     x = graph("Mul", graph("Sub", d, flow.blocked), flow.scale)
     k = _record(graph, x, flow.edges)
     t = graph("Mul", graph("Sub", x, graph("Gather", flow.centre, k)), graph("Gather", flow.rate, k))
-    blocked = graph("And", graph("LessOrEqual", x, 0.0), flow.blocks)
+    blocked = graph("And", graph("LessOrEqual", x, 0.0), flow.power > 0)
     base = graph("Where", graph("And", graph("Equal", k, 0), graph("Not", blocked)), t, 1.0)
     value = graph("Mul", graph("Pow", base, flow.power), _polynomial(graph, flow.force, k, t))
     u = graph("Sub", numbers.h_max, c)
