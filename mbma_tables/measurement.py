@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import MbmaError, NotSelfAffineError
+from mbma_tables.errors import MbmaError, NotSelfAffineError, OutOfRangeError
 from mbma_tables.plots import new_figure, theory_label
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
@@ -181,13 +181,30 @@ def _by_pressure(
     axes.grid(True, which="major", alpha=0.3)
 
 
-def table_of_loads(surface: MeasuredSurface, E_star: float = 1.0) -> dict[str, Any]:
-    """Columns by the calibrated law at a few contacts: pressure, separation, stiffness, and how far off they may be."""
+def table_of_loads(surface: MeasuredSurface, E_star: float = 1.0) -> tuple[dict[str, Any], list[str]]:
+    """Columns by the calibrated law at a few contacts, and lines on what is left out of them or not valid."""
     from mbma_tables.theories.contact import contact
 
-    found = contact(surface, area=AREAS, theory="calibrated", E_star=E_star)
+    areas, told = AREAS, []
+    try:
+        found = contact(surface, area=areas, theory="calibrated", E_star=E_star)
+    except OutOfRangeError as fault:
+        if fault.mask is None or np.all(fault.mask):
+            raise
+        areas, told = AREAS[~fault.mask], [f"{_contacts(AREAS[fault.mask])} left out: {fault}"]
+        found = contact(surface, area=areas, theory="calibrated", E_star=E_star)
     # curves of odd maps jump over some contacts
-    reached = np.isfinite(found.force) & (np.abs(np.asarray(found.area) / AREAS - 1) < REACHED)
+    reached = np.abs(np.asarray(found.area) / areas - 1) < REACHED
+    if not reached.all():
+        told.append(f"{_contacts(areas[~reached])} left out: the map's curve jumps over it")
     names = ("area", "force", "mean_separation", "stiffness", "area_scatter", "scatter")
     columns: dict[str, Any] = {name: np.asarray(getattr(found, name))[reached] for name in names}
-    return columns | {"valid": ["yes" if valid else "no" for valid in np.asarray(found.valid)[reached]]}
+    reasons, everywhere = found.reasons, surface.departures(by_map=surface.bearing is not None)
+    told += [
+        f"not valid at {_contacts(areas[m])}: {reason}" for reason, m in reasons.items() if reason not in everywhere
+    ]
+    return columns | {"valid": ["yes" if valid else "no" for valid in np.asarray(found.valid)[reached]]}, told
+
+
+def _contacts(areas: FloatArray) -> str:
+    return f"contact of {', '.join(f'{area:g}' for area in areas)}"

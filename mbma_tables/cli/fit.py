@@ -35,7 +35,7 @@ def fit_command(measurement: Path, E_star: Any, plot: Path | None, treatment: di
     modulus, stress_unit = effective_modulus_of({} if E_star is None else {"E_star": E_star})
     treated, surface = measured(measurement, treatment)
     scale = 1.0 if modulus is None else modulus
-    columns = table_of_loads(surface, scale)
+    columns, told = table_of_loads(surface, scale)
     units = Units(surface.unit, "1" if modulus is None else stress_unit)
     facts = {
         "length_unit": surface.unit,
@@ -47,10 +47,11 @@ def fit_command(measurement: Path, E_star: Any, plot: Path | None, treatment: di
         "kurtosis": surface.kurtosis,
         "anisotropy": surface.anisotropy,
         "provenance": list(surface.provenance),
+        "notes": told,
     }
     title = measurement.name
     own = {name: unit_of(name, units) or "-" for name in columns} | {"area": "A/A0", "force": unit_of("force", units)}
-    report = Report("fit", title, described(surface), facts, to_columns(columns, own))
+    report = Report("fit", title, [*described(surface), *told], facts, to_columns(columns, own))
     picture = b""
     if plot is not None:
         label = "pressure  F/(A0 E*)" if modulus is None else f"pressure [{stress_unit or 'stress'}]"

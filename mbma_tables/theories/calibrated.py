@@ -13,6 +13,7 @@ from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import calibrated_table
 from mbma_tables.theories.calibrated_curves import (
+    TESTED_AREA,
     Places,
     area_concerns,
     by_law,
@@ -47,6 +48,11 @@ class Calibrated(Theory):
         batch = select(surface, shape, np.arange(int(np.prod(shape))).reshape(*shape, 1))
         work = (self.answer(batch, u).force * u) @ np.tile(weight / 2, ENERGY_PANELS) / ENERGY_PANELS
         return np.asarray(-work * start[..., 0])
+
+    def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+        """From full contact, or where a map's curve ends before, to last contact."""
+        low, high = super().interval(surface, quantity)
+        return (np.asarray(own_law(surface).end) if isinstance(surface, MeasuredSurface) else low), high
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]; without bound at u = 0."""
@@ -116,7 +122,12 @@ class Calibrated(Theory):
     def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons for which answers lie outside what boundary elements have tested."""
         if isinstance(surface, MeasuredSurface):
-            return area_concerns(answer.area)
+            law = own_law(surface)
+            straight = np.zeros(answer.area.shape, dtype=bool)
+            if law.curve is not None:
+                straight |= law.curve.straight(np.asarray(mean_separation) / law.h_rms)
+            text = "the map's tops and valleys contradict each other: one stiffness stands for a range of forces"
+            return {text: straight & (answer.area >= TESTED_AREA[0])} | area_concerns(answer.area)
         assert isinstance(surface, Surface)
         heights = np.asarray(surface.h_max / surface.h_rms)
         reasons = {

@@ -8,7 +8,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline, CubicHermiteSpline, CubicSpline, PchipInterpolator, make_interp_spline
 from scipy.special import erfc, erfinv, ndtri
@@ -42,8 +42,12 @@ LAW_ERROR = 1e-7  # of the law's own quadrature
 MAP_ERROR = 3e-2  # of a map's curve, which is smoother than the nodes of its law: nine maps in ten
 LAW_FORCE, LAW_NODES = (-24.0, 1.5), 256  # ln F^ of a tabulated curve
 INNER_NODES = 2400  # in ln y, of its cubic spline
+STRAIGHT, SAME = 1.0, 1e-9  # of ln F, over which one stiffness is no curve; differences that are rounding
 NODE_STEP, FINE = 0.2, 8  # of a map's curve, in ln F and ln u: its own nodes are rougher; integrated by so many parts
 _GAUSS = [((1 + x) / 2, w / 2) for x, w in map(np.polynomial.legendre.leggauss, (2, 4, 6, PANEL_NODES))]
+
+
+ENDS = ", where the map's tops and valleys leave no gap: solve the map itself, theories.BoundaryElements"
 
 
 class Places:
@@ -112,6 +116,13 @@ class Curve:
         # -d ln F/d ln u where full contact is continued
         self._heaviest_rate = -float(rate[0])
         self._law = law
+        # tops and valleys of odd maps contradict each other: gaps close, or run back, at partial contact
+        heaviest = float(total[0])
+        closed = float(self.area(np.array(heaviest))) < TESTED_AREA[1]
+        self.end, self.heaviest = (float(np.exp(fine[0])), heaviest) if closed else (0.0, np.inf)
+        pieces = np.split(middle, np.flatnonzero(np.diff(stiffness) < -SAME) + 1)
+        ends = [np.array(piece[[0, -1]]) for piece in pieces if piece.size > 1]
+        self._straight = [np.exp(pair) for pair in ends if -np.diff(self._log_force_at(pair))[0] > STRAIGHT]
 
     def answer(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Force, area and stiffness: F^2 linear in ln u below the nodes, a straight line to zero at h_max above."""
@@ -129,6 +140,11 @@ class Curve:
         force = np.where(above, self._lightest * rest, force)
         stiffness = np.where(above & (rest <= 0), 0.0, stiffness)
         return force, self.area(force), stiffness
+
+    def straight(self, u: FloatArray) -> NDArray[np.bool_]:
+        """Where one stiffness stands for a whole range of forces."""
+        found = [(u >= low) & (u <= high) for low, high in self._straight]
+        return np.asarray(np.logical_or.reduce([np.zeros(np.shape(u), dtype=bool), *found]))
 
     def area(self, force: FloatArray) -> FloatArray:
         """A/A0 at a force, in proportion below the law's lightest load."""
@@ -148,6 +164,9 @@ class Curve:
             share = np.maximum(wanted, known[0])
             log_force = np.interp(np.log(share / (1 - share)), np.log(known / (1 - known)), LOG_FORCE)
             force = np.exp(log_force) * np.minimum(wanted / known[0], 1)
+        if self.end:
+            most = gradient * self.heaviest if quantity == "force" else float(self.area(np.array(self.heaviest)))
+            require(quantity, wanted, force <= self.heaviest * (1 + 1e-9), f"at most {most:.4g}{ENDS}")
         lightest, heaviest = np.exp(self._log_force[[-1, 0]])
         goal = np.log(np.clip(force, lightest, heaviest))
         low, high = np.full(goal.shape, self._log_u[0]), np.full(goal.shape, self._log_u[-1])
@@ -294,8 +313,15 @@ class OwnLaw:
             self.law.spectrum, tops / heights.h_rms, np.ones(FRACTIONS.size), -level / 2, np.maximum(pull, 0.0)
         )
 
+    @property
+    def end(self) -> float:
+        """Mean separation [length] at which the curve ends: 0 but where a map's gap closes at partial contact."""
+        return 0.0 if self.curve is None else self.curve.end * self.h_rms
+
     def answer(self, u: FloatArray) -> tuple[list[FloatArray], float]:
         """Force over A0 E*, area and stiffness at mean separations u >= 0 [length], and their error."""
+        end = self.end
+        require("mean_separation", u, u >= end * (1 - 1e-9), f"at least {end:.4g}{ENDS}")
         flat = u.ravel() / self.h_rms
         parts = by_law(self.law, flat) if self.curve is None else self.curve.answer(flat)
         units = self.gradient, 1.0, self.gradient / self.h_rms
@@ -309,11 +335,15 @@ class OwnLaw:
     def mean_separation(self, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* or an area below 1; h_max at zero."""
         if self.curve is not None:
-            return np.asarray(self.curve.separation(quantity, wanted, self.gradient) * self.h_rms)
-        light = light_factor(self.law.spectrum.alpha)
-        force = force_at_area(wanted, light) if quantity == "area" else wanted / self.gradient
-        u = self.law.separation(np.maximum(force, 1e-300)) * self.h_rms
-        return np.where(force > 0, np.minimum(u, self.h_max), self.h_max)
+            u = self.curve.separation(quantity, wanted, self.gradient) * self.h_rms
+        else:
+            light = light_factor(self.law.spectrum.alpha)
+            force = force_at_area(wanted, light) if quantity == "area" else wanted / self.gradient
+            u = self.law.separation(np.maximum(force, 1e-300)) * self.h_rms
+            u = np.where(force > 0, np.minimum(u, self.h_max), self.h_max)
+        # beside h_max, with which it makes d
+        require(quantity, wanted, u > np.finfo(float).eps * self.h_max, "less: the mean separation vanishes")
+        return np.asarray(u)
 
 
 def spectrum_of(surface: MeasuredSurface) -> Spectrum:

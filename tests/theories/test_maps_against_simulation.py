@@ -10,7 +10,8 @@ from scipy.ndimage import gaussian_filter
 
 from generate.pages import maps
 from generate.pages.gallery import BARS, REFINED, ratios, read_rows
-from mbma_tables import Surface, contact
+from mbma_tables import Surface, contact, contact_law
+from mbma_tables.errors import OutOfRangeError
 from mbma_tables.theories import BoundaryElements, Calibrated
 
 with warnings.catch_warnings():
@@ -104,6 +105,28 @@ def test_held_out_maps_that_are_stretched_or_not_gaussian():
         assert contact(surface, mean_separation=u, theory="calibrated").valid.all()
         seen.add(name)
     assert len(seen) >= 18
+
+
+def test_no_answer_beyond_where_the_tops_and_valleys_of_a_map_leave_no_gap():
+    surface = Surface.from_map("docs/data/maps/top-1.top", short_cutoff="9.4 nm")
+    for wanted in ({"area": [0.01, 0.3]}, {"mean_separation": [1.0, 0.0]}, {"pressure": [1e-3, 0.02]}):
+        with pytest.raises(OutOfRangeError) as refused:
+            contact(surface, **wanted, theory="calibrated")
+        assert refused.value.mask.tolist() == [False, True]
+    law = contact_law(surface, theory="calibrated")
+    last = contact(surface, separation=law.lowest, theory="calibrated")
+    assert 0.1 < last.area < 0.12
+    assert law.force(law.lowest) == pytest.approx(last.force, rel=1e-6)
+
+
+def test_one_stiffness_over_a_range_of_forces_is_told():
+    surface = Surface.from_map("docs/data/maps/frt-2.frt", fill="harmonic", outliers=10, short_cutoff="0.8 mm")
+    found = contact(surface, area=[0.01, 0.3, 0.6], theory="calibrated")
+    assert found.stiffness[1] == pytest.approx(found.stiffness[2])
+    masks = [mask.tolist() for reason, mask in found.reasons.items() if "one stiffness" in reason]
+    assert masks == [[False, True, True]]
+    with pytest.raises(OutOfRangeError, match="separation vanishes"):
+        contact(surface, pressure=0.1, theory="calibrated")
 
 
 POINTS, STEP = 256, 50.0
