@@ -79,7 +79,7 @@ def _fill_far(
     for k in range(points.size):
         c = 0.5 * (low + high + (high - low) * points[k])
         least = _least(c, below, 0, stop, math.inf)
-        sums[:] = 0.0
+        sums.fill(0.0)
         _sum_at(c, least, below, 0, stop, sums)
         values[0, k], values[1, k] = math.log(sums[0]) - 0.5 * least, math.log(sums[1]) - 0.5 * least
         values[2, k], values[3, k] = sums[2] / sums[0], sums[3] / sums[1]
@@ -150,7 +150,7 @@ def fill_sums(
                     own[0][0, k] *= 2.0 * place * lead_F
                     own[0][1, k] *= 2.0 * place * lead_A
             least = _least(c, below, begin, stop, _least(c, own, 0, count, math.inf))
-            sums[:] = 0.0
+            sums.fill(0.0)
             if begin > 0:
                 x = (2.0 * c - start - until) / (until - start)
                 log_F, log_A = _series_at(far[0], x), _series_at(far[1], x)
@@ -224,7 +224,8 @@ def fill_missed(
         for k in range(2 * count):
             finer[0, k] = 0.5 * weights[k % count] * _times(halves, k, fields[0, panel])
             finer[1, k], finer[2, k] = _times(halves, k, fields[2, panel]), _times(halves, k, fields[3, panel])
-        coarse[:] = weights * fields[0, panel]
+        for k in range(count):
+            coarse[k] = weights[k] * fields[0, panel, k]
         if power > 1:
             for k in range(2 * count):
                 place = 0.5 * (nodes[k] if k < count else 1.0 + nodes[k - count])
