@@ -75,7 +75,7 @@ def export_command(target: str, out: Path, **options: Any) -> None:
     if specimen is None:
         raise InputError("one surface is needed: see the options --surface, --file, --map, --hurst")
     if specimen.E_star is None:
-        raise InputError("a modulus is needed: --E-star, or --E1 --nu1 and, unless the other body is rigid, --E2 --nu2")
+        raise InputError("a modulus is needed: --E-star, or all of --E1 --nu1 --E2 --nu2")
     joint = {"surface": specimen.surface, "E_star": specimen.E_star, "stress_unit": specimen.stress_unit}
     _write(_law_files(target, out, joint, given))
 

@@ -203,8 +203,8 @@ def report_answer(
     scale = "forces are over E*, none was given"
     if specimen.E_star is not None:
         scale = f"E* is {specimen.E_star:.6g} {specimen.stress_unit or ''}".rstrip()
-    made = f"reading {answer.reading}, tier {answer.tier}, rtol {model.rtol:g}" if answer.reading else ""
-    notes += [f"{made or f'theory {model.theory}'}; {scale}", "error bounds the relative error of force and area"]
+    made = f", reading {answer.reading}, tier {answer.tier}, rtol {model.rtol:g}" if answer.reading else ""
+    notes += [f"theory {model.theory}{made}; {scale}", "error bounds the relative error of force and area"]
     if hasattr(answer, "elastic_hardness"):
         limit = f"{answer.elastic_hardness:.4g} {specimen.stress_unit or ''}".rstrip()
         if model.hardness == math.inf:

@@ -41,7 +41,7 @@ def read_measurement(
     module, place = library(), pathlib.Path(path)
     piped = os.fspath(path) == "-"
     if not piped and not place.is_file():
-        raise InputError(f"there is no file {os.fspath(path)!r}")
+        raise InputError(f"there is no file {os.fspath(path)!r}{': it is a folder' if place.is_dir() else ''}")
     with warnings.catch_warnings():
         # its readers complain of what they go around
         warnings.simplefilter("ignore")
@@ -60,9 +60,9 @@ def read_measurement(
             if place.suffix.lower() == ".csv":
                 with module.open_topography(io.BytesIO(_without_commas(place))) as reader:
                     return _channel_of(reader, place, dx, dy, unit, channel)
-            raise InputError(
-                f"SurfaceTopography cannot read {os.fspath(path)!r} as a map: {type(fault).__name__}: {reason[0]}"
-            ) from None
+            name = type(fault).__name__
+            why = "no reader knows its format" if name == "CannotDetectFileFormat" else f"{name}: {reason[0]}"
+            raise InputError(f"SurfaceTopography cannot read {os.fspath(path)!r} as a map: {why}") from None
 
 
 def _without_commas(path: pathlib.Path) -> bytes:

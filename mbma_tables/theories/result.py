@@ -112,6 +112,12 @@ class Contact(Displayed):
             more |= {"psi": self.psi, "yielded": self.yielded}
         elif units["force"] != "1":
             facts["elastic_hardness"] = shown(self.elastic_hardness, units["force"])
+            # a pressure in another unit than meant shows itself so
+            light = self.elastic_hardness * ELASTIC_PSI / 2
+            if self.force is not None and np.any(self.force > light):
+                facts["force"] += (
+                    f" (above E* g/2 = {shown(light, units['force'])}, the mean pressure in light contact)"
+                )
         if source.theory.advice:
             facts["advice"] = source.theory.advice
         return facts | {name: shown(value) for name, value in more.items()}

@@ -403,6 +403,8 @@ class TestFiles:
 
     def test_no_file_and_no_map(self, tmp_path):
         topography_class()
+        with pytest.raises(InputError, match="it is a folder"):
+            read_measurement(tmp_path)
         with pytest.raises(InputError, match="there is no file"):
             read_measurement(tmp_path / "a.sur")
         (tmp_path / "b.sur").write_text("not a map")

@@ -165,6 +165,13 @@ def test_a_map_yields_by_its_own_heights():
     assert law.turning_point is None
 
 
+def test_a_pressure_in_another_unit_shows_itself():
+    # rms gradient 0.054: E* g/2 is 2.7 GPa
+    for pressure, told in ((2.0, False), (4.0, True)):
+        found = contact(SURFACE, pressure=pressure, E_star="100 GPa", theory="calibrated")
+        assert ("above E* g/2 = 2.7" in repr(found)) is told
+
+
 @pytest.mark.parametrize(
     ("asked", "match"),
     [
