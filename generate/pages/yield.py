@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import time
 from typing import Any
@@ -9,14 +10,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from generate.boundary_elements.evidence import capped
 from generate.calibrated_hardness import BARS, blind
 from generate.pages.page import ROOT, pyplot, svg, table
 from mbma_tables import Surface, contact, materials
 from mbma_tables.arguments import FloatArray
+from mbma_tables.errors import OutOfRangeError
 from mbma_tables.theories.calibrated_table import shipped_part
 from mbma_tables.totals.conductance import conductance
 
 EVIDENCE = "docs/data/hardness.nc"
+BINS = (0.002, 0.01, 0.03, 0.1, 0.3, 0.6)  # A/A0 by which stiffness is compared, at these hardnesses
+HARDNESSES = (0.05, 0.2, 0.8)
 CONTACT = (0.01, 0.1)  # A/A0 at which elastic answers are compared
 GRADIENT = 0.1  # rms gradient of a ground face
 SHOWN = ("steel 1020", "steel 4140", "steel 52100", "stainless steel 304", "aluminium 6061", "copper C11000", "gold")
@@ -104,6 +109,35 @@ def held_out() -> str:
     return table(["surfaces", "law with", *(f"{name} [%]" for name in names)], rows)
 
 
+def frozen() -> str:
+    """Frozen stiffness at equal force of theories against every self-affine simulation, by hardness and contact."""
+    with xr.open_dataset(ROOT / EVIDENCE) as opened:
+        seen = [one for one in capped(opened.load()) if one.kind == "self_affine"]
+    rows = []
+    for theory, eta in itertools.product(("mbma", "calibrated"), HARDNESSES):
+        found = []
+        for one in (one for one in seen if one.eta == eta):
+            surface = Surface(one.node[1], 1.0, one.zeta_1, 1.0, one.h_max)
+            g, touching = float(surface.rms_gradient), np.flatnonzero(one.area > BINS[0])
+            for k in touching:
+                try:
+                    by = contact(surface, pressure=one.force[k] * g, theory=theory, hardness=eta * g)
+                except OutOfRangeError:  # MBMA ends before
+                    break
+                found.append(
+                    (one.area[k], np.log(by.incremental_stiffness / (one.frozen[k] * g)), by.stiffness_scatter)
+                )
+        area, error, stated = np.array(found).T
+        bins = [error[(area > low) & (area < high)] for low, high in itertools.pairwise(BINS)]
+        cells = [f"{100 * own.mean():+.0f} ± {100 * own.std():.0f}" for own in bins]
+        within = [f"{np.mean(np.abs(error) < n * stated):.0%}" for n in (1, 2)]
+        rows.append(
+            [f"`{theory}`", f"{eta:g}", *cells, " / ".join(within) if np.isfinite(stated).all() else "not stated"]
+        )
+    header = [f"{100 * low:g}-{100 * high:g}%" for low, high in itertools.pairwise(BINS)]
+    return table(["theory", "eta", *header, "within one / two of `stiffness_scatter`"], rows)
+
+
 def coverage() -> str:
     """Shares of held-out errors within one and two stated standard deviations."""
     rows: dict[str, list[str]] = {}
@@ -188,6 +222,7 @@ def measure() -> tuple[dict[str, str], dict[str, bytes]]:
     parts = {
         "when": when(),
         "held_out": held_out(),
+        "frozen": frozen(),
         "coverage": coverage(),
         "drift": drift(),
         "metals": metals(),
