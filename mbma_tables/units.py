@@ -248,10 +248,7 @@ def resolve(
     if unit is not None and not asked:
         plain = [n for n in given if any(DIMENSIONS.get(n, ())) and named.get(n) is None]
         if plain:
-            raise InputError(
-                f"{', '.join(plain)} without a unit beside numbers in {unit}: write the unit to each, "
-                f"or give {kind}_unit"
-            )
+            raise InputError(f"{', '.join(plain)} without a unit beside numbers in {unit}: write the unit to each")
     own = Units(length=unit) if kind == "length" else Units(stress=unit)
     return {name: own.number(name, value) for name, value in given.items()}, unit
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from mbma_tables.arguments import finite_array, require
+from mbma_tables.arguments import finite_array
 from mbma_tables.cli.format import SURFACE_NUMBERS, Report, report_answer, shown_unit, to_columns
 from mbma_tables.cli.options import (
     Model,
@@ -91,8 +91,6 @@ def contact_command(
     from mbma_tables.theories.contact import contact
 
     asked = _numbers(name, numbers, specimen, over_h_rms)
-    if name == "mean_separation":
-        require(name, asked, asked >= 0, "at least 0, where the model ends")
     answer = contact(specimen.surface, **{name: asked}, **contact_keywords(model, specimen))
     yields = ("yielded", "incremental_stiffness") if model.hardness != math.inf else ()
     values = {column: getattr(answer, column) for column in (*COLUMNS[:-1], "stiffness", *yields, COLUMNS[-1])}

@@ -225,12 +225,13 @@ def _places(
     shape = broadcast_shape(**{by: asked, "surface": surface.h_rms, "E_star": modulus, "hardness": hardness})
     asked, modulus = spread(asked, shape), spread(modulus, shape)
     h_max = np.asarray(surface.h_max)
+    if by != "separation":
+        require(by, asked, asked >= 0, "at least 0")
     if by == "separation":
         gap = asked
     elif by == "mean_separation":
         gap = 2 * asked - h_max
     else:
-        require(by, asked, asked >= 0, "at least 0")
         quantity, wanted = ("force", asked / modulus) if by == "pressure" else ("area", asked)
         try:
             gap = 2 * theory.mean_separation_at(surface, quantity, wanted) - h_max

@@ -247,6 +247,7 @@ def test_units_that_do_not_fit_are_noticed(theory):
         ({"separation": 1.0, "theory": Mbma(), "reading": "printed"}, "reading: options of theory 'mbma' alone"),
         ({"pressure": np.nan}, "pressure must be finite"),
         ({"pressure": -1.0}, "pressure must be at least 0"),
+        ({"mean_separation": -1.0}, "mean_separation must be at least 0, got -1"),
         ({"area": 0.9}, "area must be at most what theory 'mbma' reaches"),
     ],
 )
