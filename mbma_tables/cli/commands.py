@@ -65,6 +65,7 @@ def contact_keywords(model: Model, specimen: Specimen) -> dict[str, Any]:
 @load_options(numbers_option)
 @over_h_rms
 @leakage_option
+@numbers_option("--conductivity", help="Of both bodies, or of each: adds conductance. In W/(m^2 K) of '45 W/(m K)'.")
 @specimen_options
 @theory_options
 @output_options
@@ -72,6 +73,7 @@ def contact_command(
     loads: dict[str, list[float | str]],
     over_h_rms: bool,
     leakage: bool,
+    conductivity: list[float | str] | None,
     specimen: Specimen,
     model: Model,
     output: Output,
@@ -95,7 +97,13 @@ def contact_command(
     yields = ("yielded", "incremental_stiffness") if model.hardness != math.inf else ()
     values = {column: getattr(answer, column) for column in (*COLUMNS[:-1], "stiffness", *yields, COLUMNS[-1])}
     values |= _leakage(answer) if leakage else {}
-    report_answer("contact", specimen, model, answer, values).write(output)
+    units = {}
+    if conductivity:
+        if len(conductivity) > 2:
+            raise InputError(f"--conductivity is of both bodies, or of each: one or two, got {len(conductivity)}")
+        bodies, units["conductance"] = specimen.units.conductivities(*conductivity)
+        values["conductance"] = answer.conductance(*bodies)
+    report_answer("contact", specimen, model, answer, values, units).write(output)
 
 
 def _leakage(answer: Contact) -> dict[str, Any]:

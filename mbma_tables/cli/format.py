@@ -220,7 +220,7 @@ def report_answer(
         "theory": model.theory,
         "reading": answer.reading or None,
         "tier": answer.tier or None,
-        "rtol": model.rtol if answer.reading else None,
+        "rtol": model.rtol if model.theory == "mbma" else None,
         "hardness": None if model.hardness == math.inf else model.hardness,
         "E_star": specimen.E_star,
         "stress_unit": specimen.stress_unit,

@@ -70,6 +70,7 @@ def sensitivity_command(
 
     here = ", ".join(with_unit(name, f"{value:.6g}") for name, value in found.answers.items())
     notes = [f"theory {model.theory}; d ln(answer)/d ln(parameter) at given {found.by}", f"here: {here}"]
+    notes.append("conductance is over the mean conductivity of the bodies")
     for name, spans in found.ranges.items():
         ends = ", ".join(with_unit(answer, f"{low:.4g} to {high:.4g}") for answer, (low, high) in spans.items())
         notes.append(f"range of {name}: {ends}")

@@ -436,6 +436,19 @@ def test_control_c_ends_it_with_130(folder, wait):
     assert said[0] == b""
 
 
+def test_conductance_of_one_or_two_bodies():
+    asked = ("contact", "--surface", "challenge", "--length-unit", "mm", "--E-star", "25MPa", "-p", "100kPa", "--json")
+    face = contact(Surface.named("challenge").to("mm"), pressure="100 kPa", E_star="25 MPa")
+    for given, unit, bodies in (
+        ("0.3", "conductivity/mm", (0.3,)),
+        ("0.3 W/(m K),0.5 W/(m K)", "W/(m^2 K)", ("0.3 W/(m K)", "0.5 W/(m K)")),
+    ):
+        answer = json.loads(run(*asked, "--conductivity", given))
+        assert answer["columns"]["conductance"] == pytest.approx([face.conductance(*bodies)], rel=1e-9)
+        assert answer["units"]["conductance"] == unit
+    assert "one or two, got 3" in helpers.refused(*asked, "--conductivity", "1,2,3")
+
+
 def test_names_are_completed_in_a_shell():
     def completed(line):
         environment = os.environ | {"_MBMA_COMPLETE": "bash_complete", "COMP_WORDS": line, "COMP_CWORD": "3"}
