@@ -39,6 +39,7 @@ class Rule(NamedTuple):
     power: int
     nodes: FloatArray
     weights: FloatArray
+    seen: FloatArray  # nodes and CHECKS, at which islands are answered
     reach: FloatArray  # places of gaps, which are Chebyshev points of the panel
     checks: FloatArray  # (3, n)
     halves: FloatArray  # (2 n, n), at the nodes of both halves
@@ -70,7 +71,9 @@ def rule_of(n: int, power: int) -> Rule:
     places = (CHECKS, halves, np.outer(reach, nodes).ravel(), reach)
     checks, halves, inside, ends = (chebyshev.chebvander(2 * at - 1, n - 1) @ to_series for at in places)
     series: Any = np.linalg.inv(chebyshev.chebvander(points, points.size - 1))
-    return Rule(power, nodes, weights / 2, reach, checks, halves, inside, ends, series, to_series)
+    return Rule(
+        power, nodes, weights / 2, np.append(nodes, CHECKS), reach, checks, halves, inside, ends, series, to_series
+    )
 
 
 class Panels(NamedTuple):

@@ -238,13 +238,12 @@ def _answered(
     _EndOfTable
     """
     kinds = 2 * counts + (low == 0)
-    groups = [(rule_of(int(kind) // 2, 1 + int(kind) % 2), kinds == kind) for kind in np.unique(kinds)]
-    places = [rule.approach(low[own], high[own], np.append(rule.nodes, CHECKS)) for rule, own in groups]
+    groups = [(rule_of(kind // 2, 1 + kind % 2), kinds == kind) for kind in sorted(set(kinds.tolist()))[::-1]]
+    places = [rule.approach(low[own], high[own], rule.seen) for rule, own in groups]
     x = np.concatenate([part.ravel() for part in places])
     found, error = fields(x)
-    unknown = np.asarray(np.isnan(found).any(axis=0))
-    if unknown.any():
-        known = x[x < x[unknown].min()]
+    if np.isnan(found).any():
+        known = x[x < x[np.isnan(found).any(axis=0)].min()]
         if not known.size:
             raise OutOfRangeError("no island of this surface lies inside the table")
         raise _EndOfTable(float(known.max()))
@@ -266,7 +265,7 @@ def _merged(parts: list[Part]) -> tuple[FloatArray, list[Group], Nodes]:
     for rule in {id(own.rule): own.rule for own, _ in parts}.values():
         low, high, fields = zip(*(own[1:] for own, _ in parts if own.rule is rule), strict=True)
         every = Panels(rule, np.concatenate(low), np.concatenate(high), np.concatenate(fields, axis=1))
-        made.append(every.some(np.argsort(every.low)))
+        made.append(every if (np.diff(every.low) > 0).all() else every.some(np.argsort(every.low)))
     starts = np.sort(np.concatenate([own.low for own in made]))
     groups = [(own, np.searchsorted(starts, own.low)) for own in made]
     panel, weights, turns = [], [], []
@@ -276,7 +275,8 @@ def _merged(parts: list[Part]) -> tuple[FloatArray, list[Group], Nodes]:
         weights.append((fields[:-2] * rule.measure(high - low, rule.nodes, rows) * rule.weights).reshape(rows, -1))
         turns.append(fields[-2:].reshape(2, -1))
     nodes = Nodes(np.concatenate(panel), np.concatenate(weights, axis=1).T, *np.concatenate(turns, axis=1))
-    return starts, groups, nodes.some(np.argsort(nodes.panel, kind="stable"))
+    ordered = (np.diff(nodes.panel) >= 0).all()
+    return starts, groups, nodes if ordered else nodes.some(np.argsort(nodes.panel, kind="stable"))
 
 
 def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float, few: bool) -> Profile:
