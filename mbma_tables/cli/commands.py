@@ -163,17 +163,13 @@ def curve_command(
         for quantity in ("force", "area"):
             values[f"{theory}_{quantity}"] = getattr(line, quantity)
             units[f"{theory}_{quantity}"] = shown_unit(quantity, specimen.units)
-    picture = b"" if plot is None else _draw(specimen, answer, others, plot.suffix[1:], leakage, model.hardness)
+    title = specimen.title + (f", hardness {model.hardness}" if model.hardness != math.inf else "")
+    picture = b"" if plot is None else _draw(specimen, answer, others, plot.suffix[1:], leakage, title)
     report_answer("curve", specimen, model, answer, values, units).write(output, plot, picture)
 
 
 def _draw(
-    specimen: Specimen,
-    answer: Contact,
-    others: Mapping[str, OtherTheory],
-    kind: str,
-    leakage: bool,
-    hardness: float | str,
+    specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory], kind: str, leakage: bool, title: str
 ) -> bytes:
     from mbma_tables.plots import Curve, draw_compression, force_label, leakage_label, theory_label, to_picture
 
@@ -183,7 +179,6 @@ def _draw(
         known = np.isfinite(line.force)
         curves.append(Curve(theory_label(name), gap[known], *(field[known] for field in line)))
     force, flow = force_label(unit_of("force", specimen.units)), leakage_label(unit_of("leakage", specimen.units))
-    title = specimen.title if hardness == math.inf else f"{specimen.title}, hardness {hardness}"
     return to_picture(draw_compression(curves, title, force, leakage_label=flow), kind)
 
 

@@ -212,13 +212,7 @@ def _contact(
 
 
 def _places(
-    surface: AnySurface,
-    value: ArrayLike,
-    E_star: ArrayLike,
-    hardness: ArrayLike,
-    by: str,
-    theory: Theory,
-    unit: str | None,
+    surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, theory: Theory, unit: str | None
 ) -> tuple[FloatArray, FloatArray, dict[str, Any]]:
     """What is known, the modulus, and both separations, all of the broadcast shape."""
     asked, modulus = finite_array(by, value), positive_modulus(E_star)
