@@ -21,7 +21,7 @@ from mbma_tables.theories.protocol import Theory, UserTheory
 
 MAX_NAME = 31  # letters, as Fortran and C99 read them
 # steps of coefficients over the least value and the least slope of a polynomial; flatter ones count as so steep
-VALUES, SLOPES, FLAT = 2e-14, 8e-13, 1e-4
+VALUES, SLOPES, FLAT = 2e-14, 4e-13, 1e-4
 MORE = ("conductance", "leakage")  # asked for
 FUNCTIONS = ("pressure", "tangent", "with_tangent", "curvature", "area", "energy", "overclosure", *MORE)
 
@@ -259,7 +259,10 @@ def _lines(rows: FloatArray, begin: str, end: str) -> str:
 
 def _step(row: FloatArray) -> float:
     """The step in which coefficients are written: values are then right to 1e-13, slopes to about 1e-11."""
-    value, slope = (float(np.abs(polyval([-1, 0, 1], a)).min()) for a in (row, polyder(row)))
+    values, slopes = (polyval([-1, 0, 1], a) for a in (row, polyder(row)))
+    value = float(np.abs(values).min())
+    # about a maximum slopes are small, though not at the ends
+    slope = float(np.abs(slopes).min()) if slopes.min() * slopes.max() > 0 else 0.0
     return min(VALUES * value, SLOPES * max(slope, FLAT * value))
 
 
