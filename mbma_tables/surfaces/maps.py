@@ -247,9 +247,8 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
         1 / (1 / bins.weight - SCATTER**2),
         curves.anisotropy,
     ).scaled(scale, treated.unit)
-    read = {"step": "read", "points": list(treated.heights.shape), "steps": list(treated.steps), "unit": treated.unit}
     edges = "periodic" if treated.periodic else "under a window for the spectrum, mirrored for the curves"
-    return dataclasses.replace(known, provenance=(read, *treated.provenance, {"step": "edges", "kind": edges}, *notes))
+    return dataclasses.replace(known, provenance=(treated.read, *treated.provenance, {"step": "edges", "kind": edges}, *notes))
 
 
 def _with_anisotropy(

@@ -34,6 +34,7 @@ BY_MAP = {"skewness of heights": (-3.1, 2.1), "kurtosis of slopes": (2.8, 16.5),
 WIDEST, SCAN = 1.5, 400  # ends of the largest islands' band (27a); wavenumbers at which it is tried
 SAME_LAW = 0.01  # of ln C about one power law: a spectrum this straight counts as self-affine
 FINE = 1.02  # between wavenumbers of a sum of spectra: a sum of power laws is none, by 1e-4 at most
+NO_POWER = 1e-3  # share of the squared gradient beyond the last waves that count
 SIDE = 1e-12  # beside a wavenumber, relative
 
 
@@ -296,13 +297,17 @@ class MeasuredSurface(AnySurface):
 
 def resolution(surface: MeasuredSurface) -> dict[str, Any]:
     """A record of how much the shortest octave of a measured spectrum matters."""
-    laws = surface.laws
-    below = float(laws.below(2, laws.place(np.asarray(surface.q1 / 2))))
-    factor = math.sqrt(laws.moment(2) / below) if below > 0 else math.inf
-    shortest = 2 * math.pi / float(surface.q1)
+    laws, q = surface.laws, surface.q
+    below = laws.below(2, laws.place(q))
+    # a map may be sampled more finely than what it shows
+    end = float(q[np.argmax(below >= (1 - NO_POWER) * below[-1])])
+    before = float(laws.below(2, laws.place(np.asarray(end / 2))))
+    factor = math.sqrt(laws.moment(2) / before) if before > 0 else math.inf
+    shortest, unit = 2 * math.pi / end, f" {surface.unit}" if surface.unit else ""
+    finer = f" (sampled to {2 * math.pi / q[-1]:.4g}{unit}, without power there)" if end < q[-1] else ""
     told = (
-        f"area is a matter of resolution: waves are known down to {shortest:.4g} {surface.unit or ''}".rstrip()
-        + f", and without the last octave of them area at light load would be {factor:.2f} times larger"
+        f"area is a matter of resolution: waves are known down to {shortest:.4g}{unit}{finer}, and without the last "
+        f"octave of them area at light load would be {factor:.2f} times larger"
     )
     return {"step": "resolution", "shortest": shortest, "area_without_last_octave": factor, "told": told}
 

@@ -142,10 +142,9 @@ def measured_profile(treated: Treated, h_max: Any) -> MeasuredSurface:
         heights,
         samples=np.interp(np.log(found.edges), np.log(found.edges[:-1]), found.count),
     ).scaled(scale, treated.unit)
-    read = {"step": "read", "points": list(treated.heights.shape), "steps": list(treated.steps), "unit": treated.unit}
     edges = "periodic" if treated.periodic else "under a window for the spectrum"
     notes = _limits(found, steps[0] * scaled.heights.size)
-    provenance = (read, *treated.provenance, {"step": "edges", "kind": edges}, *notes)
+    provenance = (treated.read, *treated.provenance, {"step": "edges", "kind": edges}, *notes)
     return dataclasses.replace(surface, provenance=provenance)
 
 

@@ -90,6 +90,18 @@ class Treated:
         record = {"step": step, **numbers, "told": told}
         return dataclasses.replace(self, heights=heights, provenance=(*self.provenance, record))
 
+    @property
+    def read(self) -> dict[str, Any]:
+        """The record of what was read, which comes before all that was done to it."""
+        shape, unit = self.heights.shape, f" {self.unit}" if self.unit else ""
+        sides = " x ".join(f"{count * step:.4g}" for count, step in zip(shape, self.steps, strict=True))
+        told = (
+            f"{'map' if len(shape) == 2 else 'line scan'} of {' x '.join(map(str, shape))} points, {sides}{unit}, "
+            f"heights read in {self.unit or 'the same unit, which is not known'}"
+        )
+        record = {"step": "read", "points": list(shape), "steps": list(self.steps), "unit": self.unit}
+        return record | {"told": told}
+
     def windowed(self) -> FloatArray:
         """Heights under a window of unit mean square, their mean under it removed; as they are where periodic."""
         if self.window is None and self.periodic:
