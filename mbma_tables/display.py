@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import base64
 import html
+import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from mbma_tables.arguments import is_labelled, needed
-from mbma_tables.errors import MbmaError
-from mbma_tables.plots import to_picture
+from mbma_tables.errors import InputError, MbmaError
+from mbma_tables.files import write_file
+from mbma_tables.plots import KINDS, to_picture
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -82,17 +84,23 @@ class Displayed:
             return f"{table}</div>"
         return f"{table}<img src='data:image/png;base64,{picture}'></div>"
 
-    def plot(self) -> Figure:
-        """A picture of it; notebooks show the figure, `figure.savefig("name.svg")` keeps it.
+    def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
+        """A picture of it, kept under `path` where that is given ("name.svg", .pdf, .png); notebooks show the figure.
 
         Raises
         ------
         InputError
-            Where there is no curve to draw, as of a single contact.
+            Where there is no curve to draw, as of a single contact, or no such kind of picture.
         MbmaError
             Where matplotlib is missing.
         """
-        return self._figure()
+        figure = self._figure()
+        if path is not None:
+            kind = os.fspath(path).rpartition(".")[2]
+            if kind not in KINDS:
+                raise InputError(f"a picture's name must end with one of .{', .'.join(KINDS)}, got {os.fspath(path)!r}")
+            write_file(path, to_picture(figure, kind))
+        return figure
 
     def to_dataset(self) -> xr.Dataset:
         """What it holds as an xarray Dataset, each variable with its unit and what it is."""

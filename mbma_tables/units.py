@@ -90,7 +90,7 @@ def known(unit: Any, kind: str = "length") -> str:
     plain = ALIASES.get(unit.strip(), unit.strip().translate(_ASCII))
     plain = ALIASES.get(plain, plain)
     if plain not in SIZES[kind]:
-        near = difflib.get_close_matches(plain, SIZES[kind], 3, 0.5) or SIZES[kind]
+        near = difflib.get_close_matches(plain, SIZES[kind], 3, 0.6) or SIZES[kind]
         raise InputError(f"{unit!r} is no known unit of {kind}: write {' or '.join(near)}")
     return plain
 

@@ -81,6 +81,13 @@ def test_without_numba_laws_answer_and_name_the_extra():
     assert "pip install 'mbma_tables[fast]'" in said
 
 
+def test_a_picture_is_kept(tmp_path):
+    ROAD.plot(tmp_path / "road.svg")
+    assert b"<svg" in (tmp_path / "road.svg").read_bytes()
+    with pytest.raises(InputError, match="must end with one of"):
+        ROAD.plot(tmp_path / "road.xyz")
+
+
 def test_a_figure_is_none_of_pyplots(thing):
     before = "matplotlib.pyplot" in sys.modules
     figure = thing.plot()

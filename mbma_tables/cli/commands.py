@@ -85,6 +85,8 @@ def contact_command(
 
     Example: mbma contact --surface challenge --E-star 25MPa --length-unit mm -p 100kPa
     """
+    import numpy as np
+
     if len(loads) != 1:
         raise InputError("one of --separation, --mean-separation, --pressure and --area is needed")
     (name, numbers), *_ = loads.items()
@@ -96,6 +98,8 @@ def contact_command(
     answer = contact(specimen.surface, **{name: asked}, **contact_keywords(model, specimen))
     yields = ("yielded", "incremental_stiffness") if model.hardness != math.inf else ()
     values = {column: getattr(answer, column) for column in (*COLUMNS[:-1], "stiffness", *yields, COLUMNS[-1])}
+    values |= {"scatter": answer.scatter, "area_scatter": answer.area_scatter}
+    values["valid"] = np.where(answer.valid, "yes", "no")
     values |= _leakage(answer) if leakage else {}
     units = {}
     if conductivity:

@@ -248,7 +248,9 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
         curves.anisotropy,
     ).scaled(scale, treated.unit)
     edges = "periodic" if treated.periodic else "under a window for the spectrum, mirrored for the curves"
-    return dataclasses.replace(known, provenance=(treated.read, *treated.provenance, {"step": "edges", "kind": edges}, *notes))
+    return dataclasses.replace(
+        known, provenance=(treated.read, *treated.provenance, {"step": "edges", "kind": edges}, *notes)
+    )
 
 
 def _with_anisotropy(

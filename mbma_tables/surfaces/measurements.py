@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import finite_array, needed, number_in, one_number, require
+from mbma_tables.arguments import finite_array, needed, one_number, require
 from mbma_tables.errors import InputError, MbmaError
 from mbma_tables.files import read_file
 
+LISTS = (2, 3)  # columns of a list of points, which is no matrix of heights
 MAX_TEXT_BYTES = 256 * 2**20
 MIN_LENGTH, MAX_LENGTH = 1e-30, 1e30  # in any unit: fourth powers of them, which C has, keep their digits
 
@@ -87,18 +88,31 @@ def _channel_of(
     chosen = reader.default_channel if channel is None else channels[channel]
     given: dict[str, Any] = {} if channel is None else {"channel_index": channel}
     if chosen.physical_sizes is None:
+        if min(chosen.nb_grid_pts) in LISTS:
+            raise InputError(
+                f"{path.name} holds {' x '.join(map(str, chosen.nb_grid_pts))} numbers. A list of x, y and height is "
+                "read where its points fill a grid: give missing ones a row with NaN, or write a matrix"
+            )
         if dx is None:
             raise InputError(f"{path.name} has no lengths: give the sampling step dx")
         steps = (dx, dx if dy is None else dy)
         given["physical_sizes"] = tuple(
-            count * number_in("dx, dy", step, MIN_LENGTH, MAX_LENGTH)
-            for count, step in zip(chosen.nb_grid_pts, steps, strict=False)
+            count * sampling_step(name, step)
+            for name, count, step in zip(("dx", "dy"), chosen.nb_grid_pts, steps, strict=False)
         )
     elif dx is not None or dy is not None:
-        raise InputError(f"{path.name} has its own lengths: leave dx and dy out")
+        raise InputError(f"{path.name} has its own lengths: leave dx and dy out (unit says what they are in)")
     if unit is not None and chosen.unit is None:
         given["unit"] = unit
     return reader.topography(**given)
+
+
+def sampling_step(name: str, value: Any) -> float:
+    """A sampling step [length] as a number."""
+    step = one_number(name, value)
+    require(name, step, step > 0, "positive")
+    require(name, step, (step >= MIN_LENGTH) & (step <= MAX_LENGTH), "in [1e-30, 1e30]")
+    return float(step)
 
 
 def grid_of(
@@ -109,12 +123,8 @@ def grid_of(
         if dx is None:
             raise InputError("dx is missing: the sampling step of a plain array of heights")
         given = {"dx": dx, "dy": dx if dy is None else dy} if dimensions == 2 else {"dx": dx}
-        steps = []
-        for name, value in given.items():
-            step = one_number(name, value)
-            require(name, step, (step >= MIN_LENGTH) & (step <= MAX_LENGTH), "in [1e-30, 1e30]")
-            steps.append(float(step))
-        return source, tuple(steps), bool(periodic), None, {}
+        steps = tuple(sampling_step(name, value) for name, value in given.items())
+        return source, steps, bool(periodic), None, {}
     if dx is not None or dy is not None:
         raise InputError("dx and dy belong to a plain array; a topography has its own physical_sizes")
     if not getattr(source, "is_uniform", True):

@@ -248,6 +248,11 @@ def _resolution(known: Treated, treatment: Treatment, info: Mapping[str, Any]) -
 
 def _within(known: Treated, short: float | None, long: float | None) -> Treated:
     """Heights whose waves lie between both cut-offs."""
+    if short is not None and not short > 2 * min(known.steps):
+        raise InputError(
+            f"short_cutoff must be longer than two sampling steps, {2 * min(known.steps):.4g}, the shortest wave that "
+            f"was sampled, got {short:g}"
+        )
     if short is not None and long is not None and not long > short:
         raise InputError(f"long_cutoff must be larger than short_cutoff, got {long:g} and {short:g}")
     values = known.heights if known.periodic or short is long is None else mirrored(known.heights)
@@ -260,7 +265,7 @@ def _within(known: Treated, short: float | None, long: float | None) -> Treated:
         after = squares(values, known.steps)
         if not after[0] > 1e-24 * before[0]:
             raise InputError(f"{name} {wavelength:g} leaves no wave of the measurement")
-        of_variance, of_gradient = (1 - b / a for a, b in zip(before, after, strict=True))
+        of_variance, of_gradient = (max(1 - b / a, 0.0) for a, b in zip(before, after, strict=True))
         length = f"{wavelength:.4g} {known.unit or ''}".rstrip()
         told = f"a {name.replace('_cutoff', ' cut-off')} at {length} removes {of_gradient:.0%} of the squared gradient"
         if name == "short_cutoff":

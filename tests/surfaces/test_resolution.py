@@ -27,6 +27,17 @@ def test_the_last_octave():
     assert f"{expected:.2f} times larger" in found["told"]
 
 
+def test_waves_that_hold_no_power_are_not_known():
+    q = np.geomspace(1.0, 400.0, 200)
+    C = WHOLE.power_spectrum(q * (1 - 1e-12)) * np.where(q > 100, 1e-6, 1.0)
+    found = resolution(Surface.from_spectrum(q, C, h_max=1.0, unit="um"))
+    assert found["shortest"] == pytest.approx(2 * np.pi / 100, rel=0.04)
+    assert found["area_without_last_octave"] == pytest.approx(
+        resolution(measured(100.0))["area_without_last_octave"], rel=0.02
+    )
+    assert "(sampled to 0.01571 um, without power there)" in found["told"]
+
+
 def test_the_true_power_law_gives_the_whole_surface_back():
     longer = extrapolated(measured(50.0), 2 * np.pi / 400, 0.7)
     assert longer.rms_gradient == pytest.approx(WHOLE.rms_gradient, rel=2e-3)

@@ -200,6 +200,13 @@ class TestReading:
             with pytest.raises(InputError, match="has no lengths: give the sampling step dx"):
                 Surface.from_map(tmp_path / name)
 
+    def test_a_list_of_points_with_gaps_is_no_matrix(self, tmp_path):
+        points = np.c_[[(i, j, MAP[i, j]) for i in range(40) for j in range(40)]]
+        np.savetxt(tmp_path / "a.txt", np.delete(points, [3, 77], axis=0))
+        for dx in (None, 1.0):
+            with pytest.raises(InputError, match="give missing ones a row with NaN"):
+                Surface.from_map(tmp_path / "a.txt", dx)
+
     def test_a_file_knows_its_lengths_and_unit(self, tmp_path):
         path = tmp_path / "a.nc"
         library.Topography(MAP, (SIDE, SIDE), unit="nm").to_netcdf(str(path))
