@@ -66,7 +66,9 @@ def summary(seen: list[Seen]) -> list[str]:
         for _, surface, rows in seen:
             force, area, u = rows[:, (rows[1] >= low) & (rows[1] <= high)]
             try:
-                valid = contact(surface, mean_separation=u, theory=theory).valid
+                # a map's curve may end before full contact
+                valid, reached = np.full(u.size, np.nan), u >= theory.interval(surface)[0]
+                valid[reached] = contact(surface, mean_separation=u[reached], theory=theory).valid
                 found.append(np.stack([*ratios(theory, surface, force, area, u), valid]))
             except MbmaError:
                 found.append(np.full((3, u.size), np.nan))
