@@ -144,11 +144,13 @@ def _with_slopes(address: int, word: int, t: float) -> tuple[float, float, float
 
 @njit(cache=True, fastmath=CONTRACT, error_model="numpy", forceinline=True)
 def _integral(address: int, word: int, t: float, power: float) -> float:
-    """Sum of coefficients t^k/(power + k)."""
-    value = number(address, word + DEGREE) * (1.0 / (power + DEGREE))
-    for k in range(DEGREE - 1, -1, -1):
-        value = value * t + number(address, word + k) * (1.0 / (power + k))
-    result: float = value
+    """Sum of coefficients t^k/(power + k); even and odd k apart, whose sums do not wait for each other."""
+    square = t * t
+    value, odd = number(address, word + DEGREE) * (1.0 / (power + DEGREE)), 0.0
+    for k in range(DEGREE - 1, 0, -2):
+        odd = odd * square + number(address, word + k) * (1.0 / (power + k))
+        value = value * square + number(address, word + k - 1) * (1.0 / (power + k - 1))
+    result: float = value + t * odd
     return result
 
 
@@ -304,7 +306,8 @@ def _fill_inverse(
     unsure = bad = 0
     for k in range(wanted.size):
         y = wanted[k]
-        bad += not least <= y <= y_high
+        if not least <= y <= y_high:
+            bad += 1
         held = min(max(y, y_low), y_high)
         bucket = (bits_of(held) >> (52 - INVERSE_BITS)) - first + (held > turn)
         word = INVERSE_HEAD + bucket * INVERSE_RECORD
@@ -323,9 +326,10 @@ def _fill_inverse(
         step = (wanted[k] - value) * inverse_slope
         step -= bend * inverse_slope * step * step
         gap = max((x * width - h_max) * side - step / place.q, end)
-        sure = (abs(step) < SURE) & (wanted[k] >= y_low)
-        unsure += not sure
-        out[k] = gap if sure else math.nan
+        # branches that are hardly ever taken cost less than masks
+        if not (abs(step) < SURE and wanted[k] >= y_low):
+            gap, unsure = math.nan, unsure + 1
+        out[k] = gap
         if area is not None:
             area[k] = _value(address, place.word + AREA_AT, place.t + step)
         if stiffness is not None:
