@@ -21,9 +21,13 @@ def with_slopes(law):
     return (law.force, lambda d: law.stiffness(d) / 2), (law.area, law.area_slope)
 
 
-def random_map(points, low, high, power=1.8, seed=1):
-    """A periodic random map with waves between `low` and `high` [1/step], amplitudes falling as a power of them."""
+def random_map(points, low, high, power=1.8, seed=1, phases=False):
+    """A periodic random map with waves between `low` and `high` [1/step], amplitudes falling as a power of them.
+
+    Of random `phases` alone its amplitudes are fixed.
+    """
     noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((points, points)))
+    noise /= np.abs(noise) if phases else 1
     q = np.hypot(np.fft.fftfreq(points)[:, None], np.fft.rfftfreq(points))
     return np.fft.irfft2(np.where((q > low) & (q < high), noise * np.maximum(q, 1e-3) ** -power, 0))
 

@@ -147,7 +147,8 @@ def _fit_intervals(values: Values, low: FloatArray, high: FloatArray) -> tuple[F
     records[:, FORCE_AT:AREA_AT], records[:, AREA_AT:ENERGY_AT] = monomials
     least = found.min(axis=-1)
     steep = np.maximum(1.0, (found.max(axis=-1) / least - 1) * high / half / 2)
-    slope *= high / half / least
+    slope *= high / half
+    slope /= least
     errors = np.stack([(value / least).max(axis=0), slope.max(axis=0), (slope / steep).max(axis=0)], axis=-1)
     return records, errors
 
