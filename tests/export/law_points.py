@@ -49,7 +49,7 @@ class Points:
         pairs = (p, self.p), (area, self.area), (energy, self.energy), (leakage, self.leakage)
         for found, known in pairs:
             np.testing.assert_allclose(found, known, rtol=close, atol=0)
-        slope = np.maximum(np.abs(self.tangent), 2e-2 * self.p / np.abs(self.c))
+        slope = np.maximum(np.abs(self.tangent), 1e-2 * self.p / np.abs(self.c))
         assert np.abs((np.asarray(tangent) - self.tangent) / slope).max() <= max(TANGENTS, close)
 
     def pressures(self) -> np.ndarray:
