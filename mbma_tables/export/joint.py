@@ -7,6 +7,8 @@ approach, so that -dp/du = dp/dc.
 from __future__ import annotations
 
 import dataclasses
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +29,8 @@ from mbma_tables.units import Units, in_unit, resolve
 
 LAW_RTOL = 1e-8
 LOOKED_AT = 200  # compressions at which validity and scatter are looked at
+SMALL, NEAREST = 20, 1e-5  # smaller ones for validity alone, down to this share of the largest
+ROUNDS, PARTS = 4, 32  # of the search for an end of validity between two of them
 OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # said of a surface that is its own spectrum
 
 
@@ -101,13 +105,13 @@ class Joint:
     def _validity(self, end: float, leakage: bool) -> tuple[str, ...]:
         """Lines that say where the law holds, how far simulations scatter about it, and where its numbers are from."""
         law, stress_unit = self.law, self.stress
-        u = np.linspace(law.h_max, law.h_max - end, LOOKED_AT + 1)[1:]
+        # small overclosures by their logarithm, larger ones evenly
+        small = np.geomspace(NEAREST, 1 / LOOKED_AT, SMALL, endpoint=False)
+        u = law.h_max - end * np.append(small, np.linspace(0, 1, LOOKED_AT + 1)[1:])
         found = self.answer(u)
         pressure = np.asarray(law.force(u=u))
-        lines = []
-        for reason, mask in (found.leakage if leakage else found).reasons.items():
-            first, last = pressure[mask].min(), pressure[mask].max()
-            lines.append(f"not valid from p = {first:.4g} to {last:.4g} {stress_unit}: {reason}")
+        reasons = (found.leakage if leakage else found).reasons
+        lines = [line for reason, bad in reasons.items() for line in self._not_valid(reason, u, bad, leakage)]
         if law.softening is not None:
             lines.append(
                 f"softening: stiffness falls with compression from c = {law.h_max - law.softening:.4g}, "
@@ -125,9 +129,35 @@ class Joint:
             lines.append(f"table: data {str(universal_model().content.attributes['values_sha256'])[:16]}")
         return tuple(lines)
 
+    def _not_valid(self, reason: str, u: FloatArray, bad: Any, leakage: bool) -> list[str]:
+        """Ranges of pressure in which a reason holds, by the outermost pressures found valid, rounded away from it."""
+        lines = []
+        steps = np.flatnonzero(np.diff(bad)) + 1
+        for first, last in zip(np.append(0, steps), np.append(steps, bad.size), strict=True):
+            if not bad[first]:
+                continue
+            begin = None if first == 0 else self._last_valid(reason, u[first - 1], u[first], leakage)
+            end = None if last == bad.size else self._last_valid(reason, u[last], u[last - 1], leakage)
+            low = "" if begin is None else outward(begin, ROUND_FLOOR)
+            high = "" if end is None else outward(end, ROUND_CEILING)
+            where = f"from p = {low} to {high}" if low and high else f"above p = {low}" if low else f"below p = {high}"
+            where = f"{where} {self.stress}" if low or high else "at any pressure of the range"
+            lines.append(f"not valid {where}: {reason}")
+        return lines
+
+    def _last_valid(self, reason: str, good: float, bad: float, leakage: bool) -> float:
+        """Pressure at the last mean separation where a reason does not hold, between one where not and one where so."""
+        for _ in range(ROUNDS):
+            u = np.linspace(good, bad, PARTS + 1)
+            found = self.answer(u[1:-1])
+            mask = (found.leakage if leakage else found).reasons.get(reason, np.zeros(PARTS - 1, bool))
+            k = 1 + int(np.argmax(np.append(mask, True)))
+            good, bad = u[k - 1], u[k]
+        return float(self.law.force(u=good))
+
     def _spread(self, what: str, scatter: Numbers, pressure: FloatArray) -> str:
         """A scatter at five pressures where it is known."""
-        sizes = np.asarray(scatter)
+        sizes, pressure = np.asarray(scatter)[SMALL:], pressure[SMALL:]
         known = np.flatnonzero(np.isfinite(sizes))
         places = known[np.linspace(0, known.size - 1, 5).astype(int)] if known.size else known
         listed = ", ".join(f"{sizes[k]:.2g} at {pressure[k]:.3g}" for k in places)
@@ -147,6 +177,17 @@ class Joint:
             "scatter of K from simulation to simulation, "
             + self._spread("one standard deviation of ln K", scatter, pressure),
         )
+
+
+def outward(value: float, rounding: str) -> str:
+    """Four digits of a number, the last one rounded as told.
+
+    Examples
+    --------
+    >>> outward(13.2231, ROUND_CEILING), outward(13.2231, ROUND_FLOOR)
+    ('13.23', '13.22')
+    """
+    return f"{float(Context(prec=4, rounding=rounding).create_decimal(value)):.4g}"
 
 
 def frozen_joint(
