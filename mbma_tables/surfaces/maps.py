@@ -132,25 +132,6 @@ def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | N
 LONG = 4.0  # grid steps in wavenumber: waves up to there are few, and a window weighs them by chance
 RAISED, MET = 6.0, 1e-6  # of ln C, by which the strongest waves under a window may change; sums that are met
 TOLD = 0.05  # relative difference of rms gradients that is told, and half of that of h_rms
-STEEPEST = 4.0  # by which `matched` may tilt a spectrum
-
-
-def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> FloatArray:
-    """C of averaged samples, tilted a little so that its variance and mean square wavenumber are those of all waves.
-
-    The longest waves of a map are few, and samples do not reach half way to the next ones.
-    """
-    from scipy.optimize import brentq
-
-    def excess(tilt: float) -> float:
-        laws = PowerLaws(q, C * (q / q[0]) ** tilt)
-        return math.log(2 * laws.moment(2) / laws.moment(0) / square)
-
-    if q.size < 2 or not excess(-STEEPEST) < 0 < excess(STEEPEST):
-        # too few waves for a slope
-        return C
-    tilted = C * (q / q[0]) ** brentq(excess, -STEEPEST, STEEPEST)
-    return np.asarray(tilted * (variance / PowerLaws(q, tilted).moment(0)))
 
 
 def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> FloatArray:
@@ -168,7 +149,8 @@ def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> Floa
 
     found = least_squares(misses, np.zeros(2), bounds=(-RAISED, RAISED), xtol=1e-12)
     # not where heights are of a trend, of which the window shows no wave
-    return np.asarray(C * np.exp(found.x @ ways)) if np.abs(found.fun).max() < MET else C
+    changed = C * np.exp(found.x @ ways)
+    return np.asarray(changed * (variance / PowerLaws(q, changed).moment(0)) if np.abs(found.fun).max() < MET else C)
 
 
 def _unwindowed(
@@ -223,7 +205,7 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
     own = Heights.of(values)
     C_bins, notes = np.exp(bins.log_c), []
     if treated.periodic:
-        C_bins = matched(bins.q, C_bins, own.h_rms**2, float((C * waves) @ q**2 / (C @ waves)))
+        C_bins = raised(bins.q, C_bins, own.h_rms**2, own.h_rms**2 * float((C * waves) @ q**2 / (C @ waves)))
     else:
         grid = [2 * math.pi / (count * step) for count, step in zip(values.shape, (unit_x, unit_y), strict=True)]
         slopes, values = C * waves * q**2 * grid[0] * grid[1], mirrored(values)

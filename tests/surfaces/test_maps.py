@@ -458,6 +458,16 @@ def test_the_gradient_of_a_map_that_is_not_periodic_is_that_of_its_heights(roll_
     assert np.mean(ratios) == pytest.approx(1, abs=0.02)
 
 
+@pytest.mark.parametrize("roll_off", [1.0, 0.25])
+def test_moments_of_a_periodic_map_are_those_of_its_waves(roll_off):
+    heights, gradient = cut_out(3, roll_off, points=256, tiles=1)
+    k = np.hypot(*np.meshgrid(np.fft.fftfreq(256, 1 / 256), np.fft.fftfreq(256, 1 / 256), indexing="ij"))
+    m4 = 0.375 * np.sum((2 * np.pi * k) ** 4 * np.abs(np.fft.fft2(heights) / heights.size) ** 2)
+    surface = Surface.from_map(heights, 1 / 256, periodic=True)
+    assert surface.rms_gradient == pytest.approx(gradient, rel=1e-3)
+    assert surface.m4 == pytest.approx(m4, rel=0.08)
+
+
 def test_a_trend_that_is_left_is_told_and_short_waves_stay():
     heights, _ = cut_out(0, 0.25)
     x = np.linspace(0, 1, 128)
