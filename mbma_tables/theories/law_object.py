@@ -85,6 +85,7 @@ class ContactLaw(Displayed):
         Gaps d that the law covers; highest is infinite where contact ends at h_max.
     error : float
         Bound on the relative error of force and area, of the polynomials and of what they were made from together.
+        With a hardness it does not hold within 1e-6 h_max of last contact, where islands turn elastic one by one.
     turning_point, area_turning_point : float or None
         Gap below which force, or area, falls again, where it does; inverses end there.
     theory, reading, tier : str
