@@ -1,21 +1,24 @@
 """Rows of a curve for linear interpolation, chosen by their error.
 
 Linear interpolation over a step h has an error of about h^2 y''/8. Rows are spaced so that this is the same fraction of
-y everywhere above a floor, and are then moved by half of it, so that the error has both signs.
+y everywhere above a floor, and are then moved by half of it, so that the error has both signs; the last row stays on
+the curve, for a solver has nothing beyond it.
 """
 
 from __future__ import annotations
 
 import bisect
+from decimal import ROUND_CEILING, Context
 
 import numpy as np
 
 from mbma_tables.arguments import FloatArray, number_in, whole_number_in
 from mbma_tables.errors import InputError
-from mbma_tables.export.text import number
+from mbma_tables.export.text import DIGITS, number
 
 MIN_ROWS, MAX_ROWS = 3, 5000
 ROUNDS = 40  # of making the errors of chords equal
+LAST = 1.5  # the last chord's error counts so much more, as its last row is not moved
 
 
 def chosen_rows(
@@ -33,6 +36,7 @@ def chosen_rows(
         x = rounded(places)
         y = np.interp(x, fine_x, fine_y)
         y = rounded(y if evenly else balanced(x, y, fine_x, fine_y, floor))
+        x[-1], y[-1] = _not_below(fine_x[-1]), _not_below(fine_y[-1])
         return x, y, chord_error(x, y, fine_x, fine_y, floor)
 
     if rows is not None:
@@ -54,6 +58,11 @@ def rounded(values: FloatArray) -> FloatArray:
     return np.array([float(number(value)) for value in values])
 
 
+def _not_below(value: float) -> float:
+    """A number as a file holds it, rounded up, so that rows reach it; what is one but for rounding stays."""
+    return float(Context(prec=DIGITS, rounding=ROUND_CEILING).create_decimal(float(value) * (1 - 1e-13)))
+
+
 def spread(x: FloatArray, y: FloatArray, count: int, floor: float) -> FloatArray:
     """Places of `count` rows along x whose chords have equal errors relative to max(y, floor), by iteration."""
     scale = np.maximum(y, floor)
@@ -66,6 +75,7 @@ def spread(x: FloatArray, y: FloatArray, count: int, floor: float) -> FloatArray
         step = np.clip(np.searchsorted(places, x, side="right") - 1, 0, count - 2)
         error = np.zeros(count - 1)
         np.maximum.at(error, step, np.abs(np.interp(x, places, chords) - y) / scale)
+        error[-1] *= LAST
         if error.max() < best:
             best, found = error.max(), places
         # the error of a chord falls like the square of its length
@@ -98,7 +108,7 @@ def balanced(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArra
     middle = (high + low) / 2
     beside = np.concatenate([[middle[0]], (middle[1:] + middle[:-1]) / 2, [middle[-1]]])
     moved = np.maximum(y - beside * np.maximum(y, floor), 0.0)
-    moved[0] = y[0]
+    moved[0], moved[-1] = y[0], y[-1]
     # pressure rises; conductance may fall where the model's stiffness jumps
     if (np.diff(fine_y) >= 0).all():
         moved = np.maximum.accumulate(moved)

@@ -296,6 +296,37 @@ def test_light_loads_are_within_the_error_too(theory, quantity):
         law_of(pressures=(1e-5, 0.1), largest_overclosure=0.5)
 
 
+@pytest.mark.parametrize("target", [*SOLVERS, "csv"])
+@pytest.mark.parametrize("largest", [0.1, 0.1234567890123])
+@pytest.mark.parametrize("choice", [{"rows": 20}, {"rows": 33, "evenly": True}, {"rows": None, "rtol": 3e-3}])
+def test_rows_reach_the_largest_pressure(target, largest, choice):
+    """A solver that keeps the last pressure beyond the last row carries the largest load, at its overclosure."""
+    law = law_of(theory="calibrated", pressures=(1e-4, largest), **choice)
+    if target == "csv":
+        lines = data.to_csv(law).decode().splitlines()
+        rows = [numbers(line) for line in lines if not line.startswith(("#", "overclosure"))]
+    else:
+        rows = parse(target, getattr(solvers, target)(law))
+    c, p = np.array(rows).T
+    assert p[-1] >= largest
+    at = CONCRETE.h_max - contact(CONCRETE, pressure=largest, E_star=13.3, theory="calibrated").mean_separation
+    # the law itself is within 6e-6 of the theory
+    assert np.interp(at * (1 + 1e-4), c, p) >= largest
+    assert np.interp(at, c, p) == pytest.approx(largest, rel=law.largest_error + 1e-4)
+
+
+@pytest.mark.parametrize("quantity", ["conductance", "leakage"])
+def test_rows_against_pressure_reach_the_largest(quantity):
+    heat = {"conductivity": 50.0, "conductivity_unit": "mW/K"} if quantity == "conductance" else {}
+    law = law_of(theory="calibrated", quantity=quantity, pressures=(1e-4, 0.1234567890123), rows=20, **heat)
+    assert law.x[-1] >= 0.1234567890123
+    found = contact(CONCRETE, pressure=0.1234567890123, E_star=13.3, theory="calibrated")
+    model = found.stiffness * 50.0 / 13.3 if heat else found.leakage.conductance
+    assert law.y[-1] == pytest.approx(model, rel=law.largest_error + 1e-4)
+    if law.behaviour:
+        assert law.behaviour.y[-1] >= 0.1234567890123
+
+
 def test_json_comes_back():
     for law in (law_of(), law_of(quantity="conductance", conductivity=50.0, conductivity_unit="mW/K")):
         held = data.from_json(data.to_json(law))
