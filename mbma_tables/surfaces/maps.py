@@ -147,6 +147,11 @@ def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> Floa
         laws = PowerLaws(q, C * np.exp(by @ ways))
         return np.log([laws.moment(0) / variance, 2 * laws.moment(2) / slopes])
 
+    with np.errstate(all="ignore"):
+        known = np.isfinite(misses(np.zeros(2))).all()
+    if not known:
+        # one wave, or moments beyond what numbers hold
+        return C
     found = least_squares(misses, np.zeros(2), bounds=(-RAISED, RAISED), xtol=1e-12)
     # not where heights are of a trend, of which the window shows no wave
     changed = C * np.exp(found.x @ ways)
