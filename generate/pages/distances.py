@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -27,14 +26,13 @@ from mbma_tables.calibrated import CONSTANTS, YANG_PERSSON, Law, Spectrum
 from mbma_tables.calibrated_map import MAP_CONSTANTS
 from mbma_tables.errors import MbmaError
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.maps import matched
 from mbma_tables.surfaces.measured import MeasuredSurface
-from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.readings import REPORTED, Reading
 
 DATA = ROOT / "docs" / "data"
 LOW, HIGH = 0.01, 0.97  # A/A0 of the simulations between which distances are summed up
 COVER = dataclasses.replace(REPORTED, name="reported, areas as a cover", addition="cover")
-STEEPEST = 4.0  # by which `matched` may tilt a spectrum
 MEASURED = {"al3d-1": "measured: optical map", "di-1": "measured: AFM map"}
 ROLLOFF = (0.041954782, 0.037331897)  # h_max of the maps
 
@@ -76,24 +74,6 @@ class Curve:
         return np.asarray(
             self._answer(self._surface, np.minimum(u * self._h_rms, float(self._surface.h_max)))[0] / self._g
         )
-
-
-def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> FloatArray:
-    """C of averaged samples, tilted a little so that its variance and mean square wavenumber are those of all waves.
-
-    The longest waves of a map are few, and samples do not reach half way to the next ones.
-    """
-    from scipy.optimize import brentq
-
-    def excess(tilt: float) -> float:
-        laws = PowerLaws(q, C * (q / q[0]) ** tilt)
-        return math.log(2 * laws.moment(2) / laws.moment(0) / square)
-
-    if q.size < 2 or not excess(-STEEPEST) < 0 < excess(STEEPEST):
-        # too few waves for a slope
-        return C
-    tilted = C * (q / q[0]) ** brentq(excess, -STEEPEST, STEEPEST)
-    return np.asarray(tilted * (variance / PowerLaws(q, tilted).moment(0)))
 
 
 def surface_of(one: Case) -> AnySurface:

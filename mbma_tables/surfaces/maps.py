@@ -131,7 +131,26 @@ def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | N
 
 LONG = 4.0  # grid steps in wavenumber: waves up to there are few, and a window weighs them by chance
 RAISED, MET = 6.0, 1e-6  # of ln C, by which the strongest waves under a window may change; sums that are met
+STEEPEST = 4.0  # by which `matched` may tilt a spectrum
 TOLD = 0.05  # relative difference of rms gradients that is told, and half of that of h_rms
+
+
+def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> FloatArray:
+    """C of averaged samples, tilted a little so that its variance and mean square wavenumber are those of all waves.
+
+    The longest waves of a map are few, and samples do not reach half way to the next ones.
+    """
+    from scipy.optimize import brentq
+
+    def excess(tilt: float) -> float:
+        laws = PowerLaws(q, C * (q / q[0]) ** tilt)
+        return math.log(2 * laws.moment(2) / laws.moment(0) / square)
+
+    if q.size < 2 or not excess(-STEEPEST) < 0 < excess(STEEPEST):
+        # too few waves for a slope
+        return C
+    tilted = C * (q / q[0]) ** brentq(excess, -STEEPEST, STEEPEST)
+    return np.asarray(tilted * (variance / PowerLaws(q, tilted).moment(0)))
 
 
 def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> FloatArray:
@@ -210,7 +229,10 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
     own = Heights.of(values)
     C_bins, notes = np.exp(bins.log_c), []
     if treated.periodic:
-        C_bins = raised(bins.q, C_bins, own.h_rms**2, own.h_rms**2 * float((C * waves) @ q**2 / (C @ waves)))
+        square = float((C * waves) @ q**2 / (C @ waves))
+        changed = raised(bins.q, C_bins, own.h_rms**2, own.h_rms**2 * square)
+        # a tilt where no waves are the few longest, as of a step
+        C_bins = matched(bins.q, C_bins, own.h_rms**2, square) if changed is C_bins else changed
     else:
         grid = [2 * math.pi / (count * step) for count, step in zip(values.shape, (unit_x, unit_y), strict=True)]
         slopes, values = C * waves * q**2 * grid[0] * grid[1], mirrored(values)
