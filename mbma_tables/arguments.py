@@ -120,11 +120,11 @@ def spread(array: Any, shape: tuple[int, ...]) -> Any:
     return array if np.shape(array) == shape else np.broadcast_to(array, shape)
 
 
-def require(name: str, value: FloatArray, good: Any, allowed: str) -> None:
-    """Refuse the entries of `value` where `good` is false; `allowed` says what would have been right."""
+def require(name: str, value: FloatArray, good: Any, allowed: str, unit: str = "") -> None:
+    """Refuse the entries of `value` where `good` is false; `allowed` says what would have been right, `unit` theirs."""
     bad = ~np.asarray(good, dtype=bool)
     if bad.any():
-        raise OutOfRangeError(f"{name} must be {allowed}, got {describe_entries(value, bad)}", bad)
+        raise OutOfRangeError(f"{name} must be {allowed}, got {describe_entries(value, bad)}{unit}", bad)
 
 
 def positive_modulus(E_star: ArrayLike) -> FloatArray:

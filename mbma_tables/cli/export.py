@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mbma_tables.arguments import nearest
 from mbma_tables.cli.options import (
     hardness_option,
     optional_specimen_options,
@@ -35,11 +36,25 @@ OPTIONS = {
     **dict.fromkeys(CODE, frozenset({"reading", "check"})),
     "calculix --exponential": frozenset({"specimen", "name", "exponential"}),
 }
+TARGETS = (*SOLVERS, *DATA, *LAWS, *FMUS, *GRAPHS, *CODE)
 DEFAULTS = {"theory": "mbma", "reading": "reported", "exponential": False, "leakage": False, "check": False}
 
 
-@click.command("export", short_help="A contact law, or the whole model, for other codes.")
-@click.argument("target", type=click.Choice([*SOLVERS, *DATA, *LAWS, *FMUS, *GRAPHS, *CODE]))
+class _Target(click.Choice[str]):
+    """One of the targets; of a mistaken one the nearest is told."""
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        if value not in self.choices:
+            self.fail(f"no target is called {value!r}: {nearest(value, self.choices)}", param, ctx)
+        return value
+
+
+@click.command(
+    "export",
+    short_help="A contact law, or the whole model, for other codes.",
+    epilog=f"Targets: {', '.join(TARGETS)}.",
+)
+@click.argument("target", metavar="TARGET", type=_Target(TARGETS))
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write; a folder for source code.")
 @optional_specimen_options
 @click.option("--rows", type=int, help="How many rows of a table; else as few as --rtol needs.")

@@ -207,7 +207,9 @@ _SPECIMEN_OPTIONS = (
     quantity_option("--Sds", "Sds", help="or summits per area [1/length^2],"),
     quantity_option("--Spd", "Spd", help="the same by its newer name;"),
     quantity_option("--Sp", "Sp", help="highest point of a map [length] in place of --h-max."),
-    quantity_option("--E-star", "E_star", help="Effective modulus; without one forces are over E*."),
+    quantity_option(
+        "--E-star", "E_star", help="Effective modulus; export needs one, elsewhere forces are over E* without it."
+    ),
     quantity_option("--E1", "E1", help="Instead of --E-star: Young's modulus,"),
     click.option("--nu1", "nu1", type=float, help="and Poisson's ratio of one body,"),
     quantity_option("--E2", "E2", help="Young's modulus of the other,"),

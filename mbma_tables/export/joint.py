@@ -25,7 +25,7 @@ from mbma_tables.theories.law_object import ContactLaw
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.result import Contact
-from mbma_tables.units import Units, in_unit, resolve
+from mbma_tables.units import Units, factor, in_unit, resolve
 
 LAW_RTOL = 1e-8
 LOOKED_AT = 200  # compressions at which validity and scatter are looked at
@@ -171,7 +171,8 @@ class Joint:
             least = f"blocked, K = 0, from p = {float(self.law.force(blocked)):.10g} {self.stress}, c = {c:.10g} on"
         return (
             f"leakage is the flow conductance K [{self.length}^3] of the gaps: flow per length of seal is "
-            "K dp/(12 viscosity width)",
+            f"K dp/(12 viscosity width), viscosity in {self.stress} s: 1e-3 Pa s, as water's, is "
+            f"{1e-3 * factor('Pa', self.stress, 'stress'):.4g} {self.stress} s",
             least,
             f"K is within {self.law.leakage.error:.1e} of that at the law's area",
             "scatter of K from simulation to simulation, "
@@ -214,13 +215,15 @@ def frozen_joint(
     modulus = number_in("E_star", plain["E_star"], 1e-300, 1e300)
     cap = Units(length, stress).number("hardness", hardness)
     law = contact_law(surface, LAW_RTOL, reading=reading, E_star=modulus, theory=theory, hardness=cap)
+    law = dataclasses.replace(law, units=Units(length, stress))
     own = Mbma(reading=reading) if theory == Mbma.name else get_theory(theory)
     return Joint(surface, law, own, modulus, float(cap), length, stress)
 
 
 def _known(name: str, unit: str | None) -> str:
     if unit is None:
-        raise InputError(f"{name} is missing: a law without units is read wrongly sooner or later")
+        kind, sample = name.split("_")[0], {"length_unit": "'0.8 um'", "stress_unit": "E_star = '115 GPa'"}[name]
+        raise InputError(f"{name} is missing: give it (--{kind}-unit in a shell), or numbers with units, like {sample}")
     return unit
 
 

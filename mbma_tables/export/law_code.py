@@ -354,7 +354,9 @@ LANGUAGES = {
     "abaqus-uinter": FORTRAN._replace(
         usage="*SURFACE INTERACTION, NAME=..., USER: abaqus job=... user={name}.f90. Place the bodies so that their "
         "surfaces touch where the mean planes are h_max apart. Beyond the law's range the increment is tried again "
-        f"with a smaller step. Without friction. {READ} Arguments: Abaqus 2017, user subroutines, UINTER.",
+        "with a smaller step. Without friction. A linear perturbation step stops the program: for "
+        "modes of a preloaded joint take the tangent at its pressure, from this module, as a spring's stiffness. "
+        f"{READ} Arguments: Abaqus 2017, user subroutines, UINTER.",
         subroutine="uinter.f90",
     ),
     "abaqus-gapcon": GAPCON._replace(

@@ -22,7 +22,7 @@ from mbma_tables.leakage import LARGEST_AREA
 from mbma_tables.plots import draw_lines
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.theories.law_object import ContactLaw
+from mbma_tables.theories.law_object import ROUNDING, ContactLaw
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.totals.conductance import conductance
 from mbma_tables.units import Units
@@ -215,7 +215,7 @@ def _table(
     x, y, error = choose(fine_x, fine_y, floor)
     comments = joint.header(
         f"{names[1]} [{names[3]}] against {names[0]} [{names[2]}]",
-        f"{names[0]} from 0 to {x[-1]:.10g}, {_why_there(law, names[0])}",
+        f"{names[0]} from 0 to {x[-1]:.10g} {names[2]}, {_why_there(law, end, y[-1] == 0)}",
         f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, "
         f"above {names[1]} {floor:.4g} {names[3]}",
         *(["the first row is zero, whatever the pressure of the theory is there"] if law.highest < np.inf else ()),
@@ -225,13 +225,20 @@ def _table(
     return LawTable(x, y, *names, error, comments, law.theory, floor, behaviour)
 
 
-def _why_there(law: ContactLaw, x_name: str) -> str:
+def _why_there(law: ContactLaw, end: float, blocked: bool) -> str:
     """Why rows end where they do."""
-    if x_name != "overclosure":
-        return "the same"
+    if blocked:
+        return "where contact blocks the gaps"
+    if end < _last(law) * (1 - ROUNDING):
+        return "the largest asked for"
     if law.turning_point is None:
-        return "the largest asked for, or full compression"
-    return "where the force of this surface turns down, or the largest asked for; nothing is known beyond"
+        return "where the law ends"
+    return "where the force of this surface turns down; nothing is known beyond"
+
+
+def _last(law: ContactLaw) -> float:
+    """Overclosure at full compression, or where the force turns down."""
+    return (law.h_max - (law.lowest if law.turning_point is None else law.turning_point)) / 2
 
 
 def _range(
@@ -245,15 +252,14 @@ def _range(
     low, high = (number_in("pressures", units.number("pressure", p), 1e-300, 1e300) for p in pressures)
     if low >= high:
         raise InputError(f"pressures must be two rising numbers, got {low:g} and {high:g}")
-    return low, (law.h_max - float(law.separation(force=high))) / 2
+    return low, (law.h_max - float(law.at_pressure(high).separation)) / 2
 
 
 def _range_end(law: ContactLaw, asked: float | None) -> float:
     """The largest overclosure: as asked, or at full compression, or where the force turns down."""
-    turn = law.turning_point
-    end = (law.h_max - (law.lowest if turn is None else turn)) / 2
+    end = _last(law)
     found = end if asked is None else float(asked)
     if not 0 < found <= end:
-        why = "full compression" if turn is None else "where the force of this surface turns down"
+        why = "full compression" if law.turning_point is None else "where the force of this surface turns down"
         raise InputError(f"largest_overclosure must be in (0, {end:g}], up to {why}, got {found:g}")
     return found

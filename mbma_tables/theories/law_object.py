@@ -259,21 +259,25 @@ class ContactLaw(Displayed):
     def at_pressure(self, pressure: ArrayLike) -> LawPoint:
         """Separations, area and stiffness -dF/du where F/A0 is `pressure`, on the branch of first contact."""
         force = self.units.number("force", pressure)
-        d, area, stiffness = self._inverse("force", force, 3)
+        d, area, stiffness = self._inverse("pressure", force, 3)
         mean = d + self.h_max
         mean *= 0.5
         return LawPoint(d, mean, area, stiffness, force if is_labelled(force) else np.asarray(force, float)[()])
 
     def _inverse(self, name: str, given: Any, count: int = 1) -> tuple[Any, ...]:
         """Gaps of forces or areas, and with a `count` of 3 area and -dF/du there."""
-        which, inverse = (FORCE if name == "force" else AREA), self._inverse_block(name)
+        key = "area" if name == "area" else "force"
+        which, inverse = (FORCE if key == "force" else AREA), self._inverse_block(key)
         least, most, end = inverse[kernel.Y_LEAST], inverse[kernel.Y_HIGH], inverse[kernel.END]
 
         def check(given: Any) -> FloatArray:
             wanted = finite_array(name, given)
+            length, unit = self._unit_texts
+            unit = unit if key == "force" else ""
+            low, high = f"at least {least:.6g}{unit}", f"at most {most:.6g}{unit}"
             require(name, wanted, wanted >= 0, "at least 0")
-            require(name, wanted, wanted >= least, f"at least {least:.6g}, where the law of {self.theory!r} ends")
-            require(name, wanted, wanted <= most, f"at most {most:.6g}, at d = {end:.6g} where the branch ends")
+            require(name, wanted, wanted >= least, f"{low}, where the law of {self.theory!r} ends", unit)
+            require(name, wanted, wanted <= most, f"{high}, at d = {end:.6g}{length} where the branch ends", unit)
             return wanted
 
         def fill(wanted: FloatArray, gap: FloatArray, *also: FloatArray) -> bool:
@@ -281,6 +285,13 @@ class ContactLaw(Displayed):
             return bool(kernel.fill_inverse(which, self._address, address, wanted, gap, *(also or (None, None))))
 
         return self._ask(given, count, check, fill)
+
+    @functools.cached_property
+    def _unit_texts(self) -> tuple[str, str]:
+        """Units for messages, " um" and " GPa" for messages, nothing where a unit is not known."""
+        known = (self.units.length, self.units.stress)
+        length, stress = ("" if unit in (None, "1") else f" {unit}" for unit in known)
+        return length, stress
 
     def _inverse_block(self, name: str) -> FloatArray:
         """Polynomials of x over force or area, made when first asked for."""

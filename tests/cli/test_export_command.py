@@ -105,6 +105,7 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
             "conductivity_unit is not printable",
         ),
         (["cobol", "--out", "law", *LAW], "cobol"),
+        (["c_law", "--out", "law", *LAW], "no target is called 'c_law': did you mean 'c-law'?"),
         (["c", "--out", "code", "--reading", "other"], "reading"),
         (["c", "--out", "code", "--rows", "3", "--exponential"], "leave --rows and --exponential out"),
         (["calculix", "--out", "law", *LAW, "--exponential"], "leave --rows out"),
@@ -112,7 +113,10 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
         (["calculix", "--out", "law", *LAW, "--name", "1 X"], "a name must be a letter"),
         (["calculix", "--out", "law", *LAW, "--pressures", "1"], "--pressures must be like 0.1:100"),
         (["calculix", "--out", "law", *LAW, "--pressures", "2:1"], "pressures must be two rising numbers"),
-        (["calculix", "--out", "law", *LAW, "--pressures", "1:1e9"], "force must be at most"),
+        (
+            ["calculix", "--out", "law", *LAW, "--pressures", "1:1e9"],
+            "pressure must be at most 2.02721 MPa, at d = -1.1 mm where",
+        ),
         (["calculix", "--out", "law", *LAW, "--conductivity-unit", "W/K"], "needs conductivity, which is missing"),
     ],
 )

@@ -373,6 +373,8 @@ class TestLeakage:
         assert np.nanmax(np.abs(error)) < 1.05e-3 + 1e-4
         text = "\n".join(law.comments)
         assert "blocked, K = 0, from p = " in text
+        assert "viscosity in MPa s: 1e-3 Pa s, as water's, is 1e-09 MPa s" in text
+        assert f"pressure from 0 to {law.x[-1]:.10g} MPa, where contact blocks the gaps" in text
         assert "leakage: A/A0 is above 0.3" in text
         assert "one standard deviation of ln K" in text
 
