@@ -139,7 +139,7 @@ def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | fl
         "MIN_APPROACH": 1e-140,  # squares of what is of its order do not underflow
         "STRETCH": kernel.STRETCH,
         "NARROW": intervals.NARROW,
-        "SAFETY": intervals.SAFETY,
+        "SAFETY": intervals.safety_of(reading.floor_d),
         "QUADRATURE_SHARE": island_sum.QUADRATURE_SHARE,
         "FORMULA_X_LOW": form["X"][0],
         "FORMULA_X_HIGH": form["X"][1],

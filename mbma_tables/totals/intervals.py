@@ -19,7 +19,7 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import REORDER, njit
 from mbma_tables.elementary import exp, expm1
 from mbma_tables.models.universal_kernel import OK, UNRESOLVED, Table, universal_phi, universal_slopes
-from mbma_tables.surfaces.readings import ReadingNumbers
+from mbma_tables.surfaces.readings import PRINTED, ReadingNumbers
 from mbma_tables.totals.gauss_kronrod import GAUSS_21, GAUSS_31, KRONROD_21, KRONROD_31, NODES_21, NODES_31
 from mbma_tables.totals.kernel import (
     ROOT_TWO_PI,
@@ -38,6 +38,7 @@ WORK = 13  # rows of numbers at the nodes of a rule
 NARROW = 2.5  # in h_rms: above the floor of zeta_d, the smaller rule resolves a Gaussian this wide to 1e-8
 LEAST = -700.0  # of exponents: below it a Gaussian is nothing
 SAFETY = 4.0  # a Kronrod sum errs by at most 3 (difference to Gauss)^1.5, seen over random surfaces: 4^1.5 = 8
+SAFETY_BELOW, PAPER_FLOOR = 400.0, PRINTED.floor_d  # the same of a reading with a lower floor of zeta_d
 
 # columns of force and area: the total, its derivatives, and what of it lies below the floor of zeta_d; over nodes,
 # derivatives are by H at given e = zeta_1^(-2H), and by log(e)
@@ -101,10 +102,16 @@ def approach_at(t: float, straight: bool, scale: float) -> tuple[float, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def error_of(force: float, gauss_force: float, area: float, gauss_area: float) -> float:
+def safety_of(floor_d: float) -> float:
+    """The factor of `error_of` for a reading's floor of zeta_d."""
+    return SAFETY if floor_d >= PAPER_FLOOR else SAFETY_BELOW
+
+
+@njit(cache=True, error_model="numpy")
+def error_of(force: float, gauss_force: float, area: float, gauss_area: float, safety: float) -> float:
     """Relative error of both Kronrod sums: both integrands resolve alike, and one may agree by chance."""
     difference = max(abs(gauss_force / force - 1.0), abs(gauss_area / area - 1.0))
-    error: float = min(difference, (SAFETY * difference) ** 1.5)
+    error: float = min(difference, (safety * difference) ** 1.5)
     return error
 
 
@@ -186,7 +193,7 @@ def _rule(
         part[0, BELOW_KINK], part[1, BELOW_KINK] = below * part[0, 0], below * part[1, 0]
     if not (force > 0.0 and area > 0.0):
         return OK, 0.0, table_error, count
-    return OK, error_of(force, gauss_force, area, gauss_area), table_error, count
+    return OK, error_of(force, gauss_force, area, gauss_area, safety_of(surface.reading.floor_d)), table_error, count
 
 
 @njit(cache=True, error_model="numpy")

@@ -87,10 +87,8 @@ def test_the_estimate_is_of_the_kronrod_sum():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "exceeded", "largest"), [("reported", 0, 1e-8), ("printed", 0, 1e-8), ("fitted", 0.004, 1e-5)]
-)
-def test_stated_errors_of_the_compiled_rule(name, exceeded, largest):
+@pytest.mark.parametrize("name", ["reported", "printed", "fitted"])
+def test_stated_errors_of_the_compiled_rule(name):
     # of a force and an area that are nearly proportional both differences between the rules may vanish by chance
     rng, reading, count = np.random.default_rng(1), get_reading(name), 100_000
     low, high = (0.1, np.log(max(3.1, 1.01 * reading.floor_u)), 2.5, 0), (1, np.log(1e4), 5.5, 1)
@@ -100,5 +98,5 @@ def test_stated_errors_of_the_compiled_rule(name, exceeded, largest):
     found, known = (totals_of(get_model("universal", 1e-8, reading), pairs, reading, rtol) for rtol in (1e-8, 1e-12))
     with np.errstate(invalid="ignore"):
         off = [np.nan_to_num(np.abs(a / b - 1)) for a, b in ((found.force, known.force), (found.area, known.area))]
-    assert np.max(off) < largest
-    assert np.mean(np.max(off, axis=0) > found.error) <= exceeded
+    assert (np.max(off, axis=0) <= found.error).all()
+    assert found.error.max() <= 1e-8
