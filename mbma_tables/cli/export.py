@@ -131,9 +131,21 @@ def _law_files(target: str, out: Path, joint: dict[str, Any], given: dict[str, A
     heat = "conductance" if given.keys() & {"conductivity", "conductivity_unit"} else "pressure"
     quantity = "leakage" if given.pop("leakage", False) else heat
     law = describe_law(**joint, quantity=quantity, **given)
+    if "pressures" in given:
+        _warn(law)
     if target in SOLVERS:
         return {out: getattr(solvers, target)(law, **named).encode()}
     return _data_files(target, out, law)
+
+
+def _warn(law: LawTable) -> None:
+    """Tell of pressures asked for at which the law is not valid."""
+    rows = law.behaviour or law
+    for line in rows.comments:
+        # a limit below the smallest pressure asked for does not matter
+        below = line.startswith("not valid below") and rows.y_name == "pressure"
+        if line.startswith("not valid") and not (below and float(line.split("p = ")[1].split()[0]) <= rows.floor):
+            echo(line, err=True)
 
 
 def _pressures(text: str) -> tuple[float | str, ...]:

@@ -23,10 +23,10 @@ def doing(what: str) -> None:
     _state["doing"] = what
 
 
-def echo(text: object, nl: bool = True) -> None:
-    """Print to standard output, with the line of progress gone before."""
+def echo(text: object, nl: bool = True, err: bool = False) -> None:
+    """Print to standard output, or with `err` to standard error, with the line of progress gone before."""
     _end()
-    click.echo(text, nl=nl)
+    click.echo(text, nl=nl, err=err)
 
 
 @contextlib.contextmanager

@@ -156,6 +156,8 @@ def text_of(target: str, name: str, asked: AskedLaw) -> str:
         "HEADER": opening((line.format(name=name) for line in lines), language.mark),
         "NAME": name,
         "SUBROUTINE": "",
+        "LENGTH": asked.joint.length,
+        "STRESS": asked.joint.stress,
         **dict(language.parts),
         **{quantity.upper(): asked.more.get(quantity, "") and language.number(asked.ratio) for quantity in MORE},
         **_numbers("", numbers, {"p": numbers.force, "a": numbers.area}, language),

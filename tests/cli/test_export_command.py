@@ -27,6 +27,13 @@ def test_one_file(target, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["law.out"]
 
 
+def test_pressures_asked_for_that_are_not_valid_are_told(tmp_path):
+    law = [*LAW, "--theory", "calibrated", "--out", tmp_path / "law.csv", "--pressures"]
+    # A/A0 = 0.001 is at 0.0046 MPa
+    assert "not valid below p = 0.00" in run("csv", *law, "0.001:0.05").stderr
+    assert run("csv", *law, "0.01:0.05").stderr == ""
+
+
 def test_matlab_writes_its_reader_too(tmp_path):
     assert run("matlab", "--out", tmp_path / "law.mat", *LAW).exit_code == 0
     assert sorted(p.name for p in tmp_path.iterdir()) == ["law.m", "law.mat"]
