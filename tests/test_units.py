@@ -341,6 +341,9 @@ def test_a_law_keeps_its_units(theory):
     assert law.force(u="0.7 mm") == law.force(u=700.0)
     assert law.separation(force="10 kPa") == law.separation(force=0.01)
     assert law.at_pressure("10 kPa").area == law.at_pressure(0.01).area
+    point = law.at_pressure("10 kPa")
+    assert f"mean_separation {point.mean_separation:.4g} um," in repr(point)
+    assert "force 0.01 MPa" in repr(pickle.loads(pickle.dumps(point)))
     assert pickle.loads(pickle.dumps(law)).units == law.units
     with pytest.raises(InputError, match="needs a modulus"):
         contact_law(CONCRETE, 1e-3).at_pressure("10 kPa")

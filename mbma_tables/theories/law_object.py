@@ -40,17 +40,25 @@ DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polyno
 QUANTITIES = ("force", "area", "stiffness", "area_slope", "energy")
 
 
-class LawPoint(NamedTuple):
-    """Where a law has a given pressure: separation d, mean separation u, A/A0, -dF/du and F/A0, of its shape.
-
-    What yields, and the incremental stiffness with it, no law holds: `contact` answers that.
-    """
-
+class _Point(NamedTuple):
     separation: Any
     mean_separation: Any
     area: Any
     stiffness: Any
     force: Any
+
+
+class LawPoint(_Point):
+    """Where a law has a given pressure: separation d, mean separation u, A/A0, -dF/du and F/A0, of its shape.
+
+    `units` are the law's. What yields, and the incremental stiffness with it, no law holds: `contact` answers that.
+    """
+
+    units = Units()
+
+    def __repr__(self) -> str:
+        fields = self._asdict().items()
+        return f"LawPoint({', '.join(f'{name} {shown(value, unit_of(name, self.units))}' for name, value in fields)})"
 
     @property
     def mean_pressure(self) -> Any:
@@ -262,7 +270,9 @@ class ContactLaw(Displayed):
         d, area, stiffness = self._inverse("pressure", force, 3)
         mean = d + self.h_max
         mean *= 0.5
-        return LawPoint(d, mean, area, stiffness, force if is_labelled(force) else np.asarray(force, float)[()])
+        point = LawPoint(d, mean, area, stiffness, force if is_labelled(force) else np.asarray(force, float)[()])
+        point.units = self.units
+        return point
 
     def _inverse(self, name: str, given: Any, count: int = 1) -> tuple[Any, ...]:
         """Gaps of forces or areas, and with a `count` of 3 area and -dF/du there."""
