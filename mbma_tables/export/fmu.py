@@ -26,7 +26,7 @@ STANDARDS = {
 }
 SAID = {
     "conductance": "through the contact, over nominal area",
-    "leakage": "flow conductance K: flow per length of seal is K dp/(12 viscosity width)",
+    "leakage": "flow conductance K: K dp/(12 viscosity width) per length of seal, viscosity in stress times s",
 }
 INPUT = 1  # value reference of overclosure, after time
 
