@@ -274,9 +274,8 @@ class Contact(Displayed):
     def stiffness_scatter(self) -> Numbers:
         """Standard deviation of ln of `incremental_stiffness` at this force, likewise: of conductance, too."""
         area = self._answer.area if self.area is None else self.area
-        return self._source.map(lambda theory, s, u, E, A: (theory.stiffness_scatter(s, A),), self, 1, {"area": area})[
-            0
-        ]
+        (found,) = self._source.map(lambda by, s, u, E, A: (by.stiffness_scatter(s, A),), self, 1, {"area": area})
+        return found
 
     @property
     def separation_scatter(self) -> Numbers:

@@ -156,7 +156,10 @@ def _by_profiles(
         shapes = list(zip(*(field.ravel().tolist() for field in numbers), strict=True))
     if len(shapes) > 1:
         number = np.broadcast_to(np.arange(len(shapes)).reshape(surface.shape), depth.shape).ravel()[touching]
-        groups = {k: touching[number == k] for k in np.unique(number)}
+        order = np.argsort(number, kind="stable")
+        known, first = np.unique(number[order], return_index=True)
+        # where nothing touches, one group is split off no surface
+        groups = dict(zip(known.tolist(), np.split(touching[order], first[1:]), strict=False))
     for k, places in groups.items():
         if not places.size:
             continue
