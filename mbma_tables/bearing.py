@@ -13,6 +13,9 @@ FRACTIONS = np.logspace(-4.5, 0, 91)  # shares of the map, from the highest poin
 MIN_TOP_POINTS = 16  # gradients are averaged over at least so many points
 QUANTILES = 1 - np.concatenate([[0], np.logspace(-5, -1, 61)[:-1], np.linspace(0.1, 1, 139)])
 BANDS = 40
+RESOLVED = 1e-14  # of the larger eigenvalue of a gradient tensor: a smaller one is rounding, as of ridges
+# <|w|> and <|w|^4>/3 of Gaussian gradients w of unit variance: of ridges along one axis, else along both
+RIDGES, BOTH = (np.sqrt(2 / np.pi), 1.0), (np.sqrt(np.pi / 2), 8 / 3)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -37,12 +40,13 @@ class Bearing:
     gradient: float  # rms in two dimensions
     quantiles: FloatArray  # heights below which shares `QUANTILES` of the map lie, highest first, shape (200,)
     mean_height: FloatArray  # M(a), mean height of the highest share a of the map, a = `FRACTIONS`
-    # (2/sqrt(pi)) <|w|>/sqrt(2) over the same tops, w the gradient whitened by its own tensor: 1 if Gaussian
+    # (2/sqrt(pi)) <|w|>/sqrt(2) over the same tops, w the gradient whitened by its own tensor: 1 if Gaussian.
+    # Of ridges, where w has one component, sqrt(pi/2) <|w|>
     top_gradient: FloatArray
     tension_force: FloatArray  # mean pressures F at which full contact would pull on shares `FRACTIONS` of the map,
     tension: FloatArray  # and the mean pull then, <max(-p, 0)> over the whole map [E*]
-    anisotropy: float  # root of the ratio of the gradient tensor's eigenvalues, at least 1
-    slope_kurtosis: float  # (3/8) <|w|^4>: 3 if Gaussian
+    anisotropy: float  # root of the ratio of the gradient tensor's eigenvalues, 1 to 1e7, which stands for ridges
+    slope_kurtosis: float  # (3/8) <|w|^4>, of ridges <|w|^4>: 3 if Gaussian
 
 
 def wavevectors(shape: tuple[int, ...], sizes: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
@@ -92,13 +96,15 @@ def bearing(heights: FloatArray, sizes: tuple[float, float]) -> Bearing:
     slopes = np.stack([np.fft.irfft2(1j * q * transform, s=values.shape).ravel() for q in (qx, qy)])
     tensor = slopes @ slopes.T / values.size
     eigenvalues, directions = np.linalg.eigh(tensor)
+    mean_norm, fourth = BOTH if eigenvalues[0] > RESOLVED * eigenvalues[1] else RIDGES
+    eigenvalues = np.maximum(eigenvalues, RESOLVED * eigenvalues[1])
     whitened = np.hypot(*(directions.T @ slopes / np.sqrt(eigenvalues)[:, None]))
     order = np.argsort(values, axis=None)[::-1]
     ordered = values.ravel()[order]
     count = np.arange(1, values.size + 1)
     share = count / values.size
     first = min(MIN_TOP_POINTS, values.size) - 1
-    tops = np.cumsum(whitened[order]) / count * (2 / np.sqrt(np.pi)) / np.sqrt(2)
+    tops = np.cumsum(whitened[order]) / count / mean_norm
     # pressures of full contact, E* |q| h_q/2, about their mean; lowest first
     full = np.sort(np.fft.irfft2(transform * np.hypot(qx, qy) / 2, s=values.shape), axis=None)
     pull = (np.cumsum(full) - full * count) / values.size
@@ -112,5 +118,5 @@ def bearing(heights: FloatArray, sizes: tuple[float, float]) -> Bearing:
         np.interp(FRACTIONS, share, -full),
         np.interp(FRACTIONS, share, -pull),
         float(np.sqrt(eigenvalues[1] / eigenvalues[0])),
-        float(0.375 * np.mean(whitened**4)),
+        float(np.mean(whitened**4) / fourth),
     )

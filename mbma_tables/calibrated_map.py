@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq, isotonic_regression
-from scipy.special import ellipe, ellipk, erf, expit, ndtr, ndtri
+from scipy.special import ellipe, ellipkm1, erf, expit, ndtr, ndtri
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.bearing import FRACTIONS, Bearing, RadialSpectrum
@@ -70,14 +70,14 @@ def hertz_ellipse(anisotropy: float) -> tuple[float, float]:
 
     def curvatures(b: float) -> tuple[float, float]:
         m = 1 - b * b
-        K, E = float(ellipk(m)), float(ellipe(m))
+        K, E = float(ellipkm1(b * b)), float(ellipe(m))
         return 2 * b / m * (K - E), 2 * b / m * (E / (b * b) - K)
 
     def mismatch(b: float) -> float:
         ka, kb = curvatures(b)
         return kb / ka - anisotropy**2
 
-    b = brentq(mismatch, 1e-6, 1 - 1e-7, xtol=1e-14)
+    b = brentq(mismatch, 1e-9, 1 - 1e-7, xtol=1e-14)
     ka, kb = curvatures(b)
     product = np.sqrt(ka * kb)
     # the circle has curvatures pi/2 at semi-axis 1

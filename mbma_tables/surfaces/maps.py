@@ -226,6 +226,8 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
     values, (unit_x, unit_y) = treated.heights / scale, (step / scale for step in treated.steps)
     q, C, waves, _ = _within_band(treated, scale, radial_spectrum(treated.windowed() / scale, unit_x, unit_y))
     bins = log_bins(q, C, waves / (2.0 if treated.periodic else 2.0 * WINDOW_OVERLAP))
+    # of ridges, or of a few cosines, some hold no wave
+    bins = bins[bins.log_c > bins.log_c.max() + math.log(MIN_POWER)]
     own = Heights.of(values)
     C_bins, notes = np.exp(bins.log_c), []
     if treated.periodic:

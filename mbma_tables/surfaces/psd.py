@@ -39,7 +39,17 @@ MIN_VARIANCE_SHARE = 0.1  # of the variance; a flat roll-off leaves 1/(1 + H) > 
 
 @dataclasses.dataclass(frozen=True)
 class SpectrumFit:
-    """How well a self-affine band describes a measured spectrum. Units follow the measurement's length unit."""
+    """How well a self-affine band describes a measured spectrum. Units follow the measurement's length unit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mbma_tables import Surface
+    >>> q = np.geomspace(1, 100, 40)
+    >>> Surface.from_spectrum(q, 1e-3 * q**-3.4, h_max=0.3, unit="um", model="self-affine").fit
+    SpectrumFit(hurst=0.7, hurst_error=..., hurst_held=False, q0=1, q1=100, q_low=1, q_high=100, points=40,
+    residual=..., roll_off=None, cut_off=None, variance_share=1, convention='paper', windowed=False, detrend=None, ...)
+    """
 
     hurst: float  # fitted,
     hurst_error: float  # and its standard error

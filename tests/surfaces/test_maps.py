@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from mbma_tables import Surface
+from mbma_tables import Surface, contact
 from mbma_tables.errors import InputError, MbmaError, NotSelfAffineError, OutOfRangeError
 from mbma_tables.surfaces.maps import radial_spectrum
 from mbma_tables.surfaces.measurements import read_measurement
@@ -477,3 +477,25 @@ def test_a_trend_that_is_left_is_told_and_short_waves_stay():
     np.testing.assert_allclose(tilted.power_spectrum(q), clean.power_spectrum(q), rtol=0.1)
     assert not any("a trend is left" in entry.get("told", "") for entry in clean.provenance)
     assert any("a trend is left" in entry.get("told", "") for entry in tilted.provenance)
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_ridges_are_a_line_seen_twice(periodic):
+    waves = np.arange(65.0)
+    noise = np.random.default_rng(2).standard_normal(65) * np.exp(2j * np.pi * np.random.default_rng(3).random(65))
+    line = np.fft.irfft(np.where(waves > 0, noise / np.maximum(waves, 1) ** 1.3, 0))
+    ridges = Surface.from_map(np.repeat(line[:, None], 100, axis=1), 0.5, periodic=periodic)
+    turned = Surface.from_map(np.repeat(line[None, :], 100, axis=0), 0.5, periodic=periodic)
+    assert ridges.h_rms == pytest.approx(ridges.heights.h_rms, rel=1e-5)
+    assert ridges.rms_gradient == pytest.approx(ridges.bearing.gradient, rel=0.01)
+    assert any("anisotropy is 1e+07, tested" in reason for reason in ridges.departures(by_map=True))
+    if periodic:
+        slope = np.fft.irfft(2j * np.pi * waves / 64 * np.fft.rfft(line))
+        assert ridges.bearing.gradient == pytest.approx(slope.std(), rel=1e-9)
+        assert ridges.bearing.slope_kurtosis == pytest.approx(np.mean(slope**4) / slope.var() ** 2, rel=1e-9)
+        whitened = np.sqrt(np.pi / 2) * np.abs(slope).mean() / slope.std()
+        assert ridges.bearing.top_gradient[-1] == pytest.approx(whitened, rel=1e-9)
+    for theory in ("calibrated", "persson", "mbma"):
+        answers = [contact(one, area=[0.01, 0.1], theory=theory) for one in (ridges, turned)]
+        assert not answers[0].valid.any()
+        assert answers[1].force == pytest.approx(answers[0].force, rel=0.05)
