@@ -116,12 +116,24 @@ def in_blocks(fill: Callable[[slice], Answer], count: int, size: int, workers: i
     Blocks are the same whatever the number of threads, `workers`, and so are the bits of what they fill.
     """
     blocks = [slice(first, min(first + size, count)) for first in range(0, count, size)]
-    if workers == 1 or len(blocks) == 1:
+    others = min(workers, len(blocks)) - 1
+    if others <= 0:
         return [fill(block) for block in blocks]
+    left, answers = enumerate(blocks), dict[int, Answer]()
+
+    def work() -> None:
+        try:
+            for number, block in left:
+                answers[number] = fill(block)
+        finally:
+            # after Ctrl-C, the blocks at work alone are waited for
+            for _ in left:
+                pass
+
     # threads end with the call, so that a process may fork after it
-    pool = ThreadPoolExecutor(workers)
-    try:
-        return list(pool.map(fill, blocks))
-    finally:
-        # after Ctrl-C, the blocks at work alone are waited for
-        pool.shutdown(cancel_futures=True)
+    with ThreadPoolExecutor(others) as pool:
+        begun = [pool.submit(work) for _ in range(others)]
+        work()
+        for other in begun:
+            other.result()
+    return [answers[number] for number in range(len(blocks))]

@@ -178,3 +178,5 @@ def test_workers_stop_at_an_interrupt():
     with pytest.raises(KeyboardInterrupt):
         in_blocks(fill, 1000, 1, workers=2)
     assert len(begun) < 100
+    # answers keep their order whoever gives them, a thread a block at most
+    assert in_blocks(lambda block: block.stop, 5, 2, workers=9) == [2, 4, 5]

@@ -230,10 +230,11 @@ def _by_parameter(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Chain rule from H, log(zeta_1), compression and peak to the gap and the surface's own parameters."""
     shape = sums.shape[:-2]
-    hurst, zeta_1, compression, peak, rms_over_s, _ = (field.reshape(shape) for field in pairs)
+    hurst, zeta_1, compression, peak = (field.reshape(shape) for field in pairs)
     h_rms, q0, q1 = surface.h_rms, surface.q0, surface.q1
     # log(s/h_rms) by H and by log(zeta_1): (h_rms/s)^2 = 1 - zeta_1^(-2H)
-    lift = -(1 - rms_over_s**2) / rms_over_s**2
+    power = -2 * hurst * np.log(zeta_1)
+    lift = np.exp(power) / np.expm1(power)
     answers = []
     for number in range(2):
         value, by_H, by_zeta, by_compression, by_peak, _ = np.moveaxis(sums[..., number, :], -1, 0)

@@ -301,7 +301,7 @@ def fill_totals(
 ) -> int:
     """`total`, with derivatives where `slopes` is True, of each of the pairs given; returns the islands.
 
-    Given are the first four of `Pairs`; filled `status`, `out` (pairs, 2, columns), the `bound` on the relative error.
+    Given are `Pairs`; filled `status`, `out` (pairs, 2, columns), the `bound` on the relative error.
     """
     islands = 0
     hurst, zeta_1, compression, peak = given

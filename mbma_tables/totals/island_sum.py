@@ -23,7 +23,7 @@ from mbma_tables.totals.kernel import STRETCH, Pairs
 
 QUADRATURE_SHARE = 0.9  # of the tolerance asked for; a table's own error comes on top
 SUM_SHARE = 0.5  # where islands are solved to a share of it
-BLOCK = 512  # pairs between two looks for Ctrl-C
+BLOCK = 256  # pairs between two looks for Ctrl-C
 
 
 class Totals(NamedTuple):
@@ -56,7 +56,7 @@ def sum_islands(
     worst_island = np.zeros(count)
 
     # as in `intervals`: approach = scale sinh(t)^2 up to the floor of zeta_d, and from there on as it is
-    scale = STRETCH * pairs.layer
+    scale = STRETCH * pairs.zeta_1**-pairs.hurst
     turn = np.arcsinh(np.sqrt(kink_d / scale))
 
     def to_grid(approach: FloatArray) -> FloatArray:
@@ -66,6 +66,7 @@ def sum_islands(
 
     def integrand(owner: NDArray[np.intp], t: FloatArray) -> FloatArray:
         own = pairs.some((owner, None))
+        rms_over_s = own.rms_over_s
         own_scale, own_turn, own_kink = (field[owner, None] for field in (scale, turn, kink_d))
         hurst, zeta_1 = (np.broadcast_to(field, t.shape) for field in (own.hurst, own.zeta_1))
         curved = np.minimum(t, own_turn)
@@ -80,9 +81,9 @@ def sum_islands(
             raise type(fault)(f"an island failed: {fault}", failed) from fault
         with np.errstate(invalid="ignore"):
             np.maximum.at(worst_island, owner, phi.error.max(axis=1))
-        height = kernel.island_height(approach, g["h_d"], g["sigma_d"], own, own.rms_over_s)
-        weight = kernel.island_density(height, g["D_d"], g["sigma_d"]) * own.rms_over_s * stretch
-        K1 = kernel.jacobian_below(own.rms_over_s, reading.beta, reading.jacobian == "printed", reading.offset)
+        height = kernel.island_height(approach, g["h_d"], g["sigma_d"], own, rms_over_s)
+        weight = kernel.island_density(height, g["D_d"], g["sigma_d"]) * rms_over_s * stretch
+        K1 = kernel.jacobian_below(rms_over_s, reading.beta, reading.jacobian == "printed", reading.offset)
         weight *= np.where(approach < own_kink, K1, 1.0)
         parts = {FORCE: scale_force(g) * phi.phi_F, AREA: scale_area(g) * phi.phi_A}
         return np.stack([part * weight for name, part in parts.items() if which in (name, BOTH)], axis=-1)
@@ -139,13 +140,13 @@ def _by_table(
     slopes: bool | None,
 ) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:  # fmt: skip
     """What `intervals.fill_totals` fills, islands, and the pairs that the table does not cover, which are NaN."""
-    count = pairs.compression.size
+    count, numbers = pairs.compression.size, reading.numbers
     status, bound = np.empty(count, dtype=np.int64), np.empty(count)
     out = np.empty((count, 2, intervals.COLUMNS if slopes else 1))
 
     def fill(block: slice) -> int:
         return intervals.fill_totals(
-            pairs.some(block)[:4], QUADRATURE_SHARE * rtol, reading.numbers, reading.jacobian == "printed",
+            pairs.some(block), QUADRATURE_SHARE * rtol, numbers, reading.jacobian == "printed",
             model.kernel, slopes, status[block], out[block], bound[block],
         )  # fmt: skip
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.arguments import FloatArray, spread
 from mbma_tables.compiled import REORDER, jitable, njit
 from mbma_tables.elementary import exp, expm1, log, log1p
 from mbma_tables.islands.geometry import floor_offset
@@ -33,27 +33,18 @@ class Pairs(NamedTuple):
     zeta_1: FloatArray
     compression: FloatArray  # (h_max - d)/h_rms
     peak: FloatArray  # h_max/h_rms
-    rms_over_s: FloatArray  # h_rms/s = sqrt(1 - zeta_1^(-2H))
-    layer: FloatArray  # approach at which zeta_d leaves zeta_1, zeta_1^(-H)
 
     @classmethod
     def of(cls, surface: Surface, depth: FloatArray) -> Pairs:
         """Of a surface, or a batch, at h_max - d = `depth` [length], of the shape that both broadcast to."""
+        scaled = depth / surface.h_rms, surface.h_max / surface.h_rms
+        # copies, since numba compiles again for arrays that cannot be written
+        return cls(*(spread(f, depth.shape).flatten() for f in (surface.hurst, surface.zeta_1, *scaled)))
 
-        def flat(field: Any) -> FloatArray:
-            array = np.asarray(field, dtype=float)
-            # copies, since numba compiles again for arrays that cannot be written
-            return np.full(depth.size, array) if array.ndim == 0 else np.broadcast_to(array, depth.shape).flatten()
-
-        hurst, zeta_1 = flat(surface.hurst), flat(surface.zeta_1)
-        return cls(
-            hurst=hurst,
-            zeta_1=zeta_1,
-            compression=flat(depth / surface.h_rms),
-            peak=flat(surface.h_max / surface.h_rms),
-            rms_over_s=flat(surface.h_rms / surface.s),
-            layer=np.exp(-hurst * np.log(zeta_1)),
-        )
+    @property
+    def rms_over_s(self) -> FloatArray:
+        """h_rms/s = sqrt(1 - zeta_1^(-2H))."""
+        return np.asarray(np.sqrt(-np.expm1(-2 * self.hurst * np.log(self.zeta_1))))
 
     def some(self, chosen: Any) -> Pairs:
         """The pairs at these places."""
