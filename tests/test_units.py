@@ -190,10 +190,10 @@ def test_conflicts_in_toml(case, tmp_path):
 
 BAND = ("--hurst", "0.8", "--q0", "0.1/mm", "--zeta-1", "50", "--h-rms", "800um")
 COMMANDS = {
-    "plain beside a unit": ((*BAND, "--h-max", "3", "-d", "1"), "h_max without a unit beside numbers in mm"),
+    "plain beside a unit": ((*BAND, "--h-max", "3", "-d", "1"), "--h-max without a unit beside numbers in mm"),
     "gap without the surface's": (
         ("--hurst", "0.8", "--q0", "0.1", "--zeta-1", "50", "--h-rms", "1", "--h-max", "3", "-d", "1mm"),
-        "give the surface its unit",
+        "give --length-unit",
     ),
     "pressure without E*": (("--surface", "concrete", "-p", "1MPa"), "needs a modulus"),
     "pressure beside a plain E*": (("--surface", "concrete", "--E-star", "9", "-p", "1MPa"), "give E* with its unit"),

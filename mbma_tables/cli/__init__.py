@@ -6,8 +6,10 @@ numba or scipy is imported where a command runs, so that ``--help`` answers at o
 
 from __future__ import annotations
 
+import re
 import sys
 import warnings
+from collections.abc import Sequence
 from typing import Any
 
 import click
@@ -40,6 +42,41 @@ def _describe(fault: Exception) -> str:
     return " ".join(str(fault).split())
 
 
+# of Python, in a shell
+SAID = {
+    "surface.fit()": "--model self-affine",
+    "outside='exact'": "--tier exact",
+    "give the surface its unit": "give --length-unit",
+    "force must be": "--pressure must be",
+    "k1 must be": "--conductivity must be",
+    "k2 must be": "--conductivity must be",
+}
+# where a name that is an English word too is that of an option: at a verb, and in lists of options
+BEFORE = r"^|\b(?:leave|give|got|one of|needs) |--[\w-]+(?:,|,? and|,? or) "
+AFTER = r"[,;:]| = | (?:must|has|is|are|and|or|out|without)\b|$"
+
+
+def _in_options(text: str, command: click.Command, words: list[str]) -> str:
+    """A message of the library, which names arguments, with the options of a command for them."""
+    # what the command line says by itself, and what is of a file that was given, in whose words it is
+    if "--" in text or text.startswith(tuple(word + end for word in words for end in ":,")):
+        return text
+    for python, shell in SAID.items():
+        text = text.replace(python, shell)
+    options = {o.name: max(o.opts, key=len) for o in command.params if isinstance(o, click.Option) and o.name}
+    valued = options | {"unit": "--length-unit"}
+    signs = [name for name in options if re.search(r"[A-Z_\d]|^d[xy]$|^rtol$", name)]
+    plain = "|".join(options.keys() - set(signs)) or "^$"
+    text = re.sub(rf"\b({'|'.join(valued)})=(['\w.-]+)", lambda m: f"{valued[m[1]]} {m[2].strip(chr(39))}", text)
+    # not in formulas, nor where a number was found
+    outside = r"(?<![\w/.*^'-])(?<![<>=] )({})(?![\w/(^*'.])(?! ?[<>]| ?=(?! '))".format("|".join(signs) or "^$")
+    text = re.sub(outside, lambda m: options[m[1]], text)
+    for _ in options:
+        text = re.sub(rf"({BEFORE})({plain})(?={AFTER})", lambda m: m[1] + options[m[2]], text)
+        text = re.sub(rf"(?<![\w-])({plain})(?=,? (?:and |or )?--)", lambda m: options[m[1]], text)
+    return text
+
+
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """A warning as one line."""
     click.echo(f"mbma: warning: {' '.join(str(message).split())}", err=True)
@@ -48,18 +85,22 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 class Program(click.Group):
     """A group of commands whose every known fault ends in a short message."""
 
-    def main(self, *args: Any, **extra: Any) -> Any:
+    def main(self, args: Sequence[str] | None = None, *more: Any, **extra: Any) -> Any:
         """Run, and exit with 0, with 2 for bad input, or with 130 where it was interrupted."""
+        words = list(sys.argv[1:] if args is None else args)
         extra["standalone_mode"] = False
         warnings.showwarning = _show_warning
         try:
             with progress.shown("starting"):
-                code = super().main(*args, **extra)
+                code = super().main(words, *more, **extra)
         except click.Abort:
             click.echo("mbma: interrupted", err=True)
             sys.exit(INTERRUPTED)
         except (click.ClickException, MbmaError, OSError) as fault:
-            click.echo(f"mbma: {_describe(fault)}", err=True)
+            said = _describe(fault)
+            if isinstance(fault, MbmaError):
+                said = _in_options(said, next((self.commands[w] for w in words if w in self.commands), self), words)
+            click.echo(f"mbma: {said}", err=True)
             sys.exit(BAD_INPUT)
         sys.exit(code if isinstance(code, int) else 0)
 

@@ -12,7 +12,16 @@ import click
 
 from mbma_tables.cli.commands import COLUMNS, contact_keywords
 from mbma_tables.cli.format import Report, shown_unit, to_columns
-from mbma_tables.cli.options import Model, Output, load_options, output_options, quantity_option, theory_options
+from mbma_tables.cli.options import (
+    Model,
+    Output,
+    length_unit,
+    load_options,
+    output_options,
+    quantity_option,
+    stress_unit_option,
+    theory_options,
+)
 from mbma_tables.cli.progress import doing
 from mbma_tables.errors import InputError
 from mbma_tables.files import read_file
@@ -29,8 +38,8 @@ LOADS = ("separation", "mean_separation", "pressure", "area")
 @quantity_option(
     "--E-star", "E_star", help="Effective modulus of lines that name none; without one forces are over E*."
 )
-@click.option("--length-unit", metavar="UNIT", help="Unit of plain lengths and of the answer, such as mm.")
-@click.option("--stress-unit", metavar="UNIT", help="Unit of plain moduli and of the answer, such as MPa.")
+@length_unit()
+@stress_unit_option
 @theory_options
 @output_options
 def batch_command(

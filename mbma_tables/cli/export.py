@@ -106,8 +106,9 @@ def _refuse_unused(target: str, given: Mapping[str, Any]) -> None:
     """Refuse options that would be without effect."""
     kind = f"{target} --exponential" if "exponential" in given else target
     taken = OPTIONS.get(kind, OPTIONS[target])
-    names = {"specimen": "surface"}
-    unused = [f"--{names.get(name, name).replace('_', '-')}" for name in given if name not in taken]
+    unused = [
+        "the surface" if name == "specimen" else f"--{name.replace('_', '-')}" for name in given if name not in taken
+    ]
     if unused:
         raise InputError(f"without effect on {kind if kind in OPTIONS else target}: leave {' and '.join(unused)} out")
 

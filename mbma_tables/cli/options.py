@@ -131,7 +131,7 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
     if given["file"] is not None:
         specimen = read_specimen(given["file"])
     elif given["map"] is not None:
-        specimen = from_map(given["map"], treatment)
+        specimen = from_map(given["map"], treatment | {"unit": length})
     elif given["surface"] is not None:
         specimen = from_name(given["surface"])
     else:
@@ -143,13 +143,9 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
     return specimen.in_units(length, stress)
 
 
-def _among(*names: str) -> Callable[[click.Context, click.Parameter, str], list[str]]:
-    """What a shell completes."""
-    return lambda ctx, param, incomplete: [name for name in names if name.startswith(incomplete)]
-
-
 def _surface_names(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
-    return _among(*CASES)(ctx, param, incomplete)
+    """What a shell completes."""
+    return [name for name in CASES if name.startswith(incomplete)]
 
 
 # in the words of `mbma_tables.surfaces.treatment.Treatment`
@@ -173,6 +169,12 @@ _MAP_OPTIONS = (
 )
 
 
+length_unit = functools.partial(
+    click.option, "--length-unit", metavar="UNIT", help="Unit of plain lengths and of the answer, such as mm."
+)
+stress_unit_option = click.option(
+    "--stress-unit", metavar="UNIT", help="Unit of plain moduli and of the answer, such as MPa."
+)
 over_h_rms = click.option("--over-h-rms", is_flag=True, help="The lengths given are multiples of h_rms.")
 
 _SPECIMEN_OPTIONS = (
@@ -185,7 +187,9 @@ _SPECIMEN_OPTIONS = (
     click.option("--file", type=click.Path(path_type=Path), metavar="TOML", help="Surface: a TOML file."),
     click.option("--map", type=click.Path(path_type=Path), metavar="MAP", help="Surface: a measured map or line scan."),
     *_MAP_OPTIONS,
-    click.option("--model", metavar="measured|self-affine", help="Of a map: its own spectrum, or five numbers."),
+    click.option(
+        "--model", type=click.Choice(("measured", "self-affine")), help="Of a map: its own spectrum, or five numbers."
+    ),
     click.option("--hurst", type=float, help="Surface in numbers: Hurst exponent, in (0, 1]."),
     quantity_option("--q0", help="Smallest wavenumber [1/length]."),
     quantity_option("--q1", help="Largest wavenumber [1/length]; or give --zeta-1."),
@@ -214,10 +218,10 @@ _SPECIMEN_OPTIONS = (
     click.option("--nu1", "nu1", type=float, help="and Poisson's ratio of one body,"),
     quantity_option("--E2", "E2", help="Young's modulus of the other,"),
     click.option("--nu2", "nu2", type=float, help="and its Poisson's ratio."),
-    click.option("--length-unit", metavar="UNIT", help="Unit of plain lengths and of the answer, such as mm."),
-    click.option("--stress-unit", metavar="UNIT", help="Unit of a plain modulus and of the answer, such as MPa."),
+    length_unit(),
+    stress_unit_option,
 )
-map_options = _group("treatment", _given, *_MAP_OPTIONS)
+map_options = _group("treatment", _given, *_MAP_OPTIONS, length_unit("unit"))
 specimen_options = _group("specimen", _specimen, *_SPECIMEN_OPTIONS)
 # None where none of them is given
 optional_specimen_options = _group(
@@ -241,8 +245,7 @@ reading_option = click.option(
     "--reading",
     default="reported",
     show_default=True,
-    metavar="|".join(NAMED),
-    shell_complete=_among(*NAMED),
+    type=click.Choice(list(NAMED)),
     help="Reading of the paper's equations, of mbma.",
 )
 
@@ -252,8 +255,7 @@ _MODEL_OPTIONS = (
         "--tier",
         default="universal",
         show_default=True,
-        metavar="|".join(TIERS),
-        shell_complete=_among(*TIERS),
+        type=click.Choice(TIERS),
         help="Island model.",
     ),
     click.option(
@@ -264,8 +266,7 @@ theory_option = click.option(
     "--theory",
     default="mbma",
     show_default=True,
-    metavar="|".join(THEORIES),
-    shell_complete=_among(*THEORIES),
+    type=click.Choice(list(THEORIES)),
     help="Theory; the others have no tier, reading or rtol.",
 )
 # of islands, which MBMA alone has

@@ -26,7 +26,7 @@ def _pair(text: str) -> tuple[str, tuple[str, str]]:
     low, colon, high = ends.partition(":")
     if not (equals and colon and low and high):
         raise InputError(f"--range must be like h_max=2um:4um, got {text!r}")
-    return name.strip().replace("-", "_"), (low, high)
+    return name.strip().lstrip("-").replace("-", "_"), (low, high)
 
 
 @click.command("sensitivity", short_help="How much each unknown matters.")

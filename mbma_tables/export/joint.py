@@ -222,8 +222,8 @@ def frozen_joint(
 
 def _known(name: str, unit: str | None) -> str:
     if unit is None:
-        kind, sample = name.split("_")[0], {"length_unit": "'0.8 um'", "stress_unit": "E_star = '115 GPa'"}[name]
-        raise InputError(f"{name} is missing: give it (--{kind}-unit in a shell), or numbers with units, like {sample}")
+        sample = {"length_unit": "'0.8 um'", "stress_unit": "E_star = '115 GPa'"}[name]
+        raise InputError(f"{name} is missing: give it, or numbers with units, like {sample}")
     return unit
 
 

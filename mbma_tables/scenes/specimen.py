@@ -179,7 +179,7 @@ def _from_table(surface: Mapping[str, Any], folder: pathlib.Path, title: str) ->
     if given == ["name"]:
         return from_name(str(texts["name"])).in_units(unit, None)
     if given == ["map"]:
-        return from_map(_file(folder, str(texts["map"]), "map"), treatment).in_units(unit, None)
+        return from_map(_file(folder, str(texts["map"]), "map"), treatment | {"unit": unit})
     if given == ["psd"]:
         path = _file(folder, str(texts["psd"]), "psd")
         return _from_psd(path, numbers, texts["convention"] or "paper", unit)

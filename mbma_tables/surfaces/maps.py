@@ -22,7 +22,7 @@ from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.psd import check_band, fit_spectrum
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.surfaces.treatment import LENGTHS, Treated, Treatment, mirrored, squares, treat
-from mbma_tables.units import Units, known, resolve
+from mbma_tables.units import Units, factor, known, resolve
 
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
 WINDOW_LOBE = 2.0  # half-width of a Hann window's main lobe, in grid steps: closer to q = 0 it mixes with the mean
@@ -94,8 +94,9 @@ def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2
     dimensions = source.dim if dimensions is None else dimensions
     grid, steps, whole, own, info = grid_of(source, lengths.get("dx"), lengths.get("dy"), periodic, dimensions)
     own = unit if own is None else known(own)
-    if unit is not None and unit != own:
-        raise InputError(f"lengths are in {own}, not in {unit}: leave the unit out")
+    if own is not None and unit not in (None, own):
+        by, own = factor(own, unit), unit
+        grid, steps = grid * by, tuple(step * by for step in steps)
     units = Units(own)
     given |= {name: units.number(name, given[name]) for name in given.keys() & {*LENGTHS, "outliers"}}
     return treat(grid, steps, whole, Treatment(**given), own, info)

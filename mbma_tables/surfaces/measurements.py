@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import pathlib
+import re
 import sys
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,9 +17,10 @@ import numpy as np
 from mbma_tables.arguments import finite_array, needed, one_number, require
 from mbma_tables.errors import InputError, MbmaError
 from mbma_tables.files import read_file
+from mbma_tables.units import factor, known
 
 LISTS = (2, 3)  # columns of a list of points, which is no matrix of heights
-MAX_TEXT_BYTES = 256 * 2**20
+MAX_TEXT_BYTES, MAX_HEADER_BYTES = 256 * 2**20, 2**14
 MIN_LENGTH, MAX_LENGTH = 1e-30, 1e30  # in any unit: fourth powers of them, which C has, keep their digits
 
 
@@ -37,7 +40,8 @@ def read_measurement(
 ) -> Any:
     """The topography or line scan in a file: any format of SurfaceTopography, and text with commas; "-" is stdin.
 
-    Sampling steps [length] and unit are of files that have none; without a channel it is the file's own default.
+    Sampling steps [length], in `unit`, are of files that have none, and so is the unit; without a channel it is the
+    file's own default. A list of points may name units in the header of its columns, like "x [um]".
     """
     module, place = library(), pathlib.Path(path)
     piped = os.fspath(path) == "-"
@@ -48,11 +52,11 @@ def read_measurement(
         warnings.simplefilter("ignore")
         try:
             # opened here: its readers leave open what they cannot read
-            with (
-                io.BytesIO(sys.stdin.buffer.read()) if piped else open(place, "rb") as stream,
-                module.open_topography(stream) as reader,
-            ):
-                return _channel_of(reader, place, dx, dy, unit, channel)
+            with io.BytesIO(sys.stdin.buffer.read()) if piped else open(place, "rb") as stream:
+                named = _units_of_header(stream.read(MAX_HEADER_BYTES))
+                stream.seek(0)
+                with module.open_topography(stream) as reader:
+                    return _channel_of(reader, place, dx, dy, unit, channel, named)
         except MbmaError:
             raise
         # its readers raise whatever their parsers raise
@@ -60,7 +64,7 @@ def read_measurement(
             reason = str(fault).strip().splitlines() or [type(fault).__name__]
             if place.suffix.lower() == ".csv":
                 with module.open_topography(io.BytesIO(_without_commas(place))) as reader:
-                    return _channel_of(reader, place, dx, dy, unit, channel)
+                    return _channel_of(reader, place, dx, dy, unit, channel, named)
             name = type(fault).__name__
             why = "no reader knows its format" if name == "CannotDetectFileFormat" else f"{name}: {reason[0]}"
             raise InputError(f"SurfaceTopography cannot read {os.fspath(path)!r} as a map: {why}") from None
@@ -79,14 +83,45 @@ def _without_commas(path: pathlib.Path) -> bytes:
     return content.getvalue()
 
 
+def _units_of_header(content: bytes) -> list[str]:
+    """Units in brackets, as instruments write them beside the names of columns, above the numbers of a text."""
+    found: list[str] = []
+    # no text has zero bytes; what is no UTF-8 is the micro sign of Latin-1
+    text = "" if b"\0" in content else content.decode("utf-8", "replace").replace("\ufffd", "u")
+    for line in text.splitlines():
+        if re.fullmatch(r"[\s,;]*[-+.]?\d[-+.\deE\s,;]*", line):
+            break
+        for name in re.findall(r"[\[(]\s*([^\W\d]+)\s*[\])]", line):
+            with contextlib.suppress(InputError):
+                found.append(known(name))
+    return found
+
+
 def _channel_of(
-    reader: Any, path: pathlib.Path, dx: float | None, dy: float | None, unit: str | None, channel: int | None
+    reader: Any,
+    path: pathlib.Path,
+    dx: float | None,
+    dy: float | None,
+    unit: str | None,
+    channel: int | None,
+    named: Sequence[str] = (),
 ) -> Any:
+    """A channel of an open file; `named` are the units of its header, that of heights last."""
     channels = reader.channels
     if channel is not None and not 0 <= channel < len(channels):
         raise InputError(f"{path.name} has channels 0 to {len(channels) - 1}, not {channel}")
     chosen = reader.default_channel if channel is None else channels[channel]
     given: dict[str, Any] = {} if channel is None else {"channel_index": channel}
+    own = chosen.unit
+    if own is None and named:
+        *lateral, height = named
+        if len(set(lateral)) > 1:
+            raise InputError(f"{path.name} names the units {', '.join(named)}: write x and y in one unit")
+        given["unit"] = own = (lateral or named)[0]
+        if height != own:
+            given["height_scale_factor"] = factor(height, own)
+    elif own is None and unit is not None:
+        given["unit"] = unit
     if chosen.physical_sizes is None:
         if min(chosen.nb_grid_pts) in LISTS:
             raise InputError(
@@ -96,14 +131,13 @@ def _channel_of(
         if dx is None:
             raise InputError(f"{path.name} has no lengths: give the sampling step dx")
         steps = (dx, dx if dy is None else dy)
+        scale = 1.0 if own is None or unit is None else factor(unit, own)
         given["physical_sizes"] = tuple(
-            count * sampling_step(name, step)
+            count * scale * sampling_step(name, step)
             for name, count, step in zip(("dx", "dy"), chosen.nb_grid_pts, steps, strict=False)
         )
     elif dx is not None or dy is not None:
-        raise InputError(f"{path.name} has its own lengths: leave dx and dy out (unit says what they are in)")
-    if unit is not None and chosen.unit is None:
-        given["unit"] = unit
+        raise InputError(f"{path.name} has its own lengths: leave dx and dy out (unit=... says what they are in)")
     return reader.topography(**given)
 
 

@@ -41,7 +41,7 @@ SAID = {
     "h_max": "contact begins at h_max above the mid-plane",
     "Sp": "h_max = Sp: contact begins at the highest point of the map, which a larger one would exceed",
 }
-TYPICAL = "of Gaussian heights 3 to 4.5 h_rms, near h_rms sqrt(2 ln N) of N independent points"
+TYPICAL = "of Gaussian heights 3 to 4.5 times the rms height, near sqrt(2 ln N) times it of N independent points"
 
 
 def _one_of(names: tuple[str, ...], given: Mapping[str, Any], what: str, needed: bool = True) -> str | None:
@@ -79,7 +79,7 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
     assert top is not None
     h_rms = at[height] * (math.sqrt(math.pi / 2) if height in ("Ra", "Sa") else 1.0)
     said = f" [{unit}]" if unit else ""
-    require(f"{top}{said}", at[top], at[top] > h_rms, f"above h_rms; {TYPICAL}")
+    require(f"{top}{said}", at[top], at[top] > h_rms, f"above the rms height; {TYPICAL}")
     if slope is None:
         long, short = at["longest"], at["shortest"]
         few = long <= spectrum.MIN_ZETA_1 * short

@@ -381,8 +381,8 @@ class Surface(AnySurface):
         outliers, fill, short_cutoff, long_cutoff, tip_radius, reliable, window : optional
             As in `mbma_tables.surfaces.treatment.Treatment`; what was done is the surface's `provenance`.
         unit : str, optional
-            Unit of the heights and of plain lengths, where a file has none; dx may name its own, such as "195 nm", in
-            which heights are too without a unit.
+            Unit of the answer and of plain lengths, to which lengths of a file are converted, or which they have where
+            it names none; dx may name its own, such as "195 nm", in which heights are too without a unit.
         channel : int, optional
             Of a file with several maps.
 

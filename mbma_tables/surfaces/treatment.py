@@ -109,10 +109,11 @@ class Treated:
         if self.window is None:
             windows = [np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2 for count in self.heights.shape]
         else:
-            windows = [
-                np.asarray(wrapped(np.ones(count), (1.0,), False).window(self.window).heights())
-                for count in self.heights.shape
-            ]
+            ones = (wrapped(np.ones(count), (1.0,), False) for count in self.heights.shape)
+            try:
+                windows = [np.asarray(one.window(self.window).heights()) for one in ones]
+            except ValueError:
+                raise InputError(f"window must be one of scipy.signal.get_window, got {self.window!r}") from None
         window = windows[0] if len(windows) == 1 else np.outer(*windows)
         values = self.heights - np.average(self.heights, weights=window)
         return np.asarray(values * (window / math.sqrt(np.mean(window**2))))

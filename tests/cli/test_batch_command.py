@@ -54,7 +54,7 @@ def test_named_surfaces_loads_in_columns_and_other_kinds_of_numbers():
         ("hurst,q0,q1,h_rms,h_max\n0.8,1,9,1\n", "line 2: a surface needs"),
         ("hurst,q0,q1,h_rms,h_max\n0.8,1,9,1,3,4\n", "line 2: more cells than the header has"),
         ("surface,hurst\nconcrete,0.8\n", "line 2: a named surface and numbers"),
-        ("surface,pressure\nconcrete,1\n", "one of separation, mean_separation, pressure and area"),
+        ("surface,pressure\nconcrete,1\n", "one of --separation, --mean-separation, --pressure and --area"),
         ("surface,E_star\nconcrete,1\nasphalt,\n", "some lines know their units"),
     ],
 )
@@ -64,4 +64,4 @@ def test_what_is_refused(tmp_path, lines, message):
 
 
 def test_one_load_is_needed():
-    assert "one of separation" in refused("batch", "s.csv")
+    assert "one of --separation" in refused("batch", "s.csv")

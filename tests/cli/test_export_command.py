@@ -98,18 +98,18 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["calculix", "--out", "law", *NUMBERS, "--E-star", "13.3MPa"], "length_unit is missing"),
-        (["calculix", "--out", "law", *WITHOUT["--stress-unit"]], "stress_unit is missing"),
+        (["calculix", "--out", "law", *NUMBERS, "--E-star", "13.3MPa"], "--length-unit is missing"),
+        (["calculix", "--out", "law", *WITHOUT["--stress-unit"]], "--stress-unit is missing"),
         (["calculix", "--out", "law", *WITHOUT["--E-star"]], "is given and no modulus"),
         (["calculix", "--out", "law", *WITHOUT["--surface"]], "one surface is needed"),
         (["calculix", "--out", "law", *WITHOUT["--rows"], "--rows", "300"], "holds 200 rows"),
-        (["calculix", "--out", "law", *LAW, "--largest-overclosure", "5"], "largest_overclosure must be in"),
+        (["calculix", "--out", "law", *LAW, "--largest-overclosure", "5"], "--largest-overclosure must be in"),
         (["calculix", "--out", "no/such/folder/law", *LAW], "cannot be written"),
         (["matlab", "--out", "1law.mat", *LAW], "a name must be a letter"),
         (["matlab", "--out", "law.txt", *LAW], "must be NAME.mat"),
         (
             ["abaqus", "--out", "law", *LAW, *CONDUCTANCE, "W\n*INCLUDE, INPUT=evil"],
-            "conductivity_unit is not printable",
+            "--conductivity-unit is not printable",
         ),
         (["cobol", "--out", "law", *LAW], "cobol"),
         (["c_law", "--out", "law", *LAW], "no target is called 'c_law': did you mean 'c-law'?"),
@@ -124,7 +124,7 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
             ["calculix", "--out", "law", *LAW, "--pressures", "1:1e9"],
             "pressure must be at most 2.02721 MPa, at d = -1.1 mm where",
         ),
-        (["calculix", "--out", "law", *LAW, "--conductivity-unit", "W/K"], "needs conductivity, which is missing"),
+        (["calculix", "--out", "law", *LAW, "--conductivity-unit", "W/K"], "needs --conductivity, which is missing"),
     ],
 )
 def test_bad_requests(arguments, said, tmp_path, monkeypatch):

@@ -85,9 +85,10 @@ def test_the_same_in_toml(map_file, tmp_path):
     [
         (["fit", "absent.sur"], "there is no file"),
         (["contact", "--surface", "concrete", "--outliers", "8", "-a", "0.1"], "goes with --map"),
-        (["fit", "MAP", "--detrend", "cubic"], "detrend must be one of"),
-        (["fit", "MAP", "--dx", "1um"], "has its own lengths"),
-        (["fit", "MAP", "--extrapolate-to", "0.1um"], "give both or neither"),
+        (["fit", "MAP", "--detrend", "cubic"], "--detrend must be one of"),
+        (["fit", "MAP", "--window", "bay"], "--window must be one of scipy.signal.get_window, got 'bay'"),
+        (["fit", "MAP", "--dx", "1um"], "leave --dx and --dy out (--length-unit ... says what they are in)"),
+        (["fit", "MAP", "--extrapolate-to", "0.1um"], "--extrapolate-to and --extrapolate-hurst: give both"),
         (["fit", "MAP", "--channel", "7"], "has channels 0 to 0"),
     ],
 )
@@ -98,5 +99,18 @@ def test_mistakes(words, message, map_file):
 def test_an_array_in_a_file_needs_its_step(tmp_path):
     path = tmp_path / "own.npy"
     np.save(path, 0.02 * random_map(POINTS, 0.03, 1, 1.7))
-    assert "give the sampling step dx" in refused("fit", path)
+    assert "give the sampling step --dx" in refused("fit", path)
     assert json.loads(run("fit", path, "--dx", "500nm", "--json"))["length_unit"] == "nm"
+    found = json.loads(run("fit", path, "--dx", "500nm", "--length-unit", "um", "--short-cutoff", "2", "--json"))
+    own = Surface.from_map(path, dx=0.5, unit="um", short_cutoff="2000 nm")
+    assert (found["length_unit"], found["rms_gradient"]) == ("um", pytest.approx(float(own.rms_gradient)))
+    known = json.loads(run("contact", "--map", path, "--dx", "0.5", "--length-unit", "um", "-a", "0.01", "--json"))
+    assert known["surface"]["h_rms"] == pytest.approx(float(Surface.from_map(path, dx=0.5).h_rms))
+
+
+def test_plain_lengths_of_a_map_are_in_the_unit_asked_for(map_file):
+    words = ("--short-cutoff", "2000", "--length-unit", "nm", "--json")
+    found, own = json.loads(run("fit", map_file, *words)), Surface.from_map(map_file, short_cutoff=2.0)
+    assert found["h_rms"] == pytest.approx(1e3 * float(own.h_rms))
+    surface = json.loads(run("contact", "--map", map_file, "-a", "0.01", *words))["surface"]
+    assert surface["h_rms"] == pytest.approx(1e3 * float(own.h_rms))

@@ -107,8 +107,8 @@ GOOD = {"Rq": 0.6, "Rdq": 0.2, "longest": 300.0, "hurst": 0.8, "h_max": 2.0}
         ({"Ra": 0.5}, "the height of roughness: give one of Rq, Ra, Sq, Sa; got Rq and Ra"),
         ({"Rq": None}, "got none"),
         ({"hurst": None}, "hurst is missing: a drawing does not tell it"),
-        ({"h_max": None}, r"the highest point, .* 3 to 4.5 h_rms.*: give one of h_max, Sp"),
-        ({"h_max": 0.5}, "h_max must be above h_rms"),
+        ({"h_max": None}, r"the highest point, .* 3 to 4.5 times the rms height.*: give one of h_max, Sp"),
+        ({"h_max": 0.5}, "h_max must be above the rms height"),
         (
             {"Rdq": None, "longest": "2 um", "shortest": "0.1 mm", "Rq": "1 um", "h_max": "3 um"},
             r"longest \[um\] .* 100, got 2",

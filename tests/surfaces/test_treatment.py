@@ -215,10 +215,45 @@ class TestReading:
         assert found.h_rms == pytest.approx(Surface.from_map(MAP, STEP, model="measured").h_rms, rel=1e-6)
         with pytest.raises(InputError, match="has its own lengths"):
             read_measurement(path, dx=1.0)
-        with pytest.raises(InputError, match="lengths are in nm, not in um"):
-            Surface.from_map(path, unit="um")
+        other = Surface.from_map(path, unit="um", short_cutoff=2e-3)
+        expected = Surface.from_map(path, short_cutoff=2.0).to("um")
+        assert (other.unit, other.q1, other.h_rms) == ("um", pytest.approx(expected.q1), pytest.approx(expected.h_rms))
         with pytest.raises(InputError, match="has channels 0 to 0, not 3"):
             read_measurement(path, channel=3)
+
+    @pytest.mark.parametrize(
+        ("header", "unit", "scale"),
+        [
+            ("x [um] y [um] z [um]", "um", 1),
+            ("# 2024-05-03, probe 7\n# X(mm);Y(mm);Z(mm)", "mm", 1),
+            ("x[\xb5m]\ty[\xb5m]\tz[nm]", "um", 1e-3),
+            ("# [um]", "um", 1),
+            ("x y z [V]", None, 1),
+        ],
+    )
+    def test_units_in_the_header_of_points(self, tmp_path, header, unit, scale):
+        points = np.c_[[(i * STEP, j * STEP, MAP[i, j]) for i in range(40) for j in range(40)]]
+        (tmp_path / "a.xyz").write_text("\n".join([header, *(" ".join(map(str, p)) for p in points)]), "latin-1")
+        found, plain = Surface.from_map(tmp_path / "a.xyz"), Surface.from_map(MAP[:40, :40], STEP)
+        assert found.unit == unit
+        assert found.h_rms == pytest.approx(scale * plain.h_rms, rel=1e-9)
+        assert found.q1 == pytest.approx(plain.q1, rel=1e-9)
+        if unit == "um":
+            other = Surface.from_map(tmp_path / "a.xyz", unit="mm")
+            assert other.h_rms == pytest.approx(1e-3 * found.h_rms, rel=1e-9)
+
+    def test_units_of_points_that_differ_along_the_axes(self, tmp_path):
+        points = [(i, j, MAP[i, j]) for i in range(40) for j in range(40)]
+        np.savetxt(tmp_path / "a.xyz", points, header="x [um] y [mm] z [nm]")
+        with pytest.raises(InputError, match="names the units um, mm, nm: write x and y in one unit"):
+            Surface.from_map(tmp_path / "a.xyz")
+
+    def test_numbers_are_no_units(self, tmp_path):
+        # of 64 bit, among which brackets may stand
+        heights = MAP.copy()
+        heights[3, :2] = np.frombuffer(b"(m) (m) [um]    ")
+        np.save(tmp_path / "a.npy", heights)
+        assert read_measurement(tmp_path / "a.npy", dx=STEP).unit is None
 
     def test_a_csv_of_words(self, tmp_path):
         (tmp_path / "w.csv").write_text("1,2,3,4,5\na,b,c,d,e\n")
