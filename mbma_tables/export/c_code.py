@@ -165,7 +165,7 @@ def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | fl
 def theory_numbers() -> tuple[dict[str, int | float], dict[str, FloatArray]]:
     """The same of mbma_theories.c: the calibrated law with its table, and Persson's."""
     table = calibrated_table.shipped()
-    spline = table.coefficients[..., :-2]
+    spline = table.coefficients
     rules = [np.polynomial.legendre.leggauss(count) for count in (2, 4, 6, 10)]
     constants: dict[str, int | float] = {"PI": math.pi, "MIN_ZETA_1": MIN_ZETA_1, "MAX_ZETA_1": MAX_ZETA_1}
     for k, name in enumerate(("HURST", "ZETA", "U")):

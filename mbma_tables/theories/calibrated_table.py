@@ -21,13 +21,13 @@ from mbma_tables.calibrated import Constants
 from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import TableFileError
 from mbma_tables.files import shipped_file
-from mbma_tables.tablefiles.interpolate import fill_along, fill_pieces, polynomial_of, quintic, quintic_at
+from mbma_tables.tablefiles.interpolate import fill_along, fill_pieces, polynomial_of, quintic, quintic_at, tiled
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, read_sealed
 
 NAME = "calibrated.nc"
 AXES = ("hurst", "log_zeta_1", "log_separation")
 QUANTITIES = ("area", "force", "stiffness")
-BLOCK = 4096  # numbers answered at a time, which a processor's cache holds
+BLOCK = 8192  # numbers answered at a time, which a processor's cache holds
 SMALL = 256  # places up to which numpy answers, without a compiler
 FEW, MIN_SHARED = 8, 256  # surfaces up to which, and places a surface from which, its polynomials are worth making
 KEPT = 64  # surfaces whose polynomials are kept
@@ -35,7 +35,7 @@ MAX_STEPS = 100
 CLOSE = 1e-9  # of ln F: the next miss would be about the square of this one
 TINY = 1e-300
 MAX_LOG_SEPARATION = 690.0  # -ln u at which full contact is taken as reached
-TO_POWERS = np.array(polynomial_of(np.eye(6), 0)).T  # of B-splines in a cell
+TO_POWERS = np.array(polynomial_of(np.eye(6))).T  # of B-splines in a cell
 
 Owners = NDArray[np.intp]
 Along = Callable[[Owners, FloatArray], tuple[FloatArray, FloatArray]]
@@ -52,7 +52,6 @@ class SurfaceSpline:
     covered : numpy.ndarray, shape (3, 2) or (2, 2)
         First and last that are answered.
     coefficients : numpy.ndarray
-        The last axis with two zeros more.
     """
 
     first: FloatArray
@@ -63,9 +62,14 @@ class SurfaceSpline:
     @functools.cached_property
     def cells(self) -> Any:
         """Their number along each axis."""
-        return np.array(self.coefficients.shape) - (5, 5, 7)
+        return np.array(self.coefficients.shape) - 5
 
-    @property
+    @functools.cached_property
+    def tiles(self) -> Any:
+        """Coefficients as `fill_along` takes them."""
+        return tiled(self.coefficients)
+
+    @functools.cached_property
     def last(self) -> float:
         """Where the last axis ends."""
         return float(self.first[2] + self.cells[2] * self.step[2])
@@ -92,7 +96,8 @@ class SurfaceSpline:
                 number_of = np.zeros_like(owner) if alike else owner
                 fill_pieces(pieces, low, rate[2], number_of, x.reshape(found.shape[1:]), found)
             else:
-                fill_along(self.coefficients, self.first, rate, own, owner, x.reshape(found.shape[1:]), found)
+                places = x.reshape(found.shape[1:])
+                fill_along(self.tiles, number, self.first, rate, own, owner, places, found)
             return found.reshape(2, *x.shape)
 
         def plain(owner: Owners, x: FloatArray) -> Any:
@@ -181,12 +186,12 @@ class Table(SurfaceSpline):
             light, h_max = surfaces[2][own], surfaces[3][own]
             held = np.minimum(np.maximum(gap, TINY), h_max)
             (value, end), (rate, _) = curve(own, np.log([held, h_max]))
-            endless = np.exp(value)
+            lost = -np.exp(value)
             # without cancellation
-            np.multiply(-endless, np.expm1(end - value), out=force)
+            np.multiply(lost, np.expm1(end - value), out=force)
             t = force / self.constants.area_t0
             erf(force * np.sqrt(2 * (1 + t) / (light + t)), out=area)
-            np.divide(-rate * endless, held, out=stiffness)
+            np.divide(rate * lost, held, out=stiffness)
             if not ((gap > 0) & (gap < h_max)).all():
                 out[:, block][:, gap >= h_max] = 0.0
                 out[:, block][:, gap <= 0] = np.array([[np.inf], [1.0], [np.inf]])
@@ -266,7 +271,7 @@ def load(path: pathlib.Path) -> Table:
     return Table(
         *nodes_of(axes),
         covered,
-        np.pad(values["spline"].astype(np.float32), ((0, 0), (0, 0), (0, 2))),
+        values["spline"],
         constants,
         error,
         {name: np.log(values["stated_scatter"][k]) for k, name in enumerate(names)},

@@ -76,7 +76,7 @@ def shipped_flow() -> FlowTable:
     return FlowTable(
         *nodes_of([values[name] for name in AXES]),
         COVERED,
-        np.pad(values["spline"], ((0, 0), (0, 0), (0, 2))),
+        values["spline"],
         FlowConstants(*(float(facts[f"flow_{f.name}"]) for f in dataclasses.fields(FlowConstants))),
         float(facts["largest_error_log_factor"]),
         dict(zip(facts["theories"].split(), values["stated_scatter"], strict=True)),
