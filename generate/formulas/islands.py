@@ -83,15 +83,14 @@ def rigid_polynomial(which: int, accuracy: float) -> tuple[tuple[float, ...], fl
 
 
 def rigid_steps(which: int, accuracy: float) -> list[Step]:
-    """Steps of rigid_F or rigid_A for X in [-0.5, 60]."""
-    letter = "FA"[which]
-    w, p = sympy.symbols(f"w p_{letter}")
+    """Steps of the rigid sphere for X in [-0.5, 60]."""
+    w, p = sympy.symbols("w p")
     exponent: sympy.Expr = sympy.Integer(0)
     for value in reversed(rigid_polynomial(which, accuracy)[0]):
         exponent = (sympy.Float(value) + exponent) * w
     base = X + RIGID_SHIFT
     sphere = RIGID_FACTORS[which] * base ** RIGID_ORDERS[which] * sympy.exp(p)
-    return [(w.name, 1 / base), (p.name, exponent), (f"rigid_{letter}", sphere)]
+    return [(w.name, 1 / base), (p.name, exponent), ("rigid", sphere)]
 
 
 def points(count: int, min_X: float, seed: int) -> tuple[FloatArray, FloatArray]:
@@ -125,8 +124,7 @@ def fitted(which: int, count: int, min_X: float) -> Fit:
 
 def function_steps(found: Fit, rigid: float, digits: int) -> tuple[Step, ...]:
     """Steps of one function, its coefficients with that many digits."""
-    letter = "FA"[found.which]
-    u, y, t, z, v, log_Q = (sympy.Symbol(f"{name}_{letter}") for name in ("u", "y", "t", "z", "v", "log_Q"))
+    u, y, t, z, v, log_Q, rigid_sphere = sympy.symbols("u y t z v log_Q rigid")
     named = {"t": t, "z": z, "v": v}
     c, b, g = map(sympy.Float, found.shape)
     total = sympy.Add(
@@ -135,7 +133,6 @@ def function_steps(found: Fit, rigid: float, digits: int) -> tuple[Step, ...]:
             for (i, name, j), value in zip(found.terms, rounded(found.coefficients, digits).tolist(), strict=True)
         )
     )
-    rigid_sphere = sympy.Symbol(f"rigid_{letter}")
     if found.which == FORCE:
         top, limit = MU * rigid_sphere, 3 * sympy.sqrt(2) * sympy.pi / 20 * (X + 1)
     else:

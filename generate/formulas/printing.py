@@ -46,7 +46,6 @@ _HEAD = f'''"""Closed forms of the island functions and of total force and area,
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 from numpy import {", ".join(NUMPY_NAMES)}
@@ -164,10 +163,7 @@ def _dictionary(head: str, rows: Mapping[str, str]) -> str:
 
 def module_text(functions: Iterable[Function], ranges: dict[str, Ranges], certificates: dict[str, Any]) -> str:
     """The module of closed forms; `ranges` and `certificates` by form, the latter by result too."""
-    functions = list(functions)
-    own = {form: ", ".join(f"{f.result!r}: {f.name}" for f in functions if f.form == form) for form in ranges}
     data = {
-        "FUNCTIONS: dict[str, dict[str, Callable[..., FloatArray]]]": {f: f"{{{text}}}" for f, text in own.items()},
         "RANGES: dict[str, dict[str, tuple[float, float]]]": {f: repr(row) for f, row in ranges.items()},
         "CERTIFICATES: dict[str, dict[str, Certificate]]": {f: repr(row) for f, row in certificates.items()},
     }
@@ -216,7 +212,8 @@ def read_functions(module: str) -> dict[str, Function]:
     return found
 
 
-_LATEX = {"log_Q_F": r"\ln Q_F", "log_Q_A": r"\ln Q_A", "rigid_F": "R_F", "rigid_A": "R_A", "hurst": "H"} | {
+_LATEX = {
+    "hurst": "H",
     "phi_F": r"\Phi_F",
     "phi_A": r"\Phi_A",
     "log_total": r"\ln T",
@@ -228,7 +225,9 @@ _LATEX = {"log_Q_F": r"\ln Q_F", "log_Q_A": r"\ln Q_A", "rigid_F": "R_F", "rigid
 
 def latex_steps(function: Function) -> list[str]:
     """One equation a step, in the order in which they are evaluated; polynomials without Horner's brackets."""
-    names = {sympy.Symbol(name): text for name, text in _LATEX.items()}
+    _, is_island, letter = function.result.partition("phi_")
+    own = {"log_Q": rf"\ln Q_{letter}", "rigid": f"R_{letter}"} | {name: f"{name}_{{{letter}}}" for name in "pytzuv"}
+    names = {sympy.Symbol(name): text for name, text in (_LATEX | (own if is_island else {})).items()}
     style = {"symbol_names": names, "ln_notation": True, "fold_frac_powers": True}
     lines = []
     for name, value in function.steps:

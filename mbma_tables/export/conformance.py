@@ -16,7 +16,9 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.export.c_code import FORM
 from mbma_tables.export.text import comment
 from mbma_tables.islands.geometry import FIELDS, geometry
-from mbma_tables.models import closed_form_functions, universal_kernel
+from mbma_tables.models import universal_kernel
+from mbma_tables.models.closed_form_functions import RANGES
+from mbma_tables.models.closed_forms import FUNCTIONS
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import Surface
@@ -144,7 +146,7 @@ def status_rows(model: UniversalModel) -> Iterator[str]:
 
 def formula_rows(X: FloatArray, mu: FloatArray) -> Iterator[str]:
     """The closed form at those of some points that lie in its range."""
-    functions, form = closed_form_functions.FUNCTIONS[FORM], closed_form_functions.RANGES[FORM]
+    functions, form = FUNCTIONS[FORM], RANGES[FORM]
     (X_low, X_high), (_, mu_high) = form["X"], form["mu"]
     inside = (np.clip(X, X_low, X_high) == X) & (mu <= mu_high)
     X, mu = X[inside], mu[inside]

@@ -9,7 +9,6 @@ Made by `python -m generate formulas`; do not edit.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 from numpy import exp, log, pi, sqrt, where
@@ -30,140 +29,124 @@ class Certificate(NamedTuple):
 def pocket_phi_F(X: FloatArray, mu: FloatArray) -> FloatArray:
     """Phi_F, pocket form: within 0.0371."""
     w = 1/(X + 3)
-    p_F = w*(w*(w*(w*(404.3 - 406.9*w) - 101.9) - 1.906) - 7.687)
-    rigid_F = (1/5)*pi*(X + 3)**(5/2)*exp(p_F)
-    u_F = 1/(X + 1.67)
-    y_F = 0.0166*mu*(X + 1.67)
-    t_F = log(y_F + 1)
-    z_F = 1/(sqrt(y_F) + 1)
-    log_Q_F = (
-        3.29*u_F*z_F - 4.92*u_F - 7.14e-05*u_F*t_F*t_F*t_F*t_F*t_F + 0.25*z_F + 0.189*(z_F*z_F*z_F) +
-        23.0*(u_F*u_F*u_F*u_F*u_F*u_F)
-    )
-    return mu*rigid_F/((3/20)*sqrt(2)*pi*mu*(X + 1)*exp(log_Q_F) + 1)
+    p = w*(w*(w*(w*(404.3 - 406.9*w) - 101.9) - 1.906) - 7.687)
+    rigid = (1/5)*pi*(X + 3)**(5/2)*exp(p)
+    u = 1/(X + 1.67)
+    y = 0.0166*mu*(X + 1.67)
+    t = log(y + 1)
+    z = 1/(sqrt(y) + 1)
+    log_Q = 3.29*u*z - 4.92*u - 7.14e-05*u*t*t*t*t*t + 0.25*z + 0.189*(z*z*z) + 23.0*(u*u*u*u*u*u)
+    return mu*rigid/((3/20)*sqrt(2)*pi*mu*(X + 1)*exp(log_Q) + 1)
 
 
 def pocket_phi_A(X: FloatArray, mu: FloatArray) -> FloatArray:
     """Phi_A, pocket form: within 0.0317."""
     w = 1/(X + 3)
-    p_A = w*(w*(w*(w*(379.0 - 338.47*w) - 115.67) + 1.7768) - 6.2766)
-    rigid_A = (1/2)*pi*(X + 3)**2*exp(p_A)
-    u_A = 1/(X + 4.24)
-    y_A = 0.0311*mu*(X + 4.24)
-    z_A = 1/(sqrt(y_A) + 1)
-    v_A = log(0.979*mu*sqrt(u_A) + 1)
-    log_Q_A = (
-        -0.0001849*u_A*v_A*v_A*v_A*v_A + 0.2543*v_A + 47.27*z_A*(u_A*u_A) - 38.91*u_A*u_A - 0.3145*z_A*z_A -
-        4219.0*u_A*u_A*u_A*u_A*u_A*z_A*z_A*z_A + 13.91*(u_A*u_A*u_A*u_A*u_A*u_A)
+    p = w*(w*(w*(w*(379.0 - 338.47*w) - 115.67) + 1.7768) - 6.2766)
+    rigid = (1/2)*pi*(X + 3)**2*exp(p)
+    u = 1/(X + 4.24)
+    y = 0.0311*mu*(X + 4.24)
+    z = 1/(sqrt(y) + 1)
+    v = log(0.979*mu*sqrt(u) + 1)
+    log_Q = (
+        -0.0001849*u*v*v*v*v + 0.2543*v + 47.27*z*(u*u) - 38.91*u*u - 0.3145*z*z - 4219.0*u*u*u*u*u*z*z*z +
+        13.91*(u*u*u*u*u*u)
     )
-    return rigid_A/((1/3)*2**(1/3)*pi**(2/3)*mu*(X + 1)*exp(log_Q_A)/(mu*(X + 1) + 1)**(1/3) + 1)
+    return rigid/((1/3)*2**(1/3)*pi**(2/3)*mu*(X + 1)*exp(log_Q)/(mu*(X + 1) + 1)**(1/3) + 1)
 
 
 def standard_phi_F(X: FloatArray, mu: FloatArray) -> FloatArray:
     """Phi_F, standard form: within 0.00164."""
     w = 1/(X + 3)
-    p_F = w*(w*(w*(w*(w*(w*(6264.7*w - 8610.2) + 4223.7) - 822.91) + 63.132) - 12.175) - 7.4721)
-    rigid_F = (1/5)*pi*(X + 3)**(5/2)*exp(p_F)
-    u_F = 1/(X + 5.02)
-    y_F = 0.234*mu*(X + 5.02)
-    t_F = log(y_F + 1)
-    z_F = 1/(sqrt(y_F) + 1)
-    v_F = log(1.25*mu*sqrt(u_F) + 1)
-    log_Q_F = (
-        -0.93573*u_F*v_F + 0.21852*u_F*z_F - 1.6649*u_F + 0.0045288*u_F*(t_F*t_F*t_F) - 1.0907*u_F*z_F*z_F*z_F +
-        0.00024878*u_F*(v_F*v_F*v_F*v_F) - 2.5226e-05*u_F*t_F*t_F*t_F*t_F*t_F + 0.24817*z_F +
-        182.17*z_F*(u_F*u_F*u_F*u_F) - 0.33617*u_F*u_F - 0.1832*u_F*u_F*v_F*v_F + 70.644*(u_F*u_F)*(z_F*z_F) -
-        69.621*u_F*u_F*z_F*z_F*z_F + 0.5966*(z_F*z_F) - 0.33826*z_F*z_F*z_F - 1142.9*u_F*u_F*u_F*u_F +
-        0.016675*(t_F*t_F*t_F*t_F*t_F)*(u_F*u_F*u_F*u_F*u_F*u_F) - 12691.0*u_F*u_F*u_F*u_F*u_F*z_F*z_F +
-        11081.0*(u_F*u_F*u_F*u_F*u_F)*(z_F*z_F*z_F) + 21274.0*(u_F*u_F*u_F*u_F*u_F*u_F)
+    p = w*(w*(w*(w*(w*(w*(6264.7*w - 8610.2) + 4223.7) - 822.91) + 63.132) - 12.175) - 7.4721)
+    rigid = (1/5)*pi*(X + 3)**(5/2)*exp(p)
+    u = 1/(X + 5.02)
+    y = 0.234*mu*(X + 5.02)
+    t = log(y + 1)
+    z = 1/(sqrt(y) + 1)
+    v = log(1.25*mu*sqrt(u) + 1)
+    log_Q = (
+        -0.93573*u*v + 0.21852*u*z - 1.6649*u + 0.0045288*u*(t*t*t) - 1.0907*u*z*z*z + 0.00024878*u*(v*v*v*v) -
+        2.5226e-05*u*t*t*t*t*t + 0.24817*z + 182.17*z*(u*u*u*u) - 0.33617*u*u - 0.1832*u*u*v*v + 70.644*(u*u)*(z*z) -
+        69.621*u*u*z*z*z + 0.5966*(z*z) - 0.33826*z*z*z - 1142.9*u*u*u*u + 0.016675*(t*t*t*t*t)*(u*u*u*u*u*u) -
+        12691.0*u*u*u*u*u*z*z + 11081.0*(u*u*u*u*u)*(z*z*z) + 21274.0*(u*u*u*u*u*u)
     )
-    return mu*rigid_F/((3/20)*sqrt(2)*pi*mu*(X + 1)*exp(log_Q_F) + 1)
+    return mu*rigid/((3/20)*sqrt(2)*pi*mu*(X + 1)*exp(log_Q) + 1)
 
 
 def standard_phi_A(X: FloatArray, mu: FloatArray) -> FloatArray:
     """Phi_A, standard form: within 0.00768."""
     w = 1/(X + 3)
-    p_A = w*(w*(w*(w*(w*(w*(6056.0*w - 9136.5) + 5056.8) - 1192.8) + 117.26) - 14.285) - 5.8993)
-    rigid_A = (1/2)*pi*(X + 3)**2*exp(p_A)
-    u_A = 1/(X + 3.22)
-    y_A = 0.589*mu*(X + 3.22)
-    t_A = log(y_A + 1)
-    z_A = 1/(sqrt(y_A) + 1)
-    v_A = log(1.51*mu*sqrt(u_A) + 1)
-    log_Q_A = (
-        16.02*u_A*z_A - 1.743*u_A - 28.84*u_A*z_A*z_A - 0.003347*u_A*t_A*t_A*t_A + 0.2406*v_A - 0.5935*z_A +
-        7.182*z_A*(u_A*u_A) - 558.5*z_A*u_A*u_A*u_A*u_A*u_A - 16.9*u_A*u_A + 78.03*(u_A*u_A)*(z_A*z_A*z_A) +
-        0.001228*(v_A*v_A) - 0.05628*z_A*z_A + 1.166*(z_A*z_A*z_A) - 7.966*u_A*u_A*u_A*u_A + 7.555e-05*(v_A*v_A*v_A*v_A)
-        + 1.13e-05*(t_A*t_A*t_A*t_A*t_A)*(u_A*u_A) - 9.138e-05*t_A*t_A*t_A*t_A*t_A*u_A*u_A*u_A*u_A*u_A +
-        930.1*(u_A*u_A*u_A*u_A*u_A)*(z_A*z_A) - 1747.0*u_A*u_A*u_A*u_A*u_A*z_A*z_A*z_A + 591.1*(u_A*u_A*u_A*u_A*u_A*u_A)
+    p = w*(w*(w*(w*(w*(w*(6056.0*w - 9136.5) + 5056.8) - 1192.8) + 117.26) - 14.285) - 5.8993)
+    rigid = (1/2)*pi*(X + 3)**2*exp(p)
+    u = 1/(X + 3.22)
+    y = 0.589*mu*(X + 3.22)
+    t = log(y + 1)
+    z = 1/(sqrt(y) + 1)
+    v = log(1.51*mu*sqrt(u) + 1)
+    log_Q = (
+        16.02*u*z - 1.743*u - 28.84*u*z*z - 0.003347*u*t*t*t + 0.2406*v - 0.5935*z + 7.182*z*(u*u) - 558.5*z*u*u*u*u*u -
+        16.9*u*u + 78.03*(u*u)*(z*z*z) + 0.001228*(v*v) - 0.05628*z*z + 1.166*(z*z*z) - 7.966*u*u*u*u +
+        7.555e-05*(v*v*v*v) + 1.13e-05*(t*t*t*t*t)*(u*u) - 9.138e-05*t*t*t*t*t*u*u*u*u*u + 930.1*(u*u*u*u*u)*(z*z) -
+        1747.0*u*u*u*u*u*z*z*z + 591.1*(u*u*u*u*u*u)
     )
-    return rigid_A/((1/3)*2**(1/3)*pi**(2/3)*mu*(X + 1)*exp(log_Q_A)/(mu*(X + 1) + 1)**(1/3) + 1)
+    return rigid/((1/3)*2**(1/3)*pi**(2/3)*mu*(X + 1)*exp(log_Q)/(mu*(X + 1) + 1)**(1/3) + 1)
 
 
 def long_phi_F(X: FloatArray, mu: FloatArray) -> FloatArray:
     """Phi_F, long form: within 0.00054."""
     w = 1/(X + 3)
-    p_F = (
+    p = (
         w*(w*(w*(w*(w*(w*(w*(w*(202680.3 - 116676.09*w) - 139391.11) + 47261.94) - 8071.9332) + 724.69922) - 40.764531)
         - 9.090187) - 7.4943273)
     )
-    rigid_F = (1/5)*pi*(X + 3)**(5/2)*exp(p_F)
-    u_F = 1/(X + 2.0)
-    y_F = 1.0*mu*(X + 2.0)
-    t_F = log(y_F + 1)
-    z_F = 1/(sqrt(y_F) + 1)
-    v_F = log(3.0*mu*sqrt(u_F) + 1)
-    log_Q_F = (
-        -0.118296*t_F*u_F - 3.01064*t_F*u_F*u_F*u_F*u_F*u_F - 0.263905*u_F*v_F + 3.80004*u_F*z_F - 0.836377*u_F -
-        0.0619324*u_F*v_F*v_F - 20.2772*u_F*z_F*z_F - 3.85487e-05*u_F*t_F*t_F*t_F + 0.00635397*u_F*(v_F*v_F*v_F) +
-        19.8987*u_F*(z_F*z_F*z_F) - 0.000379636*u_F*v_F*v_F*v_F*v_F + 3.9305e-06*u_F*(t_F*t_F*t_F*t_F*t_F) +
-        1.53774*v_F*(u_F*u_F) + 0.484979*z_F + 50.6236*z_F*(u_F*u_F) - 225.267*z_F*u_F*u_F*u_F +
-        411.195*z_F*(u_F*u_F*u_F*u_F) - 325.948*z_F*u_F*u_F*u_F*u_F*u_F - 10.7045*u_F*u_F + 33.8306*(u_F*u_F)*(z_F*z_F)
-        - 0.0163792*u_F*u_F*v_F*v_F*v_F - 102.576*u_F*u_F*z_F*z_F*z_F + 0.925984*(z_F*z_F) +
-        0.0154324*(t_F*t_F*t_F)*(u_F*u_F*u_F*u_F*u_F*u_F) - 22.121*u_F*u_F*u_F + 310.16*(u_F*u_F*u_F)*(z_F*z_F*z_F) +
-        0.00050287*(u_F*u_F*u_F)*(v_F*v_F*v_F*v_F) - 1.16559*z_F*z_F*z_F + 0.00155839*(t_F*t_F*t_F*t_F)*(u_F*u_F) +
-        0.00513046*(t_F*t_F*t_F*t_F)*(u_F*u_F*u_F*u_F*u_F) + 166.302*(u_F*u_F*u_F*u_F) - 162.134*u_F*u_F*u_F*u_F*z_F*z_F
-        - 429.543*u_F*u_F*u_F*u_F*z_F*z_F*z_F - 3.19737e-05*t_F*t_F*t_F*t_F*t_F*u_F*u_F -
-        0.000104206*t_F*t_F*t_F*t_F*t_F*u_F*u_F*u_F*u_F - 0.000601264*t_F*t_F*t_F*t_F*t_F*u_F*u_F*u_F*u_F*u_F*u_F -
-        279.441*u_F*u_F*u_F*u_F*u_F + 277.261*(u_F*u_F*u_F*u_F*u_F)*(z_F*z_F) +
-        180.761*(u_F*u_F*u_F*u_F*u_F)*(z_F*z_F*z_F) + 174.525*(u_F*u_F*u_F*u_F*u_F*u_F)
+    rigid = (1/5)*pi*(X + 3)**(5/2)*exp(p)
+    u = 1/(X + 2.0)
+    y = 1.0*mu*(X + 2.0)
+    t = log(y + 1)
+    z = 1/(sqrt(y) + 1)
+    v = log(3.0*mu*sqrt(u) + 1)
+    log_Q = (
+        -0.118296*t*u - 3.01064*t*u*u*u*u*u - 0.263905*u*v + 3.80004*u*z - 0.836377*u - 0.0619324*u*v*v - 20.2772*u*z*z
+        - 3.85487e-05*u*t*t*t + 0.00635397*u*(v*v*v) + 19.8987*u*(z*z*z) - 0.000379636*u*v*v*v*v +
+        3.9305e-06*u*(t*t*t*t*t) + 1.53774*v*(u*u) + 0.484979*z + 50.6236*z*(u*u) - 225.267*z*u*u*u +
+        411.195*z*(u*u*u*u) - 325.948*z*u*u*u*u*u - 10.7045*u*u + 33.8306*(u*u)*(z*z) - 0.0163792*u*u*v*v*v -
+        102.576*u*u*z*z*z + 0.925984*(z*z) + 0.0154324*(t*t*t)*(u*u*u*u*u*u) - 22.121*u*u*u + 310.16*(u*u*u)*(z*z*z) +
+        0.00050287*(u*u*u)*(v*v*v*v) - 1.16559*z*z*z + 0.00155839*(t*t*t*t)*(u*u) + 0.00513046*(t*t*t*t)*(u*u*u*u*u) +
+        166.302*(u*u*u*u) - 162.134*u*u*u*u*z*z - 429.543*u*u*u*u*z*z*z - 3.19737e-05*t*t*t*t*t*u*u -
+        0.000104206*t*t*t*t*t*u*u*u*u - 0.000601264*t*t*t*t*t*u*u*u*u*u*u - 279.441*u*u*u*u*u +
+        277.261*(u*u*u*u*u)*(z*z) + 180.761*(u*u*u*u*u)*(z*z*z) + 174.525*(u*u*u*u*u*u)
     )
-    return mu*rigid_F/((3/20)*sqrt(2)*pi*mu*(X + 1)*exp(log_Q_F) + 1)
+    return mu*rigid/((3/20)*sqrt(2)*pi*mu*(X + 1)*exp(log_Q) + 1)
 
 
 def long_phi_A(X: FloatArray, mu: FloatArray) -> FloatArray:
     """Phi_A, long form: within 0.000718."""
     w = 1/(X + 3)
-    p_A = (
+    p = (
         w*(w*(w*(w*(w*(w*(w*(w*(283024.13 - 151141.2*w) - 214699.54) + 83691.155) - 17683.969) + 2076.1419) - 145.64022)
         - 3.8642267) - 6.0454312)
     )
-    rigid_A = (1/2)*pi*(X + 3)**2*exp(p_A)
-    u_A = 1/(X + 3.0)
-    y_A = 0.5*mu*(X + 3.0)
-    t_A = log(y_A + 1)
-    z_A = 1/(sqrt(y_A) + 1)
-    v_A = log(3.0*mu*sqrt(u_A) + 1)
-    log_Q_A = (
-        2.702999*t_A*u_A - 63.31776*t_A*u_A*u_A*u_A + 268.1615*t_A*(u_A*u_A*u_A*u_A*u_A*u_A) + 3.809611*u_A*v_A +
-        15.52818*u_A*z_A - 7.687747*u_A - 0.5328182*u_A*t_A*t_A - 0.7197839*u_A*v_A*v_A - 11.14794*u_A*z_A*z_A -
-        0.0263022*u_A*t_A*t_A*t_A + 0.08046351*u_A*(v_A*v_A*v_A) + 9.137597*u_A*(z_A*z_A*z_A) +
-        0.008110612*u_A*(t_A*t_A*t_A*t_A) - 0.01113995*u_A*v_A*v_A*v_A*v_A - 0.0002514788*u_A*t_A*t_A*t_A*t_A*t_A +
-        0.1158525*v_A - 4.095103*v_A*u_A*u_A - 0.2289378*z_A + 233.3311*z_A*(u_A*u_A) - 1411.913*z_A*u_A*u_A*u_A +
-        4693.561*z_A*(u_A*u_A*u_A*u_A*u_A) - 4.698431*t_A*t_A*u_A*u_A*u_A + 7.863849*(t_A*t_A)*(u_A*u_A*u_A*u_A*u_A) +
-        32.86004*(t_A*t_A)*(u_A*u_A*u_A*u_A*u_A*u_A) - 88.83575*u_A*u_A + 4.020746*(u_A*u_A)*(v_A*v_A) -
-        235.4572*u_A*u_A*z_A*z_A - 28.28981*u_A*u_A*z_A*z_A*z_A - 0.03251855*u_A*u_A*v_A*v_A*v_A*v_A +
-        0.03479262*(v_A*v_A) - 0.3867149*z_A*z_A + 605.9977*(u_A*u_A*u_A) + 2166.446*(u_A*u_A*u_A)*(z_A*z_A) -
-        570.3672*u_A*u_A*u_A*z_A*z_A*z_A - 0.00513524*v_A*v_A*v_A + 0.3401002*(z_A*z_A*z_A) +
-        0.5740654*(t_A*t_A*t_A*t_A)*(u_A*u_A*u_A*u_A) - 2.593164*t_A*t_A*t_A*t_A*u_A*u_A*u_A*u_A*u_A*u_A -
-        1270.736*u_A*u_A*u_A*u_A - 3979.136*u_A*u_A*u_A*u_A*z_A*z_A + 2330.272*(u_A*u_A*u_A*u_A)*(z_A*z_A*z_A) +
-        0.0002993666*(v_A*v_A*v_A*v_A) + 0.00288502*(t_A*t_A*t_A*t_A*t_A)*(u_A*u_A) -
-        0.01963705*t_A*t_A*t_A*t_A*t_A*u_A*u_A*u_A*u_A - 0.09416472*t_A*t_A*t_A*t_A*t_A*u_A*u_A*u_A*u_A*u_A +
-        0.3054986*(t_A*t_A*t_A*t_A*t_A)*(u_A*u_A*u_A*u_A*u_A*u_A) + 2873.193*(u_A*u_A*u_A*u_A*u_A) +
-        96.5359*(u_A*u_A*u_A*u_A*u_A)*(z_A*z_A) - 1849.622*u_A*u_A*u_A*u_A*u_A*z_A*z_A*z_A -
-        4654.55*u_A*u_A*u_A*u_A*u_A*u_A
+    rigid = (1/2)*pi*(X + 3)**2*exp(p)
+    u = 1/(X + 3.0)
+    y = 0.5*mu*(X + 3.0)
+    t = log(y + 1)
+    z = 1/(sqrt(y) + 1)
+    v = log(3.0*mu*sqrt(u) + 1)
+    log_Q = (
+        2.702999*t*u - 63.31776*t*u*u*u + 268.1615*t*(u*u*u*u*u*u) + 3.809611*u*v + 15.52818*u*z - 7.687747*u -
+        0.5328182*u*t*t - 0.7197839*u*v*v - 11.14794*u*z*z - 0.0263022*u*t*t*t + 0.08046351*u*(v*v*v) +
+        9.137597*u*(z*z*z) + 0.008110612*u*(t*t*t*t) - 0.01113995*u*v*v*v*v - 0.0002514788*u*t*t*t*t*t + 0.1158525*v -
+        4.095103*v*u*u - 0.2289378*z + 233.3311*z*(u*u) - 1411.913*z*u*u*u + 4693.561*z*(u*u*u*u*u) - 4.698431*t*t*u*u*u
+        + 7.863849*(t*t)*(u*u*u*u*u) + 32.86004*(t*t)*(u*u*u*u*u*u) - 88.83575*u*u + 4.020746*(u*u)*(v*v) -
+        235.4572*u*u*z*z - 28.28981*u*u*z*z*z - 0.03251855*u*u*v*v*v*v + 0.03479262*(v*v) - 0.3867149*z*z +
+        605.9977*(u*u*u) + 2166.446*(u*u*u)*(z*z) - 570.3672*u*u*u*z*z*z - 0.00513524*v*v*v + 0.3401002*(z*z*z) +
+        0.5740654*(t*t*t*t)*(u*u*u*u) - 2.593164*t*t*t*t*u*u*u*u*u*u - 1270.736*u*u*u*u - 3979.136*u*u*u*u*z*z +
+        2330.272*(u*u*u*u)*(z*z*z) + 0.0002993666*(v*v*v*v) + 0.00288502*(t*t*t*t*t)*(u*u) -
+        0.01963705*t*t*t*t*t*u*u*u*u - 0.09416472*t*t*t*t*t*u*u*u*u*u + 0.3054986*(t*t*t*t*t)*(u*u*u*u*u*u) +
+        2873.193*(u*u*u*u*u) + 96.5359*(u*u*u*u*u)*(z*z) - 1849.622*u*u*u*u*u*z*z*z - 4654.55*u*u*u*u*u*u
     )
-    return rigid_A/((1/3)*2**(1/3)*pi**(2/3)*mu*(X + 1)*exp(log_Q_A)/(mu*(X + 1) + 1)**(1/3) + 1)
+    return rigid/((1/3)*2**(1/3)*pi**(2/3)*mu*(X + 1)*exp(log_Q)/(mu*(X + 1) + 1)**(1/3) + 1)
 
 
 def totals_force(
@@ -225,13 +208,6 @@ def totals_area(
     log_total = where(k < r, far, near)
     return exp(log_total)
 
-
-FUNCTIONS: dict[str, dict[str, Callable[..., FloatArray]]] = {
-    "pocket": {"phi_F": pocket_phi_F, "phi_A": pocket_phi_A},
-    "standard": {"phi_F": standard_phi_F, "phi_A": standard_phi_A},
-    "long": {"phi_F": long_phi_F, "phi_A": long_phi_A},
-    "totals": {"force": totals_force, "area": totals_area},
-}
 
 RANGES: dict[str, dict[str, tuple[float, float]]] = {
     "pocket": {"X": (0.8, 25.0), "mu": (0.0, 2000.0)},

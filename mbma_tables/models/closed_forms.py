@@ -14,13 +14,15 @@ from numpy.typing import ArrayLike
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.errors import InputError
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models.closed_form_functions import CERTIFICATES, FUNCTIONS, RANGES
+from mbma_tables.models import closed_form_functions as printed
+from mbma_tables.models.closed_form_functions import CERTIFICATES, RANGES
 from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
 from mbma_tables.surfaces.surface import Surface
 
 ISLAND_FORMS = ("pocket", "standard", "long")
 TOTALS = "totals"
 RESULTS = ("phi_F", "phi_A")
+FUNCTIONS = {form: {name: getattr(printed, f"{form}_{name}") for name in own} for form, own in CERTIFICATES.items()}
 
 
 class FormulaModel:

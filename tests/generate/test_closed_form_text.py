@@ -11,7 +11,7 @@ import pytest
 import mbma_tables
 from generate.formulas.printing import module_text, read_functions
 from mbma_tables.export.code import write_code
-from mbma_tables.models import closed_form_functions as shipped
+from mbma_tables.models import closed_forms as shipped
 
 PACKAGE = pathlib.Path(mbma_tables.__file__).parent
 MODULE = (PACKAGE / "models" / "closed_form_functions.py").read_text()

@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, greenwood_tripp, island
-from mbma_tables.models.closed_form_functions import CERTIFICATES, FUNCTIONS, RANGES
-from mbma_tables.models.closed_forms import ISLAND_FORMS, RESULTS, TOTALS, FormulaModel, closed_totals
+from mbma_tables.models.closed_forms import (
+    CERTIFICATES,
+    FUNCTIONS,
+    ISLAND_FORMS,
+    RANGES,
+    RESULTS,
+    TOTALS,
+    FormulaModel,
+    closed_totals,
+)
 from mbma_tables.models.protocol import AREA, FORCE
 
 BULK = pytest.param(20_000, marks=pytest.mark.slow)
