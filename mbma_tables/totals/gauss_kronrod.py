@@ -7,8 +7,8 @@ on its own and is judged by its own value.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,8 +65,7 @@ DEPTH = 64  # halvings of an interval before giving up
 Integrand = Callable[[NDArray[np.intp], FloatArray], FloatArray]
 
 
-@dataclasses.dataclass(frozen=True)
-class Integrals:
+class Integrals(NamedTuple):
     """Values and relative error estimates, shape (integrals, components), and the points evaluated."""
 
     value: FloatArray
@@ -121,11 +120,16 @@ def integrate(
         # one component stands for all
         nothing = np.zeros((count, 1))
         return Integrals(nothing, nothing, 0)
-    value, error = _evaluate(integrand, owner, low, high)
-    evaluations = owner.size * NODES_21.size
-    unfinished = np.zeros(count, dtype=bool)
+    evaluations, kept = 0, list[Any]()
+    fresh: list[Any] = [owner, low, high]
     for _ in range(DEPTH):
-        total, bound = (_sum_by_owner(x, owner, count) for x in (value, error))
+        batches = [[part[k : k + BATCH] for part in fresh] for k in range(0, fresh[0].size, BATCH)]
+        fresh += map(np.concatenate, zip(*(_apply_rule(integrand, *batch) for batch in batches), strict=True))
+        evaluations += fresh[0].size * NODES_21.size
+        kept = [np.concatenate(both) for both in zip(kept, fresh, strict=True)] if kept else fresh
+        owner, low, high, value, error = kept
+        sums: Any = [np.stack([np.bincount(owner, x, count) for x in part.T], axis=1) for part in (value, error)]
+        total, bound = sums
         relative = np.divide(bound, total, out=np.zeros_like(bound), where=total > 0)
         unfinished = np.asarray((relative > rtol).any(axis=1))
         if not unfinished.any():
@@ -134,33 +138,9 @@ def integrate(
         leaves = np.bincount(owner, minlength=count)[owner, None]
         split = unfinished[owner] & (error * leaves > rtol * total[owner]).any(axis=1)
         middle = (low[split] + high[split]) / 2
-        new_low = np.concatenate([low[split], middle])
-        new_high = np.concatenate([middle, high[split]])
-        new_owner = np.tile(owner[split], 2)
-        new_value, new_error = _evaluate(integrand, new_owner, new_low, new_high)
-        evaluations += new_owner.size * NODES_21.size
-        keep = ~split
-        owner, low, high = (
-            np.concatenate([old[keep], new]) for old, new in ((owner, new_owner), (low, new_low), (high, new_high))
-        )
-        value = np.concatenate([value[keep], new_value])
-        error = np.concatenate([error[keep], new_error])
+        halves = (low[split], middle), (middle, high[split])
+        fresh = [np.tile(owner[split], 2), *map(np.concatenate, halves)]
+        kept = [part[~split] for part in kept]
     raise ConvergenceError(
         f"quadrature did not reach {rtol:.1e} for {int(unfinished.sum())} of {count} integrals", unfinished
     )
-
-
-def _evaluate(
-    integrand: Integrand, owner: NDArray[np.intp], low: FloatArray, high: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """`_apply_rule` in batches."""
-    parts = [
-        _apply_rule(integrand, owner[k : k + BATCH], low[k : k + BATCH], high[k : k + BATCH])
-        for k in range(0, owner.size, BATCH)
-    ]
-    return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
-
-
-def _sum_by_owner(values: FloatArray, owner: NDArray[np.intp], count: int) -> FloatArray:
-    columns = [np.bincount(owner, column, count) for column in values.T]
-    return np.stack(columns, axis=1)
