@@ -14,8 +14,7 @@ from generate.tables import chunks
 from generate.timing import GAPS, held_out_surfaces, measure, measured_gaps, variant
 from mbma_tables import Scene, Surface, contact, contact_law, theories
 from mbma_tables.arguments import FloatArray
-from mbma_tables.models import TIERS
-from mbma_tables.models.protocol import IslandAnswer
+from mbma_tables.models import TIERS, IslandAnswer
 from mbma_tables.scenes.costs import Row
 
 EVERY = 5  # of the timed gaps, one is compared with the reference

@@ -1,38 +1,133 @@
-"""Island models, one protocol: totals take any of them, by name or as an object, and do not ask which."""
+"""Island models: anything that answers (X, mu) with force, area and a bound on its own error.
+
+Totals take any of them, by name or as an object, and do not ask which. Two need no table: the exact solver and the
+rigid sphere.
+"""
 
 from __future__ import annotations
 
-from mbma_tables.arguments import number_in
-from mbma_tables.errors import InputError
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+
+from mbma_tables.arguments import FloatArray, number_in
+from mbma_tables.errors import InputError, OutOfRangeError
+from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.greenwood_tripp import MIN_SOLVER_RTOL
-from mbma_tables.models.protocol import (
-    MAX_RTOL,
-    MIN_RTOL,
-    AnyModel,
-    ExactModel,
-    GeometryModel,
-    IslandAnswer,
-    IslandModel,
-    RigidModel,
-    answer_islands,
-)
+from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.surfaces.readings import Reading
 
-__all__ = [
-    "TIERS",
-    "AnyModel",
-    "ExactModel",
-    "GeometryModel",
-    "IslandAnswer",
-    "IslandModel",
-    "RigidModel",
-    "answer_islands",
-    "exact_model",
-    "get_model",
-    "tier_name",
-]
-
 TIERS = ("exact", "universal", "island4d", "formula", "rigid")
+OUTSIDE = ("raise", "exact", "nan")  # what to do about islands that a table does not cover
+QUANTITIES = ("force", "area")
+FORCE, AREA, BOTH = 0, 1, 2  # which of them is asked for
+MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # that totals and islands may be asked for
+EXACT_RTOL = 1e-10  # of the exact solver, where it replaces a table
+CLOSED_FORM_ERROR = 1e-14
+
+
+class IslandAnswer(NamedTuple):
+    """Phi_F and Phi_A of islands, with a bound on their relative error; arrays of one shape.
+
+    Where a model was asked for one of the two and the other would have cost more, the other is NaN.
+    """
+
+    phi_F: FloatArray
+    phi_A: FloatArray
+    error: FloatArray
+
+
+@runtime_checkable
+class IslandModel(Protocol):
+    """An island model: `contact`, `contact_law`, `island` and `Scene` take any such object as their `tier`."""
+
+    @property
+    def name(self) -> str:
+        """What results call it."""
+
+    def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
+        """Phi_F, Phi_A and a bound on their relative error at finite X and mu >= 0, arrays of one shape."""
+
+
+@runtime_checkable
+class GeometryModel(Protocol):
+    """An island model that needs more of an island than X and mu, or has cheaper ways to answer one quantity."""
+
+    @property
+    def name(self) -> str:
+        """What results call it."""
+
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
+        """Phi_F and Phi_A of islands, given as `islands.geometry.FIELDS` and hurst, arrays of one shape.
+
+        `outside` is one of `OUTSIDE`; `which` is FORCE, AREA or BOTH. Used in place of `answer` where both exist.
+        """
+
+
+AnyModel = IslandModel | GeometryModel
+
+
+def answer_islands(
+    model: AnyModel, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH
+) -> IslandAnswer:
+    """Phi_F and Phi_A of islands by any model; what a model of two numbers answers is checked.
+
+    Raises
+    ------
+    InputError
+        Where an answer is not of the arguments' shape.
+    OutOfRangeError
+        Where it is not finite and `outside` is not "nan".
+    """
+    if isinstance(model, GeometryModel):
+        return model.of_islands(islands, outside, which)
+    shape = islands["X"].shape
+    given: Any = model.answer(islands["X"], islands["mu"])
+    try:
+        phi_F, phi_A, error = (np.broadcast_to(np.asarray(part, dtype=float), shape) for part in given)
+    except (TypeError, ValueError) as fault:
+        raise InputError(
+            f"island model {model.name!r} must answer Phi_F, Phi_A and error of shape {shape}: {fault}"
+        ) from None
+    bad = ~(np.isfinite(phi_F) & np.isfinite(phi_A) & (error >= 0))
+    if outside != "nan" and bad.any():
+        raise OutOfRangeError(f"island model {model.name!r} has no answer for {int(bad.sum())} islands", bad)
+    return IslandAnswer(phi_F, phi_A, error)
+
+
+@dataclasses.dataclass(frozen=True)
+class ExactModel:
+    """The island problem solved for each island (Newton's method), to a relative error of `rtol`."""
+
+    rtol: float
+    name: str = "exact"
+
+    def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
+        """Phi_F and Phi_A by `greenwood_tripp.solve`."""
+        solved = greenwood_tripp.solve(X, mu, rtol=self.rtol)
+        return IslandAnswer(solved.phi_F, solved.phi_A, solved.error)
+
+
+@dataclasses.dataclass(frozen=True)
+class RigidModel:
+    """The sphere does not deform (w = 0 in Eq. 34): closed form, exact as mu goes to 0."""
+
+    name: str = "rigid"
+
+    def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
+        """Phi_F = (mu/2) pi F_{5/2}(-X)/(5/2), Phi_A = pi F_2(-X)/2."""
+        return self.of_islands({"X": X, "mu": mu})
+
+    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
+        """Phi_F and Phi_A of islands, or the one asked for."""
+        X, mu = np.broadcast_arrays(islands["X"], islands["mu"])
+        none = np.full(X.shape, np.nan)
+        force = none if which == AREA else math.pi / 5 * mu * height_integral(2.5, -X)
+        area = none if which == FORCE else math.pi / 2 * height_integral(2.0, -X)
+        return IslandAnswer(force, area, np.full(X.shape, CLOSED_FORM_ERROR))
 
 
 def exact_model(rtol: float) -> ExactModel:
@@ -64,7 +159,10 @@ def get_model(tier: str | AnyModel, rtol: float, reading: Reading) -> AnyModel:
         For an unknown tier, an object that is no island model, an `rtol` out of range, or another reading.
     """
     asked = number_in("rtol", rtol, MIN_RTOL, MAX_RTOL)
-    model = _named(tier, asked) if isinstance(tier, str) else _checked(tier)
+    model = _named(tier, asked) if isinstance(tier, str) and tier in TIERS else tier
+    known = isinstance(model, IslandModel | GeometryModel) and not isinstance(model, type)
+    if isinstance(model, str) or not known or not isinstance(model.name, str):
+        raise InputError(f"tier must be one of {TIERS} or an object with a name and answer(X, mu), got {model!r}")
     own = getattr(model, "reading", None)
     if isinstance(own, Reading) and (
         own.density_divisor != reading.density_divisor or own.summit_sigma != reading.summit_sigma
@@ -76,25 +174,16 @@ def get_model(tier: str | AnyModel, rtol: float, reading: Reading) -> AnyModel:
     return model
 
 
-def _checked(model: AnyModel) -> AnyModel:
-    known = isinstance(model, IslandModel | GeometryModel) and not isinstance(model, type)
-    if not known or not isinstance(model.name, str):
-        raise InputError(f"tier must be one of {TIERS} or an object with a name and answer(X, mu), got {model!r}")
-    return model
-
-
 def _named(tier: str, rtol: float) -> AnyModel:
     if tier == "exact":
         return exact_model(rtol)
     if tier == "rigid":
         return RigidModel()
+    # closed forms and netCDF come in where they are asked for
     if tier == "formula":
         from mbma_tables.models.closed_forms import FormulaModel
 
         return FormulaModel()
-    if tier not in TIERS:
-        raise InputError(f"tier must be one of {TIERS} or an island model, got {tier!r}")
-    # netCDF comes in where a table is asked for
     from mbma_tables.models.tables import open_table
 
     return open_table(tier)

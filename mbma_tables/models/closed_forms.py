@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.errors import InputError
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.models import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
 from mbma_tables.models import closed_form_functions as printed
 from mbma_tables.models.closed_form_functions import CERTIFICATES, RANGES
-from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
 from mbma_tables.surfaces.surface import Surface
 
 ISLAND_FORMS = ("pocket", "standard", "long")

@@ -18,7 +18,7 @@ from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, Coordinates, band_fields, hat_scales, to_axes
 from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
+from mbma_tables.models import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
 from mbma_tables.plots import draw_lines
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.interpolate import fill_4d, fill_gradient_4d

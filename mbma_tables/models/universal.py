@@ -16,8 +16,7 @@ from mbma_tables.compiled import in_blocks
 from mbma_tables.display import Displayed, Variable
 from mbma_tables.errors import InputError
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models import universal_kernel
-from mbma_tables.models.protocol import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
+from mbma_tables.models import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer, universal_kernel
 from mbma_tables.models.universal_kernel import RECORD, TERMS, Table
 from mbma_tables.plots import draw_lines
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent

@@ -21,7 +21,7 @@ from mbma_tables.scenes.effects import OF_LAW, OUTPUTS, REFINEMENTS
 from mbma_tables.scenes.problem import INVERTED, Problem
 
 if TYPE_CHECKING:
-    from mbma_tables.models.protocol import AnyModel
+    from mbma_tables.models import AnyModel
 
 ISLAND_SHARE = 0.5  # of a step's tolerance; the rest is asked of its quadrature or law
 # inverting a law adds the gap's error to that of the values; slopes of a law are rarely worse by more than 300;

@@ -16,7 +16,7 @@ from mbma_tables.theories import THEORIES, get_theory
 from mbma_tables.units import Units, in_unit, known, modulus_and_units
 
 if TYPE_CHECKING:
-    from mbma_tables.models.protocol import AnyModel
+    from mbma_tables.models import AnyModel
     from mbma_tables.surfaces.any_surface import AnySurface
     from mbma_tables.surfaces.readings import Reading
     from mbma_tables.theories.protocol import Theory, UserTheory

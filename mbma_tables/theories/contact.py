@@ -22,8 +22,7 @@ from mbma_tables.arguments import (
 )
 from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.labels import apply_to_surface
-from mbma_tables.models import AnyModel
-from mbma_tables.models.protocol import QUANTITIES
+from mbma_tables.models import QUANTITIES, AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.theories import get_theory

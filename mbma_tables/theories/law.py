@@ -15,8 +15,7 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray, checked_hardness, hinted, number_in
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
-from mbma_tables.models import AnyModel, get_model
-from mbma_tables.models.protocol import MAX_RTOL, MIN_RTOL
+from mbma_tables.models import MAX_RTOL, MIN_RTOL, AnyModel, get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import Surface

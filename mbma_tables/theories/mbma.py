@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError
-from mbma_tables.models import TIERS, AnyModel, get_model, tier_name
-from mbma_tables.models.protocol import QUANTITIES
+from mbma_tables.models import QUANTITIES, TIERS, AnyModel, get_model, tier_name
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import NAMED, Reading, get_reading

@@ -22,8 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require, whole_number_in
 from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
-from mbma_tables.models import AnyModel, get_model
-from mbma_tables.models.protocol import AREA, BOTH, FORCE, OUTSIDE, QUANTITIES
+from mbma_tables.models import AREA, BOTH, FORCE, OUTSIDE, QUANTITIES, AnyModel, get_model
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading, get_reading

@@ -11,8 +11,7 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.islands.geometry import floor_offset, geometry
-from mbma_tables.models import AnyModel, answer_islands, exact_model
-from mbma_tables.models.protocol import AREA, BOTH, FORCE
+from mbma_tables.models import AREA, BOTH, FORCE, AnyModel, answer_islands, exact_model
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.models.universal_kernel import OK, REASONS, UNRESOLVED
 from mbma_tables.surfaces.readings import Reading

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, greenwood_tripp, island
+from mbma_tables.models import AREA, FORCE
 from mbma_tables.models.closed_forms import (
     CERTIFICATES,
     FUNCTIONS,
@@ -16,7 +17,6 @@ from mbma_tables.models.closed_forms import (
     FormulaModel,
     closed_totals,
 )
-from mbma_tables.models.protocol import AREA, FORCE
 
 BULK = pytest.param(20_000, marks=pytest.mark.slow)
 
