@@ -6,6 +6,7 @@ import difflib
 import functools
 import importlib
 import inspect
+import math
 import sys
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
@@ -57,7 +58,7 @@ def hinted(function: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(function)
     def checked(*given: P.args, **named: P.kwargs) -> R:
-        for name in named.keys() - parameters.keys():
+        for name in (name for name in named if name not in parameters):
             if name in ("E1", "nu1", "E2", "nu2") and "E_star" in names:
                 raise TypeError(
                     f"{called} has no argument {name!r}: E_star=materials.effective_modulus(E1, nu1, E2, nu2)"
@@ -89,6 +90,8 @@ def finite_array(name: str, value: ArrayLike) -> FloatArray:
 
     An array without hidden entries is taken though it is a masked one.
     """
+    if isinstance(value, float) and math.isfinite(value):
+        return np.asarray(value, dtype=np.float64)
     # xarray's other containers, and HDF5's: an array with names that would be lost here
     if hasattr(value, "dims") and not is_labelled(value):
         raise InputError(
@@ -169,6 +172,8 @@ def whole_number_in(name: str, value: Any, low: int, high: int) -> int:
 def broadcast_shape(**arguments: Any) -> tuple[int, ...]:
     """The common shape of named arrays, or one message that lists theirs."""
     shapes = {name: np.shape(value) for name, value in arguments.items()}
+    if len(set(shapes.values())) == 1:
+        return next(iter(shapes.values()))
     try:
         return np.broadcast_shapes(*shapes.values())
     except ValueError:

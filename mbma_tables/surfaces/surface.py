@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import broadcast_shape, finite_array, hinted, is_labelled, require
+from mbma_tables.arguments import broadcast_shape, finite_array, hinted, is_labelled, require, spread
 from mbma_tables.display import shown
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces import spectrum
@@ -94,7 +94,7 @@ class Surface(AnySurface):
             require(name, given[name], given[name] > 0, "positive")
         shape = broadcast_shape(**given)
         for name, array in given.items():
-            kept = np.array(np.broadcast_to(array, shape))
+            kept = np.array(spread(array, shape))
             kept.setflags(write=False)
             object.__setattr__(self, name, kept[()])
         zeta_1 = np.asarray(self.zeta_1)

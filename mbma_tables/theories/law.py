@@ -6,9 +6,8 @@ the polynomials and bounds their errors.
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +28,7 @@ from mbma_tables.theories.law_pieces import (
     Side,
     assemble,
     fill_energies,
-    first_fall,
+    first_falls,
     first_record,
     order_of,
     power_record,
@@ -106,33 +105,35 @@ def contact_law(
     """
     given, units = modulus_and_units(E_star, surface)
     modulus = number_in("E_star", given, np.finfo(float).tiny, np.finfo(float).max)
-    cap = checked_hardness(units.number("hardness", hardness))
-    if cap.ndim:
-        raise InputError(f"hardness must be one number, got shape {cap.shape}: a law is of one surface")
     if theory == Mbma.name:
         chosen: Theory = Mbma(tier, reading)
     else:
         refuse_options_of_mbma(tier=tier != "universal", reading=reading != "reported")
         chosen = get_theory(theory)
-    if cap < math.inf:
-        from mbma_tables.theories.yielding import Yielding
+    if hardness is not math.inf:
+        cap = checked_hardness(units.number("hardness", hardness))
+        if cap.ndim:
+            raise InputError(f"hardness must be one number, got shape {cap.shape}: a law is of one surface")
+        if cap < math.inf:
+            from mbma_tables.theories.yielding import Yielding
 
-        chosen = Yielding(chosen, float(cap) / modulus)
+            chosen = Yielding(chosen, float(cap) / modulus)
     one = surface
     if one.labelled:
         one = one.with_numbers(*(np.asarray(getattr(one, name)) for name in one.parameters))
     if one.shape != ():
         raise InputError(f"a law is of one surface, got a batch of shape {one.shape}")
     asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
+    facts = {"surface": one, "E_star": modulus, "units": units}
     if isinstance(chosen, Mbma):
-        return dataclasses.replace(_mbma_law(one, asked, chosen.tier, chosen.reading, modulus), units=units)
+        return _mbma_law(one, chosen.tier, chosen.reading, asked, facts)
     try:
-        return dataclasses.replace(_theory_law(one, chosen, asked, modulus), units=units)
+        return _theory_law(one, chosen, asked, facts)
     except ConvergenceError as fault:
         raise ConvergenceError(f"theory {chosen.name!r}: {fault}; ask for a larger rtol", fault.mask) from None
 
 
-def _mbma_law(surface: AnySurface, rtol: float, tier: Any, reading: Reading, E_star: float) -> ContactLaw:
+def _mbma_law(surface: AnySurface, tier: Any, reading: Reading, rtol: float, facts: dict[str, Any]) -> ContactLaw:
     """A law of the MBMA model: x = (h_max - d)/(2 h_max), powers of it below half of the boundary layer.
 
     Where the tier's table does not cover the islands of full compression, the law ends with the table.
@@ -141,26 +142,25 @@ def _mbma_law(surface: AnySurface, rtol: float, tier: Any, reading: Reading, E_s
     model = get_model(tier, inner, reading)
     h_max = float(surface.h_max)
     islands = _islands(surface, model, reading, inner)
-    end, worst = islands.end, 0.0
+    end = islands.end
+    errors: list[float] = []
 
     def values(x: FloatArray) -> FloatArray:
-        nonlocal worst
-        force, area, error = islands.totals(x * end)
-        worst = max(worst, float(np.max(error)))
-        if not (force.all() and area.all()):
+        found, error = islands.totals(x * end)
+        errors.append(error)
+        if not found.all():
             high = h_max / float(surface.h_rms)
             raise OutOfRangeError(f"h_max is {high:g} h_rms, so high that force or area underflow")
-        return np.stack([force, reading.area_of(area)])
+        found[1] = reading.area_of(found[1])
+        return found
 
     places = [kink / end for kink in islands.kinks]
     tolerance = min(rtol, RESOLVED)
     octaves = range(math.ceil(-math.log2(min(LAYER_SHARE * islands.layer / end, *places))), 1100)
     start, first = first_record(lambda start: power_record(values, start, POWERS), octaves, tolerance)
-    facts = {"surface": surface, "E_star": E_star, "theory": "mbma", "reading": reading.name, "tier": model.name}
-    side = Side(-1, start, values, tuple(places))
-    made = _finish(1 / end, [side], tolerance, first, h_max - end, math.inf, 0.0, facts)
-    own = np.array([0.0, islands.leverage * worst])
-    return dataclasses.replace(made, error=made.error + worst, errors=made.errors + own)
+    facts |= {"theory": "mbma", "reading": reading.name, "tier": model.name}
+    side, limits = Side(-1, start, values, tuple(places)), (h_max - end, math.inf)
+    return _finish(1 / end, [side], tolerance, first, limits, 0.0, errors, islands.leverage, facts)
 
 
 class Islands(NamedTuple):
@@ -170,7 +170,7 @@ class Islands(NamedTuple):
     layer: float  # approach at which an island's band leaves the shortest wave [length]
     kinks: list[float]  # approaches at floors of the band [length]
     leverage: float  # what their error is worth in slopes
-    totals: Callable[[FloatArray], tuple[FloatArray, ...]]  # force with E* = 1, sum of areas and error at h_max - d
+    totals: Callable[[FloatArray], tuple[FloatArray, float]]  # force with E* = 1, sum of areas; error, at h_max - d
 
 
 def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float) -> Islands:
@@ -181,8 +181,13 @@ def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float
             raise OutOfRangeError(f"q1/q0 must be greater than {reading.floor_u:g}, the reading's floor of zeta_u")
         stress = float(surface.q0 * surface.s)
         shape = float(surface.hurst), float(surface.zeta_1), float(surface.h_max) / h_rms
-    source = source_of(shape, reading)
-    known = source.layer * h_rms, [float(place) * h_rms for place in source.breaks[-2:]]
+    end = 2 * float(surface.h_max)
+
+    def of_profile(depth: FloatArray) -> tuple[FloatArray, float]:
+        found = kept.totals(depth / h_rms)
+        found[0] *= stress
+        return found, kept.error
+
     try:
         kept = profile(shape, model, reading, rtol)
     except ConvergenceError:
@@ -191,21 +196,19 @@ def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float
         # a model that is rough between its nodes: gap by gap, where errors are relative to the whole sum
         one = surface
 
-        def of_gaps(depth: FloatArray) -> tuple[FloatArray, ...]:
+        def of_gaps(depth: FloatArray) -> tuple[FloatArray, float]:
             found = totals_of(model, Pairs.of(one, depth), reading, max(0.03 * rtol, MIN_RTOL))
-            return found.force * stress, found.area, found.error
+            return np.stack([found.force * stress, found.area]), float(found.error.max())
 
-        return Islands(2 * float(surface.h_max), *known, ROUGH_LEVERAGE, of_gaps)
-
-    def of_profile(depth: FloatArray) -> tuple[FloatArray, ...]:
-        force, area = kept.totals(depth / h_rms)
-        return force * stress, area, np.array(kept.error)
-
-    # rounding may pass full compression
-    return Islands(min(kept.edges[-1] * h_rms, 2 * float(surface.h_max)), *known, kept.leverage, of_profile)
+        source, leverage, totals = source_of(shape, reading), ROUGH_LEVERAGE, of_gaps
+    else:
+        # rounding may pass full compression
+        end = min(float(kept.edges[-1]) * h_rms, end)
+        source, leverage, totals = kept.source, kept.leverage, of_profile
+    return Islands(end, source.layer * h_rms, [float(x) * h_rms for x in source.breaks[-2:]], leverage, totals)
 
 
-def _theory_law(surface: AnySurface, theory: Theory, rtol: float, E_star: float) -> ContactLaw:
+def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[str, Any]) -> ContactLaw:
     """A law fitted to a theory's answers: x from first contact, from u = 0, or from both where force has no bound."""
     h_max, ends = float(surface.h_max), theory.ends_at_h_max
     # below the elastic theory's end, and with a hardness towards u = 0, force depends on the logarithm of u
@@ -242,54 +245,50 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, E_star: float)
         sides = [above._replace(start=start)]
     beyond = 0.0 if ends else 2 * float(theory.energy(surface, np.array(highest)))
     limits = 2 * lowest - h_max, math.inf if ends else 2 * highest - h_max
-    facts = {"surface": surface, "E_star": E_star, "theory": theory.name, "reading": "", "tier": ""}
-    made = _finish(1 / (2 * width), sides, tolerance, first, *limits, beyond, facts)
-    return dataclasses.replace(made, error=made.error + max(float(each.max()) for each in errors))
+    facts |= {"theory": theory.name, "reading": "", "tier": ""}
+    return _finish(1 / (2 * width), sides, tolerance, first, limits, beyond, errors, 0.0, facts)
 
 
 def _finish(
-    scale: float, sides: list[Side], tolerance: float, first: First, lowest: float, highest: float, beyond: float,
-    facts: dict[str, Any],
+    scale: float, sides: list[Side], tolerance: float, first: First, limits: tuple[float, float], beyond: float,
+    own_errors: Sequence[Any], leverage: float, facts: dict[str, Any],
 ) -> ContactLaw:  # fmt: skip
     """Fit the sides, put the block together, and look for turning points."""
-    h_max = float(facts["surface"].h_max)
+    h_max, (lowest, highest) = float(facts["surface"].h_max), limits
     sides = [side._replace(kinks=tuple(kink for kink in side.kinks if side.start < kink < 1)) for side in sides]
     pieces: list[Pieces] = [side_pieces(side, tolerance) for side in sides]
-    record, record_error, powers = first
-    made = assemble(h_max, scale, sides, pieces, record, record_error)
+    ends = (
+        lowest if lowest == -h_max else lowest - ROUNDING * h_max,
+        np.finfo(float).max if highest == math.inf else highest * (1 + ROUNDING),
+    )
+    block, records, errors = assemble(h_max, scale, sides, pieces, first, ends)
     order, signs = order_of(sides, pieces)
-    fill_energies(made, order, signs, powers[0], beyond)
-    turns = [first_fall(made, order, signs, start) for start in (FORCE_AT, AREA_AT)]
-    side_of = dict(zip(order.tolist(), signs.tolist(), strict=True))
+    fill_energies(records, order, signs, scale, first[2][0], beyond)
+    own = records[order]
 
     def gap(turn: tuple[int, float] | None) -> float | None:
         if turn is None:
             return None
-        number, t = turn
-        x = made.records[number, kernel.CENTRE] + t / made.records[number, kernel.RATE]
-        return float(side_of[number] * (x / scale - h_max))
+        place, t = turn
+        x = own[place, kernel.CENTRE] + t / own[place, kernel.RATE]
+        return float(signs[place] * (x / scale - h_max))
 
+    turns = [gap(turn) for turn in first_falls(own, signs)]
     # forces carry the modulus
-    made.records[:, FORCE_AT:AREA_AT] *= facts["E_star"]
-    made.records[:, kernel.ENERGY_AT] *= facts["E_star"]
-    slack = ROUNDING * h_max
-    head = made.head
-    head[[kernel.POWER_F, kernel.POWER_A]] = powers
-    head[kernel.LOWEST] = lowest if lowest == -h_max else lowest - slack
-    head[kernel.HIGHEST] = np.finfo(float).max if highest == math.inf else highest * (1 + ROUNDING)
-    head.view(np.int64)[kernel.ENDS] = sides[0].sign < 0
-    block = made.block
+    records[:, FORCE_AT:AREA_AT] *= facts["E_star"]
+    records[:, kernel.ENERGY_AT] *= facts["E_star"]
     block.flags.writeable = False
+    error, own_error = float(errors[:, 0].max()), max(float(np.max(each)) for each in own_errors)
     return ContactLaw(
         **facts,
         h_max=h_max,
         lowest=lowest,
         highest=highest,
-        error=float(made.errors[:, 0].max()),
-        turning_point=gap(turns[0]),
-        area_turning_point=gap(turns[1]),
+        error=error + own_error,
+        turning_point=turns[0],
+        area_turning_point=turns[1],
         block=block,
-        errors=made.errors,
+        errors=errors + np.array([0.0, leverage * own_error]),
     )
 
 

@@ -22,8 +22,6 @@ from mbma_tables.theories.law_kernel import (
     KINK_SIGN,
     KINK_SIGN_2,
     LOWEST,
-    POWER_A,
-    POWER_F,
     RATE,
     fill,
 )
@@ -116,7 +114,7 @@ def leakage_law(law: ContactLaw, surface: AnySurface) -> LeakageLaw:
 
     # gaps close as u under full compression
     known = (3.0, 1.0) if bottom == -law.h_max else (0.0, 0.0)
-    start, (record, record_error, powers) = first_record(
+    start, first = first_record(
         lambda start: straight_record(values, start) if blocked else power_record(values, start, known),
         range(MOST_OCTAVES if blocked else 6, MOST_OCTAVES + 1),
         rtol,
@@ -129,13 +127,10 @@ def leakage_law(law: ContactLaw, surface: AnySurface) -> LeakageLaw:
     except ConvergenceError:
         # what the law's polynomials miss of each other where they meet grows towards the blocked gap
         pieces = side_pieces(side, max(RTOL, law.error))
-    made = assemble(-bottom, 1 / span, [side], [pieces], record, record_error)
-    made.head[[POWER_F, POWER_A]] = powers
-    made.head[[LOWEST, HIGHEST]] = law.block[LOWEST], top
-    made.head.view(np.int64)[ENDS] = blocked
-    block = made.block
+    block, _, errors = assemble(-bottom, 1 / span, [side], [pieces], first, (law.block[LOWEST], top))
+    block.view(np.int64)[ENDS] = blocked
     block.flags.writeable = False
-    error = float(made.errors[:, 0].max()) + _between_nodes(pieces, values)
+    error = float(errors[:, 0].max()) + _between_nodes(pieces, values)
     return LeakageLaw(law, h_rms, bottom if blocked else -np.inf, error, block)
 
 

@@ -472,12 +472,12 @@ def test_slopes_are_within_their_bound(rtol):
 
 
 def rising_but_for(dip):
-    """A law of one polynomial between x = 1/2 and 1 whose slope is that of `dip`, a polynomial in t."""
-    record = np.zeros((2, RECORD))
+    """A law's one polynomial between x = 1/2 and 1 whose slope is that of `dip`, a polynomial in t."""
+    record = np.zeros((1, RECORD))
     integral = dip.integ()
-    record[1, [CENTRE, RATE]] = 0.75, 4.0
-    record[1, FORCE_AT : FORCE_AT + integral.coef.size] = integral.coef
-    return law_pieces.Assembly(np.zeros(0), np.zeros((0, 2)), record, np.zeros((2, 2)))
+    record[0, [CENTRE, RATE]] = 0.75, 4.0
+    record[0, FORCE_AT : FORCE_AT + integral.coef.size] = integral.coef
+    return record
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
@@ -488,14 +488,13 @@ def test_a_narrow_dip_is_a_turning_point(at, width, sign):
     t = np.polynomial.Polynomial([-at, 1.0])
     dip = (t**2 - width**2) * (1 + 0.3 * t**4)
     assert dip.degree() < DEGREE
-    made = rising_but_for(-sign * dip)
-    found = law_pieces.first_fall(made, np.array([1]), np.array([float(sign)]), FORCE_AT)
-    assert found[0] == 1
+    place, t = law_pieces.first_falls(rising_but_for(-sign * dip), np.array([float(sign)]))[0]
+    assert place == 0
     # compression goes from t = s to t = -s
     expected = max(at - width, -1.0) if sign < 0 else min(at + width, 1.0)
-    assert found[1] == pytest.approx(expected, abs=1e-9)
+    assert t == pytest.approx(expected, abs=1e-9)
     above = rising_but_for(-sign * (dip + 2 * width**2))
-    assert law_pieces.first_fall(above, np.array([1]), np.array([float(sign)]), FORCE_AT) is None
+    assert law_pieces.first_falls(above, np.array([float(sign)]))[0] is None
 
 
 def slope_misses(surface, law, gap, reading="reported"):
