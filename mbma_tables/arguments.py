@@ -91,6 +91,7 @@ def finite_array(name: str, value: ArrayLike) -> FloatArray:
     An array without hidden entries is taken though it is a masked one.
     """
     if isinstance(value, float) and math.isfinite(value):
+        # numpy takes long over single numbers
         return np.asarray(value, dtype=np.float64)
     # xarray's other containers, and HDF5's: an array with names that would be lost here
     if hasattr(value, "dims") and not is_labelled(value):
@@ -125,6 +126,8 @@ def spread(array: Any, shape: tuple[int, ...]) -> Any:
 
 def require(name: str, value: FloatArray, good: Any, allowed: str, unit: str = "") -> None:
     """Refuse the entries of `value` where `good` is false; `allowed` says what would have been right, `unit` theirs."""
+    if isinstance(good, np.bool_) and good:
+        return
     bad = ~np.asarray(good, dtype=bool)
     if bad.any():
         raise OutOfRangeError(f"{name} must be {allowed}, got {describe_entries(value, bad)}{unit}", bad)
@@ -172,10 +175,9 @@ def whole_number_in(name: str, value: Any, low: int, high: int) -> int:
 def broadcast_shape(**arguments: Any) -> tuple[int, ...]:
     """The common shape of named arrays, or one message that lists theirs."""
     shapes = {name: np.shape(value) for name, value in arguments.items()}
-    if len(set(shapes.values())) == 1:
-        return next(iter(shapes.values()))
+    extended = {shape for shape in shapes.values() if shape}
     try:
-        return np.broadcast_shapes(*shapes.values())
+        return np.broadcast_shapes(*extended) if len(extended) > 1 else next(iter(extended), ())
     except ValueError:
         listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
         raise InputError(f"arguments do not broadcast: {listed}") from None

@@ -137,10 +137,10 @@ def contact(
     by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
     E_star, units = modulus_and_units(E_star, surface)
     value, hardness = units.number(by, value), units.number("hardness", hardness)
-    chosen = get_theory(theory)
     if theory == Mbma.name:
-        chosen = Mbma(tier, reading, rtol, outside, workers)
+        chosen: Theory = Mbma(tier, reading, rtol, outside, workers)
     else:
+        chosen = get_theory(theory)
         refuse_options_of_mbma(
             tier=tier != "universal", reading=reading != "reported", rtol=rtol != 1e-8, outside=outside != "raise",
             workers=workers != 1,

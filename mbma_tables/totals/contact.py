@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require, whole_number_in
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require, spread, whole_number_in
 from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import AREA, BOTH, FORCE, OUTSIDE, QUANTITIES, AnyModel, get_model
@@ -91,8 +91,7 @@ def totals_at(
     model, workers = get_model(tier, rtol, reading), whole_number_in("workers", workers, 1, MOST_WORKERS)
     which = BOTH if len(quantities) > 1 else QUANTITIES.index(quantities[0])
     shape = broadcast_shape(separation=gap, surface=surface.h_rms, E_star=modulus)
-    gap = np.broadcast_to(gap, shape)
-    h_max = np.broadcast_to(np.asarray(surface.h_max), shape)
+    gap, h_max = spread(gap, shape), spread(np.asarray(surface.h_max), shape)
     require("separation", gap, gap >= -h_max, "at least -h_max, where the model ends")
     depth = np.asarray(h_max - gap)
     force_by = area_by = None
@@ -151,8 +150,8 @@ def _by_profiles(
     if isinstance(surface, Surface):
         # what lies outside of the table is solved gap by gap
         outside = "nan"
-        numbers = np.broadcast_arrays(surface.hurst, surface.zeta_1, surface.h_max / surface.h_rms)
-        shapes = list(zip(*(field.ravel().tolist() for field in numbers), strict=True))
+        numbers = surface.hurst, surface.zeta_1, surface.h_max / surface.h_rms
+        shapes = list(zip(*(np.ravel(field).tolist() for field in numbers), strict=True))
     if len(shapes) > 1:
         number = np.broadcast_to(np.arange(len(shapes)).reshape(surface.shape), depth.shape).ravel()[touching]
         order = np.argsort(number, kind="stable")

@@ -285,15 +285,18 @@ def fill_fields(
 
     Returns the status of the worst, and the largest error.
     """
-    surface = surface_constants(hurst, zeta_1, reading, printed)
+    surface, X, mu = surface_constants(hurst, zeta_1, reading, printed), np.empty(x.size), np.empty(x.size)
     rms_over_s, worst, largest = surface.rms_over_s, OK, 0.0
     for k in range(x.size):
         floor_d = x[k] >= surface.kink_d
         node = island_node(x[k], floor_d, x[k] > surface.kink_u, surface)
-        status, phi_F, phi_A, error = universal_phi(node.X, node.mu, table)
-        worst, largest = max(worst, status), max(largest, error)
         each = (1.0 if floor_d else surface.jacobian) * rms_over_s * node.D_d / (ROOT_TWO_PI * node.sigma_d)
-        out[0, k], out[1, k] = node.force * phi_F * each, node.area * phi_A * each
+        X[k], mu[k], out[0, k], out[1, k] = node.X, node.mu, node.force * each, node.area * each
         out[2, k] = ((peak + x[k]) * rms_over_s - node.h_d) / node.sigma_d
         out[3, k] = rms_over_s / node.sigma_d
+    for k in range(x.size):
+        status, phi_F, phi_A, error = universal_phi(X[k], mu[k], table)
+        worst, largest = max(worst, status), max(largest, error)
+        out[0, k] *= phi_F
+        out[1, k] *= phi_A
     return worst, largest

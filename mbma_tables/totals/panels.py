@@ -6,7 +6,6 @@ Of an island at a gap of compression c = (h_max - d)/h_rms, force and area count
 from __future__ import annotations
 
 import functools
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,8 +14,9 @@ from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 
-COUNTS = ((0.3, 8), (math.inf, 16))  # nodes of a panel by its width over delta
-MORE = 4  # gaps of a panel than nodes
+NODES, FEWER, NARROW = 16, 8, 0.3  # nodes of a panel, and of one whose width is less than NARROW of its approaches
+COUNTS = np.array([NODES, NODES, FEWER])  # of each of the `rules`
+MORE = 4  # terms of a panel's series than nodes
 CHECKS = np.array([1e-4, 0.5, 1 - 1e-4])  # places where polynomials miss most
 SPREAD = np.linspace(0, 1, 9)  # gaps that a panel is checked at, from it to the last
 TOPS = 8  # and those at which a Gaussian has its top in it
@@ -33,24 +33,19 @@ Sums = tuple[FloatArray, FloatArray]  # what `_sums` gives
 class Rule(NamedTuple):
     """Of panels with n nodes at places in [0, 1]: from the low to the high end delta rises like place^power.
 
-    Matrices take values at the nodes to those at other places.
+    Matrices take values at the nodes, their rows, to those at other places.
     """
 
     power: int
     nodes: FloatArray
     weights: FloatArray
-    seen: FloatArray  # nodes and CHECKS, at which islands are answered
-    reach: FloatArray  # places of gaps, which are Chebyshev points of the panel
-    checks: FloatArray  # (3, n)
-    halves: FloatArray  # (2 n, n), at the nodes of both halves
-    inside: FloatArray  # (gaps n, n), at the nodes of the part below each gap
-    ends: FloatArray  # (gaps, n), at the gaps
-    series: FloatArray  # (gaps, gaps), values at the gaps to a Chebyshev series
+    reach: FloatArray  # places of gaps, which are Chebyshev points of the panel, and 1
+    checks: FloatArray  # (n, 3)
+    halves: FloatArray  # (n, 2 n), at the nodes of both halves
+    inside: FloatArray  # (n, (gaps + 1) n), at the nodes of the part below each of them
+    ends: FloatArray  # (n, gaps), at the gaps
+    series: FloatArray  # (2 gaps, 2 gaps), values and slopes at the gaps to a Chebyshev series
     to_series: FloatArray  # (n, n), values at the nodes to one
-
-    def approach(self, low: FloatArray, high: FloatArray, places: FloatArray) -> FloatArray:
-        """Approaches at places, (panels, places)."""
-        return np.asarray(low[:, None] + (high - low)[:, None] * places**self.power)
 
     def measure(self, width: FloatArray, places: FloatArray, rows: int) -> FloatArray:
         """What weights are multiplied by in integrals over places of panels so wide, (rows or 1, panels, places)."""
@@ -60,55 +55,90 @@ class Rule(NamedTuple):
         return np.asarray(self.power * width[:, None] * places ** (self.power - 1) * lead)
 
 
-@functools.cache
-def rule_of(n: int, power: int) -> Rule:
-    """The rule with n nodes; power is 2 in the panel from 0, and 1 else."""
+def _rule(n: int, power: int) -> Rule:
     x, weights = np.polynomial.legendre.leggauss(n)
-    nodes, points = (1 + x) / 2, chebyshev.chebpts1(n + MORE)
-    to_series: Any = np.linalg.inv(chebyshev.chebvander(x, n - 1))
-    reach = ((1 + points) / 2) ** (1 / power)
-    halves = np.concatenate([nodes, 1 + nodes]) / 2
-    places = (CHECKS, halves, np.outer(reach, nodes).ravel(), reach)
-    checks, halves, inside, ends = (chebyshev.chebvander(2 * at - 1, n - 1) @ to_series for at in places)
-    series: Any = np.linalg.inv(chebyshev.chebvander(points, points.size - 1))
-    return Rule(
-        power, nodes, weights / 2, np.append(nodes, CHECKS), reach, checks, halves, inside, ends, series, to_series
-    )
+    nodes, points = (1 + x) / 2, chebyshev.chebpts1((n + MORE) // 2)
+    to_series: Any = np.linalg.inv(chebyshev.chebvander(x, n - 1)).T.copy()
+    reach, terms = np.append(((1 + points) / 2) ** (1 / power), 1.0), np.eye(2 * points.size)
+    places = (CHECKS, np.concatenate([nodes, 1 + nodes]) / 2, np.outer(reach, nodes).ravel(), reach[:-1])
+    checks, halves, inside, ends = (to_series @ chebyshev.chebvander(2 * at - 1, n - 1).T for at in places)
+    both = [chebyshev.chebval(points, terms), chebyshev.chebval(points, chebyshev.chebder(terms))]
+    series: Any = np.linalg.inv(np.concatenate(both, axis=1))
+    return Rule(power, nodes, weights / 2, reach, checks, halves, inside, ends, series, to_series)
+
+
+@functools.cache
+def rules() -> tuple[Rule, Rule, Rule]:
+    """Those of the panel from 0, where delta goes with the square of the place, of others, and of narrow ones."""
+    return _rule(NODES, 2), _rule(NODES, 1), _rule(FEWER, 1)
 
 
 class Panels(NamedTuple):
-    """Panels of one rule; in the one from 0, weights lack the powers of delta that they begin with."""
+    """Panels in order; in the one from 0, weights lack the powers of delta that they begin with."""
 
-    rule: Rule
+    kind: NDArray[np.intp]  # number of the rule
     low: FloatArray
     high: FloatArray
-    fields: FloatArray  # weights of force, area and so on, shift and rate of heights at the nodes, (rows, panels, n)
+    fields: FloatArray  # weights of force, area and so on, shift and rate of heights, (rows, panels, NODES + checks)
 
     def some(self, chosen: Any) -> Panels:
         """Those at these places."""
-        return Panels(self.rule, self.low[chosen], self.high[chosen], np.ascontiguousarray(self.fields[:, chosen]))
+        return Panels(
+            self.kind[chosen], self.low[chosen], self.high[chosen], np.ascontiguousarray(self.fields[:, chosen])
+        )
 
+    def joined(self, other: Panels) -> Panels:
+        """These, and after them others."""
+        kind, low, high = (np.concatenate(pair) for pair in zip(self[:3], other[:3], strict=True))
+        return Panels(kind, low, high, np.concatenate([self.fields, other.fields], axis=1))
 
-Group = tuple[Panels, NDArray[np.intp]]  # panels of one rule, and their places among all
+    def groups(self) -> list[tuple[Rule, NDArray[np.intp], FloatArray]]:
+        """Rules with the places of their panels, and these panels' fields at the rule's nodes."""
+        places = [(rule, np.flatnonzero(self.kind == number)) for number, rule in enumerate(rules())]
+        return [(rule, own, self.fields[:, own, : rule.nodes.size]) for rule, own in places if own.size]
 
 
 class Nodes(NamedTuple):
-    """Islands at the nodes of panels."""
+    """Islands at the nodes of panels, in order, with weights as they count in sums."""
 
-    panel: NDArray[np.intp]
-    weights: FloatArray  # (nodes, rows)
+    weights: FloatArray  # (rows, nodes)
     shift: FloatArray
     rate: FloatArray
-
-    def some(self, chosen: Any) -> Nodes:
-        """Those at these places."""
-        return Nodes(*(field[chosen] for field in self))
+    stops: NDArray[np.intp]  # how many lie below each panel, and in all
 
 
-def missed_by(panels: Panels, true: FloatArray, last: float) -> FloatArray:
+@functools.cache
+def seen() -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Shares of panels at which islands are answered, of each rule, and which of them count: nodes, then CHECKS."""
+    shares = np.ones((3, NODES + CHECKS.size))
+    for own, rule in zip(shares, rules(), strict=True):
+        own[: rule.nodes.size], own[NODES:] = rule.nodes**rule.power, CHECKS**rule.power
+    return shares, shares < 1
+
+
+def nodes_of(panels: Panels) -> Nodes:
+    """The islands of panels."""
+    islands = panels.fields[..., :NODES].copy()
+    for rule, own, fields in panels.groups():
+        measure = rule.measure((panels.high - panels.low)[own], rule.nodes, len(islands) - 2)
+        islands[:-2, own, : rule.nodes.size] = fields[:-2] * measure * rule.weights
+    islands = islands[:, seen()[1][panels.kind, :NODES]]
+    return Nodes(islands[:-2], islands[-2], islands[-1], np.append(0, COUNTS[panels.kind].cumsum()))
+
+
+def missed_by(panels: Panels, last: float) -> FloatArray:
     """Bound on the relative error of panels: of what they interpolate, against islands, and of their sums."""
-    rule, low, high, fields = panels
-    missed = fields @ rule.checks.T - true
+    found = np.empty(panels.low.size)
+    for rule, own, fields in panels.groups():
+        found[own] = _missed(rule, panels.low[own], panels.high[own], fields, panels.fields[:, own, NODES:], last)
+    return found
+
+
+def _missed(
+    rule: Rule, low: FloatArray, high: FloatArray, fields: FloatArray, true: FloatArray, last: float
+) -> FloatArray:
+    """`missed_by` of panels of one rule."""
+    missed = fields @ rule.checks - true
     # what underflows is right
     own = true[:-2]
     relative = np.abs(np.divide(missed[:-2], own, out=np.zeros_like(own), where=own > 0)).max(axis=(0, 2))
@@ -130,7 +160,7 @@ def missed_by(panels: Panels, true: FloatArray, last: float) -> FloatArray:
         # in units of the panel's largest, so that nothing underflows
         return np.asarray((np.exp(0.5 * (least - far)) @ force[..., None])[..., 0])
 
-    finer = fields @ rule.halves.T
+    finer = fields @ rule.halves
     coarse_far, fine_far = squares(fields), squares(finer)
     least = fine_far.min(axis=(1, 2), keepdims=True)
     fine = sums(finer, fine_far, np.concatenate([rule.nodes, 1 + rule.nodes]) / 2, np.tile(rule.weights / 2, 2))
@@ -164,21 +194,21 @@ def _cut(rule: Rule, width: FloatArray, c: FloatArray, reach: FloatArray, inside
     return logs, slopes + own * np.exp(-0.5 * height * height - logs)
 
 
-def sums_at(c: FloatArray, own: NDArray[np.intp], groups: list[Group], nodes: Nodes) -> Sums:
-    """`_sums` at a few gaps in panels `own`; groups of panels are at places among all."""
-    found = np.empty((2, nodes.weights.shape[1], c.size))
-    for (rule, low, high, fields), rank in groups:
-        mine, which = np.nonzero(own[:, None] == rank)
+def sums_at(c: FloatArray, own: NDArray[np.intp], panels: Panels, nodes: Nodes) -> Sums:
+    """`_sums` at a few gaps in panels `own`."""
+    found, islands = np.empty((2, len(nodes.weights), c.size)), np.arange(nodes.shift.size)
+    for number, rule in enumerate(rules()):
+        mine = np.flatnonzero(panels.kind[own] == number)
         if mine.size:
-            width = (high - low)[which]
+            _, low, high, fields = panels.some(own[mine])
             # at a panel's end the island at the gap counts, and nothing else
-            reach = np.maximum((c[mine] - low[which]) / width, LEAST) ** (1 / rule.power)
-            places = reach[:, None] * np.append(rule.nodes, 1.0)
-            basis = chebyshev.chebvander(2 * places - 1, rule.nodes.size - 1) @ rule.to_series
-            at = np.einsum("gji,rgi->rgj", basis, fields[:, which])
-            found[..., mine] = _cut(rule, width, c[mine], reach, at[..., :-1], at[..., -1])
+            reach = np.maximum((c[mine] - low) / (high - low), LEAST) ** (1 / rule.power)
+            inner = reach[:, None] * np.append(rule.nodes, 1.0)
+            basis = chebyshev.chebvander(2 * inner - 1, rule.nodes.size - 1) @ rule.to_series.T
+            at = np.einsum("gji,rgi->rgj", basis, fields[..., : rule.nodes.size])
+            found[..., mine] = _cut(rule, high - low, c[mine], reach, at[..., :-1], at[..., -1])
     # and over all panels below
-    heights = np.where(nodes.panel < own[:, None], nodes.shift - nodes.rate * c[:, None], FAR)
-    below, by_gap = _sums(heights, nodes.weights, nodes.weights * nodes.rate[:, None])
+    heights = np.where(islands < nodes.stops[own][:, None], nodes.shift - nodes.rate * c[:, None], FAR)
+    below, by_gap = _sums(heights, nodes.weights.T, (nodes.weights * nodes.rate).T)
     logs = np.logaddexp(found[0], below)
     return logs, found[1] * np.exp(found[0] - logs) + by_gap * np.exp(below - logs)

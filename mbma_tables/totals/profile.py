@@ -28,7 +28,7 @@ from mbma_tables.surfaces.readings import Reading
 from mbma_tables.totals import kernel, panels, panels_kernel
 from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
 from mbma_tables.totals.island_sum import kinks
-from mbma_tables.totals.panels import CHECKS, COUNTS, POWERS, Group, Nodes, Panels, rule_of
+from mbma_tables.totals.panels import NARROW, POWERS, Nodes, Panels, nodes_of, seen
 
 FEW = 256  # gaps that are asked of numpy, one by one
 KEPT = 64  # profiles, for whoever asks the same surface again
@@ -37,7 +37,6 @@ MAX_ROUNDS = 30
 MOST = 1000  # panels to be answered anew at a time
 
 Fields = Callable[[FloatArray], tuple[FloatArray, float]]  # rows of `Panels.fields` at approaches, and their error
-Part = tuple[Panels, FloatArray]  # panels that were answered at once, and their errors
 
 
 class Source(NamedTuple):
@@ -102,17 +101,16 @@ class Profile:
         The surface's islands.
     edges : ndarray, shape (panels + 1,)
         Ends of the panels, delta/h_rms; the last is 2 h_max/h_rms, or less where a table ends.
-    series : ndarray, shape (panels, 2 rows, n), or None
-        ln(F), ln(A) and so on, then their slopes by ln(compression), as Chebyshev series of the compression. In the
-        first panel the logarithms lack those of the powers that they begin with. For few gaps there is none.
+    series : ndarray, shape (panels, 2, terms), or None
+        ln(F) and ln(A) as Chebyshev series of the compression. In the first panel they lack the logarithms of the
+        powers that they begin with. For few gaps there is none.
     error : float
         Bound on the relative error of totals, of panels and islands together.
     islands : int
         Islands answered for it.
+    panels : Panels
     nodes : Nodes
-        The islands.
-    groups : list of (Panels, ndarray)
-        Panels of one rule, and their places among all.
+        Their islands.
     """
 
     source: Source
@@ -120,8 +118,8 @@ class Profile:
     series: Any
     error: float
     islands: int
+    panels: Panels
     nodes: Nodes
-    groups: list[Group]
 
     @property
     def end(self) -> float:
@@ -135,22 +133,21 @@ class Profile:
         F/(A0 E* q0 s) and the sum of areas over A0, perhaps the number of islands per area; of a measured surface
         F/(A0 E*).
         """
-        count = self.nodes.weights.shape[1]
         if self.series is None:
             parts = [self._summed(compression[k : k + FEW]) for k in range(0, compression.size, FEW)]
-            return np.concatenate(parts, axis=1)[: 2 * count if slopes else count]
+            return np.concatenate(parts, axis=1)[: None if slopes else len(self.nodes.weights)]
+        out = np.empty((2, compression.size))
+        panels_kernel.fill_totals(compression, self.edges, self.series, out)
         if not slopes:
-            out = np.empty((2, compression.size))
-            panels_kernel.fill_totals(compression, self.edges, self.series, out)
             return out
         panel = self._panel(compression)
         low, high = self.edges[panel], self.edges[panel + 1]
-        basis = chebyshev.chebvander((2 * compression - low - high) / (high - low), self.series.shape[-1] - 1)
+        by_place = chebyshev.chebder(self.series, axis=-1)
+        basis = chebyshev.chebvander((2 * compression - low - high) / (high - low), by_place.shape[-1] - 1)
         # sums whose order does not depend on the number of gaps
-        found: FloatArray = (self.series[panel] * basis[:, None]).sum(axis=-1).T
-        found[:count] = np.exp(found[:count]) * np.where(panel > 0, 1.0, compression ** (POWERS[:count, 0] + 1))
-        found[count:] *= found[:count] / compression
-        return found
+        steep = 2 * (by_place[panel] * basis[:, None]).sum(axis=-1).T / (high - low)
+        steep += np.where(panel > 0, 0.0, (POWERS[:2, 0] + 1) / compression)
+        return np.concatenate([out, out * steep])
 
     def _panel(self, compression: FloatArray) -> NDArray[np.intp]:
         places = np.searchsorted(self.edges, compression, side="right") - 1
@@ -158,7 +155,7 @@ class Profile:
 
     @np.errstate(under="ignore")
     def _summed(self, compression: FloatArray) -> FloatArray:
-        logs, by_gap = panels.sums_at(compression, self._panel(compression), self.groups, self.nodes)
+        logs, by_gap = panels.sums_at(compression, self._panel(compression), self.panels, self.nodes)
         return np.concatenate([np.exp(logs), np.exp(logs) * by_gap])
 
     @functools.cached_property
@@ -168,11 +165,13 @@ class Profile:
         An error e of f in F = integral of f G up to l changes l dF/dl by at most e (l f G + integral of f |l dG/dl|).
         """
         ends = np.unique(np.linspace(0, self.edges.size - 2, 9).astype(int))
-        c, count = self.edges[1 + ends], self.nodes.weights.shape[1]
+        c, count = self.edges[1 + ends], len(self.nodes.weights)
         found = self.totals(c, slopes=True)
-        heights = self.nodes.shift - self.nodes.rate * c[:, None]
-        negative = np.exp(-0.5 * heights**2) * np.minimum(heights, 0) * (self.nodes.panel <= ends[:, None])
-        turned = found[count:] - 2 * (negative @ (self.nodes.weights * self.nodes.rate[:, None])).T
+        weights, shift, rate, stops = self.nodes
+        heights = shift - rate * c[:, None]
+        negative = np.exp(-0.5 * heights**2) * np.minimum(heights, 0)
+        negative *= np.arange(shift.size) < stops[1 + ends][:, None]
+        turned = found[count:] - 2 * (weights * rate) @ negative.T
         own = found[:count]
         return float(np.divide(c * turned, own, out=np.zeros_like(own), where=own > 0).max())
 
@@ -186,15 +185,14 @@ def _edges(source: Source, last: float) -> FloatArray:
     equal = top + (last - top) * (np.arange(count) / max(count, 1))
     edges = np.sort(np.concatenate([[0.0], graded, breaks, equal, [last]]))
     # breaks that coincide but for rounding
-    return np.append(edges[:-1][np.diff(edges) > 1e-12 * edges[:-1]], last)
+    return np.concatenate([edges[:-1][edges[1:] - edges[:-1] > 1e-12 * edges[:-1]], [last]])
 
 
-def _count(low: FloatArray, high: FloatArray) -> NDArray[np.intp]:
-    """Numbers of nodes of panels."""
+def _kinds(low: FloatArray, high: FloatArray) -> NDArray[np.intp]:
+    """Numbers of panels' rules."""
     # above delta = h_rms/2 it is the Gaussian that bends
-    ratio = np.divide(high - low, np.minimum(low, 0.5), out=np.full(low.size, math.inf), where=low > 0)
-    counts: NDArray[np.intp] = np.array([n for _, n in COUNTS])[np.searchsorted([bound for bound, _ in COUNTS], ratio)]
-    return counts
+    narrow = high - low <= NARROW * np.minimum(low, 0.5)
+    return np.where(narrow, 2, (low > 0).astype(np.intp))
 
 
 class _EndOfTable(Exception):
@@ -229,83 +227,58 @@ def _compiled_fields(shape: tuple[float, float, float], model: Any, reading: Rea
 
 
 def _answered(
-    fields: Fields, low: FloatArray, high: FloatArray, counts: NDArray[np.intp], last: float, few: bool
-) -> tuple[list[Part], int, float]:
-    """Panels of so many nodes and their errors, the number of islands, and their own error.
+    fields: Fields, kind: NDArray[np.intp], low: FloatArray, high: FloatArray, last: float, few: bool
+) -> tuple[Panels, FloatArray, int, float]:
+    """Panels and their errors, the number of islands, and their own error.
 
     Raises
     ------
     _EndOfTable
     """
-    kinds = 2 * counts + (low == 0)
-    groups = [(rule_of(kind // 2, 1 + kind % 2), kinds == kind) for kind in sorted(set(kinds.tolist()))[::-1]]
-    places = [rule.approach(low[own], high[own], rule.seen) for rule, own in groups]
-    x = np.concatenate([part.ravel() for part in places])
+    shares, used = (each[kind] for each in seen())
+    x = (low[:, None] + (high - low)[:, None] * shares)[used]
     found, error = fields(x)
-    if np.isnan(found).any():
-        known = x[x < x[np.isnan(found).any(axis=0)].min()]
+    if not (found[:-2] >= 0).all():
+        unknown = np.isnan(found).any(axis=0)
+        known = x[x < x[unknown].min(initial=math.inf)]
+        if not unknown.any():
+            raise ConvergenceError("K1 (47) is negative", np.array(True))
         if not known.size:
             raise OutOfRangeError("no island of this surface lies inside the table")
         raise _EndOfTable(float(known.max()))
-    if (found[:-2] < 0).any():
-        raise ConvergenceError("K1 (47) is negative", np.array(True))
-    parts, missed_by = [], panels.missed_by if few else panels_kernel.missed_by
-    for (rule, own), at, end in zip(groups, places, np.cumsum([part.size for part in places]), strict=True):
-        values = found[:, end - at.size : end].reshape(-1, *at.shape)
-        if rule.power > 1:
-            values[:-2] /= at ** POWERS[: len(values) - 2]
-        made = Panels(rule, low[own], high[own], np.ascontiguousarray(values[..., : -CHECKS.size]))
-        parts.append((made, missed_by(made, values[..., -CHECKS.size :], last)))
-    return parts, x.size, error
-
-
-def _merged(parts: list[Part]) -> tuple[FloatArray, list[Group], Nodes]:
-    """Low ends of panels, panels of each rule with their places among all, and islands, all in order."""
-    made = []
-    for rule in {id(own.rule): own.rule for own, _ in parts}.values():
-        low, high, fields = zip(*(own[1:] for own, _ in parts if own.rule is rule), strict=True)
-        every = Panels(rule, np.concatenate(low), np.concatenate(high), np.concatenate(fields, axis=1))
-        made.append(every if (np.diff(every.low) > 0).all() else every.some(np.argsort(every.low)))
-    starts = np.sort(np.concatenate([own.low for own in made]))
-    groups = [(own, np.searchsorted(starts, own.low)) for own in made]
-    panel, weights, turns = [], [], []
-    for (rule, low, high, fields), rank in groups:
-        rows = len(fields) - 2
-        panel.append(rank.repeat(rule.nodes.size))
-        weights.append((fields[:-2] * rule.measure(high - low, rule.nodes, rows) * rule.weights).reshape(rows, -1))
-        turns.append(fields[-2:].reshape(2, -1))
-    nodes = Nodes(np.concatenate(panel), np.concatenate(weights, axis=1).T, *np.concatenate(turns, axis=1))
-    ordered = (np.diff(nodes.panel) >= 0).all()
-    return starts, groups, nodes if ordered else nodes.some(np.argsort(nodes.panel, kind="stable"))
+    values = np.zeros((len(found), *used.shape))
+    values[:, used] = found
+    if kind[0] == 0:
+        values[:-2, 0] /= (high[0] * shares[0]) ** POWERS[: len(found) - 2, 0]
+    made = Panels(kind, low, high, values)
+    return made, (panels.missed_by if few else panels_kernel.missed_by)(made, last), x.size, error
 
 
 def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float, few: bool) -> Profile:
     """Panels, halved until polynomials through their islands, and those of their sums, are good to `rtol`."""
     low, high, last = edges[:-1], edges[1:], float(edges[-1])
-    counts, islands, worst, seen = _count(low, high), 0, 0.0, 0.0
-    parts: list[Part] = []
+    kind, islands, worst, known, errors = _kinds(low, high), 0, 0.0, None, edges[:0]
     for _ in range(MAX_ROUNDS):
-        fresh, count, error = _answered(fields, low, high, counts, last, few)
+        fresh, missed, count, error = _answered(fields, kind, low, high, last, few)
+        order = np.argsort(np.append(known.low, low)) if known else slice(None)
+        known, errors = known.joined(fresh).some(order) if known else fresh, np.append(errors, missed)[order]
         islands, worst = islands + count, max(worst, error)
         # no nearer than islands themselves are known
         limit = max(0.5 * rtol, worst)
-        seen = max([seen, *(float(errors[errors <= limit].max(initial=0.0)) for _, errors in fresh)])
-        parts += fresh
-        if all((errors <= limit).all() for _, errors in parts):
-            starts, groups, nodes = _merged(parts)
-            ends = np.append(starts, last)
+        bad = ~(errors <= limit)
+        if not bad.any():
+            ends, bound = np.append(known.low, last), float(errors.max()) + worst
             if few:
-                return Profile(source, ends, None, seen + worst, islands, nodes, groups)
-            series, tails = panels_kernel.series_of(groups, nodes)
-            if (tails <= limit).all():
-                return Profile(source, ends, series, seen + worst + float(tails.max()), islands, nodes, groups)
-            parts = [(own, tails[rank]) for own, rank in groups]
-        bad = [(own.some(~(errors <= limit)), own.rule.nodes.size) for own, errors in parts]
-        parts = [(own.some(errors <= limit), errors[errors <= limit]) for own, errors in parts]
-        low, high = (np.concatenate([getattr(own, end) for own, _ in bad]) for end in ("low", "high"))
-        middle = (low + high) / 2
-        counts = np.tile(np.concatenate([np.full(own.low.size, count) for own, count in bad]), 2)
+                return Profile(source, ends, None, bound, islands, known, nodes_of(known))
+            series, tails, nodes = panels_kernel.series_of(known)
+            bad = ~(tails <= limit)
+            if not bad.any():
+                return Profile(source, ends, series, bound + float(tails.max()), islands, known, nodes)
+        low, high = known.low[bad], known.high[bad]
+        middle, parents = (low + high) / 2, known.kind[bad]
+        kind = np.concatenate([parents, np.maximum(parents, 1)])
         low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
+        known, errors = known.some(~bad), errors[~bad]
         if low.size > MOST + edges.size:
             break
     raise ConvergenceError(f"a profile of islands did not reach {rtol:.1e}", np.array(True))
