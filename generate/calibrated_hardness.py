@@ -16,7 +16,7 @@ import xarray as xr
 from scipy.optimize import least_squares
 
 from generate.boundary_elements.design import SPLITS, TRAINING
-from generate.boundary_elements.evidence import GAUSSIAN, Capped, capped
+from generate.boundary_elements.evidence import GAUSSIAN, LEVELS, Capped, capped
 from generate.calibrated_file import write_part
 from mbma_tables import Surface, contact
 from mbma_tables import hardness as cap
@@ -104,17 +104,32 @@ def errors_of_law(one: Capped, form: str, constants: cap.Constants) -> dict[str,
     yielded = cap.yielded_area(one.force, one.elastic_areas[form], one.eta, constants)
     at_gap = one.map_curve.answer(one.u)[0] if by_map else one.by_law[0]
     force = cap.force(at_gap, 0.0, one.shares[0 if by_map else 1], 0.0, one.eta, constants)[0]
-    # from pressure to the gap to the stiffness, on the law's own curve
-    endless, steep, share = one.curves[form]
-    curve = np.log(np.maximum(cap.force(endless, 0.0, share, 0.0, one.eta, constants)[0], 1e-30))
-    frozen = np.log(np.maximum(steep * cap.frozen_factor(one.eta, constants), 1e-30))
-    at = np.interp(-np.log(one.force), -curve, frozen)
     return {
         "area": np.log(area / one.area),
         "yielded": yielded / area - one.yielded / one.area,
         "force": np.log(np.maximum(force, 1e-6 * one.force) / one.force),
-        "stiffness": at - np.log(one.frozen),
+        "stiffness": frozen_errors(one, one.curves[form], constants),
     }
+
+
+def frozen_errors(one: Capped, elastic: tuple[FloatArray, ...], constants: cap.Constants) -> FloatArray:
+    """ln of a theory's frozen stiffness over the simulated one at equal force, NaN where the theory ends before.
+
+    From pressure to the gap to the stiffness, on its own curve: force, stiffness and Q of the elastic contact.
+    """
+    endless, steep, share = elastic
+    curve = np.log(np.maximum(cap.force(endless, 0.0, share, 0.0, one.eta, constants)[0], 1e-30))
+    frozen = np.log(np.maximum(steep * cap.frozen_factor(one.eta, constants), 1e-30))
+    at = np.interp(-np.log(one.force), -curve, frozen, left=np.nan)
+    return np.asarray(at - np.log(one.frozen))
+
+
+@functools.cache
+def elastic_curve(node: tuple[float | str, ...], zeta_1: float, h_max: float, name: str) -> tuple[FloatArray, ...]:
+    """Force, stiffness and Q of a theory at `LEVELS` of a self-affine surface."""
+    surface, u = Surface(node[1], 1.0, zeta_1, 1.0, h_max), h_max * LEVELS[:-1]
+    found, g = get_theory(name).answer(surface, u), float(surface.rms_gradient)
+    return found.force / g, found.stiffness / g, get_theory(name).bearing_share(surface, u)[0]
 
 
 def accuracy(groups: dict[str, list[Capped]], constants: cap.Constants) -> FloatArray:
@@ -130,14 +145,24 @@ def accuracy(groups: dict[str, list[Capped]], constants: cap.Constants) -> Float
     return table
 
 
-def by_contact(seen: Sequence[Capped], values: Sequence[FloatArray], etas: Sequence[float]) -> FloatArray:
-    """Root mean squares of values at simulated contacts, by hardness and contact fraction."""
+def by_contact(
+    seen: Sequence[Capped],
+    values: Sequence[FloatArray],
+    etas: Sequence[float],
+    areas: Sequence[FloatArray] | None = None,
+) -> FloatArray:
+    """Root mean squares of values at simulated contacts, by hardness and contact fraction, the simulated if not given.
+
+    NaN where there is none.
+    """
+    areas = [one.area for one in seen] if areas is None else areas
     rms = np.full((len(etas), len(EDGES) - 1), np.nan)
     for row, eta in enumerate(etas):
         own = [k for k, one in enumerate(seen) if one.eta == eta]
-        bins = np.digitize(np.concatenate([seen[k].area for k in own]), EDGES) - 1
+        bins = np.digitize(np.concatenate([areas[k] for k in own]), EDGES) - 1
         e = np.concatenate([values[k] for k in own])
-        rms[row] = [np.sqrt(np.mean(e[bins == b] ** 2)) for b in range(len(EDGES) - 1)]
+        inside = ((bins == b) & np.isfinite(e) for b in range(len(EDGES) - 1))
+        rms[row] = [np.sqrt(np.mean(e[some] ** 2)) if some.any() else np.nan for some in inside]
     return rms
 
 
@@ -186,7 +211,7 @@ def blind() -> dict[str, FloatArray]:
 
 
 def told_errors(one: Capped, name: str, constants: cap.Constants) -> dict[str, FloatArray]:
-    """Errors of a theory with a hardness on one surface, of force and area."""
+    """Errors of a theory with a hardness on one surface, of force, area and frozen stiffness."""
     if name not in OTHERS:
         return errors_of_law(one, name, constants)
     surface = Surface(one.node[1], 1.0, one.zeta_1, 1.0, one.h_max)
@@ -197,7 +222,8 @@ def told_errors(one: Capped, name: str, constants: cap.Constants) -> dict[str, F
     held = (one.u < one.h_max) & (one.area > EDGES[0]) & (loads < theory.answer(surface, np.maximum(low, LEAST)).force)
     force[held] = Yielding(theory, one.eta * gradient).answer(surface, one.u[held]).force / gradient
     area[held] = cap.area(one.force[held], theory.area_at(surface, loads[held]), one.eta, constants)
-    return {"force": np.log(force / one.force), "area": np.log(area / one.area)}
+    frozen = frozen_errors(one, elastic_curve(one.node, one.zeta_1, one.h_max, name), constants)
+    return {"force": np.log(force / one.force), "area": np.log(area / one.area), "stiffness": frozen}
 
 
 def coverage(seen: Sequence[Capped], constants: cap.Constants, scatter: Scatter) -> dict[str, list[float]]:
@@ -205,13 +231,16 @@ def coverage(seen: Sequence[Capped], constants: cap.Constants, scatter: Scatter)
     told: dict[str, list[float]] = {}
     for name in (*FORMS, *OTHERS):
         own = [one for one in seen if name in FORMS or one.kind == "self_affine"]
-        for quantity in ("area", "force"):
+        for quantity in ("area", "force", "stiffness"):
             sizes = []
             for one in own:
                 kept = (one.area > LIGHTEST) & (one.area < EDGES[-1])
-                known = calibrated_table.shipped().standard_deviation(name, quantity, one.area)
-                sigma = scatter.standard_deviation(name, quantity, np.array(one.eta), one.area, known)
-                sizes.append((np.abs(told_errors(one, name, constants)[quantity]) / sigma)[kept])
+                told_here = told_errors(one, name, constants)
+                # of stiffness by the own area, as stated
+                area = one.area * np.exp(told_here["area"]) if quantity == "stiffness" else one.area
+                known = calibrated_table.shipped().standard_deviation(name, quantity, area)
+                sigma = scatter.standard_deviation(name, quantity, np.array(one.eta), area, known)
+                sizes.append((np.abs(told_here[quantity]) / sigma)[kept])
             size = np.concatenate(sizes)
             told[f"{name} {quantity}"] = [float(np.mean(size[np.isfinite(size)] < limit)) for limit in (1, 2)]
     return told
@@ -230,6 +259,16 @@ def stated(training: Sequence[Capped], constants: cap.Constants) -> Scatter:
         )
         for form in (*FORMS, ELASTIC)
     }
+    # what they lack is what the elastic theories' become
+    alike = [pair for pair in left_out if pair[0].kind == "self_affine"]
+    for name in OTHERS:
+        found = [told_errors(one, name, own) for one, own in alike]
+        # by the theory's own area, which is what a user has
+        areas = [one.area * np.exp(e["area"]) for (one, _), e in zip(alike, found, strict=True)]
+        rms[name] = np.full_like(rms[ELASTIC], np.nan)
+        rms[name][QUANTITIES.index("stiffness")] = by_contact(
+            [one for one, _ in alike], [e["stiffness"] for e in found], etas, areas
+        )
     weights = {
         q: by_contact(training, [weight_of_elastic(one, q, constants) for one in training], etas)
         for q in ("area", "force")
@@ -252,7 +291,7 @@ def dataset(scatter: Scatter, told: FloatArray) -> xr.Dataset:
                 np.array([*scatter.rms.values()]),
                 {
                     "long_name": "root mean square of ln(law/simulation) on the training set, by constants from other "
-                    "spectra; of the theory elastic with the simulated elastic contact",
+                    "spectra; of the theory elastic with the simulated elastic contact; NaN: not measured",
                     **unit,
                 },
             ),

@@ -28,6 +28,7 @@ QUANTITIES = ("area", "yielded", "force", "stiffness")
 TESTED_ETA = 0.025  # p_m/(E* g) down to which boundary elements were solved
 STEPS = 200
 LOWEST = 1e-300
+CLOSED = 1e-9  # u/h_rms of contacts that count as full
 MAX_LEVEL = 37.0  # of heights over h_rms above which shares are no normal numbers
 
 
@@ -56,8 +57,9 @@ class Scatter(NamedTuple):
         NaN where neither is known: how much of an error of stiffness a hardness lets through was not measured.
         """
         row = QUANTITIES.index(quantity)
-        if theory in self.rms:
-            found = self._at(self.rms[theory][row], eta, area)
+        own = self.rms.get(theory)
+        if own is not None and np.isfinite(own[row]).any():
+            found = self._at(own[row], eta, area)
         elif quantity not in self.weight:
             found = np.full(np.broadcast_shapes(np.shape(eta), np.shape(area)), np.nan)
         else:
@@ -178,7 +180,10 @@ class Yielding(Theory):
     def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which the elastic force falls, and Gaussian heights end in numbers."""
         low, high = self.elastic.interval(surface, "force")
-        return low, np.minimum(high, MAX_LEVEL * np.asarray(surface.h_rms))
+        h_rms = np.asarray(surface.h_rms)
+        # Persson's theory has no finite force at zero, where a hardness leaves full contact
+        low = low if quantity == "force" or self.ends_at_h_max else np.maximum(low, CLOSED * h_rms)
+        return low, np.minimum(high, MAX_LEVEL * h_rms)
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at which "force" (over A0 E*, below the hardness) or "area" has a wanted value."""
@@ -229,7 +234,7 @@ class Yielding(Theory):
         return found, table.standard_deviation(name, "area", eta, area, contact)
 
     def stiffness_scatter(self, surface: AnySurface, area: FloatArray) -> FloatArray:
-        """Standard deviation of ln of the frozen contact's stiffness at given F, likewise."""
+        """Standard deviation of ln of the frozen contact's stiffness at given F; of what was measured alone, else NaN."""
         eta, elastic = self.hardness / np.asarray(surface.rms_gradient), self.elastic.stiffness_scatter(surface, area)
         return shipped().standard_deviation(self.scatter_name(surface), "stiffness", eta, area, elastic)
 

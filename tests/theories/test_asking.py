@@ -135,15 +135,21 @@ def test_scatter_of_stiffness_and_separation():
         theories, middle = data.theories.split(), float(data["contact"][3])
         row = data["stated_scatter"][:, data.quantities.split().index("stiffness"), 3]
         hard = data["hardness"]
-        eta, cap = float(hard["eta"][2]), hard["stated_scatter"][0, hard.quantities.split().index("stiffness"), 2]
-        contacts = hard["contact"][:]
+        eta, cap = float(hard["eta"][2]), hard["stated_scatter"][:, hard.quantities.split().index("stiffness"), 2]
+        contacts, capped = hard["contact"][:], hard.theories.split()
     for theory in ("calibrated", "mbma", "persson"):
         stated = contact(SURFACE, area=middle, theory=theory).stiffness_scatter
         assert stated == pytest.approx(row[theories.index(theory)], rel=1e-6)
     caps = {"hardness": eta * float(SURFACE.rms_gradient), "area": contacts[:-1]}
-    assert contact(SURFACE, theory="calibrated", **caps).stiffness_scatter == pytest.approx(cap[:-1], rel=1e-6)
+    for theory in ("calibrated", "persson"):
+        stated = contact(SURFACE, theory=theory, **caps).stiffness_scatter
+        assert stated == pytest.approx(cap[capped.index(theory)][:-1], rel=1e-6)
+    # MBMA ends before
+    light = caps | {"area": contacts[:3]}
+    stated = contact(SURFACE, theory="mbma", **light).stiffness_scatter
+    assert stated == pytest.approx(cap[capped.index("mbma")][:3], rel=1e-6)
     # with a hardness that of other theories was not measured
-    assert np.isnan(contact(SURFACE, theory="mbma", **caps).stiffness_scatter).all()
+    assert np.isnan(contact(SURFACE, theory="greenwood_williamson", **light).stiffness_scatter).all()
     # nor anything on surfaces unlike those simulated
     heights = np.minimum(np.random.default_rng(1).normal(size=(64, 64)), 0)
     worn = Surface.from_spectrum(*(np.geomspace(1, 30, 40) ** power for power in (1, -3.6)), heights=heights)
