@@ -234,7 +234,7 @@ class Yielding(Theory):
         return found, table.standard_deviation(name, "area", eta, area, contact)
 
     def stiffness_scatter(self, surface: AnySurface, area: FloatArray) -> FloatArray:
-        """Standard deviation of ln of the frozen contact's stiffness at given F; of what was measured alone, else NaN."""
+        """Standard deviation of ln of the frozen contact's stiffness at given F; NaN where it was not measured."""
         eta, elastic = self.hardness / np.asarray(surface.rms_gradient), self.elastic.stiffness_scatter(surface, area)
         return shipped().standard_deviation(self.scatter_name(surface), "stiffness", eta, area, elastic)
 
