@@ -160,7 +160,8 @@ def get_model(tier: str | AnyModel, rtol: float, reading: Reading) -> AnyModel:
     """
     asked = number_in("rtol", rtol, MIN_RTOL, MAX_RTOL)
     model = _named(tier, asked) if isinstance(tier, str) and tier in TIERS else tier
-    known = isinstance(model, IslandModel | GeometryModel) and not isinstance(model, type)
+    # it takes long to see whether an object has what a protocol asks for
+    known = model is not tier or (isinstance(model, IslandModel | GeometryModel) and not isinstance(model, type))
     if isinstance(model, str) or not known or not isinstance(model.name, str):
         raise InputError(f"tier must be one of {TIERS} or an object with a name and answer(X, mu), got {model!r}")
     own = getattr(model, "reading", None)

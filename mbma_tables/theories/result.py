@@ -338,7 +338,7 @@ class Source:
     @property
     def yields(self) -> bool:
         """Whether a hardness is given."""
-        return is_labelled(self.hardness) or not np.all(np.isposinf(self.hardness))
+        return is_labelled(self.hardness) or not np.equal(self.hardness, np.inf).all()
 
     def theory_at(self, E_star: Any, hardness: Any) -> Theory:
         """The theory, with the hardness where there is one."""

@@ -91,7 +91,7 @@ def totals_at(
     model, workers = get_model(tier, rtol, reading), whole_number_in("workers", workers, 1, MOST_WORKERS)
     which = BOTH if len(quantities) > 1 else QUANTITIES.index(quantities[0])
     shape = broadcast_shape(separation=gap, surface=surface.h_rms, E_star=modulus)
-    gap, h_max = spread(gap, shape), spread(np.asarray(surface.h_max), shape)
+    gap, h_max = spread(gap, shape), np.asarray(surface.h_max)
     require("separation", gap, gap >= -h_max, "at least -h_max, where the model ends")
     depth = np.asarray(h_max - gap)
     force_by = area_by = None

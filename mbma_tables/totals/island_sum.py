@@ -39,10 +39,9 @@ class Totals(NamedTuple):
 
 def kinks(hurst: Any, zeta_1: Any, reading: Reading) -> tuple[Any, Any]:
     """delta/h_rms at which zeta_d (27) and zeta_u (30) reach their floors; arrays of one shape."""
-    h, z = np.broadcast_arrays(np.asarray(hurst, dtype=float), np.asarray(zeta_1, dtype=float))
-    rms_over_s = np.sqrt(-np.expm1(-2 * h * np.log(z)))
+    rms_over_s = np.sqrt(-np.expm1(-2 * hurst * np.log(zeta_1)))
     slope_d, slope_u = 4 / 3 * reading.beta, reading.phi / (1 + reading.phi) * rms_over_s
-    at_d, at_u = (np.sqrt(floor_offset(h, z, floor)) for floor in (reading.floor_d, reading.floor_u))
+    at_d, at_u = (np.sqrt(floor_offset(hurst, zeta_1, floor)) for floor in (reading.floor_d, reading.floor_u))
     return (at_d / slope_d)[()], (at_u / slope_u)[()]
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -36,7 +37,8 @@ WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
 MAX_ROUNDS = 30
 MOST = 1000  # panels to be answered anew at a time
 
-Fields = Callable[[FloatArray], tuple[FloatArray, float]]  # rows of `Panels.fields` at approaches, and their error
+# of approaches and which of them count: rows of `Panels.fields`, and their error
+Fields = Callable[[FloatArray, NDArray[np.bool_]], tuple[FloatArray, float]]
 
 
 class Source(NamedTuple):
@@ -178,14 +180,14 @@ class Profile:
 
 def _edges(source: Source, last: float) -> FloatArray:
     """Panels that double from the first on, with ends where anything changes, and equal ones above zeta_d's floor."""
-    breaks = source.breaks[source.breaks < last]
-    first, top = min(source.layer, float(breaks.min(initial=last))), min(source.at_d, last)
+    breaks = [place for place in source.breaks.tolist() if place < last]
+    first, top = min(source.layer, last, *breaks), min(source.at_d, last)
     doubled, count = math.ceil(math.log2(top / first)), math.ceil((last - top) / WIDEST)
-    graded = first * (top / first) ** (np.arange(doubled) / doubled) if doubled else np.array([first])
-    equal = top + (last - top) * (np.arange(count) / max(count, 1))
-    edges = np.sort(np.concatenate([[0.0], graded, breaks, equal, [last]]))
+    graded = [first * (top / first) ** (k / doubled) for k in range(doubled)] or [first]
+    equal = [top + (last - top) * k / count for k in range(count)]
+    edges = sorted([0.0, *graded, *breaks, *equal, last])
     # breaks that coincide but for rounding
-    return np.concatenate([edges[:-1][edges[1:] - edges[:-1] > 1e-12 * edges[:-1]], [last]])
+    return np.array([*(low for low, high in itertools.pairwise(edges) if high - low > 1e-12 * low), last])
 
 
 def _kinds(low: FloatArray, high: FloatArray) -> NDArray[np.intp]:
@@ -200,15 +202,16 @@ class _EndOfTable(Exception):
 
 
 def _fields(source: Source, model: AnyModel, outside: str, rows: int) -> Fields:
-    def fields(x: FloatArray) -> tuple[FloatArray, float]:
+    def fields(places: FloatArray, used: NDArray[np.bool_]) -> tuple[FloatArray, float]:
+        x = places[used]
         g = source.islands(x)
         phi = answer_islands(model, g, outside)
         area = scale_area(g) * phi.phi_A
         weights = [scale_force(g) * phi.phi_F, area, np.ones(x.size), area / g["eta"]]
         density = source.density(g, x) * source.h_rms
-        return np.stack([*(weight * density for weight in weights[:rows]), *source.heights(g, x)]), float(
-            np.nanmax(phi.error, initial=0.0)
-        )
+        found = np.zeros((rows + 2, *used.shape))
+        found[:, used] = [*(weight * density for weight in weights[:rows]), *source.heights(g, x)]
+        return found, float(np.nanmax(phi.error, initial=0.0))
 
     return fields
 
@@ -218,10 +221,10 @@ def _compiled_fields(shape: tuple[float, float, float], model: Any, reading: Rea
     hurst, zeta_1, peak = shape
     printed = reading.jacobian == "printed"
 
-    def fields(x: FloatArray) -> tuple[FloatArray, float]:
-        found = np.empty((4, x.size))
-        _, error = kernel.fill_fields(x, peak, hurst, zeta_1, reading.numbers, printed, model.kernel, found)
-        return found, error
+    def fields(x: FloatArray, used: NDArray[np.bool_]) -> tuple[FloatArray, float]:
+        found, given = np.empty((4, x.size)), (peak, hurst, zeta_1, reading.numbers, printed, model.kernel)
+        _, error = kernel.fill_fields(x.ravel(), *given, found)
+        return found.reshape(4, *x.shape), error
 
     return fields
 
@@ -235,9 +238,9 @@ def _answered(
     ------
     _EndOfTable
     """
-    shares, used = (each[kind] for each in seen())
-    x = (low[:, None] + (high - low)[:, None] * shares)[used]
-    found, error = fields(x)
+    shares, counted = seen()
+    x, used = low[:, None] + (high - low)[:, None] * shares[kind], counted[kind]
+    found, error = fields(x, used)
     if not (found[:-2] >= 0).all():
         unknown = np.isnan(found).any(axis=0)
         known = x[x < x[unknown].min(initial=math.inf)]
@@ -246,12 +249,10 @@ def _answered(
         if not known.size:
             raise OutOfRangeError("no island of this surface lies inside the table")
         raise _EndOfTable(float(known.max()))
-    values = np.zeros((len(found), *used.shape))
-    values[:, used] = found
     if kind[0] == 0:
-        values[:-2, 0] /= (high[0] * shares[0]) ** POWERS[: len(found) - 2, 0]
-    made = Panels(kind, low, high, values)
-    return made, (panels.missed_by if few else panels_kernel.missed_by)(made, last), x.size, error
+        found[:-2, 0] /= x[0] ** POWERS[: len(found) - 2, 0]
+    made = Panels(kind, low, high, found)
+    return made, (panels.missed_by if few else panels_kernel.missed_by)(made, last), int(used.sum()), error
 
 
 def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float, few: bool) -> Profile:
