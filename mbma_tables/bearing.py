@@ -88,12 +88,16 @@ def radial_spectrum(heights: FloatArray, sizes: tuple[float, float]) -> RadialSp
         )
 
 
-def bearing(heights: FloatArray, sizes: tuple[float, float]) -> Bearing:
-    """Curves of a periodic map; its mean is taken off, gradients are spectral."""
-    values = heights - heights.mean()
-    qx, qy = wavevectors(values.shape, sizes)
-    transform = np.fft.rfft2(values)
-    slopes = np.stack([np.fft.irfft2(1j * q * transform, s=values.shape).ravel() for q in (qx, qy)])
+def bearing(heights: FloatArray, sizes: tuple[float, float], part: tuple[slice, ...] = ()) -> Bearing:
+    """Curves of a periodic map; its mean is taken off, gradients are spectral.
+
+    Where all but a `part` are mirror images they are of that part: images would hide a lay at an angle to the axes.
+    """
+    whole = heights - heights.mean()
+    qx, qy = wavevectors(whole.shape, sizes)
+    transform = np.fft.rfft2(whole)
+    values = whole[part]
+    slopes = np.stack([np.fft.irfft2(1j * q * transform, s=whole.shape)[part].ravel() for q in (qx, qy)])
     tensor = slopes @ slopes.T / values.size
     eigenvalues, directions = np.linalg.eigh(tensor)
     mean_norm, fourth = BOTH if eigenvalues[0] > RESOLVED * eigenvalues[1] else RIDGES
@@ -106,7 +110,7 @@ def bearing(heights: FloatArray, sizes: tuple[float, float]) -> Bearing:
     first = min(MIN_TOP_POINTS, values.size) - 1
     tops = np.cumsum(whitened[order]) / count / mean_norm
     # pressures of full contact, E* |q| h_q/2, about their mean; lowest first
-    full = np.sort(np.fft.irfft2(transform * np.hypot(qx, qy) / 2, s=values.shape), axis=None)
+    full = np.sort(np.fft.irfft2(transform * np.hypot(qx, qy) / 2, s=whole.shape)[part], axis=None)
     pull = (np.cumsum(full) - full * count) / values.size
     return Bearing(
         float(values.std()),

@@ -248,7 +248,7 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
         )
         notes.append(note)
     sizes = values.shape[0] * unit_x, values.shape[1] * unit_y
-    curves = bearing.bearing(values, sizes)
+    curves = bearing.bearing(values, sizes, tuple(slice(count) for count in treated.heights.shape))
     known = MeasuredSurface(
         bins.q,
         C_bins,

@@ -499,3 +499,17 @@ def test_ridges_are_a_line_seen_twice(periodic):
         answers = [contact(one, area=[0.01, 0.1], theory=theory) for one in (ridges, turned)]
         assert not answers[0].valid.any()
         assert answers[1].force == pytest.approx(answers[0].force, rel=0.05)
+
+
+@pytest.mark.parametrize("turn", [0.0, math.pi / 4, 1.0])
+def test_a_lay_at_an_angle_to_the_axes_is_seen(turn):
+    count = 512
+    k = np.stack(np.meshgrid(np.fft.fftfreq(count, 1 / count), np.fft.rfftfreq(count, 1 / count), indexing="ij"))
+    along, across = np.tensordot([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]], k, 1)
+    q = np.hypot(4 * along, across)
+    noise = np.fft.rfft2(np.random.default_rng(4).standard_normal((count, count)))
+    heights = np.fft.irfft2(noise * np.where((q > 20) & (q < 200), np.maximum(q, 1.0) ** -1.8, 0))
+    assert Surface.from_map(heights, 1.0, periodic=True).anisotropy == pytest.approx(4, rel=0.05)
+    found = Surface.from_map(heights[:400, :300], 1.0)
+    assert found.anisotropy == pytest.approx(4, rel=0.1)
+    assert found.anisotropy == found.bearing.anisotropy
