@@ -7,7 +7,8 @@ the polynomials and bounds their errors.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -104,7 +105,7 @@ def contact_law(
     '0.0001832, 2.276'
     """
     given, units = modulus_and_units(E_star, surface)
-    modulus = number_in("E_star", given, np.finfo(float).tiny, np.finfo(float).max)
+    modulus = number_in("E_star", given, sys.float_info.min, sys.float_info.max)
     if theory == Mbma.name:
         chosen: Theory = Mbma(tier, reading)
     else:
@@ -160,7 +161,7 @@ def _mbma_law(surface: AnySurface, tier: Any, reading: Reading, rtol: float, fac
     start, first = first_record(lambda start: power_record(values, start, POWERS), octaves, tolerance)
     facts |= {"theory": "mbma", "reading": reading.name, "tier": model.name}
     side, limits = Side(-1, start, values, tuple(places)), (h_max - end, math.inf)
-    return _finish(1 / end, [side], tolerance, first, limits, 0.0, errors, islands.leverage, facts)
+    return _finish(1 / end, [side], tolerance, first, limits, 0.0, lambda: max(errors), islands.leverage, facts)
 
 
 class Islands(NamedTuple):
@@ -246,12 +247,16 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[st
     beyond = 0.0 if ends else 2 * float(theory.energy(surface, np.array(highest)))
     limits = 2 * lowest - h_max, math.inf if ends else 2 * highest - h_max
     facts |= {"theory": theory.name, "reading": "", "tier": ""}
-    return _finish(1 / (2 * width), sides, tolerance, first, limits, beyond, errors, 0.0, facts)
+
+    def own_error() -> float:
+        return max(float(each.max()) for each in errors)
+
+    return _finish(1 / (2 * width), sides, tolerance, first, limits, beyond, own_error, 0.0, facts)
 
 
 def _finish(
     scale: float, sides: list[Side], tolerance: float, first: First, limits: tuple[float, float], beyond: float,
-    own_errors: Sequence[Any], leverage: float, facts: dict[str, Any],
+    own_error: Callable[[], float], leverage: float, facts: dict[str, Any],
 ) -> ContactLaw:  # fmt: skip
     """Fit the sides, put the block together, and look for turning points."""
     h_max, (lowest, highest) = float(facts["surface"].h_max), limits
@@ -259,36 +264,36 @@ def _finish(
     pieces: list[Pieces] = [side_pieces(side, tolerance) for side in sides]
     ends = (
         lowest if lowest == -h_max else lowest - ROUNDING * h_max,
-        np.finfo(float).max if highest == math.inf else highest * (1 + ROUNDING),
+        sys.float_info.max if highest == math.inf else highest * (1 + ROUNDING),
     )
     block, records, errors = assemble(h_max, scale, sides, pieces, first, ends)
     order, signs = order_of(sides, pieces)
     fill_energies(records, order, signs, scale, first[2][0], beyond)
-    own = records[order]
+    in_order = records[order]
 
     def gap(turn: tuple[int, float] | None) -> float | None:
         if turn is None:
             return None
         place, t = turn
-        x = own[place, kernel.CENTRE] + t / own[place, kernel.RATE]
+        x = in_order[place, kernel.CENTRE] + t / in_order[place, kernel.RATE]
         return float(signs[place] * (x / scale - h_max))
 
-    turns = [gap(turn) for turn in first_falls(own, signs)]
+    turns = [gap(turn) for turn in first_falls(in_order, signs)]
     # forces carry the modulus
     records[:, FORCE_AT:AREA_AT] *= facts["E_star"]
     records[:, kernel.ENERGY_AT] *= facts["E_star"]
     block.flags.writeable = False
-    error, own_error = float(errors[:, 0].max()), max(float(np.max(each)) for each in own_errors)
+    error, own = float(errors[:, 0].max()), own_error()
     return ContactLaw(
         **facts,
         h_max=h_max,
         lowest=lowest,
         highest=highest,
-        error=error + own_error,
+        error=error + own,
         turning_point=turns[0],
         area_turning_point=turns[1],
         block=block,
-        errors=errors + np.array([0.0, leverage * own_error]),
+        errors=errors + np.array([0.0, leverage * own]),
     )
 
 

@@ -161,11 +161,18 @@ def side_pieces(side: Side, rtol: float) -> Pieces:
     return Pieces(whole[:, :RECORD], whole[:, RECORD:-1], rows)
 
 
+@functools.cache
+def _equal(e: int, count: int) -> list[tuple[float, float]]:
+    """Ends of the equal buckets of an octave."""
+    return list(itertools.pairwise(2.0**e * (1 + k / count) for k in range(count + 1)))
+
+
 def _buckets(side: Side, e: int, count: int) -> list[tuple[float, float]]:
-    """Ends of the buckets of an octave, cut at kinks."""
-    equal = (2.0**e * (1 + k / count) for k in range(count))
-    edges = {edge if edge > side.start * (1 + 1e-15) else side.start for edge in equal}
-    edges |= {kink for kink in side.kinks if 2.0**e < kink < 2.0 ** (e + 1)}
+    """They, cut at kinks."""
+    equal, inside = _equal(e, count), {kink for kink in side.kinks if 2.0**e < kink < 2.0 ** (e + 1)}
+    if side.start <= 2.0**e and not inside:
+        return equal
+    edges = {low if low > side.start * (1 + 1e-15) else side.start for low, _ in equal} | inside
     return list(itertools.pairwise([*sorted(edges), 2.0 ** (e + 1)]))
 
 
@@ -275,24 +282,26 @@ def fill_energies(records: FloatArray, order: Any, signs: FloatArray, scale: flo
 def first_falls(own: FloatArray, signs: FloatArray) -> list[tuple[int, float] | None]:
     """Where force, and area, first stop rising with compression: place among records in its order, t; None if never."""
     series = own[:, FORCE_AT:ENERGY_AT].reshape(-1, KEPT)
+    found: list[tuple[int, float] | None] = [None, None]
     # a polynomial whose Bernstein coefficients are positive is positive
-    doubtful = (series @ _bernstein() * -np.repeat(signs, 2)[:, None]).min(axis=1) <= 0
-    return [_first_fall(series[row::2], signs, np.flatnonzero(doubtful[row::2])) for row in (0, 1)]
+    for k in np.flatnonzero((series @ _bernstein() * -np.repeat(signs, 2)[:, None]).min(axis=1) <= 0).tolist():
+        place, row = divmod(k, 2)
+        t = None if found[row] else _first_fall(-signs[place] * series[k], float(signs[place]))
+        found[row] = found[row] if t is None else (place, t)
+    return found
 
 
-def _first_fall(series: FloatArray, signs: FloatArray, doubtful: Any) -> tuple[int, float] | None:
-    for k in doubtful:
-        slope, end = np.polynomial.Polynomial(-signs[k] * series[k]).deriv(), float(signs[k])
-        if slope(end) <= 0:
-            return int(k), end
-        roots = slope.roots()
-        real = roots[np.isreal(roots) & (np.abs(roots) < 1)].real
-        # the first on the way from last contact; slopes at double roots do not change sign
-        way = [*sorted(real, key=lambda t: abs(t - end)), -end]
-        for root, following in itertools.pairwise(way):
-            if slope((root + following) / 2) < 0:
-                return int(k), float(root)
-    return None
+def _first_fall(series: FloatArray, end: float) -> float | None:
+    """t at which a polynomial first falls on the way from an end of [-1, 1] to the other."""
+    slope = np.polynomial.Polynomial(series).deriv()
+    if slope(end) <= 0:
+        return end
+    roots = slope.roots()
+    real = roots[np.isreal(roots) & (np.abs(roots) < 1)].real
+    # slopes at double roots do not change sign
+    way = [*sorted(real, key=lambda t: abs(t - end)), -end]
+    falls = (float(root) for root, following in itertools.pairwise(way) if slope((root + following) / 2) < 0)
+    return next(falls, None)
 
 
 @functools.cache
