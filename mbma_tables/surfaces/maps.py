@@ -96,7 +96,8 @@ def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2
     own = unit if own is None else known(own)
     if own is not None and unit not in (None, own):
         by, own = factor(own, unit), unit
-        grid, steps = grid * by, tuple(step * by for step in steps)
+        # steps that are given are in the unit that is
+        grid, steps = grid * by, steps if lengths else tuple(step * by for step in steps)
     units = Units(own)
     given |= {name: units.number(name, given[name]) for name in given.keys() & {*LENGTHS, "outliers"}}
     return treat(grid, steps, whole, Treatment(**given), own, info)
@@ -130,7 +131,8 @@ def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | N
     return _with_anisotropy(fitted, q, C * waves, directions)
 
 
-LONG = 4.0  # grid steps in wavenumber: waves up to there are few, and a window weighs them by chance
+# grid steps in wavenumber: waves below are few, and a window weighs them by chance; no wave lies at a rounding's mercy
+LONG = 4.0 * (1 - 1e-9)
 RAISED, MET = 6.0, 1e-6  # of ln C, by which the strongest waves under a window may change; sums that are met
 STEEPEST = 4.0  # by which `matched` may tilt a spectrum
 TOLD = 0.05  # relative difference of rms gradients that is told, and half of that of h_rms

@@ -158,7 +158,9 @@ def grid_of(
             raise InputError("dx is missing: the sampling step of a plain array of heights")
         given = {"dx": dx, "dy": dx if dy is None else dy} if dimensions == 2 else {"dx": dx}
         steps = tuple(sampling_step(name, value) for name, value in given.items())
-        return source, steps, bool(periodic), None, {}
+        # of a DataArray
+        stated = getattr(source, "attrs", {}).get("units")
+        return source, steps, bool(periodic), None if stated in ("", "1") else stated, {}
     if dx is not None or dy is not None:
         raise InputError("dx and dy belong to a plain array; a topography has its own physical_sizes")
     if not getattr(source, "is_uniform", True):

@@ -84,8 +84,11 @@ class Surface(AnySurface):
     provenance: tuple[Mapping[str, Any], ...] = dataclasses.field(default=(), repr=False, kw_only=True)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "unit", Units(self.unit).length)
+        units = Units(self.unit)
+        object.__setattr__(self, "unit", units.length)
         if self.labelled:
+            for name in PARAMETERS:
+                units.number(name, getattr(self, name))
             # perhaps lazy: checked block by block, where numbers are computed
             return
         given = {name: finite_array(name, getattr(self, name)) for name in PARAMETERS}

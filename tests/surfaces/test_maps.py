@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
@@ -513,3 +513,18 @@ def test_a_lay_at_an_angle_to_the_axes_is_seen(turn):
     found = Surface.from_map(heights[:400, :300], 1.0)
     assert found.anisotropy == pytest.approx(4, rel=0.1)
     assert found.anisotropy == found.bearing.anisotropy
+
+
+@settings(max_examples=20, deadline=None)
+@example(scale=0.26362359173243805, lift=0.0, periodic=False, square=False)
+@given(scale=st.floats(1e-6, 1e6), lift=st.floats(-1e6, 1e6), periodic=st.booleans(), square=st.booleans())
+def test_neither_units_nor_heights_from_afar_matter(scale, lift, periodic, square):
+    # waves on the axes lie where a range of wavenumbers ends
+    heights = BASE[::4, ::4] if square else BASE[:48, :40]
+    heights = heights / heights.std()
+    plain = Surface.from_map(heights, 0.5, periodic=periodic)
+    found = Surface.from_map(scale * (heights + lift), scale * 0.5, periodic=periodic)
+    assert found.h_rms == pytest.approx(scale * plain.h_rms, rel=1e-7)
+    assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=1e-7)
+    assert found.m4 == pytest.approx(plain.m4 / scale**2, rel=1e-6)
+    assert found.bearing.anisotropy == pytest.approx(plain.bearing.anisotropy, rel=1e-6)

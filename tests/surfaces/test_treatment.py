@@ -242,6 +242,20 @@ class TestReading:
             other = Surface.from_map(tmp_path / "a.xyz", unit="mm")
             assert other.h_rms == pytest.approx(1e-3 * found.h_rms, rel=1e-9)
 
+    def test_units_of_a_labelled_array(self):
+        xr = pytest.importorskip("xarray")
+        plain = Surface.from_map(MAP, STEP)
+        own = xr.DataArray(MAP, dims=("x", "y"), attrs={"units": "um"})
+        for dx, unit, scale in ((STEP, None, 1.0), (STEP * 1e-3, "mm", 1e-3), (f"{1e3 * STEP} nm", None, 1e3)):
+            found = Surface.from_map(own, dx, unit=unit)
+            assert found.h_rms == pytest.approx(scale * plain.h_rms, rel=1e-9)
+            assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=1e-9)
+            assert found.unit == {1.0: "um", 1e-3: "mm", 1e3: "nm"}[scale]
+        with pytest.raises(InputError, match="'V' is no known unit of length"):
+            Surface.from_map(own.assign_attrs(units="V"), STEP)
+        with pytest.raises(InputError, match="h_rms is in 'um' by its attribute units, and asked for in 'mm'"):
+            Surface(0.8, 1.0, 100.0, xr.DataArray(1.0, attrs={"units": "um"}), 3.0, unit="mm")
+
     def test_units_of_points_that_differ_along_the_axes(self, tmp_path):
         points = [(i, j, MAP[i, j]) for i in range(40) for j in range(40)]
         np.savetxt(tmp_path / "a.xyz", points, header="x [um] y [mm] z [nm]")
