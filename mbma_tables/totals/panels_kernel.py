@@ -95,12 +95,12 @@ def _fill_far(
     low: float, high: float, below: Nodes, stop: int, points: FloatArray, to_series: FloatArray, out: FloatArray
 ) -> float:
     """Series of ln(F), ln(A) and their slopes over compressions in [low, high], of islands below; their error."""
-    values, sums = np.empty((4, points.size)), np.empty(4)
+    values, sums, begin = np.empty((4, points.size)), np.empty(4), below.stops[0]
     for k in range(points.size):
         c = 0.5 * (low + high + (high - low) * points[k])
-        least = _least(c, below, 0, stop, math.inf)
+        least = _least(c, below, begin, stop, math.inf)
         sums.fill(0.0)
-        _sum_at(c, least, below, 0, stop, sums)
+        _sum_at(c, least, below, begin, stop, sums)
         values[0, k], values[1, k] = math.log(sums[0]) - 0.5 * least, math.log(sums[1]) - 0.5 * least
         values[2, k], values[3, k] = sums[2] / sums[0], sums[3] / sums[1]
     for row in range(4):
@@ -137,7 +137,9 @@ def fill_series(
     most = (NODES + MORE) // 2
     inside, ends, values = np.empty((4, NODES * (most + 1))), np.empty((4, most)), np.empty((2, 2 * most))
     sums, far, steepest = np.empty(4), np.zeros((4, points.size)), np.empty(2)
-    missed, begin, stop, start, until = 0.0, 0, 0, 0.0, 0.0
+    # no literal 0, for which numba would compile everything again
+    begin = stop = islands.stops[0]
+    missed = start = until = 0.0
     for panel in range(low.size):
         rule, width = rules[kinds[panel]], high[panel] - low[panel]
         count, gaps = rule.nodes.size, rule.ends.shape[1]
