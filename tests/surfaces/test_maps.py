@@ -528,3 +528,13 @@ def test_neither_units_nor_heights_from_afar_matter(scale, lift, periodic, squar
     assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=1e-7)
     assert found.m4 == pytest.approx(plain.m4 / scale**2, rel=1e-6)
     assert found.bearing.anisotropy == pytest.approx(plain.bearing.anisotropy, rel=1e-6)
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_waves_that_one_axis_alone_samples_are_told(periodic):
+    even = Surface.from_map(BASE, STEP, periodic=periodic)
+    assert not any(entry["step"] == "corners" for entry in even.provenance)
+    uneven = Surface.from_map(BASE[:, ::4], STEP, 4 * STEP, periodic=periodic)
+    (entry,) = (entry for entry in uneven.provenance if entry["step"] == "corners")
+    assert entry["rms_gradient"] == pytest.approx(uneven.bearing.gradient / uneven.rms_gradient, rel=0.02)
+    assert "are left out of the spectrum: with them the rms gradient would be 1." in entry["told"]
