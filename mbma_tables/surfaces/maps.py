@@ -254,7 +254,7 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
     rougher = curves.gradient / math.sqrt(squares(values, (unit_x, unit_y), (0.0, float(q[-1]) * (1 + 1e-9)))[1])
     if rougher > 1 + TOLD:
         told = (
-            f"waves that only one axis or the diagonals sample are left out of the spectrum: with them the rms gradient "
+            "waves that only one axis or the diagonals sample are left out of the spectrum: with them the rms gradient "
             f"would be {rougher:.2f} times as large"
         )
         notes.append({"step": "corners", "rms_gradient": rougher, "told": told})

@@ -17,6 +17,7 @@ import numpy as np
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces.heights import Heights, one_height
+from mbma_tables.surfaces.maps import MIN_POWER
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 
@@ -95,9 +96,11 @@ class ProfileSpectrum:
         middle = np.log(fine[1:] * fine[:-1]) / 2
         between = np.stack([np.interp(middle, log_q, row) for row in np.eye(log_q.size)], axis=1)
         independent = np.maximum(self.count, 1.0)
-        weight = np.sqrt(independent)
+        # bins that hold no wave, as of a square one, tell nothing
+        lit = self.mean > MIN_POWER * self.mean.max()
+        weight, mean = np.sqrt(independent) * lit, np.where(lit, self.mean, 1.0)
         # the logarithm of a mean of few waves lies low
-        wanted = np.log(self.mean) - digamma(independent) + np.log(independent)
+        wanted = np.log(mean) - digamma(independent) + np.log(independent)
         bend = np.diff(np.diff(np.eye(log_q.size), axis=0) / np.diff(log_q)[:, None], axis=0) / STRAIGHT
         sums = np.stack([np.pi * np.diff(fine**2), np.pi / 2 * np.diff(fine**4)])
         totals = np.log([self.h_rms**2, self.gradient**2])
@@ -114,7 +117,7 @@ class ProfileSpectrum:
             return np.vstack([weight[:, None] * seen, bend, HELD * held])
 
         middles = np.sqrt(self.edges[1:] * self.edges[:-1])
-        start = np.interp(log_q, np.log(middles), np.log(self.mean / (2 * np.pi * middles)))
+        start = np.interp(log_q, np.log(middles[lit]), np.log(mean[lit] / (2 * np.pi * middles[lit])))
         return np.asarray(np.exp(least_squares(deviations, start, jac=jacobian).x))
 
 

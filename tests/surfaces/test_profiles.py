@@ -144,3 +144,13 @@ def test_files_and_scans(tmp_path):
 def test_refused(line, error, message):
     with pytest.raises(error, match=message):
         Surface.from_profile(line, 1.0)
+
+
+@pytest.mark.parametrize("wave", [np.sign, np.abs, lambda sine: sine + 0.1 * sine**9])
+def test_a_line_of_few_waves_keeps_its_variance_and_gradient(wave):
+    # most bins of its spectrum hold none
+    line = wave(np.sin(2 * np.pi * (np.arange(512) + 0.5) / 64))
+    slope = np.fft.irfft(2j * np.pi * np.fft.rfftfreq(512, 0.5) * np.fft.rfft(line))
+    found = Surface.from_profile(line, 0.5, periodic=True)
+    assert found.h_rms == pytest.approx(line.std(), rel=1e-3)
+    assert found.rms_gradient == pytest.approx(np.sqrt(2) * slope.std(), rel=1e-3)
