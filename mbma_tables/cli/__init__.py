@@ -46,6 +46,8 @@ def _describe(fault: Exception) -> str:
 SAID = {
     "surface.fit()": "--model self-affine",
     "outside='exact'": "--tier exact",
+    "ask method='full', or ": "give ",
+    "Surface.from_profile takes line scans": "--model measured takes line scans",
     "give the surface its unit": "give --length-unit",
     "force must be": "--pressure must be",
     "k1 must be": "--conductivity must be",

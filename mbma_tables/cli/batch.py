@@ -61,7 +61,10 @@ def batch_command(
     """
     from mbma_tables.theories.contact import contact
 
-    lines = list(_lines(file))
+    try:
+        lines = list(_lines(file))
+    except csv.Error as fault:
+        raise InputError(f"{file} cannot be read: {fault}") from None
     given = {name for _, row in lines for name in row if name in LOADS} | set(loads)
     if len(given) != 1:
         raise InputError("one of separation, mean_separation, pressure and area is needed, as an option or a column")
@@ -106,7 +109,10 @@ def _lines(file: Path) -> Any:
     text = read_file(file, MAX_BYTES).decode("utf-8-sig", "replace")
     rows = csv.DictReader(line for line in io.StringIO(text, newline=""))
     known = {"name", "surface", *NUMBERS, *MATERIAL, *LOADS}
-    unknown = [name for name in rows.fieldnames or () if name.strip() not in known]
+    names = [name.strip() for name in rows.fieldnames or ()]
+    if repeated := sorted({name for name in names if names.count(name) > 1}):
+        raise InputError(f"{file}: more than one column {', '.join(repeated)}")
+    unknown = [name for name in names if name not in known]
     if unknown:
         raise InputError(f"{file}: unknown columns {', '.join(unknown)}; there are {', '.join(sorted(known))}")
     empty = True

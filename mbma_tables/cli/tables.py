@@ -19,7 +19,7 @@ def _path(name: str) -> Path:
     return shipped(name) if name in KINDS else Path(name)
 
 
-@click.group("tables")
+@click.group("tables", no_args_is_help=False)
 def tables_group() -> None:
     """List, describe and check tables."""
 

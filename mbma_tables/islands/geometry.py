@@ -51,7 +51,7 @@ def summit_sigma(m0: Any, alpha: Any, summits: bool) -> Any:
     return np.sqrt((1.0 - (BROADENING / alpha if summits else 0.0)) * m0)
 
 
-@np.errstate(under="ignore")
+@np.errstate(under="ignore", over="ignore")  # a square that overflows lies beyond the floors
 def geometry(approach: FloatArray, hurst: Any, zeta_1: Any, reading: Reading) -> dict[str, FloatArray]:
     """`FIELDS` of islands at delta/h_rms = approach > 0; arguments of one shape, or numbers for one surface."""
     log_zeta_1 = np.log(zeta_1)

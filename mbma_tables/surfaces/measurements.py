@@ -165,7 +165,10 @@ def grid_of(
         raise InputError("dx and dy belong to a plain array; a topography has its own physical_sizes")
     if not getattr(source, "is_uniform", True):
         # its points are nearly as dense where they are not even
-        source = source.to_uniform(nb_points=source.nb_grid_pts[0])
+        try:
+            source = source.to_uniform(nb_points=source.nb_grid_pts[0])
+        except RuntimeError:
+            raise InputError("the points of a line scan must be in the order of rising x") from None
     grid = source.heights()
     sizes = getattr(source, "physical_sizes", None)
     if np.ndim(grid) != dimensions or sizes is None or np.shape(sizes) != (dimensions,):
@@ -175,7 +178,8 @@ def grid_of(
             f"{np.shape(grid)} and {sizes}; {other}"
         )
     extent = finite_array("physical_sizes", sizes)
-    require("physical_sizes", extent, (extent >= MIN_LENGTH) & (extent <= MAX_LENGTH), "in [1e-30, 1e30]")
+    allowed = "in [1e-30, 1e30], x and y rising"
+    require("physical_sizes", extent, (extent >= MIN_LENGTH) & (extent <= MAX_LENGTH), allowed)
     if periodic is None:
         periodic = getattr(source, "is_periodic", False)
     found = tuple(float(size) / max(count, 1) for size, count in zip(extent, np.shape(grid), strict=True))

@@ -292,6 +292,7 @@ def test_bad_input_of_every_command(folder, arguments, message):
         (["curve", "--plot", "no/such/c.png"], "cannot be written"),
         (["island"], "--delta"),
         (["island", "--delta", "0"], "--delta must be positive, got 0"),
+        (["island", "--delta", "1e300"], "X must be in [-6.25, 41]"),
     ],
 )
 def test_bad_input_of_one_command(folder, arguments, message):

@@ -114,3 +114,8 @@ def test_plain_lengths_of_a_map_are_in_the_unit_asked_for(map_file):
     assert found["h_rms"] == pytest.approx(1e3 * float(own.h_rms))
     surface = json.loads(run("contact", "--map", map_file, "-a", "0.01", *words))["surface"]
     assert surface["h_rms"] == pytest.approx(1e3 * float(own.h_rms))
+
+
+def test_five_numbers_of_a_line_are_refused_in_the_words_of_the_shell(line_file):
+    said = refused("contact", "--map", line_file, "--model", "self-affine", "-a", "0.1")
+    assert "--model measured takes line scans" in said

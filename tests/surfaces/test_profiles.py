@@ -146,6 +146,18 @@ def test_refused(line, error, message):
         Surface.from_profile(line, 1.0)
 
 
+def test_points_of_a_line_go_forward(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    x, z = np.random.default_rng(1).random(100), np.random.default_rng(2).normal(size=100).cumsum()
+    for places, message in (
+        (x, "must be in the order of rising x"),
+        (np.arange(100)[::-1], "x and y rising, got -100"),
+    ):
+        np.savetxt(tmp_path / "line.txt", np.c_[places, z])
+        with pytest.raises(InputError, match=message):
+            Surface.from_profile(tmp_path / "line.txt")
+
+
 @pytest.mark.parametrize("wave", [np.sign, np.abs, lambda sine: sine + 0.1 * sine**9])
 def test_a_line_of_few_waves_keeps_its_variance_and_gradient(wave):
     # most bins of its spectrum hold none
