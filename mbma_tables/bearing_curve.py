@@ -12,6 +12,7 @@ from scipy.special import ndtr, ndtri
 from mbma_tables.arguments import FloatArray
 from mbma_tables.bearing import FRACTIONS
 from mbma_tables.compiled import njit
+from mbma_tables.errors import InputError
 
 LINEAR, LEAST = 8.3, 1e-300  # mean gaps from which u = d, and below which all heights lie above the level
 LOG_GAPS, NODES = (-12.0, math.log(8.3)), 16384  # of tabulated levels
@@ -142,6 +143,10 @@ class BearingCurve:
         for k, own in enumerate(gap):
             if 0 < own < (1 - MIN_SPACING) * last and share[k] < MOST_SHARE:
                 kept[k], last = True, own
+        if not kept.any():
+            raise InputError(
+                f"nearly {MOST_SHARE:.0%} of the map or more is at its highest point: it has no bearing curve"
+            )
         self._top, self._lightest, self._h_max = float(gap[kept][0]), float(share[kept][0]), h_max
         # against Gaussian heights; valleys below the last node as deep as theirs
         level, own = _levels_at(gap[kept][::-1]), -ndtri(share[kept][::-1])
