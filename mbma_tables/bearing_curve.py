@@ -145,7 +145,7 @@ class BearingCurve:
                 kept[k], last = True, own
         if not kept.any():
             raise InputError(
-                f"nearly {MOST_SHARE:.0%} of the map or more is at its highest point: it has no bearing curve"
+                f"nearly {MOST_SHARE:.0%} of the map or more is its highest point: it has no bearing curve"
             )
         self._top, self._lightest, self._h_max = float(gap[kept][0]), float(share[kept][0]), h_max
         # against Gaussian heights; valleys below the last node as deep as theirs

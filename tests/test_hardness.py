@@ -15,8 +15,8 @@ from generate.boundary_elements.surfaces import Recipe, heights
 from generate.calibrated_hardness import BARS, FORMS, OTHERS, blind
 from mbma_tables import hardness
 from mbma_tables.bearing import bearing
-from mbma_tables.errors import InputError
 from mbma_tables.boundary_elements import Contact as Elastic
+from mbma_tables.errors import InputError
 from mbma_tables.files import shipped_file
 from mbma_tables.theories.calibrated_table import shipped_part
 
@@ -87,7 +87,7 @@ def test_a_flat_with_a_pit_has_no_bearing_curve():
     pit = np.zeros((64, 64))
     pit[30, 30] = -1
     known = bearing(pit, (1.0, 1.0))
-    with pytest.raises(InputError, match="of the map or more is at its highest point"):
+    with pytest.raises(InputError, match="of the map or more is its highest point"):
         hardness.BearingCurve(known.mean_height / known.h_rms, known.h_max / known.h_rms)
 
 
