@@ -82,6 +82,9 @@ def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2
     Without a number of `dimensions`, a file decides.
     """
     given = {name: value for name, value in options.items() if value is not None}
+    for name in given.keys() & {"periodic", "reliable"}:
+        if not isinstance(given[name], bool | np.bool_):
+            raise InputError(f"{name} must be True or False, got {given[name]!r}")
     lengths, unit = resolve({name: given.pop(name) for name in ("dx", "dy") if name in given}, given.pop("unit", None))
     channel, periodic = given.pop("channel", None), given.pop("periodic", None)
     if isinstance(source, str | os.PathLike):
@@ -112,8 +115,8 @@ def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | N
     q, C, waves, directions = _within_band(treated, 1.0, radial_spectrum(treated.windowed() / scale, *treated.steps))
     C = C * scale**2
     steps = [2 * math.pi / (n * d) for n, d in zip(treated.heights.shape, treated.steps, strict=True)]
-    independent = 1.0 if treated.periodic else WINDOW_OVERLAP
-    low = float(q[0]) if treated.periodic else max(WINDOW_LOBE * max(steps), float(q[0]))
+    independent = 1.0 if treated.plain else WINDOW_OVERLAP
+    low = float(q[0]) if treated.plain else max(WINDOW_LOBE * max(steps), float(q[0]))
     fitted = fit_spectrum(
         q,
         C,
@@ -124,7 +127,7 @@ def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | N
         band=check_band(band, float(q[0]), float(q[-1])),
         power=float(np.mean((treated.windowed() / scale) ** 2)) * scale**2,
         convention="paper",
-        windowed=not treated.periodic,
+        windowed=not treated.plain,
         detrend=next(step["mode"] for step in treated.provenance if step["step"] == "detrend"),
         length_unit=treated.unit,
     )
@@ -228,19 +231,19 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
     scale = float(np.abs(treated.heights).max())
     values, (unit_x, unit_y) = treated.heights / scale, (step / scale for step in treated.steps)
     q, C, waves, _ = _within_band(treated, scale, radial_spectrum(treated.windowed() / scale, unit_x, unit_y))
-    bins = log_bins(q, C, waves / (2.0 if treated.periodic else 2.0 * WINDOW_OVERLAP))
+    bins = log_bins(q, C, waves / (2.0 if treated.plain else 2.0 * WINDOW_OVERLAP))
     # of ridges, or of a few cosines, some hold no wave
     bins = bins[bins.log_c > bins.log_c.max() + math.log(MIN_POWER)]
     own = Heights.of(values)
     C_bins, notes = np.exp(bins.log_c), []
-    if treated.periodic:
+    if treated.plain:
         square = float((C * waves) @ q**2 / (C @ waves))
         changed = raised(bins.q, C_bins, own.h_rms**2, own.h_rms**2 * square)
         # a tilt where no waves are the few longest, as of a step
         C_bins = matched(bins.q, C_bins, own.h_rms**2, square) if changed is C_bins else changed
     else:
         grid = [2 * math.pi / (count * step) for count, step in zip(values.shape, (unit_x, unit_y), strict=True)]
-        slopes, values = C * waves * q**2 * grid[0] * grid[1], mirrored(values)
+        slopes, values = C * waves * q**2 * grid[0] * grid[1], values if treated.periodic else mirrored(values)
         C_bins, note = _unwindowed(
             bins.q,
             C_bins,
@@ -268,7 +271,8 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
         1 / (1 / bins.weight - SCATTER**2),
         curves.anisotropy,
     ).scaled(scale, treated.unit)
-    edges = "periodic" if treated.periodic else "under a window for the spectrum, mirrored for the curves"
+    edges = "periodic" if treated.plain else "under a window for the spectrum"
+    edges += "" if treated.periodic else ", mirrored for the curves"
     return dataclasses.replace(
         known, provenance=(treated.read, *treated.provenance, {"step": "edges", "kind": edges}, *notes)
     )

@@ -54,7 +54,7 @@ class ProfileSpectrum:
         transform = step * np.fft.rfft(treated.windowed())
         last = (heights.size - 1) // 2
         q, C = unit * np.arange(1, last + 1), np.abs(transform[1 : last + 1]) ** 2 / length
-        overlap = 1.0 if treated.periodic else OVERLAP
+        overlap = 1.0 if treated.plain else OVERLAP
         low, high = treated.waves
         held = (q >= low * (1 - 1e-9)) & (q <= high * (1 + 1e-9))
         if held.any():
@@ -145,7 +145,7 @@ def measured_profile(treated: Treated, h_max: Any) -> MeasuredSurface:
         heights,
         samples=np.interp(np.log(found.edges), np.log(found.edges[:-1]), found.count),
     ).scaled(scale, treated.unit)
-    edges = "periodic" if treated.periodic else "under a window for the spectrum"
+    edges = "periodic" if treated.plain else "under a window for the spectrum"
     notes = _limits(found, steps[0] * scaled.heights.size)
     provenance = (treated.read, *treated.provenance, {"step": "edges", "kind": edges}, *notes)
     return dataclasses.replace(surface, provenance=provenance)

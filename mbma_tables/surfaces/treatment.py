@@ -102,9 +102,14 @@ class Treated:
         record = {"step": "read", "points": list(shape), "steps": list(self.steps), "unit": self.unit}
         return record | {"told": told}
 
+    @property
+    def plain(self) -> bool:
+        """Whether the spectrum is taken without a window: where periodic, unless one is asked for."""
+        return self.periodic and self.window is None
+
     def windowed(self) -> FloatArray:
-        """Heights under a window of unit mean square, their mean under it removed; as they are where periodic."""
-        if self.window is None and self.periodic:
+        """Heights under a window of unit mean square, their mean under it removed; as they are where `plain`."""
+        if self.plain:
             return np.asarray(self.heights)
         if self.window is None:
             windows = [np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2 for count in self.heights.shape]

@@ -538,3 +538,10 @@ def test_waves_that_one_axis_alone_samples_are_told(periodic):
     (entry,) = (entry for entry in uneven.provenance if entry["step"] == "corners")
     assert entry["rms_gradient"] == pytest.approx(uneven.bearing.gradient / uneven.rms_gradient, rel=0.02)
     assert "are left out of the spectrum: with them the rms gradient would be 1." in entry["told"]
+
+
+def test_a_window_leaves_a_periodic_map_its_gradient():
+    plain, found = (Surface.from_map(BASE, STEP, periodic=True, window=window) for window in (None, "hann"))
+    assert found.h_rms == pytest.approx(plain.h_rms, rel=1e-5)
+    assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=0.01)
+    assert found.bearing.gradient == plain.bearing.gradient

@@ -242,6 +242,11 @@ class TestReading:
             other = Surface.from_map(tmp_path / "a.xyz", unit="mm")
             assert other.h_rms == pytest.approx(1e-3 * found.h_rms, rel=1e-9)
 
+    @pytest.mark.parametrize("name", ["periodic", "reliable"])
+    def test_a_text_is_no_yes(self, name):
+        with pytest.raises(InputError, match=f"{name} must be True or False, got 'no'"):
+            Surface.from_map(MAP, STEP, **{name: "no"})
+
     def test_units_of_a_labelled_array(self):
         xr = pytest.importorskip("xarray")
         plain = Surface.from_map(MAP, STEP)
