@@ -45,6 +45,7 @@ class Rule(NamedTuple):
     inside: FloatArray  # (n, (gaps + 1) n), at the nodes of the part below each of them
     ends: FloatArray  # (n, gaps), at the gaps
     series: FloatArray  # (2 gaps, 2 gaps), values and slopes at the gaps to a Chebyshev series
+    integrated: FloatArray  # the same by the slopes, of the values their mean alone
     to_series: FloatArray  # (n, n), values at the nodes to one
 
     def measure(self, width: FloatArray, places: FloatArray, rows: int) -> FloatArray:
@@ -64,7 +65,11 @@ def _rule(n: int, power: int) -> Rule:
     checks, halves, inside, ends = (to_series @ chebyshev.chebvander(2 * at - 1, n - 1).T for at in places)
     both = [chebyshev.chebval(points, terms), chebyshev.chebval(points, chebyshev.chebder(terms))]
     series: Any = np.linalg.inv(np.concatenate(both, axis=1))
-    return Rule(power, nodes, weights / 2, reach, checks, halves, inside, ends, series, to_series)
+    slopes: Any = np.linalg.inv(both[0][: points.size])
+    integrals = chebyshev.chebint(slopes, axis=1)
+    integrated = np.zeros_like(series)
+    integrated[: points.size, 0], integrated[points.size :, 1 : points.size + 1] = 1 / points.size, integrals[:, 1:]
+    return Rule(power, nodes, weights / 2, reach, checks, halves, inside, ends, series, integrated, to_series)
 
 
 @functools.cache

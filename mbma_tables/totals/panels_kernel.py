@@ -19,8 +19,9 @@ TAIL_SHARE = 2.0  # of the last two coefficients, for all that follow: they fall
 SLOPES = 0.1  # of their relative error counts
 MANY = 1000  # islands below, from which those far below are summed by series of TERMS
 FAR_ERROR = 5e-11  # of such a series, or they are summed after all
+THIN = 1e-2  # width over gap, of panels in which values round to more than slopes change
 BRANCHES = 32  # panels, of more a gap's is looked for by halves
-STRETCH, TERMS = 0.1, 12  # of the compression, or of h_rms, that one such series covers
+STRETCH, TERMS = 0.06, 8  # of the compression, or of h_rms, that one such series covers
 
 Rules = tuple[Rule, Rule, Rule]
 
@@ -183,12 +184,12 @@ def fill_series(
         _place(rule, width, 1.0, inside, gaps * count, islands, stop)
         stop += count
         islands.stops[panel + 1] = stop
-        error[panel] = missed
+        error[panel], thin = missed, width < THIN * high[panel]
         for row in range(2):
             made = out[panel, row, : 2 * gaps]
-            _combined(values[row], rule.series, made)
-            slopes = 4.0 * gaps * high[panel] / (width * steepest[row])
-            error[panel] = max(error[panel], missed + _tail(made) * (1.0 + SLOPES * slopes))
+            _combined(values[row], rule.integrated if thin else rule.series, made)
+            tail, slopes = _tail(made[: gaps + 1] if thin else made), 4.0 * gaps * high[panel] / (width * steepest[row])
+            error[panel] = max(error[panel], missed + tail * (1.0 + SLOPES * slopes))
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy", nogil=True)
