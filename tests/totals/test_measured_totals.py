@@ -102,6 +102,14 @@ def test_errors_hold_and_slopes_are_slopes(seed, share):
     assert two[2:] == pytest.approx(slopes, rel=2e-5)
 
 
+def test_slopes_hold_in_thin_panels():
+    # values of 5,000 samples round there to more than they change
+    model = get_model("universal", 1e-8, REPORTED)
+    many, few = (profile(rough(count=5000), model, REPORTED, 1e-10, size=size) for size in (None, 1))
+    c = np.linspace(0.01, 0.99, 50) * many.end
+    assert many.totals(c, slopes=True) == pytest.approx(few.totals(c, slopes=True), rel=1e-11)
+
+
 def test_first_contact_is_a_power_of_depth():
     surface = rough()
     found = contact(surface, surface.h_max - np.array([2**-44, 2**-43]))
