@@ -97,6 +97,11 @@ def bearing(heights: FloatArray, sizes: tuple[float, float], part: tuple[slice, 
     qx, qy = wavevectors(whole.shape, sizes)
     transform = np.fft.rfft2(whole)
     values = whole[part]
+    stiffness = np.hypot(qx, qy) / 2
+    for q, count in zip((qx, qy), whole.shape, strict=True):
+        if count % 2 == 0:
+            # the shortest wave is level at its points
+            q.flat[count // 2] = 0.0
     slopes = np.stack([np.fft.irfft2(1j * q * transform, s=whole.shape)[part].ravel() for q in (qx, qy)])
     tensor = slopes @ slopes.T / values.size
     eigenvalues, directions = np.linalg.eigh(tensor)
@@ -110,7 +115,7 @@ def bearing(heights: FloatArray, sizes: tuple[float, float], part: tuple[slice, 
     first = min(MIN_TOP_POINTS, values.size) - 1
     tops = np.cumsum(whitened[order]) / count / mean_norm
     # pressures of full contact, E* |q| h_q/2, about their mean; lowest first
-    full = np.sort(np.fft.irfft2(transform * np.hypot(qx, qy) / 2, s=whole.shape)[part], axis=None)
+    full = np.sort(np.fft.irfft2(transform * stiffness, s=whole.shape)[part], axis=None)
     pull = (np.cumsum(full) - full * count) / values.size
     return Bearing(
         float(values.std()),

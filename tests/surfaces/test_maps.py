@@ -545,3 +545,15 @@ def test_a_window_leaves_a_periodic_map_its_gradient():
     assert found.h_rms == pytest.approx(plain.h_rms, rel=1e-5)
     assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=0.01)
     assert found.bearing.gradient == plain.bearing.gradient
+
+
+@pytest.mark.parametrize("shape", [(64, 64), (63, 64), (64, 45)])
+def test_which_way_a_periodic_map_is_turned_does_not_matter(shape):
+    heights = np.random.default_rng(8).standard_normal(shape)  # up to the shortest wave
+    plain = Surface.from_map(heights, 1.0, periodic=True)
+    for turned in (heights.T, heights[::-1], heights[:, ::-1], np.roll(heights, (5, 9), (0, 1))):
+        found = Surface.from_map(turned, 1.0, periodic=True)
+        for name in ("gradient", "slope_kurtosis", "anisotropy"):
+            assert getattr(found.bearing, name) == pytest.approx(getattr(plain.bearing, name), rel=1e-12)
+        np.testing.assert_allclose(found.bearing.top_gradient, plain.bearing.top_gradient, rtol=1e-12)
+        assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=1e-9)
