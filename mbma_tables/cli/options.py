@@ -143,11 +143,6 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
     return specimen.in_units(length, stress)
 
 
-def _surface_names(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
-    """What a shell completes."""
-    return [name for name in CASES if name.startswith(incomplete)]
-
-
 # in the words of `mbma_tables.surfaces.treatment.Treatment`
 _MAP_OPTIONS = (
     quantity_option("--dx", "dx", help="Sampling step [length], of a map whose file has none;"),
@@ -180,8 +175,8 @@ over_h_rms = click.option("--over-h-rms", is_flag=True, help="The lengths given 
 _SPECIMEN_OPTIONS = (
     click.option(
         "--surface",
+        type=click.Choice(list(CASES)),
         metavar="NAME",
-        shell_complete=_surface_names,
         help="Surface: a case of the paper; `mbma surfaces` lists them.",
     ),
     click.option("--file", type=click.Path(path_type=Path), metavar="TOML", help="Surface: a TOML file."),

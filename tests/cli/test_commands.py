@@ -10,7 +10,7 @@ import helpers
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from helpers import run
+from helpers import random_map, run
 
 from mbma_tables import Surface, contact, island, theories
 from mbma_tables.cli import main
@@ -246,7 +246,7 @@ def test_out_holds_what_stdout_would(folder):
         (options(YANG_PERSSON | {"h_rms": -1.0}), "mbma: --h-rms must be positive, got -1"),
         (options(YANG_PERSSON | {"q1": 10.0}), "got --hurst, --q0, --q1, --h-rms, --h-max, --zeta-1"),
         (options(CONCRETE | {"m4": 0.5}), "alpha = m0 m4/m2^2 must be in"),
-        (["--surface", "granite"], "no surface is named 'granite'; there are yang-persson"),
+        (["--surface", "granite"], "'granite' is not one of 'yang-persson'"),
         (["--hurst", "0.8"], "(or --zeta-1 for --q1), or --hurst, --m0, --m2, --m4, --h-max, or roughness (--Rq, ...)"),
         (["--hurst", "1", "--h-max", "1", "--Rq", "1"], "with one of --longest, --shortest and --Sds, or --longest"),
         ([], "one surface is needed"),
@@ -327,17 +327,8 @@ def write_map(path, heights, **options) -> None:
         Topography(heights, (100.0, 100.0), **options).to_netcdf(str(path))
 
 
-def self_affine_heights(points: int, hurst: float) -> np.ndarray:
-    """A periodic map with C ~ q^(-2-2H) exactly up to half the Nyquist wavenumber, random phases."""
-    noise = np.fft.fft2(np.random.default_rng(5).standard_normal((points, points)))
-    waves = np.hypot(*np.meshgrid(np.fft.fftfreq(points), np.fft.fftfreq(points))) * points
-    inside = (waves >= 1) & (waves <= points / 4)
-    amplitude = np.where(inside, np.where(inside, waves, 1.0) ** (-1 - hurst), 0.0)
-    return np.fft.ifft2(noise / np.abs(noise) * amplitude).real * points
-
-
 def test_a_map_is_fitted_and_says_how_well(folder):
-    write_map(folder / "m.nc", self_affine_heights(128, 0.7), unit="um", periodic=True)
+    write_map(folder / "m.nc", random_map(128, 0.5 / 128, 0.25, 1.7, phases=True), unit="um", periodic=True)
     (folder / "s.toml").write_text("[surface]\nmap = 'm.nc'\nmodel = 'self-affine'\n")
     (folder / "sub").mkdir()
     os.chdir(folder / "sub")
