@@ -29,6 +29,12 @@ EXACT_RTOL = 1e-10  # of the exact solver, where it replaces a table
 CLOSED_FORM_ERROR = 1e-14
 
 
+def check_outside(outside: str) -> None:
+    """Refuse what is none of `OUTSIDE`."""
+    if outside not in OUTSIDE:
+        raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
+
+
 class IslandAnswer(NamedTuple):
     """Phi_F and Phi_A of islands, with a bound on their relative error; arrays of one shape.
 

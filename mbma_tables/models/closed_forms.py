@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.errors import InputError
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
+from mbma_tables.models import BOTH, EXACT_RTOL, IslandAnswer, check_outside
 from mbma_tables.models import closed_form_functions as printed
 from mbma_tables.models.closed_form_functions import CERTIFICATES, RANGES
 from mbma_tables.surfaces.surface import Surface
@@ -70,8 +70,7 @@ class FormulaModel:
         ------
         InputError, OutOfRangeError
         """
-        if outside not in OUTSIDE:
-            raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
+        check_outside(outside)
         given = {"X": finite_array("X", X), "mu": finite_array("mu", mu)}
         require("mu", given["mu"], given["mu"] >= 0, "at least 0")
         shape = broadcast_shape(**given)

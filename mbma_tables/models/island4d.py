@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import os
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
@@ -18,7 +17,7 @@ from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, Coordinates, band_fields, hat_scales, to_axes
 from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.models import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer
+from mbma_tables.models import BOTH, EXACT_RTOL, IslandAnswer, check_outside
 from mbma_tables.plots import draw_lines
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.interpolate import fill_4d, fill_gradient_4d
@@ -83,6 +82,7 @@ class Island4dModel(Displayed):
         self.content = content
         self.reading = get_reading(content.attributes["reading"])
         self._X, self._spread, _, self._hurst = content.axes
+        self._error: FloatArray = content.local_error.max(axis=-1)
 
     def _facts(self) -> dict[str, str]:
         return self.content.facts()
@@ -131,8 +131,7 @@ class Island4dModel(Displayed):
         ------
         InputError, OutOfRangeError
         """
-        if outside not in OUTSIDE:
-            raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
+        check_outside(outside)
         if derivatives and outside == "exact":
             raise InputError("derivatives come from the table: outside must be 'raise' or 'nan' with them")
         shape, raw = _broadcast(delta_over_h_rms, zeta_d, zeta_u, hurst)
@@ -188,18 +187,18 @@ class Island4dModel(Displayed):
         return IslandAnswer(phi[0].reshape(shape), phi[1].reshape(shape), error.reshape(shape))
 
     def _covers(self, place: Coordinates) -> NDArray[np.bool_]:
-        inside = np.ones(place.X.shape, dtype=bool)
-        for axis, x in zip(self.content.axes, place.axes, strict=True):
-            # below the first spread the expansion about the rigid sphere answers
-            inside &= (x <= axis.high) & ((x >= axis.low) | (axis.name == "spread"))
-        return inside
+        # below the first spread the expansion about the rigid sphere answers
+        covered = [
+            (x <= axis.high) & ((x >= axis.low) | (axis is self._spread))
+            for axis, x in zip(self.content.axes, place.axes, strict=True)
+        ]
+        return np.asarray(np.all(covered, axis=0))
 
     def _refuse_ends(self, hurst: FloatArray, zeta_d: FloatArray) -> None:
         """Refuse what the axes hurst and sphere do not cover."""
         low, high = self._hurst.low, self._hurst.high
         require("hurst", hurst, (hurst >= low) & (hurst <= high), f"in [{low:g}, {high:g}]")
-        least = SPHERE_FLOOR
-        require("zeta_d", zeta_d, zeta_d >= least, f"at least {least:g}")
+        require("zeta_d", zeta_d, zeta_d >= SPHERE_FLOOR, f"at least {SPHERE_FLOOR:g}")
 
     def _refuse(self, place: Coordinates, inside: NDArray[np.bool_], shape: tuple[int, ...]) -> None:
         """Name the first axis that an island leaves."""
@@ -232,9 +231,9 @@ class Island4dModel(Displayed):
 
     def _share(self, place: Coordinates) -> FloatArray:
         """mu over mu at the least spread, below it; 1 elsewhere."""
-        lowest = np.maximum(place.spread, self._spread.low)
-        edge: FloatArray = band_fields(lowest, place.sphere, place.hurst, self.reading)[0]
-        return np.where(place.spread < self._spread.low, place.mu / edge, 1.0)
+        low = self._spread.low
+        edge = band_fields(np.maximum(place.spread, low), place.sphere, place.hurst, self.reading)[0]
+        return np.where(place.spread < low, place.mu / edge, 1.0)
 
     def log_ratio(self, place: Coordinates, parallel: bool = False) -> FloatArray:
         """log(Phi/Phi_rigid) inside the table or below its spread, shape (2, entries)."""
@@ -247,63 +246,39 @@ class Island4dModel(Displayed):
             out[:, block] = found
 
         in_blocks(fill, place.X.size, BLOCK, (os.cpu_count() or 1) if parallel else 1)
-        scaled: FloatArray = out * self._share(place)
-        return scaled
-
-    @functools.cached_property
-    def _error_field(self) -> FloatArray:
-        field: FloatArray = self.content.local_error.max(axis=-1)
-        return field
+        return np.asarray(out * self._share(place))
 
     def error(self, place: Coordinates) -> FloatArray:
         """Bound on the relative error of both functions."""
-        field = self._error_field
-        cells = (
-            error_cell(axis, count, p)
-            for axis, count, p in zip(self.content.axes, field.shape, self._positions(place), strict=True)
-        )
-        bound: FloatArray = field[tuple(cells)]
-        return bound
+        every = zip(self.content.axes, self._error.shape, self._positions(place), strict=True)
+        return np.asarray(self._error[tuple(error_cell(axis, count, p) for axis, count, p in every)])
 
-    def _log_slopes(
-        self, place: Coordinates, inside: NDArray[np.bool_], raw: tuple[FloatArray, ...]
-    ) -> dict[str, FloatArray]:
+    def _moving(self, raw: Any, below: NDArray[np.bool_]) -> FloatArray:
+        """What log F_hat and log A_hat follow: positions on the axes, log(mu), X, and the logarithms of both scales."""
+        delta, zeta_d, zeta_u, hurst = raw
+        at = to_axes(delta, zeta_d, zeta_u, hurst, self.reading)
+        places, log_mu = self._positions(at), np.log(at.mu)
+        # below the table only mu moves the logarithm
+        places[1] = np.where(below, 0.0, places[1])
+        scales = np.log(hat_scales(at.spread, zeta_d, hurst, at.sigma, self.reading))
+        return np.stack([*places, log_mu, at.X, scales[0] + log_mu, scales[1]])
+
+    def _log_slopes(self, place: Coordinates, inside: NDArray[np.bool_], raw: Any) -> dict[str, FloatArray]:
         """Derivatives of log F_hat and log A_hat by the raw numbers, each (2, entries); NaN outside."""
-        out = np.empty((10, int(inside.sum())))
-        kept, raw = _some(place, inside), tuple(number[inside] for number in raw)
-        fill_gradient_4d(self.content.coefficients, self._positions(kept), out)
+        kept, raw = _some(place, inside), [number[inside] for number in raw]
+        out, below = np.empty((2, 5, kept.X.size)), kept.spread < self._spread.low
+        fill_gradient_4d(self.content.coefficients, self._positions(kept), out.reshape(10, -1))
         out *= self._share(kept)
-        rigid_slope = np.stack(
-            [
-                2.5 * height_integral(1.5, -kept.X) / height_integral(2.5, -kept.X),
-                2.0 * height_integral(1.0, -kept.X) / height_integral(2.0, -kept.X),
-            ]
-        )
-        below = kept.spread < self._spread.low
+        rigid = [n * height_integral(n - 1, -kept.X) / height_integral(n, -kept.X) for n in (2.5, 2.0)]
+        by = np.concatenate([out[:, 1:], np.where(below, out[:, :1], 0.0), np.stack(rigid)[:, None]], axis=1)
         found = {}
         for number, name in enumerate(RAW):
-            ends = []
             # the spread follows the ends of a narrow band closely, X the other two, down to their last bit
             width = kept.spread if name in ("zeta_d", "zeta_u") else kept.sigma
             step = np.maximum(STEP * raw[number] * np.minimum(1.0, width), np.spacing(raw[number]))
-            for sign in (1.0, -1.0):
-                moved = list(raw)
-                moved[number] = raw[number] + sign * step
-                at = to_axes(moved[0], moved[1], moved[2], moved[3], self.reading)
-                scales = np.log(hat_scales(at.spread, moved[1], at.hurst, at.sigma, self.reading))
-                scales[0] += np.log(at.mu)
-                places = self._positions(at)
-                # below the table only mu moves the logarithm
-                places[1] = np.where(below, 0.0, places[1])
-                ends.append((scales, at.X, places, np.log(at.mu), moved[number]))
-            (s1, X1, p1, m1, r1), (s0, X0, p0, m0, r0) = ends
-            # as rounded
-            width = r1 - r0
-            slope = (s1 - s0 + rigid_slope * (X1 - X0)) / width
-            for function in range(2):
-                rows = out[5 * function : 5 * function + 5]
-                slope[function] += ((p1 - p0) * rows[1:]).sum(axis=0) / width
-                slope[function] += np.where(below, rows[0] * (m1 - m0) / width, 0.0)
+            high, low = ([*raw[:number], raw[number] + move, *raw[number + 1 :]] for move in (step, -step))
+            # over the step as rounded
+            change = (self._moving(high, below) - self._moving(low, below)) / (high[number] - low[number])
             found[name] = np.full((2, inside.size), np.nan)
-            found[name][:, inside] = slope
+            found[name][:, inside] = change[6:] + (by * change[:6]).sum(axis=1)
         return found

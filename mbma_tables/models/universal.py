@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.compiled import in_blocks
 from mbma_tables.display import Displayed, Variable
-from mbma_tables.errors import InputError
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models import BOTH, EXACT_RTOL, OUTSIDE, IslandAnswer, universal_kernel
+from mbma_tables.models import BOTH, EXACT_RTOL, IslandAnswer, check_outside, universal_kernel
 from mbma_tables.models.universal_kernel import RECORD, TERMS, Table
 from mbma_tables.plots import draw_lines
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
@@ -85,8 +84,7 @@ class UniversalModel(Displayed):
         ------
         InputError, OutOfRangeError
         """
-        if outside not in OUTSIDE:
-            raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
+        check_outside(outside)
         flat_X, flat_mu, shape = self._inside(X, mu, outside == "raise")
         out = np.empty((flat_X.size, 3))
         status = np.empty(flat_X.size, dtype=np.int64)
