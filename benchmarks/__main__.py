@@ -103,10 +103,10 @@ def tables(rng: np.random.Generator) -> None:
     taken = rounds(
         {
             "erf": lambda: erf(u),
-            "random": lambda: universal_kernel.fill_phi(X, mu, kernel, status, phi),
-            "path": lambda: universal_kernel.fill_phi(*path, kernel, status, phi),
-            "random slopes": lambda: universal_kernel.fill_slopes(X, mu, kernel, status, slopes),
-            "path slopes": lambda: universal_kernel.fill_slopes(*path, kernel, status, slopes),
+            "random": lambda: universal_kernel.fill(X, mu, kernel, None, status, phi),
+            "path": lambda: universal_kernel.fill(*path, kernel, None, status, phi),
+            "random slopes": lambda: universal_kernel.fill(X, mu, kernel, True, status, slopes),
+            "path slopes": lambda: universal_kernel.fill(*path, kernel, True, status, slopes),
         }
     )
     click.echo("\nUniversal table: Phi_F, Phi_A and the bound on their error at once")
@@ -124,7 +124,7 @@ def tables(rng: np.random.Generator) -> None:
     report(f"largest error on {HELD_OUT} fresh points", error, "", at_most=1e-9)
     report("file", shipped_file("universal.nc").stat().st_size / 1e6, "MB", at_most=6)
     given = X[:POINTS], mu[:POINTS]
-    own = {"own": lambda: universal_kernel.fill_phi(*given, kernel, status[:POINTS], phi[:POINTS])}
+    own = {"own": lambda: universal_kernel.fill(*given, kernel, None, status[:POINTS], phi[:POINTS])}
     others = peers(*given)
     beside = rounds(own | others, 3)
     for name in others:

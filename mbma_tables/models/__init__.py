@@ -165,11 +165,12 @@ def get_model(tier: str | AnyModel, rtol: float, reading: Reading) -> AnyModel:
         For an unknown tier, an object that is no island model, an `rtol` out of range, or another reading.
     """
     asked = number_in("rtol", rtol, MIN_RTOL, MAX_RTOL)
-    model = _named(tier, asked) if isinstance(tier, str) and tier in TIERS else tier
-    # it takes long to see whether an object has what a protocol asks for
-    known = model is not tier or (isinstance(model, IslandModel | GeometryModel) and not isinstance(model, type))
-    if isinstance(model, str) or not known or not isinstance(model.name, str):
-        raise InputError(f"tier must be one of {TIERS} or an object with a name and answer(X, mu), got {model!r}")
+    if isinstance(tier, str) and tier in TIERS:
+        model = _named(tier, asked)
+    elif isinstance(tier, IslandModel | GeometryModel) and not isinstance(tier, type) and isinstance(tier.name, str):
+        model = tier
+    else:
+        raise InputError(f"tier must be one of {TIERS} or an object with a name and answer(X, mu), got {tier!r}")
     own = getattr(model, "reading", None)
     if isinstance(own, Reading) and (
         own.density_divisor != reading.density_divisor or own.summit_sigma != reading.summit_sigma

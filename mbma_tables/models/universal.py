@@ -86,29 +86,29 @@ class UniversalModel(Displayed):
         """
         check_outside(outside)
         flat_X, flat_mu, shape = self._inside(X, mu, outside == "raise")
-        out = np.empty((flat_X.size, 3))
-        status = np.empty(flat_X.size, dtype=np.int64)
-
-        def fill(block: slice) -> None:
-            universal_kernel.fill_phi(flat_X[block], flat_mu[block], self.kernel, status[block], out[block])
-
-        if flat_X.size <= SMALL:
-            self._fill_small(flat_X, flat_mu, status, out)
-        else:
-            in_blocks(fill, flat_X.size, BLOCK, (os.cpu_count() or 1) if parallel else 1)
+        status, out = self._filled(flat_X, flat_mu, None, (os.cpu_count() or 1) if parallel else 1)
         missing = status != universal_kernel.OK
         if outside == "exact" and missing.any():
             solved = greenwood_tripp.solve(flat_X[missing], flat_mu[missing], rtol=EXACT_RTOL)
             out[missing] = np.stack([solved.phi_F, solved.phi_A, solved.error], axis=-1)
         return IslandAnswer(*(column.reshape(shape)[()] for column in out.T))
 
-    def _fill_small(self, X: FloatArray, mu: FloatArray, status: NDArray[np.int64], out: FloatArray) -> None:
-        """`universal_kernel.fill_phi` in numpy, operation by operation."""
-        k, table = universal_kernel, self.kernel
+    def _filled(
+        self, X: FloatArray, mu: FloatArray, slopes: bool | None, workers: int = 1
+    ) -> tuple[NDArray[np.int64], FloatArray]:
+        """Status and the rows of `universal_kernel.fill`; of a few values by numpy, operation by operation."""
+        k, table, status = universal_kernel, self.kernel, np.empty(X.size, dtype=np.int64)
+        out = np.empty((X.size, 7 if slopes else 3))
+        if slopes or X.size > SMALL:
+
+            def fill(block: slice) -> None:
+                k.fill(X[block], mu[block], table, slopes, status[block], out[block])
+
+            in_blocks(fill, X.size, BLOCK, workers)
+            return status, out
         ends = [table.X_low > X, table.X_high < X, mu > table.mu_high]
         status[:] = np.select(ends, [k.X_BELOW, k.X_ABOVE, k.MU_ABOVE])
-        out[:] = np.nan
-        good = status == k.OK
+        out[:], good = np.nan, status == k.OK
         X, mu = X[good], mu[good]
         strips = table.places[((X - table.X_low) * table.X_rate).astype(np.intp)]
         buckets = np.clip((_bits(mu) >> BUCKET_BITS) - table.first_bucket, 0, table.buckets - 1)
@@ -118,6 +118,7 @@ class UniversalModel(Displayed):
         powers = r[:, k.FORCE_POWERS :].reshape(-1, 2, TERMS, TERMS)
         force, area = k.polynomial(powers, x[:, None, None, None], y[:, None, None, None]).T
         out[good] = np.stack([mu * force, area, r[:, k.ERROR]], axis=-1)
+        return status, out
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
         """Phi_F and Phi_A of islands, both: one costs what both do."""
@@ -126,14 +127,8 @@ class UniversalModel(Displayed):
     def slopes(self, X: ArrayLike, mu: ArrayLike) -> tuple[IslandAnswer, IslandAnswer, IslandAnswer]:
         """Answers, and their derivatives by X and by mu, in one pass; the errors are those of the answers."""
         flat_X, flat_mu, shape = self._inside(X, mu)
-        out = np.empty((flat_X.size, 7))
-        status = np.empty(flat_X.size, dtype=np.int64)
-
-        def fill(block: slice) -> None:
-            universal_kernel.fill_slopes(flat_X[block], flat_mu[block], self.kernel, status[block], out[block])
-
-        in_blocks(fill, flat_X.size, BLOCK)
-        force, F_X, F_mu, area, A_X, A_mu, error = (column.reshape(shape)[()] for column in out.T)
+        columns = self._filled(flat_X, flat_mu, True)[1].T
+        force, area, error, F_X, F_mu, A_X, A_mu = (column.reshape(shape)[()] for column in columns)
         return IslandAnswer(force, area, error), IslandAnswer(F_X, A_X, error), IslandAnswer(F_mu, A_mu, error)
 
     def status(self, X: ArrayLike, mu: ArrayLike) -> tuple[Any, Any]:

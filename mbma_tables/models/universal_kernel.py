@@ -169,24 +169,21 @@ def _find(X: float, mu: float, table: Table) -> tuple[int, int, float, float]:
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", forceinline=True)
-def universal_phi(X: float, mu: float, table: Table) -> tuple[int, float, float, float]:
-    """Status, Phi_F, Phi_A and the bound on their relative error at (X, mu)."""
-    status, cell, x, y = _find(X, mu, table)
-    if status != OK:
-        return status, math.nan, math.nan, math.nan
-    r = table.records
-    force, area = value_at(r, cell + FORCE_POWERS, x, y), value_at(r, cell + AREA_POWERS, x, y)
-    return OK, mu * force, area, r[cell + ERROR]
+def universal_phi(
+    X: float, mu: float, table: Table, slopes: Any
+) -> tuple[int, float, float, float, float, float, float, float]:
+    """Status, Phi_F and its derivatives by X and by mu, Phi_A and its, and the bound on the error of the functions.
 
-
-@njit(cache=True, fastmath=False, error_model="numpy", forceinline=True)
-def universal_slopes(X: float, mu: float, table: Table) -> tuple[int, float, float, float, float, float, float, float]:
-    """Status, Phi_F and its derivatives by X and by mu, Phi_A and its, and the bound on the error of the functions."""
+    Where `slopes` is None, not True, derivatives are 0 and cost nothing: the code of each is compiled by itself.
+    """
     status, cell, x, y = _find(X, mu, table)
     if status != OK:
         nan = math.nan
         return status, nan, nan, nan, nan, nan, nan, nan
     r = table.records
+    if slopes is None:
+        F, A = value_at(r, cell + FORCE_POWERS, x, y), value_at(r, cell + AREA_POWERS, x, y)
+        return OK, mu * F, 0.0, 0.0, A, 0.0, 0.0, r[cell + ERROR]
     by_X, bottom = r[cell + RATE], mu * r[cell + BOTTOM_MU] + r[cell + BOTTOM]
     by_mu = (r[cell + TOP_MU] * r[cell + BOTTOM] - r[cell + TOP] * r[cell + BOTTOM_MU]) / (bottom * bottom)
     F, F_x, F_y = gradient_at(r, cell + FORCE_POWERS, x, y)
@@ -195,15 +192,10 @@ def universal_slopes(X: float, mu: float, table: Table) -> tuple[int, float, flo
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def fill_phi(X: FloatArray, mu: FloatArray, table: Table, status: NDArray[np.int64], out: FloatArray) -> None:
-    """`universal_phi` of each entry: status, and Phi_F, Phi_A, error into the rows of `out` (entries, 3)."""
-    for k in range(X.size):
-        status[k], out[k, 0], out[k, 1], out[k, 2] = universal_phi(X[k], mu[k], table)
-
-
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def fill_slopes(X: FloatArray, mu: FloatArray, table: Table, status: NDArray[np.int64], out: FloatArray) -> None:
-    """`universal_slopes` of each entry: status, and the other seven into the rows of `out` (entries, 7)."""
+def fill(X: FloatArray, mu: FloatArray, table: Table, slopes: Any, status: NDArray[np.int64], out: FloatArray) -> None:
+    """`universal_phi` of each entry: status, and Phi_F, Phi_A, error, then derivatives, into rows of `out`."""
     for k in range(X.size):
         row = out[k]
-        status[k], row[0], row[1], row[2], row[3], row[4], row[5], row[6] = universal_slopes(X[k], mu[k], table)
+        status[k], row[0], F_X, F_mu, row[1], A_X, A_mu, row[2] = universal_phi(X[k], mu[k], table, slopes)
+        if slopes is not None:
+            row[3], row[4], row[5], row[6] = F_X, F_mu, A_X, A_mu

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import REORDER, njit
 from mbma_tables.elementary import exp, expm1
-from mbma_tables.models.universal_kernel import OK, UNRESOLVED, Table, universal_phi, universal_slopes
+from mbma_tables.models.universal_kernel import OK, UNRESOLVED, Table, universal_phi
 from mbma_tables.surfaces.readings import PRINTED, ReadingNumbers
 from mbma_tables.totals.gauss_kronrod import GAUSS_21, GAUSS_31, KRONROD_21, KRONROD_31, NODES_21, NODES_31
 from mbma_tables.totals.kernel import (
@@ -161,13 +161,10 @@ def _rule(
     _, kronrod, gauss = rule_for(interval)
     count = kronrod.size
     fill_nodes(interval, gap, surface, slopes, work)
+    part.fill(0.0)
     force = area = gauss_force = gauss_area = table_error = 0.0
-    F_steep = A_steep = F_by_hurst = A_by_hurst = F_by_e = A_by_e = 0.0
     for k in range(count):
-        if slopes is not None:
-            status, phi_F, F_X, F_mu, phi_A, A_X, A_mu, error = universal_slopes(work[0, k], work[1, k], table)
-        else:
-            status, phi_F, phi_A, error = universal_phi(work[0, k], work[1, k], table)
+        status, phi_F, F_X, F_mu, phi_A, A_X, A_mu, error = universal_phi(work[0, k], work[1, k], table, slopes)
         if status != OK:
             return status, math.nan, math.nan, count
         f, g = work[2, k] * phi_F, work[3, k] * phi_A
@@ -177,20 +174,17 @@ def _rule(
         gauss_area += gauss[k] * g
         table_error = max(table_error, error)
         if slopes is not None:
-            f, g = kronrod[k] * work[2, k], kronrod[k] * work[3, k]
-            F_steep += f * phi_F * work[4, k]
-            A_steep += g * phi_A * work[4, k]
-            F_by_hurst += f * (phi_F * work[7, k] + F_X * work[5, k] + F_mu * work[6, k])
-            A_by_hurst += g * (phi_A * work[8, k] + A_X * work[5, k] + A_mu * work[6, k])
-            F_by_e += f * (phi_F * work[11, k] + F_X * work[9, k] + F_mu * work[10, k])
-            A_by_e += g * (phi_A * work[12, k] + A_X * work[9, k] + A_mu * work[10, k])
-    K1 = 1.0 if interval.floor_d else surface.jacobian
-    part[0, 0], part[1, 0] = K1 * force, K1 * area
-    if slopes is not None:
-        part[0, BY_HURST], part[0, BY_LOG_E], part[0, BY_COMPRESSION] = K1 * F_by_hurst, K1 * F_by_e, K1 * F_steep
-        part[1, BY_HURST], part[1, BY_LOG_E], part[1, BY_COMPRESSION] = K1 * A_by_hurst, K1 * A_by_e, K1 * A_steep
-        part[0, BY_PEAK], part[1, BY_PEAK], below = 0.0, 0.0, 0.0 if interval.floor_d else 1.0
-        part[0, BELOW_KINK], part[1, BELOW_KINK] = below * part[0, 0], below * part[1, 0]
+            for row, phi, by_X, by_mu in ((0, phi_F, F_X, F_mu), (1, phi_A, A_X, A_mu)):
+                share, own = kronrod[k] * work[2 + row, k], part[row]
+                own[BY_COMPRESSION] += share * phi * work[4, k]
+                own[BY_HURST] += share * (phi * work[7 + row, k] + by_X * work[5, k] + by_mu * work[6, k])
+                own[BY_LOG_E] += share * (phi * work[11 + row, k] + by_X * work[9, k] + by_mu * work[10, k])
+    part[0, 0], part[1, 0] = force, area
+    for row in range(2):
+        for column in range(part.shape[1]):
+            part[row, column] *= 1.0 if interval.floor_d else surface.jacobian
+        if slopes is not None:
+            part[row, BELOW_KINK] = 0.0 if interval.floor_d else part[row, 0]
     if not (force > 0.0 and area > 0.0):
         return OK, 0.0, table_error, count
     return OK, error_of(force, gauss_force, area, gauss_area, safety_of(surface.reading.floor_d)), table_error, count
@@ -211,7 +205,6 @@ def total(
     count = first_intervals(gap.compression, surface, pieces)
     table_error = 0.0
     while True:
-        force = area = force_error = area_error = 0.0
         for k in range(count):
             if pieces[k, ERROR] == NOT_YET:
                 interval = Interval(pieces[k, 0], pieces[k, 1], pieces[k, 2] > 0.0, pieces[k, 3] > 0.0)
@@ -222,10 +215,15 @@ def total(
                 if status != OK:
                     return status, math.nan, islands
                 table_error = max(table_error, own_error)
-            force += parts[k, 0, 0]
-            area += parts[k, 1, 0]
+        out.fill(0.0)
+        force_error = area_error = 0.0
+        for k in range(count):
+            for row in range(2):
+                for column in range(out.shape[1]):
+                    out[row, column] += parts[k, row, column]
             force_error += parts[k, 0, 0] * pieces[k, ERROR]
             area_error += parts[k, 1, 0] * pieces[k, ERROR]
+        force, area = out[0, 0], out[1, 0]
         empty = not (force > 0.0 and area > 0.0)
         if empty or (force_error <= rtol * force and area_error <= rtol * area):
             break
@@ -241,11 +239,6 @@ def total(
                 pieces[count, 2], pieces[count, 3] = pieces[k, 2], pieces[k, 3]
                 pieces[k, ERROR] = pieces[count, ERROR] = NOT_YET
                 count += 1
-    for row in range(2):
-        for column in range(out.shape[1]):
-            out[row, column] = 0.0
-            for k in range(count):
-                out[row, column] += parts[k, row, column]
     if empty:
         return OK, 0.0, islands
     return OK, max(force_error / force, area_error / area) + table_error, islands
@@ -256,7 +249,7 @@ def _integrand(x: float, gap: Gap, surface: SurfaceConstants, table: Table) -> t
     """Status and the integrands of force and area over x = delta/h_rms, at the floor of zeta_d or next to it."""
     floor_d = x >= surface.kink_d
     node = island_node(x, floor_d, x > surface.kink_u, surface)
-    status, phi_F, phi_A, _ = universal_phi(node.X, node.mu, table)
+    status, phi_F, _, _, phi_A, _, _, _ = universal_phi(node.X, node.mu, table, None)
     height = island_height(x, node.h_d, node.sigma_d, gap, surface.rms_over_s)
     weight = island_density(height, node.D_d, node.sigma_d) * surface.rms_over_s
     return status, (node.force * phi_F * weight, node.area * phi_A * weight)

@@ -295,7 +295,7 @@ def fill_fields(
         out[2, k] = ((peak + x[k]) * rms_over_s - node.h_d) / node.sigma_d
         out[3, k] = rms_over_s / node.sigma_d
     for k in range(x.size):
-        status, phi_F, phi_A, error = universal_phi(X[k], mu[k], table)
+        status, phi_F, _, _, phi_A, _, _, error = universal_phi(X[k], mu[k], table, None)
         worst, largest = max(worst, status), max(largest, error)
         out[0, k] *= phi_F
         out[1, k] *= phi_A
