@@ -79,7 +79,8 @@ def phi_rows(model: UniversalModel, X: FloatArray, mu: FloatArray) -> Iterator[s
 
 def geometry_rows(approach: FloatArray, hurst: FloatArray, zeta_1: FloatArray, reading: Reading) -> Iterator[str]:
     """Islands by the library."""
-    out = np.stack(list(geometry(approach, hurst, zeta_1, reading).values()))
+    fields = geometry(approach, hurst, zeta_1, reading)
+    out = np.stack([fields[name] for name in FIELDS])
     for k in range(approach.size):
         # a height of exactly 0 is met exactly
         scales = np.where(out[:, k] == 0, 1.0, np.abs(out[:, k]))

@@ -33,9 +33,8 @@ from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, alpha_of, m0_of, m
 # of an island in units of s and 1/q0: zeta_d (27), zeta_u (30), R_d (26), R_u (29), D and sigma (32), h_d (B.3),
 # h_u (B.12), eta (39), X = (h_rms/s delta/h_rms - h_d)/sigma, mu = 8/3 D sigma sqrt(2 R_u R_d), D_d and sigma_d (43),
 # width = log(zeta_u/zeta_d)
-FIELDS = (
-    "zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "h_u", "eta", "X", "mu", "D_d", "sigma_d", "width",
-)  # fmt: skip
+BANDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "h_u", "D_d", "sigma_d", "width")
+FIELDS = (*BANDS[:8], "eta", "X", "mu", *BANDS[8:])
 
 
 @jitable
@@ -90,23 +89,13 @@ def _fields(
     delta: FloatArray, bands: tuple[FloatArray, ...], D_top: Any, R_top: Any, reading: Reading
 ) -> dict[str, FloatArray]:
     """`FIELDS` of islands from their bands, and the summits of all waves (top)."""
-    zeta_d, zeta_u, R_d, R_u, D, sigma, root_a, root_b, D_d, sigma_d, width = bands
+    _, _, R_d, R_u, D, sigma, root_a, root_b, _, _, _ = bands
     h_d = root_a if reading.offset else np.zeros_like(root_a)
-    return {
-        "zeta_d": zeta_d,
-        "zeta_u": zeta_u,
-        "R_d": R_d,
-        "R_u": R_u,
-        "D": D,
-        "sigma": sigma,
+    return dict(zip(BANDS, bands, strict=True)) | {
         "h_d": h_d,
-        "h_u": root_b,
         "eta": 0.75 * np.cbrt(np.pi * D_top) * np.cbrt(1.5 * R_top) ** 2 * np.cbrt(root_b / (reading.phi * R_u)),
         "X": (delta - h_d) / sigma,
         "mu": 8.0 / 3.0 * D * sigma * np.sqrt(2.0 * R_u * R_d),
-        "D_d": D_d,
-        "sigma_d": sigma_d,
-        "width": width,
     }
 
 

@@ -14,14 +14,7 @@ from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import njit
-from mbma_tables.islands.height_integrals import (
-    f_five_halves,
-    f_half,
-    f_one,
-    f_three_halves,
-    f_two,
-    pressure_integrals,
-)
+from mbma_tables.islands.height_integrals import f_five_halves, f_half, f_one, f_three_halves, f_two, pressure_integrals
 from mbma_tables.islands.spectral import Basis
 
 MAX_STEPS = 200

@@ -16,7 +16,6 @@ import numpy as np
 from mbma_tables.arguments import FloatArray, number_in
 from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.greenwood_tripp import MIN_SOLVER_RTOL
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.surfaces.readings import Reading
 
@@ -25,7 +24,6 @@ OUTSIDE = ("raise", "exact", "nan")  # what to do about islands that a table doe
 QUANTITIES = ("force", "area")
 FORCE, AREA, BOTH = 0, 1, 2  # which of them is asked for
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # that totals and islands may be asked for
-EXACT_RTOL = 1e-10  # of the exact solver, where it replaces a table
 CLOSED_FORM_ERROR = 1e-14
 
 
@@ -95,9 +93,8 @@ def answer_islands(
     try:
         phi_F, phi_A, error = (np.broadcast_to(np.asarray(part, dtype=float), shape) for part in given)
     except (TypeError, ValueError) as fault:
-        raise InputError(
-            f"island model {model.name!r} must answer Phi_F, Phi_A and error of shape {shape}: {fault}"
-        ) from None
+        wanted = f"must answer Phi_F, Phi_A and error of shape {shape}"
+        raise InputError(f"island model {model.name!r} {wanted}: {fault}") from None
     bad = ~(np.isfinite(phi_F) & np.isfinite(phi_A) & (error >= 0))
     if outside != "nan" and bad.any():
         raise OutOfRangeError(f"island model {model.name!r} has no answer for {int(bad.sum())} islands", bad)
@@ -115,6 +112,9 @@ class ExactModel:
         """Phi_F and Phi_A by `greenwood_tripp.solve`."""
         solved = greenwood_tripp.solve(X, mu, rtol=self.rtol)
         return IslandAnswer(solved.phi_F, solved.phi_A, solved.error)
+
+
+SOLVER = ExactModel(1e-10)  # where it replaces a table
 
 
 @dataclasses.dataclass(frozen=True)
@@ -138,7 +138,7 @@ class RigidModel:
 
 def exact_model(rtol: float) -> ExactModel:
     """The exact solver, accurate enough for totals at `rtol`."""
-    return ExactModel(max(0.1 * rtol, MIN_SOLVER_RTOL))
+    return ExactModel(max(0.1 * rtol, greenwood_tripp.MIN_SOLVER_RTOL))
 
 
 def tier_name(tier: str | AnyModel) -> str:
@@ -183,10 +183,8 @@ def get_model(tier: str | AnyModel, rtol: float, reading: Reading) -> AnyModel:
 
 
 def _named(tier: str, rtol: float) -> AnyModel:
-    if tier == "exact":
-        return exact_model(rtol)
-    if tier == "rigid":
-        return RigidModel()
+    if tier in ("exact", "rigid"):
+        return exact_model(rtol) if tier == "exact" else RigidModel()
     # closed forms and netCDF come in where they are asked for
     if tier == "formula":
         from mbma_tables.models.closed_forms import FormulaModel

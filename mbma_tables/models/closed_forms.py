@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.errors import InputError
-from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models import BOTH, EXACT_RTOL, IslandAnswer, check_outside
+from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
 from mbma_tables.models import closed_form_functions as printed
 from mbma_tables.models.closed_form_functions import CERTIFICATES, RANGES
 from mbma_tables.surfaces.surface import Surface
@@ -88,8 +87,7 @@ class FormulaModel:
             out[RESULTS.index(name), inside] = FUNCTIONS[self.form][name](every_X[inside], every_mu[inside])
         out[2, inside] = max(CERTIFICATES[self.form][name].largest for name in wanted)
         if outside == "exact" and not inside.all():
-            solved = greenwood_tripp.solve(every_X[~inside], every_mu[~inside], rtol=EXACT_RTOL)
-            out[:, ~inside] = solved.phi_F, solved.phi_A, solved.error
+            out[:, ~inside] = SOLVER.answer(every_X[~inside], every_mu[~inside])
         return IslandAnswer(*(row[()] for row in out))
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:

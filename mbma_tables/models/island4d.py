@@ -17,7 +17,7 @@ from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, Coordinates, band_fields, hat_scales, to_axes
 from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.models import BOTH, EXACT_RTOL, IslandAnswer, check_outside
+from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
 from mbma_tables.plots import draw_lines
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.interpolate import fill_4d, fill_gradient_4d
@@ -221,8 +221,7 @@ class Island4dModel(Displayed):
         if inside.any():
             phi[:, inside], error[inside] = self._answer(_some(place, inside), inside[inside], outside, parallel)
         if outside == "exact":
-            solved = greenwood_tripp.solve(place.X[~inside], place.mu[~inside], rtol=EXACT_RTOL)
-            phi[:, ~inside], error[~inside] = (solved.phi_F, solved.phi_A), solved.error
+            *phi[:, ~inside], error[~inside] = SOLVER.answer(place.X[~inside], place.mu[~inside])
         return phi, error
 
     def _positions(self, place: Coordinates) -> FloatArray:

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.compiled import in_blocks
 from mbma_tables.display import Displayed, Variable
-from mbma_tables.islands import greenwood_tripp
-from mbma_tables.models import BOTH, EXACT_RTOL, IslandAnswer, check_outside, universal_kernel
+from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside, universal_kernel
 from mbma_tables.models.universal_kernel import RECORD, TERMS, Table
 from mbma_tables.plots import draw_lines
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
@@ -89,8 +88,7 @@ class UniversalModel(Displayed):
         status, out = self._filled(flat_X, flat_mu, None, (os.cpu_count() or 1) if parallel else 1)
         missing = status != universal_kernel.OK
         if outside == "exact" and missing.any():
-            solved = greenwood_tripp.solve(flat_X[missing], flat_mu[missing], rtol=EXACT_RTOL)
-            out[missing] = np.stack([solved.phi_F, solved.phi_A, solved.error], axis=-1)
+            out[missing] = np.stack(SOLVER.answer(flat_X[missing], flat_mu[missing]), axis=-1)
         return IslandAnswer(*(column.reshape(shape)[()] for column in out.T))
 
     def _filled(
@@ -116,7 +114,7 @@ class UniversalModel(Displayed):
         x = (X - r[:, k.CENTRE]) * r[:, k.RATE]
         y = (mu * r[:, k.TOP_MU] + r[:, k.TOP]) / (mu * r[:, k.BOTTOM_MU] + r[:, k.BOTTOM])
         powers = r[:, k.FORCE_POWERS :].reshape(-1, 2, TERMS, TERMS)
-        force, area = k.polynomial(powers, x[:, None, None, None], y[:, None, None, None]).T
+        force, area = k.polynomial(powers.transpose(2, 3, 1, 0), x, y)
         out[good] = np.stack([mu * force, area, r[:, k.ERROR]], axis=-1)
         return status, out
 

@@ -44,111 +44,95 @@ class Table(NamedTuple):
     buckets: int
 
 
-class _Polynomial:
-    """Code for TERMS rows of powers of x from `offset` on, a row for each power of y; fused, or rounded as in numpy."""
+class _Lanes:
+    """A double, or a vector of them, in LLVM's code, with the arithmetic of numpy."""
 
-    def __init__(self, context: Any, builder: Any, signature: Any, arguments: Any, fused: bool = False) -> None:
+    def __init__(self, builder: Any, value: Any, flags: tuple[str, ...]) -> None:
+        self.builder, self.value, self.flags = builder, value, flags
+
+    def __add__(self, other: _Lanes) -> _Lanes:
+        return _Lanes(self.builder, self.builder.fadd(self.value, other.value, flags=self.flags), self.flags)
+
+    def __mul__(self, other: Any) -> _Lanes:
+        """By another alike; of a vector by a list of constants, or every lane of it by a number."""
         from llvmlite import ir
-        from numba.np.arrayobj import make_array
 
-        array, self.offset, self.x, self.y = arguments
-        self.ir, self.builder, self.flags = ir, builder, ("contract",) if fused else ()
-        self.data = make_array(signature.args[0])(context, builder, array).data
+        own, factor = self.value, ir.Constant(self.value.type, other) if isinstance(other, list) else other.value
+        if own.type != factor.type:
+            factor = ir.Constant(own.type, ir.Undefined)
+            for k in range(own.type.count):
+                factor = self.builder.insert_element(factor, other.value, ir.IntType(32)(k))
+        return _Lanes(self.builder, self.builder.fmul(own, factor, flags=self.flags), self.flags)
 
-    def row(self, power: int) -> Any:
-        builder, ir = self.builder, self.ir
-        start = builder.gep(self.data, [builder.add(self.offset, ir.IntType(64)(TERMS * power))], inbounds=True)
-        vector = builder.load(builder.bitcast(start, ir.VectorType(ir.DoubleType(), TERMS).as_pointer()))
-        # doubles, not vectors, are what numpy aligns
-        vector.align = 8
-        return vector
+    def __getitem__(self, lanes: Any) -> _Lanes:
+        from llvmlite import ir
 
-    def add(self, total: Any, factor: Any, vector: Any) -> Any:
-        """``total + factor * vector`` of vectors and a number."""
-        spread = self.ir.Constant(vector.type, self.ir.Undefined)
-        for k in range(vector.type.count):
-            spread = self.builder.insert_element(spread, factor, self.ir.IntType(32)(k))
-        return self.builder.fadd(total, self.builder.fmul(spread, vector, flags=self.flags), flags=self.flags)
-
-    def picked(self, vector: Any, lanes: range | list[int]) -> Any:
-        index = self.ir.IntType(32)
-        mask = self.ir.Constant(self.ir.VectorType(index, len(lanes)), [index(k) for k in lanes])
-        return self.builder.shuffle_vector(vector, self.ir.Constant(vector.type, self.ir.Undefined), mask)
-
-    def sum(self) -> Any:
-        """The sum over the rows by pairs, which waits less than one after the other."""
-        rows, power = [self.row(k) for k in range(TERMS)], self.y
-        while len(rows) > 1:
-            rows = [self.add(even, power, odd) for even, odd in zip(rows[::2], rows[1::2], strict=True)]
-            power = self.builder.fmul(power, power)
-        return rows[0]
-
-    def sums(self) -> tuple[Any, Any]:
-        """The sum over the rows, and its derivative by y."""
-        value, slope = self.row(TERMS - 1), None
-        for power in range(TERMS - 2, -1, -1):
-            slope = value if slope is None else self.add(value, self.y, slope)
-            value = self.add(self.row(power), self.y, value)
-        return value, slope
-
-    def along_x(self, row: Any) -> Any:
-        """The sum over one row, by halves."""
-        powers = [self.x]
-        while 2 ** len(powers) < TERMS:
-            powers.append(self.builder.fmul(powers[-1], powers[-1]))
-        for power in reversed(powers):
-            half = row.type.count // 2
-            low, high = (self.picked(row, range(k, k + half)) for k in (0, half))
-            row = self.add(low, power, high)
-        return self.builder.extract_element(row, self.ir.IntType(32)(0))
-
-    def slope_along_x(self, row: Any) -> Any:
-        powers = [*range(1, TERMS), 0]
-        factors = self.ir.Constant(row.type, [float(power) for power in powers])
-        return self.along_x(self.builder.fmul(self.picked(row, powers), factors))
+        index, vector = ir.IntType(32), self.value
+        if isinstance(lanes, int):
+            return _Lanes(self.builder, self.builder.extract_element(vector, index(lanes)), self.flags)
+        places = [index(k) for k in (lanes if isinstance(lanes, list) else range(vector.type.count)[lanes])]
+        mask = ir.Constant(ir.VectorType(index, len(places)), places)
+        picked = self.builder.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), mask)
+        return _Lanes(self.builder, picked, self.flags)
 
 
-def polynomial(powers: FloatArray, x: Any, y: Any) -> Any:
-    """Polynomials (..., y, x) in numpy, operation by operation as compiled; x and y have two axes of length 1 more."""
-    rows, power = powers, y
-    while rows.shape[-2] > 1:
-        rows, power = rows[..., ::2, :] + power * rows[..., 1::2, :], power * power
-    row = rows[..., 0, :]
-    for power in ((x * x) * (x * x), x * x, x):
-        half = row.shape[-1] // 2
-        row = row[..., :half] + power[..., 0] * row[..., half:]
-    return row[..., 0]
+def _along_x(row: Any, x: Any) -> Any:
+    """The sum over a row of powers of x, by halves."""
+    for power, half in (((x * x) * (x * x), 4), (x * x, 2), (x, 1)):
+        row = row[:half] + row[half:] * power
+    return row[0]
 
 
-def _plain(array: FloatArray, offset: int, x: float, y: float) -> tuple[Any, Any, Any]:
-    powers = array[offset : offset + TERMS**2].reshape(TERMS, TERMS)
-    by_x = np.pad(powers[:, 1:] * np.arange(1, TERMS), ((0, 0), (0, 1)))
-    by_y = np.pad(powers[1:] * np.arange(1, TERMS)[:, None], ((0, 1), (0, 0)))
-    value, slope_x, slope_y = polynomial(np.stack([powers, by_x, by_y]), np.array([[x]]), np.array([[y]]))
-    return value, slope_x, slope_y
+def polynomial(rows: Any, x: Any, y: Any) -> Any:
+    """Rows of powers of x, one for each power of y, summed by pairs, which waits less than one after the other.
+
+    An array of `_Lanes`, or one whose first axes are those of the powers of y and x.
+    """
+    while len(rows) > 1:
+        rows, y = rows[::2] + rows[1::2] * y, y * y
+    return _along_x(rows[0], x)
 
 
-def _instruction(slopes: bool) -> Any:
-    """A polynomial of an array from an offset on, at x and y in [-1, 1], perhaps with its derivatives by both."""
+def gradient(rows: Any, x: Any, y: Any) -> Any:
+    """The same, summed one after the other, and its derivatives by x and by y."""
+    value, slope = rows[-2] + rows[-1] * y, rows[-1]
+    for row in rows[-3::-1]:
+        value, slope = row + value * y, value + slope * y
+    powers = [*range(1, TERMS), 0]
+    return _along_x(value, x), _along_x(value[powers] * powers, x), _along_x(slope, x)
+
+
+def _instruction(function: Any, *flags: str) -> Any:
+    """`polynomial` or `gradient` of an array from an offset on, at x and y in [-1, 1], with flags of LLVM's."""
 
     def define(typing: Any, array: Any, offset: Any, x: Any, y: Any) -> Any:
+        from llvmlite import ir
         from numba import types
+        from numba.np.arrayobj import make_array
 
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            polynomial = _Polynomial(context, builder, signature, arguments, fused=slopes)
-            if not slopes:
-                return polynomial.along_x(polynomial.sum())
-            value, slope = polynomial.sums()
-            parts = polynomial.along_x(value), polynomial.slope_along_x(value), polynomial.along_x(slope)
-            return context.make_tuple(builder, signature.return_type, parts)
+            data, rows = make_array(signature.args[0])(context, builder, arguments[0]).data, np.empty(TERMS, object)
+            for k in range(TERMS):
+                at = builder.gep(data, [builder.add(arguments[1], ir.IntType(64)(TERMS * k))], inbounds=True)
+                row = builder.load(builder.bitcast(at, ir.VectorType(ir.DoubleType(), TERMS).as_pointer()))
+                # doubles, not vectors, are what numpy aligns
+                row.align = 8
+                rows[k] = _Lanes(builder, row, flags)
+            found = function(rows, *(_Lanes(builder, number, flags) for number in arguments[2:]))
+            if function is polynomial:
+                return found.value
+            return context.make_tuple(builder, signature.return_type, [part.value for part in found])
 
-        made = types.UniTuple(types.float64, 3) if slopes else types.float64
+        made = types.float64 if function is polynomial else types.UniTuple(types.float64, 3)
         return made(array, types.int64, x, y), generate
 
-    return Instruction(define, _plain if slopes else lambda *given: _plain(*given)[0])
+    def plain(array: FloatArray, offset: int, x: float, y: float) -> Any:
+        return function(array[offset : offset + TERMS**2].reshape(TERMS, TERMS), x, y)
+
+    return Instruction(define, plain)
 
 
-value_at, gradient_at = _instruction(False), _instruction(True)
+value_at, gradient_at = _instruction(polynomial), _instruction(gradient, "contract")
 
 
 # fastmath=False is said because else numba takes that of whichever caller compiles these first, and bits depend on it

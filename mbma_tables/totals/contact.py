@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require, spread, whole_number_in
 from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
-from mbma_tables.models import AREA, BOTH, FORCE, OUTSIDE, QUANTITIES, AnyModel, get_model
+from mbma_tables.models import AREA, BOTH, FORCE, QUANTITIES, AnyModel, check_outside, get_model
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading, get_reading
@@ -86,8 +86,7 @@ def totals_at(
     gap = finite_array("separation", separation)
     modulus = finite_array("E_star", E_star)
     require("E_star", modulus, modulus > 0, "positive")
-    if outside not in OUTSIDE:
-        raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
+    check_outside(outside)
     model, workers = get_model(tier, rtol, reading), whole_number_in("workers", workers, 1, MOST_WORKERS)
     which = BOTH if len(quantities) > 1 else QUANTITIES.index(quantities[0])
     shape = broadcast_shape(separation=gap, surface=surface.h_rms, E_star=modulus)

@@ -161,7 +161,8 @@ def _rule(
     _, kronrod, gauss = rule_for(interval)
     count = kronrod.size
     fill_nodes(interval, gap, surface, slopes, work)
-    part.fill(0.0)
+    for column in range(part.shape[1]):
+        part[0, column] = part[1, column] = 0.0
     force = area = gauss_force = gauss_area = table_error = 0.0
     for k in range(count):
         status, phi_F, F_X, F_mu, phi_A, A_X, A_mu, error = universal_phi(work[0, k], work[1, k], table, slopes)
@@ -215,7 +216,8 @@ def total(
                 if status != OK:
                     return status, math.nan, islands
                 table_error = max(table_error, own_error)
-        out.fill(0.0)
+        for column in range(out.shape[1]):
+            out[0, column] = out[1, column] = 0.0
         force_error = area_error = 0.0
         for k in range(count):
             for row in range(2):
@@ -294,7 +296,8 @@ def fill_totals(
 ) -> int:
     """`total`, with derivatives where `slopes` is True, of each of the pairs given; returns the islands.
 
-    Given are `Pairs`; filled `status`, `out` (pairs, 2, columns), the `bound` on the relative error.
+    Given are `Pairs`; filled, where a gap touches, `status`, `out` (pairs, 2, columns), the `bound` on the
+    relative error.
     """
     islands = 0
     hurst, zeta_1, compression, peak = given
@@ -303,8 +306,6 @@ def fill_totals(
         if k > 0 and (hurst[k] != hurst[k - 1] or zeta_1[k] != zeta_1[k - 1]):
             surface = surface_constants(hurst[k], zeta_1[k], reading, printed)
         gap, sums = Gap(compression[k], peak[k]), out[k]
-        sums.fill(0.0)
-        status[k], bound[k] = OK, 0.0
         if gap.compression > 0.0:
             status[k], bound[k], count = total(gap, rtol, surface, slopes, table, sums)
             islands += count

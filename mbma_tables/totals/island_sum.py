@@ -57,25 +57,18 @@ def sum_islands(
     scale = STRETCH * pairs.zeta_1**-pairs.hurst
     turn = np.arcsinh(np.sqrt(kink_d / scale))
 
-    def to_grid(approach: FloatArray) -> FloatArray:
-        curved = np.arcsinh(np.sqrt(np.minimum(approach, kink_d) / scale))
-        grid: FloatArray = curved + np.maximum(approach - kink_d, 0.0)
-        return grid
-
     def integrand(owner: NDArray[np.intp], t: FloatArray) -> FloatArray:
         own = pairs.some((owner, None))
         rms_over_s = own.rms_over_s
         own_scale, own_turn, own_kink = (field[owner, None] for field in (scale, turn, kink_d))
-        hurst, zeta_1 = (np.broadcast_to(field, t.shape) for field in (own.hurst, own.zeta_1))
         curved = np.minimum(t, own_turn)
         approach = np.where(t < own_turn, own_scale * np.sinh(curved) ** 2, own_kink + (t - own_turn))
         stretch = np.where(t < own_turn, own_scale * np.sinh(2 * curved), 1.0)
-        g = geometry(approach, hurst, zeta_1, reading)
+        g = geometry(approach, own.hurst, own.zeta_1, reading)
         try:
-            phi = answer_islands(model, g | {"hurst": hurst}, outside, which)
+            phi = answer_islands(model, g | {"hurst": np.broadcast_to(own.hurst, t.shape)}, outside, which)
         except (ConvergenceError, OutOfRangeError) as fault:
-            failed = np.zeros(count, dtype=bool)
-            failed[owner if fault.mask is None else owner[fault.mask.any(axis=1)]] = True
+            failed = np.isin(np.arange(count), owner if fault.mask is None else owner[fault.mask.any(axis=1)])
             raise type(fault)(f"an island failed: {fault}", failed) from fault
         with np.errstate(invalid="ignore"):
             np.maximum.at(worst_island, owner, phi.error.max(axis=1))
@@ -89,7 +82,8 @@ def sum_islands(
     compression = np.maximum(pairs.compression, 0)
     edges = [np.minimum(k, compression) for k in (kink_d, kink_u)]
     breaks = np.sort(np.stack([np.zeros(count), *edges, compression]), axis=0)
-    low, high = (to_grid(b) for b in (breaks[:-1], breaks[1:]))
+    grid = np.arcsinh(np.sqrt(np.minimum(breaks, kink_d) / scale)) + np.maximum(breaks - kink_d, 0.0)
+    low, high = grid[:-1], grid[1:]
     owner = np.broadcast_to(np.arange(count), low.shape)
     filled = high > low
     found = integrate(integrand, owner[filled], low[filled], high[filled], count, rtol)
@@ -113,9 +107,7 @@ def totals_of(
         try:
             found = sum_islands(pairs.some(missing), reading, exact_model(rtol), SUM_SHARE * rtol, which=which)
         except ConvergenceError as fault:
-            mask = np.zeros(error.size, dtype=bool)
-            mask[missing[fault.mask]] = True
-            fault.mask = mask
+            fault.mask = np.isin(np.arange(error.size), missing[fault.mask])
             raise
         force[missing], area[missing], error[missing] = found[:3]
         islands += found.islands
@@ -139,8 +131,8 @@ def _by_table(
 ) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:  # fmt: skip
     """What `intervals.fill_totals` fills, islands, and the pairs that the table does not cover, which are NaN."""
     count, numbers = pairs.compression.size, reading.numbers
-    status, bound = np.empty(count, dtype=np.int64), np.empty(count)
-    out = np.empty((count, 2, intervals.COLUMNS if slopes else 1))
+    status, bound = np.full(count, OK), np.zeros(count)
+    out = np.zeros((count, 2, intervals.COLUMNS if slopes else 1))
 
     def fill(block: slice) -> int:
         return intervals.fill_totals(
