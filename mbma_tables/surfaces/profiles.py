@@ -19,6 +19,7 @@ from mbma_tables.errors import InputError
 from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.maps import MIN_POWER
 from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.treatment import Treated
 
 PER_DECADE = 10  # nodes of the spectrum
@@ -47,7 +48,7 @@ class ProfileSpectrum:
 
     @classmethod
     def of(cls, treated: Treated) -> ProfileSpectrum:
-        """Of a treated line scan."""
+        """Of a treated line scan; errors are those of the waves that were kept."""
         heights, step = treated.heights, treated.steps[0]
         length = heights.size * step
         unit = 2 * math.pi / length
@@ -56,7 +57,7 @@ class ProfileSpectrum:
         q, C = unit * np.arange(1, last + 1), np.abs(transform[1 : last + 1]) ** 2 / length
         overlap = 1.0 if treated.plain else OVERLAP
         low, high = treated.waves
-        held = (q >= low * (1 - 1e-9)) & (q <= high * (1 + 1e-9))
+        held = q >= low * (1 - 1e-9)
         if held.any():
             # nothing but rounding and leakage beyond where the surface ends
             rest = np.cumsum((C * q**2 * held)[::-1])[::-1]
@@ -72,9 +73,9 @@ class ProfileSpectrum:
         count = np.bincount(number).astype(float)
         sides = 4 * np.pi * np.sqrt(np.maximum(_panels(edges) ** 2 - q[:, None] ** 2, 0))
         kernel = np.add.reduceat(np.diff(sides, axis=1), np.searchsorted(number, np.arange(count.size)), axis=0)
-        slopes = C * q**2
+        slopes, kept = C * q**2, q <= high * (1 + 1e-9)
         # a wave's power is exponentially distributed: its square's mean is twice its mean's square
-        errors = [math.sqrt(each @ each / 2) / each.sum() / 2 for each in (C, slopes)]
+        errors = [math.sqrt(each @ each / 2) / each.sum() / 2 for each in (C[kept], slopes[kept])]
         return cls(
             edges,
             np.bincount(number, C) / count,
@@ -133,17 +134,21 @@ def measured_profile(treated: Treated, h_max: Any) -> MeasuredSurface:
     scale = float(np.abs(treated.heights).max())
     steps, waves = (treated.steps[0] / scale,), (scale * treated.waves[0], scale * treated.waves[1])
     scaled = dataclasses.replace(treated, heights=treated.heights / scale, steps=steps, waves=waves)
-    found = ProfileSpectrum.of(scaled)
+    # oblique waves shorter than a cut-off are seen longer along the line: the spectrum is cut, not the trace
+    uncut = scaled.heights if treated.uncut is None else treated.uncut / scale
+    found = ProfileSpectrum.of(dataclasses.replace(scaled, heights=uncut))
     heights = Heights.of(scaled.heights)
     if found.longest > ROLLED_OFF:
         # a few waves have no distribution
         heights = Heights.gaussian(found.h_rms, heights.h_max)
+    end = min(waves[1], float(found.edges[-1]))
+    q = np.append(found.edges[found.edges < end], end)
     surface = MeasuredSurface(
-        found.edges,
-        found.isotropic(),
+        q,
+        PowerLaws(found.edges, found.isotropic()).at(q),
         None if h_max is None else one_height(h_max) / scale,
         heights,
-        samples=np.interp(np.log(found.edges), np.log(found.edges[:-1]), found.count),
+        samples=np.interp(np.log(q), np.log(found.edges[:-1]), found.count),
     ).scaled(scale, treated.unit)
     edges = "periodic" if treated.plain else "under a window for the spectrum"
     notes = _limits(found, steps[0] * scaled.heights.size)

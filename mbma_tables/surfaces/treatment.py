@@ -84,6 +84,7 @@ class Treated:
     waves: tuple[float, float] = (0.0, math.inf)  # wavenumbers between which the waves are that were kept
     provenance: Provenance = ()  # each step: its name ("step"), its numbers, and a sentence ("told")
     window: str | None = None
+    uncut: Any = None  # heights before the short cut-off, where there is one
 
     def after(self, heights: Any, step: str, told: str, **numbers: Any) -> Treated:
         """The same after a step, which is recorded."""
@@ -262,9 +263,12 @@ def _within(known: Treated, short: float | None, long: float | None) -> Treated:
     if short is not None and long is not None and not long > short:
         raise InputError(f"long_cutoff must be larger than short_cutoff, got {long:g} and {short:g}")
     values = known.heights if known.periodic or short is long is None else mirrored(known.heights)
+    whole = tuple(slice(count) for count in known.heights.shape)
     for name, method, wavelength in (("long_cutoff", "longcut", long), ("short_cutoff", "shortcut", short)):
         if wavelength is None:
             continue
+        if name == "short_cutoff":
+            known = dataclasses.replace(known, uncut=values[whole])
         before = squares(values, known.steps)
         scan = wrapped(values, known.steps, True, known.unit)
         values = np.asarray(getattr(scan, method)(cutoff_wavelength=wavelength).heights(), float)
@@ -278,7 +282,6 @@ def _within(known: Treated, short: float | None, long: float | None) -> Treated:
             told += f": area at light load is {math.sqrt(before[1] / after[1]):.2f} times larger than without"
         told += f"; it removes {of_variance:.0%} of the height variance"
         known = known.after(values, name, told, wavelength=wavelength, of_gradient=of_gradient, of_variance=of_variance)
-    whole = tuple(slice(count if known.periodic else count // 2) for count in values.shape)
     return known if short is long is None else dataclasses.replace(known, heights=values[whole])
 
 

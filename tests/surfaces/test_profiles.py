@@ -146,6 +146,22 @@ def test_refused(line, error, message):
         Surface.from_profile(line, 1.0)
 
 
+@pytest.mark.parametrize("cut", [8.0, 20.0])
+def test_a_cut_line_is_that_of_the_cut_surface(cut):
+    # waves along the line that are longer than the cut-off are in part of oblique shorter ones
+    roll_off = 2 * np.pi * 40 / POINTS
+    C = plateau(0.6, roll_off, roll_off / 4)
+    ratios = []
+    for seed in range(4):
+        found = Surface.from_profile(trace(C, roll_off / 4, seed), 1.0, short_cutoff=cut)
+        m2, m4 = moments(lambda q: np.where(q <= 2 * np.pi / cut, C(q), 0.0), roll_off / 4, 2, 4)
+        assert found.q1 == pytest.approx(2 * np.pi / cut)
+        ratios.append((found.rms_gradient / np.sqrt(m2), found.m4 / (0.375 * m4)))
+    gradient, curvature = np.mean(ratios, axis=0)
+    assert gradient == pytest.approx(1, abs=0.03)
+    assert curvature == pytest.approx(1, abs=0.08)
+
+
 def test_points_of_a_line_go_forward(tmp_path):
     pytest.importorskip("SurfaceTopography")
     x, z = np.random.default_rng(1).random(100), np.random.default_rng(2).normal(size=100).cumsum()
