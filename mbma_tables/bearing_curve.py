@@ -113,12 +113,12 @@ def _fill_bearing(u: FloatArray, h_max: FloatArray, share: FloatArray, slope: Fl
             share[k] = slope[k] = 0.0
             continue
         d = _level(u[k])
-        above = 0.5 * math.erfc(d / math.sqrt(2.0))
+        # the larger follows from the smaller
+        below = mean_gap(d)[1] if d <= 0.0 else 0.0
+        above = 0.5 * math.erfc(d / math.sqrt(2.0)) if d > 0.0 else 1.0 - below
         share[k] = max(above - end, 0.0) / (1.0 - end)
         density = math.exp(-0.5 * d * d) / math.sqrt(2 * math.pi)
-        slope[k] = (
-            -density / ((1.0 - above) if d > 0.0 else mean_gap(d)[1]) / (1.0 - end) if d > -math.inf else -math.inf
-        )
+        slope[k] = -density / (below if d <= 0.0 else 1.0 - above) / (1.0 - end) if d > -math.inf else -math.inf
 
 
 def bearing_share(u: ArrayLike, h_max: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:

@@ -33,7 +33,7 @@ from mbma_tables.compiled import njit
 
 IMAGES = 0.06  # tau below which images converge faster than the series
 SHARPEST = 1e-200
-TERMS = 9  # of the series from there on
+TERMS, NOTHING = 9, 1e-20  # of the series from there on; a term that is less than rounding
 NODE, WEIGHT = np.polynomial.legendre.leggauss(8)
 SETTLED = 1e-7  # of ln F, before the last step
 MIN_DEPTH = 4 * np.finfo(float).eps  # relative, of separations that rounding leaves distinct
@@ -94,7 +94,7 @@ def _fill_area(known: FloatArray, numbers: tuple[float, float], sign: float, out
         x = min(load / cap, 1.0)
         tau = 1.0
         if load > 0.0:
-            elastic, limit = 2.0 * (load / spread) ** 2, cap**1.5 / scale
+            elastic, limit = 2.0 * (load / spread) ** 2, cap * math.sqrt(cap) / scale
             # the smaller over the larger cannot overflow; an elastic contact that is closed has no variance left
             small, large = min(elastic, limit), max(elastic, limit)
             S = small * (1.0 + (small / large) ** power) ** (-1.0 / power)
@@ -120,6 +120,8 @@ def diffused(x: float, tau: float, sign: float) -> float:
             # first^(n^2) by the odd powers between the squares
             odd *= first * first
             factor *= odd
+            if factor < NOTHING:
+                break
         return x + total * 2.0 / math.pi
     width = 2.0 * math.sqrt(tau)
     if sign > 0.0:
@@ -141,12 +143,12 @@ def _difference(centre: float, half: float) -> float:
 @njit(cache=True, error_model="numpy")
 def _joined(
     elastic: float, stiffness: float, share: float, slope: float, cap: float, numbers: tuple[float, float, float]
-) -> tuple[float, float]:
-    """F, and -d ln F/du."""
+) -> tuple[float, float, float]:
+    """The smaller of both forces, by how much ln F lies below its logarithm, and -d ln F/du."""
     n, full = numbers[0] + numbers[1] * cap + numbers[2] * share, cap * share
     small, large = min(elastic, full), max(elastic, full)
     if small <= 0.0:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     gain = math.log(large / small)
     power = math.exp(-n * gain) if large < math.inf else 0.0
     lower = math.log1p(power) / n  # of ln F below the smaller
@@ -155,14 +157,15 @@ def _joined(
     by_elastic = 1.0 - weight if elastic <= full else weight
     # where the elastic force has no bound it has no weight
     rate = by_elastic * stiffness / elastic if elastic < math.inf else 0.0
-    return small * math.exp(-lower), rate - ((1.0 - by_elastic) / share + numbers[2] * by_n) * slope
+    return small, lower, rate - ((1.0 - by_elastic) / share + numbers[2] * by_n) * slope
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _fill_force(known: FloatArray, numbers: tuple[float, float, float], out: FloatArray) -> None:
     for k in range(known.shape[1]):
-        force, rate = _joined(known[0, k], known[1, k], known[2, k], known[3, k], known[4, k], numbers)
-        out[0, k], out[1, k] = force, force * rate
+        small, lower, rate = _joined(known[0, k], known[1, k], known[2, k], known[3, k], known[4, k], numbers)
+        out[0, k] = small * math.exp(-lower)
+        out[1, k] = out[0, k] * rate
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -186,8 +189,8 @@ def newton_step(
     for k in range(places.size):
         place = places[k]
         u, wanted, cap, end = bracket[0, place], known[0, place], known[1, place], known[2, place]
-        force, rate = _joined(elastic[k], stiffness[k], share[k], slope[k], cap, numbers)
-        miss = math.log(force / wanted)
+        small, lower, rate = _joined(elastic[k], stiffness[k], share[k], slope[k], cap, numbers)
+        miss = math.log(small / wanted) - lower
         if miss > 0.0:
             bracket[1, place] = u
         else:

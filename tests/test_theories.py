@@ -250,6 +250,10 @@ def test_extreme_loads_stay_numbers():
     light = separation(YANG_PERSSON, [1e-300, 1e-150])
     assert relative(separation(YANG_PERSSON, [1e-300, 1e-150], LIGHT), light) < 1e-4
     assert separation(YANG_PERSSON, 1e300) == 0
+    # p0/Y about which exp(-(p0/Y)^2) is no normal number any more
+    vanishing = separation(YANG_PERSSON, math.sqrt(YANG_PERSSON.m2) * np.linspace(25.0, 28.0, 31))
+    assert (np.diff(vanishing) <= 0).all()
+    assert vanishing[0] > 0 == vanishing[-1]
     loads = np.array([1e-290, 1e-100, 1e-10, 1.0, 10.0])
     again = FULL.answer(YANG_PERSSON, separation(YANG_PERSSON, loads)).force
     assert relative(again, loads) < 1e-9

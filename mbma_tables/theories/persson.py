@@ -110,7 +110,8 @@ def _inner(log_a: FloatArray) -> FloatArray:
 def _full(bands: _Bands, log_p: FloatArray) -> FloatArray:
     """u/s of Eq. (19) and -d(u/s)/d(log p0), shape (2, loads), at log of p0/(E* q0 s)."""
     log_a = log_p - bands.log_top
-    some = np.flatnonzero(log_a < math.log(MAX_RATIO + 1))
+    # beyond it no quadrature of denormal numbers meets its tolerance
+    some = np.flatnonzero(log_a < math.log(MAX_RATIO + 0.1))
     if some.size == 0:
         return np.zeros((2, log_p.size))
     a_top = np.exp(log_a[some])

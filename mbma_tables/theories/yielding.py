@@ -6,6 +6,7 @@ pressures capped at the hardness. u is the mean gap, points that yield flattened
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 from collections.abc import Mapping
@@ -13,10 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import ndtri
+from scipy.interpolate import CubicSpline
+from scipy.special import expit, logit, ndtri
 
 from mbma_tables import hardness as law
-from mbma_tables.arguments import FloatArray, checked_hardness
+from mbma_tables.arguments import FloatArray, checked_hardness, require
 from mbma_tables.bearing_curve import rows
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -29,6 +31,9 @@ TESTED_ETA = 0.025  # p_m/(E* g) down to which boundary elements were solved
 STEPS = 200
 LOWEST = 1e-300
 CLOSED = 1e-9  # u/h_rms of contacts that count as full
+MANY = 200  # forces on one surface from which on a spline is worth making,
+NODE_STEP, BEYOND = 0.1, 16  # its steps in ln F/(p_m A0 - F), those beyond the forces at either end,
+MOST_ODDS = 20.0  # and the largest
 MAX_LEVEL = 37.0  # of heights over h_rms above which shares are no normal numbers
 
 
@@ -199,14 +204,9 @@ class Yielding(Theory):
         return self._separation(surface, given)
 
     def _separation(self, surface: AnySurface, force: FloatArray) -> FloatArray:
-        """Newton's method in a bracket: u lies below the elastic contact's, and the start is close."""
-        low, high = self.interval(surface)
-        above = self.elastic.mean_separation_at(surface, "force", force)
-        gradient, end = np.asarray(surface.rms_gradient), surface.h_max if self.ends_at_h_max else np.inf
-        known, _ = rows(force / gradient, self.hardness / gradient, end, surface.h_rms)
-        bracket, _ = rows(-ndtri(np.minimum(force / self.hardness, 1.0)), np.maximum(low, LOWEST), above)
-        law.start(known, law.CONSTANTS.exponent, bracket)
-        left = np.flatnonzero((force > 0) & (force < self.hardness) & np.isfinite(self.hardness))
+        """Newton's method in a bracket."""
+        known, bracket = self._started(surface, force)
+        left = np.flatnonzero((known[0] > 0) & (known[0] < known[1]) & (known[1] < np.inf))
         for _ in range(STEPS):
             if not left.size:
                 break
@@ -219,8 +219,48 @@ class Yielding(Theory):
         else:
             missed = np.isin(np.arange(force.size), left).reshape(force.shape)
             raise ConvergenceError(f"no separation was found for {left.size} pressures", missed)
-        u = np.where(force < self.hardness, bracket[0].reshape(force.shape), low)
+        low, high = self.interval(surface)
+        u, _, above = bracket.reshape(3, *force.shape)
+        u = np.where(force < self.hardness, u, low)
         return np.where(np.isinf(self.hardness), above, np.where(force > 0, u, high))
+
+    def _started(self, surface: AnySurface, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """`known` and `bracket` of `hardness.newton_step`: u lies below the elastic contact's, the start is close."""
+        (low, high), gradient = self.interval(surface), np.asarray(surface.rms_gradient)
+        low, end = np.maximum(low, LOWEST), surface.h_max if self.ends_at_h_max else np.inf
+        known, _ = rows(force / gradient, self.hardness / gradient, end, surface.h_rms)
+        log_odds = logit(force / self.hardness)
+        some = log_odds[np.abs(log_odds) < MOST_ODDS]
+        if not surface.shape and not self.hardness.ndim and some.size >= MANY:
+            with contextlib.suppress(OutOfRangeError):  # of all forces it says which
+                u = self._along_spline(surface, log_odds, some, (low, high * (1 - law.MIN_DEPTH), end))
+                return known, rows(u, low, high)[0]
+        above = self.elastic.mean_separation_at(surface, "force", force)
+        bracket, _ = rows(-ndtri(np.minimum(force / self.hardness, 1.0)), low, above)
+        law.start(known, law.CONSTANTS.exponent, bracket)
+        return known, bracket
+
+    def _along_spline(self, surface: AnySurface, log_odds: FloatArray, some: FloatArray, ends: Any) -> FloatArray:
+        """Separations at ln F/(p_m A0 - F) on one surface, about, by a spline through contacts over `some` of them."""
+        low, high, end = ends
+
+        def to_u(y: FloatArray) -> FloatArray:
+            return np.asarray(np.exp(y) / (1 + np.exp(y) / end))
+
+        nodes = np.linspace(some.min(), some.max(), min(int(np.ptp(some) / NODE_STEP) + 2, some.size // 4))
+        u = self._started(surface, self.hardness * expit(nodes))[1][0]
+        require("mean_separation", u, u > low, "positive")
+        # in what is straight at either end of contact, and a little beyond the nodes
+        y, more = np.log(u / (1 - u / end)), NODE_STEP * np.arange(1, BEYOND)
+        y = np.concatenate([y[0] + more[::-1], y, y[-1] - more])
+        y = y[(low < to_u(y)) & (to_u(y) < high)]
+        g, elastic = np.asarray(surface.rms_gradient), self.elastic.answer(surface, to_u(y))
+        bearing, eta = self.elastic.bearing_share(surface, to_u(y)), self.hardness / g
+        load, _ = law.force(elastic.force / g, elastic.stiffness / g, *bearing, eta)
+        met = logit(np.clip(load / eta, LOWEST, 1 - np.finfo(float).epsneg))
+        rising = np.append(True, np.diff(np.maximum.accumulate(met)) > 0)
+        found = CubicSpline(met[rising], y[rising])(np.clip(log_odds, met[0], met[-1]))
+        return np.clip(to_u(found), low, high)
 
     def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of ln F at given u and of ln A at given F against boundary elements with a hardness.

@@ -12,7 +12,7 @@ from helpers import random_map
 from mbma_tables import InputError, Surface, contact, contact_law, hardness
 from mbma_tables.theories import THEORIES, get_theory
 from mbma_tables.theories.calibrated_table import shipped
-from mbma_tables.theories.yielding import Yielding
+from mbma_tables.theories.yielding import MANY, Yielding
 
 SURFACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
 MODULUS = 100e3
@@ -69,6 +69,21 @@ def test_pressure_is_inverted_and_slopes_are_those_of_the_curve(theory):
     assert found.stiffness[kept] == pytest.approx(slope[kept], rel=1e-5)
     assert (found.incremental_stiffness > found.stiffness).all()
     assert (found.plane_separation <= found.mean_separation).all()
+
+
+@each
+@pytest.mark.parametrize("cap", [0.005, 0.05, 5.0])
+def test_many_pressures_on_one_surface(theory, cap):
+    share = 10 ** np.random.default_rng(4).uniform(-6, np.log10(min(0.5, 0.005 / cap)), MANY)
+    if theory == "calibrated":
+        # beyond the spline from which others start
+        share = np.append(share, [1e-12, min(0.99, 0.1 / cap)])
+    asked = Yielding(get_theory(theory), cap)
+    u = asked.mean_separation_at(SURFACE, "force", cap * share)
+    found = asked.answer(SURFACE, u)
+    # but for the last bits of u
+    rounding = 16 * np.finfo(float).eps * (cap * share + u * found.stiffness)
+    assert (np.abs(found.force - cap * share) <= rounding + 1e-12 * cap * share).all()
 
 
 def test_ten_thousand_contacts_keep_bounds_and_order():
