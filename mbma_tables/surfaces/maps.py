@@ -137,7 +137,7 @@ def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | N
 # grid steps in wavenumber: waves below are few, and a window weighs them by chance; no wave lies at a rounding's mercy
 LONG = 4.0 * (1 - 1e-9)
 RAISED, MET = 6.0, 1e-6  # of ln C, by which the strongest waves under a window may change; sums that are met
-STEEPEST = 4.0  # by which `matched` may tilt a spectrum
+STEEPEST = 30.0  # by which `matched` may tilt a spectrum
 TOLD = 0.05  # relative difference of rms gradients that is told, and half of that of h_rms
 
 
@@ -152,10 +152,11 @@ def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> Flo
         laws = PowerLaws(q, C * (q / q[0]) ** tilt)
         return math.log(2 * laws.moment(2) / laws.moment(0) / square)
 
-    if q.size < 2 or not excess(-STEEPEST) < 0 < excess(STEEPEST):
-        # too few waves for a slope
+    if q.size < 2:
+        # refused later
         return C
-    tilted = C * (q / q[0]) ** brentq(excess, -STEEPEST, STEEPEST)
+    slope = excess(-STEEPEST) < 0 < excess(STEEPEST)
+    tilted = C * (q / q[0]) ** brentq(excess, -STEEPEST, STEEPEST) if slope else C
     return np.asarray(tilted * (variance / PowerLaws(q, tilted).moment(0)))
 
 
@@ -195,8 +196,6 @@ def _unwindowed(
     rougher = parts[1] / parts[0] if min(parts) > 0 else 1.0
     under = math.sqrt(PowerLaws(q, C).moment(0) / variance)
     C = raised(q, C * rougher, variance, own(0.0))
-    laws = PowerLaws(q, C)
-    h_rms, gradient = math.sqrt(laws.moment(0) / variance), math.sqrt(2 * laws.moment(2) / own(0.0))
     record = {"step": "window", "h_rms": under, "rms_gradient": math.sqrt(seen(0.0) / own(0.0))}
     told = []
     if abs(math.sqrt(rougher) - 1) > TOLD:
@@ -208,12 +207,20 @@ def _unwindowed(
         told.append(
             f"few long waves carry the heights: under the window of the spectrum h_rms is {under:.2f} times the map's"
         )
-    if max(abs(h_rms - 1), abs(gradient - 1)) > TOLD:
-        told.append(
-            f"spectrum and heights disagree, as where a trend is left: h_rms of the spectrum is {h_rms:.2f} times the "
-            f"map's, its rms gradient {gradient:.2f} times"
-        )
+    told += _disagreement(q, C, variance, own(0.0))
     return C, record | ({"told": "; ".join(told)} if told else {})
+
+
+def _disagreement(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> list[str]:
+    """What is to be told where a spectrum has neither the variance nor the mean squared gradient of the heights."""
+    laws = PowerLaws(q, C)
+    h_rms, gradient = math.sqrt(laws.moment(0) / variance), math.sqrt(2 * laws.moment(2) / slopes)
+    if max(abs(h_rms - 1), abs(gradient - 1)) <= TOLD:
+        return []
+    return [
+        "spectrum and heights disagree, as where a trend is left or waves are few: h_rms of the spectrum is "
+        f"{h_rms:.2f} times the map's, its rms gradient {gradient:.2f} times"
+    ]
 
 
 def _within_band(treated: Treated, scale: float, spectrum: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -235,12 +242,16 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
     # of ridges, or of a few cosines, some hold no wave
     bins = bins[bins.log_c > bins.log_c.max() + math.log(MIN_POWER)]
     own = Heights.of(values)
-    C_bins, notes = np.exp(bins.log_c), []
+    notes: list[dict[str, Any]] = []
+    C_bins = np.exp(bins.log_c)
     if treated.plain:
         square = float((C * waves) @ q**2 / (C @ waves))
         changed = raised(bins.q, C_bins, own.h_rms**2, own.h_rms**2 * square)
         # a tilt where no waves are the few longest, as of a step
         C_bins = matched(bins.q, C_bins, own.h_rms**2, square) if changed is C_bins else changed
+        if bins.q.size > 1:
+            few = _disagreement(bins.q, C_bins, own.h_rms**2, own.h_rms**2 * square)
+            notes += [{"step": "few waves", "told": line} for line in few]
     else:
         grid = [2 * math.pi / (count * step) for count, step in zip(values.shape, (unit_x, unit_y), strict=True)]
         slopes, values = C * waves * q**2 * grid[0] * grid[1], values if treated.periodic else mirrored(values)

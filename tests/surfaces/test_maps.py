@@ -557,3 +557,21 @@ def test_which_way_a_periodic_map_is_turned_does_not_matter(shape):
             assert getattr(found.bearing, name) == pytest.approx(getattr(plain.bearing, name), rel=1e-12)
         np.testing.assert_allclose(found.bearing.top_gradient, plain.bearing.top_gradient, rtol=1e-12)
         assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=1e-9)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6))
+@example(seed=0)
+def test_a_periodic_map_of_few_waves_keeps_its_height_and_gradient_or_tells(seed):
+    rng = np.random.default_rng(seed)
+    x, y = np.mgrid[:64, :64] / 64
+    waves = rng.integers(0, 20, (rng.integers(2, 8), 2))
+    heights = sum(10 ** rng.uniform(-4, 0) * np.cos(2 * np.pi * (m * x + n * y) + rng.uniform(0, 6)) for m, n in waves)
+    try:
+        found = Surface.from_map(heights, 1.0, periodic=True)
+    except InputError:
+        # no spectrum from so few
+        return
+    assert found.h_rms == pytest.approx(found.heights.h_rms, rel=1e-9)
+    told = any("waves are few" in entry.get("told", "") for entry in found.provenance)
+    assert told == (abs(found.rms_gradient / found.bearing.gradient - 1) > 0.05)
