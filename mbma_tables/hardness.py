@@ -28,7 +28,7 @@ from scipy.special import erfinv, ndtri
 from mbma_tables.arguments import FloatArray
 from mbma_tables.bearing_curve import BearingCurve as BearingCurve
 from mbma_tables.bearing_curve import bearing_share as bearing_share
-from mbma_tables.bearing_curve import mean_gap, rows
+from mbma_tables.bearing_curve import rows
 from mbma_tables.compiled import njit
 
 IMAGES = 0.06  # tau below which images converge faster than the series
@@ -207,27 +207,6 @@ def newton_step(
         left[k] = not (near or high - low <= MIN_DEPTH * high or following == u)
         bracket[0, place] = following
     return left
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def start(known: FloatArray, numbers: tuple[float, float, float], bracket: FloatArray) -> None:
-    """First separations u for `newton_step`, in place of levels d above which a share F/(p_m A0) of heights lies.
-
-    Below the elastic contact's, which are the upper bounds, and below the bearing curve's.
-    """
-    for k in range(known.shape[1]):
-        wanted, cap, h_rms, d = known[0, k], known[1, k], known[3, k], bracket[0, k]
-        low, high = bracket[1, k], bracket[2, k]
-        if not 0.0 < wanted < cap < math.inf:
-            continue
-        x, density = wanted / cap, math.exp(-0.5 * d * d) / math.sqrt(2.0 * math.pi)
-        gap = mean_gap(d)[0]
-        # powers of u near both, joined as forces are
-        steep = min(max(gap * density / (x * (1.0 - x)), 1.0), 40.0)
-        n = (numbers[0] + numbers[1] * cap + numbers[2] * x) * steep
-        small, large = min(high, gap * h_rms), max(high, gap * h_rms)
-        u = small * (1.0 + (small / large) ** n) ** (-1.0 / n)
-        bracket[0, k] = min(max(u, low), high * (1.0 - MIN_DEPTH))
 
 
 def force(

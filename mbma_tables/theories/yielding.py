@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
-from scipy.special import expit, logit, ndtri
+from scipy.special import expit, logit, ndtr, ndtri
 
 from mbma_tables import hardness as law
 from mbma_tables.arguments import FloatArray, checked_hardness, require
@@ -222,7 +222,7 @@ class Yielding(Theory):
         low, high = self.interval(surface)
         u, _, above = bracket.reshape(3, *force.shape)
         u = np.where(force < self.hardness, u, low)
-        return np.where(np.isinf(self.hardness), above, np.where(force > 0, u, high))
+        return np.where(np.isinf(self.hardness), above, np.where(known[0].reshape(force.shape) > 0, u, high))
 
     def _started(self, surface: AnySurface, force: FloatArray) -> tuple[FloatArray, FloatArray]:
         """`known` and `bracket` of `hardness.newton_step`: u lies below the elastic contact's, the start is close."""
@@ -236,9 +236,17 @@ class Yielding(Theory):
                 u = self._along_spline(surface, log_odds, some, (low, high * (1 - law.MIN_DEPTH), end))
                 return known, rows(u, low, high)[0]
         above = self.elastic.mean_separation_at(surface, "force", force)
-        bracket, _ = rows(-ndtri(np.minimum(force / self.hardness, 1.0)), low, above)
-        law.start(known, law.CONSTANTS.exponent, bracket)
-        return known, bracket
+        with np.errstate(all="ignore"):
+            x = force / self.hardness
+            d, numbers = -ndtri(x), law.CONSTANTS.exponent
+            density = np.exp(-d * d / 2) / np.sqrt(2 * np.pi)
+            gap = np.maximum(d * ndtr(d) + density, LOWEST)
+            # powers of u near the elastic contact's and the bearing curve's, joined as forces are
+            n = numbers[0] + numbers[1] * self.hardness / gradient + numbers[2] * x
+            n = n * np.clip(gap * density / (x * (1 - x)), 1.0, 40.0)
+            ratio = gap * surface.h_rms / above
+            u = above * np.minimum(ratio, 1) * (1 + np.minimum(ratio, 1 / ratio) ** n) ** (-1 / n)
+        return known, rows(np.clip(u, low, above * (1 - law.MIN_DEPTH)), low, above)[0]
 
     def _along_spline(self, surface: AnySurface, log_odds: FloatArray, some: FloatArray, ends: Any) -> FloatArray:
         """Separations at ln F/(p_m A0 - F) on one surface, about, by a spline through contacts over `some` of them."""
