@@ -5,7 +5,6 @@ Of an island at a gap of compression c = (h_max - d)/h_rms, force and area count
 
 from __future__ import annotations
 
-import functools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +14,6 @@ from numpy.typing import NDArray
 from mbma_tables.arguments import FloatArray
 
 NODES, FEWER, NARROW = 16, 8, 0.3  # nodes of a panel, and of one whose width is less than NARROW of its approaches
-COUNTS = np.array([NODES, NODES, FEWER])  # of each of the `rules`
 MORE = 4  # terms of a panel's series than nodes
 CHECKS = np.array([1e-4, 0.5, 1 - 1e-4])  # places where polynomials miss most
 SPREAD = np.linspace(0, 1, 9)  # gaps that a panel is checked at, from it to the last
@@ -72,10 +70,14 @@ def _rule(n: int, power: int) -> Rule:
     return Rule(power, nodes, weights / 2, reach, checks, halves, inside, ends, series, integrated, to_series)
 
 
-@functools.cache
-def rules() -> tuple[Rule, Rule, Rule]:
-    """Those of the panel from 0, where delta goes with the square of the place, of others, and of narrow ones."""
-    return _rule(NODES, 2), _rule(NODES, 1), _rule(FEWER, 1)
+# of the panel from 0, where delta goes with the square of the place, of others, and of narrow ones
+RULES = _rule(NODES, 2), _rule(NODES, 1), _rule(FEWER, 1)
+COUNTS = np.array([rule.nodes.size for rule in RULES])
+# shares of panels at which islands are answered, nodes and then CHECKS, and which of them count
+SHARES = np.ones((len(RULES), NODES + CHECKS.size))
+for _own, _one in zip(SHARES, RULES, strict=True):
+    _own[: _one.nodes.size], _own[NODES:] = _one.nodes**_one.power, CHECKS**_one.power
+COUNTED = SHARES < 1
 
 
 class Panels(NamedTuple):
@@ -99,7 +101,7 @@ class Panels(NamedTuple):
 
     def groups(self) -> list[tuple[Rule, NDArray[np.intp], FloatArray]]:
         """Rules with the places of their panels, and these panels' fields at the rule's nodes."""
-        places = [(rule, np.flatnonzero(self.kind == number)) for number, rule in enumerate(rules())]
+        places = [(rule, np.flatnonzero(self.kind == number)) for number, rule in enumerate(RULES)]
         return [(rule, own, self.fields[:, own, : rule.nodes.size]) for rule, own in places if own.size]
 
 
@@ -112,22 +114,13 @@ class Nodes(NamedTuple):
     stops: NDArray[np.intp]  # how many lie below each panel, and in all
 
 
-@functools.cache
-def seen() -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Shares of panels at which islands are answered, of each rule, and which of them count: nodes, then CHECKS."""
-    shares = np.ones((3, NODES + CHECKS.size))
-    for own, rule in zip(shares, rules(), strict=True):
-        own[: rule.nodes.size], own[NODES:] = rule.nodes**rule.power, CHECKS**rule.power
-    return shares, shares < 1
-
-
 def nodes_of(panels: Panels) -> Nodes:
     """The islands of panels."""
     islands = panels.fields[..., :NODES].copy()
     for rule, own, fields in panels.groups():
         measure = rule.measure((panels.high - panels.low)[own], rule.nodes, len(islands) - 2)
         islands[:-2, own, : rule.nodes.size] = fields[:-2] * measure * rule.weights
-    islands = islands[:, seen()[1][panels.kind, :NODES]]
+    islands = islands[:, COUNTED[panels.kind, :NODES]]
     return Nodes(islands[:-2], islands[-2], islands[-1], np.append(0, COUNTS[panels.kind].cumsum()))
 
 
@@ -202,7 +195,7 @@ def _cut(rule: Rule, width: FloatArray, c: FloatArray, reach: FloatArray, inside
 def sums_at(c: FloatArray, own: NDArray[np.intp], panels: Panels, nodes: Nodes) -> Sums:
     """`_sums` at a few gaps in panels `own`."""
     found, islands = np.empty((2, len(nodes.weights), c.size)), np.arange(nodes.shift.size)
-    for number, rule in enumerate(rules()):
+    for number, rule in enumerate(RULES):
         mine = np.flatnonzero(panels.kind[own] == number)
         if mine.size:
             _, low, high, fields = panels.some(own[mine])

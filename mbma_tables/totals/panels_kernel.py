@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import Any
 
@@ -13,7 +12,7 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import REORDER, njit
 from mbma_tables.elementary import exp
 from mbma_tables.totals.intervals import LEAST
-from mbma_tables.totals.panels import BETWEEN, COUNTS, HIGH, MORE, NODES, SPREAD, TOPS, Nodes, Panels, Rule, rules
+from mbma_tables.totals.panels import BETWEEN, HIGH, MORE, NODES, RULES, SPREAD, TOPS, Nodes, Panels, Rule
 
 TAIL_SHARE = 2.0  # of the last two coefficients, for all that follow: they fall by 2 at least, and count twice
 SLOPES = 0.1  # of their relative error counts
@@ -22,8 +21,8 @@ FAR_ERROR = 5e-11  # of such a series, or they are summed after all
 THIN = 1e-2  # width over gap, of panels in which values round to more than slopes change
 BRANCHES = 32  # panels, of more a gap's is looked for by halves
 STRETCH, TERMS = 0.06, 8  # of the compression, or of h_rms, that one such series covers
-
-Rules = tuple[Rule, Rule, Rule]
+FAR_POINTS = chebyshev.chebpts1(TERMS)
+FAR_SERIES: Any = np.linalg.inv(chebyshev.chebvander(FAR_POINTS, TERMS - 1).T)
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy", forceinline=True)
@@ -92,20 +91,18 @@ def _tail(series: FloatArray) -> float:
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy")
-def _fill_far(
-    low: float, high: float, below: Nodes, stop: int, points: FloatArray, to_series: FloatArray, out: FloatArray
-) -> float:
+def _fill_far(low: float, high: float, below: Nodes, stop: int, out: FloatArray) -> float:
     """Series of ln(F), ln(A) and their slopes over compressions in [low, high], of islands below; their error."""
-    values, sums, begin = np.empty((4, points.size)), np.empty(4), below.stops[0]
-    for k in range(points.size):
-        c = 0.5 * (low + high + (high - low) * points[k])
+    values, sums, begin = np.empty((4, TERMS)), np.empty(4), below.stops[0]
+    for k in range(TERMS):
+        c = 0.5 * (low + high + (high - low) * FAR_POINTS[k])
         least = _least(c, below, begin, stop, math.inf)
         sums.fill(0.0)
         _sum_at(c, least, below, begin, stop, sums)
         values[0, k], values[1, k] = math.log(sums[0]) - 0.5 * least, math.log(sums[1]) - 0.5 * least
         values[2, k], values[3, k] = sums[2] / sums[0], sums[3] / sums[1]
     for row in range(4):
-        _combined(values[row], to_series, out[row])
+        _combined(values[row], FAR_SERIES, out[row])
     return max(_tail(out[0]), _tail(out[1]))
 
 
@@ -126,23 +123,22 @@ def _place(rule: Rule, width: float, reach: float, fields: FloatArray, first: in
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy", nogil=True)
-def fill_series(
-    panels: Panels, rules: Rules, points: FloatArray, to_series: FloatArray, islands: Nodes, out: FloatArray,
-    error: FloatArray,
-) -> None:  # fmt: skip
-    """`Profile.series` of panels and their errors, and the islands of all.
-
-    Islands far below many narrow panels are summed by a series in c, made at `points` by the matrix `to_series`.
-    """
+def series_of(panels: Panels) -> tuple[FloatArray, FloatArray, Nodes]:
+    """`Profile.series` of panels, their errors, and their islands; those far below many narrow panels by a series."""
     kinds, low, high, fields = panels
+    places = 0
+    for kind in kinds:
+        places += RULES[kind].nodes.size
+    islands = Nodes(np.empty((2, places)), np.empty(places), np.empty(places), np.zeros(low.size + 1, dtype=np.intp))
+    out, error = np.zeros((low.size, 2, NODES + MORE)), np.empty(low.size)
     most = (NODES + MORE) // 2
     inside, ends, values = np.empty((4, NODES * (most + 1))), np.empty((4, most)), np.empty((2, 2 * most))
-    sums, far, steepest = np.empty(4), np.zeros((4, points.size)), np.empty(2)
+    sums, far, steepest = np.empty(4), np.zeros((4, TERMS)), np.empty(2)
     # no literal 0, for which numba would compile everything again
     begin = stop = islands.stops[0]
     missed = start = until = 0.0
     for panel in range(low.size):
-        rule, width = rules[kinds[panel]], high[panel] - low[panel]
+        rule, width = RULES[kinds[panel]], high[panel] - low[panel]
         count, gaps = rule.nodes.size, rule.ends.shape[1]
         if high[panel] > until:
             # as many panels as make both sums equal work
@@ -150,7 +146,7 @@ def fill_series(
             begin, missed, start = 0, 0.0, low[panel]
             until = min(start + STRETCH * min(start, 1.0), many)
             if stop > MANY and high[panel] <= until:
-                missed = _fill_far(start, until, islands, stop, points, to_series, far)
+                missed = _fill_far(start, until, islands, stop, far)
                 begin, missed = (stop, missed) if missed <= FAR_ERROR else (0, 0.0)
         for row in range(4):
             _combined(fields[row, panel], rule.inside, inside[row])
@@ -190,6 +186,7 @@ def fill_series(
             _combined(values[row], rule.integrated if thin else rule.series, made)
             tail, slopes = _tail(made[: gaps + 1] if thin else made), 4.0 * gaps * high[panel] / (width * steepest[row])
             error[panel] = max(error[panel], missed + tail * (1.0 + SLOPES * slopes))
+    return out, error, islands
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy", nogil=True)
@@ -217,13 +214,13 @@ def fill_totals(compression: FloatArray, edges: FloatArray, series: FloatArray, 
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy", nogil=True)
-def fill_missed(panels: Panels, last: float, rules: Rules, spread: FloatArray, out: FloatArray) -> None:
-    """`panels.missed_by`; `spread` are places between a panel and `last`."""
+def missed_by(panels: Panels, last: float) -> FloatArray:
+    """`panels.missed_by`."""
     kinds, low, high, fields = panels
     finer, seen, coarse = np.empty((4, 2 * NODES)), np.empty((4, fields.shape[2] - NODES)), np.empty(NODES)
-    c = np.empty(spread.size + TOPS)
+    c, out = np.empty(SPREAD.size + TOPS), np.empty(low.size)
     for panel in range(low.size):
-        rule, width = rules[kinds[panel]], high[panel] - low[panel]
+        rule, width = RULES[kinds[panel]], high[panel] - low[panel]
         force, shift, rate = fields[0, panel], fields[2, panel], fields[3, panel]
         nodes, count = rule.nodes, rule.nodes.size
         for row in range(4):
@@ -251,8 +248,8 @@ def fill_missed(panels: Panels, last: float, rules: Rules, spread: FloatArray, o
                 coarse[k] *= 2.0 * nodes[k] * _leads(width * nodes[k] * nodes[k])[0]
         least = math.inf
         for k in range(c.size):
-            node = (k - spread.size) * (count // TOPS)
-            top = low[panel] + (last - low[panel]) * spread[k] if k < spread.size else shift[node] / rate[node]
+            node = (k - SPREAD.size) * (count // TOPS)
+            top = low[panel] + (last - low[panel]) * SPREAD[k] if k < SPREAD.size else shift[node] / rate[node]
             c[k] = min(max(top, high[panel]), last)
             for j in range(0, 2 * count, 4):
                 height = finer[2, j] - finer[3, j] * c[k]
@@ -268,26 +265,4 @@ def fill_missed(panels: Panels, last: float, rules: Rules, spread: FloatArray, o
                 rough += coarse[j] * exp(0.5 * (least - height * height))
             most, off = max(most, fine), max(off, abs(rough - fine))
         out[panel] = relative + HIGH * turned + BETWEEN * off / most
-
-
-@functools.cache
-def _far_rule() -> tuple[FloatArray, FloatArray]:
-    points = chebyshev.chebpts1(TERMS)
-    to_series: Any = np.linalg.inv(chebyshev.chebvander(points, TERMS - 1).T)
-    return points, to_series
-
-
-def series_of(panels: Panels) -> tuple[FloatArray, FloatArray, Nodes]:
-    """`Profile.series` of panels, their errors, and their islands."""
-    count, places = panels.low.size, int(COUNTS[panels.kind].sum())
-    made, errors = np.zeros((count, 2, NODES + MORE)), np.empty(count)
-    islands = Nodes(np.empty((2, places)), np.empty(places), np.empty(places), np.zeros(count + 1, dtype=np.intp))
-    fill_series(panels, rules(), *_far_rule(), islands, made, errors)
-    return made, errors, islands
-
-
-def missed_by(panels: Panels, last: float) -> FloatArray:
-    """`panels.missed_by`."""
-    out = np.empty(panels.low.size)
-    fill_missed(panels, last, rules(), SPREAD, out)
     return out

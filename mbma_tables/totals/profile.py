@@ -29,7 +29,7 @@ from mbma_tables.surfaces.readings import Reading
 from mbma_tables.totals import kernel, panels, panels_kernel
 from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
 from mbma_tables.totals.island_sum import kinks
-from mbma_tables.totals.panels import NARROW, POWERS, Nodes, Panels, nodes_of, seen
+from mbma_tables.totals.panels import COUNTED, NARROW, POWERS, SHARES, Nodes, Panels, nodes_of
 
 FEW = 256  # gaps that are asked of numpy, one by one
 KEPT = 64  # profiles, for whoever asks the same surface again
@@ -238,8 +238,7 @@ def _answered(
     ------
     _EndOfTable
     """
-    shares, counted = seen()
-    x, used = low[:, None] + (high - low)[:, None] * shares[kind], counted[kind]
+    x, used = low[:, None] + (high - low)[:, None] * SHARES[kind], COUNTED[kind]
     found, error = fields(x, used)
     if not (found[:-2] >= 0).all():
         unknown = np.isnan(found).any(axis=0)
