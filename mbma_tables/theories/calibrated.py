@@ -96,12 +96,12 @@ class Calibrated(Theory):
         else:
             force = (places.flat / places.gradient).reshape(places.shape)
         loads = force.ravel()
-        u = np.empty(loads.size)
-        covered = places.covered(table)[places.owner] & (loads > 0)
-        some = np.flatnonzero(covered)
+        # zero load is last contact
+        u, loaded, covered = np.full(loads.size, np.inf), loads > 0, places.covered(table)[places.owner]
+        some = np.flatnonzero(covered & loaded)
         u[some] = table.separations(places.columns, places.owner[some], loads[some])
-        for row, mine in places.outside(~covered):
-            u[mine] = np.where(loads[mine] > 0, places.law(row).separation(np.maximum(loads[mine], 1e-300)), np.inf)
+        for row, mine in places.outside(~covered & loaded):
+            u[mine] = places.law(row).separation(np.maximum(loads[mine], 1e-300))
         require(quantity, np.broadcast_to(wanted, places.shape), ~np.isnan(u).reshape(places.shape), "less: u is 0")
         return np.asarray(np.minimum((u * places.h_rms).reshape(places.shape), surface.h_max))
 

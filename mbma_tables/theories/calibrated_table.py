@@ -248,6 +248,22 @@ def nodes_of(axes: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
     return np.array([axis[0] for axis in axes]), np.array([(axis[-1] - axis[0]) / (axis.size - 1) for axis in axes])
 
 
+def _read(path: pathlib.Path, group: str = "") -> tuple[dict[str, FloatArray], dict[str, Any], dict[str, Any]]:
+    """Variables and attributes of a file of the calibrated law, or of a group of it, and what its axes cover."""
+    import netCDF4
+
+    body = read_sealed(path)
+    with HDF5_LOCK, netCDF4.Dataset(path.name, memory=body) as data:
+        if getattr(data, "mbma_kind", None) != "calibrated":
+            raise TableFileError(f"{path}: is no table of the calibrated law")
+        if group and group not in data.groups:
+            raise TableFileError(f"{path}: has no group {group!r}, only {sorted(data.groups)}")
+        data.set_auto_mask(False)
+        part = data[group] if group else data
+        covered = {name: x.getncattr("covered") for name, x in part.variables.items() if "covered" in x.ncattrs()}
+        return {name: np.array(x[...]) for name, x in part.variables.items()}, part.__dict__, covered
+
+
 def load(path: pathlib.Path) -> Table:
     """Read a table file.
 
@@ -256,25 +272,14 @@ def load(path: pathlib.Path) -> Table:
     TableFileError
         Where it is damaged or is another file.
     """
-    import netCDF4
-
-    body = read_sealed(path)
-    with HDF5_LOCK, netCDF4.Dataset(path.name, memory=body) as data:
-        if getattr(data, "mbma_kind", None) != "calibrated":
-            raise TableFileError(f"{path}: is no table of the calibrated law")
-        data.set_auto_mask(False)
-        covered = np.array([data[name].getncattr("covered") for name in AXES])
-        values = {name: np.array(variable[...]) for name, variable in data.variables.items()}
-        constants = Constants(*(float(data.getncattr(f"law_{f.name}")) for f in dataclasses.fields(Constants)))
-        names, error = data.getncattr("theories").split(), float(data.getncattr("largest_error_force"))
-    axes = [values[name] for name in AXES]
+    values, facts, covered = _read(path)
     return Table(
-        *nodes_of(axes),
-        covered,
+        *nodes_of([values[name] for name in AXES]),
+        np.array([covered[name] for name in AXES]),
         values["spline"],
-        constants,
-        error,
-        {name: np.log(values["stated_scatter"][k]) for k, name in enumerate(names)},
+        Constants(*(float(facts[f"law_{field.name}"]) for field in dataclasses.fields(Constants))),
+        float(facts["largest_error_force"]),
+        dict(zip(facts["theories"].split(), np.log(values["stated_scatter"]), strict=True)),
         np.log(values["contact"]),
     )
 
@@ -288,14 +293,4 @@ def shipped() -> Table:
 @functools.cache
 def shipped_part(group: str) -> tuple[dict[str, FloatArray], dict[str, Any]]:
     """Variables and attributes of a group of the shipped file, read once."""
-    import netCDF4
-
-    path = shipped_file(NAME)
-    body = read_sealed(path)
-    with HDF5_LOCK, netCDF4.Dataset(path.name, memory=body) as data:
-        data.set_auto_mask(False)
-        if group not in data.groups:
-            raise TableFileError(f"{path}: has no group {group!r}, only {sorted(data.groups)}")
-        part = data[group]
-        variables = {name: np.array(variable[...]) for name, variable in part.variables.items()}
-        return variables, {name: part.getncattr(name) for name in part.ncattrs()}
+    return _read(shipped_file(NAME), group)[:2]
