@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -185,18 +185,17 @@ def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> Floa
 
 
 def _unwindowed(
-    q: FloatArray, C: FloatArray, variance: float, seen: Callable[[float], float], own: Callable[[float], float]
+    q: FloatArray, C: FloatArray, variance: float, slopes: float, seen: float, parts: tuple[float, float]
 ) -> tuple[FloatArray, dict[str, Any]]:
     """C under a window as that of the whole map, and what was done.
 
-    Short waves are scaled to their own mean squared gradient, of which `seen` and `own` tell the part from a wavenumber
-    on under the window and of the map; what is left of h_rms and of the gradient is up to the longest waves.
+    Short waves are scaled to their own mean squared gradient, `parts` of what is `seen` under the window and of the
+    map's `slopes`; what is left of h_rms and of the gradient is up to the longest waves.
     """
-    parts = [find(LONG) for find in (seen, own)]
     rougher = parts[1] / parts[0] if min(parts) > 0 else 1.0
     under = math.sqrt(PowerLaws(q, C).moment(0) / variance)
-    C = raised(q, C * rougher, variance, own(0.0))
-    record = {"step": "window", "h_rms": under, "rms_gradient": math.sqrt(seen(0.0) / own(0.0))}
+    C = raised(q, C * rougher, variance, slopes)
+    record = {"step": "window", "h_rms": under, "rms_gradient": math.sqrt(seen / slopes)}
     told = []
     if abs(math.sqrt(rougher) - 1) > TOLD:
         told.append(
@@ -207,7 +206,7 @@ def _unwindowed(
         told.append(
             f"few long waves carry the heights: under the window of the spectrum h_rms is {under:.2f} times the map's"
         )
-    told += _disagreement(q, C, variance, own(0.0))
+    told += _disagreement(q, C, variance, slopes)
     return C, record | ({"told": "; ".join(told)} if told else {})
 
 
@@ -242,30 +241,29 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
     # of ridges, or of a few cosines, some hold no wave
     bins = bins[bins.log_c > bins.log_c.max() + math.log(MIN_POWER)]
     own = Heights.of(values)
+    values = values if treated.periodic else mirrored(values)
+    grid = [2 * math.pi / (n * step) for n, step in zip(treated.heights.shape, (unit_x, unit_y), strict=True)]
+
+    def slopes(low: float) -> float:
+        """Mean squared gradient of the map's own waves above a wavenumber, as far as the spectrum's last ring goes."""
+        return squares(values, (unit_x, unit_y), (low, float(q[-1]) + min(grid) / RINGS))[1]
+
     notes: list[dict[str, Any]] = []
-    C_bins = np.exp(bins.log_c)
+    C_bins, variance, whole = np.exp(bins.log_c), own.h_rms**2, slopes(0.0)
     if treated.plain:
-        square = float((C * waves) @ q**2 / (C @ waves))
-        changed = raised(bins.q, C_bins, own.h_rms**2, own.h_rms**2 * square)
+        changed = raised(bins.q, C_bins, variance, whole)
         # a tilt where no waves are the few longest, as of a step
-        C_bins = matched(bins.q, C_bins, own.h_rms**2, square) if changed is C_bins else changed
-        if bins.q.size > 1:
-            few = _disagreement(bins.q, C_bins, own.h_rms**2, own.h_rms**2 * square)
-            notes += [{"step": "few waves", "told": line} for line in few]
+        C_bins = matched(bins.q, C_bins, variance, whole / variance) if changed is C_bins else changed
+        few = _disagreement(bins.q, C_bins, variance, whole) if bins.q.size > 1 else []
+        notes += [{"step": "few waves", "told": line} for line in few]
     else:
-        grid = [2 * math.pi / (count * step) for count, step in zip(values.shape, (unit_x, unit_y), strict=True)]
-        slopes, values = C * waves * q**2 * grid[0] * grid[1], values if treated.periodic else mirrored(values)
-        C_bins, note = _unwindowed(
-            bins.q,
-            C_bins,
-            own.h_rms**2,
-            lambda low: float(slopes[q >= low * max(grid)].sum()),
-            lambda low: squares(values, (unit_x, unit_y), (low * max(grid), float(q[-1]) * (1 + 1e-9)))[1],
-        )
+        seen, floor = C * waves * q**2 * grid[0] * grid[1], LONG * max(grid)
+        parts = float(seen[q >= floor].sum()), slopes(floor)
+        C_bins, note = _unwindowed(bins.q, C_bins, variance, whole, float(seen.sum()), parts)
         notes.append(note)
     sizes = values.shape[0] * unit_x, values.shape[1] * unit_y
     curves = bearing.bearing(values, sizes, tuple(slice(count) for count in treated.heights.shape))
-    rougher = curves.gradient / math.sqrt(squares(values, (unit_x, unit_y), (0.0, float(q[-1]) * (1 + 1e-9)))[1])
+    rougher = curves.gradient / math.sqrt(whole)
     if rougher > 1 + TOLD:
         told = (
             "waves that only one axis or the diagonals sample are left out of the spectrum: with them the rms gradient "
