@@ -191,7 +191,7 @@ class Island4d:
         found = to_axes(raw["delta_over_h_rms"], zeta_d, raw["zeta_u"], hurst, self.reading)
         scales = np.stack(hat_scales(found.spread, zeta_d, hurst, found.sigma, self.reading))
         conditioning = 1e-4 * (1 + found.X) / found.sigma
-        return ConformancePoints(raw, found.axes, found.X, found.mu, scales, conditioning)
+        return ConformancePoints(raw, found[:4], found.X, found.mu, scales, conditioning)
 
     def check(self, content: TableContent) -> None:
         """Force and area finite and positive, below the rigid sphere's, increasing in X, force increasing in mu."""

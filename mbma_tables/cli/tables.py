@@ -87,14 +87,12 @@ def verify_command(tables: tuple[str, ...], as_json: bool) -> None:
 
     The conformance points are answered by the table and by the exact solver, and compared with the stored answers.
     """
-    import dataclasses
-
     from mbma_tables.models.tables import verify
     from mbma_tables.tablefiles.schema import KINDS
 
     verdicts = [verify(_path(t), t if t in KINDS else None) for t in tables or KINDS]
     if as_json:
-        echo(json.dumps({"tables": [dataclasses.asdict(v) for v in verdicts]}, indent=2))
+        echo(json.dumps({"tables": [v._asdict() for v in verdicts]}, indent=2))
         return
     for v in verdicts:
         found = f"within {v.solver_error:.1e}" if v.solver_error else "identical to the last bit"

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -60,9 +59,8 @@ def band_fields(spread: FloatArray, sphere: FloatArray, hurst: FloatArray, readi
     return out.reshape((3, *spread.shape))
 
 
-@dataclasses.dataclass(frozen=True)
-class Coordinates:
-    """Islands in the coordinates of the four-parameter table, and what else follows from the four numbers."""
+class Coordinates(NamedTuple):
+    """Islands in the four-parameter table: in the order of its axes, and what else follows from the four numbers."""
 
     X: FloatArray
     spread: FloatArray
@@ -71,10 +69,9 @@ class Coordinates:
     mu: FloatArray
     sigma: FloatArray  # times zeta_d^H
 
-    @property
-    def axes(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """In the order of the table's axes."""
-        return self.X, self.spread, self.sphere, self.hurst
+    def some(self, chosen: Any) -> Coordinates:
+        """The islands at these places."""
+        return Coordinates(*(field[chosen] for field in self))
 
 
 def to_axes(

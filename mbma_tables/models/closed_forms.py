@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, positive_modulus, require
 from mbma_tables.errors import InputError
 from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
 from mbma_tables.models import closed_form_functions as printed
@@ -133,8 +133,7 @@ def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1
     >>> error < 0.1
     True
     """
-    gap, modulus = finite_array("separation", separation), finite_array("E_star", E_star)
-    require("E_star", modulus, modulus > 0, "positive")
+    gap, modulus = finite_array("separation", separation), positive_modulus(E_star)
     shape = broadcast_shape(separation=gap, surface=surface.h_rms, E_star=modulus)
     fields = {
         "d_over_h_rms": gap / surface.h_rms,

@@ -38,11 +38,6 @@ def _broadcast(*values: ArrayLike) -> tuple[tuple[int, ...], list[FloatArray]]:
     return shape, [np.ascontiguousarray(np.broadcast_to(array, shape)) for array in given.values()]
 
 
-def _some(place: Coordinates, chosen: NDArray[np.bool_]) -> Coordinates:
-    """The islands at these places."""
-    return Coordinates(*(getattr(place, field.name)[chosen] for field in dataclasses.fields(place)))
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class Lookup:
     """F_hat = F^i q0/(E* s), A_hat = A^i q0^2/eta and the bound on their relative error, arrays of one shape.
@@ -169,7 +164,7 @@ class Island4dModel(Displayed):
         shape, raw = _broadcast(delta_over_h_rms, zeta_d, zeta_u, hurst)
         delta, low, high, H = (array.ravel() for array in raw)
         place = to_axes(delta, low, high, H, self.reading)
-        return tuple(axis.side(x.reshape(shape)) for axis, x in zip(self.content.axes, place.axes, strict=True))
+        return tuple(axis.side(x.reshape(shape)) for axis, x in zip(self.content.axes, place, strict=False))
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
         """Phi_F and Phi_A of islands, through their band and not through mu; `outside` as in `lookup`."""
@@ -190,7 +185,7 @@ class Island4dModel(Displayed):
         # below the first spread the expansion about the rigid sphere answers
         covered = [
             (x <= axis.high) & ((x >= axis.low) | (axis is self._spread))
-            for axis, x in zip(self.content.axes, place.axes, strict=True)
+            for axis, x in zip(self.content.axes, place, strict=False)
         ]
         return np.asarray(np.all(covered, axis=0))
 
@@ -219,7 +214,7 @@ class Island4dModel(Displayed):
             return phi, self.error(place)
         phi, error = np.full((2, inside.size), np.nan), np.full(inside.size, np.nan)
         if inside.any():
-            phi[:, inside], error[inside] = self._answer(_some(place, inside), inside[inside], outside, parallel)
+            phi[:, inside], error[inside] = self._answer(place.some(inside), inside[inside], outside, parallel)
         if outside == "exact":
             *phi[:, ~inside], error[~inside] = SOLVER.answer(place.X[~inside], place.mu[~inside])
         return phi, error
@@ -264,7 +259,7 @@ class Island4dModel(Displayed):
 
     def _log_slopes(self, place: Coordinates, inside: NDArray[np.bool_], raw: Any) -> dict[str, FloatArray]:
         """Derivatives of log F_hat and log A_hat by the raw numbers, each (2, entries); NaN outside."""
-        kept, raw = _some(place, inside), [number[inside] for number in raw]
+        kept, raw = place.some(inside), [number[inside] for number in raw]
         out, below = np.empty((2, 5, kept.X.size)), kept.spread < self._spread.low
         fill_gradient_4d(self.content.coefficients, self._positions(kept), out.reshape(10, -1))
         out *= self._share(kept)

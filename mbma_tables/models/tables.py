@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import os
 import pathlib
+from typing import NamedTuple
 
 import numpy as np
 
@@ -70,26 +70,12 @@ def universal_model() -> UniversalModel:
     return model
 
 
-@dataclasses.dataclass(frozen=True)
-class Verdict:
-    """What a check found.
-
-    Attributes
-    ----------
-    path : str
-    kind : str
-    points : int
-        Conformance points of the file, each answered twice.
-    table_error : float
-        Largest relative difference between the answers of the table as opened and those stored.
-    solver_error : float
-        Largest relative difference between the installed solver's answers and those stored; 0 where they are
-        identical to the last bit.
-    """
+class Verdict(NamedTuple):
+    """What a check of a file found: largest relative differences to the answers that are stored in it."""
 
     path: str
     kind: str
-    points: int
+    points: int  # answered by the table as opened, and by the installed solver
     table_error: float
     solver_error: float
 

@@ -283,7 +283,7 @@ def _comparison(run: Run, step: Step) -> None:
         assert problem.conductivities is not None
         pressure = (run.found.get("nominal_pressure") or run.found["force"])[1]
         k_s, cap = conductance.mean_conductivity(*problem.conductivities), problem.hardness or np.inf
-        found = conductance.CORRELATIONS[step.name](problem.surface, pressure, k_s, problem.E_star, cap)
+        found = getattr(conductance, step.name)(problem.surface, pressure, k_s, problem.E_star, cap)
         run.found[f"{step.name}_conductance"] = (("gap",), found)
         return
     cap = math.inf if run.problem.hardness is None else run.problem.hardness

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import Numbers, broadcast_shape, finite_array, require
+from mbma_tables.arguments import Numbers, broadcast_shape, finite_array, positive_modulus, require
 
 
 def mean_conductivity(k1: ArrayLike, k2: ArrayLike) -> Numbers:
@@ -56,9 +56,8 @@ def conductance(stiffness: ArrayLike, k_s: ArrayLike, E_star: ArrayLike) -> Numb
     80000.0
     """
     slope = finite_array("stiffness", stiffness)
-    mean, modulus = finite_array("k_s", k_s), finite_array("E_star", E_star)
+    mean, modulus = finite_array("k_s", k_s), positive_modulus(E_star)
     require("k_s", mean, mean > 0, "positive")
-    require("E_star", modulus, modulus > 0, "positive")
     broadcast_shape(stiffness=slope, k_s=mean, E_star=modulus)
     return (mean / modulus * slope)[()]
 
@@ -109,6 +108,3 @@ def mikic(
 def _by_slope(surface: Any, k_s: ArrayLike, number: Any) -> Numbers:
     found: Numbers = (np.asarray(k_s) * np.sqrt(2 * surface.m2 / np.pi) / surface.h_rms * number)[()]
     return found
-
-
-CORRELATIONS = {"cooper_mikic_yovanovich": cooper_mikic_yovanovich, "mikic": mikic}

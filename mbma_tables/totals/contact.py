@@ -19,7 +19,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require, spread, whole_number_in
+from mbma_tables.arguments import (
+    FloatArray,
+    broadcast_shape,
+    finite_array,
+    positive_modulus,
+    require,
+    spread,
+    whole_number_in,
+)
 from mbma_tables.compiled import in_blocks
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import AREA, BOTH, FORCE, QUANTITIES, AnyModel, check_outside, get_model
@@ -84,8 +92,7 @@ def totals_at(
     """
     quantities, reading = wanted_quantities(quantities), get_reading(reading)
     gap = finite_array("separation", separation)
-    modulus = finite_array("E_star", E_star)
-    require("E_star", modulus, modulus > 0, "positive")
+    modulus = positive_modulus(E_star)
     check_outside(outside)
     model, workers = get_model(tier, rtol, reading), whole_number_in("workers", workers, 1, MOST_WORKERS)
     which = BOTH if len(quantities) > 1 else QUANTITIES.index(quantities[0])

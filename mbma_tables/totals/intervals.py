@@ -91,28 +91,10 @@ def rule_for(interval: Interval) -> tuple[FloatArray, FloatArray, FloatArray]:
     return PADDED_31, KRONROD_31, GAUSS_31
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def approach_at(t: float, straight: bool, scale: float) -> tuple[float, float]:
-    """X = delta/h_rms and dx/dt at a node."""
-    # sinh and cosh by expm1: exponentials would cancel at small t
-    more = expm1(t)
-    rise = 0.5 * (more + more / (more + 1.0))
-    steep = scale * rise * (more + 1.0 + 1.0 / (more + 1.0))
-    return (t, 1.0) if straight else (scale * rise * rise, steep)
-
-
 @njit(cache=True, error_model="numpy")
 def safety_of(floor_d: float) -> float:
-    """The factor of `error_of` for a reading's floor of zeta_d."""
+    """What differences to the Gauss rule are multiplied by, for a reading's floor of zeta_d."""
     return SAFETY if floor_d >= PAPER_FLOOR else SAFETY_BELOW
-
-
-@njit(cache=True, error_model="numpy")
-def error_of(force: float, gauss_force: float, area: float, gauss_area: float, safety: float) -> float:
-    """Relative error of both Kronrod sums: both integrands resolve alike, and one may agree by chance."""
-    difference = max(abs(gauss_force / force - 1.0), abs(gauss_area / area - 1.0))
-    error: float = min(difference, (safety * difference) ** 1.5)
-    return error
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy")
@@ -125,9 +107,14 @@ def fill_nodes(interval: Interval, gap: Gap, surface: SurfaceConstants, slopes: 
     low, high, floor_d, floor_u = interval
     nodes = rule_for(interval)[0]
     half, centre = 0.5 * (high - low), 0.5 * (high + low)
-    rms_over_s = surface.rms_over_s
+    rms_over_s, scale = surface.rms_over_s, surface.map_scale
     for k in range(nodes.size):
-        x, stretch = approach_at(centre + half * nodes[k], floor_d, surface.map_scale)
+        t = centre + half * nodes[k]
+        # sinh and cosh by expm1: exponentials would cancel at small t
+        more = expm1(t)
+        rise = 0.5 * (more + more / (more + 1.0))
+        steep = scale * rise * (more + 1.0 + 1.0 / (more + 1.0))
+        x, stretch = (t, 1.0) if floor_d else (scale * rise * rise, steep)
         node = island_node(x, floor_d, floor_u, surface)
         height = island_height(x, node.h_d, node.sigma_d, gap, rms_over_s)
         share = -0.5 * height * height
@@ -188,7 +175,9 @@ def _rule(
             part[row, BELOW_KINK] = 0.0 if interval.floor_d else part[row, 0]
     if not (force > 0.0 and area > 0.0):
         return OK, 0.0, table_error, count
-    return OK, error_of(force, gauss_force, area, gauss_area, safety_of(surface.reading.floor_d)), table_error, count
+    # of both sums: both integrands resolve alike, and one may agree by chance
+    difference = max(abs(gauss_force / force - 1.0), abs(gauss_area / area - 1.0))
+    return OK, min(difference, (safety_of(surface.reading.floor_d) * difference) ** 1.5), table_error, count
 
 
 @njit(cache=True, error_model="numpy")
