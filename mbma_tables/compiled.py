@@ -94,6 +94,52 @@ class Instruction:
         return context.resolve_value_type(made)
 
 
+class Lanes:
+    """A double, or a vector of them, in LLVM's code, with the arithmetic of numpy; `flags` are LLVM's of each step."""
+
+    def __init__(self, builder: Any, value: Any, flags: tuple[str, ...]) -> None:
+        self.builder, self.value, self.flags = builder, value, flags
+
+    @classmethod
+    def load(cls, builder: Any, data: Any, at: Any, count: int, flags: tuple[str, ...]) -> Lanes:
+        """Neighbours in an array of doubles or floats, from number `at` on."""
+        from llvmlite import ir
+
+        pointer, double = builder.gep(data, [at], inbounds=True), ir.DoubleType()
+        kind = pointer.type.pointee
+        vector = builder.load(builder.bitcast(pointer, ir.VectorType(kind, count).as_pointer()))
+        # numbers, not vectors, are what numpy aligns
+        vector.align = 8 if kind == double else 4
+        return cls(builder, vector if kind == double else builder.fpext(vector, ir.VectorType(double, count)), flags)
+
+    def __add__(self, other: Lanes) -> Lanes:
+        """Of two alike."""
+        return Lanes(self.builder, self.builder.fadd(self.value, other.value, flags=self.flags), self.flags)
+
+    def __mul__(self, other: Any) -> Lanes:
+        """By another alike; of a vector by a list of constants, or every lane of it by a number."""
+        from llvmlite import ir
+
+        own, factor = self.value, ir.Constant(self.value.type, other) if isinstance(other, list) else other.value
+        if own.type != factor.type:
+            factor = ir.Constant(own.type, ir.Undefined)
+            for k in range(own.type.count):
+                factor = self.builder.insert_element(factor, other.value, ir.IntType(32)(k))
+        return Lanes(self.builder, self.builder.fmul(own, factor, flags=self.flags), self.flags)
+
+    def __getitem__(self, lanes: Any) -> Lanes:
+        """One lane, or the vector of those in a slice or list."""
+        from llvmlite import ir
+
+        index, vector = ir.IntType(32), self.value
+        if isinstance(lanes, int):
+            return Lanes(self.builder, self.builder.extract_element(vector, index(lanes)), self.flags)
+        places = [index(k) for k in (lanes if isinstance(lanes, list) else range(vector.type.count)[lanes])]
+        mask = ir.Constant(ir.VectorType(index, len(places)), places)
+        picked = self.builder.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), mask)
+        return Lanes(self.builder, picked, self.flags)
+
+
 def njit(**options: Any) -> Callable[[Function], Function]:
     """`numba.njit`, put off; with `cache=True` the code is kept where numba finds a folder for it."""
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import Instruction, njit
+from mbma_tables.compiled import Instruction, Lanes, njit
 from mbma_tables.elementary import bits_of
 from mbma_tables.tablefiles.schema import BUCKET_BITS
 
@@ -44,38 +44,6 @@ class Table(NamedTuple):
     buckets: int
 
 
-class _Lanes:
-    """A double, or a vector of them, in LLVM's code, with the arithmetic of numpy."""
-
-    def __init__(self, builder: Any, value: Any, flags: tuple[str, ...]) -> None:
-        self.builder, self.value, self.flags = builder, value, flags
-
-    def __add__(self, other: _Lanes) -> _Lanes:
-        return _Lanes(self.builder, self.builder.fadd(self.value, other.value, flags=self.flags), self.flags)
-
-    def __mul__(self, other: Any) -> _Lanes:
-        """By another alike; of a vector by a list of constants, or every lane of it by a number."""
-        from llvmlite import ir
-
-        own, factor = self.value, ir.Constant(self.value.type, other) if isinstance(other, list) else other.value
-        if own.type != factor.type:
-            factor = ir.Constant(own.type, ir.Undefined)
-            for k in range(own.type.count):
-                factor = self.builder.insert_element(factor, other.value, ir.IntType(32)(k))
-        return _Lanes(self.builder, self.builder.fmul(own, factor, flags=self.flags), self.flags)
-
-    def __getitem__(self, lanes: Any) -> _Lanes:
-        from llvmlite import ir
-
-        index, vector = ir.IntType(32), self.value
-        if isinstance(lanes, int):
-            return _Lanes(self.builder, self.builder.extract_element(vector, index(lanes)), self.flags)
-        places = [index(k) for k in (lanes if isinstance(lanes, list) else range(vector.type.count)[lanes])]
-        mask = ir.Constant(ir.VectorType(index, len(places)), places)
-        picked = self.builder.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), mask)
-        return _Lanes(self.builder, picked, self.flags)
-
-
 def _along_x(row: Any, x: Any) -> Any:
     """The sum over a row of powers of x, by halves."""
     for power, half in (((x * x) * (x * x), 4), (x * x, 2), (x, 1)):
@@ -86,7 +54,7 @@ def _along_x(row: Any, x: Any) -> Any:
 def polynomial(rows: Any, x: Any, y: Any) -> Any:
     """Rows of powers of x, one for each power of y, summed by pairs, which waits less than one after the other.
 
-    An array of `_Lanes`, or one whose first axes are those of the powers of y and x.
+    An array of `Lanes`, or one whose first axes are those of the powers of y and x.
     """
     while len(rows) > 1:
         rows, y = rows[::2] + rows[1::2] * y, y * y
@@ -106,19 +74,15 @@ def _instruction(function: Any, *flags: str) -> Any:
     """`polynomial` or `gradient` of an array from an offset on, at x and y in [-1, 1], with flags of LLVM's."""
 
     def define(typing: Any, array: Any, offset: Any, x: Any, y: Any) -> Any:
-        from llvmlite import ir
         from numba import types
         from numba.np.arrayobj import make_array
 
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             data, rows = make_array(signature.args[0])(context, builder, arguments[0]).data, np.empty(TERMS, object)
             for k in range(TERMS):
-                at = builder.gep(data, [builder.add(arguments[1], ir.IntType(64)(TERMS * k))], inbounds=True)
-                row = builder.load(builder.bitcast(at, ir.VectorType(ir.DoubleType(), TERMS).as_pointer()))
-                # doubles, not vectors, are what numpy aligns
-                row.align = 8
-                rows[k] = _Lanes(builder, row, flags)
-            found = function(rows, *(_Lanes(builder, number, flags) for number in arguments[2:]))
+                at = builder.add(arguments[1], arguments[1].type(TERMS * k))
+                rows[k] = Lanes.load(builder, data, at, TERMS, flags)
+            found = function(rows, *(Lanes(builder, number, flags) for number in arguments[2:]))
             if function is polynomial:
                 return found.value
             return context.make_tuple(builder, signature.return_type, [part.value for part in found])

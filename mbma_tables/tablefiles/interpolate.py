@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import CONTRACT, Instruction, jitable, njit
+from mbma_tables.compiled import CONTRACT, Instruction, Lanes, jitable, njit
 
 Six = tuple[Any, Any, Any, Any, Any, Any]
 Four = tuple[Any, Any, Any, Any]
@@ -32,56 +32,30 @@ def _patch_lanes(
     typing_context: Any, array: Any, offset: Any, row: Any, step: Any, across: Any, along: Any
 ) -> Any:  # fmt: skip
     """Sum of ``across[a] along[b]`` times the eight neighbours from ``offset + a row + b step`` on."""
-    from llvmlite import ir
     from numba import types
     from numba.np.arrayobj import make_array
 
-    double, place = ir.VectorType(ir.DoubleType(), LANES), ir.IntType(32)
-    single = array.dtype == types.float32
-    vector = ir.VectorType(ir.FloatType(), LANES) if single else double
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        data = make_array(signature.args[0])(context, builder, arguments[0]).data
-
-        def spread(weights: Any, n: int) -> Any:
-            lane = builder.insert_element(
-                ir.Constant(double, ir.Undefined), builder.extract_value(weights, n), place(0)
-            )
-            return builder.shuffle_vector(
-                lane, ir.Constant(double, ir.Undefined), ir.Constant(ir.VectorType(place, LANES), [0] * LANES)
-            )
-
-        def add(total: Any, weight: Any, lanes: Any) -> Any:
-            product = builder.fmul(weight, lanes, flags=("contract",))
-            return product if total is None else builder.fadd(total, product, flags=("contract",))
-
-        inner = [spread(arguments[5], n) for n in range(len(along))]
-        total, start = None, arguments[1]
-        for a in range(len(across)):
-            rowwise, at = None, start
-            for weight in inner:
-                pointer = builder.gep(data, [at], inbounds=True)
-                lanes = builder.load(builder.bitcast(pointer, vector.as_pointer()))
-                # numbers, not vectors, are what numpy aligns
-                lanes.align = 4 if single else 8
-                rowwise = add(rowwise, weight, builder.fpext(lanes, double) if single else lanes)
+        data, flags = make_array(signature.args[0])(context, builder, arguments[0]).data, ("contract",)
+        outer, inner = (
+            [Lanes(builder, builder.extract_value(given, n), flags) for n in range(len(kind))]
+            for given, kind in ((arguments[4], across), (arguments[5], along))
+        )
+        total: Any = None
+        start = arguments[1]
+        for weight in outer:
+            rowwise: Any = None
+            at = start
+            for own in inner:
+                product = Lanes.load(builder, data, at, LANES, flags) * own
+                rowwise = product if rowwise is None else rowwise + product
                 at = builder.add(at, arguments[3])
-            total = add(total, spread(arguments[4], a), rowwise)
+            total = rowwise * weight if total is None else total + rowwise * weight
             start = builder.add(start, arguments[2])
-        return _to_tuple(context, builder, signature, total)
+        return context.make_tuple(builder, signature.return_type, [total[n].value for n in range(LANES)])
 
     result = types.UniTuple(types.float64, LANES)
     return result(array, types.intp, types.intp, types.intp, across, along), generate
-
-
-def _to_tuple(context: Any, builder: Any, signature: Any, vector: Any) -> Any:
-    from llvmlite import ir
-    from numba.core.imputils import impl_ret_untracked
-
-    lanes = ir.Constant(context.get_value_type(signature.return_type), ir.Undefined)
-    for n in range(LANES):
-        lanes = builder.insert_value(lanes, builder.extract_element(vector, ir.IntType(32)(n)), n)
-    return impl_ret_untracked(context, builder, signature.return_type, lanes)
 
 
 def _plain_patch(array: Any, start: int, row: int, step: int, across: Any, along: Any) -> tuple[float, ...]:
