@@ -15,11 +15,15 @@ from mbma_tables.arguments import FloatArray
 
 NODES, FEWER, NARROW = 16, 8, 0.3  # nodes of a panel, and of one whose width is less than NARROW of its approaches
 MORE = 4  # terms of a panel's series than nodes
-CHECKS = np.array([1e-4, 0.5, 1 - 1e-4])  # places where polynomials miss most
+CHECKS = np.array([1e-5, 0.5, 1 - 1e-5])  # places where polynomials miss most
+AT_ENDS = 1.01  # times as much at the ends as next to them
 SPREAD = np.linspace(0, 1, 9)  # gaps that a panel is checked at, from it to the last
 TOPS = 8  # and those at which a Gaussian has its top in it
+BEYOND = 0.25 * np.linspace(0, 1, TOPS) ** 3  # shares of the way back from the last gap, where that top is beyond it
 BETWEEN = 3.0  # times more is missed at gaps between them, and past turning points, where sums fall
-HIGH = 6.0  # of sigma_d: islands beyond carry less than 1e-7
+HIGH = 6.0  # of sigma_d: islands beyond carry less than 1e-7, where there are others
+LEADS = 20.0  # by which exponents of the smallest islands exceed those of others that still count
+TINY = 1e-290  # for an approach of 0
 LEAST = 1e-100  # share of a panel that a gap cuts
 FAR = 1e150  # height of an island that is not there
 # of delta, in which force, area, number of islands and Hertz area begin
@@ -142,11 +146,14 @@ def _missed(
     relative = np.abs(np.divide(missed[:-2], own, out=np.zeros_like(own), where=own > 0)).max(axis=(0, 2))
     # heights count where the Gaussian does: near the gap of its top
     at = np.clip(true[-2] / true[-1], high[:, None], last)
-    turned = (np.abs(missed[-2] - missed[-1] * at) + HIGH * np.abs(missed[-1]) / true[-1]).max(axis=1)
+    highest = np.minimum(true[-2] - true[-1] * high[:, None], LEADS / (true[-1] * np.maximum(low[:, None], TINY)))
+    highest = np.maximum(highest, HIGH)
+    turned = (highest * (np.abs(missed[-2] - missed[-1] * at) + highest * np.abs(missed[-1]) / true[-1])).max(axis=1)
     # sums over whole panels, relative to the largest of the panel
     spread = low[:, None] + (last - low)[:, None] * SPREAD
     # where Gaussians are narrow no such gap may meet one: gaps at which one has its top in the panel
     tops = (fields[-2] / fields[-1])[:, :: max(1, rule.nodes.size // TOPS)]
+    tops = np.where(tops < last, tops, last - (last - high)[:, None] * BEYOND)
     c = np.clip(np.concatenate([spread, tops], axis=1), high[:, None], last)[..., None]
 
     def squares(at: FloatArray) -> FloatArray:
@@ -155,15 +162,20 @@ def _missed(
 
     def sums(at: FloatArray, far: FloatArray, places: FloatArray, weights: FloatArray) -> FloatArray:
         force = at[0] * rule.measure(high - low, places, 1)[0] * weights
-        # in units of the panel's largest, so that nothing underflows
+        # in units of the gap's largest, so that nothing underflows
         return np.asarray((np.exp(0.5 * (least - far)) @ force[..., None])[..., 0])
 
     finer = fields @ rule.halves
     coarse_far, fine_far = squares(fields), squares(finer)
-    least = fine_far.min(axis=(1, 2), keepdims=True)
+    least = fine_far.min(axis=2, keepdims=True)
     fine = sums(finer, fine_far, np.concatenate([rule.nodes, 1 + rule.nodes]) / 2, np.tile(rule.weights / 2, 2))
-    off = np.abs(sums(fields, coarse_far, rule.nodes, rule.weights) - fine).max(axis=1)
-    return np.asarray(relative + HIGH * turned + BETWEEN * off / fine.max(axis=1))
+    off = np.abs(sums(fields, coarse_far, rule.nodes, rule.weights) - fine)
+    scale = np.exp(0.5 * (least.min(axis=1) - least[..., 0]))
+    share = (off * scale).max(axis=1) / (fine * scale).max(axis=1)
+    if rule.power > 1:
+        # up to its own end the panel from 0 is all there is
+        share = np.maximum(share, off[:, 0] / fine[:, 0])
+    return np.asarray(AT_ENDS * relative + turned + BETWEEN * share)
 
 
 def _sums(heights: FloatArray, weights: FloatArray, turned: FloatArray) -> Sums:

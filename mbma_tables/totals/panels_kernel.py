@@ -12,7 +12,22 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.compiled import REORDER, njit
 from mbma_tables.elementary import exp
 from mbma_tables.totals.intervals import LEAST
-from mbma_tables.totals.panels import BETWEEN, HIGH, MORE, NODES, RULES, SPREAD, TOPS, Nodes, Panels, Rule
+from mbma_tables.totals.panels import (
+    AT_ENDS,
+    BETWEEN,
+    BEYOND,
+    HIGH,
+    LEADS,
+    MORE,
+    NODES,
+    RULES,
+    SPREAD,
+    TINY,
+    TOPS,
+    Nodes,
+    Panels,
+    Rule,
+)
 
 TAIL_SHARE = 2.0  # of the last two coefficients, for all that follow: they fall by 2 at least, and count twice
 SLOPES = 0.1  # of their relative error counts
@@ -218,7 +233,7 @@ def missed_by(panels: Panels, last: float) -> FloatArray:
     """`panels.missed_by`."""
     kinds, low, high, fields = panels
     finer, seen, coarse = np.empty((4, 2 * NODES)), np.empty((4, fields.shape[2] - NODES)), np.empty(NODES)
-    c, out = np.empty(SPREAD.size + TOPS), np.empty(low.size)
+    (c, least), out = np.empty((2, SPREAD.size + TOPS)), np.empty(low.size)
     for panel in range(low.size):
         rule, width = RULES[kinds[panel]], high[panel] - low[panel]
         force, shift, rate = fields[0, panel], fields[2, panel], fields[3, panel]
@@ -235,7 +250,9 @@ def missed_by(panels: Panels, last: float) -> FloatArray:
             true_shift, true_rate = shift[NODES + k], rate[NODES + k]
             at = min(max(true_shift / true_rate, high[panel]), last)
             off_shift, off_rate = seen[2, k] - true_shift, seen[3, k] - true_rate
-            turned = max(turned, abs(off_shift - off_rate * at) + HIGH * abs(off_rate) / true_rate)
+            highest = min(true_shift - true_rate * high[panel], LEADS / (true_rate * max(low[panel], TINY)))
+            highest = max(highest, HIGH)
+            turned = max(turned, highest * (abs(off_shift - off_rate * at) + highest * abs(off_rate) / true_rate))
         for k in range(count):
             coarse[k] = rule.weights[k] * force[k]
             finer[0, k] *= 0.5 * rule.weights[k]
@@ -246,23 +263,31 @@ def missed_by(panels: Panels, last: float) -> FloatArray:
                 finer[0, k] *= 2.0 * place * _leads(width * place * place)[0]
             for k in range(count):
                 coarse[k] *= 2.0 * nodes[k] * _leads(width * nodes[k] * nodes[k])[0]
-        least = math.inf
         for k in range(c.size):
             node = (k - SPREAD.size) * (count // TOPS)
-            top = low[panel] + (last - low[panel]) * SPREAD[k] if k < SPREAD.size else shift[node] / rate[node]
-            c[k] = min(max(top, high[panel]), last)
+            if k < SPREAD.size:
+                top = low[panel] + (last - low[panel]) * SPREAD[k]
+            else:
+                top = shift[node] / rate[node]
+                top = top if top < last else last - (last - high[panel]) * BEYOND[k - SPREAD.size]
+            c[k], least[k] = min(max(top, high[panel]), last), math.inf
             for j in range(0, 2 * count, 4):
                 height = finer[2, j] - finer[3, j] * c[k]
-                least = min(least, height * height)
-        most = off = 0.0
+                least[k] = min(least[k], height * height)
+        most = off = alone = 0.0
         for k in range(c.size):
             fine = rough = 0.0
             for j in range(2 * count):
                 height = finer[2, j] - finer[3, j] * c[k]
-                fine += finer[0, j] * exp(0.5 * (least - height * height))
+                fine += finer[0, j] * exp(0.5 * (least[k] - height * height))
             for j in range(count):
                 height = shift[j] - rate[j] * c[k]
-                rough += coarse[j] * exp(0.5 * (least - height * height))
-            most, off = max(most, fine), max(off, abs(rough - fine))
-        out[panel] = relative + HIGH * turned + BETWEEN * off / most
+                rough += coarse[j] * exp(0.5 * (least[k] - height * height))
+            if k == 0 and rule.power > 1:
+                # up to its own end the panel from 0 is all there is
+                alone = abs(rough / fine - 1.0)
+            scale = math.exp(0.5 * (least.min() - least[k]))
+            most, off = max(most, scale * fine), max(off, scale * abs(rough - fine))
+        out[panel] = AT_ENDS * relative + turned + BETWEEN * max(alone, off / most)
+
     return out

@@ -316,6 +316,28 @@ def test_many_gaps_agree_with_single_ones(case, rtol):
     assert many.error[-2:].tolist() == [0.0, 0.0]
 
 
+@pytest.mark.parametrize(
+    ("numbers", "c", "rtol"),
+    [
+        # narrow Gaussians, cut by full compression
+        ((0.3566638412640283, 15570.082637991512, 4.200752427274573), (8.2, 8.4), 1e-5),
+        ((0.26366837301283275, 6448.236926881643, 3.711386736093041), (7.3, 7.42), 1e-5),
+        # heights of many standard deviations
+        ((0.2608903712824928, 5.854429825826772, 23.84250400111467), (0.5, 2.0), 1e-8),
+        ((0.5943805915598791, 7.218250172446161, 36.37146982662594), (7.0, 11.0), 1e-10),
+        # next to first contact
+        ((0.24350908204112362, 880518.4043600445, 4.509820485898938), (1.8e-11, 1.9e-11), 1e-5),
+    ],
+)
+@pytest.mark.parametrize("size", [40, None])
+def test_bounds_of_a_profile_where_a_search_found_them_exceeded(numbers, c, rtol, size):
+    surface, reading = Surface(numbers[0], 1.0, numbers[1], 1.0, numbers[2]), NAMED["fitted"]
+    model, c = get_model("universal", 1e-8, reading), np.linspace(*c, 40)
+    kept = profile(numbers, model, reading, 0.9 * rtol, size=size)
+    single = totals_of(model, Pairs.of(surface, c), reading, 1e-11)
+    assert np.abs(kept.totals(c) / np.stack([single.force, single.area]) - 1).max() <= kept.error
+
+
 @pytest.mark.slow
 def test_no_bound_of_a_profile_is_exceeded_on_300_surfaces():
     rng = np.random.default_rng(5)
