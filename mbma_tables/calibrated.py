@@ -73,6 +73,21 @@ def area(force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS) -
     return np.asarray(erf(values * np.sqrt(2 * (1 + t) / (light_factor(alpha, constants) + t))))
 
 
+def force_of(e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
+    """F/(A0 E* g) at A/A0 = erf(e) by the light factor s0: `area` inverted, 2 y^2 (1 + y/t0) = e^2 (s0 + y/t0)."""
+    wanted, s0, t0 = np.asarray(e, float), np.asarray(light), constants.area_t0
+    # at y = e/sqrt(2) the left side is the larger, and the cubic is convex from there to its root
+    y = wanted / np.sqrt(2)
+    for _ in range(60):
+        miss = 2 * y**2 * (1 + y / t0) - wanted**2 * (s0 + y / t0)
+        slope = 4 * y + 6 * y**2 / t0 - wanted**2 / t0
+        step = np.divide(miss, slope, out=np.zeros(np.shape(slope)), where=slope > 0)
+        y = np.maximum(y - step, 0.3 * y)
+        if (step <= 1e-15 * y).all():
+            break
+    return np.asarray(y)
+
+
 def light_factor(alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """s0, the value of S at light loads."""
     return np.minimum(constants.area_s0 + constants.area_slope * np.log(np.asarray(alpha) / 10), 1.0)

@@ -27,7 +27,7 @@ from scipy.special import ellipe, ellipkm1, erf, expit, ndtr, ndtri
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.bearing import FRACTIONS, Bearing, RadialSpectrum
-from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, area, light_factor, mean_top_height
+from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, area, force_of, light_factor, mean_top_height
 
 LIGHTEST, HEAVIEST = -16.0, 1.4  # ln F^ of a map's curve
 NODES = 500
@@ -148,11 +148,7 @@ class MapLaw:
         contact = erf(e)
         light = 1 + self.map_constants.elliptic * np.exp(-contact / ELLIPTIC_AREA)
         s0 = light_factor(self.spectrum.alpha, c) / self._ellipse[0] ** (2 * light)
-        # 2 y^2 (1 + y/t0) = e^2 (s0 + y/t0) at A = erf(e)
-        y = e / np.sqrt(2)
-        for _ in range(60):
-            value = 2 * y**2 * (1 + y / c.area_t0) - e**2 * (s0 + y / c.area_t0)
-            y = np.maximum(y - value / (4 * y + 6 * y**2 / c.area_t0 - e**2 / c.area_t0), 0.3 * y)
+        y = force_of(e, s0, c)
         top = -np.expm1(2 * np.log1p(-np.minimum(contact, 1 - 1e-12)))
         gradient = np.interp(np.log(top), np.log(FRACTIONS), self.top_gradient)
         log_force = np.maximum.accumulate(np.log(y * gradient) + 1e-12 * np.arange(NODES))

@@ -17,12 +17,12 @@ from mbma_tables.arguments import FloatArray, require, spread
 from mbma_tables.bearing import FRACTIONS
 from mbma_tables.calibrated import (
     CLOSEST,
-    CONSTANTS,
     LOG_Y,
     PANEL,
     PANEL_NODES,
     Law,
     Spectrum,
+    force_of,
     inner_integral,
     light_factor,
 )
@@ -180,21 +180,10 @@ class Curve:
 
 
 def force_at_area(area: ArrayLike, light: ArrayLike) -> FloatArray:
-    """F/(A0 E* g) at A/A0: the inverse of `calibrated.area`, from 2 y^2 (1 + y/t0) = e^2 (s0 + y/t0), A = erf(e)."""
+    """F/(A0 E* g) at A/A0."""
     share = np.asarray(area, float)
     require("area", share, (share >= 0) & (share < 1), "below 1, which is reached at infinite load")
-    e, s0, t0 = erfinv(share), np.asarray(light), CONSTANTS.area_t0
-    # at y = e/sqrt(2) the left side is the larger, and the cubic is convex from there to its root
-    y = e / np.sqrt(2)
-    for _ in range(60):
-        slope = 4 * y + 6 * y**2 / t0 - e**2 / t0
-        step = np.divide(
-            2 * y**2 * (1 + y / t0) - e**2 * (s0 + y / t0), slope, out=np.zeros(np.shape(slope)), where=slope > 0
-        )
-        y = np.maximum(y - step, 0.3 * y)
-        if (step <= 1e-15 * y).all():
-            break
-    return np.asarray(y)
+    return force_of(erfinv(share), light)
 
 
 def by_law(law: Law, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
