@@ -98,15 +98,15 @@ def tables(rng: np.random.Generator) -> None:
     fields = geometry(np.linspace(1e-3, 4, MANY), np.full(MANY, 0.8), np.full(MANY, 200.0), get_reading("reported"))
     path = [np.ascontiguousarray(fields[name]) for name in ("X", "mu")]
     u = rng.uniform(0.01, 3.3, MANY)
-    phi, slopes, status = np.empty((MANY, 3)), np.empty((MANY, 7)), np.empty(MANY, dtype=np.int64)
+    phi, slopes = np.empty((MANY, 3)), np.empty((MANY, 7))
     kernel = universal.kernel
     taken = rounds(
         {
             "erf": lambda: erf(u),
-            "random": lambda: universal_kernel.fill(X, mu, kernel, None, status, phi),
-            "path": lambda: universal_kernel.fill(*path, kernel, None, status, phi),
-            "random slopes": lambda: universal_kernel.fill(X, mu, kernel, True, status, slopes),
-            "path slopes": lambda: universal_kernel.fill(*path, kernel, True, status, slopes),
+            "random": lambda: universal_kernel.fill(X, mu, kernel, None, phi),
+            "path": lambda: universal_kernel.fill(*path, kernel, None, phi),
+            "random slopes": lambda: universal_kernel.fill(X, mu, kernel, True, slopes),
+            "path slopes": lambda: universal_kernel.fill(*path, kernel, True, slopes),
         }
     )
     click.echo("\nUniversal table: Phi_F, Phi_A and the bound on their error at once")
@@ -124,7 +124,7 @@ def tables(rng: np.random.Generator) -> None:
     report(f"largest error on {HELD_OUT} fresh points", error, "", at_most=1e-9)
     report("file", shipped_file("universal.nc").stat().st_size / 1e6, "MB", at_most=6)
     given = X[:POINTS], mu[:POINTS]
-    own = {"own": lambda: universal_kernel.fill(*given, kernel, None, status[:POINTS], phi[:POINTS])}
+    own = {"own": lambda: universal_kernel.fill(*given, kernel, None, phi[:POINTS])}
     others = peers(*given)
     beside = rounds(own | others, 3)
     for name in others:

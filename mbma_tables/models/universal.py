@@ -85,28 +85,21 @@ class UniversalModel(Displayed):
         """
         check_outside(outside)
         flat_X, flat_mu, shape = self._inside(X, mu, outside == "raise")
-        status, out = self._filled(flat_X, flat_mu, None, (os.cpu_count() or 1) if parallel else 1)
-        missing = status != universal_kernel.OK
+        out = self._filled(flat_X, flat_mu, None, (os.cpu_count() or 1) if parallel else 1)
+        missing = np.isnan(out[:, 0])
         if outside == "exact" and missing.any():
             out[missing] = np.stack(SOLVER.answer(flat_X[missing], flat_mu[missing]), axis=-1)
         return IslandAnswer(*(column.reshape(shape)[()] for column in out.T))
 
-    def _filled(
-        self, X: FloatArray, mu: FloatArray, slopes: bool | None, workers: int = 1
-    ) -> tuple[NDArray[np.int64], FloatArray]:
-        """Status and the rows of `universal_kernel.fill`; of a few values by numpy, operation by operation."""
-        k, table, status = universal_kernel, self.kernel, np.empty(X.size, dtype=np.int64)
-        out = np.empty((X.size, 7 if slopes else 3))
+    def _filled(self, X: FloatArray, mu: FloatArray, slopes: bool | None, workers: int = 1) -> FloatArray:
+        """The rows of `universal_kernel.fill`; of a few values by numpy, operation by operation."""
+        k, table = universal_kernel, self.kernel
         if slopes or X.size > SMALL:
-
-            def fill(block: slice) -> None:
-                k.fill(X[block], mu[block], table, slopes, status[block], out[block])
-
-            in_blocks(fill, X.size, BLOCK, workers)
-            return status, out
-        ends = [table.X_low > X, table.X_high < X, mu > table.mu_high]
-        status[:] = np.select(ends, [k.X_BELOW, k.X_ABOVE, k.MU_ABOVE])
-        out[:], good = np.nan, status == k.OK
+            rows = np.empty((X.size, 7 if slopes else 3))
+            in_blocks(lambda block: k.fill(X[block], mu[block], table, slopes, rows[block]), X.size, BLOCK, workers)
+            return rows
+        good = (table.X_low <= X) & (table.X_high >= X) & (mu <= table.mu_high)
+        out = np.full((X.size, 3), np.nan)
         X, mu = X[good], mu[good]
         strips = table.places[((X - table.X_low) * table.X_rate).astype(np.intp)]
         buckets = np.clip((_bits(mu) >> BUCKET_BITS) - table.first_bucket, 0, table.buckets - 1)
@@ -116,7 +109,7 @@ class UniversalModel(Displayed):
         powers = r[:, k.FORCE_POWERS :].reshape(-1, 2, TERMS, TERMS)
         force, area = k.polynomial(powers.transpose(2, 3, 1, 0), x, y)
         out[good] = np.stack([mu * force, area, r[:, k.ERROR]], axis=-1)
-        return status, out
+        return out
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
         """Phi_F and Phi_A of islands, both: one costs what both do."""
@@ -125,7 +118,7 @@ class UniversalModel(Displayed):
     def slopes(self, X: ArrayLike, mu: ArrayLike) -> tuple[IslandAnswer, IslandAnswer, IslandAnswer]:
         """Answers, and their derivatives by X and by mu, in one pass; the errors are those of the answers."""
         flat_X, flat_mu, shape = self._inside(X, mu)
-        columns = self._filled(flat_X, flat_mu, True)[1].T
+        columns = self._filled(flat_X, flat_mu, True).T
         force, area, error, F_X, F_mu, A_X, A_mu = (column.reshape(shape)[()] for column in columns)
         return IslandAnswer(force, area, error), IslandAnswer(F_X, A_X, error), IslandAnswer(F_mu, A_mu, error)
 
@@ -178,16 +171,8 @@ class UniversalModel(Displayed):
         places = [steps.size + buckets.size * np.minimum(strips, lows.size - 1)]
         strip_cells = np.split(np.arange(cells), firsts[1:])
         places += [own[np.searchsorted(mu_low[own], buckets, side="right") - 1] for own in strip_cells]
-        return Table(
-            records.reshape(-1),
-            np.concatenate(places).astype(np.int32),
-            self._X.low,
-            self._X.high,
-            float(X_STEPS),
-            self._mu.high,
-            first - 1,
-            buckets.size,
-        )
+        ends = self._X.low, self._X.high, float(X_STEPS), self._mu.high
+        return Table(records.reshape(-1), np.concatenate(places).astype(np.int32), *ends, first - 1, buckets.size)
 
 
 def _bits(values: ArrayLike) -> NDArray[np.int64]:

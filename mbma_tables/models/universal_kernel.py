@@ -140,10 +140,10 @@ def universal_phi(
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def fill(X: FloatArray, mu: FloatArray, table: Table, slopes: Any, status: NDArray[np.int64], out: FloatArray) -> None:
-    """`universal_phi` of each entry: status, and Phi_F, Phi_A, error, then derivatives, into rows of `out`."""
+def fill(X: FloatArray, mu: FloatArray, table: Table, slopes: Any, out: FloatArray) -> None:
+    """`universal_phi` of each entry into rows of `out`: Phi_F, Phi_A, error, then derivatives; NaN outside."""
     for k in range(X.size):
         row = out[k]
-        status[k], row[0], F_X, F_mu, row[1], A_X, A_mu, row[2] = universal_phi(X[k], mu[k], table, slopes)
+        _, row[0], F_X, F_mu, row[1], A_X, A_mu, row[2] = universal_phi(X[k], mu[k], table, slopes)
         if slopes is not None:
             row[3], row[4], row[5], row[6] = F_X, F_mu, A_X, A_mu
