@@ -274,7 +274,7 @@ def missed_by(panels: Panels, last: float) -> FloatArray:
             for j in range(0, 2 * count, 4):
                 height = finer[2, j] - finer[3, j] * c[k]
                 least[k] = min(least[k], height * height)
-        most = off = alone = 0.0
+        most, off, alone, lowest = 0.0, 0.0, 0.0, least.min()
         for k in range(c.size):
             fine = rough = 0.0
             for j in range(2 * count):
@@ -286,8 +286,7 @@ def missed_by(panels: Panels, last: float) -> FloatArray:
             if k == 0 and rule.power > 1:
                 # up to its own end the panel from 0 is all there is
                 alone = abs(rough / fine - 1.0)
-            scale = math.exp(0.5 * (least.min() - least[k]))
+            scale = exp(0.5 * (lowest - least[k]))
             most, off = max(most, scale * fine), max(off, scale * abs(rough - fine))
         out[panel] = AT_ENDS * relative + turned + BETWEEN * max(alone, off / most)
-
     return out
