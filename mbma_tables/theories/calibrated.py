@@ -20,11 +20,10 @@ from mbma_tables.theories.calibrated_curves import (
     force_at_area,
     own_law,
 )
-from mbma_tables.theories.protocol import Theory, TheoryAnswer, select
+from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
 TESTED_HURST, TESTED_ZETA_1 = 0.2, 128.0
 TESTED_HEIGHTS = (2.5, 5.5)  # h_max/h_rms
-ENERGY_PANELS, MIN_ENERGY_GAP = 200, 1e-9  # of energies; u/h_max from where on
 
 
 class Calibrated(Theory):
@@ -36,18 +35,6 @@ class Calibrated(Theory):
     """
 
     name = "calibrated"
-
-    def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
-        """Elastic energy over A0 E* [length], by panels in ln u."""
-        shape = np.broadcast_shapes(np.shape(mean_separation), surface.shape)
-        h_max = np.broadcast_to(np.asarray(surface.h_max, float), shape)[..., None]
-        start = np.log(np.clip(np.broadcast_to(mean_separation, shape)[..., None] / h_max, MIN_ENERGY_GAP, 1.0))
-        node, weight = np.polynomial.legendre.leggauss(4)
-        share = ((np.arange(ENERGY_PANELS)[:, None] + (1 + node) / 2) / ENERGY_PANELS).ravel()
-        u = h_max * np.exp(start * share)
-        batch = select(surface, shape, np.arange(int(np.prod(shape))).reshape(*shape, 1))
-        work = (self.answer(batch, u).force * u) @ np.tile(weight / 2, ENERGY_PANELS) / ENERGY_PANELS
-        return np.asarray(-work * start[..., 0])
 
     def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """From full contact, or where a map's curve ends before, to last contact."""
