@@ -265,7 +265,7 @@ class Island4dModel(Displayed):
         out *= self._share(kept)
         rigid = [n * height_integral(n - 1, -kept.X) / height_integral(n, -kept.X) for n in (2.5, 2.0)]
         by = np.concatenate([out[:, 1:], np.where(below, out[:, :1], 0.0), np.stack(rigid)[:, None]], axis=1)
-        found = {}
+        found = {name: np.full((2, inside.size), np.nan) for name in RAW}
         for number, name in enumerate(RAW):
             # the spread follows the ends of a narrow band closely, X the other two, down to their last bit
             width = kept.spread if name in ("zeta_d", "zeta_u") else kept.sigma
@@ -273,6 +273,5 @@ class Island4dModel(Displayed):
             high, low = ([*raw[:number], raw[number] + move, *raw[number + 1 :]] for move in (step, -step))
             # over the step as rounded
             change = (self._moving(high, below) - self._moving(low, below)) / (high[number] - low[number])
-            found[name] = np.full((2, inside.size), np.nan)
             found[name][:, inside] = change[6:] + (by * change[:6]).sum(axis=1)
         return found

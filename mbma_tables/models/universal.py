@@ -57,10 +57,9 @@ class UniversalModel(Displayed):
 
     def _variables(self) -> dict[str, Variable]:
         X, mu = (axis.coordinate(np.linspace(0, axis.nodes - 1, SHOWN)) for axis in self.content.axes)
-        found = self.answer(X[:, None], mu)
-        held = {"Phi_F": found.phi_F, "Phi_A": found.phi_A, "error": found.error}
+        held = zip(("Phi_F", "Phi_A", "error"), self.answer(X[:, None], mu), strict=True)
         axes = {"X": Variable(X, "1", self._X.long_name, ("X",)), "mu": Variable(mu, "1", self._mu.long_name, ("mu",))}
-        return axes | {name: Variable(values, "1", "", ("X", "mu")) for name, values in held.items()}
+        return axes | {name: Variable(values, "1", "", ("X", "mu")) for name, values in held}
 
     def _figure(self) -> Figure:
         X = np.linspace(0.0, 20.0, 60)

@@ -36,7 +36,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.intervals import BY_COMPRESSION
-from mbma_tables.totals.island_sum import QUADRATURE_SHARE, slopes_of, totals_of
+from mbma_tables.totals.island_sum import QUADRATURE_SHARE, sums_by_table, totals_of
 from mbma_tables.totals.kernel import Pairs
 from mbma_tables.totals.profile import Profile, profile
 
@@ -109,7 +109,7 @@ def totals_at(
             require("q1/q0", np.asarray(surface.zeta_1), surface.zeta_1 > reading.floor_u, allowed)
         if isinstance(surface, Surface) and derivatives is True:
             pairs = Pairs.of(surface, depth)
-            sums, error, islands = slopes_of(model, pairs, reading, rtol, outside, workers)
+            sums, error, islands, _ = sums_by_table(model, pairs, reading, rtol, outside, workers)
             force, area = sums[:, 0, 0], sums[:, 1, 0]
             force_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
         else:
@@ -216,7 +216,7 @@ def _totals(
     rest = rest if left.size == size else rest.some(left)
     try:
         if slopes:
-            columns, error[left], more = slopes_of(model, rest, reading, rtol, outside, workers)
+            columns, error[left], more, _ = sums_by_table(model, rest, reading, rtol, outside, workers)
             sums[:, left] = columns[:, :, [0, BY_COMPRESSION]].T.reshape(4, -1)
         else:
             found = totals_of(model, rest, reading, rtol, outside, which, workers)

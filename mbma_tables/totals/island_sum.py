@@ -56,11 +56,11 @@ def sum_islands(
     # as in `intervals`: approach = scale sinh(t)^2 up to the floor of zeta_d, and from there on as it is
     scale = STRETCH * pairs.zeta_1**-pairs.hurst
     turn = np.arcsinh(np.sqrt(kink_d / scale))
+    h_rms = np.sqrt(-np.expm1(-2 * pairs.hurst * np.log(pairs.zeta_1)))  # over s
 
     def integrand(owner: NDArray[np.intp], t: FloatArray) -> FloatArray:
         own = pairs.some((owner, None))
-        rms_over_s = own.rms_over_s
-        own_scale, own_turn, own_kink = (field[owner, None] for field in (scale, turn, kink_d))
+        own_scale, own_turn, own_kink, rms_over_s = (f[owner, None] for f in (scale, turn, kink_d, h_rms))
         curved = np.minimum(t, own_turn)
         approach = np.where(t < own_turn, own_scale * np.sinh(curved) ** 2, own_kink + (t - own_turn))
         stretch = np.where(t < own_turn, own_scale * np.sinh(2 * curved), 1.0)
@@ -101,7 +101,7 @@ def totals_of(
     """
     if not isinstance(model, UniversalModel):
         return sum_islands(pairs, reading, model, SUM_SHARE * rtol, outside, which)
-    out, error, islands, missing = _by_table(model, pairs, reading, rtol, outside, workers, None)
+    out, error, islands, missing = sums_by_table(model, pairs, reading, rtol, outside, workers, None)
     force, area = out[:, :, 0].T
     if missing.size and outside == "exact":
         try:
@@ -114,22 +114,17 @@ def totals_of(
     return Totals(force, area, error, islands)
 
 
-def slopes_of(
-    model: AnyModel, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", workers: int = 1
-) -> tuple[FloatArray, FloatArray, int]:
-    """Totals with their derivatives (pairs, 2, columns of `intervals`), the bound on their error, islands."""
+def sums_by_table(
+    model: AnyModel, pairs: Pairs, reading: Reading, rtol: float, outside: str, workers: int, slopes: bool | None = True
+) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:
+    """Totals with their derivatives as `intervals.fill_totals` fills them, bound on their error, islands.
+
+    The last are the pairs that the table does not cover, which are NaN. Without derivatives `slopes` is None.
+    """
     if not isinstance(model, UniversalModel):
         raise InputError(f"derivatives come from tier 'universal', {model.name!r} has none")
-    if outside == "exact":
+    if slopes and outside == "exact":
         raise InputError("derivatives come from the universal table: outside must be 'raise' or 'nan' with them")
-    return _by_table(model, pairs, reading, rtol, outside, workers, True)[:3]
-
-
-def _by_table(
-    model: UniversalModel, pairs: Pairs, reading: Reading, rtol: float, outside: str, workers: int,
-    slopes: bool | None,
-) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:  # fmt: skip
-    """What `intervals.fill_totals` fills, islands, and the pairs that the table does not cover, which are NaN."""
     count, numbers = pairs.compression.size, reading.numbers
     status, bound = np.full(count, OK), np.zeros(count)
     out = np.zeros((count, 2, intervals.COLUMNS if slopes else 1))

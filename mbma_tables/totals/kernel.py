@@ -41,11 +41,6 @@ class Pairs(NamedTuple):
         # copies, since numba compiles again for arrays that cannot be written
         return cls(*(spread(f, depth.shape).flatten() for f in (surface.hurst, surface.zeta_1, *scaled)))
 
-    @property
-    def rms_over_s(self) -> FloatArray:
-        """h_rms/s = sqrt(1 - zeta_1^(-2H))."""
-        return np.asarray(np.sqrt(-np.expm1(-2 * self.hurst * np.log(self.zeta_1))))
-
     def some(self, chosen: Any) -> Pairs:
         """The pairs at these places."""
         return Pairs(*(field[chosen] for field in self))
