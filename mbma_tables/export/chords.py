@@ -109,8 +109,9 @@ def balanced(x: FloatArray, y: FloatArray, fine_x: FloatArray, fine_y: FloatArra
     beside = np.concatenate([[middle[0]], (middle[1:] + middle[:-1]) / 2, [middle[-1]]])
     moved = np.maximum(y - beside * np.maximum(y, floor), 0.0)
     moved[0], moved[-1] = y[0], y[-1]
-    # pressure rises; conductance may fall where the model's stiffness jumps
-    if (np.diff(fine_y) >= 0).all():
-        moved = np.maximum.accumulate(moved)
+    # pressure rises and leakage falls; conductance may fall where the model's stiffness jumps
+    for keeps, accumulated in ((np.greater_equal, np.maximum), (np.less_equal, np.minimum)):
+        if keeps(np.diff(fine_y), 0).all():
+            moved = accumulated.accumulate(moved)
     result: FloatArray = moved
     return result

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
+import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -14,7 +16,7 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError
 from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
 from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers, flow_numbers, law_numbers
-from mbma_tables.export.text import checked_name, filled, opening, wrapped
+from mbma_tables.export.text import checked_name, filled, opening, template, wrapped
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.theories.protocol import Theory, UserTheory
@@ -33,7 +35,8 @@ class Language(NamedTuple):
 
     `call` is a function's call with {name}, {what} and {x}; `number` writes a float, `arrays` columns of numbers and
     rows of polynomials by their places in the template, whose names begin with a prefix. `subroutine` is the template
-    of a solver's user subroutine that calls the law, `parts` what else is filled in.
+    of a solver's user subroutine that calls the law, `parts` what else is filled in. `own_name` has key words where
+    the law's name stands alone, as that of a module or package.
     """
 
     template: str
@@ -45,6 +48,7 @@ class Language(NamedTuple):
     subroutine: str = ""
     parts: tuple[tuple[str, str], ...] = ()
     only_conductance: bool = False
+    own_name: str = ""
 
 
 def law_text(
@@ -97,7 +101,7 @@ def law_text(
     """
     if target not in LANGUAGES:
         raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
-    name, heat = code_name(name), (conductivity, conductivity_unit, leakage, LANGUAGES[target].only_conductance)
+    name, heat = code_name(name, target), (conductivity, conductivity_unit, leakage, LANGUAGES[target].only_conductance)
     if leakage and LANGUAGES[target].subroutine:
         raise InputError(f"{target} has no place for leakage: leave it out")
     units: dict[str, Any] = {"length_unit": length_unit, "stress_unit": stress_unit}
@@ -119,11 +123,24 @@ class AskedLaw(NamedTuple):
     said: tuple[str, ...]
 
 
-def code_name(name: str) -> str:
-    """A name that functions of a law may begin with."""
+def code_name(name: str, target: str = "c-law") -> str:
+    """A name that functions of a law may begin with, or its module or package be called."""
     if checked_name(name, MAX_NAME).lower() in FUNCTIONS:
         raise InputError(f"name must not be that of a function of the law, {', '.join(FUNCTIONS)}")
+    if name.lower() in _words(target):
+        raise InputError(f"name = {name!r} stands for something else in {target}: take another one")
     return name
+
+
+@functools.cache
+def _words(target: str) -> frozenset[str]:
+    """Words that a file's own name must not be: those in its templates, but for comments and texts, and key words."""
+    language = LANGUAGES[target]
+    if not language.own_name:
+        return frozenset()
+    text = " ".join(template(name) for name in (language.template, language.subroutine) if name)
+    code = re.sub(rf"{language.mark}.*|\"[^\"]*\"|'[^'\n]*'|@\w+@", "", text)
+    return frozenset(re.findall(r"[a-z]\w*", f"{code} {language.own_name}".lower()))
 
 
 def asked_law(
@@ -212,7 +229,9 @@ def _c(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
 
     def polynomial(row: FloatArray) -> str:
         unit = f"{_step(row):.0e}"
-        return f"Q({unit},{','.join(f'{value / float(unit):.0f}' for value in row)})"
+        # where a polynomial covers many decades the largest are beyond C's whole numbers
+        numbers = (value / float(unit) for value in row)
+        return f"Q({unit},{','.join(f'{n:.0f}' if abs(n) < 2**53 else f'{n:.17e}' for n in numbers)})"
 
     heads = [[f"{value:.16g}" for value in column] for name, column in columns.items() if name != "edges"]
     rows = [list(map(polynomial, row)) for row in polynomials.values()]
@@ -293,6 +312,7 @@ FORTRAN = Language(
     "{what}({x})",
     _fortran_number,
     _data,
+    own_name="program",
 )
 READ = (
     "Written from the manual's list of arguments and called with it by a program of the tests; not run in the solver."
@@ -343,6 +363,7 @@ LANGUAGES = {
         "law.{what}({x})",
         _with_infinity("-Inf"),
         _matrices,
+        own_name="case catch classdef continue elseif global otherwise parfor return spmd switch try while",
     ),
     "modelica-law": Language(
         "law.mo",
@@ -352,6 +373,9 @@ LANGUAGES = {
         "{name}.{what}({x})",
         _with_infinity("-1e300"),
         _braces,
+        own_name="and block class connect connector der discrete each elsewhen encapsulated enumeration equation "
+        "expandable extends external false final flow impure import initial inner model operator or outer partial "
+        "public pure record redeclare replaceable return stream then time true type when while within",
     ),
     "abaqus-uinter": FORTRAN._replace(
         usage="*SURFACE INTERACTION, NAME=..., USER: abaqus job=... user={name}.f90. Place the bodies so that their "

@@ -252,7 +252,11 @@ def _range(
     low, high = (number_in("pressures", units.number("pressure", p), 1e-300, 1e300) for p in pressures)
     if low >= high:
         raise InputError(f"pressures must be two rising numbers, got {low:g} and {high:g}")
-    return low, (law.h_max - float(law.at_pressure(high).separation)) / 2
+    found = (law.h_max - float(law.at_pressure(high).separation)) / 2
+    if found <= 0:
+        least = f"{float(law.force(law.h_max)):.4g} {units.stress}"
+        raise InputError(f"pressures must reach above {least}, that at c = 0, where rows begin, got {high:g}")
+    return low, found
 
 
 def _range_end(law: ContactLaw, asked: float | None) -> float:

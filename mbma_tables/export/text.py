@@ -63,10 +63,15 @@ def wrapped(items: Iterable[str], indent: str = "", end: str = "") -> str:
     return text.replace("\n", f"{end}\n")
 
 
+def template(name: str) -> str:
+    """The text of a template."""
+    return (importlib.resources.files("mbma_tables.export") / "templates" / f"{name}.in").read_text(encoding="utf-8")
+
+
 def filled(name: str, **parts: str) -> str:
     """A template with its places, such as @HEADER@, filled in; @IF PLACE@ ... @END@ stays where that is not empty."""
-    text = (importlib.resources.files("mbma_tables.export") / "templates" / f"{name}.in").read_text(encoding="utf-8")
-    text = re.sub(r"@IF ([A-Z]+)@(\n)?(.*?)@END@(?(2)\n)", lambda found: parts[found[1]] and found[3], text, flags=re.S)
+    chosen = re.compile(r"@IF ([A-Z]+)@(\n)?(.*?)@END@(?(2)\n)", re.S)
+    text = chosen.sub(lambda found: parts[found[1]] and found[3], template(name))
     # in one pass: a header may hold such a name itself
     return re.sub("@([A-Z_]+)@", lambda place: parts[place[1]], text)
 

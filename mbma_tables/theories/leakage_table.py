@@ -93,7 +93,7 @@ def conductance(
 ) -> FloatArray:
     """k of mean gaps [h_rms] and contact fractions from ln R and its slope by odds, held beyond `first` and `last`."""
     constants = shipped_flow().constants
-    left = np.maximum(constants.threshold - area, np.finfo(float).tiny)
+    left = np.maximum(constants.threshold - area, 1e-300)  # areas of Greenwood and Williamson exceed 1
     with np.errstate(divide="ignore"):
         odds = np.log(area / left)
     value, slope = log_factor(odds)

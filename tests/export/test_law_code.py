@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 from law_points import ASKED, CONDUCTIVITY, VALUES, needs, points
 
-from mbma_tables import InputError, Surface
+from mbma_tables import InputError, Surface, contact_law
 from mbma_tables.export import LAWS, SUBROUTINES
-from mbma_tables.export.law_code import LANGUAGES, law_text
+from mbma_tables.export.law_code import LANGUAGES, code_name, law_text
 from mbma_tables.export.onnx import onnx
 
 QUANTITIES = ("pressure", "tangent", "area", "energy", "leakage")
@@ -475,6 +475,36 @@ def test_modelica(name: str, tmp_path: pathlib.Path) -> None:
         answers.append([found[what] for what in ("p", "h", "a", "e", "l")])
     p, conductance, *others = np.concatenate(answers, axis=1)
     known.assert_equal(p, conductance / (CONDUCTIVITY / 13.3), *others, close=1e-9)
+
+
+@needs("gcc")
+def test_c_of_a_polynomial_over_many_decades(tmp_path: pathlib.Path) -> None:
+    surface, asked = Surface(0.3, 1.0, 3.5, 0.125, 0.125, unit="mm"), {"theory": "mbma", "hardness": "0.06 MPa"}
+    (tmp_path / "law.c").write_text(law_text("c-law", surface, "1 MPa", name="road", **asked))
+    run("gcc", "-std=c99", *WARNINGS, "-shared", "-fPIC", "law.c", "-lm", "-o", "law.so", folder=tmp_path)
+    u = 0.125 * (1 - np.geomspace(1e-12, 1, 500)[:-1])
+    known = contact_law(surface, E_star="1 MPa", **asked).force(u=u)
+    found = c_function(ctypes.CDLL(str(tmp_path / "law.so")), "pressure")(0.125 - u)
+    np.testing.assert_allclose(found, known, rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("target", "names"),
+    [
+        ("fortran-law", ("dp", "H_MAX", "place", "k_")),
+        ("matlab-law", ("numbers", "end", "while", "zeros")),
+        ("modelica-law", ("Real", "piece", "model", "equation")),
+        ("abaqus-uinter", ("uinter", "Flux")),
+        ("calculix-gapcon", ("gapcon", "ak")),
+    ],
+)
+def test_a_name_that_stands_for_something_else(target: str, names: tuple[str, ...]) -> None:
+    for name in names:
+        with pytest.raises(InputError, match=f"{name}' stands for something else in {target}"):
+            code_name(name, target)
+    for name in (*names, "law", "contact", "Surface"):
+        assert code_name(name, "c-law") == name
+    assert code_name("contact", target) == "contact"
 
 
 @pytest.mark.parametrize("target", LAWS)

@@ -268,6 +268,19 @@ def test_a_batch_is_refused():
         law_of(Surface([0.5, 0.8], 1.0, 100.0, 1.0, 3.0))
 
 
+def test_pressures_below_that_of_first_contact():
+    surface = Surface(0.8, 1.0, 100.0, 1.0, 1.5, unit="mm")
+    with pytest.raises(InputError, match=r"pressures must reach above \S+ MPa, that at c = 0, where rows begin"):
+        describe_law(surface, "1 MPa", theory="persson", pressures=(1e-12, 1e-9))
+
+
+def test_rows_of_leakage_fall():
+    surface = Surface(0.8, 2.3, 2300.0, 1e-3, 1e-3, unit="mm")
+    law = describe_law(surface, "900 MPa", theory="persson", quantity="leakage", hardness="3.4 MPa")
+    assert (np.diff(law.y) <= 0).all()
+    assert law.largest_error < 1e-3
+
+
 def test_rows_too_near_for_calculix():
     tiny = law_of(Surface.named("yang-persson"), length_unit="m")
     with pytest.raises(InputError, match="closer than 1e-10 m"):

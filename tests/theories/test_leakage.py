@@ -242,6 +242,12 @@ class TestLaw:
                 law.leakage(**gaps)
 
 
+def test_areas_above_all_of_the_nominal_one():
+    found = contact(Surface(1.0, 3e-3, 300.0, 1.0, 3.0), mean_separation=1e-3, theory="greenwood_williamson")
+    assert found.area > 4
+    assert found.leakage.conductance == 0
+
+
 def test_leakage_is_not_computed_unless_read():
     found = contact(SEAL, area=0.1, theory="calibrated")
     assert "leakage" not in vars(found)
