@@ -22,22 +22,34 @@ LAST = 1.5  # the last chord's error counts so much more, as its last row is not
 
 
 def chosen_rows(
-    fine_x: FloatArray, fine_y: FloatArray, floor: float, rows: int | None, rtol: float | None, evenly: bool = False
+    fine_x: FloatArray,
+    fine_y: FloatArray,
+    floor: float,
+    rows: int | None,
+    rtol: float | None,
+    evenly: bool = False,
+    jump: bool = False,
 ) -> tuple[FloatArray, FloatArray, float]:
     """Rows of a curve on fine points, as a file holds them, and their largest relative error where y is above `floor`.
 
-    As many as `rows`, or as few as `rtol` needs; 1e-3 where neither is given.
+    As many as `rows`, or as few as `rtol` needs; 1e-3 where neither is given. With a `jump` the first two fine points
+    are rows.
     """
+    begin = fine_x[:1], fine_y[:1]
+    if jump:
+        fine_x, fine_y = fine_x[1:], fine_y[1:]
     if rows is not None and rtol is not None:
         raise InputError("rows and rtol are both given: give one of them")
 
     def with_rows(count: int) -> tuple[FloatArray, FloatArray, float]:
-        places = np.linspace(0, fine_x[-1], count) if evenly else spread(fine_x, fine_y, count, floor)
+        count -= jump
+        places = np.linspace(fine_x[0], fine_x[-1], count) if evenly else spread(fine_x, fine_y, count, floor)
         x = rounded(places)
         y = np.interp(x, fine_x, fine_y)
         y = rounded(y if evenly else balanced(x, y, fine_x, fine_y, floor))
         x[-1], y[-1] = _not_below(fine_x[-1]), _not_below(fine_y[-1])
-        return x, y, chord_error(x, y, fine_x, fine_y, floor)
+        error = chord_error(x, y, fine_x, fine_y, floor)
+        return (np.append(begin[0], x), np.append(begin[1], y), error) if jump else (x, y, error)
 
     if rows is not None:
         x, y, error = with_rows(whole_number_in("rows", rows, MIN_ROWS, MAX_ROWS))

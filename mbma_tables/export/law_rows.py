@@ -90,7 +90,7 @@ def _curve(joint: Joint, quantity: str, max_overclosure: float, k_s: float) -> t
     """The law on fine points; conductance by the frozen contact's stiffness where it is not the law's own slope."""
     law = joint.law
     # squares: fine where p is a high power of the overclosure
-    c = max_overclosure * np.linspace(0, 1, FINE) ** 2
+    c = max_overclosure * np.linspace(0, 1, FINE) ** (2 if law.highest == np.inf else 1)
     d = law.h_max - 2 * c
     pressure, stiffness = np.asarray(law.force(d)), np.asarray(law.stiffness(d))
     pressure[0] = stiffness[0] = 0.0
@@ -186,7 +186,7 @@ def describe_law(
         names = ("pressure", "leakage", joint.stress, f"{joint.length}^3")
     if quantity != "conductance" and (conductivity is not None or conductivity_unit is not None):
         raise InputError("conductivity and conductivity_unit belong to quantity='conductance': leave them out")
-    choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly)
+    choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly, jump=law.highest < np.inf)
     behaviour = _table(joint, "pressure", own, least, end, choose) if quantity == "conductance" else None
     return _table(joint, quantity, names, least, end, choose, k_s, behaviour)
 
@@ -207,27 +207,28 @@ def _table(
     floor = FLOOR * float(fine_y[-1])
     if quantity == "leakage":
         floor = float(fine_y[-1])
-        if law.area(law.h_max - 2 * end) > LARGEST_AREA:
+        if law.at_pressure(fine_x[-1]).area > LARGEST_AREA:
             floor = float(law.leakage(law.separation(area=LARGEST_AREA)))
-        floor *= 1 - 1e-9
+        # without so much contact gaps may close for want of a mean separation
+        floor = (floor or FLOOR * float(fine_y[0])) * (1 - 1e-9)
     elif least is not None:
         floor = least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
     x, y, error = choose(fine_x, fine_y, floor)
     comments = joint.header(
         f"{names[1]} [{names[3]}] against {names[0]} [{names[2]}]",
-        f"{names[0]} from 0 to {x[-1]:.10g} {names[2]}, {_why_there(law, end, y[-1] == 0)}",
+        f"{names[0]} from 0 to {x[-1]:.10g} {names[2]}, {_why_there(law, end, quantity)}",
         f"{x.size} rows; largest error of linear interpolation {error:.1e}, relative, "
         f"above {names[1]} {floor:.4g} {names[3]}",
-        *(["the first row is zero, whatever the pressure of the theory is there"] if law.highest < np.inf else ()),
+        *(["the first row is zero, whatever the theory has up to the second"] if law.highest < np.inf else ()),
         end=end,
         leakage=quantity == "leakage",
     )
     return LawTable(x, y, *names, error, comments, law.theory, floor, behaviour)
 
 
-def _why_there(law: ContactLaw, end: float, blocked: bool) -> str:
+def _why_there(law: ContactLaw, end: float, quantity: str) -> str:
     """Why rows end where they do."""
-    if blocked:
+    if quantity == "leakage" and law.leakage.blocked_at >= law.h_max - 2 * end:
         return "where contact blocks the gaps"
     if end < _last(law) * (1 - ROUNDING):
         return "the largest asked for"

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from mbma_tables import InputError, MbmaError, Surface, contact
+from mbma_tables import InputError, MbmaError, Surface, contact, contact_law
 from mbma_tables.export import DATA, SOLVERS, chords, data, solvers
 from mbma_tables.export.law_rows import FLOOR, describe_law
 from mbma_tables.export.solvers import calculix, exponential, optistruct
@@ -274,11 +274,34 @@ def test_pressures_below_that_of_first_contact():
         describe_law(surface, "1 MPa", theory="persson", pressures=(1e-12, 1e-9))
 
 
+def test_rows_without_a_last_contact_begin_with_one_step():
+    surface = Surface(0.8, 1e3, 1e5, 1e-3, 2e-3, unit="mm")
+    law = describe_law(surface, "1 MPa", theory="persson")
+    known = contact_law(surface, theory="persson")
+    assert (law.x[0], law.y[0]) == (0, 0)
+    assert law.y[1] == pytest.approx(known.force(known.h_max), rel=2e-3)
+    assert law.x[1] == pytest.approx(5e-5 * law.x[-1])
+    c = np.append(law.x[1], np.geomspace(law.x[1], law.x[-1], 3000)[1:-1])
+    found = np.interp(c, law.x, law.y) / known.force(u=known.h_max - c) - 1
+    assert np.abs(found).max() <= 1.02 * law.largest_error
+    assert "TABULAR" in calculix(law)
+
+
 def test_rows_of_leakage_fall():
-    surface = Surface(0.8, 2.3, 2300.0, 1e-3, 1e-3, unit="mm")
-    law = describe_law(surface, "900 MPa", theory="persson", quantity="leakage", hardness="3.4 MPa")
+    surface = Surface(0.8, 1.0, 1e3, 1.0, 1.5, unit="mm")
+    law = describe_law(surface, "900 MPa", theory="persson", quantity="leakage", rows=50)
     assert (np.diff(law.y) <= 0).all()
-    assert law.largest_error < 1e-3
+
+
+def test_rows_of_leakage_without_a_block():
+    surface = Surface(0.8, 1.0, 1e3, 1.0, 3.0, unit="mm")  # 26% contact at most
+    law, known = describe_law(surface, "900 MPa", quantity="leakage", rtol=1e-2), contact_law(surface, E_star=900.0)
+    assert law.y[-1] == 0
+    assert known.leakage.blocked_at == -np.inf
+    assert "where contact blocks" not in " ".join(law.comments)
+    d = np.linspace(known.lowest, known.h_max, 5000)
+    kept = known.leakage(d) > FLOOR * law.y[0]
+    np.testing.assert_allclose(np.interp(known.force(d), law.x, law.y)[kept], known.leakage(d)[kept], rtol=1.01e-2)
 
 
 def test_rows_too_near_for_calculix():
