@@ -30,6 +30,7 @@ from mbma_tables.totals.panels import (
 )
 
 TAIL_SHARE = 2.0  # of the last two coefficients, for all that follow: they fall by 2 at least, and count twice
+OLDER = 0.25  # of the two before them: signs change, and the last two may be small by chance
 SLOPES = 0.1  # of their relative error counts
 MANY = 1000  # islands below, from which those far below are summed by series of TERMS
 FAR_ERROR = 5e-11  # of such a series, or they are summed after all
@@ -199,7 +200,8 @@ def series_of(panels: Panels) -> tuple[FloatArray, FloatArray, Nodes]:
         for row in range(2):
             made = out[panel, row, : 2 * gaps]
             _combined(values[row], rule.integrated if thin else rule.series, made)
-            tail, slopes = _tail(made[: gaps + 1] if thin else made), 4.0 * gaps * high[panel] / (width * steepest[row])
+            tail = _tail(made[: gaps + 1]) if thin else max(_tail(made), OLDER * _tail(made[:-2]))
+            slopes = 4.0 * gaps * high[panel] / (width * steepest[row])
             error[panel] = max(error[panel], missed + tail * (1.0 + SLOPES * slopes))
     return out, error, islands
 
