@@ -85,10 +85,10 @@ class Island4dModel(Displayed):
     def _variables(self) -> dict[str, Variable]:
         names = tuple(axis.name for axis in self.content.axes)
         axes = {axis.name: Variable(axis.values, "1", axis.long_name, (axis.name,)) for axis in self.content.axes}
-        for name, (dims, values, about) in self.content.auxiliary.items():
-            if dims == names:
-                axes[name] = Variable(values, "1", about["long_name"], names)
-        return axes
+        fields = {name: row for name, row in self.content.auxiliary.items() if row[0] == names}
+        return axes | {
+            name: Variable(values, "1", about["long_name"], names) for name, (_, values, about) in fields.items()
+        }
 
     def _figure(self) -> Figure:
         delta = np.geomspace(0.05, 2.0, 60)

@@ -152,9 +152,8 @@ class UniversalModel(Displayed):
         records[:, universal_kernel.CENTRE] = 0.5 * (X_low + X_high)
         records[:, universal_kernel.RATE] = 2 / (X_high - X_low)
         records[:, universal_kernel.TOP_MU : universal_kernel.BOTTOM + 1] = fractions_of_mu(mu_low, mu_high).T
-        powers = np.zeros((TERMS, TERMS))
-        for order in range(TERMS):
-            powers[order, : order + 1] = chebyshev.cheb2poly(np.eye(TERMS)[order, : order + 1])
+        rows = (chebyshev.cheb2poly(row) for row in np.eye(TERMS))
+        powers = np.array([np.pad(row, (0, TERMS - row.size)) for row in rows])
         # the functions, then powers of mu, then of X
         by_X = np.einsum("cijf,ip->cfjp", self.content.coefficients, powers)
         by_power = np.einsum("cfjp,jq->cfqp", by_X, powers)

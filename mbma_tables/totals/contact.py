@@ -240,16 +240,11 @@ def _by_parameter(
     power = -2 * hurst * np.log(zeta_1)
     lift = np.exp(power) / np.expm1(power)
     answers = []
-    for number in range(2):
+    for number, scale in enumerate((stress, 1.0)):
         value, by_H, by_zeta, by_compression, by_peak, _ = np.moveaxis(sums[..., number, :], -1, 0)
-        scale: Any = 1.0
-        own = np.zeros_like(value)
-        if number == 0:
-            # force carries q0 s
-            scale = stress
-            by_H = by_H + value * lift * np.log(zeta_1)
-            by_zeta = by_zeta + value * lift * hurst
-            own = value
+        # force carries q0 s
+        own = np.zeros_like(value) if number else value
+        by_H, by_zeta = by_H + own * lift * np.log(zeta_1), by_zeta + own * lift * hurst
         found = {
             "separation": -by_compression / h_rms,
             "hurst": by_H,

@@ -125,10 +125,8 @@ def fill_nodes(interval: Interval, gap: Gap, surface: SurfaceConstants, slopes: 
         out[2, k], out[3, k] = node.force * weight, node.area * weight
         out[4, k] = height * rms_over_s / node.sigma_d
         if slopes is not None:
-            by_hurst = node_slopes(True, height, floor_d, floor_u, node, surface)
-            by_log_e = node_slopes(False, height, floor_d, floor_u, node, surface)
-            out[5, k], out[6, k], out[7, k], out[8, k] = by_hurst
-            out[9, k], out[10, k], out[11, k], out[12, k] = by_log_e
+            out[5, k], out[6, k], out[7, k], out[8, k] = node_slopes(True, height, floor_d, floor_u, node, surface)
+            out[9, k], out[10, k], out[11, k], out[12, k] = node_slopes(False, height, floor_d, floor_u, node, surface)
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy")
@@ -198,13 +196,11 @@ def total(
         for k in range(count):
             if pieces[k, ERROR] == NOT_YET:
                 interval = Interval(pieces[k, 0], pieces[k, 1], pieces[k, 2] > 0.0, pieces[k, 3] > 0.0)
-                status, pieces[k, ERROR], own_error, nodes = _rule(
-                    interval, gap, surface, slopes, table, work, parts[k]
-                )
+                status, pieces[k, ERROR], known, nodes = _rule(interval, gap, surface, slopes, table, work, parts[k])
                 islands += nodes
                 if status != OK:
                     return status, math.nan, islands
-                table_error = max(table_error, own_error)
+                table_error = max(table_error, known)
         for column in range(out.shape[1]):
             out[0, column] = out[1, column] = 0.0
         force_error = area_error = 0.0

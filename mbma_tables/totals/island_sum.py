@@ -52,7 +52,6 @@ def sum_islands(
     count = pairs.compression.size
     kink_d, kink_u = kinks(pairs.hurst, pairs.zeta_1, reading)
     worst_island = np.zeros(count)
-
     # as in `intervals`: approach = scale sinh(t)^2 up to the floor of zeta_d, and from there on as it is
     scale = STRETCH * pairs.zeta_1**-pairs.hurst
     turn = np.arcsinh(np.sqrt(kink_d / scale))
