@@ -202,8 +202,10 @@ def newton_step(
         following = ratio / (1.0 + ratio / end)
         # the next miss would be the square of this one
         near = abs(miss) <= SETTLED
-        if not low < following < high:
-            following = u if near else (math.sqrt(low * high) if high > 2.0 * low else 0.5 * (low + high))
+        if near:
+            following = min(max(following, low), high)
+        elif not low < following < high:
+            following = math.sqrt(low * high) if high > 2.0 * low else 0.5 * (low + high)
         left[k] = not (near or high - low <= MIN_DEPTH * high or following == u)
         bracket[0, place] = following
     return left

@@ -276,10 +276,11 @@ class _Planner:
         call = self.costs.of(theory, "call")
         each = seconds_by_theory(self.costs, theory, self.count, inverse) - call
         seconds = math.nan if mbma else YIELDING_CALL * call + YIELDING_GAP * each
-        asked = max(ISLAND_SHARE * self.rtol, MIN_THEORY_LAW_RTOL) if mbma else None
-        error = 2 * (asked + certified_error("universal", asked) if asked else self.own_error())
+        # the elastic errors of force and of area at that force may add up
+        tier, asked = (self.tier(self.rtol / 2), ISLAND_SHARE * self.rtol / 2) if mbma else (None, None)
+        error = 2 * (asked + certified_error(tier, asked) if tier and asked else self.own_error())
         what = f"force, area and what yields at {self.count} gaps"
-        return Step("contact", ", ".join(why), what, None, asked, self.count, error, seconds, theory=theory)
+        return Step("contact", ", ".join(why), what, tier, asked, self.count, error, seconds, theory=theory)
 
     def own_error(self) -> float:
         """The numerical error that the scene's theory states of an answer."""

@@ -120,6 +120,8 @@ def _find_gaps(run: Run, law: ContactLaw) -> float:
         return 2 * law.error
     run.gap = law.separation(area=run.problem.gaps)
     gap = run.gap[law.area(run.gap) > 0]
+    if not gap.size:
+        return law.error
     # area falls by d, half as fast as by u
     ratio = law.stiffness(gap) / 2 * law.area(gap) / (law.force(gap) * law.area_slope(gap))
     return (1 + max(1.0, float(ratio.max(initial=0.0)))) * law.error
@@ -159,14 +161,14 @@ def _contact(run: Run, step: Step) -> None:
     if problem.hardness is not None:
         known["hardness"] = problem.hardness
         if problem.theory == "mbma":
-            known |= {"reading": problem.reading, "rtol": step.rtol, "tier": problem.tier or "universal"}
+            known |= {"reading": problem.reading, "rtol": step.rtol, "tier": step.tier}
     found = contact(run.surface, E_star=problem.E_star, theory=problem.theory, **known)
     run.gap = found.separation
     _keep(run, lambda name: getattr(found, name))
     if problem.hardness is not None:
         names = ("yielded", "mean_pressure", "plane_separation", "incremental_stiffness")
         run.found |= {name: (("gap",), getattr(found, name)) for name in names}
-    run.close(step, float(found.error.max()), None)
+    run.close(step, float(found.error.max()), step.tier_name)
 
 
 def _asked(run: Run) -> Contact:

@@ -50,4 +50,5 @@ class GreenwoodWilliamson(Theory):
 
     def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons for which answers lie outside what the theory was made for."""
-        return {f"asperities are taken as independent, A/A0 is above {MAX_AREA:g}": answer.area > MAX_AREA}
+        dense = {f"asperities are taken as independent, A/A0 is above {MAX_AREA:g}": answer.area > MAX_AREA}
+        return {**super().concerns(surface, answer, mean_separation), **dense}

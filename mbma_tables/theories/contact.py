@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Iterable
 from typing import Any
@@ -182,6 +183,8 @@ def _contact(
         unit = source.units.stress
         value, E_star, places = _places(surface, value, E_star, hardness, by, theory, unit)
     held = {"pressure": "force", "area": "area"}.get(by)
+    capped: Any = theory
+    by_log_modulus: dict[str, Any] = {"force": 0.0, "area": 0.0}
     if derivatives and held:
         require(by, value, np.asarray(value) > 0, "positive where derivatives are asked for: a gap has no slope there")
     if isinstance(theory, Mbma):
@@ -190,20 +193,22 @@ def _contact(
         fields = vars(totals) | places
     else:
         u = np.asarray(places["mean_separation"])
-        capped: Any = theory
         loaded = None if theory is source.theory else capped.loaded(surface, u)
         found = theory.answer(surface, u) if loaded is None else loaded.answer
         source = dataclasses.replace(source, answer=found, loaded=loaded)
         error = spread(found.error, np.shape(found.force))[()]
         fields = {"force": (E_star * found.force)[()], "area": found.area[()], "error": error} | places
-        fields |= {"reading": "", "tier": "", "islands": None}
+        fields |= {**_labels(source.theory), "islands": None}
         if derivatives:
             force_by, area_by = differentiate(theory, surface, u)
+            by_log_modulus = {"force": force_by.pop("E_star", 0.0), "area": area_by.pop("E_star", 0.0)}
             fields |= {"force_by": {name: (E_star * slope)[()] for name, slope in force_by.items()}}
             fields |= {"area_by": {name: slope[()] for name, slope in area_by.items()}}
     if derivatives and held:
         slopes = {"force": fields["force_by"], "area": fields["area_by"]}
-        fields |= _at_fixed(held, by, slopes, fields["force"] / E_star)
+        by_modulus = {"force": fields["force"] / E_star + by_log_modulus["force"]}
+        by_modulus["area"] = by_log_modulus["area"] / E_star
+        fields |= _at_fixed(held, by, slopes, by_modulus)
     for name in QUANTITIES:
         if name not in quantities:
             fields |= {name: None, f"{name}_by": None}
@@ -221,18 +226,18 @@ def _places(
     if by != "separation":
         require(by, asked, asked >= 0, "at least 0")
     if by == "separation":
-        gap = asked
+        average = (h_max + asked) / 2
     elif by == "mean_separation":
-        gap = 2 * asked - h_max
+        average = asked
     else:
         quantity, wanted = ("force", asked / modulus) if by == "pressure" else ("area", asked)
         try:
-            gap = 2 * theory.mean_separation_at(surface, quantity, wanted) - h_max
+            average = theory.mean_separation_at(surface, quantity, wanted)
         except OutOfRangeError:
             if by == "pressure":
                 _refuse_pressures(surface, asked, modulus, hardness, theory, unit)
             raise
-    average = asked if by == "mean_separation" else (h_max + gap) / 2
+    gap = asked if by == "separation" else 2 * average - h_max
     both = {"separation": gap, "mean_separation": average}
     return asked, modulus, {name: spread(place, shape)[()] for name, place in both.items()}
 
@@ -241,14 +246,18 @@ def _refuse_pressures(
     surface: AnySurface, asked: FloatArray, modulus: FloatArray, hardness: ArrayLike, theory: Theory, unit: str | None
 ) -> None:
     """Refuse pressures beyond the hardness or the theory's end, in the unit in which they were asked for."""
-    largest = modulus * theory.answer(surface, theory.interval(surface)[0]).force
     name = "pressure" if unit in (None, "1") else f"pressure [{unit}]"
-    for limit, what in ((hardness, "the hardness"), (largest, f"what theory {theory.name!r} reaches on this surface")):
+    limits = [(hardness, "the hardness")]
+    with contextlib.suppress(OutOfRangeError):  # at full compression Persson's theory has no finite force
+        deepest = theory.interval(surface, "force" if theory.ends_at_h_max else "area")[0]
+        reached = modulus * theory.answer(surface, deepest).force
+        limits.append((reached, f"what theory {theory.name!r} reaches on this surface"))
+    for limit, what in limits:
         end = spread(np.asarray(limit), asked.shape)
         require(name, asked, asked <= end, f"at most {what}, {describe_entries(end, asked > end)}")
 
 
-def _at_fixed(held: str, by: str, slopes: dict[str, Any], per_modulus: Any) -> dict[str, Any]:
+def _at_fixed(held: str, by: str, slopes: dict[str, Any], by_modulus: dict[str, Any]) -> dict[str, Any]:
     """Derivatives where force or area is held: of the separation, and of the quantity that is not held."""
     other = "area" if held == "force" else "force"
     steep, follows = slopes[held]["separation"], slopes[other]["separation"]
@@ -256,8 +265,8 @@ def _at_fixed(held: str, by: str, slopes: dict[str, Any], per_modulus: Any) -> d
     gap = {by: 1 / steep} | {name: -slopes[held][name] / steep for name in names}
     free = {by: follows / steep} | {name: slopes[other][name] + follows * gap[name] for name in names}
     if held == "force":
-        gap["E_star"] = -per_modulus / steep
-        free["E_star"] = follows * gap["E_star"]
+        gap["E_star"] = -by_modulus["force"] / steep
+        free["E_star"] = by_modulus["area"] + follows * gap["E_star"]
     return {"separation_by": gap, f"{other}_by": free, f"{held}_by": None}
 
 
@@ -291,6 +300,12 @@ def _of_labelled(surface: AnySurface, value: Any, E_star: Any, hardness: Any, op
         fields |= {by: value, "mean_separation": (surface.h_max + value) / 2}
     elif by == "mean_separation":
         fields |= {by: value, "separation": 2 * value - surface.h_max}
-    mbma = isinstance(theory, Mbma)
-    labels = {"reading": theory.reading.name, "tier": theory.tier_name} if mbma else {"reading": "", "tier": ""}
-    return Contact(theory=theory.name, islands=None, _source=options["source"], **labels, **fields)
+    fields |= _labels(theory)
+    return Contact(theory=theory.name, islands=None, _source=options["source"], **fields)
+
+
+def _labels(theory: Theory) -> dict[str, str]:
+    """Reading and tier of MBMA, with a hardness or without."""
+    if not isinstance(theory, Mbma):
+        return {"reading": "", "tier": ""}
+    return {"reading": theory.reading.name, "tier": theory.tier_name}

@@ -299,11 +299,6 @@ class Persson(Theory):
         batch = select(surface, force.shape, np.arange(force.size).reshape(*force.shape, 1))
         return np.asarray((lighter * self._decay(batch, lighter)) @ _T_WEIGHTS)
 
-    def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
-        """Where heights' end, which the theory does not know, decides."""
-        beyond = mean_separation > np.asarray(surface.h_max)
-        return {"u is above h_max, where the surface has no contact and the theory's heights have no end": beyond}
-
     def _decay(self, surface: AnySurface, force: FloatArray) -> FloatArray:
         """-du/dlog F [length] at a load."""
         if isinstance(surface, MeasuredSurface):

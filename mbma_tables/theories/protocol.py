@@ -73,6 +73,10 @@ class Theory(abc.ABC):
         """The theory at flat places of a broadcast shape, where it holds arrays of its own."""
         return self
 
+    def stiffer(self, times: FloatArray) -> Theory:
+        """The theory at a modulus so many times as large, where it holds numbers over E*."""
+        return self
+
     def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E*."""
         return self.answer(surface, self.mean_separation_at(surface, "force", force)).area
@@ -98,7 +102,10 @@ class Theory(abc.ABC):
 
     def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """Reasons for which answers lie outside what the theory was tested for, each with a mask."""
-        return {}
+        if self.ends_at_h_max:
+            return {}
+        beyond = mean_separation > np.asarray(surface.h_max)
+        return {"u is above h_max, where the surface has no contact and the theory's heights have no end": beyond}
 
     def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of ln F at given u and of ln A at given F against simulations, at A/A0 = `area`.

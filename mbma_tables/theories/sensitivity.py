@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 STEP = 0.02  # of a parameter, or of the room that it has
 RTOL = 1e-6  # of a derivative that is given out, or of the quantity over the parameter
-GAP = "mean_separation"
+GAP, MODULUS = "mean_separation", "E_star"
 KINDS = ("force", "area")
 
 
@@ -30,13 +30,15 @@ def differentiate(
 ) -> tuple[dict[str, FloatArray], ...]:
     """Derivatives of F/(A0 E*) and A/A0 by "separation" d and each of the surface's parameters, the others held.
 
+    With a hardness, which is held, also by the logarithm of "E_star".
+
     Where differences do not settle, at corners of a theory or where force has no bound, it is a ConvergenceError.
     """
     shape = np.broadcast_shapes(np.shape(mean_separation), surface.shape)
-    names = (GAP, *surface.parameters)
+    names = (GAP, *surface.parameters, *(() if theory is theory.elastic else (MODULUS,)))
     at = {name: np.broadcast_to(np.asarray(getattr(surface, name), float), shape) for name in PARAMETERS[1:]}
     at |= {name: np.broadcast_to(np.asarray(getattr(surface, name), float), shape) for name in surface.parameters}
-    at[GAP] = np.broadcast_to(np.asarray(mean_separation, float), shape)
+    at |= {GAP: np.broadcast_to(np.asarray(mean_separation, float), shape), MODULUS: np.ones(shape)}
     whole = theory.answer(surface, at[GAP])
     slopes: tuple[dict[str, FloatArray], ...] = ({}, {})
     for kind, found in zip(KINDS, slopes, strict=True):
@@ -65,9 +67,9 @@ def _derivative(
         own = {other: numbers.ravel()[flat] for other, numbers in at.items()} | {name: x}
         return np.asarray(
             getattr(
-                theory.at(value.shape, place).answer(
-                    surface.with_numbers(*(own[p] for p in surface.parameters)), own[GAP]
-                ),
+                theory.at(value.shape, place)
+                .stiffer(own[MODULUS])
+                .answer(surface.with_numbers(*(own[p] for p in surface.parameters)), own[GAP]),
                 kind,
             )
         )

@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 from scipy.special import expit, logit, ndtr, ndtri
 
 from mbma_tables import hardness as law
-from mbma_tables.arguments import FloatArray, checked_hardness, require
+from mbma_tables.arguments import FloatArray, checked_hardness, describe_entries, require
 from mbma_tables.bearing_curve import rows
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -149,6 +149,10 @@ class Yielding(Theory):
         chosen = np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)]
         return Yielding(self.elastic, chosen)
 
+    def stiffer(self, times: FloatArray) -> Theory:
+        """With hardnesses that are less of the modulus."""
+        return Yielding(self.elastic, self.hardness / times)
+
     def bends(self, surface: AnySurface) -> FloatArray:
         """Where derivatives of the elastic force jump."""
         return self.elastic.bends(surface)
@@ -169,9 +173,10 @@ class Yielding(Theory):
         share, slope = self.elastic.bearing_share(surface, u)
         load, stiffness = law.force(elastic.force / gradient, elastic.stiffness / gradient, share, slope, eta)
         force = load * gradient
-        # where nothing yields or touches, a force that the theory is sure to reach
         needed = (force > 0) & ~endless
-        at_force = np.where(needed, self.elastic.area_at(surface, np.where(needed, force, elastic.force)), 0.0)
+        # where nothing yields or touches, a force that the theory is sure to reach
+        asked = np.where(needed, force, np.minimum(elastic.force, gradient))
+        at_force = np.where(needed, self.elastic.area_at(surface, asked), 0.0)
         # both of the elastic errors, force and area at that force, may add up
         capped = TheoryAnswer(force, law.area(load, at_force, eta), stiffness * gradient, 2 * elastic.error)
         if endless.any():
@@ -222,6 +227,7 @@ class Yielding(Theory):
         low, high = self.interval(surface)
         u, _, above = bracket.reshape(3, *force.shape)
         u = np.where(force < self.hardness, u, low)
+        self._refuse_unreached(surface, force, u)
         return np.where(np.isinf(self.hardness), above, np.where(known[0].reshape(force.shape) > 0, u, high))
 
     def _started(self, surface: AnySurface, force: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -269,6 +275,17 @@ class Yielding(Theory):
         rising = np.append(True, np.diff(np.maximum.accumulate(met)) > 0)
         found = CubicSpline(met[rising], y[rising])(np.clip(log_odds, met[0], met[-1]))
         return np.clip(to_u(found), low, high)
+
+    def _refuse_unreached(self, surface: AnySurface, force: FloatArray, u: FloatArray) -> None:
+        """Refuse forces that full compression does not reach, short of the hardness."""
+        low = np.broadcast_to(self.interval(surface, "force" if self.ends_at_h_max else "area")[0], u.shape)
+        doubtful = (u <= 2 * np.maximum(low, LOWEST)) & np.isfinite(self.hardness)
+        if doubtful.any():
+            largest = self.answer(surface, low).force
+            out = doubtful & (force > largest * (1 + law.MIN_DEPTH))
+            require(
+                "force", force, ~out, f"at most what theory {self.name!r} reaches, {describe_entries(largest, out)}"
+            )
 
     def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of ln F at given u and of ln A at given F against boundary elements with a hardness.

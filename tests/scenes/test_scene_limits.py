@@ -155,3 +155,9 @@ def test_a_table_as_an_object_is_the_tier_with_its_name():
     found, same = scene_of(tier=table).run(), scene_of(tier="universal").run()
     np.testing.assert_array_equal(found["force"], same["force"])
     assert found.attrs["table_hashes"] == same.attrs["table_hashes"]
+
+
+def test_no_contact_asked_by_area_is_answered():
+    found = Scene(Surface.named("concrete"), effects=["force", "stiffness"], areas=[0.0]).run()
+    assert found.separation.values == pytest.approx(1.1)
+    assert (found.force.values, found.stiffness.values) == (0, 0)

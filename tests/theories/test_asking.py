@@ -267,3 +267,15 @@ def test_a_theory_object_with_its_own_options():
     by_name = contact(SURFACE, 1.0, tier="rigid", reading="printed")
     assert by_object.force == by_name.force
     assert (by_object.tier, by_object.reading, by_object.theory) == ("rigid", "printed", "mbma")
+
+
+@pytest.mark.parametrize("theory", ["persson", "greenwood_williamson"])
+def test_heights_without_an_end(theory):
+    found = contact(SURFACE, mean_separation=[2.5, 3.1], theory=theory)
+    assert found.valid.tolist() == [True, False]
+    with pytest.raises(OutOfRangeError, match="force must be positive"):
+        contact(SURFACE, pressure=0.0, theory=theory)
+
+
+def test_energy_without_contact_is_no_negative_zero():
+    assert not np.signbit(contact(SURFACE, 3.0, theory="calibrated").energy)

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from helpers import random_map
 
-from mbma_tables import InputError, Surface, contact, contact_law, hardness
+from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law, hardness
 from mbma_tables.theories import THEORIES, get_theory
 from mbma_tables.theories.calibrated_table import shipped
 from mbma_tables.theories.yielding import MANY, Yielding
@@ -247,3 +247,48 @@ def test_reasons_and_what_elastic_answers_say():
     )
     assert limit.area == pytest.approx(elastic.area, rel=0.05)
     assert limit.psi == pytest.approx(1.1)
+
+
+@each
+def test_derivatives_by_the_modulus_hold_the_hardness(theory):
+    def at(modulus, **more):
+        return contact(SURFACE, pressure=50.0, E_star=modulus, theory=theory, hardness=[HARDNESS, np.inf], **more)
+
+    found, step = at(MODULUS, derivatives=True), 1e-3 * MODULUS
+    above, below = at(MODULUS + step), at(MODULUS - step)
+    for kind in ("area", "separation"):
+        expected = (getattr(above, kind) - getattr(below, kind)) / (2 * step)
+        assert getattr(found, f"{kind}_by")["E_star"] == pytest.approx(expected, rel=1e-4), kind
+
+
+@each
+def test_pressures_short_of_the_hardness_are_held_or_refused(theory):
+    concrete, known = Surface.named("concrete"), {"theory": theory, "hardness": 0.02}
+    deepest = contact(concrete, mean_separation=1e-9 * concrete.h_rms, **known).force
+    for share in (0.9, 0.9795, 0.99995):
+        if 0.02 * share < deepest or theory == "calibrated":
+            found = contact(concrete, pressure=0.02 * share, **known)
+            assert found.force == pytest.approx(0.02 * share, rel=1e-9)
+        else:
+            with pytest.raises(OutOfRangeError, match="pressure must be at most what theory"):
+                contact(concrete, pressure=0.02 * share, **known)
+
+
+def test_a_row_of_hardnesses_some_infinite_answers_areas():
+    caps = np.array([HARDNESS, np.inf, 50.0])
+    found = contact(SURFACE, area=[0.1, 0.3, 0.5], E_star=MODULUS, theory="calibrated", hardness=caps)
+    assert found.area == pytest.approx([0.1, 0.3, 0.5], rel=1e-10)
+
+
+def test_a_hardness_leaves_mbma_its_reading_and_tier():
+    found = contact(SURFACE, 0.5, reading="printed", hardness=0.02)
+    assert (found.reading, found.tier) == ("printed", "universal")
+
+
+def test_the_lightest_pressures_are_held():
+    # the last step there ends at the elastic contact's separation
+    surface = Surface(hurst=0.096, q0=0.0015, q1=0.27, h_rms=0.043, h_max=0.3)
+    cap = 0.3 * float(surface.rms_gradient)
+    for depth in np.geomspace(1e-5, 1e-3, 9):
+        force = contact(surface, mean_separation=0.3 * (1 - depth), hardness=cap).force
+        assert contact(surface, pressure=force, hardness=cap).force == pytest.approx(force, rel=1e-9)
