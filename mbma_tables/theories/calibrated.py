@@ -46,29 +46,20 @@ class Calibrated(Theory):
         if isinstance(surface, MeasuredSurface):
             gap = np.asarray(mean_separation, float)
             require("mean_separation", gap, gap >= 0, "at least 0")
-            parts, own_error = own_law(surface).answer(gap)
-            force, area, stiffness = parts
+            (force, area, stiffness), own_error = own_law(surface).answer(gap)
             return TheoryAnswer(force, area, stiffness, np.full(gap.shape, own_error))
         assert isinstance(surface, Surface)
         table, places = calibrated_table.shipped(), Places(surface, mean_separation)
         u = places.flat / places.h_rms
         require("mean_separation", places.flat.reshape(places.shape), u.reshape(places.shape) >= 0, "at least 0")
-        covered = places.covered(table)[places.owner]
-        if covered.all():
-            out = table.fill(places.columns, places.owner, u)
-        else:
-            out, some = np.empty((3, u.size)), np.flatnonzero(covered)
-            out[:, some] = table.fill(places.columns, places.owner[some], u[some])
-            for row, mine in places.outside(~covered):
-                out[:, mine] = by_law(places.law(row), u[mine])
-        force, area, stiffness = out
-        error = np.full(places.shape, table.error)
-        return TheoryAnswer(
-            (force * places.gradient).reshape(places.shape),
-            area.reshape(places.shape),
-            (stiffness * places.gradient / places.h_rms).reshape(places.shape),
-            error,
-        )
+        out = table.fill(places.columns, places.owner, u)
+        for row, mine in places.outside(~places.covered(table)[places.owner]):
+            out[:, mine] = by_law(places.law(row), u[mine])
+        out[0] *= places.gradient
+        out[2] *= places.gradient
+        out[2] /= places.h_rms
+        force, area, stiffness = out.reshape(3, *places.shape)
+        return TheoryAnswer(force, area, stiffness, np.full(places.shape, table.error))
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* or an area below 1; h_max at zero."""
@@ -77,12 +68,10 @@ class Calibrated(Theory):
         assert isinstance(surface, Surface)
         table, places = calibrated_table.shipped(), Places(surface, wanted)
         if quantity == "area":
-            force = force_at_area(
-                places.flat.reshape(places.shape), places.columns[2][places.owner].reshape(places.shape)
-            )
+            light = places.columns[2][places.owner].reshape(places.shape)
+            loads = force_at_area(places.flat.reshape(places.shape), light).ravel()
         else:
-            force = (places.flat / places.gradient).reshape(places.shape)
-        loads = force.ravel()
+            loads = places.flat / places.gradient
         # zero load is last contact
         u, loaded, covered = np.full(loads.size, np.inf), loads > 0, places.covered(table)[places.owner]
         some = np.flatnonzero(covered & loaded)

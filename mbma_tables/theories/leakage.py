@@ -241,11 +241,8 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
     given = np.stack([np.ravel(surface.hurst), np.log(np.ravel(surface.zeta_1))])
     number = np.arange(given.shape[1]).reshape(surface.shape)
     owner = np.ascontiguousarray(np.broadcast_to(number, shape)).ravel()
-    inside = table.covers(*given)
-    # what the table does not cover is answered below
-    held = given if inside.all() else np.where(inside, given, table.covered.mean(axis=1)[:, None])
-    out = table.flow(held, owner, u, contact)
-    for row in np.flatnonzero(~inside):
+    out = table.flow(given, owner, u, contact)
+    for row in np.flatnonzero(~table.covers(*given)):
         mine = owner == row
         out[mine] = flow_of_spectrum(self_affine(*map(float, given[:, row])), u[mine], contact[mine])
     return out.reshape(shape)
