@@ -29,7 +29,7 @@ from mbma_tables.totals.panels import (
     Rule,
 )
 
-TAIL_SHARE = 2.0  # of the last two coefficients, for all that follow: they fall by 2 at least, and count twice
+TAIL_SHARE = 5.0  # of the last two coefficients, for all that follow: they may fall slowly, and slopes err more
 OLDER = 0.25  # of the two before them: signs change, and the last two may be small by chance
 SLOPES = 0.1  # of their relative error counts
 MANY = 1000  # islands below, from which those far below are summed by series of TERMS
