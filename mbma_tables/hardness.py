@@ -182,8 +182,8 @@ def newton_step(
     """One step of some separations towards their forces; which of them are not there yet.
 
     `elastic` force, its `stiffness`, `share` Q and its `slope` by u are those at the gaps u in the first row of
-    `bracket`, at `places`; its others have lower and upper bounds of u. Rows of `known`: the wanted force, eta, the
-    last gap with contact, which may be infinite, and h_rms. Forces in A0 E* g.
+    `bracket`, at `places`; its others have lower and upper bounds of u. Rows of `known`: the wanted force, eta and the
+    last gap with contact, which may be infinite. Forces in A0 E* g.
     """
     left = np.ones(places.size, dtype=np.bool_)
     for k in range(places.size):

@@ -234,7 +234,7 @@ class Yielding(Theory):
         """`known` and `bracket` of `hardness.newton_step`: u lies below the elastic contact's, the start is close."""
         (low, high), gradient = self.interval(surface), np.asarray(surface.rms_gradient)
         low, end = np.maximum(low, LOWEST), surface.h_max if self.ends_at_h_max else np.inf
-        known, _ = rows(force / gradient, self.hardness / gradient, end, surface.h_rms)
+        known, _ = rows(force / gradient, self.hardness / gradient, end)
         log_odds = logit(force / self.hardness)
         some = log_odds[np.abs(log_odds) < MOST_ODDS]
         if not surface.shape and not self.hardness.ndim and some.size >= MANY:
