@@ -111,7 +111,8 @@ def jacobian_below(rms_over_s: Any, beta: float, printed: bool, offset: bool) ->
     return 1.0 - 4.0 / 3.0 * beta / (1.0 if printed else rms_over_s) if printed or offset else 1.0
 
 
-@njit(cache=True, error_model="numpy")
+# fastmath=False is said because else numba takes that of whichever caller compiles it first, and bits depend on it
+@njit(cache=True, fastmath=False, error_model="numpy")
 def surface_constants(hurst: float, zeta_1: float, reading: ReadingNumbers, printed: bool) -> SurfaceConstants:
     """The constants of a surface; `printed` is of the reading's Jacobian."""
     phi = reading.phi

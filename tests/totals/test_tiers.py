@@ -3,6 +3,9 @@
 import dataclasses
 import functools
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -230,3 +233,16 @@ def test_long_batches_run_in_blocks(monkeypatch, derivatives):
     monkeypatch.setattr(intervals, "fill_totals", interrupt)
     with pytest.raises(KeyboardInterrupt):
         contact(surfaces, 1.0, derivatives=derivatives)
+
+
+@pytest.mark.slow
+def test_bits_do_not_depend_on_what_was_asked_before(tmp_path):
+    """No compiled function takes its arithmetic from whoever calls it first."""
+    batch = "contact(Surface(0.8, 0.3, np.linspace(5.0, 500.0, 200), 0.7, 2.1), 1.0).force.tobytes().hex()"
+    answers = []
+    for before in ("", "contact(Surface(0.7, 0.2, 60.0, 1.0, 3.0), np.linspace(-2.9, 2.9, 1000)); "):
+        code = f"import numpy as np; from mbma_tables import Surface, contact; {before}print({batch})"
+        folder = tmp_path / str(len(answers))
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
+        answers.append(subprocess.check_output([sys.executable, "-c", code], env=environment))
+    assert answers[0] == answers[1]
