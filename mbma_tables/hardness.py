@@ -205,7 +205,7 @@ def newton_step(
         if near:
             following = min(max(following, low), high)
         elif not low < following < high:
-            following = math.sqrt(low * high) if high > 2.0 * low else 0.5 * (low + high)
+            following = math.sqrt(low) * math.sqrt(high) if high > 2.0 * low else 0.5 * (low + high)
         left[k] = not (near or high - low <= MIN_DEPTH * high or following == u)
         bracket[0, place] = following
     return left

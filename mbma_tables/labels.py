@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import is_labelled
+from mbma_tables.arguments import broadcast_shape, is_labelled
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces.any_surface import AnySurface
 
@@ -41,13 +41,26 @@ def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
     )
 
 
+def refuse_plain(arguments: Mapping[str, Any]) -> None:
+    """Refuse arrays without names beside DataArrays."""
+    for name, given in arguments.items():
+        if not is_labelled(given) and np.ndim(given):
+            raise InputError(f"beside DataArrays, {name} must be one or a scalar, got shape {np.shape(given)}")
+
+
+def agree(**arguments: Any) -> None:
+    """Refuse plain arrays that do not broadcast, or that stand beside DataArrays."""
+    if any(map(is_labelled, arguments.values())):
+        refuse_plain(arguments)
+    else:
+        broadcast_shape(**arguments)
+
+
 def apply_to_surface(answer: Any, surface: AnySurface, arrays: Mapping[str, Any], outputs: int) -> Any:
     """``answer(surface, *arrays)``, a tuple of `outputs` arrays, of DataArrays; plain arrays among them are refused."""
     count = len(surface.parameters)
     arguments = {name: getattr(surface, name) for name in surface.parameters} | dict(arrays)
-    for name, given in arguments.items():
-        if not is_labelled(given) and np.ndim(given):
-            raise InputError(f"beside DataArrays, {name} must be one or a scalar, got shape {np.shape(given)}")
+    refuse_plain(arguments)
 
     def block(*numbers: Any) -> Any:
         found = answer(surface.with_numbers(*numbers[:count]), *numbers[count:])

@@ -52,6 +52,8 @@ DIMENSIONS = {
     **dict.fromkeys(("separation", "mean_separation", "delta", "R_d", "R_u", "sigma", "h_d", "overclosure"), (1, 0)),
     **dict.fromkeys(("separations", "mean_separations", "deltas"), (1, 0)),
     **dict.fromkeys(("dx", "dy", "short_cutoff", "long_cutoff", "tip_radius", "extrapolate_to"), (1, 0)),
+    **dict.fromkeys(("width", "mean_free_path"), (1, 0)),
+    **dict.fromkeys(("viscosity", "pressure_drop", "pressure_in", "pressure_out"), (0, 1)),
     **dict.fromkeys(("q0", "q1"), (-1, 0)),
     **dict.fromkeys(("D", "m4", "Sds", "Spd"), (-2, 0)),
     **dict.fromkeys(("E_star", "E1", "E2", "hardness", "elastic_hardness"), (0, 1)),
@@ -243,7 +245,7 @@ def resolve(
     >>> resolve({"hurst": 0.8, "h_rms": "0.8 um", "h_max": "3e-3 mm"})
     ({'hurst': 0.8, 'h_rms': 0.8, 'h_max': 3.0}, 'um')
     """
-    named = {name: read(name, value)[1] for name, value in given.items() if isinstance(value, str)}
+    named = {name: _named(name, value, kind) for name, value in given.items()}
     unit = known(asked, kind) if asked else next((u for u in named.values() if u is not None), None)
     if unit is not None and not asked:
         plain = [n for n in given if any(DIMENSIONS.get(n, ())) and named.get(n) is None]
@@ -251,6 +253,16 @@ def resolve(
             raise InputError(f"{', '.join(plain)} without a unit beside numbers in {unit}: write the unit to each")
     own = Units(length=unit) if kind == "length" else Units(stress=unit)
     return {name: own.number(name, value) for name, value in given.items()}, unit
+
+
+def _named(name: str, value: Any, kind: str) -> str | None:
+    """The unit that a text, the first such in a list, or the attribute units of a DataArray names."""
+    if isinstance(value, list | tuple):
+        return next((unit for unit in (_named(name, entry, kind) for entry in value) if unit), None)
+    if isinstance(value, str):
+        return read(name, value)[1]
+    stated = getattr(value, "attrs", {}).get("units")
+    return stated if stated in SIZES[kind] else None
 
 
 def modulus_and_units(E_star: Any, surface: Any, asked: str | None = None) -> tuple[Any, Units]:

@@ -227,6 +227,7 @@ def _places(
         require(by, asked, asked >= 0, "at least 0")
     if by == "separation":
         average = (h_max + asked) / 2
+        require(by, asked, asked >= -h_max, "at least -h_max, which is full compression")
     elif by == "mean_separation":
         average = asked
     else:

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, require
+from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, require
 from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
+from mbma_tables.labels import agree
 from mbma_tables.leakage import LARGEST_AREA
 from mbma_tables.plots import draw_compression, force_label, leakage_label
 from mbma_tables.surfaces.measured import MeasuredSurface
@@ -150,7 +151,7 @@ class Leakage(Displayed):
         '3.0e+02 um^2/s'
         """
         eta, drop, length = self._positive(viscosity=viscosity, pressure_drop=pressure_drop, width=width)
-        broadcast_shape(k=self.k, viscosity=eta, pressure_drop=drop, width=length)
+        agree(k=self.k, viscosity=eta, pressure_drop=drop, width=length)
         return self.conductance * (drop / (12 * eta * length))
 
     def gas(
@@ -184,36 +185,39 @@ class Leakage(Displayed):
         eta, high, low, length = self._positive(
             viscosity=viscosity, pressure_in=pressure_in, pressure_out=pressure_out, width=width
         )
-        require("pressure_in", high, high >= low, "at least pressure_out: it is the larger, absolute pressure")
+        require(
+            "pressure_in",
+            np.asarray(high + 0 * low),
+            np.asarray(high >= low),
+            "at least pressure_out: it is the larger, absolute pressure",
+        )
         path = self._number("mean_free_path", mean_free_path)
-        require("mean_free_path", path, path >= 0, "at least 0")
+        require("mean_free_path", np.asarray(path), np.asarray(path >= 0), "at least 0")
         channel = np.cbrt(self.conductance)
-        open_ = np.asarray(channel) > 0
-        knudsen = np.where(open_, path / np.where(open_, channel, 1.0), 0.0)
+        agree(k=self.k, viscosity=eta, pressure_in=high, pressure_out=low, width=length, mean_free_path=path)
+        knudsen = path / np.maximum(channel, np.finfo(float).tiny) * (channel > 0)
         limit = f"at most {LARGEST_KNUDSEN} of the channel k^(1/3) h_rms: beyond, flow is not that of slip"
-        require("mean_free_path", np.broadcast_to(path, knudsen.shape), knudsen <= LARGEST_KNUDSEN, limit)
-        broadcast_shape(k=knudsen, viscosity=eta, pressure_in=high, pressure_out=low, width=length)
+        require("mean_free_path", np.asarray(path + 0 * knudsen), np.asarray(knudsen <= LARGEST_KNUDSEN), limit)
         return self.conductance * (1 + SLIP * knudsen) * ((high - low) / low * (high + low) / (24 * eta * length))
 
     def _positive(self, **given: Any) -> list[FloatArray]:
         found = []
         for name, value in given.items():
             number = self._number(name, value)
-            require(name, number, number > 0, "positive")
+            require(name, np.asarray(number), np.asarray(number > 0), "positive")
             found.append(number)
         return found
 
     def _number(self, name: str, value: Any) -> FloatArray:
         """A number in the units of surface and modulus."""
-        if isinstance(value, str):
-            kind = "h_rms" if name in ("width", "mean_free_path") else "pressure"
-            if name == "viscosity":
-                plain, found, rest = value.strip().rpartition(" ")
-                if rest != "s" or not found:
-                    raise InputError(f"viscosity = {value!r} must be a stress times seconds, such as '1e-3 Pa s'")
-                value = plain
-            value = self._source.units.number(kind, value)
-        return finite_array(name, value)
+        if name == "viscosity" and isinstance(value, str):
+            plain, found, rest = value.strip().rpartition(" ")
+            if rest != "s" or not found:
+                raise InputError(f"viscosity = {value!r} must be a stress times seconds, such as '1e-3 Pa s'")
+            value = plain
+        value = self._source.units.number(name, value)
+        array = finite_array(name, value)
+        return value if is_labelled(value) else array
 
 
 def leakage_of(source: Source, contact: Contact, area: Any) -> Leakage:

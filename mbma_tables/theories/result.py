@@ -163,6 +163,11 @@ class Contact(Displayed):
         found: Any = source.map(lambda theory, s, u, E: theory.answer(s, u), self, 4)
         return TheoryAnswer(*found)
 
+    @property
+    def _touching(self) -> Numbers:
+        """A/A0, whether asked for or not."""
+        return self._answer.area if self.area is None else self.area
+
     @functools.cached_property
     def stiffness(self) -> Numbers:
         """-d(F/A0)/du [stress/length] of loading, against the mean separation; computed when first read."""
@@ -257,8 +262,9 @@ class Contact(Displayed):
     @property
     def mean_pressure(self) -> Numbers:
         """Mean pressure in the contact, F/A [stress]; NaN where there is none."""
+        force = self._source.E_star * self._answer.force if self.force is None else self.force
         with np.errstate(invalid="ignore"):
-            return self.force / self.area
+            return force / self._touching
 
     @property
     def scatter(self) -> Numbers:
@@ -273,8 +279,8 @@ class Contact(Displayed):
     @functools.cached_property
     def stiffness_scatter(self) -> Numbers:
         """Standard deviation of ln of `incremental_stiffness` at this force, likewise: of conductance, too."""
-        area = self._answer.area if self.area is None else self.area
-        (found,) = self._source.map(lambda by, s, u, E, A: (by.stiffness_scatter(s, A),), self, 1, {"area": area})
+        more = {"area": self._touching}
+        (found,) = self._source.map(lambda by, s, u, E, A: (by.stiffness_scatter(s, A),), self, 1, more)
         return found
 
     @property
@@ -285,16 +291,14 @@ class Contact(Displayed):
 
     @functools.cached_property
     def _scatter(self) -> tuple[Numbers, ...]:
-        area = self._answer.area if self.area is None else self.area
-        return self._source.map(lambda theory, s, u, E, A: theory.scatter(s, A), self, 2, {"area": area})
+        return self._source.map(lambda theory, s, u, E, A: theory.scatter(s, A), self, 2, {"area": self._touching})
 
     @functools.cached_property
     def leakage(self) -> Leakage:
         """Flow through the gaps of the contact, `theories.leakage.Leakage`; computed when first read."""
         from mbma_tables.theories.leakage import leakage_of
 
-        area = self._answer.area if self.area is None else self.area
-        return leakage_of(self._source, self, area)
+        return leakage_of(self._source, self, self._touching)
 
     @functools.cached_property
     def valid(self) -> Numbers:
@@ -338,7 +342,8 @@ class Source:
     @property
     def yields(self) -> bool:
         """Whether a hardness is given."""
-        return is_labelled(self.hardness) or not np.equal(self.hardness, np.inf).all()
+        # an empty one is refused where it is checked
+        return is_labelled(self.hardness) or not np.size(self.hardness) or not np.equal(self.hardness, np.inf).all()
 
     def theory_at(self, E_star: Any, hardness: Any) -> Theory:
         """The theory, with the hardness where there is one."""

@@ -30,6 +30,7 @@ QUANTITIES = ("area", "yielded", "force", "stiffness")
 TESTED_ETA = 0.025  # p_m/(E* g) down to which boundary elements were solved
 STEPS = 200
 LOWEST = 1e-300
+REACHED = 1e-9  # relative, of forces at full compression
 CLOSED = 1e-9  # u/h_rms of contacts that count as full
 MANY = 200  # forces on one surface from which on a spline is worth making,
 NODE_STEP, BEYOND = 0.1, 16  # its steps in ln F/(p_m A0 - F), those beyond the forces at either end,
@@ -277,15 +278,14 @@ class Yielding(Theory):
         return np.clip(to_u(found), low, high)
 
     def _refuse_unreached(self, surface: AnySurface, force: FloatArray, u: FloatArray) -> None:
-        """Refuse forces that full compression does not reach, short of the hardness."""
+        """Refuse forces that full compression, or the least gap that is a number, does not reach."""
         low = np.broadcast_to(self.interval(surface, "force" if self.ends_at_h_max else "area")[0], u.shape)
         doubtful = (u <= 2 * np.maximum(low, LOWEST)) & np.isfinite(self.hardness)
         if doubtful.any():
-            largest = self.answer(surface, low).force
-            out = doubtful & (force > largest * (1 + law.MIN_DEPTH))
-            require(
-                "force", force, ~out, f"at most what theory {self.name!r} reaches, {describe_entries(largest, out)}"
-            )
+            largest = self.answer(surface, np.maximum(u, low)).force
+            out = doubtful & (force > largest * (1 + REACHED))
+            allowed = f"at most what theory {self.name!r} reaches, {describe_entries(largest, out)}"
+            require("force", force, ~out, allowed)
 
     def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of ln F at given u and of ln A at given F against boundary elements with a hardness.

@@ -279,3 +279,26 @@ def test_heights_without_an_end(theory):
 
 def test_energy_without_contact_is_no_negative_zero():
     assert not np.signbit(contact(SURFACE, 3.0, theory="calibrated").energy)
+
+
+def test_a_modulus_names_its_unit_in_lists_and_attributes():
+    listed = contact(SURFACE, pressure="1 MPa", E_star=["100 GPa", "200 GPa"])
+    assert listed.force == pytest.approx([1e-3, 1e-3])
+    named = xr.DataArray([100.0, 200.0], dims="body", attrs={"units": "GPa"})
+    assert contact(SURFACE, pressure="1 MPa", E_star=named).units["force"] == "GPa"
+    with pytest.raises(InputError, match="hardness is in 'MPa'"):
+        contact(SURFACE, pressure=0.001, E_star=named, hardness=named.assign_attrs(units="MPa"))
+
+
+def test_one_quantity_alone_has_a_mean_pressure_and_a_dataset():
+    both, one = contact(SURFACE, 0.5, E_star=MODULUS), contact(SURFACE, 0.5, E_star=MODULUS, quantities=("area",))
+    assert one.mean_pressure == pytest.approx(both.mean_pressure, rel=1e-8)
+    assert "mean_pressure" in one.to_dataset()
+
+
+@each
+def test_what_is_asked_is_what_a_refusal_names(theory):
+    with pytest.raises(OutOfRangeError, match=r"^separation must be at least -h_max"):
+        contact(SURFACE, -3.1, theory=theory)
+    with pytest.raises(InputError, match="hardness is empty"):
+        contact(SURFACE, 0.5, theory=theory, hardness=[])

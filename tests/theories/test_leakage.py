@@ -290,3 +290,21 @@ def test_stated_scatter_is_honest():
     one, two = shipped_part("leakage")[1]["coverage"]
     assert 0.6 <= one <= 0.76
     assert 0.9 <= two <= 0.99
+
+
+def test_rates_of_named_arrays_keep_their_dimensions_and_units():
+    seal = Surface(hurst=0.8, q0=0.01, q1=0.5, h_rms=1.0, h_max=3.5, unit="um")
+    gaps, width = xr.DataArray([1.9, 2.0], dims="gap"), xr.DataArray([2.0, 3.0, 4.0], dims="width")
+    known = {"theory": "calibrated", "E_star": "10 MPa"}
+    named = contact(seal, mean_separation=gaps, **known).leakage
+    plain = contact(seal, mean_separation=gaps.values[:, None], **known).leakage
+    found, expected = named.liquid("1e-3 Pa s", "0.1 MPa", width), plain.liquid("1e-3 Pa s", "0.1 MPa", width.values)
+    assert found.dims == ("gap", "width")
+    assert found.values == pytest.approx(expected)
+    air = ("2e-5 Pa s", "2 bar", "1 bar")
+    assert named.gas(*air, width, "1 nm").values == pytest.approx(plain.gas(*air, width.values, "1 nm"))
+    assert plain.liquid("1e-3 Pa s", "0.1 MPa", ["2 um", "3e-3 mm", "4 um"]) == pytest.approx(expected)
+    with pytest.raises(InputError, match="width is in 'mm'"):
+        plain.liquid("1e-3 Pa s", "0.1 MPa", width.assign_attrs(units="mm"))
+    with pytest.raises(InputError, match="beside DataArrays, width"):
+        named.liquid("1e-3 Pa s", "0.1 MPa", width.values[:2])
