@@ -63,7 +63,7 @@ def effective_modulus(E1: ArrayLike | str, nu1: ArrayLike, E2: ArrayLike | str, 
     broadcast_shape(**given)
     a, b = ((1 - nu) * (1 + nu) / E for nu, E in ((given["nu1"], given["E1"]), (given["nu2"], given["E2"])))
     found = (1 / (a + b))[()]
-    return found if unit is None else f"{one_number('E_star', found)} {unit}"
+    return found if unit is None or not isinstance(E1, str) else f"{one_number('E_star', found)} {unit}"
 
 
 @dataclasses.dataclass(frozen=True)

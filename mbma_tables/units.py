@@ -247,7 +247,7 @@ def resolve(
     """
     named = {name: _named(name, value, kind) for name, value in given.items()}
     unit = known(asked, kind) if asked else next((u for u in named.values() if u is not None), None)
-    if unit is not None and not asked:
+    if unit is not None and not asked and any(isinstance(value, str) for value in given.values()):
         plain = [n for n in given if any(DIMENSIONS.get(n, ())) and named.get(n) is None]
         if plain:
             raise InputError(f"{', '.join(plain)} without a unit beside numbers in {unit}: write the unit to each")
