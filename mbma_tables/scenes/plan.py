@@ -253,7 +253,7 @@ class _Planner:
         return Step("profiles", "pressure_profile", what, "exact", asked, islands, asked, seconds)
 
     def by_theory(self, why: Sequence[str]) -> Step:
-        """Another theory's answers: its own, or through its law where that costs less and no slopes are asked."""
+        """Another theory's answers: its own, or through its law where that costs less and force and area suffice."""
         outputs, theory = self.problem.outputs, self.problem.theory_name
         inverse = self.problem.prescribed in INVERTED
         rtol = max((1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_THEORY_LAW_RTOL)
@@ -263,7 +263,7 @@ class _Planner:
         pays = self.count >= MIN_LAW_GAPS_OF_OTHERS if math.isnan(direct) else by_law < direct
         own = self.own_error()
         name, asked, error, seconds = "contact", None, own, direct
-        if pays and not outputs & {"stiffness", "conductance"}:
+        if pays and not outputs & set(OF_LAW):
             name, asked, seconds = "law", rtol, by_law
             error = (AMPLIFICATION["inverse"] if inverse else 1.0) * (rtol + own)
         what = f"force, area and what follows from them at {self.count} gaps"

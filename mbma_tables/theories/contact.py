@@ -29,10 +29,10 @@ from mbma_tables.surfaces.readings import Reading
 from mbma_tables.theories import get_theory
 from mbma_tables.theories.mbma import Mbma, refuse_options_of_mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
-from mbma_tables.theories.result import MEANINGS, Contact, Source
+from mbma_tables.theories.result import Contact, Source, named
 from mbma_tables.theories.sensitivity import differentiate
 from mbma_tables.totals.contact import wanted_quantities
-from mbma_tables.units import modulus_and_units, unit_of
+from mbma_tables.units import modulus_and_units
 
 KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by
 
@@ -293,14 +293,14 @@ def _of_labelled(surface: AnySurface, value: Any, E_star: Any, hardness: Any, op
     arrays = {by: value, "E_star": E_star, "hardness": hardness}
     outputs = apply_to_surface(answer, surface, arrays, len(names) + len(slopes))
     for found, name in zip(outputs, names, strict=False):
-        fields[name] = found.rename(name).assign_attrs(long_name=MEANINGS[name], units=unit_of(name, units))
+        fields[name] = named(found, name, units)
     for (kind, name), found in zip(slopes, outputs[len(names) :], strict=True):
         fields.setdefault(kind, {})[name] = found
     # what was given is kept, with its name and attributes
     if by == "separation":
-        fields |= {by: value, "mean_separation": (surface.h_max + value) / 2}
+        fields |= {by: value, "mean_separation": named((surface.h_max + value) / 2, "mean_separation", units)}
     elif by == "mean_separation":
-        fields |= {by: value, "separation": 2 * value - surface.h_max}
+        fields |= {by: value, "separation": named(2 * value - surface.h_max, "separation", units)}
     fields |= _labels(theory)
     return Contact(theory=theory.name, islands=None, _source=options["source"], **fields)
 

@@ -49,6 +49,24 @@ MEANINGS = {
 MAX_GRADIENT = 1.0  # rms gradient above which heights and wavenumbers are hardly in one unit
 
 
+def named(value: Any, name: str, units: Units) -> Any:
+    """A quantity of a contact; a DataArray of it knows its name, meaning and unit."""
+    if not is_labelled(value):
+        return value
+    return value.rename(name).assign_attrs(long_name=MEANINGS[name], units=unit_of(name, units))
+
+
+def described(method: Callable[[Any], Numbers]) -> functools.cached_property[Numbers]:
+    """A quantity of a contact that is kept when it was read."""
+
+    @functools.wraps(method)
+    def found(contact: Contact) -> Numbers:
+        value: Numbers = named(method(contact), method.__name__, contact._source.units)
+        return value
+
+    return functools.cached_property(found)
+
+
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Contact(Displayed):
     """A contact: force, area and what follows from them; arrays of the broadcast shape, or DataArrays.
@@ -168,13 +186,13 @@ class Contact(Displayed):
         """A/A0, whether asked for or not."""
         return self._answer.area if self.area is None else self.area
 
-    @functools.cached_property
+    @described
     def stiffness(self) -> Numbers:
         """-d(F/A0)/du [stress/length] of loading, against the mean separation; computed when first read."""
         found: Numbers = (self._source.E_star * self._answer.stiffness)[()]
         return found
 
-    @functools.cached_property
+    @described
     def energy(self) -> Numbers:
         """Elastic energy per nominal area [stress length], the integral of F/A0 over u; computed when first read."""
         if self._source.yields:
@@ -228,12 +246,12 @@ class Contact(Displayed):
         found: Numbers = self._source.map(number, self, 1)[0] if known is None else getattr(known, name)[()]
         return found
 
-    @functools.cached_property
+    @described
     def yielded(self) -> Numbers:
         """Share of the contact area at the hardness, 0 to 1."""
         return self._of_loading("yielded") if self._source.yields else 0.0 * self.mean_separation
 
-    @functools.cached_property
+    @described
     def incremental_stiffness(self) -> Numbers:
         """-d(F/A0)/du [stress/length] of a small unloading, the contact area frozen; `stiffness` if nothing yields."""
         if not self._source.yields:
@@ -241,7 +259,7 @@ class Contact(Displayed):
         found: Numbers = (self._source.E_star * self._of_loading("incremental_stiffness"))[()]
         return found
 
-    @functools.cached_property
+    @described
     def plane_separation(self) -> Numbers:
         """Gap between the mean planes [length]: u less what yielded points are flattened."""
         return self._of_loading("plane_separation") if self._source.yields else self.mean_separation
@@ -259,31 +277,31 @@ class Contact(Displayed):
         found: Numbers = (self._source.E_star * self._source.surface.rms_gradient / ELASTIC_PSI)[()]
         return found
 
-    @property
+    @described
     def mean_pressure(self) -> Numbers:
         """Mean pressure in the contact, F/A [stress]; NaN where there is none."""
         force = self._source.E_star * self._answer.force if self.force is None else self.force
         with np.errstate(invalid="ignore"):
             return force / self._touching
 
-    @property
+    @described
     def scatter(self) -> Numbers:
         """Standard deviation of ln F at this mean separation from simulation to simulation; NaN where not known."""
         return self._scatter[0]
 
-    @property
+    @described
     def area_scatter(self) -> Numbers:
         """Standard deviation of ln A at this force, likewise."""
         return self._scatter[1]
 
-    @functools.cached_property
+    @described
     def stiffness_scatter(self) -> Numbers:
         """Standard deviation of ln of `incremental_stiffness` at this force, likewise: of conductance, too."""
         more = {"area": self._touching}
         (found,) = self._source.map(lambda by, s, u, E, A: (by.stiffness_scatter(s, A),), self, 1, more)
         return found
 
-    @property
+    @described
     def separation_scatter(self) -> Numbers:
         """Standard deviation of the mean separation at this force [length], `scatter` times F/(-dF/du)."""
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -300,7 +318,7 @@ class Contact(Displayed):
 
         return leakage_of(self._source, self, self._touching)
 
-    @functools.cached_property
+    @described
     def valid(self) -> Numbers:
         """Whether the theory was tested for contacts such as these; `reasons` says where and why not."""
 

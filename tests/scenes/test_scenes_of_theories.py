@@ -143,3 +143,12 @@ def test_a_file_and_an_object_ask_the_same():
     by_file, by_object = Scene.from_mapping(content).run(), scene_of(Persson(), E_star=1.0, areas=[0.01, 0.1]).run()
     assert by_file["force"].values.tolist() == by_object["force"].values.tolist()
     assert by_file["area"].values == pytest.approx([0.01, 0.1], rel=1e-9)
+
+
+def test_energies_of_many_gaps_reach_beyond_a_law():
+    surface = Surface.named("concrete")
+    u = np.linspace(0.8, 0.98, 400) * surface.h_max
+    known = {"theory": "greenwood_williamson", "mean_separations": u, "rtol": 1e-5}
+    found = Scene(surface, effects=["force", "energy"], **known).run()
+    expected = contact(surface, mean_separation=u, theory="greenwood_williamson").energy
+    assert found.energy.values == pytest.approx(expected, rel=1e-5)

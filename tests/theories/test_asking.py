@@ -302,3 +302,13 @@ def test_what_is_asked_is_what_a_refusal_names(theory):
         contact(SURFACE, -3.1, theory=theory)
     with pytest.raises(InputError, match="hardness is empty"):
         contact(SURFACE, 0.5, theory=theory, hardness=[])
+
+
+def test_what_is_read_of_named_arrays_has_its_unit():
+    gaps = xr.DataArray([0.5, 1.0], dims="gap", name="mine")
+    found = contact(dataclasses.replace(SURFACE, unit="um"), gaps, E_star="100 GPa", hardness="1.5 GPa")
+    expected = {"stiffness": "GPa/um", "mean_pressure": "GPa", "mean_separation": "um", "separation_scatter": "um"}
+    for name, unit in expected.items():
+        quantity = getattr(found, name)
+        assert (quantity.name, quantity.attrs["units"]) == (name, unit)
+    assert found.separation.name == "mine"
