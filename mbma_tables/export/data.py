@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import finite_array, needed
+from mbma_tables.arguments import finite_array, needed, number_in
 from mbma_tables.errors import InputError
 from mbma_tables.export.law_rows import LawTable
 from mbma_tables.export.text import checked_name, comment, csv_cell
@@ -81,8 +81,8 @@ def _law_of(held: dict[str, Any]) -> LawTable:
         raise ValueError("two columns of one length are needed, the first of them rising")
     x_name, y_name, x_unit, y_unit = (str(held[name]) for name in ("x", "y", "x_unit", "y_unit"))
     comments, behaviour = tuple(map(str, held["comments"])), _law_of(held["behaviour"]) if "behaviour" in held else None
-    error, theory, floor = float(held["largest_error"]), str(held["theory"]), float(held["floor"])
-    return LawTable(x, y, x_name, y_name, x_unit, y_unit, error, comments, theory, floor, behaviour)
+    error, floor = (number_in(name, held[name], 0, 1e300) for name in ("largest_error", "floor"))
+    return LawTable(x, y, x_name, y_name, x_unit, y_unit, error, comments, str(held["theory"]), floor, behaviour)
 
 
 def to_matlab(law: LawTable) -> bytes:

@@ -233,6 +233,6 @@ def checked_conductivity(conductivity: float | None, unit: str | None) -> tuple[
         raise InputError("conductance needs conductivity, which is missing: k_s = 2 k1 k2/(k1 + k2)")
     if not unit:
         raise InputError("conductance needs conductivity_unit, which is missing: that of k_s, such as 'W/(m K)'")
-    if not unit.isprintable():
+    if not isinstance(unit, str) or not unit.isprintable():
         raise InputError(f"conductivity_unit is not printable: {unit!r}")
     return number_in("conductivity", conductivity, 1e-300, 1e300), unit

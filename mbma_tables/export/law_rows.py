@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, hinted, number_in
+from mbma_tables.arguments import FloatArray, hinted, number_in, one_number
 from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
 from mbma_tables.export.chords import chosen_rows
@@ -250,6 +250,8 @@ def _range(
         return None, _range_end(law, end)
     if end is not None:
         raise InputError("largest_overclosure and pressures are both given: give one of them")
+    if not isinstance(pressures, tuple | list | np.ndarray) or len(pressures) != 2:
+        raise InputError(f"pressures must be two rising numbers, got {pressures!r}")
     low, high = (number_in("pressures", units.number("pressure", p), 1e-300, 1e300) for p in pressures)
     if low >= high:
         raise InputError(f"pressures must be two rising numbers, got {low:g} and {high:g}")
@@ -263,7 +265,7 @@ def _range(
 def _range_end(law: ContactLaw, asked: float | None) -> float:
     """The largest overclosure: as asked, or at full compression, or where the force turns down."""
     end = _last(law)
-    found = end if asked is None else float(asked)
+    found = end if asked is None else one_number("largest_overclosure", asked)
     if not 0 < found <= end:
         why = "full compression" if law.turning_point is None else "where the force of this surface turns down"
         raise InputError(f"largest_overclosure must be in (0, {end:g}], up to {why}, got {found:g}")

@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from mbma_tables import __version__
+from mbma_tables.arguments import whole_number_in
 from mbma_tables.errors import InputError
 from mbma_tables.export.law_rows import LawTable
 from mbma_tables.export.text import DIGITS, checked_name, comment, number
@@ -19,6 +20,7 @@ from mbma_tables.units import in_unit, modulus_and_units
 MAX_CALCULIX_ROWS = 200
 MAX_CALCULIX_CONDUCTANCES = 20  # of more, 2.20 keeps the last twenty, without a message
 MIN_CALCULIX_STEP = 1e-10  # overclosures that are closer are moved apart when they are read
+MAX_ID = 99_999_999  # of a card: eight columns
 MAX_NAME = 80  # letters of a name in CalculiX and Abaqus
 
 
@@ -134,6 +136,7 @@ def exponential(
 
 def lsdyna(law: LawTable, curve: int = 1) -> str:
     """A *DEFINE_CURVE for LS-DYNA, to be included: without *END, which would end the deck that it is pasted into."""
+    curve = whole_number_in("curve", curve, 1, MAX_ID)
     head = f"*DEFINE_CURVE\n{curve:10d}{0:10d}{1.0:10.1f}{1.0:10.1f}{0.0:10.1f}{0.0:10.1f}{0:10d}\n"
     rows = "".join(f"{x:20.{DIGITS - 1}E}{y:20.{DIGITS - 1}E}\n" for x, y in zip(law.x, law.y, strict=True))
     return comment(law.comments, "$") + head + rows
@@ -142,6 +145,7 @@ def lsdyna(law: LawTable, curve: int = 1) -> str:
 def optistruct(law: LawTable, contact: int = 1, table: int = 2) -> str:
     """PCONT and TABLES1 for OptiStruct, in long fields of 16 columns."""
     _is_pressure(law, "OptiStruct")
+    contact, table = (whole_number_in(n, k, 1, MAX_ID) for n, k in (("contact", contact), ("table", table)))
     pairs = [f"{value:<16.9E}" for row in zip(law.x, law.y, strict=True) for value in row]
     # the keyword stands where a line begins: on the first one that field is the friction coefficient
     lines = [f"PCONT,{contact:d}", f"+,STFTAB,{table:d}", f"{'TABLES1*':<8}{table:<16d}{'':<16}{'':<16}{'':<16}*"]

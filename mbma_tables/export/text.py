@@ -83,7 +83,7 @@ def csv_cell(text: str) -> str:
 
 def checked_name(name: str, max_length: int) -> str:
     """A name that every target can use: an ASCII letter, then letters, digits and underscores."""
-    if not re.fullmatch(rf"[A-Za-z][A-Za-z0-9_]{{0,{max_length - 1}}}", name):
+    if not isinstance(name, str) or not re.fullmatch(rf"[A-Za-z][A-Za-z0-9_]{{0,{max_length - 1}}}", name):
         raise InputError(
             f"a name must be a letter, then letters, digits and underscores, {max_length} at most, got {name!r}"
         )

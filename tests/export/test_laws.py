@@ -244,6 +244,14 @@ def test_data_come_back(target, tmp_path):
         ({"rows": None, "rtol": 1e-9}, "rtol"),
         ({"largest_overclosure": 2.0}, "largest_overclosure must be in"),
         ({"largest_overclosure": 0.0}, "largest_overclosure must be in"),
+        ({"largest_overclosure": [0.1, 0.2]}, "largest_overclosure must be one number"),
+        ({"pressures": ("1 kPa",)}, "pressures must be two rising numbers"),
+        ({"pressures": "1:2"}, "pressures must be two rising numbers"),
+        ({"pressures": 5}, "pressures must be two rising numbers"),
+        (
+            {"quantity": "conductance", "conductivity": 1.0, "conductivity_unit": 3},
+            "conductivity_unit is not printable",
+        ),
         ({"quantity": "stiffness"}, "quantity must be one of"),
         ({"quantity": "conductance"}, "conductance needs"),
         ({"reading": "other"}, "reading"),
@@ -372,7 +380,8 @@ def test_json_comes_back():
         assert (held.behaviour is None) == (law.behaviour is None)
         assert solvers.abaqus(held) == solvers.abaqus(law)
     good = json.loads(data.to_json(law_of()))
-    for bad in ("", "[]", "{}", json.dumps(good | {"columns": {}}), json.dumps(good | {"comments": 3})):
+    changes = ({"columns": {}}, {"comments": 3}, {"largest_error": -1e-3}, {"floor": np.nan})
+    for bad in ("", "[]", "{}", *(json.dumps(good | change) for change in changes)):
         with pytest.raises(InputError, match="no law as `mbma export json` writes it"):
             data.from_json(bad)
 
@@ -391,6 +400,14 @@ def test_optistruct_has_its_keyword_on_a_line_of_its_own():
     # on the first line that field would be the friction coefficient
     assert lines[:2] == ["PCONT,3", "+,STFTAB,7"]
     assert (lines[2][:8], lines[2][8:24].strip()) == ("TABLES1*", "7")
+
+
+@pytest.mark.parametrize("number", [0, 10**8, 1.5, "x"])
+def test_numbers_of_cards_fit_their_columns(number):
+    law = law_of()
+    for write, name in ((solvers.lsdyna, "curve"), (optistruct, "contact"), (optistruct, "table")):
+        with pytest.raises(InputError, match=f"{name} must be a whole number in"):
+            write(law, **{name: number})
 
 
 class TestLeakage:

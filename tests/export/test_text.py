@@ -82,7 +82,7 @@ def test_exponential_cards(law: LawTable) -> None:
     assert live[0].startswith("*SURFACE INTERACTION")
 
 
-@pytest.mark.parametrize("name", ["A\n*INCLUDE, INPUT=evil", "A, B", "", "1", "x'); system('evil", "é", "A" * 81])
+@pytest.mark.parametrize("name", ["A\n*INCLUDE, INPUT=evil", "A, B", "", "1", "x'); system('evil", "é", "A" * 81, 3])
 def test_names_of_cards_and_functions(name: str, law: LawTable) -> None:
     writers = (solvers.calculix, solvers.abaqus, solvers.modelica, data.matlab_reader)
     for write in writers:
