@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 
 QUANTITIES = ("pressure", "conductance", "leakage")
 FLOOR = 1e-3  # of the largest value, where no range is given: below it, errors are relative to this, not to the value
-FINE = 20_001  # points at which the error of a choice of rows is measured
+FINE, LAST = 20_001, 2_001  # points at which the error of a choice of rows is measured
+LAST_SHARE, NEAREST_END = 1e-2, 1e-9  # of h_max, mean separations of the last points
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -91,6 +92,9 @@ def _curve(joint: Joint, quantity: str, max_overclosure: float, k_s: float) -> t
     law = joint.law
     # squares: fine where p is a high power of the overclosure
     c = max_overclosure * np.linspace(0, 1, FINE) ** (2 if law.highest == np.inf else 1)
+    # close to full compression pressure may run up with the logarithm of the mean separation
+    u = law.h_max * np.geomspace(max(1 - max_overclosure / law.h_max, NEAREST_END), LAST_SHARE, LAST)
+    c = np.union1d(c, law.h_max - u[1:-1]) if u[0] < u[-1] else c
     d = law.h_max - 2 * c
     pressure, stiffness = np.asarray(law.force(d)), np.asarray(law.stiffness(d))
     pressure[0] = stiffness[0] = 0.0

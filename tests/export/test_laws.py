@@ -295,6 +295,14 @@ def test_rows_without_a_last_contact_begin_with_one_step():
     assert "TABULAR" in calculix(law)
 
 
+@pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
+def test_the_stated_error_holds_up_to_full_compression(theory):
+    law, known = law_of(theory=theory, rows=50), contact_law(CONCRETE, theory=theory, E_star=13.3)
+    u = np.geomspace(max(known.h_max - law.x[-1], 1e-9), 0.5, 5000)[1:]
+    error = np.abs(np.interp(known.h_max - u, law.x, law.y) / known.force(u=u) - 1)
+    assert error.max() <= 1.02 * law.largest_error
+
+
 def test_rows_of_leakage_fall():
     surface = Surface(0.8, 1.0, 1e3, 1.0, 1.5, unit="mm")
     law = describe_law(surface, "900 MPa", theory="persson", quantity="leakage", rows=50)
