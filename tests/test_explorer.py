@@ -170,8 +170,8 @@ def test_one_file_of_at_most_four_megabytes_that_asks_for_nothing():
     ("arguments", "said"),
     [
         (["--surface", "concrete", "--theory", "greenwood_williamson"], "the page has the theories"),
-        (["--surface", "concrete", "--reading", "mine"], "reading must be one of"),
-        (["--hurst", "0.8"], "h_max"),
+        (["--surface", "concrete", "--reading", "mine"], "'mine' is not one of"),
+        (["--hurst", "0.8"], "--h-max"),
         ([], "one surface is needed"),
     ],
 )
