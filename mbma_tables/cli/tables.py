@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from mbma_tables.cli.progress import echo
+from mbma_tables.errors import InputError
 
 
 def _path(name: str) -> Path:
@@ -16,7 +17,11 @@ def _path(name: str) -> Path:
     from mbma_tables.models.tables import shipped
     from mbma_tables.tablefiles.schema import KINDS
 
-    return shipped(name) if name in KINDS else Path(name)
+    if name in KINDS:
+        return shipped(name)
+    if not Path(name).exists():
+        raise InputError(f"no table and no file is called {name!r}: the tables are {' and '.join(KINDS)}")
+    return Path(name)
 
 
 @click.group("tables", no_args_is_help=False)
@@ -63,7 +68,7 @@ def list_command(as_json: bool) -> None:
 def info_command(table: str, as_json: bool) -> None:
     """Axes and attributes of TABLE (a kind or a file)."""
     from mbma_tables.tablefiles.netcdf import read_table
-    from mbma_tables.tablefiles.schema import KINDS
+    from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL
 
     content = read_table(_path(table), table if table in KINDS else None)
     axes = {axis.name: {**axis.attributes(), "nodes": axis.nodes} for axis in content.axes}
@@ -71,10 +76,9 @@ def info_command(table: str, as_json: bool) -> None:
         echo(json.dumps({"axes": axes, "attributes": content.attributes}, indent=2))
         return
     for name, attributes in axes.items():
-        echo(
-            f"axis {name}: {attributes['long_name']}, {attributes['first']:g} to {attributes['last']:g}, "
-            f"{attributes['nodes']} nodes, {attributes['position_formula']}"
-        )
+        # the universal table has cells, not nodes
+        nodes = "" if content.kind == UNIVERSAL else f", {attributes['nodes']} nodes, {attributes['position_formula']}"
+        echo(f"axis {name}: {attributes['long_name']}, {attributes['first']:g} to {attributes['last']:g}{nodes}")
     for name, value in content.attributes.items():
         echo(f"{name}: {value}")
 
