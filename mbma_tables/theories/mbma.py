@@ -109,8 +109,9 @@ class Mbma(Theory):
         """Mean separations [length] at which the largest island reaches the floor of zeta_d, and of zeta_u."""
         if not isinstance(surface, Surface):
             return np.empty(0)
-        places = np.array(kinks(surface.hurst, surface.zeta_1, self.reading)) * float(surface.h_rms)
-        return np.asarray(surface.h_max - places[places < 2 * surface.h_max] / 2)
+        places = np.array(kinks(surface.hurst, surface.zeta_1, self.reading)) * np.asarray(surface.h_rms)
+        u = np.asarray(surface.h_max) - places / 2
+        return u[u > 0] if surface.shape == () else np.maximum(u, 0)
 
     def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] from where force or area is largest, or the table ends, to first contact."""

@@ -21,6 +21,7 @@ from mbma_tables.theories import calibrated_table
 
 ROOT_RTOL = 1e-12  # of forces and areas at which a separation is asked
 ENERGY_RTOL = 1e-9
+LEAST_LEVEL = 4  # of the rule of energies, whose estimate of its error may vanish by chance where it is coarse
 SCAN = 49  # compressions at which a law is looked at for a turning point
 
 
@@ -97,7 +98,7 @@ class Theory(abc.ABC):
         return np.zeros_like(high), high
 
     def bends(self, surface: AnySurface) -> FloatArray:
-        """Mean separations [length] of one surface, two at most, at which derivatives of force or area jump."""
+        """Mean separations [length], two at most, at which derivatives of force or area jump; rows of a batch's."""
         return np.empty(0)
 
     def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
@@ -129,15 +130,20 @@ class Theory(abc.ABC):
         from scipy.integrate import tanhsinh
 
         u = np.asarray(mean_separation, dtype=float)
-        low = np.minimum(u, self.interval(surface)[1])
+        high = np.broadcast_to(self.interval(surface)[1], u.shape)
+        low = np.minimum(u, high)
+        # from bend to bend, across which no rule converges
+        edges = np.sort([low, *(np.clip(bend, low, high) for bend in self.bends(surface)), high], axis=0)
         found = tanhsinh(
             lambda x, place: self.at(u.shape, place).answer(select(surface, u.shape, place), x).force,
-            *np.broadcast_arrays(low, np.broadcast_to(self.interval(surface)[1], u.shape)),
+            edges[:-1],
+            edges[1:],
             args=(_places(u.shape),),
             rtol=ENERGY_RTOL,
+            minlevel=LEAST_LEVEL,
         )
-        _refuse_unfinished(found.success, "the elastic energy")
-        return np.asarray(found.integral)
+        _refuse_unfinished(found.success.all(axis=0), "the elastic energy")
+        return np.asarray(found.integral.sum(axis=0))
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at which "force" (over A0 E*) or "area" has a wanted value; h_max at zero.
