@@ -111,7 +111,7 @@ class Mbma(Theory):
             return np.empty(0)
         places = np.array(kinks(surface.hurst, surface.zeta_1, self.reading)) * np.asarray(surface.h_rms)
         u = np.asarray(surface.h_max) - places / 2
-        return u[u > 0] if surface.shape == () else np.maximum(u, 0)
+        return np.asarray(u[u > 0] if surface.shape == () else np.maximum(u, 0))
 
     def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] from where force or area is largest, or the table ends, to first contact."""
