@@ -241,3 +241,21 @@ def test_few_surfaces_keep_their_bound_with_any_reading(numbers, u):
     found = contact_by_tier(surface, mean_separation=u, reading="fitted")
     known = totals_at(surface, 2 * u - surface.h_max, reading="fitted", rtol=1e-11, derivatives=True)
     assert abs(found.force / known.force - 1) <= found.error
+
+
+@pytest.mark.parametrize(
+    ("reading", "numbers", "compression", "rtol"),
+    [
+        ("printed", (0.531947294354621, 716405.4119302577, 3.982572903065155), 1.67147, 1e-8),
+        ("printed", (0.5913947825075665, 463746.61320114444, 3.708447610995201), 1.26928, 1e-5),
+        ("fitted", (0.24255115327802002, 31377.867654901776, 0.8042366230900542), 1.21085, 1e-5),
+    ],
+)
+def test_many_surfaces_keep_their_bound_where_sums_agree_by_chance(reading, numbers, compression, rtol):
+    hurst, zeta_1, top = numbers
+    surfaces = Surface(hurst, 1.0, zeta_1, 1.0, np.full((30, 1), top))
+    gaps = top - compression * (1 + np.linspace(-1e-3, 1e-3, 41))
+    found, known = (contact_by_tier(surfaces, gaps, reading=reading, rtol=asked) for asked in (rtol, 1e-11))
+    for name in ("force", "area"):
+        assert (np.abs(getattr(found, name) / getattr(known, name) - 1) <= found.error).all()
+    assert found.error.max() <= rtol
