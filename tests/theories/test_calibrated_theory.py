@@ -417,3 +417,16 @@ def test_loads_of_surfaces_with_a_peak_far_out(h_max, entries):
             np.testing.assert_allclose(found.force, force, rtol=1e-10)
             expected = contact(usual, pressure=force, theory="calibrated").mean_separation
             np.testing.assert_allclose(found.mean_separation, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("hurst", "zeta_1", "top"), [(0.3, 30.0, 2.0), (0.8, 1000.0, 5.0)])
+def test_errors_hold_next_to_last_contact(hurst, zeta_1, top):
+    surface, law = Surface(hurst, 1.0, zeta_1, 1.0, top), Law(Spectrum.self_affine(hurst, zeta_1), top)
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    u = top * (1 - 10.0 ** -np.arange(1.5, 13))
+    found = contact(surface, mean_separation=u, theory="calibrated")
+    # stiffness, which nothing cancels in, integrated
+    depth = (top - u)[:, None]
+    stiffness = law.force_and_stiffness((top - depth * (1 + nodes) / 2).ravel())[1].reshape(u.size, -1)
+    exact = surface.rms_gradient * (stiffness * depth / 2) @ weights
+    assert (np.abs(found.force / exact - 1) <= found.error).all()
