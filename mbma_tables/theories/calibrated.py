@@ -26,14 +26,15 @@ TESTED_HURST, TESTED_ZETA_1 = 0.2, 128.0
 TESTED_HEIGHTS = (2.5, 5.5)  # h_max/h_rms
 
 
-NEAREST, ROUNDING = 0.95, 1e-14  # of h_max: where certificates end, and what is lost of a separation beside it
+NEAREST = 0.95  # of h_max: where the certificate of the table ends
+ROUNDING = 1e-14  # what a separation loses beside h_max
 
 
-def _error(stated: float, share: FloatArray) -> FloatArray:
-    """Relative error at shares of h_max: beyond certificates force is a small difference, which loses digits."""
+def _error(stated: float, nearer: float, share: FloatArray) -> FloatArray:
+    """Relative error at shares of h_max; nearer to it than NEAREST force is a small difference, which loses digits."""
     near = (share > NEAREST) & (share < 1)
     error = np.full(share.shape, stated)
-    error[near] = 2 * stated + ROUNDING / (1 - share[near])
+    error[near] = nearer + ROUNDING / (1 - share[near])
     return error
 
 
@@ -58,7 +59,7 @@ class Calibrated(Theory):
             gap = np.asarray(mean_separation, float)
             require("mean_separation", gap, gap >= 0, "at least 0")
             (force, area, stiffness), own_error = own_law(surface).answer(gap)
-            return TheoryAnswer(force, area, stiffness, _error(own_error, gap / np.asarray(surface.h_max)))
+            return TheoryAnswer(force, area, stiffness, _error(own_error, own_error, gap / np.asarray(surface.h_max)))
         assert isinstance(surface, Surface)
         table, places = calibrated_table.shipped(), Places(surface, mean_separation)
         u = places.flat / places.h_rms
@@ -71,7 +72,7 @@ class Calibrated(Theory):
         out[2] /= places.h_rms
         force, area, stiffness = out.reshape(3, *places.shape)
         share = u / places.columns[3][places.owner]
-        return TheoryAnswer(force, area, stiffness, _error(table.error, share.reshape(places.shape)))
+        return TheoryAnswer(force, area, stiffness, _error(table.error, 2 * table.error, share.reshape(places.shape)))
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* or an area below 1; h_max at zero."""
