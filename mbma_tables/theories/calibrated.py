@@ -24,8 +24,6 @@ from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
 TESTED_HURST, TESTED_ZETA_1 = 0.2, 128.0
 TESTED_HEIGHTS = (2.5, 5.5)  # h_max/h_rms
-
-
 NEAREST = 0.95  # of h_max: where the certificate of the table ends
 ROUNDING = 1e-14  # what a separation loses beside h_max
 
