@@ -175,7 +175,7 @@ def describe_law(
     >>> road = Surface.named("concrete")
     >>> law = describe_law(road, "13.3 MPa", rows=20)
     >>> law.y_name, law.y_unit, law.x_unit, round(law.largest_error, 3)
-    ('pressure', 'MPa', 'mm', 0.02)
+    ('pressure', 'MPa', 'mm', 0.021)
     """
     if quantity not in QUANTITIES:
         raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
