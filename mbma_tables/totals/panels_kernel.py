@@ -1,4 +1,4 @@
-"""The loops of `panels` compiled, for who compiles anyway: force and area alone, every island summed one by one."""
+"""The loops of `panels` compiled, for who compiles anyway: force and area alone, as series of the compression."""
 
 from __future__ import annotations
 
@@ -265,6 +265,7 @@ def missed_by(panels: Panels, last: float) -> FloatArray:
                 finer[0, k] *= 2.0 * place * _leads(width * place * place)[0]
             for k in range(count):
                 coarse[k] *= 2.0 * nodes[k] * _leads(width * nodes[k] * nodes[k])[0]
+        lowest, most, off, alone = math.inf, 0.0, 0.0, 0.0
         for k in range(c.size):
             node = (k - SPREAD.size) * (count // TOPS)
             if k < SPREAD.size:
@@ -276,7 +277,7 @@ def missed_by(panels: Panels, last: float) -> FloatArray:
             for j in range(0, 2 * count, 4):
                 height = finer[2, j] - finer[3, j] * c[k]
                 least[k] = min(least[k], height * height)
-        most, off, alone, lowest = 0.0, 0.0, 0.0, least.min()
+            lowest = min(lowest, least[k])
         for k in range(c.size):
             fine = rough = 0.0
             for j in range(2 * count):

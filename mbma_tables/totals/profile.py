@@ -322,7 +322,6 @@ def profile(
     """
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)
-    make: Any = _profile
     few = rows > 2 or (size is not None and size <= FEW)
-    kept: Profile = make(surface, model, reading, rtol, outside == "exact", few, rows)
-    return kept
+    given: Any = surface, model, reading, rtol, outside == "exact", few, rows
+    return _profile(*given)
