@@ -204,6 +204,19 @@ WRAP(profile_totals, "DDDiiw",
      (mbma_profile_totals(a[0].n, a[0].data, a[1].n - 1, a[1].data, a[2].data, (int)a[3].i, (int)a[4].i, a[5].data), 0))
 
 /* ---- spline4.c ---- */
+/* How many coefficients a table of so many nodes has; 0 of one that cannot be. */
+static size_t coefficients_of(const argument *nodes) {
+    const int64_t *const count = (const int64_t *)nodes->data;
+    size_t product = nodes->n == 4 ? 2 : 0;
+    for (size_t k = 0; k < nodes->n && product; k++)
+        product = count[k] >= 2 && count[k] < 4096 ? product * (size_t)(count[k] + 2) : 0;
+    return product;
+}
+WRAP(spline4, "DDLiw",
+     coefficients_of(&a[2]) && a[1].n == coefficients_of(&a[2]) && 4 * a[4].n == (a[3].i ? 10 : 2) * a[0].n,
+     mbma_spline4(a[0].n / 4, a[0].data, a[1].data, a[2].data, a[3].i != 0, a[4].data))
+WRAP(four_numbers, "DDDdiw", a[0].n == a[1].n && a[0].n == a[2].n && a[5].n == 4 * a[0].n,
+     mbma_four_numbers(a[0].n, a[0].data, a[1].data, a[2].data, a[3].d, a[4].i != 0, a[5].data))
 
 /* ---- newton.c ---- */
 
@@ -233,6 +246,8 @@ static PyMethodDef METHODS[] = {
     ENTRY(profile_totals),
 
     /* spline4.c */
+    ENTRY(spline4),
+    ENTRY(four_numbers),
 
     /* newton.c */
 

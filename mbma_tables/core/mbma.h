@@ -131,6 +131,17 @@ void mbma_profile_totals(size_t n, const double *compression, size_t panels, con
 
 /* ---- spline4.c: islands by the four-number table ----------------------------------------------------------------- */
 
+/* Two functions of four axes by their tensor spline of degree 3 over equally spaced nodes. `places` is (4, n), positions
+ * along the axes from 0 to nodes - 1; `coefficients` those of cardinal B-splines, (nodes[0] + 2, ..., nodes[3] + 2, 2);
+ * `out` is (2, n), or with slopes (10, n): f, its derivatives along the axes, g, its derivatives. */
+size_t mbma_spline4(size_t n, const double *places, const double *coefficients, const int64_t *nodes, int slopes,
+                    double *out);
+
+/* Bands of the paper's four numbers, by zeta_u/zeta_d - 1 and (1.25/zeta_d)^(4 - 2 H), finite for every zeta_d. `out` is
+ * (4, n): mu = 8/3 D sigma sqrt(2 R_u R_d); sigma zeta_d^H; F_hat zeta_d^(1 + H) per Phi_F, A_hat zeta_d^2 per Phi_A. */
+size_t mbma_four_numbers(size_t n, const double *spread, const double *sphere, const double *hurst,
+                         double density_divisor, int summit_sigma, double *out);
+
 /* ---- newton.c: exact islands ------------------------------------------------------------------------------------ */
 
 /* ---- law.c: contact laws ---------------------------------------------------------------------------------------- */
