@@ -21,7 +21,6 @@ from mbma_tables.models.island4d import RAW
 from mbma_tables.models.tables import open_table, universal_model
 from mbma_tables.surfaces.readings import READINGS, REPORTED, get_reading
 from mbma_tables.theories.law_kernel import CENTRE, RATE
-from mbma_tables.totals.intervals import NARROW
 from mbma_tables.totals.island_sum import kinks
 
 STEP = 1e-9
@@ -29,6 +28,8 @@ WIDE = 1e-6
 EPS = np.finfo(float).eps
 INPUTS = ("hurst", "q0", "q1", "h_rms", "h_max", "separation")
 SOLVER_RTOL = 1e-10
+
+NARROW = 2.5  # in h_rms: above the floor of zeta_d, intervals up to it take the smaller rule (totals.c)
 
 
 def surfaces(rng, count):

@@ -331,11 +331,10 @@ def test_many_gaps_agree_with_single_ones(case, rtol):
         ((0.24350908204112362, 880518.4043600445, 4.509820485898938), (1.8e-11, 1.9e-11), 1e-5),
     ],
 )
-@pytest.mark.parametrize("size", [40, None])
-def test_bounds_of_a_profile_where_a_search_found_them_exceeded(numbers, c, rtol, size):
+def test_bounds_of_a_profile_where_a_search_found_them_exceeded(numbers, c, rtol):
     surface, reading = Surface(numbers[0], 1.0, numbers[1], 1.0, numbers[2]), NAMED["fitted"]
     model, c = get_model("universal", 1e-8, reading), np.linspace(*c, 40)
-    kept = profile(numbers, model, reading, 0.9 * rtol, size=size)
+    kept = profile(numbers, model, reading, 0.9 * rtol)
     single = totals_of(model, Pairs.of(surface, c), reading, 1e-11)
     assert np.abs(kept.totals(c) / np.stack([single.force, single.area]) - 1).max() <= kept.error
 
@@ -349,7 +348,7 @@ def test_no_bound_of_a_profile_is_exceeded_on_300_surfaces():
         surface = Surface(rng.uniform(0.2, 1.0), 1.0, zeta_1, 1.0, top)
         shape = float(surface.hurst), zeta_1, top
         model = get_model("universal", 1e-8, reading)
-        kept = profile(shape, model, reading, 10 ** rng.uniform(-10, -3), size=(40, None)[number % 2])
+        kept = profile(shape, model, reading, 10 ** rng.uniform(-10, -3))
         c = np.append(2 * top * 10 ** rng.uniform(-8, 0, 20), rng.uniform(0, 2 * top, 20))
         c = c[c < kept.end]
         single = totals_of(model, Pairs.of(surface, c), reading, 1e-11)
