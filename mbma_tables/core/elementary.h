@@ -12,6 +12,10 @@
 #include <stdint.h>
 #include <string.h>
 
+#ifdef __cplusplus
+#define restrict __restrict
+#endif
+
 #if defined(__GNUC__)
 #define MBMA_INLINE static inline __attribute__((always_inline, unused))
 #else
