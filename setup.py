@@ -41,10 +41,10 @@ TARGET = OTHER or this_machine()
 
 def command(folder: str) -> list[str]:
     """The compiler and what it needs; files made for it are put in `folder`."""
-    linking = ["-Wl,-undefined,dynamic_lookup"] if "macos" in TARGET else []
+    linking = ["-Wl,-undefined,dynamic_lookup", "-Wl,-install_name,@rpath/mbma_core"] if "macos" in TARGET else []
     if COMPILER:
-        headers = sorted({sysconfig.get_path(name) for name in ("include", "platinclude")})
-        return [*COMPILER, *(f"-I{headers}" for headers in headers), *linking]
+        folders = sorted({sysconfig.get_path(name) for name in ("include", "platinclude")})
+        return [*COMPILER, *(f"-I{folder}" for folder in folders), *linking]
     # else zig keeps what it makes of the C library in the user's home
     os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", folder)
     os.environ.setdefault("ZIG_LOCAL_CACHE_DIR", folder)
