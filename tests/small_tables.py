@@ -13,7 +13,6 @@ from generate.tables.commands import built
 from generate.tables.configuration import load
 from generate.tables.island4d import Island4d
 from generate.tables.universal import Universal
-from mbma_tables.tablefiles.interpolate import fill_4d
 from mbma_tables.tablefiles.netcdf import SEAL, SEAL_LENGTH
 
 SMALL = {
@@ -60,13 +59,6 @@ def small_build(kind):
 def small_table(kind):
     """A table of few nodes or cells."""
     return small_build(kind)[1]
-
-
-def at_positions(coefs, positions):
-    """The spline at positions in node units, flat, shape (2, entries)."""
-    out = np.empty((2, positions[0].size))
-    fill_4d(coefs, np.ascontiguousarray(positions), out)
-    return out
 
 
 def unseal(content):

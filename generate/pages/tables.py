@@ -11,7 +11,7 @@ from numpy.polynomial import chebyshev
 from generate.pages.page import pyplot, svg, table
 from generate.tables.build import evaluate
 from mbma_tables.arguments import FloatArray
-from mbma_tables.islands.four_numbers import hat_scales, to_axes
+from mbma_tables.islands.four_numbers import to_axes
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models.tables import shipped
 from mbma_tables.models.universal import fractions_of_mu
@@ -130,7 +130,7 @@ def example_island4d() -> str:
     reading = get_reading(content.attributes["reading"])
     place = to_axes(raw[0], raw[1], raw[2], raw[3], reading)
     X, mu, spread, sphere, sigma = (float(a[0]) for a in (place.X, place.mu, place.spread, place.sphere, place.sigma))
-    scales = [float(s[0]) for s in hat_scales(place.spread, raw[1], raw[3], place.sigma, reading)]
+    scales = [float(place.force[0]), float(place.area[0])]
     rows = [[name, repr(float(value[0]))] for name, value in zip(names, raw, strict=True)]
     rows += [
         ["spread, sphere", f"{spread:.12e}, {sphere:.12e}"],

@@ -19,7 +19,6 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import MbmaError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.tablefiles.checks import check_content
-from mbma_tables.tablefiles.interpolate import cubic, fill_4d
 from mbma_tables.tablefiles.schema import (
     DEGREE,
     FUNCTIONS,
@@ -29,7 +28,7 @@ from mbma_tables.tablefiles.schema import (
     error_cells,
     labels_of_nodes,
 )
-from mbma_tables.tablefiles.splines import coefficients
+from mbma_tables.tablefiles.splines import at_places, coefficients
 
 BLAS_THREADS = 2  # as when the shipped tables were made
 LINES = 24  # sample lines along an axis that decide its resolution
@@ -105,9 +104,7 @@ class ConformancePoints:
 
 def evaluate(coefs: FloatArray, positions: list[FloatArray]) -> FloatArray:
     """The table's spline at positions in node units, shape (entries, 2)."""
-    out = np.empty((2, positions[0].size))
-    fill_4d(coefs, np.ascontiguousarray(positions), out)
-    return out.T
+    return at_places(coefs, np.stack(positions)).T
 
 
 def _between(axis: Axis) -> FloatArray:
@@ -143,7 +140,9 @@ def line_errors(
 def _evaluate_1d(coefs: FloatArray, positions: FloatArray) -> FloatArray:
     nodes = coefs.shape[0] - DEGREE + 1
     first = np.minimum(positions.astype(int), nodes - 2)
-    weights = np.array([cubic(u) for u in positions - first])
+    u = positions - first
+    v = 1 - u
+    weights = np.stack([v**3 / 6, 2 / 3 - u**2 * (1 - u / 2), 2 / 3 - v**2 * (1 - v / 2), u**3 / 6], axis=1)
     taps = np.stack([coefs[first + k] for k in range(DEGREE + 1)])
     fitted: FloatArray = np.einsum("nk,kn...->n...", weights, taps)
     return fitted

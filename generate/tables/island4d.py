@@ -21,7 +21,7 @@ from generate.tables.build import ConformancePoints, UncertifiedError, evaluate
 from generate.tables.configuration import Configuration, make_axis
 from generate.tables.universal import MAX_DRAWS, visited_surfaces
 from mbma_tables.arguments import FloatArray
-from mbma_tables.islands.four_numbers import SPHERE_FLOOR, band_fields, from_axes, hat_scales, to_axes
+from mbma_tables.islands.four_numbers import SPHERE_FLOOR, band_fields, from_axes, to_axes
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.surfaces.readings import get_reading
@@ -121,7 +121,7 @@ class Island4d:
         """The raw parameters on the grid, and the numbers that turn a ratio into a force."""
         _, spread, sphere, hurst = (axis.values for axis in axes)
         grid = np.meshgrid(spread, sphere, hurst, indexing="ij")
-        mu, sigma, _ = band_fields(*grid, self.reading)
+        mu, sigma, _, _ = band_fields(*grid, self.reading)
         zeta_d = from_axes(sphere[:, None], hurst)
         names = tuple(axis.name for axis in axes)
         return {
@@ -189,8 +189,8 @@ class Island4d:
             "hurst": hurst,
         }
         found = to_axes(raw["delta_over_h_rms"], zeta_d, raw["zeta_u"], hurst, self.reading)
-        scales = np.stack(hat_scales(found.spread, zeta_d, hurst, found.sigma, self.reading))
         conditioning = 1e-4 * (1 + found.X) / found.sigma
+        scales = np.stack([found.force, found.area])
         return ConformancePoints(raw, found[:4], found.X, found.mu, scales, conditioning)
 
     def check(self, content: TableContent) -> None:

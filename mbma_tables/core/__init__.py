@@ -15,6 +15,9 @@ from typing import Any, TypeVar
 
 Answer = TypeVar("Answer")
 
+# `mbma_status` of mbma.h
+OK, X_BELOW, X_ABOVE, MU_ABOVE, UNRESOLVED, INVALID, OUTSIDE = range(7)
+REASONS = {X_BELOW: "X below", X_ABOVE: "X above", MU_ABOVE: "mu above"}
 GENERATIONS = {"x86_64_v4": 4, "x86_64_v3": 3, "plain": 0}
 
 

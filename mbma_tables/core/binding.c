@@ -109,11 +109,118 @@ WRAP(elementary, "iDw", a[1].n == a[2].n, elementary(a[0].i, a[1].n, a[1].data, 
 
 /* ---- phi.c ---- */
 
+/* The table from three arrays: cells, places, and X_low, X_high, X_rate, mu_high, first_bucket, buckets. */
+static mbma_cells cells_of(const argument *a) {
+    const double *const n = a[2].data;
+    return (mbma_cells){a[0].data, a[1].data, n[0], n[1], n[2], n[3], (int64_t)n[4], (int64_t)n[5]};
+}
+/* Whether places and cells lie inside their arrays; checked once for a table, by the function `table_fits`. */
+static bool is_table(const argument *a) {
+    if (a[2].n != 6 || a[1].n == 0 || a[0].n % (sizeof(mbma_cell) / sizeof(double)) != 0)
+        return false;
+    const mbma_cells t = cells_of(a);
+    const double steps = (t.X_high - t.X_low) * t.X_rate;
+    if (!(steps >= 0.0 && steps < (double)a[1].n && t.buckets > 0))
+        return false;
+    const size_t strips = (size_t)steps + 1, cells = a[0].n / (sizeof(mbma_cell) / sizeof(double));
+    for (size_t k = 0; k < a[1].n; k++) {
+        const int64_t place = t.places[k];
+        if (place < 0 || (k < strips ? (size_t)(place + t.buckets) > a[1].n : (size_t)place >= cells))
+            return false;
+    }
+    return true;
+}
+WRAP(table_fits, "DJD", true, is_table(a))
+static size_t phi_of(const argument *a, size_t n, int slopes) {
+    const mbma_cells t = cells_of(a + 2);
+    return mbma_phi(n, a[0].data, a[1].data, &t, slopes, a[6].data, a[7].data);
+}
+WRAP(phi, "DDDJDiwb",
+     a[1].n == a[0].n && a[4].n == 6 && a[6].n == a[0].n * (a[5].i ? 7 : 3) && (!a[7].data || a[7].n == a[0].n),
+     phi_of(a, a[0].n, (int)a[5].i))
+
 /* ---- totals.c ---- */
+
+/* From density_divisor, beta, phi, floor_d, floor_u, offset, summit_sigma, printed. */
+static mbma_variant variant_of(const argument *a) {
+    const double *const n = a->data;
+    return (mbma_variant){n[0], n[1], n[2], n[3], n[4], n[5] != 0.0, n[6] != 0.0, n[7] != 0.0};
+}
+static size_t totals_of(const argument *a) {
+    const mbma_variant v = variant_of(a + 5);
+    const mbma_cells t = cells_of(a + 6);
+    return mbma_totals(a[0].n, a[0].data, a[1].data, a[2].data, a[3].data, a[4].d, &v, &t, (int)a[9].i, a[10].data,
+                       a[11].data, a[12].data, a[13].data);
+}
+WRAP(totals, "DDDDdDDJDiwwbl",
+     a[1].n == a[0].n && a[2].n == a[0].n && a[3].n == a[0].n && a[5].n == 8 && a[8].n == 6 &&
+         a[10].n == a[0].n * (a[9].i ? 2 * MBMA_TOTALS_COLUMNS : 2) && a[11].n == a[0].n && a[12].n == a[0].n && a[13].n == 1,
+     totals_of(a))
+static int64_t geometry_of(const argument *a) {
+    const mbma_variant v = variant_of(a + 3);
+    return mbma_island_geometry(a[0].d, a[1].d, a[2].d, &v, a[4].data);
+}
+WRAP(island_geometry, "dddDw", a[3].n == 8 && a[4].n == sizeof(mbma_island) / sizeof(double), geometry_of(a))
+WRAP(kronrod, "iwww", a[0].i > 0 && a[0].i < 32 && a[1].n == (size_t)a[0].i && a[2].n == a[1].n && a[3].n == a[1].n,
+     mbma_kronrod((int)a[0].i, a[1].data, a[2].data, a[3].data))
 
 /* ---- profile.c ---- */
 
+enum { PLACES = MBMA_PANEL_NODES + MBMA_PANEL_CHECKS, SERIES_TERMS = 2 * MBMA_PANEL_GAPS };
+
+/* The rules as one array, and kinds, low and high ends and fields of panels. */
+static bool are_panels(const argument *a, int64_t rows) {
+    const size_t panels = a[1].n;
+    if (a[0].n != sizeof(mbma_rules) / sizeof(double) || rows < 2 || rows > MBMA_PANEL_ROWS || a[2].n != panels ||
+        a[3].n != panels || a[4].n != (size_t)(rows + 2) * panels * PLACES)
+        return false;
+    for (size_t k = 0; k < panels; k++) {
+        const int64_t kind = ((const int64_t *)a[1].data)[k];
+        if (kind < 0 || kind > 2)
+            return false;
+    }
+    return true;
+}
+static int64_t islands_of_profile(const argument *a) {
+    const mbma_variant v = variant_of(a + 4);
+    const mbma_cells t = cells_of(a + 5);
+    return mbma_profile_islands(a[0].n, a[0].data, a[1].d, a[2].d, a[3].d, &v, &t, a[8].data, a[9].data);
+}
+WRAP(profile_islands, "DdddDDJDww", a[4].n == 8 && a[7].n == 6 && a[8].n == 4 * a[0].n && a[9].n == 1,
+     islands_of_profile(a))
+WRAP(profile_missed, "DLDDDidw", are_panels(a, a[5].i) && a[7].n == a[1].n,
+     (mbma_profile_missed(a[0].data, a[1].n, a[1].data, a[2].data, a[3].data, a[4].data, (int)a[5].i, a[6].d, a[7].data),
+      0))
+static int64_t series_of(const argument *a) {
+    const mbma_nodes islands = {(int64_t)a[9].n, a[8].data, a[9].data, a[10].data};
+    mbma_profile_series(a[0].data, a[1].n, a[1].data, a[2].data, a[3].data, a[4].data, (int)a[5].i, a[6].data, a[7].data,
+                        &islands, a[11].data);
+    return 0;
+}
+WRAP(profile_series, "DLDDDiwwwwwl",
+     are_panels(a, a[5].i) && a[6].n == a[1].n * (size_t)a[5].i * SERIES_TERMS && a[7].n == a[1].n &&
+         a[9].n == a[1].n * MBMA_PANEL_NODES && a[8].n == (size_t)a[5].i * a[9].n && a[10].n == a[9].n &&
+         a[11].n == a[1].n + 1,
+     series_of(a))
+WRAP(profile_totals, "DDDiiw",
+     a[1].n > 1 && a[3].i > 0 && a[3].i <= MBMA_PANEL_ROWS &&
+         a[2].n == (a[1].n - 1) * (size_t)a[3].i * SERIES_TERMS && a[5].n == a[0].n * (size_t)a[3].i * (a[4].i ? 2 : 1),
+     (mbma_profile_totals(a[0].n, a[0].data, a[1].n - 1, a[1].data, a[2].data, (int)a[3].i, (int)a[4].i, a[5].data), 0))
+
 /* ---- spline4.c ---- */
+/* How many coefficients a table of so many nodes has; 0 of one that cannot be. */
+static size_t coefficients_of(const argument *nodes) {
+    const int64_t *const count = (const int64_t *)nodes->data;
+    size_t product = nodes->n == 4 ? 2 : 0;
+    for (size_t k = 0; k < nodes->n && product; k++)
+        product = count[k] >= 2 && count[k] < 4096 ? product * (size_t)(count[k] + 2) : 0;
+    return product;
+}
+WRAP(spline4, "DDLiw",
+     coefficients_of(&a[2]) && a[1].n == coefficients_of(&a[2]) && 4 * a[4].n == (a[3].i ? 10 : 2) * a[0].n,
+     mbma_spline4(a[0].n / 4, a[0].data, a[1].data, a[2].data, a[3].i != 0, a[4].data))
+WRAP(four_numbers, "DDDdiw", a[0].n == a[1].n && a[0].n == a[2].n && a[5].n == 4 * a[0].n,
+     mbma_four_numbers(a[0].n, a[0].data, a[1].data, a[2].data, a[3].d, a[4].i != 0, a[5].data))
 
 /* ---- newton.c ---- */
 
@@ -128,12 +235,23 @@ WRAP(elementary, "iDw", a[1].n == a[2].n, elementary(a[0].i, a[1].n, a[1].data, 
 static PyMethodDef METHODS[] = {
     ENTRY(elementary),
     /* phi.c */
+    ENTRY(table_fits),
+    ENTRY(phi),
 
     /* totals.c */
+    ENTRY(totals),
+    ENTRY(island_geometry),
+    ENTRY(kronrod),
 
     /* profile.c */
+    ENTRY(profile_islands),
+    ENTRY(profile_missed),
+    ENTRY(profile_series),
+    ENTRY(profile_totals),
 
     /* spline4.c */
+    ENTRY(spline4),
+    ENTRY(four_numbers),
 
     /* newton.c */
 

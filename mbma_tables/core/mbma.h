@@ -28,11 +28,119 @@ typedef enum {
 
 /* ---- phi.c: islands by the universal table ---------------------------------------------------------------------- */
 
+/* A cell: a bound on the relative error, x = (X - centre) rate, y = (mu top_mu + top)/(mu bottom_mu + bottom), and
+ * Phi_F/mu and Phi_A as sums of c[j][i] x^i y^j. */
+typedef struct {
+    double error, centre, rate, top_mu, top, bottom_mu, bottom, unused;
+    double force[8][8], area[8][8];
+} mbma_cell;
+
+/* The table. The cell of (X, mu) is places[places[(X - X_low) X_rate] + (bits of mu >> 49) - first_bucket]. */
+typedef struct {
+    const mbma_cell *cells;
+    const int32_t *places; /* where a strip's buckets begin, by equal steps of X; then the cells of the buckets */
+    double X_low, X_high, X_rate, mu_high;
+    int64_t first_bucket, buckets;
+} mbma_cells;
+
+/* Rows of Phi_F, Phi_A and the bound on their relative error; with `slopes` also dPhi_F/dX, dPhi_F/dmu, dPhi_A/dX and
+ * dPhi_A/dmu. `status`, one for each entry, may be NULL. */
+size_t mbma_phi(size_t n, const double *X, const double *mu, const mbma_cells *cells, int slopes, double *out,
+                uint8_t *status);
+
 /* ---- totals.c: force and area of surfaces ----------------------------------------------------------------------- */
+
+#define MBMA_MAX_ZETA_1 1e8
+#define MBMA_MIN_APPROACH 1e-140 /* squares of what is of its order do not underflow */
+
+/* How the paper's equations are read: summit density is m4/(density_divisor m2) (2); beta (B.6) and phi (28); floors of
+ * zeta_d (27) and zeta_u (30); whether islands stand h_d below z_max (35), whether sigma is the summits' (32), and
+ * whether K1 is as printed in (47). */
+typedef struct {
+    double density_divisor, beta, phi, floor_d, floor_u;
+    int offset, summit_sigma, printed;
+} mbma_variant;
+
+/* An island (Section 3.2) in units of s and 1/q0; width is ln(zeta_u/zeta_d). */
+typedef struct {
+    double zeta_d, zeta_u, R_d, R_u, D, sigma, h_d, h_u, eta, X, mu, D_d, sigma_d, width;
+} mbma_island;
+
+/* The island at delta = approach h_rms, approach >= MBMA_MIN_APPROACH. */
+int mbma_island_geometry(double approach, double hurst, double zeta_1, const mbma_variant *variant, mbma_island *out);
+
+enum { MBMA_TOTALS_COLUMNS = 5 };
+
+/* F/(A0 E* q0 s) and A/A0 of pairs of a surface and a gap: hurst in (0, 1], zeta_1 = q1/q0, the compression
+ * (h_max - d)/h_rms and the peak h_max/h_rms. With `slopes` each is followed by its derivatives by hurst, ln(zeta_1),
+ * compression and peak, MBMA_TOTALS_COLUMNS numbers in all. `error` bounds the relative error, of quadrature to `rtol`
+ * and of the table; `islands` counts those looked up. */
+size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const double *compression, const double *peak,
+                   double rtol, const mbma_variant *variant, const mbma_cells *cells, int slopes, double *out,
+                   double *error, uint8_t *status, int64_t *islands);
+
+/* Nodes and weights of QUADPACK's Gauss-Kronrod rules of 21 and 31 nodes on [-1, 1]. */
+int mbma_kronrod(int count, double *nodes, double *kronrod, double *gauss);
 
 /* ---- profile.c: one surface at many gaps ------------------------------------------------------------------------ */
 
+enum { MBMA_PANEL_NODES = 16, MBMA_PANEL_CHECKS = 3, MBMA_PANEL_GAPS = 10, MBMA_PANEL_ROWS = 4, MBMA_FAR_TERMS = 8 };
+
+/* Of panels of the approach with `count` nodes at places in [0, 1]: from the low to the high end delta rises like
+ * place^power. Matrices take values at the nodes, their rows, to those at other places: checks between the nodes, nodes of
+ * both halves, nodes of the part below each of `gaps` gaps, the gaps themselves; and values and slopes at the gaps to a
+ * Chebyshev series, by both, or by the slopes and the mean of the values. */
+typedef struct {
+    double power, count, gaps; /* whole numbers */
+    double nodes[16], weights[16], reach[11];
+    double checks[16][3], halves[16][32], inside[16][176], ends[16][10], series[20][20], integrated[20][20];
+} mbma_panel_rule;
+
+/* The rules of the panel from 0, of others, and of narrow ones; Chebyshev points, and values there to a series. */
+typedef struct {
+    mbma_panel_rule of[3];
+    double far_points[8], far_series[8][8];
+} mbma_rules;
+
+/* Islands as they count in sums: weights (rows, size), shift and rate of heights. */
+typedef struct {
+    int64_t size;
+    double *weights, *shift, *rate;
+} mbma_nodes;
+
+/* Weights of force and area, shift and rate of heights of a self-affine surface's islands at approaches x = delta/h_rms,
+ * (4, n); the worst status, and the largest error of the table. */
+int mbma_profile_islands(size_t n, const double *x, double peak, double hurst, double zeta_1,
+                         const mbma_variant *variant, const mbma_cells *cells, double *out, double *error);
+
+/* Bounds on the relative error of panels [low, high] by rules `kind` up to the compression `last`. `fields` holds weights
+ * of force, area and perhaps number of islands and Hertz area, then shift and rate, (rows + 2, panels, nodes + checks);
+ * in the panel from 0 weights lack the power of delta that they begin with. */
+void mbma_profile_missed(const mbma_rules *rules, size_t panels, const int64_t *kind, const double *low,
+                         const double *high, const double *fields, int rows, double last, double *error);
+
+/* Series of the logarithm of each row's sum over each panel, (panels, rows, 20), and their errors; the islands, and how
+ * many lie below each panel and in all. */
+void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *kind, const double *low,
+                         const double *high, const double *fields, int rows, double *series, double *error,
+                         const mbma_nodes *islands, int64_t *stops);
+
+/* The sums at compressions, (rows, n), and with `slopes` their derivatives by it below; NaN beyond the last panel. */
+void mbma_profile_totals(size_t n, const double *compression, size_t panels, const double *edges, const double *series,
+                         int rows, int slopes, double *out);
+
 /* ---- spline4.c: islands by the four-number table ----------------------------------------------------------------- */
+
+/* Two functions of four axes by their tensor spline of degree 3 over equally spaced nodes. `places` is (4, n), positions
+ * along the axes from 0 to nodes - 1; `coefficients` those of cardinal B-splines, (nodes[0] + 2, ..., nodes[3] + 2, 2);
+ * `out` is (2, n), or with slopes (10, n): f, its derivatives along the axes, g, its derivatives. */
+size_t mbma_spline4(size_t n, const double *places, const double *coefficients, const int64_t *nodes, int slopes,
+                    double *out);
+
+/* Bands of the paper's four numbers, by zeta_u/zeta_d - 1 and (1.25/zeta_d)^(4 - 2 H), finite for every zeta_d. `out` is
+ * (4, n): mu = 8/3 D sigma sqrt(2 R_u R_d); sigma zeta_d^H; F_hat zeta_d^(1 + H) per Phi_F, A_hat zeta_d^2 per Phi_A. */
+size_t mbma_four_numbers(size_t n, const double *spread, const double *sphere, const double *hurst,
+                         double density_divisor, int summit_sigma, double *out);
 
 /* ---- newton.c: exact islands ------------------------------------------------------------------------------------ */
 

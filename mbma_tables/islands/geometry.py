@@ -23,7 +23,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import jitable
 from mbma_tables.errors import OutOfRangeError
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.power_laws import Place
@@ -37,14 +36,12 @@ BANDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "h_u", "D_d", "s
 FIELDS = (*BANDS[:8], "eta", "X", "mu", *BANDS[8:])
 
 
-@jitable
 def floor_offset(hurst: Any, zeta_1: Any, floor: float) -> Any:
     """floor^(-2H) - zeta_1^(-2H) without cancellation: the largest a (or b) above a floor; of numbers or arrays."""
     e = np.exp(-2.0 * hurst * np.log(zeta_1))
     return e * np.expm1(2.0 * hurst * np.log1p((zeta_1 - floor) / floor))
 
 
-@jitable
 def summit_sigma(m0: Any, alpha: Any, summits: bool) -> Any:
     """Standard deviation of summit heights (2), or of all heights where a reading says so."""
     return np.sqrt((1.0 - (BROADENING / alpha if summits else 0.0)) * m0)

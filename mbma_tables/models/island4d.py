@@ -11,17 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
-from mbma_tables.compiled import in_blocks
+from mbma_tables.core import in_blocks
 from mbma_tables.display import Displayed, Variable
 from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.four_numbers import SPHERE_FLOOR, Coordinates, band_fields, hat_scales, to_axes
+from mbma_tables.islands.four_numbers import SPHERE_FLOOR, Coordinates, band_fields, to_axes
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
 from mbma_tables.plots import draw_lines
 from mbma_tables.surfaces.readings import get_reading
-from mbma_tables.tablefiles.interpolate import fill_4d, fill_gradient_4d
 from mbma_tables.tablefiles.schema import TableContent, error_cell
+from mbma_tables.tablefiles.splines import at_places
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -141,9 +141,8 @@ class Island4dModel(Displayed):
         inside = self._covers(place)
         if outside == "raise":
             self._refuse(place, inside, shape)
-        force, area = hat_scales(place.spread, low, H, place.sigma, self.reading)
         phi, error = self._answer(place, inside, outside, parallel)
-        F_hat, A_hat = force * phi[0], area * phi[1]
+        F_hat, A_hat = place.force * phi[0], place.area * phi[1]
         by: tuple[dict[str, Any] | None, ...] = (None, None)
         if derivatives:
             slopes = self._log_slopes(place, inside, (delta, low, high, H))
@@ -173,7 +172,7 @@ class Island4dModel(Displayed):
             np.ascontiguousarray(islands[name], dtype=float).ravel() for name in ("X", "width", "zeta_d", "hurst", "mu")
         )
         sphere = (SPHERE_FLOOR / zeta_d) ** (4 - 2 * hurst)
-        place = Coordinates(X, np.expm1(width), sphere, hurst, mu, np.ones_like(X))
+        place = Coordinates(X, np.expm1(width), sphere, hurst, mu, *np.ones((3, X.size)))
         inside = self._covers(place)
         if outside == "raise":
             self._refuse_ends(islands["hurst"], islands["zeta_d"])
@@ -235,9 +234,7 @@ class Island4dModel(Displayed):
         places = self._positions(place)
 
         def fill(block: slice) -> None:
-            found = np.empty((2, block.stop - block.start))
-            fill_4d(self.content.coefficients, np.ascontiguousarray(places[:, block]), found)
-            out[:, block] = found
+            out[:, block] = at_places(self.content.coefficients, places[:, block])
 
         in_blocks(fill, place.X.size, BLOCK, (os.cpu_count() or 1) if parallel else 1)
         return np.asarray(out * self._share(place))
@@ -254,15 +251,13 @@ class Island4dModel(Displayed):
         places, log_mu = self._positions(at), np.log(at.mu)
         # below the table only mu moves the logarithm
         places[1] = np.where(below, 0.0, places[1])
-        scales = np.log(hat_scales(at.spread, zeta_d, hurst, at.sigma, self.reading))
-        return np.stack([*places, log_mu, at.X, scales[0] + log_mu, scales[1]])
+        return np.stack([*places, log_mu, at.X, np.log(at.force) + log_mu, np.log(at.area)])
 
     def _log_slopes(self, place: Coordinates, inside: NDArray[np.bool_], raw: Any) -> dict[str, FloatArray]:
         """Derivatives of log F_hat and log A_hat by the raw numbers, each (2, entries); NaN outside."""
         kept, raw = place.some(inside), [number[inside] for number in raw]
-        out, below = np.empty((2, 5, kept.X.size)), kept.spread < self._spread.low
-        fill_gradient_4d(self.content.coefficients, self._positions(kept), out.reshape(10, -1))
-        out *= self._share(kept)
+        below = kept.spread < self._spread.low
+        out = at_places(self.content.coefficients, self._positions(kept), slopes=True) * self._share(kept)
         rigid = [n * height_integral(n - 1, -kept.X) / height_integral(n, -kept.X) for n in (2.5, 2.0)]
         by = np.concatenate([out[:, 1:], np.where(below, out[:, :1], 0.0), np.stack(rigid)[:, None]], axis=1)
         found = {name: np.full((2, inside.size), np.nan) for name in RAW}

@@ -13,7 +13,7 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import TableFileError
 from mbma_tables.files import shipped_file
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.four_numbers import hat_scales, to_axes
+from mbma_tables.islands.four_numbers import to_axes
 from mbma_tables.models.island4d import Island4dModel
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, read_table
@@ -90,8 +90,7 @@ def _replay(content: TableContent) -> tuple[FloatArray, FloatArray]:
         delta, zeta_d, zeta_u, hurst = (points[name] for name in ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst"))
         found = model.lookup(delta, zeta_d, zeta_u, hurst)
         place = to_axes(delta, zeta_d, zeta_u, hurst, model.reading)
-        X, mu = place.X, place.mu
-        scales = np.stack(hat_scales(place.spread, zeta_d, hurst, place.sigma, model.reading))
+        X, mu, scales = place.X, place.mu, np.stack([place.force, place.area])
         table = np.stack([found.F_hat, found.A_hat])
     solved = greenwood_tripp.solve(X, mu, rtol=greenwood_tripp.MIN_SOLVER_RTOL)
     return table, scales * np.stack([solved.phi_F, solved.phi_A])

@@ -12,10 +12,10 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
-from mbma_tables.compiled import in_blocks
+from mbma_tables.core import core, in_blocks
 from mbma_tables.display import Displayed, Variable
-from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside, universal_kernel
-from mbma_tables.models.universal_kernel import RECORD, TERMS, Table
+from mbma_tables.errors import TableFileError
+from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
 from mbma_tables.plots import draw_lines
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
 
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 SHOWN = 65  # places along an axis of the table as a Dataset
 BLOCK = 1 << 16  # islands between two looks for Ctrl-C
-SMALL = 1 << 13  # islands up to which numpy answers, without a compiler
+TERMS = 8  # of each polynomial along each axis
+RECORD = 8 + 2 * TERMS**2  # doubles of a cell, `mbma_cell` of mbma.h
 
 
 class UniversalModel(Displayed):
@@ -84,31 +85,21 @@ class UniversalModel(Displayed):
         """
         check_outside(outside)
         flat_X, flat_mu, shape = self._inside(X, mu, outside == "raise")
-        out = self._filled(flat_X, flat_mu, None, (os.cpu_count() or 1) if parallel else 1)
+        out = self._filled(flat_X, flat_mu, False, (os.cpu_count() or 1) if parallel else 1)
         missing = np.isnan(out[:, 0])
         if outside == "exact" and missing.any():
             out[missing] = np.stack(SOLVER.answer(flat_X[missing], flat_mu[missing]), axis=-1)
         return IslandAnswer(*(column.reshape(shape)[()] for column in out.T))
 
-    def _filled(self, X: FloatArray, mu: FloatArray, slopes: bool | None, workers: int = 1) -> FloatArray:
-        """The rows of `universal_kernel.fill`; of a few values by numpy, operation by operation."""
-        k, table = universal_kernel, self.kernel
-        if slopes or X.size > SMALL:
-            rows = np.empty((X.size, 7 if slopes else 3))
-            in_blocks(lambda block: k.fill(X[block], mu[block], table, slopes, rows[block]), X.size, BLOCK, workers)
-            return rows
-        good = (table.X_low <= X) & (table.X_high >= X) & (mu <= table.mu_high)
-        out = np.full((X.size, 3), np.nan)
-        X, mu = X[good], mu[good]
-        strips = table.places[((X - table.X_low) * table.X_rate).astype(np.intp)]
-        buckets = np.clip((_bits(mu) >> BUCKET_BITS) - table.first_bucket, 0, table.buckets - 1)
-        r = table.records.reshape(-1, RECORD)[table.places[strips + buckets]]
-        x = (X - r[:, k.CENTRE]) * r[:, k.RATE]
-        y = (mu * r[:, k.TOP_MU] + r[:, k.TOP]) / (mu * r[:, k.BOTTOM_MU] + r[:, k.BOTTOM])
-        powers = r[:, k.FORCE_POWERS :].reshape(-1, 2, TERMS, TERMS)
-        force, area = k.polynomial(powers.transpose(2, 3, 1, 0), x, y)
-        out[good] = np.stack([mu * force, area, r[:, k.ERROR]], axis=-1)
-        return out
+    def _filled(self, X: FloatArray, mu: FloatArray, slopes: bool, workers: int = 1) -> FloatArray:
+        """Rows of Phi_F, Phi_A, error, and with `slopes` of the derivatives by X and mu; NaN outside."""
+        rows = np.empty((X.size, 7 if slopes else 3))
+
+        def fill(block: slice) -> None:
+            core.phi(X[block], mu[block], *self.cells, int(slopes), rows[block], None)
+
+        in_blocks(fill, X.size, BLOCK, workers)
+        return rows
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
         """Phi_F and Phi_A of islands, both: one costs what both do."""
@@ -140,24 +131,22 @@ class UniversalModel(Displayed):
         return flat_X, flat_mu, shape
 
     @functools.cached_property
-    def kernel(self) -> Table:
-        """The table as compiled code takes it."""
+    def cells(self) -> tuple[FloatArray, NDArray[np.int32], FloatArray]:
+        """The table as the core takes it, `mbma_cells` of mbma.h: cells, places, and the numbers."""
         X_low, X_high, mu_low, mu_high = (self.content.auxiliary[name][1] for name in CELL_EDGES)
-        cells = X_low.size
+        count = X_low.size
         # doubles on lines of the cache, eight each
-        memory = np.zeros(RECORD * cells + TERMS)
+        memory = np.zeros(RECORD * count + TERMS)
         start = -(memory.ctypes.data // 8) % TERMS
-        records = memory[start : start + RECORD * cells].reshape(cells, RECORD)
-        records[:, universal_kernel.ERROR] = self.content.local_error.max(axis=-1)
-        records[:, universal_kernel.CENTRE] = 0.5 * (X_low + X_high)
-        records[:, universal_kernel.RATE] = 2 / (X_high - X_low)
-        records[:, universal_kernel.TOP_MU : universal_kernel.BOTTOM + 1] = fractions_of_mu(mu_low, mu_high).T
+        records = memory[start : start + RECORD * count].reshape(count, RECORD)
+        records[:, 0] = self.content.local_error.max(axis=-1)
+        records[:, 1], records[:, 2] = 0.5 * (X_low + X_high), 2 / (X_high - X_low)
+        records[:, 3:7] = fractions_of_mu(mu_low, mu_high).T
         rows = (chebyshev.cheb2poly(row) for row in np.eye(TERMS))
         powers = np.array([np.pad(row, (0, TERMS - row.size)) for row in rows])
         # the functions, then powers of mu, then of X
         by_X = np.einsum("cijf,ip->cfjp", self.content.coefficients, powers)
-        by_power = np.einsum("cfjp,jq->cfqp", by_X, powers)
-        records[:, universal_kernel.FORCE_POWERS :] = by_power.reshape(cells, -1)
+        records[:, 8:] = np.einsum("cfjp,jq->cfqp", by_X, powers).reshape(count, -1)
 
         first, last = (int(bits >> BUCKET_BITS) for bits in _bits([mu_high.min(), self._mu.high]))
         # the bucket below the first edge stands for all that is less
@@ -167,10 +156,17 @@ class UniversalModel(Displayed):
         steps = np.arange(int((self._X.high - self._X.low) * X_STEPS) + 1)
         strips = np.searchsorted(lows, self._X.low + (steps + 0.5) / X_STEPS, side="right") - 1
         places = [steps.size + buckets.size * np.minimum(strips, lows.size - 1)]
-        strip_cells = np.split(np.arange(cells), firsts[1:])
+        strip_cells = np.split(np.arange(count), firsts[1:])
         places += [own[np.searchsorted(mu_low[own], buckets, side="right") - 1] for own in strip_cells]
         ends = self._X.low, self._X.high, float(X_STEPS), self._mu.high
-        return Table(records.reshape(-1), np.concatenate(places).astype(np.int32), *ends, first - 1, buckets.size)
+        found = (
+            records.reshape(-1),
+            np.concatenate(places).astype(np.int32),
+            np.array([*ends, first - 1, buckets.size], dtype=float),
+        )
+        if not core.table_fits(*found):
+            raise TableFileError("the cells of the universal table do not cover its range")
+        return found
 
 
 def _bits(values: ArrayLike) -> NDArray[np.int64]:

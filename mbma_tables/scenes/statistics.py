@@ -43,7 +43,7 @@ def hertz_area(problem: Problem, surface: AnySurface, gap: FloatArray, step: Ste
     """A/A0 with eta = 1 in Eq. 38 (C.1), and the bound on its relative error."""
     reading, rtol, tier = _asked(problem, step)
     depth = (float(surface.h_max) - gap) / float(surface.h_rms)
-    kept = profile(_shape(surface), get_model(tier, rtol, reading), reading, rtol, _outside(tier), depth.size, rows=4)
+    kept = profile(_shape(surface), get_model(tier, rtol, reading), reading, rtol, _outside(tier), rows=4)
     area = np.zeros(depth.shape)
     area[depth > 0] = kept.totals(depth[depth > 0])[3]
     return {"area": (("gap",), area)}, kept.error
@@ -67,7 +67,7 @@ def island_statistics(problem: Problem, surface: AnySurface, gap: FloatArray, st
     force, area, error = np.zeros(grid.size), np.zeros(grid.size), 0.0
     if deepest > 0:
         # islands are counted without an island model
-        kept = profile(shape, RigidModel(), reading, rtol, size=depth.size, rows=3)
+        kept = profile(shape, RigidModel(), reading, rtol, rows=3)
         number[depth > 0] = kept.totals(depth[depth > 0])[2]
         g, s, q0 = islands_of(surface, grid * h_rms, reading)
         phi = answer_islands(model, g, _outside(tier))

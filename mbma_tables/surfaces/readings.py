@@ -10,25 +10,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces.spectrum import NAYAK
-
-
-class ReadingNumbers(NamedTuple):
-    """The numbers of a `Reading`, for compiled code."""
-
-    density_divisor: float
-    beta: float
-    phi: float
-    floor_d: float
-    floor_u: float
-    offset: bool
-    summit_sigma: bool
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,10 +88,10 @@ class Reading:
         return -np.expm1(-area_sum) if self.addition == "cover" else area_sum
 
     @property
-    def numbers(self) -> ReadingNumbers:
-        """What compiled code needs; the Jacobian goes beside it."""
-        values = [getattr(self, name) for name in ReadingNumbers._fields]
-        return ReadingNumbers._make([*map(float, values[:5]), *map(bool, values[5:])])
+    def numbers(self) -> FloatArray:
+        """What the core takes, `mbma_variant` of mbma.h."""
+        flags = self.offset, self.summit_sigma, self.jacobian == "printed"
+        return np.array([self.density_divisor, self.beta, self.phi, self.floor_d, self.floor_u, *flags], dtype=float)
 
 
 PRINTED = Reading("printed")

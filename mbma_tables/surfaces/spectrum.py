@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
-from mbma_tables.compiled import jitable
 
 NAYAK = 6 * math.pi * math.sqrt(3)  # summit density is m4 / (NAYAK m2), Eq. (2)
 RADIUS = 3 * math.sqrt(math.pi) / 8  # summit radius is RADIUS / sqrt(m4), Eq. (2)
@@ -24,7 +23,6 @@ BISECTIONS = 56  # of log(zeta_1), to rounding
 TINY = 1e-300  # in place of 0, where a quotient tends to 1
 
 
-@jitable
 def _growth(power: Any, log_ratio: Any) -> Any:
     """(r^power - 1)/(power log r) with r = exp(log_ratio): 1 where either is 0."""
     x = power * log_ratio
@@ -32,27 +30,23 @@ def _growth(power: Any, log_ratio: Any) -> Any:
     return np.expm1(x) / x
 
 
-@jitable
 def m0_of(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
     """Variance of height over the band, Eq. (7), in s^2."""
     return 2.0 * hurst * np.exp(-2.0 * hurst * log_za) * log_ratio * _growth(-2.0 * hurst, log_ratio)
 
 
-@jitable
 def m2_of(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
     """Variance of a profile's slope over the band, Eq. (7), in (s q0)^2."""
     power = 2.0 - 2.0 * hurst
     return hurst * np.exp(power * log_za) * log_ratio * _growth(power, log_ratio)
 
 
-@jitable
 def m4_of(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
     """Variance of a profile's second derivative over the band, Eq. (7), in (s q0^2)^2."""
     power = 4.0 - 2.0 * hurst
     return 0.75 * hurst * np.exp(power * log_za) * log_ratio * _growth(power, log_ratio)
 
 
-@jitable
 def alpha_of(hurst: Any, log_ratio: Any) -> Any:
     """Nayak's bandwidth parameter m0 m4/m2^2, Eq. (3): a function of zb/za alone, 1.5 where that is 1."""
     g2 = _growth(2.0 - 2.0 * hurst, log_ratio)
@@ -60,7 +54,6 @@ def alpha_of(hurst: Any, log_ratio: Any) -> Any:
     return 1.5 * (_growth(-2.0 * hurst, log_ratio) / g2) * (_growth(4.0 - 2.0 * hurst, log_ratio) / g2)
 
 
-@jitable
 def summit_rate(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
     """m4/m2 over the band [q0^2], which summit densities are made of, Eq. (2); finite for a band of no width."""
     growth = _growth(4.0 - 2.0 * hurst, log_ratio) / _growth(2.0 - 2.0 * hurst, log_ratio)

@@ -119,7 +119,7 @@ class Mbma(Theory):
         if isinstance(surface, MeasuredSurface):
             model = get_model(self.tier, self.rtol, self.reading)
             # islands up to an approach of 2 h_max make u = 0
-            kept = profile(surface, model, self.reading, QUADRATURE_SHARE * self.rtol, self.outside, 1)
+            kept = profile(surface, model, self.reading, QUADRATURE_SHARE * self.rtol, self.outside)
             end = float(kept.edges[-1]) / (2 * kept.source.peak)
             lowest = np.asarray(surface.h_max * (1 - end))
         return self._maximum(surface, quantity, lowest), np.asarray(surface.h_max, dtype=float)

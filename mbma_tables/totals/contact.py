@@ -28,16 +28,15 @@ from mbma_tables.arguments import (
     spread,
     whole_number_in,
 )
-from mbma_tables.compiled import in_blocks
+from mbma_tables.core import in_blocks
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import AREA, BOTH, FORCE, QUANTITIES, AnyModel, check_outside, get_model
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.totals.intervals import BY_COMPRESSION
-from mbma_tables.totals.island_sum import QUADRATURE_SHARE, sums_by_table, totals_of
-from mbma_tables.totals.kernel import Pairs
+from mbma_tables.totals.island_sum import BY_COMPRESSION, QUADRATURE_SHARE, sums_by_table, totals_of
+from mbma_tables.totals.pairs import Pairs
 from mbma_tables.totals.profile import Profile, profile
 
 # surfaces whose islands are kept as a profile, in numpy; of more, those with so many gaps each that it costs less
@@ -168,7 +167,7 @@ def _by_profiles(
         if not places.size:
             continue
         try:
-            kept = profile(shapes[k], model, reading, QUADRATURE_SHARE * rtol, outside, depth.size)
+            kept = profile(shapes[k], model, reading, QUADRATURE_SHARE * rtol, outside)
         except (ConvergenceError, OutOfRangeError):
             if not isinstance(surface, Surface):
                 raise
@@ -241,7 +240,7 @@ def _by_parameter(
     lift = np.exp(power) / np.expm1(power)
     answers = []
     for number, scale in enumerate((stress, 1.0)):
-        value, by_H, by_zeta, by_compression, by_peak, _ = np.moveaxis(sums[..., number, :], -1, 0)
+        value, by_H, by_zeta, by_compression, by_peak = np.moveaxis(sums[..., number, :], -1, 0)
         # force carries q0 s
         own = np.zeros_like(value) if number else value
         by_H, by_zeta = by_H + own * lift * np.log(zeta_1), by_zeta + own * lift * hurst

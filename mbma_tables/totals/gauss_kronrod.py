@@ -7,57 +7,25 @@ on its own and is judged by its own value.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.core import core
 from mbma_tables.errors import ConvergenceError
 
-# half of each rule, from the end to the middle; the Gauss rule has every other node
-_NODES_21 = (
-    0.9956571630258081, 0.9739065285171717, 0.9301574913557082, 0.8650633666889845, 0.7808177265864169,
-    0.6794095682990244, 0.5627571346686047, 0.4333953941292472, 0.2943928627014602, 0.14887433898163122, 0.0,
-)  # fmt: skip
-_KRONROD_21 = (
-    0.011694638867371874, 0.032558162307964725, 0.054755896574351995, 0.07503967481091996, 0.0931254545836976,
-    0.10938715880229764, 0.12349197626206584, 0.13470921731147334, 0.14277593857706009, 0.14773910490133849,
-    0.1494455540029169,
-)  # fmt: skip
-_GAUSS_21 = (
-    0.06667134430868814, 0.1494513491505806, 0.21908636251598204, 0.26926671930999635, 0.29552422471475287,
-)  # fmt: skip
-_NODES_31 = (
-    0.9980022986933971, 0.9879925180204854, 0.9677390756791391, 0.937273392400706, 0.8972645323440819,
-    0.8482065834104272, 0.790418501442466, 0.7244177313601701, 0.650996741297417, 0.5709721726085388,
-    0.4850818636402397, 0.3941513470775634, 0.29918000715316884, 0.20119409399743451, 0.1011420669187175, 0.0,
-)  # fmt: skip
-_KRONROD_31 = (
-    0.005377479872923349, 0.015007947329316122, 0.02546084732671532, 0.03534636079137585, 0.04458975132476488,
-    0.05348152469092809, 0.06200956780067064, 0.06985412131872826, 0.07684968075772038, 0.08308050282313302,
-    0.08856444305621176, 0.09312659817082532, 0.09664272698362368, 0.09917359872179196, 0.10076984552387559,
-    0.10133000701479154,
-)  # fmt: skip
-_GAUSS_31 = (
-    0.03075324199611727, 0.07036604748810812, 0.10715922046717194, 0.13957067792615432, 0.16626920581699392,
-    0.1861610000155622, 0.19843148532711158, 0.2025782419255613,
-)  # fmt: skip
 
-
-def _whole(nodes: Sequence[float], kronrod: Sequence[float], gauss: Sequence[float]) -> tuple[FloatArray, ...]:
+def _rule(count: int) -> FloatArray:
     """Nodes on [-1, 1], Kronrod weights, and Gauss weights, zero where that rule has no node."""
-    spread = np.zeros(len(nodes))
-    spread[1::2] = gauss
-    return tuple(
-        np.concatenate([sign * half[:-1], half[::-1]])
-        for sign, half in ((-1.0, np.array(nodes)), (1.0, np.array(kronrod)), (1.0, spread))
-    )
+    rule = np.empty((3, count))
+    core.kronrod(count, *rule)
+    return rule
 
 
-NODES_21, KRONROD_21, GAUSS_21 = _whole(_NODES_21, _KRONROD_21, _GAUSS_21)
-NODES_31, KRONROD_31, GAUSS_31 = _whole(_NODES_31, _KRONROD_31, _GAUSS_31)
+NODES_21, KRONROD_21, GAUSS_21 = _rule(21)
 
 BATCH = 2048  # intervals evaluated together: bounds the memory, not the work
 DEPTH = 64  # halvings of an interval before giving up

@@ -8,21 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import in_blocks
+from mbma_tables.core import OK, REASONS, UNRESOLVED, core, in_blocks
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.islands.geometry import floor_offset, geometry
 from mbma_tables.models import AREA, BOTH, FORCE, AnyModel, answer_islands, exact_model
 from mbma_tables.models.universal import UniversalModel
-from mbma_tables.models.universal_kernel import OK, REASONS, UNRESOLVED
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.totals import intervals, kernel
 from mbma_tables.totals.gauss_kronrod import integrate
 from mbma_tables.totals.island import scale_area, scale_force
-from mbma_tables.totals.kernel import STRETCH, Pairs
+from mbma_tables.totals.pairs import STRETCH, Pairs, island_density, island_height, jacobian_below
 
 QUADRATURE_SHARE = 0.9  # of the tolerance asked for; a table's own error comes on top
 SUM_SHARE = 0.5  # where islands are solved to a share of it
 BLOCK = 256  # pairs between two looks for Ctrl-C
+COLUMNS, BY_COMPRESSION = (
+    5,
+    3,
+)  # of force and area with their derivatives: value, by hurst, ln(zeta_1), compression, peak
 
 
 class Totals(NamedTuple):
@@ -52,7 +54,7 @@ def sum_islands(
     count = pairs.compression.size
     kink_d, kink_u = kinks(pairs.hurst, pairs.zeta_1, reading)
     worst_island = np.zeros(count)
-    # as in `intervals`: approach = scale sinh(t)^2 up to the floor of zeta_d, and from there on as it is
+    # as in the core: approach = scale sinh(t)^2 up to the floor of zeta_d, and from there on as it is
     scale = STRETCH * pairs.zeta_1**-pairs.hurst
     turn = np.arcsinh(np.sqrt(kink_d / scale))
     h_rms = np.sqrt(-np.expm1(-2 * pairs.hurst * np.log(pairs.zeta_1)))  # over s
@@ -71,9 +73,9 @@ def sum_islands(
             raise type(fault)(f"an island failed: {fault}", failed) from fault
         with np.errstate(invalid="ignore"):
             np.maximum.at(worst_island, owner, phi.error.max(axis=1))
-        height = kernel.island_height(approach, g["h_d"], g["sigma_d"], own, rms_over_s)
-        weight = kernel.island_density(height, g["D_d"], g["sigma_d"]) * rms_over_s * stretch
-        K1 = kernel.jacobian_below(rms_over_s, reading.beta, reading.jacobian == "printed", reading.offset)
+        height = island_height(approach, g["h_d"], g["sigma_d"], own, rms_over_s)
+        weight = island_density(height, g["D_d"], g["sigma_d"]) * rms_over_s * stretch
+        K1 = jacobian_below(rms_over_s, reading.beta, reading.jacobian == "printed", reading.offset)
         weight *= np.where(approach < own_kink, K1, 1.0)
         parts = {FORCE: scale_force(g) * phi.phi_F, AREA: scale_area(g) * phi.phi_A}
         return np.stack([part * weight for name, part in parts.items() if which in (name, BOTH)], axis=-1)
@@ -100,7 +102,7 @@ def totals_of(
     """
     if not isinstance(model, UniversalModel):
         return sum_islands(pairs, reading, model, SUM_SHARE * rtol, outside, which)
-    out, error, islands, missing = sums_by_table(model, pairs, reading, rtol, outside, workers, None)
+    out, error, islands, missing = sums_by_table(model, pairs, reading, rtol, outside, workers, slopes=False)
     force, area = out[:, :, 0].T
     if missing.size and outside == "exact":
         try:
@@ -114,25 +116,25 @@ def totals_of(
 
 
 def sums_by_table(
-    model: AnyModel, pairs: Pairs, reading: Reading, rtol: float, outside: str, workers: int, slopes: bool | None = True
+    model: AnyModel, pairs: Pairs, reading: Reading, rtol: float, outside: str, workers: int, slopes: bool = True
 ) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:
-    """Totals with their derivatives as `intervals.fill_totals` fills them, bound on their error, islands.
+    """Totals, (pairs, 2, COLUMNS or 1) with or without derivatives, the bound on their error, and the islands.
 
-    The last are the pairs that the table does not cover, which are NaN. Without derivatives `slopes` is None.
+    The last are the pairs that the table does not cover, which are NaN.
     """
     if not isinstance(model, UniversalModel):
         raise InputError(f"derivatives come from tier 'universal', {model.name!r} has none")
     if slopes and outside == "exact":
         raise InputError("derivatives come from the universal table: outside must be 'raise' or 'nan' with them")
     count, numbers = pairs.compression.size, reading.numbers
-    status, bound = np.full(count, OK), np.zeros(count)
-    out = np.zeros((count, 2, intervals.COLUMNS if slopes else 1))
+    status, bound = np.empty(count, np.uint8), np.empty(count)
+    out = np.empty((count, 2, COLUMNS if slopes else 1))
 
     def fill(block: slice) -> int:
-        return intervals.fill_totals(
-            pairs.some(block), QUADRATURE_SHARE * rtol, numbers, reading.jacobian == "printed",
-            model.kernel, slopes, status[block], out[block], bound[block],
-        )  # fmt: skip
+        islands = np.zeros(1, np.int64)
+        own = *pairs.some(block), QUADRATURE_SHARE * rtol, numbers, *model.cells, int(slopes)
+        core.totals(*own, out[block], bound[block], status[block], islands)
+        return int(islands[0])
 
     islands = sum(in_blocks(fill, count, BLOCK, workers))
     if (status == UNRESOLVED).any():
@@ -145,8 +147,7 @@ def sums_by_table(
             f"islands of {missing.size} of {count} entries lie outside the universal table "
             f"({X.low:g} <= X <= {X.high:g}, mu <= {mu.high:g}), the first at hurst = {pairs.hurst[first]:g}, "
             f"zeta_1 = {pairs.zeta_1[first]:g}, (h_max - d)/h_rms = {pairs.compression[first]:g} "
-            f"({REASONS[status[first]]}); outside='exact' solves these",
+            f"({REASONS[int(status[first])]}); outside='exact' solves these",
             status != OK,
         )
-    out[missing] = bound[missing] = np.nan
     return out, bound, islands, missing

@@ -15,10 +15,10 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.core import core
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.islands.geometry import floors_of, geometry, measured_islands, s_over_h_rms
 from mbma_tables.models import AnyModel, answer_islands
@@ -26,12 +26,11 @@ from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.power_laws import Place
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.totals import kernel, panels, panels_kernel
 from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
 from mbma_tables.totals.island_sum import kinks
-from mbma_tables.totals.panels import COUNTED, NARROW, POWERS, SHARES, Nodes, Panels, nodes_of
+from mbma_tables.totals.pairs import island_density, jacobian_below
+from mbma_tables.totals.panels import COUNTED, NARROW, POWERS, SHARES, Nodes, Panels
 
-FEW = 256  # gaps that are asked of numpy, one by one
 KEPT = 64  # profiles, for whoever asks the same surface again
 WIDEST = 1.25  # panels above the floor of zeta_d, in h_rms
 MAX_ROUNDS = 30
@@ -55,7 +54,7 @@ class Source(NamedTuple):
     def density(self, g: dict[str, FloatArray], x: FloatArray, height: Any = 0.0) -> FloatArray:
         """Islands per area and approach (42, 46) in the units of `g`; but for the Gaussian without a height."""
         K1 = np.where(x < self.at_d, self.jacobian, 1.0)
-        return np.asarray(kernel.island_density(height, g["D_d"], g["sigma_d"]) * K1)
+        return np.asarray(island_density(height, g["D_d"], g["sigma_d"]) * K1)
 
     def heights(self, g: dict[str, FloatArray], x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Shift and rate of z'/sigma_d (41) = shift - rate compression; nothing cancels at first contact."""
@@ -79,14 +78,14 @@ def source_of(surface: tuple[float, float, float] | MeasuredSurface, reading: Re
         def islands(x: FloatArray) -> dict[str, FloatArray]:
             return geometry(x, hurst, zeta_1, reading) | {"hurst": np.full(x.size, hurst)}
 
-        jacobian = float(kernel.jacobian_below(h_rms, reading.beta, printed, reading.offset))
+        jacobian = float(jacobian_below(h_rms, reading.beta, printed, reading.offset))
         return Source(islands, h_rms, peak, zeta_1**-hurst, float(breaks[0]), breaks, jacobian)
     own, h_rms, laws, floors = surface, float(surface.h_rms), surface.laws, floors_of(surface, reading)
     roots = np.sqrt(laws.above(Place(np.arange(laws.width.size), laws.width)))
     samples = [roots[roots < floors.root_d] / floors.slope_d, roots[roots < floors.root_u] / floors.slope_u]
     # T is a straight line up to a part of it
     layer = math.sqrt(2 * math.pi * surface.C[-1]) * float(surface.q1) / floors.slope_d
-    jacobian = float(kernel.jacobian_below(1 / s_over_h_rms(surface), reading.beta, printed, reading.offset))
+    jacobian = float(jacobian_below(1 / s_over_h_rms(surface), reading.beta, printed, reading.offset))
     return Source(
         lambda x: measured_islands(own, x * h_rms, reading), h_rms, float(surface.h_max) / h_rms, layer / h_rms,
         floors.kinks[0] / h_rms, np.concatenate([*samples, floors.kinks]) / h_rms, jacobian,
@@ -103,16 +102,15 @@ class Profile:
         The surface's islands.
     edges : ndarray, shape (panels + 1,)
         Ends of the panels, delta/h_rms; the last is 2 h_max/h_rms, or less where a table ends.
-    series : ndarray, shape (panels, 2, terms), or None
-        ln(F) and ln(A) as Chebyshev series of the compression. In the first panel they lack the logarithms of the
-        powers that they begin with. For few gaps there is none.
+    series : ndarray, shape (panels, rows, terms)
+        ln(F), ln(A) and so on as Chebyshev series of the compression. In the first panel they lack the logarithms of
+        the powers that they begin with.
     error : float
         Bound on the relative error of totals, of panels and islands together.
     islands : int
         Islands answered for it.
-    panels : Panels
     nodes : Nodes
-        Their islands.
+        The islands of the panels.
     """
 
     source: Source
@@ -120,7 +118,6 @@ class Profile:
     series: Any
     error: float
     islands: int
-    panels: Panels
     nodes: Nodes
 
     @property
@@ -128,37 +125,16 @@ class Profile:
         """The largest compression that it answers."""
         return float(self.edges[-1]) * (1 + 1e-14)
 
-    @np.errstate(under="ignore")
     def totals(self, compression: FloatArray, slopes: bool = False) -> FloatArray:
         """Totals at (h_max - d)/h_rms > 0 within the profile, shape (rows, gaps), and slopes by the compression below.
 
-        F/(A0 E* q0 s) and the sum of areas over A0, perhaps the number of islands per area; of a measured surface
-        F/(A0 E*).
+        F/(A0 E* q0 s) and the sum of areas over A0, perhaps the number of islands per area and the Hertz area; of a
+        measured surface F/(A0 E*).
         """
-        if self.series is None:
-            parts = [self._summed(compression[k : k + FEW]) for k in range(0, compression.size, FEW)]
-            return np.concatenate(parts, axis=1)[: None if slopes else len(self.nodes.weights)]
-        out = np.empty((2, compression.size))
-        panels_kernel.fill_totals(compression, self.edges, self.series, out)
-        if not slopes:
-            return out
-        panel = self._panel(compression)
-        low, high = self.edges[panel], self.edges[panel + 1]
-        by_place = chebyshev.chebder(self.series, axis=-1)
-        basis = chebyshev.chebvander((2 * compression - low - high) / (high - low), by_place.shape[-1] - 1)
-        # sums whose order does not depend on the number of gaps
-        steep = 2 * (by_place[panel] * basis[:, None]).sum(axis=-1).T / (high - low)
-        steep += np.where(panel > 0, 0.0, (POWERS[:2, 0] + 1) / compression)
-        return np.concatenate([out, out * steep])
-
-    def _panel(self, compression: FloatArray) -> NDArray[np.intp]:
-        places = np.searchsorted(self.edges, compression, side="right") - 1
-        return np.clip(places, 0, self.edges.size - 2)
-
-    @np.errstate(under="ignore")
-    def _summed(self, compression: FloatArray) -> FloatArray:
-        logs, by_gap = panels.sums_at(compression, self._panel(compression), self.panels, self.nodes)
-        return np.concatenate([np.exp(logs), np.exp(logs) * by_gap])
+        rows = self.series.shape[1]
+        out = np.empty((2 * rows if slopes else rows, compression.size))
+        core.profile_totals(np.ascontiguousarray(compression), self.edges, self.series, rows, int(slopes), out)
+        return out
 
     @functools.cached_property
     def leverage(self) -> float:
@@ -216,21 +192,20 @@ def _fields(source: Source, model: AnyModel, outside: str, rows: int) -> Fields:
     return fields
 
 
-def _compiled_fields(shape: tuple[float, float, float], model: Any, reading: Reading) -> Fields:
-    """The same of a self-affine surface and the universal table in one pass, for who compiles anyway."""
+def _fields_by_table(shape: tuple[float, float, float], model: UniversalModel, reading: Reading) -> Fields:
+    """The same of a self-affine surface and the universal table, of force and area, in one pass."""
     hurst, zeta_1, peak = shape
-    printed = reading.jacobian == "printed"
 
     def fields(x: FloatArray, used: NDArray[np.bool_]) -> tuple[FloatArray, float]:
-        found, given = np.empty((4, x.size)), (peak, hurst, zeta_1, reading.numbers, printed, model.kernel)
-        _, error = kernel.fill_fields(x.ravel(), *given, found)
-        return found.reshape(4, *x.shape), error
+        found, error = np.empty((4, x.size)), np.empty(1)
+        core.profile_islands(x.ravel(), peak, hurst, zeta_1, reading.numbers, *model.cells, found, error)
+        return found.reshape(4, *x.shape), float(error[0])
 
     return fields
 
 
 def _answered(
-    fields: Fields, kind: NDArray[np.intp], low: FloatArray, high: FloatArray, last: float, few: bool
+    fields: Fields, kind: NDArray[np.intp], low: FloatArray, high: FloatArray, last: float
 ) -> tuple[Panels, FloatArray, int, float]:
     """Panels and their errors, the number of islands, and their own error.
 
@@ -251,15 +226,15 @@ def _answered(
     if kind[0] == 0:
         found[:-2, 0] /= x[0] ** POWERS[: len(found) - 2, 0]
     made = Panels(kind, low, high, found)
-    return made, (panels.missed_by if few else panels_kernel.missed_by)(made, last), int(used.sum()), error
+    return made, made.missed(last), int(used.sum()), error
 
 
-def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float, few: bool) -> Profile:
+def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float) -> Profile:
     """Panels, halved until polynomials through their islands, and those of their sums, are good to `rtol`."""
     low, high, last = edges[:-1], edges[1:], float(edges[-1])
     kind, islands, worst, known, errors = _kinds(low, high), 0, 0.0, None, edges[:0]
     for _ in range(MAX_ROUNDS):
-        fresh, missed, count, error = _answered(fields, kind, low, high, last, few)
+        fresh, missed, count, error = _answered(fields, kind, low, high, last)
         order = np.argsort(np.append(known.low, low)) if known else slice(None)
         known, errors = known.joined(fresh).some(order) if known else fresh, np.append(errors, missed)[order]
         islands, worst = islands + count, max(worst, error)
@@ -268,12 +243,10 @@ def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float, few: 
         bad = ~(errors <= limit)
         if not bad.any():
             ends, bound = np.append(known.low, last), float(errors.max()) + worst
-            if few:
-                return Profile(source, ends, None, bound, islands, known, nodes_of(known))
-            series, tails, nodes = panels_kernel.series_of(known)
+            series, tails, nodes = known.series()
             bad = ~(tails <= limit)
             if not bad.any():
-                return Profile(source, ends, series, bound + float(tails.max()), islands, known, nodes)
+                return Profile(source, ends, series, bound + float(tails.max()), islands, nodes)
         low, high = known.low[bad], known.high[bad]
         middle, parents = (low + high) / 2, known.kind[bad]
         kind = np.concatenate([parents, np.maximum(parents, 1)])
@@ -285,20 +258,20 @@ def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float, few: 
 
 
 @functools.lru_cache(maxsize=KEPT)
-def _profile(surface: Any, model: Any, reading: Reading, rtol: float, exact: bool, few: bool, rows: int) -> Profile:
+def _profile(surface: Any, model: Any, reading: Reading, rtol: float, exact: bool, rows: int) -> Profile:
     source = source_of(surface, reading)
-    if not few and isinstance(surface, tuple) and isinstance(model, UniversalModel):
-        fields = _compiled_fields(surface, model, reading)
+    if rows == 2 and isinstance(surface, tuple) and isinstance(model, UniversalModel):
+        fields = _fields_by_table(surface, model, reading)
     else:
         fields = _fields(source, model, "exact" if exact else "nan", rows)
     edges = _edges(source, 2 * source.peak)
     # what underflows is right
     with np.errstate(under="ignore"):
         try:
-            return _built(source, fields, edges, rtol, few)
+            return _built(source, fields, edges, rtol)
         except _EndOfTable as fault:
             end = fault.args[0]
-            return _built(source, fields, np.append(edges[edges < end * (1 - 1e-12)], end), rtol, few)
+            return _built(source, fields, np.append(edges[edges < end * (1 - 1e-12)], end), rtol)
 
 
 def profile(
@@ -307,14 +280,12 @@ def profile(
     reading: Reading,
     rtol: float,
     outside: str = "nan",
-    size: int | None = None,
     rows: int = 2,
 ) -> Profile:
     """The profile of a surface, (hurst, zeta_1, h_max/h_rms) or a `MeasuredSurface`, to `rtol` and the model's error.
 
-    `outside` is "exact" to solve islands that a table does not cover; else the profile ends with the table. For a
-    `size` of up to FEW gaps, or where the number of islands or their Hertz area is wanted as the third and fourth of
-    `rows`, islands are summed at each gap in numpy. Else there are series, made and asked by compiled code.
+    `outside` is "exact" to solve islands that a table does not cover; else the profile ends with the table. The number
+    of islands and their Hertz area are the third and fourth of `rows`.
 
     Raises
     ------
@@ -322,6 +293,5 @@ def profile(
     """
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)
-    few = rows > 2 or (size is not None and size <= FEW)
-    given: Any = surface, model, reading, rtol, outside == "exact", few, rows
+    given: Any = surface, model, reading, rtol, outside == "exact", rows
     return _profile(*given)

@@ -4,12 +4,11 @@ import mpmath
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
-from small_tables import at_positions
 
+from mbma_tables.core import core
 from mbma_tables.tablefiles import interpolate
-from mbma_tables.tablefiles.splines import TAPS, coefficients, padding
+from mbma_tables.tablefiles.splines import TAPS, at_places, coefficients, padding
 
-WEIGHTS = {3: interpolate.cubic, 5: interpolate.quintic}
 SHAPE = (8, 7, 6, 5)
 
 
@@ -45,7 +44,7 @@ def test_tensor_splines_are_those_of_scipy():
     coefs = coefficients(values, degree, len(shape))
     assert coefs.shape == (*(n + degree - 1 for n in shape), 2)
     positions = random_positions(shape, 500)
-    found = at_positions(coefs, positions).T
+    found = at_places(coefs, positions).T
     expected = by_scipy(values, degree, len(shape))(np.stack(positions, axis=-1))
     np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11 * np.abs(values).max())
 
@@ -68,37 +67,91 @@ def test_one_axis_against_scipy_and_more_components(degree, nodes):
     np.testing.assert_allclose(BSpline(knots, coefs, degree)(places), expected, rtol=1e-11, atol=1e-11)
 
 
-@pytest.mark.parametrize("degree", [3, 5])
-def test_weights_at_fifty_digits(degree):
-    value = WEIGHTS[degree]
+def basis(number, u, cell):
+    """The cubic B-spline and its derivative as the core has them, from a table that is it along each axis in turn."""
+    for axis in range(4):
+        shape = [7, 7, 7, 7]
+        coefs = np.ones((*shape, 2))
+        one = np.zeros(7)
+        one[cell + number] = 1.0
+        coefs *= one.reshape([7 if k == axis else 1 for k in range(4)] + [1])
+        place = np.full(4, 2.0)
+        place[axis] = cell + u
+        out = at_places(coefs, place[:, None], slopes=True)[..., 0]
+        np.testing.assert_array_equal(out[0], out[1])
+        # the others sum to 1, to rounding
+        yield out[0, 0], out[0, 1 + axis]
+
+
+def by_truncated_powers(degree, number, u, order=0):
+    """The cardinal B-spline by divided differences of truncated powers."""
+    x = u + degree - number
+    terms = (
+        (-1) ** k * mpmath.binomial(degree + 1, k) * max(x - k, mpmath.mpf(0)) ** (degree - order)
+        for k in range(degree + 2)
+    )
+    return mpmath.fsum(terms) / mpmath.factorial(degree - order)
+
+
+def test_cubic_weights_at_fifty_digits():
     with mpmath.workdps(50):
-        for number in range(degree + 1):
+        for number in range(4):
+            for u in (k / 16 for k in range(16)):
+                for value, slope in basis(number, u, 2):
+                    assert abs(value - by_truncated_powers(3, number, mpmath.mpf(u))) < 4e-16
+                    assert abs(slope - by_truncated_powers(3, number, mpmath.mpf(u), 1)) < 8e-16
 
-            def exact(u, order=0, number=number):
-                # the cardinal B-spline by divided differences of truncated powers
-                x = u + degree - number
-                terms = (
-                    (-1) ** k * mpmath.binomial(degree + 1, k) * max(x - k, mpmath.mpf(0)) ** (degree - order)
-                    for k in range(degree + 2)
-                )
-                return mpmath.fsum(terms) / mpmath.factorial(degree - order)
 
+def test_quintic_weights_at_fifty_digits():
+    with mpmath.workdps(50):
+        for number in range(6):
             for u in (mpmath.mpf(k) / 17 for k in range(18)):
-                # 2/3 is rounded
-                assert abs(value(u)[number] - exact(u)) < 1e-16
-                if degree == 3:
-                    assert abs(interpolate.cubic_slope(u)[number] - exact(u, 1)) < 1e-16
+                assert abs(interpolate.quintic(u)[number] - by_truncated_powers(5, number, u)) < 1e-16
     for u in np.linspace(0, 1, 11):
-        assert sum(value(u)) == pytest.approx(1, rel=4e-16, abs=0)
-        assert sum(interpolate.cubic_slope(u)) == pytest.approx(0, abs=4e-16)
-    np.testing.assert_allclose(value(0.0)[:-1], TAPS[degree], rtol=2e-16)
+        assert sum(interpolate.quintic(u)) == pytest.approx(1, rel=4e-16, abs=0)
+    np.testing.assert_allclose(interpolate.quintic(0.0)[:-1], TAPS[5], rtol=2e-16)
+
+
+def test_slopes_are_those_of_scipy():
+    values = node_values(SHAPE)
+    coefs, spline = coefficients(values, 3, 4), by_scipy(values, 3, 4)
+    positions = random_positions(SHAPE, 300)
+    found, points = at_places(coefs, positions, slopes=True), np.stack(positions, axis=-1)
+    np.testing.assert_allclose(found[:, 0], at_places(coefs, positions), rtol=1e-13, atol=1e-13)
+    for axis in range(4):
+        order = [int(axis == k) for k in range(4)]
+        np.testing.assert_allclose(found[:, 1 + axis].T, spline(points, nu=order), rtol=1e-10, atol=1e-10)
 
 
 def test_the_last_node_belongs_to_the_table():
-    assert interpolate.cell(9.0, 10) == (8, 1.0)
-    assert interpolate.cell(0.0, 10) == (0, 0.0)
-    assert interpolate.cell(3.0, 10) == (3, 0.0)
-    assert interpolate.cell(np.nextafter(9.0, 10.0), 10)[0] == 8
     values = node_values(SHAPE)
-    found = at_positions(coefficients(values, 3, 4), [np.array([n - 1.0]) for n in SHAPE])[:, 0]
-    np.testing.assert_allclose(found, values[-1, -1, -1, -1], rtol=0, atol=1e-13 * np.abs(values).max())
+    coefs, last = coefficients(values, 3, 4), np.array([[n - 1.0] for n in SHAPE])
+    size = np.abs(values).max()
+    for place in (last, np.nextafter(last, 10.0)):
+        found = at_places(coefs, place)[:, 0]
+        np.testing.assert_allclose(found, values[-1, -1, -1, -1], rtol=0, atol=1e-13 * size)
+    found = at_places(coefs, np.full((4, 1), -1e-15))[:, 0]
+    np.testing.assert_allclose(found, values[0, 0, 0, 0], rtol=0, atol=1e-13 * size)
+
+
+HOSTILE = [np.nan, np.inf, -np.inf, 1e308, -1e308, -1.0, 1e-3 - 2, 1e9, 2.0**63, -(2.0**63)]
+TINY = [5e-324, -5e-324, 2e-308, -0.0]
+
+
+@pytest.mark.parametrize("slopes", [False, True])
+def test_no_place_leaves_memory(slopes):
+    coefs = coefficients(node_values(SHAPE), 3, 4)
+    nodes = np.array(SHAPE)
+    rows = 10 if slopes else 2
+    for axis in range(4):
+        places = np.full((4, len(HOSTILE) + len(TINY)), 1.5)
+        places[axis] = HOSTILE + TINY
+        out = np.empty((rows, places.shape[1]))
+        assert core.spline4(places, coefs, nodes, slopes, out) == len(HOSTILE)
+        assert np.isnan(out[:, : len(HOSTILE)]).all()
+        assert np.isfinite(out[:, len(HOSTILE) :]).all()
+    for wrong in ([1, 7, 6, 5], [8, 7, 6], [8, 7, 6, 6], [-8, -7, 6, 5], [2**62, 2, 2, 2]):
+        with pytest.raises(ValueError, match="sizes"):
+            core.spline4(places, coefs, np.array(wrong), slopes, out)
+    with pytest.raises(ValueError, match="sizes"):
+        core.spline4(places, coefs, nodes, slopes, out[:, :-1].copy())

@@ -12,7 +12,7 @@ from mbma_tables.models import get_model
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.totals.gauss_kronrod import GAUSS_21, KRONROD_21, NODES_21, integrate
 from mbma_tables.totals.island_sum import totals_of
-from mbma_tables.totals.kernel import Pairs
+from mbma_tables.totals.pairs import Pairs
 
 
 def run(function, low, high, rtol=1e-10, owner=None):

@@ -1,0 +1,125 @@
+/* Islands of a self-affine surface at an approach, for loops to inline (Section 3.2 of the paper).
+ *
+ * Lengths are in units of 1/q0, heights of s or h_rms; zeta_d^(-2H) = e + a and zeta_u^(-2H) = e + b with
+ * e = zeta_1^(-2H). A moment over [1, zeta] is m2 = H (zeta^p - 1)/p with p = 2 - 2H, m4 = (3/4) H (zeta^p - 1)/p with
+ * p = 4 - 2H, and Nayak's parameter is alpha = m0 m4/m2^2 (3, 7).
+ */
+#ifndef MBMA_ISLAND_H
+#define MBMA_ISLAND_H
+
+#include "elementary.h"
+#include "mbma.h"
+
+#define BROADENING 0.8968           /* summit variance is (1 - BROADENING/alpha) m0 (2) */
+#define RADIUS 0.66467019408956848  /* 3 sqrt(pi)/8: summit radius is RADIUS/sqrt(m4) (2) */
+#define ROOT_TWO_PI 2.50662827463100050
+#define NO_POWER 1e-100             /* for p = 0 */
+#define STRETCH 8.0                 /* scale of the approach's map, in boundary layers zeta_1^(-H) */
+
+/* What islands need of their surface. */
+typedef struct {
+    double hurst, log_zeta_1, e;
+    double rms_over_s;           /* h_rms/s = sqrt(1 - e) */
+    double slope_d, slope_u;     /* sqrt(a) and sqrt(b) per x = delta/h_rms below the floors (27, 30) */
+    double root_floor_d, root_floor_u, offset_floor_u; /* sqrt(a), sqrt(b) and b at the floors */
+    double log_floor_d, log_floor_u, eta_factor;
+    double kink_d, kink_u;       /* x at which zeta_d and zeta_u reach their floors */
+    double map_scale;
+    double jacobian, jacobian_by_e; /* K1 (47) below kink_d; derivative of its logarithm by ln e */
+    double p2, p4, over_p2, over_2H, rate, tilt, density, radius;
+    double offset;               /* 1, or 0 without h_d */
+} surface;
+
+/* An island; force and area are those per Phi_F and Phi_A. The rest is for derivatives. */
+typedef struct {
+    double X, mu, force, area, h_d, D_d, sigma_d;
+    double m0, sigma, b, top, log_d, width, top2, below2, band2, top4, below4, band4, eta, R_d, R_u, D;
+} island;
+
+/* (r^power - 1)/(power ln r) with r = exp(log_ratio): 1 where either is 0 */
+MBMA_INLINE double growth(double power, double log_ratio) {
+    const double x = power * log_ratio;
+    return x != 0.0 ? expm1(x) / x : 1.0;
+}
+
+/* floor^(-2H) - zeta_1^(-2H) without cancellation */
+MBMA_INLINE double floor_offset(double hurst, double zeta_1, double floor) {
+    return exp(-2.0 * hurst * log(zeta_1)) * expm1(2.0 * hurst * log1p((zeta_1 - floor) / floor));
+}
+
+MBMA_INLINE surface surface_of(double hurst, double zeta_1, const mbma_variant *v) {
+    const double L = log(zeta_1);
+    surface s;
+    s.hurst = hurst;
+    s.log_zeta_1 = L;
+    s.e = exp(-2.0 * hurst * L);
+    s.rms_over_s = sqrt(-expm1(-2.0 * hurst * L));
+    s.slope_d = 4.0 / 3.0 * v->beta;
+    s.slope_u = v->phi / (1.0 + v->phi) * s.rms_over_s;
+    s.root_floor_d = sqrt(floor_offset(hurst, zeta_1, v->floor_d));
+    s.offset_floor_u = floor_offset(hurst, zeta_1, v->floor_u);
+    s.root_floor_u = sqrt(s.offset_floor_u);
+    s.log_floor_d = log(v->floor_d);
+    s.log_floor_u = log(v->floor_u);
+    s.kink_d = s.root_floor_d / s.slope_d;
+    s.kink_u = s.root_floor_u / s.slope_u;
+    s.map_scale = STRETCH * exp(-hurst * L);
+    s.p2 = hurst != 1.0 ? 2.0 - 2.0 * hurst : NO_POWER;
+    s.p4 = 4.0 - 2.0 * hurst;
+    s.over_p2 = 1.0 / s.p2;
+    s.over_2H = 0.5 / hurst;
+    s.rate = 0.75 / s.p4;
+    s.tilt = v->summit_sigma ? BROADENING * hurst / s.rate : 0.0;
+    s.density = s.rate / v->density_divisor;
+    s.radius = RADIUS / sqrt(s.rate * hurst);
+    s.offset = v->offset ? 1.0 : 0.0;
+    /* the factor of eta (39) that depends on the surface alone: all its summits */
+    const double D = 0.75 * growth(s.p4, L) / growth(2.0 - 2.0 * hurst, L) / v->density_divisor;
+    const double R = RADIUS / sqrt(0.75 * hurst * L * growth(s.p4, L));
+    s.eta_factor = 0.75 * cbrt(MBMA_PI * D) * pow(1.5 * R, 2.0 / 3.0) / cbrt(v->phi);
+    const double below = 1.0 - s.slope_d / (v->printed ? 1.0 : s.rms_over_s);
+    s.jacobian = v->printed || v->offset ? below : 1.0;
+    s.jacobian_by_e = v->printed ? 0.0 : 0.5 * (1.0 - 1.0 / s.jacobian) * s.e / (s.rms_over_s * s.rms_over_s);
+    return s;
+}
+
+/* The island at delta = x h_rms; `floor_d` and `floor_u` tell whether zeta_d (27) and zeta_u (30) are at their floors,
+ * and are constants wherever this is inlined, so that it has no branch. */
+MBMA_INLINE island island_at(double x, bool floor_d, bool floor_u, const surface *s) {
+    island n;
+    const double root_a = floor_d ? s->root_floor_d : s->slope_d * x;
+    const double root_b = floor_u ? s->root_floor_u : s->slope_u * x;
+    const double a = root_a * root_a;
+    n.b = floor_u ? s->offset_floor_u : root_b * root_b;
+    /* both shrink with x below the floors, where the difference of squares would cancel */
+    n.m0 = floor_u ? a - n.b : (root_a - root_b) * (root_a + root_b);
+    n.top = s->e + a;
+    /* only the width needs its relative digits */
+    n.log_d = floor_d ? s->log_floor_d : -mbma_log(n.top) * s->over_2H;
+    n.width = mbma_log1p(n.m0 / (s->e + n.b)) * s->over_2H;
+    /* zeta_d^p, (zeta_d^p - 1)/p and (zeta_u^p - zeta_d^p)/p for p = 2 - 2H; the same for 4 - 2H without the division */
+    const double square = mbma_exp(2.0 * n.log_d);
+    n.top4 = square * square * n.top;
+    n.below4 = n.top4 - 1.0;
+    n.below2 = mbma_expm1(s->p2 * n.log_d) * s->over_p2;
+    n.top2 = mbma_fma(s->p2, n.below2, 1.0);
+    n.band2 = n.top2 * mbma_expm1(s->p2 * n.width) * s->over_p2;
+    n.band4 = n.top4 * mbma_expm1(s->p4 * n.width);
+    const double over_band2 = 1.0 / n.band2, over_below2 = 1.0 / n.below2;
+    n.D = s->density * n.band4 * over_band2;
+    n.D_d = s->density * n.below4 * over_below2;
+    n.sigma = sqrt(n.m0 - s->tilt * n.band2 * (n.band2 / n.band4));
+    n.sigma_d = sqrt(1.0 - n.top - s->tilt * n.below2 * (n.below2 / n.below4));
+    n.R_d = s->radius / sqrt(n.below4);
+    n.R_u = s->radius / sqrt(n.below4 + n.band4);
+    n.h_d = s->offset * root_a;
+    const double both = n.R_u * n.R_d;
+    n.force = n.sigma * sqrt(2.0 * n.R_d * n.sigma);                     /* (40) per Phi_F */
+    n.mu = 8.0 / 3.0 * n.D * n.sigma * sqrt(2.0 * both);                 /* (32) */
+    n.eta = s->eta_factor * mbma_exp(mbma_log(root_b / n.R_u) * (1.0 / 3.0)); /* (39) */
+    n.area = 2.0 * MBMA_PI * n.eta * n.D * both * n.sigma * n.sigma;
+    n.X = (s->rms_over_s * x - n.h_d) / n.sigma;
+    return n;
+}
+
+#endif

@@ -1,0 +1,23 @@
+/* Islands by the universal table: Phi_F and Phi_A over X and mu (34-40). */
+#include "phi.h"
+
+MBMA_INLINE size_t fill(size_t n, const double *X, const double *mu, const mbma_cells *cells, bool slopes, double *out,
+                        uint8_t *status) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        const phi found = phi_at(cells, X[k], mu[k], slopes);
+        double *const row = out + k * (slopes ? 7 : 3);
+        row[0] = found.force, row[1] = found.area, row[2] = found.error;
+        if (slopes)
+            row[3] = found.force_by_X, row[4] = found.force_by_mu, row[5] = found.area_by_X, row[6] = found.area_by_mu;
+        bad += found.status != MBMA_OK;
+        if (status)
+            status[k] = (uint8_t)found.status;
+    }
+    return bad;
+}
+
+size_t mbma_phi(size_t n, const double *X, const double *mu, const mbma_cells *cells, int slopes, double *out,
+                uint8_t *status) {
+    return slopes ? fill(n, X, mu, cells, true, out, status) : fill(n, X, mu, cells, false, out, status);
+}

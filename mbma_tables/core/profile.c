@@ -1,0 +1,372 @@
+/* One surface at many gaps: its islands are looked up once, at the nodes of panels of the approach, and sums over them at
+ * some gaps of each panel make Chebyshev series of the logarithms of force and area (44-49).
+ *
+ * Of an island at a gap of compression c = (h_max - d)/h_rms, force and area count as weight exp(-(shift - rate c)^2/2).
+ */
+#include "island.h"
+#include "phi.h"
+
+enum { NODES = MBMA_PANEL_NODES, CHECKS = MBMA_PANEL_CHECKS, PLACES = NODES + CHECKS, GAPS = MBMA_PANEL_GAPS };
+enum { TERMS = 2 * GAPS, SPREAD = 9, TOPS = 8, FAR_TERMS = 8, LANES = 8, CHUNK = 256, ROWS = MBMA_PANEL_ROWS };
+
+/* of errors of a panel */
+static const double AT_ENDS = 1.01;  /* times as much is missed at the ends as next to them */
+static const double BETWEEN = 3.0;   /* times more at gaps between those checked, and past turning points */
+static const double HIGH = 6.0;      /* of sigma_d: islands beyond carry less than 1e-7, where there are others */
+static const double LEADS = 20.0;    /* by which exponents of the smallest islands exceed those of others that count */
+static const double LEAST_APPROACH = 1e-290;
+/* of errors of a series */
+static const double TAIL_SHARE = 5.0; /* of the last two terms, for all that follow: they may fall slowly */
+static const double OLDER = 0.25;     /* of the two before them: signs change, and the last two may be small by chance */
+static const double SLOPES = 0.1;     /* of their relative error counts */
+static const double THIN = 1e-3;      /* width over gap of panels in which values round to more than slopes change */
+/* of sums over many islands far below a gap */
+enum { MANY = 1000 };                   /* islands from which those far below are summed by a series */
+static const double FAR_ERROR = 5e-11;  /* of such a series, or they are summed after all */
+static const double FAR_REACH = 0.06;   /* of the compression, or of h_rms, that one such series covers */
+static const double UNDERFLOW = -700.0; /* of ln F */
+
+/* out = values times the first `rows` rows of a matrix, a multiple of four, with `stride` columns of which some count */
+MBMA_INLINE void combined(const double *restrict values, const double *restrict matrix, int rows, int columns,
+                          int stride, double *restrict out) {
+    for (int j = 0; j < columns; j++)
+        out[j] = 0.0;
+    for (int k = 0; k < rows; k += 4) {
+        const double a = values[k], b = values[k + 1], c = values[k + 2], d = values[k + 3];
+        const double *const m = matrix + k * stride;
+        for (int j = 0; j < columns; j++)
+            out[j] = mbma_fma(d, m[j + 3 * stride], mbma_fma(c, m[j + 2 * stride], mbma_fma(b, m[j + stride],
+                                                                                          mbma_fma(a, m[j], out[j]))));
+    }
+}
+
+/* The power of delta that weights lack in the panel from 0: of force, area, number of islands, Hertz area. */
+static double lead(int row, double delta) {
+    return row == 0 ? delta * delta * sqrt(delta) : row == 1 ? delta * delta * cbrt(delta) : row == 2 ? 1.0 : delta * delta;
+}
+/* and the power of the compression that their sums begin with */
+static const double BEGUN[ROWS] = {3.5, 10.0 / 3.0, 1.0, 3.0};
+
+static double lanes_sum(const double a[LANES]) {
+    return ((a[0] + a[4]) + (a[2] + a[6])) + ((a[1] + a[5]) + (a[3] + a[7]));
+}
+
+/* a . b in eight lanes */
+MBMA_INLINE double dot(const double *restrict a, const double *restrict b, int64_t n) {
+    double s[LANES] = {0.0};
+    int64_t k = 0;
+    for (; k + LANES <= n; k += LANES)
+        for (int l = 0; l < LANES; l++)
+            s[l] = mbma_fma(a[k + l], b[k + l], s[l]);
+    for (int l = 0; k + l < n; l++)
+        s[l] = mbma_fma(a[k + l], b[k + l], s[l]);
+    return lanes_sum(s);
+}
+
+/* Adds to `out` the sums of rows, then their slopes by the compression, of islands begin:stop, times exp(least/2). */
+static void add_sums(double c, double least, const mbma_nodes *islands, int rows, int64_t begin, int64_t stop, double *out) {
+    double share[CHUNK], turned[CHUNK];
+    for (int64_t first = begin; first < stop; first += CHUNK) {
+        const int64_t count = stop - first < CHUNK ? stop - first : CHUNK;
+        const double *const shift = islands->shift + first, *const rate = islands->rate + first;
+        for (int64_t k = 0; k < count; k++) {
+            const double height = mbma_fma(-rate[k], c, shift[k]);
+            share[k] = mbma_exp(0.5 * mbma_fma(-height, height, least));
+            turned[k] = share[k] * height * rate[k];
+        }
+        for (int row = 0; row < rows; row++) {
+            out[row] += dot(share, islands->weights + row * islands->size + first, count);
+            out[rows + row] += dot(turned, islands->weights + row * islands->size + first, count);
+        }
+    }
+}
+
+/* About the least square of a height of islands begin:stop at a gap; neighbours differ by far less than exponentials
+ * reach. */
+static double least_square(double c, const mbma_nodes *islands, int64_t begin, int64_t stop) {
+    double least = INFINITY;
+    for (int64_t k = begin; k < stop; k += 4) {
+        const double height = mbma_fma(-islands->rate[k], c, islands->shift[k]);
+        least = mbma_min(least, height * height);
+    }
+    return least;
+}
+
+/* A Chebyshev series at x in [-1, 1]. */
+MBMA_INLINE double series_at(const double *series, int terms, double x) {
+    double before = 1.0, term = x, sum = series[0];
+    for (int k = 1; k < terms; k++) {
+        const double next = mbma_fma(2.0 * x, term, -before);
+        sum = mbma_fma(series[k], term, sum);
+        before = term;
+        term = next;
+    }
+    return sum;
+}
+
+/* Its derivative by x: sum of k c[k] U[k - 1]. */
+MBMA_INLINE double series_slope(const double *series, int terms, double x) {
+    double before = 0.0, term = 1.0, sum = 0.0;
+    for (int k = 1; k < terms; k++) {
+        const double next = mbma_fma(2.0 * x, term, -before);
+        sum = mbma_fma(k * series[k], term, sum);
+        before = term;
+        term = next;
+    }
+    return sum;
+}
+
+/* Bound on what a series leaves out. */
+static double tail(const double *series, int terms) {
+    return TAIL_SHARE * (fabs(series[terms - 1]) + fabs(series[terms - 2]));
+}
+
+/* Series over compressions in [low, high] of islands 0:stop, of ln of sums and of their slopes; the error of the first. */
+static double fill_far(double low, double high, const mbma_rules *r, const mbma_nodes *islands, int rows, int64_t stop,
+                       double out[2 * ROWS][FAR_TERMS]) {
+    double values[2 * ROWS][FAR_TERMS], error = 0.0;
+    for (int k = 0; k < FAR_TERMS; k++) {
+        const double c = 0.5 * (low + high + (high - low) * r->far_points[k]);
+        const double least = least_square(c, islands, 0, stop);
+        double sums[2 * ROWS] = {0.0};
+        add_sums(c, least, islands, rows, 0, stop, sums);
+        for (int row = 0; row < rows; row++) {
+            values[row][k] = log(sums[row]) - 0.5 * least;
+            values[rows + row][k] = sums[rows + row] / sums[row];
+        }
+    }
+    for (int row = 0; row < 2 * rows; row++) {
+        combined(values[row], &r->far_series[0][0], FAR_TERMS, FAR_TERMS, FAR_TERMS, out[row]);
+        if (row < rows)
+            error = mbma_max(error, tail(out[row], FAR_TERMS));
+    }
+    return error;
+}
+
+/* Puts the islands of a panel up to the place `reach` behind `stop` others, by fields at its nodes from `first` on. */
+static void place(const mbma_panel_rule *r, double width, double reach, double fields[ROWS + 2][NODES * (GAPS + 1)],
+                  int rows, int first, const mbma_nodes *islands, int64_t stop) {
+    for (int k = 0; k < r->count; k++) {
+        const double at = reach * r->nodes[k], delta = r->power > 1 ? width * at * at : 0.0;
+        const double weight = reach * width * r->weights[k] * (r->power > 1 ? 2.0 * at : 1.0);
+        for (int row = 0; row < rows; row++)
+            islands->weights[row * islands->size + stop + k] =
+                weight * fields[row][first + k] * (r->power > 1 ? lead(row, delta) : 1.0);
+        islands->shift[stop + k] = fields[rows][first + k];
+        islands->rate[stop + k] = fields[rows + 1][first + k];
+    }
+}
+
+void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *kind, const double *low,
+                         const double *high, const double *fields, int rows, double *series, double *error,
+                         const mbma_nodes *islands, int64_t *stops) {
+    double inside[ROWS + 2][NODES * (GAPS + 1)], ends[ROWS + 2][GAPS], values[TERMS], far[2 * ROWS][FAR_TERMS];
+    int64_t begin = 0, stop = 0;
+    double missed = 0.0, start = 0.0, until = 0.0;
+    stops[0] = 0;
+    memset(series, 0, panels * (size_t)rows * TERMS * sizeof *series);
+    for (size_t panel = 0; panel < panels; panel++) {
+        const mbma_panel_rule *const r = &rules->of[kind[panel]];
+        const double width = high[panel] - low[panel];
+        const int count = (int)r->count, gaps = (int)r->gaps;
+        if (high[panel] > until) {
+            /* as many panels as make both sums equal work */
+            const size_t ahead = panel + (size_t)sqrt((double)panels);
+            begin = 0;
+            missed = 0.0;
+            start = low[panel];
+            until = mbma_min(start + FAR_REACH * mbma_min(start, 1.0), high[ahead < panels ? ahead : panels - 1]);
+            if (stop > MANY && high[panel] <= until) {
+                missed = fill_far(start, until, rules, islands, rows, stop, far);
+                begin = missed <= FAR_ERROR ? stop : 0;
+                missed = missed <= FAR_ERROR ? missed : 0.0;
+            }
+        }
+        for (int row = 0; row < rows + 2; row++) {
+            const double *const own = fields + ((size_t)row * panels + panel) * PLACES;
+            combined(own, &r->inside[0][0], count, count * (gaps + 1), NODES * (GAPS + 1), inside[row]);
+            combined(own, &r->ends[0][0], count, gaps, GAPS, ends[row]);
+        }
+        /* where force turns, slopes are as good as those of a straight line */
+        double steepest[ROWS], logs[ROWS][GAPS], slopes[ROWS][GAPS];
+        for (int row = 0; row < rows; row++)
+            steepest[row] = 1.0;
+        for (int gap = 0; gap < gaps; gap++) {
+            const double reach = r->reach[gap], c = low[panel] + width * (r->power > 1 ? reach * reach : reach);
+            double sums[2 * ROWS] = {0.0};
+            place(r, width, reach, inside, rows, gap * count, islands, stop);
+            double least = least_square(c, islands, begin, stop + count);
+            if (begin > 0) {
+                const double x = (2.0 * c - start - until) / (until - start), log_F = series_at(far[0], FAR_TERMS, x);
+                least = mbma_min(least, -2.0 * log_F);
+                for (int row = 0; row < rows; row++) {
+                    sums[row] = exp((row == 0 ? log_F : series_at(far[row], FAR_TERMS, x)) + 0.5 * least);
+                    sums[rows + row] = sums[row] * series_at(far[rows + row], FAR_TERMS, x);
+                }
+            }
+            add_sums(c, least, islands, rows, begin, stop + count, sums);
+            /* the island at the gap itself */
+            const double height = ends[rows][gap] - ends[rows + 1][gap] * c;
+            const double share = mbma_exp(0.5 * (least - height * height));
+            for (int row = 0; row < rows; row++) {
+                const double begun = r->power > 1 ? BEGUN[row] : 0.0;
+                sums[rows + row] += share * (r->power > 1 ? lead(row, c) : 1.0) * ends[row][gap];
+                const double steep = sums[rows + row] / sums[row];
+                steepest[row] = mbma_max(steepest[row], c * fabs(steep));
+                logs[row][gap] = log(sums[row]) - 0.5 * least - begun * log(c);
+                slopes[row][gap] = 0.5 * width * (steep - begun / c);
+            }
+        }
+        place(r, width, 1.0, inside, rows, gaps * count, islands, stop);
+        stop += count;
+        stops[panel + 1] = stop;
+        error[panel] = missed;
+        const bool thin = width < THIN * high[panel];
+        for (int row = 0; row < rows; row++) {
+            double *const made = series + (panel * (size_t)rows + (size_t)row) * TERMS;
+            memcpy(values, logs[row], (size_t)gaps * sizeof *values);
+            memcpy(values + gaps, slopes[row], (size_t)gaps * sizeof *values);
+            combined(values, thin ? &r->integrated[0][0] : &r->series[0][0], 2 * gaps, 2 * gaps, TERMS, made);
+            const double rest = thin ? tail(made, gaps + 1)
+                                     : mbma_max(tail(made, 2 * gaps), OLDER * tail(made, 2 * gaps - 2));
+            const double leverage = 4.0 * gaps * high[panel] / (width * steepest[row]);
+            error[panel] = mbma_max(error[panel], missed + rest * (1.0 + SLOPES * leverage));
+        }
+    }
+}
+
+void mbma_profile_totals(size_t n, const double *compression, size_t panels, const double *edges, const double *series,
+                         int rows, int slopes, double *out) {
+    for (size_t k = 0; k < n; k++) {
+        const double c = compression[k];
+        size_t first = 0, last = panels;
+        while (last - first > 1) {
+            const size_t middle = (first + last) / 2;
+            if (edges[middle] <= c)
+                first = middle;
+            else
+                last = middle;
+        }
+        const double low = edges[first], high = edges[first + 1], x = (2.0 * c - low - high) / (high - low);
+        const double *const own = series + first * (size_t)rows * TERMS;
+        /* beyond the profile, and for NaN, there is no answer */
+        const bool inside = c > 0.0 && x <= 1.0 + 1e-12 * high / (high - low);
+        for (int row = 0; row < rows; row++) {
+            const double log_sum = series_at(own + row * TERMS, TERMS, x);
+            double sum = log_sum > UNDERFLOW ? mbma_exp(log_sum) : 0.0;
+            if (first == 0)
+                sum *= c * lead(row, c);
+            out[(size_t)row * n + k] = inside ? sum : c <= 0.0 ? 0.0 : NAN;
+            if (slopes) {
+                const double steep = 2.0 * series_slope(own + row * TERMS, TERMS, x) / (high - low);
+                const double found = sum * (steep + (first == 0 ? BEGUN[row] / c : 0.0));
+                out[(size_t)(rows + row) * n + k] = inside ? found : c <= 0.0 ? 0.0 : NAN;
+            }
+        }
+    }
+}
+
+/* Bound on the relative error of one panel: of what it interpolates, against islands, and of its sums. */
+static double missed_by(const mbma_panel_rule *r, double low, double high, const double *fields, size_t stride, int rows,
+                        double last) {
+    double finer[ROWS + 2][2 * NODES], seen[ROWS + 2][CHECKS + 1], coarse[NODES], fine_weight[2 * NODES];
+    double c[SPREAD + TOPS], least[SPREAD + TOPS];
+    const double *const force = fields, *const shift = fields + (size_t)rows * stride, *const rate = shift + stride;
+    const double width = high - low;
+    const int count = (int)r->count;
+    for (int row = 0; row < rows + 2; row++) {
+        combined(fields + (size_t)row * stride, &r->checks[0][0], count, CHECKS, CHECKS, seen[row]);
+        combined(fields + (size_t)row * stride, &r->halves[0][0], count, 2 * count, 2 * NODES, finer[row]);
+    }
+    double relative = 0.0, turned = 0.0;
+    for (int k = 0; k < CHECKS; k++) {
+        for (int row = 0; row < rows; row++) {
+            const double known = fields[(size_t)row * stride + NODES + (size_t)k];
+            if (known > 0.0) /* underflow to zero is correct here */
+                relative = mbma_max(relative, fabs(seen[row][k] / known - 1.0));
+        }
+        /* heights count where the Gaussian does: near the gap of its top */
+        const double true_shift = shift[NODES + k], true_rate = rate[NODES + k];
+        const double at = mbma_held(true_shift / true_rate, high, last);
+        const double off_shift = seen[rows][k] - true_shift, off_rate = seen[rows + 1][k] - true_rate;
+        const double highest =
+            mbma_max(mbma_min(true_shift - true_rate * high, LEADS / (true_rate * mbma_max(low, LEAST_APPROACH))), HIGH);
+        turned = mbma_max(turned, highest * (fabs(off_shift - off_rate * at) + highest * fabs(off_rate) / true_rate));
+    }
+    /* sums over whole panels, relative to the largest of the panel */
+    for (int k = 0; k < 2 * count; k++) {
+        const double at = 0.5 * (k < count ? r->nodes[k] : 1.0 + r->nodes[k - count]);
+        fine_weight[k] = 0.5 * r->weights[k % count] * finer[0][k];
+        if (r->power > 1)
+            fine_weight[k] *= 2.0 * at * lead(0, width * at * at);
+    }
+    for (int k = 0; k < count; k++) {
+        const double at = r->nodes[k];
+        coarse[k] = r->weights[k] * force[k] * (r->power > 1 ? 2.0 * at * lead(0, width * at * at) : 1.0);
+    }
+    double lowest = INFINITY, most = 0.0, off = 0.0, alone = 0.0;
+    for (int k = 0; k < SPREAD + TOPS; k++) {
+        double top = low + (last - low) * k / (double)(SPREAD - 1);
+        if (k >= SPREAD) {
+            /* where Gaussians are narrow no such gap may meet one: gaps at which one has its top in the panel, or where
+             * that is beyond the last gap, some of the way back from there */
+            const int number = k - SPREAD, node = number * (count / TOPS);
+            const double share = number / (double)(TOPS - 1);
+            top = shift[node] / rate[node];
+            top = top < last ? top : last - (last - high) * 0.25 * share * share * share;
+        }
+        c[k] = mbma_held(top, high, last);
+        least[k] = INFINITY;
+        for (int j = 0; j < 2 * count; j += 4) {
+            const double height = mbma_fma(-finer[rows + 1][j], c[k], finer[rows][j]);
+            least[k] = mbma_min(least[k], height * height);
+        }
+        lowest = mbma_min(lowest, least[k]);
+    }
+    for (int k = 0; k < SPREAD + TOPS; k++) {
+        double fine[2 * NODES], rough[NODES];
+        for (int j = 0; j < 2 * count; j++) {
+            const double height = mbma_fma(-finer[rows + 1][j], c[k], finer[rows][j]);
+            fine[j] = mbma_exp(0.5 * mbma_fma(-height, height, least[k]));
+        }
+        for (int j = 0; j < count; j++) {
+            const double height = mbma_fma(-rate[j], c[k], shift[j]);
+            rough[j] = mbma_exp(0.5 * mbma_fma(-height, height, least[k]));
+        }
+        const double sum = dot(fine, fine_weight, 2 * count), other = dot(rough, coarse, count);
+        const double scale = mbma_exp(0.5 * (lowest - least[k]));
+        /* up to its own end the panel from 0 is all there is */
+        if (k == 0 && r->power > 1)
+            alone = fabs(other / sum - 1.0);
+        most = mbma_max(most, scale * sum);
+        off = mbma_max(off, scale * fabs(other - sum));
+    }
+    return AT_ENDS * relative + turned + BETWEEN * mbma_max(alone, off / most);
+}
+
+void mbma_profile_missed(const mbma_rules *rules, size_t panels, const int64_t *kind, const double *low,
+                         const double *high, const double *fields, int rows, double last, double *error) {
+    for (size_t panel = 0; panel < panels; panel++)
+        error[panel] = missed_by(&rules->of[kind[panel]], low[panel], high[panel], fields + panel * PLACES,
+                                 panels * PLACES, rows, last);
+}
+
+int mbma_profile_islands(size_t n, const double *x, double peak, double hurst, double zeta_1, const mbma_variant *v,
+                         const mbma_cells *cells, double *out, double *error) {
+    const surface s = surface_of(hurst, zeta_1, v);
+    int worst = MBMA_OK;
+    *error = 0.0;
+    for (size_t k = 0; k < n; k++) {
+        const bool floor_d = x[k] >= s.kink_d;
+        const island i = island_at(x[k], floor_d, x[k] > s.kink_u, &s);
+        const phi found = phi_at(cells, i.X, i.mu, false);
+        const double each = (floor_d ? 1.0 : s.jacobian) * s.rms_over_s * i.D_d / (ROOT_TWO_PI * i.sigma_d);
+        out[k] = i.force * each * found.force;
+        out[n + k] = i.area * each * found.area;
+        out[2 * n + k] = ((peak + x[k]) * s.rms_over_s - i.h_d) / i.sigma_d;
+        out[3 * n + k] = s.rms_over_s / i.sigma_d;
+        worst = found.status > worst ? found.status : worst;
+        *error = mbma_max(*error, found.error);
+    }
+    return worst;
+}

@@ -1,0 +1,123 @@
+/* Islands by the paper's four numbers: the spline of the four-number table, and the bands that its axes stand for. */
+#include "eight.h"
+#include "mbma.h"
+
+#define RADIUS 0.66467019408956851 /* 3 sqrt(pi)/8: summit radii are this over sqrt(m4), Eq. (2) */
+#define BROADENING 0.8968          /* summit variance is (1 - BROADENING/alpha) m0, Eq. (2) */
+#define BEYOND 1e-9                /* of a cell: how far rounding may take a place off the ends of its axis */
+
+typedef struct {
+    int64_t cell;
+    double value[4], slope[4]; /* cardinal cubic B-splines that reach the cell, and their derivatives */
+} weights;
+
+/* Of a place inside [0, nodes - 1]; the last node belongs to the last cell. */
+MBMA_INLINE weights weights_at(double place, int64_t nodes) {
+    const int64_t whole = (int64_t)place, cell = whole < nodes - 2 ? whole : nodes - 2;
+    const double u = place - (double)cell, v = 1.0 - u, u2 = u * u, v2 = v * v;
+    const weights found = {
+        cell,
+        {v2 * v / 6.0, 2.0 / 3.0 - u2 * (1.0 - 0.5 * u), 2.0 / 3.0 - v2 * (1.0 - 0.5 * v), u2 * u / 6.0},
+        {-0.5 * v2, u * (1.5 * u - 2.0), -v * (1.5 * v - 2.0), 0.5 * u2}};
+    return found;
+}
+
+/* Both functions from the sums over the other axes: four coefficients of two functions each. */
+MBMA_INLINE void last_axis(const double *w, eight sums, double *f, double *g) {
+    double lanes[8];
+    memcpy(lanes, &sums, sizeof lanes);
+    *f = mbma_fma(w[0], lanes[0], w[1] * lanes[2]) + mbma_fma(w[2], lanes[4], w[3] * lanes[6]);
+    *g = mbma_fma(w[0], lanes[1], w[1] * lanes[3]) + mbma_fma(w[2], lanes[5], w[3] * lanes[7]);
+}
+
+MBMA_INLINE size_t spline4(size_t n, const double *places, const double *coefficients, const int64_t *nodes,
+                           bool slopes, double *out) {
+    static const double ZEROS[8] = {0};
+    const int64_t row = 2 * (nodes[3] + 2), plane = row * (nodes[2] + 2), cube = plane * (nodes[1] + 2);
+    const size_t count = slopes ? 5 : 1; /* of each function */
+    const eight none = row_of(ZEROS);
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        weights w[4];
+        bool inside = true;
+        for (size_t axis = 0; axis < 4; axis++) {
+            const double place = places[axis * n + k], last = (double)(nodes[axis] - 1);
+            inside = inside && place >= -BEYOND && place <= last + BEYOND;
+            w[axis] = weights_at(mbma_held(place, 0.0, last), nodes[axis]);
+        }
+        const int64_t corner = w[0].cell * cube + w[1].cell * plane + w[2].cell * row + 2 * w[3].cell;
+        const double *const start = coefficients + corner;
+        eight value = none, by_x = none, by_y = none, by_z = none;
+        for (int a = 0; a < 4; a++) {
+            eight over_y = none, slope_y = none, slope_z = none;
+            for (int b = 0; b < 4; b++) {
+                const double *const from = start + a * cube + b * plane;
+                eight over_z = none, steep_z = none;
+                for (int c = 0; c < 4; c++) {
+                    const eight neighbours = row_of(from + c * row);
+                    over_z = fma8(neighbours, w[2].value[c], over_z);
+                    if (slopes)
+                        steep_z = fma8(neighbours, w[2].slope[c], steep_z);
+                }
+                over_y = fma8(over_z, w[1].value[b], over_y);
+                if (slopes) {
+                    slope_y = fma8(over_z, w[1].slope[b], slope_y);
+                    slope_z = fma8(steep_z, w[1].value[b], slope_z);
+                }
+            }
+            value = fma8(over_y, w[0].value[a], value);
+            if (slopes) {
+                by_x = fma8(over_y, w[0].slope[a], by_x);
+                by_y = fma8(slope_y, w[0].value[a], by_y);
+                by_z = fma8(slope_z, w[0].value[a], by_z);
+            }
+        }
+        double found[10];
+        last_axis(w[3].value, value, &found[0], &found[count]);
+        if (slopes) {
+            last_axis(w[3].value, by_x, &found[1], &found[6]);
+            last_axis(w[3].value, by_y, &found[2], &found[7]);
+            last_axis(w[3].value, by_z, &found[3], &found[8]);
+            last_axis(w[3].slope, value, &found[4], &found[9]);
+        }
+        for (size_t m = 0; m < 2 * count; m++)
+            out[m * n + k] = inside ? found[m] : NAN;
+        bad += !inside;
+    }
+    return bad;
+}
+
+size_t mbma_spline4(size_t n, const double *places, const double *coefficients, const int64_t *nodes, int slopes,
+                    double *out) {
+    return slopes ? spline4(n, places, coefficients, nodes, true, out)
+                  : spline4(n, places, coefficients, nodes, false, out);
+}
+
+/* (r^power - 1)/(power log r) with x = power log r: 1 where x is 0. */
+MBMA_INLINE double growth(double x) { return x == 0.0 ? 1.0 : mbma_expm1(x) / x; }
+
+size_t mbma_four_numbers(size_t n, const double *spread, const double *sphere, const double *hurst,
+                         double density_divisor, int summit_sigma, double *out) {
+    const double broadening = summit_sigma ? BROADENING / 1.5 : 0.0;
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        const double H = hurst[k], power = 4.0 - 2.0 * H, width = mbma_log1p(spread[k]);
+        const double inverse = sphere[k] * mbma_exp(-0.22314355131420976 * power); /* log(1.25): zeta_d^(-p) */
+        const double g0 = growth(-2.0 * H * width), g2 = growth((2.0 - 2.0 * H) * width), g4 = growth(power * width);
+        const double D = 0.75 * (g4 / g2) / density_divisor;
+        /* alpha = 1.5 g0 g4/g2^2, Eq. (3), grouped so that nothing overflows */
+        const double share = 1.0 - broadening * (g2 / g0) * (g2 / g4);
+        const double sigma = sqrt(share * (2.0 * H * width * g0));
+        const double scale = 0.75 * H / power, top = mbma_expm1(power * width) + 1.0;
+        const double R_d = RADIUS / sqrt(scale * (1.0 - inverse)), R_u = RADIUS / sqrt(scale * (top - inverse));
+        const double mu = 8.0 / 3.0 * D * sigma * sqrt(2.0 * R_u * R_d);
+        const double found[4] = {mu, sigma, sigma * sqrt(2.0 * R_d * sigma),
+                                 2.0 * MBMA_PI * D * R_u * R_d * sigma * sigma};
+        /* beyond, exponentials are held and nothing is right */
+        const bool good = spread[k] > 0.0 && sphere[k] >= 0.0 && fabs(power * width) < 700.0 && mu > 0.0;
+        for (size_t m = 0; m < 4; m++)
+            out[m * n + k] = good ? found[m] : NAN;
+        bad += !good;
+    }
+    return bad;
+}
