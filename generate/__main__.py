@@ -22,6 +22,7 @@ GROUPS = {
     "grids": "generate.boundary_elements.grids",
     "measured_maps": "generate.boundary_elements.measured_maps",
     "tables": "generate.tables.commands",
+    "wheels": "generate.wheels",
 }
 
 

@@ -1,0 +1,94 @@
+/* The part of CPython's stable ABI that binding.c uses, for builds without Python's own headers: on machines that have
+ * none, and for other platforms. Layouts and names are fixed for every CPython from 3.11 on with a global lock
+ * (https://docs.python.org/3/c-api/stable.html); tests/core/test_build.py compares them with Python.h. */
+#ifndef MBMA_STABLE_ABI_H
+#define MBMA_STABLE_ABI_H
+
+#ifndef Py_PYTHON_H
+#include <stddef.h>
+
+typedef ptrdiff_t Py_ssize_t;
+typedef struct _object {
+    Py_ssize_t ob_refcnt;
+    struct _typeobject *ob_type;
+} PyObject;
+
+typedef struct {
+    void *buf;
+    PyObject *obj;
+    Py_ssize_t len, itemsize;
+    int readonly, ndim;
+    char *format;
+    Py_ssize_t *shape, *strides, *suboffsets;
+    void *internal;
+} Py_buffer;
+
+typedef PyObject *(*PyCFunction)(PyObject *, PyObject *);
+typedef struct PyMethodDef {
+    const char *ml_name;
+    PyCFunction ml_meth;
+    int ml_flags;
+    const char *ml_doc;
+} PyMethodDef;
+
+typedef struct PyModuleDef_Slot {
+    int slot;
+    void *value;
+} PyModuleDef_Slot;
+
+typedef struct PyModuleDef {
+    struct {
+        PyObject ob_base;
+        PyObject *(*m_init)(void);
+        Py_ssize_t m_index;
+        PyObject *m_copy;
+    } m_base;
+    const char *m_name, *m_doc;
+    Py_ssize_t m_size;
+    PyMethodDef *m_methods;
+    PyModuleDef_Slot *m_slots;
+    int (*m_traverse)(PyObject *, int (*)(PyObject *, void *), void *);
+    int (*m_clear)(PyObject *);
+    void (*m_free)(void *);
+} PyModuleDef;
+
+typedef struct _ts PyThreadState;
+
+#define PyModuleDef_HEAD_INIT {{1, NULL}, NULL, 0, NULL}
+#define METH_FASTCALL 0x80
+#define Py_mod_exec 2
+#define PyBUF_WRITABLE 1
+#define PyBUF_FORMAT 4
+#define PyBUF_C_CONTIGUOUS 0x38
+#define Py_None (&_Py_NoneStruct)
+#define Py_BEGIN_ALLOW_THREADS { PyThreadState *held_state = PyEval_SaveThread();
+#define Py_END_ALLOW_THREADS PyEval_RestoreThread(held_state); }
+
+#ifdef _WIN32
+#define PyAPI_FUNC(type) __declspec(dllimport) type
+#define PyAPI_DATA(type) extern __declspec(dllimport) type
+#define PyMODINIT_FUNC __declspec(dllexport) PyObject *
+#else
+#define PyAPI_FUNC(type) type
+#define PyAPI_DATA(type) extern type
+#define PyMODINIT_FUNC __attribute__((visibility("default"))) PyObject *
+#endif
+#endif
+
+PyAPI_DATA(PyObject) _Py_NoneStruct;
+PyAPI_DATA(PyObject *) PyExc_TypeError;
+PyAPI_DATA(PyObject *) PyExc_ValueError;
+PyAPI_FUNC(void) PyBuffer_Release(Py_buffer *);
+PyAPI_FUNC(PyObject *) PyErr_Format(PyObject *, const char *, ...);
+PyAPI_FUNC(PyObject *) PyErr_Occurred(void);
+PyAPI_FUNC(void) PyErr_SetString(PyObject *, const char *);
+PyAPI_FUNC(void) PyEval_RestoreThread(PyThreadState *);
+PyAPI_FUNC(PyThreadState *) PyEval_SaveThread(void);
+PyAPI_FUNC(double) PyFloat_AsDouble(PyObject *);
+PyAPI_FUNC(long long) PyLong_AsLongLong(PyObject *);
+PyAPI_FUNC(PyObject *) PyLong_FromLongLong(long long);
+PyAPI_FUNC(PyObject *) PyModuleDef_Init(PyModuleDef *);
+PyAPI_FUNC(int) PyModule_AddIntConstant(PyObject *, const char *, long);
+PyAPI_FUNC(int) PyObject_GetBuffer(PyObject *, Py_buffer *, int);
+
+#endif
