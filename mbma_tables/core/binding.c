@@ -225,6 +225,193 @@ WRAP(four_numbers, "DDDdiw", a[0].n == a[1].n && a[0].n == a[2].n && a[5].n == 4
 /* ---- newton.c ---- */
 
 /* ---- law.c ---- */
+static mbma_law law_in(const argument *block) {
+    mbma_law law;
+    mbma_law_open(block->data, block->n, &law);
+    return law;
+}
+static mbma_inverse inverse_in(const argument *block) {
+    mbma_inverse inverse;
+    mbma_inverse_open(block->data, block->n, &inverse);
+    return inverse;
+}
+static bool is_law(const argument *a) { return law_in(a).head != NULL; }
+/* whether arrays are as long as the first, or not wanted */
+static bool alike(const argument *a, Py_ssize_t first, Py_ssize_t count) {
+    bool good = a[0].data != NULL;
+    for (Py_ssize_t k = first; k < first + count; k++)
+        good = good && (a[k].data == NULL || a[k].n == a[0].n);
+    return good;
+}
+static size_t law_fill(const argument *a) {
+    const mbma_law law = law_in(&a[1]);
+    return mbma_law_fill(a[0].n, a[0].data, &law, a[2].data, a[3].data, a[4].data, a[5].data, a[6].data);
+}
+WRAP(law_fill, "DDwwwww", is_law(&a[1]) && alike(a, 2, 5), law_fill(a))
+static size_t law_records(const argument *a) {
+    const mbma_law law = law_in(&a[2]);
+    return mbma_law_records(a[0].n, a[0].data, a[1].data, &law, a[3].data);
+}
+WRAP(law_records, "DDDl", is_law(&a[2]) && a[1].data && a[3].data && alike(a, 1, 1) && alike(a, 3, 1), law_records(a))
+static size_t inverse_nodes(const argument *a) {
+    const mbma_law law = law_in(&a[1]);
+    return mbma_inverse_nodes(a[0].n, a[0].data, &law, (mbma_quantity)a[2].i, a[3].d, a[4].data, a[5].data);
+}
+WRAP(inverse_nodes, "DDidww", is_law(&a[1]) && a[4].data && a[5].data && alike(a, 4, 2), inverse_nodes(a))
+static size_t law_invert(const argument *a) {
+    const mbma_law law = law_in(&a[1]);
+    const mbma_inverse inverse = inverse_in(&a[2]);
+    return mbma_law_invert(a[0].n, a[0].data, &law, &inverse, (mbma_quantity)a[3].i, a[4].data, a[5].data, a[6].data);
+}
+WRAP(law_invert, "DDDiwww", is_law(&a[1]) && inverse_in(&a[2]).head && a[4].data && alike(a, 4, 3), law_invert(a))
+static size_t law_flow_fill(const argument *a) {
+    const mbma_law flow = law_in(&a[1]);
+    return mbma_law_flow_fill(a[0].n, a[0].data, &flow, a[2].d, a[3].d, a[4].data);
+}
+WRAP(law_flow_fill, "DDddw", is_law(&a[1]) && a[4].data && alike(a, 4, 1), law_flow_fill(a))
+WRAP(law_fit, "DDDDDw",
+     a[0].data && a[1].data && a[2].data && a[3].data && a[4].data && a[5].data && a[0].n % 2 == 0 &&
+         a[1].n == MBMA_FIT_SAMPLES * a[0].n && a[2].n == MBMA_FIT_SAMPLES * MBMA_FIT_SAMPLES &&
+         a[3].n == 2 * MBMA_FIT_SAMPLES && a[4].n == (MBMA_LAW_DEGREE + 1) * (MBMA_LAW_DEGREE + 1) &&
+         a[5].n == a[0].n / 2 * (sizeof(mbma_law_record) / sizeof(double) + 3),
+     mbma_law_fit(a[0].n / 2, a[0].data, a[1].data, a[2].data, a[3].data, a[4].data, a[5].data))
+
+enum { FEW = 1000 }; /* gaps, for which the interpreter lock is kept */
+
+/* Base class of laws in Python: quantities at one float, or at an array of few, are answered here, all else by the method
+ * `_ask_one`. */
+typedef struct {
+    PyObject_HEAD
+    Py_buffer view; /* of the attribute `block` */
+    mbma_law law;   /* its head is NULL before the first question */
+} law_object;
+
+static const mbma_law *law_of(PyObject *self) {
+    law_object *const own = (law_object *)self;
+    if (own->law.head == NULL) {
+        PyObject *const block = PyObject_GetAttrString(self, "block");
+        argument a = {0};
+        const bool good = block != NULL && take(block, 'D', &a);
+        Py_XDECREF(block);
+        if (!good)
+            return NULL;
+        mbma_law found = law_in(&a);
+        /* another thread may have been faster */
+        if (own->law.head == NULL && found.head != NULL) {
+            own->view = a.view;
+            own->law = found;
+        } else
+            release(&a, 1);
+        if (found.head == NULL) {
+            PyErr_SetString(PyExc_ValueError, "core: the block is not that of a law");
+            return NULL;
+        }
+    }
+    return &own->law;
+}
+
+static void law_dealloc(PyObject *self) {
+    PyTypeObject *const type = Py_TYPE(self);
+    if (((law_object *)self)->law.head != NULL)
+        PyBuffer_Release(&((law_object *)self)->view);
+    ((freefunc)PyType_GetSlot(type, Py_tp_free))(self);
+    Py_DECREF(type);
+}
+
+/* A quantity of a small array of doubles, numpy's own as the block is; NULL where Python is to answer. */
+static PyObject *ask_law_array(law_object *self, PyObject *gaps, int what) {
+    argument a[2] = {{0}};
+    PyObject *found = NULL;
+    if (self->law.head == NULL || Py_TYPE(gaps) != Py_TYPE(self->view.obj) || !take(gaps, 'D', &a[0])) {
+        PyErr_Clear();
+        return NULL;
+    }
+    if (a[0].view.ndim > 0 && a[0].n > 0 && a[0].n <= FEW)
+        found = PyObject_CallMethod(gaps, "copy", NULL);
+    if (found != NULL && take(found, 'w', &a[1])) {
+        double *out[5] = {NULL};
+        out[what] = a[1].data;
+        if (mbma_law_fill(a[0].n, a[0].data, &self->law, out[0], out[1], out[2], out[3], out[4]) > 0)
+            Py_CLEAR(found);
+    }
+    release(a, 2);
+    PyErr_Clear();
+    return found;
+}
+
+static PyObject *ask_law(PyObject *self, PyObject *const *given, Py_ssize_t count, PyObject *names, int what) {
+    const Py_ssize_t named = names == NULL ? 0 : PyTuple_Size(names);
+    PyObject *by[] = {count > 0 ? given[0] : Py_None, Py_None};
+    if (count > 1)
+        return PyErr_Format(PyExc_TypeError, "one separation, or u=, is taken, got %zd arguments", count);
+    for (Py_ssize_t k = 0; k < named; k++) {
+        PyObject *const name = PyTuple_GetItem(names, k);
+        const bool is_u = PyUnicode_CompareWithASCIIString(name, "u") == 0;
+        if (!is_u && (count > 0 || PyUnicode_CompareWithASCIIString(name, "separation") != 0))
+            return PyErr_Format(PyExc_TypeError, "unexpected keyword argument %R: separation or u is taken", name);
+        by[is_u] = given[count + k];
+    }
+    const int which = by[0] == Py_None;
+    if (PyFloat_CheckExact(by[which]) && by[1 - which] == Py_None) {
+        const mbma_law *const law = law_of(self);
+        if (law == NULL)
+            return NULL;
+        const double gap = PyFloat_AsDouble(by[which]);
+        const double found = mbma_law_at(law, (mbma_quantity)what, which ? 2.0 * gap - law->head->h_max : gap);
+        /* NaN: refused below, with a reason */
+        if (found == found)
+            return PyFloat_FromDouble(found);
+    }
+    PyObject *const found = which ? NULL : ask_law_array((law_object *)self, by[0], what);
+    return found != NULL ? found : PyObject_CallMethod(self, "_ask_one", "iOO", what, by[0], by[1]);
+}
+
+#define ASK(name, what) \
+    static PyObject *law_##name(PyObject *self, PyObject *const *given, Py_ssize_t count, PyObject *names) { \
+        return ask_law(self, given, count, names, what); \
+    } \
+    static double call_##name(double d, void *law) { return mbma_law_at((const mbma_law *)law, what, d); }
+ASK(force, MBMA_FORCE)
+ASK(area, MBMA_AREA)
+ASK(stiffness, MBMA_STIFFNESS)
+ASK(area_slope, MBMA_AREA_SLOPE)
+ASK(energy, MBMA_ENERGY)
+
+/* Addresses of a function of (d, data) that answers one quantity, and of its data, which live as long as the law. */
+static PyObject *law_addresses(PyObject *self, PyObject *what) {
+    static double (*const CALLS[])(double, void *) = {call_force, call_area, call_stiffness, call_area_slope,
+                                                      call_energy};
+    const long number = PyLong_AsLong(what);
+    const mbma_law *const law = number == -1 && PyErr_Occurred() ? NULL : law_of(self);
+    if (law == NULL)
+        return NULL;
+    if (number < MBMA_FORCE || number > MBMA_ENERGY)
+        return PyErr_Format(PyExc_ValueError, "core: no quantity has the number %ld", number);
+    return Py_BuildValue("KK", (unsigned long long)(uintptr_t)CALLS[number], (unsigned long long)(uintptr_t)law);
+}
+
+#define GAP "($self, separation=None, *, u=None)\n--\n\n"
+#define METHOD(name, text) \
+    {#name, (PyCFunction)(void (*)(void))law_##name, METH_FASTCALL | METH_KEYWORDS, #name GAP text}
+static PyMethodDef LAW_METHODS[] = {
+    METHOD(force, "F/A0 in the unit of E_star at d; where contact ends at h_max, zero from there on."),
+    METHOD(area, "A/A0 at d; where contact ends at h_max, zero from there on."),
+    METHOD(stiffness, "-dF/du per nominal area, against the mean separation u = (h_max + d)/2: -2 dF/dd.\n\n"
+                      "MBMA's jumps where zeta_d reaches its floor, and belongs to the larger gap there."),
+    METHOD(area_slope, "-d(A/A0)/dd."),
+    METHOD(energy, "Elastic energy per nominal area, the integral of F/A0 over u to last contact."),
+    {"_addresses", law_addresses, METH_O, NULL},
+    {NULL, NULL, 0, NULL},
+};
+static PyType_Slot LAW_SLOTS[] = {
+    {Py_tp_dealloc, (void *)law_dealloc},
+    {Py_tp_methods, LAW_METHODS},
+    {Py_tp_doc, (void *)"Quantities of a contact law's block at separations."},
+    {0, NULL},
+};
+static PyType_Spec LAW_TYPE = {
+    "mbma_tables.core.Law", sizeof(law_object), 0, Py_TPFLAGS_DEFAULT | Py_TPFLAGS_BASETYPE, LAW_SLOTS,
+};
 
 /* ---- calibrated.c ---- */
 
@@ -256,6 +443,7 @@ static PyMethodDef METHODS[] = {
     /* newton.c */
 
     /* law.c */
+    ENTRY(law_fill), ENTRY(law_records), ENTRY(inverse_nodes), ENTRY(law_invert), ENTRY(law_flow_fill), ENTRY(law_fit),
 
     /* calibrated.c */
 
@@ -292,7 +480,12 @@ static int generation(void) {
 static int generation(void) { return 0; }
 #endif
 
-static int execute(PyObject *module) { return PyModule_AddIntConstant(module, "generation", generation()); }
+static int execute(PyObject *module) {
+    PyObject *const law = PyType_FromSpec(&LAW_TYPE);
+    const int added = law == NULL ? -1 : PyModule_AddObjectRef(module, "Law", law);
+    Py_XDECREF(law);
+    return added < 0 ? added : PyModule_AddIntConstant(module, "generation", generation());
+}
 
 static PyModuleDef_Slot SLOTS[] = {{Py_mod_exec, (void *)execute}, {0, NULL}};
 

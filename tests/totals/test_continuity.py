@@ -20,7 +20,7 @@ from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.island4d import RAW
 from mbma_tables.models.tables import open_table, universal_model
 from mbma_tables.surfaces.readings import READINGS, REPORTED, get_reading
-from mbma_tables.theories.law_kernel import CENTRE, RATE
+from mbma_tables.theories.law_block import CENTRE, RATE
 from mbma_tables.totals.island_sum import kinks
 
 STEP = 1e-9
