@@ -223,6 +223,26 @@ WRAP(four_numbers, "DDDdiw", a[0].n == a[1].n && a[0].n == a[2].n && a[5].n == 4
      mbma_four_numbers(a[0].n, a[0].data, a[1].data, a[2].data, a[3].d, a[4].i != 0, a[5].data))
 
 /* ---- newton.c ---- */
+#define BASIS(k) {a[k].n, a[k].data, a[(k) + 1].data, a[(k) + 2].data, a[(k) + 3].data}
+#define BASIS_FITS(k) (a[(k) + 1].n == a[k].n && a[(k) + 2].n == a[k].n * a[k].n && a[(k) + 3].n == a[k].n * a[k].n)
+static size_t solve_islands(const argument *a) {
+    const mbma_basis fine = BASIS(3), coarse = BASIS(7);
+    return mbma_solve_islands(a[0].n, a[0].data, a[1].data, a[2].d, &fine, &coarse, a[11].data, a[12].data, a[13].data,
+                              a[14].data, a[15].data, a[16].data, a[17].data);
+}
+WRAP(height_integrals, "iDw", a[1].n == a[2].n, mbma_height_integrals(a[0].i, a[1].n, a[1].data, a[2].data))
+WRAP(islands_work, "i", true, MBMA_ISLANDS_WORK(a[0].i))
+WRAP(solve_islands, "DDdDDDDDDDDwlbwwww",
+     a[1].n == a[0].n && BASIS_FITS(3) && BASIS_FITS(7) && a[11].n == 3 * a[0].n && a[12].n == a[0].n &&
+         a[13].n == a[0].n && a[14].n == (a[14].data ? a[0].n * a[3].n : 0) && a[15].n == a[14].n &&
+         a[16].n == a[14].n && a[17].n >= MBMA_ISLANDS_WORK(a[3].n),
+     solve_islands(a))
+WRAP(island_extents, "DDdw", a[0].n == a[1].n && a[0].n == a[3].n,
+     mbma_island_extents(a[0].n, a[0].data, a[1].data, a[2].d, a[3].data))
+WRAP(damped_steps, "dddddiDwwwl",
+     a[7].n > 0 && a[6].n == a[7].n * a[7].n && a[8].n == a[7].n && a[9].n == 2 && a[10].n == 1,
+     mbma_damped_steps(a[0].d, a[1].d, a[2].d, a[3].d, a[4].d, a[5].i, a[7].n, a[6].data, a[7].data, a[8].data,
+                       a[9].data, a[10].data))
 
 /* ---- law.c ---- */
 static mbma_law law_in(const argument *block) {
@@ -441,6 +461,11 @@ static PyMethodDef METHODS[] = {
     ENTRY(four_numbers),
 
     /* newton.c */
+    ENTRY(height_integrals),
+    ENTRY(islands_work),
+    ENTRY(solve_islands),
+    ENTRY(island_extents),
+    ENTRY(damped_steps),
 
     /* law.c */
     ENTRY(law_fill), ENTRY(law_records), ENTRY(inverse_nodes), ENTRY(law_invert), ENTRY(law_flow_fill), ENTRY(law_fit),

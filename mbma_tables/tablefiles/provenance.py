@@ -14,9 +14,10 @@ import numpy as np
 from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
 
 SOLVER = (
-    "mbma_tables.islands.height_integrals",
+    "mbma_tables/core/elementary.h",
+    "mbma_tables/core/height_coefficients.h",
+    "mbma_tables/core/newton.c",
     "mbma_tables.islands.spectral",
-    "mbma_tables.islands.newton",
     "mbma_tables.islands.greenwood_tripp",
 )
 GEOMETRY = ("mbma_tables.surfaces.spectrum", "mbma_tables.islands.geometry", "mbma_tables.islands.four_numbers")
@@ -41,13 +42,16 @@ def digest_arrays(arrays: dict[str, Any]) -> str:
 
 
 def source_digest(modules: tuple[str, ...]) -> str:
-    """SHA-256 of the source files of modules, as bytes: a record of what ran, which nothing is compared with."""
+    """SHA-256 of the files of modules, or of C sources, as bytes: a record of what ran, compared with nothing."""
     digest = hashlib.sha256()
     for module in modules:
-        spec = importlib.util.find_spec(module)
-        if spec is None or spec.origin is None:
-            raise ModuleNotFoundError(module)
-        digest.update(pathlib.Path(spec.origin).read_bytes())
+        path: str | pathlib.Path = pathlib.Path(__file__).parents[2] / module
+        if "/" not in module:
+            spec = importlib.util.find_spec(module)
+            if spec is None or spec.origin is None:
+                raise ModuleNotFoundError(module)
+            path = spec.origin
+        digest.update(pathlib.Path(path).read_bytes())
     return digest.hexdigest()
 
 
