@@ -509,7 +509,14 @@ static int execute(PyObject *module) {
     PyObject *const law = PyType_FromSpec(&LAW_TYPE);
     const int added = law == NULL ? -1 : PyModule_AddObjectRef(module, "Law", law);
     Py_XDECREF(law);
-    return added < 0 ? added : PyModule_AddIntConstant(module, "generation", generation());
+#if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+    const char *const arithmetic = "fma";
+#else
+    const char *const arithmetic = "plain";
+#endif
+    if (added < 0 || PyModule_AddStringConstant(module, "arithmetic", arithmetic) < 0)
+        return -1;
+    return PyModule_AddIntConstant(module, "generation", generation());
 }
 
 static PyModuleDef_Slot SLOTS[] = {{Py_mod_exec, (void *)execute}, {0, NULL}};

@@ -1,4 +1,4 @@
-"""Hashes of values and attributes, and where values came from: versions, processor, source files."""
+"""Hashes of values and attributes, and where values came from: versions, arithmetic, source files."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from mbma_tables.core import ARITHMETIC
 from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
 
 SOLVER = (
@@ -55,30 +56,18 @@ def source_digest(modules: tuple[str, ...]) -> str:
     return digest.hexdigest()
 
 
-def processor() -> tuple[str, str]:
-    """Name and features of the processor that numba compiles for; they decide the last bits of values."""
-    from llvmlite import binding
-    from numba.core import config
-
-    # set by the environment where code is compiled for another processor
-    name, features = (getattr(config, f"CPU_{what}") for what in ("NAME", "FEATURES"))
-    return name or binding.get_host_cpu_name(), features or binding.get_host_cpu_features().flatten()
-
-
 def versions() -> dict[str, str]:
-    """The processor, and the versions of what computes."""
+    """Versions of what computes, and whether the core's processor has fused multiply-add, which decides last bits."""
     import netCDF4
-    import numba
     import scipy
 
     from mbma_tables import __version__
 
     return {
-        "processor": processor()[0],
+        "arithmetic": ARITHMETIC,
         "mbma_tables": __version__,
         "python": platform.python_version(),
         "numpy": np.__version__,
         "scipy": scipy.__version__,
-        "numba": numba.__version__,
         "netCDF4": netCDF4.__version__,
     }
