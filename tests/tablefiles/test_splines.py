@@ -1,4 +1,4 @@
-"""Spline coefficients and their compiled evaluation against scipy, polynomials, and arithmetic at 50 digits."""
+"""Spline coefficients and their evaluation against scipy, polynomials, and arithmetic at 50 digits."""
 
 import mpmath
 import numpy as np
