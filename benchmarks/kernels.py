@@ -45,7 +45,12 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
     X, mu = rng.uniform(-6.25, 41.0, MANY), 10 ** rng.uniform(-8, 6, MANY)
     fields = geometry(np.linspace(1e-3, 4, MANY), np.full(MANY, 0.8), np.full(MANY, 200.0), get_reading("reported"))
     path = [np.ascontiguousarray(fields[name]) for name in ("X", "mu")]
-    raw = 10 ** rng.uniform(-2, 0.5, MANY), rng.uniform(1.5, 30, MANY), rng.uniform(1.5, 60, MANY), rng.uniform(0.3, 1, MANY)
+    raw = (
+        10 ** rng.uniform(-2, 0.5, MANY),
+        rng.uniform(1.5, 30, MANY),
+        rng.uniform(1.5, 60, MANY),
+        rng.uniform(0.3, 1, MANY),
+    )
     raw = raw[0], raw[1], raw[1] * (1 + raw[2]), raw[3]
     surfaces, gaps = held_out(SURFACES, rng)
     one, fresh = Surface.named("asphalt"), itertools.count(1)
