@@ -35,7 +35,7 @@ from benchmarks.rows import LINES, microseconds, report, rounds, times_faster
 from benchmarks.scenes import scenes
 from generate.pages import page
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
-from mbma_tables.calibrated import Law, Spectrum, light_factor
+from mbma_tables.calibrated import Law, Spectrum
 from mbma_tables.files import shipped_file
 from mbma_tables.tablefiles.schema import TableContent
 from mbma_tables.tablefiles.splines import at_places
@@ -242,10 +242,9 @@ def calibrated(rng: np.random.Generator) -> None:
     report("force, area and stiffness of a random separation", 1e3 * spent, "ns", at_most=100)
     report("the same in evaluations of scipy.special.erf", spent / microseconds(taken["erf"], GAPS), "")
     surfaces, gaps = held_out(SURFACES, rng)
-    light = np.asarray(light_factor(surfaces.alpha))
-    columns = np.stack([surfaces.hurst, np.log(surfaces.zeta_1), light, surfaces.h_max])
+    columns = np.stack([surfaces.hurst, np.log(surfaces.zeta_1), surfaces.h_max])
     table, at = shipped(), np.arange(SURFACES)
-    alone = rounds({"fill": lambda: table.fill(columns, at, (gaps + columns[3]) / 2)})
+    alone = rounds({"fill": lambda: table.fill(columns, at, (gaps + columns[2]) / 2)})
     report(
         "the same with a new surface each, table alone", 1e3 * microseconds(alone["fill"], SURFACES), "ns", at_most=100
     )

@@ -102,7 +102,8 @@ static bool take_all(PyObject *const *given, Py_ssize_t count, const char *kinds
 /* Elementary functions of an array, for their test against mpmath. */
 static size_t elementary(int64_t which, size_t n, const double *x, double *out) {
     for (size_t k = 0; k < n; k++)
-        out[k] = which == 0 ? mbma_exp(x[k]) : which == 1 ? mbma_expm1(x[k]) : which == 2 ? mbma_log(x[k]) : mbma_log1p(x[k]);
+        out[k] = which == 0 ? mbma_exp(x[k]) : which == 1 ? mbma_expm1(x[k]) : which == 2 ? mbma_log(x[k])
+                 : which == 3 ? mbma_log1p(x[k]) : mbma_erf(x[k]);
     return 0;
 }
 WRAP(elementary, "iDw", a[1].n == a[2].n, elementary(a[0].i, a[1].n, a[1].data, a[2].data))
@@ -435,6 +436,62 @@ static PyType_Spec LAW_TYPE = {
 
 /* ---- calibrated.c ---- */
 
+/* First in all calls: coefficients; first nodes, rates, ends of what is covered, three constants; cells; of surfaces
+ * Hurst exponents, ln zeta_1, h_max or None, ends or None, pieces or None. */
+#define SPLINE "FDLDDDDD"
+enum { SPLINE_NUMBERS = 13 };
+typedef struct {
+    mbma_calibrated_table law;
+    mbma_flow_table flow;
+    mbma_surfaces surfaces;
+} spline_call;
+static bool fits_spline(const argument *a, bool law) {
+    const int64_t *c = a[2].data;
+    const size_t count = a[3].n;
+    if (a[1].n != SPLINE_NUMBERS || a[2].n != 3 || a[4].n != count || (law && a[5].n != count))
+        return false;
+    for (int k = 0; k < 3; k++)
+        if (c[k] < 1 || c[k] > 100000)
+            return false;
+    return a[7].data ? a[7].n == count * 6 * (size_t)c[2]
+                     : a[0].n >= (size_t)(c[0] + 5) * (size_t)(c[1] + 5) * (size_t)(c[2] + 5) + 2;
+}
+static spline_call spline_of(const argument *a) {
+    const int64_t *c = a[2].data;
+    const double *x = a[1].data;
+    const mbma_spline s = {a[0].data,          {(size_t)c[0], (size_t)c[1], (size_t)c[2]},
+                           {x[0], x[1], x[2]}, {x[3], x[4], x[5]},
+                           {x[6], x[8]},       {x[7], x[9]}};
+    const spline_call call = {
+        {s, x[10], x[11], x[12]}, {s, x[10], x[11]}, {a[3].n, a[3].data, a[4].data, a[5].data, a[6].data, a[7].data}};
+    return call;
+}
+#define CALL_SPLINE(name, table, ...) \
+    static size_t name(const argument *a) { \
+        const spline_call call = spline_of(a); \
+        return mbma_##name(&call.table, &call.surfaces, __VA_ARGS__); \
+    }
+CALL_SPLINE(spline_pieces, law.log_force, a[8].data)
+CALL_SPLINE(calibrated_ends, law, a[8].data)
+CALL_SPLINE(calibrated_contact, law, a[8].n, a[8].data, a[9].data, a[10].data, a[11].data, a[12].data)
+CALL_SPLINE(calibrated_separation, law, a[8].n, a[8].data, a[9].data, a[10].data)
+CALL_SPLINE(calibrated_slopes, law, a[8].data, a[9].data)
+CALL_SPLINE(flow, flow, a[8].n, a[8].data, a[9].data, a[10].data, a[11].data)
+WRAP(spline_pieces, SPLINE "w",
+     fits_spline(a, false) && !a[7].data && a[8].n == a[3].n * 6 * (size_t)((int64_t *)a[2].data)[2], spline_pieces(a))
+WRAP(calibrated_ends, SPLINE "w", fits_spline(a, true) && a[8].n == 2 * a[3].n, calibrated_ends(a))
+WRAP(calibrated_contact, SPLINE "LDwww",
+     fits_spline(a, true) && a[6].n == 2 * a[3].n && a[9].n == a[8].n && a[10].n == a[8].n && a[11].n == a[8].n &&
+         a[12].n == a[8].n,
+     calibrated_contact(a))
+WRAP(calibrated_separation, SPLINE "LDw",
+     fits_spline(a, true) && a[6].n == 2 * a[3].n && a[9].n == a[8].n && a[10].n == a[8].n, calibrated_separation(a))
+WRAP(calibrated_slopes, SPLINE "Dw", fits_spline(a, true) && !a[7].data && a[8].n == a[3].n && a[9].n == 10 * a[3].n,
+     calibrated_slopes(a))
+WRAP(flow, SPLINE "LDDw", fits_spline(a, false) && a[9].n == a[8].n && a[10].n == a[8].n && a[11].n == a[8].n, flow(a))
+WRAP(self_affine, "DDww", a[0].n == a[1].n && a[0].n == a[2].n && a[0].n == a[3].n,
+     mbma_self_affine(a[0].n, a[0].data, a[1].data, a[2].data, a[3].data))
+
 /* ---- spectrum_laws.c ---- */
 
 /* ---- hardness.c ---- */
@@ -471,6 +528,13 @@ static PyMethodDef METHODS[] = {
     ENTRY(law_fill), ENTRY(law_records), ENTRY(inverse_nodes), ENTRY(law_invert), ENTRY(law_flow_fill), ENTRY(law_fit),
 
     /* calibrated.c */
+    ENTRY(spline_pieces),
+    ENTRY(calibrated_ends),
+    ENTRY(calibrated_contact),
+    ENTRY(calibrated_separation),
+    ENTRY(calibrated_slopes),
+    ENTRY(flow),
+    ENTRY(self_affine),
 
     /* spectrum_laws.c */
 

@@ -285,6 +285,64 @@ size_t mbma_law_fit(size_t n, const double *ends, const double *found, const dou
 
 /* ---- calibrated.c: the law calibrated on boundary elements, by its table ------------------------------------------ */
 
+/* Quintic B-splines on equally spaced nodes over Hurst exponent, ln zeta_1 and a third axis, which runs fastest. Along
+ * each axis there are 5 coefficients more than cells; two more of any value follow the last one. */
+typedef struct {
+    const float *coefficients;
+    size_t cells[3];
+    double first[3], rate[3]; /* first node, and nodes in 1 */
+    double low[2], high[2];   /* of Hurst exponent and ln zeta_1, between which surfaces are answered */
+} mbma_spline;
+
+/* The calibrated law: forces F over A0 E* g with g the rms gradient; mean separations u and other heights over h_rms. */
+typedef struct {
+    mbma_spline log_force;               /* of a surface without end, over ln u */
+    double area_s0, area_slope, area_t0; /* A/A0 = erf(F sqrt(2 (1 + t)/(s0 + t))), t = F/t0; s0 at Nayak's alpha 10 */
+} mbma_calibrated_table;
+
+/* Flow through gaps of mean u: k = u^3 (1 - 1.5/(u^2 + 4)) R, and 0 from A/A0 = threshold on. */
+typedef struct {
+    mbma_spline log_factor; /* ln R over ln A/(threshold A0 - A) */
+    double threshold, obstruction;
+} mbma_flow_table;
+
+/* Surfaces that entries of calls share. */
+typedef struct {
+    size_t count;
+    const double *hurst, *log_zeta_1;
+    const double *h_max;  /* of the calibrated law alone, */
+    const double *ends;   /* and two numbers each by mbma_calibrated_ends */
+    const double *pieces; /* by mbma_spline_pieces; NULL where that does not pay */
+} mbma_surfaces;
+
+/* Nayak's alpha of self-affine surfaces, and their rms gradient over q0 h_rms. */
+size_t mbma_self_affine(size_t n, const double *hurst, const double *log_zeta_1, double *alpha, double *gradient);
+
+/* Six coefficients for each cell of the third axis and each surface. With these, calls give the same bits in less time;
+ * they are worth making from about 40 entries a surface on. */
+size_t mbma_spline_pieces(const mbma_spline *spline, const mbma_surfaces *surfaces, double *pieces);
+
+/* s0 of each surface, and ln F at its h_max. */
+size_t mbma_calibrated_ends(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, double *ends);
+
+/* Force, area and -dF/du at mean separations; `owner` has the number of each entry's surface, from 0. */
+size_t mbma_calibrated_contact(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, size_t n,
+                               const int64_t *owner, const double *u, double *force, double *area, double *stiffness);
+
+/* Mean separations at forces > 0. */
+size_t mbma_calibrated_separation(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, size_t n,
+                                  const int64_t *owner, const double *force, double *u);
+
+/* Force over A0 E* q0 h_rms and area, each with its derivatives by u, h_max, Hurst exponent and ln zeta_1: ten numbers
+ * an entry, which is of the surface of its own number; 0 < u. */
+size_t mbma_calibrated_slopes(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, const double *u,
+                              double *out);
+
+/* k at mean gaps over h_rms and at A/A0. With `pieces`, which may be those of any spectrum, nothing else of the
+ * surfaces is read. */
+size_t mbma_flow(const mbma_flow_table *table, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
+                 const double *u, const double *area, double *k);
+
 /* ---- spectrum_laws.c: Persson's theory and the calibrated law of a spectrum --------------------------------------- */
 
 /* ---- hardness.c: contact with a hardness -------------------------------------------------------------------------- */
