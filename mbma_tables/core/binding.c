@@ -496,6 +496,28 @@ WRAP(self_affine, "DDww", a[0].n == a[1].n && a[0].n == a[2].n && a[0].n == a[3]
 
 /* ---- hardness.c ---- */
 
+WRAP(gaussian_level, "Dw", a[0].n == a[1].n, mbma_gaussian_level(a[0].n, a[0].data, a[1].data))
+WRAP(bearing_share, "DDww", a[0].n == a[1].n && a[0].n == a[2].n && a[0].n == a[3].n,
+     mbma_bearing_share(a[0].n, a[0].data, a[1].data, a[2].data, a[3].data))
+WRAP(diffused, "DDiw", a[0].n == a[1].n && a[0].n == a[3].n,
+     mbma_diffused(a[0].n, a[0].data, a[1].data, a[2].i != 0, a[3].data))
+WRAP(capped_area, "DDDddiw", a[0].n == a[1].n && a[0].n == a[2].n && a[0].n == a[6].n,
+     mbma_capped_area(a[0].n, a[0].data, a[1].data, a[2].data, a[3].d, a[4].d, a[5].i != 0, a[6].data))
+WRAP(capped_force, "DDDDDdddww",
+     a[0].n == a[1].n && a[0].n == a[2].n && a[0].n == a[3].n && a[0].n == a[4].n && a[0].n == a[8].n &&
+         a[0].n == a[9].n,
+     mbma_capped_force(a[0].n, a[0].data, a[1].data, a[2].data, a[3].data, a[4].data, a[5].d, a[6].d, a[7].d, a[8].data,
+                       a[9].data))
+WRAP(gap_start, "iDDDiDDw",
+     (a[0].i == 1 || (uint64_t)a[0].i == a[5].n) && a[0].i > 0 && a[1].n % (size_t)a[0].i == 0 && a[1].n == a[2].n &&
+         a[1].n == a[3].n && a[1].n > 0 && a[5].n == a[6].n && 6 * a[5].n == a[7].n,
+     mbma_gap_start(a[5].n, a[1].n / (size_t)a[0].i, (size_t)a[0].i, a[1].data, a[2].data, a[3].data, a[4].i != 0,
+                    a[5].data, a[6].data, a[7].data))
+WRAP(gap_step, "DDiLDDwb",
+     a[0].n == a[1].n && a[0].n == a[3].n && a[4].n == a[5].n && 6 * a[4].n == a[6].n && a[0].n == a[7].n,
+     mbma_gap_step(a[0].n, a[0].data, a[1].data, a[2].i != 0, a[3].data, a[4].n, a[4].data, a[5].data, a[6].data,
+                   a[7].data))
+
 static PyMethodDef METHODS[] = {
     ENTRY(elementary),
     /* phi.c */
@@ -539,6 +561,13 @@ static PyMethodDef METHODS[] = {
     /* spectrum_laws.c */
 
     /* hardness.c */
+    ENTRY(gaussian_level),
+    ENTRY(bearing_share),
+    ENTRY(diffused),
+    ENTRY(capped_area),
+    ENTRY(capped_force),
+    ENTRY(gap_start),
+    ENTRY(gap_step),
 
     {NULL, NULL, 0, NULL},
 };

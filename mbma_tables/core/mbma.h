@@ -347,6 +347,44 @@ size_t mbma_flow(const mbma_flow_table *table, const mbma_surfaces *surfaces, si
 
 /* ---- hardness.c: contact with a hardness -------------------------------------------------------------------------- */
 
+/* Contact whose pressure cannot exceed a hardness p_m, from the elastic contact of the same surface. Lengths are in
+ * h_rms, forces in A0 E* g with g the rms gradient; eta = p_m/(E* g) is infinite where nothing yields. */
+
+/* Levels d below which Gaussian heights leave a mean gap u: the inverse of u = d Phi(d) + phi(d); -inf below 1e-300. */
+size_t mbma_gaussian_level(size_t n, const double *u, double *level);
+
+/* Share Q of Gaussian heights above the level of mean gap u, and dQ/du; heights end at h_max, which may be infinite. */
+size_t mbma_bearing_share(size_t n, const double *u, const double *h_max, double *share, double *slope);
+
+/* Share of a diffusion from x in [0, 1] between walls at 0 and 1, after a variance of 2 tau, that has not ended at 0,
+ * or that has ended at 1. */
+size_t mbma_diffused(size_t n, const double *x, const double *tau, int at_one, double *out);
+
+/* Contact area A/A0 at a load, or its yielded part. `spread` is the inverse error function of the elastic A/A0 at that
+ * load; `power` and `scale` are the constants a and b of S^-a = S_el^-a + (eta^1.5/b)^-a. */
+size_t mbma_capped_area(size_t n, const double *load, const double *spread, const double *eta, double power,
+                        double scale, int yielded, double *out);
+
+/* Force F and -dF/du of F^-n = F_el^-n + (eta Q)^-n, n = light + by_eta eta + by_share Q, from the elastic force and
+ * -dF_el/du and from the share Q and dQ/du at a mean gap. */
+size_t mbma_capped_force(size_t n, const double *elastic, const double *stiffness, const double *share,
+                         const double *slope, const double *eta, double light, double by_eta, double by_share,
+                         double *force, double *steepness);
+
+/* Gaps at which a value that falls with the gap (a force, an area) is as wanted, by Newton's method in a bracket that
+ * the caller repeats: values and -dvalue/du at state[0], then a step. `state` has six rows: the gap, its lower and upper
+ * bound, and three numbers of the place before. `end` is the last gap with contact, which may be infinite. `exact` says
+ * that slopes are those of the values; else they are about right, and differences are used.
+ *
+ * The start, from values at m places in order from last contact on, rows of one column for all, or of one column each;
+ * bounds are given. */
+size_t mbma_gap_start(size_t n, size_t m, size_t columns, const double *u, const double *value, const double *steep,
+                      int exact, const double *wanted, const double *end, double *state);
+
+/* One step of the gaps numbered `places`, of `total`, to whose places value and slope belong; `left`: not there yet. */
+size_t mbma_gap_step(size_t n, const double *value, const double *steep, int exact, const int64_t *places, size_t total,
+                     const double *wanted, const double *end, double *state, uint8_t *left);
+
 #ifdef __cplusplus
 }
 #endif
