@@ -256,9 +256,11 @@ MBMA_INLINE void totals_at(double c, size_t panels, const double *edges, const d
     /* beyond the profile, and for NaN, there is no answer */
     const bool inside = c > 0.0 && x <= 1.0 + 1e-12 * high / width;
     for (int row = 0; row < rows; row++) {
-        double sum = sums[row] > UNDERFLOW ? mbma_exp(sums[row]) : 0.0;
-        if (first == 0)
-            sum *= c * lead(row, c);
+        const double begun = first == 0 ? c * lead(row, c) : 1.0;
+        double sum = mbma_exp(sums[row]) * begun;
+        /* subnormal numbers, digit by digit */
+        if (!(sums[row] > UNDERFLOW && sum > 1e-290))
+            sum = exp(sums[row] + (first == 0 ? BEGUN[row] * log(c) : 0.0));
         out[(size_t)row * stride] = inside ? sum : c <= 0.0 ? 0.0 : NAN;
         if (slopes) {
             const double found = sum * (2.0 * steep[row] / width + (first == 0 ? BEGUN[row] / c : 0.0));
