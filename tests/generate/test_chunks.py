@@ -73,13 +73,13 @@ def test_finished_chunks_are_not_computed_again(expected, tmp_path, monkeypatch)
 @pytest.mark.parametrize(
     "change",
     [
-        lambda patch: patch.setattr(chunks, "processor", lambda: ("haswell", "+avx2")),
+        lambda patch: patch.setattr(chunks, "versions", lambda: {**versions(), "arithmetic": "none"}),
         lambda patch: patch.setattr(chunks, "versions", lambda: {**versions(), "numpy": "1.0"}),
         lambda patch: patch.setattr(chunks, "source_digest", lambda modules: "0" * 64),
     ],
-    ids=["processor", "version", "source"],
+    ids=["arithmetic", "version", "source"],
 )
-def test_chunks_of_another_processor_version_or_source_are_not_mixed_in(change, expected, tmp_path, monkeypatch):
+def test_chunks_of_another_arithmetic_version_or_source_are_not_mixed_in(change, expected, tmp_path, monkeypatch):
     run(ChunkedSolver(folder=tmp_path))
     before = files(tmp_path)
     change(monkeypatch)
