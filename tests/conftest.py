@@ -29,3 +29,14 @@ def tally(record_property):
     record_property("inputs fuzzed", count.tried)
     record_property("refused", count.refused)
     assert count.tried
+
+
+@pytest.fixture(scope="session")
+def generations():
+    """The modules of the core that round alike, as they have an fma, and that this processor can run."""
+    import importlib
+
+    from mbma_tables.core import GENERATIONS, core
+
+    names = [name for name, least in GENERATIONS.items() if 0 < least <= core.generation]
+    return [importlib.import_module(f"mbma_tables.core._{name}") for name in names] or [core]

@@ -16,6 +16,7 @@ from generate.calibrated_hardness import BARS, FORMS, OTHERS, blind
 from mbma_tables import hardness
 from mbma_tables.bearing import bearing
 from mbma_tables.boundary_elements import Contact as Elastic
+from mbma_tables.core import core
 from mbma_tables.errors import InputError
 from mbma_tables.files import shipped_file
 from mbma_tables.theories.calibrated_table import shipped_part
@@ -41,8 +42,7 @@ def test_areas_are_those_of_a_diffusion_between_walls():
     x = 10 ** rng.uniform(-12, 0, 62)
     exact = np.array([between_walls(*point) for point in zip(x, tau, strict=True)])
     for column, (sign, rel) in enumerate(((1.0, 1e-12), (-1.0, 1e-11))):
-        found = [hardness.diffused(*point, sign) for point in zip(x, tau, strict=True)]
-        assert found == pytest.approx(exact[:, column], rel=rel, abs=1e-250)
+        assert hardness.diffused(x, tau, sign) == pytest.approx(exact[:, column], rel=rel, abs=1e-250)
 
 
 @pytest.mark.parametrize("u", [1e-250, 1e-10, 1e-3, 0.1, 0.39, 1.0, 3.0, 5.0, 8.2, 20.0])
@@ -53,6 +53,21 @@ def test_bearing_share_of_gaussian_heights(u):
             -float(mpmath.sqrt(-2 * mpmath.log(u))) if u < 0.4 else u,
         )
         assert hardness.bearing_share(u)[0] == pytest.approx(float(mpmath.ncdf(-level)), rel=1e-12)
+
+
+def test_levels_of_mean_gaps():
+    u = np.append(10 ** np.random.default_rng(2).uniform(-290, 1, 40), [3.8e-4, np.nextafter(3.8e-4, 0), 3.0, 8.3])
+    u = np.append(u, np.geomspace(1e-6, 8, 60))
+    found = np.empty(u.size)
+    assert core.gaussian_level(u, found) == 0
+    with mpmath.workdps(40):
+        for gap, level in zip(u.tolist(), found.tolist(), strict=True):
+            d = mpmath.mpf(level)
+            for _ in range(3):
+                below = mpmath.erfc(-d / mpmath.sqrt(2)) / 2
+                mean = d * below + mpmath.npdf(d)
+                d -= mpmath.log(mean / gap) * mean / below
+            assert level == pytest.approx(float(d), abs=1e-14, rel=1e-15)
 
 
 def test_derivatives_of_the_force():
@@ -179,3 +194,110 @@ def test_refined_grids_agree_on_corrected_areas():
         area = grids.area.values[:, :-1]
         kept = (area[-1] > 0.03) & (area[-1] < 0.95)
         assert np.abs(np.log(area[1] / area[-1]))[kept].max() < 0.05  # 8 and 32 points a shortest wave
+
+
+NUMBERS = (np.nan, np.inf, -np.inf, -1.0, 0.0, 5e-324, 1e-310, 1e-300, 0.3, 1.0, 1e5, 1e300, 1.7e308)
+LOOPS = {
+    "gaussian_level": (1, (), 1),
+    "bearing_share": (2, (), 2),
+    "diffused": (2, (0,), 1),
+    "capped_area": (3, (3.196, 0.6301, 0), 1),
+    "capped_force": (5, (1.119, 1.767, 0.4736), 2),
+}
+
+
+def looped(module, name, given):
+    """Answers of a loop of the core on rows of numbers, and how many it says are none."""
+    _, more, outputs = LOOPS[name]
+    out = np.full((outputs, given.shape[1]), 7.0)
+    return out, getattr(module, name)(*given, *more, *out)
+
+
+def likely(name, n):
+    """Rows of numbers as they occur, and of any size."""
+    rng = np.random.default_rng(11)
+    rows = np.stack([*rng.uniform(0, 1, (4, n)), 10 ** rng.uniform(-3, 1, n)])[-LOOPS[name][0] :]
+    # a diffusion begins between its walls
+    wide = 10 ** rng.uniform(-300, [[0.0 if name == "diffused" else 300.0], *[[300.0]] * (len(rows) - 1)], rows.shape)
+    return np.where(rng.uniform(size=n) < 0.3, wide, rows)
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_loops_take_any_numbers(name):
+    mixed = np.stack(np.meshgrid(*[NUMBERS] * min(LOOPS[name][0], 3))).reshape(min(LOOPS[name][0], 3), -1)
+    given = np.concatenate([mixed, mixed[::-1][: LOOPS[name][0] - len(mixed)]])
+    out, missed = looped(core, name, given)
+    assert missed == np.isnan(out[0]).sum()
+    assert (out[:, np.isnan(given).any(axis=0)] != 7.0).all()
+    if name != "capped_force":  # where nothing yields, levels have no part
+        assert np.isnan(out[:, np.isnan(given).any(axis=0)]).all()
+    assert not np.isnan(looped(core, name, likely(name, 1000))[0][0]).any()
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_loops_give_one_entry_and_many_the_same_bits(name, generations):
+    given = likely(name, 333)
+    out, _ = looped(core, name, given)
+    for k in range(333):
+        np.testing.assert_array_equal(looped(core, name, given[:, k : k + 1].copy())[0][:, 0], out[:, k])
+    for other in generations:
+        np.testing.assert_array_equal(looped(other, name, given)[0], looped(generations[0], name, given)[0])
+
+
+def stepped(module, wanted, end, exact, value, steep, places):
+    """Gaps at which a function of the gap has wanted values, by the core, and how often the function was asked."""
+    nodes = np.ascontiguousarray(places[:, None])
+    state = np.concatenate([np.tile([[np.nan], [0.0], [end]], wanted.size), np.full((3, wanted.size), np.nan)])
+    state = np.ascontiguousarray(state)
+    ends = np.full(wanted.size, end)
+    assert module.gap_start(1, nodes, value(nodes), steep(nodes), exact, wanted, ends, state) == 0
+    left, asked = np.arange(wanted.size), 0
+    while left.size:
+        u, more = state[0, left], np.empty(left.size, bool)
+        assert module.gap_step(value(u), steep(u), exact, left, wanted, ends, state, more) == 0
+        left, asked = left[more], asked + 1
+        assert asked < 60
+    return state[0], asked
+
+
+@pytest.mark.parametrize(("exact", "most"), [(1, 4), (0, 5)])
+def test_gaps_at_wanted_values(exact, most, generations):
+    def value(u):
+        return (3.0 - u) ** 3.5 * (1 + u * u) * np.exp(-u)
+
+    def steep(u):
+        return value(u) * (3.5 / (3.0 - u) - 2 * u / (1 + u * u) + 1) * (1 if exact else 0.8)
+
+    u = 3.0 / (1 + np.exp(np.linspace(-9, 4, 200)))
+    wanted, places = value(u), 3.0 / (1 + np.exp(np.linspace(-5, 5, 12)))
+    found, asked = stepped(core, wanted, 3.0, exact, value, steep, places)
+    assert asked <= most
+    np.testing.assert_allclose(found, u, rtol=1e-11)
+    for k in (0, 77, 199):
+        assert stepped(core, wanted[k : k + 1], 3.0, exact, value, steep, places)[0] == found[k]
+    for other in generations:
+        again, _ = stepped(other, wanted, 3.0, exact, value, steep, places)
+        np.testing.assert_array_equal(again, stepped(generations[0], wanted, 3.0, exact, value, steep, places)[0])
+
+
+def test_gaps_at_what_is_no_number():
+    n, total = 13, 4
+    state, left = np.full((6, total), 0.5), np.empty(n, bool)
+    places = np.array([*range(4), -1, 4, 2**62, -(2**63), 0, 1, 2, 3, 0])
+    for known in (np.array(NUMBERS), np.full(n, np.nan), np.full(n, 0.3)):
+        missed = core.gap_step(
+            known, known[::-1].copy(), 1, places, np.full(total, 0.1), np.full(total, 3.0), state, left
+        )
+        assert missed >= 4
+        assert not left[4:8].any()
+    for wanted in NUMBERS:
+        state[:3] = np.array([[np.nan], [0.0], [3.0]])
+        nodes = np.array(NUMBERS)
+        missed = core.gap_start(1, nodes, nodes, nodes, 1, np.full(total, wanted), np.full(total, 3.0), state)
+        assert missed == np.isnan(state[0]).sum()
+    with pytest.raises(ValueError, match="sizes of the arrays of gap_step"):
+        core.gap_step(
+            np.ones(2), np.ones(2), 1, np.zeros(2, np.int64), np.ones(4), np.ones(4), np.ones((6, 3)), left[:2]
+        )
+    with pytest.raises(ValueError, match="sizes of the arrays of gap_start"):
+        core.gap_start(3, np.ones(6), np.ones(6), np.ones(6), 1, np.ones(4), np.ones(4), np.ones((6, 4)))

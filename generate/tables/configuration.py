@@ -74,7 +74,7 @@ class Configuration:
 
     def digest(self) -> str:
         """SHA-256 of the configuration, the reading's numbers included."""
-        numbers = list(get_reading(self.reading).numbers) if self.kind == ISLAND4D else []
+        numbers = get_reading(self.reading).recorded if self.kind == ISLAND4D else []
         return digest_json([dataclasses.asdict(self), numbers])
 
 

@@ -169,7 +169,7 @@ class Island4d:
             "delta_over_h_rms": "(1 + X sigma) inverse_zeta_d^hurst, at any node",
             "zeta_u": "(1 + spread)/inverse_zeta_d, at any node; no bound at sphere = 0, where inverse_zeta_d = 0",
             "reading": self.reading.name,
-            "reading_numbers": json.dumps(self.reading.numbers),
+            "reading_numbers": json.dumps(self.reading.recorded),
             "reading_numbers_meaning": (
                 "density divisor n of the summit density m4/(n m2), beta, phi, floor of zeta_d, floor of zeta_u, "
                 "islands stand h_d below the top, sigma is the summits'"

@@ -12,6 +12,10 @@
 #include <stdint.h>
 #include <string.h>
 
+#ifdef __cplusplus
+#define restrict __restrict
+#endif
+
 #if defined(__GNUC__)
 #define MBMA_INLINE static inline __attribute__((always_inline, unused))
 #else
@@ -113,6 +117,30 @@ MBMA_INLINE double mbma_log1p(double x) {
     const double u = 1.0 + x;
     /* what rounding took from 1 + x */
     return mbma_log(u) + (x - (u - 1.0)) / u;
+}
+
+/* erf(x), as 1 - exp(-x G(x)) with a polynomial for G in (x - 5)/(x + 5). */
+MBMA_INLINE double mbma_erf(double x) {
+    const double a = mbma_min(fabs(x), 6.0), t = 1.5 - 10.0 / (a + 5.0);
+    double p = 0.0009578986658192441;
+    p = mbma_fma(p, t, 0.004828592382423287);
+    p = mbma_fma(p, t, 0.013846723547252188);
+    p = mbma_fma(p, t, 0.024690988558762395);
+    p = mbma_fma(p, t, 0.0333716398824953);
+    p = mbma_fma(p, t, 0.05087222244418428);
+    p = mbma_fma(p, t, 0.08061120895418113);
+    p = mbma_fma(p, t, 0.11199256666681254);
+    p = mbma_fma(p, t, 0.17090247890034505);
+    p = mbma_fma(p, t, 0.2708586037313628);
+    p = mbma_fma(p, t, 0.38000980758630726);
+    p = mbma_fma(p, t, 0.5755591732915837);
+    p = mbma_fma(p, t, 0.9152147920778164);
+    p = mbma_fma(p, t, 1.2761629053011574);
+    p = mbma_fma(p, t, 1.9316582692343824);
+    p = mbma_fma(p, t, 3.1912882808115683);
+    p = mbma_fma(p, t, 3.7649901910458783);
+    p = mbma_fma(p, t, 2.396521719854481);
+    return copysign(-mbma_expm1(-a * p), x);
 }
 
 #endif

@@ -2,15 +2,13 @@
 #ifndef MBMA_PHI_H
 #define MBMA_PHI_H
 
-#include "elementary.h"
+#include "eight.h"
 #include "mbma.h"
 
 #define BUCKET_BITS 49 /* 3 bits of the mantissa of mu: 8 buckets an octave */
 
-/* Eight doubles, a row of powers of x: fma8(a, y, b) is a y + b, along_x(a, x) the sum of a[k] x^k by halves, and
- * derived(a) the row of its derivative. All three ways of writing them round alike where the processor has an fma. */
+/* Of a row of powers of x: along_x(a, x) is the sum of a[k] x^k by halves, derived(a) the row of its derivative. */
 #if defined(__FMA__)
-#include <immintrin.h>
 /* the last two halvings */
 MBMA_INLINE double along_four(__m256d row, double x) {
     const double x2 = x * x;
@@ -20,9 +18,6 @@ MBMA_INLINE double along_four(__m256d row, double x) {
 #endif
 
 #if defined(__AVX512F__)
-typedef __m512d eight;
-MBMA_INLINE eight row_of(const double *powers) { return _mm512_loadu_pd(powers); }
-MBMA_INLINE eight fma8(eight a, double y, eight b) { return _mm512_fmadd_pd(a, _mm512_set1_pd(y), b); }
 MBMA_INLINE double along_x(eight a, double x) {
     const __m256d x4 = _mm256_set1_pd((x * x) * (x * x));
     return along_four(_mm256_fmadd_pd(_mm512_extractf64x4_pd(a, 1), x4, _mm512_castpd512_pd256(a)), x);
@@ -32,51 +27,25 @@ MBMA_INLINE eight derived(eight a) {
     return _mm512_mul_pd(_mm512_castsi512_pd(shifted), _mm512_setr_pd(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 0.0));
 }
 #elif defined(__FMA__)
-typedef struct {
-    __m256d low, high;
-} eight;
-MBMA_INLINE eight row_of(const double *powers) {
-    return (eight){_mm256_loadu_pd(powers), _mm256_loadu_pd(powers + 4)};
-}
-MBMA_INLINE eight fma8(eight a, double y, eight b) {
-    const __m256d by = _mm256_set1_pd(y);
-    return (eight){_mm256_fmadd_pd(a.low, by, b.low), _mm256_fmadd_pd(a.high, by, b.high)};
-}
 MBMA_INLINE double along_x(eight a, double x) {
     return along_four(_mm256_fmadd_pd(a.high, _mm256_set1_pd((x * x) * (x * x)), a.low), x);
 }
 MBMA_INLINE eight derived(eight a) {
     const __m256d low = _mm256_blend_pd(a.low, a.high, 1), high = a.high;
-    return (eight){_mm256_mul_pd(_mm256_permute4x64_pd(low, 0x39), _mm256_setr_pd(1.0, 2.0, 3.0, 4.0)),
-                   _mm256_mul_pd(_mm256_permute4x64_pd(high, 0x39), _mm256_setr_pd(5.0, 6.0, 7.0, 0.0))};
+    const eight found = {_mm256_mul_pd(_mm256_permute4x64_pd(low, 0x39), _mm256_setr_pd(1.0, 2.0, 3.0, 4.0)),
+                         _mm256_mul_pd(_mm256_permute4x64_pd(high, 0x39), _mm256_setr_pd(5.0, 6.0, 7.0, 0.0))};
+    return found;
 }
 #else
-typedef double pair __attribute__((vector_size(16)));
-#if defined(__ARM_FEATURE_FMA)
-#define PAIR_FMA(a, y, b) (pair){mbma_fma((a)[0], y, (b)[0]), mbma_fma((a)[1], y, (b)[1])}
-#else
-#define PAIR_FMA(a, y, b) ((a) * (y) + (b))
-#endif
-typedef struct {
-    pair at[4];
-} eight;
-MBMA_INLINE eight row_of(const double *powers) {
-    eight row;
-    memcpy(&row, powers, sizeof row);
-    return row;
-}
-MBMA_INLINE eight fma8(eight a, double y, eight b) {
-    return (eight){{PAIR_FMA(a.at[0], y, b.at[0]), PAIR_FMA(a.at[1], y, b.at[1]), PAIR_FMA(a.at[2], y, b.at[2]),
-                    PAIR_FMA(a.at[3], y, b.at[3])}};
-}
 MBMA_INLINE double along_x(eight a, double x) {
     const double x2 = x * x, x4 = x2 * x2;
     const pair p = PAIR_FMA(a.at[2], x4, a.at[0]), q = PAIR_FMA(a.at[3], x4, a.at[1]), r = PAIR_FMA(q, x2, p);
     return mbma_fma(r[1], x, r[0]);
 }
 MBMA_INLINE eight derived(eight a) {
-    return (eight){{{a.at[0][1], 2.0 * a.at[1][0]}, {3.0 * a.at[1][1], 4.0 * a.at[2][0]},
-                    {5.0 * a.at[2][1], 6.0 * a.at[3][0]}, {7.0 * a.at[3][1], 0.0}}};
+    const eight found = {{{a.at[0][1], 2.0 * a.at[1][0]}, {3.0 * a.at[1][1], 4.0 * a.at[2][0]},
+                          {5.0 * a.at[2][1], 6.0 * a.at[3][0]}, {7.0 * a.at[3][1], 0.0}}};
+    return found;
 }
 #endif
 

@@ -104,18 +104,6 @@ MBMA_INLINE double series_at(const double *series, int terms, double x) {
     return sum;
 }
 
-/* Its derivative by x: sum of k c[k] U[k - 1]. */
-MBMA_INLINE double series_slope(const double *series, int terms, double x) {
-    double before = 0.0, term = 1.0, sum = 0.0;
-    for (int k = 1; k < terms; k++) {
-        const double next = mbma_fma(2.0 * x, term, -before);
-        sum = mbma_fma(k * series[k], term, sum);
-        before = term;
-        term = next;
-    }
-    return sum;
-}
-
 /* Bound on what a series leaves out. */
 static double tail(const double *series, int terms) {
     return TAIL_SHARE * (fabs(series[terms - 1]) + fabs(series[terms - 2]));
@@ -235,35 +223,59 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
     }
 }
 
-void mbma_profile_totals(size_t n, const double *compression, size_t panels, const double *edges, const double *series,
-                         int rows, int slopes, double *out) {
-    for (size_t k = 0; k < n; k++) {
-        const double c = compression[k];
-        size_t first = 0, last = panels;
-        while (last - first > 1) {
-            const size_t middle = (first + last) / 2;
-            if (edges[middle] <= c)
-                first = middle;
-            else
-                last = middle;
-        }
-        const double low = edges[first], high = edges[first + 1], x = (2.0 * c - low - high) / (high - low);
-        const double *const own = series + first * (size_t)rows * TERMS;
-        /* beyond the profile, and for NaN, there is no answer */
-        const bool inside = c > 0.0 && x <= 1.0 + 1e-12 * high / (high - low);
+/* Rows of a panel at one compression, and perhaps slopes; `rows` and `slopes` are constants wherever this is inlined. */
+MBMA_INLINE void totals_at(double c, size_t panels, const double *edges, const double *series, int rows, bool slopes,
+                           double *out, size_t stride) {
+    /* the panel by halves, without branches that nothing foretells */
+    size_t first = 0, left = panels;
+    while (left > 1) {
+        const size_t half = left / 2;
+        first += edges[first + half] <= c ? half : 0;
+        left -= half;
+    }
+    const double low = edges[first], high = edges[first + 1], width = high - low, x = (2.0 * c - low - high) / width;
+    const double *const own = series + first * (size_t)rows * TERMS;
+    double sums[ROWS], steep[ROWS], before = 1.0, term = x, before_slope = 0.0, slope = 1.0;
+    for (int row = 0; row < rows; row++) {
+        sums[row] = own[row * TERMS];
+        steep[row] = 0.0;
+    }
+    /* Chebyshev polynomials of the first kind, and for their derivatives of the second */
+    for (int k = 1; k < TERMS; k++) {
         for (int row = 0; row < rows; row++) {
-            const double log_sum = series_at(own + row * TERMS, TERMS, x);
-            double sum = log_sum > UNDERFLOW ? mbma_exp(log_sum) : 0.0;
-            if (first == 0)
-                sum *= c * lead(row, c);
-            out[(size_t)row * n + k] = inside ? sum : c <= 0.0 ? 0.0 : NAN;
-            if (slopes) {
-                const double steep = 2.0 * series_slope(own + row * TERMS, TERMS, x) / (high - low);
-                const double found = sum * (steep + (first == 0 ? BEGUN[row] / c : 0.0));
-                out[(size_t)(rows + row) * n + k] = inside ? found : c <= 0.0 ? 0.0 : NAN;
-            }
+            sums[row] = mbma_fma(own[row * TERMS + k], term, sums[row]);
+            if (slopes)
+                steep[row] = mbma_fma(k * own[row * TERMS + k], slope, steep[row]);
+        }
+        const double next = mbma_fma(2.0 * x, term, -before), next_slope = mbma_fma(2.0 * x, slope, -before_slope);
+        before = term;
+        term = next;
+        before_slope = slope;
+        slope = next_slope;
+    }
+    /* beyond the profile, and for NaN, there is no answer */
+    const bool inside = c > 0.0 && x <= 1.0 + 1e-12 * high / width;
+    for (int row = 0; row < rows; row++) {
+        double sum = sums[row] > UNDERFLOW ? mbma_exp(sums[row]) : 0.0;
+        if (first == 0)
+            sum *= c * lead(row, c);
+        out[(size_t)row * stride] = inside ? sum : c <= 0.0 ? 0.0 : NAN;
+        if (slopes) {
+            const double found = sum * (2.0 * steep[row] / width + (first == 0 ? BEGUN[row] / c : 0.0));
+            out[(size_t)(rows + row) * stride] = inside ? found : c <= 0.0 ? 0.0 : NAN;
         }
     }
+}
+
+void mbma_profile_totals(size_t n, const double *compression, size_t panels, const double *edges, const double *series,
+                         int rows, int slopes, double *out) {
+    for (size_t k = 0; k < n; k++)
+        if (slopes)
+            totals_at(compression[k], panels, edges, series, rows, true, out + k, n);
+        else if (rows == 2)
+            totals_at(compression[k], panels, edges, series, 2, false, out + k, n);
+        else
+            totals_at(compression[k], panels, edges, series, rows, false, out + k, n);
 }
 
 /* Bound on the relative error of one panel: of what it interpolates, against islands, and of its sums. */

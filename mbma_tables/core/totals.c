@@ -342,6 +342,9 @@ MBMA_INLINE size_t fill(bool slopes, size_t n, const double *hurst, const double
             if (slopes && found == MBMA_OK && sums[0][0] > 0.0 && sums[1][0] > 0.0)
                 found = end_slopes(&g, table, sums);
         }
+        for (int c = 0; c < 2 * columns; c++)
+            if (!(fabs(sums[c % 2][c / 2]) < INFINITY))
+                found = found == MBMA_OK ? MBMA_UNRESOLVED : found;
         for (int c = 0; c < columns; c++)
             for (int q = 0; q < 2; q++)
                 out[(2 * k + (size_t)q) * (size_t)columns + (size_t)c] = found == MBMA_OK ? sums[q][c] : NAN;

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.theories import law_kernel as kernel
-from mbma_tables.theories.law_kernel import AREA_AT, CENTRE, ENERGY_AT, FORCE_AT, POWER_F, RATE, SCALE
+from mbma_tables.theories import law_block as kernel
+from mbma_tables.theories.law_block import AREA_AT, CENTRE, ENERGY_AT, FORCE_AT, POWER_F, RATE, SCALE
 from mbma_tables.theories.law_leakage import LeakageLaw
 from mbma_tables.theories.law_object import ROUNDING, ContactLaw
 

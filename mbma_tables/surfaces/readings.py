@@ -88,10 +88,15 @@ class Reading:
         return -np.expm1(-area_sum) if self.addition == "cover" else area_sum
 
     @property
+    def recorded(self) -> list[float]:
+        """What table files record."""
+        numbers = self.density_divisor, self.beta, self.phi, self.floor_d, self.floor_u
+        return [*map(float, numbers), bool(self.offset), bool(self.summit_sigma)]
+
+    @property
     def numbers(self) -> FloatArray:
         """What the core takes, `mbma_variant` of mbma.h."""
-        flags = self.offset, self.summit_sigma, self.jacobian == "printed"
-        return np.array([self.density_divisor, self.beta, self.phi, self.floor_d, self.floor_u, *flags], dtype=float)
+        return np.array([*self.recorded, self.jacobian == "printed"], dtype=float)
 
 
 PRINTED = Reading("printed")

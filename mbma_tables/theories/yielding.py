@@ -20,6 +20,7 @@ from scipy.special import expit, logit, ndtr, ndtri
 from mbma_tables import hardness as law
 from mbma_tables.arguments import FloatArray, checked_hardness, describe_entries, require
 from mbma_tables.bearing_curve import rows
+from mbma_tables.core import core
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.calibrated_table import at_contact, shipped_part
@@ -31,10 +32,12 @@ TESTED_ETA = 0.025  # p_m/(E* g) down to which boundary elements were solved
 STEPS = 200
 LOWEST = 1e-300
 REACHED = 1e-9  # relative, of forces at full compression
+HEAVIEST = 1e6  # F/(A0 E* g) from which on areas are those of full contact
 CLOSED = 1e-9  # u/h_rms of contacts that count as full
 MANY = 200  # forces on one surface from which on a spline is worth making,
 NODE_STEP, BEYOND = 0.1, 16  # its steps in ln F/(p_m A0 - F), those beyond the forces at either end,
 MOST_ODDS = 20.0  # and the largest
+MIN_DEPTH = 4 * np.finfo(float).eps  # relative, of separations that rounding leaves distinct
 MAX_LEVEL = 37.0  # of heights over h_rms above which shares are no normal numbers
 
 
@@ -158,6 +161,11 @@ class Yielding(Theory):
         """Where derivatives of the elastic force jump."""
         return self.elastic.bends(surface)
 
+    def _eta(self, surface: AnySurface) -> FloatArray:
+        """p_m/(E* g)."""
+        with np.errstate(over="ignore"):
+            return np.asarray(self.hardness / np.asarray(surface.rms_gradient))
+
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and the loading curve's stiffness at mean separations u [length]."""
         return self.loaded(surface, mean_separation).answer
@@ -167,7 +175,7 @@ class Yielding(Theory):
         u, h_rms = np.asarray(mean_separation, dtype=float), np.asarray(surface.h_rms)
         elastic = self.elastic.answer(surface, u)
         gradient = np.asarray(surface.rms_gradient)
-        eta = self.hardness / gradient
+        eta = self._eta(surface)
         endless = np.isinf(self.hardness)
         if endless.all():
             return Loaded(u, h_rms, eta, elastic.force / gradient, elastic, elastic, elastic.area)
@@ -176,7 +184,7 @@ class Yielding(Theory):
         force = load * gradient
         needed = (force > 0) & ~endless
         # where nothing yields or touches, a force that the theory is sure to reach
-        asked = np.where(needed, force, np.minimum(elastic.force, gradient))
+        asked = np.where(needed, np.minimum(force, HEAVIEST * gradient), np.minimum(elastic.force, gradient))
         at_force = np.where(needed, self.elastic.area_at(surface, asked), 0.0)
         # both of the elastic errors, force and area at that force, may add up
         capped = TheoryAnswer(force, law.area(load, at_force, eta), stiffness * gradient, 2 * elastic.error)
@@ -211,37 +219,42 @@ class Yielding(Theory):
 
     def _separation(self, surface: AnySurface, force: FloatArray) -> FloatArray:
         """Newton's method in a bracket."""
-        known, bracket = self._started(surface, force)
-        left = np.flatnonzero((known[0] > 0) & (known[0] < known[1]) & (known[1] < np.inf))
+        known, state = self._started(surface, force)
+        asked = (known[0] > 0) & (known[0] < known[1]) & (known[1] < np.inf)
+        left = np.flatnonzero(asked)
         for _ in range(STEPS):
             if not left.size:
                 break
             some, elastic = select(surface, force.shape, left), self.elastic.at(force.shape, left)
-            found = elastic.answer(some, bracket[0, left])
-            share, slope = elastic.bearing_share(some, bracket[0, left])
+            found = elastic.answer(some, state[0, left])
+            share, slope = elastic.bearing_share(some, state[0, left])
             g = np.asarray(some.rms_gradient)
-            contacts = found.force / g, found.stiffness / g, share, slope
-            left = left[law.newton_step(*contacts, known, law.CONSTANTS.exponent, bracket, left)]
-        else:
-            missed = np.isin(np.arange(force.size), left).reshape(force.shape)
-            raise ConvergenceError(f"no separation was found for {left.size} pressures", missed)
+            load, steep = law.force(found.force / g, found.stiffness / g, share, slope, known[1, left])
+            more = np.empty(left.size, dtype=bool)
+            core.gap_step(load, steep, 1, left, known[0], known[2], state, more)
+            left = left[more]
+        missed = asked & np.isnan(state[0])
+        missed[left] = True
+        if missed.any():
+            text = f"no separation was found for {int(missed.sum())} pressures"
+            raise ConvergenceError(text, missed.reshape(force.shape))
         low, high = self.interval(surface)
-        u, _, above = bracket.reshape(3, *force.shape)
+        u, _, above = state[:3].reshape(3, *force.shape)
         u = np.where(force < self.hardness, u, low)
         self._refuse_unreached(surface, force, u)
         return np.where(np.isinf(self.hardness), above, np.where(known[0].reshape(force.shape) > 0, u, high))
 
     def _started(self, surface: AnySurface, force: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """`known` and `bracket` of `hardness.newton_step`: u lies below the elastic contact's, the start is close."""
+        """Force, hardness and last gap, and the state of `gap_step`: u lies below the elastic contact's."""
         (low, high), gradient = self.interval(surface), np.asarray(surface.rms_gradient)
         low, end = np.maximum(low, LOWEST), surface.h_max if self.ends_at_h_max else np.inf
-        known, _ = rows(force / gradient, self.hardness / gradient, end)
+        known, _ = rows(force / gradient, self._eta(surface), end)
         log_odds = logit(force / self.hardness)
         some = log_odds[np.abs(log_odds) < MOST_ODDS]
         if not surface.shape and not self.hardness.ndim and some.size >= MANY:
             with contextlib.suppress(OutOfRangeError):  # of all forces it says which
-                u = self._along_spline(surface, log_odds, some, (low, high * (1 - law.MIN_DEPTH), end))
-                return known, rows(u, low, high)[0]
+                u = self._along_spline(surface, log_odds, some, (low, high * (1 - MIN_DEPTH), end))
+                return known, rows(u, low, high, *3 * [np.nan])[0]
         above = self.elastic.mean_separation_at(surface, "force", force)
         with np.errstate(all="ignore"):
             x = force / self.hardness
@@ -249,11 +262,11 @@ class Yielding(Theory):
             density = np.exp(-d * d / 2) / np.sqrt(2 * np.pi)
             gap = np.maximum(d * ndtr(d) + density, LOWEST)
             # powers of u near the elastic contact's and the bearing curve's, joined as forces are
-            n = numbers[0] + numbers[1] * self.hardness / gradient + numbers[2] * x
+            n = numbers[0] + numbers[1] * self._eta(surface) + numbers[2] * x
             n = n * np.clip(gap * density / (x * (1 - x)), 1.0, 40.0)
             ratio = gap * surface.h_rms / above
             u = above * np.minimum(ratio, 1) * (1 + np.minimum(ratio, 1 / ratio) ** n) ** (-1 / n)
-        return known, rows(np.clip(u, low, above * (1 - law.MIN_DEPTH)), low, above)[0]
+        return known, rows(np.clip(u, low, above * (1 - MIN_DEPTH)), low, above, *3 * [np.nan])[0]
 
     def _along_spline(self, surface: AnySurface, log_odds: FloatArray, some: FloatArray, ends: Any) -> FloatArray:
         """Separations at ln F/(p_m A0 - F) on one surface, about, by a spline through contacts over `some` of them."""
@@ -270,7 +283,7 @@ class Yielding(Theory):
         y = np.concatenate([y[0] + more[::-1], y, y[-1] - more])
         y = y[(low < to_u(y)) & (to_u(y) < high)]
         g, elastic = np.asarray(surface.rms_gradient), self.elastic.answer(surface, to_u(y))
-        bearing, eta = self.elastic.bearing_share(surface, to_u(y)), self.hardness / g
+        bearing, eta = self.elastic.bearing_share(surface, to_u(y)), self._eta(surface)
         load, _ = law.force(elastic.force / g, elastic.stiffness / g, *bearing, eta)
         met = logit(np.clip(load / eta, LOWEST, 1 - np.finfo(float).epsneg))
         rising = np.append(True, np.diff(np.maximum.accumulate(met)) > 0)
@@ -293,19 +306,19 @@ class Yielding(Theory):
         Those of the calibrated law are measured; others are what the elastic theory's become, and the hardness law's
         own beside it. NaN where the elastic theory's is not known.
         """
-        eta, table, name = self.hardness / np.asarray(surface.rms_gradient), shipped(), self.scatter_name(surface)
+        eta, table, name = self._eta(surface), shipped(), self.scatter_name(surface)
         force, contact = self.elastic.scatter(surface, area)
         found = table.standard_deviation(name, "force", eta, area, force)
         return found, table.standard_deviation(name, "area", eta, area, contact)
 
     def stiffness_scatter(self, surface: AnySurface, area: FloatArray) -> FloatArray:
         """Standard deviation of ln of the frozen contact's stiffness at given F; NaN where it was not measured."""
-        eta, elastic = self.hardness / np.asarray(surface.rms_gradient), self.elastic.stiffness_scatter(surface, area)
+        eta, elastic = self._eta(surface), self.elastic.stiffness_scatter(surface, area)
         return shipped().standard_deviation(self.scatter_name(surface), "stiffness", eta, area, elastic)
 
     def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """The elastic theory's reasons, and hardnesses below those that were simulated."""
-        soft = self.hardness / np.asarray(surface.rms_gradient) < TESTED_ETA * (1 - 1e-9)
+        soft = self._eta(surface) < TESTED_ETA * (1 - 1e-9)
         return {
             **self.elastic.concerns(surface, answer, mean_separation),
             f"the hardness over E* times the rms gradient is below {TESTED_ETA:g}": np.broadcast_to(

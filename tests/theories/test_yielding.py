@@ -249,6 +249,27 @@ def test_reasons_and_what_elastic_answers_say():
     assert limit.psi == pytest.approx(1.1)
 
 
+@pytest.mark.parametrize("theory", ["calibrated", "persson"])
+@pytest.mark.parametrize("cap", [1e-320, 1e-300, 1e-100, 1e100, 1e200, 1e308])
+def test_hardnesses_of_any_size(theory, cap):
+    # of next to none the bearing curve, of a huge one the elastic contact
+    if cap < 1:
+        asked, expected = [{"pressure": 0.1 * cap}, {"mean_separation": 1.5}, {"area": 0.1}], None
+    else:
+        elastic = contact(SURFACE, mean_separation=1.5, theory=theory)
+        asked = [{"pressure": elastic.force}, {"mean_separation": 1.5}, {"area": elastic.area}]
+        expected = elastic
+    for one in asked:
+        found = contact(SURFACE, **one, theory=theory, hardness=cap)
+        if expected is None:
+            assert found.area == pytest.approx(found.force / cap, rel=1e-2 if cap < 1e-310 else 1e-12)
+            assert found.yielded == pytest.approx(1, rel=1e-2 if cap < 1e-310 else 1e-12)
+        else:
+            for name in ("mean_separation", "force", "area", "stiffness", "incremental_stiffness"):
+                assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-11), name
+            assert found.yielded == 0
+
+
 @each
 def test_derivatives_by_the_modulus_hold_the_hardness(theory):
     def at(modulus, **more):

@@ -1,4 +1,4 @@
-"""The compiled pass: its rule, its islands against `islands.geometry`, its independence of order and batch."""
+"""Totals in the core: their rules, its islands against `islands.geometry`, its independence of order and batch."""
 
 import math
 
@@ -8,21 +8,20 @@ from catalogue import LEVEL, OWN
 from numpy.polynomial import legendre
 
 from mbma_tables import ConvergenceError, Surface, contact
-from mbma_tables.islands.geometry import geometry
+from mbma_tables.core import INVALID, OK, UNRESOLVED, core
+from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.models.tables import universal_model
-from mbma_tables.models.universal_kernel import UNRESOLVED
 from mbma_tables.surfaces.readings import PRINTED, REPORTED
-from mbma_tables.totals import intervals
-from mbma_tables.totals import kernel as lookup
+from mbma_tables.totals import island_sum
 from mbma_tables.totals.island_sum import kinks
 
 
-@pytest.mark.parametrize(("straight", "width", "points"), [(False, 1.0, 31), (True, 3.0, 31), (True, 1.0, 21)])
-def test_the_rules_by_their_degrees(straight, width, points):
+@pytest.mark.parametrize("points", [21, 31])
+def test_the_rules_by_their_degrees(points):
     """2 n + 1 Kronrod points are exact up to degree 3 n + 1, n Gauss points up to 2 n - 1, and not beyond."""
-    nodes, kronrod, gauss = intervals.rule_for(intervals.Interval(0.0, width, straight, straight))
-    n, nodes = points // 2, nodes[:points]
-    assert kronrod.size == points
+    nodes, kronrod, gauss = np.empty((3, points))
+    assert core.kronrod(points, nodes, kronrod, gauss) == OK
+    n = points // 2
     np.testing.assert_allclose(nodes[1::2], legendre.leggauss(n)[0], rtol=0, atol=2e-16)
     np.testing.assert_allclose(gauss[1::2], legendre.leggauss(n)[1], rtol=1e-14)
     assert (gauss[::2] == 0).all()
@@ -40,55 +39,85 @@ def test_islands_are_those_of_geometry(reading):
     hurst = rng.uniform(0.1, 1, 3000)
     hurst[::10] = 1
     hurst[1::10] = 1 - 10 ** rng.uniform(-15, -3, 300)
-    zeta_1 = 10 ** rng.uniform(math.log10(3.01), 8, 3000)
+    zeta_1 = np.maximum(10 ** rng.uniform(math.log10(3.01), 8, 3000), 1.001 * reading.floor_u)
     x = 10 ** rng.uniform(-12, 1, 3000)
     g = geometry(x, hurst, zeta_1, reading)
-    at_d, at_u = kinks(hurst, zeta_1, reading)
-    nodes = np.array(
-        [
-            lookup.island_node(
-                x[k],
-                x[k] > at_d[k],
-                x[k] > at_u[k],
-                lookup.surface_constants(hurst[k], zeta_1[k], reading.numbers, True),
-            )
-            for k in range(x.size)
-        ]
-    ).T[:7]
-    force = g["sigma"] * np.sqrt(2 * g["R_d"] * g["sigma"])
-    area = 2 * math.pi * g["eta"] * g["D"] * g["R_u"] * g["R_d"] * g["sigma"] ** 2
-    expected = np.stack([g["X"], g["mu"], force, area, g["h_d"], g["D_d"], g["sigma_d"]])
+    nodes = np.empty((3000, len(FIELDS)))
+    for given in zip(x, hurst, zeta_1, nodes, strict=True):
+        assert core.island_geometry(*given[:3], reading.numbers, given[3]) == OK
+    expected = np.stack([g[name] for name in FIELDS], axis=-1)
     np.testing.assert_allclose(nodes, expected, rtol=1e-11)
-    assert np.median(np.abs(nodes[:4] / expected[:4] - 1)) < 1e-14
+    assert np.median(np.abs(nodes / np.where(expected == 0, 1.0, expected) - (expected != 0))) < 1e-14
 
 
-def totals(compression, rtol=1e-9, jacobian=5 / 9):
-    """Status, force, area and error of `intervals.total` of one surface."""
-    surface = lookup.surface_constants(0.8, 216.0, REPORTED.numbers, True)._replace(jacobian=jacobian)
-    gap, out = intervals.Gap(compression, 3.0), np.empty((2, 1))
-    status, error, _ = intervals.total(gap, rtol, surface, None, universal_model().kernel, out)
-    return status, *out[:, 0], error
+def test_islands_that_are_none():
+    out = np.empty(len(FIELDS))
+    for bad in [(math.nan, 0.8, 9.0), (1.0, math.nan, 9.0), (1.0, 0.8, math.inf), (0.0, 0.8, 9.0), (1.0, 1.5, 9.0)]:
+        assert core.island_geometry(*bad, REPORTED.numbers, out) == INVALID
+        assert np.isnan(out).all()
+
+
+def totals(hurst, zeta_1, compression, peak, rtol=1e-9, slopes=0):
+    """Totals, error and status straight from the core."""
+    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, float)) for x in (hurst, zeta_1, compression, peak)))
+    given, count = [np.ascontiguousarray(array) for array in arrays], arrays[0].size
+    out, error, status = np.empty((count, 2, 5 if slopes else 1)), np.empty(count), np.empty(count, np.uint8)
+    own = REPORTED.numbers, *universal_model().cells, slopes
+    bad = core.totals(*given, rtol, *own, out, error, status, np.empty(1, np.int64))
+    assert bad == (status != OK).sum()
+    return out, error, status
+
+
+@pytest.mark.parametrize("slopes", [0, 1])
+def test_no_number_crashes_and_none_that_is_wrong_is_answered(slopes):
+    awful = np.array([math.nan, math.inf, -math.inf, 5e-324, -5e-324, 1e300, -1.0, 0.0, 1.0, 1e-160])
+    good = (0.8, 216.0, 2.0, 3.0)
+    for place in range(4):
+        given = list(good)
+        given[place] = awful
+        out, error, status = totals(*given, slopes=slopes)
+        answered = status == OK
+        assert np.isfinite(out[answered]).all()
+        assert np.isnan(out[~answered]).all()
+        assert np.isnan(error[~answered]).all()
+        assert not answered[:3].any()
+        # 1e300 times h_rms is deeper than any table
+        assert (out[answered] >= 0)[:, :, 0].all()
 
 
 def test_what_cannot_be_resolved_is_said(monkeypatch):
     """A tolerance below rounding ends in a status, never in a number that looks right."""
-    assert totals(4.0, rtol=1e-9)[0] == lookup.OK
-    status, _, _, error = totals(4.0, rtol=1e-30)
-    assert status == UNRESOLVED
-    assert math.isnan(error)
+    assert totals(0.8, 216.0, 4.0, 3.0)[2][0] == OK
+    out, error, status = totals(0.8, 216.0, 4.0, 3.0, rtol=1e-30)
+    assert status[0] == UNRESOLVED
+    assert np.isnan([*error, *out.ravel()]).all()
     surface = Surface(np.linspace(0.2, 0.9, 20)[:, None], 0.2, 40.0, 1.0, 3.0)
 
-    def unresolved(*given):
-        *_, status, out, bound = given
-        status[:] = lookup.OK
-        status[3] = UNRESOLVED
-        out[:] = bound[:] = 1.0
-        return 31
+    class Unresolved:
+        def totals(self, *given):
+            *_, out, bound, status, _ = given
+            status[:], out[:], bound[:] = OK, 1.0, 1.0
+            status[3] = UNRESOLVED
 
-    monkeypatch.setattr(intervals, "fill_totals", unresolved)
+    monkeypatch.setattr(island_sum, "core", Unresolved())
     with pytest.raises(ConvergenceError, match="quadrature did not reach its tolerance") as caught:
         contact(surface, [0.0, 1.0], outside="nan")
     assert np.argwhere(caught.value.mask).tolist() == [[1, 1]]
+
+
+@pytest.mark.parametrize("slopes", [0, 1])
+def test_bits_depend_neither_on_the_batch_nor_on_the_generation(slopes, generations):
+    rng = np.random.default_rng(8)
+    given = rng.uniform(0.2, 1, 300), 10 ** rng.uniform(0.7, 4, 300), rng.uniform(0, 6, 300), rng.uniform(3, 5, 300)
+    whole = totals(*given, slopes=slopes)[0]
+    for k in range(0, 300, 37):
+        assert totals(*(x[k] for x in given), slopes=slopes)[0].tobytes() == whole[k].tobytes()
+    X, mu = rng.uniform(-6, 40, 500), 10 ** rng.uniform(-10, 6, 500)
+    phi = []
+    for one in generations:
+        phi.append(np.empty((500, 7)))
+        one.phi(X, mu, *universal_model().cells, 1, phi[-1], None)
+        assert phi[-1].tobytes() == phi[0].tobytes()
 
 
 @pytest.mark.parametrize("reading", [REPORTED, OWN], ids=lambda reading: reading.name)

@@ -18,8 +18,7 @@ from mbma_tables.models.island4d import RAW
 from mbma_tables.models.tables import open_table, universal_model
 from mbma_tables.surfaces.readings import READINGS, REPORTED
 from mbma_tables.surfaces.spectrum import band_moment
-from mbma_tables.theories.law_kernel import CENTRE, RATE
-from mbma_tables.totals.intervals import NARROW
+from mbma_tables.theories.law_block import CENTRE, RATE
 from mbma_tables.totals.island_sum import kinks
 
 EVERY = [*READINGS.values(), OWN, LEVEL]
@@ -38,6 +37,8 @@ TOTAL_KINKS = {"zeta_d": {"force", "area"}, "zeta_u": set()}
 # slope at 0 from values at 0, 1, 2 ... steps on one side
 OFFSETS = np.arange(6.0)
 WEIGHTS = difference_weights(OFFSETS)
+
+NARROW = 2.5  # in h_rms: above the floor of zeta_d, intervals up to it take the smaller rule (totals.c)
 
 
 def surfaces(rng, count):

@@ -1,0 +1,378 @@
+/* Contact whose pressure cannot exceed a hardness, from the elastic contact of the same surface.
+ *
+ * Lengths are in h_rms, forces in A0 E* g with g the rms gradient, hardnesses as eta = p_m/(E* g). The law is in
+ * mbma_tables/hardness.py: force is closed between the elastic force and the bearing curve, area is that of pressures
+ * that diffuse between walls at zero and at the hardness.
+ *
+ * SPDX-License-Identifier: BSD-3-Clause. Copyright (c) 2026, mbma_tables contributors.
+ */
+#include "elementary.h"
+#include "mbma.h"
+
+#define SQRT1_2 0.70710678118654752440
+#define SQRT_1_2PI 0.39894228040143267794
+#define LOG_SQRT_2PI 0.91893853320467274178
+#define TWO_OVER_SQRT_PI 1.12837916709551257390
+
+#define STRAIGHT_GAP 8.3 /* mean gap from which the level is the gap itself, */
+#define NEAR_GAP 3.0     /* from which it is nearly, */
+#define DEEP_GAP 3.8e-4  /* below which Mills' ratio is needed, */
+#define LEAST_GAP 1e-300 /* and below which all heights lie above it */
+
+static size_t count_missing(size_t n, const double *x) {
+    size_t missing = 0;
+    for (size_t k = 0; k < n; k++)
+        missing += x[k] != x[k];
+    return missing;
+}
+
+/* A plane at level d over Gaussian heights: their density there, and their shares below and above. */
+typedef struct {
+    double d, density, below, above;
+} plane;
+
+/* Mills' ratio R(x) = Phi(-x)/phi(x) of x >= 2.9, and 1 - x R(x), by the continued fraction without divisions. */
+static void mills(double x, double *ratio, double *rest) {
+    double p = 0.0, q = 1.0;
+    /* rounding is reached by so many terms */
+    for (int k = (int)(6.0 + 540.0 / (x * x)); k > 0; k--) {
+        const double before = p;
+        p = k * q;
+        q = mbma_fma(x, q, before);
+    }
+    *ratio = q / mbma_fma(x, q, p);
+    *rest = *ratio * (p / q);
+}
+
+/* The plane whose mean gap d Phi(d) + phi(d) is u, where both terms nearly cancel: the gap is phi (1 - x R), x = -d. */
+static plane deep_plane(double u) {
+    /* a fit in ln z, z the level of that density, leaves 1e-3 */
+    const double log_u = log(u), z = sqrt(-2.0 * (log_u + LOG_SQRT_2PI)), t = log(z);
+    double x = z + mbma_fma(mbma_fma(mbma_fma(mbma_fma(0.01149149, t, -0.1315785), t, 0.508909), t, -0.5419618), t,
+                            -0.6321294);
+    double ratio = 0.0, rest = 1.0, move = 1.0;
+    for (int step = 0; step < 4 && fabs(move) > 1e-7; step++) {
+        mills(x, &ratio, &rest);
+        /* derivatives of ln u by -x: rate, q - rate^2, -d q - 3 q rate + 2 rate^3 */
+        const double rate = ratio / rest, q = 1.0 / rest, bend = q - rate * rate;
+        const double turn = x * q - 3.0 * q * rate + 2.0 * rate * rate * rate;
+        const double first = (log_u - (log(rest) - 0.5 * x * x - LOG_SQRT_2PI)) / rate, a = bend / (2.0 * rate);
+        move = first * (1.0 - first * (a - first * (2.0 * a * a - turn / (6.0 * rate))));
+        x -= move;
+    }
+    /* R' = -(1 - x R) */
+    const double moved = mbma_fma(rest, move, ratio);
+    rest += (ratio - (x + move) * rest) * move;
+    const double density = u / rest, below = density * moved;
+    const plane found = {-x, density, below, 1.0 - below};
+    return found;
+}
+
+/* The plane whose mean gap is u: a fit to 3e-4, then one step of fourth order, which leaves rounding. */
+static plane plane_at(double u) {
+    if (u != u) {
+        const plane none = {NAN, NAN, NAN, NAN};
+        return none;
+    }
+    if (u <= LEAST_GAP) {
+        const plane closed = {-INFINITY, 0.0, 0.0, 1.0};
+        return closed;
+    }
+    if (u < DEEP_GAP)
+        return deep_plane(u);
+    double d = u;
+    if (u < NEAR_GAP) {
+        const double v = sqrt(sqrt(u));
+        d = 9.929421;
+        d = mbma_fma(d, v, -75.30938);
+        d = mbma_fma(d, v, 245.7741);
+        d = mbma_fma(d, v, -452.8998);
+        d = mbma_fma(d, v, 521.9537);
+        d = mbma_fma(d, v, -393.3206);
+        d = mbma_fma(d, v, 198.2552);
+        d = mbma_fma(d, v, -67.49275);
+        d = mbma_fma(d, v, 18.72423);
+        d = mbma_fma(d, v, -4.71472);
+    }
+    const double density = exp(-0.5 * d * d) * SQRT_1_2PI, tail = 0.5 * erfc(fabs(d) * SQRT1_2);
+    if (u >= STRAIGHT_GAP) {
+        const plane straight = {d, density, 1.0 - tail, tail};
+        return straight;
+    }
+    const double below = d > 0.0 ? 1.0 - tail : tail;
+    /* what is missing of u; of positive d the large part goes first */
+    const double missing = d > 0.0 ? (u - d) + (d * tail - density) : (u - density) - d * tail;
+    const double r = missing / below, square = mbma_fma(d, d, -1.0);
+    const double a = density / (2.0 * below), b = -a * d / 3.0, c = a * square / 12.0;
+    const double third = 2.0 * a * a - b, fourth = 5.0 * a * (b - a * a) - c;
+    const double move = r * mbma_fma(r, mbma_fma(r, mbma_fma(r, fourth, third), -a), 1.0);
+    /* share and density there by their own series */
+    const double turn = mbma_fma(move, d * (2.0 - square) / 24.0, square / 6.0);
+    const double rise = density * move * mbma_fma(move, mbma_fma(move, turn, -0.5 * d), 1.0);
+    const double w = move * mbma_fma(0.5, move, d);
+    const double shrink = mbma_fma(w, mbma_fma(w, mbma_fma(w, 1.0 / 24.0, -1.0 / 6.0), 0.5), -1.0);
+    const double kept = d > 0.0 ? tail - rise : tail + rise;
+    const double rest = 1.0 - kept, shrunk = density * mbma_fma(w, shrink, 1.0);
+    const plane found = {d + move, shrunk, d > 0.0 ? rest : kept, d > 0.0 ? kept : rest};
+    return found;
+}
+
+size_t mbma_gaussian_level(size_t n, const double *u, double *level) {
+    for (size_t k = 0; k < n; k++)
+        level[k] = plane_at(u[k]).d;
+    return count_missing(n, level);
+}
+
+size_t mbma_bearing_share(size_t n, const double *u, const double *h_max, double *share, double *slope) {
+    double last = NAN;
+    plane end = plane_at(NAN);
+    size_t missed = 0;
+    for (size_t k = 0; k < n; k++) {
+        if (h_max[k] != last) {
+            last = h_max[k];
+            end = plane_at(last);
+        }
+        share[k] = slope[k] = 0.0;
+        if (u[k] != u[k] || !(last > LEAST_GAP)) {
+            share[k] = slope[k] = NAN;
+            missed++;
+        } else if (u[k] < last) {
+            const plane at = plane_at(u[k]);
+            const double between = end.d > 0.0 ? at.above - end.above : end.below - at.below;
+            share[k] = mbma_max(between, 0.0) / end.below;
+            slope[k] = at.below > 0.0 ? -at.density / at.below / end.below : -INFINITY;
+        }
+    }
+    return missed;
+}
+
+enum { TERMS = 9 };     /* of the series where images converge slower */
+#define IMAGES 0.06     /* tau below which they converge faster */
+#define SHARPEST 1e-200 /* least tau */
+#define NOTHING 1e-20   /* a term that is less than rounding */
+#define NARROW 0.05     /* half-width over which a difference of complementary error functions is integrated */
+
+/* erfc(centre - half) - erfc(centre + half), to relative accuracy where half is small. */
+static double difference(double centre, double half) {
+    static const double NODE[4] = {0.1834346424956498, 0.525532409916329, 0.7966664774136267, 0.9602898564975363};
+    static const double WEIGHT[4] = {0.362683783378362, 0.31370664587788727, 0.22238103445337448, 0.10122853629037626};
+    if (half >= NARROW / mbma_max(centre, 1.0))
+        return erfc(centre - half) - erfc(centre + half);
+    double total = 0.0;
+    for (int k = 0; k < 4; k++) {
+        const double low = centre - half * NODE[k], high = centre + half * NODE[k];
+        total += WEIGHT[k] * (exp(-low * low) + exp(-high * high));
+    }
+    return total * half * TWO_OVER_SQRT_PI;
+}
+
+/* Share of a diffusion from x, between walls at 0 and 1, after a variance of 2 tau, that has not ended at 0 or that has
+ * ended at 1; `reach` is x over the root of 4 tau, which need not be a normal number. */
+static double ended(double x, double tau, double reach, bool at_one) {
+    if (tau >= IMAGES) {
+        const double first = exp(-MBMA_PI * MBMA_PI * tau), twice = 2.0 * cos(MBMA_PI * x);
+        double before = 0.0, sine = sin(MBMA_PI * x), factor = first, odd = first, total = 0.0, turn = 1.0;
+        for (int n = 1; n <= TERMS && factor >= NOTHING; n++) {
+            turn = at_one ? -turn : turn;
+            total += turn * sine * factor / n;
+            const double following = twice * sine - before;
+            before = sine;
+            sine = following;
+            /* first^(n^2) by the odd powers between the squares */
+            odd *= first * first;
+            factor *= odd;
+        }
+        return x + total * (2.0 / MBMA_PI);
+    }
+    const double width = 2.0 * sqrt(mbma_max(tau, SHARPEST));
+    return at_one ? difference(1.0 / width, reach) + difference(3.0 / width, reach)
+                  : erf(reach) + difference(2.0 / width, reach);
+}
+
+size_t mbma_diffused(size_t n, const double *x, const double *tau, int at_one, double *out) {
+    size_t missed = 0;
+    for (size_t k = 0; k < n; k++) {
+        const bool good = x[k] >= 0.0 && x[k] <= 1.0 && tau[k] >= 0.0;
+        const double reach = 0.5 * x[k] / sqrt(mbma_max(tau[k], SHARPEST));
+        out[k] = good ? ended(x[k], tau[k], reach, at_one != 0) : NAN;
+        missed += !good;
+    }
+    return missed;
+}
+
+size_t mbma_capped_area(size_t n, const double *load, const double *spread, const double *eta, double power,
+                        double scale, int yielded, double *out) {
+    size_t missed = 0;
+    for (size_t k = 0; k < n; k++) {
+        const double x = mbma_min(load[k] / eta[k], 1.0);
+        out[k] = NAN;
+        if (!(load[k] >= 0.0 && spread[k] >= 0.0 && eta[k] > 0.0 && load[k] < INFINITY)) {
+            missed++;
+        } else if (!(x > 0.0)) {
+            /* nothing touches, or nothing yields */
+            out[k] = yielded || load[k] == 0.0 ? 0.0 : erf(spread[k]);
+        } else {
+            /* tau = S/(8 eta^2) of the elastic contact, whose closing leaves no variance, and of the hardness alone */
+            const double half = 0.5 * x / spread[k], elastic = half * half, limit = 0.125 / (scale * sqrt(eta[k]));
+            /* the smaller over the larger cannot overflow */
+            const double ratio = mbma_max(mbma_min(elastic, limit) / mbma_max(elastic, limit), LEAST_GAP);
+            const double joint = mbma_log1p(mbma_exp(power * mbma_log(ratio))) / power;
+            const double near = spread[k] < INFINITY ? spread[k] : 0.5 * x / sqrt(SHARPEST);
+            const double reach = (elastic < limit ? near : 0.5 * x / sqrt(limit)) * mbma_exp(0.5 * joint);
+            const double share = ended(x, mbma_min(elastic, limit) * mbma_exp(-joint), reach, yielded != 0);
+            /* rounding may cross the bounds */
+            out[k] = yielded ? mbma_held(share, 0.0, x) : mbma_held(share, x, 1.0);
+        }
+    }
+    return missed;
+}
+
+#define MOST_ETA 1e100 /* what is larger leaves the same force */
+#define MOST_RATIO 1e300
+
+size_t mbma_capped_force(size_t n, const double *elastic, const double *stiffness, const double *share,
+                         const double *slope, const double *eta, double light, double by_eta, double by_share,
+                         double *__restrict force, double *__restrict steepness) {
+    for (size_t k = 0; k < n; k++) {
+        const double own = elastic[k], Q = share[k], steep = stiffness[k], cap = eta[k], level = slope[k];
+        /* NaN where an argument is; where nothing yields the level has no part */
+        const double product = cap * Q, bound = cap > 0.0 ? product : NAN, full = cap == INFINITY ? cap : bound;
+        const double unknown = own == own ? full : NAN, small = mbma_min(own, full), large = mbma_max(own, full);
+        const double exponent = light + by_eta * mbma_min(cap, MOST_ETA) + by_share * Q;
+        /* a force without bound has no weight, and what does not touch no force */
+        const double quotient = large / small, ratio = small > 0.0 ? quotient : 1.0;
+        const double gain = mbma_log(mbma_min(ratio, MOST_RATIO)), weight_over = mbma_exp(-exponent * gain);
+        const double power = large < INFINITY ? weight_over : 0.0, weight = power / (1.0 + power);
+        /* ln F lies so much below that of the smaller; derivatives by the exponent, by the elastic force, and by Q */
+        const double lower = mbma_log1p(power) / exponent, by_exponent = (lower + weight * gain) / exponent;
+        const double by_elastic = own <= full ? 1.0 - weight : weight;
+        const double by_level = (1.0 - by_elastic) / Q + by_share * by_exponent, rising = by_level * level;
+        const double falling = by_elastic * steep / own, falls = own < INFINITY ? falling : 0.0;
+        const double rate = falls - (by_level > 0.0 ? rising : 0.0), met = small * mbma_exp(-lower);
+        const double value = small > 0.0 ? met : 0.0, slopes = small > 0.0 ? value * rate : 0.0;
+        force[k] = unknown == unknown ? value : NAN;
+        steepness[k] = unknown == unknown ? slopes : NAN;
+    }
+    return count_missing(n, force);
+}
+
+/* ---- the gap at a force or an area ---- */
+
+#define SETTLED 1e-7          /* of a logarithm, before the last step, whose miss would be about its square */
+#define SETTLED_BOTH 1e-14    /* of its product with the step before, where slopes are not known */
+#define FARTHEST 40.0         /* step of y */
+#define DISTINCT 8.881784e-16 /* relative, of gaps that rounding leaves distinct */
+
+/* A place of the curve: ln of its value, y = ln u - ln(end - u), in which it is straight at either end of contact, and
+ * the derivative of y by that logarithm. */
+typedef struct {
+    double value, y, rate;
+} place;
+
+static place place_of(double u, double value, double steep, double end) {
+    const double rest = 1.0 - u / end;
+    const place found = {log(value), log(u / rest), -value / (steep * u * rest)};
+    return found;
+}
+
+static double gap_of(double y, double end) {
+    const double ratio = exp(y);
+    return ratio / (1.0 + ratio / end);
+}
+
+/* The step of y from a place to a value by the cubic through it and another, slopes scaled to the straight line through
+ * both unless they are exact. */
+static double step_to(double value, place from, place other, bool exact) {
+    const double way = value - from.value, apart = from.value - other.value, mean = (from.y - other.y) / apart;
+    const double scale = exact ? 1.0 : 2.0 * mean / (from.rate + other.rate), rate = scale * from.rate;
+    const double second = (rate - mean) / apart, third = (second - (mean - scale * other.rate) / apart) / apart;
+    const double straight = rate * way, curved = way * way * mbma_fma(third, way + apart, second);
+    if (fabs(curved) <= 0.5 * fabs(straight))
+        return straight + curved;
+    return mean < 0.0 ? mean * way : from.rate * way;
+}
+
+static double middle(double low, double high) {
+    if (high == INFINITY)
+        return 2.0 * low;
+    return high > 2.0 * low && low > 0.0 ? sqrt(low) * sqrt(high) : 0.5 * (low + high);
+}
+
+size_t mbma_gap_start(size_t n, size_t m, size_t columns, const double *u, const double *value, const double *steep,
+                      int exact, const double *wanted, const double *end, double *state) {
+    size_t missed = 0;
+    for (size_t k = 0; k < n; k++) {
+        double *const gap = state + k, *const low = gap + n, *const high = low + n, *const kept = high + n;
+        const size_t column = columns == n ? k : 0;
+        /* the branch of first contact: the first place, coming from there, at which enough is reached */
+        size_t i = 0;
+        while (i < m && !(value[i * columns + column] >= wanted[k]))
+            i++;
+        place known[2] = {{NAN, NAN, NAN}, {NAN, NAN, NAN}}; /* beyond it and before it */
+        for (size_t side = 0; side < 2; side++) {
+            if (i + 1 - side > m || i < side)
+                continue;
+            const size_t at = (i - side) * columns + column;
+            *(side ? high : low) = u[at];
+            if (value[at] > 0.0 && value[at] < INFINITY)
+                known[side] = place_of(u[at], value[at], steep[at], end[k]);
+        }
+        const double goal = log(wanted[k]);
+        const bool both = known[0].y == known[0].y && known[1].y == known[1].y;
+        const bool first = known[0].y == known[0].y && !(both && goal - known[1].value < known[0].value - goal);
+        const place from = known[first ? 0 : 1];
+        const place other = known[first ? 1 : 0];
+        double step = both ? step_to(goal, from, other, exact != 0) : from.rate * (goal - from.value);
+        if (both && !((from.y + step - other.y) * step <= 0.0))
+            step = (from.y - other.y) / (from.value - other.value) * (goal - from.value);
+        *gap = gap_of(from.y + mbma_held(step, -FARTHEST, FARTHEST), end[k]);
+        if (!(*gap > *low && *gap < *high))
+            *gap = middle(*low, *high);
+        kept[0] = from.value;
+        kept[n] = from.y;
+        kept[2 * n] = from.rate;
+        missed += *gap != *gap;
+    }
+    return missed;
+}
+
+size_t mbma_gap_step(size_t n, const double *value, const double *steep, int exact, const int64_t *places, size_t total,
+                     const double *wanted, const double *end, double *state, uint8_t *left) {
+    size_t missed = 0;
+    for (size_t k = 0; k < n; k++) {
+        left[k] = 0;
+        if (!(places[k] >= 0 && (uint64_t)places[k] < total)) {
+            missed++;
+            continue;
+        }
+        const size_t own = (size_t)places[k];
+        double *const gap = state + own, *const low = gap + total, *const high = low + total;
+        double *const kept = high + total;
+        const double u = *gap, miss = log(value[k] / wanted[own]);
+        const place at = place_of(u, value[k], steep[k], end[own]);
+        if (miss != miss || !(u > 0.0)) {
+            *gap = NAN;
+            missed++;
+            continue;
+        }
+        *(miss > 0.0 ? low : high) = u;
+        const place before = {kept[0], kept[total], kept[2 * total]};
+        const bool known = before.y == before.y && before.value != at.value && fabs(at.value) < INFINITY;
+        /* the miss itself has more digits than the difference of logarithms */
+        const place here = {0.0, at.y, at.rate}, other = {before.value - at.value, before.y, before.rate};
+        const double step = known ? step_to(-miss, here, other, exact != 0) : -miss * at.rate;
+        double following = u * exp(mbma_held(step, -FARTHEST, FARTHEST));
+        following /= 1.0 + (following - u) / end[own];
+        const bool near = fabs(miss) <= SETTLED && (exact || fabs(miss * (before.value - at.value)) <= SETTLED_BOTH);
+        if (near)
+            following = mbma_held(following, *low, *high);
+        else if (!(following > *low && following < *high))
+            following = middle(*low, *high);
+        left[k] = !(near || *high - *low <= DISTINCT * *high || following == u);
+        *gap = following;
+        kept[0] = at.value;
+        kept[total] = at.y;
+        kept[2 * total] = at.rate;
+    }
+    return missed;
+}
