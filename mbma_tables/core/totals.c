@@ -259,7 +259,8 @@ MBMA_INLINE int total(bool slopes, const gap *g, double rtol, const mbma_cells *
             *bound = mbma_max(mbma_max(force_error / force, area_error / area), rtol) + table_error;
             return MBMA_OK;
         }
-        for (int k = 0, present = count; k < present; k++) {
+        const int present = count;
+        for (int k = 0; k < present; k++) {
             interval *const p = &intervals[k];
             const double share = present * p->error;
             if (!(p->sums[0][0] * share > rtol * force || p->sums[1][0] * share > rtol * area))
@@ -271,6 +272,8 @@ MBMA_INLINE int total(bool slopes, const gap *g, double rtol, const mbma_cells *
             intervals[count] = *p;
             p->high = intervals[count++].low = middle;
         }
+        if (count == present) /* of NaN, in rtol for instance */
+            return MBMA_UNRESOLVED;
     }
 }
 
