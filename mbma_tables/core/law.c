@@ -86,7 +86,7 @@ MBMA_INLINE taylor polynomial(const double *c, double t) {
 /* Sum of c[k] t^k/(power + k); even and odd k apart, whose sums do not wait for each other. */
 MBMA_INLINE double integral(const double *c, double t, double power) {
     const double square = t * t;
-    double even = c[MBMA_LAW_DEGREE] * (1.0 / (power + MBMA_LAW_DEGREE)), odd = 0.0;
+    double even = c[MBMA_LAW_DEGREE] * (1.0 / (power + (int)MBMA_LAW_DEGREE)), odd = 0.0;
     for (int k = MBMA_LAW_DEGREE - 1; k > 0; k -= 2) {
         odd = mbma_fma(odd, square, c[k] * (1.0 / (power + k)));
         even = mbma_fma(even, square, c[k - 1] * (1.0 / (power + k - 1)));
