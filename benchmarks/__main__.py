@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 
-os.environ["NUMBA_NUM_THREADS"] = "1"
 os.environ["OMP_NUM_THREADS"] = "1"
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
@@ -20,8 +19,8 @@ import itertools
 import statistics
 import subprocess
 import sys
-import tempfile
 import time
+import timeit
 from collections.abc import Callable
 from typing import Any
 
@@ -31,15 +30,13 @@ from scipy.interpolate import NdBSpline, RegularGridInterpolator, make_interp_sp
 from scipy.special import erf
 
 from benchmarks.exports import exported
-from benchmarks.rows import LINES, held_out, microseconds, report, rounds, times_faster
+from benchmarks.kernels import BEFORE, held_out, measured
+from benchmarks.rows import LINES, microseconds, report, rounds, times_faster
 from benchmarks.scenes import scenes
 from generate.pages import page
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
-from mbma_tables.calibrated import Law, Spectrum, light_factor
+from mbma_tables.calibrated import Law, Spectrum
 from mbma_tables.files import shipped_file
-from mbma_tables.islands.geometry import geometry
-from mbma_tables.models import universal_kernel
-from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.schema import TableContent
 from mbma_tables.tablefiles.splines import at_places
 from mbma_tables.theories import Calibrated
@@ -48,8 +45,6 @@ from mbma_tables.theories.calibrated_table import shipped
 POINTS = 20_000
 HELD_OUT = 500
 MANY, GRID = 100_000, 256
-# the spline of log(Phi/Phi_rigid) over 225 x 262 nodes, the table until its format 2.0, in evaluations of erf
-BEFORE = {"random": 7.33, "path": 5.79, "random slopes": 11.9, "path slopes": 9.78}
 SURFACES = 2_000
 GAPS, MANY_GAPS = 100_000, 1_000_000
 CALLS = 10_000  # of one number: a loop of them, not its first ones
@@ -95,28 +90,7 @@ def tables(rng: np.random.Generator) -> None:
     """The universal table against its past and others' interpolators, the four-number table against scipy's."""
     universal, four = open_table("universal"), open_table("island4d").content
     X, mu = rng.uniform(-6.25, 41.0, MANY), 10 ** rng.uniform(-8, 6, MANY)
-    fields = geometry(np.linspace(1e-3, 4, MANY), np.full(MANY, 0.8), np.full(MANY, 200.0), get_reading("reported"))
-    path = [np.ascontiguousarray(fields[name]) for name in ("X", "mu")]
-    u = rng.uniform(0.01, 3.3, MANY)
-    phi, slopes = np.empty((MANY, 3)), np.empty((MANY, 7))
-    kernel = universal.kernel
-    taken = rounds(
-        {
-            "erf": lambda: erf(u),
-            "random": lambda: universal_kernel.fill(X, mu, kernel, None, phi),
-            "path": lambda: universal_kernel.fill(*path, kernel, None, phi),
-            "random slopes": lambda: universal_kernel.fill(X, mu, kernel, True, slopes),
-            "path slopes": lambda: universal_kernel.fill(*path, kernel, True, slopes),
-        }
-    )
     click.echo("\nUniversal table: Phi_F, Phi_A and the bound on their error at once")
-    for name, most in (("random", 0.35), ("path", 0.25), ("random slopes", None), ("path slopes", None)):
-        report(f"{name}, a lookup", 1e3 * microseconds(taken[name], MANY), "ns")
-        share = 1 / times_faster(taken, "erf", name) / BEFORE[name]
-        report("  of the spline of logarithms before it", share, "x", at_most=most)
-    for name in ("random", "path"):
-        share = times_faster(taken, f"{name} slopes", name)
-        report(f"{name}, slopes against values", share, "x", at_most=2)
     some = slice(HELD_OUT)
     exact = greenwood_tripp.solve(X[some], mu[some], rtol=1e-12)
     found = universal.answer(X[some], mu[some])
@@ -124,7 +98,7 @@ def tables(rng: np.random.Generator) -> None:
     report(f"largest error on {HELD_OUT} fresh points", error, "", at_most=1e-9)
     report("file", shipped_file("universal.nc").stat().st_size / 1e6, "MB", at_most=6)
     given = X[:POINTS], mu[:POINTS]
-    own = {"own": lambda: universal_kernel.fill(*given, kernel, None, phi[:POINTS])}
+    own = {"own": lambda: universal.answer(*given)}
     others = peers(*given)
     beside = rounds(own | others, 3)
     for name in others:
@@ -197,28 +171,6 @@ def totals(rng: np.random.Generator) -> None:
         both = rounds({"contact": lambda: contact(one, 0.4)} | steps)
         for name in steps:
             report(f"one contact is faster than one step of {name}", times_faster(both, name, "contact"), "x")
-    one, fresh = Surface.named("asphalt"), itertools.count(1)
-    some, many = (rng.uniform(-one.h_max, 0.9999 * one.h_max, count) for count in (1000, GAPS))
-
-    def another() -> Surface:
-        # one that nothing is kept of
-        return Surface(one.hurst, one.q0, one.q1, one.h_rms, one.h_max * (1 + 1e-9 * next(fresh)))
-
-    taken = rounds(
-        {
-            "some": lambda: [contact(another(), some) for _ in range(DESIGNS)],
-            "known": lambda: [contact(one, some) for _ in range(DESIGNS)],
-            "many": lambda: contact(another(), many),
-        }
-    )
-    report(
-        f"1000 gaps on each of {DESIGNS} new surfaces, a gap",
-        microseconds(taken["some"], 1000 * DESIGNS),
-        "us",
-        at_most=0.4,
-    )
-    report("1000 gaps on a known surface, a gap", microseconds(taken["known"], 1000 * DESIGNS), "us", at_most=0.4)
-    report(f"{GAPS} of them", microseconds(taken["many"], GAPS), "us", at_most=0.4)
     batch, gaps = held_out(10 * SURFACES, rng)
     walls: dict[int, list[float]] = {1: [], 2: []}
     for workers in (1, 2) * 4:
@@ -290,10 +242,9 @@ def calibrated(rng: np.random.Generator) -> None:
     report("force, area and stiffness of a random separation", 1e3 * spent, "ns", at_most=100)
     report("the same in evaluations of scipy.special.erf", spent / microseconds(taken["erf"], GAPS), "")
     surfaces, gaps = held_out(SURFACES, rng)
-    light = np.asarray(light_factor(surfaces.alpha))
-    columns = np.stack([surfaces.hurst, np.log(surfaces.zeta_1), light, surfaces.h_max])
+    columns = np.stack([surfaces.hurst, np.log(surfaces.zeta_1), surfaces.h_max])
     table, at = shipped(), np.arange(SURFACES)
-    alone = rounds({"fill": lambda: table.fill(columns, at, (gaps + columns[3]) / 2)})
+    alone = rounds({"fill": lambda: table.fill(columns, at, (gaps + columns[2]) / 2)})
     report(
         "the same with a new surface each, table alone", 1e3 * microseconds(alone["fill"], SURFACES), "ns", at_most=100
     )
@@ -305,30 +256,71 @@ def calibrated(rng: np.random.Generator) -> None:
     report("faster than the law's quadrature", microseconds(taken["law"], HELD_OUT) / spent, "x")
 
 
-def fresh_process() -> None:
-    """Import, first lookup and the command, and the command with nothing compiled."""
-    lookup = (
-        "import time; t = time.perf_counter(); import mbma_tables as m; a = time.perf_counter(); "
-        "m.contact(m.Surface(0.8, 1.0, 200.0, 1.0, 3.0), 1.0); b = time.perf_counter(); print(a - t, b - a)"
+def kernels(rng: np.random.Generator) -> None:
+    """Every kernel in terms of its time with numba."""
+    click.echo("\nTimes over those of the last version that used numba, warm")
+    found = measured()
+    shares = {name: found[name] / BEFORE[name] for name in found}
+    for name, share in shares.items():
+        exact = name.startswith("exact")
+        report(name, share, "x", at_most=0.85 if exact else 1.35)
+    report("mean of all", statistics.mean(shares.values()), "x", at_most=1.0)
+
+
+def few_numbers(rng: np.random.Generator) -> None:
+    """Calls of single numbers and of ten."""
+    surface = Surface.named("asphalt")
+    law, ten, yielding = contact_law(surface), np.linspace(0.1, 1.0, 10), {"theory": "calibrated", "hardness": 0.1}
+    u = np.linspace(0.05, 0.9, 100) * surface.h_max
+    law.at_pressure(1e-4)
+    calls: dict[str, tuple[Callable[[], Any], int, float]] = {
+        "law.force(1.0)": (lambda: law.force(1.0), CALLS, 0.1),
+        "law.force(u=1.0)": (lambda: law.force(u=1.0), CALLS, 0.15),
+        "law.force of ten numbers": (lambda: law.force(ten), CALLS, 1.0),
+        "contact at a pressure with a hardness": (lambda: contact(surface, pressure=1e-3, **yielding), 50, 500.0),
+        "the same with derivatives": (
+            lambda: contact(surface, pressure=1e-3, derivatives=True, **yielding),
+            20,
+            5000.0,
+        ),
+        "100 gaps of Persson's theory": (lambda: contact(surface, mean_separation=u, theory="persson"), 3, 2000.0),
+        "Persson's law": (lambda: contact_law(surface, theory="persson"), 3, 50e3),
+        "Persson's law with a hardness": (lambda: contact_law(surface, theory="persson", hardness=0.1), 1, 150e3),
+    }
+    click.echo("\nFew numbers")
+    for name, (call, count, most) in calls.items():
+        call()
+        spent = min(timeit.repeat(call, number=count, repeat=5)) / count
+        report(name, 1e6 * spent, "us", at_most=most)
+
+
+FIRST = {
+    "import mbma_tables": "",
+    "an answer": "m.contact(m.Surface(0.8, 1.0, 200.0, 1.0, 3.0), 1.0)",
+    "100,000 gaps of a law": "m.contact_law(S()).force(np.linspace(-2.9, 2.9, 100_000))",
+    "10,000 surfaces": "m.contact(S(10_000), 1.0)",
+    "10,000 surfaces with derivatives": "m.contact(S(10_000), 1.0, derivatives=True)",
+    "an exact total": "m.contact(S(), 1.0, tier='exact')",
+}
+
+
+def fresh_process(rng: np.random.Generator) -> None:
+    """The first answer of anything in a new process, import included."""
+    begin = (
+        "import time; t = time.perf_counter(); import mbma_tables as m, numpy as np; "
+        "S = lambda n=1: m.Surface(np.linspace(0.5, 0.9, n) if n > 1 else 0.8, 1.0, 200.0, 1.0, 3.0); "
     )
-    command = [sys.executable, "-m", "mbma_tables", "contact", "--surface", "concrete", "-d", "0.4"]
-
-    def run(**environment: str) -> list[float]:
-        found = {**os.environ, **environment}
-        said = subprocess.check_output([sys.executable, "-c", lookup], env=found)
+    click.echo("\nFirst answers in a new process, import included")
+    for name, asked in FIRST.items():
+        code = f"{begin}{asked}; print(time.perf_counter() - t)"
+        taken = [float(subprocess.check_output([sys.executable, "-c", code])) for _ in range(5)]
+        report(name, statistics.median(taken), "s", at_most=0.5)
+    command, taken = [sys.executable, "-m", "mbma_tables", "contact", "--surface", "concrete", "-d", "0.4"], []
+    for _ in range(5):
         start = time.perf_counter()
-        subprocess.check_output(command, env=found)
-        return [*(float(word) for word in said.split()), time.perf_counter() - start]
-
-    run()
-    warm = np.median([run() for _ in range(5)], axis=0)
-    with tempfile.TemporaryDirectory() as folder:
-        cold = run(NUMBA_CACHE_DIR=folder)
-    click.echo("\nA fresh process")
-    report("import mbma_tables", warm[0], "s", at_most=0.5)
-    report("first lookup after the import", warm[1], "s", at_most=0.8)
-    report("mbma contact --surface concrete -d 0.4", warm[2], "s", at_most=0.8)
-    report("the same with nothing compiled", cold[2], "s", at_most=1.5)
+        subprocess.check_output(command)
+        taken.append(time.perf_counter() - start)
+    report("mbma contact --surface concrete -d 0.4", statistics.median(taken), "s", at_most=0.8)
 
 
 @click.command()
@@ -338,9 +330,8 @@ def main(write: bool) -> None:
     rng = np.random.default_rng(SEED)
     load = os.getloadavg()
     click.echo(f"{os.cpu_count()} cores, load average {load[0]:.2f} at the start; numpy {np.__version__}")
-    for section in (tables, totals, laws, calibrated, exported, scenes):
+    for section in (kernels, few_numbers, fresh_process, tables, totals, laws, calibrated, exported, scenes):
         section(rng)
-    fresh_process()
     click.echo(f"\nload average {os.getloadavg()[0]:.2f} at the end")
     if write:
         marks = {None: "", True: "met", False: "missed"}

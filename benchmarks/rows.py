@@ -9,9 +9,6 @@ from collections.abc import Callable
 from typing import Any
 
 import click
-import numpy as np
-
-from mbma_tables import Surface
 
 ROUNDS = 9
 
@@ -43,7 +40,7 @@ def report(name: str, value: float, unit: str, at_least: float | None = None, at
 
 
 def rounds(runs: dict[str, Callable[[], Any]], count: int = ROUNDS) -> dict[str, list[float]]:
-    """Processor seconds of each run in every round; runs take turns, a first round, which compiles, is not counted."""
+    """Processor seconds of each run in every round; runs take turns, a first round is not counted."""
     taken: dict[str, list[float]] = {name: [] for name in runs}
     for number in range(count + 1):
         for name, run in runs.items():
@@ -63,11 +60,3 @@ def times_faster(taken: dict[str, list[float]], slow: str, fast: str) -> float:
 def microseconds(taken: list[float], count: int) -> float:
     """Median time of one of `count`."""
     return 1e6 * statistics.median(taken) / count
-
-
-def held_out(count: int, rng: np.random.Generator) -> tuple[Surface, np.ndarray]:
-    """Random surfaces, and a gap of each between -h_max and 0.9999 h_max."""
-    hurst = rng.uniform(0.3, 1, count)
-    zeta_1 = np.exp(rng.uniform(np.log(3.01), np.log(1e4), count))
-    h_max = rng.uniform(2.5, 4.7, count)
-    return Surface(hurst, 1.0, zeta_1, 1.0, h_max), rng.uniform(-1, 0.9999, count) * h_max

@@ -19,7 +19,7 @@ from scipy.interpolate import PchipInterpolator, make_interp_spline
 from generate.boundary_elements.evidence import Case
 from generate.calibrated_file import write_part
 from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import Constants, Law, Spectrum, light_factor
+from mbma_tables.calibrated import Constants, Law, Spectrum
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.tablefiles.provenance import source_digest, versions
 from mbma_tables.tablefiles.splines import coefficients
@@ -155,8 +155,7 @@ def certificate(path: pathlib.Path) -> dict[str, float]:
                 np.exp(rng.uniform(COVERED["log_separation"][0], np.log(far), points // 2)),
             ]
         )
-        column = np.array([[hurst], [log_zeta], [float(light_factor(spectrum.alpha, table.constants))], [top]])
-        out = table.fill(column, np.zeros(u.size, np.intp), u)
+        out = table.fill(np.array([[hurst], [log_zeta], [top]]), np.zeros(u.size, np.int64), u)
         law = Law(spectrum, top, table.constants)
         force, stiffness = law.force_and_stiffness(u)
         exact = (force, stiffness, law.area(force))

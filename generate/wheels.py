@@ -44,10 +44,11 @@ def parts(data: bytes) -> tuple[str, list[str], list[str], dict[str, str]]:
         offered = [str(symbol.name) for symbol in symbols if symbol.shndx]
         wanted = {str(symbol.name): _version(symbol) for symbol in symbols if not symbol.shndx}
     elif isinstance(module, lief.MachO.Binary):
-        libraries = [library.name for library in module.libraries if library.command.name != "ID_DYLIB"]
+        own = lief.MachO.LoadCommand.TYPE.ID_DYLIB
+        libraries = [library.name for library in module.libraries if library.command != own]
         offered = [str(symbol.name)[1:] for symbol in module.exported_symbols]
-        bound = [(one.symbol, one.library.name if one.has_library else "") for one in module.bindings]
-        wanted = {str(symbol.name)[1:]: library for symbol, library in bound}
+        bound = [(one.symbol, one.library) for one in module.bindings if one.symbol]
+        wanted = {str(symbol.name)[1:]: library.name if library else "" for symbol, library in bound}
     elif isinstance(module, lief.PE.Binary):
         libraries = [str(library.name) for library in module.imports]
         offered = [str(function.name) for function in module.exported_functions]

@@ -5,7 +5,6 @@ import sys
 
 import numpy as np
 import pytest
-from helpers import fresh
 
 from mbma_tables import InputError, MbmaError, Scene, Surface, contact, contact_law, island, open_table, sensitivity
 from mbma_tables.export.law_rows import describe_law
@@ -60,25 +59,6 @@ def test_without_xarray_the_extra_is_named(monkeypatch):
     for ask in (ROAD.to_dataset, Scene(ROAD, separations=[0.5], effects=["force"]).run):
         with pytest.raises(MbmaError, match=r"this needs xarray: pip install 'mbma_tables\[xarray\]'"):
             ask()
-
-
-def test_without_numba_laws_answer_and_name_the_extra():
-    code = (
-        "import sys, json\n"
-        "sys.modules['numba'] = sys.modules['llvmlite'] = None\n"
-        "from mbma_tables import MbmaError, Surface, contact, contact_law\n"
-        "road = Surface.named('concrete')\n"
-        "law = contact_law(road, rtol=1e-4, theory='calibrated')\n"
-        "try:\n"
-        "    law.compiled()\n"
-        "except MbmaError as fault:\n"
-        "    said = str(fault)\n"
-        "print(json.dumps([law.force(u=0.5), float(contact(road, mean_separation=0.5).force), said]))\n"
-    )
-    by_law, by_mbma, said = fresh(code)
-    assert by_law == pytest.approx(float(contact(ROAD, mean_separation=0.5, theory="calibrated").force), rel=1e-4)
-    assert by_mbma == pytest.approx(float(contact(ROAD, mean_separation=0.5).force), rel=1e-8)
-    assert "pip install 'mbma_tables[fast]'" in said
 
 
 def test_a_picture_is_kept(tmp_path):

@@ -5,10 +5,7 @@ import errno
 import os
 import pathlib
 import resource
-import shutil
 import signal
-import subprocess
-import sys
 
 import pytest
 
@@ -16,7 +13,6 @@ import mbma_tables
 from mbma_tables import files
 from mbma_tables.errors import InputError
 from mbma_tables.files import read_file, write_file
-from mbma_tables.islands.height_integrals import height_integral
 
 ROOT = pathlib.Path(mbma_tables.__file__).parents[1]
 
@@ -115,22 +111,3 @@ def test_a_size_is_not_believed(tmp_path):
         read_file(path, 1000)
     path.write_bytes(bytes(1000))
     assert read_file(path, 1000) == bytes(1000)
-
-
-SMALL = "from mbma_tables.islands.height_integrals import height_integral as h; print(repr(float(h(1.5, 0.3))))"
-
-
-@pytest.mark.slow
-def test_nowhere_to_keep_what_is_compiled(tmp_path):
-    for name in ("mbma_tables", "tables"):
-        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
-    # files where folders are needed: nobody can write there, not even root
-    for folder in [p for p in (tmp_path / "mbma_tables").rglob("*") if p.is_dir()] + [tmp_path / "mbma_tables"]:
-        (folder / "__pycache__").write_bytes(b"")
-    (tmp_path / "file").write_bytes(b"")
-    places = {name: str(tmp_path / "file" / "x") for name in ("HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR")}
-    command = [sys.executable, "-W", "error", "-c", SMALL]
-    environment = os.environ | {"PYTHONPATH": str(tmp_path)} | places
-    made = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=tmp_path)
-    assert (made.returncode, made.stderr) == (0, "")
-    assert float(made.stdout) == float(height_integral(1.5, 0.3))

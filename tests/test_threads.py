@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mbma_tables import InputError, Surface, contact, contact_law
-from mbma_tables.compiled import in_blocks
+from mbma_tables.core import in_blocks
 from mbma_tables.models.tables import universal_model
 
 THREADS = 16

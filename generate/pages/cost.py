@@ -22,7 +22,7 @@ from mbma_tables.scenes.costs import UNIT, Costs, Distance, Row, read_costs, rea
 from mbma_tables.theories import THEORIES
 
 METHODS = {"classical": "classical iteration", "exact": "Newton (exact)"}
-LIBRARIES = ("numpy", "scipy", "numba")
+LIBRARIES = ("numpy", "scipy")
 SHOWN_RTOLS = ("1e-02", "1e-05", "1e-08")
 HEAD = """\
 # What accuracy costs, measured by python -m generate pages cost; docs/cost.md says how. Costs are times over that of a

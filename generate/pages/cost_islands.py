@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -16,9 +15,8 @@ from generate.timing import measure, variant
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.classical import iterate, ring_matrix
+from mbma_tables.islands.classical import iterate, radius, ring_matrix
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.islands.newton import extent_squared
 from mbma_tables.models import TIERS, answer_islands, get_model
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.scenes.costs import Row
@@ -71,7 +69,7 @@ def classical(X: FloatArray, mu: FloatArray, matrix: FloatArray, tolerance: floa
     rings = len(matrix)
     w, p = np.empty(rings), np.empty(rings)
     rows = [
-        iterate(x, m, math.sqrt(extent_squared(x, m, 0.03 * tolerance)), matrix, DAMPING, tolerance, MAX_STEPS, w, p)
+        iterate(x, m, radius(x, m, tolerance), matrix, DAMPING, tolerance, MAX_STEPS, w, p)
         for x, m in zip(X, mu, strict=True)
     ]
     return tuple(np.array(column) for column in zip(*rows, strict=True))

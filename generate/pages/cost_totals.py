@@ -22,7 +22,7 @@ REFERENCE_RTOL, REFERENCE_ISLANDS = 1e-11, 1e-12
 RTOLS = tuple(10.0**-k for k in range(1, 9))
 EXACT_RTOLS = (*RTOLS, 1e-9, 1e-10)
 LAW_RTOLS = RTOLS[1:]
-# as many as a law begins to pay for: few are answered in numpy, without a compiler, at another price
+# as many as a law begins to pay for
 THEORY_GAPS = {"calibrated": 20_000, "greenwood_williamson": 20_000, "persson": 100}
 THEORY_LAW_RTOLS = (1e-3, 1e-5, 1e-7)
 SLOW_LAW_RTOLS = (1e-2, 1e-4)
@@ -160,12 +160,12 @@ def theory_rows() -> Iterator[Row]:
 
 
 def first_use_rows() -> Iterator[Row]:
-    """First use in a new process, compiled code in its cache."""
+    """First use in a new process."""
     seconds = measure(lambda: None)[1]
     for tier in TIERS:
         command = [sys.executable, "-c", FIRST_USE.format(tier=tier)]
         taken = [float(subprocess.run(command, check=True, capture_output=True).stdout) for _ in range(4)]
-        # the first fills the caches
+        # the first fills the caches of the system
         yield Row(tier, "import", "both", None, min(taken[1:]) / seconds)
 
 

@@ -1,7 +1,7 @@
 """The exact islands that tables are made of, solved in chunks by worker processes, one file a finished chunk.
 
-A chunk's file is named by the hash of all that decides its values to the last bit: the solver's source, versions and
-processor, tolerance and arguments. So a resumed run computes what is missing, and never mixes processors or versions.
+A chunk's file is named by the hash of all that decides its values to the last bit: the solver's source, versions,
+tolerance and arguments. So a resumed run computes what is missing, and never mixes versions.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import MbmaError
 from mbma_tables.files import write_file
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.tablefiles.provenance import SOLVER, digest_arrays, digest_json, processor, source_digest, versions
+from mbma_tables.tablefiles.provenance import SOLVER, digest_arrays, digest_json, source_digest, versions
 
 CHUNK = 2000
 Work = Callable[..., FloatArray]
@@ -45,7 +45,7 @@ def phi(X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> Floa
 
 def chunk_key(work: Work, job: Job) -> str:
     """Name of a chunk's file."""
-    made_by = [source_digest(CODE), versions(), processor(), work.__name__]
+    made_by = [source_digest(CODE), versions(), work.__name__]
     return digest_json([made_by, digest_arrays({str(number): value for number, value in enumerate(job)})])
 
 

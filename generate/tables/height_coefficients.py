@@ -1,24 +1,32 @@
-"""Compute the polynomial pieces behind `mbma_tables.islands.height_integrals` with mpmath.
+"""Compute the polynomial pieces of the height integrals with mpmath.
 
-``python -m generate tables heights`` writes ``tables/height_coefficients.csv`` again; the output is the same on every
-machine.
+``python -m generate tables heights`` writes ``mbma_tables/core/height_coefficients.h`` again; the output is the same
+on every machine.
 """
 
 from __future__ import annotations
 
 import itertools
 import pathlib
+import textwrap
 from collections.abc import Callable
 
 import mpmath
 
 from mbma_tables.files import write_file
 
-TARGET = pathlib.Path(__file__).parents[2] / "tables" / "height_coefficients.csv"
-HEAD = (
-    "# F_n for n = 1/2, 1, 3/2, 2, 5/2: eight rows of polynomial coefficients each. "
-    "Made by python -m generate tables heights"
-)
+TARGET = pathlib.Path(__file__).parents[2] / "mbma_tables" / "core" / "height_coefficients.h"
+HEADER = """\
+/* F_n for n = 1/2, 1, 3/2, 2, 5/2: eight polynomials each. Made by python -m generate tables heights. */
+#ifndef MBMA_HEIGHT_COEFFICIENTS_H
+#define MBMA_HEIGHT_COEFFICIENTS_H
+
+static const double MBMA_HEIGHT[5][8][19] = {
+%s
+};
+
+#endif
+"""
 DIGITS = 40
 TERMS = 19  # the hardest piece, [-2, 0], needs 19 for 2e-17
 SAMPLES = 48
@@ -85,5 +93,7 @@ def pieces(twice_n: int) -> list[list[mpmath.mpf]]:
 def main() -> None:
     """Write the coefficients."""
     with mpmath.workdps(DIGITS):
-        rows = [",".join(repr(float(value)) for value in row) for k in (1, 2, 3, 4, 5) for row in pieces(k)]
-    write_file(TARGET, "\n".join([HEAD, *rows, ""]).encode())
+        orders = [[[repr(float(value)) for value in row] for row in pieces(k)] for k in (1, 2, 3, 4, 5)]
+    rows = ",\n".join("{" + ",\n".join("{" + ", ".join(row) + "}" for row in rows) + "}" for rows in orders)
+    text = textwrap.indent("\n".join(textwrap.wrap(rows, 116, break_on_hyphens=False)), "    ")
+    write_file(TARGET, (HEADER % text).encode())

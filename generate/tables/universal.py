@@ -24,8 +24,7 @@ from generate.tables.configuration import Configuration
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.models.universal import UniversalModel, fractions_of_mu
-from mbma_tables.models.universal import TERMS
+from mbma_tables.models.universal import TERMS, UniversalModel, fractions_of_mu
 from mbma_tables.surfaces.readings import READINGS
 from mbma_tables.tablefiles.checks import check_content
 from mbma_tables.tablefiles.schema import (

@@ -1,7 +1,7 @@
 """The command line `mbma`: contact, curves and islands of a surface, as a table, JSON, CSV or a picture.
 
 Bad input ends with one or two lines on stderr and exit code 2, before anything is written. Whatever needs
-numba or scipy is imported where a command runs, so that ``--help`` answers at once.
+scipy is imported where a command runs, so that ``--help`` answers at once.
 """
 
 from __future__ import annotations

@@ -7,7 +7,6 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from importlib.util import find_spec
 
 import click
 
@@ -49,11 +48,10 @@ def shown(what: str) -> Iterator[None]:
 
 def _beat(start: float) -> None:
     wait = PATIENCE
-    faster = "" if find_spec("numba") else "; pip install 'mbma_tables[fast]' shortens it"
     while not _ended.wait(wait):
         wait = 0.5
         _state["shown"] = "yes"
-        text = f"{WIPE}mbma: {_state['doing']}, {time.monotonic() - start:.0f} s (Ctrl-C ends it{faster})"
+        text = f"{WIPE}mbma: {_state['doing']}, {time.monotonic() - start:.0f} s (Ctrl-C ends it)"
         click.echo(text, err=True, nl=False)
 
 

@@ -31,6 +31,8 @@ def _load() -> Any:
 
 
 core: Any = _load()
+# builds of one arithmetic give the same bits
+ARITHMETIC: str = core.arithmetic
 
 
 def in_blocks(fill: Callable[[slice], Answer], count: int, size: int, workers: int = 1) -> list[Answer]:

@@ -102,7 +102,8 @@ static bool take_all(PyObject *const *given, Py_ssize_t count, const char *kinds
 /* Elementary functions of an array, for their test against mpmath. */
 static size_t elementary(int64_t which, size_t n, const double *x, double *out) {
     for (size_t k = 0; k < n; k++)
-        out[k] = which == 0 ? mbma_exp(x[k]) : which == 1 ? mbma_expm1(x[k]) : which == 2 ? mbma_log(x[k]) : mbma_log1p(x[k]);
+        out[k] = which == 0 ? mbma_exp(x[k]) : which == 1 ? mbma_expm1(x[k]) : which == 2 ? mbma_log(x[k])
+                 : which == 3 ? mbma_log1p(x[k]) : mbma_erf(x[k]);
     return 0;
 }
 WRAP(elementary, "iDw", a[1].n == a[2].n, elementary(a[0].i, a[1].n, a[1].data, a[2].data))
@@ -223,10 +224,273 @@ WRAP(four_numbers, "DDDdiw", a[0].n == a[1].n && a[0].n == a[2].n && a[5].n == 4
      mbma_four_numbers(a[0].n, a[0].data, a[1].data, a[2].data, a[3].d, a[4].i != 0, a[5].data))
 
 /* ---- newton.c ---- */
+#define BASIS(k) {a[k].n, a[k].data, a[(k) + 1].data, a[(k) + 2].data, a[(k) + 3].data}
+#define BASIS_FITS(k) (a[(k) + 1].n == a[k].n && a[(k) + 2].n == a[k].n * a[k].n && a[(k) + 3].n == a[k].n * a[k].n)
+static size_t solve_islands(const argument *a) {
+    const mbma_basis fine = BASIS(3), coarse = BASIS(7);
+    return mbma_solve_islands(a[0].n, a[0].data, a[1].data, a[2].d, &fine, &coarse, a[11].data, a[12].data, a[13].data,
+                              a[14].data, a[15].data, a[16].data, a[17].data);
+}
+WRAP(height_integrals, "iDw", a[1].n == a[2].n, mbma_height_integrals(a[0].i, a[1].n, a[1].data, a[2].data))
+WRAP(islands_work, "i", true, MBMA_ISLANDS_WORK(a[0].i))
+WRAP(solve_islands, "DDdDDDDDDDDwlbwwww",
+     a[1].n == a[0].n && BASIS_FITS(3) && BASIS_FITS(7) && a[11].n == 3 * a[0].n && a[12].n == a[0].n &&
+         a[13].n == a[0].n && a[14].n == (a[14].data ? a[0].n * a[3].n : 0) && a[15].n == a[14].n &&
+         a[16].n == a[14].n && a[17].n >= MBMA_ISLANDS_WORK(a[3].n),
+     solve_islands(a))
+WRAP(island_extents, "DDdw", a[0].n == a[1].n && a[0].n == a[3].n,
+     mbma_island_extents(a[0].n, a[0].data, a[1].data, a[2].d, a[3].data))
+WRAP(damped_steps, "dddddiDwwwl",
+     a[7].n > 0 && a[6].n == a[7].n * a[7].n && a[8].n == a[7].n && a[9].n == 2 && a[10].n == 1,
+     mbma_damped_steps(a[0].d, a[1].d, a[2].d, a[3].d, a[4].d, a[5].i, a[7].n, a[6].data, a[7].data, a[8].data,
+                       a[9].data, a[10].data))
 
 /* ---- law.c ---- */
+static mbma_law law_in(const argument *block) {
+    mbma_law law;
+    mbma_law_open(block->data, block->n, &law);
+    return law;
+}
+static mbma_inverse inverse_in(const argument *block) {
+    mbma_inverse inverse;
+    mbma_inverse_open(block->data, block->n, &inverse);
+    return inverse;
+}
+static bool is_law(const argument *a) { return law_in(a).head != NULL; }
+/* whether arrays are as long as the first, or not wanted */
+static bool alike(const argument *a, Py_ssize_t first, Py_ssize_t count) {
+    bool good = a[0].data != NULL;
+    for (Py_ssize_t k = first; k < first + count; k++)
+        good = good && (a[k].data == NULL || a[k].n == a[0].n);
+    return good;
+}
+static size_t law_fill(const argument *a) {
+    const mbma_law law = law_in(&a[1]);
+    return mbma_law_fill(a[0].n, a[0].data, &law, a[2].data, a[3].data, a[4].data, a[5].data, a[6].data);
+}
+WRAP(law_fill, "DDwwwww", is_law(&a[1]) && alike(a, 2, 5), law_fill(a))
+static size_t law_records(const argument *a) {
+    const mbma_law law = law_in(&a[2]);
+    return mbma_law_records(a[0].n, a[0].data, a[1].data, &law, a[3].data);
+}
+WRAP(law_records, "DDDl", is_law(&a[2]) && a[1].data && a[3].data && alike(a, 1, 1) && alike(a, 3, 1), law_records(a))
+static size_t inverse_nodes(const argument *a) {
+    const mbma_law law = law_in(&a[1]);
+    return mbma_inverse_nodes(a[0].n, a[0].data, &law, (mbma_quantity)a[2].i, a[3].d, a[4].data, a[5].data);
+}
+WRAP(inverse_nodes, "DDidww", is_law(&a[1]) && a[4].data && a[5].data && alike(a, 4, 2), inverse_nodes(a))
+static size_t law_invert(const argument *a) {
+    const mbma_law law = law_in(&a[1]);
+    const mbma_inverse inverse = inverse_in(&a[2]);
+    return mbma_law_invert(a[0].n, a[0].data, &law, &inverse, (mbma_quantity)a[3].i, a[4].data, a[5].data, a[6].data);
+}
+WRAP(law_invert, "DDDiwww", is_law(&a[1]) && inverse_in(&a[2]).head && a[4].data && alike(a, 4, 3), law_invert(a))
+static size_t law_flow_fill(const argument *a) {
+    const mbma_law flow = law_in(&a[1]);
+    return mbma_law_flow_fill(a[0].n, a[0].data, &flow, a[2].d, a[3].d, a[4].data);
+}
+WRAP(law_flow_fill, "DDddw", is_law(&a[1]) && a[4].data && alike(a, 4, 1), law_flow_fill(a))
+WRAP(law_fit, "DDDDDw",
+     a[0].data && a[1].data && a[2].data && a[3].data && a[4].data && a[5].data && a[0].n % 2 == 0 &&
+         a[1].n == MBMA_FIT_SAMPLES * a[0].n && a[2].n == MBMA_FIT_SAMPLES * MBMA_FIT_SAMPLES &&
+         a[3].n == 2 * MBMA_FIT_SAMPLES && a[4].n == (MBMA_LAW_DEGREE + 1) * (MBMA_LAW_DEGREE + 1) &&
+         a[5].n == a[0].n / 2 * (sizeof(mbma_law_record) / sizeof(double) + 3),
+     mbma_law_fit(a[0].n / 2, a[0].data, a[1].data, a[2].data, a[3].data, a[4].data, a[5].data))
+
+enum { FEW = 1000 }; /* gaps, for which the interpreter lock is kept */
+
+/* Base class of laws in Python: quantities at one float, or at an array of few, are answered here, all else by the method
+ * `_ask_one`. */
+typedef struct {
+    PyObject_HEAD
+    Py_buffer view; /* of the attribute `block` */
+    mbma_law law;   /* its head is NULL before the first question */
+} law_object;
+
+static const mbma_law *law_of(PyObject *self) {
+    law_object *const own = (law_object *)self;
+    if (own->law.head == NULL) {
+        PyObject *const block = PyObject_GetAttrString(self, "block");
+        argument a = {0};
+        const bool good = block != NULL && take(block, 'D', &a);
+        Py_XDECREF(block);
+        if (!good)
+            return NULL;
+        mbma_law found = law_in(&a);
+        /* another thread may have been faster */
+        if (own->law.head == NULL && found.head != NULL) {
+            own->view = a.view;
+            own->law = found;
+        } else
+            release(&a, 1);
+        if (found.head == NULL) {
+            PyErr_SetString(PyExc_ValueError, "core: the block is not that of a law");
+            return NULL;
+        }
+    }
+    return &own->law;
+}
+
+static void law_dealloc(PyObject *self) {
+    PyTypeObject *const type = Py_TYPE(self);
+    if (((law_object *)self)->law.head != NULL)
+        PyBuffer_Release(&((law_object *)self)->view);
+    ((freefunc)PyType_GetSlot(type, Py_tp_free))(self);
+    Py_DECREF(type);
+}
+
+/* A quantity of a small array of doubles, numpy's own as the block is; NULL where Python is to answer. */
+static PyObject *ask_law_array(law_object *self, PyObject *gaps, int what) {
+    argument a[2] = {{0}};
+    PyObject *found = NULL;
+    if (self->law.head == NULL || Py_TYPE(gaps) != Py_TYPE(self->view.obj) || !take(gaps, 'D', &a[0])) {
+        PyErr_Clear();
+        return NULL;
+    }
+    if (a[0].view.ndim > 0 && a[0].n > 0 && a[0].n <= FEW)
+        found = PyObject_CallMethod(gaps, "copy", NULL);
+    if (found != NULL && take(found, 'w', &a[1])) {
+        double *out[5] = {NULL};
+        out[what] = a[1].data;
+        if (mbma_law_fill(a[0].n, a[0].data, &self->law, out[0], out[1], out[2], out[3], out[4]) > 0)
+            Py_CLEAR(found);
+    }
+    release(a, 2);
+    PyErr_Clear();
+    return found;
+}
+
+static PyObject *ask_law(PyObject *self, PyObject *const *given, Py_ssize_t count, PyObject *names, int what) {
+    const Py_ssize_t named = names == NULL ? 0 : PyTuple_Size(names);
+    PyObject *by[] = {count > 0 ? given[0] : Py_None, Py_None};
+    if (count > 1)
+        return PyErr_Format(PyExc_TypeError, "one separation, or u=, is taken, got %zd arguments", count);
+    for (Py_ssize_t k = 0; k < named; k++) {
+        PyObject *const name = PyTuple_GetItem(names, k);
+        const bool is_u = PyUnicode_CompareWithASCIIString(name, "u") == 0;
+        if (!is_u && (count > 0 || PyUnicode_CompareWithASCIIString(name, "separation") != 0))
+            return PyErr_Format(PyExc_TypeError, "unexpected keyword argument %R: separation or u is taken", name);
+        by[is_u] = given[count + k];
+    }
+    const int which = by[0] == Py_None;
+    if (PyFloat_CheckExact(by[which]) && by[1 - which] == Py_None) {
+        const mbma_law *const law = law_of(self);
+        if (law == NULL)
+            return NULL;
+        const double gap = PyFloat_AsDouble(by[which]);
+        const double found = mbma_law_at(law, (mbma_quantity)what, which ? 2.0 * gap - law->head->h_max : gap);
+        /* NaN: refused below, with a reason */
+        if (found == found)
+            return PyFloat_FromDouble(found);
+    }
+    PyObject *const found = which ? NULL : ask_law_array((law_object *)self, by[0], what);
+    return found != NULL ? found : PyObject_CallMethod(self, "_ask_one", "iOO", what, by[0], by[1]);
+}
+
+#define ASK(name, what) \
+    static PyObject *law_##name(PyObject *self, PyObject *const *given, Py_ssize_t count, PyObject *names) { \
+        return ask_law(self, given, count, names, what); \
+    } \
+    static double call_##name(double d, void *law) { return mbma_law_at((const mbma_law *)law, what, d); }
+ASK(force, MBMA_FORCE)
+ASK(area, MBMA_AREA)
+ASK(stiffness, MBMA_STIFFNESS)
+ASK(area_slope, MBMA_AREA_SLOPE)
+ASK(energy, MBMA_ENERGY)
+
+/* Addresses of a function of (d, data) that answers one quantity, and of its data, which live as long as the law. */
+static PyObject *law_addresses(PyObject *self, PyObject *what) {
+    static double (*const CALLS[])(double, void *) = {call_force, call_area, call_stiffness, call_area_slope,
+                                                      call_energy};
+    const long number = PyLong_AsLong(what);
+    const mbma_law *const law = number == -1 && PyErr_Occurred() ? NULL : law_of(self);
+    if (law == NULL)
+        return NULL;
+    if (number < MBMA_FORCE || number > MBMA_ENERGY)
+        return PyErr_Format(PyExc_ValueError, "core: no quantity has the number %ld", number);
+    return Py_BuildValue("KK", (unsigned long long)(uintptr_t)CALLS[number], (unsigned long long)(uintptr_t)law);
+}
+
+#define GAP "($self, separation=None, *, u=None)\n--\n\n"
+#define METHOD(name, text) \
+    {#name, (PyCFunction)(void (*)(void))law_##name, METH_FASTCALL | METH_KEYWORDS, #name GAP text}
+static PyMethodDef LAW_METHODS[] = {
+    METHOD(force, "F/A0 in the unit of E_star at d; where contact ends at h_max, zero from there on."),
+    METHOD(area, "A/A0 at d; where contact ends at h_max, zero from there on."),
+    METHOD(stiffness, "-dF/du per nominal area, against the mean separation u = (h_max + d)/2: -2 dF/dd.\n\n"
+                      "MBMA's jumps where zeta_d reaches its floor, and belongs to the larger gap there."),
+    METHOD(area_slope, "-d(A/A0)/dd."),
+    METHOD(energy, "Elastic energy per nominal area, the integral of F/A0 over u to last contact."),
+    {"_addresses", law_addresses, METH_O, NULL},
+    {NULL, NULL, 0, NULL},
+};
+static PyType_Slot LAW_SLOTS[] = {
+    {Py_tp_dealloc, (void *)law_dealloc},
+    {Py_tp_methods, LAW_METHODS},
+    {Py_tp_doc, (void *)"Quantities of a contact law's block at separations."},
+    {0, NULL},
+};
+static PyType_Spec LAW_TYPE = {
+    "mbma_tables.core.Law", sizeof(law_object), 0, Py_TPFLAGS_DEFAULT | Py_TPFLAGS_BASETYPE, LAW_SLOTS,
+};
 
 /* ---- calibrated.c ---- */
+
+/* First in all calls: coefficients; first nodes, rates, ends of what is covered, three constants; cells; of surfaces
+ * Hurst exponents, ln zeta_1, h_max or None, ends or None, pieces or None. */
+#define SPLINE "FDLDDDDD"
+enum { SPLINE_NUMBERS = 13 };
+typedef struct {
+    mbma_calibrated_table law;
+    mbma_flow_table flow;
+    mbma_surfaces surfaces;
+} spline_call;
+static bool fits_spline(const argument *a, bool law) {
+    const int64_t *c = a[2].data;
+    const size_t count = a[3].n;
+    if (a[1].n != SPLINE_NUMBERS || a[2].n != 3 || a[4].n != count || (law && a[5].n != count))
+        return false;
+    for (int k = 0; k < 3; k++)
+        if (c[k] < 1 || c[k] > 100000)
+            return false;
+    return a[7].data ? a[7].n == count * 6 * (size_t)c[2]
+                     : a[0].n >= (size_t)(c[0] + 5) * (size_t)(c[1] + 5) * (size_t)(c[2] + 5) + 2;
+}
+static spline_call spline_of(const argument *a) {
+    const int64_t *c = a[2].data;
+    const double *x = a[1].data;
+    const mbma_spline s = {a[0].data,          {(size_t)c[0], (size_t)c[1], (size_t)c[2]},
+                           {x[0], x[1], x[2]}, {x[3], x[4], x[5]},
+                           {x[6], x[8]},       {x[7], x[9]}};
+    const spline_call call = {
+        {s, x[10], x[11], x[12]}, {s, x[10], x[11]}, {a[3].n, a[3].data, a[4].data, a[5].data, a[6].data, a[7].data}};
+    return call;
+}
+#define CALL_SPLINE(name, table, ...) \
+    static size_t name(const argument *a) { \
+        const spline_call call = spline_of(a); \
+        return mbma_##name(&call.table, &call.surfaces, __VA_ARGS__); \
+    }
+CALL_SPLINE(spline_pieces, law.log_force, a[8].data)
+CALL_SPLINE(calibrated_ends, law, a[8].data)
+CALL_SPLINE(calibrated_contact, law, a[8].n, a[8].data, a[9].data, a[10].data, a[11].data, a[12].data)
+CALL_SPLINE(calibrated_separation, law, a[8].n, a[8].data, a[9].data, a[10].data)
+CALL_SPLINE(calibrated_slopes, law, a[8].data, a[9].data)
+CALL_SPLINE(flow, flow, a[8].n, a[8].data, a[9].data, a[10].data, a[11].data)
+WRAP(spline_pieces, SPLINE "w",
+     fits_spline(a, false) && !a[7].data && a[8].n == a[3].n * 6 * (size_t)((int64_t *)a[2].data)[2], spline_pieces(a))
+WRAP(calibrated_ends, SPLINE "w", fits_spline(a, true) && a[8].n == 2 * a[3].n, calibrated_ends(a))
+WRAP(calibrated_contact, SPLINE "LDwww",
+     fits_spline(a, true) && a[6].n == 2 * a[3].n && a[9].n == a[8].n && a[10].n == a[8].n && a[11].n == a[8].n &&
+         a[12].n == a[8].n,
+     calibrated_contact(a))
+WRAP(calibrated_separation, SPLINE "LDw",
+     fits_spline(a, true) && a[6].n == 2 * a[3].n && a[9].n == a[8].n && a[10].n == a[8].n, calibrated_separation(a))
+WRAP(calibrated_slopes, SPLINE "Dw", fits_spline(a, true) && !a[7].data && a[8].n == a[3].n && a[9].n == 10 * a[3].n,
+     calibrated_slopes(a))
+WRAP(flow, SPLINE "LDDw", fits_spline(a, false) && a[9].n == a[8].n && a[10].n == a[8].n && a[11].n == a[8].n, flow(a))
+WRAP(self_affine, "DDww", a[0].n == a[1].n && a[0].n == a[2].n && a[0].n == a[3].n,
+     mbma_self_affine(a[0].n, a[0].data, a[1].data, a[2].data, a[3].data))
 
 /* ---- spectrum_laws.c ---- */
 
@@ -276,10 +540,23 @@ static PyMethodDef METHODS[] = {
     ENTRY(four_numbers),
 
     /* newton.c */
+    ENTRY(height_integrals),
+    ENTRY(islands_work),
+    ENTRY(solve_islands),
+    ENTRY(island_extents),
+    ENTRY(damped_steps),
 
     /* law.c */
+    ENTRY(law_fill), ENTRY(law_records), ENTRY(inverse_nodes), ENTRY(law_invert), ENTRY(law_flow_fill), ENTRY(law_fit),
 
     /* calibrated.c */
+    ENTRY(spline_pieces),
+    ENTRY(calibrated_ends),
+    ENTRY(calibrated_contact),
+    ENTRY(calibrated_separation),
+    ENTRY(calibrated_slopes),
+    ENTRY(flow),
+    ENTRY(self_affine),
 
     /* spectrum_laws.c */
 
@@ -321,7 +598,19 @@ static int generation(void) {
 static int generation(void) { return 0; }
 #endif
 
-static int execute(PyObject *module) { return PyModule_AddIntConstant(module, "generation", generation()); }
+static int execute(PyObject *module) {
+    PyObject *const law = PyType_FromSpec(&LAW_TYPE);
+    const int added = law == NULL ? -1 : PyModule_AddObjectRef(module, "Law", law);
+    Py_XDECREF(law);
+#if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+    const char *const arithmetic = "fma";
+#else
+    const char *const arithmetic = "plain";
+#endif
+    if (added < 0 || PyModule_AddStringConstant(module, "arithmetic", arithmetic) < 0)
+        return -1;
+    return PyModule_AddIntConstant(module, "generation", generation());
+}
 
 static PyModuleDef_Slot SLOTS[] = {{Py_mod_exec, (void *)execute}, {0, NULL}};
 

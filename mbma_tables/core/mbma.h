@@ -144,9 +144,207 @@ size_t mbma_four_numbers(size_t n, const double *spread, const double *sphere, c
 
 /* ---- newton.c: exact islands ------------------------------------------------------------------------------------ */
 
+/* F_n(x) = integral_x^inf (z - x)^n phi(z) dz, phi the standard normal density, of twice_n = 1, 2, 3, 4 or 5. */
+size_t mbma_height_integrals(int64_t twice_n, size_t n, const double *x, double *out);
+
+/* Gauss nodes v = (rho/a)^2 on [0, 1] and the half-space in them (37), for vectors of values times `root_weights`. */
+typedef struct {
+    size_t nodes; /* at least 8 */
+    const double *v, *root_weights;
+    const double *modes;  /* row k takes a vector to its k-th orthonormal Legendre coefficient */
+    const double *matrix; /* w = a matrix p; symmetric and positive definite */
+} mbma_basis;
+
+#define MBMA_ISLANDS_WORK(nodes) ((nodes) * ((nodes) + 9))
+
+/* Newton's method (34)-(37): `phi` (n, 3) receives Phi_F, Phi_A and an estimate of their relative error, whose size the
+ * caller judges, `steps` the steps; profiles (n, nodes) where `rho` is not NULL. `coarse` is the small basis of the
+ * first guess, `work` space for MBMA_ISLANDS_WORK numbers. */
+size_t mbma_solve_islands(size_t n, const double *X, const double *mu, double rtol, const mbma_basis *fine,
+                          const mbma_basis *coarse, double *phi, int64_t *steps, uint8_t *status, double *rho,
+                          double *pressure, double *gap, double *work);
+
+/* a^2 of the disc rho < a that holds all but `share` of the area of an island. */
+size_t mbma_island_extents(size_t n, const double *X, const double *mu, double share, double *squared);
+
+/* The damped iteration of Greenwood and Tripp on rings of equal width in rho < a: at most `most` steps on from `w`, to
+ * which the pressures p, Phi_F and Phi_A belong. MBMA_OK where it has converged; NaN where it has diverged. */
+mbma_status mbma_damped_steps(double X, double mu, double a, double damping, double tolerance, int64_t most,
+                              size_t rings, const double *matrix, double *w, double *p, double phi[2],
+                              int64_t *steps);
+
 /* ---- law.c: contact laws ---------------------------------------------------------------------------------------- */
 
+/* A contact law holds one surface's force and area as polynomials of the gap, of which there are three coordinates:
+ *
+ *     d  separation, from h_max at first contact to -h_max at full compression,
+ *     u  mean separation (h_max + d)/2,
+ *     c  overclosure h_max - u, from 0 at first contact.
+ *
+ * A law is one block of 8-byte words: head, rows, records. With x = (h_max + s d) scale, s the sign that the head gives
+ * for this side of d = 0, the exponent of x picks a row, the row a record, and with t = (x - centre) rate
+ *
+ *     record number = (bits of x >> shift) + base + kinks passed,    q = -s scale rate,    -dF/dd = q dF/dt,
+ *     F = sum_k force[k] t^k,    A = sum_k area[k] t^k,    2 E = energy + sum_k force[k] t^(k+1)/(k+1)/q.
+ *
+ * Below x = low the first record holds: F is t^power_force times its polynomial, and A likewise.
+ */
+enum { MBMA_LAW_DEGREE = 8, MBMA_INVERSE_DEGREE = 5, MBMA_FIT_SAMPLES = 16 };
+
+typedef struct {
+    double h_max, scale, low, high;              /* low and high: of x */
+    double plus, minus;                          /* s where d >= 0, and below */
+    double kink_sign, kink, kink_sign_2, kink_2; /* a kink is passed where kink_sign d > kink */
+    double power_force, power_area;              /* of t, in the first record */
+    double lowest, highest;                      /* d that the law covers */
+    int64_t exponent, minus_rows;                /* of the first row; where the rows of d < 0 begin */
+    int64_t first_word, ends;                    /* of the records; whether contact ends at x = 0 */
+} mbma_law_head;
+
+typedef struct {
+    int64_t shift, base;
+} mbma_law_row;
+
+typedef struct {
+    double centre, rate;
+    double force[MBMA_LAW_DEGREE + 1], area[MBMA_LAW_DEGREE + 1];
+    double energy;
+} mbma_law_record;
+
+typedef struct {
+    const mbma_law_head *head;
+    const mbma_law_row *rows;
+    const mbma_law_record *records;
+    int64_t last; /* number of the last record */
+} mbma_law;
+
+typedef enum {
+    MBMA_FORCE = 0,      /* F/A0, pressure */
+    MBMA_AREA = 1,       /* A/A0 */
+    MBMA_STIFFNESS = 2,  /* -dF/du = dF/dc */
+    MBMA_AREA_SLOPE = 3, /* -dA/dd = dA/dc / 2 */
+    MBMA_ENERGY = 4,     /* integral of F over u to last contact */
+    MBMA_CURVATURE = 5   /* d2F/du2 = d2F/dc2 */
+} mbma_quantity;
+
+/* The parts of a block of so many words; 0 where they do not fit together. The block must outlive the law. */
+int mbma_law_open(const void *block, size_t words, mbma_law *law);
+
+/* One quantity at a separation, or at an overclosure, which keeps its digits next to first contact; NaN outside. */
+double mbma_law_at(const mbma_law *law, mbma_quantity what, double d);
+double mbma_law_at_overclosure(const mbma_law *law, mbma_quantity what, double c);
+
+/* Force (area) at an overclosure, and its derivative by that. */
+double mbma_law_and_slope(const mbma_law *law, mbma_quantity which, double c, double *by_c);
+
+/* The quantities in the order of mbma_quantity, as far as their arrays are not NULL. */
+size_t mbma_law_fill(size_t n, const double *d, const mbma_law *law, double *force, double *area, double *stiffness,
+                     double *area_slope, double *energy);
+
+/* Numbers of the records that hold at separations, whose x is known better. */
+size_t mbma_law_records(size_t n, const double *x, const double *d, const mbma_law *law, int64_t *record);
+
+/* The overclosure between two at which force (area) has a value, where it rises from one to the other. */
+double mbma_law_overclosure(const mbma_law *law, mbma_quantity which, double wanted, double low, double high);
+
+/* The inverse of force or area: guesses of x in four buckets an octave of its value, which bits of the value pick. */
+typedef struct {
+    double least, low, high, turn; /* values: the law's least, ends of the buckets, that at d = 0 where s turns */
+    int64_t first_bucket;
+    double end; /* d, where force or area turns down */
+} mbma_inverse_head;
+
+typedef struct {
+    double centre, rate, side;
+    double x[MBMA_INVERSE_DEGREE + 1];
+} mbma_inverse_record;
+
+typedef struct {
+    const mbma_inverse_head *head;
+    const mbma_inverse_record *records;
+    int64_t last;
+} mbma_inverse;
+
+int mbma_inverse_open(const void *block, size_t words, mbma_inverse *inverse);
+
+/* x, and s there, at values of force or area, down to the separation `end`: nodes of an inverse that is to be made. */
+size_t mbma_inverse_nodes(size_t n, const double *wanted, const mbma_law *law, mbma_quantity which, double end,
+                          double *x, double *side);
+
+/* Separations at forces (areas), with area and stiffness there where their arrays are not NULL. */
+size_t mbma_law_invert(size_t n, const double *wanted, const mbma_law *law, const mbma_inverse *inverse,
+                       mbma_quantity which, double *d, double *area, double *stiffness);
+
+/* Flow conductance of the gaps at separations: `flow` is a block like that of a law, with the conductance in place of
+ * force; bodies farther apart than it reaches are u^3 (1 - 1.5/(u^2/h_rms^2 + 4)). `by_c` may be NULL, or get dK/dc. */
+double mbma_law_flow(const mbma_law *flow, double h_max, double h_rms, double d, double *by_c);
+size_t mbma_law_flow_fill(size_t n, const double *d, const mbma_law *flow, double h_max, double h_rms, double *out);
+
+/* Records of intervals of x, (n, 2), from force and area at their Chebyshev points, (2, n, 16); behind each record
+ * bounds on its errors: of value over F, of slope over F/x, of slope over itself. Matrices as law_pieces.py makes them:
+ * series (16, 16), bounds (2, 16), monomials (9, 9). Not OK are intervals with values that are not positive. */
+size_t mbma_law_fit(size_t n, const double *ends, const double *found, const double *series, const double *bounds,
+                    const double *monomials, double *made);
+
 /* ---- calibrated.c: the law calibrated on boundary elements, by its table ------------------------------------------ */
+
+/* Quintic B-splines on equally spaced nodes over Hurst exponent, ln zeta_1 and a third axis, which runs fastest. Along
+ * each axis there are 5 coefficients more than cells; two more of any value follow the last one. */
+typedef struct {
+    const float *coefficients;
+    size_t cells[3];
+    double first[3], rate[3]; /* first node, and nodes in 1 */
+    double low[2], high[2];   /* of Hurst exponent and ln zeta_1, between which surfaces are answered */
+} mbma_spline;
+
+/* The calibrated law: forces F over A0 E* g with g the rms gradient; mean separations u and other heights over h_rms. */
+typedef struct {
+    mbma_spline log_force;               /* of a surface without end, over ln u */
+    double area_s0, area_slope, area_t0; /* A/A0 = erf(F sqrt(2 (1 + t)/(s0 + t))), t = F/t0; s0 at Nayak's alpha 10 */
+} mbma_calibrated_table;
+
+/* Flow through gaps of mean u: k = u^3 (1 - 1.5/(u^2 + 4)) R, and 0 from A/A0 = threshold on. */
+typedef struct {
+    mbma_spline log_factor; /* ln R over ln A/(threshold A0 - A) */
+    double threshold, obstruction;
+} mbma_flow_table;
+
+/* Surfaces that entries of calls share. */
+typedef struct {
+    size_t count;
+    const double *hurst, *log_zeta_1;
+    const double *h_max;  /* of the calibrated law alone, */
+    const double *ends;   /* and two numbers each by mbma_calibrated_ends */
+    const double *pieces; /* by mbma_spline_pieces; NULL where that does not pay */
+} mbma_surfaces;
+
+/* Nayak's alpha of self-affine surfaces, and their rms gradient over q0 h_rms. */
+size_t mbma_self_affine(size_t n, const double *hurst, const double *log_zeta_1, double *alpha, double *gradient);
+
+/* Six coefficients for each cell of the third axis and each surface. With these, calls give the same bits in less time;
+ * they are worth making from about 40 entries a surface on. */
+size_t mbma_spline_pieces(const mbma_spline *spline, const mbma_surfaces *surfaces, double *pieces);
+
+/* s0 of each surface, and ln F at its h_max. */
+size_t mbma_calibrated_ends(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, double *ends);
+
+/* Force, area and -dF/du at mean separations; `owner` has the number of each entry's surface, from 0. */
+size_t mbma_calibrated_contact(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, size_t n,
+                               const int64_t *owner, const double *u, double *force, double *area, double *stiffness);
+
+/* Mean separations at forces > 0. */
+size_t mbma_calibrated_separation(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, size_t n,
+                                  const int64_t *owner, const double *force, double *u);
+
+/* Force over A0 E* q0 h_rms and area, each with its derivatives by u, h_max, Hurst exponent and ln zeta_1: ten numbers
+ * an entry, which is of the surface of its own number; 0 < u. */
+size_t mbma_calibrated_slopes(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, const double *u,
+                              double *out);
+
+/* k at mean gaps over h_rms and at A/A0. With `pieces`, which may be those of any spectrum, nothing else of the
+ * surfaces is read. */
+size_t mbma_flow(const mbma_flow_table *table, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
+                 const double *u, const double *area, double *k);
 
 /* ---- spectrum_laws.c: Persson's theory and the calibrated law of a spectrum --------------------------------------- */
 

@@ -7,7 +7,7 @@
 #include "phi.h"
 
 enum { NODES = MBMA_PANEL_NODES, CHECKS = MBMA_PANEL_CHECKS, PLACES = NODES + CHECKS, GAPS = MBMA_PANEL_GAPS };
-enum { TERMS = 2 * GAPS, SPREAD = 9, TOPS = 8, FAR_TERMS = 8, LANES = 8, CHUNK = 256, ROWS = MBMA_PANEL_ROWS };
+enum { TERMS = 2 * GAPS, SPREAD = 9, TOPS = 8, FAR_TERMS = 8, CHUNK = 256, ROWS = MBMA_PANEL_ROWS };
 
 /* of errors of a panel */
 static const double AT_ENDS = 1.01;  /* times as much is missed at the ends as next to them */
@@ -47,21 +47,7 @@ static double lead(int row, double delta) {
 /* and the power of the compression that their sums begin with */
 static const double BEGUN[ROWS] = {3.5, 10.0 / 3.0, 1.0, 3.0};
 
-static double lanes_sum(const double a[LANES]) {
-    return ((a[0] + a[4]) + (a[2] + a[6])) + ((a[1] + a[5]) + (a[3] + a[7]));
-}
 
-/* a . b in eight lanes */
-MBMA_INLINE double dot(const double *restrict a, const double *restrict b, int64_t n) {
-    double s[LANES] = {0.0};
-    int64_t k = 0;
-    for (; k + LANES <= n; k += LANES)
-        for (int l = 0; l < LANES; l++)
-            s[l] = mbma_fma(a[k + l], b[k + l], s[l]);
-    for (int l = 0; k + l < n; l++)
-        s[l] = mbma_fma(a[k + l], b[k + l], s[l]);
-    return lanes_sum(s);
-}
 
 /* Adds to `out` the sums of rows, then their slopes by the compression, of islands begin:stop, times exp(least/2). */
 static void add_sums(double c, double least, const mbma_nodes *islands, int rows, int64_t begin, int64_t stop, double *out) {
@@ -75,8 +61,8 @@ static void add_sums(double c, double least, const mbma_nodes *islands, int rows
             turned[k] = share[k] * height * rate[k];
         }
         for (int row = 0; row < rows; row++) {
-            out[row] += dot(share, islands->weights + row * islands->size + first, count);
-            out[rows + row] += dot(turned, islands->weights + row * islands->size + first, count);
+            out[row] += dot(share, islands->weights + row * islands->size + first, (size_t)count);
+            out[rows + row] += dot(turned, islands->weights + row * islands->size + first, (size_t)count);
         }
     }
 }
@@ -98,18 +84,6 @@ MBMA_INLINE double series_at(const double *series, int terms, double x) {
     for (int k = 1; k < terms; k++) {
         const double next = mbma_fma(2.0 * x, term, -before);
         sum = mbma_fma(series[k], term, sum);
-        before = term;
-        term = next;
-    }
-    return sum;
-}
-
-/* Its derivative by x: sum of k c[k] U[k - 1]. */
-MBMA_INLINE double series_slope(const double *series, int terms, double x) {
-    double before = 0.0, term = 1.0, sum = 0.0;
-    for (int k = 1; k < terms; k++) {
-        const double next = mbma_fma(2.0 * x, term, -before);
-        sum = mbma_fma(k * series[k], term, sum);
         before = term;
         term = next;
     }
@@ -235,35 +209,61 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
     }
 }
 
-void mbma_profile_totals(size_t n, const double *compression, size_t panels, const double *edges, const double *series,
-                         int rows, int slopes, double *out) {
-    for (size_t k = 0; k < n; k++) {
-        const double c = compression[k];
-        size_t first = 0, last = panels;
-        while (last - first > 1) {
-            const size_t middle = (first + last) / 2;
-            if (edges[middle] <= c)
-                first = middle;
-            else
-                last = middle;
-        }
-        const double low = edges[first], high = edges[first + 1], x = (2.0 * c - low - high) / (high - low);
-        const double *const own = series + first * (size_t)rows * TERMS;
-        /* beyond the profile, and for NaN, there is no answer */
-        const bool inside = c > 0.0 && x <= 1.0 + 1e-12 * high / (high - low);
+/* Rows of a panel at one compression, and perhaps slopes; `rows` and `slopes` are constants wherever this is inlined. */
+MBMA_INLINE void totals_at(double c, size_t panels, const double *edges, const double *series, int rows, bool slopes,
+                           double *out, size_t stride) {
+    /* the panel by halves, without branches that nothing foretells */
+    size_t first = 0, left = panels;
+    while (left > 1) {
+        const size_t half = left / 2;
+        first += edges[first + half] <= c ? half : 0;
+        left -= half;
+    }
+    const double low = edges[first], high = edges[first + 1], width = high - low, x = (2.0 * c - low - high) / width;
+    const double *const own = series + first * (size_t)rows * TERMS;
+    double sums[ROWS], steep[ROWS], before = 1.0, term = x, before_slope = 0.0, slope = 1.0;
+    for (int row = 0; row < rows; row++) {
+        sums[row] = own[row * TERMS];
+        steep[row] = 0.0;
+    }
+    /* Chebyshev polynomials of the first kind, and for their derivatives of the second */
+    for (int k = 1; k < TERMS; k++) {
         for (int row = 0; row < rows; row++) {
-            const double log_sum = series_at(own + row * TERMS, TERMS, x);
-            double sum = log_sum > UNDERFLOW ? mbma_exp(log_sum) : 0.0;
-            if (first == 0)
-                sum *= c * lead(row, c);
-            out[(size_t)row * n + k] = inside ? sum : c <= 0.0 ? 0.0 : NAN;
-            if (slopes) {
-                const double steep = 2.0 * series_slope(own + row * TERMS, TERMS, x) / (high - low);
-                const double found = sum * (steep + (first == 0 ? BEGUN[row] / c : 0.0));
-                out[(size_t)(rows + row) * n + k] = inside ? found : c <= 0.0 ? 0.0 : NAN;
-            }
+            sums[row] = mbma_fma(own[row * TERMS + k], term, sums[row]);
+            if (slopes)
+                steep[row] = mbma_fma(k * own[row * TERMS + k], slope, steep[row]);
+        }
+        const double next = mbma_fma(2.0 * x, term, -before), next_slope = mbma_fma(2.0 * x, slope, -before_slope);
+        before = term;
+        term = next;
+        before_slope = slope;
+        slope = next_slope;
+    }
+    /* beyond the profile, and for NaN, there is no answer */
+    const bool inside = c > 0.0 && x <= 1.0 + 1e-12 * high / width;
+    for (int row = 0; row < rows; row++) {
+        const double begun = first == 0 ? c * lead(row, c) : 1.0;
+        double sum = mbma_exp(sums[row]) * begun;
+        /* subnormal numbers, digit by digit */
+        if (!(sums[row] > UNDERFLOW && sum > 1e-290))
+            sum = exp(sums[row] + (first == 0 ? BEGUN[row] * log(c) : 0.0));
+        out[(size_t)row * stride] = inside ? sum : c <= 0.0 ? 0.0 : NAN;
+        if (slopes) {
+            const double found = sum * (2.0 * steep[row] / width + (first == 0 ? BEGUN[row] / c : 0.0));
+            out[(size_t)(rows + row) * stride] = inside ? found : c <= 0.0 ? 0.0 : NAN;
         }
     }
+}
+
+void mbma_profile_totals(size_t n, const double *compression, size_t panels, const double *edges, const double *series,
+                         int rows, int slopes, double *out) {
+    for (size_t k = 0; k < n; k++)
+        if (slopes)
+            totals_at(compression[k], panels, edges, series, rows, true, out + k, n);
+        else if (rows == 2)
+            totals_at(compression[k], panels, edges, series, 2, false, out + k, n);
+        else
+            totals_at(compression[k], panels, edges, series, rows, false, out + k, n);
 }
 
 /* Bound on the relative error of one panel: of what it interpolates, against islands, and of its sums. */
@@ -333,7 +333,7 @@ static double missed_by(const mbma_panel_rule *r, double low, double high, const
             const double height = mbma_fma(-rate[j], c[k], shift[j]);
             rough[j] = mbma_exp(0.5 * mbma_fma(-height, height, least[k]));
         }
-        const double sum = dot(fine, fine_weight, 2 * count), other = dot(rough, coarse, count);
+        const double sum = dot(fine, fine_weight, (size_t)(2 * count)), other = dot(rough, coarse, (size_t)count);
         const double scale = mbma_exp(0.5 * (lowest - least[k]));
         /* up to its own end the panel from 0 is all there is */
         if (k == 0 && r->power > 1)
@@ -361,8 +361,8 @@ int mbma_profile_islands(size_t n, const double *x, double peak, double hurst, d
         const island i = island_at(x[k], floor_d, x[k] > s.kink_u, &s);
         const phi found = phi_at(cells, i.X, i.mu, false);
         const double each = (floor_d ? 1.0 : s.jacobian) * s.rms_over_s * i.D_d / (ROOT_TWO_PI * i.sigma_d);
-        out[k] = i.force * each * found.force;
-        out[n + k] = i.area * each * found.area;
+        out[k] = i.force * each * found.value[0];
+        out[n + k] = i.area * each * found.value[1];
         out[2 * n + k] = ((peak + x[k]) * s.rms_over_s - i.h_d) / i.sigma_d;
         out[3 * n + k] = s.rms_over_s / i.sigma_d;
         worst = found.status > worst ? found.status : worst;

@@ -8,9 +8,10 @@
 #include <stddef.h>
 
 typedef ptrdiff_t Py_ssize_t;
+typedef struct _typeobject PyTypeObject;
 typedef struct _object {
     Py_ssize_t ob_refcnt;
-    struct _typeobject *ob_type;
+    PyTypeObject *ob_type;
 } PyObject;
 
 typedef struct {
@@ -52,15 +53,42 @@ typedef struct PyModuleDef {
     void (*m_free)(void *);
 } PyModuleDef;
 
-typedef struct _ts PyThreadState;
+typedef struct {
+    int slot;
+    void *pfunc;
+} PyType_Slot;
 
+typedef struct {
+    const char *name;
+    int basicsize, itemsize;
+    unsigned flags;
+    PyType_Slot *slots;
+} PyType_Spec;
+
+typedef struct _ts PyThreadState;
+typedef void (*freefunc)(void *);
+
+#define PyObject_HEAD PyObject ob_base;
 #define PyModuleDef_HEAD_INIT {{1, NULL}, NULL, 0, NULL}
+#define METH_KEYWORDS 2
+#define METH_O 8
 #define METH_FASTCALL 0x80
 #define Py_mod_exec 2
+#define Py_tp_dealloc 52
+#define Py_tp_doc 56
+#define Py_tp_methods 64
+#define Py_tp_free 74
+#define Py_TPFLAGS_BASETYPE (1UL << 10)
+#define Py_TPFLAGS_DEFAULT (1UL << 18)
 #define PyBUF_WRITABLE 1
 #define PyBUF_FORMAT 4
 #define PyBUF_C_CONTIGUOUS 0x38
 #define Py_None (&_Py_NoneStruct)
+#define Py_TYPE(object) (((PyObject *)(object))->ob_type)
+#define PyFloat_CheckExact(object) (Py_TYPE(object) == &PyFloat_Type)
+#define Py_DECREF(object) Py_DecRef((PyObject *)(object))
+#define Py_XDECREF(object) Py_DecRef((PyObject *)(object)) /* NULL is taken */
+#define Py_CLEAR(object) do { PyObject *const cleared = (PyObject *)(object); (object) = NULL; Py_DecRef(cleared); } while (0)
 #define Py_BEGIN_ALLOW_THREADS { PyThreadState *held_state = PyEval_SaveThread();
 #define Py_END_ALLOW_THREADS PyEval_RestoreThread(held_state); }
 
@@ -78,17 +106,32 @@ typedef struct _ts PyThreadState;
 PyAPI_DATA(PyObject) _Py_NoneStruct;
 PyAPI_DATA(PyObject *) PyExc_TypeError;
 PyAPI_DATA(PyObject *) PyExc_ValueError;
+PyAPI_DATA(PyTypeObject) PyFloat_Type;
 PyAPI_FUNC(void) PyBuffer_Release(Py_buffer *);
+PyAPI_FUNC(void) PyErr_Clear(void);
 PyAPI_FUNC(PyObject *) PyErr_Format(PyObject *, const char *, ...);
 PyAPI_FUNC(PyObject *) PyErr_Occurred(void);
 PyAPI_FUNC(void) PyErr_SetString(PyObject *, const char *);
 PyAPI_FUNC(void) PyEval_RestoreThread(PyThreadState *);
 PyAPI_FUNC(PyThreadState *) PyEval_SaveThread(void);
 PyAPI_FUNC(double) PyFloat_AsDouble(PyObject *);
+PyAPI_FUNC(PyObject *) PyFloat_FromDouble(double);
+PyAPI_FUNC(long) PyLong_AsLong(PyObject *);
 PyAPI_FUNC(long long) PyLong_AsLongLong(PyObject *);
 PyAPI_FUNC(PyObject *) PyLong_FromLongLong(long long);
 PyAPI_FUNC(PyObject *) PyModuleDef_Init(PyModuleDef *);
 PyAPI_FUNC(int) PyModule_AddIntConstant(PyObject *, const char *, long);
+PyAPI_FUNC(int) PyModule_AddObjectRef(PyObject *, const char *, PyObject *);
+PyAPI_FUNC(int) PyModule_AddStringConstant(PyObject *, const char *, const char *);
+PyAPI_FUNC(PyObject *) PyObject_CallMethod(PyObject *, const char *, const char *, ...);
+PyAPI_FUNC(PyObject *) PyObject_GetAttrString(PyObject *, const char *);
 PyAPI_FUNC(int) PyObject_GetBuffer(PyObject *, Py_buffer *, int);
+PyAPI_FUNC(PyObject *) PyTuple_GetItem(PyObject *, Py_ssize_t);
+PyAPI_FUNC(Py_ssize_t) PyTuple_Size(PyObject *);
+PyAPI_FUNC(PyObject *) PyType_FromSpec(PyType_Spec *);
+PyAPI_FUNC(void *) PyType_GetSlot(PyTypeObject *, int);
+PyAPI_FUNC(int) PyUnicode_CompareWithASCIIString(PyObject *, const char *);
+PyAPI_FUNC(PyObject *) Py_BuildValue(const char *, ...);
+PyAPI_FUNC(void) Py_DecRef(PyObject *);
 
 #endif

@@ -11,12 +11,9 @@ import math
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import njit
-from mbma_tables.islands.height_integrals import f_one, f_three_halves
-from mbma_tables.islands.newton import extent_squared
+from mbma_tables.core import core
 
-MAX_DEFORMATION = 1e12  # one this large is divergence
-BLOCK = 1 << 26  # products of a ring and a ring between two looks for Ctrl-C, about 0.1 s
+BLOCK = 1 << 26  # products of a ring and a ring between two looks for Ctrl-C, at most about 0.1 s
 
 
 def ring_matrix(rings: int) -> FloatArray:
@@ -33,57 +30,6 @@ def ring_matrix(rings: int) -> FloatArray:
     return matrix
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def _steps(
-    X: float,
-    mu: float,
-    a: float,
-    matrix: FloatArray,
-    damping: float,
-    tolerance: float,
-    most: int,
-    w: FloatArray,
-    p: FloatArray,
-) -> tuple[int, bool, bool]:
-    """At most `most` steps on from `w`; returns their number, whether w converged, and whether it diverged."""
-    n = w.size
-    for step in range(most):
-        for i in range(n):
-            rho = a * (i + 0.5) / n
-            p[i] = 0.5 * mu * f_three_halves(rho * rho - X + w[i])  # (36)
-        largest = 0.0
-        scale = 0.0
-        for i in range(n):
-            total = 0.0
-            for j in range(n):
-                total += matrix[i, j] * p[j]
-            change = damping * (a * total - w[i])
-            largest = max(largest, abs(change))
-            w[i] += change
-            scale = max(scale, abs(w[i]))
-        if not scale < MAX_DEFORMATION:
-            return step + 1, False, True
-        if largest <= tolerance * damping * scale:
-            return step + 1, True, False
-    return most, False, False
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _totals(X: float, mu: float, a: float, w: FloatArray, p: FloatArray) -> tuple[float, float]:
-    """Phi_F and Phi_A by the midpoint rule; fills the pressures `p`."""
-    n = w.size
-    force = 0.0
-    area = 0.0
-    for i in range(n):
-        rho = a * (i + 0.5) / n
-        gap = rho * rho - X + w[i]
-        p[i] = 0.5 * mu * f_three_halves(gap)
-        force += rho * p[i]
-        area += rho * f_one(gap)
-    width = 2.0 * math.pi * a / n
-    return width * force, width * area
-
-
 def iterate(
     X: float,
     mu: float,
@@ -95,24 +41,31 @@ def iterate(
     w: FloatArray,
     p: FloatArray,
 ) -> tuple[int, bool, float, float]:
-    """Iterate from w = 0; returns iterations, whether it converged, Phi_F and Phi_A."""
+    """Iterate from w = 0; returns iterations, whether it converged, Phi_F and Phi_A, NaN where it diverged."""
     w[:] = 0.0
-    iterations = 0
-    converged = diverged = False
-    # compiled code does not look for Ctrl-C: it gets a fraction of a second of work at a time
+    phi, used = np.zeros(2), np.zeros(1, dtype=np.int64)
+    iterations, converged = 0, False
+    # the core does not look for Ctrl-C: it gets a fraction of a second of work at a time
     block = max(1, BLOCK // w.size**2)
-    while iterations < max_iterations and not (converged or diverged):
+    while iterations < max_iterations and not converged and not np.isnan(phi[0]):
         most = min(block, max_iterations - iterations)
-        used, converged, diverged = _steps(X, mu, a, matrix, damping, tolerance, most, w, p)
-        iterations += used
-    return iterations, converged, *_totals(X, mu, a, w, p)
+        converged = core.damped_steps(X, mu, a, damping, tolerance, most, matrix, w, p, phi, used) == 0
+        iterations += int(used[0])
+    return iterations, converged, float(phi[0]), float(phi[1])
+
+
+def radius(X: float, mu: float, rtol: float) -> float:
+    """Where an island ends, as far as a relative error `rtol` tells."""
+    squared = np.empty(1)
+    core.island_extents(np.array([X]), np.array([mu]), 0.03 * rtol, squared)
+    return math.sqrt(squared[0])
 
 
 def solve_classical(
     X: float, mu: float, rings: int, damping: float, rtol: float, max_iterations: int
 ) -> tuple[int, bool, float, float, FloatArray, FloatArray, FloatArray]:
     """One island; returns iterations, converged, Phi_F, Phi_A, rho, pressure, gap."""
-    a = math.sqrt(extent_squared(X, mu, 0.03 * rtol))
+    a = radius(X, mu, rtol)
     w, p = np.zeros(rings), np.zeros(rings)
     rho = a * (np.arange(rings) + 0.5) / rings
     steps, converged, force, area = iterate(X, mu, a, ring_matrix(rings), damping, rtol, max_iterations, w, p)

@@ -12,16 +12,16 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, number_in, require, whole_number_in
+from mbma_tables.core import core, in_blocks
 from mbma_tables.errors import ConvergenceError, InputError
 from mbma_tables.islands.classical import solve_classical
 from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.islands.newton import solve_islands
 from mbma_tables.islands.spectral import basis
 
 Method = Literal["newton", "classical"]
@@ -30,7 +30,7 @@ LEVELS = np.array([*range(12, 64, 4), *range(64, 128, 8), *range(128, 256, 32), 
 MIN_SOLVER_RTOL = 1e-13
 MAX_NODES = {"newton": 1024, "classical": 2048}  # a few seconds for an island
 CLASSICAL_RINGS = 200
-BLOCK = 1 << 22  # islands times nodes^2 in one compiled call, well under a second, which no signal interrupts
+BLOCK = 1 << 22  # islands times nodes^2 in one call of the core, well under a second, which no signal interrupts
 COARSE_NODES = 12  # of the first guess
 
 
@@ -67,8 +67,9 @@ class IslandSolution:
         count = int(np.max(self.nodes))
         shape = (*np.shape(self.X), count)
         if self.method == "newton":
-            flat = _newton(np.ravel(self.X), np.ravel(self.mu), self.rtol, count, profiles=True)
-            rho, pressure, gap = flat.rho, flat.pressure, flat.gap
+            profiles = np.empty((3, np.size(self.X), count))
+            _newton(np.ravel(self.X), np.ravel(self.mu), self.rtol, count, profiles)
+            rho, pressure, gap = profiles
         else:
             rows = [
                 solve_classical(x, m, count, self.damping, self.rtol, self.max_iterations)[4:]
@@ -93,35 +94,23 @@ class IslandSolution:
         return self._profiles[2]
 
 
-class _Batch(NamedTuple):
-    phi: FloatArray
-    steps: NDArray[np.int64]
-    rho: FloatArray
-    pressure: FloatArray
-    gap: FloatArray
+def _newton(
+    X: FloatArray, mu: FloatArray, rtol: float, nodes: int, profiles: FloatArray | None = None
+) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Phi_F, Phi_A and their error (entries, 3), and the steps, of all entries on one basis.
 
+    `profiles` (3, entries, nodes) receives rho, pressure and gap.
+    """
+    phi, steps = np.empty((X.size, 3)), np.empty(X.size, dtype=np.int64)
+    status, work = np.empty(X.size, dtype=np.uint8), np.empty(core.islands_work(nodes))
+    bases = (*basis(nodes), *basis(COARSE_NODES))
 
-def _newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int, profiles: bool) -> _Batch:
-    """All entries on one basis; profiles are empty unless asked for."""
-    b = basis(nodes)
-    phi = np.empty((X.size, 3))
-    squared = np.empty(X.size)
-    steps = np.empty(X.size, dtype=np.int64)
-    w = np.empty((X.size if profiles else 1, nodes))
-    p = np.empty_like(w)
-    block = max(1, BLOCK // nodes**2)
-    for start in range(0, X.size, block):
-        part = slice(start, start + block)
-        kept = part if profiles else slice(None)
-        solve_islands(
-            X[part], mu[part], rtol, b, basis(COARSE_NODES), phi[part], squared[part], steps[part], w[kept], p[kept]
-        )
-    phi[:, 0] *= mu
-    if not profiles:
-        return _Batch(phi, steps, *(np.empty((0, nodes)),) * 3)
-    rho_squared = squared[:, None] * b.v
-    gap = rho_squared - X[:, None] + w / b.root_weights
-    return _Batch(phi, steps, np.sqrt(rho_squared), mu[:, None] * p / b.root_weights, gap)
+    def fill(part: slice) -> None:
+        kept = (None,) * 3 if profiles is None else profiles[:, part]
+        core.solve_islands(X[part], mu[part], rtol, *bases, phi[part], steps[part], status[part], *kept, work)
+
+    in_blocks(fill, X.size, max(1, BLOCK // nodes**2))
+    return phi, steps
 
 
 def rigid_sphere(X: FloatArray, mu: FloatArray) -> FloatArray:
@@ -151,11 +140,11 @@ def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None)
         now = np.flatnonzero(failed & (level <= number))
         if now.size == 0:
             continue
-        batch = _newton(X[now], mu[now], rtol, int(count), profiles=False)
-        phi[now], used[now] = batch.phi, count
-        steps[now] += batch.steps
+        found, taken = _newton(X[now], mu[now], rtol, int(count))
+        phi[now], used[now] = found, count
+        steps[now] += taken
         # nodes that were asked for give what they give
-        failed[now] = ~(batch.phi[:, 2] <= (rtol if nodes is None else np.inf))
+        failed[now] = ~(found[:, 2] <= (rtol if nodes is None else np.inf))
     return {"phi": phi, "iterations": steps, "nodes": used, "failed": failed | ~np.isfinite(phi).all(axis=1)}
 
 

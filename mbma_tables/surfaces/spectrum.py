@@ -1,8 +1,7 @@
 """Moments and summits of a self-affine spectrum over a band of magnifications (Eqs. 2, 3, 6, 7, 22, 31), and back.
 
 Units: heights in s = h_rms / sqrt(1 - zeta_1^(-2H)), lengths in 1/q0. A band [za, zb] is given by log(za) and
-log(zb/za), so that a band of any width, however narrow, keeps its digits. Plain arithmetic, for arrays
-and for compiled code alike.
+log(zb/za), so that a band of any width, however narrow, keeps its digits.
 """
 
 from __future__ import annotations

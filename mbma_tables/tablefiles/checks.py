@@ -1,6 +1,6 @@
 """What a table file may hold: the type of every attribute, and how the parts of a table fit one another.
 
-Compiled code takes for granted what is checked here, and the text of attributes goes into exported files.
+The core takes for granted what is checked here, and the text of attributes goes into exported files.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def check_attribute(owner: str, name: str, value: Any) -> None:
 def _check_axis(axis: Axis) -> None:
     low, high = LIMITS.get(axis.name, (-np.inf, np.inf))
     positive = axis.low + axis.offset > 0 or axis.transform == "linear"
-    # compiled lookups know an offset of X alone
+    # lookups know an offset of X alone
     known = axis.offset == 0 or axis.name == "X"
     if not (positive and known and low <= axis.low < axis.high <= high and axis.nodes > 1):
         raise ValueError(f"has axis {axis.name} from {axis.low:g} to {axis.high:g} with offset {axis.offset:g}")

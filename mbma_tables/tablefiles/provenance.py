@@ -1,4 +1,4 @@
-"""Hashes of values and attributes, and where values came from: versions, processor, source files."""
+"""Hashes of values and attributes, and where values came from: versions, arithmetic, source files."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from mbma_tables.core import ARITHMETIC
 from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
 
 SOLVER = (
-    "mbma_tables.islands.height_integrals",
+    "mbma_tables/core/elementary.h",
+    "mbma_tables/core/height_coefficients.h",
+    "mbma_tables/core/newton.c",
     "mbma_tables.islands.spectral",
-    "mbma_tables.islands.newton",
     "mbma_tables.islands.greenwood_tripp",
 )
 GEOMETRY = ("mbma_tables.surfaces.spectrum", "mbma_tables.islands.geometry", "mbma_tables.islands.four_numbers")
@@ -41,40 +43,31 @@ def digest_arrays(arrays: dict[str, Any]) -> str:
 
 
 def source_digest(modules: tuple[str, ...]) -> str:
-    """SHA-256 of the source files of modules, as bytes: a record of what ran, which nothing is compared with."""
+    """SHA-256 of the files of modules, or of C sources, as bytes: a record of what ran, compared with nothing."""
     digest = hashlib.sha256()
     for module in modules:
-        spec = importlib.util.find_spec(module)
-        if spec is None or spec.origin is None:
-            raise ModuleNotFoundError(module)
-        digest.update(pathlib.Path(spec.origin).read_bytes())
+        path: str | pathlib.Path = pathlib.Path(__file__).parents[2] / module
+        if "/" not in module:
+            spec = importlib.util.find_spec(module)
+            if spec is None or spec.origin is None:
+                raise ModuleNotFoundError(module)
+            path = spec.origin
+        digest.update(pathlib.Path(path).read_bytes())
     return digest.hexdigest()
 
 
-def processor() -> tuple[str, str]:
-    """Name and features of the processor that numba compiles for; they decide the last bits of values."""
-    from llvmlite import binding
-    from numba.core import config
-
-    # set by the environment where code is compiled for another processor
-    name, features = (getattr(config, f"CPU_{what}") for what in ("NAME", "FEATURES"))
-    return name or binding.get_host_cpu_name(), features or binding.get_host_cpu_features().flatten()
-
-
 def versions() -> dict[str, str]:
-    """The processor, and the versions of what computes."""
+    """Versions of what computes, and whether the core's processor has fused multiply-add, which decides last bits."""
     import netCDF4
-    import numba
     import scipy
 
     from mbma_tables import __version__
 
     return {
-        "processor": processor()[0],
+        "arithmetic": ARITHMETIC,
         "mbma_tables": __version__,
         "python": platform.python_version(),
         "numpy": np.__version__,
         "scipy": scipy.__version__,
-        "numba": numba.__version__,
         "netCDF4": netCDF4.__version__,
     }

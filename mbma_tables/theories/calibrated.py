@@ -8,6 +8,7 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray, require
 from mbma_tables.calibrated import area as law_area
+from mbma_tables.calibrated import light_factor
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.surface import Surface
@@ -69,7 +70,7 @@ class Calibrated(Theory):
         out[2] *= places.gradient
         out[2] /= places.h_rms
         force, area, stiffness = out.reshape(3, *places.shape)
-        share = u / places.columns[3][places.owner]
+        share = u / places.columns[2][places.owner]
         return TheoryAnswer(force, area, stiffness, _error(table.error, 2 * table.error, share.reshape(places.shape)))
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
@@ -79,7 +80,7 @@ class Calibrated(Theory):
         assert isinstance(surface, Surface)
         table, places = calibrated_table.shipped(), Places(surface, wanted)
         if quantity == "area":
-            light = places.columns[2][places.owner].reshape(places.shape)
+            light = np.broadcast_to(light_factor(surface.alpha), places.shape)
             loads = force_at_area(places.flat.reshape(places.shape), light).ravel()
         else:
             loads = places.flat / places.gradient

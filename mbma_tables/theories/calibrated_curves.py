@@ -58,9 +58,7 @@ class Places:
         self.flat = np.ascontiguousarray(spread(np.asarray(value, float), self.shape)).ravel()
         hurst = np.asarray(surface.hurst, float).ravel()
         zeta_1, h_rms = np.asarray(surface.zeta_1, float).ravel(), np.asarray(surface.h_rms, float).ravel()
-        light = light_factor(np.asarray(surface.alpha).ravel())
-        heights = np.asarray(surface.h_max, float).ravel() / h_rms
-        self.columns = np.array([hurst, np.log(zeta_1), light, heights])
+        self.columns = np.array([hurst, np.log(zeta_1), np.asarray(surface.h_max, float).ravel() / h_rms])
         number = np.arange(hurst.size).reshape(surface.shape)
         self.owner = np.ascontiguousarray(spread(number, self.shape)).ravel()
         self.h_rms = h_rms[self.owner] if hurst.size > 1 else h_rms
@@ -77,7 +75,7 @@ class Places:
 
     def law(self, row: int) -> Law:
         """The law of one surface."""
-        hurst, log_zeta, _, heights = self.columns[:, row]
+        hurst, log_zeta, heights = self.columns[:, row]
         return Law(Spectrum.self_affine(float(hurst), float(np.exp(log_zeta))), float(heights))
 
 

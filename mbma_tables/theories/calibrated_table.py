@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import pathlib
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -18,32 +17,23 @@ from numpy.typing import NDArray
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import Constants
-from mbma_tables.compiled import in_blocks
+from mbma_tables.core import core, in_blocks
 from mbma_tables.errors import TableFileError
 from mbma_tables.files import shipped_file
-from mbma_tables.tablefiles.interpolate import fill_along, fill_pieces, polynomial_of, quintic, quintic_at, tiled
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, read_sealed
 
 NAME = "calibrated.nc"
 AXES = ("hurst", "log_zeta_1", "log_separation")
 QUANTITIES = ("area", "force", "stiffness")
-BLOCK = 8192  # numbers answered at a time, which a processor's cache holds
-SMALL = 256  # places up to which numpy answers, without a compiler
-FEW, MIN_SHARED = 8, 256  # surfaces up to which, and places a surface from which, its polynomials are worth making
-KEPT = 64  # surfaces whose polynomials are kept
-MAX_STEPS = 100
-CLOSE = 1e-9  # of ln F: the next miss would be about the square of this one
-TINY = 1e-300
-MAX_LOG_SEPARATION = 690.0  # -ln u at which full contact is taken as reached
-TO_POWERS = np.array(polynomial_of(np.eye(6))).T  # of B-splines in a cell
+BLOCK = 65536  # entries answered between two chances of Ctrl-C
+FEW, MIN_SHARED = 64, 40  # surfaces up to which, and entries a surface from which, its polynomials are worth making
 
-Owners = NDArray[np.intp]
-Along = Callable[[Owners, FloatArray], tuple[FloatArray, FloatArray]]
+Owners = NDArray[np.int64]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SurfaceSpline:
-    """Quintic B-splines over Hurst exponent, ln zeta_1 and a last axis.
+    """Quintic B-splines over Hurst exponent, ln zeta_1 and a last axis, for the compiled core.
 
     Attributes
     ----------
@@ -51,7 +41,7 @@ class SurfaceSpline:
         Of the equally spaced nodes along the axes.
     covered : numpy.ndarray, shape (3, 2) or (2, 2)
         First and last that are answered.
-    coefficients : numpy.ndarray
+    coefficients : numpy.ndarray of float32
     """
 
     first: FloatArray
@@ -62,78 +52,37 @@ class SurfaceSpline:
     @functools.cached_property
     def cells(self) -> Any:
         """Their number along each axis."""
-        return np.array(self.coefficients.shape) - 5
+        return np.array(self.coefficients.shape, np.int64) - 5
 
-    @functools.cached_property
-    def tiles(self) -> Any:
-        """Coefficients as `fill_along` takes them."""
-        return tiled(self.coefficients)
-
-    @functools.cached_property
+    @property
     def last(self) -> float:
         """Where the last axis ends."""
         return float(self.first[2] + self.cells[2] * self.step[2])
+
+    @property
+    def law_constants(self) -> tuple[float, float, float]:
+        """What the core needs to know of the law beside the spline."""
+        raise NotImplementedError
+
+    @functools.cached_property
+    def core_table(self) -> tuple[Any, FloatArray, Any]:
+        """Coefficients, numbers and cells as the core takes them."""
+        numbers = [*self.first, *(1 / self.step), *self.covered[:2].ravel(), *self.law_constants]
+        return np.pad(self.coefficients.ravel(), (0, 2)), np.array(numbers), self.cells
 
     def covers(self, hurst: FloatArray, log_zeta_1: FloatArray) -> Any:
         """Which surfaces lie inside the table."""
         (low, high), (start, stop) = self.covered[:2]
         return (low <= hurst) & (hurst <= high) & (start <= log_zeta_1) & (log_zeta_1 <= stop)
 
-    def along(self, surfaces: FloatArray, count: int) -> Along:
-        """Value and derivative along the last axis, held at its ends, of numbers of surfaces and places there.
-
-        Columns of `surfaces` begin with H and ln zeta_1; `count` is how many numbers will be asked at a time.
-        """
-        alike = all(bool((x[-1:] == x[:1]).all() and (x == x[:1]).all()) for x in surfaces[:2])
-        own = surfaces[:, :1] if alike else surfaces
-        shared = own.shape[1] <= FEW or count >= MIN_SHARED * own.shape[1]
-        pieces = self._pieces(own) if shared else np.empty((0, 0, 0))
-        low, rate, number = self.first[2], 1 / self.step, int(self.cells[2])
-
-        def compiled(owner: Owners, x: FloatArray) -> Any:
-            found = np.empty((2, x.size // max(owner.size, 1), owner.size))
-            if shared:
-                number_of = np.zeros_like(owner) if alike else owner
-                fill_pieces(pieces, low, rate[2], number_of, x.reshape(found.shape[1:]), found)
-            else:
-                places = x.reshape(found.shape[1:])
-                fill_along(self.tiles, number, self.first, rate, own, owner, places, found)
-            return found.reshape(2, *x.shape)
-
-        def plain(owner: Owners, x: FloatArray) -> Any:
-            place = np.minimum(np.maximum((x - low) * rate[2], 0.0), number)
-            k = np.minimum(place.astype(np.intp), number - 1)
-            six = pieces[0 if alike else owner, k] if shared else self._piece(own[:, owner], k)
-            value, slope = quintic_at([six[..., m] for m in range(6)], place - k)
-            return value, slope * rate[2]
-
-        return plain if count <= SMALL else compiled
-
-    def _placed(self, surfaces: FloatArray) -> tuple[Any, Any]:
-        """Cells of surfaces along H and ln zeta_1, and places in them, shape (2, surfaces)."""
-        sizes = self.cells[:2, None]
-        places = np.clip((surfaces[:2] - self.first[:2, None]) / self.step[:2, None], 0.0, sizes)
-        cells = np.minimum(places.astype(np.intp), sizes - 1)
-        return cells, places - cells
-
-    def _piece(self, surfaces: FloatArray, cell: Owners) -> FloatArray:
-        """Quintics in cells of the last axis, shape (..., surfaces, 6)."""
-        (i, j), (x, y) = self._placed(surfaces)
-        a, b, c = (steps[(...,) + (None,) * cell.ndim] for steps in np.ogrid[:6, :6, :6])
-        six = np.einsum("abc...n,an,bn->...nc", self.coefficients[i + a, j + b, cell + c], quintic(x), quintic(y))
-        return np.asarray(six @ TO_POWERS)
-
-    def _pieces(self, surfaces: FloatArray) -> FloatArray:
-        """Quintics in all cells of the last axis, shape (surfaces, cells, 6)."""
-        return np.stack([_pieces_of(self, *one) for one in surfaces[:2].T.tolist()])
-
-
-@functools.lru_cache(KEPT)
-def _pieces_of(table: SurfaceSpline, hurst: float, log_zeta_1: float) -> FloatArray:
-    """Those of one surface, kept for calls one by one."""
-    (i, j), (x, y) = (part[:, 0].tolist() for part in table._placed(np.array([[hurst], [log_zeta_1]])))
-    line = np.einsum("abk,a,b->k", table.coefficients[i : i + 6, j : j + 6], quintic(x), quintic(y))
-    return np.asarray(line[np.arange(table.cells[2])[:, None] + np.arange(6)] @ TO_POWERS)
+    def shared(self, surfaces: FloatArray, entries: int) -> FloatArray | None:
+        """Polynomials of surfaces whose first rows are H and ln zeta_1, where these are worth making."""
+        count = surfaces.shape[1]
+        if count > FEW or entries < MIN_SHARED * count:
+            return None
+        pieces = np.empty((count, int(self.cells[2]), 6))
+        core.spline_pieces(*self.core_table, surfaces[0], surfaces[1], None, None, None, pieces)
+        return pieces
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -157,76 +106,30 @@ class Table(SurfaceSpline):
     scatter: dict[str, FloatArray]
     log_area: FloatArray
 
-    def _log_gaussian(self, surfaces: FloatArray, count: int) -> Along:
-        """ln F_G and its derivative by ln u, for `count` numbers at a time."""
-        inside, low, high = self.along(surfaces, count), self.first[2], self.last
+    @property
+    def law_constants(self) -> tuple[float, float, float]:
+        """Of the area."""
+        return self.constants.area_s0, self.constants.area_slope, self.constants.area_t0
 
-        def curve(owner: Owners, log_u: FloatArray) -> tuple[FloatArray, FloatArray]:
-            value, rate = inside(owner, log_u)
-            if not low <= log_u.min() <= log_u.max() <= high:
-                growth, square = np.expm1(np.maximum(log_u - high, 0)), 1 + 2 * rate * np.minimum(log_u - low, 0)
-                value, rate = value + rate * growth + np.log(square) / 2, rate * (growth + 1) / square
-            return value, rate
+    def _given(self, surfaces: FloatArray, entries: int) -> tuple[Any, ...]:
+        ends = np.empty((surfaces.shape[1], 2))
+        core.calibrated_ends(*self.core_table, *surfaces, None, None, ends)
+        return *self.core_table, *surfaces, ends, self.shared(surfaces, entries)
 
-        return curve
-
-    @np.errstate(under="ignore")
     def fill(self, surfaces: FloatArray, owner: Owners, u: FloatArray) -> FloatArray:
-        """Force, area and -dF/du, shape (3, n), of mean separations u [h_rms].
+        """Force, area and -dF/du, shape (3, n), of mean separations u [h_rms]; NaN for surfaces outside the table.
 
-        `surfaces` has a column of Hurst exponent, ln zeta_1, s0 and h_max/h_rms for each surface, `owner` its number
-        for each separation.
+        `surfaces` has a column of Hurst exponent, ln zeta_1 and h_max/h_rms for each surface, `owner` its number for
+        each separation.
         """
-        from scipy.special import erf
-
-        curve, out = self._log_gaussian(surfaces, u.size), np.empty((3, u.size))
-
-        def fill(block: slice) -> None:
-            own, gap, (force, area, stiffness) = owner[block], u[block], out[:, block]
-            light, h_max = surfaces[2][own], surfaces[3][own]
-            held = np.minimum(np.maximum(gap, TINY), h_max)
-            (value, end), (rate, _) = curve(own, np.log([held, h_max]))
-            lost = -np.exp(value)
-            # without cancellation
-            np.multiply(lost, np.expm1(end - value), out=force)
-            t = force / self.constants.area_t0
-            erf(force * np.sqrt(2 * (1 + t) / (light + t)), out=area)
-            np.divide(rate * lost, held, out=stiffness)
-            if not ((gap > 0) & (gap < h_max)).all():
-                out[:, block][:, gap >= h_max] = 0.0
-                out[:, block][:, gap <= 0] = np.array([[np.inf], [1.0], [np.inf]])
-
-        in_blocks(fill, u.size, BLOCK)
+        given, out = self._given(surfaces, u.size), np.empty((3, u.size))
+        in_blocks(lambda k: core.calibrated_contact(*given, owner[k], u[k], *out[:, k]), u.size, BLOCK)
         return out
 
-    @np.errstate(under="ignore")
     def separations(self, surfaces: FloatArray, owner: Owners, force: FloatArray) -> FloatArray:
         """Mean separations [h_rms] at forces F/(A0 E* g) > 0; NaN where they lie beyond the table."""
-        curve, out = self._log_gaussian(surfaces, force.size), np.empty(force.size)
-        nodes = self.first[2] + self.step[2] * np.arange(self.cells[2])
-
-        def fill(block: slice) -> None:
-            own = owner[block]
-            high, low = np.log(surfaces[3][own]), np.full(own.size, -MAX_LOG_SEPARATION)
-            end, most = curve(own, np.array([high, low]))[0]
-            # Newton's method in ln(F + F_G(h_max)), which is smooth to the end, in a bracket
-            rise, x = np.logaddexp(0.0, np.log(force[block]) - end), high - 0.5
-            if surfaces.shape[1] == 1:
-                x = np.minimum(np.interp(-(end + rise), -self._pieces(surfaces)[0, :, 0], nodes), high)
-            beyond = done = end + rise > most
-            for _ in range(MAX_STEPS):
-                value, rate = curve(own, x)
-                miss = (value - end) - rise
-                low, high = np.where(miss > 0, x, low), np.where(miss > 0, high, x)
-                following, near = x - miss / rate, np.abs(miss) <= CLOSE
-                held = np.where(near, np.clip(following, low, high), 0.5 * (low + high))
-                following = np.where((low < following) & (following < high), following, held)
-                x, done = np.where(done, x, following), done | near | (high - low <= 2e-16)
-                if done.all():
-                    break
-            out[block] = np.where(beyond, np.nan, np.exp(x))
-
-        in_blocks(fill, force.size, BLOCK)
+        given, out = self._given(surfaces, force.size), np.empty(force.size)
+        in_blocks(lambda k: core.calibrated_separation(*given, owner[k], force[k], out[k]), force.size, BLOCK)
         return out
 
     def standard_deviation(self, theory: str, quantity: str, area: FloatArray) -> FloatArray:

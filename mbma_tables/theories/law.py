@@ -20,8 +20,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import get_theory
-from mbma_tables.theories import law_kernel as kernel
-from mbma_tables.theories.law_kernel import AREA_AT, FORCE_AT
+from mbma_tables.theories.law_block import AREA_AT, CENTRE, ENERGY_AT, FORCE_AT, RATE, RECORD
 from mbma_tables.theories.law_object import ROUNDING, ContactLaw
 from mbma_tables.theories.law_pieces import (
     First,
@@ -239,7 +238,7 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[st
         below = Side(-1, start, lambda x: answer(h_max - width * x), tuple((h_max - bends) / width))
         sides, first = [below, above] if lowest else [below], straight_record(below.values, start)
     elif lowest > 0:
-        sides, first = [above], (np.zeros(kernel.RECORD), np.zeros(2), (0.0, 0.0))
+        sides, first = [above], (np.zeros(RECORD), np.zeros(2), (0.0, 0.0))
     else:
         octaves = range(3, MOST_OCTAVES)
         start, first = first_record(lambda start: power_record(above.values, start, (0.0, 0.0)), octaves, tolerance)
@@ -275,13 +274,13 @@ def _finish(
         if turn is None:
             return None
         place, t = turn
-        x = in_order[place, kernel.CENTRE] + t / in_order[place, kernel.RATE]
+        x = in_order[place, CENTRE] + t / in_order[place, RATE]
         return float(signs[place] * (x / scale - h_max))
 
     turns = [gap(turn) for turn in first_falls(in_order, signs)]
     # forces carry the modulus
     records[:, FORCE_AT:AREA_AT] *= facts["E_star"]
-    records[:, kernel.ENERGY_AT] *= facts["E_star"]
+    records[:, ENERGY_AT] *= facts["E_star"]
     block.flags.writeable = False
     error, own = float(errors[:, 0].max()), own_error()
     return ContactLaw(

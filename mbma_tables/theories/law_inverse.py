@@ -14,8 +14,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.theories import law_kernel as kernel
-from mbma_tables.theories.law_kernel import INVERSE_BITS, INVERSE_DEGREE, INVERSE_RECORD
+from mbma_tables.core import core
+from mbma_tables.theories import law_block as at
+from mbma_tables.theories.law_block import AREA, INVERSE_BITS, INVERSE_DEGREE, INVERSE_RECORD
 
 OCTAVES = 100  # below the largest value; lighter loads are found by iteration
 LEAST = float(np.finfo(float).tiny)
@@ -30,17 +31,13 @@ def _rule() -> tuple[Any, Any]:
 
 def inverse_block(which: int, block: FloatArray, end: float) -> FloatArray:
     """The inverse of force or area of a law's block, down to the gap `end`."""
-    address, ends = int(block.ctypes.data), bool(block.view(np.int64)[kernel.ENDS])
-    h_max, scale, low = block[kernel.H_MAX], block[kernel.SCALE], block[kernel.LOW]
-
-    def value(d: float) -> float:
-        return float(kernel.evaluate(which, address, d))
-
-    most = value(end)
-    top = h_max - low / scale if ends else float(block[kernel.HIGHEST])
-    bottom = min(max(value(top), most * 2.0**-OCTAVES, LEAST), most)
-    two_sided = block[kernel.PLUS] != block[kernel.MINUS]
-    turn = value(0.0) if two_sided and end < 0 else math.inf
+    ends = bool(block.view(np.int64)[at.ENDS])
+    top = block[at.H_MAX] - block[at.LOW] / block[at.SCALE] if ends else block[at.HIGHEST]
+    values = np.empty(3)
+    core.law_fill(np.array([top, end, 0.0]), block, *((None, values) if which == AREA else (values, None)), *[None] * 3)
+    least, most, middle = values.tolist()
+    bottom = min(max(least, most * 2.0**-OCTAVES, LEAST), most)
+    turn = middle if block[at.PLUS] != block[at.MINUS] and end < 0 else math.inf
     bits = 52 - INVERSE_BITS
     first, last = (int(np.float64(y).view(np.int64) >> bits) for y in (bottom, most))
     edges = (np.arange(first, last + 2) << bits).view(np.float64)
@@ -51,14 +48,14 @@ def inverse_block(which: int, block: FloatArray, end: float) -> FloatArray:
     centre, half = (edges[1:] + edges[:-1]) / 2, (edges[1:] - edges[:-1]) / 2
     wanted = (centre[:, None] + half[:, None] * points).ravel()
     x, side = np.empty((2, wanted.size))
-    kernel.fill_inverse_nodes(which, address, wanted, end, x, side)
+    core.inverse_nodes(wanted, block, which, end, x, side)
     records = np.zeros((centre.size, INVERSE_RECORD))
     records[:, 0] = centre
     records[:, 1] = np.divide(1.0, half, out=np.zeros_like(half), where=half > 0)
     records[:, 2] = side.reshape(-1, points.size)[:, points.size // 2]
     records[:, 3:] = x.reshape(-1, points.size) @ transform
-    head = np.zeros(kernel.INVERSE_HEAD)
-    head[kernel.Y_LEAST] = 0.0 if ends else value(float(block[kernel.HIGHEST]))
-    head[[kernel.Y_LOW, kernel.Y_HIGH, kernel.Y_TURN, kernel.END]] = bottom, most, turn, end
-    head.view(np.int64)[kernel.FIRST_BUCKET] = first
+    head = np.zeros(at.INVERSE_HEAD)
+    head[at.Y_LEAST] = 0.0 if ends else least
+    head[[at.Y_LOW, at.Y_HIGH, at.Y_TURN, at.END]] = bottom, most, turn, end
+    head.view(np.int64)[at.FIRST_BUCKET] = first
     return np.concatenate([head, records.ravel()])

@@ -9,21 +9,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, Numbers, is_labelled
+from mbma_tables.core import core
 from mbma_tables.errors import ConvergenceError, InputError
 from mbma_tables.labels import apply
-from mbma_tables.leakage import wide_gap
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories.law_kernel import (
+from mbma_tables.theories.law_block import (
     AREA_AT,
     CENTRE,
     ENDS,
     FORCE_AT,
-    HIGHEST,
     KINK_SIGN,
     KINK_SIGN_2,
     LOWEST,
     RATE,
-    fill,
 )
 from mbma_tables.theories.law_pieces import (
     SAMPLES,
@@ -62,7 +60,7 @@ class LeakageLaw:
         Bound on the relative error of the polynomials, against the flow at the law's area. Errors of that area come on
         top, times -d ln k/d ln A, which grows without limit towards `blocked_at`.
     block : ndarray
-        In the layout of `mbma_tables.theories.law_kernel`: the conductance in place of force, and its cube root, the
+        In the layout of a law's block: the conductance in place of force, and its cube root, the
         gap of parallel plates that pass as much, in place of area; of gaps from `blocked_at` to h_max, or to the end
         of a law without last contact.
     """
@@ -90,10 +88,7 @@ class LeakageLaw:
         d = self.law.separation(force=pressure) if pressure is not None else self.law.gaps(separation, u)
         flat = np.ascontiguousarray(d).reshape(-1)
         found = np.empty(flat.size)
-        fill(int(self.block.ctypes.data), np.minimum(flat, self.block[HIGHEST]), found, None, None, None, None)
-        apart = flat > self.block[HIGHEST]
-        mean = (self.law.h_max + flat[apart]) / 2
-        found[apart] = mean**3 * wide_gap(mean / self.h_rms)
+        core.law_flow_fill(flat, self.block, self.law.h_max, self.h_rms, found)
         return found.reshape(np.shape(d))[()]
 
 

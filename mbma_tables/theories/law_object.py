@@ -1,10 +1,11 @@
 """What a contact law answers, whatever theory it is of: values, slopes, energy and inverses against the gap.
 
-All of them come from one record of polynomials, found from the bits of the gap (`law_kernel`).
+All of them come from one record of polynomials, found from the bits of the gap (`core/law.c`).
 """
 
 from __future__ import annotations
 
+import ctypes
 import dataclasses
 import functools
 import math
@@ -14,22 +15,35 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, needed, require
-from mbma_tables.compiled import in_blocks
+from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, require
+from mbma_tables.core import core, in_blocks
 from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
 from mbma_tables.plots import Curve, draw_compression, force_label, theory_label
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories import law_kernel as kernel
-from mbma_tables.theories.law_kernel import AREA, FORCE
+from mbma_tables.theories import law_block as at
+from mbma_tables.theories.law_block import AREA, FORCE, QUANTITIES
 from mbma_tables.theories.result import MEANINGS
 from mbma_tables.units import UNKNOWN, Units, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from scipy import LowLevelCallable
 
-    from mbma_tables.theories.law_compiled import CompiledLaw
     from mbma_tables.theories.law_leakage import LeakageLaw
+
+    class Law:
+        """As `core/binding.c` has it, which answers floats and small arrays without Python."""
+
+        force: Callable[..., Numbers]
+        area: Callable[..., Numbers]
+        stiffness: Callable[..., Numbers]
+        area_slope: Callable[..., Numbers]
+        energy: Callable[..., Numbers]
+        _addresses: Callable[[int], tuple[int, int]]
+
+else:
+    Law = core.Law
 
 BLOCK = 1 << 16  # gaps between two looks for Ctrl-C
 SHOWN_POINTS = 200  # separations of a law as a Dataset, and of its picture
@@ -37,7 +51,6 @@ SPACED = (1e-3, 0.2)  # of the way down: geometric up to here, then even
 SCAN = 49  # gaps at which a law's stiffness is looked at for its maximum
 ROUNDING = 4 * float(np.finfo(float).eps)
 DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polynomials'
-QUANTITIES = ("force", "area", "stiffness", "area_slope", "energy")
 
 
 class _Point(NamedTuple):
@@ -77,7 +90,7 @@ class LawValues(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class ContactLaw(Displayed):
+class ContactLaw(Law, Displayed):
     """Force and area of one surface against its gap; made by `contact_law`, picklable, tens of kB with its surface.
 
     Every method takes the separation d, or the mean separation ``u=`` instead: numbers in the law's unit of length, or
@@ -99,7 +112,7 @@ class ContactLaw(Displayed):
     theory, reading, tier : str
         What made it; reading and tier are empty where the theory is not MBMA.
     block : ndarray
-        The polynomials, in the layout that `mbma_tables.theories.law_kernel` describes.
+        The polynomials, in the layout that `mbma_tables/core/mbma.h` describes.
     errors : ndarray, shape (records, 2)
         Bounds on the relative error of a record's values, and of its slopes over F/x.
     units : Units
@@ -134,29 +147,19 @@ class ContactLaw(Displayed):
     units: Units = UNKNOWN
     surface: AnySurface | None = None
 
-    @functools.cached_property
-    def _force_at(self) -> Any:
-        """Force at one gap, a float."""
-        compiled: Any = kernel.force_at
-        return functools.partial(compiled.entry("(int64, float64)"), self._address)
-
-    @functools.cached_property
-    def _address(self) -> int:
-        return int(self.block.ctypes.data)
-
     @property
     def rows(self) -> Any:
         """Shift and base of each octave of x, shape (octaves, 2)."""
-        return self.block[kernel.HEAD : self._first_word].view(np.int64).reshape(-1, 2)
+        return self.block[at.HEAD : self._first_word].view(np.int64).reshape(-1, 2)
 
     @property
     def records(self) -> FloatArray:
         """Centre, rate, polynomials of force and area, and energy of each piece, shape (records, RECORD)."""
-        return self.block[self._first_word :].reshape(-1, kernel.RECORD)
+        return self.block[self._first_word :].reshape(-1, at.RECORD)
 
     @property
     def _first_word(self) -> int:
-        return int(self.block.view(np.int64)[kernel.RECORDS])
+        return int(self.block.view(np.int64)[at.RECORDS])
 
     def gaps(self, separation: Any, u: Any) -> FloatArray:
         """Separations d, checked, of separations or of mean separations."""
@@ -204,33 +207,17 @@ class ContactLaw(Displayed):
 
         def fill(d: FloatArray, *out: FloatArray) -> bool:
             found = dict(zip(wanted, out, strict=True))
-            return bool(kernel.fill(self._address, d, *map(found.get, QUANTITIES)))
+            return not core.law_fill(d, self.block, *map(found.get, QUANTITIES))
 
         return self._ask(separation if u is None else u, len(wanted), check, fill, plain=u is None)
+
+    def _ask_one(self, what: int, separation: Any, u: Any) -> Any:
+        """What a method of `Law` does not answer itself."""
+        return self._values((QUANTITIES[what],), separation, u)[0]
 
     def __call__(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
         """The same as `force`."""
         return self.force(separation, u=u)
-
-    def force(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
-        """F/A0 in the unit of E_star at d; where contact ends at h_max, zero from there on."""
-        if type(separation) is float and u is None:
-            value: np.float64 = self._force_at(separation)
-            # NaN: refused below
-            if value == value:
-                return value
-        return self._values(("force",), separation, u)[0]  # type: ignore[no-any-return]
-
-    def area(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
-        """A/A0 at d; where contact ends at h_max, zero from there on."""
-        return self._values(("area",), separation, u)[0]  # type: ignore[no-any-return]
-
-    def stiffness(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
-        """-dF/du per nominal area, against the mean separation u = (h_max + d)/2: -2 dF/dd.
-
-        MBMA's jumps where zeta_d reaches its floor, and belongs to the larger gap there.
-        """
-        return self._values(("stiffness",), separation, u)[0]  # type: ignore[no-any-return]
 
     def force_and_stiffness(
         self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None
@@ -238,14 +225,6 @@ class ContactLaw(Displayed):
         """F/A0 and -dF/du in one pass, as iterations need them."""
         force, stiffness = self._values(("force", "stiffness"), separation, u)
         return force, stiffness
-
-    def area_slope(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
-        """-d(A/A0)/dd."""
-        return self._values(("area_slope",), separation, u)[0]  # type: ignore[no-any-return]
-
-    def energy(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
-        """Elastic energy per nominal area, the integral of F/A0 over u to last contact."""
-        return self._values(("energy",), separation, u)[0]  # type: ignore[no-any-return]
 
     def values(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> LawValues:
         """Force, area, stiffness -dF/du and energy in one pass."""
@@ -278,7 +257,7 @@ class ContactLaw(Displayed):
         """Gaps of forces or areas, and with a `count` of 3 area and -dF/du there."""
         key = "area" if name == "area" else "force"
         which, inverse = (FORCE if key == "force" else AREA), self._inverse_block(key)
-        least, most, end = inverse[kernel.Y_LEAST], inverse[kernel.Y_HIGH], inverse[kernel.END]
+        least, most, end = inverse[at.Y_LEAST], inverse[at.Y_HIGH], inverse[at.END]
 
         def check(given: Any) -> FloatArray:
             wanted = finite_array(name, given)
@@ -291,8 +270,7 @@ class ContactLaw(Displayed):
             return wanted
 
         def fill(wanted: FloatArray, gap: FloatArray, *also: FloatArray) -> bool:
-            address = int(inverse.ctypes.data)
-            return bool(kernel.fill_inverse(which, self._address, address, wanted, gap, *(also or (None, None))))
+            return not core.law_invert(wanted, self.block, inverse, which, gap, *(also or (None, None)))
 
         return self._ask(given, count, check, fill)
 
@@ -359,23 +337,19 @@ class ContactLaw(Displayed):
         """
         d = self.gaps(separation, None)
         head = self.block
-        x = (self.h_max + np.where(d < 0, head[kernel.MINUS], head[kernel.PLUS]) * d) * head[kernel.SCALE]
+        x = (self.h_max + np.where(d < 0, head[at.MINUS], head[at.PLUS]) * d) * head[at.SCALE]
         bound = self.errors[self._records_at(d, x), 1]
-        if head.view(np.int64)[kernel.ENDS]:
+        if head.view(np.int64)[at.ENDS]:
             left = self.h_max - d
             with np.errstate(divide="ignore", invalid="ignore"):
-                bound = np.where(left > 0, bound * left * head[kernel.SCALE] / x, 0.0)
+                bound = np.where(left > 0, bound * left * head[at.SCALE] / x, 0.0)
         return bound[()]
 
     def _records_at(self, d: FloatArray, x: FloatArray) -> Any:
-        """Numbers of the records that hold gaps, as the kernel finds them."""
-        head, whole = self.block, self.block.view(np.int64)
-        bits = np.clip(x, head[kernel.LOW], head[kernel.HIGH]).view(np.int64)
-        row = (bits >> 52) - whole[kernel.EXPONENT] + np.where(d < 0, whole[kernel.MINUS_ROWS], 0)
-        shift, base = np.moveaxis(self.rows[row], -1, 0)
-        passed = (d * head[kernel.KINK_SIGN] > head[kernel.KINK]).astype(int)
-        passed += d * head[kernel.KINK_SIGN_2] > head[kernel.KINK_2]
-        return np.where(x < head[kernel.LOW], 0, (bits >> shift) + base + passed)
+        """Numbers of the records that hold gaps."""
+        found = np.empty(np.shape(x), dtype=np.int64)
+        core.law_records(np.ascontiguousarray(x), np.ascontiguousarray(d), self.block, found)
+        return found
 
     def _facts(self) -> dict[str, str]:
         unit, modulus = self.units.length or "1", unit_of("force", self.units)
@@ -403,28 +377,40 @@ class ContactLaw(Displayed):
         label = force_label(unit_of("force", self.units))
         return draw_compression([curve], force_label=label, gap_label=f"mean separation u [{unit}]")
 
-    def compiled(self) -> CompiledLaw:
-        """The law for functions that numba compiles: an argument of theirs with methods of one float, such as `force`.
+    def compiled(self, quantity: str = "force") -> LowLevelCallable:
+        """A quantity at a separation as a function of C, ``double (double, void *)``, which scipy calls without Python.
+
+        Parameters
+        ----------
+        quantity : str
+            "force" (F/A0), "area" (A/A0), "stiffness" (-dF/du), "area_slope" (-d(A/A0)/dd) or "energy" (by u).
+
+        Returns
+        -------
+        scipy.LowLevelCallable
+            NaN outside the law. For ctypes, cffi and what else calls C, `function` is of ctypes and `user_data` its
+            last argument; the law lives as long as that.
 
         Examples
         --------
-        >>> from numba import njit
+        >>> from scipy.integrate import quad
         >>> from mbma_tables import Surface, contact_law
-        >>> @njit
-        ... def work(law, first, last, steps):
-        ...     total = 0.0
-        ...     for k in range(steps):
-        ...         total += law.force(first + (last - first) * (k + 0.5) / steps) * (first - last) / steps
-        ...     return total / 2  # u moves half as far as d
         >>> law = contact_law(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0))
-        >>> found = work(law.compiled(), 3.0, 1.0, 1000)
-        >>> bool(abs(found / law.energy(1.0) - 1) < 1e-4)
+        >>> force = law.compiled()
+        >>> work, _ = quad(force, 1.0, 3.0, epsabs=0.0)
+        >>> bool(abs(work / 2 / law.energy(1.0) - 1) < 1e-7)  # u moves half as far as d
+        True
+        >>> force.function(1.0, force.user_data) == law.force(1.0)
         True
         """
-        needed("numba", "fast")
-        from mbma_tables.theories.law_compiled import CompiledLaw
+        from scipy import LowLevelCallable
 
-        return CompiledLaw(self.block)
+        if quantity not in QUANTITIES:
+            raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
+        address, data = self._addresses(QUANTITIES.index(quantity))
+        given = ctypes.c_void_p(data)
+        given.law = self  # type: ignore[attr-defined]
+        return LowLevelCallable(ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_void_p)(address), given)
 
     def __getstate__(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}

@@ -17,10 +17,19 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.compiled import CONTRACT, njit
+from mbma_tables.core import core
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.theories import law_kernel as kernel
-from mbma_tables.theories.law_kernel import AREA_AT, CENTRE, DEGREE, ENERGY_AT, FORCE_AT, RATE, RECORD
+from mbma_tables.theories.law_block import (
+    AREA_AT,
+    CENTRE,
+    DEGREE,
+    ENERGY_AT,
+    EXPONENT,
+    FORCE_AT,
+    HEAD,
+    RATE,
+    RECORD,
+)
 
 SAMPLES = 16
 MAX_RECORDS = 4000
@@ -81,44 +90,12 @@ def _rule() -> Rule:
     return Rule(np.stack([1 - points, 1 + points]) / 2, series, bounds, monomials, from_zero)
 
 
-@njit(cache=True, fastmath=CONTRACT, error_model="numpy", nogil=True)
-def _fill_pieces(ends: FloatArray, found: FloatArray, rule: Rule, made: FloatArray) -> None:
-    """Records of intervals from values, (2, intervals, SAMPLES); behind each, bounds on its errors.
-
-    These are of value over F, of slope over F/x, and of slope over itself; none of intervals too narrow to tell.
-    """
-    terms = np.empty(SAMPLES)
-    for k in range(ends.shape[0]):
-        half = 0.5 * (ends[k, 1] - ends[k, 0])
-        reach = ends[k, 1] / half
-        made[k, CENTRE], made[k, RATE] = 0.5 * (ends[k, 0] + ends[k, 1]), 1.0 / half
-        for row in range(2):
-            values, start = found[row, k], FORCE_AT + row * KEPT
-            terms[:] = 0.0
-            for i in range(SAMPLES):
-                for j in range(SAMPLES):
-                    terms[j] += values[i] * rule.series[i, j]
-            for i in range(KEPT):
-                for j in range(i + 1):
-                    made[k, start + j] += terms[i] * rule.monomials[i, j]
-            value = slope = 0.0
-            for i in range(KEPT, SAMPLES):
-                value += abs(terms[i]) * rule.bounds[0, i]
-                slope += abs(terms[i]) * rule.bounds[1, i]
-            least = values.min()
-            steep = max(1.0, 0.5 * reach * (values.max() / least - 1.0))
-            slope *= reach
-            if ends[k, 1] - ends[k, 0] > NEAR * ends[k, 0]:
-                made[k, RECORD] = max(made[k, RECORD], value / least)
-                made[k, RECORD + 1] = max(made[k, RECORD + 1], slope / least)
-                made[k, RECORD + 2] = max(made[k, RECORD + 2], slope / least / steep)
-
-
 def _fit_intervals(values: Values, ends: FloatArray) -> FloatArray:
     """Records of intervals (n, 2) of x and bounds on their errors, (n, RECORD + 3)."""
-    rule, made = _rule(), np.zeros((len(ends), RECORD + 3))
-    found = positive(values((ends @ rule.places).ravel()))
-    _fill_pieces(ends, found.reshape(2, -1, SAMPLES), rule, made)
+    rule, made = _rule(), np.empty((len(ends), RECORD + 3))
+    found = np.ascontiguousarray(values((ends @ rule.places).ravel()))
+    if core.law_fit(ends, found, rule.series, rule.bounds, rule.monomials, made):
+        positive(found)
     return made
 
 
@@ -255,7 +232,7 @@ def assemble(
     signs = sides[0].sign, sides[-1].sign
     head = np.array([h_max, scale, low, math.nextafter(1.0, 0.0), *signs, *kinks, *first[2], *ends, 0, 0, 0, 0])
     below = -lowest if len(sides) > 1 else 0
-    head.view(np.int64)[kernel.EXPONENT :] = lowest + 1023, below, kernel.HEAD + rows.size, signs[0] < 0
+    head.view(np.int64)[EXPONENT:] = lowest + 1023, below, HEAD + rows.size, signs[0] < 0
     parts = [head, rows.view(np.float64), first[0], *(piece.records for piece in pieces)]
     block = np.concatenate([part.ravel() for part in parts])
     errors = np.concatenate([first[1][None], *(piece.errors for piece in pieces)])

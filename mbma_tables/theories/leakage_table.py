@@ -9,15 +9,15 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import Spectrum
-from mbma_tables.compiled import in_blocks
-from mbma_tables.leakage import FlowConstants, contact_factor, wide_gap
+from mbma_tables.core import core, in_blocks
+from mbma_tables.leakage import FlowConstants, contact_factor
 from mbma_tables.theories.calibrated_table import BLOCK, Owners, SurfaceSpline, nodes_of, shipped_part
 
 GROUP = "leakage"
@@ -47,16 +47,15 @@ class FlowTable(SurfaceSpline):
     scatter: dict[str, FloatArray]
     contact: FloatArray
 
+    @property
+    def law_constants(self) -> tuple[float, float, float]:
+        """Of contact that obstructs."""
+        return self.constants.threshold, self.constants.obstruction, 0.0
+
     def flow(self, surfaces: FloatArray, owner: Owners, u: FloatArray, area: FloatArray) -> FloatArray:
         """k of mean gaps [h_rms] and contact fractions; 0 where blocked. Columns of `surfaces`: H, ln zeta_1."""
-        log_factor, out = self.along(surfaces, u.size), np.empty(u.size)
-
-        def fill(block: slice) -> None:
-            own = functools.partial(log_factor, owner[block])
-            out[block] = conductance(own, self.first[2], self.last, u[block], area[block])
-
-        in_blocks(fill, u.size, BLOCK)
-        return out
+        given = *self.core_table, *surfaces, None, None, self.shared(surfaces, u.size)
+        return _flow(given, owner, u, area)
 
     def standard_deviation(self, theory: str, area: FloatArray) -> FloatArray:
         """Root mean square of ln(k/simulation) at contact fractions; NaN where not known or blocked."""
@@ -84,33 +83,25 @@ def shipped_flow() -> FlowTable:
     )
 
 
-def conductance(
-    log_factor: Callable[[FloatArray], tuple[FloatArray, FloatArray]],
-    first: float,
-    last: float,
-    u: FloatArray,
-    area: FloatArray,
-) -> FloatArray:
-    """k of mean gaps [h_rms] and contact fractions from ln R and its slope by odds, held beyond `first` and `last`."""
-    constants = shipped_flow().constants
-    left = np.maximum(constants.threshold - area, 1e-300)  # areas of Greenwood and Williamson exceed 1
-    with np.errstate(divide="ignore"):
-        odds = np.log(area / left)
-    value, slope = log_factor(odds)
-    value += slope * np.maximum(odds - last, 0.0)
-    value *= np.exp(constants.obstruction * np.minimum(odds - first, 0.0))
-    return np.where(area < constants.threshold, u * u * u * wide_gap(u) * np.exp(np.minimum(value, 0.0)), 0.0)
+def _flow(given: tuple[Any, ...], owner: Owners, u: FloatArray, area: FloatArray) -> FloatArray:
+    out = np.empty(u.size)
+    in_blocks(lambda k: core.flow(*given, owner[k], u[k], area[k], out[k]), u.size, BLOCK)
+    return out
 
 
 @functools.lru_cache(KEPT)
-def own_factor(spectrum: Spectrum) -> tuple[PchipInterpolator, FloatArray]:
-    """ln R over the table's odds of one spectrum, and its slope beyond."""
+def own_factor(spectrum: Spectrum) -> tuple[Any, ...]:
+    """ln R over the table's odds of one spectrum, as `core.flow` takes it."""
     table = shipped_flow()
-    low, high = table.first[2], table.last
-    odds = np.linspace(low, high, OWN_NODES)
+    odds, step = np.linspace(table.first[2], table.last, OWN_NODES, retstep=True)
     log_factor = contact_factor(spectrum, table.constants.threshold / (1 + np.exp(-odds)), table.constants)
-    found = PchipInterpolator(odds, np.minimum.accumulate(np.minimum(log_factor, 0.0)))
-    return found, found(high, 1)
+    cubics = PchipInterpolator(odds, np.minimum.accumulate(np.minimum(log_factor, 0.0))).c[::-1]
+    pieces = np.zeros((OWN_NODES - 1, 6))
+    pieces[:, :4] = (cubics * step ** np.arange(4)[:, None]).T
+    numbers = table.core_table[1].copy()
+    numbers[5] = 1 / step
+    anything = np.zeros(1)
+    return None, numbers, np.array([1, 1, OWN_NODES - 1]), anything, anything, None, None, pieces
 
 
 @functools.lru_cache(KEPT)
@@ -121,6 +112,4 @@ def self_affine(hurst: float, log_zeta_1: float) -> Spectrum:
 
 def flow_of_spectrum(spectrum: Spectrum, u: FloatArray, area: FloatArray) -> FloatArray:
     """k of mean gaps [h_rms] and contact fractions of one spectrum; 0 where blocked."""
-    log_factor, slope = own_factor(spectrum)
-    first, last = log_factor.x[[0, -1]]
-    return conductance(lambda odds: (log_factor(np.clip(odds, first, last)), slope), first, last, u, area)
+    return _flow(own_factor(spectrum), np.zeros(u.size, np.int64), u, area)

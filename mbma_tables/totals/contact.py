@@ -43,6 +43,7 @@ from mbma_tables.totals.profile import Profile, profile
 FEW_SURFACES, MANY_GAPS = 16, 300
 BLOCK = 1 << 14  # gaps between two looks for Ctrl-C
 MOST_WORKERS = 1024
+LEAST, SUBNORMAL = 1e-290, float(np.finfo(float).smallest_subnormal)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -125,6 +126,10 @@ def totals_at(
         if fault.mask is not None:
             fault.mask = fault.mask.reshape(shape)
         raise
+    # what is nearly nothing has few digits
+    tiny = (np.minimum(force, area) < LEAST) & (np.maximum(force, area) > 0)
+    if tiny.any():
+        error[tiny] = np.minimum(error[tiny] + SUBNORMAL / np.minimum(force, area)[tiny].clip(SUBNORMAL), 1.0)
     return Totals(
         separation=gap[()],
         mean_separation=((h_max + gap) / 2)[()],

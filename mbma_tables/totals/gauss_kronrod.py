@@ -29,6 +29,8 @@ NODES_21, KRONROD_21, GAUSS_21 = _rule(21)
 
 BATCH = 2048  # intervals evaluated together: bounds the memory, not the work
 DEPTH = 64  # halvings of an interval before giving up
+MOST = 1000  # intervals of an integral, likewise
+LEAST = 1e-290  # of integrals: smaller ones have lost digits that no halving brings back
 
 Integrand = Callable[[NDArray[np.intp], FloatArray], FloatArray]
 
@@ -82,7 +84,7 @@ def integrate(
     Raises
     ------
     ConvergenceError
-        Where `DEPTH` halvings did not suffice; `mask` says which integrals.
+        Where `DEPTH` halvings, or `MOST` intervals, did not suffice; `mask` is true for these integrals.
     """
     if owner.size == 0:
         # one component stands for all
@@ -99,11 +101,14 @@ def integrate(
         sums: Any = [np.stack([np.bincount(owner, x, count) for x in part.T], axis=1) for part in (value, error)]
         total, bound = sums
         relative = np.divide(bound, total, out=np.zeros_like(bound), where=total > 0)
-        unfinished = np.asarray((relative > rtol).any(axis=1))
+        unfinished = np.asarray(((relative > rtol) & (total > LEAST)).any(axis=1))
         if not unfinished.any():
             return Integrals(total, relative, evaluations)
         # an interval is halved where it has more than its even share of the error allowed
-        leaves = np.bincount(owner, minlength=count)[owner, None]
+        counts = np.bincount(owner, minlength=count)
+        if (counts[unfinished] > MOST).any():
+            break
+        leaves = counts[owner, None]
         split = unfinished[owner] & (error * leaves > rtol * total[owner]).any(axis=1)
         middle = (low[split] + high[split]) / 2
         halves = (low[split], middle), (middle, high[split])

@@ -1,4 +1,4 @@
-"""The sum over islands (Eqs. 44-49): for any island model in numpy, for the universal table in one compiled pass."""
+"""The sum over islands (Eqs. 44-49): for any island model in numpy, for the universal table in the core."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def totals_of(
 ) -> Totals:  # fmt: skip
     """Totals by an island model, in the way that suits its class; errors carry a mask of the pairs.
 
-    `workers` threads share the compiled pass.
+    `workers` threads share the pairs of the universal table.
     """
     if not isinstance(model, UniversalModel):
         return sum_islands(pairs, reading, model, SUM_SHARE * rtol, outside, which)

@@ -33,8 +33,9 @@ def _rule(n: int, power: int) -> tuple[FloatArray, Any]:
     slopes: Any = np.linalg.inv(both[0][:gaps])
     integrated = np.zeros_like(series)
     integrated[:gaps, 0], integrated[gaps:, 1 : gaps + 1] = 1 / gaps, chebyshev.chebint(slopes, axis=1)[:, 1:]
-    shapes = (NODES,), (NODES,), (GAPS + 1,), (NODES, CHECKS.size), (NODES, 2 * NODES), (NODES, NODES * (GAPS + 1))
-    shapes += (NODES, GAPS), (2 * GAPS, 2 * GAPS), (2 * GAPS, 2 * GAPS)
+    vectors: list[tuple[int, ...]] = [(NODES,), (NODES,), (GAPS + 1,)]
+    columns = CHECKS.size, 2 * NODES, NODES * (GAPS + 1), GAPS
+    shapes = [*vectors, *((NODES, count) for count in columns), (2 * GAPS, 2 * GAPS), (2 * GAPS, 2 * GAPS)]
     held = [np.array([power, n, gaps], float)]
     for part, shape in zip((nodes, weights / 2, reach, *matrices, series, integrated), shapes, strict=True):
         held.append(np.zeros(shape))

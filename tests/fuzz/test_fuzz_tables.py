@@ -62,7 +62,7 @@ def answers(path):
 def test_content_under_right_hashes(kind, sources, tmp_path, tally):
     rng = np.random.default_rng(23)
     path = tmp_path / "table.nc"
-    # the file as it is passes, and what compiles does so now
+    # the file as it is passes
     assert finite(*answers(edited(path, sources[kind], lambda dataset: None)))
     for _ in range(40 * SCALE):
         edited(path, sources[kind], lambda dataset: forge(dataset, rng))

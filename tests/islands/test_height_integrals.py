@@ -6,21 +6,11 @@ import warnings
 import mpmath as mp
 import numpy as np
 import pytest
-from numba import njit
 
 from mbma_tables import InputError
-from mbma_tables.islands.height_integrals import (
-    ORDERS,
-    f_five_halves,
-    f_half,
-    f_one,
-    f_three_halves,
-    f_two,
-    height_integral,
-    pressure_integrals,
-)
+from mbma_tables.core import core
+from mbma_tables.islands.height_integrals import ORDERS, height_integral
 
-COMPILED = dict(zip(ORDERS, (f_half, f_one, f_three_halves, f_two, f_five_halves), strict=True))
 EDGES = [-8.0, -6.0, -4.0, -2.0, 0.0, 1.0, 4.0]  # where the pieces meet
 
 
@@ -86,27 +76,30 @@ def test_smooth_underflow(n):
 
 
 @pytest.mark.parametrize("n", ORDERS)
-def test_arrays_and_compiled_calls_agree(n):
+def test_bits_do_not_depend_on_neighbours(n):
     x = np.concatenate([np.random.default_rng(0).uniform(-15, 41, 5000), EDGES, [-1e6]])
-    single = COMPILED[n]
-
-    @njit
-    def loop(points, out):
-        for k in range(points.size):
-            out[k] = single(points[k])
-
-    looped = np.empty_like(x)
-    loop(x, looped)
-    array = height_integral(n, x)
-    np.testing.assert_allclose(array, looped, rtol=2e-15, atol=1e-307)
-    np.testing.assert_array_equal(looped, [single(at) for at in x])
-    assert np.array_equal(array, [height_integral(n, at) for at in x])
+    found = height_integral(n, x)
+    np.testing.assert_array_equal(found, [height_integral(n, at) for at in x])
+    np.testing.assert_array_equal(found[1::3], height_integral(n, x[1::3]))
 
 
-def test_the_pair_of_pressure_integrals():
-    x = np.concatenate([np.random.default_rng(1).uniform(-15, 41, 5000), EDGES])
-    pairs = np.array([pressure_integrals(at) for at in x])
-    np.testing.assert_allclose(pairs.T, [height_integral(1.5, x), height_integral(0.5, x)], rtol=2e-15, atol=1e-307)
+@pytest.mark.parametrize("n", ORDERS)
+def test_the_core_is_told_anything(n):
+    x = np.array([math.nan, math.inf, -math.inf, 5e-324, -5e-324, 0.0, -0.0, 1e308, -1e200])
+    found = np.empty(x.size)
+    assert core.height_integrals(int(2 * n), x, found) == 3
+    assert np.isnan(found[:3]).all()
+    np.testing.assert_allclose(found[3:7], found[5], rtol=1e-15)
+    assert found[7] == 0
+    # a power of -x, until it overflows
+    assert found[8] == pytest.approx(1e200**n, rel=1e-13) if n < 2 else np.isinf(found[8])
+
+
+@pytest.mark.parametrize("twice_n", [0, 6, -1, 2**32 + 1])
+def test_the_core_knows_five_orders(twice_n):
+    found = np.empty(2)
+    assert core.height_integrals(twice_n, np.zeros(2), found) == 2
+    assert np.isnan(found).all()
 
 
 def test_shapes():

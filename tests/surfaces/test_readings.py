@@ -29,7 +29,8 @@ def test_by_name_or_own():
     assert get_reading("printed") is PRINTED
     own = dataclasses.replace(PRINTED, name="own", beta=0.3)
     assert get_reading(own) is own
-    assert own.numbers == (PRINTED.density_divisor, 0.3, 0.05, 1.5, 3.0, True, True)
+    assert own.recorded == [PRINTED.density_divisor, 0.3, 0.05, 1.5, 3.0, True, True]
+    assert own.numbers.tolist() == [*own.recorded, True]
 
 
 @pytest.mark.parametrize("name", ["guessed", "", None, 3, ["printed"]])

@@ -20,7 +20,9 @@ PACKAGE = pathlib.Path(mbma_tables.__file__).parent
 
 def test_the_source_digest_is_that_of_the_files():
     assert set(MODULES[UNIVERSAL]) < set(MODULES[ISLAND4D])
-    files = [PACKAGE.parent / f"{module.replace('.', '/')}.py" for module in MODULES[ISLAND4D]]
+    python, c = ([name for name in MODULES[ISLAND4D] if ("/" in name) == is_c] for is_c in (False, True))
+    assert (*c, *python) == MODULES[ISLAND4D]
+    files = [PACKAGE.parent / path for path in (*c, *(f"{name.replace('.', '/')}.py" for name in python))]
     joined = b"".join(file.read_bytes() for file in files)
     assert source_digest(MODULES[ISLAND4D]) == hashlib.sha256(joined).hexdigest()
     with pytest.raises(ModuleNotFoundError, match=r"mbma_tables\.nowhere"):
@@ -31,11 +33,11 @@ def test_the_source_digest_is_that_of_the_files():
 def test_renaming_a_local_variable_of_the_solver_changes_nothing_outside(tmp_path):
     for name in ("mbma_tables", "tables"):
         shutil.copytree(PACKAGE.parent / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
-    newton = tmp_path / "mbma_tables" / "islands" / "newton.py"
-    source = newton.read_text(encoding="utf-8")
-    renamed, count = re.subn(r"\btotal\b", "running_sum", source)
-    assert count > 5
-    newton.write_text(renamed, encoding="utf-8")
+    solver = tmp_path / "mbma_tables" / "islands" / "greenwood_tripp.py"
+    source = solver.read_text(encoding="utf-8")
+    renamed, count = re.subn(r"\bdigits\b", "decimal_digits", source)
+    assert count > 1
+    solver.write_text(renamed, encoding="utf-8")
     command = [sys.executable, "-W", "error", "-m", "mbma_tables", "tables", "verify"]
     environment = os.environ | {"PYTHONPATH": str(tmp_path)}
     made = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)

@@ -1,4 +1,4 @@
-"""Spline coefficients and their compiled evaluation against scipy, polynomials, and arithmetic at 50 digits."""
+"""Spline coefficients and their evaluation against scipy, polynomials, and arithmetic at 50 digits."""
 
 import mpmath
 import numpy as np
@@ -6,7 +6,6 @@ import pytest
 from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
 
 from mbma_tables.core import core
-from mbma_tables.tablefiles import interpolate
 from mbma_tables.tablefiles.splines import TAPS, at_places, coefficients, padding
 
 SHAPE = (8, 7, 6, 5)
@@ -100,16 +99,6 @@ def test_cubic_weights_at_fifty_digits():
                 for value, slope in basis(number, u, 2):
                     assert abs(value - by_truncated_powers(3, number, mpmath.mpf(u))) < 4e-16
                     assert abs(slope - by_truncated_powers(3, number, mpmath.mpf(u), 1)) < 8e-16
-
-
-def test_quintic_weights_at_fifty_digits():
-    with mpmath.workdps(50):
-        for number in range(6):
-            for u in (mpmath.mpf(k) / 17 for k in range(18)):
-                assert abs(interpolate.quintic(u)[number] - by_truncated_powers(5, number, u)) < 1e-16
-    for u in np.linspace(0, 1, 11):
-        assert sum(interpolate.quintic(u)) == pytest.approx(1, rel=4e-16, abs=0)
-    np.testing.assert_allclose(interpolate.quintic(0.0)[:-1], TAPS[5], rtol=2e-16)
 
 
 def test_slopes_are_those_of_scipy():

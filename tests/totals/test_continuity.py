@@ -10,17 +10,16 @@ import numpy as np
 import pytest
 from helpers import SCALE, with_slopes
 
-from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island
-from mbma_tables.islands import newton
+from mbma_tables import Surface, contact, contact_law, greenwood_tripp, height_integral, island
+from mbma_tables.core import core
 from mbma_tables.islands.four_numbers import band_fields, from_axes, to_axes
-from mbma_tables.islands.height_integrals import f_half
 from mbma_tables.models import answer_islands
 from mbma_tables.models.closed_form_functions import RANGES
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.island4d import RAW
 from mbma_tables.models.tables import open_table, universal_model
 from mbma_tables.surfaces.readings import READINGS, REPORTED, get_reading
-from mbma_tables.theories.law_kernel import CENTRE, RATE
+from mbma_tables.theories.law_block import CENTRE, RATE
 from mbma_tables.totals.island_sum import kinks
 
 STEP = 1e-9
@@ -248,8 +247,10 @@ def test_the_solver_does_not_jump(which, record_property):
 def test_the_solver_joins_the_rigid_sphere(record_property):
     """Where the deformation is left out altogether."""
     X = np.random.default_rng(11).uniform(-20, 38, 200 * SCALE)
-    squared = np.array([newton.extent_squared(x, 0.0, 0.03 * SOLVER_RTOL) for x in X])
-    edge = newton.NEGLIGIBLE / (np.array([f_half(-x) for x in X]) * (1 + squared))
+    squared = np.empty(X.size)
+    assert core.island_extents(X, np.zeros(X.size), 0.03 * SOLVER_RTOL, squared) == 0
+    # NEGLIGIBLE of newton.c
+    edge = 1e-17 / (height_integral(0.5, -X) * (1 + squared))
     one, other = (greenwood_tripp.solve(X, edge * (1 + sign * STEP), rtol=SOLVER_RTOL) for sign in (-1, 1))
     assert (one.iterations == 0).all()
     assert (other.iterations > 0).all()

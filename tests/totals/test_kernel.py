@@ -1,4 +1,4 @@
-"""The compiled pass: its rule, its islands against `islands.geometry`, its independence of order and batch."""
+"""Totals in the core: their rules, its islands against `islands.geometry`, its independence of order and batch."""
 
 import math
 

@@ -1,9 +1,11 @@
 """Contact laws against totals, differences and quadrature; inverses; what the model does; use from other codes."""
 
 import functools
+import gc
 import itertools
 import math
 import pickle
+import weakref
 
 import numpy as np
 import pytest
@@ -11,13 +13,12 @@ import scipy.integrate
 import scipy.optimize
 import xarray as xr
 from helpers import difference_weights, with_slopes
-from numba import njit
 
 from mbma_tables import ContactLaw, ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.models import get_model
 from mbma_tables.surfaces.readings import NAMED
 from mbma_tables.theories import law_pieces
-from mbma_tables.theories.law_kernel import CENTRE, DEGREE, FORCE_AT, RATE, RECORD
+from mbma_tables.theories.law_block import CENTRE, DEGREE, FORCE_AT, RATE, RECORD
 from mbma_tables.totals.island_sum import totals_of
 from mbma_tables.totals.pairs import Pairs
 from mbma_tables.totals.profile import profile
@@ -250,37 +251,32 @@ def test_a_pickle_is_the_same_law_and_small():
         assert pickle.dumps(pickle.loads(again)) == again
 
 
-@njit
-def added_up(law, gaps):
-    force = area = stiffness = area_slope = energy = 0.0
-    for d in gaps:
-        force += law.force(d)
-        area += law.area(d)
-        stiffness += law.stiffness(d)
-        area_slope += law.area_slope(d)
-        energy += law.energy(d)
-    return force, area, stiffness, area_slope, energy
-
-
-@njit
-def force_at(law, d):
-    return law.force(d)
-
-
-def test_inside_compiled_code():
-    gaps = np.array([2.05, 1.3, 0.2, -1.7])
-    names = ("force", "area", "stiffness", "area_slope", "energy")
+def test_as_a_function_of_c():
     for case in CASES[:3]:
         law = law_of(case)
-        compiled = law.compiled()
-        sums = [math.fsum(getattr(law, name)(gaps)) for name in names]
-        assert added_up(compiled, gaps) == pytest.approx(sums, rel=1e-14, abs=0)
-        assert [getattr(compiled, name)(1.3) for name in names] == [getattr(law, name)(1.3) for name in names]
-        assert force_at(compiled, law.h_max + 1) == 0.0
-        assert math.isnan(force_at(compiled, math.nextafter(-law.h_max, -9)))
-        assert math.isnan(force_at(compiled, math.nan))
-    # one compilation serves every law
-    assert len(added_up.signatures) == len(force_at.signatures) == 1
+        for name in NAMES:
+            asked = law.compiled(name)
+            assert [asked.function(d, asked.user_data) for d in (2.05, 1.3, 0.2, -1.7)] == [
+                getattr(law, name)(d) for d in (2.05, 1.3, 0.2, -1.7)
+            ]
+            assert asked.function(law.h_max + 1, asked.user_data) == 0.0
+            for outside in (math.nextafter(-law.h_max, -9), math.nan, math.inf, -math.inf):
+                assert math.isnan(asked.function(outside, asked.user_data))
+    work, _ = scipy.integrate.quad(law.compiled(), 1.0, law.h_max, epsabs=0)
+    assert work == pytest.approx(2 * law.energy(1.0), rel=1e-7, abs=0)
+    with pytest.raises(InputError, match="quantity must be one of"):
+        law.compiled("pressure")
+
+
+def test_a_function_of_c_keeps_its_law():
+    law = contact_law(surface_of(*CASES[0][:3]), rtol=1e-3)
+    gone, expected, asked = weakref.ref(law), law.force(1.0), law.compiled()
+    del law
+    gc.collect()
+    assert asked.function(1.0, asked.user_data) == expected
+    del asked
+    gc.collect()
+    assert gone() is None
 
 
 @pytest.mark.parametrize("case", CASES[:4])

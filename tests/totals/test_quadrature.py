@@ -88,7 +88,7 @@ def test_the_estimate_is_of_the_kronrod_sum():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["reported", "printed", "fitted"])
-def test_stated_errors_of_the_compiled_rule(name):
+def test_stated_errors_of_totals(name):
     # of a force and an area that are nearly proportional both differences between the rules may vanish by chance
     rng, reading, count = np.random.default_rng(1), get_reading(name), 100_000
     low, high = (0.1, np.log(max(3.1, 1.01 * reading.floor_u)), 2.5, 0), (1, np.log(1e4), 5.5, 1)

@@ -18,7 +18,7 @@ from mbma_tables.models.island4d import RAW
 from mbma_tables.models.tables import open_table, universal_model
 from mbma_tables.surfaces.readings import READINGS, REPORTED
 from mbma_tables.surfaces.spectrum import band_moment
-from mbma_tables.theories.law_kernel import CENTRE, RATE
+from mbma_tables.theories.law_block import CENTRE, RATE
 from mbma_tables.totals.island_sum import kinks
 
 EVERY = [*READINGS.values(), OWN, LEVEL]

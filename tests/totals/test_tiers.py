@@ -174,7 +174,7 @@ import numpy as np
 from mbma_tables import Surface, contact
 gaps = np.linspace(2.5, 3.0, 200_000)
 surface = Surface(0.8, 0.2, 40.0, np.linspace(0.9, 1.1, gaps.size), 3.0)
-contact(Surface(0.8, 0.2, 40.0, np.linspace(0.9, 1.1, 1000), 3.0), gaps[:1000])  # imports numba, too
+contact(Surface(0.8, 0.2, 40.0, np.linspace(0.9, 1.1, 1000), 3.0), gaps[:1000])
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 tracemalloc.start()
 found = contact(surface, gaps)
@@ -239,3 +239,13 @@ def test_long_batches_run_in_blocks(monkeypatch, derivatives):
     monkeypatch.setattr(island_sum, "core", Counted(interrupted=True))
     with pytest.raises(KeyboardInterrupt):
         contact(surfaces, 1.0, derivatives=derivatives)
+
+
+@pytest.mark.parametrize("tier", ["exact", "universal"])
+def test_what_is_nearly_nothing_ends_and_states_its_digits(tier):
+    """Heights of 32 standard deviations: totals below the normal numbers, whose digits no halving brings back."""
+    surface = Surface(0.12887275768129156, 1.0, 7.092276972058787, 1.0, 32.0)
+    gaps = np.array([31.9, 31.998, 31.999])
+    found, known = contact(surface, gaps, tier=tier), contact(surface, gaps, tier="exact", rtol=1e-10)
+    assert (np.abs(found.force - known.force) <= (found.error + known.error) * known.force).all()
+    assert found.error[2] > 1e-7

@@ -1,0 +1,503 @@
+/* The law calibrated on boundary elements and the flow through its gaps, by quintic splines over the numbers of a
+ * surface and a third axis.
+ *
+ * Sums over the first two axes are made in the same order for one entry and for all cells of the third axis, so that
+ * answers do not depend on what is asked beside them.
+ */
+#include "elementary.h"
+#include "mbma.h"
+
+#include <float.h>
+
+enum { CHUNK = 128, COLUMNS = 8, MOST_STEPS = 100 };
+
+#define LEAST 1e-300                /* u that counts as none */
+#define LEAST_LOG_SEPARATION -690.0 /* ln u at which full contact counts as reached */
+#define CLOSE 1e-9                  /* of ln F: the next miss would be about the square of this one */
+
+typedef struct {
+    int32_t cell;
+    double z; /* in [0, 1] of it */
+} place;
+
+/* Where x lies among the cells of an axis; beyond them at their end, and NaN at the first. */
+MBMA_INLINE place place_of(const mbma_spline *s, int axis, double x) {
+    const double at = mbma_held((x - s->first[axis]) * s->rate[axis], 0.0, (double)s->cells[axis]);
+    const int32_t cell = (int32_t)mbma_min(at, (double)s->cells[axis] - 1.0);
+    const place found = {cell, at - cell};
+    return found;
+}
+
+/* The six cardinal quintic B-splines that reach a cell, at u in [0, 1] of it. */
+MBMA_INLINE void quintic(double u, double w[6]) {
+    const double v = 1.0 - u, u2 = u * u, v2 = v * v, part = 1.0 / 120.0;
+    w[0] = v2 * v2 * v * part;
+    w[1] = mbma_fma(u, mbma_fma(u, mbma_fma(u, mbma_fma(u, mbma_fma(u, 5.0, -20.0), 20.0), 20.0), -50.0), 26.0) * part;
+    w[2] = mbma_fma(u2, mbma_fma(u2, mbma_fma(u, -10.0, 30.0), -60.0), 66.0) * part;
+    w[3] = mbma_fma(v2, mbma_fma(v2, mbma_fma(v, -10.0, 30.0), -60.0), 66.0) * part;
+    w[4] = mbma_fma(v, mbma_fma(v, mbma_fma(v, mbma_fma(v, mbma_fma(v, 5.0, -20.0), 20.0), 20.0), -50.0), 26.0) * part;
+    w[5] = u2 * u2 * u * part;
+}
+
+/* Their derivatives. */
+static void quintic_slopes(double u, double w[6]) {
+    const double v = 1.0 - u, u2 = u * u, v2 = v * v;
+    w[0] = -v2 * v2 / 24.0;
+    w[1] = (-50.0 + u * (40.0 + u * (60.0 + u * (-80.0 + 25.0 * u)))) / 120.0;
+    w[2] = u * (-120.0 + u2 * (120.0 - 50.0 * u)) / 120.0;
+    w[3] = -v * (-120.0 + v2 * (120.0 - 50.0 * v)) / 120.0;
+    w[4] = -(-50.0 + v * (40.0 + v * (60.0 + v * (-80.0 + 25.0 * v)))) / 120.0;
+    w[5] = u2 * u2 / 24.0;
+}
+
+/* From coefficients of B-splines to those of powers. */
+MBMA_INLINE void to_powers(const double c[6], double p[6]) {
+    const double part = 1.0 / 120.0, outer = c[0] + c[4], inner = c[1] + c[3];
+    p[0] = mbma_fma(66.0, c[2], mbma_fma(26.0, inner, outer)) * part;
+    p[1] = mbma_fma(10.0, c[3] - c[1], c[4] - c[0]) * (5.0 * part);
+    p[2] = mbma_fma(-6.0, c[2], mbma_fma(2.0, inner, outer)) * (10.0 * part);
+    p[3] = mbma_fma(2.0, c[1] - c[3], c[4] - c[0]) * (10.0 * part);
+    p[4] = mbma_fma(6.0, c[2], mbma_fma(-4.0, inner, outer)) * (5.0 * part);
+    p[5] = mbma_fma(10.0, c[3] - c[2], mbma_fma(5.0, c[1] - c[4], c[5] - c[0])) * part;
+}
+
+MBMA_INLINE double power_value(const double p[6], double z) {
+    return mbma_fma(mbma_fma(mbma_fma(mbma_fma(mbma_fma(p[5], z, p[4]), z, p[3]), z, p[2]), z, p[1]), z, p[0]);
+}
+
+MBMA_INLINE double power_slope(const double p[6], double z) {
+    const double high = mbma_fma(mbma_fma(5.0 * p[5], z, 4.0 * p[4]), z, 3.0 * p[3]);
+    return mbma_fma(mbma_fma(high, z, 2.0 * p[2]), z, p[1]);
+}
+
+MBMA_INLINE double row_sum(const float *c, size_t row, const double w[6], int k) {
+    double sum = w[0] * (double)c[k];
+    for (size_t b = 1; b < 6; b++)
+        sum = mbma_fma(w[b], (double)c[b * row + (size_t)k], sum);
+    return sum;
+}
+
+/* Sums over the first two axes for the coefficients that reach a cell, and two more. */
+static void patch(const mbma_spline *s, size_t i, size_t j, size_t cell, const double a[6], const double b[6],
+                  double sums[COLUMNS]) {
+    const size_t row = s->cells[2] + 5, plane = (s->cells[1] + 5) * row;
+    const float *c = s->coefficients + i * plane + j * row + cell;
+    double total[COLUMNS] = {0.0};
+    for (int m = 0; m < 6; m++, c += plane)
+        for (int k = 0; k < COLUMNS; k++)
+            total[k] = mbma_fma(a[m], row_sum(c, row, b, k), total[k]);
+    for (int k = 0; k < COLUMNS; k++)
+        sums[k] = total[k];
+}
+
+static bool covers(const mbma_spline *s, double hurst, double log_zeta_1) {
+    return s->low[0] <= hurst && hurst <= s->high[0] && s->low[1] <= log_zeta_1 && log_zeta_1 <= s->high[1];
+}
+
+/* A chunk of entries: surfaces, and places on the third axis. Each step has a loop of its own, which vectorises. */
+typedef struct {
+    size_t count, owner[CHUNK];
+    double x[CHUNK], value[CHUNK], slope[CHUNK]; /* along the third axis, held at its ends */
+    int32_t cell[3][CHUNK];
+    double z[3][CHUNK], w[2][6][CHUNK], p[6][CHUNK];
+} chunk;
+
+static size_t chunk_of(size_t n) { return n < (size_t)CHUNK ? n : (size_t)CHUNK; }
+
+static void place_chunk(const mbma_spline *s, chunk *c, int axis, const double *x) {
+    for (size_t n = 0; n < c->count; n++) {
+        const place at = place_of(s, axis, x[n]);
+        c->cell[axis][n] = at.cell;
+        c->z[axis][n] = at.z;
+    }
+}
+
+/* Where surfaces lie, by which sums are weighted. */
+static void weigh(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c) {
+    for (int axis = 0; axis < 2 && !surfaces->pieces; axis++) {
+        const double *given = axis == 0 ? surfaces->hurst : surfaces->log_zeta_1;
+        double x[CHUNK];
+        for (size_t n = 0; n < c->count; n++)
+            x[n] = given[c->owner[n]];
+        place_chunk(s, c, axis, x);
+        for (size_t n = 0; n < c->count; n++) {
+            double w[6];
+            quintic(c->z[axis][n], w);
+            for (int m = 0; m < 6; m++)
+                c->w[axis][m][n] = w[m];
+        }
+    }
+}
+
+static void look_up(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c) {
+    place_chunk(s, c, 2, c->x);
+    for (size_t n = 0; n < c->count; n++) {
+        double a[6], b[6], sums[COLUMNS];
+        const double *six = sums;
+        if (surfaces->pieces) {
+            six = surfaces->pieces + (c->owner[n] * s->cells[2] + (size_t)c->cell[2][n]) * 6;
+        } else {
+            for (int m = 0; m < 6; m++) {
+                a[m] = c->w[0][m][n];
+                b[m] = c->w[1][m][n];
+            }
+            patch(s, (size_t)c->cell[0][n], (size_t)c->cell[1][n], (size_t)c->cell[2][n], a, b, sums);
+        }
+        for (int m = 0; m < 6; m++)
+            c->p[m][n] = six[m];
+    }
+    for (size_t n = 0; n < c->count; n++) {
+        double given[6], p[6];
+        for (int m = 0; m < 6; m++)
+            p[m] = given[m] = c->p[m][n];
+        if (!surfaces->pieces)
+            to_powers(given, p);
+        c->value[n] = power_value(p, c->z[2][n]);
+        c->slope[n] = power_slope(p, c->z[2][n]) * s->rate[2];
+    }
+}
+
+size_t mbma_spline_pieces(const mbma_spline *s, const mbma_surfaces *surfaces, double *pieces) {
+    mbma_surfaces direct = *surfaces;
+    chunk c;
+    size_t bad = 0;
+    direct.pieces = NULL;
+    c.count = 1;
+    for (size_t k = 0; k < surfaces->count; k++) {
+        const bool good = covers(s, surfaces->hurst[k], surfaces->log_zeta_1[k]);
+        double a[6], b[6], sums[COLUMNS];
+        c.owner[0] = k;
+        weigh(s, &direct, &c);
+        for (int m = 0; m < 6; m++) {
+            a[m] = c.w[0][m][0];
+            b[m] = c.w[1][m][0];
+        }
+        for (size_t cell = 0; cell < s->cells[2]; cell++, pieces += 6) {
+            patch(s, (size_t)c.cell[0][0], (size_t)c.cell[1][0], cell, a, b, sums);
+            to_powers(sums, pieces);
+            for (int m = 0; m < 6 && !good; m++)
+                pieces[m] = NAN;
+        }
+        bad += !good;
+    }
+    return bad;
+}
+
+MBMA_INLINE double last_of(const mbma_spline *s) { return s->first[2] + (double)s->cells[2] / s->rate[2]; }
+
+/* Beyond the ends of the third axis: below, full contact rules, F^2 linear in ln u; above, ln F is linear in u. */
+MBMA_INLINE void continued(const mbma_spline *s, double log_u, double *value, double *rate) {
+    const double beyond = mbma_expm1(mbma_max(log_u - last_of(s), 0.0));
+    const double square = mbma_fma(2.0 * *rate, mbma_min(log_u - s->first[2], 0.0), 1.0);
+    *value = mbma_fma(*rate, beyond, *value) + 0.5 * mbma_log(square);
+    *rate = *rate * (beyond + 1.0) / square;
+}
+
+/* ln F of surfaces without end. */
+static void log_forces(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c) {
+    double low = last_of(s), high = s->first[2];
+    const double last = low, first = high;
+    look_up(s, surfaces, c);
+    for (size_t n = 0; n < c->count; n++) {
+        low = mbma_min(low, c->x[n]);
+        high = mbma_max(high, c->x[n]);
+    }
+    if (low < first || high > last)
+        for (size_t n = 0; n < c->count; n++)
+            continued(s, c->x[n], &c->value[n], &c->slope[n]);
+}
+
+/* ---- the calibrated law ------------------------------------------------------------------------------------------ */
+
+/* Nayak's alpha and the rms gradient over q0 h_rms, from moments of x^-2H, x^(2 - 2H) and x^(4 - 2H) over ln x: each is
+ * (exp(p) - 1)/p, and p may be 0. */
+MBMA_INLINE double self_affine(double hurst, double log_zeta_1, double *gradient) {
+    const double given = (2.0 - 2.0 * hurst) * log_zeta_1, twice = 2.0 * log_zeta_1;
+    const double p2 = fabs(given) > 1e-30 ? given : 1e-30, p0 = -hurst * twice, p4 = given + twice;
+    const double m0 = mbma_expm1(p0), m2 = mbma_expm1(p2), m4 = mbma_expm1(p4);
+    *gradient = sqrt(m2 * p0 / (p2 * m0));
+    return 1.5 * (m0 * m4 * p2 * p2) / (m2 * m2 * p0 * p4);
+}
+
+/* Derivative of ln((exp(x) - 1)/x), by its series where the difference loses digits. */
+static double growth_slope(double x) {
+    const double square = x * x;
+    return fabs(x) > 0.2 ? -1.0 / mbma_expm1(-x) - 1.0 / x
+                         : 0.5 + x / 12.0 * (1.0 - square / 60.0 * (1.0 - square / 42.0 * (1.0 - square / 40.0)));
+}
+
+/* How the logarithms of both change with H and ln zeta_1. */
+static void self_affine_slopes(double hurst, double log_zeta_1, double alpha_by[2], double gradient_by[2]) {
+    for (int p = 0; p < 2; p++) {
+        double m[3];
+        for (int k = 0; k < 3; k++) {
+            const double power = 2.0 * k - 2.0 * hurst;
+            m[k] = growth_slope(power * log_zeta_1) * (p == 0 ? -2.0 * log_zeta_1 : power);
+        }
+        alpha_by[p] = m[0] + m[2] - 2.0 * m[1];
+        gradient_by[p] = 0.5 * (m[1] - m[0]);
+    }
+}
+
+size_t mbma_self_affine(size_t n, const double *hurst, const double *log_zeta_1, double *alpha, double *gradient) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        const bool good = hurst[k] > 0.0 && hurst[k] <= 1.0 && log_zeta_1[k] > 1e-9 && log_zeta_1[k] < 100.0;
+        alpha[k] = good ? self_affine(hurst[k], log_zeta_1[k], &gradient[k]) : NAN;
+        gradient[k] = good ? gradient[k] : NAN;
+        bad += !good;
+    }
+    return bad;
+}
+
+MBMA_INLINE double light_factor(const mbma_calibrated_table *t, double alpha) {
+    return mbma_min(mbma_fma(t->area_slope, mbma_log(alpha / 10.0), t->area_s0), 1.0);
+}
+
+/* The next entries, and what these are asked; of no such surface, the first one and NaN. */
+static void take(const mbma_surfaces *surfaces, const int64_t *owner, const double *given, size_t n, chunk *c,
+                 double asked[CHUNK]) {
+    c->count = chunk_of(n);
+    for (size_t k = 0; k < c->count; k++) {
+        const bool known = (uint64_t)owner[k] < surfaces->count;
+        c->owner[k] = known ? (size_t)owner[k] : 0;
+        asked[k] = known ? given[k] : NAN;
+    }
+}
+
+/* No answers. */
+static size_t none(size_t n, double *out) {
+    for (size_t k = 0; k < n; k++)
+        out[k] = NAN;
+    return n;
+}
+
+size_t mbma_calibrated_ends(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, double *ends) {
+    size_t bad = 0;
+    for (size_t begin = 0; begin < surfaces->count; begin += CHUNK) {
+        const double *H = surfaces->hurst + begin, *L = surfaces->log_zeta_1 + begin, *h_max = surfaces->h_max + begin;
+        double s0[CHUNK];
+        chunk c;
+        c.count = chunk_of(surfaces->count - begin);
+        for (size_t n = 0; n < c.count; n++) {
+            double gradient;
+            s0[n] = light_factor(t, self_affine(H[n], L[n], &gradient));
+            c.x[n] = mbma_log(mbma_max(h_max[n], LEAST));
+        }
+        for (size_t n = 0; n < c.count; n++)
+            c.owner[n] = begin + n;
+        weigh(&t->log_force, surfaces, &c);
+        log_forces(&t->log_force, surfaces, &c);
+        for (size_t n = 0; n < c.count; n++) {
+            const bool good = covers(&t->log_force, H[n], L[n]) && h_max[n] >= LEAST;
+            ends[2 * (begin + n)] = good ? s0[n] : NAN;
+            ends[2 * (begin + n) + 1] = good ? c.value[n] : NAN;
+            bad += !good;
+        }
+    }
+    return bad;
+}
+
+size_t mbma_calibrated_contact(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, size_t n,
+                               const int64_t *owner, const double *u, double *force, double *area, double *stiffness) {
+    size_t bad = 0;
+    if (surfaces->count == 0)
+        return none(n, force), none(n, area), none(n, stiffness);
+    for (size_t begin = 0; begin < n; begin += CHUNK) {
+        double gap[CHUNK], h_max[CHUNK], s0[CHUNK], end[CHUNK], held[CHUNK], F[CHUNK], A[CHUNK], K[CHUNK];
+        chunk c;
+        take(surfaces, owner + begin, u + begin, n - begin, &c, gap);
+        for (size_t k = 0; k < c.count; k++) {
+            h_max[k] = surfaces->h_max[c.owner[k]];
+            s0[k] = surfaces->ends[2 * c.owner[k]];
+            end[k] = surfaces->ends[2 * c.owner[k] + 1];
+        }
+        for (size_t k = 0; k < c.count; k++) {
+            held[k] = mbma_held(gap[k], LEAST, h_max[k]);
+            c.x[k] = mbma_log(held[k]);
+        }
+        weigh(&t->log_force, surfaces, &c);
+        log_forces(&t->log_force, surfaces, &c);
+        for (size_t k = 0; k < c.count; k++) {
+            const double value = c.value[k], endless = value < -700.0 ? 0.0 : mbma_exp(value);
+            /* without cancellation */
+            const double load = -endless * mbma_expm1(end[k] - value), over = load / t->area_t0;
+            const double share = mbma_erf(load * sqrt(2.0 * (1.0 + over) / (s0[k] + over)));
+            const double known = gap[k] == gap[k] && end[k] == end[k] ? 0.0 : NAN;
+            const double touching = gap[k] >= h_max[k] ? 0.0 : 1.0;
+            const bool full = gap[k] <= 0.0;
+            F[k] = (full ? INFINITY : touching * load) + known;
+            A[k] = (full ? 1.0 : touching * share) + known;
+            K[k] = (full ? INFINITY : touching * (-c.slope[k] * endless / held[k])) + known;
+        }
+        for (size_t k = 0; k < c.count; k++) {
+            force[begin + k] = F[k];
+            area[begin + k] = A[k];
+            stiffness[begin + k] = K[k];
+            bad += F[k] != F[k];
+        }
+    }
+    return bad;
+}
+
+/* Newton's method in ln(F + F at h_max), which is smooth to the end, in a bracket. */
+typedef struct {
+    size_t entry;
+    double goal, low, high; /* of ln F without end; of ln u */
+} search;
+
+size_t mbma_calibrated_separation(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, size_t n,
+                                  const int64_t *owner, const double *force, double *u) {
+    if (surfaces->count == 0)
+        return none(n, u);
+    for (size_t begin = 0; begin < n; begin += CHUNK) {
+        double asked[CHUNK], *out = u + begin;
+        search left[CHUNK];
+        size_t searched = 0;
+        chunk c;
+        take(surfaces, owner + begin, force + begin, n - begin, &c, asked);
+        for (size_t k = 0; k < c.count; k++)
+            c.x[k] = LEAST_LOG_SEPARATION;
+        weigh(&t->log_force, surfaces, &c);
+        log_forces(&t->log_force, surfaces, &c);
+        for (size_t k = 0; k < c.count; k++) {
+            const size_t own = c.owner[k];
+            const double end = surfaces->ends[2 * own + 1], over = mbma_log(mbma_max(asked[k], DBL_MIN)) - end;
+            const double goal = end + (mbma_max(over, 0.0) + mbma_log1p(mbma_exp(-fabs(over))));
+            out[k] = NAN;
+            if (asked[k] > 0.0 && goal <= c.value[k]) {
+                const search one = {k, goal, LEAST_LOG_SEPARATION, mbma_log(surfaces->h_max[own])};
+                /* ln F is about -3 u at light loads */
+                c.x[searched] = mbma_log(mbma_held(-0.3 * goal, 1e-3, 0.99 * surfaces->h_max[own]));
+                c.owner[searched] = own;
+                left[searched++] = one;
+            }
+        }
+        for (int step = 0; step < MOST_STEPS && searched > 0; step++) {
+            c.count = searched;
+            searched = 0;
+            weigh(&t->log_force, surfaces, &c);
+            log_forces(&t->log_force, surfaces, &c);
+            for (size_t k = 0; k < c.count; k++) {
+                search one = left[k];
+                const double x = c.x[k], miss = c.value[k] - one.goal, following = x - miss / c.slope[k];
+                const bool near = fabs(miss) <= CLOSE;
+                *(miss > 0.0 ? &one.low : &one.high) = x;
+                const bool inside = following > one.low && following < one.high;
+                const double middle = near ? mbma_held(following, one.low, one.high) : 0.5 * (one.low + one.high);
+                c.x[searched] = inside ? following : middle;
+                if (near || one.high - one.low <= 2e-16) {
+                    out[one.entry] = mbma_exp(c.x[searched]);
+                } else {
+                    c.owner[searched] = c.owner[k];
+                    left[searched++] = one;
+                }
+            }
+        }
+    }
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++)
+        bad += u[k] != u[k];
+    return bad;
+}
+
+/* ln F of a surface without end, and its derivatives by ln u, H and ln zeta_1. */
+static double log_force_slopes(const mbma_spline *s, const mbma_surfaces *surfaces, size_t k, double log_u,
+                               double by[3]) {
+    double value[3], rate[3];
+    chunk c;
+    c.count = 1;
+    c.owner[0] = k;
+    c.x[0] = log_u;
+    for (int m = 0; m < 3; m++) {
+        double slopes[6];
+        weigh(s, surfaces, &c);
+        quintic_slopes(m > 0 ? c.z[m - 1][0] : 0.0, slopes);
+        for (int i = 0; i < 6 && m > 0; i++)
+            c.w[m - 1][i][0] = slopes[i] * s->rate[m - 1];
+        look_up(s, surfaces, &c);
+        value[m] = c.value[0];
+        rate[m] = c.slope[0];
+    }
+    const double below = mbma_min(log_u - s->first[2], 0.0), square = 1.0 + 2.0 * rate[0] * below;
+    for (int m = 1; m < 3; m++)
+        by[m] = value[m] + rate[m] * (mbma_expm1(mbma_max(log_u - last_of(s), 0.0)) + below / square);
+    continued(s, log_u, &value[0], &rate[0]);
+    by[0] = rate[0];
+    return value[0];
+}
+
+size_t mbma_calibrated_slopes(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, const double *u,
+                              double *out) {
+    mbma_surfaces direct = *surfaces;
+    size_t bad = 0;
+    direct.pieces = NULL;
+    for (size_t k = 0; k < surfaces->count; k++, out += 10) {
+        const double H = surfaces->hurst[k], L = surfaces->log_zeta_1[k], h_max = surfaces->h_max[k];
+        const bool good = covers(&t->log_force, H, L) && h_max >= LEAST && h_max < INFINITY && u[k] > 0.0;
+        double gradient, alpha_by[2], gradient_by[2], by[3], end_by[3], F_by[4] = {0.0}, *A_by = out + 6;
+        if (!good) {
+            bad += none(10, out) > 0;
+            continue;
+        }
+        const double s0 = light_factor(t, self_affine(H, L, &gradient)), held = mbma_held(u[k], LEAST, h_max);
+        const double end = log_force_slopes(&t->log_force, &direct, k, mbma_log(h_max), end_by);
+        const double value = log_force_slopes(&t->log_force, &direct, k, mbma_log(held), by), endless = exp(value);
+        const double F = -endless * mbma_expm1(end - value), over = F / t->area_t0;
+        const double root = sqrt(2.0 * (1.0 + over) / (s0 + over));
+        const double bell = 2.0 / sqrt(MBMA_PI) * exp(-F * root * F * root);
+        const double by_s0 = -0.5 * bell * F * root / (s0 + over);
+        const double by_F = bell * root * (1.0 + 0.5 * over * (s0 - 1.0) / ((1.0 + over) * (s0 + over)));
+        self_affine_slopes(H, L, alpha_by, gradient_by);
+        if (u[k] < h_max) {
+            F_by[0] = by[0] / held * endless;
+            F_by[1] = -end_by[0] / h_max * exp(end);
+            for (int p = 1; p < 3; p++)
+                F_by[1 + p] = endless * (by[p] - end_by[p]) + F * end_by[p];
+        }
+        out[0] = gradient * F;
+        out[5] = mbma_erf(F * root);
+        for (int p = 0; p < 4; p++) {
+            out[1 + p] = gradient * (F_by[p] + (p < 2 ? 0.0 : F * gradient_by[p - 2]));
+            A_by[p] = by_F * F_by[p] + (p >= 2 && s0 < 1.0 ? by_s0 * t->area_slope * alpha_by[p - 2] : 0.0);
+        }
+    }
+    return bad;
+}
+
+/* ---- flow through gaps ------------------------------------------------------------------------------------------- */
+
+size_t mbma_flow(const mbma_flow_table *t, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
+                 const double *u, const double *area, double *k) {
+    const mbma_spline *s = &t->log_factor;
+    size_t bad = 0;
+    if (surfaces->count == 0)
+        return none(n, k);
+    for (size_t begin = 0; begin < n; begin += CHUNK) {
+        double gap[CHUNK], found[CHUNK];
+        bool inside[CHUNK];
+        const double *A = area + begin;
+        chunk c;
+        take(surfaces, owner + begin, u + begin, n - begin, &c, gap);
+        for (size_t m = 0; m < c.count; m++) {
+            const size_t own = c.owner[m];
+            inside[m] = surfaces->pieces || covers(s, surfaces->hurst[own], surfaces->log_zeta_1[own]);
+            /* contact fractions of Greenwood and Williamson exceed 1 */
+            c.x[m] = mbma_log(mbma_max(A[m], LEAST) / mbma_max(t->threshold - A[m], LEAST));
+        }
+        weigh(s, surfaces, &c);
+        look_up(s, surfaces, &c);
+        for (size_t m = 0; m < c.count; m++) {
+            const double beyond = mbma_fma(c.slope[m], mbma_max(c.x[m] - last_of(s), 0.0), c.value[m]);
+            const double log_factor = beyond * mbma_exp(t->obstruction * mbma_min(c.x[m] - s->first[2], 0.0));
+            const double wide = gap[m] * gap[m] * gap[m] * (1.0 - 1.5 / mbma_fma(gap[m], gap[m], 4.0));
+            const double known = gap[m] == gap[m] && A[m] == A[m] && inside[m] ? 0.0 : NAN;
+            found[m] = (A[m] < t->threshold ? wide * mbma_exp(mbma_min(log_factor, 0.0)) : 0.0) + known;
+        }
+        for (size_t m = 0; m < c.count; m++) {
+            k[begin + m] = found[m];
+            bad += found[m] != found[m];
+        }
+    }
+    return bad;
+}

@@ -1,0 +1,244 @@
+"""The core's law: the same bits however it is asked, and no gap, force or block that could make it read elsewhere."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import itertools
+import math
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from mbma_tables import OutOfRangeError, Surface, contact_law
+from mbma_tables.core import core
+from mbma_tables.leakage import wide_gap
+from mbma_tables.theories.law_block import (
+    AREA,
+    EXPONENT,
+    FORCE,
+    HEAD,
+    HIGH,
+    MINUS_ROWS,
+    QUANTITIES,
+    RECORD,
+    RECORDS,
+)
+
+SURFACES = {
+    "mbma": (Surface(0.8, 0.3, 64.8, 0.7, 2.1), {}),
+    "turning": (Surface(0.3, 1.0, 1e4, 0.7, 2.8), {}),
+    # two sides of d = 0
+    "calibrated": (Surface(0.8, 0.3, 64.8, 0.7, 2.1), {"theory": "calibrated"}),
+    # no last contact
+    "persson": (Surface(0.8, 0.3, 64.8, 0.7, 2.1), {"theory": "persson"}),
+}
+NO_GAPS = [math.nan, -math.nan, math.inf, -math.inf, -1e300, -2.9, np.int64(0x7FF4 << 48).view(float).item()]
+TINY = [5e-324, -5e-324, 1e-310, 2.2250738585072014e-308, 0.0, -0.0]
+
+
+@functools.cache
+def law_of(name):
+    surface, options = SURFACES[name]
+    return contact_law(surface, rtol=1e-6, E_star=3.0, **options)
+
+
+def gaps_of(law, count=3000):
+    top = law.h_max if math.isinf(law.highest) else law.highest
+    rng = np.random.default_rng(8)
+    near = top - (top - law.lowest) * 10 ** rng.uniform(-16, 0, count)
+    return np.concatenate([near, rng.uniform(law.lowest, top, count), TINY, [top, math.nextafter(top, 0), law.lowest]])
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_the_same_bits_however_asked(name):
+    law = law_of(name)
+    d = gaps_of(law)
+    named = xr.DataArray(d.reshape(-1, 3), dims=("a", "b"))
+    for what in QUANTITIES:
+        ask = getattr(law, what)
+        whole = ask(d)
+        assert np.isfinite(whole).all()
+        for size in (1, 7, 1000, 1001):
+            np.testing.assert_array_equal(np.concatenate([ask(d[k : k + size]) for k in range(0, d.size, size)]), whole)
+        np.testing.assert_array_equal([ask(gap) for gap in d.tolist()], whole)
+        np.testing.assert_array_equal(ask(d.tolist()), whole)
+        np.testing.assert_array_equal(ask(d.reshape(3, -1).T), whole.reshape(3, -1).T)
+        np.testing.assert_array_equal(ask(np.tile(d, 12)), np.tile(whole, 12))
+        np.testing.assert_array_equal(ask(named), whole.reshape(-1, 3))
+        np.testing.assert_array_equal(ask(named.chunk(500)), whole.reshape(-1, 3))
+        asked = law.compiled(what)
+        np.testing.assert_array_equal([asked.function(gap, asked.user_data) for gap in d.tolist()], whole)
+        u = (d[d > law.lowest + 1e-9] + law.h_max) / 2
+        np.testing.assert_array_equal([ask(u=gap) for gap in u.tolist()], ask(u=u))
+        np.testing.assert_array_equal([ask(separation=gap) for gap in d[:9].tolist()], whole[:9])
+    np.testing.assert_array_equal(law.values(d), [getattr(law, what)(d) for what in law.values(d)._fields])
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_inverses_have_the_same_bits_however_asked(name):
+    law = law_of(name)
+    d = gaps_of(law, 300)
+    force = law.force(d[d > (law.lowest if law.turning_point is None else law.turning_point)])
+    whole = law.at_pressure(force)
+    assert [law.at_pressure(value).separation for value in force] == whole.separation.tolist()
+    assert [law.at_pressure(value).stiffness for value in force] == whole.stiffness.tolist()
+    np.testing.assert_array_equal(law.separation(force=force), whole.separation)
+    np.testing.assert_array_equal(law.separation(force=xr.DataArray(force, dims="a")), whole.separation)
+    np.testing.assert_array_equal(law.leakage(d), [law.leakage(gap) for gap in d])
+
+
+def filled(law, d, count=5):
+    out = np.full((5, d.size), -7.0)
+    bad = core.law_fill(d, law.block, *(out[k] if k < count else None for k in range(5)))
+    return bad, out
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_gaps_outside_are_nan_and_counted(name):
+    law = law_of(name)
+    d = np.concatenate([gaps_of(law, 500), NO_GAPS, gaps_of(law, 500), [-math.inf]])
+    outside = np.isin(np.arange(d.size), [*range(1009, 1009 + len(NO_GAPS)), d.size - 1])
+    bad, out = filled(law, d)
+    assert bad == outside.sum()
+    assert (np.isnan(out) == outside).all()
+    found = np.empty(d.size)
+    # what leaks apart needs no law
+    assert core.law_flow_fill(d, law.leakage.block, law.h_max, law.leakage.h_rms, found) == outside.sum()
+    assert (np.isnan(found) == outside).all()
+    for gap in NO_GAPS:
+        for ask in (law.force, law.area, law.stiffness, law.area_slope, law.energy, law.values, law.leakage):
+            for given in (gap, np.array([gap]), np.array([1.0, gap]), np.full(2000, gap)):
+                with pytest.raises(OutOfRangeError, match=r"^separation must be") as caught:
+                    ask(given)
+                assert caught.value.mask.sum() == np.size(given) - (np.size(given) == 2)
+
+
+@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize("which", [FORCE, AREA])
+def test_values_that_no_gap_has_are_nan_and_counted(name, which):
+    law = law_of(name)
+    inverse = law._inverse_block(QUANTITIES[which])
+    most = float((law.force, law.area)[which](inverse[5]))
+    wanted = np.array([0.5 * most, math.nan, math.inf, -math.inf, -1.0, 1.001 * most, 1e300, 0.1 * most, -5e-324])
+    gap, area, stiffness = np.empty((3, wanted.size))
+    assert core.law_invert(wanted, law.block, inverse, which, gap, area, stiffness) == 7
+    for found in (gap, area, stiffness):
+        assert np.isfinite(found).tolist() == [True, *[False] * 6, True, False]
+    for bad in (math.nan, [math.inf], np.array([0.1 * most, math.nan])):
+        with pytest.raises(OutOfRangeError, match=f"{QUANTITIES[which]} must be finite"):
+            law.separation(**{QUANTITIES[which]: bad})
+    for tiny in (0.0, 5e-324, 1e-310):
+        if math.isinf(law.highest):
+            assert law.separation(**{QUANTITIES[which]: tiny}) == law.h_max
+
+
+def test_a_light_load_has_all_digits_of_its_overclosure():
+    """A power of it, where contact ends: what is left to last contact is found relative to itself."""
+    law = law_of("mbma")
+    inverse = law._inverse_block("force")
+    x, side = np.empty((2, 60))
+    wanted = np.geomspace(1e-280, 1e-60, 60)
+    core.inverse_nodes(wanted, law.block, FORCE, inverse[5], x, side)
+    assert (side == -1).all()
+    np.testing.assert_allclose(np.diff(np.log(x)) / np.diff(np.log(wanted)), 1 / 3.5, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["mbma", "calibrated"])
+def test_leakage_apart(name):
+    law = law_of(name)
+    mean = law.h_max * np.array([1.0 + 1e-12, 1.5, 20.0, 1e6])
+    np.testing.assert_allclose(law.leakage(u=mean), mean**3 * wide_gap(mean / 0.7), rtol=1e-15)
+
+
+def test_broken_blocks_are_refused():
+    law = law_of("calibrated")
+    out, d = np.empty(1), np.zeros(1)
+
+    def refused(block):
+        with pytest.raises(ValueError, match="sizes of the arrays of law_fill do not match"):
+            core.law_fill(d, block, out, None, None, None, None)
+
+    for words in (0, 1, HEAD, int(law.block.view(np.int64)[RECORDS]), law.block.size - 1):
+        refused(law.block[:words].copy())
+    for word, values in {
+        RECORDS: (-1, 0, HEAD - 1, HEAD, 1 << 62, -(1 << 63)),
+        EXPONENT: (-1, 0, 1022, 1 << 40, -(1 << 63)),
+        MINUS_ROWS: (-1, 1 << 40),
+        HIGH: (math.inf, math.nan, -1.0, 2.0),
+    }.items():
+        for value in values:
+            block = law.block.copy()
+            (block.view(np.int64) if isinstance(value, int) else block)[word] = value
+            refused(block)
+    with pytest.raises(ValueError, match="do not match"):
+        core.law_fill(d, law.block, np.empty(2), None, None, None, None)
+    with pytest.raises(TypeError, match="an array of 'd' was expected"):
+        core.law_fill(d.astype(np.float32), law.block, out, None, None, None, None)
+
+
+def test_no_block_makes_the_core_read_elsewhere():
+    """Random words, of which some pass for a law's: answers are numbers or NaN, and nothing is read beyond the end."""
+    law, rng = law_of("calibrated"), np.random.default_rng(2)
+    d, wanted = np.concatenate([gaps_of(law, 200), NO_GAPS]), np.geomspace(1e-12, 1, 300)
+    inverse = law._inverse_block("force")
+    places = [*range(HEAD + 2 * len(law.rows)), *range(HEAD + 2 * len(law.rows), law.block.size, RECORD + 4)]
+    accepted = 0
+    for place, _ in itertools.product(places, range(6)):
+        block, bent = law.block.copy(), inverse.copy()
+        word = rng.integers(-(2**63), 2**63) if rng.integers(2) else rng.integers(-70, 1 << 12)
+        block.view(np.int64)[place] = word
+        bent.view(np.int64)[rng.integers(bent.size)] = word
+        out, record = np.empty((5, d.size)), np.full(d.size, -1)
+        try:
+            core.law_fill(d, block, *out)
+            core.law_records(np.abs(d), d, block, record)
+        except ValueError:
+            continue
+        accepted += 1
+        assert (record >= 0).all()
+        assert (record < len(law.records)).all()
+        gap = np.empty((3, wanted.size))
+        core.law_invert(wanted[:30], block, bent, FORCE, *gap[:, :30].copy())
+    assert accepted > 100
+
+
+def test_questions_that_are_none():
+    law = law_of("mbma")
+    for ask in (law.force, law.energy):
+        with pytest.raises(TypeError, match="one separation, or u=, is taken, got 2 arguments"):
+            ask(1.0, 2.0)
+        with pytest.raises(TypeError, match="unexpected keyword argument 'v': separation or u is taken"):
+            ask(v=1.0)
+        with pytest.raises(TypeError, match="unexpected keyword argument 'separation'"):
+            ask(1.0, separation=1.0)
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_two_generations_of_processors_have_the_same_bits(name):
+    if core.__name__.rpartition(".")[2] not in ("_x86_64_v3", "_x86_64_v4"):
+        pytest.skip("one generation alone runs here")
+    other = importlib.import_module("mbma_tables.core._x86_64_v3")
+    law = law_of(name)
+    d, out = gaps_of(law), np.empty((5, gaps_of(law).size))
+    assert other.law_fill(d, law.block, *out) == 0
+    np.testing.assert_array_equal(out, filled(law, d)[1])
+    force, found = law.force(d[d > 0]), np.empty((3, (d > 0).sum()))
+    assert other.law_invert(force, law.block, law._inverse_block("force"), FORCE, *found) == 0
+    np.testing.assert_array_equal(
+        found, [getattr(law.at_pressure(force), n) for n in ("separation", "area", "stiffness")]
+    )
+
+
+def test_a_law_is_answered_without_leaving_anything():
+    law = law_of("mbma")
+    d = np.linspace(0, 2, 10)
+    law.force(d), law.force(1.0)
+    before = sys.getrefcount(law.block), sys.getrefcount(d)
+    for _ in range(100):
+        law.force(d), law.force(1.0), law.area(u=1.0)
+        with pytest.raises(OutOfRangeError):
+            law.force(np.array([math.nan]))
+    assert (sys.getrefcount(law.block), sys.getrefcount(d)) == before
