@@ -360,11 +360,11 @@ int mbma_profile_islands(size_t n, const double *x, double peak, double hurst, d
         const bool floor_d = x[k] >= s.kink_d;
         const island i = island_at(x[k], floor_d, x[k] > s.kink_u, &s);
         const phi found = phi_at(cells, i.X, i.mu, false);
-        const double each = (floor_d ? 1.0 : s.jacobian) * s.rms_over_s * i.D_d / (ROOT_TWO_PI * i.sigma_d);
+        const double each = (floor_d ? 1.0 : s.jacobian) * i.count;
         out[k] = i.force * each * found.value[0];
         out[n + k] = i.area * each * found.value[1];
-        out[2 * n + k] = ((peak + x[k]) * s.rms_over_s - i.h_d) / i.sigma_d;
-        out[3 * n + k] = s.rms_over_s / i.sigma_d;
+        out[2 * n + k] = height_of(peak + x[k], &i, &s);
+        out[3 * n + k] = s.rms_over_s * i.narrowness;
         worst = found.status > worst ? found.status : worst;
         *error = mbma_max(*error, found.error);
     }
