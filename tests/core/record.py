@@ -68,29 +68,49 @@ class Recorder:
 
 
 def use():
-    """Call every function, by the library where it does that at once."""
-    from mbma_tables import Surface, contact, contact_law, open_table
+    """Call every function, by the library where it does."""
+    from mbma_tables import Surface, contact, contact_law, greenwood_tripp, hardness, open_table
+    from mbma_tables.bearing_curve import FRACTIONS, BearingCurve
+    from mbma_tables.islands import classical
+    from mbma_tables.theories.calibrated_table import shipped
 
+    core = package.core
     for which, first in enumerate([-700.0, -2.0, 1e-300, -0.9]):
         x = np.linspace(first, 10.0, 501)
-        package.core.elementary(which, x, np.empty(501))
-    package.core.island_geometry(0.3, 0.7, 300.0, np.array([2.0, 0.37, 0.5, 1.5, 1.5, 1.0, 1.0, 0.0]), np.empty(14))
-    surface = Surface(0.7, 0.2, 60.0, 1.0, 3.0)
-    many = Surface(np.linspace(0.3, 1.0, 40), 0.2, np.geomspace(0.7, 4000, 40), 1.0, 3.0)
-    universal, four = open_table("universal"), open_table("island4d")
-    for derivatives in (False, True):
-        contact(surface, [0.5, 1.0], derivatives=derivatives)
-        contact(many, np.linspace(-2, 2.9, 40), rtol=1e-6, derivatives=derivatives)
+        core.elementary(which, x, np.empty(501))
+    core.island_geometry(0.3, 0.7, 300.0, np.array([2.0, 0.37, 0.5, 1.5, 1.5, 1.0, 1.0, 0.0]), np.empty(14))
+    surfaces = np.linspace(0.3, 0.9, 20), np.linspace(1.5, 6.0, 20), np.full(20, 3.0)
+    core.calibrated_slopes(*shipped().core_table, *surfaces, None, None, np.linspace(0.3, 2.5, 20), np.empty((20, 10)))
+    core.self_affine(*surfaces[:2], np.empty(20), np.empty(20))
+    classical.solve_classical(2.0, 0.5, 20, 0.3, 1e-6, 100)
+    hardness.diffused(surfaces[0], 0.1, 1.0)
+    BearingCurve(np.linspace(3.0, 1.0, FRACTIONS.size), 3.0)
+    u = np.geomspace(2.9, 0.1, 12)
+    core.gap_start(1, u, np.exp(-u), np.exp(-u), 1, surfaces[0], surfaces[2], np.full((6, 20), 0.5))
+
+    open_table("island4d").lookup(np.linspace(1.0, 2.0, 100), 3.0, 20.0, 0.8)
+    universal = open_table("universal")
     X, mu = np.linspace(-5, 40, 300), np.geomspace(1e-6, 1e5, 300)
     universal.answer(X, mu)
     universal.slopes(X, mu)
-    four.lookup(np.linspace(1.0, 2.0, 100), 3.0, 20.0, 0.8)
-    law = contact_law(surface)
-    for gaps in (0.5, np.linspace(-2.9, 2.9, 100)):
-        law.force(gaps)
-        law.stiffness(gaps)
-        law.energy(gaps)
+    greenwood_tripp.solve(X[50:250:10], mu[50:250:10]).pressure.sum()
+    one = Surface(0.7, 0.2, 60.0, 1.0, 3.0)
+    many = Surface(np.linspace(0.3, 1.0, 40), 0.2, np.geomspace(0.7, 4000, 40), 1.0, 3.0)
+    for derivatives in (False, True):
+        contact(one, [0.5, 1.0], derivatives=derivatives)
+        contact(many, np.linspace(-2, 2.9, 40), rtol=1e-6, derivatives=derivatives)
+    law, gaps = contact_law(one), np.linspace(-2.9, 2.9, 100)
+    for quantity in (law.force, law.area, law.stiffness, law.area_slope, law.energy):
+        quantity(0.5)
+        quantity(np.linspace(-2.9, 2.9, 2000))
     law.at_pressure(law.force(np.linspace(-2, 2.5, 30)))
+    law.leakage(gaps)
+    law.slope_error(gaps)
+    for theory in ("mbma", "calibrated"):
+        for hardness in (np.inf, 0.05):
+            found = contact(one, mean_separation=np.linspace(0.2, 2.5, 30), theory=theory, hardness=hardness)
+            contact(one, pressure=found.force, theory=theory, hardness=hardness)
+    contact(many, mean_separation=1.0, theory="calibrated")
 
 
 if __name__ == "__main__":

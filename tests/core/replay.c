@@ -33,12 +33,10 @@ PyObject *PyErr_Format(PyObject *type, const char *text, ...) {
     PyErr_SetString(type, text);
     return NULL;
 }
+void PyErr_Clear(void) { raised = false; }
 PyThreadState *PyEval_SaveThread(void) { return STATE; }
 void PyEval_RestoreThread(PyThreadState *state) { (void)state; }
 PyObject *PyModuleDef_Init(PyModuleDef *definition) { return (PyObject *)(void *)definition; }
-int PyModule_AddIntConstant(PyObject *module, const char *name, long value) {
-    return module && name && value < 0 ? -1 : 0;
-}
 PyObject *PyLong_FromLongLong(long long value) {
     answer.i = value;
     return &answer.head;
@@ -66,6 +64,28 @@ int PyObject_GetBuffer(PyObject *given, Py_buffer *view, int flags) {
     return 0;
 }
 void PyBuffer_Release(Py_buffer *view) { view->buf = NULL; }
+
+/* What the class of laws and the start of the module ask for, which are not tried here. */
+struct _typeobject {
+    int unused;
+};
+PyTypeObject PyFloat_Type;
+PyObject *PyFloat_FromDouble(double value) { return value == value ? NULL : Py_None; }
+long PyLong_AsLong(PyObject *given) { return given == NULL; }
+int PyModule_AddIntConstant(PyObject *module, const char *name, long value) { return module && name && value; }
+int PyModule_AddObjectRef(PyObject *module, const char *name, PyObject *value) { return module && name && value; }
+int PyModule_AddStringConstant(PyObject *module, const char *name, const char *value) { return module && name && value; }
+PyObject *PyObject_CallMethod(PyObject *given, const char *name, const char *format, ...) {
+    return name && format ? given : NULL;
+}
+PyObject *PyObject_GetAttrString(PyObject *given, const char *name) { return name ? given : NULL; }
+PyObject *PyTuple_GetItem(PyObject *tuple, Py_ssize_t place) { return place ? tuple : NULL; }
+Py_ssize_t PyTuple_Size(PyObject *tuple) { return tuple != NULL; }
+PyObject *PyType_FromSpec(PyType_Spec *spec) { return spec ? Py_None : NULL; }
+void *PyType_GetSlot(PyTypeObject *type, int slot) { return slot ? type : NULL; }
+int PyUnicode_CompareWithASCIIString(PyObject *text, const char *other) { return text && other; }
+PyObject *Py_BuildValue(const char *format, ...) { return format ? Py_None : NULL; }
+void Py_DecRef(PyObject *given) { (void)given; }
 
 /* ---- the file ---- */
 
