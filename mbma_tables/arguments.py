@@ -124,6 +124,16 @@ def spread(array: Any, shape: tuple[int, ...]) -> Any:
     return array if np.shape(array) == shape else np.broadcast_to(array, shape)
 
 
+def rows(*given: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
+    """What is given, broadcast and flat, and the shape."""
+    arrays = [np.asarray(value, float) for value in given]
+    shape = np.broadcast(*arrays).shape
+    table = np.empty((len(arrays), *shape))
+    for k, array in enumerate(arrays):
+        table[k] = array
+    return table.reshape(len(arrays), -1), shape
+
+
 def require(name: str, value: FloatArray, good: Any, allowed: str, unit: str = "") -> None:
     """Refuse the entries of `value` where `good` is false; `allowed` says what would have been right, `unit` theirs."""
     if isinstance(good, np.bool_) and good:
@@ -142,6 +152,8 @@ def positive_modulus(E_star: ArrayLike) -> FloatArray:
 
 def checked_hardness(hardness: ArrayLike) -> FloatArray:
     """Hardnesses as positive numbers; infinity means that nothing yields."""
+    if isinstance(hardness, float) and hardness > 0:
+        return np.asarray(hardness, dtype=np.float64)
     values = np.asarray(hardness)
     infinite = np.isposinf(values) if values.dtype.kind in "fiu" else False
     given = finite_array("hardness", np.where(infinite, 1.0, values) if np.any(infinite) else hardness)

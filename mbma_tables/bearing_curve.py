@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 from scipy.special import ndtr, ndtri
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.arguments import FloatArray, rows
 from mbma_tables.bearing import FRACTIONS
 from mbma_tables.core import core, in_blocks
 from mbma_tables.errors import InputError
@@ -21,19 +21,12 @@ DEPTH = 30.0  # of a map's valleys below the last node, in levels
 MIN_SPACING = 0.02  # relative, of mean gaps between nodes of a map's bearing curve
 
 
-def rows(*given: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
-    """What is given, broadcast and flat, and the shape."""
-    arrays = [np.asarray(value, float) for value in given]
-    shape = np.broadcast(*arrays).shape
-    table = np.empty((len(arrays), *shape))
-    for k, array in enumerate(arrays):
-        table[k] = array
-    return table.reshape(len(arrays), -1), shape
-
-
 def filled(fill: Callable[..., int], known: FloatArray, out: FloatArray, *more: Any) -> FloatArray:
     """Rows of `out`, one or several, by a loop of the compiled core over rows of as many entries."""
-    own = [out] if out.ndim == 1 else list(out)
+    own = [out] if out.ndim == 1 else out
+    if out.shape[-1] <= BLOCK:
+        fill(*known, *more, *own)
+        return out
 
     def block(some: slice) -> int:
         return fill(*(row[some] for row in known), *more, *(row[some] for row in own))

@@ -24,10 +24,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import erfinv, ndtri
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.arguments import FloatArray, rows
 from mbma_tables.bearing_curve import BearingCurve as BearingCurve
 from mbma_tables.bearing_curve import bearing_share as bearing_share
-from mbma_tables.bearing_curve import filled, rows
+from mbma_tables.bearing_curve import filled
 from mbma_tables.core import core
 
 

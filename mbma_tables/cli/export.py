@@ -119,7 +119,12 @@ def _law_files(target: str, out: Path, joint: dict[str, Any], given: dict[str, A
     from mbma_tables.export.law_rows import describe_law
 
     if target in LAWS:
-        return {out: law_code.law_text(target, **joint, **given).encode()}
+        files, beside = {out: law_code.law_text(target, **joint, **given).encode()}, law_code.LANGUAGES[target].beside
+        if beside and str(out) == "-":
+            raise InputError(f"{target} is two files: --out must be that of the first")
+        if beside:
+            files[out.with_name(f"{out.stem}_c.c")] = law_code.law_text(beside, **joint, **given).encode()
+        return files
     if target in FMUS:
         return {out: fmu.fmu(target, **joint, **given)}
     if target in GRAPHS:

@@ -47,6 +47,11 @@ MBMA_INLINE double mbma_max(double a, double b) { return a > b ? a : b; }
 /* x held in [low, high]; NaN becomes low, so that what is indexed by it stays inside */
 MBMA_INLINE double mbma_held(double x, double low, double high) { return mbma_min(mbma_max(x, low), high); }
 
+/* p x^4 + a x^3 + b x^2 + c x + d by Horner's rule */
+MBMA_INLINE double mbma_horner(double p, double x, double a, double b, double c, double d) {
+    return mbma_fma(mbma_fma(mbma_fma(mbma_fma(p, x, a), x, b), x, c), x, d);
+}
+
 #define MBMA_ROUND 6755399441055744.0 /* 1.5 2^52: adding it rounds to a whole number */
 #define MBMA_LN2_HIGH 0.6931471803691238
 #define MBMA_LN2_LOW 1.9082149292705877e-10
@@ -59,18 +64,10 @@ MBMA_INLINE mbma_reduced mbma_reduce(double x) {
     const double inside = mbma_held(x, -700.0, 700.0);
     const double shifted = mbma_fma(inside, 1.4426950408889634, MBMA_ROUND), power = shifted - MBMA_ROUND;
     const double r = mbma_fma(-power, MBMA_LN2_LOW, mbma_fma(-power, MBMA_LN2_HIGH, inside));
-    double p = 1.0 / 6227020800.0;
-    p = mbma_fma(p, r, 1.0 / 479001600.0);
-    p = mbma_fma(p, r, 1.0 / 39916800.0);
-    p = mbma_fma(p, r, 1.0 / 3628800.0);
-    p = mbma_fma(p, r, 1.0 / 362880.0);
-    p = mbma_fma(p, r, 1.0 / 40320.0);
-    p = mbma_fma(p, r, 1.0 / 5040.0);
-    p = mbma_fma(p, r, 1.0 / 720.0);
-    p = mbma_fma(p, r, 1.0 / 120.0);
-    p = mbma_fma(p, r, 1.0 / 24.0);
-    p = mbma_fma(p, r, 1.0 / 6.0);
-    p = mbma_fma(p, r, 0.5);
+    const double high = mbma_horner(1.0 / 6227020800.0, r, 1.0 / 479001600.0, 1.0 / 39916800.0, 1.0 / 3628800.0,
+                                    1.0 / 362880.0);
+    const double low = mbma_horner(high, r, 1.0 / 40320.0, 1.0 / 5040.0, 1.0 / 720.0, 1.0 / 120.0);
+    const double p = mbma_fma(mbma_fma(mbma_fma(low, r, 1.0 / 24.0), r, 1.0 / 6.0), r, 0.5);
     const mbma_reduced found = {
         mbma_float((int64_t)(UINT64_C(0x3FF0000000000000) + ((uint64_t)mbma_bits(shifted) << 52))),
         mbma_fma(r * r, p, r)};
@@ -98,16 +95,8 @@ MBMA_INLINE double mbma_log(double x) {
     const double f = mbma_float((int64_t)(bits - (halvings << 52))) - 1.0;
     const double k = mbma_float((int64_t)((uint64_t)mbma_bits(MBMA_ROUND) + halvings)) - MBMA_ROUND;
     const double s = f / (2.0 + f), z = s * s;
-    double p = 2.0 / 21.0;
-    p = mbma_fma(p, z, 2.0 / 19.0);
-    p = mbma_fma(p, z, 2.0 / 17.0);
-    p = mbma_fma(p, z, 2.0 / 15.0);
-    p = mbma_fma(p, z, 2.0 / 13.0);
-    p = mbma_fma(p, z, 2.0 / 11.0);
-    p = mbma_fma(p, z, 2.0 / 9.0);
-    p = mbma_fma(p, z, 2.0 / 7.0);
-    p = mbma_fma(p, z, 2.0 / 5.0);
-    p = mbma_fma(p, z, 2.0 / 3.0);
+    const double high = mbma_horner(2.0 / 21.0, z, 2.0 / 19.0, 2.0 / 17.0, 2.0 / 15.0, 2.0 / 13.0);
+    const double p = mbma_fma(mbma_horner(high, z, 2.0 / 11.0, 2.0 / 9.0, 2.0 / 7.0, 2.0 / 5.0), z, 2.0 / 3.0);
     /* 2 s = f - s f, whose rounding does not count */
     return mbma_fma(k, MBMA_LN2_HIGH, f - mbma_fma(s, mbma_fma(-z, p, f), -k * MBMA_LN2_LOW));
 }
@@ -123,24 +112,11 @@ MBMA_INLINE double mbma_log1p(double x) {
 MBMA_INLINE double mbma_erf(double x) {
     const double a = mbma_min(fabs(x), 6.0), t = 1.5 - 10.0 / (a + 5.0);
     double p = 0.0009578986658192441;
-    p = mbma_fma(p, t, 0.004828592382423287);
-    p = mbma_fma(p, t, 0.013846723547252188);
-    p = mbma_fma(p, t, 0.024690988558762395);
-    p = mbma_fma(p, t, 0.0333716398824953);
-    p = mbma_fma(p, t, 0.05087222244418428);
-    p = mbma_fma(p, t, 0.08061120895418113);
-    p = mbma_fma(p, t, 0.11199256666681254);
-    p = mbma_fma(p, t, 0.17090247890034505);
-    p = mbma_fma(p, t, 0.2708586037313628);
-    p = mbma_fma(p, t, 0.38000980758630726);
-    p = mbma_fma(p, t, 0.5755591732915837);
-    p = mbma_fma(p, t, 0.9152147920778164);
-    p = mbma_fma(p, t, 1.2761629053011574);
-    p = mbma_fma(p, t, 1.9316582692343824);
-    p = mbma_fma(p, t, 3.1912882808115683);
-    p = mbma_fma(p, t, 3.7649901910458783);
-    p = mbma_fma(p, t, 2.396521719854481);
-    return copysign(-mbma_expm1(-a * p), x);
+    p = mbma_horner(p, t, 0.004828592382423287, 0.013846723547252188, 0.024690988558762395, 0.0333716398824953);
+    p = mbma_horner(p, t, 0.05087222244418428, 0.08061120895418113, 0.11199256666681254, 0.17090247890034505);
+    p = mbma_horner(p, t, 0.2708586037313628, 0.38000980758630726, 0.5755591732915837, 0.9152147920778164);
+    p = mbma_horner(p, t, 1.2761629053011574, 1.9316582692343824, 3.1912882808115683, 3.7649901910458783);
+    return copysign(-mbma_expm1(-a * mbma_fma(p, t, 2.396521719854481)), x);
 }
 
 #endif

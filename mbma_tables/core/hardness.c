@@ -261,6 +261,7 @@ size_t mbma_capped_force(size_t n, const double *elastic, const double *stiffnes
 #define SETTLED 1e-7          /* of a logarithm, before the last step, whose miss would be about its square */
 #define SETTLED_BOTH 1e-14    /* of its product with the step before, where slopes are not known */
 #define FARTHEST 40.0         /* step of y */
+enum { AROUND = 4 };           /* places from which a step begins */
 #define DISTINCT 8.881784e-16 /* relative, of gaps that rounding leaves distinct */
 
 /* A place of the curve: ln of its value, y = ln u - ln(end - u), in which it is straight at either end of contact, and
@@ -298,6 +299,22 @@ static double middle(double low, double high) {
     return high > 2.0 * low && low > 0.0 ? sqrt(low) * sqrt(high) : 0.5 * (low + high);
 }
 
+/* y at a value by the polynomial through places of different values and their rates, by divided differences. */
+static double through(double value, const place *known, int n) {
+    double z[2 * AROUND], d[2 * AROUND];
+    for (int i = 0; i < 2 * n; i++) {
+        z[i] = known[i / 2].value;
+        d[i] = known[i / 2].y;
+    }
+    for (int order = 1; order < 2 * n; order++)
+        for (int i = 2 * n - 1; i >= order; i--)
+            d[i] = order == 1 && i % 2 ? known[i / 2].rate : (d[i] - d[i - 1]) / (z[i] - z[i - order]);
+    double y = d[2 * n - 1];
+    for (int i = 2 * n - 2; i >= 0; i--)
+        y = mbma_fma(y, value - z[i], d[i]);
+    return y;
+}
+
 size_t mbma_gap_start(size_t n, size_t m, size_t columns, const double *u, const double *value, const double *steep,
                       int exact, const double *wanted, const double *end, double *state) {
     size_t missed = 0;
@@ -308,24 +325,36 @@ size_t mbma_gap_start(size_t n, size_t m, size_t columns, const double *u, const
         size_t i = 0;
         while (i < m && !(value[i * columns + column] >= wanted[k]))
             i++;
-        place known[2] = {{NAN, NAN, NAN}, {NAN, NAN, NAN}}; /* beyond it and before it */
-        for (size_t side = 0; side < 2; side++) {
-            if (i + 1 - side > m || i < side)
+        if (i < m)
+            *low = u[i * columns + column];
+        if (i > 0)
+            *high = u[(i - 1) * columns + column];
+        /* places around it whose values rise, and how many of them lie before it */
+        place known[AROUND];
+        int count = 0, before = 0;
+        for (size_t at = i > AROUND / 2 ? i - AROUND / 2 : 0; at < m && at < i + AROUND / 2; at++) {
+            const double own = value[at * columns + column];
+            if (!(own > 0.0 && own < INFINITY && (count == 0 || log(own) > known[count - 1].value)))
                 continue;
-            const size_t at = (i - side) * columns + column;
-            *(side ? high : low) = u[at];
-            if (value[at] > 0.0 && value[at] < INFINITY)
-                known[side] = place_of(u[at], value[at], steep[at], end[k]);
+            known[count++] = place_of(u[at * columns + column], own, steep[at * columns + column], end[k]);
+            before += at < i;
         }
         const double goal = log(wanted[k]);
-        const bool both = known[0].y == known[0].y && known[1].y == known[1].y;
-        const bool first = known[0].y == known[0].y && !(both && goal - known[1].value < known[0].value - goal);
-        const place from = known[first ? 0 : 1];
-        const place other = known[first ? 1 : 0];
-        double step = both ? step_to(goal, from, other, exact != 0) : from.rate * (goal - from.value);
-        if (both && !((from.y + step - other.y) * step <= 0.0))
-            step = (from.y - other.y) / (from.value - other.value) * (goal - from.value);
-        *gap = gap_of(from.y + mbma_held(step, -FARTHEST, FARTHEST), end[k]);
+        place from = {NAN, NAN, NAN};
+        if (count > 0) {
+            const bool inside = before > 0 && before < count;
+            const int lighter = before > 0 ? before - 1 : 0, other = inside ? before : lighter;
+            from = known[inside && known[before].value - goal < goal - known[lighter].value ? before : lighter];
+            double y = from.y + from.rate * (goal - from.value);
+            if (inside) {
+                const double way = (goal - known[lighter].value) / (known[other].value - known[lighter].value);
+                const double straight = known[lighter].y + way * (known[other].y - known[lighter].y);
+                y = exact ? through(goal, known, count) : straight;
+                if (!(y <= known[lighter].y && y >= known[other].y))
+                    y = straight;
+            }
+            *gap = gap_of(from.y + mbma_held(y - from.y, -FARTHEST, FARTHEST), end[k]);
+        }
         if (!(*gap > *low && *gap < *high))
             *gap = middle(*low, *high);
         kept[0] = from.value;

@@ -8,7 +8,7 @@
 enum { CHUNK = 256, STEPS = 200, KEPT = MBMA_LAW_DEGREE + 1, INVERSE_BITS = 2 };
 static const double SURE = 3e-6;     /* steps, in halves of a record, after which another would change nothing */
 static const double EPSILON = 4e-16; /* steps that another would not shorten */
-static const double NEAR = 1e-7;     /* relative width of an interval that is too narrow to tell its errors */
+static const double NARROW = 1e-7;   /* relative width of an interval that is too narrow to tell its errors */
 
 int mbma_law_open(const void *block, size_t words, mbma_law *law) {
     const size_t head_words = sizeof(mbma_law_head) / sizeof(double), row_words = 2;
@@ -86,7 +86,7 @@ MBMA_INLINE taylor polynomial(const double *c, double t) {
 /* Sum of c[k] t^k/(power + k); even and odd k apart, whose sums do not wait for each other. */
 MBMA_INLINE double integral(const double *c, double t, double power) {
     const double square = t * t;
-    double even = c[MBMA_LAW_DEGREE] * (1.0 / (power + (int)MBMA_LAW_DEGREE)), odd = 0.0;
+    double even = c[MBMA_LAW_DEGREE] * (1.0 / (power + (double)MBMA_LAW_DEGREE)), odd = 0.0;
     for (int k = MBMA_LAW_DEGREE - 1; k > 0; k -= 2) {
         odd = mbma_fma(odd, square, c[k] * (1.0 / (power + k)));
         even = mbma_fma(even, square, c[k - 1] * (1.0 / (power + k - 1)));
@@ -98,16 +98,22 @@ MBMA_INLINE bool of_area(mbma_quantity what) { return what == MBMA_AREA || what 
 
 /* A quantity of t^power times the polynomial. */
 MBMA_INLINE double quantity_at(mbma_quantity what, place p, double power) {
-    const double lead = power != 0.0 ? pow(p.t, power) : 1.0;
-    if (what == MBMA_ENERGY)
-        return 0.5 * mbma_fma(lead * p.beyond, integral(p.record->force, p.t, 1.0 + power), p.record->energy);
-    const taylor at = polynomial(of_area(what) ? p.record->area : p.record->force, p.t);
+    const bool plain = power == 0.0;
+    const double t = p.t;
+    if (what == MBMA_ENERGY) {
+        const double beyond = plain ? p.beyond : pow(t, power) * p.beyond;
+        return 0.5 * mbma_fma(beyond, integral(p.record->force, t, 1.0 + power), p.record->energy);
+    }
+    const taylor at = polynomial(of_area(what) ? p.record->area : p.record->force, t);
     if (what == MBMA_FORCE || what == MBMA_AREA)
-        return lead * at.value;
-    const double over_t = power != 0.0 ? power / p.t : 0.0;
-    if (what == MBMA_CURVATURE)
-        return 4.0 * p.q * p.q * lead * (2.0 * at.bend + over_t * (2.0 * at.slope + (power - 1.0) / p.t * at.value));
-    const double slope = (power == 0.0 ? at.slope : lead * (at.slope + over_t * at.value)) * p.q;
+        return plain ? at.value : pow(t, power) * at.value;
+    if (what == MBMA_CURVATURE) {
+        const double last = power * (power - 1.0) * at.value;
+        const double more = 2.0 * t * (at.bend * t + power * at.slope);
+        const double bend = plain ? 2.0 * at.bend : pow(t, power - 2.0) * (more + last);
+        return 4.0 * p.q * p.q * bend;
+    }
+    const double slope = (plain ? at.slope : pow(t, power - 1.0) * (t * at.slope + power * at.value)) * p.q;
     return what == MBMA_STIFFNESS ? 2.0 * slope : slope;
 }
 
@@ -150,6 +156,22 @@ MBMA_INLINE double depth_of_overclosure(const mbma_law_head *head, double c, dou
 double mbma_law_at_overclosure(const mbma_law *law, mbma_quantity what, double c) {
     const double d = law->head->h_max - 2.0 * c;
     return law->head->ends && c <= 0.0 ? 0.0 : at_place(law, what, depth_of_overclosure(law->head, c, d), d);
+}
+
+double mbma_law_and_slope(const mbma_law *law, mbma_quantity which, double c, double *by_c) {
+    const mbma_law_head *const head = law->head;
+    const double d = head->h_max - 2.0 * c, x = depth_of_overclosure(head, c, d);
+    *by_c = 0.0;
+    if (head->ends && c <= 0.0)
+        return 0.0;
+    if (!(head->low <= x && head->lowest <= d && d <= head->highest)) {
+        *by_c = which == MBMA_AREA ? 2.0 * at_place(law, MBMA_AREA_SLOPE, x, d) : at_place(law, MBMA_STIFFNESS, x, d);
+        return at_place(law, which, x, d);
+    }
+    const place p = place_of(law, x, d);
+    const taylor found = polynomial(which == MBMA_AREA ? p.record->area : p.record->force, p.t);
+    *by_c = 2.0 * (found.slope * p.q);
+    return found.value;
 }
 
 /* Places of a chunk of gaps, by member. */
@@ -225,9 +247,8 @@ double mbma_law_overclosure(const mbma_law *law, mbma_quantity which, double wan
     if (!(wanted > 0.0))
         return low;
     for (int n = 0; n < STEPS; n++) {
-        const double value = mbma_law_at_overclosure(law, which, c);
-        const double slope = which == MBMA_AREA ? 2.0 * mbma_law_at_overclosure(law, MBMA_AREA_SLOPE, c)
-                                                : mbma_law_at_overclosure(law, MBMA_STIFFNESS, c);
+        double slope;
+        const double value = mbma_law_and_slope(law, which, c, &slope);
         if (value < wanted)
             low = c;
         else
@@ -411,7 +432,7 @@ size_t mbma_law_fit(size_t n, const double *ends, const double *found, const dou
                 slope = mbma_fma(fabs(terms[i]), bounds[SAMPLES + i], slope);
             }
             bad += !(least > 0.0 && most < (double)INFINITY && !isnan(value));
-            if (high - low > NEAR * low) {
+            if (high - low > NARROW * low) {
                 const double steep = mbma_max(1.0, 0.5 * reach * (most / least - 1.0));
                 errors[0] = mbma_max(errors[0], value / least);
                 errors[1] = mbma_max(errors[1], slope * reach / least);

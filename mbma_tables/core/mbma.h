@@ -234,6 +234,9 @@ int mbma_law_open(const void *block, size_t words, mbma_law *law);
 double mbma_law_at(const mbma_law *law, mbma_quantity what, double d);
 double mbma_law_at_overclosure(const mbma_law *law, mbma_quantity what, double c);
 
+/* Force (area) at an overclosure, and its derivative by that. */
+double mbma_law_and_slope(const mbma_law *law, mbma_quantity which, double c, double *by_c);
+
 /* The quantities in the order of mbma_quantity, as far as their arrays are not NULL. */
 size_t mbma_law_fill(size_t n, const double *d, const mbma_law *law, double *force, double *area, double *stiffness,
                      double *area_slope, double *energy);

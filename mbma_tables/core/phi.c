@@ -7,9 +7,9 @@ MBMA_INLINE size_t fill(size_t n, const double *X, const double *mu, const mbma_
     for (size_t k = 0; k < n; k++) {
         const phi found = phi_at(cells, X[k], mu[k], slopes);
         double *const row = out + k * (slopes ? 7 : 3);
-        row[0] = found.force, row[1] = found.area, row[2] = found.error;
-        if (slopes)
-            row[3] = found.force_by_X, row[4] = found.force_by_mu, row[5] = found.area_by_X, row[6] = found.area_by_mu;
+        row[0] = found.value[0], row[1] = found.value[1], row[2] = found.error;
+        for (int q = 0; q < 2 && slopes; q++)
+            row[3 + 2 * q] = found.by_X[q], row[4 + 2 * q] = found.by_mu[q];
         bad += found.status != MBMA_OK;
         if (status)
             status[k] = (uint8_t)found.status;

@@ -7,7 +7,7 @@
 #include "phi.h"
 
 enum { NODES = MBMA_PANEL_NODES, CHECKS = MBMA_PANEL_CHECKS, PLACES = NODES + CHECKS, GAPS = MBMA_PANEL_GAPS };
-enum { TERMS = 2 * GAPS, SPREAD = 9, TOPS = 8, FAR_TERMS = 8, LANES = 8, CHUNK = 256, ROWS = MBMA_PANEL_ROWS };
+enum { TERMS = 2 * GAPS, SPREAD = 9, TOPS = 8, FAR_TERMS = 8, CHUNK = 256, ROWS = MBMA_PANEL_ROWS };
 
 /* of errors of a panel */
 static const double AT_ENDS = 1.01;  /* times as much is missed at the ends as next to them */
@@ -47,21 +47,7 @@ static double lead(int row, double delta) {
 /* and the power of the compression that their sums begin with */
 static const double BEGUN[ROWS] = {3.5, 10.0 / 3.0, 1.0, 3.0};
 
-static double lanes_sum(const double a[LANES]) {
-    return ((a[0] + a[4]) + (a[2] + a[6])) + ((a[1] + a[5]) + (a[3] + a[7]));
-}
 
-/* a . b in eight lanes */
-MBMA_INLINE double dot(const double *restrict a, const double *restrict b, int64_t n) {
-    double s[LANES] = {0.0};
-    int64_t k = 0;
-    for (; k + LANES <= n; k += LANES)
-        for (int l = 0; l < LANES; l++)
-            s[l] = mbma_fma(a[k + l], b[k + l], s[l]);
-    for (int l = 0; k + l < n; l++)
-        s[l] = mbma_fma(a[k + l], b[k + l], s[l]);
-    return lanes_sum(s);
-}
 
 /* Adds to `out` the sums of rows, then their slopes by the compression, of islands begin:stop, times exp(least/2). */
 static void add_sums(double c, double least, const mbma_nodes *islands, int rows, int64_t begin, int64_t stop, double *out) {
@@ -75,8 +61,8 @@ static void add_sums(double c, double least, const mbma_nodes *islands, int rows
             turned[k] = share[k] * height * rate[k];
         }
         for (int row = 0; row < rows; row++) {
-            out[row] += dot(share, islands->weights + row * islands->size + first, count);
-            out[rows + row] += dot(turned, islands->weights + row * islands->size + first, count);
+            out[row] += dot(share, islands->weights + row * islands->size + first, (size_t)count);
+            out[rows + row] += dot(turned, islands->weights + row * islands->size + first, (size_t)count);
         }
     }
 }
@@ -347,7 +333,7 @@ static double missed_by(const mbma_panel_rule *r, double low, double high, const
             const double height = mbma_fma(-rate[j], c[k], shift[j]);
             rough[j] = mbma_exp(0.5 * mbma_fma(-height, height, least[k]));
         }
-        const double sum = dot(fine, fine_weight, 2 * count), other = dot(rough, coarse, count);
+        const double sum = dot(fine, fine_weight, (size_t)(2 * count)), other = dot(rough, coarse, (size_t)count);
         const double scale = mbma_exp(0.5 * (lowest - least[k]));
         /* up to its own end the panel from 0 is all there is */
         if (k == 0 && r->power > 1)
@@ -375,8 +361,8 @@ int mbma_profile_islands(size_t n, const double *x, double peak, double hurst, d
         const island i = island_at(x[k], floor_d, x[k] > s.kink_u, &s);
         const phi found = phi_at(cells, i.X, i.mu, false);
         const double each = (floor_d ? 1.0 : s.jacobian) * s.rms_over_s * i.D_d / (ROOT_TWO_PI * i.sigma_d);
-        out[k] = i.force * each * found.force;
-        out[n + k] = i.area * each * found.area;
+        out[k] = i.force * each * found.value[0];
+        out[n + k] = i.area * each * found.value[1];
         out[2 * n + k] = ((peak + x[k]) * s.rms_over_s - i.h_d) / i.sigma_d;
         out[3 * n + k] = s.rms_over_s / i.sigma_d;
         worst = found.status > worst ? found.status : worst;

@@ -35,7 +35,7 @@ MBMA_INLINE size_t spline4(size_t n, const double *places, const double *coeffic
     static const double ZEROS[8] = {0};
     const int64_t row = 2 * (nodes[3] + 2), plane = row * (nodes[2] + 2), cube = plane * (nodes[1] + 2);
     const size_t count = slopes ? 5 : 1; /* of each function */
-    const eight none = row_of(ZEROS);
+    const eight none = eight_of(ZEROS);
     size_t bad = 0;
     for (size_t k = 0; k < n; k++) {
         weights w[4];
@@ -54,7 +54,7 @@ MBMA_INLINE size_t spline4(size_t n, const double *places, const double *coeffic
                 const double *const from = start + a * cube + b * plane;
                 eight over_z = none, steep_z = none;
                 for (int c = 0; c < 4; c++) {
-                    const eight neighbours = row_of(from + c * row);
+                    const eight neighbours = eight_of(from + c * row);
                     over_z = fma8(neighbours, w[2].value[c], over_z);
                     if (slopes)
                         steep_z = fma8(neighbours, w[2].slope[c], steep_z);

@@ -192,7 +192,7 @@ MBMA_INLINE int apply_rule(bool slopes, interval *p, const gap *g, const mbma_ce
         const phi found = phi_at(table, at.X[k], at.mu[k], slopes);
         if (found.status != MBMA_OK)
             return found.status;
-        const double f = at.weight[0][k] * found.force, a = at.weight[1][k] * found.area;
+        const double f = at.weight[0][k] * found.value[0], a = at.weight[1][k] * found.value[1];
         force = mbma_fma(r->kronrod[k], f, force);
         area = mbma_fma(r->kronrod[k], a, area);
         gauss_force = mbma_fma(r->gauss[k], f, gauss_force);
@@ -200,8 +200,8 @@ MBMA_INLINE int apply_rule(bool slopes, interval *p, const gap *g, const mbma_ce
         *table_error = mbma_max(*table_error, found.error);
         if (!slopes)
             continue;
-        const double values[2] = {found.force, found.area}, by_X[2] = {found.force_by_X, found.area_by_X};
-        const double by_mu[2] = {found.force_by_mu, found.area_by_mu};
+        const double values[2] = {found.value[0], found.value[1]}, by_X[2] = {found.by_X[0], found.by_X[1]};
+        const double by_mu[2] = {found.by_mu[0], found.by_mu[1]};
         for (int q = 0; q < 2; q++) {
             const double share = r->kronrod[k] * at.weight[q][k];
             sums[q][BY_COMPRESSION] += share * values[q] * at.rise[k];
@@ -284,8 +284,8 @@ static int integrand(double x, const gap *g, const mbma_cells *table, double out
     const phi found = phi_at(table, n.X, n.mu, false);
     const double height = height_of(x, &n, g);
     const double weight = n.D_d * exp(-0.5 * height * height) / (ROOT_TWO_PI * n.sigma_d) * g->s.rms_over_s;
-    out[0] = n.force * found.force * weight;
-    out[1] = n.area * found.area * weight;
+    out[0] = n.force * found.value[0] * weight;
+    out[1] = n.area * found.value[1] * weight;
     return found.status;
 }
 

@@ -74,6 +74,8 @@ def fmu(
     token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, f'{target} {law}')}}}"
     parts = STANDARDS[target] | {"LAW": law, "NAME": name, "TOKEN": token, "START": repr(_start(found.numbers))}
     parts |= {name.upper(): found.more.get(name, "") and repr(found.ratio) for name in MORE}
+    least, most = found.numbers.c_least, found.numbers.c_most
+    parts |= {"LEAST": "-INFINITY" if found.numbers.ends else repr(least), "MOST": repr(most)}
     described = _description(target == "fmu3", name, token, "\n".join(found.said), variables, found.joint)
     files = {
         "modelDescription.xml": described,

@@ -1,4 +1,4 @@
-"""A contact law as source code that needs nothing else: one description, `law_numbers`, and a template a language."""
+"""A contact law as source code that needs nothing else: the core's own C, or `law_numbers` in a template a language."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from numpy.polynomial.polynomial import polyder, polyval
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError
+from mbma_tables.export.core_text import block_rows, block_text, core_text
 from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
 from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers, flow_numbers, law_numbers
 from mbma_tables.export.text import checked_name, filled, opening, template, wrapped
@@ -34,9 +35,10 @@ class Language(NamedTuple):
     """How a law is written in one language.
 
     `call` is a function's call with {name}, {what} and {x}; `number` writes a float, `arrays` columns of numbers and
-    rows of polynomials by their places in the template, whose names begin with a prefix. `subroutine` is the template
-    of a solver's user subroutine that calls the law, `parts` what else is filled in. `own_name` has key words where
-    the law's name stands alone, as that of a module or package.
+    rows of polynomials by their places in the template, whose names begin with a prefix; None where the law is read by
+    the core's C. `subroutine` is the template of a solver's user subroutine that calls the law, `parts` what else is
+    filled in. `own_name` has key words where the law's name stands alone, as that of a module or package. `beside` is
+    the target that it calls, of the same name, in a file of its own; `inverts` whether it has `overclosure`.
     """
 
     template: str
@@ -44,11 +46,13 @@ class Language(NamedTuple):
     usage: str
     call: str
     number: Callable[[float], str]
-    arrays: Callable[[str, Columns, Columns], dict[str, str]]
+    arrays: Callable[[str, Columns, Columns], dict[str, str]] | None = None
     subroutine: str = ""
     parts: tuple[tuple[str, str], ...] = ()
     only_conductance: bool = False
     own_name: str = ""
+    beside: str = ""
+    inverts: bool = True
 
 
 def law_text(
@@ -84,7 +88,7 @@ def law_text(
     Returns
     -------
     str
-        The text of one file.
+        The text of one file; that of fortran-law calls the C of c-law by the same name.
 
     Raises
     ------
@@ -96,8 +100,8 @@ def law_text(
     --------
     >>> from mbma_tables import Surface
     >>> text = law_text("c-law", Surface.named("concrete"), "13.3 MPa", name="road", theory="calibrated")
-    >>> "double road_with_tangent(double c, double *tangent);" in text
-    True
+    >>> "double road_with_tangent(double c, double *tangent);" in text, "size_t mbma_law_fill(" in text
+    (True, True)
     """
     if target not in LANGUAGES:
         raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
@@ -177,16 +181,43 @@ def text_of(target: str, name: str, asked: AskedLaw) -> str:
         "STRESS": asked.joint.stress,
         **dict(language.parts),
         **{quantity.upper(): asked.more.get(quantity, "") and language.number(asked.ratio) for quantity in MORE},
-        **_numbers("", numbers, {"p": numbers.force, "a": numbers.area}, language),
     }
-    if flow:
-        parts |= _numbers("flow_", flow, {"p": flow.force}, language)
+    if language.arrays is None:
+        parts |= _core(name, asked, language.number)
+    else:
+        parts |= _numbers("", numbers, {"p": numbers.force, "a": numbers.area}, language, language.arrays)
+        if flow:
+            parts |= _numbers("flow_", flow, {"p": flow.force}, language, language.arrays)
     if language.subroutine:
         parts["SUBROUTINE"] = filled(language.subroutine, **parts)
     return filled(language.template, **parts)
 
 
-def _numbers(prefix: str, numbers: LawNumbers | FlowNumbers, rows: Columns, language: Language) -> dict[str, str]:
+def _core(name: str, asked: AskedLaw, number: Callable[[float], str]) -> dict[str, str]:
+    """The core's C and the law's own blocks, and what the glue about them needs."""
+    law, numbers = asked.joint.law, asked.numbers
+    first = 0.0 if numbers.ends else (law.h_max - law.highest) / 2
+    ends = {"H_MAX": law.h_max, "FIRST": first, "TURN": numbers.c_turn}
+    parts = {place: number(value) for place, value in ends.items()} | {"CORE": core_text(["law.c"], name)}
+    whats = [what for what in FUNCTIONS if what != "with_tangent" and (what in asked.more or what not in MORE)]
+    parts["INTERFACES"] = "\n".join(FORTRAN_INTERFACE.format(name=name, what=what) for what in whats)
+    parts["FUNCTIONS"] = "\n".join(FORTRAN_FUNCTION.format(what=what) for what in whats)
+    blocks = {"": law.block}
+    if asked.flow:
+        blocks["FLOW_"], parts["FLOW_H_RMS"] = law.leakage.block, number(asked.flow.h_rms)
+    for prefix, block in blocks.items():
+        rows, records = block_rows(block)
+        parts |= {f"{prefix}ROWS": str(rows), f"{prefix}RECORDS": str(records), f"{prefix}DATA": block_text(block)}
+    return parts
+
+
+def _numbers(
+    prefix: str,
+    numbers: LawNumbers | FlowNumbers,
+    rows: Columns,
+    language: Language,
+    arrays: Callable[[str, Columns, Columns], dict[str, str]],
+) -> dict[str, str]:
     """All numbers by their places, flags and counts as whole ones."""
     known = {field.name: getattr(numbers, field.name) for field in dataclasses.fields(numbers)}
     places = {"RECORDS": str(numbers.centre.size)}
@@ -194,7 +225,7 @@ def _numbers(prefix: str, numbers: LawNumbers | FlowNumbers, rows: Columns, lang
         if isinstance(value, int | float):
             places[name.upper()] = str(int(value)) if isinstance(value, int) else language.number(value)
     columns = {name: column for name, column in known.items() if name in ("edges", "centre", "rate", "energies")}
-    return {f"{prefix}{place}".upper(): text for place, text in places.items()} | language.arrays(prefix, columns, rows)
+    return {f"{prefix}{place}".upper(): text for place, text in places.items()} | arrays(prefix, columns, rows)
 
 
 def _head(joint: Joint, numbers: LawNumbers, more: dict[str, str]) -> tuple[str, ...]:
@@ -206,7 +237,7 @@ def _head(joint: Joint, numbers: LawNumbers, more: dict[str, str]) -> tuple[str,
     begin = "no contact below c = 0" if numbers.ends else f"c from {numbers.c_least:.10g}"
     range_ = f"{begin}, to {numbers.c_most:.10g}; there is no answer outside"
     inverse = f"overclosure at a pressure: up to c = {numbers.c_turn:.10g}"
-    inverse += ", where pressure turns down" if numbers.c_turn < numbers.c_most else ""
+    inverse += "" if joint.law.turning_point is None else ", where pressure turns down"
     what += f", against overclosure c [{length}]"
     return joint.header(what, range_, inverse, end=numbers.c_turn, leakage="leakage" in more)
 
@@ -216,28 +247,12 @@ def _example(joint: Joint, language: Language) -> str:
     law = joint.law
     c = float(f"{(law.h_max - (law.lowest if law.turning_point is None else law.turning_point)) / 8:.3g}")
     p, k = (float(value) for value in law.force_and_stiffness(law.h_max - 2 * c))
-    answers = {"pressure": (c, p), "tangent": (c, k), "overclosure": (p, c)}
+    answers = {"pressure": (c, p), "tangent": (c, k)} | ({"overclosure": (p, c)} if language.inverts else {})
     said = ", ".join(
         f"{language.call.format(name='{name}', what=what, x=language.number(float(f'{x:.7g}')))} = {y:.7g}"
         for what, (x, y) in answers.items()
     )
     return f"Example: {said}"
-
-
-def _c(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
-    """A structure a record; coefficients as whole numbers in units of their own, which is shortest."""
-
-    def polynomial(row: FloatArray) -> str:
-        unit = f"{_step(row):.0e}"
-        # where a polynomial covers many decades the largest are beyond C's whole numbers
-        numbers = (value / float(unit) for value in row)
-        return f"Q({unit},{','.join(f'{n:.0f}' if abs(n) < 2**53 else f'{n:.17e}' for n in numbers)})"
-
-    heads = [[f"{value:.16g}" for value in column] for name, column in columns.items() if name != "edges"]
-    rows = [list(map(polynomial, row)) for row in polynomials.values()]
-    lines = [f"{{{','.join(parts)}}}," for parts in zip(*heads, *rows, strict=True)]
-    place = prefix.upper()
-    return {f"{place}ROWS": "\n".join(lines), f"{place}EDGES": wrapped(map(repr, columns["edges"].tolist()))}
 
 
 def _lists(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
@@ -262,18 +277,6 @@ def _matrices(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, 
     return {f"{prefix}{name}".upper(): f"[\n{_lines(rows, '', ';')}]" for name, rows in matrices.items()}
 
 
-def _data(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
-    """Statements of Fortran, one a record: no statement grows with the law."""
-    lines, columns = [], columns | {"edges": np.append(columns["edges"], math.inf)}
-    for k, head in enumerate(zip(*columns.values(), strict=True)):
-        names = ", ".join(f"{prefix}{name}({k + 1})" for name in columns)
-        lines.append(f"  data {names} &\n    / {wrapped(map(_fortran_number, head))} /")
-        for name, rows in polynomials.items():
-            text = wrapped(map(_fortran_number, _decimals(rows[k : k + 1])[0]), "    ", " &")
-            lines.append(f"  data ({prefix}{name}_(k_, {k + 1}), k_ = 0, 8) / &\n{text} /")
-    return {f"{prefix}data".upper(): "\n".join(lines)}
-
-
 def _lines(rows: FloatArray, begin: str, end: str) -> str:
     return "\n".join(f"{begin}{', '.join(map(repr, row))}{end}" for row in rows.tolist())
 
@@ -294,8 +297,6 @@ def _decimals(rows: FloatArray) -> FloatArray:
 
 
 def _fortran_number(value: float) -> str:
-    if math.isinf(value):
-        return "-huge(1d0)" if value < 0 else "1d300"
     text = repr(float(value))
     return text.replace("e", "d") if "e" in text else f"{text}d0"
 
@@ -305,33 +306,48 @@ def _with_infinity(text: str) -> Callable[[float], str]:
 
 
 NAN = "Outside the range: NaN."
-FORTRAN = Language(
-    "law.f90",
-    "!",
-    f"Fortran 2008: gfortran -c {{name}}.f90, then use {{name}}; functions are elemental, of real(real64). {NAN}",
-    "{what}({x})",
-    _fortran_number,
-    _data,
-    own_name="program",
+C = Language(
+    "law.c",
+    "/*",
+    "C99, also C++11: cc -O2 -c {name}.c, link with -lm; declare what you call as where they are declared below. The "
+    f"C of the library itself, and the law's own numbers. {NAN}",
+    "{name}_{what}({x})",
+    repr,
 )
-READ = (
-    "Written from the manual's list of arguments and called with it by a program of the tests; not run in the solver."
+FORTRAN_INTERFACE = """\
+    pure function c_{what}(x) bind(c, name="{name}_{what}") result(y)
+      import :: dp
+      real(dp), intent(in), value :: x
+      real(dp) :: y
+    end function c_{what}"""
+FORTRAN_FUNCTION = """\
+  elemental function {what}(x) result(y)
+    real(dp), intent(in) :: x
+    real(dp) :: y
+    y = c_{what}(x)
+  end function {what}
+"""
+SUBROUTINE = (
+    "{name}.c is C99, also C++11. Written from the manual's list of arguments and called with it by a program of the "
+    "tests; not run in the solver."
 )
-GAPCON = FORTRAN._replace(subroutine="gapcon.f90", only_conductance=True)
+GAPCON = C._replace(subroutine="gapcon.c", only_conductance=True)
 LANGUAGES = {
-    "c-law": Language(
-        "law.c",
-        "/*",
-        f"C99, also C++11: cc -O2 -c {{name}}.c, link with -lm; declare what you call as below. {NAN}",
-        "{name}_{what}({x})",
-        _with_infinity("-INFINITY"),
-        _c,
+    "c-law": C,
+    "fortran-law": Language(
+        "law.f90",
+        "!",
+        "Fortran 2008 on top of {name}_c.c, which is written beside it, by `mbma export c-law`: cc -O2 -c {name}_c.c, "
+        f"gfortran -c {{name}}.f90, then use {{name}}; functions are elemental, of real(c_double). {NAN}",
+        "{what}({x})",
+        _fortran_number,
+        own_name="import program pure result value x y",
+        beside="c-law",
     ),
-    "fortran-law": FORTRAN,
     "javascript-law": Language(
         "law.mjs",
         "/*",
-        "An ECMAScript module: import {{{{ pressure, withTangent, area, energy, overclosure }}}} from './{name}.mjs'. "
+        "An ECMAScript module: import {{ pressure, withTangent, area, energy, overclosure }} from './{name}.mjs'. "
         "Outside the range a RangeError, of what is no number a TypeError is thrown.",
         "{what}({x})",
         _with_infinity("-Infinity"),
@@ -373,26 +389,29 @@ LANGUAGES = {
         "{name}.{what}({x})",
         _with_infinity("-1e300"),
         _braces,
+        inverts=False,
         own_name="and block class connect connector der discrete each elsewhen encapsulated enumeration equation "
         "expandable extends external false final flow impure import initial inner model operator or outer partial "
         "public pure record redeclare replaceable return stream then time true type when while within",
     ),
-    "abaqus-uinter": FORTRAN._replace(
-        usage="*SURFACE INTERACTION, NAME=..., USER: abaqus job=... user={name}.f90. Place the bodies so that their "
+    "abaqus-uinter": C._replace(
+        usage="*SURFACE INTERACTION, NAME=..., USER: abaqus job=... user={name}.c. Place the bodies so that their "
         "surfaces touch where the mean planes are h_max apart. Beyond the law's range the increment is tried again "
         "with a smaller step. Without friction. A linear perturbation step stops the program: for "
-        "modes of a preloaded joint take the tangent at its pressure, from this module, as a spring's stiffness. "
-        f"{READ} Arguments: Abaqus 2017, user subroutines, UINTER.",
-        subroutine="uinter.f90",
+        "modes of a preloaded joint take the tangent at its pressure, from this file, as a spring's stiffness. "
+        f"{SUBROUTINE} Arguments: Abaqus 2017, user subroutines, UINTER.",
+        subroutine="uinter.c",
     ),
     "abaqus-gapcon": GAPCON._replace(
-        usage="*GAP CONDUCTANCE, USER: abaqus job=... user={name}.f90, beside a table of pressures. A pressure beyond "
-        f"the law's range stops the program. {READ} Arguments: Abaqus 6.5 to 2017, user subroutines, GAPCON.",
-        parts=(("SOLVER", "Abaqus/Standard"), ("MORE", ""), ("DECLARED", "")),
+        usage="*GAP CONDUCTANCE, USER: abaqus job=... user={name}.c, beside a table of pressures. A pressure beyond "
+        f"the law's range stops the program. {SUBROUTINE} Arguments: Abaqus 6.5 to 2017, user subroutines, GAPCON.",
+        parts=(("SOLVER", "Abaqus/Standard"),),
     ),
     "calculix-gapcon": GAPCON._replace(
-        usage="*GAP CONDUCTANCE, USER: in place of gapcon.f in the sources of CalculiX, which is then built anew. A "
-        f"pressure beyond the law's range stops the program. {READ} Arguments: CalculiX 2.7 to 2.20, gapcon.f.",
-        parts=(("SOLVER", "CalculiX"), ("MORE", ", &\n  area_"), ("DECLARED", ", area_")),
+        usage="*GAP CONDUCTANCE, USER, in place of CalculiX's gapcon.f: in its sources cc -O2 -c {name}.c -o gapcon.o, "
+        "ar r ccx_2.20.a gapcon.o, and link ccx anew. Use it with *CONTACT PAIR, TYPE=SURFACE TO SURFACE and a closure "
+        "that is LINEAR or EXPONENTIAL: 2.20 takes wrong conductances with NODE TO SURFACE, and none with TABULAR. A "
+        f"pressure beyond the law's range stops the program. {SUBROUTINE} Arguments: CalculiX 2.7 to 2.20, gapcon.f.",
+        parts=(("SOLVER", "CalculiX"),),
     ),
 }

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.theories import law_block as kernel
+from mbma_tables.theories import law_block as at
 from mbma_tables.theories.law_block import AREA_AT, CENTRE, ENERGY_AT, FORCE_AT, POWER_F, RATE, SCALE
 from mbma_tables.theories.law_leakage import LeakageLaw
 from mbma_tables.theories.law_object import ROUNDING, ContactLaw
@@ -95,7 +95,7 @@ class FlowNumbers:
 def flow_numbers(leakage: LeakageLaw) -> FlowNumbers:
     """The numbers of a law's leakage."""
     head = leakage.block
-    blocked = -float(head[kernel.H_MAX])
+    blocked = -float(head[at.H_MAX])
     # in the layout of a law that counts from full compression
     as_law = dataclasses.replace(leakage.law, block=head, h_max=-blocked, lowest=blocked)
     x, which = _intervals(as_law, 1.0)
@@ -115,10 +115,10 @@ def flow_numbers(leakage: LeakageLaw) -> FlowNumbers:
 def law_numbers(law: ContactLaw) -> LawNumbers:
     """The numbers of a law."""
     head = law.block
-    h_max, ends = law.h_max, bool(head.view(np.int64)[kernel.ENDS])
+    h_max, ends = law.h_max, bool(head.view(np.int64)[at.ENDS])
     scale = 2 * float(head[SCALE])
     # sides in order of rising c: by the depth below h_max, then by the height above full compression
-    sides = ([-1.0] if ends else []) + ([1.0] if head[kernel.MINUS] > 0 else [])
+    sides = ([-1.0] if ends else []) + ([1.0] if head[at.MINUS] > 0 else [])
     edges: list[FloatArray] = []
     numbers, signs = [], []
     for sign in sides:
@@ -133,14 +133,14 @@ def law_numbers(law: ContactLaw) -> LawNumbers:
     turn = law.lowest if law.turning_point is None else law.turning_point
     return LawNumbers(
         h_max=h_max,
-        c_least=-math.inf if ends else (h_max - float(head[kernel.HIGHEST])) / 2,
+        c_least=-math.inf if ends else (h_max - float(head[at.HIGHEST])) / 2,
         c_turn=(h_max - turn) / 2,
-        c_most=(h_max - float(head[kernel.LOWEST])) / 2,
+        c_most=(h_max - float(head[at.LOWEST])) / 2,
         ends=ends,
         side=numbers[0].size if ends else 0,
         scale=scale,
         power_p=float(head[POWER_F]) if ends else 0.0,
-        power_a=float(head[kernel.POWER_A]) if ends else 0.0,
+        power_a=float(head[at.POWER_A]) if ends else 0.0,
         edges=np.concatenate(edges),
         centre=of_side * records[:, CENTRE],
         rate=of_side * records[:, RATE],
@@ -153,15 +153,15 @@ def law_numbers(law: ContactLaw) -> LawNumbers:
 def _intervals(law: ContactLaw, sign: float) -> tuple[FloatArray, Any]:
     """Ends of the intervals of x on the side where x = (h_max + sign d) scale, and the records that hold there."""
     head, whole = law.block, law.block.view(np.int64)
-    two = head[kernel.PLUS] != head[kernel.MINUS]
-    octaves = int(whole[kernel.MINUS_ROWS]) if two else len(law.rows)
+    two = head[at.PLUS] != head[at.MINUS]
+    octaves = int(whole[at.MINUS_ROWS]) if two else len(law.rows)
     first = octaves if two and sign > 0 else 0
-    edges = [np.array([0.0, head[kernel.LOW], 1.0])]
+    edges = [np.array([0.0, head[at.LOW], 1.0])]
     for k, shift in enumerate(law.rows[first : first + octaves, 0]):
         # shifts of 63 mark octaves in which this side has nothing
         buckets = 1 << max(52 - int(shift), 0)
-        edges.append(2.0 ** (int(whole[kernel.EXPONENT]) - 1023 + k) * (1 + np.arange(buckets) / buckets))
-    for kink_sign, kink in ((kernel.KINK_SIGN, kernel.KINK), (kernel.KINK_SIGN_2, kernel.KINK_2)):
+        edges.append(2.0 ** (int(whole[at.EXPONENT]) - 1023 + k) * (1 + np.arange(buckets) / buckets))
+    for kink_sign, kink in ((at.KINK_SIGN, at.KINK), (at.KINK_SIGN_2, at.KINK_2)):
         if head[kink_sign] == sign:
             edges.append(np.array([(head[kink] + law.h_max) * head[SCALE]]))
     least = (law.h_max + law.lowest) * head[SCALE] if sign > 0 else 0.0

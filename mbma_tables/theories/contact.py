@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -179,9 +179,10 @@ def _contact(
     """`contact` of plain arrays."""
     theory = source.theory_at(E_star, hardness)
     places: dict[str, Any] = {}
+    lighter = None
     if by != "separation" or not isinstance(theory, Mbma):
         unit = source.units.stress
-        value, E_star, places = _places(surface, value, E_star, hardness, by, theory, unit)
+        value, E_star, places, lighter = _places(surface, value, E_star, hardness, by, theory, unit)
     held = {"pressure": "force", "area": "area"}.get(by)
     capped: Any = theory
     by_log_modulus: dict[str, Any] = {"force": 0.0, "area": 0.0}
@@ -193,14 +194,14 @@ def _contact(
         fields = vars(totals) | places
     else:
         u = np.asarray(places["mean_separation"])
-        loaded = None if theory is source.theory else capped.loaded(surface, u)
+        loaded = None if theory is source.theory else capped.loaded(surface, u, lighter)
         found = theory.answer(surface, u) if loaded is None else loaded.answer
         source = dataclasses.replace(source, answer=found, loaded=loaded)
         error = spread(found.error, np.shape(found.force))[()]
         fields = {"force": (E_star * found.force)[()], "area": found.area[()], "error": error} | places
         fields |= {**_labels(source.theory), "islands": None}
         if derivatives:
-            force_by, area_by = differentiate(theory, surface, u)
+            force_by, area_by = differentiate(theory, surface, u, lighter)
             by_log_modulus = {"force": force_by.pop("E_star", 0.0), "area": area_by.pop("E_star", 0.0)}
             fields |= {"force_by": {name: (E_star * slope)[()] for name, slope in force_by.items()}}
             fields |= {"area_by": {name: slope[()] for name, slope in area_by.items()}}
@@ -217,12 +218,12 @@ def _contact(
 
 def _places(
     surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, theory: Theory, unit: str | None
-) -> tuple[FloatArray, FloatArray, dict[str, Any]]:
-    """What is known, the modulus, and both separations, all of the broadcast shape."""
+) -> tuple[FloatArray, FloatArray, dict[str, Any], Any]:
+    """What is known, the modulus, and both separations, all of the broadcast shape; `lighter` of `Yielding.loaded`."""
     asked, modulus = finite_array(by, value), positive_modulus(E_star)
     shape = broadcast_shape(**{by: asked, "surface": surface.h_rms, "E_star": modulus, "hardness": hardness})
     asked, modulus = spread(asked, shape), spread(modulus, shape)
-    h_max = np.asarray(surface.h_max)
+    h_max, lighter, capped = np.asarray(surface.h_max), None, cast(Any, theory)
     if by != "separation":
         require(by, asked, asked >= 0, "at least 0")
     if by == "separation":
@@ -233,14 +234,17 @@ def _places(
     else:
         quantity, wanted = ("force", asked / modulus) if by == "pressure" else ("area", asked)
         try:
-            average = theory.mean_separation_at(surface, quantity, wanted)
+            if by == "pressure" and theory is not theory.elastic:
+                average, lighter = capped.pressed(surface, wanted)
+            else:
+                average = theory.mean_separation_at(surface, quantity, wanted)
         except OutOfRangeError:
             if by == "pressure":
                 _refuse_pressures(surface, asked, modulus, hardness, theory, unit)
             raise
     gap = asked if by == "separation" else 2 * average - h_max
     both = {"separation": gap, "mean_separation": average}
-    return asked, modulus, {name: spread(place, shape)[()] for name, place in both.items()}
+    return asked, modulus, {name: spread(place, shape)[()] for name, place in both.items()}, lighter
 
 
 def _refuse_pressures(

@@ -15,7 +15,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import NAMED, Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.theories.protocol import SCAN, Theory, TheoryAnswer, select
+from mbma_tables.theories.protocol import FEW_LOOKS, SCAN, Theory, TheoryAnswer, select
 from mbma_tables.totals.contact import Totals, totals_at
 from mbma_tables.totals.island_sum import QUADRATURE_SHARE, kinks
 from mbma_tables.totals.profile import profile
@@ -80,6 +80,26 @@ class Mbma(Theory):
             return TheoryAnswer(found.force, found.area, self._differences(surface, u), found.error)
         # du = dd/2
         return TheoryAnswer(found.force, found.area, -2 * found.force_by["separation"], found.error)
+
+    def slopes(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...] | None:
+        """By its own differentiated sums."""
+        if not self._has_slopes(surface):
+            return None
+        gap = 2 * np.asarray(mean_separation) - np.asarray(surface.h_max)
+        found = self.totals(surface, gap, derivatives=True)
+        return tuple(_at_mean_separation(by) for by in (found.force_by, found.area_by))
+
+    def looks(self, surface: AnySurface) -> int:
+        """Few of tiers that take long."""
+        return super().looks(surface) if self._has_slopes(surface) else FEW_LOOKS
+
+    def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
+        """Force or area, without slopes where these are differences."""
+        if self._has_slopes(surface):
+            return super().values(surface, mean_separation, quantity)
+        gap = 2 * np.asarray(mean_separation) - np.asarray(surface.h_max)
+        found = np.asarray(getattr(self.totals(surface, gap, quantities=(quantity,)), quantity))
+        return found, np.full(found.shape, np.nan), False
 
     def _differences(self, surface: AnySurface, u: FloatArray) -> FloatArray:
         """-dF/du by numerical differentiation, for tiers without derivatives."""
@@ -170,6 +190,13 @@ class Mbma(Theory):
                 1 - _highest(value, np.maximum(peak, 0.5) / SCAN, (peak + 2) / SCAN)
             )
         return result.reshape(surface.shape)
+
+
+def _at_mean_separation(by: Any) -> dict[str, FloatArray]:
+    """Derivatives by u = (h_max + d)/2 and by parameters at held u from those at held d."""
+    by_gap = by.pop("separation")
+    by |= {"h_max": by["h_max"] - by_gap} if "h_max" in by else {}
+    return {"mean_separation": 2 * by_gap, **by}
 
 
 def _highest(value: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray) -> FloatArray:

@@ -8,18 +8,23 @@ user's own object with a `name` and an ``answer(surface, mean_separation)``. Wha
 from __future__ import annotations
 
 import abc
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.arguments import FloatArray, describe_entries, require
+from mbma_tables.arguments import FloatArray, describe_entries, require, rows
+from mbma_tables.core import core
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import calibrated_table
 
-ROOT_RTOL = 1e-12  # of forces and areas at which a separation is asked
+LOOKS, FEW_LOOKS = 64, 8  # gaps at which an inversion begins, of one surface and of each of a batch,
+LOOKED_AT = 7.0  # from where to where, of ln u - ln(h_max - u),
+FAR = 12.0  # and up to which u/h_rms where contact has no end
+STEPS = 200
+MISSED = 0.5  # of ln of a value that lies between two numbers u
 ENERGY_RTOL = 1e-9
 LEAST_LEVEL = 4  # of the rule of energies, whose estimate of its error may vanish by chance where it is coarse
 SCAN = 49  # compressions at which a law is looked at for a turning point
@@ -51,6 +56,7 @@ class Theory(abc.ABC):
 
     name: str
     advice = ""  # one line beside each answer
+    reached = 0.0  # by how much, relatively, a wanted value may be more than the largest
     ends_at_h_max = True  # whether force vanishes at u = h_max; else its Gaussian heights have no end
 
     @abc.abstractmethod
@@ -80,7 +86,7 @@ class Theory(abc.ABC):
 
     def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E*."""
-        return self.answer(surface, self.mean_separation_at(surface, "force", force)).area
+        return self.answer(surface, self.inverted(surface, "force", force)[0]).area
 
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Share of heights above the level whose mean gap is u, and its derivative by u: Gaussian heights."""
@@ -142,8 +148,29 @@ class Theory(abc.ABC):
             rtol=ENERGY_RTOL,
             minlevel=LEAST_LEVEL,
         )
-        _refuse_unfinished(found.success.all(axis=0), "the elastic energy")
+        refuse_unfinished(found.success.all(axis=0), "the elastic energy")
         return np.asarray(found.integral.sum(axis=0))
+
+    @property
+    def knows_areas(self) -> bool:
+        """Whether the area at a force needs no separation."""
+        return type(self.elastic).area_at is not Theory.area_at
+
+    def slopes(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...] | None:
+        """Derivatives of force and of area by "mean_separation" and the surface's parameters, where it knows them."""
+        return None
+
+    def looks(self, surface: AnySurface) -> int:
+        """At how many gaps of each surface an inversion begins."""
+        return LOOKS if surface.shape == () else FEW_LOOKS
+
+    def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
+        """Force or area at mean separations, about -d/du of it, and whether that is exact; NaN where not known."""
+        found = self.answer(surface, mean_separation)
+        if quantity == "force":
+            return found.force, found.stiffness, True
+        # area rises nearly as force does
+        return found.area, found.area * found.stiffness / found.force, False
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at which "force" (over A0 E*) or "area" has a wanted value; h_max at zero.
@@ -153,55 +180,62 @@ class Theory(abc.ABC):
         OutOfRangeError
             Where the branch of first contact does not reach it.
         """
-        from scipy.optimize.elementwise import find_root
+        u, missed = self.inverted(surface, quantity, np.asarray(wanted, dtype=float))
+        refuse_unfinished(~missed, f"the separation at this {quantity}")
+        return u
 
-        shape = np.broadcast_shapes(np.shape(wanted), surface.shape)
-        given = np.broadcast_to(np.asarray(wanted, dtype=float), shape)
-        free = given == 0
+    @np.errstate(all="ignore")
+    def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """As `mean_separation_at`, by Newton's method in a bracket, and where rounding of u leaves no such value."""
+        first, last = self.interval(surface, quantity)
+        end = surface.h_max if self.ends_at_h_max else np.inf
+        (goal, ends, low, high), shape = rows(wanted, end, first, last)
         if not self.ends_at_h_max:
-            require(quantity, given, ~free, f"positive: contact has no end in theory {self.name!r}")
-        low, high = (np.broadcast_to(end, shape) for end in self.interval(surface, quantity))
-        largest = getattr(self.answer(surface, low), quantity)
-        target = np.where(free, largest, given)
-        out = target > largest
+            allowed = f"positive: contact has no end in theory {self.name!r}"
+            require(quantity, goal.reshape(shape), goal.reshape(shape) != 0, allowed)
+        # gaps closer together at either end
+        near = last if self.ends_at_h_max else np.minimum(last, FAR * surface.h_rms)
+        places = np.linspace(-LOOKED_AT, LOOKED_AT, self.looks(surface)).reshape(-1, *(1 for _ in shape))
+        looked = first + (near - first) / (1 + np.exp(places))
+        value, steep, exact = self.values(surface, looked, quantity)
+        seen = np.array(np.broadcast_arrays(looked, value, steep))
+        if seen[0, 0].size > 1:
+            seen = np.array(np.broadcast_arrays(*seen, np.empty((1, *shape)))[:3])
+        state = np.full((6, goal.size), np.nan)
+        state[1], state[2] = low, high
+        core.gap_start(seen[0, 0].size, *seen, exact, goal, ends, state)
+        at_end = self._at_end(surface, quantity, goal, seen[1, -1], first, shape)
+        left = np.flatnonzero((goal > 0) & ~at_end)
+        for _ in range(STEPS):
+            if not left.size:
+                break
+            u, more = state[0, left], np.empty(left.size, dtype=bool)
+            value, steep, _ = self.at(shape, left).values(select(surface, shape, left), u, quantity)
+            known = np.ascontiguousarray(value), np.ascontiguousarray(steep)
+            core.gap_step(*known, exact, left, goal, ends, state, more)
+            left = left[more]
+        missed = (np.isnan(state[0]) | (np.abs(state[3] - np.log(goal)) > MISSED)) & (goal > 0) & ~at_end
+        missed[left] = True
+        u = np.where(goal == 0, high, np.where(at_end, low, state[0]))
+        return u.reshape(shape), missed.reshape(shape)
+
+    def _at_end(
+        self, surface: AnySurface, quantity: str, goal: FloatArray, seen: FloatArray, first: FloatArray, shape: Any
+    ) -> NDArray[np.bool_]:
+        """Which of the wanted values are the largest one; more is refused. No larger ones were `seen` before."""
+        beyond = goal > np.broadcast_to(seen, shape).ravel()
+        if not beyond.any():
+            return beyond
+        largest = np.broadcast_to(getattr(self.answer(surface, first), quantity), shape)
+        wanted = goal.reshape(shape)
+        out = wanted > largest * (1 + self.reached)
         if out.any():
             raise OutOfRangeError(
                 f"{quantity} must be at most what theory {self.name!r} reaches on this surface "
-                f"({describe_entries(largest, out)}), got {describe_entries(target, out)}",
+                f"({describe_entries(largest, out)}), got {describe_entries(wanted, out)}",
                 out,
             )
-        to_u, first, last = self._coordinate(low, high)
-
-        def excess(x: FloatArray, place: FloatArray) -> FloatArray:
-            # log of the value: loads range over many decades
-            place = place.astype(np.intp)
-            u = to_u(x, place)
-            value = getattr(self.at(shape, place).answer(select(surface, shape, place), u), quantity)
-            with np.errstate(divide="ignore"):
-                return np.asarray(np.log(value) - np.log(target.ravel()[place]))
-
-        found = find_root(
-            excess, (first, last), args=(_places(shape),), tolerances={"xrtol": 1e-15, "fatol": ROOT_RTOL}
-        )
-        at_end = target == largest
-        _refuse_unfinished(found.success | at_end, f"the separation at this {quantity}")
-        u = to_u(np.where(at_end, first, found.x), np.asarray(_places(shape), dtype=np.intp))
-        return np.where(free, high, np.where(at_end, low, u))
-
-    def _coordinate(
-        self, low: FloatArray, high: FloatArray
-    ) -> tuple[Callable[[FloatArray, NDArray[Any]], FloatArray], FloatArray, FloatArray]:
-        """Map of an unknown x to u, and the ends of x: u itself, or minus the logarithm of the depth below h_max."""
-        if not self.ends_at_h_max:
-            return lambda x, place: x, low, high
-        flat_low, flat_high = low.ravel(), high.ravel()
-        span = high - low
-
-        def to_u(x: FloatArray, place: NDArray[Any]) -> FloatArray:
-            return np.asarray(np.maximum(flat_high[place] - np.exp(-x), flat_low[place]))
-
-        # the lightest load that rounding of h_max - u leaves distinct
-        return to_u, -np.log(span), -np.log(4 * np.finfo(float).eps * np.maximum(span, high))
+        return np.asarray(wanted >= largest).ravel()
 
 
 def _places(shape: tuple[int, ...]) -> FloatArray:
@@ -218,7 +252,8 @@ def select(surface: AnySurface, shape: tuple[int, ...], place: Any) -> AnySurfac
     return surface.with_numbers(*numbers)
 
 
-def _refuse_unfinished(success: Any, what: str) -> None:
+def refuse_unfinished(success: Any, what: str) -> None:
+    """Say which entries were not found."""
     failed = ~np.asarray(success)
     if failed.any():
         raise ConvergenceError(f"{what} was not found for {int(failed.sum())} entries", failed)
@@ -268,3 +303,13 @@ class Wrapped(Theory):
         step = 0.01 * np.broadcast_to(np.asarray(surface.h_rms), u.shape)
         slope = derivative(force_at, u, args=(_places(u.shape),), initial_step=step)
         return TheoryAnswer(force, area, -slope.df, np.full(u.shape, np.nan))
+
+    def looks(self, surface: AnySurface) -> int:
+        """Few: an answer may take long."""
+        return FEW_LOOKS
+
+    def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
+        """Force or area alone."""
+        u = np.asarray(mean_separation, dtype=float)
+        found = np.asarray(self._theory.answer(surface, u)[int(quantity == "area")], dtype=float)
+        return np.broadcast_to(found, u.shape), np.full(u.shape, np.nan), False

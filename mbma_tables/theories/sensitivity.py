@@ -1,12 +1,15 @@
-"""Derivatives of a theory's force and area in the gap and in the surface's parameters, by numerical differentiation.
+"""Derivatives of a theory's force and area in the gap and in the surface's parameters.
 
-Richardson extrapolation of central differences (one-sided where a parameter ends) in steps that keep clear of the
-ends of contact; every result carries an estimate of its own error, which decides whether it is given out.
+Where a theory does not know them they are differences of fourth order at two steps, extrapolated, or one-sided ones
+where a parameter ends, in steps that keep clear of the ends of contact; every result carries an estimate of its own
+error, which decides whether it is given out. With a hardness the elastic contact is differentiated, and a contact that
+is straight in the parameters, with these slopes, goes through the law.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -15,35 +18,67 @@ from mbma_tables.errors import ConvergenceError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
 from mbma_tables.surfaces.surface import PARAMETERS
-
-if TYPE_CHECKING:
-    from mbma_tables.theories.protocol import Theory
+from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
 STEP = 0.02  # of a parameter, or of the room that it has
 RTOL = 1e-6  # of a derivative that is given out, or of the quantity over the parameter
+HALVINGS = 10  # of the step, at most
 GAP, MODULUS = "mean_separation", "E_star"
 KINDS = ("force", "area")
 
+# places over the step, and weights of the derivative: in their middle, and at the first of them
+CENTRAL: tuple[Any, Any] = np.array([-1.0, -0.5, 0.5, 1.0]), np.array([1.0, -8.0, 8.0, -1.0]) / 6
+_SIDE = (1 - np.cos(np.linspace(0, np.pi, 7))) / 2
+ONE_SIDED: tuple[Any, Any] = _SIDE, np.linalg.solve(np.vander(_SIDE, increasing=True).T, np.eye(7)[1])
+
+Slopes = tuple[dict[str, FloatArray], ...]  # of force and of area, by names
+
+
+def differences(
+    function: Callable[[Any, FloatArray], FloatArray],
+    step: FloatArray,
+    side: FloatArray,
+    scale: FloatArray,
+    halvings: int = HALVINGS,
+) -> tuple[FloatArray, FloatArray]:
+    """Derivatives at 0, shape (kinds, entries), and estimates of their errors.
+
+    ``function(k, x)`` has kinds as rows, of entries `k` at x. `side` is 0, or that on which to step; `scale` a size of
+    derivatives, next to which errors do not count; steps are halved so often at most.
+    """
+    found, error = np.zeros(scale.shape), np.full(scale.shape, np.inf)
+    for (places, weights), apart in ((CENTRAL, 0), (ONE_SIDED, 1)):
+        left, widths = np.flatnonzero(np.abs(side) == apart), 2.0 ** -np.arange(2.0)
+        coarse = np.empty((len(scale), 0))
+        while left.size and widths[-1] >= 2.0**-halvings:
+            h = np.where(apart, side, 1.0)[left] * step[left] * widths[:, None, None]
+            x = places[:, None] * h
+            values = function(np.broadcast_to(left, x.shape).ravel(), x.ravel()).reshape(-1, *x.shape)
+            slopes = np.swapaxes(weights @ values, 0, 1) / h
+            # of two steps at first, of one more later
+            coarse, fine = slopes if widths.size > 1 else (coarse, slopes[0])
+            best = fine if apart else fine + (fine - coarse) / 15
+            miss = np.abs(best - (coarse if apart else fine))
+            better = ~(miss >= error[:, left])
+            found[:, left] = np.where(better, best, found[:, left])
+            error[:, left] = np.where(better, miss, error[:, left])
+            rough = ~(miss <= RTOL * STEP * np.maximum(np.abs(best), scale[:, left])).all(axis=0)
+            coarse, left, widths = fine[:, rough], left[rough], widths[-1:] / 2
+    return found, error
+
 
 def differentiate(
-    theory: Theory, surface: AnySurface, mean_separation: FloatArray
-) -> tuple[dict[str, FloatArray], ...]:
+    theory: Theory, surface: AnySurface, mean_separation: FloatArray, lighter: FloatArray | None = None
+) -> Slopes:
     """Derivatives of F/(A0 E*) and A/A0 by "separation" d and each of the surface's parameters, the others held.
 
-    With a hardness, which is held, also by the logarithm of "E_star".
+    With a hardness, which is held, also by the logarithm of "E_star"; `lighter` is that of `Yielding.loaded`.
 
     Where differences do not settle, at corners of a theory or where force has no bound, it is a ConvergenceError.
     """
-    shape = np.broadcast_shapes(np.shape(mean_separation), surface.shape)
-    names = (GAP, *surface.parameters, *(() if theory is theory.elastic else (MODULUS,)))
-    at = {name: np.broadcast_to(np.asarray(getattr(surface, name), float), shape) for name in PARAMETERS[1:]}
-    at |= {name: np.broadcast_to(np.asarray(getattr(surface, name), float), shape) for name in surface.parameters}
-    at |= {GAP: np.broadcast_to(np.asarray(mean_separation, float), shape), MODULUS: np.ones(shape)}
-    whole = theory.answer(surface, at[GAP])
-    slopes: tuple[dict[str, FloatArray], ...] = ({}, {})
-    for kind, found in zip(KINDS, slopes, strict=True):
-        for name in names:
-            found[name] = _derivative(theory, surface, at, name, kind, getattr(whole, kind))
+    u = np.asarray(mean_separation, dtype=float)
+    slopes = _elastic(theory, surface, u) if theory is theory.elastic else _yielding(theory, surface, u, lighter)
+    for found in slopes:
         # d = 2 u - h_max is held, not u
         by_gap = found.pop(GAP)
         found["separation"] = by_gap / 2
@@ -52,48 +87,106 @@ def differentiate(
     return slopes
 
 
-def _derivative(
-    theory: Theory, surface: AnySurface, at: dict[str, FloatArray], name: str, kind: str, value: FloatArray
-) -> FloatArray:
-    """Derivative by one parameter, the others and u held."""
-    from scipy.differentiate import derivative
+def _elastic(theory: Theory, surface: AnySurface, u: FloatArray) -> Slopes:
+    known = theory.slopes(surface, u)
+    if known is not None:
+        return known
+    whole, names = theory.answer(surface, u), (GAP, *surface.parameters)
 
-    centre = at[name]
-    places = np.arange(value.size, dtype=float).reshape(value.shape)
-    step, direction = _steps(theory, at, name)
+    def answer(moved: AnySurface, own: Mapping[str, FloatArray], entry: tuple[Any, Any], x: FloatArray) -> TheoryAnswer:
+        return theory.at(np.shape(whole.force), entry[1]).answer(moved, own[GAP])
 
-    def moved(x: FloatArray, place: FloatArray) -> FloatArray:
-        flat = place.astype(np.intp)
-        own = {other: numbers.ravel()[flat] for other, numbers in at.items()} | {name: x}
-        return np.asarray(
-            getattr(
-                theory.at(value.shape, place)
-                .stiffer(own[MODULUS])
-                .answer(surface.with_numbers(*(own[p] for p in surface.parameters)), own[GAP]),
-                kind,
-            )
-        )
+    return _numerical(theory, surface, u, names, whole, answer)
+
+
+class _Straight(Theory):
+    """An elastic contact that is straight in the parameters, at some of them: for `Yielding` to go through its law."""
+
+    def __init__(self, elastic: Theory, answer: TheoryAnswer, line: tuple[FloatArray, ...] | None) -> None:
+        self._elastic, self._answer, self._line = elastic, answer, line
+        self.name, self.ends_at_h_max = elastic.name, elastic.ends_at_h_max
+
+    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
+        return self._answer
+
+    def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
+        if self._line is None:
+            return self._elastic.area_at(surface, force)
+        area, slope, at = self._line
+        return area + slope * (force - at)
+
+    def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return self._elastic.bearing_share(surface, mean_separation)
+
+
+@np.errstate(all="ignore")
+def _yielding(capped: Any, surface: AnySurface, u: FloatArray, lighter: FloatArray | None) -> Slopes:
+    elastic, names = capped.elastic, (GAP, *surface.parameters, MODULUS)
+    if lighter is None and not capped.knows_areas:
+        lighter = capped.lighter(surface, u)
+    whole = capped.loaded(surface, u, lighter)
+    shape = np.shape(whole.answer.force)
+    gaps = np.stack([np.broadcast_to(gap, shape) for gap in (u, lighter) if gap is not None])
+    # by gap, name and flat place
+    force, area = (
+        np.array([np.broadcast_to(slopes.get(name, 0.0), gaps.shape).reshape(len(gaps), -1) for name in names])
+        for slopes in _elastic(elastic, surface, gaps)
+    )
+    at_force, rise = np.broadcast_to(whole.elastic_area, shape).ravel(), np.zeros(0)
+    if lighter is not None:
+        # of the area at a force by the force, and by parameters
+        rise = np.nan_to_num(area[0, 1] / force[0, 1])
+        tilt = area[:, 1] - force[:, 1] * rise
+
+    def answer(moved: AnySurface, own: Mapping[str, FloatArray], entry: tuple[Any, Any], x: FloatArray) -> TheoryAnswer:
+        name, place = entry
+        known = zip(whole.elastic[:2], (force, area), strict=True)
+        ends = (np.ravel(part)[place] + slope[name, 0, place] * x for part, slope in known)
+        line = None
+        if lighter is not None:
+            line = at_force[place] + tilt[name, place] * x, rise[place], np.ravel(whole.answer.force)[place]
+        straight = _Straight(elastic, TheoryAnswer(*ends, *np.zeros((2, x.size))), line)
+        found: TheoryAnswer = capped.at(shape, place).stiffer(own[MODULUS]).over(straight).answer(moved, own[GAP])
+        return found
+
+    return _numerical(capped, surface, u, names, whole.answer, answer)
+
+
+def _numerical(
+    theory: Theory,
+    surface: AnySurface,
+    u: FloatArray,
+    names: tuple[str, ...],
+    whole: TheoryAnswer,
+    answer: Callable[..., TheoryAnswer],
+) -> Slopes:
+    """By differences of ``answer(moved, own, (name, place), x)``: surfaces, their numbers, and what was moved by x."""
+    shape = np.shape(whole.force)
+    at = {name: getattr(surface, name) for name in (*PARAMETERS[1:], *surface.parameters)} | {GAP: u, MODULUS: 1.0}
+    at = {name: np.broadcast_to(np.asarray(value, dtype=float), shape).ravel() for name, value in at.items()}
+    size, values = at[GAP].size, np.stack([np.ravel(getattr(whole, kind)) for kind in KINDS])
+    step, side = np.swapaxes([_steps(theory, at, name) for name in names], 0, 1).reshape(2, -1)
+    centre = np.concatenate([at[name] for name in names])
+    scale = np.abs(np.tile(values, len(names)) / np.where(centre == 0, 1.0, centre))
+
+    def moved(k: Any, x: FloatArray) -> FloatArray:
+        number, place = np.divmod(k, size)
+        own = {name: value[place] for name, value in at.items()}
+        for j, name in enumerate(names):
+            own[name] = own[name] + np.where(number == j, x, 0.0)
+        found = answer(surface.with_numbers(*(own[name] for name in surface.parameters)), own, (number, place), x)
+        return np.stack([found.force, found.area])
 
     with np.errstate(all="ignore"):
-        found = derivative(
-            moved,
-            centre,
-            args=(places,),
-            initial_step=step,
-            step_direction=direction,
-            tolerances={"rtol": RTOL * STEP, "atol": RTOL * STEP * float(np.nanmin(_scale(value, centre)))},
-        )
-        missed = ~(found.error <= RTOL * np.maximum(np.abs(found.df), _scale(value, centre)))
-    if missed.any():
-        raise ConvergenceError(f"theory {theory.name!r}: no derivative of {kind} by {name} was found", missed)
-    return np.asarray(found.df)
+        slopes, error = (each.reshape(2, len(names), *shape) for each in differences(moved, step, side, scale))
+        missed = ~(error <= RTOL * np.maximum(np.abs(slopes), scale.reshape(slopes.shape)))
+    for kind, name in zip(*np.nonzero(missed.reshape(2, len(names), -1).any(axis=-1)), strict=True):
+        text = f"theory {theory.name!r}: no derivative of {KINDS[kind]} by {names[name]} was found"
+        raise ConvergenceError(text, missed[kind, name])
+    return tuple(dict(zip(names, rows, strict=True)) for rows in slopes)
 
 
-def _scale(value: FloatArray, centre: FloatArray) -> FloatArray:
-    return np.abs(value / np.where(centre == 0, 1.0, centre))
-
-
-def _steps(theory: Theory, at: dict[str, FloatArray], name: str) -> tuple[FloatArray, FloatArray]:
+def _steps(theory: Theory, at: Mapping[str, FloatArray], name: str) -> tuple[FloatArray, FloatArray]:
     """First steps, and on which side of a parameter to step: 0 for both."""
     centre = at[name]
     room = np.abs(centre)

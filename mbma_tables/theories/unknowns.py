@@ -24,10 +24,11 @@ from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.contact import contact, one_known
 from mbma_tables.theories.protocol import Theory, UserTheory
+from mbma_tables.theories.result import Contact
+from mbma_tables.theories.sensitivity import differences
 from mbma_tables.units import Units, modulus_and_units, unit_of
 
 STEP = 0.02  # of the logarithm of a parameter
-RTOL = 1e-6
 MAX_HURST = 0.9  # from which its steps go down: two of them, and 1 is the end
 MAX_ERROR = 0.05  # of a slope that is told, over itself or 1
 POINTS = 33  # of a range, geometric
@@ -144,39 +145,37 @@ def sensitivity(
     same = {"pressure": "force", "separation": "mean_separation"}.get(by, by)
     wanted = [name for name in ANSWERS if name != same]
 
+    def found_at(**own: Any) -> Contact:
+        modulus, place = own.pop("E_star"), own.pop(by)
+        return contact(make(**own), **{by: place}, E_star=modulus, **options)
+
     def answers(moved: Mapping[str, Any]) -> Answers:
         own = {name: moved.get(name, number) for name, number in numbers.items()}
         if isinstance(surface, Surface):
-            return of_contact(**own)
+            found = found_at(**own)
+            return {name: np.asarray(value) for name, value in _answers(found, own["E_star"]).items()}
         # there are no batches of spectra
         places = np.broadcast(*own.values())
-        found = [one(*map(float, entry)) for entry in places]
-        return {name: np.reshape([each[name] for each in found], places.shape) for name in wanted}
-
-    def of_contact(**own: Any) -> Answers:
-        modulus, place = own.pop("E_star"), own.pop(by)
-        found = contact(make(**own), **{by: place}, E_star=modulus, **options)
-        values = {name: getattr(found, name) for name in ANSWERS[:-1]} | {"conductance": found.stiffness / modulus}
-        return {name: np.asarray(values[name]) for name in wanted}
+        rows = [one(*map(float, entry)) for entry in places]
+        return {name: np.reshape([row[name] for row in rows], places.shape) for name in ANSWERS}
 
     @functools.cache
     def one(*own: float) -> Answers:
-        return of_contact(**dict(zip(numbers, own, strict=True)))
+        known = dict(zip(numbers, own, strict=True))
+        return _answers(found_at(**known), known["E_star"])
 
-    here = answers({})
+    known = found_at(**numbers)
+    here = {name: float(number) for name, number in _answers(known, numbers["E_star"]).items() if name in wanted}
     if not all(number > 0 for number in here.values()):
         raise InputError(f"there is no contact at this {by}, or full contact: nothing to take a logarithm of")
     varied = [name for name, number in numbers.items() if number != 0 and (name != "E_star" or units.stress != "1")]
-    slopes, errors = _slopes(answers, numbers, varied, wanted, 4 if isinstance(surface, Surface) else 2)
-    return Sensitivity(
-        by,
-        {name: numbers[name] for name in varied},
-        {name: float(number) for name, number in here.items()},
-        slopes,
-        errors,
-        _ranges(answers, numbers, ranges or {}, units),
-        units,
-    )
+    slopes, errors = _slopes(known, make, numbers, varied, by, wanted)
+    ends = _ranges(answers, numbers, ranges or {}, units, wanted)
+    return Sensitivity(by, {name: numbers[name] for name in varied}, here, slopes, errors, ends, units)
+
+
+def _answers(found: Any, modulus: Any) -> Answers:
+    return {name: getattr(found, name) for name in ANSWERS[:-1]} | {"conductance": found.stiffness / modulus}
 
 
 def _parameters(surface: Surface) -> tuple[Callable[..., Surface], dict[str, Any]]:
@@ -223,45 +222,60 @@ def _of_spectrum(surface: Any, theory: Any) -> tuple[Callable[..., MeasuredSurfa
     return make, own
 
 
+@np.errstate(all="ignore")
 def _slopes(
-    answers: Callable[[Mapping[str, Any]], Answers],
+    known: Contact,
+    make: Callable[..., Any],
     numbers: Mapping[str, float],
     varied: list[str],
+    by: str,
     wanted: list[str],
-    rounds: int,
-) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, float]]]:
-    """Logarithmic derivatives and their errors, by Richardson extrapolation of differences."""
-    from scipy.differentiate import derivative
+) -> tuple[dict[str, dict[str, float]], ...]:
+    """Logarithmic derivatives and their errors, by differences at held gaps, and what is held in place of the gap."""
+    theory, batches = known._source.theory, isinstance(known._source.surface, Surface)
+    u, depth = float(known.mean_separation), 1 - float(known.mean_separation / known._source.surface.h_max)
+    # at a held pressure or area, the gap moves in place of that: next to last contact what is left to it
+    inverted, near = by in ("pressure", "area"), theory.ends_at_h_max and depth < 0.5
+    moving = [name for name in varied if name != by or not inverted] + ["gap"] * inverted
+    made = functools.cache(make)
 
-    of, what = (index.astype(float) for index in np.indices((len(varied), len(wanted))))
-
-    def logarithm(x: Any, parameter: Any, answer: Any) -> Any:
-        x, parameter, answer = np.broadcast_arrays(x, parameter, answer)
-        moved = {
-            name: numbers[name] * np.exp(np.where(parameter == place, x, 0.0)) for place, name in enumerate(varied)
-        }
-        found = answers(moved)
-        return np.log(np.choose(answer.astype(int), [found[name] for name in wanted]))
+    def logarithms(k: Any, x: FloatArray) -> FloatArray:
+        shift = [np.exp(np.where(k == place, x, 0.0)) for place in range(len(moving))]
+        own = {name: np.full(x.size, number) for name, number in numbers.items()}
+        own |= {name: numbers[name] * times for name, times in zip(moving, shift, strict=True) if name != "gap"}
+        modulus, held = own.pop("E_star"), own.pop(by)
+        rows = [slice(None)] if batches else [np.array([row]) for row in range(x.size)]
+        found = np.empty((len(ANSWERS), x.size))
+        for row in rows:
+            surface = make(**own) if batches else made(**{name: float(value[row][0]) for name, value in own.items()})
+            gap = (surface.h_max + held[row]) / 2 if by == "separation" else held[row]
+            if inverted:
+                gap = surface.h_max * (1 - depth * shift[-1][row]) if near else u * shift[-1][row]
+            answer = theory.answer(surface, gap)
+            stress = np.stack([answer.force, answer.stiffness]) * modulus[row]
+            found[:, row] = gap, stress[0], answer.area, stress[1], answer.stiffness
+        return np.log(found)
 
     # exponents near their end, and cut-offs, which only take waves away
     ways = {name: -1.0 for name in ("hurst", "extrapolate_hurst") if numbers.get(name, 0.0) > MAX_HURST}
     ways |= {"shortest": 1.0, "longest": -1.0}
-    found = derivative(
-        logarithm,
-        np.zeros(of.shape),
-        args=(of, what),
-        initial_step=STEP,
-        step_direction=np.array([[ways.get(name, 0.0)] * len(wanted) for name in varied]),
-        tolerances={"rtol": RTOL, "atol": RTOL},
-        maxiter=rounds,
-    )
+    sides = np.array([ways.get(name, 0.0) for name in moving])
+    scale = np.ones((len(ANSWERS), len(moving)))
+    df, error = differences(logarithms, np.full(len(moving), STEP), sides, scale, 3 if batches else 1)
+    if inverted:
+        row, place = ANSWERS.index("force" if by == "pressure" else "area"), varied.index(by)
+        steep, follows = df[row, -1], df[:, -1:] / df[row, -1]
+        rough = (error[:, -1:] + np.abs(follows) * error[row, -1]) / np.abs(steep)
+        error = error + np.abs(follows) * error[row] + rough * np.abs(df[row])
+        df = np.insert((df - follows * df[row])[:, :-1], place, follows[:, 0], axis=1)
+        error = np.insert(error[:, :-1], place, rough[:, 0], axis=1)
     # an answer that jumps has no slope
-    df = np.where(found.error <= MAX_ERROR * np.maximum(1, np.abs(found.df)), found.df, np.nan)
-    slopes, errors = (
-        {name: dict(zip(wanted, row, strict=True)) for name, row in zip(varied, table.tolist(), strict=True)}
-        for table in (df, found.error)
+    df = np.where(error <= MAX_ERROR * np.maximum(1, np.abs(df)), df, np.nan)
+    chosen = [ANSWERS.index(name) for name in wanted]
+    return tuple(
+        {name: dict(zip(wanted, row, strict=True)) for name, row in zip(varied, table[chosen].T.tolist(), strict=True)}
+        for table in (df, error)
     )
-    return slopes, errors
 
 
 def _ranges(
@@ -269,6 +283,7 @@ def _ranges(
     numbers: Mapping[str, float],
     ranges: Mapping[str, tuple[Any, Any]],
     units: Units,
+    wanted: list[str],
 ) -> dict[str, dict[str, tuple[float, float]]]:
     """Smallest and largest answers over each range, and over the ends of all."""
     ends = {}
@@ -286,6 +301,6 @@ def _ranges(
         corners = np.array(list(itertools.product(*((low, numbers[name], high) for name, (low, high) in ends.items()))))
         found["all"] = answers(dict(zip(ends, corners.T, strict=True)))
     return {
-        name: {answer: (float(np.min(v)), float(np.max(v))) for answer, v in values.items()}
+        name: {answer: (float(np.min(values[answer])), float(np.max(values[answer]))) for answer in wanted}
         for name, values in found.items()
     }

@@ -6,38 +6,29 @@ pressures capped at the hardness. u is the mean gap, points that yield flattened
 
 from __future__ import annotations
 
-import contextlib
+import copy
 import dataclasses
 import functools
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
-from scipy.special import expit, logit, ndtr, ndtri
+from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables import hardness as law
-from mbma_tables.arguments import FloatArray, checked_hardness, describe_entries, require
-from mbma_tables.bearing_curve import rows
-from mbma_tables.core import core
-from mbma_tables.errors import ConvergenceError, OutOfRangeError
+from mbma_tables.arguments import FloatArray, checked_hardness
+from mbma_tables.errors import OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.calibrated_table import at_contact, shipped_part
-from mbma_tables.theories.protocol import Theory, TheoryAnswer, select
+from mbma_tables.theories.protocol import FEW_LOOKS, Theory, TheoryAnswer, refuse_unfinished
 
 GROUP = "hardness"  # of the calibrated laws' file
 QUANTITIES = ("area", "yielded", "force", "stiffness")
 TESTED_ETA = 0.025  # p_m/(E* g) down to which boundary elements were solved
-STEPS = 200
-LOWEST = 1e-300
 REACHED = 1e-9  # relative, of forces at full compression
 HEAVIEST = 1e6  # F/(A0 E* g) from which on areas are those of full contact
-CLOSED = 1e-9  # u/h_rms of contacts that count as full
-MANY = 200  # forces on one surface from which on a spline is worth making,
-NODE_STEP, BEYOND = 0.1, 16  # its steps in ln F/(p_m A0 - F), those beyond the forces at either end,
-MOST_ODDS = 20.0  # and the largest
-MIN_DEPTH = 4 * np.finfo(float).eps  # relative, of separations that rounding leaves distinct
+CLOSED, LEAST = 1e-9, 1e-300  # u/h_rms of contacts that count as full, and u of those of surfaces that end at h_max
+MANY = 200  # hardnesses up to which inversions look at as many gaps as without
 MAX_LEVEL = 37.0  # of heights over h_rms above which shares are no normal numbers
 
 
@@ -130,8 +121,20 @@ class Yielding(Theory):
     """
 
     def __init__(self, theory: Theory, hardness: ArrayLike) -> None:
-        self._elastic, self.hardness = theory, checked_hardness(hardness)
+        self._elastic, self.hardness, self.reached = theory, checked_hardness(hardness), REACHED
         self.name, self.ends_at_h_max = theory.name, theory.ends_at_h_max
+
+    def over(self, elastic: Theory) -> Yielding:
+        """The same over another elastic theory."""
+        other = copy.copy(self)
+        other._elastic = elastic
+        return other
+
+    def _with(self, hardness: FloatArray) -> Yielding:
+        """With other hardnesses, checked before."""
+        other = copy.copy(self)
+        other.hardness = hardness
+        return other
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """As of the elastic theory."""
@@ -151,11 +154,11 @@ class Yielding(Theory):
         if self.hardness.ndim == 0:
             return self
         chosen = np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)]
-        return Yielding(self.elastic, chosen)
+        return self._with(chosen)
 
     def stiffer(self, times: FloatArray) -> Theory:
         """With hardnesses that are less of the modulus."""
-        return Yielding(self.elastic, self.hardness / times)
+        return self._with(np.asarray(self.hardness / times))
 
     def bends(self, surface: AnySurface) -> FloatArray:
         """Where derivatives of the elastic force jump."""
@@ -170,27 +173,46 @@ class Yielding(Theory):
         """Force, area and the loading curve's stiffness at mean separations u [length]."""
         return self.loaded(surface, mean_separation).answer
 
-    def loaded(self, surface: AnySurface, mean_separation: FloatArray) -> Loaded:
-        """The answer at mean separations u [length], and what more is known there."""
+    def loaded(self, surface: AnySurface, mean_separation: FloatArray, lighter: FloatArray | None = None) -> Loaded:
+        """The answer at mean separations u [length], and what more is known there.
+
+        `lighter` are those of the elastic contact at the same forces, where they are known.
+        """
         u, h_rms = np.asarray(mean_separation, dtype=float), np.asarray(surface.h_rms)
-        elastic = self.elastic.answer(surface, u)
-        gradient = np.asarray(surface.rms_gradient)
-        eta = self._eta(surface)
-        endless = np.isinf(self.hardness)
+        at_force: Any = None
+        if lighter is None:
+            elastic = self.elastic.answer(surface, u)
+        else:
+            both = self.elastic.answer(surface, np.stack([u, lighter]))
+            elastic, (_, at_force, *_) = (TheoryAnswer(*(part[k] for part in both)) for k in range(2))
+        eta, gradient, endless = self._eta(surface), np.asarray(surface.rms_gradient), np.isinf(self.hardness)
         if endless.all():
             return Loaded(u, h_rms, eta, elastic.force / gradient, elastic, elastic, elastic.area)
-        share, slope = self.elastic.bearing_share(surface, u)
-        load, stiffness = law.force(elastic.force / gradient, elastic.stiffness / gradient, share, slope, eta)
-        force = load * gradient
-        needed = (force > 0) & ~endless
-        # where nothing yields or touches, a force that the theory is sure to reach
-        asked = np.where(needed, np.minimum(force, HEAVIEST * gradient), np.minimum(elastic.force, gradient))
-        at_force = np.where(needed, self.elastic.area_at(surface, asked), 0.0)
+        force, stiffness = self._closed(surface, u, elastic.force, elastic.stiffness)
+        if at_force is None:
+            needed = (force > 0) & ~endless
+            # where nothing yields or touches, a force that the theory is sure to reach
+            known = np.minimum(np.where(needed, force, elastic.force), np.where(needed, HEAVIEST, 1.0) * gradient)
+            at_force = np.where(needed, self.elastic.area_at(surface, known), 0.0)
         # both of the elastic errors, force and area at that force, may add up
-        capped = TheoryAnswer(force, law.area(load, at_force, eta), stiffness * gradient, 2 * elastic.error)
+        area = law.area(force / gradient, at_force, eta)
+        capped = TheoryAnswer(force, area, stiffness, 2 * elastic.error)
         if endless.any():
             capped = TheoryAnswer(*(np.where(endless, one, other) for one, other in zip(elastic, capped, strict=True)))
         return Loaded(u, h_rms, eta, capped.force / gradient, capped, elastic, at_force)
+
+    def _closed(self, surface: AnySurface, u: FloatArray, force: Any, stiffness: Any) -> tuple[FloatArray, FloatArray]:
+        """Force over A0 E* and its -d/du between the elastic ones and the bearing curve."""
+        gradient, bearing = np.asarray(surface.rms_gradient), self.elastic.bearing_share(surface, u)
+        load, steep = law.force(force / gradient, stiffness / gradient, *bearing, self._eta(surface))
+        return load * gradient, steep * gradient
+
+    def lighter(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
+        """Mean separations [length] of the elastic contact at the forces of this one."""
+        force, _, _ = self.values(surface, mean_separation, "force")
+        # one without end has no gap without force
+        least = 0.0 if self.ends_at_h_max else np.finfo(float).tiny
+        return self.elastic.inverted(surface, "force", np.maximum(force, least))[0]
 
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The elastic theory's."""
@@ -200,105 +222,44 @@ class Yielding(Theory):
         """Mean separations [length] between which the elastic force falls, and Gaussian heights end in numbers."""
         low, high = self.elastic.interval(surface, "force")
         h_rms = np.asarray(surface.h_rms)
-        # Persson's theory has no finite force at zero, where a hardness leaves full contact
-        low = low if quantity == "force" or self.ends_at_h_max else np.maximum(low, CLOSED * h_rms)
+        # at zero, where a hardness leaves full contact, some theories have no finite force
+        low = np.maximum(low, LEAST if self.ends_at_h_max else CLOSED * h_rms)
         return low, np.minimum(high, MAX_LEVEL * h_rms)
+
+    def looks(self, surface: AnySurface) -> int:
+        """Few at many hardnesses, too, and of Persson's theory, which answers loads: each gap is an inversion."""
+        few = self.hardness.size > MANY or (self.knows_areas and not self.ends_at_h_max)
+        return FEW_LOOKS if few else self.elastic.looks(surface)
+
+    def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
+        """Force without the area, which follows from it."""
+        if quantity != "force":
+            return super().values(surface, mean_separation, quantity)
+        force, steep, exact = self.elastic.values(surface, mean_separation, quantity)
+        return *self._closed(surface, mean_separation, force, steep), exact
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at which "force" (over A0 E*, below the hardness) or "area" has a wanted value."""
-        if np.isinf(self.hardness).all():
-            return self.elastic.mean_separation_at(surface, quantity, wanted)
-        shape = np.broadcast_shapes(np.shape(wanted), surface.shape, self.hardness.shape)
-        given = np.broadcast_to(np.asarray(wanted, dtype=float), shape)
-        if quantity == "area":
-            return super().mean_separation_at(surface, quantity, given)
-        cap = np.broadcast_to(self.hardness, shape)
-        if (given > cap).any():
-            raise OutOfRangeError("pressure must be at most the hardness", given > cap)
-        return self._separation(surface, given)
+        asked: Theory = self.elastic if np.isinf(self.hardness).all() else super()  # type: ignore[assignment]
+        return asked.mean_separation_at(surface, quantity, wanted)
 
-    def _separation(self, surface: AnySurface, force: FloatArray) -> FloatArray:
-        """Newton's method in a bracket."""
-        known, state = self._started(surface, force)
-        asked = (known[0] > 0) & (known[0] < known[1]) & (known[1] < np.inf)
-        left = np.flatnonzero(asked)
-        for _ in range(STEPS):
-            if not left.size:
-                break
-            some, elastic = select(surface, force.shape, left), self.elastic.at(force.shape, left)
-            found = elastic.answer(some, state[0, left])
-            share, slope = elastic.bearing_share(some, state[0, left])
-            g = np.asarray(some.rms_gradient)
-            load, steep = law.force(found.force / g, found.stiffness / g, share, slope, known[1, left])
-            more = np.empty(left.size, dtype=bool)
-            core.gap_step(load, steep, 1, left, known[0], known[2], state, more)
-            left = left[more]
-        missed = asked & np.isnan(state[0])
-        missed[left] = True
-        if missed.any():
-            text = f"no separation was found for {int(missed.sum())} pressures"
-            raise ConvergenceError(text, missed.reshape(force.shape))
-        low, high = self.interval(surface)
-        u, _, above = state[:3].reshape(3, *force.shape)
-        u = np.where(force < self.hardness, u, low)
-        self._refuse_unreached(surface, force, u)
-        return np.where(np.isinf(self.hardness), above, np.where(known[0].reshape(force.shape) > 0, u, high))
+    def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """As of any theory; no force is beyond the hardness."""
+        over = np.asarray(wanted > self.hardness)
+        if quantity == "force" and over.any():
+            raise OutOfRangeError("pressure must be at most the hardness", over)
+        return super().inverted(surface, quantity, np.broadcast_to(wanted, over.shape))
 
-    def _started(self, surface: AnySurface, force: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Force, hardness and last gap, and the state of `gap_step`: u lies below the elastic contact's."""
-        (low, high), gradient = self.interval(surface), np.asarray(surface.rms_gradient)
-        low, end = np.maximum(low, LOWEST), surface.h_max if self.ends_at_h_max else np.inf
-        known, _ = rows(force / gradient, self._eta(surface), end)
-        log_odds = logit(force / self.hardness)
-        some = log_odds[np.abs(log_odds) < MOST_ODDS]
-        if not surface.shape and not self.hardness.ndim and some.size >= MANY:
-            with contextlib.suppress(OutOfRangeError):  # of all forces it says which
-                u = self._along_spline(surface, log_odds, some, (low, high * (1 - MIN_DEPTH), end))
-                return known, rows(u, low, high, *3 * [np.nan])[0]
-        above = self.elastic.mean_separation_at(surface, "force", force)
-        with np.errstate(all="ignore"):
-            x = force / self.hardness
-            d, numbers = -ndtri(x), law.CONSTANTS.exponent
-            density = np.exp(-d * d / 2) / np.sqrt(2 * np.pi)
-            gap = np.maximum(d * ndtr(d) + density, LOWEST)
-            # powers of u near the elastic contact's and the bearing curve's, joined as forces are
-            n = numbers[0] + numbers[1] * self._eta(surface) + numbers[2] * x
-            n = n * np.clip(gap * density / (x * (1 - x)), 1.0, 40.0)
-            ratio = gap * surface.h_rms / above
-            u = above * np.minimum(ratio, 1) * (1 + np.minimum(ratio, 1 / ratio) ** n) ** (-1 / n)
-        return known, rows(np.clip(u, low, above * (1 - MIN_DEPTH)), low, above, *3 * [np.nan])[0]
-
-    def _along_spline(self, surface: AnySurface, log_odds: FloatArray, some: FloatArray, ends: Any) -> FloatArray:
-        """Separations at ln F/(p_m A0 - F) on one surface, about, by a spline through contacts over `some` of them."""
-        low, high, end = ends
-
-        def to_u(y: FloatArray) -> FloatArray:
-            return np.asarray(np.exp(y) / (1 + np.exp(y) / end))
-
-        nodes = np.linspace(some.min(), some.max(), min(int(np.ptp(some) / NODE_STEP) + 2, some.size // 4))
-        u = self._started(surface, self.hardness * expit(nodes))[1][0]
-        require("mean_separation", u, u > low, "positive")
-        # in what is straight at either end of contact, and a little beyond the nodes
-        y, more = np.log(u / (1 - u / end)), NODE_STEP * np.arange(1, BEYOND)
-        y = np.concatenate([y[0] + more[::-1], y, y[-1] - more])
-        y = y[(low < to_u(y)) & (to_u(y) < high)]
-        g, elastic = np.asarray(surface.rms_gradient), self.elastic.answer(surface, to_u(y))
-        bearing, eta = self.elastic.bearing_share(surface, to_u(y)), self._eta(surface)
-        load, _ = law.force(elastic.force / g, elastic.stiffness / g, *bearing, eta)
-        met = logit(np.clip(load / eta, LOWEST, 1 - np.finfo(float).epsneg))
-        rising = np.append(True, np.diff(np.maximum.accumulate(met)) > 0)
-        found = CubicSpline(met[rising], y[rising])(np.clip(log_odds, met[0], met[-1]))
-        return np.clip(to_u(found), low, high)
-
-    def _refuse_unreached(self, surface: AnySurface, force: FloatArray, u: FloatArray) -> None:
-        """Refuse forces that full compression, or the least gap that is a number, does not reach."""
-        low = np.broadcast_to(self.interval(surface, "force" if self.ends_at_h_max else "area")[0], u.shape)
-        doubtful = (u <= 2 * np.maximum(low, LOWEST)) & np.isfinite(self.hardness)
-        if doubtful.any():
-            largest = self.answer(surface, np.maximum(u, low)).force
-            out = doubtful & (force > largest * (1 + REACHED))
-            allowed = f"at most what theory {self.name!r} reaches, {describe_entries(largest, out)}"
-            require("force", force, ~out, allowed)
+    def pressed(self, surface: AnySurface, force: FloatArray) -> tuple[FloatArray, FloatArray | None]:
+        """Mean separations u at forces over A0 E*, and `lighter` of `loaded` where areas need that."""
+        if self.knows_areas or np.isinf(self.hardness).all():
+            return self.mean_separation_at(surface, "force", force), None
+        shape = np.broadcast_shapes(force.shape, surface.shape, self.hardness.shape)
+        cap = np.reshape(self.hardness, (1,) * (len(shape) - self.hardness.ndim) + self.hardness.shape)
+        both = self._with(np.stack([cap, np.full(cap.shape, np.inf)]))
+        u, missed = both.inverted(surface, "force", np.broadcast_to(force, (2, *shape)))
+        refuse_unfinished(~missed[0], "the separation at this force")
+        return u[0], u[1]
 
     def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of ln F at given u and of ln A at given F against boundary elements with a hardness.

@@ -39,6 +39,17 @@ def test_matlab_writes_its_reader_too(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["law.m", "law.mat"]
 
 
+def test_fortran_writes_its_c_too(tmp_path):
+    law = [*LAW[:-2], "--name", "road", "--theory", "calibrated", "--out"]
+    assert run("fortran-law", *law, tmp_path / "own.f90").exit_code == 0
+    assert run("c-law", *law, tmp_path / "own.c").exit_code == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["own.c", "own.f90", "own_c.c"]
+    assert (tmp_path / "own_c.c").read_bytes() == (tmp_path / "own.c").read_bytes()
+    result = run("fortran-law", *law, "-")
+    assert result.exit_code == 2
+    assert "fortran-law is two files: --out must be that of the first" in result.stderr
+
+
 @pytest.mark.skipif(shutil.which("cc") is None, reason="cc is not installed")
 def test_code_is_written_and_replayed(tmp_path):
     result = run("c", "--out", tmp_path / "code", "--check")
