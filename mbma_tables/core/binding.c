@@ -232,7 +232,7 @@ static size_t solve_islands(const argument *a) {
                               a[14].data, a[15].data, a[16].data, a[17].data);
 }
 WRAP(height_integrals, "iDw", a[1].n == a[2].n, mbma_height_integrals(a[0].i, a[1].n, a[1].data, a[2].data))
-WRAP(islands_work, "i", true, MBMA_ISLANDS_WORK(a[0].i))
+WRAP(islands_work, "i", a[0].i >= 0 && a[0].i < 1 << 20, MBMA_ISLANDS_WORK(a[0].i))
 WRAP(solve_islands, "DDdDDDDDDDDwlbwwww",
      a[1].n == a[0].n && BASIS_FITS(3) && BASIS_FITS(7) && a[11].n == 3 * a[0].n && a[12].n == a[0].n &&
          a[13].n == a[0].n && a[14].n == (a[14].data ? a[0].n * a[3].n : 0) && a[15].n == a[14].n &&
