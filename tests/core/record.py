@@ -13,15 +13,20 @@ MOST_CALLS = 12  # of each function
 MOST_BYTES = 20_000_000  # of an array
 
 
+def functions():
+    """The functions of the core by their names."""
+    found = vars(package.core).items()
+    return [(name, one) for name, one in found if type(one).__name__ == "builtin_function_or_method"]
+
+
 class Recorder:
     """Stands in for every function of the core, and writes down the first calls of each."""
 
     def __init__(self):
         self.numbers, self.arrays, self.trusted, self.calls = {}, [], set(), {}
-        for name, function in list(vars(package.core).items()):
-            if type(function).__name__ == "builtin_function_or_method":
-                self.calls[name] = []
-                setattr(package.core, name, self.recording(name, function))
+        for name, function in functions():
+            self.calls[name] = []
+            setattr(package.core, name, self.recording(name, function))
 
     def number(self, array):
         """Of an array in the file, where equal ones are one."""
