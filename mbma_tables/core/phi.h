@@ -17,13 +17,14 @@ MBMA_INLINE double along_four(__m256d row, double x) {
 }
 #endif
 
+/* masks of all: without them GCC warns of what its own headers leave unset */
 #if defined(__AVX512F__)
 MBMA_INLINE double along_x(eight a, double x) {
-    const __m256d x4 = _mm256_set1_pd((x * x) * (x * x));
-    return along_four(_mm256_fmadd_pd(_mm512_extractf64x4_pd(a, 1), x4, _mm512_castpd512_pd256(a)), x);
+    const __m256d low = _mm512_maskz_extractf64x4_pd(0xFF, a, 0), high = _mm512_maskz_extractf64x4_pd(0xFF, a, 1);
+    return along_four(_mm256_fmadd_pd(high, _mm256_set1_pd((x * x) * (x * x)), low), x);
 }
 MBMA_INLINE eight derived(eight a) {
-    const __m512i next = _mm512_castpd_si512(a), shifted = _mm512_alignr_epi64(next, next, 1);
+    const __m512i next = _mm512_castpd_si512(a), shifted = _mm512_maskz_alignr_epi64(0xFF, next, next, 1);
     return _mm512_mul_pd(_mm512_castsi512_pd(shifted), _mm512_setr_pd(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 0.0));
 }
 #elif defined(__FMA__)
