@@ -33,6 +33,7 @@ typedef struct {
 /* An island; force and area are those per Phi_F and Phi_A. The rest is for derivatives. */
 typedef struct {
     double X, mu, force, area, h_d, D_d, sigma_d;
+    double narrowness, count; /* 1/sigma_d; islands by x, times exp(-height^2/2) (44) */
     double m0, sigma, b, top, log_d, width, top2, below2, band2, top4, below4, band4, eta, R_d, R_u, D;
 } island;
 
@@ -112,6 +113,8 @@ MBMA_INLINE island island_at(double x, bool floor_d, bool floor_u, const surface
     n.sigma_d = sqrt(1.0 - n.top - s->tilt * n.below2 * (n.below2 / n.below4));
     n.R_d = s->radius / sqrt(n.below4);
     n.R_u = s->radius / sqrt(n.below4 + n.band4);
+    n.narrowness = 1.0 / n.sigma_d;
+    n.count = n.D_d * n.narrowness * (s->rms_over_s / ROOT_TWO_PI);
     n.h_d = s->offset * root_a;
     const double both = n.R_u * n.R_d;
     n.force = n.sigma * sqrt(2.0 * n.R_d * n.sigma);                     /* (40) per Phi_F */
@@ -120,6 +123,11 @@ MBMA_INLINE island island_at(double x, bool floor_d, bool floor_u, const surface
     n.area = 2.0 * MBMA_PI * n.eta * n.D * both * n.sigma * n.sigma;
     n.X = (s->rms_over_s * x - n.h_d) / n.sigma;
     return n;
+}
+
+/* z'/sigma_d (41) of an island whose top is at `peak` over h_rms */
+MBMA_INLINE double height_of(double peak, const island *n, const surface *s) {
+    return (peak * s->rms_over_s - n->h_d) * n->narrowness;
 }
 
 #endif

@@ -23,11 +23,21 @@ enum { BY_LOG_E = BY_LOG_ZETA }; /* over nodes, derivatives are by H at given e 
 #define SAFETY 4.0
 #define SAFETY_BELOW 400.0
 
-/* A surface with the gap asked for, in units of h_rms. */
+/* A whole rule, nodes filled up with 0 to whole vectors. */
+enum { MOST_NODES = 32 };
+typedef struct {
+    int count;
+    double nodes[MOST_NODES], kronrod[MOST_NODES], gauss[MOST_NODES];
+} rule;
+
+/* A surface with the gap asked for, by what its sums are made, and what they have cost. */
 typedef struct {
     surface s;
     double compression, peak; /* (h_max - d)/h_rms and h_max/h_rms */
-    double safety;
+    double safety, table_error;
+    int64_t islands;
+    const mbma_cells *cells;
+    rule rules[2];
 } gap;
 
 /* An interval of the mapped approach, whether zeta_d and zeta_u are at their floors in it, and its sums. */
@@ -64,11 +74,10 @@ static void m2_slopes(const surface *s, double by[2]) {
  * e, or by ln e at given H; `eta_factor` and K1 are held. d_D is of ln D, and so on; those of e, a, b, m0, h_d, X,
  * height and of logarithms are of themselves. */
 MBMA_INLINE void node_slopes(bool by_hurst, double height, bool floor_d, bool floor_u, const island *n,
-                             const surface *s, double out[4]) {
+                             const surface *s, double (*out)[MOST_NODES], int k) {
     const double H = s->hurst, h = by_hurst ? 1.0 : 0.0, p2 = s->p2, p4 = s->p4, over_2H = s->over_2H;
     const double d_e = by_hurst ? 0.0 : s->e, d_rms = -0.5 * d_e / (s->rms_over_s * s->rms_over_s);
-    const double low = s->e + n->b;
-    const double floor_a = by_hurst ? -2.0 * s->log_floor_d * n->top : -d_e;
+    const double low = s->e + n->b, floor_a = by_hurst ? -2.0 * s->log_floor_d * n->top : -d_e;
     const double floor_b = by_hurst ? -2.0 * s->log_floor_u * low : -d_e;
     const double d_a = floor_d ? floor_a : 0.0, d_b = floor_u ? floor_b : 2.0 * n->b * d_rms, d_m0 = d_a - d_b;
     const double d_log_d = floor_d ? 0.0 : -d_e / n->top * over_2H - h * n->log_d / H;
@@ -76,78 +85,69 @@ MBMA_INLINE void node_slopes(bool by_hurst, double height, bool floor_d, bool fl
     /* of the p-th powers at the lower end; of what the band adds, and of what lies below it */
     const double d_end2 = p2 * d_log_d - 2.0 * h * n->log_d, d_end4 = p4 * d_log_d - 2.0 * h * n->log_d;
     const double grown2 = n->band2 / n->top2, grown4 = n->band4 / n->top4;
-    double d_band2 = d_end2 + (1.0 + p2 * grown2) * d_width / grown2;
+    const double more2 = by_hurst ? 2.0 * moment(p2, n->width, grown2) / grown2 : 0.0;
+    const double more2_d = by_hurst ? 2.0 * moment(p2, n->log_d, n->below2) / n->below2 : 0.0;
+    const double d_band2 = d_end2 + (1.0 + p2 * grown2) * d_width / grown2 - more2;
     const double d_band4 = d_end4 + (1.0 + grown4) * (p4 * d_width - 2.0 * h * n->width) / grown4;
-    double d_below2 = n->top2 * d_log_d / n->below2;
-    const double d_below4 = n->top4 * d_end4 / n->below4;
-    if (by_hurst) {
-        d_band2 -= 2.0 * moment(p2, n->width, grown2) / grown2;
-        d_below2 -= 2.0 * moment(p2, n->log_d, n->below2) / n->below2;
-    }
+    const double d_below2 = n->top2 * d_log_d / n->below2 - more2_d, d_below4 = n->top4 * d_end4 / n->below4;
     /* of summit densities, standard deviations, radii, as in `island_at` */
-    const double d_rate = 2.0 * h / p4, d_tilt = h / H - d_rate;
+    const double d_rate = 2.0 * h / p4, d_tilt = h / H - d_rate, d_R = d_rate + h / H;
     const double part = s->tilt * n->band2 * (n->band2 / n->band4);
     const double part_d = s->tilt * n->below2 * (n->below2 / n->below4);
     const double d_D = d_rate + d_band4 - d_band2, d_D_d = d_rate + d_below4 - d_below2;
-    const double d_sigma = 0.5 * (d_m0 - part * (d_tilt + 2.0 * d_band2 - d_band4)) / (n->sigma * n->sigma);
-    const double d_sigma_d =
-        -0.5 * (d_e + d_a + part_d * (d_tilt + 2.0 * d_below2 - d_below4)) / (n->sigma_d * n->sigma_d);
-    const double d_R_d = -0.5 * (d_rate + h / H + d_below4);
-    const double d_R_u =
-        -0.5 * (d_rate + h / H + (n->below4 * d_below4 + n->band4 * d_band4) / (n->below4 + n->band4));
+    const double d_s2 = d_m0 - part * (d_tilt + 2.0 * d_band2 - d_band4);
+    const double d_s2_d = -(d_e + d_a + part_d * (d_tilt + 2.0 * d_below2 - d_below4));
+    const double d_sigma = 0.5 * d_s2 / (n->sigma * n->sigma);
+    const double d_sigma_d = 0.5 * d_s2_d / (n->sigma_d * n->sigma_d);
+    const double d_R_d = -0.5 * (d_R + d_below4);
+    const double d_R_u = -0.5 * (d_R + (n->below4 * d_below4 + n->band4 * d_band4) / (n->below4 + n->band4));
     const double d_h_d = s->offset * 0.5 * d_a / s->root_floor_d;
     const double d_root_b = floor_u ? 0.5 * floor_b / n->b : d_rms;
-    const double d_X = ((n->X * n->sigma + n->h_d) * d_rms - d_h_d) / n->sigma - n->X * d_sigma;
     const double d_height = ((height * n->sigma_d + n->h_d) * d_rms - d_h_d) / n->sigma_d - height * d_sigma_d;
     /* delta/h_rms is held, so the density is per h_rms: h_rms/s is part of it */
     const double common = d_D_d - d_sigma_d + d_rms - height * d_height;
-    out[0] = d_X;
-    out[1] = n->mu * (d_D + d_sigma + 0.5 * (d_R_d + d_R_u));
-    out[2] = 1.5 * d_sigma + 0.5 * d_R_d + common;
-    out[3] = (d_root_b - d_R_u) / 3.0 + d_D + d_R_u + d_R_d + 2.0 * d_sigma + common;
+    out[0][k] = ((n->X * n->sigma + n->h_d) * d_rms - d_h_d) / n->sigma - n->X * d_sigma;
+    out[1][k] = n->mu * (d_D + d_sigma + 0.5 * (d_R_d + d_R_u));
+    out[2][k] = 1.5 * d_sigma + 0.5 * d_R_d + common;
+    out[3][k] = (d_root_b - d_R_u) / 3.0 + d_D + d_R_u + d_R_d + 2.0 * d_sigma + common;
 }
 
 /* z'/sigma_d (41) at x = delta/h_rms; z_max is counted down from h_max, so nothing cancels at first contact */
-MBMA_INLINE double height_of(double x, const island *n, const gap *g) {
-    return ((g->peak - (g->compression - x)) * g->s.rms_over_s - n->h_d) / n->sigma_d;
+MBMA_INLINE double height_at(double x, const island *n, const gap *g) {
+    return height_of(g->peak - (g->compression - x), n, &g->s);
 }
 
 /* A loop over the nodes of an interval that vectorises: the floors and `slopes` are constants, nothing is called. */
-MBMA_INLINE void fill_nodes(bool floor_d, bool floor_u, bool slopes, const interval *p, const double *restrict nodes,
-                            int padded, const gap *g, at_nodes *restrict out) {
+MBMA_INLINE void fill_nodes(bool floor_d, bool floor_u, bool slopes, const interval *p, const rule *restrict r,
+                            const gap *g, at_nodes *restrict out) {
     const double half = 0.5 * (p->high - p->low), centre = 0.5 * (p->high + p->low), scale = g->s.map_scale;
-    const double rms_over_s = g->s.rms_over_s, share = rms_over_s * half / ROOT_TWO_PI;
+    const int padded = (r->count + 7) / 8 * 8;
     for (int k = 0; k < padded; k++) {
-        const double t = mbma_fma(half, nodes[k], centre);
+        const double t = mbma_fma(half, r->nodes[k], centre);
         /* sinh and cosh by expm1: exponentials would cancel at small t */
         const double more = mbma_expm1(t), inverse = 1.0 / (more + 1.0), rise = 0.5 * (more + more * inverse);
         const double x = floor_d ? t : scale * rise * rise;
-        const double stretch = floor_d ? 1.0 : scale * rise * (more + 1.0 + inverse);
+        const double stretch = floor_d ? half : half * scale * rise * (more + 1.0 + inverse);
         const island n = island_at(x, floor_d, floor_u, &g->s);
-        const double narrowness = 1.0 / n.sigma_d;
-        const double height = ((g->peak - (g->compression - x)) * rms_over_s - n.h_d) * narrowness;
-        const double exponent = -0.5 * height * height, gaussian = mbma_exp(exponent);
-        const double weight = n.D_d * narrowness * share * stretch * (exponent > LEAST ? gaussian : 0.0);
+        const double height = height_at(x, &n, g), exponent = -0.5 * height * height, gaussian = mbma_exp(exponent);
+        const double weight = n.count * stretch * (exponent > LEAST ? gaussian : 0.0);
         out->X[k] = n.X;
         out->mu[k] = n.mu;
         out->weight[0][k] = n.force * weight;
         out->weight[1][k] = n.area * weight;
         if (!slopes)
             continue;
-        out->rise[k] = height * rms_over_s * narrowness;
-        double by[4];
-        node_slopes(true, height, floor_d, floor_u, &n, &g->s, by);
-        out->by[0][0][k] = by[0], out->by[0][1][k] = by[1], out->by[0][2][k] = by[2], out->by[0][3][k] = by[3];
-        node_slopes(false, height, floor_d, floor_u, &n, &g->s, by);
-        out->by[1][0][k] = by[0], out->by[1][1][k] = by[1], out->by[1][2][k] = by[2], out->by[1][3][k] = by[3];
+        out->rise[k] = height * g->s.rms_over_s * n.narrowness;
+        node_slopes(true, height, floor_d, floor_u, &n, &g->s, out->by[0], k);
+        node_slopes(false, height, floor_d, floor_u, &n, &g->s, out->by[1], k);
     }
 }
 
 /* Each case in a function of its own, which compilers take for a loop of its own. */
-typedef void fill_function(const interval *, const double *, int, const gap *, at_nodes *);
+typedef void fill_function(const interval *, const rule *, const gap *, at_nodes *);
 #define FILL(name, floor_d, floor_u, slopes) \
-    static void name(const interval *p, const double *nodes, int padded, const gap *g, at_nodes *out) { \
-        fill_nodes(floor_d, floor_u, slopes, p, nodes, padded, g, out); \
+    static void name(const interval *p, const rule *r, const gap *g, at_nodes *out) { \
+        fill_nodes(floor_d, floor_u, slopes, p, r, g, out); \
     }
 FILL(values_free, false, false, false)
 FILL(values_floor_u, false, true, false)
@@ -166,8 +166,7 @@ static int first_intervals(const gap *g, interval *intervals) {
     const double edges[4] = {0.0, mbma_min(first, g->compression), mbma_min(second, g->compression), g->compression};
     int count = 0;
     for (int k = 0; k < 3; k++) {
-        double low = edges[k], high = edges[k + 1];
-        const double middle = 0.5 * (low + high);
+        const double low = edges[k], high = edges[k + 1], middle = 0.5 * (low + high);
         if (!(high > low))
             continue;
         interval *const p = &intervals[count++];
@@ -181,82 +180,70 @@ static int first_intervals(const gap *g, interval *intervals) {
 }
 
 /* One Kronrod rule over an interval: its sums, with K1 (47), and their relative error. */
-MBMA_INLINE int apply_rule(bool slopes, interval *p, const gap *g, const mbma_cells *table, double *table_error,
-                           int64_t *islands) {
-    const rule *const r = p->floor_d && p->high - p->low < NARROW ? &RULE_21 : &RULE_31;
+MBMA_INLINE int apply_rule(bool slopes, interval *p, gap *g) {
+    const rule *const r = &g->rules[!(p->floor_d && p->high - p->low < NARROW)];
+    double sums[2][COLUMNS] = {{0.0}}, gauss[2] = {0.0};
     at_nodes at;
-    FILLS[slopes][p->floor_d][p->floor_u](p, r->nodes, r->padded, g, &at);
-    double force = 0.0, area = 0.0, gauss_force = 0.0, gauss_area = 0.0, sums[2][COLUMNS] = {{0.0}};
-    *islands += r->count;
+    FILLS[slopes][p->floor_d][p->floor_u](p, r, g, &at);
+    g->islands += r->count;
     for (int k = 0; k < r->count; k++) {
-        const phi found = phi_at(table, at.X[k], at.mu[k], slopes);
+        const phi found = phi_at(g->cells, at.X[k], at.mu[k], slopes);
         if (found.status != MBMA_OK)
             return found.status;
-        const double f = at.weight[0][k] * found.value[0], a = at.weight[1][k] * found.value[1];
-        force = mbma_fma(r->kronrod[k], f, force);
-        area = mbma_fma(r->kronrod[k], a, area);
-        gauss_force = mbma_fma(r->gauss[k], f, gauss_force);
-        gauss_area = mbma_fma(r->gauss[k], a, gauss_area);
-        *table_error = mbma_max(*table_error, found.error);
-        if (!slopes)
-            continue;
-        const double values[2] = {found.value[0], found.value[1]}, by_X[2] = {found.by_X[0], found.by_X[1]};
-        const double by_mu[2] = {found.by_mu[0], found.by_mu[1]};
+        g->table_error = mbma_max(g->table_error, found.error);
         for (int q = 0; q < 2; q++) {
-            const double share = r->kronrod[k] * at.weight[q][k];
-            sums[q][BY_COMPRESSION] += share * values[q] * at.rise[k];
-            for (int by = 0; by < 2; by++)
-                sums[q][BY_HURST + by] += share * (values[q] * at.by[by][2 + q][k] + by_X[q] * at.by[by][0][k] +
-                                                   by_mu[q] * at.by[by][1][k]);
+            const double term = at.weight[q][k] * found.value[q], share = r->kronrod[k] * at.weight[q][k];
+            sums[q][0] = mbma_fma(r->kronrod[k], term, sums[q][0]);
+            gauss[q] = mbma_fma(r->gauss[k], term, gauss[q]);
+            if (slopes)
+                sums[q][BY_COMPRESSION] += share * found.value[q] * at.rise[k];
+            for (int by = 0; by < 2 && slopes; by++)
+                sums[q][BY_HURST + by] += share * (found.value[q] * at.by[by][2 + q][k] +
+                                                   found.by_X[q] * at.by[by][0][k] + found.by_mu[q] * at.by[by][1][k]);
         }
     }
-    sums[0][0] = force;
-    sums[1][0] = area;
+    p->error = 0.0;
+    p->known = true;
+    if (sums[0][0] > 0.0 && sums[1][0] > 0.0) {
+        /* of both sums: both integrands resolve alike, and one may agree by chance */
+        const double difference = mbma_max(fabs(gauss[0] / sums[0][0] - 1.0), fabs(gauss[1] / sums[1][0] - 1.0));
+        const double scaled = g->safety * difference;
+        p->error = mbma_min(difference, scaled * sqrt(scaled));
+    }
     for (int q = 0; q < 2; q++) {
         for (int c = 0; c < (slopes ? COLUMNS : 1); c++)
             p->sums[q][c] = sums[q][c] * (p->floor_d ? 1.0 : g->s.jacobian);
         p->sums[q][BELOW_KINK] = p->floor_d ? 0.0 : p->sums[q][0];
     }
-    p->error = 0.0;
-    p->known = true;
-    if (force > 0.0 && area > 0.0) {
-        /* of both sums: both integrands resolve alike, and one may agree by chance */
-        const double difference = mbma_max(fabs(gauss_force / force - 1.0), fabs(gauss_area / area - 1.0));
-        const double scaled = g->safety * difference;
-        p->error = mbma_min(difference, scaled * sqrt(scaled));
-    }
     return MBMA_OK;
 }
 
 /* Integrates over the approaches to `rtol`. */
-MBMA_INLINE int total(bool slopes, const gap *g, double rtol, const mbma_cells *table, double sums[2][COLUMNS],
-                      double *bound, int64_t *islands) {
+static int total(bool slopes, gap *g, double rtol, double sums[2][COLUMNS], double *bound) {
     interval intervals[MAX_INTERVALS];
     int count = first_intervals(g, intervals);
-    double table_error = 0.0;
+    g->table_error = 0.0;
     for (;;) {
-        double force_error = 0.0, area_error = 0.0;
-        for (int c = 0; c < COLUMNS; c++)
-            sums[0][c] = sums[1][c] = 0.0;
+        double errors[2] = {0.0};
+        memset(sums, 0, 2 * sizeof *sums);
         for (int k = 0; k < count; k++) {
             interval *const p = &intervals[k];
-            const int status = p->known ? MBMA_OK : apply_rule(slopes, p, g, table, &table_error, islands);
+            const int status = p->known ? MBMA_OK : slopes ? apply_rule(true, p, g) : apply_rule(false, p, g);
             if (status != MBMA_OK)
                 return status;
-            for (int c = 0; c < (slopes ? COLUMNS : 1); c++) {
-                sums[0][c] += p->sums[0][c];
-                sums[1][c] += p->sums[1][c];
+            for (int q = 0; q < 2; q++) {
+                for (int c = 0; c < (slopes ? COLUMNS : 1); c++)
+                    sums[q][c] += p->sums[q][c];
+                errors[q] += p->sums[q][0] * p->error;
             }
-            force_error += p->sums[0][0] * p->error;
-            area_error += p->sums[1][0] * p->error;
         }
         const double force = sums[0][0], area = sums[1][0];
         *bound = 0.0;
         if (!(force > 0.0 && area > 0.0))
             return MBMA_OK;
-        if (force_error <= rtol * force && area_error <= rtol * area) {
+        if (errors[0] <= rtol * force && errors[1] <= rtol * area) {
             /* no less than was asked for: sums of an interval may agree by chance */
-            *bound = mbma_max(mbma_max(force_error / force, area_error / area), rtol) + table_error;
+            *bound = mbma_max(mbma_max(errors[0] / force, errors[1] / area), rtol) + g->table_error;
             return MBMA_OK;
         }
         const int present = count;
@@ -267,10 +254,9 @@ MBMA_INLINE int total(bool slopes, const gap *g, double rtol, const mbma_cells *
                 continue;
             if (count == MAX_INTERVALS)
                 return MBMA_UNRESOLVED;
-            const double middle = 0.5 * (p->low + p->high);
             p->known = false;
             intervals[count] = *p;
-            p->high = intervals[count++].low = middle;
+            p->high = intervals[count++].low = 0.5 * (p->low + p->high);
         }
         if (count == present) /* of NaN, in rtol for instance */
             return MBMA_UNRESOLVED;
@@ -278,12 +264,10 @@ MBMA_INLINE int total(bool slopes, const gap *g, double rtol, const mbma_cells *
 }
 
 /* The integrands of force and area over x = delta/h_rms. */
-static int integrand(double x, const gap *g, const mbma_cells *table, double out[2]) {
-    const bool floor_d = x >= g->s.kink_d, floor_u = x > g->s.kink_u;
-    const island n = island_at(x, floor_d, floor_u, &g->s);
-    const phi found = phi_at(table, n.X, n.mu, false);
-    const double height = height_of(x, &n, g);
-    const double weight = n.D_d * exp(-0.5 * height * height) / (ROOT_TWO_PI * n.sigma_d) * g->s.rms_over_s;
+static int integrand(double x, const gap *g, double out[2]) {
+    const island n = island_at(x, x >= g->s.kink_d, x > g->s.kink_u, &g->s);
+    const phi found = phi_at(g->cells, n.X, n.mu, false);
+    const double height = height_at(x, &n, g), weight = n.count * exp(-0.5 * height * height);
     out[0] = n.force * found.value[0] * weight;
     out[1] = n.area * found.value[1] * weight;
     return found.status;
@@ -291,13 +275,13 @@ static int integrand(double x, const gap *g, const mbma_cells *table, double out
 
 /* Sums over nodes as derivatives by H, ln zeta_1, compression and peak: the upper limit moves with the compression, the
  * kink with H and zeta_1; K1 and `eta_factor` change. */
-static int end_slopes(const gap *g, const mbma_cells *table, double sums[2][COLUMNS]) {
+static int end_slopes(const gap *g, double sums[2][COLUMNS]) {
     const surface *const s = &g->s;
     double edge[2], at_kink[2] = {0.0, 0.0}, m2_by[2];
-    int status = integrand(g->compression, g, table, edge);
+    int status = integrand(g->compression, g, edge);
     const double K1 = g->compression > s->kink_d ? 1.0 : s->jacobian;
     if (status == MBMA_OK && s->kink_d < g->compression)
-        status = integrand(s->kink_d, g, table, at_kink);
+        status = integrand(s->kink_d, g, at_kink);
     const double jump = 0.5 * (s->jacobian - 1.0) / (s->root_floor_d * s->slope_d);
     const double kink_by_hurst = -2.0 * s->log_floor_d * (s->e + s->root_floor_d * s->root_floor_d);
     m2_slopes(s, m2_by);
@@ -315,16 +299,36 @@ static int end_slopes(const gap *g, const mbma_cells *table, double sums[2][COLU
     return status;
 }
 
-MBMA_INLINE size_t fill(bool slopes, size_t n, const double *hurst, const double *zeta_1, const double *compression,
-                        const double *peak, double rtol, const mbma_variant *v, const mbma_cells *table, double *out,
-                        double *error, uint8_t *status, int64_t *islands) {
-    const int columns = slopes ? MBMA_TOTALS_COLUMNS : 1;
+int mbma_kronrod(int count, double *nodes, double *kronrod, double *gauss) {
+    if (count != 21 && count != 31)
+        return MBMA_INVALID;
+    for (int k = 0; k < count; k++) {
+        const bool upper = 2 * k >= count;
+        const int own = upper ? count - 1 - k : k, which = count == 31;
+        nodes[k] = upper ? HALF_RULES[which].nodes[own] : -HALF_RULES[which].nodes[own];
+        kronrod[k] = HALF_RULES[which].kronrod[own];
+        gauss[k] = own % 2 ? HALF_RULES[which].gauss[own / 2] : 0.0;
+    }
+    return MBMA_OK;
+}
+
+size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const double *compression, const double *peak,
+                   double rtol, const mbma_variant *v, const mbma_cells *cells, int slopes, double *out, double *error,
+                   uint8_t *status, int64_t *islands) {
+    const size_t columns = slopes ? MBMA_TOTALS_COLUMNS : 1;
     double own_hurst = NAN, own_zeta_1 = NAN;
     size_t bad = 0;
     gap g;
+    memset(&g, 0, sizeof g);
+    g.cells = cells;
     g.safety = v->floor_d >= PAPER_FLOOR ? SAFETY : SAFETY_BELOW;
+    for (int k = 0; k < 2; k++) {
+        rule *const r = &g.rules[k];
+        r->count = k ? 31 : 21;
+        mbma_kronrod(r->count, r->nodes, r->kronrod, r->gauss);
+    }
     for (size_t k = 0; k < n; k++) {
-        double sums[2][COLUMNS] = {{0.0}};
+        double sums[2][COLUMNS] = {{0.0}}, *const row = out + 2 * columns * k;
         int found = MBMA_OK;
         error[k] = 0.0;
         g.compression = compression[k];
@@ -333,50 +337,29 @@ MBMA_INLINE size_t fill(bool slopes, size_t n, const double *hurst, const double
               fabs(g.compression) < INFINITY && g.peak > 0.0 && g.peak < INFINITY))
             found = MBMA_INVALID;
         else if (g.compression > 0.0) {
-            if (hurst[k] != own_hurst || zeta_1[k] != own_zeta_1) {
-                own_hurst = hurst[k];
-                own_zeta_1 = zeta_1[k];
-                g.s = surface_of(own_hurst, own_zeta_1, v);
-            }
-            found = total(slopes, &g, rtol, table, sums, &error[k], islands);
+            if (hurst[k] != own_hurst || zeta_1[k] != own_zeta_1)
+                g.s = surface_of(own_hurst = hurst[k], own_zeta_1 = zeta_1[k], v);
+            found = total(slopes != 0, &g, rtol, sums, &error[k]);
             if (slopes && found == MBMA_OK && sums[0][0] > 0.0 && sums[1][0] > 0.0)
-                found = end_slopes(&g, table, sums);
+                found = end_slopes(&g, sums);
         }
-        for (int c = 0; c < 2 * columns; c++)
-            if (!(fabs(sums[c % 2][c / 2]) < INFINITY))
-                found = found == MBMA_OK ? MBMA_UNRESOLVED : found;
-        for (int c = 0; c < columns; c++)
-            for (int q = 0; q < 2; q++)
-                out[(2 * k + (size_t)q) * (size_t)columns + (size_t)c] = found == MBMA_OK ? sums[q][c] : NAN;
-        if (found != MBMA_OK)
-            error[k] = NAN;
+        for (size_t c = 0; c < 2 * columns; c++) {
+            row[c] = sums[c / columns][c % columns];
+            if (!(fabs(row[c]) < INFINITY) && found == MBMA_OK)
+                found = MBMA_UNRESOLVED;
+        }
+        for (size_t c = 0; c < 2 * columns && found != MBMA_OK; c++)
+            row[c] = error[k] = NAN;
         status[k] = (uint8_t)found;
         bad += found != MBMA_OK;
     }
+    *islands = g.islands;
     return bad;
 }
 
-size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const double *compression, const double *peak,
-                   double rtol, const mbma_variant *v, const mbma_cells *cells, int slopes, double *out, double *error,
-                   uint8_t *status, int64_t *islands) {
-    *islands = 0;
-    if (slopes)
-        return fill(true, n, hurst, zeta_1, compression, peak, rtol, v, cells, out, error, status, islands);
-    return fill(false, n, hurst, zeta_1, compression, peak, rtol, v, cells, out, error, status, islands);
-}
-
-int mbma_kronrod(int count, double *nodes, double *kronrod, double *gauss) {
-    const rule *const r = count == 21 ? &RULE_21 : &RULE_31;
-    if (count != r->count)
-        return MBMA_INVALID;
-    memcpy(nodes, r->nodes, (size_t)count * sizeof *nodes);
-    memcpy(kronrod, r->kronrod, (size_t)count * sizeof *kronrod);
-    memcpy(gauss, r->gauss, (size_t)count * sizeof *gauss);
-    return MBMA_OK;
-}
-
 int mbma_island_geometry(double approach, double hurst, double zeta_1, const mbma_variant *v, mbma_island *out) {
-    *out = (mbma_island){NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+    static const mbma_island NONE = {NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+    *out = NONE;
     if (!(approach >= MBMA_MIN_APPROACH && approach < INFINITY && hurst > 0.0 && hurst <= 1.0 &&
           zeta_1 > v->floor_u && zeta_1 <= MBMA_MAX_ZETA_1))
         return MBMA_INVALID;
@@ -384,7 +367,9 @@ int mbma_island_geometry(double approach, double hurst, double zeta_1, const mbm
     const bool floor_u = approach >= s.kink_u;
     const island n = island_at(approach, approach >= s.kink_d, floor_u, &s);
     const double zeta_d = exp(n.log_d);
-    *out = (mbma_island){zeta_d, zeta_d * exp(n.width), n.R_d, n.R_u, n.D, n.sigma, n.h_d,
-                         floor_u ? s.root_floor_u : s.slope_u * approach, n.eta, n.X, n.mu, n.D_d, n.sigma_d, n.width};
+    const mbma_island found = {zeta_d, zeta_d * exp(n.width), n.R_d, n.R_u, n.D, n.sigma, n.h_d,
+                               floor_u ? s.root_floor_u : s.slope_u * approach, n.eta, n.X, n.mu, n.D_d, n.sigma_d,
+                               n.width};
+    *out = found;
     return MBMA_OK;
 }
