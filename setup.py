@@ -14,14 +14,9 @@ from concurrent.futures import ThreadPoolExecutor
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 
-from build_backend import compiler
+from build_backend import FLAGS, LEVELS, ZIG_LEVELS, compiler
 
 CORE = pathlib.Path("mbma_tables/core")
-# no rounding depends on the compiler; nothing sets errno or traps, which would keep loops from being vectorised
-FLAGS = ["-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fvisibility=hidden"]
-LEVELS = {"_x86_64_v4": ["-march=x86-64-v4"], "_x86_64_v3": ["-march=x86-64-v3"], "_plain": []}
-# in zig's words; clang vectorises loops that read tables only where it is told that gathering is fast
-ZIG_LEVELS = LEVELS | {f"_{name}": [f"-mcpu={name}+fast_gather"] for name in ("x86_64_v4", "x86_64_v3")}
 
 
 def this_machine() -> str:
@@ -43,8 +38,8 @@ def command(folder: str) -> list[str]:
     """The compiler and what it needs; files made for it are put in `folder`."""
     linking = ["-Wl,-undefined,dynamic_lookup", "-Wl,-install_name,@rpath/mbma_core"] if "macos" in TARGET else []
     if COMPILER:
-        folders = sorted({sysconfig.get_path(name) for name in ("include", "platinclude")})
-        return [*COMPILER, *(f"-I{folder}" for folder in folders), *linking]
+        headers = sorted({sysconfig.get_path(name) for name in ("include", "platinclude")})
+        return [*COMPILER, *(f"-I{path}" for path in headers), *linking]
     # else zig keeps what it makes of the C library in the user's home
     os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", folder)
     os.environ.setdefault("ZIG_LOCAL_CACHE_DIR", folder)

@@ -57,8 +57,10 @@ CONSTANTS = Constants()
 
 
 def area(force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
-    """A/A0 at F/(A0 E* g), at most eta, from the elastic A/A0 at that force."""
-    return _between_walls(force, elastic_area, eta, (constants.area_power, constants.area_scale), 0)
+    """A/A0 at F/(A0 E* g), at most eta, from the elastic A/A0 at that force; above 1 only where that is."""
+    return np.maximum(elastic_area, 1.0) * _between_walls(
+        force, elastic_area, eta, (constants.area_power, constants.area_scale), 0
+    )
 
 
 def yielded_area(

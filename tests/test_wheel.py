@@ -1,4 +1,7 @@
-"""The wheel, away from the checkout, does what the README shows; the source distribution is complete."""
+"""The wheel, away from the checkout, does what the README shows; the source distribution is complete.
+
+Built by the machine's compiler, by zig where there is none, and by zig for other machines.
+"""
 
 import os
 import pathlib
@@ -6,6 +9,7 @@ import re
 import subprocess
 import sys
 import tarfile
+import zipfile
 
 import pytest
 
@@ -24,14 +28,21 @@ def source(tmp_path_factory):
     return source
 
 
+PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check")
+
+
+def wheel_of(source, folder, **options):
+    run(*PIP, "wheel", "--no-deps", "--no-build-isolation", "-w", str(folder), str(source), **options)
+    (wheel,) = folder.glob("*.whl")
+    assert wheel.stat().st_size < 9e6
+    assert "-cp311-abi3-" in wheel.name
+    return wheel
+
+
 @pytest.fixture(scope="module")
 def site(source, tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
-    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
-    run(*pip, "wheel", "--no-deps", "--no-build-isolation", "-w", str(folder), str(source))
-    (wheel,) = folder.glob("*.whl")
-    assert wheel.stat().st_size < 8e6
-    run(*pip, "install", "--no-deps", "--target", str(folder / "site"), str(wheel))
+    run(*PIP, "install", "--no-deps", "--target", str(folder / "site"), str(wheel_of(source, folder)))
     return folder / "site"
 
 
@@ -62,3 +73,43 @@ def test_source_distribution_holds_what_the_checkout_holds(source, tmp_path):
         held = {name.partition("/")[2] for name in packed.getnames()}
     tracked = run("git", "ls-files", cwd=source).stdout.splitlines()
     assert [name for name in tracked if not name.startswith(".") and name not in held] == []
+    # and it is enough for a wheel
+    with zipfile.ZipFile(wheel_of(archive, tmp_path)) as packed:
+        assert any(re.search(r"core/_plain\.\S+$", name) for name in packed.namelist())
+
+
+def asked(source, **environment):
+    """What the build backend asks for, and whether it asks for the same of an editable installation."""
+    program = (
+        "import build_backend as b; asked = b.get_requires_for_build_wheel(); "
+        "assert asked == b.get_requires_for_build_editable(); print(*asked)"
+    )
+    said = run(sys.executable, "-c", program, cwd=source, env={**os.environ, **environment}).stdout.splitlines()
+    return [one for one in said[-1:] if "ziglang" in one]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="compilers are hidden by PATH")
+def test_without_a_compiler(source, tmp_path):
+    pytest.importorskip("ziglang")
+    hidden = {"PATH": str(tmp_path / "empty"), "CC": ""}
+    assert asked(source, **hidden)
+    assert not asked(source, CC="cc")
+    wheel = wheel_of(source, tmp_path, env={**os.environ, **hidden})
+    run(*PIP, "install", "--no-deps", "--target", str(tmp_path / "site"), str(wheel))
+    program = "import mbma_tables.core as c; print(c.__file__, c.core.island_geometry.__name__)"
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
+    said = run(sys.executable, "-c", program, cwd=tmp_path, env=environment).stdout
+    assert said.startswith(str(tmp_path))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="made on Linux")
+def test_a_wheel_for_another_machine(tmp_path):
+    pytest.importorskip("abi3info", reason="of the extra wheels")
+    pytest.importorskip("lief", reason="of the extra wheels")
+    from generate.wheels import build, faults
+
+    wheel = build("manylinux2014_aarch64", tmp_path)
+    assert list(faults(wheel, "manylinux2014_aarch64")) == []
+    found = "; ".join(faults(wheel, "musllinux_1_2_x86_64"))
+    for expected in ("it is not tagged", "is for ARM64", "asks for libc.so.6", "its modules are"):
+        assert expected in found

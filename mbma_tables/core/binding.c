@@ -232,7 +232,7 @@ static size_t solve_islands(const argument *a) {
                               a[14].data, a[15].data, a[16].data, a[17].data);
 }
 WRAP(height_integrals, "iDw", a[1].n == a[2].n, mbma_height_integrals(a[0].i, a[1].n, a[1].data, a[2].data))
-WRAP(islands_work, "i", true, MBMA_ISLANDS_WORK(a[0].i))
+WRAP(islands_work, "i", a[0].i >= 0 && a[0].i < 1 << 20, MBMA_ISLANDS_WORK(a[0].i))
 WRAP(solve_islands, "DDdDDDDDDDDwlbwwww",
      a[1].n == a[0].n && BASIS_FITS(3) && BASIS_FITS(7) && a[11].n == 3 * a[0].n && a[12].n == a[0].n &&
          a[13].n == a[0].n && a[14].n == (a[14].data ? a[0].n * a[3].n : 0) && a[15].n == a[14].n &&
@@ -493,6 +493,34 @@ WRAP(self_affine, "DDww", a[0].n == a[1].n && a[0].n == a[2].n && a[0].n == a[3]
      mbma_self_affine(a[0].n, a[0].data, a[1].data, a[2].data, a[3].data))
 
 /* ---- spectrum_laws.c ---- */
+#define WORDS(type) (sizeof(type) / sizeof(double))
+static size_t inner_integrals(void *inner) {
+    mbma_inner_integrals(inner);
+    return 0;
+}
+/* The inner integrals; x, variances, shares below; gradient, alpha, seven constants and h_max; work; the law. */
+static mbma_status spectrum_law_of(const argument *a) {
+    const double *c = a[4].data;
+    const mbma_waves waves = {a[1].n, a[1].data, a[2].data, a[3].data, c[0], c[1]};
+    const mbma_law_constants constants = {c[2], c[3], c[4], c[5], c[6], c[7], c[8]};
+    return mbma_spectrum_law_of(a[0].data, &waves, &constants, c[9], a[5].data, a[6].data);
+}
+WRAP(words_of_inner, "", true, WORDS(mbma_inner))
+WRAP(words_of_spectrum_law, "", true, WORDS(mbma_spectrum_law))
+WRAP(inner_integrals, "w", a[0].n == WORDS(mbma_inner), inner_integrals(a[0].data))
+WRAP(spectrum_waves, "DDwwww", a[0].n == a[1].n && a[2].n == a[3].n && a[2].n == a[4].n && a[5].n == 2,
+     mbma_spectrum_waves(a[0].n, a[0].data, a[1].data, a[2].n, a[2].data, a[3].data, a[4].data, a[5].data))
+WRAP(spectrum_law_of, "DDDDDww",
+     a[0].n == WORDS(mbma_inner) && a[1].n == a[2].n && a[1].n == a[3].n && a[4].n == 10 && a[5].n == 9 * a[1].n &&
+         a[6].n == WORDS(mbma_spectrum_law),
+     spectrum_law_of(a))
+WRAP(spectrum_law_persson, "DDww", a[0].n == WORDS(mbma_spectrum_law) && a[2].n == a[1].n && a[3].n == a[1].n,
+     mbma_spectrum_law_persson(a[0].data, a[1].n, a[1].data, a[2].data, a[3].data))
+WRAP(spectrum_law_contact, "DDwww",
+     a[0].n == WORDS(mbma_spectrum_law) && a[2].n == a[1].n && a[3].n == a[1].n && a[4].n == a[1].n,
+     mbma_spectrum_law_contact(a[0].data, a[1].n, a[1].data, a[2].data, a[3].data, a[4].data))
+WRAP(spectrum_law_separation, "DDw", a[0].n == WORDS(mbma_spectrum_law) && a[2].n == a[1].n,
+     mbma_spectrum_law_separation(a[0].data, a[1].n, a[1].data, a[2].data))
 
 /* ---- hardness.c ---- */
 
@@ -559,6 +587,14 @@ static PyMethodDef METHODS[] = {
     ENTRY(self_affine),
 
     /* spectrum_laws.c */
+    ENTRY(words_of_inner),
+    ENTRY(words_of_spectrum_law),
+    ENTRY(inner_integrals),
+    ENTRY(spectrum_waves),
+    ENTRY(spectrum_law_of),
+    ENTRY(spectrum_law_persson),
+    ENTRY(spectrum_law_contact),
+    ENTRY(spectrum_law_separation),
 
     /* hardness.c */
     ENTRY(gaussian_level),

@@ -211,14 +211,16 @@ size_t mbma_capped_area(size_t n, const double *load, const double *spread, cons
         } else if (!(x > 0.0)) {
             /* nothing touches, or nothing yields */
             out[k] = yielded || load[k] == 0.0 ? 0.0 : erf(spread[k]);
+        } else if (spread[k] == INFINITY) {
+            /* what is closed has no variance */
+            out[k] = !yielded || x == 1.0 ? 1.0 : 0.0;
         } else {
-            /* tau = S/(8 eta^2) of the elastic contact, whose closing leaves no variance, and of the hardness alone */
+            /* tau = S/(8 eta^2) of the elastic contact and of the hardness alone */
             const double half = 0.5 * x / spread[k], elastic = half * half, limit = 0.125 / (scale * sqrt(eta[k]));
             /* the smaller over the larger cannot overflow */
             const double ratio = mbma_max(mbma_min(elastic, limit) / mbma_max(elastic, limit), LEAST_GAP);
             const double joint = mbma_log1p(mbma_exp(power * mbma_log(ratio))) / power;
-            const double near = spread[k] < INFINITY ? spread[k] : 0.5 * x / sqrt(SHARPEST);
-            const double reach = (elastic < limit ? near : 0.5 * x / sqrt(limit)) * mbma_exp(0.5 * joint);
+            const double reach = (elastic < limit ? spread[k] : 0.5 * x / sqrt(limit)) * mbma_exp(0.5 * joint);
             const double share = ended(x, mbma_min(elastic, limit) * mbma_exp(-joint), reach, yielded != 0);
             /* rounding may cross the bounds */
             out[k] = yielded ? mbma_held(share, 0.0, x) : mbma_held(share, x, 1.0);

@@ -24,7 +24,7 @@ static const double THIN = 1e-3;      /* width over gap of panels in which value
 enum { MANY = 1000 };                   /* islands from which those far below are summed by a series */
 static const double FAR_ERROR = 5e-11;  /* of such a series, or they are summed after all */
 static const double FAR_REACH = 0.06;   /* of the compression, or of h_rms, that one such series covers */
-static const double UNDERFLOW = -700.0; /* of ln F */
+static const double LEAST_LOG = -700.0; /* of ln F */
 
 /* out = values times the first `rows` rows of a matrix, a multiple of four, with `stride` columns of which some count */
 MBMA_INLINE void combined(const double *restrict values, const double *restrict matrix, int rows, int columns,
@@ -53,7 +53,7 @@ static const double BEGUN[ROWS] = {3.5, 10.0 / 3.0, 1.0, 3.0};
 static void add_sums(double c, double least, const mbma_nodes *islands, int rows, int64_t begin, int64_t stop, double *out) {
     double share[CHUNK], turned[CHUNK];
     for (int64_t first = begin; first < stop; first += CHUNK) {
-        const int64_t count = stop - first < CHUNK ? stop - first : CHUNK;
+        const int64_t count = stop - first < CHUNK ? stop - first : (int64_t)CHUNK;
         const double *const shift = islands->shift + first, *const rate = islands->rate + first;
         for (int64_t k = 0; k < count; k++) {
             const double height = mbma_fma(-rate[k], c, shift[k]);
@@ -245,7 +245,7 @@ MBMA_INLINE void totals_at(double c, size_t panels, const double *edges, const d
         const double begun = first == 0 ? c * lead(row, c) : 1.0;
         double sum = mbma_exp(sums[row]) * begun;
         /* subnormal numbers, digit by digit */
-        if (!(sums[row] > UNDERFLOW && sum > 1e-290))
+        if (!(sums[row] > LEAST_LOG && sum > 1e-290))
             sum = exp(sums[row] + (first == 0 ? BEGUN[row] * log(c) : 0.0));
         out[(size_t)row * stride] = inside ? sum : c <= 0.0 ? 0.0 : NAN;
         if (slopes) {

@@ -1,6 +1,6 @@
 /* The part of CPython's stable ABI that binding.c uses, for builds without Python's own headers: on machines that have
  * none, and for other platforms. Layouts and names are fixed for every CPython from 3.11 on with a global lock
- * (https://docs.python.org/3/c-api/stable.html); tests/core/test_build.py compares them with Python.h. */
+ * (https://docs.python.org/3/c-api/stable.html); tests/core/test_core_builds.py compares them with Python.h. */
 #ifndef MBMA_STABLE_ABI_H
 #define MBMA_STABLE_ABI_H
 
@@ -79,7 +79,7 @@ typedef void (*freefunc)(void *);
 #define Py_tp_methods 64
 #define Py_tp_free 74
 #define Py_TPFLAGS_BASETYPE (1UL << 10)
-#define Py_TPFLAGS_DEFAULT (1UL << 18)
+#define Py_TPFLAGS_DEFAULT 0UL
 #define PyBUF_WRITABLE 1
 #define PyBUF_FORMAT 4
 #define PyBUF_C_CONTIGUOUS 0x38

@@ -8,19 +8,20 @@ user's own object with a `name` and an ``answer(surface, mean_separation)``. Wha
 from __future__ import annotations
 
 import abc
+import functools
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.arguments import FloatArray, describe_entries, require, rows
+from mbma_tables.arguments import FloatArray, describe_entries, require, rows, spread
 from mbma_tables.core import core
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import calibrated_table
 
-LOOKS, FEW_LOOKS = 64, 8  # gaps at which an inversion begins, of one surface and of each of a batch,
+LOOKS, FEW_LOOKS = 128, 8  # gaps at which an inversion begins, of one surface and of each of a batch,
 LOOKED_AT = 7.0  # from where to where, of ln u - ln(h_max - u),
 FAR = 12.0  # and up to which u/h_rms where contact has no end
 STEPS = 200
@@ -87,6 +88,10 @@ class Theory(abc.ABC):
     def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E*."""
         return self.answer(surface, self.inverted(surface, "force", force)[0]).area
+
+    def along(self, surface: AnySurface, lowest: float) -> Theory:
+        """The theory for the force and area of many gaps on one surface, from a lowest one on."""
+        return self
 
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Share of heights above the level whose mean gap is u, and its derivative by u: Gaussian heights."""
@@ -193,18 +198,17 @@ class Theory(abc.ABC):
         if not self.ends_at_h_max:
             allowed = f"positive: contact has no end in theory {self.name!r}"
             require(quantity, goal.reshape(shape), goal.reshape(shape) != 0, allowed)
-        # gaps closer together at either end
         near = last if self.ends_at_h_max else np.minimum(last, FAR * surface.h_rms)
-        places = np.linspace(-LOOKED_AT, LOOKED_AT, self.looks(surface)).reshape(-1, *(1 for _ in shape))
-        looked = first + (near - first) / (1 + np.exp(places))
+        shares = _shares(self.looks(surface)).reshape(-1, *(1 for _ in shape))
+        looked = np.asarray(first + (near - first) * shares)
         value, steep, exact = self.values(surface, looked, quantity)
-        seen = np.array(np.broadcast_arrays(looked, value, steep))
-        if seen[0, 0].size > 1:
-            seen = np.array(np.broadcast_arrays(*seen, np.empty((1, *shape)))[:3])
+        # one column of places for all, or one for each
+        whole = shares.shape if max(looked.size, np.size(value)) == shares.size else (shares.size, *shape)
+        seen = [np.ascontiguousarray(spread(each, whole)) for each in (looked, value, steep)]
         state = np.full((6, goal.size), np.nan)
         state[1], state[2] = low, high
-        core.gap_start(seen[0, 0].size, *seen, exact, goal, ends, state)
-        at_end = self._at_end(surface, quantity, goal, seen[1, -1], first, shape)
+        core.gap_start(seen[0][0].size, *seen, exact, goal, ends, state)
+        at_end = self._at_end(surface, quantity, goal, seen[1][-1], first, shape)
         left = np.flatnonzero((goal > 0) & ~at_end)
         for _ in range(STEPS):
             if not left.size:
@@ -223,7 +227,7 @@ class Theory(abc.ABC):
         self, surface: AnySurface, quantity: str, goal: FloatArray, seen: FloatArray, first: FloatArray, shape: Any
     ) -> NDArray[np.bool_]:
         """Which of the wanted values are the largest one; more is refused. No larger ones were `seen` before."""
-        beyond = goal > np.broadcast_to(seen, shape).ravel()
+        beyond = goal > seen.ravel()
         if not beyond.any():
             return beyond
         largest = np.broadcast_to(getattr(self.answer(surface, first), quantity), shape)
@@ -236,6 +240,12 @@ class Theory(abc.ABC):
                 out,
             )
         return np.asarray(wanted >= largest).ravel()
+
+
+@functools.cache
+def _shares(count: int) -> FloatArray:
+    """Places from 1 to 0, closer together at either end."""
+    return np.asarray(1 / (1 + np.exp(np.linspace(-LOOKED_AT, LOOKED_AT, count))))
 
 
 def _places(shape: tuple[int, ...]) -> FloatArray:

@@ -146,7 +146,9 @@ def _yielding(capped: Any, surface: AnySurface, u: FloatArray, lighter: FloatArr
         if lighter is not None:
             line = at_force[place] + tilt[name, place] * x, rise[place], np.ravel(whole.answer.force)[place]
         straight = _Straight(elastic, TheoryAnswer(*ends, *np.zeros((2, x.size))), line)
-        found: TheoryAnswer = capped.at(shape, place).stiffer(own[MODULUS]).over(straight).answer(moved, own[GAP])
+        found: TheoryAnswer = (
+            capped.at(shape, place).stiffer(own[MODULUS]).changed(_elastic=straight).answer(moved, own[GAP])
+        )
         return found
 
     return _numerical(capped, surface, u, names, whole.answer, answer)
@@ -192,7 +194,8 @@ def _steps(theory: Theory, at: Mapping[str, FloatArray], name: str) -> tuple[Flo
     room = np.abs(centre)
     side: FloatArray = np.zeros(centre.shape)
     if name == GAP:
-        room = np.where(centre > 0, centre, at["h_rms"])
+        # no gap is negative
+        room, side = np.where(centre > 0, centre, at["h_rms"]), np.where(centre > 0, 0.0, 1.0)
     if name in (GAP, "h_max") and theory.ends_at_h_max:
         beyond = np.abs(at["h_max"] - at[GAP])
         room = np.where(beyond > 0, np.minimum(room, beyond), room)

@@ -6,18 +6,21 @@ pressures capped at the hardness. u is the mean gap, points that yield flattened
 
 from __future__ import annotations
 
-import copy
+import contextlib
 import dataclasses
 import functools
+import itertools
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables import hardness as law
 from mbma_tables.arguments import FloatArray, checked_hardness
-from mbma_tables.errors import OutOfRangeError
+from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.calibrated_table import at_contact, shipped_part
 from mbma_tables.theories.protocol import FEW_LOOKS, Theory, TheoryAnswer, refuse_unfinished
@@ -28,6 +31,8 @@ TESTED_ETA = 0.025  # p_m/(E* g) down to which boundary elements were solved
 REACHED = 1e-9  # relative, of forces at full compression
 HEAVIEST = 1e6  # F/(A0 E* g) from which on areas are those of full contact
 CLOSED, LEAST = 1e-9, 1e-300  # u/h_rms of contacts that count as full, and u of those of surfaces that end at h_max
+POINTS = chebyshev.chebpts1(24)  # of ln F on a span of ln u
+SPANS, MOST_SPANS, CLOSE = 6, 100, 1e-11  # how many of them at first and at most, and the size of their last terms
 MANY = 200  # hardnesses up to which inversions look at as many gaps as without
 MAX_LEVEL = 37.0  # of heights over h_rms above which shares are no normal numbers
 
@@ -109,6 +114,39 @@ class Loaded:
         return np.where(np.isinf(self.eta), self.u, planes)
 
 
+class Along(Theory):
+    """An elastic theory on one surface between two gaps: ln F by Chebyshev polynomials of ln u, without slopes."""
+
+    def __init__(self, elastic: Theory, surface: AnySurface, low: float, high: float) -> None:
+        self.name, self.ends_at_h_max, self._elastic, self._error = elastic.name, elastic.ends_at_h_max, elastic, 0.0
+        to_terms = np.linalg.inv(chebyshev.chebvander(POINTS, POINTS.size - 1)).T
+        edges, known = np.linspace(math.log(low), math.log(high), SPANS + 1), dict[tuple[float, float], FloatArray]()
+        while fresh := [span for span in itertools.pairwise(edges.tolist()) if span not in known]:
+            start, stop = np.transpose(fresh)[..., None]
+            found = elastic.answer(surface, np.exp((start + stop + (stop - start) * POINTS) / 2).ravel())
+            self._error = max(self._error, float(np.max(found.error)) + CLOSE)
+            terms = np.log(found.force).reshape(-1, POINTS.size) @ to_terms
+            known |= dict(zip(fresh, terms, strict=True))
+            rough = ~(np.abs(terms[:, -3:]).max(axis=1) <= CLOSE)
+            edges = np.sort(np.append(edges, (start + stop)[rough, 0] / 2))
+            if edges.size > MOST_SPANS:
+                raise ConvergenceError(f"theory {elastic.name!r} is not smooth", np.array(True))
+        self._edges, self._terms = edges, np.array([known[span] for span in itertools.pairwise(edges.tolist())]).T
+
+    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
+        """Force alone."""
+        log_u = np.log(mean_separation)
+        k = np.clip(np.searchsorted(self._edges, log_u) - 1, 0, self._edges.size - 2)
+        start, stop = self._edges[k], self._edges[k + 1]
+        force = np.exp(chebyshev.chebval((2 * log_u - start - stop) / (stop - start), self._terms[:, k], tensor=False))
+        nothing = np.zeros(force.shape)
+        return TheoryAnswer(force, nothing, nothing, nothing + self._error)
+
+    def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
+        """The theory's."""
+        return self._elastic.area_at(surface, force)
+
+
 class Yielding(Theory):
     """A theory whose pressures cannot exceed a hardness.
 
@@ -124,25 +162,19 @@ class Yielding(Theory):
         self._elastic, self.hardness, self.reached = theory, checked_hardness(hardness), REACHED
         self.name, self.ends_at_h_max = theory.name, theory.ends_at_h_max
 
-    def over(self, elastic: Theory) -> Yielding:
-        """The same over another elastic theory."""
-        other = copy.copy(self)
-        other._elastic = elastic
-        return other
-
-    def _with(self, hardness: FloatArray) -> Yielding:
-        """With other hardnesses, checked before."""
-        other = copy.copy(self)
-        other.hardness = hardness
+    def changed(self, **fields: Any) -> Yielding:
+        """The same with another elastic theory, or other hardnesses, checked before."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__ | fields)
         return other
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """As of the elastic theory."""
-        return self._elastic.departures(surface)
+        return self.elastic.departures(surface)
 
     def scatter_name(self, surface: AnySurface) -> str:
         """The elastic theory's."""
-        return self._elastic.scatter_name(surface)
+        return self.elastic.scatter_name(surface)
 
     @property
     def elastic(self) -> Theory:
@@ -154,11 +186,11 @@ class Yielding(Theory):
         if self.hardness.ndim == 0:
             return self
         chosen = np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)]
-        return self._with(chosen)
+        return self.changed(hardness=chosen)
 
     def stiffer(self, times: FloatArray) -> Theory:
         """With hardnesses that are less of the modulus."""
-        return self._with(np.asarray(self.hardness / times))
+        return self.changed(hardness=np.asarray(self.hardness / times))
 
     def bends(self, surface: AnySurface) -> FloatArray:
         """Where derivatives of the elastic force jump."""
@@ -227,9 +259,13 @@ class Yielding(Theory):
         return low, np.minimum(high, MAX_LEVEL * h_rms)
 
     def looks(self, surface: AnySurface) -> int:
-        """Few at many hardnesses, too, and of Persson's theory, which answers loads: each gap is an inversion."""
-        few = self.hardness.size > MANY or (self.knows_areas and not self.ends_at_h_max)
-        return FEW_LOOKS if few else self.elastic.looks(surface)
+        """Few at many hardnesses, too."""
+        return FEW_LOOKS if self.hardness.size > MANY or self._by_load else self.elastic.looks(surface)
+
+    @property
+    def _by_load(self) -> bool:
+        """Whether the elastic theory answers loads, and each gap is an inversion: Persson's."""
+        return self.knows_areas and not self.ends_at_h_max
 
     def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
         """Force without the area, which follows from it."""
@@ -256,10 +292,17 @@ class Yielding(Theory):
             return self.mean_separation_at(surface, "force", force), None
         shape = np.broadcast_shapes(force.shape, surface.shape, self.hardness.shape)
         cap = np.reshape(self.hardness, (1,) * (len(shape) - self.hardness.ndim) + self.hardness.shape)
-        both = self._with(np.stack([cap, np.full(cap.shape, np.inf)]))
+        both = self.changed(hardness=np.stack([cap, np.full(cap.shape, np.inf)]))
         u, missed = both.inverted(surface, "force", np.broadcast_to(force, (2, *shape)))
         refuse_unfinished(~missed[0], "the separation at this force")
         return u[0], u[1]
+
+    def along(self, surface: AnySurface, lowest: float) -> Theory:
+        """The same for the force and area of many gaps on one surface, from a lowest one on."""
+        with contextlib.suppress(ConvergenceError):  # where it is too rough
+            if self._by_load:
+                return self.changed(_elastic=Along(self.elastic, surface, lowest, float(self.interval(surface)[1])))
+        return self
 
     def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of ln F at given u and of ln A at given F against boundary elements with a hardness.

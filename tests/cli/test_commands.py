@@ -420,8 +420,14 @@ def test_a_terminal_sees_that_work_goes_on():
 def test_control_c_ends_it_with_130(folder, module):
     # while modules are imported, and with the last of them in place
     command = [sys.executable, "-X", "importtime", "-m", "mbma_tables", "curve", "--surface", "concrete"]
-    options = ["--tier", "exact", "--points", "100000"]
-    with subprocess.Popen([*command, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as program:
+    command += ["--tier", "exact", "--points", "100000"]
+
+    def heeding():
+        # where the tests themselves run in the background, SIGINT is ignored, and would be by the program
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "preexec_fn": heeding}
+    with subprocess.Popen(command, **pipes) as program:
         try:
             while program.stderr.readline().decode().rpartition("|")[2].strip() != module:
                 assert program.poll() is None

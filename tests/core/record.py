@@ -13,15 +13,20 @@ MOST_CALLS = 12  # of each function
 MOST_BYTES = 20_000_000  # of an array
 
 
+def functions():
+    """The functions of the core by their names."""
+    found = vars(package.core).items()
+    return [(name, one) for name, one in found if type(one).__name__ == "builtin_function_or_method"]
+
+
 class Recorder:
     """Stands in for every function of the core, and writes down the first calls of each."""
 
     def __init__(self):
         self.numbers, self.arrays, self.trusted, self.calls = {}, [], set(), {}
-        for name, function in list(vars(package.core).items()):
-            if type(function).__name__ == "builtin_function_or_method":
-                self.calls[name] = []
-                setattr(package.core, name, self.recording(name, function))
+        for name, function in functions():
+            self.calls[name] = []
+            setattr(package.core, name, self.recording(name, function))
 
     def number(self, array):
         """Of an array in the file, where equal ones are one."""
@@ -75,7 +80,7 @@ def use():
     from mbma_tables.theories.calibrated_table import shipped
 
     core = package.core
-    for which, first in enumerate([-700.0, -2.0, 1e-300, -0.9]):
+    for which, first in enumerate([-700.0, -2.0, 1e-300, -0.9, -6.0]):
         x = np.linspace(first, 10.0, 501)
         core.elementary(which, x, np.empty(501))
     core.island_geometry(0.3, 0.7, 300.0, np.array([2.0, 0.37, 0.5, 1.5, 1.5, 1.0, 1.0, 0.0]), np.empty(14))
@@ -107,9 +112,9 @@ def use():
     law.leakage(gaps)
     law.slope_error(gaps)
     for theory in ("mbma", "calibrated"):
-        for hardness in (np.inf, 0.05):
-            found = contact(one, mean_separation=np.linspace(0.2, 2.5, 30), theory=theory, hardness=hardness)
-            contact(one, pressure=found.force, theory=theory, hardness=hardness)
+        for cap in (np.inf, 0.05):
+            found = contact(one, mean_separation=np.linspace(0.2, 2.5, 30), theory=theory, hardness=cap)
+            contact(one, pressure=found.force, theory=theory, hardness=cap)
     contact(many, mean_separation=1.0, theory="calibrated")
 
 

@@ -6,7 +6,7 @@ import pytest
 from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
 
 from mbma_tables.core import core
-from mbma_tables.tablefiles.splines import TAPS, at_places, coefficients, padding
+from mbma_tables.tablefiles.splines import at_places, coefficients, padding
 
 SHAPE = (8, 7, 6, 5)
 

@@ -76,7 +76,7 @@ def test_pressure_is_inverted_and_slopes_are_those_of_the_curve(theory):
 def test_many_pressures_on_one_surface(theory, cap):
     share = 10 ** np.random.default_rng(4).uniform(-6, np.log10(min(0.5, 0.005 / cap)), MANY)
     if theory == "calibrated":
-        # beyond the spline from which others start
+        # beyond the gaps from which others start
         share = np.append(share, [1e-12, min(0.99, 0.1 / cap)])
     asked = Yielding(get_theory(theory), cap)
     u = asked.mean_separation_at(SURFACE, "force", cap * share)
@@ -249,8 +249,8 @@ def test_reasons_and_what_elastic_answers_say():
     assert limit.psi == pytest.approx(1.1)
 
 
-@pytest.mark.parametrize("theory", ["calibrated", "persson"])
-@pytest.mark.parametrize("cap", [1e-320, 1e-300, 1e-100, 1e100, 1e200, 1e308])
+@each
+@pytest.mark.parametrize("cap", [1e-320, 1e-300, 1e-100, 1e100, 1e200, 1.7e308])
 def test_hardnesses_of_any_size(theory, cap):
     # of next to none the bearing curve, of a huge one the elastic contact
     if cap < 1:
@@ -266,8 +266,66 @@ def test_hardnesses_of_any_size(theory, cap):
             assert found.yielded == pytest.approx(1, rel=1e-2 if cap < 1e-310 else 1e-12)
         else:
             for name in ("mean_separation", "force", "area", "stiffness", "incremental_stiffness"):
-                assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-11), name
+                assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-10), name
             assert found.yielded == 0
+
+
+def test_areas_above_one_are_the_elastic_ones():
+    # asperities that lie on one another
+    elastic = contact(SURFACE, mean_separation=0.01, theory="greenwood_williamson")
+    assert elastic.area > 1
+    found = contact(SURFACE, mean_separation=0.01, theory="greenwood_williamson", hardness=[1e3, 1e200])
+    assert found.area == pytest.approx(np.full(2, elastic.area), rel=1e-12)
+
+
+@each
+@pytest.mark.parametrize("cap", [HARDNESS, np.inf])
+def test_batches_are_their_contacts_one_by_one(theory, cap):
+    batch = Surface([0.6, 0.8, 0.9], 0.01, [1.0, 2.0, 0.4], 1.0, [3.0, 3.4, 2.8])
+    options = {"E_star": MODULUS, "theory": theory, "hardness": cap}
+    for asked in ({"pressure": [1e-2, 30.0, 300.0]}, {"area": [1e-4, 0.03, 0.2]}):
+        whole = contact(batch, **asked, **options)
+        for k in range(3):
+            one = Surface(*(float(np.broadcast_to(getattr(batch, name), 3)[k]) for name in batch.parameters))
+            alone = contact(one, **{name: values[k] for name, values in asked.items()}, **options)
+            for name in ("mean_separation", "force", "area", "stiffness", "incremental_stiffness"):
+                assert getattr(whole, name)[k] == pytest.approx(getattr(alone, name), rel=1e-9), name
+
+
+def counted(monkeypatch, theory):
+    """Calls of a theory's answers, and gaps asked about."""
+    kind, asked = type(get_theory(theory)), []
+    original = kind.answer
+
+    def answer(self, surface, mean_separation):
+        asked.append(np.size(mean_separation))
+        return original(self, surface, mean_separation)
+
+    monkeypatch.setattr(kind, "answer", answer)
+    return asked
+
+
+@pytest.mark.parametrize(("theory", "most"), [("calibrated", 4), ("mbma", 5), ("greenwood_williamson", 5)])
+def test_a_pressure_takes_few_elastic_answers(monkeypatch, theory, most):
+    asked = counted(monkeypatch, theory)
+    for pressure in (0.1, 3.0, 30.0, 500.0):
+        asked.clear()
+        contact(SURFACE, pressure=pressure, E_star=MODULUS, theory=theory, hardness=HARDNESS)
+        assert len(asked) <= most
+    for more in ({"derivatives": True}, {"derivatives": True, "hardness": HARDNESS}):
+        asked.clear()
+        contact(SURFACE, pressure=30.0, E_star=MODULUS, theory=theory, **more)
+        assert len(asked) <= most + 3
+
+
+def test_a_law_by_persson_takes_few_elastic_answers(monkeypatch):
+    asked = counted(monkeypatch, "persson")
+    law = contact_law(SURFACE, theory="persson", E_star=MODULUS, hardness=HARDNESS)
+    assert sum(asked) < 300
+    u = np.geomspace(1e-5, 29, 20)
+    found = contact(SURFACE, mean_separation=u, theory="persson", E_star=MODULUS, hardness=HARDNESS)
+    np.testing.assert_allclose(law.force(u=u), found.force, rtol=law.error)
+    np.testing.assert_allclose(law.area(u=u), found.area, rtol=law.error)
 
 
 @each

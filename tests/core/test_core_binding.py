@@ -1,0 +1,113 @@
+"""The core as Python calls it: wrong arguments, threads, forks and Ctrl-C."""
+
+import os
+import pathlib
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+from mbma_tables.core import core
+
+
+def run(code, timeout=120):
+    return subprocess.run([sys.executable, *code], capture_output=True, text=True, check=True, timeout=timeout).stdout
+
+
+def test_wrong_arguments_are_refused():
+    """Their number, kinds, items, order in memory, and results that cannot be written, of every function."""
+    assert int(run([str(pathlib.Path(__file__).with_name("refusals.py"))])) > 1500
+
+
+def test_arrays_of_wrong_sizes_are_refused():
+    x = np.linspace(0.1, 1.0, 10)
+    for size in (0, 9, 11):
+        with pytest.raises(ValueError, match="sizes of the arrays of elementary do not match"):
+            core.elementary(0, x, np.empty(size))
+    locked = x.copy()
+    locked.flags.writeable = False
+    out = np.empty(10)
+    assert core.elementary(0, locked, out) == 0
+    np.testing.assert_allclose(out, np.exp(x), rtol=1e-15)
+    with pytest.raises(ValueError, match="read-only"):
+        core.elementary(0, x, locked)
+
+
+def test_other_threads_go_on_during_a_call():
+    x = np.full(3_000_000, 0.5)
+    worker = threading.Thread(target=lambda: core.elementary(3, x, np.empty(x.size)))
+    worker.start()
+    turns = 0
+    while worker.is_alive():
+        turns += 1
+    assert turns > 100
+
+
+FORK = """
+import os, signal
+import numpy as np
+from mbma_tables import Surface, contact, contact_law
+signal.alarm(100)
+n = 1000
+many = Surface(np.linspace(0.3, 1.0, n), 0.2, np.geomspace(0.7, 4000, n), 1.0, 3.0)
+
+def answers():
+    law = contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0))
+    found = contact(many, 1.0, derivatives=True, workers=2).force, law.force(0.5), law.at_pressure(1e-3).area
+    return b"".join(np.asarray(one).tobytes() for one in found)
+
+known = answers()
+for _ in range(4):
+    child = os.fork()
+    if child == 0:
+        os._exit(answers() != known)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), answers() == known)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_forks_after_use_go_on():
+    assert run(["-c", FORK]) == "0 True\n" * 4
+
+
+LONG = """
+import signal, time
+import numpy as np
+from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
+signal.signal(signal.SIGPROF, signal.default_int_handler)  # as Ctrl-C does, but counted in time of the processor
+one, n = Surface(0.7, 0.2, 60.0, 1.0, 3.0), 100_000
+many = Surface(np.linspace(0.3, 1.0, n), 0.2, np.geomspace(0.7, 4000, n), 1.0, 3.0)
+law, four, X = contact_law(one), open_table("island4d"), np.linspace(-5, 40, 1_000_000)
+u, pressure = np.linspace(0.2, 2.5, 3_000_000), np.geomspace(1e-4, 1e-2, 1_000_000)
+requests = {
+    "totals": lambda: contact(many, 1.0),
+    "derivatives": lambda: contact(many, 1.0, derivatives=True),
+    "workers": lambda: contact(many, 1.0, derivatives=True, workers=2),
+    "exact": lambda: contact(one, np.linspace(0, 2, 2000), tier="exact"),
+    "islands": lambda: greenwood_tripp.solve(X, 1.0),
+    "four numbers": lambda: four.lookup(np.linspace(1, 2, 3_000_000), 3.0, 20.0, 0.8),
+    "a law's inverse": lambda: law.at_pressure(law.force(np.linspace(-2, 2.5, 10_000_000))),
+    "calibrated": lambda: contact(one, mean_separation=u, theory="calibrated"),
+    "hardness": lambda: contact(one, pressure=pressure, theory="calibrated", hardness=0.05),
+}
+for name, ask in requests.items():
+    begun = time.process_time()
+    signal.setitimer(signal.ITIMER_PROF, 0.2)
+    try:
+        ask()
+        print(name, "was not interrupted")
+    except KeyboardInterrupt:
+        late = time.process_time() - begun - 0.2
+        if late > 1.0:
+            print(name, "went on for", late)
+    signal.setitimer(signal.ITIMER_PROF, 0)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_control_c_ends_long_requests_within_a_second():
+    assert run(["-c", LONG]) == ""

@@ -1,0 +1,73 @@
+"""Tests that matter to the core pass with the module of every generation of processor, and under sanitizers."""
+
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import sysconfig
+
+import pytest
+from test_core_builds import BUILD, CORE, SANITIZERS, SOURCES, found, run
+
+from mbma_tables.core import GENERATIONS, core
+
+ROOT = pathlib.Path(__file__).parents[2]
+QUICK = [
+    *(
+        "core/test_calibrated_core.py",
+        "islands/test_core_islands.py",
+        "tablefiles/test_splines.py",
+        "test_elementary.py",
+    ),
+    *("test_hardness.py", "totals/test_kernel.py", "totals/test_law_core.py", "totals/test_tiers.py"),
+]
+MORE = ["islands/test_island.py", "models", "test_calibrated.py", "theories/test_yielding.py", "totals/test_contact.py"]
+pytestmark = pytest.mark.slow
+
+
+def passed(tests, **environment):
+    """Quick tests, in one other process."""
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        "pytest",
+        "-n",
+        "0",
+        "-p",
+        "no:cacheprovider",
+        *(f"tests/{name}" for name in tests),
+    ]
+    done = subprocess.run(command, cwd=ROOT, env=os.environ | environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("generation", GENERATIONS)
+def test_with_each_generation(generation):
+    if core.generation < GENERATIONS[generation]:
+        pytest.skip(f"this processor is no {generation}")
+    passed(QUICK + MORE, MBMA_TABLES_CORE=generation)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="LD_PRELOAD")
+def test_under_sanitizers(tmp_path):
+    """The plain module, in a copy of the package."""
+    package = tmp_path / "mbma_tables"
+    shutil.copytree(CORE.parent, package, ignore=shutil.ignore_patterns("__pycache__", "_plain.*"))
+    for name in ("docs", "tables"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    include, cc = f"-I{sysconfig.get_path('include')}", found("cc")
+    options = [*BUILD.FLAGS, *SANITIZERS, include, "-DMBMA_MODULE=_plain", "-shared", "-fPIC"]
+    run(cc, *options, *SOURCES, CORE / "binding.c", "-o", package / "core" / "_plain.abi3.so", "-lm")
+    library = run(cc, "-print-file-name=libasan.so").strip()
+    # Python itself keeps what it has allocated
+    sanitizer = {"LD_PRELOAD": library, "ASAN_OPTIONS": "detect_leaks=0", "MBMA_TABLES_CORE": "plain"}
+    paths = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    said = run(
+        *(sys.executable, "-P", "-c", "from mbma_tables.core import core; print(core.__file__)"),
+        env=os.environ | sanitizer | {"PYTHONPATH": paths}, cwd=tmp_path,
+    )  # fmt: skip
+    assert said.startswith(str(package))
+    passed(QUICK, PYTHONPATH=paths, **sanitizer)
