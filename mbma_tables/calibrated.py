@@ -11,32 +11,27 @@ energy over A0 E* g h_rms. A spectrum enters by its shares w(x) of h_rms^2 per d
     F(u)    = F_G(u) - F_G(h_max)                        one that ends at h_max: its stiffness is the endless one's
 
 W = P is Persson's theory with weight 1, W = gamma P + (1 - gamma) P^3 Yang and Persson's. a depends on the
-spectrum's narrowness nu = 1/(<x> <1/x>), which needs no Hurst exponent. Because P depends on F and x through
-y = F g/g(x) alone, the inner integral is a function of y, tabulated once: a curve is one sum over waves.
+spectrum's narrowness nu = 1/(<x> <1/x>), which needs no Hurst exponent. The compiled core, spectrum_laws.c, keeps
+u_P(F) as polynomials of ln F.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.arguments import FloatArray
+from mbma_tables.core import core, in_blocks
+from mbma_tables.errors import ConvergenceError, InputError
 
-if TYPE_CHECKING:
-    from scipy.interpolate import CubicSpline
-
-LOG_Y = (-32.0, 2.25)  # ln y of the tabulated inner integrals; above its end they are below 1e-150
-Y_NODES = 4800
 POWERS = (1, 3, 16)  # of the cover in the weight W
-CLOSEST = -36.0  # ln ln x where a self-affine spectrum's quadrature begins
-PANEL, PANEL_NODES = 1.0, 10  # its panels, in ln ln x below x = e and in ln x above
-LOG_FORCE = (-21.0, 1.6)  # ln F^ over which a curve is tabulated
-FORCE_NODES = 227
 NARROWNESS = 0.65  # that W's slope refers to
+BLOCK = 65536  # numbers answered between two chances of Ctrl-C
+UNRESOLVED = 4  # the core's status where a quadrature did not reach its tolerance
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,20 +52,21 @@ PERSSON = Constants(area_s0=1.0, area_slope=0.0, weight=1.0, weight_slope=0.0, c
 YANG_PERSSON = dataclasses.replace(PERSSON, weight=0.42, cubic=0.58)
 
 
-def _cover(force: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """erf(sqrt(2) F), Persson's contact of unit gradient, and its derivative."""
-    from scipy.special import erf
-
-    return erf(np.sqrt(2) * force), np.sqrt(8 / np.pi) * np.exp(-2 * force**2)
-
-
 def area(force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
-    """A/A0 at F/(A0 E* g) on a surface of Nayak's parameter alpha = m0 m4/m2^2."""
-    from scipy.special import erf
+    """A/A0 at F/(A0 E* g) >= 0 on a surface of Nayak's parameter alpha = m0 m4/m2^2."""
+    return _area(force, light_factor(alpha, constants), constants.area_t0)
 
-    values = np.asarray(force, float)
-    t = values / constants.area_t0
-    return np.asarray(erf(values * np.sqrt(2 * (1 + t) / (light_factor(alpha, constants) + t))))
+
+def area_persson(force: ArrayLike) -> FloatArray:
+    """The same by Persson's theory, erf(sqrt(2) F)."""
+    return _area(force, 1.0, 1.0)
+
+
+def _area(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
+    load, light = np.broadcast_arrays(np.asarray(force, float), s0)
+    out = np.empty(load.shape)
+    core.contact_area(np.ascontiguousarray(load), np.ascontiguousarray(light), t0, out)
+    return out
 
 
 def force_of(e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
@@ -94,34 +90,11 @@ def light_factor(alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArr
 
 
 @functools.cache
-def _inner_integrals() -> CubicSpline:
-    """ln of I_n(y) = integral from y to infinity of dP^n/y', for n in POWERS, over ln y; shape (..., 3)."""
-    from scipy.interpolate import CubicSpline
-
-    log_y = np.linspace(*LOG_Y, Y_NODES)
-    node, weight = np.polynomial.legendre.leggauss(12)
-    step = log_y[1] - log_y[0]
-    y = np.exp(log_y[:-1, None] + step * (node + 1) / 2)
-    P, dP = _cover(y)
-    dP_end = _cover(np.exp(log_y))[1]
-    values = []
-    for n in POWERS:
-        # dP^n/y' = n P^(n-1) P' d ln y'
-        pieces = (n * P ** (n - 1) * dP) @ weight * step / 2
-        # beyond the end the integrand falls like exp(-2 y^2): its own share of the last value
-        end = n * dP_end[-1] / (4 * np.exp(2 * log_y[-1]))
-        values.append(np.log(np.cumsum(np.append(pieces, end)[::-1])[::-1]))
-    return CubicSpline(log_y, np.stack(values, axis=1))
-
-
-def inner_integral(y: FloatArray, coefficients: FloatArray) -> FloatArray:
-    """Sum of a_n I_n(y)."""
-    log_y = np.log(y)
-    inside = np.clip(log_y, *LOG_Y)
-    total = np.exp(_inner_integrals()(inside)) @ coefficients
-    # below the table I_1 is a logarithm, the others are constant
-    total += coefficients[0] * np.sqrt(8 / np.pi) * (inside - log_y) * (log_y < LOG_Y[0])
-    return np.where(log_y < LOG_Y[1], total, 0.0)
+def _inner_integrals() -> FloatArray:
+    """What the core makes all laws from."""
+    inner = np.empty(core.words_of_inner())
+    core.inner_integrals(inner)
+    return inner
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -140,31 +113,20 @@ class Spectrum:
         return float(1 / (np.sum(self.variance * self.x) * np.sum(self.variance / self.x)))
 
     @classmethod
-    def self_affine(cls, hurst: float, zeta_1: float, panel: float = PANEL) -> Spectrum:
-        """Power law x^(-2H) between 1 and zeta_1, graded towards x = 1 where g(x) vanishes."""
-        L = np.log(zeta_1)
-        first = min(L, 1.0)
-        graded = first * np.exp(np.linspace(CLOSEST, 0, round(-CLOSEST / panel) + 1))
-        edges = np.append(graded, np.linspace(first, L, int(np.ceil((L - first) / panel)) + 1)[1:])
-        node, weight = np.polynomial.legendre.leggauss(PANEL_NODES)
-        half = np.diff(edges)[:, None] / 2
-        log_x = (edges[:-1, None] + half * (1 + node)).ravel()
-        d_log_x = (half * weight).ravel()
-        low, mid, high = -2 * hurst, 2 - 2 * hurst, 4 - 2 * hurst
+    def self_affine(cls, hurst: float, zeta_1: float) -> Spectrum:
+        """Power law x^(-2H) between 1 and zeta_1."""
+        return cls.from_samples(np.array([1.0, zeta_1]), np.array([1.0, zeta_1 ** (-2 - 2 * hurst)]))
 
-        def growth(power: float, log_ratio: ArrayLike) -> FloatArray:
-            """Integral of x^power d ln x from 1."""
-            width = np.asarray(log_ratio)
-            return np.expm1(power * width) / power if abs(power) > 1e-9 else width * (1 + power * width / 2)
-
-        m0, m2, m4 = (growth(power, L) for power in (low, mid, high))
-        return cls(
-            np.exp(log_x),
-            np.exp(low * log_x) * d_log_x / m0,
-            growth(mid, log_x) / m2,
-            float(np.sqrt(m2 / m0)),
-            float(1.5 * m0 * m4 / m2**2),
-        )
+    @classmethod
+    def from_samples(cls, q: FloatArray, C: FloatArray) -> Spectrum:
+        """Power laws between samples of C(q) [length^4], h_rms^2 = 2 pi integral C q dq; a repeated q is a jump."""
+        facts, none = np.empty(2), np.empty(0)
+        count = core.spectrum_waves(q, C, none, none, none, facts)
+        if not count:
+            raise InputError("there is no spectrum between these samples, or its moments are not finite")
+        x, variance, below = np.empty((3, count))
+        core.spectrum_waves(q, C, x, variance, below, facts)
+        return cls(x, variance, below, *facts.tolist())
 
     @classmethod
     def from_shares(cls, x: ArrayLike, variance: ArrayLike) -> Spectrum:
@@ -200,86 +162,59 @@ class Law:
         a = c.weight + c.weight_slope * (self.spectrum.narrowness - NARROWNESS)
         return np.array([a, c.cubic, 1 - a - c.cubic])
 
-    def _over_spectrum(self, force: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """y = F g/g(x), shape (..., n), 1/g(x) and the spectrum's weights x w/(4 g^)."""
-        inverse = 1 / np.sqrt(self.spectrum.below)
-        shares = self.spectrum.x * self.spectrum.variance / (4 * self.spectrum.gradient)
-        return np.asarray(force, float)[..., None] * inverse, inverse, shares
+    @functools.cached_property
+    def _prepared(self) -> FloatArray:
+        """What the core knows of the law."""
+        s, c = self.spectrum, self.constants
+        highest = np.inf if self.h_max is None else self.h_max
+        constants = c.area_s0, c.area_slope, c.area_t0, c.weight, c.weight_slope, c.cubic, c.tail
+        law = np.empty(core.words_of_spectrum_law())
+        numbers, work = np.array([s.gradient, s.alpha, *constants, highest]), np.empty(9 * s.x.size)
+        status = core.spectrum_law_of(_inner_integrals(), s.x, s.variance, s.below, numbers, work, law)
+        if status == UNRESOLVED:
+            raise ConvergenceError("the law of this spectrum has no curve that polynomials follow")
+        if status:
+            raise InputError("a spectrum has rising positive wavenumbers and shares of variance that are not negative")
+        return law
+
+    def _asked(self, function: Any, given: ArrayLike, rows: int) -> list[FloatArray]:
+        """Rows of what a function of the core answers of an array."""
+        values = np.asarray(given, float)
+        flat, out = np.ascontiguousarray(values).ravel(), np.empty((rows, values.size))
+        in_blocks(lambda k: function(self._prepared, flat[k], *out[:, k]), flat.size, BLOCK)
+        return [row.reshape(values.shape) for row in out]
 
     def energy(self, force: ArrayLike) -> FloatArray:
         """Elastic energy U of the endless Gaussian surface, before its tail factor."""
-        y, _, shares = self._over_spectrum(force)
-        P, _ = _cover(y)
+        from scipy.special import erf
+
+        s = self.spectrum
+        P = erf(np.sqrt(2) * np.asarray(force, float)[..., None] / np.sqrt(s.below))
         weights = sum(a * P**n for n, a in zip(POWERS, self.coefficients, strict=True))
-        return np.asarray(weights @ shares)
+        return np.asarray(weights @ (s.x * s.variance / (4 * s.gradient)))
 
     def separation_persson(self, force: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """u_P and du_P/d ln F, before the tail factor."""
-        y, inverse, shares = self._over_spectrum(force)
-        u = inner_integral(y, self.coefficients) @ (shares * inverse)
-        P, dP = _cover(y)
-        slope = sum(a * n * P ** (n - 1) for n, a in zip(POWERS, self.coefficients, strict=True)) * dP
-        return u, -np.asarray(slope @ (shares * inverse))
+        """u_P and du_P/d ln F, before the tail factor; 0 at loads that leave no gap."""
+        u, slope = self._asked(core.spectrum_law_persson, force, 2)
+        return u, slope
 
-    @functools.cached_property
-    def _curve(self) -> tuple[FloatArray, FloatArray]:
-        """ln F_P, falling, and u."""
-        log_force = np.linspace(*LOG_FORCE[::-1], FORCE_NODES)
-        return log_force, self.separation_persson(np.exp(log_force))[0]
-
-    def _log_force_persson(self, u: FloatArray) -> FloatArray:
-        """ln F_P(u): from the tabulated curve, then Newton's method on it."""
-        log_nodes, u_nodes = self._curve
-        log_force = np.interp(np.log(u), np.log(u_nodes), log_nodes)
-        for _ in range(30):
-            value, slope = self.separation_persson(np.exp(log_force))
-            # in ln u: nearly straight in F^2 at high loads, safe at light ones
-            step = np.clip((np.log(value) - np.log(u)) * value / slope, -0.5, 0.5)
-            log_force -= step
-            if np.all(np.abs(step) < 1e-12):
-                break
-        return log_force
-
-    def gaussian(self, u: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """ln F_G and -d ln F_G/du of the endless Gaussian surface at mean separations u > 0."""
-        values = np.asarray(u, float)
-        flat = values.ravel()
-        log_force = self._log_force_persson(flat)
-        _, slope = self.separation_persson(np.exp(log_force))
-        return (
-            (log_force - self.tail * flat**3).reshape(values.shape),
-            (-1 / slope + 3 * self.tail * flat**2).reshape(values.shape),
-        )
+    def contact(self, u: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Force, area and -dF/du at mean separations u [h_rms]: 0 from h_max on, without bound at u = 0."""
+        force, share, stiffness = self._asked(core.spectrum_law_contact, u, 3)
+        return force, share, stiffness
 
     def force(self, u: ArrayLike) -> FloatArray:
         """F/(A0 E* g) at mean separations u [h_rms]; zero from h_max on."""
-        return self.force_and_stiffness(u)[0]
+        return self.contact(u)[0]
 
     def force_and_stiffness(self, u: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Force and -dF/du [A0 E* g/h_rms]."""
-        gap = np.asarray(u, float)
-        log_gaussian, rate = self.gaussian(gap)
-        if self.h_max is None:
-            return np.exp(log_gaussian), rate * np.exp(log_gaussian)
-        end, touching = np.exp(self.gaussian(self.h_max)[0]), gap < self.h_max
-        endless = np.exp(log_gaussian)
-        force = np.where(touching, endless - end, 0.0)
-        return force, np.where(touching, rate * endless, 0.0)
+        force, _, stiffness = self.contact(u)
+        return force, stiffness
 
     def separation(self, force: ArrayLike) -> FloatArray:
         """Mean separation u [h_rms] at F/(A0 E* g): the inverse of `force`."""
-        given = np.asarray(force, float)
-        end = 0.0 if self.h_max is None else np.exp(self.gaussian(self.h_max)[0])
-        goal = np.log(given.ravel() + end)
-        log_nodes, u_nodes = self._curve
-        log_force = np.interp(goal, (log_nodes - self.tail * u_nodes**3)[::-1], log_nodes[::-1])
-        for _ in range(30):
-            u, slope = self.separation_persson(np.exp(log_force))
-            step = (log_force - self.tail * u**3 - goal) / (1 - 3 * self.tail * u**2 * slope)
-            log_force -= step
-            if np.all(np.abs(step) < 1e-12):
-                break
-        return self.separation_persson(np.exp(log_force))[0].reshape(given.shape)
+        return self._asked(core.spectrum_law_separation, force, 1)[0]
 
     def area(self, force: ArrayLike) -> FloatArray:
         """A/A0 at F/(A0 E* g)."""

@@ -159,6 +159,8 @@ CALL_SPLINE(calibrated_contact, law, a[8].n, a[8].data, a[9].data, a[10].data, a
 CALL_SPLINE(calibrated_separation, law, a[8].n, a[8].data, a[9].data, a[10].data)
 CALL_SPLINE(calibrated_slopes, law, a[8].data, a[9].data)
 CALL_SPLINE(flow, flow, a[8].n, a[8].data, a[9].data, a[10].data, a[11].data)
+WRAP(contact_area, "DDdw", a[0].n == a[1].n && a[0].n == a[3].n,
+     mbma_contact_area(a[0].n, a[0].data, a[1].data, a[2].d, a[3].data))
 WRAP(spline_pieces, SPLINE "w",
      fits_spline(a, false) && !a[7].data && a[8].n == a[3].n * 6 * (size_t)((int64_t *)a[2].data)[2], spline_pieces(a))
 WRAP(calibrated_ends, SPLINE "w", fits_spline(a, true) && a[8].n == 2 * a[3].n, calibrated_ends(a))
@@ -175,6 +177,34 @@ WRAP(self_affine, "DDww", a[0].n == a[1].n && a[0].n == a[2].n && a[0].n == a[3]
      mbma_self_affine(a[0].n, a[0].data, a[1].data, a[2].data, a[3].data))
 
 /* ---- spectrum_laws.c ---- */
+#define WORDS(type) (sizeof(type) / sizeof(double))
+static size_t inner_integrals(void *inner) {
+    mbma_inner_integrals(inner);
+    return 0;
+}
+/* The inner integrals; x, variances, shares below; gradient, alpha, seven constants and h_max; work; the law. */
+static mbma_status spectrum_law_of(const argument *a) {
+    const double *c = a[4].data;
+    const mbma_waves waves = {a[1].n, a[1].data, a[2].data, a[3].data, c[0], c[1]};
+    const mbma_law_constants constants = {c[2], c[3], c[4], c[5], c[6], c[7], c[8]};
+    return mbma_spectrum_law_of(a[0].data, &waves, &constants, c[9], a[5].data, a[6].data);
+}
+WRAP(words_of_inner, "", true, WORDS(mbma_inner))
+WRAP(words_of_spectrum_law, "", true, WORDS(mbma_spectrum_law))
+WRAP(inner_integrals, "w", a[0].n == WORDS(mbma_inner), inner_integrals(a[0].data))
+WRAP(spectrum_waves, "DDwwww", a[0].n == a[1].n && a[2].n == a[3].n && a[2].n == a[4].n && a[5].n == 2,
+     mbma_spectrum_waves(a[0].n, a[0].data, a[1].data, a[2].n, a[2].data, a[3].data, a[4].data, a[5].data))
+WRAP(spectrum_law_of, "DDDDDww",
+     a[0].n == WORDS(mbma_inner) && a[1].n == a[2].n && a[1].n == a[3].n && a[4].n == 10 && a[5].n == 9 * a[1].n &&
+         a[6].n == WORDS(mbma_spectrum_law),
+     spectrum_law_of(a))
+WRAP(spectrum_law_persson, "DDww", a[0].n == WORDS(mbma_spectrum_law) && a[2].n == a[1].n && a[3].n == a[1].n,
+     mbma_spectrum_law_persson(a[0].data, a[1].n, a[1].data, a[2].data, a[3].data))
+WRAP(spectrum_law_contact, "DDwww",
+     a[0].n == WORDS(mbma_spectrum_law) && a[2].n == a[1].n && a[3].n == a[1].n && a[4].n == a[1].n,
+     mbma_spectrum_law_contact(a[0].data, a[1].n, a[1].data, a[2].data, a[3].data, a[4].data))
+WRAP(spectrum_law_separation, "DDw", a[0].n == WORDS(mbma_spectrum_law) && a[2].n == a[1].n,
+     mbma_spectrum_law_separation(a[0].data, a[1].n, a[1].data, a[2].data))
 
 /* ---- hardness.c ---- */
 
@@ -193,6 +223,7 @@ static PyMethodDef METHODS[] = {
     /* law.c */
 
     /* calibrated.c */
+    ENTRY(contact_area),
     ENTRY(spline_pieces),
     ENTRY(calibrated_ends),
     ENTRY(calibrated_contact),
@@ -202,6 +233,14 @@ static PyMethodDef METHODS[] = {
     ENTRY(self_affine),
 
     /* spectrum_laws.c */
+    ENTRY(words_of_inner),
+    ENTRY(words_of_spectrum_law),
+    ENTRY(inner_integrals),
+    ENTRY(spectrum_waves),
+    ENTRY(spectrum_law_of),
+    ENTRY(spectrum_law_persson),
+    ENTRY(spectrum_law_contact),
+    ENTRY(spectrum_law_separation),
 
     /* hardness.c */
 

@@ -24,7 +24,7 @@ from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
 from mbma_tables.tablefiles.schema import BUCKET_BITS
-from mbma_tables.theories import calibrated_curves, calibrated_table, persson
+from mbma_tables.theories import calibrated_table, persson, spectrum_laws
 from mbma_tables.totals import gauss_kronrod, intervals, island_sum, kernel
 
 FORM = "standard"  # that of tier "formula"
@@ -183,9 +183,9 @@ def theory_numbers() -> tuple[dict[str, int | float], dict[str, FloatArray]]:
         "PERSSON_GAMMA": persson.GAMMA,
         "CALIBRATED_ERROR": table.error,
         "PERSSON_ERROR": persson.INVERSE_RTOL,
-        "LAW_ERROR": calibrated_curves.LAW_ERROR,
+        "LAW_ERROR": spectrum_laws.LAW_ERROR,
         "MAX_LOG_FORCE": -persson.MIN_LOG_FORCE,
-        "GRADED": round(-calibrated.CLOSEST),
+        "GRADED": 36,
     }
     padded = [np.stack([np.pad(part, (0, 10 - part.size)) for part in column]) for column in zip(*rules, strict=True)]
     arrays = {"GAUSS_NODES": padded[0], "GAUSS_WEIGHTS": padded[1], "SPLINE": np.ravel(spline)}

@@ -29,7 +29,7 @@ from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import FITTED, PRINTED, REPORTED, get_reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import calibrated, calibrated_table, mbma, result
-from mbma_tables.theories.calibrated_curves import TESTED_AREA
+from mbma_tables.theories.spectrum_laws import TESTED_AREA
 from mbma_tables.units import Units
 
 MODULE = "explorer.wasm"

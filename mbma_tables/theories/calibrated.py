@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,20 +13,23 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import calibrated_table
-from mbma_tables.theories.calibrated_curves import (
-    TESTED_AREA,
-    Places,
-    area_concerns,
-    by_law,
-    force_at_area,
-    own_law,
-)
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
+from mbma_tables.theories.spectrum_laws import TESTED_AREA, Places, area_concerns, force_at_area
+
+if TYPE_CHECKING:
+    from mbma_tables.theories.calibrated_curves import OwnLaw
 
 TESTED_HURST, TESTED_ZETA_1 = 0.2, 128.0
 TESTED_HEIGHTS = (2.5, 5.5)  # h_max/h_rms
 NEAREST = 0.95  # of h_max: where the certificate of the table ends
 ROUNDING = 1e-14  # what a separation loses beside h_max
+
+
+def _own_law(surface: MeasuredSurface) -> OwnLaw:
+    # what maps need of scipy takes long to import
+    from mbma_tables.theories.calibrated_curves import own_law
+
+    return own_law(surface)
 
 
 def _error(stated: float, nearer: float, share: FloatArray) -> FloatArray:
@@ -50,14 +53,14 @@ class Calibrated(Theory):
     def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """From full contact, or where a map's curve ends before, to last contact."""
         low, high = super().interval(surface, quantity)
-        return (np.asarray(own_law(surface).end) if isinstance(surface, MeasuredSurface) else low), high
+        return (np.asarray(_own_law(surface).end) if isinstance(surface, MeasuredSurface) else low), high
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]; without bound at u = 0."""
         if isinstance(surface, MeasuredSurface):
             gap = np.asarray(mean_separation, float)
             require("mean_separation", gap, gap >= 0, "at least 0")
-            (force, area, stiffness), own_error = own_law(surface).answer(gap)
+            (force, area, stiffness), own_error = _own_law(surface).answer(gap)
             return TheoryAnswer(force, area, stiffness, _error(own_error, own_error, gap / np.asarray(surface.h_max)))
         assert isinstance(surface, Surface)
         table, places = calibrated_table.shipped(), Places(surface, mean_separation)
@@ -65,7 +68,7 @@ class Calibrated(Theory):
         require("mean_separation", places.flat.reshape(places.shape), u.reshape(places.shape) >= 0, "at least 0")
         out = table.fill(places.columns, places.owner, u)
         for row, mine in places.outside(~places.covered(table)[places.owner]):
-            out[:, mine] = by_law(places.law(row), u[mine])
+            out[:, mine] = places.law(row).contact(u[mine])
         out[0] *= places.gradient
         out[2] *= places.gradient
         out[2] /= places.h_rms
@@ -76,7 +79,7 @@ class Calibrated(Theory):
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* or an area below 1; h_max at zero."""
         if isinstance(surface, MeasuredSurface):
-            return own_law(surface).mean_separation(quantity, np.asarray(wanted, float))
+            return _own_law(surface).mean_separation(quantity, np.asarray(wanted, float))
         assert isinstance(surface, Surface)
         table, places = calibrated_table.shipped(), Places(surface, wanted)
         if quantity == "area":
@@ -96,12 +99,12 @@ class Calibrated(Theory):
     def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E*, but for a map in closed form."""
         if isinstance(surface, MeasuredSurface):
-            return own_law(surface).area(np.asarray(force, float))
+            return _own_law(surface).area(np.asarray(force, float))
         return law_area(force / np.asarray(surface.rms_gradient), surface.alpha, calibrated_table.shipped().constants)
 
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Share of heights above the level whose mean gap is u, and its derivative: measured heights, or Gaussian."""
-        heights = own_law(surface).heights if isinstance(surface, MeasuredSurface) else None
+        heights = _own_law(surface).heights if isinstance(surface, MeasuredSurface) else None
         if heights is None:
             return super().bearing_share(surface, mean_separation)
         share, slope = heights(np.asarray(mean_separation) / np.asarray(surface.h_rms))
@@ -110,7 +113,7 @@ class Calibrated(Theory):
     def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Reasons for which answers lie outside what boundary elements have tested."""
         if isinstance(surface, MeasuredSurface):
-            law = own_law(surface)
+            law = _own_law(surface)
             straight = np.zeros(answer.area.shape, dtype=bool)
             if law.curve is not None:
                 straight |= law.curve.straight(np.asarray(mean_separation) / law.h_rms)

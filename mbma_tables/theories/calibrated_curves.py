@@ -1,82 +1,34 @@
-"""Curves of the calibrated law on the surfaces of a question, of a spectrum, of heights or of a map."""
+"""Curves of the calibrated law on measured surfaces: of a spectrum, of heights or of a map."""
 
 from __future__ import annotations
 
 import functools
 import itertools
-import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
-from scipy.interpolate import BSpline, CubicHermiteSpline, CubicSpline, PchipInterpolator, make_interp_spline
-from scipy.special import erfc, erfinv, ndtri
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+from scipy.special import erfc, ndtri
 
-from mbma_tables.arguments import FloatArray, require, spread
+from mbma_tables.arguments import FloatArray, require
 from mbma_tables.bearing import FRACTIONS
-from mbma_tables.calibrated import (
-    CLOSEST,
-    LOG_Y,
-    PANEL,
-    PANEL_NODES,
-    Law,
-    Spectrum,
-    force_of,
-    inner_integral,
-    light_factor,
-)
+from mbma_tables.calibrated import Law, light_factor
 from mbma_tables.calibrated_map import LOG_FORCE, MapLaw, convex
-from mbma_tables.compiled import CONTRACT, njit
 from mbma_tables.surfaces.heights import SHARES
 from mbma_tables.surfaces.measured import MeasuredSurface
-from mbma_tables.surfaces.surface import Surface
-from mbma_tables.theories import calibrated_table
+from mbma_tables.theories.spectrum_laws import LAW_ERROR, TESTED_AREA, force_at_area, spectrum_of
 
 if TYPE_CHECKING:
     from mbma_tables.hardness import BearingCurve
 
-TESTED_AREA = (1e-3, 0.97)
-WIDTHS = (0.01, 0.1, 0.4)  # of panels in ln q, up to which few nodes suffice
-LAW_ERROR = 1e-7  # of the law's own quadrature
 MAP_ERROR = 3e-2  # of a map's curve, which is smoother than the nodes of its law: nine maps in ten
-LAW_FORCE, LAW_NODES = (-24.0, 1.5), 256  # ln F^ of a tabulated curve
-INNER_NODES = 2400  # in ln y, of its cubic spline
 STRAIGHT, SAME = 1.0, 1e-9  # of ln F, over which one stiffness is no curve; differences that are rounding
 NODE_STEP, FINE = 0.2, 8  # of a map's curve, in ln F and ln u: its own nodes are rougher; integrated by so many parts
-_GAUSS = [((1 + x) / 2, w / 2) for x, w in map(np.polynomial.legendre.leggauss, (2, 4, 6, PANEL_NODES))]
 
 
 ENDS = ", where the map's tops and valleys leave no gap: solve the map itself, theories.BoundaryElements"
-
-
-class Places:
-    """A batch of surfaces and numbers that broadcast with it, flat."""
-
-    def __init__(self, surface: Surface, value: ArrayLike) -> None:
-        self.shape = np.broadcast_shapes(np.shape(value), surface.shape)
-        self.flat = np.ascontiguousarray(spread(np.asarray(value, float), self.shape)).ravel()
-        hurst = np.asarray(surface.hurst, float).ravel()
-        zeta_1, h_rms = np.asarray(surface.zeta_1, float).ravel(), np.asarray(surface.h_rms, float).ravel()
-        self.columns = np.array([hurst, np.log(zeta_1), np.asarray(surface.h_max, float).ravel() / h_rms])
-        number = np.arange(hurst.size).reshape(surface.shape)
-        self.owner = np.ascontiguousarray(spread(number, self.shape)).ravel()
-        self.h_rms = h_rms[self.owner] if hurst.size > 1 else h_rms
-        gradient = np.asarray(surface.rms_gradient, float).ravel()
-        self.gradient = gradient[self.owner] if hurst.size > 1 else gradient
-
-    def covered(self, table: calibrated_table.Table) -> Any:
-        """Whether the table holds each surface."""
-        return table.covers(*self.columns[:2])
-
-    def outside(self, mask: Any) -> list[tuple[int, Any]]:
-        """Surfaces that have entries under a mask, with these."""
-        return [(int(row), np.flatnonzero(mask & (self.owner == row))) for row in np.unique(self.owner[mask])]
-
-    def law(self, row: int) -> Law:
-        """The law of one surface."""
-        hurst, log_zeta, heights = self.columns[:, row]
-        return Law(Spectrum.self_affine(float(hurst), float(np.exp(log_zeta))), float(heights))
 
 
 class Curve:
@@ -177,91 +129,6 @@ class Curve:
         return np.asarray(np.where(force < lightest, light, np.exp((low + high) / 2 + full)))
 
 
-def force_at_area(area: ArrayLike, light: ArrayLike) -> FloatArray:
-    """F/(A0 E* g) at A/A0."""
-    share = np.asarray(area, float)
-    require("area", share, (share >= 0) & (share < 1), "below 1, which is reached at infinite load")
-    return force_of(erfinv(share), light)
-
-
-def by_law(law: Law, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Force, area and stiffness by the law's quadrature."""
-    positive = np.maximum(u, 1e-12)
-    force, stiffness = law.force_and_stiffness(positive)
-    full = u <= 0
-    return np.where(full, np.inf, force), np.where(full, 1.0, law.area(force)), np.where(full, np.inf, stiffness)
-
-
-def area_concerns(area: FloatArray) -> dict[str, Any]:
-    """Contact fractions that were not simulated, or hardly."""
-    low, high = TESTED_AREA
-    return {
-        f"A/A0 is below {low:g}": (area > 0) & (area < low),
-        f"A/A0 is above {high:g}": area > high,
-    }
-
-
-@njit(cache=True, fastmath=CONTRACT, error_model="numpy", nogil=True)
-def _add_waves(
-    log_force: FloatArray,
-    log_g: FloatArray,
-    shares: FloatArray,
-    start: float,
-    step: float,
-    pieces: FloatArray,
-    out: FloatArray,
-) -> None:
-    """Sums of shares times a function of ln F - ln g, nothing beyond the cubic `pieces` of its logarithm."""
-    for k in range(log_force.size):
-        total = 0.0
-        for j in range(log_g.size):
-            place = log_force[k] - log_g[j] - start
-            number = int(place / step)
-            if number < len(pieces):
-                t, piece = place - step * number, pieces[number]
-                total += shares[j] * math.exp(((piece[0] * t + piece[1]) * t + piece[2]) * t + piece[3])
-        out[k] = total
-
-
-class TabulatedLaw(Law):
-    """A law whose curve is tabulated once, for surfaces that no table holds: each wave is asked once."""
-
-    @functools.cached_property
-    def _spline(self) -> BSpline:
-        log_force, log_y = np.linspace(*LAW_FORCE, LAW_NODES), np.linspace(LOG_Y[0], LOG_Y[1] - 1e-9, INNER_NODES)
-        # the inner integrals of this law's weight, as one function
-        inner = CubicSpline(log_y, np.log(inner_integral(np.exp(log_y), self.coefficients)))
-        log_g = np.log(self.spectrum.below) / 2
-        shares = self.spectrum.x * self.spectrum.variance / (4 * self.spectrum.gradient) * np.exp(-log_g)
-        total = np.empty(LAW_NODES)
-        _add_waves(log_force, log_g, shares, log_y[0], log_y[1] - log_y[0], np.ascontiguousarray(inner.c.T), total)
-        return make_interp_spline(log_force, np.log(total), k=5)
-
-    @functools.cached_property
-    def _rate(self) -> BSpline:
-        return self._spline.derivative()
-
-    def separation_persson(self, force: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """u_P and du_P/d ln F, before the tail factor."""
-        given = np.asarray(force, float)
-        log_force = np.log(given)
-        held = np.clip(log_force, *LAW_FORCE)
-        u = np.exp(self._spline(held))
-        slope = u * self._rate(held)
-        # light contact is a logarithm of the load
-        u += slope * np.minimum(log_force - LAW_FORCE[0], 0.0)
-        heavy = log_force > LAW_FORCE[1]
-        if heavy.any():
-            u[heavy], slope[heavy] = super().separation_persson(given[heavy])
-        return u, slope
-
-    def _log_force_persson(self, u: FloatArray) -> FloatArray:
-        """ln F_P(u): beyond the lightest load tabulated a straight line, else by Newton's method."""
-        last, slope = (float(part) for part in self.separation_persson(np.exp(LAW_FORCE[0])))
-        found = super()._log_force_persson(np.minimum(u, last))
-        return np.where(u > last, LAW_FORCE[0] + (u - last) / slope, found)
-
-
 @functools.lru_cache(maxsize=32)
 def own_law(surface: MeasuredSurface) -> OwnLaw:
     """The law of a surface, kept while it is asked again."""
@@ -274,7 +141,7 @@ class OwnLaw:
     def __init__(self, surface: MeasuredSurface) -> None:
         self.h_rms, self.h_max = float(surface.h_rms), float(surface.h_max)
         self.gradient = float(surface.rms_gradient)
-        self.law: Law = TabulatedLaw(spectrum_of(surface), self.h_max / self.h_rms)
+        self.law: Law = Law(spectrum_of(surface), self.h_max / self.h_rms)
         self._known = self._map_law(surface)
         self.curve = None if self._known is None else Curve(self._known, self.h_max / self.h_rms)
 
@@ -310,7 +177,7 @@ class OwnLaw:
         end = self.end
         require("mean_separation", u, u >= end * (1 - 1e-9), f"at least {end:.4g}{ENDS}")
         flat = u.ravel() / self.h_rms
-        parts = by_law(self.law, flat) if self.curve is None else self.curve.answer(flat)
+        parts = self.law.contact(flat) if self.curve is None else self.curve.answer(flat)
         units = self.gradient, 1.0, self.gradient / self.h_rms
         scaled = [np.reshape(part, u.shape) * unit for part, unit in zip(parts, units, strict=True)]
         return scaled, LAW_ERROR if self.curve is None else MAP_ERROR
@@ -331,39 +198,3 @@ class OwnLaw:
         # beside h_max, with which it makes d
         require(quantity, wanted, u > np.finfo(float).eps * self.h_max, "less: the mean separation vanishes")
         return np.asarray(u)
-
-
-def spectrum_of(surface: MeasuredSurface) -> Spectrum:
-    """The spectrum of a surface as a quadrature rule: Gauss nodes between samples, more the further these are apart."""
-    laws = surface.laws
-    low, high = laws.log_low - laws.log_low[0], laws.log_high - laws.log_low[0]
-    # graded towards the longest wave, where the gradient of longer ones vanishes
-    graded = min(high[-1], 1.0) * np.exp(np.arange(CLOSEST, 0.0, PANEL))
-    edges = np.unique(np.concatenate([low, high, graded, np.arange(0.0, high[-1], PANEL)]))
-    piece = np.minimum(np.searchsorted(high, (edges[1:] + edges[:-1]) / 2), high.size - 1)
-    held = edges[:-1] >= low[piece]
-    start, end, piece = edges[:-1][held], edges[1:][held], piece[held]
-    with np.errstate(divide="ignore"):
-        kind = np.searchsorted(WIDTHS, np.maximum(end - start, np.log(end / start)))
-    parts = []
-    for number, (node, weight) in enumerate(_GAUSS):
-        mine = kind == number
-        width = (end - start)[mine, None]
-        places = start[mine, None] + width * node
-        parts.append(
-            np.stack([places, width * weight, np.broadcast_to(piece[mine, None], places.shape)]).reshape(3, -1)
-        )
-    place, step, owner = np.concatenate(parts, axis=1)
-    order = np.argsort(place)
-    step, piece = step[order], owner[order].astype(np.intp)
-    rise = place[order] - low[piece]
-    log_q = laws.log_low[piece] + rise
-    variance = laws.low[piece] * np.exp(2 * (log_q - laws.log_low[0]) + laws.slope[piece] * rise) * step
-    m0, m2, m4 = (laws.moment(order) for order in (0, 2, 4))
-    return Spectrum(
-        np.exp(log_q - laws.log_low[0]),
-        variance / variance.sum(),
-        laws.below_rise(2, piece, rise) / m2,
-        math.sqrt(2 * m2 / m0) / float(surface.q0),
-        m0 * m4 / m2**2,
-    )

@@ -17,10 +17,10 @@ from mbma_tables.labels import agree
 from mbma_tables.leakage import LARGEST_AREA
 from mbma_tables.plots import draw_compression, force_label, leakage_label
 from mbma_tables.surfaces.measured import MeasuredSurface
-from mbma_tables.theories.calibrated_curves import spectrum_of
-from mbma_tables.theories.leakage_table import KEPT, flow_of_spectrum, self_affine, shipped_flow
+from mbma_tables.theories.leakage_table import flow_of_spectrum, self_affine, shipped_flow
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory
+from mbma_tables.theories.spectrum_laws import spectrum_of
 from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
@@ -240,7 +240,7 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
     gap = np.broadcast_to(np.asarray(mean_separation) / np.asarray(surface.h_rms), shape)
     u = np.ascontiguousarray(gap, float).ravel()
     if isinstance(surface, MeasuredSurface):
-        return flow_of_spectrum(_spectrum(surface), u, contact).reshape(shape)
+        return flow_of_spectrum(spectrum_of(surface), u, contact).reshape(shape)
     table = shipped_flow()
     given = np.stack([np.ravel(surface.hurst), np.log(np.ravel(surface.zeta_1))])
     number = np.arange(given.shape[1]).reshape(surface.shape)
@@ -250,10 +250,6 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
         mine = owner == row
         out[mine] = flow_of_spectrum(self_affine(*map(float, given[:, row])), u[mine], contact[mine])
     return out.reshape(shape)
-
-
-# one object for one surface
-_spectrum = functools.lru_cache(KEPT)(spectrum_of)
 
 
 def concerns(theory: Theory, surface: Any, area: FloatArray) -> dict[str, Any]:

@@ -12,7 +12,6 @@ import math
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import Spectrum
@@ -92,6 +91,8 @@ def _flow(given: tuple[Any, ...], owner: Owners, u: FloatArray, area: FloatArray
 @functools.lru_cache(KEPT)
 def own_factor(spectrum: Spectrum) -> tuple[Any, ...]:
     """ln R over the table's odds of one spectrum, as `core.flow` takes it."""
+    from scipy.interpolate import PchipInterpolator
+
     table = shipped_flow()
     odds, step = np.linspace(table.first[2], table.last, OWN_NODES, retstep=True)
     log_factor = contact_factor(spectrum, table.constants.threshold / (1 + np.exp(-odds)), table.constants)

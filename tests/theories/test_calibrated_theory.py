@@ -23,7 +23,6 @@ from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.theories import Calibrated, Mbma, Persson, get_theory
-from mbma_tables.theories.calibrated_curves import LAW_ERROR, TabulatedLaw, spectrum_of
 from mbma_tables.theories.calibrated_table import NAME, QUANTITIES, load, shipped
 
 DATA = pathlib.Path(__file__).parents[2] / "docs" / "data"
@@ -200,17 +199,6 @@ class TestScatter:
         assert fitted[1] < get_theory("mbma").scatter(SURFACE, np.array(0.05))[1] < printed[1]  # as area is
         own = dataclasses.replace(get_reading("printed"), beta=0.3)
         assert np.isnan(Mbma(reading=own).scatter(SURFACE, np.array(0.05))).all()
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_tabulated_curve_of_a_scattered_spectrum_is_its_quadrature(seed):
-    q, random = np.geomspace(0.2, 60, 20 * 4**seed), np.random.default_rng(seed)
-    C = np.minimum(1, q**-3.5) * random.uniform(0.7, 1.4, q.size)
-    spectrum = spectrum_of(Surface.from_spectrum(q, C, h_max=1.0))
-    u = np.append(10.0 ** random.uniform(-3, 0, 50), random.uniform(0, 5, 50))
-    found, exact = (law(spectrum, 6.0).force_and_stiffness(u) for law in (TabulatedLaw, Law))
-    np.testing.assert_allclose(found[0], exact[0], rtol=LAW_ERROR)
-    np.testing.assert_allclose(found[1], exact[1], rtol=20 * LAW_ERROR)
 
 
 @pytest.mark.parametrize("number", [0, 1])

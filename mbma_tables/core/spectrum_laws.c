@@ -1,0 +1,518 @@
+/* Persson's theory and the calibrated law of any isotropic spectrum, as sums over its waves.
+ *
+ * With g(x) the rms gradient of the waves below x and y = F g/g(x), a wave's part in the mean separation is a function
+ * of y alone: u(F) = sum of share I(y), I(y) = integral from y to infinity of dW/y', where W is a polynomial of
+ * P = erf(sqrt(2) y). A law keeps ln u + 2 F^2, which is smooth, as polynomials of ln F; F is over g(x) of the last wave.
+ */
+#include "elementary.h"
+#include "mbma.h"
+
+enum { ORDER = MBMA_ORDER, CELLS = MBMA_INNER_CELLS, TERMS = 5, CHUNK = 128, LANES = 8, MOST_STEPS = 100 };
+
+#define LOWEST -3.0    /* ln y of the first cell, below which a series has I, */
+#define HIGHEST 3.0    /* and of the last, above which I is below 1e-350 */
+#define CELL_RATE 5.0  /* cells in 1 of ln y */
+#define TINY 2e-12     /* of the last two coefficients of a panel, over which it is halved */
+#define NARROWEST 0.02 /* panel */
+#define NOTHING 80.0   /* exp(-80) of the largest part */
+#define CLOSE 1e-12    /* of ln F */
+#define FARTHEST 1e80  /* u at which there is no force */
+#define NARROWNESS 0.65 /* that the slope of W's first coefficient refers to */
+
+/* ln F where panels begin and end; below, u is linear in it, and above below 1e-317. */
+static const double EDGES[] = {-48.0, -36.0, -26.0, -22.0, -18.0, -15.0,  -12.0, -10.0, -8.0, -6.75,
+                               -5.5,  -4.75, -4.0,  -3.0,  -2.25, -1.875, -1.5,  -1.0,  -0.75, -0.5,
+                               -0.25, 0.0,   0.25,  0.5,   0.75,  1.0,    1.25,  1.5,   2.1,  2.95};
+
+static const double ROOT_8_PI = 1.5957691216057308; /* sqrt(8/pi) */
+
+/* Gauss's rules of 2, 4, 6 and 12 nodes on [-1, 1]: positive nodes and their weights. */
+static const int RULE_NODES[4] = {2, 4, 6, 12};
+static const double RULES[4][6][2] = {
+    {{0.5773502691896257, 1.0}},
+    {{0.33998104358485626, 0.6521451548625461}, {0.8611363115940526, 0.34785484513745385}},
+    {{0.2386191860831969, 0.46791393457269104},
+     {0.6612093864662645, 0.3607615730481386},
+     {0.932469514203152, 0.17132449237917036}},
+    {{0.1252334085114689, 0.24914704581340277},
+     {0.3678314989981802, 0.2334925365383548},
+     {0.5873179542866175, 0.20316742672306592},
+     {0.7699026741943047, 0.16007832854334622},
+     {0.9041172563704749, 0.10693932599531843},
+     {0.9815606342467192, 0.04717533638651183}},
+};
+
+/* ---- polynomials through Chebyshev nodes of [-1, 1] -------------------------------------------------------------- */
+
+typedef struct {
+    double node[ORDER], chebyshev[ORDER][ORDER], powers[ORDER][ORDER];
+} fit;
+
+static void make_fit(fit *f) {
+    for (int m = 0; m < ORDER; m++)
+        for (int j = 0; j < ORDER; j++) {
+            const double step = 1.0 / (double)ORDER, angle = MBMA_PI * (j + 0.5) * step;
+            const double twice = m > 1 && j > 0 ? 2.0 * f->powers[m - 1][j - 1] : 0.0;
+            f->node[j] = cos(angle);
+            f->chebyshev[m][j] = (m == 0 ? 1.0 : 2.0) * step * cos(m * angle);
+            f->powers[m][j] = m > 1 ? twice - f->powers[m - 2][j] : (double)(m == j);
+        }
+}
+
+/* Powers from values at the nodes; the last two Chebyshev coefficients, which tell the error. */
+static double powers_of(const fit *f, const double value[ORDER], double p[ORDER]) {
+    double c[ORDER];
+    for (int m = 0; m < ORDER; m++) {
+        c[m] = 0.0;
+        p[m] = 0.0;
+        for (int j = 0; j < ORDER; j++)
+            c[m] += f->chebyshev[m][j] * value[j];
+    }
+    for (int m = 0; m < ORDER; m++)
+        for (int j = 0; j <= m; j++)
+            p[j] += c[m] * f->powers[m][j];
+    return fabs(c[ORDER - 1]) + fabs(c[ORDER - 2]);
+}
+
+/* ---- inner integrals I(y), times exp(2 y^2) ---------------------------------------------------------------------- */
+
+/* From ln y down to another, by steps over which exp(2 y^2) changes by a factor e at most. */
+static void integrate_down(double from, double to, double inner[3]) {
+    const double span = 2.0 * (exp(2.0 * from) - exp(2.0 * to));
+    const int steps = 1 + (int)span;
+    for (int step = 0; step < steps; step++) {
+        const double high = from + (to - from) * step / steps, low = from + (to - from) * (step + 1) / steps;
+        const double end = exp(2.0 * low), fall = mbma_exp(2.0 * (end - exp(2.0 * high)));
+        for (int n = 0; n < 3; n++)
+            inner[n] *= fall;
+        for (int k = 0; k < RULE_NODES[2]; k++) {
+            const double *rule = RULES[2][k / 2], s = 0.5 * (low + high + (high - low) * (k % 2 ? rule[0] : -rule[0]));
+            const double y = mbma_exp(s), P = mbma_erf(1.4142135623730951 * y), P2 = P * P, P4 = P2 * P2, P8 = P4 * P4;
+            const double part = 0.5 * (high - low) * rule[1] * ROOT_8_PI * mbma_exp(2.0 * (end - y * y));
+            inner[0] += part;
+            inner[1] += 3.0 * part * P2;
+            inner[2] += 16.0 * part * (P8 * P4) * (P2 * P);
+        }
+    }
+}
+
+void mbma_inner_integrals(mbma_inner *inner) {
+    const double z = 2.0 * exp(2.0 * HIGHEST);
+    double series = 1.0, at = HIGHEST, value[3][ORDER];
+    fit f;
+    make_fit(&f);
+    /* exp(z) z E1(z) */
+    for (int k = 8; k > 0; k--)
+        series = 1.0 - k / z * series;
+    double own[3] = {0.5 * ROOT_8_PI / z * series, 1.5 * ROOT_8_PI / z * series, 8.0 * ROOT_8_PI / z * series};
+    for (int cell = CELLS - 1; cell >= 0; cell--) {
+        for (int j = 0; j < ORDER; j++) {
+            const double next = LOWEST + (cell + 0.5 * (1.0 + f.node[j])) / CELL_RATE;
+            integrate_down(at, next, own);
+            at = next;
+            for (int n = 0; n < 3; n++)
+                value[n][j] = own[n];
+        }
+        for (int n = 0; n < 3; n++)
+            (void)powers_of(&f, value[n], inner->p[n][cell]);
+    }
+}
+
+/* I(y) below the first cell: light[0] - light[1] ln y + sum over k > 1 of light[k] y^(2 k - 2). */
+static void light_series(const double weight[3], const double p[ORDER], double light[TERMS + 1]) {
+    const double log_y = LOWEST, square = exp(2.0 * log_y);
+    double bell[TERMS], cover[TERMS], cover_2[TERMS], start = 0.0, power = 1.0;
+    for (int k = 0; k < TERMS; k++) {
+        bell[k] = k == 0 ? 1.0 : -2.0 / k * bell[k - 1];
+        cover[k] = bell[k] / (2 * k + 1);
+        cover_2[k] = 0.0;
+        for (int i = 0; i <= k; i++)
+            cover_2[k] += cover[i] * cover[k - i];
+        /* of -dI/d ln y = dW/dP dP/dy, P being small */
+        double slope = weight[0] * bell[k];
+        for (int i = 0; i < k; i++)
+            slope += 3.0 * weight[1] * ROOT_8_PI * ROOT_8_PI * cover_2[i] * bell[k - 1 - i];
+        light[k + 1] = k == 0 ? ROOT_8_PI * slope : -ROOT_8_PI * slope / (2 * k);
+        start += k == 0 ? -light[1] * log_y : light[k + 1] * power;
+        power *= square;
+    }
+    light[0] = -start;
+    for (int m = ORDER - 1, sign = -1; m >= 0; m--, sign = -sign)
+        light[0] += sign * p[m] * exp(-2.0 * square);
+}
+
+/* ---- sums over waves --------------------------------------------------------------------------------------------- */
+
+typedef struct {
+    double p[CELLS][ORDER], light[TERMS + 1]; /* I of a law's own W */
+    size_t count;
+    /* of waves, in terms of the last one's g(x): ln g(x) and 1/g(x)^2 - 1; then sums from each wave to the last, of
+     * shares and of shares times -ln g(x), 1/g(x)^2, 1/g(x)^4 and so on */
+    double *log_g, *fall, *share, *sums[TERMS + 1];
+} wave_sum;
+
+/* The first wave whose ln y is below a limit. */
+static size_t first_below(const wave_sum *w, double log_force, double limit) {
+    size_t low = 0, high = w->count;
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (log_force - w->log_g[middle] >= limit)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* ln u + 2 F^2. */
+static double sum_at(const wave_sum *w, double log_force) {
+    const double square = 2.0 * exp(2.0 * log_force), far = 0.5 * log(NOTHING / square + 1.0);
+    const size_t light = first_below(w, log_force, LOWEST);
+    double lanes[LANES] = {0.0}, part[CHUNK], place[CHUNK], total = 0.0, power = exp(square);
+    int32_t cell[CHUNK];
+    if (light < w->count) {
+        total = power * (w->light[0] * w->sums[0][light] -
+                         w->light[1] * (log_force * w->sums[0][light] + w->sums[1][light]));
+        for (int k = 2; k <= TERMS; k++) {
+            power *= 0.5 * square;
+            total += power * w->light[k] * w->sums[k][light];
+        }
+    }
+    for (size_t first = first_below(w, log_force, fmin(HIGHEST, log_force + far)); first < light; first += CHUNK) {
+        const size_t count = light - first < (size_t)CHUNK ? light - first : (size_t)CHUNK;
+        const double *log_g = w->log_g + first, *fall = w->fall + first, *share = w->share + first;
+        for (size_t k = 0; k < count; k++) {
+            /* inside but for rounding */
+            const double at = (log_force - log_g[k] - LOWEST) * CELL_RATE;
+            const int32_t whole = (int32_t)at, last = CELLS - 1;
+            cell[k] = whole < last ? whole : last;
+            place[k] = 2.0 * (at - cell[k]) - 1.0;
+        }
+        for (size_t k = 0; k < count; k++)
+            part[k] = share[k] * mbma_exp(-square * fall[k]);
+        for (size_t k = 0; k < count; k++) {
+            const double *p = w->p[cell[k]], t = place[k], t2 = t * t, t4 = t2 * t2;
+            const double low = mbma_fma(t2, mbma_fma(t, p[3], p[2]), mbma_fma(t, p[1], p[0]));
+            const double middle = mbma_fma(t2, mbma_fma(t, p[7], p[6]), mbma_fma(t, p[5], p[4]));
+            const double high = mbma_fma(t2, mbma_fma(t, p[11], p[10]), mbma_fma(t, p[9], p[8]));
+            part[k] *= mbma_fma(t4, mbma_fma(t4, high, middle), low);
+        }
+        for (size_t k = 0; k < count; k++)
+            lanes[k % LANES] += part[k];
+    }
+    total += ((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])) + ((lanes[4] + lanes[5]) + (lanes[6] + lanes[7]));
+    return log(total);
+}
+
+/* Panels from `start` to `end`, halved until polynomials hold. */
+static bool fill_panels(const wave_sum *w, const fit *f, double start, double end, mbma_spectrum_law *law) {
+    while (start < end && law->panels < MBMA_MOST_PANELS) {
+        double width = 2.0 * (end - start), value[ORDER], tail;
+        do {
+            width *= 0.5;
+            for (int j = 0; j < ORDER; j++)
+                value[j] = sum_at(w, start + 0.5 * width * (1.0 + f->node[j]));
+            tail = powers_of(f, value, law->p[law->panels]);
+        } while (tail > TINY && width > NARROWEST);
+        start = end - start > width ? start + width : end;
+        law->edge[++law->panels] = start;
+    }
+    return start >= end;
+}
+
+/* ln u at ln F in a panel, and its derivative. */
+static double log_u_in(const mbma_spectrum_law *law, size_t panel, double log_force, double *slope) {
+    const double low = law->edge[panel], rate = 2.0 / (law->edge[panel + 1] - low), t = (log_force - low) * rate - 1.0;
+    const double *p = law->p[panel], square = 2.0 * exp(2.0 * log_force);
+    double value = p[ORDER - 1], by_t = 0.0;
+    for (int m = ORDER - 2; m >= 0; m--) {
+        by_t = mbma_fma(by_t, t, value);
+        value = mbma_fma(value, t, p[m]);
+    }
+    *slope = by_t * rate - 2.0 * square;
+    return value - square;
+}
+
+/* The panel of a number among falling or rising ones. */
+static size_t panel_of(const double *edges, size_t panels, double sign, double x) {
+    size_t low = 0, high = panels;
+    while (high - low > 1) {
+        const size_t middle = low + (high - low) / 2;
+        if (sign * edges[middle] <= sign * x)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* ln F at a mean separation before the tail's factor, by Newton's method in a bracket, and d ln u/d ln F. */
+static double log_force_of(const mbma_spectrum_law *law, double u, double *slope) {
+    const double log_u = log(u), *edge = law->edge, *ends = law->log_u;
+    const size_t panel = panel_of(ends, law->panels, -1.0, log_u);
+    if (u >= law->lightest[0]) {
+        *slope = law->lightest[1] / u;
+        return edge[0] + (u - law->lightest[0]) / law->lightest[1];
+    }
+    double low = edge[panel], high = edge[panel + 1], x = low, step = NAN;
+    if (!(log_u >= ends[law->panels]))
+        return NAN;
+    x += (high - low) * (ends[panel] - log_u) / (ends[panel] - ends[panel + 1]);
+    for (int k = 0; k < MOST_STEPS; k++) {
+        const double miss = log_u_in(law, panel, x, slope) - log_u;
+        *(miss > 0.0 ? &low : &high) = x;
+        step = -miss / *slope;
+        if (fabs(step) <= CLOSE)
+            return x + step;
+        x = x + step > low && x + step < high ? x + step : 0.5 * (low + high);
+    }
+    return x;
+}
+
+/* u before the tail's factor, and du/d ln F. */
+static double separation_of(const mbma_spectrum_law *law, double log_force, double *slope) {
+    if (log_force <= law->edge[0]) {
+        *slope = law->lightest[1];
+        return law->lightest[0] + *slope * (log_force - law->edge[0]);
+    }
+    *slope = 0.0;
+    if (log_force >= law->edge[law->panels])
+        return 0.0;
+    const double u = exp(log_u_in(law, panel_of(law->edge, law->panels, 1.0, log_force), log_force, slope));
+    *slope *= u;
+    return u;
+}
+
+/* What the tail takes from ln F. */
+static double tail_at(const mbma_spectrum_law *law, double u) { return law->tail * u * u * u; }
+
+mbma_status mbma_spectrum_law_of(const mbma_inner *inner, const mbma_waves *waves, const mbma_law_constants *c,
+                                 double h_max, double *work, mbma_spectrum_law *law) {
+    const size_t n = waves->count;
+    double mean = 0.0, inverse = 0.0, slope;
+    wave_sum w;
+    bool good = n > 0 && h_max > 0.0 && waves->gradient > 0.0 && waves->gradient < INFINITY && waves->alpha > 0.0;
+    fit f;
+    memset(law, 0, sizeof *law);
+    memset(&w, 0, sizeof w);
+    w.count = n;
+    w.log_g = work;
+    w.fall = work + n;
+    w.share = work + 2 * n;
+    for (size_t k = 0; k <= TERMS; k++)
+        w.sums[k] = work + (3 + k) * n;
+    for (size_t k = 0; k < n && good; k++) {
+        const double below = waves->below[k], last = waves->below[n - 1];
+        good = below > 0.0 && below <= last && last < 1.0 + 1e-9 && waves->x[k] > 0.0 && waves->x[k] < INFINITY &&
+               waves->variance[k] >= 0.0 && waves->variance[k] < INFINITY && (k == 0 || below >= waves->below[k - 1]);
+        mean += waves->variance[k] * waves->x[k];
+        inverse += waves->variance[k] / waves->x[k];
+        w.log_g[k] = 0.5 * log(below / last);
+        w.fall[k] = (last - below) / below;
+        w.share[k] = waves->x[k] * waves->variance[k] / (4.0 * waves->gradient * sqrt(below));
+    }
+    if (!good)
+        return MBMA_INVALID;
+    const double narrowness = 1.0 / (mean * inverse), a = c->weight + c->weight_slope * (narrowness - NARROWNESS);
+    const double weight[3] = {a, c->cubic, 1.0 - a - c->cubic};
+    for (int cell = 0; cell < CELLS; cell++)
+        for (int m = 0; m < ORDER; m++)
+            for (int k = 0; k < 3; k++)
+                w.p[cell][m] += weight[k] * inner->p[k][cell][m];
+    light_series(weight, w.p[0], w.light);
+    for (size_t k = n; k-- > 0;) {
+        double part = w.share[k];
+        for (int m = 0; m <= TERMS; m++) {
+            part *= m > 1 ? 1.0 + w.fall[k] : 1.0;
+            w.sums[m][k] = part * (m == 1 ? -w.log_g[k] : 1.0) + (k + 1 < n ? w.sums[m][k + 1] : 0.0);
+        }
+    }
+    law->s0 = mbma_min(c->area_s0 + c->area_slope * log(waves->alpha / 10.0), 1.0);
+    law->t0 = c->area_t0;
+    law->tail = c->tail * (1.0 - narrowness);
+    law->h_max = h_max;
+    law->shift = 0.5 * log(waves->below[n - 1]);
+    law->edge[0] = EDGES[0];
+    make_fit(&f);
+    for (size_t k = 0; k + 1 < sizeof EDGES / sizeof *EDGES; k++)
+        good = good && fill_panels(&w, &f, EDGES[k], EDGES[k + 1], law);
+    for (size_t k = 0; k < law->panels; k++)
+        law->log_u[k] = log_u_in(law, k, law->edge[k], &slope);
+    law->log_u[law->panels] = log_u_in(law, law->panels - 1, law->edge[law->panels], &slope);
+    law->lightest[0] = exp(log_u_in(law, 0, law->edge[0], &slope));
+    /* without the first power in W, u is constant there */
+    law->lightest[1] = fmin(slope * law->lightest[0], -1e-300);
+    law->end = h_max < FARTHEST ? log_force_of(law, h_max, &slope) + law->shift - tail_at(law, h_max) : -INFINITY;
+    good = good && law->end == law->end && law->lightest[0] > 0.0 && law->lightest[0] < INFINITY;
+    law->panels = good ? law->panels : 0;
+    return good ? MBMA_OK : MBMA_UNRESOLVED;
+}
+
+/* Whether a law was prepared: nothing is read beyond its panels. */
+static bool is_prepared(const mbma_spectrum_law *law) { return law->panels > 0 && law->panels <= MBMA_MOST_PANELS; }
+
+size_t mbma_spectrum_law_persson(const mbma_spectrum_law *law, size_t n, const double *force, double *u,
+                                 double *slope) {
+    const bool ready = is_prepared(law);
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        const bool good = ready && force[k] > 0.0;
+        u[k] = good ? separation_of(law, log(force[k]) - law->shift, &slope[k]) : NAN;
+        slope[k] = good ? slope[k] : NAN;
+        bad += !good;
+    }
+    return bad;
+}
+
+/* At 0 < u < h_max, where full contact and none are far: force, area and stiffness. */
+static void contact_at(const mbma_spectrum_law *law, double u, double found[3]) {
+    double slope;
+    const double value = log_force_of(law, u, &slope) + law->shift - tail_at(law, u), endless = exp(value);
+    const double F = -endless * expm1(law->end - value), over = F / law->t0;
+    found[0] = F;
+    found[1] = mbma_erf(F * sqrt(2.0 * (1.0 + over) / (law->s0 + over)));
+    found[2] = (3.0 * tail_at(law, u) / u - 1.0 / (slope * u)) * endless;
+}
+
+size_t mbma_spectrum_law_contact(const mbma_spectrum_law *law, size_t n, const double *u, double *force, double *area,
+                                 double *stiffness) {
+    const bool ready = is_prepared(law);
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        double found[3] = {NAN, NAN, NAN};
+        if (ready && u[k] <= 0.0) {
+            found[0] = found[2] = INFINITY;
+            found[1] = 1.0;
+        } else if (ready && (u[k] >= law->h_max || u[k] > FARTHEST)) {
+            found[0] = found[1] = found[2] = 0.0;
+        } else if (ready && u[k] > 0.0) {
+            contact_at(law, u[k], found);
+        }
+        bad += found[0] != found[0];
+        force[k] = found[0];
+        area[k] = found[1];
+        stiffness[k] = found[2];
+    }
+    return bad;
+}
+
+/* ln(F + F at h_max) is ln F of a surface without end, before the tail's factor ln F + tail: Newton's method for that. */
+static double separation_at(const mbma_spectrum_law *law, double log_force) {
+    const double over = log_force - law->end, heaviest = law->edge[law->panels];
+    const double goal = over < 700.0 ? law->end + fmax(over, 0.0) + log1p(exp(-fabs(over))) : log_force;
+    double low = -800.0, high = heaviest, x = goal - law->shift, slope;
+    if (x >= heaviest)
+        return 0.0;
+    for (int step = 0; step < MOST_STEPS; step++) {
+        x = x > low && x < high ? x : 0.5 * (low + high);
+        const double u = separation_of(law, x, &slope), miss = x + law->shift - tail_at(law, u) - goal;
+        const double move = -miss / (1.0 - 3.0 * tail_at(law, u) / u * slope);
+        *(miss > 0.0 ? &high : &low) = x;
+        x += move;
+        if (fabs(move) <= CLOSE)
+            break;
+    }
+    return fmin(separation_of(law, x, &slope), law->h_max);
+}
+
+size_t mbma_spectrum_law_separation(const mbma_spectrum_law *law, size_t n, const double *force, double *u) {
+    const bool ready = is_prepared(law);
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        u[k] = ready && force[k] > 0.0 ? separation_at(law, log(force[k])) : NAN;
+        bad += u[k] != u[k];
+    }
+    return bad;
+}
+
+/* ---- waves of power laws between samples ------------------------------------------------------------------------- */
+
+/* (exp(x) - 1)/x */
+static double growth(double x) { return x != 0.0 ? expm1(x) / x : 1.0; }
+
+static bool is_held(const double *q, const double *C, size_t k) {
+    return q[k + 1] > q[k] && C[k] > 0.0 && C[k + 1] > 0.0;
+}
+
+/* A piece between two samples: where it begins in ln(q/q0), its width, and C q^2 there over C0 q0^2 with its power. */
+typedef struct {
+    double start, width, content, power;
+} piece;
+
+static piece piece_of(const double *q, const double *C, size_t base, size_t k) {
+    const double start = log(q[k] / q[base]), width = log1p((q[k + 1] - q[k]) / q[k]);
+    const piece found = {start, width, C[k] / C[base] * exp(2.0 * start), log(C[k + 1] / C[k]) / width + 2.0};
+    return found;
+}
+
+/* What a rise from the piece's start adds to the integral of C q^(order + 1) dq. */
+static double part_of(const piece *s, int order, double rise) {
+    return s->content * exp(order * s->start) * rise * growth((s->power + order) * rise);
+}
+
+/* Where the panel that begins at t = ln x ends, and by which rule it is integrated. Panels are graded towards the longest
+ * wave, where the gradient of longer ones vanishes, and the shortest, which carry heavy loads; over one, neither what it
+ * holds nor the gradient changes much. `before` is the gradient's square up to the piece. */
+static double panel_end(const piece *s, double t, double last, double before, int *rule) {
+    const double first = fmin(last, 1.0), left = last - t, rise = t - s->start, power = fabs(s->power) + 2.0;
+    const double low = t > 0.0 ? fmax(t * exp(2.0), first * exp(-40.0)) : first * exp(-40.0);
+    double width = fmin(fmin(low - t, 1.0), left > first / 512.0 ? 0.5 * left : left), change;
+    width = fmin(fmin(width, s->start + s->width - t), 3.0 / power);
+    for (;; width *= 0.5) {
+        change = log((before + part_of(s, 2, rise + width)) / (before + part_of(s, 2, rise)));
+        if (!(t > 0.0 && change > 2.01))
+            break;
+    }
+    const double wide = fmax(fmax(width * fmax(1.0, 0.3 * power), t > 0.0 ? change : 2.0), width / left);
+    *rule = wide < 0.01 ? 0 : wide < 0.1 ? 1 : wide < 0.4 ? 2 : 3;
+    return width < s->start + s->width - t ? t + width : s->start + s->width;
+}
+
+size_t mbma_spectrum_waves(size_t count, const double *q, const double *C, size_t most, double *x, double *variance,
+                           double *below, double facts[2]) {
+    double moments[3] = {0.0, 0.0, 0.0}, before = 0.0, total = 0.0, last = 0.0;
+    size_t base = 0, waves = 0;
+    while (base + 1 < count && !is_held(q, C, base))
+        base++;
+    for (size_t k = 0; k < count; k++)
+        if (!(q[k] > 0.0 && q[k] < INFINITY && C[k] >= 0.0 && C[k] < INFINITY && (k == 0 || q[k] >= q[k - 1])))
+            return 0;
+    for (size_t k = base; k + 1 < count; k++)
+        if (is_held(q, C, k)) {
+            const piece own = piece_of(q, C, base, k);
+            last = own.start + own.width;
+            for (int m = 0; m < 3; m++)
+                moments[m] += part_of(&own, 2 * m, own.width);
+        }
+    facts[0] = sqrt(moments[1] / moments[0]);
+    facts[1] = 1.5 * moments[0] * moments[2] / (moments[1] * moments[1]);
+    if (!(last > 0.0 && facts[0] > 0.0 && facts[0] < INFINITY && facts[1] > 0.0 && facts[1] < INFINITY))
+        return 0;
+    for (size_t k = base; k + 1 < count; k++) {
+        if (!is_held(q, C, k))
+            continue;
+        const piece own = piece_of(q, C, base, k);
+        for (double t = own.start, end; t < own.start + own.width; t = end) {
+            int rule;
+            end = panel_end(&own, t, last, before, &rule);
+            /* nodes in the root of ln x, to which the gradient rises in proportion */
+            const double low = sqrt(t), high = sqrt(end);
+            const int half = RULE_NODES[rule] / 2;
+            for (int n = -half; n < half; n++, waves++) {
+                const double *node = RULES[rule][n < 0 ? -1 - n : n];
+                const double root = 0.5 * (low + high + (high - low) * (n < 0 ? -node[0] : node[0]));
+                const double log_x = root * root, rise = fmin(fmax(log_x - own.start, 0.0), own.width);
+                if (waves >= most)
+                    continue;
+                x[waves] = exp(log_x);
+                variance[waves] = own.content * exp(own.power * rise) * root * (high - low) * node[1];
+                below[waves] = (before + part_of(&own, 2, rise)) / moments[1];
+                total += variance[waves];
+            }
+        }
+        before += part_of(&own, 2, own.width);
+    }
+    for (size_t k = 0; k < waves && waves <= most; k++)
+        variance[k] /= total;
+    return waves;
+}
