@@ -11,46 +11,68 @@ from typing import Any
 import click
 import numpy as np
 
-from benchmarks.rows import microseconds, report, rounds, times_faster
+from benchmarks.rows import held_out, microseconds, report, rounds, times_faster
 from mbma_tables import Surface, contact, open_table
-from mbma_tables.export.code import write_code
+from mbma_tables.export.c_code import FLAGS
+from mbma_tables.export.code import SOURCES, write_code
+from mbma_tables.totals.contact import totals_at
+from mbma_tables.totals.island_sum import QUADRATURE_SHARE
 
-POINTS, GAPS = 20_000, 200
+POINTS, SURFACES, GAPS = 20_000, 2000, 200
 RTOL = 1e-8
-COMPILER = ("cc", "-std=c99", "-O2", "-shared", "-fPIC")
+COMPILER = ("cc", *FLAGS, "-march=native", "-shared", "-fPIC")
 
 
 def exported(rng: np.random.Generator) -> None:
-    """Islands at random (X, mu), and totals of one surface at many gaps."""
+    """Islands at random (X, mu), totals of as many surfaces as gaps, and derivatives at many gaps of one surface."""
     model, surface = open_table("universal"), Surface.named("yang-persson")
     X, mu = rng.uniform(-5.0, 40.0, POINTS), np.exp(rng.uniform(np.log(1e-7), np.log(1e6), POINTS))
+    surfaces, apart = held_out(SURFACES, rng)
     gaps = np.linspace(-0.5, 0.95, GAPS) * surface.h_max
-    islands, totals = np.empty((POINTS, 3)), np.empty((GAPS, 4))
-    numbers = (ctypes.c_double * 5)(surface.hurst, surface.q0, surface.q1, surface.h_rms, surface.h_max)
+    numbers = np.array([surface.hurst, surface.q0, surface.q1, surface.h_rms, surface.h_max])
+    heights = (surfaces.h_max - apart) / surfaces.h_rms, surfaces.h_max / surfaces.h_rms
+    islands, sums, bound = np.empty((POINTS, 3)), np.empty((SURFACES, 2)), np.empty(SURFACES)
+    contacts, by, status = np.empty((GAPS, 4)), np.empty((2, GAPS, 6)), np.empty(SURFACES, np.uint8)
 
-    def at(array: np.ndarray) -> ctypes.c_void_p:
+    def at(array: Any) -> ctypes.c_void_p:
         return ctypes.c_void_p(array.ctypes.data)
 
     with tempfile.TemporaryDirectory() as work:
         folder = pathlib.Path(work)
         write_code("c", folder)
-        subprocess.run([*COMPILER, str(folder / "mbma.c"), "-lm", "-o", str(folder / "mbma.so")], check=True)
-        library: Any = ctypes.CDLL(str(folder / "mbma.so"))
-    size, count, one, rtol = ctypes.c_size_t(POINTS), ctypes.c_size_t(GAPS), ctypes.c_double(1.0), ctypes.c_double(RTOL)
+        sources = [str(folder / name) for name in SOURCES if name != "mbma_selftest.c"]
+        subprocess.run([*COMPILER, *sources, "-lm", "-o", str(folder / "model.so")], check=True)
+        library: Any = ctypes.CDLL(str(folder / "model.so"))
+    for function in (library.mbma_table, library.mbma_reading):
+        function.restype = ctypes.c_void_p
+    table, reading = (ctypes.c_void_p(function()) for function in (library.mbma_table, library.mbma_reading))
+    size, many, count = (ctypes.c_size_t(number) for number in (POINTS, SURFACES, GAPS))
+    one, rtol, share = (ctypes.c_double(number) for number in (1.0, RTOL, QUADRATURE_SHARE * RTOL))
+    known = [np.ascontiguousarray(column, dtype=float) for column in (surfaces.hurst, surfaces.zeta_1, *heights)]
+    seen = ctypes.c_int64()
     taken = rounds(
         {
             "islands": lambda: model.answer(X, mu),
-            "C islands": lambda: library.mbma_phi_many(size, at(X), at(mu), at(islands), None),
-            "totals": lambda: contact(surface, gaps, rtol=RTOL),
-            "C totals": lambda: library.mbma_total_many(numbers, count, at(gaps), one, rtol, at(totals), None),
+            "C islands": lambda: library.mbma_phi(size, at(X), at(mu), table, 0, at(islands), None),
+            "totals": lambda: contact(surfaces, apart, rtol=RTOL),
+            "C totals": lambda: library.mbma_totals(
+                many, *map(at, known), share, reading, table, 0, at(sums), at(bound), at(status), ctypes.byref(seen)
+            ),
+            "derivatives": lambda: totals_at(surface, gaps, rtol=RTOL, derivatives=True),
+            "C derivatives": lambda: library.mbma_totals_of(
+                at(numbers), count, at(gaps), one, rtol, at(contacts), at(by[0]), at(by[1]), None
+            ),
         }
     )
-    phi, total = model.answer(X, mu), contact(surface, gaps, rtol=RTOL)
-    click.echo("\nExported C, -O2")
-    for name, entries, found, known in (
-        ("islands", POINTS, islands, (phi.phi_F, phi.phi_A)),
-        ("totals", GAPS, totals, (total.force, total.area)),
+    phi, total, near = model.answer(X, mu), contact(surfaces, apart, rtol=RTOL), totals_at(surface, gaps, rtol=RTOL)
+    unit = surfaces.q0 * surfaces.s
+    click.echo(f"\nExported C, {' '.join(FLAGS[1:])} -march=native")
+    for name, entries, found, right in (
+        ("islands", POINTS, islands.T[:2], (phi.phi_F, phi.phi_A)),
+        ("totals", SURFACES, (unit * sums[:, 0], sums[:, 1]), (total.force, total.area)),
+        ("derivatives", GAPS, contacts.T[:2], (near.force, near.area)),
     ):
         report(f"C, one of {entries} {name}", 1e3 * microseconds(taken[f"C {name}"], entries), "ns")
-        report("  as fast as the library", times_faster(taken, name, f"C {name}"), "x")
-        report("  largest relative difference", np.abs(found[:, :2].T / np.stack(known) - 1).max(), "")
+        most = 1.1 if name == "totals" else None
+        report("  time over the library's", 1 / times_faster(taken, name, f"C {name}"), "x", at_most=most)
+        report("  largest relative difference", np.abs(np.stack(found) / np.stack(right) - 1).max(), "")

@@ -53,7 +53,7 @@ static const double BEGUN[ROWS] = {3.5, 10.0 / 3.0, 1.0, 3.0};
 static void add_sums(double c, double least, const mbma_nodes *islands, int rows, int64_t begin, int64_t stop, double *out) {
     double share[CHUNK], turned[CHUNK];
     for (int64_t first = begin; first < stop; first += CHUNK) {
-        const int64_t count = stop - first < CHUNK ? stop - first : CHUNK;
+        const int64_t count = stop - first < CHUNK ? stop - first : (int64_t)CHUNK;
         const double *const shift = islands->shift + first, *const rate = islands->rate + first;
         for (int64_t k = 0; k < count; k++) {
             const double height = mbma_fma(-rate[k], c, shift[k]);

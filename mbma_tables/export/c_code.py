@@ -1,52 +1,50 @@
-"""The model as C99: its numbers as a header file, the comment that opens each file, and the texts of the files.
+"""The model as C: the core's own files, its tables as data beside them, and calls of one surface on top.
 
-The table is text, in the shortest decimals that give back every bit, so that the files mean the same to any compiler on
+Tables are text, in the shortest decimals that give back every bit, so that the files mean the same to any compiler on
 any machine; 150,000 numbers are 3 MB of text and a fraction of a second of compiling.
 """
 
 from __future__ import annotations
 
 import ast
+import dataclasses
+import importlib.resources
 import inspect
 import math
+import re
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
-from mbma_tables import __version__, calibrated
+from mbma_tables import __version__
 from mbma_tables.arguments import FloatArray
+from mbma_tables.calibrated import YANG_PERSSON
 from mbma_tables.errors import InputError
 from mbma_tables.export.text import filled, opening
-from mbma_tables.models import closed_form_functions, universal_kernel
-from mbma_tables.models.universal import UniversalModel
-from mbma_tables.surfaces import spectrum
+from mbma_tables.models import closed_form_functions
+from mbma_tables.models.universal import RECORD, UniversalModel
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
-from mbma_tables.tablefiles.schema import BUCKET_BITS
+from mbma_tables.surfaces.spectrum import MAX_ZETA_1
 from mbma_tables.theories import calibrated_table, persson, spectrum_laws
-from mbma_tables.totals import gauss_kronrod, intervals, island_sum, kernel
+from mbma_tables.totals.island_sum import QUADRATURE_SHARE
 
 FORM = "standard"  # that of tier "formula"
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # as `contact` allows
-# what lies where in a record
-RECORD_NAMES = (
-    *("TERMS", "ERROR", "CENTRE", "RATE", "TOP_MU", "TOP", "BOTTOM_MU", "BOTTOM"),
-    *("FORCE_POWERS", "AREA_POWERS"),
-)
-USAGE = (
-    "Compile mbma.c and, for the calibrated law and Persson's theory, mbma_theories.c, each with its table beside it, "
-    "and link the C mathematics library: cc -std=c99 -O2 -c mbma.c mbma_theories.c. Every function may be called from "
-    "any thread; nothing is allocated and nothing is kept between calls."
-)
-TITLES = {
-    "mbma.h": "the MBMA model in C99, declarations.",
-    "mbma.c": "the MBMA model in C99.",
-    "mbma_table.h": "the numbers of the MBMA model in C99, for mbma.c alone.",
-    "mbma_theories.h": "the calibrated law and Persson's theory in C99, declarations.",
-    "mbma_theories.c": "the calibrated law and Persson's theory in C99, beside mbma.c.",
-    "mbma_theories_table.h": "the numbers of the calibrated law in C99, for mbma_theories.c alone.",
+CORE = ("phi.c", "totals.c", "calibrated.c", "spectrum_laws.c")  # and the headers that they include
+MODEL = {
+    "mbma_model.h": "the MBMA model and the calibrated law of one surface in C11, declarations.",
+    "mbma_model.c": "the MBMA model and the calibrated law of one surface in C11.",
+    "mbma_data.c": "the tables of the MBMA model and of the calibrated law in C11.",
 }
+# what the library is compiled with; roundings do not depend on the compiler
+FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
+USAGE = (
+    f"Compile with cc {' '.join(FLAGS)} -march=native -c {' '.join(CORE)} mbma_model.c mbma_data.c, and link the C "
+    "mathematics library; mbma_model.h has the calls of one surface, mbma.h those of arrays. Every function may be "
+    "called from any thread; nothing is allocated and nothing is kept between calls."
+)
 LICENCE = (
     "SPDX-License-Identifier: BSD-3-Clause",
     "Copyright (c) 2026, mbma_tables contributors",
@@ -62,22 +60,51 @@ CONVENTIONS = (
 )
 
 
+def core_file(name: str) -> str:
+    """The text of a file of the core."""
+    return (importlib.resources.files("mbma_tables.core") / name).read_text(encoding="utf-8")
+
+
+def core_texts() -> dict[str, str]:
+    """The core's own files that exports hold, unchanged: those of `CORE` and all that they include."""
+    texts: dict[str, str] = {}
+    wanted = list(CORE)
+    while wanted:
+        name = wanted.pop()
+        if name not in texts:
+            texts[name] = core_file(name)
+            wanted += re.findall(r'#include "(.*)"', texts[name])
+    return dict(sorted(texts.items()))
+
+
 def c_texts(model: UniversalModel, reading: Reading) -> dict[str, str]:
     """Names and texts of the C sources, the self-test apart."""
     if reading.addition != "sum":
         raise InputError(f"exported code adds the areas of islands: reading {reading.name!r} takes their cover")
-    tables = {
-        "mbma_table.h": numbers_text(*numbers(model, reading)),
-        "mbma_theories_table.h": numbers_text(*theory_numbers(), what="THEORIES_TABLE"),
-    }
+    about = about_model(model, reading) + about_theories()
+    heads = {name: opening(header(f"{name}: {title}", USAGE, about), "/*") for name, title in MODEL.items()}
+    return core_texts() | model_texts(heads) | {"mbma_data.c": f"{heads['mbma_data.c']}\n{data_text(model, reading)}"}
+
+
+def model_texts(heads: dict[str, str]) -> dict[str, str]:
+    """The calls of one surface, under the opening comments of their files."""
+    form, certificates = closed_form_functions.RANGES[FORM], closed_form_functions.CERTIFICATES[FORM]
     prototypes, forms = closed_forms()
-    texts = {}
-    for name, title in TITLES.items():
-        about = about_theories() if name.startswith("mbma_theories") else about_model(model, reading)
-        head = opening(header(f"{name}: {title}", USAGE, about), "/*")
-        parts = {"HEADER": head, "CLOSED_FORMS": forms, "PROTOTYPES": prototypes}
-        texts[name] = f"{head}\n{tables[name]}" if name in tables else filled(name, **parts)
-    return texts
+    parts = {
+        "PROTOTYPES": prototypes,
+        "CLOSED_FORMS": forms,
+        "FORM_X_LOW": repr(form["X"][0]),
+        "FORM_X_HIGH": repr(form["X"][1]),
+        "FORM_MU_HIGH": repr(form["mu"][1]),
+        "FORM_ERROR": repr(max(certificate.largest for certificate in certificates.values())),
+        "MIN_RTOL": repr(MIN_RTOL),
+        "MAX_RTOL": repr(MAX_RTOL),
+        "QUADRATURE_SHARE": repr(QUADRATURE_SHARE),
+        "CALIBRATED_ERROR": repr(calibrated_table.shipped().error),
+        "LAW_ERROR": repr(spectrum_laws.LAW_ERROR),
+        "PERSSON_ERROR": repr(persson.INVERSE_RTOL),
+    }
+    return {name: filled(name, **parts, HEADER=heads[name]) for name in ("mbma_model.h", "mbma_model.c")}
 
 
 class _InC(ast.NodeTransformer):
@@ -109,117 +136,69 @@ def closed_forms() -> tuple[str, str]:
     return "".join(f"{head};\n" for head in heads), "\n".join(definitions)
 
 
-def numbers(model: UniversalModel, reading: Reading) -> tuple[dict[str, int | float], dict[str, FloatArray]]:
-    """Constants and arrays of the model by their names in C, from the modules that use them here, in one list."""
-    table = model.kernel
-    form, certificates = closed_form_functions.RANGES[FORM], closed_form_functions.CERTIFICATES[FORM]
-    constants: dict[str, int | float] = {
-        "OFFSET": int(reading.offset),
-        "SUMMITS": int(reading.summit_sigma),
-        "PRINTED_JACOBIAN": int(reading.jacobian == "printed"),
-        "MAX_INTERVALS": intervals.MAX_INTERVALS,
-        "PI": math.pi,
-        **{name: getattr(universal_kernel, name) for name in RECORD_NAMES},
-        "BUCKET_BITS": BUCKET_BITS,
-        "FIRST_BUCKET": table.first_bucket,
-        "BUCKETS": table.buckets,
-        "X_LOW": table.X_low,
-        "X_HIGH": table.X_high,
-        "X_RATE": table.X_rate,
-        "MU_HIGH": table.mu_high,
-        "RADIUS": spectrum.RADIUS,
-        "BROADENING": spectrum.BROADENING,
-        "DIVISOR": reading.density_divisor,
-        "BETA": reading.beta,
-        "PHI": reading.phi,
-        "FLOOR_D": reading.floor_d,
-        "FLOOR_U": reading.floor_u,
-        "MIN_ZETA_1": max(MIN_ZETA_1, reading.floor_u),
-        "MAX_ZETA_1": MAX_ZETA_1,
-        "MIN_APPROACH": 1e-140,  # squares of what is of its order do not underflow
-        "STRETCH": kernel.STRETCH,
-        "NARROW": intervals.NARROW,
-        "SAFETY": intervals.safety_of(reading.floor_d),
-        "QUADRATURE_SHARE": island_sum.QUADRATURE_SHARE,
-        "FORMULA_X_LOW": form["X"][0],
-        "FORMULA_X_HIGH": form["X"][1],
-        "FORMULA_MU_HIGH": form["mu"][1],
-        "FORMULA_ERROR": max(certificate.largest for certificate in certificates.values()),
-        "MIN_RTOL": MIN_RTOL,
-        "MAX_RTOL": MAX_RTOL,
+def tables(model: UniversalModel) -> dict[str, Any]:
+    """The arrays of the tables by their names in C."""
+    cells, places, _ = model.cells
+    spline, *_ = calibrated_table.shipped().core_table
+    return {"MBMA_CELLS": cells.reshape(-1, RECORD), "MBMA_PLACES": places, "MBMA_SPLINE": spline}
+
+
+def data_text(model: UniversalModel, reading: Reading, later: bool = False) -> str:
+    """The tables, and the reading of the equations; with `later` as variables, for a program to fill in."""
+    lines, law = ['#include "mbma_model.h"'], calibrated_table.shipped()
+    for (name, values), kind in zip(tables(model).items(), ("mbma_cell", "int32_t", "float"), strict=True):
+        head, body = f"{kind} {name}[{len(values)}]", _cells if kind == "mbma_cell" else _items
+        lines += ["", f"{head};"] if later else ["", f"static const {head} = {{", *body(values), "};"]
+    X, buckets, flags = model.cells[2][:4], model.cells[2][4:].astype(int), reading.numbers[5:].astype(int)
+    spline = "MBMA_SPLINE", law.cells, law.first, 1 / law.step, law.covered[:2, 0], law.covered[:2, 1]
+    theories = [np.array(dataclasses.astuple(constants)) for constants in (YANG_PERSSON, law.constants)]
+    values = {
+        "mbma_cells CELLS": _braces("MBMA_CELLS", "MBMA_PLACES", *_numbers(X), *_numbers(buckets)),
+        "mbma_calibrated_table LAW": _braces(_braces(*spline), *_numbers(theories[1][:3])),
+        "mbma_law_constants THEORIES[]": _braces(*theories),
+        "mbma_variant MBMA_READING": _braces(*_numbers(reading.numbers[:5]), *_numbers(flags)),
     }
-    arrays = {
-        "NODES_21": gauss_kronrod.NODES_21,
-        "KRONROD_21": gauss_kronrod.KRONROD_21,
-        "GAUSS_21": gauss_kronrod.GAUSS_21,
-        "NODES_31": gauss_kronrod.NODES_31,
-        "KRONROD_31": gauss_kronrod.KRONROD_31,
-        "GAUSS_31": gauss_kronrod.GAUSS_31,
-        # whole numbers, as all arrays are of doubles
-        "PLACES": table.places.astype(float),
-        "RECORDS": table.records.reshape(-1, universal_kernel.RECORD),
-    }
-    return constants, arrays
+    held = (f"{'' if later and 'MBMA' in name else 'static const '}{name} = {text};" for name, text in values.items())
+    lines += [
+        "",
+        *held,
+        "",
+        "const mbma_cells *mbma_table(void) { return &CELLS; }",
+        "const mbma_calibrated_table *mbma_law_table(void) { return &LAW; }",
+        "const mbma_variant *mbma_reading(void) { return &MBMA_READING; }",
+        "const mbma_law_constants *mbma_theory(int theory) { return &THEORIES[theory == MBMA_CALIBRATED]; }",
+    ]
+    return "\n".join([*lines, ""])
 
 
-def theory_numbers() -> tuple[dict[str, int | float], dict[str, FloatArray]]:
-    """The same of mbma_theories.c: the calibrated law with its table, and Persson's."""
-    table = calibrated_table.shipped()
-    spline = table.coefficients
-    rules = [np.polynomial.legendre.leggauss(count) for count in (2, 4, 6, 10)]
-    constants: dict[str, int | float] = {"PI": math.pi, "MIN_ZETA_1": MIN_ZETA_1, "MAX_ZETA_1": MAX_ZETA_1}
-    for k, name in enumerate(("HURST", "ZETA", "U")):
-        constants |= {
-            f"NODES_{name}": spline.shape[k] - 4,
-            f"COLUMNS_{name}": spline.shape[k],
-            f"{name}_START": table.first[k],
-            f"{name}_RATE": 1 / table.step[k],
-            f"{name}_LOW": table.covered[k, 0],
-            f"{name}_HIGH": table.covered[k, 1],
-        }
-    constants |= {name.upper(): value for name, value in vars(table.constants).items()}
-    constants |= {
-        "NARROWNESS": calibrated.NARROWNESS,
-        "PERSSON_GAMMA": persson.GAMMA,
-        "CALIBRATED_ERROR": table.error,
-        "PERSSON_ERROR": persson.INVERSE_RTOL,
-        "LAW_ERROR": spectrum_laws.LAW_ERROR,
-        "MAX_LOG_FORCE": -persson.MIN_LOG_FORCE,
-        "GRADED": 36,
-    }
-    padded = [np.stack([np.pad(part, (0, 10 - part.size)) for part in column]) for column in zip(*rules, strict=True)]
-    arrays = {"GAUSS_NODES": padded[0], "GAUSS_WEIGHTS": padded[1], "SPLINE": np.ravel(spline)}
-    return constants, arrays
+def _braces(*parts: Any) -> str:
+    """An initialiser of texts and arrays."""
+    texts = (part if isinstance(part, str) else _braces(*_numbers(part)) for part in parts)
+    return f"{{{', '.join(texts)}}}"
 
 
-def numbers_text(
-    constants: dict[str, int | float], arrays: dict[str, FloatArray], later: tuple[str, ...] = (), what: str = "TABLE"
-) -> str:
-    """The numbers as macros and constant arrays; those named in `later` as variables, for a program to fill in."""
-    lines = [f"#ifndef MBMA_{what}_H", f"#define MBMA_{what}_H", ""]
-    for name, value in constants.items():
-        text = value if isinstance(value, int) else f"({float(value)!r})"
-        lines.append(f"double MBMA_{name};" if name in later else f"#define MBMA_{name} {text}")
-    for name, values in arrays.items():
-        kind = "float" if values.dtype == np.float32 else "double"
-        what = f"{kind} MBMA_{name}{''.join(f'[{extent}]' for extent in values.shape)}"
-        lines += [
-            "",
-            *([f"{what};"] if name in later else [f"static const {what} = {{", *_initializer(values, "  "), "};"]),
-        ]
-    return "\n".join([*lines, "", "#endif", ""])
+def _numbers(values: Any) -> list[str]:
+    """Numbers in the shortest decimals of their precision."""
+    flat = np.ravel(values)
+    return [f"{text}f" for text in flat.astype(str)] if flat.dtype == np.float32 else flat.astype(str).tolist()
 
 
-def _initializer(values: FloatArray, indent: str) -> Iterator[str]:
-    if values.ndim == 1:
-        # in the shortest decimals of its precision
-        text = ", ".join(values.astype(str).tolist())
-        yield from textwrap.wrap(text, 120, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
-        return
-    for row in values:
-        yield f"{indent}{{"
-        yield from _initializer(row, indent + "  ")
-        yield f"{indent}}},"
+def _wrapped(items: Sequence[str], first: str = "", last: str = "") -> list[str]:
+    text = f"{first}{', '.join(items)}{last}"
+    return textwrap.wrap(text, 120, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False)
+
+
+def _items(values: Any) -> list[str]:
+    """Initialisers of numbers."""
+    return _wrapped(_numbers(values))
+
+
+def _cells(cells: FloatArray) -> Iterator[str]:
+    """Initialisers of mbma_cell."""
+    for cell in cells:
+        yield from _wrapped(_numbers(cell[:8]), "{", ",")
+        for name, powers in zip("FA", cell[8:].reshape(2, 8, 8), strict=True):
+            yield from _wrapped([_braces(*_numbers(row)) for row in powers], "{", "}," if name == "F" else "}},")
 
 
 def header(title: str, usage: str, about: list[str]) -> list[str]:

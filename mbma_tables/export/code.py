@@ -1,4 +1,4 @@
-"""The whole model as source code: C99, and Fortran and JavaScript over the same C; written, built and replayed."""
+"""The whole model as source code: the core's C, and Fortran and JavaScript over it; written, built and replayed."""
 
 from __future__ import annotations
 
@@ -7,30 +7,25 @@ import dataclasses
 import importlib.util
 import os
 import pathlib
-import re
 import shutil
 import subprocess
 import sys
 import tempfile
-import textwrap
 from collections.abc import Iterable
 from typing import NamedTuple
 
 from mbma_tables.errors import InputError
 from mbma_tables.export import CODE, c_code
 from mbma_tables.export.conformance import KINDS, POINTS_FILE, points_text
-from mbma_tables.export.text import filled, opening, wrapped
+from mbma_tables.export.interfaces import Declared, fortran_interface, javascript_interface
+from mbma_tables.export.text import filled, opening
 from mbma_tables.files import write_file
 from mbma_tables.models.tables import open_table
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.readings import Reading, get_reading
 
 TIMEOUT = 300.0  # seconds, of a build or a replay
-WASM_FUNCTIONS = (
-    *("mbma_phi", "mbma_phi_slopes", "mbma_formula", "mbma_island_geometry", "mbma_total", "mbma_total_slopes"),
-    *("mbma_calibrated", "mbma_calibrated_slopes", "mbma_calibrated_separation"),
-)
-ZIG = ("-m", "ziglang", "cc", "-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-O2", "-s")
+ZIG = ("-m", "ziglang", "cc", "-target", "wasm32-wasi", "-mexec-model=reactor", *c_code.FLAGS, "-s")
 
 
 class Language(NamedTuple):
@@ -45,32 +40,31 @@ class Language(NamedTuple):
     run: tuple[str, ...]
 
 
-SOURCES = ("mbma", "mbma_theories", "mbma_selftest")
+SOURCES = (*c_code.CORE, "mbma_model.c", "mbma_data.c", "mbma_selftest.c")
+IN_PLACE = tuple(f"{{0}}/{name}" for name in SOURCES)
 C_SELFTEST = {"mbma_selftest.c": "replays the conformance points of the MBMA model."}
 LANGUAGES = {
     "c": Language(
-        C_SELFTEST,
-        c_code.USAGE,
-        ("cc", "-std=c99", "-O2", *(f"{{0}}/{name}.c" for name in SOURCES), "-lm", "-o", "selftest"),
-        ("{1}/selftest",),
+        C_SELFTEST, c_code.USAGE, ("cc", *c_code.FLAGS, *IN_PLACE, "-lm", "-o", "selftest"), ("{1}/selftest",)
     ),
     "fortran": Language(
         {
-            "mbma.f90": "the MBMA model for Fortran 2008, an interface to mbma.c.",
+            "mbma.f90": "the MBMA model for Fortran 2008, an interface to the C files.",
             "mbma_selftest.f90": "what mbma_selftest.c replays, in Fortran 2008.",
         }
         | C_SELFTEST,
-        "Compile it with the C, in this order: gfortran -O2 mbma.c mbma_theories.c mbma.f90 program.f90. Every "
-        "procedure may be called from any thread.",
+        "Compile it with the C files but mbma_selftest.c, which these flags are for: gfortran "
+        f"{' '.join(c_code.FLAGS[1:])} {' '.join(SOURCES[:-1])} mbma.f90 program.f90. Every procedure may be called "
+        "from any thread.",
         (
-            *("gfortran", "-O2", "-DMBMA_OTHER_REPLAY", *(f"{{0}}/{name}.c" for name in SOURCES)),
+            *("gfortran", *c_code.FLAGS[1:], "-DMBMA_OTHER_REPLAY", *IN_PLACE),
             *("{0}/mbma.f90", "{0}/mbma_selftest.f90", "-o", "selftest"),
         ),
         ("{1}/selftest",),
     ),
     "javascript": Language(
         {
-            "mbma.mjs": "the MBMA model for JavaScript, mbma.c and mbma_theories.c as WebAssembly.",
+            "mbma.mjs": "the MBMA model for JavaScript, its C files as WebAssembly.",
             "mbma_selftest.mjs": "replays the conformance points of the MBMA model in JavaScript.",
         },
         "import { total, totalSlopes, calibrated, phi } from './mbma.mjs', in any browser since 2021 "
@@ -93,7 +87,7 @@ def write_code(
     Parameters
     ----------
     target : {"c", "fortran", "javascript"}
-        C99, which C++ compiles too; a Fortran 2008 module over that C; or an ECMAScript module with that C in it as
+        C11, which C++ compiles too; a Fortran 2008 module over that C; or an ECMAScript module with that C in it as
         WebAssembly, which the package ziglang compiles.
     folder : path
         Where the files go; it is made where it is missing. Files of the same names are replaced.
@@ -118,8 +112,8 @@ def write_code(
     Examples
     --------
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     [path.name for path in write_code("c", folder) if path.suffix == ".c"]
-    ['mbma.c', 'mbma_theories.c', 'mbma_selftest.c']
+    ...     [path.name for path in write_code("c", folder) if path.name.startswith("mbma_")]
+    ['mbma_model.h', 'mbma_model.c', 'mbma_data.c', 'mbma_selftest.c', 'mbma_conformance.csv']
     """
     if target not in CODE:
         raise InputError(f"target must be one of {CODE}, got {target!r}")
@@ -139,53 +133,20 @@ def source_texts(target: str, model: UniversalModel, reading: Reading) -> dict[s
     c_texts = c_code.c_texts(model, reading)
     texts = {} if target == "javascript" else c_texts
     about = c_code.about_model(model, reading) + c_code.about_theories()
+    declarations = c_texts["mbma.h"] + c_texts["mbma_model.h"]
     for name, title in language.titles.items():
         lines = c_code.header(f"{name}: {title}", language.usage, about)
         parts = {"HEADER": opening(lines, "!" if name.endswith(".f90") else "/*")}
         if name == "mbma.f90":
-            parts |= fortran_interface(c_texts["mbma.h"] + c_texts["mbma_theories.h"])
+            parts |= fortran_interface(declarations)
         if name == "mbma.mjs":
-            parts["WASM"] = base64.encodebytes(web_assembly(c_texts, WASM_FUNCTIONS)).decode("ascii")
+            parts |= javascript_interface(declarations)
+            parts["WASM"] = base64.encodebytes(web_assembly(c_texts, Declared(declarations).calls)).decode("ascii")
         texts[name] = filled(name, **parts)
     return texts
 
 
-def fortran_interface(declarations: str) -> dict[str, str]:
-    """What C headers declare for Fortran: numbers of a status, structures of doubles, functions that take no others."""
-    types: dict[str, list[str]] = {}
-    functions: dict[str, list[str]] = {}
-    for paragraph in declarations.split("\n\n"):
-        note, _, code = paragraph.removeprefix("/* ").partition(" */\n")
-        lines = [f"! {line}" for line in textwrap.wrap(" ".join(note.split()), 110)]
-        struct = re.fullmatch(r"typedef struct \{\s*double ([^;[]*);\s*\} (\w+);", code)
-        call = re.fullmatch(r"int (\w+)\((.*)\);", " ".join(code.split()))
-        if struct:
-            fields, name = struct.groups()
-            types[name] = [*lines, f"type, bind(c), public :: {name}", f"  real(c_double) :: {fields}", "end type", ""]
-        elif call:
-            arguments = re.findall(r"(const )?(\w+) (\*?)(\w+)(?:, |$)", call[2])
-            kinds = {kind for _, kind, _, _ in arguments}
-            if not kinds <= {"double", *types}:
-                continue
-            names = ", ".join(name for *_, name in arguments)
-            lines += [f"function {call[1]}({names}) bind(c) result(status)"]
-            lines += [f"  import :: {', '.join(sorted(kinds - {'double'} | {'c_double', 'c_int'}))}"]
-            for const, kind, pointer, name in arguments:
-                passed = "value" if not pointer else "intent(in)" if const else "intent(out)"
-                lines += [f"  {'real(c_double)' if kind == 'double' else f'type({kind})'}, {passed} :: {name}"]
-            functions[call[1]] = [*lines, "  integer(c_int) :: status", "end function", ""]
-    status = re.findall(r"(MBMA_\w+) = (\d+),? +/\* (.*?) \*/", declarations)
-    return {
-        "NAMES": wrapped(functions, indent="    ", end=" &"),
-        "STATUS": "\n".join(
-            f"  integer(c_int), parameter, public :: {name} = {k}  ! {what}" for name, k, what in status
-        ),
-        "TYPES": textwrap.indent("\n".join(line for lines in types.values() for line in lines), "  "),
-        "FUNCTIONS": textwrap.indent("\n".join(line for lines in functions.values() for line in lines), "    "),
-    }
-
-
-def web_assembly(c_texts: dict[str, str], names: Iterable[str]) -> bytes:
+def web_assembly(c_texts: dict[str, str], names: Iterable[str], *options: str) -> bytes:
     """C sources compiled to WebAssembly, with the functions and variables that it exports."""
     if importlib.util.find_spec("ziglang") is None:
         raise InputError(
@@ -197,7 +158,7 @@ def web_assembly(c_texts: dict[str, str], names: Iterable[str]) -> bytes:
             write_file(pathlib.Path(work, name), text.encode())
         sources = [name for name in c_texts if name.endswith(".c")]
         exports = [f"-Wl,--export={name}" for name in names]
-        done = _run([sys.executable, *ZIG, *exports, *sources, "-o", "mbma.wasm"], work)
+        done = _run([sys.executable, *ZIG, *options, *exports, *sources, "-o", "mbma.wasm"], work)
         if done.returncode:
             raise InputError(f"ziglang did not compile {' '.join(sources)}: {done.stderr.strip()[:500]}")
         return pathlib.Path(work, "mbma.wasm").read_bytes()

@@ -16,7 +16,6 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.export.c_code import FORM
 from mbma_tables.export.text import comment
 from mbma_tables.islands.geometry import FIELDS, geometry
-from mbma_tables.models import universal_kernel
 from mbma_tables.models.closed_form_functions import RANGES
 from mbma_tables.models.closed_forms import FUNCTIONS
 from mbma_tables.models.universal import UniversalModel
@@ -29,7 +28,7 @@ POINTS_FILE = "mbma_conformance.csv"
 BY = ("separation", "hurst", "q0", "q1", "h_rms", "h_max")
 KINDS = {
     "phi": "X, mu; phi_F, phi_A, the bound on their error",
-    "slopes": "X, mu; phi_F by X, phi_A by X, phi_F by mu, phi_A by mu, relative to themselves or |phi/argument|",
+    "slopes": "X, mu; phi_F by X, phi_F by mu, phi_A by X, phi_A by mu, relative to themselves or |phi/argument|",
     "geometry": f"approach, hurst, zeta_1; {', '.join(FIELDS)}",
     "total": "hurst, q0, q1, h_rms, h_max, separation, E_star, rtol; force, area, stiffness",
     "total_by": f"the same; derivatives of force, then of area, by {', '.join(BY)}",
@@ -39,7 +38,7 @@ KINDS = {
     "calibrated_by": "the same; derivatives of force, then of area, by mean separation, hurst, q0, q1, h_rms, h_max",
 }
 TOLERANCE, SLOPE_TOLERANCE = 1e-11, 1e-8
-INVALID = 5  # the exported code refuses by status what the library refuses by an error
+OK, X_BELOW, X_ABOVE, MU_ABOVE, INVALID = 0, 1, 2, 3, 5  # of mbma.h
 SURFACES = (
     # hurst, q0, q1, h_rms, h_max
     (0.8, 1.0, 1e2, 1.0, 3.5),
@@ -68,10 +67,10 @@ def phi_rows(model: UniversalModel, X: FloatArray, mu: FloatArray) -> Iterator[s
     answer = model.answer(X, mu)
     values = np.stack([answer.phi_F, answer.phi_A, answer.error])
     _, by_X, by_mu = model.slopes(X, mu)
-    slopes = np.stack([by_X.phi_F, by_X.phi_A, by_mu.phi_F, by_mu.phi_A])
+    slopes = np.stack([by_X.phi_F, by_mu.phi_F, by_X.phi_A, by_mu.phi_A])
     # where a derivative changes sign there is nothing to be relative to but the value over the argument
-    natural = np.abs(np.stack([values[0], values[1], values[0], values[1]]) / np.maximum([X, X, mu, mu], 1e-300))
-    scales = np.maximum(np.abs(slopes), np.where(np.stack([X, X, mu, mu]) > 0, natural, 0.0))
+    natural = np.abs(values[[0, 0, 1, 1]] / np.maximum([X, mu, X, mu], 1e-300))
+    scales = np.maximum(np.abs(slopes), np.where(np.stack([X, mu, X, mu]) > 0, natural, 0.0))
     for k in range(X.size):
         yield row("phi", (X[k], mu[k]), values[:, k], np.abs(values[:, k]))
         yield row("slopes", (X[k], mu[k]), slopes[:, k], scales[:, k])
@@ -131,13 +130,13 @@ def status_rows(model: UniversalModel) -> Iterator[str]:
     X, mu = model.content.axes
     middle = 0.5 * (X.low + X.high)
     for place, status in (
-        ((X.low, 1.0), universal_kernel.OK),
-        ((X.high, 1.0), universal_kernel.OK),
-        ((middle, mu.high), universal_kernel.OK),
-        ((middle, 0.0), universal_kernel.OK),
-        ((np.nextafter(X.low, -np.inf), 1.0), universal_kernel.X_BELOW),
-        ((np.nextafter(X.high, np.inf), 1.0), universal_kernel.X_ABOVE),
-        ((middle, np.nextafter(mu.high, np.inf)), universal_kernel.MU_ABOVE),
+        ((X.low, 1.0), OK),
+        ((X.high, 1.0), OK),
+        ((middle, mu.high), OK),
+        ((middle, 0.0), OK),
+        ((np.nextafter(X.low, -np.inf), 1.0), X_BELOW),
+        ((np.nextafter(X.high, np.inf), 1.0), X_ABOVE),
+        ((middle, np.nextafter(mu.high, np.inf)), MU_ABOVE),
         ((math.nan, 1.0), INVALID),
         ((middle, math.nan), INVALID),
         ((middle, -1e-300), INVALID),

@@ -18,11 +18,10 @@ from typing import Any
 import numpy as np
 
 from mbma_tables import __version__
-from mbma_tables.arguments import FloatArray, number_in, positive_modulus
+from mbma_tables.arguments import number_in, positive_modulus
 from mbma_tables.errors import InputError
 from mbma_tables.export import c_code
 from mbma_tables.export.code import web_assembly
-from mbma_tables.export.text import filled
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
@@ -36,11 +35,10 @@ MODULE = "explorer.wasm"
 THEORIES = ("mbma", "calibrated", "persson")
 SHOWN_READINGS = (REPORTED, PRINTED, FITTED)
 FUNCTIONS = (
-    *("mbma_total", "mbma_message", "mbma_calibrated", "mbma_persson_separation"),
-    *("mbma_law_of_surface", "mbma_law_of_spectrum", "mbma_law_contact"),
+    *("mbma_total_of", "mbma_calibrated_of", "mbma_message", "mbma_spectrum_of", "mbma_surface_spectrum_of"),
+    *("mbma_spectrum_contact_of", "mbma_spectrum_separation_of"),
 )
 SCRIPTS = ("model.js", "state.js", "curves.js", "downloads.js", "charts.js", "main.js")
-SWITCHES = ("OFFSET", "SUMMITS", "PRINTED_JACOBIAN")  # whole numbers that depend on the reading
 FEW = 1000  # numbers up to which they stay doubles
 FRACTION_BITS, ORDER = 43, 3  # of packed tables: steps of 1e-13; times that differences are taken
 MAX_EXACT, MAX_WHOLE = 2**53, 2.0**16  # of whole numbers in the page, and of numbers before they are scaled
@@ -55,32 +53,18 @@ def page_file(name: str) -> bytes:
     return (importlib.resources.files("mbma_tables.export") / "page" / name).read_bytes()
 
 
-def c_sources() -> tuple[dict[str, str], dict[str, FloatArray]]:
-    """The C of the page by file, and the numbers and tables that are variables in it by name."""
-    prototypes, forms = c_code.closed_forms()
-    texts = {
-        name: filled(name, HEADER="", PROTOTYPES=prototypes, CLOSED_FORMS=forms)
-        for name in ("mbma.h", "mbma.c", "mbma_theories.h", "mbma_theories.c")
-    }
-    values: dict[str, FloatArray] = {}
-    for what, (constants, arrays), fixed in (
-        ("TABLE", c_code.numbers(universal_model(), REPORTED), ()),
-        ("THEORIES_TABLE", c_code.theory_numbers(), ("PI", "MIN_ZETA_1", "MAX_ZETA_1")),
-    ):
-        own = {
-            name: np.asarray(value, float)
-            for name, value in constants.items()
-            if name not in fixed and (isinstance(value, float) or name in SWITCHES)
-        } | arrays
-        texts[f"mbma_{what.lower()}.h"] = c_code.numbers_text(constants, arrays, tuple(own), what)
-        values |= own
-    return texts, values
+def c_sources() -> tuple[dict[str, str], dict[str, Any]]:
+    """The C of the page by file, and the tables that are variables in it by name."""
+    model, heads = universal_model(), dict.fromkeys(c_code.MODEL, "")
+    data = {"mbma_data.c": c_code.data_text(model, REPORTED, later=True)}
+    return c_code.core_texts() | c_code.model_texts(heads) | data, c_code.tables(model)
 
 
 def compiled(texts: dict[str, str], names: list[str]) -> bytes:
     """The module, with the digest of what it was compiled from in a section of its own at the end."""
     section = b"\x06digest" + digest_of(texts)
-    module = web_assembly(texts, [*FUNCTIONS, *(f"MBMA_{name}" for name in names)])
+    # two numbers at a time, which browsers have learned by 2023
+    module = web_assembly(texts, [*FUNCTIONS, "MBMA_READING", *names], "-msimd128")
     return module + bytes([0, len(section)]) + section
 
 
@@ -89,7 +73,7 @@ def digest_of(texts: dict[str, str]) -> bytes:
     return hashlib.sha256(json.dumps(texts, sort_keys=True).encode()).digest()
 
 
-def packed(values: FloatArray) -> dict[str, Any]:
+def packed(values: Any) -> dict[str, Any]:
     """Numbers as text: whole multiples of 2^-43, differenced, zigzag, by planes of bytes, deflated; or doubles."""
     flat = np.ravel(values).astype(float)
     largest = np.abs(flat).max()
@@ -102,24 +86,20 @@ def packed(values: FloatArray) -> dict[str, Any]:
     doubles |= int(zigzag.max()) >= MAX_EXACT
     planes = np.ascontiguousarray((flat if doubles else zigzag).view(np.uint8).reshape(-1, 8).T[: 8 if doubles else 7])
     text = base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
-    differences, single = 0 if doubles else ORDER, values.dtype == np.float32
-    return {"count": flat.size, "single": single, "differences": differences, "bits": FRACTION_BITS, "text": text}
+    differences = 0 if doubles else ORDER
+    kind = {"float32": "Float32Array", "int32": "Int32Array"}.get(values.dtype.name, "Float64Array")
+    return {"count": flat.size, "kind": kind, "differences": differences, "bits": FRACTION_BITS, "text": text}
 
 
-def _model(texts: dict[str, str], values: dict[str, FloatArray]) -> dict[str, Any]:
+def _model(values: dict[str, Any]) -> dict[str, Any]:
     """The compiled module and everything that it is filled with."""
-    universal = universal_model()
-    base = {name: float(value) for name, value in values.items() if value.ndim == 0}
-    readings = {}
-    for reading in SHOWN_READINGS:
-        constants, _ = c_code.numbers(universal, reading)
-        changed = {name: float(constants[name]) for name in base if constants.get(name, base[name]) != base[name]}
-        readings[reading.name] = {"changed": changed, "cover": reading.addition == "cover"}
     return {
         "module": base64.b64encode(page_file(MODULE)).decode("ascii"),
-        "numbers": base,
-        "tables": {name: packed(value) for name, value in values.items() if value.ndim},
-        "readings": readings,
+        "tables": {name: packed(value) for name, value in values.items()},
+        "readings": {
+            reading.name: {"numbers": reading.numbers.tolist(), "cover": reading.addition == "cover"}
+            for reading in SHOWN_READINGS
+        },
     }
 
 
@@ -216,7 +196,6 @@ def explorer_page(
     modulus = 1.0 if E_star is None else number_in("E_star", float(positive_modulus(E_star)), 1e-300, 1e300)
     units = Units(surface.unit, "1" if E_star is None else stress_unit)
     start = _start(surface) | {"E_star": modulus, "k_s": 1.0, "theory": theory, "reading": get_reading(reading).name}
-    texts, values = c_sources()
     data = {
         "version": __version__,
         "title": title,
@@ -225,7 +204,7 @@ def explorer_page(
         "departures": list(surface.departures()),
         "note": MAP_NOTE if isinstance(surface, MeasuredSurface) and surface.bearing is not None else "",
         "limits": _limits(),
-        "model": _model(texts, values),
+        "model": _model(c_code.tables(universal_model())),
     }
     # a script of data ends at nothing but its own tag
     text = json.dumps(data).replace("<", "\\u003c")

@@ -8,6 +8,7 @@ import shutil
 
 import pytest
 
+import mbma_tables.core
 from mbma_tables import InputError, __version__
 from mbma_tables.export import CODE, code, conformance
 from mbma_tables.export.code import Replay, check, write_code
@@ -27,40 +28,42 @@ def test_every_file_says_what_it_is(target: str, tmp_path: pathlib.Path) -> None
     written = write_code(target, tmp_path / "code", reading="printed")
     assert sorted(written) == sorted((tmp_path / "code").iterdir())
     largest = max(attributes["largest_error_F"], attributes["largest_error_A"])
+    core = pathlib.Path(mbma_tables.core.__file__).parent
+    of_all = (f"mbma_tables {__version__}", "force is per nominal area", "BSD-3-Clause", "Reading: printed")
+    of_tables = ("-6.25 <= X <= 41", f"{largest:.2g} on", "zeta_1 in [3, 1e+05]", "of the table against the law")
     for path in written:
+        if (core / path.name).is_file():
+            assert path.read_bytes() == (core / path.name).read_bytes()
+            continue
         text = path.read_text(encoding="utf-8")
         assert not re.search("@[A-Z_]+@", text)
         # the opening comment without its marks
-        head = " ".join(word for word in text[:4000].split() if word not in ("*", "!", "#"))
-        of_all = (path.name, f"mbma_tables {__version__}", "force is per nominal area", "BSD-3-Clause")
-        if path.name.startswith("mbma_theories"):
-            for fact in (*of_all, "zeta_1 in [3, 1e+05]", "Largest relative error of the table against the law"):
-                assert fact in head, fact
-            continue
+        head = " ".join(word for word in text[:5000].split() if word not in ("*", "!", "#"))
         assert attributes["values_sha256"] in head
-        if path.suffix == ".csv":
-            continue
-        for fact in (
-            *of_all,
-            "Reading: printed",
-            "-6.25 <= X <= 41",
-            f"{largest:.2g} on",
-        ):
+        for fact in (path.name, *of_all, *of_tables) if path.suffix != ".csv" else ():
             assert fact in head, fact
+
+
+def test_headers_of_the_core_come_with_their_sources(tmp_path: pathlib.Path) -> None:
+    written = {path.name for path in write_code("c", tmp_path)}
+    included = {name for path in tmp_path.glob("*.[ch]") for name in re.findall(r'#include "(.*)"', path.read_text())}
+    assert included | set(code.SOURCES) | {"mbma_conformance.csv"} == written
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="cc is not installed")
 def test_a_wrong_number_is_seen(tmp_path: pathlib.Path) -> None:
     write_code("c", tmp_path)
-    table = tmp_path / "mbma_table.h"
+    table = tmp_path / "mbma_data.c"
     text = table.read_text(encoding="utf-8")
-    assert text.count("#define MBMA_PHI (0.05)") == 1
-    table.write_text(text.replace("MBMA_PHI (0.05)", "MBMA_PHI (0.0500000001)"), encoding="utf-8")
+    before, reading = text.split("mbma_variant MBMA_READING")
+    assert reading.count(", 0.05, ") == 1
+    changed = reading.replace(", 0.05, ", ", 0.0500000001, ")
+    table.write_text(f"{before}mbma_variant MBMA_READING{changed}", encoding="utf-8")
     found = check("c", tmp_path)
     assert found.failed > 0
     assert "tolerance" in found.reason
     assert 1e-11 < found.largest["geometry"] < 1e-7
-    (tmp_path / "mbma.c").write_text("int broken\n", encoding="utf-8")
+    (tmp_path / "phi.c").write_text("int broken\n", encoding="utf-8")
     assert "did not compile" in check("c", tmp_path).reason
 
 

@@ -5,7 +5,7 @@ const LIMITS = DATA.limits;
 const OK = 0,
   OUTSIDE = 6; // as in mbma.h
 const RTOL = 1e-11; // asked of MBMA's totals
-const LAW_BYTES = 1 << 19; // room for an mbma_law
+const LAW_BYTES = 1 << 21; // room for an mbma_spectrum
 
 function bytesOf(text) {
   const letters = atob(text),
@@ -41,7 +41,6 @@ const tables = await Promise.all(
 );
 const C = (await WebAssembly.instantiate(bytesOf(DATA.model.module))).instance.exports;
 C._initialize();
-const at = (name) => C[`MBMA_${name}`].value;
 // memory that the module does not use: two laws, arguments, answers, a spectrum
 const OWN = 65536 * C.memory.grow(Math.ceil((2 * LAW_BYTES + 2048 + 16 * LIMITS.max_samples) / 65536));
 const LAWS = { persson: OWN, calibrated: OWN + LAW_BYTES };
@@ -50,20 +49,17 @@ const ARGUMENTS = OWN + 2 * LAW_BYTES,
   SAMPLES = ANSWER + 1024;
 const numbersAt = (place, count) => new Float64Array(C.memory.buffer, place, count);
 for (const [name, values] of tables) {
-  const kind = DATA.model.tables[name].single ? Float32Array : Float64Array;
-  new kind(C.memory.buffer, at(name), values.length).set(values);
+  const kind = { Float32Array, Float64Array, Int32Array }[DATA.model.tables[name].kind];
+  new kind(C.memory.buffer, C[name].value, values.length).set(values);
 }
-for (const [name, value] of Object.entries(DATA.model.numbers)) numbersAt(at(name), 1)[0] = value;
 
 // One surface, reading and modulus as functions of the mean separation, by theory.
 function prepare(state) {
   const surface = ["hurst", "q0", "q1", "h_rms", "h_max"].map((name) => state[name]);
   const reading = DATA.model.readings[state.reading];
-  for (const { changed } of Object.values(DATA.model.readings)) {
-    for (const name of Object.keys(changed)) {
-      numbersAt(at(name), 1)[0] = reading.changed[name] ?? DATA.model.numbers[name];
-    }
-  }
+  // mbma_variant: five numbers and three flags
+  numbersAt(C.MBMA_READING.value, 5).set(reading.numbers.slice(0, 5));
+  new Int32Array(C.memory.buffer, C.MBMA_READING.value + 40, 3).set(reading.numbers.slice(5));
   numbersAt(ARGUMENTS, 5).set(surface);
   const samples = state.samples;
   if (samples) {
@@ -75,8 +71,8 @@ function prepare(state) {
     const number = theory === "persson" ? 0 : 1,
       count = samples?.q.length;
     held[theory] ??= samples
-      ? C.mbma_law_of_spectrum(count, SAMPLES, SAMPLES + 8 * count, state.h_max, number, LAWS[theory])
-      : C.mbma_law_of_surface(ARGUMENTS, number, LAWS[theory]);
+      ? C.mbma_spectrum_of(count, SAMPLES, SAMPLES + 8 * count, state.h_max, number, LAWS[theory])
+      : C.mbma_surface_spectrum_of(ARGUMENTS, number, LAWS[theory]);
     return held[theory];
   };
   let fault = OK;
@@ -88,21 +84,21 @@ function prepare(state) {
     const [force, area, stiffness] = numbersAt(ANSWER, 3);
     return { force, area, stiffness };
   };
-  const byLaw = (theory, u) => answer(law(theory) || C.mbma_law_contact(LAWS[theory], u, state.E_star, ANSWER));
+  const byLaw = (theory, u) => answer(law(theory) || C.mbma_spectrum_contact_of(LAWS[theory], u, state.E_star, ANSWER));
   return {
     mbma(u) {
-      const found = answer(C.mbma_total(ARGUMENTS, 2 * u - state.h_max, state.E_star, RTOL, ANSWER));
+      const found = answer(C.mbma_total_of(ARGUMENTS, 2 * u - state.h_max, state.E_star, RTOL, ANSWER));
       if (found && reading.cover) found.area = -Math.expm1(-found.area);
       return found;
     },
     calibrated(u) {
-      const status = samples ? OUTSIDE : C.mbma_calibrated(ARGUMENTS, u, state.E_star, ANSWER);
+      const status = samples ? OUTSIDE : C.mbma_calibrated_of(ARGUMENTS, u, state.E_star, ANSWER);
       return status === OUTSIDE ? byLaw("calibrated", u) : answer(status);
     },
     persson: (u) => byLaw("persson", u),
     // the only theory whose separation at a pressure is a formula
     perssonSeparation(pressure) {
-      const status = law("persson") || C.mbma_persson_separation(LAWS.persson, pressure, state.E_star, ANSWER);
+      const status = law("persson") || C.mbma_spectrum_separation_of(LAWS.persson, pressure, state.E_star, ANSWER);
       return status === OK ? numbersAt(ANSWER, 1)[0] : NaN;
     },
     // why the last answer that is missing is missing
@@ -110,7 +106,7 @@ function prepare(state) {
       const bytes = new Uint8Array(C.memory.buffer, C.mbma_message(fault));
       return String.fromCharCode(...bytes.subarray(0, bytes.indexOf(0)));
     },
-    // mbma_law begins with h_rms, h_max, gradient
+    // mbma_spectrum begins with h_rms, h_max, gradient
     moments() {
       const status = law("persson"),
         [h_rms, , gradient] = numbersAt(LAWS.persson, 3);

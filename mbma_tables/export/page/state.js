@@ -88,7 +88,7 @@ function samplesOf(text, convention) {
 // Faults of a state by control, in words.
 function faultsOf(state) {
   const errors = {},
-    floor = DATA.model.readings[state.reading].changed.MIN_ZETA_1 ?? DATA.model.numbers.MIN_ZETA_1;
+    floor = Math.max(3, DATA.model.readings[state.reading].numbers[4]); // of zeta_u
   for (const name of Object.keys(NUMBERS)) {
     const value = state[name];
     if (!Number.isFinite(value)) errors[name] = `${name} must be a number`;
