@@ -17,19 +17,26 @@ from mbma_tables.files import write_file
 
 TARGET = pathlib.Path(__file__).parents[2] / "mbma_tables" / "core" / "height_coefficients.h"
 HEADER = """\
-/* F_n for n = 1/2, 1, 3/2, 2, 5/2: eight polynomials each. Made by python -m generate tables heights. */
+/* Height integrals as polynomials. Made by python -m generate tables heights.
+ *
+ * F_{3/2}, then F_{5/2} from 0 on and F_{1/2} below, in [0, 1], [1, 4], [4, 40], below -8, [-8, -6] ... [-2, 0]; F_1 and
+ * F_2 from 0 on. Digits of less than 1e-17 of F are left out. */
 #ifndef MBMA_HEIGHT_COEFFICIENTS_H
 #define MBMA_HEIGHT_COEFFICIENTS_H
 
-static const double MBMA_HEIGHT[5][8][19] = {
+static const double MBMA_HEIGHT_HALVES[2][8][20] = {
+%s
+};
+static const double MBMA_HEIGHT_WHOLE[2][3][20] = {
 %s
 };
 
 #endif
 """
 DIGITS = 40
-TERMS = 19  # the hardest piece, [-2, 0], needs 19 for 2e-17
+TERMS = 20  # the hardest piece, F_{5/2} in [0, 1], needs as many for 2e-16
 SAMPLES = 48
+NOTHING = mpmath.mpf(10) ** -17  # of the least value of a piece
 DEEP_EDGE = -8  # below it: powers of 1/x^2
 MIDDLE_EDGES = (-8, -6, -4, -2, 0)  # polynomials in x
 SCALED_EDGES = (0, 1, 4, 40)  # polynomials in 1/(x + 1), exp(-x^2/2) taken out
@@ -65,10 +72,23 @@ def _on_unit_interval(function: Function, low: mpmath.mpf, high: mpmath.mpf) -> 
     return monomial
 
 
-def pieces(twice_n: int) -> list[list[mpmath.mpf]]:
-    """The polynomial pieces of F_n, n = twice_n / 2, from the deep end to the far tail."""
+def scaled_pieces(twice_n: int) -> list[list[mpmath.mpf]]:
+    """The polynomial pieces of F_n, n = twice_n / 2, from 0 on, exp(-x^2/2)/(x + 1)^(n + 1) taken out."""
     n = mpmath.mpf(twice_n) / 2
-    far = mpmath.mpf(0)
+
+    def scaled(v: mpmath.mpf) -> mpmath.mpf:
+        x = 1 / v - 1
+        return height_integral(n, x) * mpmath.exp(x * x / 2) / v ** (n + 1)
+
+    return [
+        _on_unit_interval(scaled, mpmath.mpf(1) / (high + 1), mpmath.mpf(1) / (low + 1))
+        for low, high in itertools.pairwise(SCALED_EDGES)
+    ]
+
+
+def lower_pieces(twice_n: int) -> list[list[mpmath.mpf]]:
+    """The polynomial pieces of F_n below 0, from the deep end on."""
+    n = mpmath.mpf(twice_n) / 2
 
     def deep(s: mpmath.mpf) -> mpmath.mpf:
         if s < mpmath.mpf(10) ** -30:
@@ -78,22 +98,30 @@ def pieces(twice_n: int) -> list[list[mpmath.mpf]]:
     def middle(x: mpmath.mpf) -> mpmath.mpf:
         return height_integral(n, x)
 
-    def scaled(v: mpmath.mpf) -> mpmath.mpf:
-        x = 1 / v - 1
-        return height_integral(n, x) * mpmath.exp(x * x / 2) / v ** (n + 1)
+    return [
+        _on_unit_interval(deep, mpmath.mpf(0), mpmath.mpf(1) / DEEP_EDGE**2),
+        *(_on_unit_interval(middle, mpmath.mpf(a), mpmath.mpf(b)) for a, b in itertools.pairwise(MIDDLE_EDGES)),
+    ]
 
-    rows = [_on_unit_interval(deep, far, mpmath.mpf(1) / DEEP_EDGE**2)]
-    for low, high in itertools.pairwise(MIDDLE_EDGES):
-        rows.append(_on_unit_interval(middle, mpmath.mpf(low), mpmath.mpf(high)))
-    for low, high in itertools.pairwise(SCALED_EDGES):
-        rows.append(_on_unit_interval(scaled, mpmath.mpf(1) / (high + 1), mpmath.mpf(1) / (low + 1)))
-    return rows
+
+def row_text(row: list[mpmath.mpf]) -> str:
+    """The coefficients of a piece, each with the digits that count, as an initializer."""
+    unit = NOTHING * min(abs(mpmath.polyval(row[::-1], t)) for t in mpmath.linspace(-1, 1, 41))
+    texts = []
+    for value in row:
+        digits = int(mpmath.floor(mpmath.log10(abs(value) / unit))) + 1 if abs(value) > unit else 0
+        shortest = repr(float(mpmath.nstr(value, digits)) if 0 < digits < 17 else float(value)) if digits else "0.0"
+        texts.append(shortest.replace("e-0", "e-"))
+    while texts[-1] == "0.0":
+        texts.pop()
+    return "{" + ", ".join(texts) + "}"
 
 
 def main() -> None:
     """Write the coefficients."""
     with mpmath.workdps(DIGITS):
-        orders = [[[repr(float(value)) for value in row] for row in pieces(k)] for k in (1, 2, 3, 4, 5)]
-    rows = ",\n".join("{" + ",\n".join("{" + ", ".join(row) + "}" for row in rows) + "}" for rows in orders)
-    text = textwrap.indent("\n".join(textwrap.wrap(rows, 116, break_on_hyphens=False)), "    ")
-    write_file(TARGET, (HEADER % text).encode())
+        halves = [scaled_pieces(3) + lower_pieces(3), scaled_pieces(5) + lower_pieces(1)]
+        orders = [[[row_text(row) for row in rows] for rows in both] for both in (halves, map(scaled_pieces, (2, 4)))]
+    parts = (",\n".join("{" + ", ".join(rows) + "}" for rows in both) for both in orders)
+    wrapped = (textwrap.wrap(part, 116, break_on_hyphens=False) for part in parts)
+    write_file(TARGET, (HEADER % tuple(textwrap.indent("\n".join(lines), "    ") for lines in wrapped)).encode())
