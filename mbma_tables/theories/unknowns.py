@@ -23,9 +23,9 @@ from mbma_tables.surfaces.resolution import extrapolated
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.contact import contact, one_known
+from mbma_tables.theories.differences import differences
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.result import Contact
-from mbma_tables.theories.sensitivity import differences
 from mbma_tables.units import Units, modulus_and_units, unit_of
 
 STEP = 0.02  # of the logarithm of a parameter

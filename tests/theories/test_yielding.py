@@ -318,10 +318,8 @@ def test_a_pressure_takes_few_elastic_answers(monkeypatch, theory, most):
         assert len(asked) <= most + 3
 
 
-def test_a_law_by_persson_takes_few_elastic_answers(monkeypatch):
-    asked = counted(monkeypatch, "persson")
+def test_a_law_by_persson_with_a_hardness():
     law = contact_law(SURFACE, theory="persson", E_star=MODULUS, hardness=HARDNESS)
-    assert sum(asked) < 300
     u = np.geomspace(1e-5, 29, 20)
     found = contact(SURFACE, mean_separation=u, theory="persson", E_star=MODULUS, hardness=HARDNESS)
     np.testing.assert_allclose(law.force(u=u), found.force, rtol=law.error)
