@@ -143,7 +143,7 @@ def sensitivity(
     given = parameters | {"E_star": modulus, by: units.number(by, value)}
     numbers = {name: float(one_number(name, number)) for name, number in given.items()}
     same = {"pressure": "force", "separation": "mean_separation"}.get(by, by)
-    wanted = [name for name in ANSWERS if name != same]
+    wanted, batches = [name for name in ANSWERS if name != same], isinstance(surface, Surface)
 
     def found_at(**own: Any) -> Contact:
         modulus, place = own.pop("E_star"), own.pop(by)
@@ -151,18 +151,11 @@ def sensitivity(
 
     def answers(moved: Mapping[str, Any]) -> Answers:
         own = {name: moved.get(name, number) for name, number in numbers.items()}
-        if isinstance(surface, Surface):
-            found = found_at(**own)
-            return {name: np.asarray(value) for name, value in _answers(found, own["E_star"]).items()}
-        # there are no batches of spectra
         places = np.broadcast(*own.values())
-        rows = [one(*map(float, entry)) for entry in places]
-        return {name: np.reshape([row[name] for row in rows], places.shape) for name in ANSWERS}
-
-    @functools.cache
-    def one(*own: float) -> Answers:
-        known = dict(zip(numbers, own, strict=True))
-        return _answers(found_at(**known), known["E_star"])
+        # there are no batches of spectra
+        single = [dict(zip(own, map(float, entry), strict=True)) for entry in places]
+        found = [_answers(found_at(**one), one["E_star"]) for one in ([own] if batches else single)]
+        return {name: np.reshape([one[name] for one in found], places.shape) for name in ANSWERS}
 
     known = found_at(**numbers)
     here = {name: float(number) for name, number in _answers(known, numbers["E_star"]).items() if name in wanted}
