@@ -268,6 +268,7 @@ size_t mbma_capped_force(size_t n, const double *elastic, const double *stiffnes
 /* ---- the gap at a force or an area ---- */
 
 #define SETTLED 1e-7          /* of a logarithm, before the last step, whose miss would be about its square */
+#define SETTLED_STEP 1e-4     /* of y, which is large where values hardly change */
 #define SETTLED_BOTH 1e-14    /* of its product with the step before, where slopes are not known */
 #define FARTHEST 40.0         /* step of y */
 enum { AROUND = 4 };           /* places from which a step begins */
@@ -310,17 +311,18 @@ static double middle(double low, double high) {
 
 /* y at a value by the polynomial through places of different values and their rates, by divided differences. */
 static double through(double value, const place *known, int n) {
-    double z[2 * AROUND], d[2 * AROUND];
-    for (int i = 0; i < 2 * n; i++) {
-        z[i] = known[i / 2].value;
-        d[i] = known[i / 2].y;
+    double d[2 * AROUND], over[AROUND][AROUND];
+    for (int i = 0; i < n; i++) {
+        d[2 * i] = d[2 * i + 1] = known[i].y;
+        for (int j = 0; j < i; j++)
+            over[i][j] = 1.0 / (known[i].value - known[j].value);
     }
     for (int order = 1; order < 2 * n; order++)
         for (int i = 2 * n - 1; i >= order; i--)
-            d[i] = order == 1 && i % 2 ? known[i / 2].rate : (d[i] - d[i - 1]) / (z[i] - z[i - order]);
+            d[i] = order == 1 && i % 2 ? known[i / 2].rate : (d[i] - d[i - 1]) * over[i / 2][(i - order) / 2];
     double y = d[2 * n - 1];
     for (int i = 2 * n - 2; i >= 0; i--)
-        y = mbma_fma(y, value - z[i], d[i]);
+        y = mbma_fma(y, value - known[i / 2].value, d[i]);
     return y;
 }
 
@@ -404,7 +406,8 @@ size_t mbma_gap_step(size_t n, const double *value, const double *steep, int exa
         const double step = known ? step_to(-miss, here, other, exact != 0) : -miss * at.rate;
         double following = u * exp(mbma_held(step, -FARTHEST, FARTHEST));
         following /= 1.0 + (following - u) / end[own];
-        const bool near = fabs(miss) <= SETTLED && (exact || fabs(miss * (before.value - at.value)) <= SETTLED_BOTH);
+        const bool known_well = exact || fabs(miss * (before.value - at.value)) <= SETTLED_BOTH;
+        const bool near = fabs(miss) <= SETTLED && fabs(step) <= SETTLED_STEP && known_well;
         if (near)
             following = mbma_held(following, *low, *high);
         else if (!(following > *low && following < *high))

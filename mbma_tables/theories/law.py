@@ -214,8 +214,6 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[st
     # below the elastic theory's end, and with a hardness towards u = 0, force depends on the logarithm of u
     lowest = _lowest(surface, theory.elastic, LOWEST if theory.elastic is theory else LOWEST[1:])
     highest = h_max if ends else min(float(theory.interval(surface)[1]), MAX_SPAN * h_max)
-    theory = theory.along(surface, lowest)
-    beyond = 0.0 if ends else 2 * float(theory.energy(surface, np.array(highest)))
     errors: list[FloatArray] = []
 
     def answer(u: FloatArray) -> FloatArray:
@@ -245,6 +243,7 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[st
         octaves = range(3, MOST_OCTAVES)
         start, first = first_record(lambda start: power_record(above.values, start, (0.0, 0.0)), octaves, tolerance)
         sides = [above._replace(start=start)]
+    beyond = 0.0 if ends else 2 * float(theory.energy(surface, np.array(highest)))
     limits = 2 * lowest - h_max, math.inf if ends else 2 * highest - h_max
     facts |= {"theory": theory.name, "reading": "", "tier": ""}
 

@@ -15,6 +15,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import NAMED, Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories.differences import differences
 from mbma_tables.theories.protocol import FEW_LOOKS, SCAN, Theory, TheoryAnswer, select
 from mbma_tables.totals.contact import Totals, totals_at
 from mbma_tables.totals.island_sum import QUADRATURE_SHARE, kinks
@@ -102,28 +103,20 @@ class Mbma(Theory):
         return found, np.full(found.shape, np.nan), False
 
     def _differences(self, surface: AnySurface, u: FloatArray) -> FloatArray:
-        """-dF/du by numerical differentiation, for tiers without derivatives."""
-        from scipy.differentiate import derivative
+        """-dF/du by differences, for tiers without derivatives."""
+        h_max, shape = np.asarray(surface.h_max), np.broadcast_shapes(u.shape, surface.shape)
+        gap, depth = (np.broadcast_to(each, shape).ravel() for each in (2 * u - h_max, h_max - u))
 
-        shape = np.broadcast_shapes(u.shape, surface.shape)
-        u, h_max = np.broadcast_to(u, shape), np.broadcast_to(np.asarray(surface.h_max), shape)
+        def force_at(k: Any, x: FloatArray) -> FloatArray:
+            some = select(surface, shape, k)
+            held = np.maximum(gap[k] - 2 * x, -np.asarray(some.h_max))
+            return np.asarray(self.totals(some, held, quantities=("force",)).force)[None]
 
-        def force_at(x: FloatArray, place: FloatArray) -> FloatArray:
-            chosen = select(surface, shape, place)
-            gap = np.maximum(2 * x - np.asarray(chosen.h_max), -np.asarray(chosen.h_max))
-            return np.asarray(self.totals(chosen, gap, quantities=("force",)).force)
-
-        step = 0.1 * (h_max - u)
-        touching = step > 0
-        slope = derivative(
-            force_at,
-            u,
-            args=(np.arange(u.size, dtype=float).reshape(shape),),
-            initial_step=np.where(touching, step, 1.0),
-            step_direction=np.where(u < step, 1, 0),  # not beyond full compression
-            tolerances={"rtol": 10 * self.rtol},
-        )
-        return np.where(touching, -slope.df, 0.0)
+        # by what is less than u; not beyond full compression
+        step, side = 0.1 * depth, np.where(np.broadcast_to(u, shape).ravel() < 0.1 * depth, -1.0, 0.0)
+        nothing = np.zeros((1, depth.size))
+        slope, _ = differences(force_at, step, side, nothing, 3, 10 * self.rtol)
+        return np.where(depth > 0, slope[0], 0.0).reshape(shape)
 
     def bends(self, surface: AnySurface) -> FloatArray:
         """Mean separations [length] at which the largest island reaches the floor of zeta_d, and of zeta_u."""

@@ -20,6 +20,7 @@ from mbma_tables.core import core
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import calibrated_table
+from mbma_tables.theories.differences import differences
 
 LOOKS, FEW_LOOKS = 128, 8  # gaps at which an inversion begins, of one surface and of each of a batch,
 LOOKED_AT = 7.0  # from where to where, of ln u - ln(h_max - u),
@@ -88,10 +89,6 @@ class Theory(abc.ABC):
     def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E*."""
         return self.answer(surface, self.inverted(surface, "force", force)[0]).area
-
-    def along(self, surface: AnySurface, lowest: float) -> Theory:
-        """The theory for the force and area of many gaps on one surface, from a lowest one on."""
-        return self
 
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Share of heights above the level whose mean gap is u, and its derivative by u: Gaussian heights."""
@@ -301,18 +298,17 @@ class Wrapped(Theory):
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]; the error is not known."""
-        from scipy.differentiate import derivative
-
         u = np.asarray(mean_separation, dtype=float)
-        given = self._theory.answer(surface, u)
-        force, area = (np.array(np.broadcast_to(part, u.shape), dtype=float) for part in given)
+        force, area = (
+            np.array(np.broadcast_to(part, u.shape), dtype=float) for part in self._theory.answer(surface, u)
+        )
 
-        def force_at(x: FloatArray, place: FloatArray) -> FloatArray:
-            return np.asarray(self._theory.answer(select(surface, u.shape, place), x)[0], dtype=float)
+        def force_at(k: Any, x: FloatArray) -> FloatArray:
+            return np.asarray(self._theory.answer(select(surface, u.shape, k), u.ravel()[k] + x)[0], dtype=float)[None]
 
-        step = 0.01 * np.broadcast_to(np.asarray(surface.h_rms), u.shape)
-        slope = derivative(force_at, u, args=(_places(u.shape),), initial_step=step)
-        return TheoryAnswer(force, area, -slope.df, np.full(u.shape, np.nan))
+        step = 0.01 * np.broadcast_to(np.asarray(surface.h_rms), u.shape).ravel()
+        slope, _ = differences(force_at, step, np.zeros(u.size), np.zeros((1, u.size)))
+        return TheoryAnswer(force, area, -slope[0].reshape(u.shape), np.full(u.shape, np.nan))
 
     def looks(self, surface: AnySurface) -> int:
         """Few: an answer may take long."""

@@ -1,9 +1,8 @@
 """Derivatives of a theory's force and area in the gap and in the surface's parameters.
 
-Where a theory does not know them they are differences of fourth order at two steps, extrapolated, or one-sided ones
-where a parameter ends, in steps that keep clear of the ends of contact; every result carries an estimate of its own
-error, which decides whether it is given out. With a hardness the elastic contact is differentiated, and a contact that
-is straight in the parameters, with these slopes, goes through the law.
+Where a theory does not know them they are differences in steps that keep clear of the ends of contact, whose error
+decides whether they are given out. With a hardness the elastic contact is differentiated, and one that is straight in
+the parameters, with these slopes, goes through the law.
 """
 
 from __future__ import annotations
@@ -18,53 +17,15 @@ from mbma_tables.errors import ConvergenceError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
 from mbma_tables.surfaces.surface import PARAMETERS
+from mbma_tables.theories.differences import differences
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
 STEP = 0.02  # of a parameter, or of the room that it has
 RTOL = 1e-6  # of a derivative that is given out, or of the quantity over the parameter
-HALVINGS = 10  # of the step, at most
 GAP, MODULUS = "mean_separation", "E_star"
 KINDS = ("force", "area")
 
-# places over the step, and weights of the derivative: in their middle, and at the first of them
-CENTRAL: tuple[Any, Any] = np.array([-1.0, -0.5, 0.5, 1.0]), np.array([1.0, -8.0, 8.0, -1.0]) / 6
-_SIDE = (1 - np.cos(np.linspace(0, np.pi, 7))) / 2
-ONE_SIDED: tuple[Any, Any] = _SIDE, np.linalg.solve(np.vander(_SIDE, increasing=True).T, np.eye(7)[1])
-
 Slopes = tuple[dict[str, FloatArray], ...]  # of force and of area, by names
-
-
-def differences(
-    function: Callable[[Any, FloatArray], FloatArray],
-    step: FloatArray,
-    side: FloatArray,
-    scale: FloatArray,
-    halvings: int = HALVINGS,
-) -> tuple[FloatArray, FloatArray]:
-    """Derivatives at 0, shape (kinds, entries), and estimates of their errors.
-
-    ``function(k, x)`` has kinds as rows, of entries `k` at x. `side` is 0, or that on which to step; `scale` a size of
-    derivatives, next to which errors do not count; steps are halved so often at most.
-    """
-    found, error = np.zeros(scale.shape), np.full(scale.shape, np.inf)
-    for (places, weights), apart in ((CENTRAL, 0), (ONE_SIDED, 1)):
-        left, widths = np.flatnonzero(np.abs(side) == apart), 2.0 ** -np.arange(2.0)
-        coarse = np.empty((len(scale), 0))
-        while left.size and widths[-1] >= 2.0**-halvings:
-            h = np.where(apart, side, 1.0)[left] * step[left] * widths[:, None, None]
-            x = places[:, None] * h
-            values = function(np.broadcast_to(left, x.shape).ravel(), x.ravel()).reshape(-1, *x.shape)
-            slopes = np.swapaxes(weights @ values, 0, 1) / h
-            # of two steps at first, of one more later
-            coarse, fine = slopes if widths.size > 1 else (coarse, slopes[0])
-            best = fine if apart else fine + (fine - coarse) / 15
-            miss = np.abs(best - (coarse if apart else fine))
-            better = ~(miss >= error[:, left])
-            found[:, left] = np.where(better, best, found[:, left])
-            error[:, left] = np.where(better, miss, error[:, left])
-            rough = ~(miss <= RTOL * STEP * np.maximum(np.abs(best), scale[:, left])).all(axis=0)
-            coarse, left, widths = fine[:, rough], left[rough], widths[-1:] / 2
-    return found, error
 
 
 def differentiate(

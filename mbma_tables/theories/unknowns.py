@@ -23,9 +23,9 @@ from mbma_tables.surfaces.resolution import extrapolated
 from mbma_tables.surfaces.surface import PARAMETERS, Surface
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.contact import contact, one_known
+from mbma_tables.theories.differences import differences
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.result import Contact
-from mbma_tables.theories.sensitivity import differences
 from mbma_tables.units import Units, modulus_and_units, unit_of
 
 STEP = 0.02  # of the logarithm of a parameter
@@ -143,7 +143,7 @@ def sensitivity(
     given = parameters | {"E_star": modulus, by: units.number(by, value)}
     numbers = {name: float(one_number(name, number)) for name, number in given.items()}
     same = {"pressure": "force", "separation": "mean_separation"}.get(by, by)
-    wanted = [name for name in ANSWERS if name != same]
+    wanted, batches = [name for name in ANSWERS if name != same], isinstance(surface, Surface)
 
     def found_at(**own: Any) -> Contact:
         modulus, place = own.pop("E_star"), own.pop(by)
@@ -151,18 +151,11 @@ def sensitivity(
 
     def answers(moved: Mapping[str, Any]) -> Answers:
         own = {name: moved.get(name, number) for name, number in numbers.items()}
-        if isinstance(surface, Surface):
-            found = found_at(**own)
-            return {name: np.asarray(value) for name, value in _answers(found, own["E_star"]).items()}
-        # there are no batches of spectra
         places = np.broadcast(*own.values())
-        rows = [one(*map(float, entry)) for entry in places]
-        return {name: np.reshape([row[name] for row in rows], places.shape) for name in ANSWERS}
-
-    @functools.cache
-    def one(*own: float) -> Answers:
-        known = dict(zip(numbers, own, strict=True))
-        return _answers(found_at(**known), known["E_star"])
+        # there are no batches of spectra
+        single = [dict(zip(own, map(float, entry), strict=True)) for entry in places]
+        found = [_answers(found_at(**one), one["E_star"]) for one in ([own] if batches else single)]
+        return {name: np.reshape([one[name] for one in found], places.shape) for name in ANSWERS}
 
     known = found_at(**numbers)
     here = {name: float(number) for name, number in _answers(known, numbers["E_star"]).items() if name in wanted}

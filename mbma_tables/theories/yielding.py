@@ -6,21 +6,17 @@ pressures capped at the hardness. u is the mean gap, points that yield flattened
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import functools
-import itertools
-import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables import hardness as law
 from mbma_tables.arguments import FloatArray, checked_hardness
-from mbma_tables.errors import ConvergenceError, OutOfRangeError
+from mbma_tables.errors import OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.calibrated_table import at_contact, shipped_part
 from mbma_tables.theories.protocol import FEW_LOOKS, Theory, TheoryAnswer, refuse_unfinished
@@ -31,8 +27,6 @@ TESTED_ETA = 0.025  # p_m/(E* g) down to which boundary elements were solved
 REACHED = 1e-9  # relative, of forces at full compression
 HEAVIEST = 1e6  # F/(A0 E* g) from which on areas are those of full contact
 CLOSED, LEAST = 1e-9, 1e-300  # u/h_rms of contacts that count as full, and u of those of surfaces that end at h_max
-POINTS = chebyshev.chebpts1(24)  # of ln F on a span of ln u
-SPANS, MOST_SPANS, CLOSE = 6, 100, 1e-11  # how many of them at first and at most, and the size of their last terms
 MANY = 200  # hardnesses up to which inversions look at as many gaps as without
 MAX_LEVEL = 37.0  # of heights over h_rms above which shares are no normal numbers
 
@@ -112,39 +106,6 @@ class Loaded:
         with np.errstate(invalid="ignore"):
             planes = self.h_rms * law.plane_separation(self.u / self.h_rms, self.load / self.eta, self.eta)
         return np.where(np.isinf(self.eta), self.u, planes)
-
-
-class Along(Theory):
-    """An elastic theory on one surface between two gaps: ln F by Chebyshev polynomials of ln u, without slopes."""
-
-    def __init__(self, elastic: Theory, surface: AnySurface, low: float, high: float) -> None:
-        self.name, self.ends_at_h_max, self._elastic, self._error = elastic.name, elastic.ends_at_h_max, elastic, 0.0
-        to_terms = np.linalg.inv(chebyshev.chebvander(POINTS, POINTS.size - 1)).T
-        edges, known = np.linspace(math.log(low), math.log(high), SPANS + 1), dict[tuple[float, float], FloatArray]()
-        while fresh := [span for span in itertools.pairwise(edges.tolist()) if span not in known]:
-            start, stop = np.transpose(fresh)[..., None]
-            found = elastic.answer(surface, np.exp((start + stop + (stop - start) * POINTS) / 2).ravel())
-            self._error = max(self._error, float(np.max(found.error)) + CLOSE)
-            terms = np.log(found.force).reshape(-1, POINTS.size) @ to_terms
-            known |= dict(zip(fresh, terms, strict=True))
-            rough = ~(np.abs(terms[:, -3:]).max(axis=1) <= CLOSE)
-            edges = np.sort(np.append(edges, (start + stop)[rough, 0] / 2))
-            if edges.size > MOST_SPANS:
-                raise ConvergenceError(f"theory {elastic.name!r} is not smooth", np.array(True))
-        self._edges, self._terms = edges, np.array([known[span] for span in itertools.pairwise(edges.tolist())]).T
-
-    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
-        """Force alone."""
-        log_u = np.log(mean_separation)
-        k = np.clip(np.searchsorted(self._edges, log_u) - 1, 0, self._edges.size - 2)
-        start, stop = self._edges[k], self._edges[k + 1]
-        force = np.exp(chebyshev.chebval((2 * log_u - start - stop) / (stop - start), self._terms[:, k], tensor=False))
-        nothing = np.zeros(force.shape)
-        return TheoryAnswer(force, nothing, nothing, nothing + self._error)
-
-    def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
-        """The theory's."""
-        return self._elastic.area_at(surface, force)
 
 
 class Yielding(Theory):
@@ -260,12 +221,7 @@ class Yielding(Theory):
 
     def looks(self, surface: AnySurface) -> int:
         """Few at many hardnesses, too."""
-        return FEW_LOOKS if self.hardness.size > MANY or self._by_load else self.elastic.looks(surface)
-
-    @property
-    def _by_load(self) -> bool:
-        """Whether the elastic theory answers loads, and each gap is an inversion: Persson's."""
-        return self.knows_areas and not self.ends_at_h_max
+        return FEW_LOOKS if self.hardness.size > MANY else self.elastic.looks(surface)
 
     def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
         """Force without the area, which follows from it."""
@@ -296,13 +252,6 @@ class Yielding(Theory):
         u, missed = both.inverted(surface, "force", np.broadcast_to(force, (2, *shape)))
         refuse_unfinished(~missed[0], "the separation at this force")
         return u[0], u[1]
-
-    def along(self, surface: AnySurface, lowest: float) -> Theory:
-        """The same for the force and area of many gaps on one surface, from a lowest one on."""
-        with contextlib.suppress(ConvergenceError):  # where it is too rough
-            if self._by_load:
-                return self.changed(_elastic=Along(self.elastic, surface, lowest, float(self.interval(surface)[1])))
-        return self
 
     def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of ln F at given u and of ln A at given F against boundary elements with a hardness.

@@ -318,10 +318,8 @@ def test_a_pressure_takes_few_elastic_answers(monkeypatch, theory, most):
         assert len(asked) <= most + 3
 
 
-def test_a_law_by_persson_takes_few_elastic_answers(monkeypatch):
-    asked = counted(monkeypatch, "persson")
+def test_a_law_by_persson_with_a_hardness():
     law = contact_law(SURFACE, theory="persson", E_star=MODULUS, hardness=HARDNESS)
-    assert sum(asked) < 300
     u = np.geomspace(1e-5, 29, 20)
     found = contact(SURFACE, mean_separation=u, theory="persson", E_star=MODULUS, hardness=HARDNESS)
     np.testing.assert_allclose(law.force(u=u), found.force, rtol=law.error)
@@ -347,7 +345,7 @@ def test_pressures_short_of_the_hardness_are_held_or_refused(theory):
     for share in (0.9, 0.9795, 0.99995, 1 - 5e-9):
         if 0.02 * share < deepest or (theory == "calibrated" and share < 1 - 1e-6):
             found = contact(concrete, pressure=0.02 * share, **known)
-            assert found.force == pytest.approx(0.02 * share, rel=1e-8)
+            assert found.force == pytest.approx(0.02 * share, rel=1e-11)
         else:
             with pytest.raises(OutOfRangeError, match="must be at most what theory"):
                 contact(concrete, pressure=0.02 * share, **known)
