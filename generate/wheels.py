@@ -10,12 +10,14 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
-import abi3info
 import click
-import lief
 
 from generate.pages.page import ROOT
+
+if TYPE_CHECKING:
+    import lief
 
 # a wheel's platform, what zig calls it, and the libraries that its modules may ask for
 LINUX, MUSL, MACOS = ("libc.so.6", "libm.so.6"), ("libc.so",), ("/usr/lib/libSystem.B.dylib",)
@@ -36,6 +38,8 @@ def parts(data: bytes) -> tuple[str, list[str], list[str], dict[str, str]]:
 
     What is resolved by the interpreter that loads the module, whatever its file is called, is wanted of "".
     """
+    import lief
+
     lief.logging.disable()
     module = lief.parse(list(data))
     if isinstance(module, lief.ELF.Binary):
@@ -66,6 +70,8 @@ def _version(symbol: lief.ELF.Symbol) -> str:
 
 
 def _stable(name: str) -> bool:
+    import abi3info
+
     known = abi3info.FUNCTIONS | abi3info.DATAS
     found = known.get(abi3info.models.Symbol(name))
     return found is not None and (found.added.major, found.added.minor) <= PYTHON

@@ -111,11 +111,13 @@ def use():
     law.at_pressure(law.force(np.linspace(-2, 2.5, 30)))
     law.leakage(gaps)
     law.slope_error(gaps)
-    for theory in ("mbma", "calibrated"):
+    for theory in ("mbma", "calibrated", "persson"):
         for cap in (np.inf, 0.05):
             found = contact(one, mean_separation=np.linspace(0.2, 2.5, 30), theory=theory, hardness=cap)
             contact(one, pressure=found.force, theory=theory, hardness=cap)
     contact(many, mean_separation=1.0, theory="calibrated")
+    # outside the calibrated table
+    contact(Surface(0.05, 1.0, 30.0, 1.0, 3.0), pressure=[0.01, 0.1], theory="calibrated")
 
 
 if __name__ == "__main__":

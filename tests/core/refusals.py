@@ -21,7 +21,8 @@ def recording(name):
 
 def wrong(given, changed):
     """Cases of a call by the number of arguments, their kinds, the type of items, their order, locked results."""
-    yield given[:-1]
+    if given:
+        yield given[:-1]
     yield [*given, 1.0]
     for k, one in enumerate(given):
         others = ["text", [1.0], 1j]
