@@ -11,7 +11,8 @@ from typing import Any
 import click
 import numpy as np
 
-from benchmarks.rows import held_out, microseconds, report, rounds, times_faster
+from benchmarks.kernels import held_out
+from benchmarks.rows import microseconds, report, rounds, times_faster
 from mbma_tables import Surface, contact, open_table
 from mbma_tables.export.c_code import FLAGS
 from mbma_tables.export.code import SOURCES, write_code
