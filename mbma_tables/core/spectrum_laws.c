@@ -441,7 +441,9 @@ typedef struct {
 
 static piece piece_of(const double *q, const double *C, size_t base, size_t k) {
     const double start = log(q[k] / q[base]), width = log1p((q[k + 1] - q[k]) / q[k]);
-    const piece found = {start, width, C[k] / C[base] * exp(2.0 * start), log(C[k + 1] / C[k]) / width + 2.0};
+    /* also where the quotient overflows or is none */
+    const double rise = fmin(fmax(log(C[k + 1] / C[k]), -750.0), 750.0);
+    const piece found = {start, width, C[k] / C[base] * exp(2.0 * start), rise / width + 2.0};
     return found;
 }
 
@@ -456,14 +458,16 @@ static double part_of(const piece *s, int order, double rise) {
 static double panel_end(const piece *s, double t, double last, double before, int *rule) {
     const double first = fmin(last, 1.0), left = last - t, rise = t - s->start, power = fabs(s->power) + 2.0;
     const double low = t > 0.0 ? fmax(t * exp(2.0), first * exp(-40.0)) : first * exp(-40.0);
-    double width = fmin(fmin(low - t, 1.0), left > first / 512.0 ? 0.5 * left : left), change;
+    /* steps that rounding leaves, and those in which a gradient that jumps counts for nothing */
+    const double least = 1e-14 * t, finest = least + 1e-13 * s->width;
+    double width = fmin(fmin(low - t, 1.0), left > first / 512.0 ? 0.5 * left : left), change = 2.0;
     width = fmin(fmin(width, s->start + s->width - t), 3.0 / power);
-    for (;; width *= 0.5) {
-        change = log((before + part_of(s, 2, rise + width)) / (before + part_of(s, 2, rise)));
-        if (!(t > 0.0 && change > 2.01))
-            break;
-    }
-    const double wide = fmax(fmax(width * fmax(1.0, 0.3 * power), t > 0.0 ? change : 2.0), width / left);
+    if (t > 0.0)
+        do
+            change = log((before + part_of(s, 2, rise + width)) / (before + part_of(s, 2, rise)));
+        while (change > 2.01 && (width *= 0.5) > finest);
+    width = fmax(width, least);
+    const double wide = fmax(fmax(width * fmax(1.0, 0.3 * power), change), width / left);
     *rule = wide < 0.01 ? 0 : wide < 0.1 ? 1 : wide < 0.4 ? 2 : 3;
     return width < s->start + s->width - t ? t + width : s->start + s->width;
 }

@@ -244,6 +244,11 @@ class TestAnyInput:
                 ([1.0, 2.0], [1.0, BAD[number]]),
             ):
                 assert 0 <= used.spectrum_waves(np.array(q), np.array(C), none, none, none, facts) < 20_000
+        # falls and rises that no quotient holds, between samples as close as numbers are
+        near = np.nextafter(2.0, 3.0)
+        for C in ([1e308, 5e-324, 1.0, 1.0], [1.0, 1e308, 5e-324, 1.0], [5e-324, 1.0, 5e-324, 1e308]):
+            for q in ([1.0, 2.0, 3.0, 4.0], [1.0, 2.0, near, 3.0], [2.0, near, 3.0, 4.0]):
+                assert used.spectrum_waves(np.array(q), np.array(C), none, none, none, facts) < 100_000
         assert used.spectrum_waves(none, none, none, none, none, facts) == 0
         assert used.spectrum_waves(np.ones(1), np.ones(1), none, none, none, facts) == 0
         assert used.spectrum_waves(np.ones(9), np.ones(9), none, none, none, facts) == 0
