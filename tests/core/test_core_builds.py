@@ -36,6 +36,9 @@ EXACT = {
     *("phi", "profile_missed", "self_affine", "solve_islands", "spline4", "spline_pieces", "table_fits"),
 }
 
+# coefficients of polynomials, of which small ones are differences of large numbers
+COEFFICIENTS = {"inner_integrals", "spectrum_law_of"}
+
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the core's compiler there is zig's alone")
 
 
@@ -178,7 +181,8 @@ def test_answers_of_other_processors(calls, tmp_path, record_property):
     for name in seen["_plain"]:
         libraries = {seen[build][name][0] for build in fused if name in EXACT or build != "arm64"}
         assert len(libraries) <= 1, name
-        assert all(seen[build][name][1] < 1e-12 for build in fused if core.arithmetic == "fma"), name
+        most = 1e-6 if name in COEFFICIENTS else 1e-12
+        assert all(seen[build][name][1] < most for build in fused if core.arithmetic == "fma"), name
 
 
 @pytest.mark.slow
