@@ -120,13 +120,13 @@ class Spectrum:
     @classmethod
     def from_samples(cls, q: FloatArray, C: FloatArray) -> Spectrum:
         """Power laws between samples of C(q) [length^4], h_rms^2 = 2 pi integral C q dq; a repeated q is a jump."""
-        facts, none = np.empty(2), np.empty(0)
+        facts, none = np.empty(4), np.empty(0)
         count = core.spectrum_waves(q, C, none, none, none, facts)
         if not count:
             raise InputError("there is no spectrum between these samples, or its moments are not finite")
         x, variance, below = np.empty((3, count))
         core.spectrum_waves(q, C, x, variance, below, facts)
-        return cls(x, variance, below, *facts.tolist())
+        return cls(x, variance, below, *facts[:2].tolist())
 
     @classmethod
     def from_shares(cls, x: ArrayLike, variance: ArrayLike) -> Spectrum:

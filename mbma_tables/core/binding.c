@@ -510,7 +510,7 @@ static mbma_status spectrum_law_of(const argument *a) {
 WRAP(words_of_inner, "", true, WORDS(mbma_inner))
 WRAP(words_of_spectrum_law, "", true, WORDS(mbma_spectrum_law))
 WRAP(inner_integrals, "w", a[0].n == WORDS(mbma_inner), inner_integrals(a[0].data))
-WRAP(spectrum_waves, "DDwwww", a[0].n == a[1].n && a[2].n == a[3].n && a[2].n == a[4].n && a[5].n == 2,
+WRAP(spectrum_waves, "DDwwww", a[0].n == a[1].n && a[2].n == a[3].n && a[2].n == a[4].n && a[5].n == 4,
      mbma_spectrum_waves(a[0].n, a[0].data, a[1].data, a[2].n, a[2].data, a[3].data, a[4].data, a[5].data))
 WRAP(spectrum_law_of, "DDDDDww",
      a[0].n == WORDS(mbma_inner) && a[1].n == a[2].n && a[1].n == a[3].n && a[4].n == 10 && a[5].n == 9 * a[1].n &&

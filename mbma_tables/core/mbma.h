@@ -387,9 +387,9 @@ void mbma_inner_integrals(mbma_inner *inner);
 /* A quadrature rule for power laws between samples: q rising [1/length], a repeated one is a jump; C not negative
  * [length^4], both as in h_rms^2 = 2 pi integral C q dq. How many waves it has, 0 if there is no such spectrum; they are
  * written where `most` are enough, and what they belong to in `facts`: g over q0 h_rms with q0 the first q where C is not
- * zero, and Nayak's alpha. */
+ * zero, Nayak's alpha, h_rms [length], g. */
 size_t mbma_spectrum_waves(size_t count, const double *q, const double *C, size_t most, double *x, double *variance,
-                           double *below, double facts[2]);
+                           double *below, double facts[4]);
 
 /* Prepares the law of a spectrum on surfaces that end at h_max, which may be infinite; `work` has room for nine numbers
  * a wave. */

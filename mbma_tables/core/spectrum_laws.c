@@ -473,7 +473,7 @@ static double panel_end(const piece *s, double t, double last, double before, in
 }
 
 size_t mbma_spectrum_waves(size_t count, const double *q, const double *C, size_t most, double *x, double *variance,
-                           double *below, double facts[2]) {
+                           double *below, double facts[4]) {
     double moments[3] = {0.0, 0.0, 0.0}, before = 0.0, total = 0.0, last = 0.0;
     size_t base = 0, waves = 0;
     while (base + 1 < count && !is_held(q, C, base))
@@ -490,6 +490,8 @@ size_t mbma_spectrum_waves(size_t count, const double *q, const double *C, size_
         }
     facts[0] = sqrt(moments[1] / moments[0]);
     facts[1] = 1.5 * moments[0] * moments[2] / (moments[1] * moments[1]);
+    facts[2] = moments[0] > 0.0 ? q[base] * sqrt(C[base]) * sqrt(2.0 * MBMA_PI * moments[0]) : NAN;
+    facts[3] = moments[0] > 0.0 ? q[base] * facts[0] * facts[2] : NAN;
     if (!(last > 0.0 && facts[0] > 0.0 && facts[0] < INFINITY && facts[1] > 0.0 && facts[1] < INFINITY))
         return 0;
     for (size_t k = base; k + 1 < count; k++) {

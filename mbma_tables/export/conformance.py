@@ -1,7 +1,7 @@
 """Conformance points beside exported code, which its self-test replays.
 
-A row of the points' file is: kind, tolerance, arguments, then for each answer the answer and what its difference is
-taken relative to. Lines that begin with # say what the kinds are.
+A row of the points' file is: kind, tolerance, how many arguments and they, then for each answer the answer and what its
+difference is taken relative to. Lines that begin with # say what the kinds are.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.export.c_code import FORM
 from mbma_tables.export.text import comment
 from mbma_tables.islands.geometry import FIELDS, geometry
-from mbma_tables.models.closed_form_functions import RANGES
+from mbma_tables.models.closed_form_functions import CERTIFICATES, RANGES
 from mbma_tables.models.closed_forms import FUNCTIONS
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.readings import Reading
@@ -24,20 +24,24 @@ from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.contact import contact
 from mbma_tables.theories.result import Contact
 
+Rows = Iterator[str]
 POINTS_FILE = "mbma_conformance.csv"
 BY = ("separation", "hurst", "q0", "q1", "h_rms", "h_max")
+CONTACT = f"force, area, stiffness, error; derivatives of force, then of area, by {', '.join(BY)}"
 KINDS = {
     "phi": "X, mu; phi_F, phi_A, the bound on their error",
-    "slopes": "X, mu; phi_F by X, phi_F by mu, phi_A by X, phi_A by mu, relative to themselves or |phi/argument|",
+    "slopes": "X, mu; the same, phi_F by X, phi_F by mu, phi_A by X, phi_A by mu",
     "geometry": f"approach, hurst, zeta_1; {', '.join(FIELDS)}",
-    "total": "hurst, q0, q1, h_rms, h_max, separation, E_star, rtol; force, area, stiffness",
-    "total_by": f"the same; derivatives of force, then of area, by {', '.join(BY)}",
+    "total": "hurst, q0, q1, h_rms, h_max, separation, E_star, rtol; force, area, stiffness, error",
+    "total_by": f"the same; {CONTACT}",
     "status": "X, mu; the status",
-    "formula": "X, mu; phi_F, phi_A by the closed form",
-    "calibrated": "hurst, q0, q1, h_rms, h_max, mean separation, E_star; force, area, stiffness, mean separation at it",
-    "calibrated_by": "the same; derivatives of force, then of area, by mean separation, hurst, q0, q1, h_rms, h_max",
+    "formula": "X, mu; phi_F, phi_A by the closed form, its error",
+    "calibrated": "hurst, q0, q1, h_rms, h_max, mean separation, E_star; force, area, stiffness, error",
+    "calibrated_by": f"the same; {CONTACT.replace('separation', 'mean separation')}",
+    "separation": "hurst, q0, q1, h_rms, h_max, force, E_star; mean separation by the calibrated law",
 }
 TOLERANCE, SLOPE_TOLERANCE = 1e-11, 1e-8
+ANY = 1e300  # what the difference of a number that may be any is relative to
 OK, X_BELOW, X_ABOVE, MU_ABOVE, INVALID = 0, 1, 2, 3, 5  # of mbma.h
 SURFACES = (
     # hurst, q0, q1, h_rms, h_max
@@ -50,68 +54,56 @@ SHARES = (0.02, 0.3, 0.7, 0.99)  # u/h_max
 RTOL = 1e-8
 
 
-def row(
-    kind: str,
-    arguments: Iterable[float],
-    answers: Iterable[float],
-    scales: Iterable[float],
-    tolerance: float = TOLERANCE,
-) -> str:
-    """One line of the points' file."""
-    pairs = (number for pair in zip(answers, scales, strict=True) for number in pair)
-    return ",".join((kind, *(repr(float(number)) for number in (tolerance, *arguments, *pairs))))
+def rows(kind: str, arguments: Iterable[Any], answers: Any, scales: Any = None, tolerance: Any = TOLERANCE) -> Rows:
+    """Lines of the points' file; columns of arguments, answers and scales of their differences broadcast."""
+    given = np.broadcast_arrays(*arguments, tolerance)
+    expected = np.array([np.broadcast_to(answer, given[0].shape) for answer in answers])
+    units = np.abs(expected) if scales is None else np.array([np.broadcast_to(unit, given[0].shape) for unit in scales])
+    # a number that is exactly 0 is met exactly
+    pairs = np.stack([expected, np.where(units == 0, 1.0, units)], axis=1).reshape(-1, given[0].size)
+    for *own, most, numbers in zip(*(column.ravel().tolist() for column in given), pairs.T.tolist(), strict=True):
+        yield ",".join((kind, *map(repr, (most, len(own), *own, *numbers))))
 
 
-def phi_rows(model: UniversalModel, X: FloatArray, mu: FloatArray) -> Iterator[str]:
+def phi_rows(model: UniversalModel, X: FloatArray, mu: FloatArray) -> Rows:
     """Values and slopes at flat (X, mu), mu > 0, by the compiled runtime."""
-    answer = model.answer(X, mu)
-    values = np.stack([answer.phi_F, answer.phi_A, answer.error])
-    _, by_X, by_mu = model.slopes(X, mu)
+    values, by_X, by_mu = model.slopes(X, mu)
     slopes = np.stack([by_X.phi_F, by_mu.phi_F, by_X.phi_A, by_mu.phi_A])
     # where a derivative changes sign there is nothing to be relative to but the value over the argument
-    natural = np.abs(values[[0, 0, 1, 1]] / np.maximum([X, mu, X, mu], 1e-300))
-    scales = np.maximum(np.abs(slopes), np.where(np.stack([X, mu, X, mu]) > 0, natural, 0.0))
-    for k in range(X.size):
-        yield row("phi", (X[k], mu[k]), values[:, k], np.abs(values[:, k]))
-        yield row("slopes", (X[k], mu[k]), slopes[:, k], scales[:, k])
+    places, numbers = np.array([X, mu, X, mu]), np.array([values.phi_F, values.phi_F, values.phi_A, values.phi_A])
+    scales = np.maximum(np.abs(slopes), np.where(places > 0, np.abs(numbers / np.maximum(places, 1e-300)), 0.0))
+    yield from rows("phi", (X, mu), values)
+    yield from rows("slopes", (X, mu), (*values, *slopes), (*values, *scales))
 
 
-def geometry_rows(approach: FloatArray, hurst: FloatArray, zeta_1: FloatArray, reading: Reading) -> Iterator[str]:
+def geometry_rows(approach: FloatArray, hurst: Any, zeta_1: Any, reading: Reading) -> Rows:
     """Islands by the library."""
     fields = geometry(approach, hurst, zeta_1, reading)
-    out = np.stack([fields[name] for name in FIELDS])
-    for k in range(approach.size):
-        # a height of exactly 0 is met exactly
-        scales = np.where(out[:, k] == 0, 1.0, np.abs(out[:, k]))
-        yield row("geometry", (approach[k], hurst[k], zeta_1[k]), out[:, k], scales)
+    yield from rows("geometry", (approach, hurst, zeta_1), [fields[name] for name in FIELDS])
 
 
-def total_rows(surface: tuple[float, ...], separations: Any, reading: Reading, rtol: float = RTOL) -> Iterator[str]:
+def total_rows(surface: tuple[float, ...], separations: Any, reading: Reading, rtol: float = RTOL) -> Rows:
     """Totals of one surface and their derivatives by the compiled runtime."""
     gaps = np.asarray(separations)
     found = contact(Surface(*surface), gaps, reading=reading, rtol=rtol, derivatives=True)
     slopes = _slopes_of(found)
-    values = np.array([found.force, found.area, -2 * slopes[0, 0]])
-    # without contact all are exactly 0; at a maximum of force, stiffness is
-    scales = np.where(values == 0, 1.0, np.abs(values))
-    scales[2] = np.maximum(scales[2], scales[0] / surface[4])
-    for k, gap in enumerate(gaps):
-        given = (*surface, gap, 1.0, rtol)
-        yield row("total", given, values[:, k], scales[:, k])
-        yield _slopes_row("total_by", given, values[:2, k], slopes[:, :, k])
+    # at a maximum of force, stiffness is 0
+    stiffness = -2 * slopes[0, 0]
+    least = np.maximum(np.abs(stiffness), np.where(found.force == 0, 1.0, found.force) / surface[4])
+    values = (found.force, found.area, stiffness, 0.0), (found.force, found.area, least, ANY)
+    yield from _contact_rows("total", (*surface, gaps, 1.0, rtol), *values, slopes)
 
 
-def calibrated_rows(surface: tuple[float, ...], shares: Any, E_star: float = 1.0) -> Iterator[str]:
+def calibrated_rows(surface: tuple[float, ...], shares: Any, E_star: float = 1.0) -> Rows:
     """The calibrated law of one surface at shares of h_max by the library, and its derivatives at given u."""
     u = surface[4] * np.asarray(shares)
     found = contact(Surface(*surface), mean_separation=u, theory="calibrated", E_star=E_star, derivatives=True)
     slopes = _slopes_of(found)
     slopes[:, 5] -= slopes[:, 0]  # h_max at given u = (h_max + d)/2
     slopes[:, 0] *= 2
-    for k, *values in zip(range(u.size), *map(np.asarray, (found.force, found.area, found.stiffness, u)), strict=True):
-        given = (*surface, u[k], E_star)
-        yield row("calibrated", given, values, values)
-        yield _slopes_row("calibrated_by", given, values[:2], slopes[:, :, k])
+    values = found.force, found.area, found.stiffness
+    yield from _contact_rows("calibrated", (*surface, u, E_star), (*values, 0.0), (*values, ANY), slopes)
+    yield from rows("separation", (*surface, found.force, E_star), (u,))
 
 
 def _slopes_of(found: Contact) -> FloatArray:
@@ -119,71 +111,69 @@ def _slopes_of(found: Contact) -> FloatArray:
     return np.array([[slopes[name] for name in BY] for slopes in (found.force_by, found.area_by) if slopes])
 
 
-def _slopes_row(kind: str, given: tuple[float, ...], values: Iterable[float], slopes: FloatArray) -> str:
-    """Derivatives relative to themselves or the value over the parameter; by the gap over h_rms."""
-    scales = np.maximum(np.abs(slopes), np.divide.outer(np.array(values), [given[3], *given[:5]]))
-    return row(kind, given, slopes.ravel(), np.where(scales == 0, 1.0, scales).ravel(), SLOPE_TOLERANCE)
+def _contact_rows(kind: str, given: tuple[Any, ...], values: Any, units: Any, slopes: FloatArray) -> Rows:
+    """A contact, and its derivatives, relative to themselves or the value over the parameter; by the gap over h_rms."""
+    scales = np.maximum(np.abs(slopes), np.divide.outer(np.array(values[:2]), [given[3], *given[:5]]).swapaxes(1, 2))
+    yield from rows(kind, given, values, units)
+    numbers = (*values, *slopes.reshape(12, -1)), (*units, *scales.reshape(12, -1))
+    yield from rows(f"{kind}_by", given, *numbers, SLOPE_TOLERANCE)
 
 
-def status_rows(model: UniversalModel) -> Iterator[str]:
+def status_rows(model: UniversalModel) -> Rows:
     """Points outside the table, and what is said of them."""
     X, mu = model.content.axes
     middle = 0.5 * (X.low + X.high)
-    for place, status in (
-        ((X.low, 1.0), OK),
-        ((X.high, 1.0), OK),
-        ((middle, mu.high), OK),
-        ((middle, 0.0), OK),
-        ((np.nextafter(X.low, -np.inf), 1.0), X_BELOW),
-        ((np.nextafter(X.high, np.inf), 1.0), X_ABOVE),
-        ((middle, np.nextafter(mu.high, np.inf)), MU_ABOVE),
-        ((math.nan, 1.0), INVALID),
-        ((middle, math.nan), INVALID),
-        ((middle, -1e-300), INVALID),
-    ):
-        yield row("status", place, (status,), (1.0,))
+    places = {
+        (X.low, 1.0): OK,
+        (X.high, 1.0): OK,
+        (middle, mu.high): OK,
+        (middle, 0.0): OK,
+        (np.nextafter(X.low, -np.inf), 1.0): X_BELOW,
+        (np.nextafter(X.high, np.inf), 1.0): X_ABOVE,
+        (middle, np.nextafter(mu.high, np.inf)): MU_ABOVE,
+        (math.nan, 1.0): INVALID,
+        (middle, math.nan): INVALID,
+        (middle, -1e-300): INVALID,
+    }
+    yield from rows("status", np.array([*places]).T, [[*places.values()]])
 
 
-def formula_rows(X: FloatArray, mu: FloatArray) -> Iterator[str]:
+def formula_rows(X: FloatArray, mu: FloatArray) -> Rows:
     """The closed form at those of some points that lie in its range."""
     functions, form = FUNCTIONS[FORM], RANGES[FORM]
     (X_low, X_high), (_, mu_high) = form["X"], form["mu"]
-    inside = (np.clip(X, X_low, X_high) == X) & (mu <= mu_high)
-    X, mu = X[inside], mu[inside]
-    for *place, phi_F, phi_A in zip(X, mu, functions["phi_F"](X, mu), functions["phi_A"](X, mu), strict=True):
-        yield row("formula", place, (phi_F, phi_A), (phi_F, phi_A))
-
-
-def table_rows(model: UniversalModel) -> Iterator[str]:
-    """The table's own conformance points, with the answers and tolerances that are stored in it."""
-    points = model.content.conformance
-    bound = model.answer(points["X"], points["mu"]).error
-    for k in range(bound.size):
-        answers = (points["table_F"][k], points["table_A"][k], bound[k])
-        yield row("phi", (points["X"][k], points["mu"][k]), answers, answers, points["tolerance"][k])
+    place = np.array([X, mu])[:, (np.clip(X, X_low, X_high) == X) & (mu <= mu_high)]
+    error = max(certificate.largest for certificate in CERTIFICATES[FORM].values())
+    yield from rows("formula", place, (functions["phi_F"](*place), functions["phi_A"](*place), error))
 
 
 def points_text(model: UniversalModel, reading: Reading) -> str:
     """The points' file: the table's own, and the runtime's slopes, islands, totals, refusals and calibrated law."""
     points = model.content.conformance
+    places = points["X"], points["mu"]
     head = [
         f"conformance points of the MBMA model, reading {reading.name}",
         f"data {model.content.attributes['values_sha256']}",
-        "a row: kind, tolerance, arguments; then each answer and what its difference is taken relative to",
+        "a row: kind, tolerance, how many arguments, these; each answer and what its difference is taken relative to",
         *(f"{kind}: {meaning}" for kind, meaning in KINDS.items()),
     ]
     lines = [
-        *table_rows(model),
-        *(line for line in phi_rows(model, points["X"], points["mu"]) if line.startswith("slopes")),
+        # with the answers and tolerances that are stored in the table
+        *rows(
+            "phi",
+            places,
+            (points["table_F"], points["table_A"], model.answer(*places).error),
+            None,
+            points["tolerance"],
+        ),
+        *(line for line in phi_rows(model, *places) if line.startswith("slopes")),
         *status_rows(model),
-        *formula_rows(points["X"], points["mu"]),
+        *formula_rows(*places),
     ]
     for surface in SURFACES:
         zeta_1 = surface[2] / surface[1]
-        if zeta_1 <= max(3.0, reading.floor_u):
-            continue
-        approach = np.geomspace(1e-3, 2 * surface[4] / surface[3], 8)
-        lines += geometry_rows(approach, np.full(8, surface[0]), np.full(8, zeta_1), reading)
-        lines += total_rows(surface, surface[4] * (1 - np.array(DEPTHS)), reading)
-        lines += calibrated_rows(surface, SHARES)
+        if zeta_1 > max(3.0, reading.floor_u):
+            lines += geometry_rows(np.geomspace(1e-3, 2 * surface[4] / surface[3], 8), surface[0], zeta_1, reading)
+            lines += total_rows(surface, surface[4] * (1 - np.array(DEPTHS)), reading)
+            lines += calibrated_rows(surface, SHARES)
     return comment(head, "#") + "\n".join(lines) + "\n"

@@ -175,11 +175,11 @@ def test_bits_are_those_of_any_generation():
     for used in FUSED:
         inner_of, law = np.empty(used.words_of_inner()), np.empty(used.words_of_spectrum_law())
         used.inner_integrals(inner_of)
-        facts, none, given = np.empty(2), np.empty(0), self_affine(0.8, 64.0)
+        facts, none, given = np.empty(4), np.empty(0), self_affine(0.8, 64.0)
         count = used.spectrum_waves(*given, none, none, none, facts)
         spectrum = np.empty((3, count))
         used.spectrum_waves(*given, *spectrum, facts)
-        constants = np.array([*facts, 0.5, 0.03, 0.34, 0.44, 0.09, 0.43, 0.06, 3.2])
+        constants = np.array([*facts[:2], 0.5, 0.03, 0.34, 0.44, 0.09, 0.43, 0.06, 3.2])
         assert used.spectrum_law_of(inner_of, *spectrum, constants, np.empty(9 * count), law) == 0
         u = np.linspace(1e-3, 3.1, 500)
         out, more = np.empty((3, 500)), np.empty((3, 500))
@@ -223,7 +223,7 @@ class TestAnyInput:
             used.spectrum_law_contact(law[:-1], one, *out)
 
     def test_of_spectra(self, used):
-        none, facts, inner_of = np.empty(0), np.empty(2), _inner_integrals()
+        none, facts, inner_of = np.empty(0), np.empty(4), _inner_integrals()
         spectrum = Spectrum.self_affine(0.8, 64.0)
         count = spectrum.x.size
         for number in range(len(BAD)):

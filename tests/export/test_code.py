@@ -69,6 +69,7 @@ def test_c_replays_its_points(c_folder: pathlib.Path) -> None:
         "calibrated": 12,
         "total_by": 12,
         "calibrated_by": 12,
+        "separation": 12,
     }
     assert found.points == fixed | {"formula": found.points["formula"]}
     assert found.points["formula"] > 5
