@@ -16,6 +16,7 @@ from mbma_tables.errors import MbmaError
 GROUPS = {
     "boundary_elements": "generate.boundary_elements.run",
     "calibrated": "generate.calibrated",
+    "coverage": "generate.coverage",
     "leakage_law": "generate.leakage_law",
     "explorer": "generate.explorer",
     "formulas": "generate.formulas.commands",

@@ -81,7 +81,7 @@ signal.signal(signal.SIGPROF, signal.default_int_handler)  # as Ctrl-C does, but
 one, n = Surface(0.7, 0.2, 60.0, 1.0, 3.0), 100_000
 many = Surface(np.linspace(0.3, 1.0, n), 0.2, np.geomspace(0.7, 4000, n), 1.0, 3.0)
 law, four, X = contact_law(one), open_table("island4d"), np.linspace(-5, 40, 1_000_000)
-u, pressure = np.linspace(0.2, 2.5, 20_000_000), np.geomspace(1e-4, 1e-2, 1_000_000)
+u, pressure = np.linspace(0.2, 2.5, 3_000_000), np.geomspace(1e-4, 1e-2, 1_000_000)
 requests = {
     "totals": lambda: contact(many, 1.0),
     "derivatives": lambda: contact(many, 1.0, derivatives=True),
@@ -89,7 +89,7 @@ requests = {
     "exact": lambda: contact(one, np.linspace(0, 2, 2000), tier="exact"),
     "islands": lambda: greenwood_tripp.solve(X, 1.0),
     "four numbers": lambda: four.lookup(np.linspace(1, 2, 3_000_000), 3.0, 20.0, 0.8),
-    "a law's inverse": lambda: law.at_pressure(law.force(np.linspace(-2, 2.5, 10_000_000))),
+    "a law's inverse": lambda: law.at_pressure(law.force(np.linspace(-2, 2.5, 3_000_000))),
     "calibrated": lambda: contact(one, mean_separation=u, theory="calibrated"),
     "hardness": lambda: contact(one, pressure=pressure, theory="calibrated", hardness=0.05),
 }
@@ -97,8 +97,8 @@ for name, ask in requests.items():
     begun = time.process_time()
     signal.setitimer(signal.ITIMER_PROF, 0.2)
     try:
-        ask()
-        print(name, "was not interrupted")
+        while True:  # however fast the processor
+            ask()
     except KeyboardInterrupt:
         late = time.process_time() - begun - 0.2
         if late > 1.0:
