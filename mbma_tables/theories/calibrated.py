@@ -44,7 +44,7 @@ class Calibrated(Theory):
     """Persson's energy integral with cover and weight calibrated on boundary elements.
 
     Self-affine surfaces are answered by its table, those outside of it (H below 0.1, zeta_1 above 1e5) by the law's
-    quadrature, milliseconds each. A surface that is its own spectrum is answered by that; where its heights were
+    quadrature. A surface that is its own spectrum is answered by that; where its heights were
     measured, they decide the separation, and where they were measured as a map, its tops and valleys the area, too.
     """
 
