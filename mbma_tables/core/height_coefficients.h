@@ -1,7 +1,7 @@
 /* Height integrals as polynomials. Made by python -m generate tables heights.
  *
- * F_{3/2}, then F_{5/2} from 0 on and F_{1/2} below, in [0, 1], [1, 4], [4, 40], below -8, [-8, -6] ... [-2, 0]; F_1 and
- * F_2 from 0 on. Digits of less than 1e-17 of F are left out. */
+ * F_{3/2}, then F_{5/2} from 0 on and F_{1/2} below, in [0, 1], [1, 4], [4, 40], below -8, [-8, -6] ... [-2, 0];
+ * F_1 and F_2 from 0 on. Digits of less than 1e-17 of F are left out. */
 #ifndef MBMA_HEIGHT_COEFFICIENTS_H
 #define MBMA_HEIGHT_COEFFICIENTS_H
 

@@ -40,7 +40,7 @@ typedef struct {
 /* (r^power - 1)/(power ln r) with r = exp(log_ratio): 1 where either is 0 */
 MBMA_INLINE double growth(double power, double log_ratio) {
     const double x = power * log_ratio;
-    return x != 0.0 ? expm1(x) / x : 1.0;
+    return x == 0.0 ? 1.0 : mbma_expm1(x) / x;
 }
 
 /* floor^(-2H) - zeta_1^(-2H) without cancellation */
@@ -98,7 +98,7 @@ MBMA_INLINE island island_at(double x, bool floor_d, bool floor_u, const surface
     /* only the width needs its relative digits */
     n.log_d = floor_d ? s->log_floor_d : -mbma_log(n.top) * s->over_2H;
     n.width = mbma_log1p(n.m0 / (s->e + n.b)) * s->over_2H;
-    /* zeta_d^p, (zeta_d^p - 1)/p and (zeta_u^p - zeta_d^p)/p for p = 2 - 2H; the same for 4 - 2H without the division */
+    /* zeta_d^p, (zeta_d^p - 1)/p and (zeta_u^p - zeta_d^p)/p for p = 2 - 2H; for 4 - 2H without the division */
     const double square = mbma_exp(2.0 * n.log_d);
     n.top4 = square * square * n.top;
     n.below4 = n.top4 - 1.0;

@@ -1,10 +1,8 @@
 /* Islands by the paper's four numbers: the spline of the four-number table, and the bands that its axes stand for. */
 #include "eight.h"
-#include "mbma.h"
+#include "island.h"
 
-#define RADIUS 0.66467019408956851 /* 3 sqrt(pi)/8: summit radii are this over sqrt(m4), Eq. (2) */
-#define BROADENING 0.8968          /* summit variance is (1 - BROADENING/alpha) m0, Eq. (2) */
-#define BEYOND 1e-9                /* of a cell: how far rounding may take a place off the ends of its axis */
+#define BEYOND 1e-9 /* of a cell: how far rounding may take a place off the ends of its axis */
 
 typedef struct {
     int64_t cell;
@@ -93,9 +91,6 @@ size_t mbma_spline4(size_t n, const double *places, const double *coefficients, 
                   : spline4(n, places, coefficients, nodes, false, out);
 }
 
-/* (r^power - 1)/(power log r) with x = power log r: 1 where x is 0. */
-MBMA_INLINE double growth(double x) { return x == 0.0 ? 1.0 : mbma_expm1(x) / x; }
-
 size_t mbma_four_numbers(size_t n, const double *spread, const double *sphere, const double *hurst,
                          double density_divisor, int summit_sigma, double *out) {
     const double broadening = summit_sigma ? BROADENING / 1.5 : 0.0;
@@ -103,7 +98,7 @@ size_t mbma_four_numbers(size_t n, const double *spread, const double *sphere, c
     for (size_t k = 0; k < n; k++) {
         const double H = hurst[k], power = 4.0 - 2.0 * H, width = mbma_log1p(spread[k]);
         const double inverse = sphere[k] * mbma_exp(-0.22314355131420976 * power); /* log(1.25): zeta_d^(-p) */
-        const double g0 = growth(-2.0 * H * width), g2 = growth((2.0 - 2.0 * H) * width), g4 = growth(power * width);
+        const double g0 = growth(-2.0 * H, width), g2 = growth(2.0 - 2.0 * H, width), g4 = growth(power, width);
         const double D = 0.75 * (g4 / g2) / density_divisor;
         /* alpha = 1.5 g0 g4/g2^2, Eq. (3), grouped so that nothing overflows */
         const double share = 1.0 - broadening * (g2 / g0) * (g2 / g4);
