@@ -53,12 +53,20 @@ YANG_PERSSON = dataclasses.replace(PERSSON, weight=0.42, cubic=0.58)
 
 
 def area(force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
-    """A/A0 at F/(A0 E* g) on a surface of Nayak's parameter alpha = m0 m4/m2^2."""
-    from scipy.special import erf
+    """A/A0 at F/(A0 E* g) >= 0 on a surface of Nayak's parameter alpha = m0 m4/m2^2."""
+    return _area(force, light_factor(alpha, constants), constants.area_t0)
 
-    values = np.asarray(force, float)
-    t = values / constants.area_t0
-    return np.asarray(erf(values * np.sqrt(2 * (1 + t) / (light_factor(alpha, constants) + t))))
+
+def area_persson(force: ArrayLike) -> FloatArray:
+    """The same by Persson's theory, erf(sqrt(2) F)."""
+    return _area(force, 1.0, 1.0)
+
+
+def _area(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
+    load, light = np.broadcast_arrays(np.asarray(force, float), s0)
+    out = np.empty(load.shape)
+    core.contact_area(np.ascontiguousarray(load), np.ascontiguousarray(light), t0, out)
+    return out
 
 
 def force_of(e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:

@@ -477,6 +477,8 @@ CALL_SPLINE(calibrated_contact, law, a[8].n, a[8].data, a[9].data, a[10].data, a
 CALL_SPLINE(calibrated_separation, law, a[8].n, a[8].data, a[9].data, a[10].data)
 CALL_SPLINE(calibrated_slopes, law, a[8].data, a[9].data)
 CALL_SPLINE(flow, flow, a[8].n, a[8].data, a[9].data, a[10].data, a[11].data)
+WRAP(contact_area, "DDdw", a[0].n == a[1].n && a[0].n == a[3].n,
+     mbma_contact_area(a[0].n, a[0].data, a[1].data, a[2].d, a[3].data))
 WRAP(spline_pieces, SPLINE "w",
      fits_spline(a, false) && !a[7].data && a[8].n == a[3].n * 6 * (size_t)((int64_t *)a[2].data)[2], spline_pieces(a))
 WRAP(calibrated_ends, SPLINE "w", fits_spline(a, true) && a[8].n == 2 * a[3].n, calibrated_ends(a))
@@ -578,6 +580,7 @@ static PyMethodDef METHODS[] = {
     ENTRY(law_fill), ENTRY(law_records), ENTRY(inverse_nodes), ENTRY(law_invert), ENTRY(law_flow_fill), ENTRY(law_fit),
 
     /* calibrated.c */
+    ENTRY(contact_area),
     ENTRY(spline_pieces),
     ENTRY(calibrated_ends),
     ENTRY(calibrated_contact),

@@ -254,6 +254,21 @@ MBMA_INLINE double light_factor(const mbma_calibrated_table *t, double alpha) {
     return mbma_min(mbma_fma(t->area_slope, mbma_log(alpha / 10.0), t->area_s0), 1.0);
 }
 
+MBMA_INLINE double area_at(double force, double s0, double t0) {
+    const double t = force / t0;
+    return mbma_erf(force * sqrt(2.0 * (1.0 + t) / (s0 + t)));
+}
+
+size_t mbma_contact_area(size_t n, const double *force, const double *s0, double area_t0, double *area) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        const bool good = force[k] >= 0.0 && s0[k] > 0.0 && area_t0 > 0.0;
+        area[k] = good ? area_at(mbma_min(force[k], 1e100), s0[k], area_t0) : NAN;
+        bad += !good;
+    }
+    return bad;
+}
+
 /* The next entries, and what these are asked; of no such surface, the first one and NaN. */
 static void take(const mbma_surfaces *surfaces, const int64_t *owner, const double *given, size_t n, chunk *c,
                  double asked[CHUNK]) {
@@ -321,8 +336,7 @@ size_t mbma_calibrated_contact(const mbma_calibrated_table *t, const mbma_surfac
         for (size_t k = 0; k < c.count; k++) {
             const double value = c.value[k], endless = value < -700.0 ? 0.0 : mbma_exp(value);
             /* without cancellation */
-            const double load = -endless * mbma_expm1(end[k] - value), over = load / t->area_t0;
-            const double share = mbma_erf(load * sqrt(2.0 * (1.0 + over) / (s0[k] + over)));
+            const double load = -endless * mbma_expm1(end[k] - value), share = area_at(load, s0[k], t->area_t0);
             const double known = gap[k] == gap[k] && end[k] == end[k] ? 0.0 : NAN;
             const double touching = gap[k] >= h_max[k] ? 0.0 : 1.0;
             const bool full = gap[k] <= 0.0;

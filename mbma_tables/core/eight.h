@@ -38,7 +38,8 @@ MBMA_INLINE four four_of(const double *row) {
 
 #if defined(__AVX512F__)
 typedef __m512d eight;
-#define LOW_FOUR(a) _mm512_castpd512_pd256(a)
+/* masks of all: without them GCC warns of what its own headers leave unset */
+#define LOW_FOUR(a) _mm512_maskz_extractf64x4_pd(0xFF, a, 0)
 #define HIGH_FOUR(a) _mm512_maskz_extractf64x4_pd(0xFF, a, 1)
 MBMA_INLINE eight eight_of(const double *row) { return _mm512_loadu_pd(row); }
 MBMA_INLINE eight fma8(eight a, double y, eight b) { return _mm512_fmadd_pd(a, _mm512_set1_pd(y), b); }

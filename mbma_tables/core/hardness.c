@@ -147,6 +147,7 @@ size_t mbma_bearing_share(size_t n, const double *u, const double *h_max, double
 }
 
 enum { TERMS = 9 };     /* of the series where images converge slower */
+#define BLOCK ((size_t)64) /* entries at a time, which vectors take */
 #define IMAGES 0.06     /* tau below which they converge faster */
 #define SHARPEST 1e-200 /* least tau */
 #define NOTHING 1e-20   /* a term that is less than rounding */
@@ -202,31 +203,37 @@ size_t mbma_diffused(size_t n, const double *x, const double *tau, int at_one, d
 
 size_t mbma_capped_area(size_t n, const double *load, const double *spread, const double *eta, double power,
                         double scale, int yielded, double *out) {
-    size_t missed = 0;
-    for (size_t k = 0; k < n; k++) {
-        const double x = mbma_min(load[k] / eta[k], 1.0);
-        out[k] = NAN;
-        if (!(load[k] >= 0.0 && spread[k] >= 0.0 && eta[k] > 0.0 && load[k] < INFINITY)) {
-            missed++;
-        } else if (!(x > 0.0)) {
-            /* nothing touches, or nothing yields */
-            out[k] = yielded || load[k] == 0.0 ? 0.0 : erf(spread[k]);
-        } else if (spread[k] == INFINITY) {
-            /* what is closed has no variance */
-            out[k] = !yielded || x == 1.0 ? 1.0 : 0.0;
-        } else {
+    double x[BLOCK], tau[BLOCK], reach[BLOCK];
+    for (size_t first = 0; first < n; first += BLOCK) {
+        const size_t count = n - first < BLOCK ? n - first : BLOCK;
+        for (size_t k = 0; k < count; k++) {
+            const double cap = eta[first + k], own = spread[first + k];
+            x[k] = mbma_min(load[first + k] / cap, 1.0);
             /* tau = S/(8 eta^2) of the elastic contact and of the hardness alone */
-            const double half = 0.5 * x / spread[k], elastic = half * half, limit = 0.125 / (scale * sqrt(eta[k]));
+            const double half = 0.5 * x[k] / own, elastic = half * half, limit = 0.125 / (scale * sqrt(cap));
             /* the smaller over the larger cannot overflow */
-            const double ratio = mbma_max(mbma_min(elastic, limit) / mbma_max(elastic, limit), LEAST_GAP);
-            const double joint = mbma_log1p(mbma_exp(power * mbma_log(ratio))) / power;
-            const double reach = (elastic < limit ? spread[k] : 0.5 * x / sqrt(limit)) * mbma_exp(0.5 * joint);
-            const double share = ended(x, mbma_min(elastic, limit) * mbma_exp(-joint), reach, yielded != 0);
-            /* rounding may cross the bounds */
-            out[k] = yielded ? mbma_held(share, 0.0, x) : mbma_held(share, x, 1.0);
+            const double small = mbma_min(elastic, limit), quotient = small / mbma_max(elastic, limit);
+            const double joint = mbma_log1p(mbma_exp(power * mbma_log(mbma_max(quotient, LEAST_GAP)))) / power;
+            const double near = 0.5 * x[k] / sqrt(limit);
+            tau[k] = small * mbma_exp(-joint);
+            reach[k] = (elastic < limit ? own : near) * mbma_exp(0.5 * joint);
+        }
+        for (size_t k = 0; k < count; k++) {
+            const double force = load[first + k], own = spread[first + k];
+            double share = x[k];
+            if (!(force >= 0.0 && own >= 0.0 && eta[first + k] > 0.0 && force < INFINITY))
+                share = NAN;
+            else if (!(x[k] > 0.0)) /* nothing touches, or nothing yields */
+                share = yielded || force == 0.0 ? 0.0 : erf(own);
+            else if (own == INFINITY) /* what is closed has no variance */
+                share = !yielded || x[k] == 1.0 ? 1.0 : 0.0;
+            else /* rounding may cross the bounds */
+                share = yielded ? mbma_held(ended(share, tau[k], reach[k], true), 0.0, share)
+                                : mbma_held(ended(share, tau[k], reach[k], false), share, 1.0);
+            out[first + k] = share;
         }
     }
-    return missed;
+    return count_missing(n, out);
 }
 
 #define MOST_ETA 1e100 /* what is larger leaves the same force */
@@ -335,11 +342,14 @@ size_t mbma_gap_start(size_t n, size_t m, size_t columns, const double *u, const
         place known[AROUND];
         int count = 0, before = 0;
         for (size_t at = i > AROUND / 2 ? i - AROUND / 2 : 0; at < m && at < i + AROUND / 2; at++) {
-            const double own = value[at * columns + column];
-            if (!(own > 0.0 && own < INFINITY && (count == 0 || log(own) > known[count - 1].value)))
+            const size_t own = at * columns + column;
+            if (!(value[own] > 0.0 && value[own] < INFINITY))
                 continue;
-            known[count++] = place_of(u[at * columns + column], own, steep[at * columns + column], end[k]);
-            before += at < i;
+            known[count] = place_of(u[own], value[own], steep[own], end[k]);
+            if (count == 0 || known[count].value > known[count - 1].value) {
+                before += at < i;
+                count++;
+            }
         }
         const double goal = log(wanted[k]);
         place from = {NAN, NAN, NAN};

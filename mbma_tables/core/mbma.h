@@ -321,6 +321,9 @@ typedef struct {
 /* Nayak's alpha of self-affine surfaces, and their rms gradient over q0 h_rms. */
 size_t mbma_self_affine(size_t n, const double *hurst, const double *log_zeta_1, double *alpha, double *gradient);
 
+/* A/A0 at forces, by s0 of each and t0. */
+size_t mbma_contact_area(size_t n, const double *force, const double *s0, double area_t0, double *area);
+
 /* Six coefficients for each cell of the third axis and each surface. With these, calls give the same bits in less time;
  * they are worth making from about 40 entries a surface on. */
 size_t mbma_spline_pieces(const mbma_spline *spline, const mbma_surfaces *surfaces, double *pieces);

@@ -340,9 +340,10 @@ mbma_status mbma_spectrum_law_of(const mbma_inner *inner, const mbma_waves *wave
         law->log_u[k] = log_u_in(law, k, law->edge[k], &slope);
     law->log_u[law->panels] = log_u_in(law, law->panels - 1, law->edge[law->panels], &slope);
     law->lightest[0] = exp(log_u_in(law, 0, law->edge[0], &slope));
-    law->lightest[1] = slope * law->lightest[0];
+    /* without the first power in W, u is constant there */
+    law->lightest[1] = fmin(slope * law->lightest[0], -1e-300);
     law->end = h_max < FARTHEST ? log_force_of(law, h_max, &slope) + law->shift - tail_at(law, h_max) : -INFINITY;
-    good = good && law->end == law->end && law->lightest[1] < 0.0;
+    good = good && law->end == law->end && law->lightest[0] > 0.0 && law->lightest[0] < INFINITY;
     law->panels = good ? law->panels : 0;
     return good ? MBMA_OK : MBMA_UNRESOLVED;
 }

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from mbma_tables.arguments import FloatArray, finite_array, require
-from mbma_tables.calibrated import YANG_PERSSON, Law
+from mbma_tables.calibrated import YANG_PERSSON, Law, area_persson
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
@@ -82,11 +82,11 @@ def _separations(law: Law, given: FloatArray) -> FloatArray:
 
 
 def _forces(law: Law, given: FloatArray) -> FloatArray:
-    """Force over A0 E* g, -dF/du and area at u/h_rms, and u/h_rms at the lightest and the heaviest load answered."""
+    """Force over A0 E* g and -dF/du at u/h_rms, and u/h_rms at the lightest and the heaviest load answered."""
     u, lightest = given
     most, _ = law.separation_persson(lightest)
     least, _ = law.separation_persson(MAX_RATIO / math.sqrt(2))
-    return np.array([*law.contact(u), most, np.broadcast_to(least, u.shape)])
+    return np.array([*law.force_and_stiffness(u), most, np.broadcast_to(least, u.shape)])
 
 
 def _simplified_separations(law: Law, given: FloatArray) -> FloatArray:
@@ -150,12 +150,12 @@ class Persson(Theory):
         OutOfRangeError
             Also where u is so small or so large that the force of the full form is no normal number.
         """
-        force, area, stiffness = self._contact(surface, mean_separation)
+        force, stiffness = self._force(surface, mean_separation)
         error = np.full(force.shape, LAW_ERROR if isinstance(surface, MeasuredSurface) else INVERSE_RTOL)
-        return TheoryAnswer(force, area, stiffness, error)
+        return TheoryAnswer(force, self.area_at(surface, force), stiffness, error)
 
-    def _contact(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Force over A0 E* at mean separations u [length], area and -dF/du."""
+    def _force(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Force over A0 E* at mean separations u [length], and -dF/du."""
         u = finite_array("mean_separation", mean_separation)
         allowed = u > 0 if self._is_full else u >= 0
         require("mean_separation", u, allowed, "positive" if self._is_full else "zero or positive")
@@ -165,15 +165,14 @@ class Persson(Theory):
             unit = np.asarray(surface.s if isinstance(surface, Surface) else h_rms)
             lightest = np.exp(MIN_LOG_FORCE) * np.asarray(surface.q0) * unit / gradient
             given = np.stack([u / h_rms, np.broadcast_to(lightest, u.shape)])
-            force, area, stiffness, most, least = _by_law(surface, given, _forces)
+            force, stiffness, most, least = _by_law(surface, given, _forces)
             inside = (u >= least * h_rms) & (u <= most * h_rms)
             reached = [np.max(least * h_rms / unit), np.min(most * h_rms / unit)]
             text = "within what normal numbers reach, {:.3g} to {:.6g}".format(*reached)
             require("mean_separation/s", u / unit, inside, text)
         else:
             force, stiffness = _by_law(self._self_affine(surface), (u / h_rms)[None], _simplified_forces)
-            area = self.area_at(surface, force * gradient)
-        return force * gradient, area, stiffness * gradient / h_rms
+        return force * gradient, stiffness * gradient / h_rms
 
     def _loaded(self, surface: AnySurface, force: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean separation [length] at loads over A0 E*, negative beyond lambda E*, and -du/dlog F."""
@@ -208,13 +207,11 @@ class Persson(Theory):
 
     def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
         """A/A0 = erf(p0/(2 sqrt(G))) at a force over A0 E*, G = E*^2 m2/4 at the largest magnification (18)."""
-        from scipy.special import erf
-
-        return np.asarray(erf(force / np.sqrt(surface.m2)))
+        return area_persson(force / np.asarray(surface.rms_gradient))
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], from dU = -F du = F (-du/dlog F) dlog F."""
-        force = self._contact(surface, mean_separation)[0]
+        force, _ = self._force(surface, mean_separation)
         lighter = force[..., None] * np.exp(-_T)
         batch = select(surface, force.shape, np.arange(force.size).reshape(*force.shape, 1))
         return np.asarray((lighter * self._loaded(batch, lighter)[1]) @ _T_WEIGHTS)

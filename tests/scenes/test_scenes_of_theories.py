@@ -98,7 +98,8 @@ def test_a_plan_names_its_theory(theory):
 
 @each
 def test_validity_is_an_effect(theory):
-    u = [0.8, 0.05]
+    # of gaps that are numbers, so that both are asked the same
+    u = (CONCRETE.h_max + np.array([0.5, -1.0])) / 2
     found = scene_of(theory, effects=("force", "validity"), mean_separations=u).run()
     truth = contact(CONCRETE, mean_separation=u, theory=theory)
     assert found["valid"].values.tolist() == truth.valid.tolist()
