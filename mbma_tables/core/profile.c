@@ -1,7 +1,7 @@
-/* One surface at many gaps: its islands are looked up once, at the nodes of panels of the approach, and sums over them at
- * some gaps of each panel make Chebyshev series of the logarithms of force and area (44-49).
+/* One surface at many gaps: its islands are looked up once, at the nodes of panels of the approach, and sums over them
+ * at some gaps of each panel make Chebyshev series of the logarithms of force and area (44-49).
  *
- * Of an island at a gap of compression c = (h_max - d)/h_rms, force and area count as weight exp(-(shift - rate c)^2/2).
+ * Of an island at a gap of compression c = (h_max - d)/h_rms, what counts is weight exp(-(shift - rate c)^2/2).
  */
 #include "island.h"
 #include "phi.h"
@@ -17,7 +17,7 @@ static const double LEADS = 20.0;    /* by which exponents of the smallest islan
 static const double LEAST_APPROACH = 1e-290;
 /* of errors of a series */
 static const double TAIL_SHARE = 5.0; /* of the last two terms, for all that follow: they may fall slowly */
-static const double OLDER = 0.25;     /* of the two before them: signs change, and the last two may be small by chance */
+static const double OLDER = 0.25;     /* of the two before them, for the last two may be small by chance */
 static const double SLOPES = 0.1;     /* of their relative error counts */
 static const double THIN = 1e-3;      /* width over gap of panels in which values round to more than slopes change */
 /* of sums over many islands far below a gap */
@@ -26,7 +26,7 @@ static const double FAR_ERROR = 5e-11;  /* of such a series, or they are summed 
 static const double FAR_REACH = 0.06;   /* of the compression, or of h_rms, that one such series covers */
 static const double LEAST_LOG = -700.0; /* of ln F */
 
-/* out = values times the first `rows` rows of a matrix, a multiple of four, with `stride` columns of which some count */
+/* out = values times the first `rows` rows of a matrix, a multiple of 4, of whose `stride` columns some count */
 MBMA_INLINE void combined(const double *restrict values, const double *restrict matrix, int rows, int columns,
                           int stride, double *restrict out) {
     for (int j = 0; j < columns; j++)
@@ -42,24 +42,36 @@ MBMA_INLINE void combined(const double *restrict values, const double *restrict 
 
 /* The power of delta that weights lack in the panel from 0: of force, area, number of islands, Hertz area. */
 static double lead(int row, double delta) {
-    return row == 0 ? delta * delta * sqrt(delta) : row == 1 ? delta * delta * cbrt(delta) : row == 2 ? 1.0 : delta * delta;
+    const double square = delta * delta;
+    return row == 0 ? square * sqrt(delta) : row == 1 ? square * cbrt(delta) : row == 2 ? 1.0 : square;
 }
 /* and the power of the compression that their sums begin with */
 static const double BEGUN[ROWS] = {3.5, 10.0 / 3.0, 1.0, 3.0};
 
+/* What force lacks at a place in [0, 1] of a panel: that power, and how delta rises there over `width`. */
+static double lacking(const mbma_panel_rule *r, double width, double at) {
+    return r->power > 1 ? 2.0 * at * lead(0, width * at * at) : 1.0;
+}
 
+/* exp((least - height^2)/2) of islands at a gap. */
+MBMA_INLINE void fill_shares(int64_t n, const double *restrict shift, const double *restrict rate, double c,
+                             double least, double *restrict share) {
+    for (int64_t k = 0; k < n; k++) {
+        const double height = mbma_fma(-rate[k], c, shift[k]);
+        share[k] = mbma_exp(0.5 * mbma_fma(-height, height, least));
+    }
+}
 
 /* Adds to `out` the sums of rows, then their slopes by the compression, of islands begin:stop, times exp(least/2). */
-static void add_sums(double c, double least, const mbma_nodes *islands, int rows, int64_t begin, int64_t stop, double *out) {
+static void add_sums(double c, double least, const mbma_nodes *islands, int rows, int64_t begin, int64_t stop,
+                     double *out) {
     double share[CHUNK], turned[CHUNK];
     for (int64_t first = begin; first < stop; first += CHUNK) {
         const int64_t count = stop - first < CHUNK ? stop - first : (int64_t)CHUNK;
         const double *const shift = islands->shift + first, *const rate = islands->rate + first;
-        for (int64_t k = 0; k < count; k++) {
-            const double height = mbma_fma(-rate[k], c, shift[k]);
-            share[k] = mbma_exp(0.5 * mbma_fma(-height, height, least));
-            turned[k] = share[k] * height * rate[k];
-        }
+        fill_shares(count, shift, rate, c, least, share);
+        for (int64_t k = 0; k < count; k++)
+            turned[k] = share[k] * mbma_fma(-rate[k], c, shift[k]) * rate[k];
         for (int row = 0; row < rows; row++) {
             out[row] += dot(share, islands->weights + row * islands->size + first, (size_t)count);
             out[rows + row] += dot(turned, islands->weights + row * islands->size + first, (size_t)count);
@@ -95,7 +107,7 @@ static double tail(const double *series, int terms) {
     return TAIL_SHARE * (fabs(series[terms - 1]) + fabs(series[terms - 2]));
 }
 
-/* Series over compressions in [low, high] of islands 0:stop, of ln of sums and of their slopes; the error of the first. */
+/* Series over compressions in [low, high] of ln of sums of islands 0:stop, and of slopes; the error of the first. */
 static double fill_far(double low, double high, const mbma_rules *r, const mbma_nodes *islands, int rows, int64_t stop,
                        double out[2 * ROWS][FAR_TERMS]) {
     double values[2 * ROWS][FAR_TERMS], error = 0.0;
@@ -209,7 +221,7 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
     }
 }
 
-/* Rows of a panel at one compression, and perhaps slopes; `rows` and `slopes` are constants wherever this is inlined. */
+/* Rows of a panel at one compression, and perhaps slopes; two rows alone are the most frequent, and constants then. */
 MBMA_INLINE void totals_at(double c, size_t panels, const double *edges, const double *series, int rows, bool slopes,
                            double *out, size_t stride) {
     /* the panel by halves, without branches that nothing foretells */
@@ -258,17 +270,15 @@ MBMA_INLINE void totals_at(double c, size_t panels, const double *edges, const d
 void mbma_profile_totals(size_t n, const double *compression, size_t panels, const double *edges, const double *series,
                          int rows, int slopes, double *out) {
     for (size_t k = 0; k < n; k++)
-        if (slopes)
-            totals_at(compression[k], panels, edges, series, rows, true, out + k, n);
-        else if (rows == 2)
+        if (!slopes && rows == 2)
             totals_at(compression[k], panels, edges, series, 2, false, out + k, n);
         else
-            totals_at(compression[k], panels, edges, series, rows, false, out + k, n);
+            totals_at(compression[k], panels, edges, series, rows, slopes != 0, out + k, n);
 }
 
 /* Bound on the relative error of one panel: of what it interpolates, against islands, and of its sums. */
-static double missed_by(const mbma_panel_rule *r, double low, double high, const double *fields, size_t stride, int rows,
-                        double last) {
+static double missed_by(const mbma_panel_rule *r, double low, double high, const double *fields, size_t stride,
+                        int rows, double last) {
     double finer[ROWS + 2][2 * NODES], seen[ROWS + 2][CHECKS + 1], coarse[NODES], fine_weight[2 * NODES];
     double c[SPREAD + TOPS], least[SPREAD + TOPS];
     const double *const force = fields, *const shift = fields + (size_t)rows * stride, *const rate = shift + stride;
@@ -289,21 +299,17 @@ static double missed_by(const mbma_panel_rule *r, double low, double high, const
         const double true_shift = shift[NODES + k], true_rate = rate[NODES + k];
         const double at = mbma_held(true_shift / true_rate, high, last);
         const double off_shift = seen[rows][k] - true_shift, off_rate = seen[rows + 1][k] - true_rate;
-        const double highest =
-            mbma_max(mbma_min(true_shift - true_rate * high, LEADS / (true_rate * mbma_max(low, LEAST_APPROACH))), HIGH);
+        const double leading = LEADS / (true_rate * mbma_max(low, LEAST_APPROACH));
+        const double highest = mbma_max(mbma_min(true_shift - true_rate * high, leading), HIGH);
         turned = mbma_max(turned, highest * (fabs(off_shift - off_rate * at) + highest * fabs(off_rate) / true_rate));
     }
     /* sums over whole panels, relative to the largest of the panel */
     for (int k = 0; k < 2 * count; k++) {
         const double at = 0.5 * (k < count ? r->nodes[k] : 1.0 + r->nodes[k - count]);
-        fine_weight[k] = 0.5 * r->weights[k % count] * finer[0][k];
-        if (r->power > 1)
-            fine_weight[k] *= 2.0 * at * lead(0, width * at * at);
+        fine_weight[k] = 0.5 * r->weights[k % count] * finer[0][k] * lacking(r, width, at);
     }
-    for (int k = 0; k < count; k++) {
-        const double at = r->nodes[k];
-        coarse[k] = r->weights[k] * force[k] * (r->power > 1 ? 2.0 * at * lead(0, width * at * at) : 1.0);
-    }
+    for (int k = 0; k < count; k++)
+        coarse[k] = r->weights[k] * force[k] * lacking(r, width, r->nodes[k]);
     double lowest = INFINITY, most = 0.0, off = 0.0, alone = 0.0;
     for (int k = 0; k < SPREAD + TOPS; k++) {
         double top = low + (last - low) * k / (double)(SPREAD - 1);
@@ -325,14 +331,8 @@ static double missed_by(const mbma_panel_rule *r, double low, double high, const
     }
     for (int k = 0; k < SPREAD + TOPS; k++) {
         double fine[2 * NODES], rough[NODES];
-        for (int j = 0; j < 2 * count; j++) {
-            const double height = mbma_fma(-finer[rows + 1][j], c[k], finer[rows][j]);
-            fine[j] = mbma_exp(0.5 * mbma_fma(-height, height, least[k]));
-        }
-        for (int j = 0; j < count; j++) {
-            const double height = mbma_fma(-rate[j], c[k], shift[j]);
-            rough[j] = mbma_exp(0.5 * mbma_fma(-height, height, least[k]));
-        }
+        fill_shares(2 * count, finer[rows], finer[rows + 1], c[k], least[k], fine);
+        fill_shares(count, shift, rate, c[k], least[k], rough);
         const double sum = dot(fine, fine_weight, (size_t)(2 * count)), other = dot(rough, coarse, (size_t)count);
         const double scale = mbma_exp(0.5 * (lowest - least[k]));
         /* up to its own end the panel from 0 is all there is */

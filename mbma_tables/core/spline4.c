@@ -1,10 +1,8 @@
 /* Islands by the paper's four numbers: the spline of the four-number table, and the bands that its axes stand for. */
 #include "eight.h"
-#include "mbma.h"
+#include "island.h"
 
-#define RADIUS 0.66467019408956851 /* 3 sqrt(pi)/8: summit radii are this over sqrt(m4), Eq. (2) */
-#define BROADENING 0.8968          /* summit variance is (1 - BROADENING/alpha) m0, Eq. (2) */
-#define BEYOND 1e-9                /* of a cell: how far rounding may take a place off the ends of its axis */
+#define BEYOND 1e-9 /* of a cell: how far rounding may take a place off the ends of its axis */
 
 typedef struct {
     int64_t cell;
@@ -93,7 +91,7 @@ size_t mbma_spline4(size_t n, const double *places, const double *coefficients, 
                   : spline4(n, places, coefficients, nodes, false, out);
 }
 
-/* (r^power - 1)/(power log r) with x = power log r: 1 where x is 0. */
+/* (r^power - 1)/(power ln r) with x = power ln r: 1 where x is 0 */
 MBMA_INLINE double growth(double x) { return x == 0.0 ? 1.0 : mbma_expm1(x) / x; }
 
 size_t mbma_four_numbers(size_t n, const double *spread, const double *sphere, const double *hurst,

@@ -1,7 +1,7 @@
 /* Force and area of a surface at a gap: adaptive Gauss-Kronrod quadrature over the approaches of its islands (44-50).
  *
- * Below the floor of zeta_d the approach is mapped by x = scale sinh(t)^2, a power at 0 and geometric beyond the boundary
- * layer; above it the integrand is little more than a Gaussian of x, and x itself serves.
+ * Below the floor of zeta_d the approach is mapped by x = scale sinh(t)^2, a power at 0 and geometric beyond the
+ * boundary layer; above it the integrand is little more than a Gaussian of x, and x itself serves.
  */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("no-thread-jumps") /* which makes branches that keep the loop over nodes from vectorising */
@@ -17,8 +17,8 @@ enum { BY_LOG_E = BY_LOG_ZETA }; /* over nodes, derivatives are by H at given e 
 #define LEAST (-700.0) /* of exponents: below it a Gaussian is nothing */
 #define NEAR_ONE 0.1   /* p l below which a difference goes by its series */
 
-/* A Kronrod sum errs by at most 3 (difference to Gauss)^1.5, seen over random surfaces: 4^1.5 = 8. With a lower floor of
- * zeta_d than the paper's the difference counts more. */
+/* A Kronrod sum errs by at most 3 (difference to Gauss)^1.5, seen over random surfaces: 4^1.5 = 8. With a lower floor
+ * of zeta_d than the paper's the difference counts more. */
 #define PAPER_FLOOR 1.5
 #define SAFETY 4.0
 #define SAFETY_BELOW 400.0
