@@ -79,30 +79,40 @@ static void add_sums(double c, double least, const mbma_nodes *islands, int rows
     }
 }
 
-/* About the least square of a height of islands begin:stop at a gap; neighbours differ by far less than exponentials
- * reach. */
-static double least_square(double c, const mbma_nodes *islands, int64_t begin, int64_t stop) {
+/* About the least square of a height at a gap; neighbours differ by far less than exponentials reach. */
+static double least_square(int64_t n, const double *shift, const double *rate, double c) {
     double least = INFINITY;
-    for (int64_t k = begin; k < stop; k += 4) {
-        const double height = mbma_fma(-islands->rate[k], c, islands->shift[k]);
+    for (int64_t k = 0; k < n; k += 4) {
+        const double height = mbma_fma(-rate[k], c, shift[k]);
         least = mbma_min(least, height * height);
     }
     return least;
 }
 
-/* A Chebyshev series at x in [-1, 1]. */
-MBMA_INLINE double series_at(const double *series, int terms, double x) {
-    double before = 1.0, term = x, sum = series[0];
+/* Chebyshev series at x in [-1, 1], and their derivatives unless `slopes` is NULL. */
+MBMA_INLINE void series_at(const double *series, int rows, int terms, double x, double *sums, double *slopes) {
+    double before = 1.0, term = x, before_slope = 0.0, slope = 1.0;
+    for (int row = 0; row < rows; row++) {
+        sums[row] = series[row * terms];
+        if (slopes)
+            slopes[row] = 0.0;
+    }
+    /* polynomials of the first kind, and for their derivatives of the second */
     for (int k = 1; k < terms; k++) {
-        const double next = mbma_fma(2.0 * x, term, -before);
-        sum = mbma_fma(series[k], term, sum);
+        for (int row = 0; row < rows; row++) {
+            sums[row] = mbma_fma(series[row * terms + k], term, sums[row]);
+            if (slopes)
+                slopes[row] = mbma_fma(k * series[row * terms + k], slope, slopes[row]);
+        }
+        const double next = mbma_fma(2.0 * x, term, -before), next_slope = mbma_fma(2.0 * x, slope, -before_slope);
         before = term;
         term = next;
+        before_slope = slope;
+        slope = next_slope;
     }
-    return sum;
 }
 
-/* Bound on what a series leaves out. */
+/* Bound on what a series leaves out */
 static double tail(const double *series, int terms) {
     return TAIL_SHARE * (fabs(series[terms - 1]) + fabs(series[terms - 2]));
 }
@@ -113,7 +123,7 @@ static double fill_far(double low, double high, const mbma_rules *r, const mbma_
     double values[2 * ROWS][FAR_TERMS], error = 0.0;
     for (int k = 0; k < FAR_TERMS; k++) {
         const double c = 0.5 * (low + high + (high - low) * r->far_points[k]);
-        const double least = least_square(c, islands, 0, stop);
+        const double least = least_square(stop, islands->shift, islands->rate, c);
         double sums[2 * ROWS] = {0.0};
         add_sums(c, least, islands, rows, 0, stop, sums);
         for (int row = 0; row < rows; row++) {
@@ -181,13 +191,13 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
             const double reach = r->reach[gap], c = low[panel] + width * (r->power > 1 ? reach * reach : reach);
             double sums[2 * ROWS] = {0.0};
             place(r, width, reach, inside, rows, gap * count, islands, stop);
-            double least = least_square(c, islands, begin, stop + count);
+            double least = least_square(stop + count - begin, islands->shift + begin, islands->rate + begin, c);
             if (begin > 0) {
-                const double x = (2.0 * c - start - until) / (until - start), log_F = series_at(far[0], FAR_TERMS, x);
-                least = mbma_min(least, -2.0 * log_F);
+                series_at(far[0], 2 * rows, FAR_TERMS, (2.0 * c - start - until) / (until - start), sums, NULL);
+                least = mbma_min(least, -2.0 * sums[0]);
                 for (int row = 0; row < rows; row++) {
-                    sums[row] = exp((row == 0 ? log_F : series_at(far[row], FAR_TERMS, x)) + 0.5 * least);
-                    sums[rows + row] = sums[row] * series_at(far[rows + row], FAR_TERMS, x);
+                    sums[row] = exp(sums[row] + 0.5 * least);
+                    sums[rows + row] *= sums[row];
                 }
             }
             add_sums(c, least, islands, rows, begin, stop + count, sums);
@@ -233,24 +243,8 @@ MBMA_INLINE void totals_at(double c, size_t panels, const double *edges, const d
     }
     const double low = edges[first], high = edges[first + 1], width = high - low, x = (2.0 * c - low - high) / width;
     const double *const own = series + first * (size_t)rows * TERMS;
-    double sums[ROWS], steep[ROWS], before = 1.0, term = x, before_slope = 0.0, slope = 1.0;
-    for (int row = 0; row < rows; row++) {
-        sums[row] = own[row * TERMS];
-        steep[row] = 0.0;
-    }
-    /* Chebyshev polynomials of the first kind, and for their derivatives of the second */
-    for (int k = 1; k < TERMS; k++) {
-        for (int row = 0; row < rows; row++) {
-            sums[row] = mbma_fma(own[row * TERMS + k], term, sums[row]);
-            if (slopes)
-                steep[row] = mbma_fma(k * own[row * TERMS + k], slope, steep[row]);
-        }
-        const double next = mbma_fma(2.0 * x, term, -before), next_slope = mbma_fma(2.0 * x, slope, -before_slope);
-        before = term;
-        term = next;
-        before_slope = slope;
-        slope = next_slope;
-    }
+    double sums[ROWS], steep[ROWS];
+    series_at(own, rows, TERMS, x, sums, slopes ? steep : NULL);
     /* beyond the profile, and for NaN, there is no answer */
     const bool inside = c > 0.0 && x <= 1.0 + 1e-12 * high / width;
     for (int row = 0; row < rows; row++) {
@@ -322,11 +316,7 @@ static double missed_by(const mbma_panel_rule *r, double low, double high, const
             top = top < last ? top : last - (last - high) * 0.25 * share * share * share;
         }
         c[k] = mbma_held(top, high, last);
-        least[k] = INFINITY;
-        for (int j = 0; j < 2 * count; j += 4) {
-            const double height = mbma_fma(-finer[rows + 1][j], c[k], finer[rows][j]);
-            least[k] = mbma_min(least[k], height * height);
-        }
+        least[k] = least_square(2 * count, finer[rows], finer[rows + 1], c[k]);
         lowest = mbma_min(lowest, least[k]);
     }
     for (int k = 0; k < SPREAD + TOPS; k++) {
