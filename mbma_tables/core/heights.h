@@ -58,7 +58,7 @@ MBMA_INLINE halves halves_of(double x) {
 }
 
 /* F_1 or F_2; F_1(x) = F_1(-x) - x, F_2(x) = 1 + x^2 - F_2(-x). */
-MBMA_INLINE double whole(int n, double x) {
+static double whole(int n, double x) {
     const spot at = spot_of(fabs(x));
     const double power = n == 1 ? at.base : at.base * at.base;
     const double value = height_polynomial(MBMA_HEIGHT_WHOLE[n - 1][at.piece], at.t) * (power * at.weight) * at.fade;

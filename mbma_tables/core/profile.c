@@ -264,10 +264,12 @@ MBMA_INLINE void totals_at(double c, size_t panels, const double *edges, const d
 void mbma_profile_totals(size_t n, const double *compression, size_t panels, const double *edges, const double *series,
                          int rows, int slopes, double *out) {
     for (size_t k = 0; k < n; k++)
-        if (!slopes && rows == 2)
+        if (slopes)
+            totals_at(compression[k], panels, edges, series, rows, true, out + k, n);
+        else if (rows == 2)
             totals_at(compression[k], panels, edges, series, 2, false, out + k, n);
         else
-            totals_at(compression[k], panels, edges, series, rows, slopes != 0, out + k, n);
+            totals_at(compression[k], panels, edges, series, rows, false, out + k, n);
 }
 
 /* Bound on the relative error of one panel: of what it interpolates, against islands, and of its sums. */

@@ -70,16 +70,13 @@ MBMA_INLINE size_t spline4(size_t n, const double *places, const double *coeffic
                 by_z = fma8(slope_z, w[0].value[a], by_z);
             }
         }
-        double found[10];
-        last_axis(w[3].value, value, &found[0], &found[count]);
-        if (slopes) {
-            last_axis(w[3].value, by_x, &found[1], &found[6]);
-            last_axis(w[3].value, by_y, &found[2], &found[7]);
-            last_axis(w[3].value, by_z, &found[3], &found[8]);
-            last_axis(w[3].slope, value, &found[4], &found[9]);
+        const eight sums[5] = {value, by_x, by_y, by_z, value};
+        for (size_t m = 0; m < count; m++) {
+            double found[2];
+            last_axis(m < 4 ? w[3].value : w[3].slope, sums[m], &found[0], &found[1]);
+            out[m * n + k] = inside ? found[0] : NAN;
+            out[(count + m) * n + k] = inside ? found[1] : NAN;
         }
-        for (size_t m = 0; m < 2 * count; m++)
-            out[m * n + k] = inside ? found[m] : NAN;
         bad += !inside;
     }
     return bad;

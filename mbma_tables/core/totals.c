@@ -7,7 +7,6 @@
 #pragma GCC optimize("no-thread-jumps") /* which makes branches that keep the loop over nodes from vectorising */
 #endif
 #include "island.h"
-#include "kronrod.h"
 #include "phi.h"
 
 enum { MAX_INTERVALS = 200, BY_HURST = 1, BY_LOG_ZETA, BY_COMPRESSION, BY_PEAK, BELOW_KINK, COLUMNS };
@@ -143,22 +142,21 @@ MBMA_INLINE void fill_nodes(bool floor_d, bool floor_u, bool slopes, const inter
     }
 }
 
-/* Each case in a function of its own, which compilers take for a loop of its own. */
-typedef void fill_function(const interval *, const rule *, const gap *, at_nodes *);
-#define FILL(name, floor_d, floor_u, slopes) \
-    static void name(const interval *p, const rule *r, const gap *g, at_nodes *out) { \
-        fill_nodes(floor_d, floor_u, slopes, p, r, g, out); \
+/* Each case in functions of its own, which compilers take for a loop of its own. */
+#define FILL(name, floor_d, floor_u) \
+    static void name##_values(const interval *p, const rule *r, const gap *g, at_nodes *out) { \
+        fill_nodes(floor_d, floor_u, false, p, r, g, out); \
+    } \
+    static void name##_slopes(const interval *p, const rule *r, const gap *g, at_nodes *out) { \
+        fill_nodes(floor_d, floor_u, true, p, r, g, out); \
     }
-FILL(values_free, false, false, false)
-FILL(values_floor_u, false, true, false)
-FILL(values_floor_d, true, false, false)
-FILL(values_floors, true, true, false)
-FILL(slopes_free, false, false, true)
-FILL(slopes_floor_u, false, true, true)
-FILL(slopes_floor_d, true, false, true)
-FILL(slopes_floors, true, true, true)
-static fill_function *const FILLS[2][2][2] = {{{values_free, values_floor_u}, {values_floor_d, values_floors}},
-                                              {{slopes_free, slopes_floor_u}, {slopes_floor_d, slopes_floors}}};
+FILL(free, false, false)
+FILL(floor_u, false, true)
+FILL(floor_d, true, false)
+FILL(floors, true, true)
+static void (*const FILLS[2][2][2])(const interval *, const rule *, const gap *, at_nodes *) = {
+    {{free_values, floor_u_values}, {floor_d_values, floors_values}},
+    {{free_slopes, floor_u_slopes}, {floor_d_slopes, floors_slopes}}};
 
 /* The pieces of [0, compression] between the kinks; their number. */
 static int first_intervals(const gap *g, interval *intervals) {
@@ -298,6 +296,27 @@ static int end_slopes(const gap *g, double sums[2][COLUMNS]) {
     }
     return status;
 }
+
+/* QUADPACK's Gauss-Kronrod rules of 21 and 31 nodes (Piessens, de Doncker-Kapenga, Ueberhuber and Kahaner 1983), which
+ * are symmetric: nodes from 1 to 0. Every second one, from the second on, is also a Gauss node. */
+static const struct {
+    double nodes[16], kronrod[16], gauss[8];
+} HALF_RULES[2] = {
+    {{0.9956571630258081, 0.9739065285171717, 0.9301574913557082, 0.8650633666889845, 0.7808177265864169,
+      0.6794095682990244, 0.5627571346686047, 0.4333953941292472, 0.2943928627014602, 0.14887433898163122, 0.0},
+     {0.011694638867371874, 0.032558162307964725, 0.054755896574351995, 0.07503967481091996, 0.0931254545836976,
+      0.10938715880229764, 0.12349197626206584, 0.13470921731147334, 0.14277593857706009, 0.14773910490133849,
+      0.1494455540029169},
+     {0.06667134430868814, 0.1494513491505806, 0.21908636251598204, 0.26926671930999635, 0.29552422471475287}},
+    {{0.9980022986933971, 0.9879925180204854, 0.9677390756791391, 0.937273392400706, 0.8972645323440819,
+      0.8482065834104272, 0.790418501442466, 0.7244177313601701, 0.650996741297417, 0.5709721726085388,
+      0.4850818636402397, 0.3941513470775634, 0.29918000715316884, 0.20119409399743451, 0.1011420669187175, 0.0},
+     {0.005377479872923349, 0.015007947329316122, 0.02546084732671532, 0.03534636079137585, 0.04458975132476488,
+      0.05348152469092809, 0.06200956780067064, 0.06985412131872826, 0.07684968075772038, 0.08308050282313302,
+      0.08856444305621176, 0.09312659817082532, 0.09664272698362368, 0.09917359872179196, 0.10076984552387559,
+      0.10133000701479154},
+     {0.03075324199611727, 0.07036604748810812, 0.10715922046717194, 0.13957067792615432, 0.16626920581699392,
+      0.1861610000155622, 0.19843148532711158, 0.2025782419255613}}};
 
 int mbma_kronrod(int count, double *nodes, double *kronrod, double *gauss) {
     if (count != 21 && count != 31)
