@@ -40,18 +40,17 @@ MBMA_INLINE void combined(const double *restrict values, const double *restrict 
     }
 }
 
-/* The power of delta that weights lack in the panel from 0: of force, area, number of islands, Hertz area. */
-static double lead(int row, double delta) {
-    const double square = delta * delta;
-    return row == 0 ? square * sqrt(delta) : row == 1 ? square * cbrt(delta) : row == 2 ? 1.0 : square;
-}
-/* and the power of the compression that their sums begin with */
+/* The power of the compression that sums begin with: of force, area, number of islands, Hertz area. */
 static const double BEGUN[ROWS] = {3.5, 10.0 / 3.0, 1.0, 3.0};
 
-/* What force lacks at a place in [0, 1] of a panel: that power, and how delta rises there over `width`. */
-static double lacking(const mbma_panel_rule *r, double width, double at) {
-    return r->power > 1 ? 2.0 * at * lead(0, width * at * at) : 1.0;
+/* What weights lack at delta in the panel from 0, whose rule has the power 2: delta to one power less. */
+static double lead(double power, int row, double delta) {
+    const double square = delta * delta;
+    return !(power > 1) || row == 2 ? 1.0 : row == 0 ? square * sqrt(delta) : row == 1 ? square * cbrt(delta) : square;
 }
+
+/* How delta rises over the width of a panel at a place in [0, 1]. */
+static double rise(double power, double at) { return power > 1 ? 2.0 * at : 1.0; }
 
 /* exp((least - height^2)/2) of islands at a gap. */
 MBMA_INLINE void fill_shares(int64_t n, const double *restrict shift, const double *restrict rate, double c,
@@ -112,7 +111,7 @@ MBMA_INLINE void series_at(const double *series, int rows, int terms, double x, 
     }
 }
 
-/* Bound on what a series leaves out */
+/* Bound on what a series leaves out. */
 static double tail(const double *series, int terms) {
     return TAIL_SHARE * (fabs(series[terms - 1]) + fabs(series[terms - 2]));
 }
@@ -143,11 +142,10 @@ static double fill_far(double low, double high, const mbma_rules *r, const mbma_
 static void place(const mbma_panel_rule *r, double width, double reach, double fields[ROWS + 2][NODES * (GAPS + 1)],
                   int rows, int first, const mbma_nodes *islands, int64_t stop) {
     for (int k = 0; k < r->count; k++) {
-        const double at = reach * r->nodes[k], delta = r->power > 1 ? width * at * at : 0.0;
-        const double weight = reach * width * r->weights[k] * (r->power > 1 ? 2.0 * at : 1.0);
+        const double at = reach * r->nodes[k], weight = reach * width * r->weights[k] * rise(r->power, at);
         for (int row = 0; row < rows; row++)
             islands->weights[row * islands->size + stop + k] =
-                weight * fields[row][first + k] * (r->power > 1 ? lead(row, delta) : 1.0);
+                weight * fields[row][first + k] * lead(r->power, row, width * at * at);
         islands->shift[stop + k] = fields[rows][first + k];
         islands->rate[stop + k] = fields[rows + 1][first + k];
     }
@@ -156,7 +154,7 @@ static void place(const mbma_panel_rule *r, double width, double reach, double f
 void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *kind, const double *low,
                          const double *high, const double *fields, int rows, double *series, double *error,
                          const mbma_nodes *islands, int64_t *stops) {
-    double inside[ROWS + 2][NODES * (GAPS + 1)], ends[ROWS + 2][GAPS], values[TERMS], far[2 * ROWS][FAR_TERMS];
+    double inside[ROWS + 2][NODES * (GAPS + 1)], ends[ROWS + 2][GAPS], far[2 * ROWS][FAR_TERMS];
     int64_t begin = 0, stop = 0;
     double missed = 0.0, start = 0.0, until = 0.0;
     stops[0] = 0;
@@ -173,9 +171,9 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
             start = low[panel];
             until = mbma_min(start + FAR_REACH * mbma_min(start, 1.0), high[ahead < panels ? ahead : panels - 1]);
             if (stop > MANY && high[panel] <= until) {
-                missed = fill_far(start, until, rules, islands, rows, stop, far);
-                begin = missed <= FAR_ERROR ? stop : 0;
-                missed = missed <= FAR_ERROR ? missed : 0.0;
+                const double off = fill_far(start, until, rules, islands, rows, stop, far);
+                begin = off <= FAR_ERROR ? stop : 0;
+                missed = off <= FAR_ERROR ? off : 0.0;
             }
         }
         for (int row = 0; row < rows + 2; row++) {
@@ -184,7 +182,7 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
             combined(own, &r->ends[0][0], count, gaps, GAPS, ends[row]);
         }
         /* where force turns, slopes are as good as those of a straight line */
-        double steepest[ROWS], logs[ROWS][GAPS], slopes[ROWS][GAPS];
+        double steepest[ROWS], values[ROWS][TERMS];
         for (int row = 0; row < rows; row++)
             steepest[row] = 1.0;
         for (int gap = 0; gap < gaps; gap++) {
@@ -206,11 +204,11 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
             const double share = mbma_exp(0.5 * (least - height * height));
             for (int row = 0; row < rows; row++) {
                 const double begun = r->power > 1 ? BEGUN[row] : 0.0;
-                sums[rows + row] += share * (r->power > 1 ? lead(row, c) : 1.0) * ends[row][gap];
+                sums[rows + row] += share * lead(r->power, row, c) * ends[row][gap];
                 const double steep = sums[rows + row] / sums[row];
                 steepest[row] = mbma_max(steepest[row], c * fabs(steep));
-                logs[row][gap] = log(sums[row]) - 0.5 * least - begun * log(c);
-                slopes[row][gap] = 0.5 * width * (steep - begun / c);
+                values[row][gap] = log(sums[row]) - 0.5 * least - begun * log(c);
+                values[row][gaps + gap] = 0.5 * width * (steep - begun / c);
             }
         }
         place(r, width, 1.0, inside, rows, gaps * count, islands, stop);
@@ -220,9 +218,7 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
         const bool thin = width < THIN * high[panel];
         for (int row = 0; row < rows; row++) {
             double *const made = series + (panel * (size_t)rows + (size_t)row) * TERMS;
-            memcpy(values, logs[row], (size_t)gaps * sizeof *values);
-            memcpy(values + gaps, slopes[row], (size_t)gaps * sizeof *values);
-            combined(values, thin ? &r->integrated[0][0] : &r->series[0][0], 2 * gaps, 2 * gaps, TERMS, made);
+            combined(values[row], thin ? &r->integrated[0][0] : &r->series[0][0], 2 * gaps, 2 * gaps, TERMS, made);
             const double rest = thin ? tail(made, gaps + 1)
                                      : mbma_max(tail(made, 2 * gaps), OLDER * tail(made, 2 * gaps - 2));
             const double leverage = 4.0 * gaps * high[panel] / (width * steepest[row]);
@@ -247,17 +243,17 @@ MBMA_INLINE void totals_at(double c, size_t panels, const double *edges, const d
     series_at(own, rows, TERMS, x, sums, slopes ? steep : NULL);
     /* beyond the profile, and for NaN, there is no answer */
     const bool inside = c > 0.0 && x <= 1.0 + 1e-12 * high / width;
+    const double none = c <= 0.0 ? 0.0 : NAN;
     for (int row = 0; row < rows; row++) {
-        const double begun = first == 0 ? c * lead(row, c) : 1.0;
+        const double begun = first == 0 ? c * lead(2.0, row, c) : 1.0;
         double sum = mbma_exp(sums[row]) * begun;
         /* subnormal numbers, digit by digit */
         if (!(sums[row] > LEAST_LOG && sum > 1e-290))
             sum = exp(sums[row] + (first == 0 ? BEGUN[row] * log(c) : 0.0));
-        out[(size_t)row * stride] = inside ? sum : c <= 0.0 ? 0.0 : NAN;
-        if (slopes) {
-            const double found = sum * (2.0 * steep[row] / width + (first == 0 ? BEGUN[row] / c : 0.0));
-            out[(size_t)(rows + row) * stride] = inside ? found : c <= 0.0 ? 0.0 : NAN;
-        }
+        out[(size_t)row * stride] = inside ? sum : none;
+        if (slopes)
+            out[(size_t)(rows + row) * stride] =
+                inside ? sum * (2.0 * steep[row] / width + (first == 0 ? BEGUN[row] / c : 0.0)) : none;
     }
 }
 
@@ -302,10 +298,12 @@ static double missed_by(const mbma_panel_rule *r, double low, double high, const
     /* sums over whole panels, relative to the largest of the panel */
     for (int k = 0; k < 2 * count; k++) {
         const double at = 0.5 * (k < count ? r->nodes[k] : 1.0 + r->nodes[k - count]);
-        fine_weight[k] = 0.5 * r->weights[k % count] * finer[0][k] * lacking(r, width, at);
+        fine_weight[k] = 0.5 * r->weights[k % count] * finer[0][k] * (rise(r->power, at) * lead(r->power, 0, width * at * at));
     }
-    for (int k = 0; k < count; k++)
-        coarse[k] = r->weights[k] * force[k] * lacking(r, width, r->nodes[k]);
+    for (int k = 0; k < count; k++) {
+        const double at = r->nodes[k];
+        coarse[k] = r->weights[k] * force[k] * (rise(r->power, at) * lead(r->power, 0, width * at * at));
+    }
     double lowest = INFINITY, most = 0.0, off = 0.0, alone = 0.0;
     for (int k = 0; k < SPREAD + TOPS; k++) {
         double top = low + (last - low) * k / (double)(SPREAD - 1);

@@ -62,13 +62,6 @@ MBMA_INLINE double moment(double p, double length, double grown) {
     return y < NEAR_ONE ? length * length * series : (length + (y - 1.0) * grown) / p;
 }
 
-/* Derivatives by H and by ln zeta of ln m2 over [1, zeta]. */
-static void m2_slopes(const surface *s, double by[2]) {
-    const double grown = expm1(s->p2 * s->log_zeta_1) / s->p2;
-    by[0] = 1.0 / s->hurst - 2.0 * moment(s->p2, s->log_zeta_1, grown) / grown;
-    by[1] = s->p2 + 1.0 / grown;
-}
-
 /* Derivatives of X, mu and of ln force, ln area with their weights in the totals, the node being held: by H at given
  * e, or by ln e at given H; `eta_factor` and K1 are held. d_D is of ln D, and so on; those of e, a, b, m0, h_d, X,
  * height and of logarithms are of themselves. */
@@ -111,11 +104,6 @@ MBMA_INLINE void node_slopes(bool by_hurst, double height, bool floor_d, bool fl
     out[3][k] = (d_root_b - d_R_u) / 3.0 + d_D + d_R_u + d_R_d + 2.0 * d_sigma + common;
 }
 
-/* z'/sigma_d (41) at x = delta/h_rms; z_max is counted down from h_max, so nothing cancels at first contact */
-MBMA_INLINE double height_at(double x, const island *n, const gap *g) {
-    return height_of(g->peak - (g->compression - x), n, &g->s);
-}
-
 /* A loop over the nodes of an interval that vectorises: the floors and `slopes` are constants, nothing is called. */
 MBMA_INLINE void fill_nodes(bool floor_d, bool floor_u, bool slopes, const interval *p, const rule *restrict r,
                             const gap *g, at_nodes *restrict out) {
@@ -128,7 +116,9 @@ MBMA_INLINE void fill_nodes(bool floor_d, bool floor_u, bool slopes, const inter
         const double x = floor_d ? t : scale * rise * rise;
         const double stretch = floor_d ? half : half * scale * rise * (more + 1.0 + inverse);
         const island n = island_at(x, floor_d, floor_u, &g->s);
-        const double height = height_at(x, &n, g), exponent = -0.5 * height * height, gaussian = mbma_exp(exponent);
+        /* z_max is counted down from h_max, so nothing cancels at first contact */
+        const double height = height_of(g->peak - (g->compression - x), &n, &g->s);
+        const double exponent = -0.5 * height * height, gaussian = mbma_exp(exponent);
         const double weight = n.count * stretch * (exponent > LEAST ? gaussian : 0.0);
         out->X[k] = n.X;
         out->mu[k] = n.mu;
@@ -200,14 +190,11 @@ MBMA_INLINE int apply_rule(bool slopes, interval *p, gap *g) {
                                                    found.by_X[q] * at.by[by][0][k] + found.by_mu[q] * at.by[by][1][k]);
         }
     }
-    p->error = 0.0;
+    /* of both sums: both integrands resolve alike, and one may agree by chance */
+    const double difference = mbma_max(fabs(gauss[0] / sums[0][0] - 1.0), fabs(gauss[1] / sums[1][0] - 1.0));
+    const double scaled = g->safety * difference;
+    p->error = sums[0][0] > 0.0 && sums[1][0] > 0.0 ? mbma_min(difference, scaled * sqrt(scaled)) : 0.0;
     p->known = true;
-    if (sums[0][0] > 0.0 && sums[1][0] > 0.0) {
-        /* of both sums: both integrands resolve alike, and one may agree by chance */
-        const double difference = mbma_max(fabs(gauss[0] / sums[0][0] - 1.0), fabs(gauss[1] / sums[1][0] - 1.0));
-        const double scaled = g->safety * difference;
-        p->error = mbma_min(difference, scaled * sqrt(scaled));
-    }
     for (int q = 0; q < 2; q++) {
         for (int c = 0; c < (slopes ? COLUMNS : 1); c++)
             p->sums[q][c] = sums[q][c] * (p->floor_d ? 1.0 : g->s.jacobian);
@@ -265,7 +252,8 @@ static int total(bool slopes, gap *g, double rtol, double sums[2][COLUMNS], doub
 static int integrand(double x, const gap *g, double out[2]) {
     const island n = island_at(x, x >= g->s.kink_d, x > g->s.kink_u, &g->s);
     const phi found = phi_at(g->cells, n.X, n.mu, false);
-    const double height = height_at(x, &n, g), weight = n.count * exp(-0.5 * height * height);
+    const double height = height_of(g->peak - (g->compression - x), &n, &g->s);
+    const double weight = n.count * exp(-0.5 * height * height);
     out[0] = n.force * found.value[0] * weight;
     out[1] = n.area * found.value[1] * weight;
     return found.status;
@@ -275,22 +263,24 @@ static int integrand(double x, const gap *g, double out[2]) {
  * kink with H and zeta_1; K1 and `eta_factor` change. */
 static int end_slopes(const gap *g, double sums[2][COLUMNS]) {
     const surface *const s = &g->s;
-    double edge[2], at_kink[2] = {0.0, 0.0}, m2_by[2];
+    double edge[2], at_kink[2] = {0.0, 0.0};
     int status = integrand(g->compression, g, edge);
     const double K1 = g->compression > s->kink_d ? 1.0 : s->jacobian;
     if (status == MBMA_OK && s->kink_d < g->compression)
         status = integrand(s->kink_d, g, at_kink);
     const double jump = 0.5 * (s->jacobian - 1.0) / (s->root_floor_d * s->slope_d);
     const double kink_by_hurst = -2.0 * s->log_floor_d * (s->e + s->root_floor_d * s->root_floor_d);
-    m2_slopes(s, m2_by);
+    /* of ln m2 over [1, zeta_1] */
+    const double grown = expm1(s->p2 * s->log_zeta_1) / s->p2, m2_by_log_zeta = s->p2 + 1.0 / grown;
+    const double m2_by_hurst = 1.0 / s->hurst - 2.0 * moment(s->p2, s->log_zeta_1, grown) / grown;
     for (int q = 0; q < 2; q++) {
         double *const by = sums[q];
         const double by_hurst = by[BY_HURST] + jump * kink_by_hurst * at_kink[q];
         const double by_log_e = by[BY_LOG_E] - jump * s->e * at_kink[q] + s->jacobian_by_e * by[BELOW_KINK];
         /* eta_factor goes with m2^(-1/3) */
         const double share = q == 1 ? by[0] / 3.0 : 0.0;
-        by[BY_HURST] = by_hurst - 2.0 * s->log_zeta_1 * by_log_e - share * m2_by[0];
-        by[BY_LOG_ZETA] = -2.0 * s->hurst * by_log_e - share * m2_by[1];
+        by[BY_HURST] = by_hurst - 2.0 * s->log_zeta_1 * by_log_e - share * m2_by_hurst;
+        by[BY_LOG_ZETA] = -2.0 * s->hurst * by_log_e - share * m2_by_log_zeta;
         by[BY_PEAK] = -by[BY_COMPRESSION];
         by[BY_COMPRESSION] += K1 * edge[q];
     }
