@@ -46,6 +46,7 @@ MBMA_INLINE size_t spline4(size_t n, const double *places, const double *coeffic
         const int64_t corner = w[0].cell * cube + w[1].cell * plane + w[2].cell * row + 2 * w[3].cell;
         const double *const start = coefficients + corner;
         eight value = none, by_x = none, by_y = none, by_z = none;
+        /* without slopes, what is not read is not computed either */
         for (int a = 0; a < 4; a++) {
             eight over_y = none, slope_y = none, slope_z = none;
             for (int b = 0; b < 4; b++) {
@@ -54,21 +55,16 @@ MBMA_INLINE size_t spline4(size_t n, const double *places, const double *coeffic
                 for (int c = 0; c < 4; c++) {
                     const eight neighbours = eight_of(from + c * row);
                     over_z = fma8(neighbours, w[2].value[c], over_z);
-                    if (slopes)
-                        steep_z = fma8(neighbours, w[2].slope[c], steep_z);
+                    steep_z = fma8(neighbours, w[2].slope[c], steep_z);
                 }
                 over_y = fma8(over_z, w[1].value[b], over_y);
-                if (slopes) {
-                    slope_y = fma8(over_z, w[1].slope[b], slope_y);
-                    slope_z = fma8(steep_z, w[1].value[b], slope_z);
-                }
+                slope_y = fma8(over_z, w[1].slope[b], slope_y);
+                slope_z = fma8(steep_z, w[1].value[b], slope_z);
             }
             value = fma8(over_y, w[0].value[a], value);
-            if (slopes) {
-                by_x = fma8(over_y, w[0].slope[a], by_x);
-                by_y = fma8(slope_y, w[0].value[a], by_y);
-                by_z = fma8(slope_z, w[0].value[a], by_z);
-            }
+            by_x = fma8(over_y, w[0].slope[a], by_x);
+            by_y = fma8(slope_y, w[0].value[a], by_y);
+            by_z = fma8(slope_z, w[0].value[a], by_z);
         }
         const eight sums[5] = {value, by_x, by_y, by_z, value};
         for (size_t m = 0; m < count; m++) {
