@@ -155,14 +155,13 @@ static int first_intervals(const gap *g, interval *intervals) {
     int count = 0;
     for (int k = 0; k < 3; k++) {
         const double low = edges[k], high = edges[k + 1], middle = 0.5 * (low + high);
-        if (!(high > low))
-            continue;
-        interval *const p = &intervals[count++];
-        p->floor_d = middle > g->s.kink_d;
-        p->floor_u = middle > g->s.kink_u;
-        p->low = p->floor_d ? low : asinh(sqrt(low / g->s.map_scale));
-        p->high = p->floor_d ? high : asinh(sqrt(high / g->s.map_scale));
-        p->known = false;
+        interval p = {low, high, 0.0, middle > g->s.kink_d, middle > g->s.kink_u, false, {{0.0}}};
+        if (!p.floor_d) {
+            p.low = asinh(sqrt(low / g->s.map_scale));
+            p.high = asinh(sqrt(high / g->s.map_scale));
+        }
+        if (high > low)
+            intervals[count++] = p;
     }
     return count;
 }
