@@ -68,9 +68,11 @@ static void add_sums(double c, double least, const mbma_nodes *islands, int rows
     for (int64_t first = begin; first < stop; first += CHUNK) {
         const int64_t count = stop - first < CHUNK ? stop - first : (int64_t)CHUNK;
         const double *const shift = islands->shift + first, *const rate = islands->rate + first;
-        fill_shares(count, shift, rate, c, least, share);
-        for (int64_t k = 0; k < count; k++)
-            turned[k] = share[k] * mbma_fma(-rate[k], c, shift[k]) * rate[k];
+        for (int64_t k = 0; k < count; k++) {
+            const double height = mbma_fma(-rate[k], c, shift[k]);
+            share[k] = mbma_exp(0.5 * mbma_fma(-height, height, least));
+            turned[k] = share[k] * height * rate[k];
+        }
         for (int row = 0; row < rows; row++) {
             out[row] += dot(share, islands->weights + row * islands->size + first, (size_t)count);
             out[rows + row] += dot(turned, islands->weights + row * islands->size + first, (size_t)count);
