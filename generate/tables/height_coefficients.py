@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import pathlib
-import textwrap
+import re
 from collections.abc import Callable
 
 import mpmath
@@ -21,17 +21,12 @@ HEADER = """\
  *
  * F_{3/2}, then F_{5/2} from 0 on and F_{1/2} below, in [0, 1], [1, 4], [4, 40], below -8, [-8, -6] ... [-2, 0]; F_1
  * and F_2 from 0 on. Digits of less than 1e-17 of F are left out. */
-#ifndef MBMA_HEIGHT_COEFFICIENTS_H
-#define MBMA_HEIGHT_COEFFICIENTS_H
-
 static const double MBMA_HEIGHT_HALVES[2][8][20] = {
 %s
 };
 static const double MBMA_HEIGHT_WHOLE[2][3][20] = {
 %s
 };
-
-#endif
 """
 DIGITS = 40
 TERMS = 20  # the hardest piece, F_{5/2} in [0, 1], needs as many for 2e-16
@@ -114,7 +109,7 @@ def row_text(row: list[mpmath.mpf]) -> str:
         texts.append(shortest.replace("e-0", "e-"))
     while texts[-1] == "0.0":
         texts.pop()
-    return "{" + ", ".join(texts) + "}"
+    return "{" + ",".join(texts) + "}"
 
 
 def main() -> None:
@@ -122,6 +117,6 @@ def main() -> None:
     with mpmath.workdps(DIGITS):
         halves = [scaled_pieces(3) + lower_pieces(3), scaled_pieces(5) + lower_pieces(1)]
         orders = [[[row_text(row) for row in rows] for rows in both] for both in (halves, map(scaled_pieces, (2, 4)))]
-    parts = (",\n".join("{" + ", ".join(rows) + "}" for rows in both) for both in orders)
-    wrapped = (textwrap.wrap(part, 116, break_on_hyphens=False) for part in parts)
-    write_file(TARGET, (HEADER % tuple(textwrap.indent("\n".join(lines), "    ") for lines in wrapped)).encode())
+    parts = (",".join("{" + ",".join(rows) + "}" for rows in both) for both in orders)
+    wrapped = ("\n".join(re.findall(r".{1,119}(?:,|$)", part)) for part in parts)
+    write_file(TARGET, (HEADER % tuple(wrapped)).encode())

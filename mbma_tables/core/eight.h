@@ -1,5 +1,5 @@
-/* Eight doubles at once, and their halves: fma8(a, y, b) is a y + b, and so on. All ways of writing it round alike where
- * the processor has an fma. */
+/* Eight doubles at once, and their halves: fma8(a, y, b) is a y + b, and so on. All ways of writing it round alike
+ * where the processor has an fma. */
 #ifndef MBMA_EIGHT_H
 #define MBMA_EIGHT_H
 

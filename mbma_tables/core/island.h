@@ -37,12 +37,6 @@ typedef struct {
     double m0, sigma, b, top, log_d, width, top2, below2, band2, top4, below4, band4, eta, R_d, R_u, D;
 } island;
 
-/* (r^power - 1)/(power ln r) with r = exp(log_ratio): 1 where either is 0 */
-MBMA_INLINE double growth(double power, double log_ratio) {
-    const double x = power * log_ratio;
-    return x != 0.0 ? expm1(x) / x : 1.0;
-}
-
 /* floor^(-2H) - zeta_1^(-2H) without cancellation */
 MBMA_INLINE double floor_offset(double hurst, double zeta_1, double floor) {
     return exp(-2.0 * hurst * log(zeta_1)) * expm1(2.0 * hurst * log1p((zeta_1 - floor) / floor));
@@ -75,8 +69,8 @@ MBMA_INLINE surface surface_of(double hurst, double zeta_1, const mbma_variant *
     s.radius = RADIUS / sqrt(s.rate * hurst);
     s.offset = v->offset ? 1.0 : 0.0;
     /* the factor of eta (39) that depends on the surface alone: all its summits */
-    const double D = 0.75 * growth(s.p4, L) / growth(2.0 - 2.0 * hurst, L) / v->density_divisor;
-    const double R = RADIUS / sqrt(0.75 * hurst * L * growth(s.p4, L));
+    const double grown2 = expm1(s.p2 * L) / (s.p2 * L), grown4 = expm1(s.p4 * L) / (s.p4 * L);
+    const double D = 0.75 * grown4 / grown2 / v->density_divisor, R = RADIUS / sqrt(0.75 * hurst * L * grown4);
     s.eta_factor = 0.75 * cbrt(MBMA_PI * D) * pow(1.5 * R, 2.0 / 3.0) / cbrt(v->phi);
     const double below = 1.0 - s.slope_d / (v->printed ? 1.0 : s.rms_over_s);
     s.jacobian = v->printed || v->offset ? below : 1.0;
@@ -98,7 +92,7 @@ MBMA_INLINE island island_at(double x, bool floor_d, bool floor_u, const surface
     /* only the width needs its relative digits */
     n.log_d = floor_d ? s->log_floor_d : -mbma_log(n.top) * s->over_2H;
     n.width = mbma_log1p(n.m0 / (s->e + n.b)) * s->over_2H;
-    /* zeta_d^p, (zeta_d^p - 1)/p and (zeta_u^p - zeta_d^p)/p for p = 2 - 2H; the same for 4 - 2H without the division */
+    /* zeta_d^p, (zeta_d^p - 1)/p and (zeta_u^p - zeta_d^p)/p for p = 2 - 2H; for 4 - 2H without the division */
     const double square = mbma_exp(2.0 * n.log_d);
     n.top4 = square * square * n.top;
     n.below4 = n.top4 - 1.0;

@@ -142,7 +142,7 @@ size_t mbma_spline4(size_t n, const double *places, const double *coefficients, 
 size_t mbma_four_numbers(size_t n, const double *spread, const double *sphere, const double *hurst,
                          double density_divisor, int summit_sigma, double *out);
 
-/* ---- newton.c: exact islands ------------------------------------------------------------------------------------ */
+/* ---- newton.c, damped.c: exact islands -------------------------------------------------------------------------- */
 
 /* F_n(x) = integral_x^inf (z - x)^n phi(z) dz, phi the standard normal density, of twice_n = 1, 2, 3, 4 or 5. */
 size_t mbma_height_integrals(int64_t twice_n, size_t n, const double *x, double *out);

@@ -1,4 +1,4 @@
-/* Exact islands (Eqs. 34, 36, 37): height integrals, Newton's method, and the damped iteration of the paper.
+/* Exact islands by Newton's method (Eqs. 34, 36, 37).
  *
  * Newton's unknown is the sphere's deformation w at the Gauss nodes. The residual w - a A p(w) is monotone, so full
  * steps from w = 0 converge; its Jacobian 1 + a A D, D = -dp/dw, is solved in the symmetric form 1 + s A s,
@@ -7,7 +7,7 @@
  * SPDX-License-Identifier: BSD-3-Clause. Copyright (c) 2026, mbma_tables contributors.
  */
 #include "eight.h"
-#include "height_coefficients.h"
+#include "heights.h"
 #include "mbma.h"
 
 enum {
@@ -22,69 +22,7 @@ enum {
 #define MIN_COARSE_RATIO 1.5 /* a rough solution first, where the basis is larger than its by this factor */
 #define ROUNDING 1e-14
 #define TINY 1e-300
-#define NEGLIGIBLE 1e-17     /* a relative effect of the deformation below which the sphere is rigid */
-#define MAX_DEFORMATION 1e12 /* one this large is divergence */
-
-/* ---- height integrals ---- */
-
-/* F_n = polynomial(t) base^n weight fade, of which the last product alone can underflow. */
-typedef struct {
-    size_t piece;
-    double t, base, weight, fade;
-} spot;
-
-/* Pieces are polynomials in 1/(x + 1) from 0 on, exp(-x^2/2)/(x + 1) taken out, in 1/x^2 below -8, and else in x. */
-MBMA_INLINE spot spot_of(double x) {
-    static const double SCALE[8] = {4.0, 1.0 / 0.15, 2.0 / (0.2 - 1.0 / 41.0), 128.0, 1.0, 1.0, 1.0, 1.0};
-    static const double SHIFT[8] = {
-        -3.0, -0.35 / 0.15, -(0.2 + 1.0 / 41.0) / (0.2 - 1.0 / 41.0), -1.0, 7.0, 5.0, 3.0, 1.0};
-    const bool deep = x < -8.0;
-    const int above = (x >= 1.0) + (x >= 4.0), below = 3 + (x >= -8.0) + (x >= -6.0) + (x >= -4.0) + (x >= -2.0);
-    /* beyond 40 F_n is 0; of x < 0 the weight is 1 */
-    const double light = mbma_held(x, 0.0, 41.0), head = (double)(float)light, tail = light - head;
-    const double inverse = 1.0 / (deep ? x * x : light + 1.0), v = deep ? 1.0 : inverse;
-    const double square = light * light;
-    /* what rounding took from the square, for exp is steep */
-    const double lost = ((head * head - square) + 2.0 * head * tail) + tail * tail;
-    spot at;
-    at.piece = (size_t)(x < 0.0 ? below : above);
-    at.t = mbma_fma(SCALE[at.piece], deep || x >= 0.0 ? inverse : x, SHIFT[at.piece]);
-    at.base = deep ? -x : v;
-    at.fade = mbma_exp(-0.25 * square);
-    at.weight = mbma_fma(-0.5 * lost, v, v) * at.fade;
-    return at;
-}
-
-MBMA_INLINE double polynomial(const double row[20], double t) {
-    double value = row[19];
-    for (int k = 18; k >= 0; k--)
-        value = mbma_fma(value, t, row[k]);
-    return value;
-}
-
-typedef struct {
-    double half, three_halves, five_halves;
-} halves;
-
-/* F_{1/2}, F_{3/2} and F_{5/2}, where the third of them is that of 3/2 F_{1/2} = F_{5/2} + x F_{3/2} without a
- * difference. */
-MBMA_INLINE halves halves_of(double x) {
-    const spot at = spot_of(x);
-    const double root = sqrt(at.base) * at.weight, light = mbma_held(x, 0.0, 41.0);
-    const double three = polynomial(MBMA_HEIGHT_HALVES[0][at.piece], at.t) * (root * at.base);
-    const double other = polynomial(MBMA_HEIGHT_HALVES[1][at.piece], at.t) * (x < 0.0 ? root : root * (at.base * at.base));
-    const double half = x < 0.0 ? other : (other + light * three) / 1.5;
-    const halves found = {half * at.fade, three * at.fade, (x < 0.0 ? 1.5 * other - x * three : other) * at.fade};
-    return found;
-}
-
-/* F_1 or F_2; F_1(x) = F_1(-x) - x, F_2(x) = 1 + x^2 - F_2(-x). */
-static double whole(int n, double x) {
-    const spot at = spot_of(fabs(x));
-    const double power = n == 1 ? at.base : at.base * at.base;
-    const double value = polynomial(MBMA_HEIGHT_WHOLE[n - 1][at.piece], at.t) * (power * at.weight) * at.fade;
-    return !(x < 0.0) ? value : n == 1 ? value - x : 1.0 + x * x - value;
-}
+#define NEGLIGIBLE 1e-17 /* a relative effect of the deformation below which the sphere is rigid */
 
 size_t mbma_height_integrals(int64_t twice_n, size_t n, const double *x, double *out) {
     size_t bad = 0;
@@ -333,45 +271,4 @@ size_t mbma_solve_islands(size_t n, const double *X, const double *mu, double rt
         }
     }
     return bad;
-}
-
-/* ---- the damped iteration of Greenwood and Tripp ---- */
-
-mbma_status mbma_damped_steps(double X, double mu, double a, double damping, double tolerance, int64_t most,
-                              size_t rings, const double *matrix, double *w, double *p, double phi[2],
-                              int64_t *steps) {
-    const double width = a / (double)rings;
-    mbma_status status = MBMA_UNRESOLVED;
-    for (*steps = 0;; ++*steps) {
-        double largest = 0.0, scale = 0.0;
-        for (size_t i = 0; i < rings; i++) {
-            const double rho = width * ((double)i + 0.5);
-            p[i] = 0.5 * mu * halves_of(rho * rho - X + w[i]).three_halves; /* (36) */
-        }
-        if (*steps >= most || status == MBMA_OK)
-            break;
-        for (size_t i = 0; i < rings; i++) {
-            const double change = damping * (a * dot(matrix + i * rings, p, rings) - w[i]);
-            w[i] += change;
-            largest = mbma_max(largest, fabs(change));
-            scale = mbma_max(scale, fabs(w[i]));
-        }
-        if (!(scale < MAX_DEFORMATION)) {
-            ++*steps;
-            phi[0] = phi[1] = NAN;
-            return MBMA_UNRESOLVED;
-        }
-        if (largest <= tolerance * damping * scale)
-            status = MBMA_OK;
-    }
-    phi[0] = phi[1] = 0.0;
-    for (size_t i = 0; i < rings; i++) {
-        const double rho = width * ((double)i + 0.5), ring = 2.0 * MBMA_PI * width * rho;
-        phi[0] += ring * p[i];
-        phi[1] += ring * whole(1, rho * rho - X + w[i]);
-    }
-    if (isfinite(phi[0] + phi[1]))
-        return status;
-    phi[0] = phi[1] = NAN;
-    return MBMA_UNRESOLVED;
 }

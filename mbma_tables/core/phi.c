@@ -1,11 +1,11 @@
 /* Islands by the universal table: Phi_F and Phi_A over X and mu (34-40). */
 #include "phi.h"
 
-MBMA_INLINE size_t fill(size_t n, const double *X, const double *mu, const mbma_cells *cells, bool slopes, double *out,
-                        uint8_t *status) {
+size_t mbma_phi(size_t n, const double *X, const double *mu, const mbma_cells *cells, int slopes, double *out,
+                uint8_t *status) {
     size_t bad = 0;
     for (size_t k = 0; k < n; k++) {
-        const phi found = phi_at(cells, X[k], mu[k], slopes);
+        const phi found = slopes ? phi_at(cells, X[k], mu[k], true) : phi_at(cells, X[k], mu[k], false);
         double *const row = out + k * (slopes ? 7 : 3);
         row[0] = found.value[0], row[1] = found.value[1], row[2] = found.error;
         for (int q = 0; q < 2 && slopes; q++)
@@ -15,9 +15,4 @@ MBMA_INLINE size_t fill(size_t n, const double *X, const double *mu, const mbma_
             status[k] = (uint8_t)found.status;
     }
     return bad;
-}
-
-size_t mbma_phi(size_t n, const double *X, const double *mu, const mbma_cells *cells, int slopes, double *out,
-                uint8_t *status) {
-    return slopes ? fill(n, X, mu, cells, true, out, status) : fill(n, X, mu, cells, false, out, status);
 }

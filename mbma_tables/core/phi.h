@@ -21,16 +21,14 @@ MBMA_INLINE gradient along_x(eight row, double x) {
     return found;
 }
 
-/* The polynomial of a cell at x and y, by pairs of rows, which wait less than one after the other. */
-MBMA_INLINE double polynomial(const double c[8][8], double x, double y) {
-    const double y2 = y * y;
-    const eight low = fma8(fma8(eight_of(c[3]), y, eight_of(c[2])), y2, fma8(eight_of(c[1]), y, eight_of(c[0])));
-    const eight high = fma8(fma8(eight_of(c[7]), y, eight_of(c[6])), y2, fma8(eight_of(c[5]), y, eight_of(c[4])));
-    return along_x(fma8(high, y2 * y2, low), x).value;
-}
-
-/* The same with its derivatives by x and by y. */
-MBMA_INLINE gradient polynomial_gradient(const double c[8][8], double x, double y) {
+/* The polynomial of a cell at x and y; without slopes by pairs of rows, which wait less than one after the other. */
+MBMA_INLINE gradient polynomial(const double c[8][8], double x, double y, bool slopes) {
+    if (!slopes) {
+        const double y2 = y * y;
+        const eight low = fma8(fma8(eight_of(c[3]), y, eight_of(c[2])), y2, fma8(eight_of(c[1]), y, eight_of(c[0])));
+        const eight high = fma8(fma8(eight_of(c[7]), y, eight_of(c[6])), y2, fma8(eight_of(c[5]), y, eight_of(c[4])));
+        return along_x(fma8(high, y2 * y2, low), x);
+    }
     eight slope = eight_of(c[7]), value = fma8(slope, y, eight_of(c[6]));
     for (int k = 5; k >= 0; k--) {
         slope = fma8(slope, y, value);
@@ -41,38 +39,27 @@ MBMA_INLINE gradient polynomial_gradient(const double c[8][8], double x, double 
     return found;
 }
 
-/* Phi_F and Phi_A of an island, and their derivatives where they are asked for. */
+/* Phi_F and Phi_A of an island, and their derivatives, which hold with `slopes`. */
 typedef struct {
     int status;
     double error, value[2], by_X[2], by_mu[2];
 } phi;
 
 MBMA_INLINE phi phi_at(const mbma_cells *t, double X, double mu, bool slopes) {
-    phi found = {MBMA_OK, NAN, {NAN, NAN}, {NAN, NAN}, {NAN, NAN}};
     if (!(X >= t->X_low && X <= t->X_high && mu <= t->mu_high && mu >= 0.0)) {
-        found.status = !(X == X && mu >= 0.0) ? MBMA_INVALID : X < t->X_low ? MBMA_X_BELOW :
-                       X > t->X_high ? MBMA_X_ABOVE : MBMA_MU_ABOVE;
-        return found;
+        const phi none = {!(X == X && mu >= 0.0) ? MBMA_INVALID : X < t->X_low ? MBMA_X_BELOW :
+                          X > t->X_high ? MBMA_X_ABOVE : MBMA_MU_ABOVE, NAN, {NAN, NAN}, {NAN, NAN}, {NAN, NAN}};
+        return none;
     }
     int64_t bucket = (mbma_bits(mu) >> BUCKET_BITS) - t->first_bucket;
     bucket = bucket < 0 ? 0 : bucket < t->buckets ? bucket : t->buckets - 1;
     const mbma_cell *const c = &t->cells[t->places[t->places[(int64_t)((X - t->X_low) * t->X_rate)] + bucket]];
     const double bottom = mbma_fma(mu, c->bottom_mu, c->bottom), over = 1.0 / bottom;
     const double x = (X - c->centre) * c->rate, y = mbma_fma(mu, c->top_mu, c->top) * over;
-    found.error = c->error;
-    if (!slopes) {
-        found.value[0] = mu * polynomial(c->force, x, y);
-        found.value[1] = polynomial(c->area, x, y);
-        return found;
-    }
     const double by_mu = (c->top_mu * c->bottom - c->top * c->bottom_mu) * (over * over);
-    const gradient F = polynomial_gradient(c->force, x, y), A = polynomial_gradient(c->area, x, y);
-    found.value[0] = mu * F.value;
-    found.value[1] = A.value;
-    found.by_X[0] = mu * F.by_x * c->rate;
-    found.by_X[1] = A.by_x * c->rate;
-    found.by_mu[0] = mbma_fma(mu * F.by_y, by_mu, F.value);
-    found.by_mu[1] = A.by_y * by_mu;
+    const gradient F = polynomial(c->force, x, y, slopes), A = polynomial(c->area, x, y, slopes);
+    const phi found = {MBMA_OK, c->error, {mu * F.value, A.value}, {mu * F.by_x * c->rate, A.by_x * c->rate},
+                       {mbma_fma(mu * F.by_y, by_mu, F.value), A.by_y * by_mu}};
     return found;
 }
 

@@ -1,7 +1,7 @@
-/* One surface at many gaps: its islands are looked up once, at the nodes of panels of the approach, and sums over them at
- * some gaps of each panel make Chebyshev series of the logarithms of force and area (44-49).
+/* One surface at many gaps: its islands are looked up once, at the nodes of panels of the approach, and sums over them
+ * at some gaps of each panel make Chebyshev series of the logarithms of force and area (44-49).
  *
- * Of an island at a gap of compression c = (h_max - d)/h_rms, force and area count as weight exp(-(shift - rate c)^2/2).
+ * Of an island at a gap of compression c = (h_max - d)/h_rms, what counts is weight exp(-(shift - rate c)^2/2).
  */
 #include "island.h"
 #include "phi.h"
@@ -17,7 +17,7 @@ static const double LEADS = 20.0;    /* by which exponents of the smallest islan
 static const double LEAST_APPROACH = 1e-290;
 /* of errors of a series */
 static const double TAIL_SHARE = 5.0; /* of the last two terms, for all that follow: they may fall slowly */
-static const double OLDER = 0.25;     /* of the two before them: signs change, and the last two may be small by chance */
+static const double OLDER = 0.25;     /* of the two before them, for the last two may be small by chance */
 static const double SLOPES = 0.1;     /* of their relative error counts */
 static const double THIN = 1e-3;      /* width over gap of panels in which values round to more than slopes change */
 /* of sums over many islands far below a gap */
@@ -26,7 +26,7 @@ static const double FAR_ERROR = 5e-11;  /* of such a series, or they are summed 
 static const double FAR_REACH = 0.06;   /* of the compression, or of h_rms, that one such series covers */
 static const double LEAST_LOG = -700.0; /* of ln F */
 
-/* out = values times the first `rows` rows of a matrix, a multiple of four, with `stride` columns of which some count */
+/* out = values times the first `rows` rows of a matrix, a multiple of 4, of whose `stride` columns some count */
 MBMA_INLINE void combined(const double *restrict values, const double *restrict matrix, int rows, int columns,
                           int stride, double *restrict out) {
     for (int j = 0; j < columns; j++)
@@ -40,17 +40,30 @@ MBMA_INLINE void combined(const double *restrict values, const double *restrict 
     }
 }
 
-/* The power of delta that weights lack in the panel from 0: of force, area, number of islands, Hertz area. */
-static double lead(int row, double delta) {
-    return row == 0 ? delta * delta * sqrt(delta) : row == 1 ? delta * delta * cbrt(delta) : row == 2 ? 1.0 : delta * delta;
-}
-/* and the power of the compression that their sums begin with */
+/* The power of the compression that sums begin with: of force, area, number of islands, Hertz area. */
 static const double BEGUN[ROWS] = {3.5, 10.0 / 3.0, 1.0, 3.0};
 
+/* What weights lack at delta in the panel from 0, whose rule has the power 2: delta to one power less. */
+static double lead(double power, int row, double delta) {
+    const double square = delta * delta;
+    return !(power > 1) || row == 2 ? 1.0 : row == 0 ? square * sqrt(delta) : row == 1 ? square * cbrt(delta) : square;
+}
 
+/* How delta rises over the width of a panel at a place in [0, 1]. */
+static double rise(double power, double at) { return power > 1 ? 2.0 * at : 1.0; }
+
+/* exp((least - height^2)/2) of islands at a gap. */
+MBMA_INLINE void fill_shares(int64_t n, const double *restrict shift, const double *restrict rate, double c,
+                             double least, double *restrict share) {
+    for (int64_t k = 0; k < n; k++) {
+        const double height = mbma_fma(-rate[k], c, shift[k]);
+        share[k] = mbma_exp(0.5 * mbma_fma(-height, height, least));
+    }
+}
 
 /* Adds to `out` the sums of rows, then their slopes by the compression, of islands begin:stop, times exp(least/2). */
-static void add_sums(double c, double least, const mbma_nodes *islands, int rows, int64_t begin, int64_t stop, double *out) {
+static void add_sums(double c, double least, const mbma_nodes *islands, int rows, int64_t begin, int64_t stop,
+                     double *out) {
     double share[CHUNK], turned[CHUNK];
     for (int64_t first = begin; first < stop; first += CHUNK) {
         const int64_t count = stop - first < CHUNK ? stop - first : (int64_t)CHUNK;
@@ -67,27 +80,37 @@ static void add_sums(double c, double least, const mbma_nodes *islands, int rows
     }
 }
 
-/* About the least square of a height of islands begin:stop at a gap; neighbours differ by far less than exponentials
- * reach. */
-static double least_square(double c, const mbma_nodes *islands, int64_t begin, int64_t stop) {
+/* About the least square of a height at a gap; neighbours differ by far less than exponentials reach. */
+static double least_square(int64_t n, const double *shift, const double *rate, double c) {
     double least = INFINITY;
-    for (int64_t k = begin; k < stop; k += 4) {
-        const double height = mbma_fma(-islands->rate[k], c, islands->shift[k]);
+    for (int64_t k = 0; k < n; k += 4) {
+        const double height = mbma_fma(-rate[k], c, shift[k]);
         least = mbma_min(least, height * height);
     }
     return least;
 }
 
-/* A Chebyshev series at x in [-1, 1]. */
-MBMA_INLINE double series_at(const double *series, int terms, double x) {
-    double before = 1.0, term = x, sum = series[0];
+/* Chebyshev series at x in [-1, 1], and their derivatives unless `slopes` is NULL. */
+MBMA_INLINE void series_at(const double *series, int rows, int terms, double x, double *sums, double *slopes) {
+    double before = 1.0, term = x, before_slope = 0.0, slope = 1.0;
+    for (int row = 0; row < rows; row++) {
+        sums[row] = series[row * terms];
+        if (slopes)
+            slopes[row] = 0.0;
+    }
+    /* polynomials of the first kind, and for their derivatives of the second */
     for (int k = 1; k < terms; k++) {
-        const double next = mbma_fma(2.0 * x, term, -before);
-        sum = mbma_fma(series[k], term, sum);
+        for (int row = 0; row < rows; row++) {
+            sums[row] = mbma_fma(series[row * terms + k], term, sums[row]);
+            if (slopes)
+                slopes[row] = mbma_fma(k * series[row * terms + k], slope, slopes[row]);
+        }
+        const double next = mbma_fma(2.0 * x, term, -before), next_slope = mbma_fma(2.0 * x, slope, -before_slope);
         before = term;
         term = next;
+        before_slope = slope;
+        slope = next_slope;
     }
-    return sum;
 }
 
 /* Bound on what a series leaves out. */
@@ -95,13 +118,13 @@ static double tail(const double *series, int terms) {
     return TAIL_SHARE * (fabs(series[terms - 1]) + fabs(series[terms - 2]));
 }
 
-/* Series over compressions in [low, high] of islands 0:stop, of ln of sums and of their slopes; the error of the first. */
+/* Series over compressions in [low, high] of ln of sums of islands 0:stop, and of slopes; the error of the first. */
 static double fill_far(double low, double high, const mbma_rules *r, const mbma_nodes *islands, int rows, int64_t stop,
                        double out[2 * ROWS][FAR_TERMS]) {
     double values[2 * ROWS][FAR_TERMS], error = 0.0;
     for (int k = 0; k < FAR_TERMS; k++) {
         const double c = 0.5 * (low + high + (high - low) * r->far_points[k]);
-        const double least = least_square(c, islands, 0, stop);
+        const double least = least_square(stop, islands->shift, islands->rate, c);
         double sums[2 * ROWS] = {0.0};
         add_sums(c, least, islands, rows, 0, stop, sums);
         for (int row = 0; row < rows; row++) {
@@ -121,11 +144,10 @@ static double fill_far(double low, double high, const mbma_rules *r, const mbma_
 static void place(const mbma_panel_rule *r, double width, double reach, double fields[ROWS + 2][NODES * (GAPS + 1)],
                   int rows, int first, const mbma_nodes *islands, int64_t stop) {
     for (int k = 0; k < r->count; k++) {
-        const double at = reach * r->nodes[k], delta = r->power > 1 ? width * at * at : 0.0;
-        const double weight = reach * width * r->weights[k] * (r->power > 1 ? 2.0 * at : 1.0);
+        const double at = reach * r->nodes[k], weight = reach * width * r->weights[k] * rise(r->power, at);
         for (int row = 0; row < rows; row++)
             islands->weights[row * islands->size + stop + k] =
-                weight * fields[row][first + k] * (r->power > 1 ? lead(row, delta) : 1.0);
+                weight * fields[row][first + k] * lead(r->power, row, width * at * at);
         islands->shift[stop + k] = fields[rows][first + k];
         islands->rate[stop + k] = fields[rows + 1][first + k];
     }
@@ -134,7 +156,7 @@ static void place(const mbma_panel_rule *r, double width, double reach, double f
 void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *kind, const double *low,
                          const double *high, const double *fields, int rows, double *series, double *error,
                          const mbma_nodes *islands, int64_t *stops) {
-    double inside[ROWS + 2][NODES * (GAPS + 1)], ends[ROWS + 2][GAPS], values[TERMS], far[2 * ROWS][FAR_TERMS];
+    double inside[ROWS + 2][NODES * (GAPS + 1)], ends[ROWS + 2][GAPS], far[2 * ROWS][FAR_TERMS];
     int64_t begin = 0, stop = 0;
     double missed = 0.0, start = 0.0, until = 0.0;
     stops[0] = 0;
@@ -151,9 +173,9 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
             start = low[panel];
             until = mbma_min(start + FAR_REACH * mbma_min(start, 1.0), high[ahead < panels ? ahead : panels - 1]);
             if (stop > MANY && high[panel] <= until) {
-                missed = fill_far(start, until, rules, islands, rows, stop, far);
-                begin = missed <= FAR_ERROR ? stop : 0;
-                missed = missed <= FAR_ERROR ? missed : 0.0;
+                const double off = fill_far(start, until, rules, islands, rows, stop, far);
+                begin = off <= FAR_ERROR ? stop : 0;
+                missed = off <= FAR_ERROR ? off : 0.0;
             }
         }
         for (int row = 0; row < rows + 2; row++) {
@@ -162,20 +184,20 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
             combined(own, &r->ends[0][0], count, gaps, GAPS, ends[row]);
         }
         /* where force turns, slopes are as good as those of a straight line */
-        double steepest[ROWS], logs[ROWS][GAPS], slopes[ROWS][GAPS];
+        double steepest[ROWS], values[ROWS][TERMS];
         for (int row = 0; row < rows; row++)
             steepest[row] = 1.0;
         for (int gap = 0; gap < gaps; gap++) {
             const double reach = r->reach[gap], c = low[panel] + width * (r->power > 1 ? reach * reach : reach);
             double sums[2 * ROWS] = {0.0};
             place(r, width, reach, inside, rows, gap * count, islands, stop);
-            double least = least_square(c, islands, begin, stop + count);
+            double least = least_square(stop + count - begin, islands->shift + begin, islands->rate + begin, c);
             if (begin > 0) {
-                const double x = (2.0 * c - start - until) / (until - start), log_F = series_at(far[0], FAR_TERMS, x);
-                least = mbma_min(least, -2.0 * log_F);
+                series_at(far[0], 2 * rows, FAR_TERMS, (2.0 * c - start - until) / (until - start), sums, NULL);
+                least = mbma_min(least, -2.0 * sums[0]);
                 for (int row = 0; row < rows; row++) {
-                    sums[row] = exp((row == 0 ? log_F : series_at(far[row], FAR_TERMS, x)) + 0.5 * least);
-                    sums[rows + row] = sums[row] * series_at(far[rows + row], FAR_TERMS, x);
+                    sums[row] = exp(sums[row] + 0.5 * least);
+                    sums[rows + row] *= sums[row];
                 }
             }
             add_sums(c, least, islands, rows, begin, stop + count, sums);
@@ -184,11 +206,11 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
             const double share = mbma_exp(0.5 * (least - height * height));
             for (int row = 0; row < rows; row++) {
                 const double begun = r->power > 1 ? BEGUN[row] : 0.0;
-                sums[rows + row] += share * (r->power > 1 ? lead(row, c) : 1.0) * ends[row][gap];
+                sums[rows + row] += share * lead(r->power, row, c) * ends[row][gap];
                 const double steep = sums[rows + row] / sums[row];
                 steepest[row] = mbma_max(steepest[row], c * fabs(steep));
-                logs[row][gap] = log(sums[row]) - 0.5 * least - begun * log(c);
-                slopes[row][gap] = 0.5 * width * (steep - begun / c);
+                values[row][gap] = log(sums[row]) - 0.5 * least - begun * log(c);
+                values[row][gaps + gap] = 0.5 * width * (steep - begun / c);
             }
         }
         place(r, width, 1.0, inside, rows, gaps * count, islands, stop);
@@ -198,9 +220,7 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
         const bool thin = width < THIN * high[panel];
         for (int row = 0; row < rows; row++) {
             double *const made = series + (panel * (size_t)rows + (size_t)row) * TERMS;
-            memcpy(values, logs[row], (size_t)gaps * sizeof *values);
-            memcpy(values + gaps, slopes[row], (size_t)gaps * sizeof *values);
-            combined(values, thin ? &r->integrated[0][0] : &r->series[0][0], 2 * gaps, 2 * gaps, TERMS, made);
+            combined(values[row], thin ? &r->integrated[0][0] : &r->series[0][0], 2 * gaps, 2 * gaps, TERMS, made);
             const double rest = thin ? tail(made, gaps + 1)
                                      : mbma_max(tail(made, 2 * gaps), OLDER * tail(made, 2 * gaps - 2));
             const double leverage = 4.0 * gaps * high[panel] / (width * steepest[row]);
@@ -209,7 +229,7 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
     }
 }
 
-/* Rows of a panel at one compression, and perhaps slopes; `rows` and `slopes` are constants wherever this is inlined. */
+/* Rows of a panel at one compression, and perhaps slopes; two rows alone are the most frequent, and constants then. */
 MBMA_INLINE void totals_at(double c, size_t panels, const double *edges, const double *series, int rows, bool slopes,
                            double *out, size_t stride) {
     /* the panel by halves, without branches that nothing foretells */
@@ -221,37 +241,21 @@ MBMA_INLINE void totals_at(double c, size_t panels, const double *edges, const d
     }
     const double low = edges[first], high = edges[first + 1], width = high - low, x = (2.0 * c - low - high) / width;
     const double *const own = series + first * (size_t)rows * TERMS;
-    double sums[ROWS], steep[ROWS], before = 1.0, term = x, before_slope = 0.0, slope = 1.0;
-    for (int row = 0; row < rows; row++) {
-        sums[row] = own[row * TERMS];
-        steep[row] = 0.0;
-    }
-    /* Chebyshev polynomials of the first kind, and for their derivatives of the second */
-    for (int k = 1; k < TERMS; k++) {
-        for (int row = 0; row < rows; row++) {
-            sums[row] = mbma_fma(own[row * TERMS + k], term, sums[row]);
-            if (slopes)
-                steep[row] = mbma_fma(k * own[row * TERMS + k], slope, steep[row]);
-        }
-        const double next = mbma_fma(2.0 * x, term, -before), next_slope = mbma_fma(2.0 * x, slope, -before_slope);
-        before = term;
-        term = next;
-        before_slope = slope;
-        slope = next_slope;
-    }
+    double sums[ROWS], steep[ROWS];
+    series_at(own, rows, TERMS, x, sums, slopes ? steep : NULL);
     /* beyond the profile, and for NaN, there is no answer */
     const bool inside = c > 0.0 && x <= 1.0 + 1e-12 * high / width;
+    const double none = c <= 0.0 ? 0.0 : NAN;
     for (int row = 0; row < rows; row++) {
-        const double begun = first == 0 ? c * lead(row, c) : 1.0;
+        const double begun = first == 0 ? c * lead(2.0, row, c) : 1.0;
         double sum = mbma_exp(sums[row]) * begun;
         /* subnormal numbers, digit by digit */
         if (!(sums[row] > LEAST_LOG && sum > 1e-290))
             sum = exp(sums[row] + (first == 0 ? BEGUN[row] * log(c) : 0.0));
-        out[(size_t)row * stride] = inside ? sum : c <= 0.0 ? 0.0 : NAN;
-        if (slopes) {
-            const double found = sum * (2.0 * steep[row] / width + (first == 0 ? BEGUN[row] / c : 0.0));
-            out[(size_t)(rows + row) * stride] = inside ? found : c <= 0.0 ? 0.0 : NAN;
-        }
+        out[(size_t)row * stride] = inside ? sum : none;
+        if (slopes)
+            out[(size_t)(rows + row) * stride] =
+                inside ? sum * (2.0 * steep[row] / width + (first == 0 ? BEGUN[row] / c : 0.0)) : none;
     }
 }
 
@@ -267,8 +271,8 @@ void mbma_profile_totals(size_t n, const double *compression, size_t panels, con
 }
 
 /* Bound on the relative error of one panel: of what it interpolates, against islands, and of its sums. */
-static double missed_by(const mbma_panel_rule *r, double low, double high, const double *fields, size_t stride, int rows,
-                        double last) {
+static double missed_by(const mbma_panel_rule *r, double low, double high, const double *fields, size_t stride,
+                        int rows, double last) {
     double finer[ROWS + 2][2 * NODES], seen[ROWS + 2][CHECKS + 1], coarse[NODES], fine_weight[2 * NODES];
     double c[SPREAD + TOPS], least[SPREAD + TOPS];
     const double *const force = fields, *const shift = fields + (size_t)rows * stride, *const rate = shift + stride;
@@ -289,20 +293,18 @@ static double missed_by(const mbma_panel_rule *r, double low, double high, const
         const double true_shift = shift[NODES + k], true_rate = rate[NODES + k];
         const double at = mbma_held(true_shift / true_rate, high, last);
         const double off_shift = seen[rows][k] - true_shift, off_rate = seen[rows + 1][k] - true_rate;
-        const double highest =
-            mbma_max(mbma_min(true_shift - true_rate * high, LEADS / (true_rate * mbma_max(low, LEAST_APPROACH))), HIGH);
+        const double leading = LEADS / (true_rate * mbma_max(low, LEAST_APPROACH));
+        const double highest = mbma_max(mbma_min(true_shift - true_rate * high, leading), HIGH);
         turned = mbma_max(turned, highest * (fabs(off_shift - off_rate * at) + highest * fabs(off_rate) / true_rate));
     }
     /* sums over whole panels, relative to the largest of the panel */
     for (int k = 0; k < 2 * count; k++) {
         const double at = 0.5 * (k < count ? r->nodes[k] : 1.0 + r->nodes[k - count]);
-        fine_weight[k] = 0.5 * r->weights[k % count] * finer[0][k];
-        if (r->power > 1)
-            fine_weight[k] *= 2.0 * at * lead(0, width * at * at);
+        fine_weight[k] = 0.5 * r->weights[k % count] * finer[0][k] * (rise(r->power, at) * lead(r->power, 0, width * at * at));
     }
     for (int k = 0; k < count; k++) {
         const double at = r->nodes[k];
-        coarse[k] = r->weights[k] * force[k] * (r->power > 1 ? 2.0 * at * lead(0, width * at * at) : 1.0);
+        coarse[k] = r->weights[k] * force[k] * (rise(r->power, at) * lead(r->power, 0, width * at * at));
     }
     double lowest = INFINITY, most = 0.0, off = 0.0, alone = 0.0;
     for (int k = 0; k < SPREAD + TOPS; k++) {
@@ -316,23 +318,13 @@ static double missed_by(const mbma_panel_rule *r, double low, double high, const
             top = top < last ? top : last - (last - high) * 0.25 * share * share * share;
         }
         c[k] = mbma_held(top, high, last);
-        least[k] = INFINITY;
-        for (int j = 0; j < 2 * count; j += 4) {
-            const double height = mbma_fma(-finer[rows + 1][j], c[k], finer[rows][j]);
-            least[k] = mbma_min(least[k], height * height);
-        }
+        least[k] = least_square(2 * count, finer[rows], finer[rows + 1], c[k]);
         lowest = mbma_min(lowest, least[k]);
     }
     for (int k = 0; k < SPREAD + TOPS; k++) {
         double fine[2 * NODES], rough[NODES];
-        for (int j = 0; j < 2 * count; j++) {
-            const double height = mbma_fma(-finer[rows + 1][j], c[k], finer[rows][j]);
-            fine[j] = mbma_exp(0.5 * mbma_fma(-height, height, least[k]));
-        }
-        for (int j = 0; j < count; j++) {
-            const double height = mbma_fma(-rate[j], c[k], shift[j]);
-            rough[j] = mbma_exp(0.5 * mbma_fma(-height, height, least[k]));
-        }
+        fill_shares(2 * count, finer[rows], finer[rows + 1], c[k], least[k], fine);
+        fill_shares(count, shift, rate, c[k], least[k], rough);
         const double sum = dot(fine, fine_weight, (size_t)(2 * count)), other = dot(rough, coarse, (size_t)count);
         const double scale = mbma_exp(0.5 * (lowest - least[k]));
         /* up to its own end the panel from 0 is all there is */

@@ -1,10 +1,8 @@
 /* Islands by the paper's four numbers: the spline of the four-number table, and the bands that its axes stand for. */
 #include "eight.h"
-#include "mbma.h"
+#include "island.h"
 
-#define RADIUS 0.66467019408956851 /* 3 sqrt(pi)/8: summit radii are this over sqrt(m4), Eq. (2) */
-#define BROADENING 0.8968          /* summit variance is (1 - BROADENING/alpha) m0, Eq. (2) */
-#define BEYOND 1e-9                /* of a cell: how far rounding may take a place off the ends of its axis */
+#define BEYOND 1e-9 /* of a cell: how far rounding may take a place off the ends of its axis */
 
 typedef struct {
     int64_t cell;
@@ -48,6 +46,7 @@ MBMA_INLINE size_t spline4(size_t n, const double *places, const double *coeffic
         const int64_t corner = w[0].cell * cube + w[1].cell * plane + w[2].cell * row + 2 * w[3].cell;
         const double *const start = coefficients + corner;
         eight value = none, by_x = none, by_y = none, by_z = none;
+        /* without slopes, what is not read is not computed either */
         for (int a = 0; a < 4; a++) {
             eight over_y = none, slope_y = none, slope_z = none;
             for (int b = 0; b < 4; b++) {
@@ -56,32 +55,24 @@ MBMA_INLINE size_t spline4(size_t n, const double *places, const double *coeffic
                 for (int c = 0; c < 4; c++) {
                     const eight neighbours = eight_of(from + c * row);
                     over_z = fma8(neighbours, w[2].value[c], over_z);
-                    if (slopes)
-                        steep_z = fma8(neighbours, w[2].slope[c], steep_z);
+                    steep_z = fma8(neighbours, w[2].slope[c], steep_z);
                 }
                 over_y = fma8(over_z, w[1].value[b], over_y);
-                if (slopes) {
-                    slope_y = fma8(over_z, w[1].slope[b], slope_y);
-                    slope_z = fma8(steep_z, w[1].value[b], slope_z);
-                }
+                slope_y = fma8(over_z, w[1].slope[b], slope_y);
+                slope_z = fma8(steep_z, w[1].value[b], slope_z);
             }
             value = fma8(over_y, w[0].value[a], value);
-            if (slopes) {
-                by_x = fma8(over_y, w[0].slope[a], by_x);
-                by_y = fma8(slope_y, w[0].value[a], by_y);
-                by_z = fma8(slope_z, w[0].value[a], by_z);
-            }
+            by_x = fma8(over_y, w[0].slope[a], by_x);
+            by_y = fma8(slope_y, w[0].value[a], by_y);
+            by_z = fma8(slope_z, w[0].value[a], by_z);
         }
-        double found[10];
-        last_axis(w[3].value, value, &found[0], &found[count]);
-        if (slopes) {
-            last_axis(w[3].value, by_x, &found[1], &found[6]);
-            last_axis(w[3].value, by_y, &found[2], &found[7]);
-            last_axis(w[3].value, by_z, &found[3], &found[8]);
-            last_axis(w[3].slope, value, &found[4], &found[9]);
+        const eight sums[5] = {value, by_x, by_y, by_z, value};
+        for (size_t m = 0; m < count; m++) {
+            double found[2];
+            last_axis(m < 4 ? w[3].value : w[3].slope, sums[m], &found[0], &found[1]);
+            out[m * n + k] = inside ? found[0] : NAN;
+            out[(count + m) * n + k] = inside ? found[1] : NAN;
         }
-        for (size_t m = 0; m < 2 * count; m++)
-            out[m * n + k] = inside ? found[m] : NAN;
         bad += !inside;
     }
     return bad;
@@ -93,7 +84,7 @@ size_t mbma_spline4(size_t n, const double *places, const double *coefficients, 
                   : spline4(n, places, coefficients, nodes, false, out);
 }
 
-/* (r^power - 1)/(power log r) with x = power log r: 1 where x is 0. */
+/* (r^power - 1)/(power ln r) with x = power ln r: 1 where x is 0 */
 MBMA_INLINE double growth(double x) { return x == 0.0 ? 1.0 : mbma_expm1(x) / x; }
 
 size_t mbma_four_numbers(size_t n, const double *spread, const double *sphere, const double *hurst,

@@ -1,13 +1,12 @@
 /* Force and area of a surface at a gap: adaptive Gauss-Kronrod quadrature over the approaches of its islands (44-50).
  *
- * Below the floor of zeta_d the approach is mapped by x = scale sinh(t)^2, a power at 0 and geometric beyond the boundary
- * layer; above it the integrand is little more than a Gaussian of x, and x itself serves.
+ * Below the floor of zeta_d the approach is mapped by x = scale sinh(t)^2, a power at 0 and geometric beyond the
+ * boundary layer; above it the integrand is little more than a Gaussian of x, and x itself serves.
  */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("no-thread-jumps") /* which makes branches that keep the loop over nodes from vectorising */
 #endif
 #include "island.h"
-#include "kronrod.h"
 #include "phi.h"
 
 enum { MAX_INTERVALS = 200, BY_HURST = 1, BY_LOG_ZETA, BY_COMPRESSION, BY_PEAK, BELOW_KINK, COLUMNS };
@@ -17,8 +16,8 @@ enum { BY_LOG_E = BY_LOG_ZETA }; /* over nodes, derivatives are by H at given e 
 #define LEAST (-700.0) /* of exponents: below it a Gaussian is nothing */
 #define NEAR_ONE 0.1   /* p l below which a difference goes by its series */
 
-/* A Kronrod sum errs by at most 3 (difference to Gauss)^1.5, seen over random surfaces: 4^1.5 = 8. With a lower floor of
- * zeta_d than the paper's the difference counts more. */
+/* A Kronrod sum errs by at most 3 (difference to Gauss)^1.5, seen over random surfaces: 4^1.5 = 8. With a lower floor
+ * of zeta_d than the paper's the difference counts more. */
 #define PAPER_FLOOR 1.5
 #define SAFETY 4.0
 #define SAFETY_BELOW 400.0
@@ -63,13 +62,6 @@ MBMA_INLINE double moment(double p, double length, double grown) {
     return y < NEAR_ONE ? length * length * series : (length + (y - 1.0) * grown) / p;
 }
 
-/* Derivatives by H and by ln zeta of ln m2 over [1, zeta]. */
-static void m2_slopes(const surface *s, double by[2]) {
-    const double grown = expm1(s->p2 * s->log_zeta_1) / s->p2;
-    by[0] = 1.0 / s->hurst - 2.0 * moment(s->p2, s->log_zeta_1, grown) / grown;
-    by[1] = s->p2 + 1.0 / grown;
-}
-
 /* Derivatives of X, mu and of ln force, ln area with their weights in the totals, the node being held: by H at given
  * e, or by ln e at given H; `eta_factor` and K1 are held. d_D is of ln D, and so on; those of e, a, b, m0, h_d, X,
  * height and of logarithms are of themselves. */
@@ -112,11 +104,6 @@ MBMA_INLINE void node_slopes(bool by_hurst, double height, bool floor_d, bool fl
     out[3][k] = (d_root_b - d_R_u) / 3.0 + d_D + d_R_u + d_R_d + 2.0 * d_sigma + common;
 }
 
-/* z'/sigma_d (41) at x = delta/h_rms; z_max is counted down from h_max, so nothing cancels at first contact */
-MBMA_INLINE double height_at(double x, const island *n, const gap *g) {
-    return height_of(g->peak - (g->compression - x), n, &g->s);
-}
-
 /* A loop over the nodes of an interval that vectorises: the floors and `slopes` are constants, nothing is called. */
 MBMA_INLINE void fill_nodes(bool floor_d, bool floor_u, bool slopes, const interval *p, const rule *restrict r,
                             const gap *g, at_nodes *restrict out) {
@@ -129,7 +116,9 @@ MBMA_INLINE void fill_nodes(bool floor_d, bool floor_u, bool slopes, const inter
         const double x = floor_d ? t : scale * rise * rise;
         const double stretch = floor_d ? half : half * scale * rise * (more + 1.0 + inverse);
         const island n = island_at(x, floor_d, floor_u, &g->s);
-        const double height = height_at(x, &n, g), exponent = -0.5 * height * height, gaussian = mbma_exp(exponent);
+        /* z_max is counted down from h_max, so nothing cancels at first contact */
+        const double height = height_of(g->peak - (g->compression - x), &n, &g->s);
+        const double exponent = -0.5 * height * height, gaussian = mbma_exp(exponent);
         const double weight = n.count * stretch * (exponent > LEAST ? gaussian : 0.0);
         out->X[k] = n.X;
         out->mu[k] = n.mu;
@@ -143,22 +132,21 @@ MBMA_INLINE void fill_nodes(bool floor_d, bool floor_u, bool slopes, const inter
     }
 }
 
-/* Each case in a function of its own, which compilers take for a loop of its own. */
-typedef void fill_function(const interval *, const rule *, const gap *, at_nodes *);
-#define FILL(name, floor_d, floor_u, slopes) \
-    static void name(const interval *p, const rule *r, const gap *g, at_nodes *out) { \
-        fill_nodes(floor_d, floor_u, slopes, p, r, g, out); \
+/* Each case in functions of its own, which compilers take for a loop of its own. */
+#define FILL(name, floor_d, floor_u) \
+    static void name##_values(const interval *p, const rule *r, const gap *g, at_nodes *out) { \
+        fill_nodes(floor_d, floor_u, false, p, r, g, out); \
+    } \
+    static void name##_slopes(const interval *p, const rule *r, const gap *g, at_nodes *out) { \
+        fill_nodes(floor_d, floor_u, true, p, r, g, out); \
     }
-FILL(values_free, false, false, false)
-FILL(values_floor_u, false, true, false)
-FILL(values_floor_d, true, false, false)
-FILL(values_floors, true, true, false)
-FILL(slopes_free, false, false, true)
-FILL(slopes_floor_u, false, true, true)
-FILL(slopes_floor_d, true, false, true)
-FILL(slopes_floors, true, true, true)
-static fill_function *const FILLS[2][2][2] = {{{values_free, values_floor_u}, {values_floor_d, values_floors}},
-                                              {{slopes_free, slopes_floor_u}, {slopes_floor_d, slopes_floors}}};
+FILL(free, false, false)
+FILL(floor_u, false, true)
+FILL(floor_d, true, false)
+FILL(floors, true, true)
+static void (*const FILLS[2][2][2])(const interval *, const rule *, const gap *, at_nodes *) = {
+    {{free_values, floor_u_values}, {floor_d_values, floors_values}},
+    {{free_slopes, floor_u_slopes}, {floor_d_slopes, floors_slopes}}};
 
 /* The pieces of [0, compression] between the kinks; their number. */
 static int first_intervals(const gap *g, interval *intervals) {
@@ -167,14 +155,13 @@ static int first_intervals(const gap *g, interval *intervals) {
     int count = 0;
     for (int k = 0; k < 3; k++) {
         const double low = edges[k], high = edges[k + 1], middle = 0.5 * (low + high);
-        if (!(high > low))
-            continue;
-        interval *const p = &intervals[count++];
-        p->floor_d = middle > g->s.kink_d;
-        p->floor_u = middle > g->s.kink_u;
-        p->low = p->floor_d ? low : asinh(sqrt(low / g->s.map_scale));
-        p->high = p->floor_d ? high : asinh(sqrt(high / g->s.map_scale));
-        p->known = false;
+        interval p = {low, high, 0.0, middle > g->s.kink_d, middle > g->s.kink_u, false, {{0.0}}};
+        if (!p.floor_d) {
+            p.low = asinh(sqrt(low / g->s.map_scale));
+            p.high = asinh(sqrt(high / g->s.map_scale));
+        }
+        if (high > low)
+            intervals[count++] = p;
     }
     return count;
 }
@@ -202,14 +189,11 @@ MBMA_INLINE int apply_rule(bool slopes, interval *p, gap *g) {
                                                    found.by_X[q] * at.by[by][0][k] + found.by_mu[q] * at.by[by][1][k]);
         }
     }
-    p->error = 0.0;
+    /* of both sums: both integrands resolve alike, and one may agree by chance */
+    const double difference = mbma_max(fabs(gauss[0] / sums[0][0] - 1.0), fabs(gauss[1] / sums[1][0] - 1.0));
+    const double scaled = g->safety * difference;
+    p->error = sums[0][0] > 0.0 && sums[1][0] > 0.0 ? mbma_min(difference, scaled * sqrt(scaled)) : 0.0;
     p->known = true;
-    if (sums[0][0] > 0.0 && sums[1][0] > 0.0) {
-        /* of both sums: both integrands resolve alike, and one may agree by chance */
-        const double difference = mbma_max(fabs(gauss[0] / sums[0][0] - 1.0), fabs(gauss[1] / sums[1][0] - 1.0));
-        const double scaled = g->safety * difference;
-        p->error = mbma_min(difference, scaled * sqrt(scaled));
-    }
     for (int q = 0; q < 2; q++) {
         for (int c = 0; c < (slopes ? COLUMNS : 1); c++)
             p->sums[q][c] = sums[q][c] * (p->floor_d ? 1.0 : g->s.jacobian);
@@ -267,7 +251,8 @@ static int total(bool slopes, gap *g, double rtol, double sums[2][COLUMNS], doub
 static int integrand(double x, const gap *g, double out[2]) {
     const island n = island_at(x, x >= g->s.kink_d, x > g->s.kink_u, &g->s);
     const phi found = phi_at(g->cells, n.X, n.mu, false);
-    const double height = height_at(x, &n, g), weight = n.count * exp(-0.5 * height * height);
+    const double height = height_of(g->peak - (g->compression - x), &n, &g->s);
+    const double weight = n.count * exp(-0.5 * height * height);
     out[0] = n.force * found.value[0] * weight;
     out[1] = n.area * found.value[1] * weight;
     return found.status;
@@ -277,27 +262,50 @@ static int integrand(double x, const gap *g, double out[2]) {
  * kink with H and zeta_1; K1 and `eta_factor` change. */
 static int end_slopes(const gap *g, double sums[2][COLUMNS]) {
     const surface *const s = &g->s;
-    double edge[2], at_kink[2] = {0.0, 0.0}, m2_by[2];
+    double edge[2], at_kink[2] = {0.0, 0.0};
     int status = integrand(g->compression, g, edge);
     const double K1 = g->compression > s->kink_d ? 1.0 : s->jacobian;
     if (status == MBMA_OK && s->kink_d < g->compression)
         status = integrand(s->kink_d, g, at_kink);
     const double jump = 0.5 * (s->jacobian - 1.0) / (s->root_floor_d * s->slope_d);
     const double kink_by_hurst = -2.0 * s->log_floor_d * (s->e + s->root_floor_d * s->root_floor_d);
-    m2_slopes(s, m2_by);
+    /* of ln m2 over [1, zeta_1] */
+    const double grown = expm1(s->p2 * s->log_zeta_1) / s->p2, m2_by_log_zeta = s->p2 + 1.0 / grown;
+    const double m2_by_hurst = 1.0 / s->hurst - 2.0 * moment(s->p2, s->log_zeta_1, grown) / grown;
     for (int q = 0; q < 2; q++) {
         double *const by = sums[q];
         const double by_hurst = by[BY_HURST] + jump * kink_by_hurst * at_kink[q];
         const double by_log_e = by[BY_LOG_E] - jump * s->e * at_kink[q] + s->jacobian_by_e * by[BELOW_KINK];
         /* eta_factor goes with m2^(-1/3) */
         const double share = q == 1 ? by[0] / 3.0 : 0.0;
-        by[BY_HURST] = by_hurst - 2.0 * s->log_zeta_1 * by_log_e - share * m2_by[0];
-        by[BY_LOG_ZETA] = -2.0 * s->hurst * by_log_e - share * m2_by[1];
+        by[BY_HURST] = by_hurst - 2.0 * s->log_zeta_1 * by_log_e - share * m2_by_hurst;
+        by[BY_LOG_ZETA] = -2.0 * s->hurst * by_log_e - share * m2_by_log_zeta;
         by[BY_PEAK] = -by[BY_COMPRESSION];
         by[BY_COMPRESSION] += K1 * edge[q];
     }
     return status;
 }
+
+/* QUADPACK's Gauss-Kronrod rules of 21 and 31 nodes (Piessens, de Doncker-Kapenga, Ueberhuber and Kahaner 1983), which
+ * are symmetric: nodes from 1 to 0. Every second one, from the second on, is also a Gauss node. */
+static const struct {
+    double nodes[16], kronrod[16], gauss[8];
+} HALF_RULES[2] = {
+    {{0.9956571630258081, 0.9739065285171717, 0.9301574913557082, 0.8650633666889845, 0.7808177265864169,
+      0.6794095682990244, 0.5627571346686047, 0.4333953941292472, 0.2943928627014602, 0.14887433898163122, 0.0},
+     {0.011694638867371874, 0.032558162307964725, 0.054755896574351995, 0.07503967481091996, 0.0931254545836976,
+      0.10938715880229764, 0.12349197626206584, 0.13470921731147334, 0.14277593857706009, 0.14773910490133849,
+      0.1494455540029169},
+     {0.06667134430868814, 0.1494513491505806, 0.21908636251598204, 0.26926671930999635, 0.29552422471475287}},
+    {{0.9980022986933971, 0.9879925180204854, 0.9677390756791391, 0.937273392400706, 0.8972645323440819,
+      0.8482065834104272, 0.790418501442466, 0.7244177313601701, 0.650996741297417, 0.5709721726085388,
+      0.4850818636402397, 0.3941513470775634, 0.29918000715316884, 0.20119409399743451, 0.1011420669187175, 0.0},
+     {0.005377479872923349, 0.015007947329316122, 0.02546084732671532, 0.03534636079137585, 0.04458975132476488,
+      0.05348152469092809, 0.06200956780067064, 0.06985412131872826, 0.07684968075772038, 0.08308050282313302,
+      0.08856444305621176, 0.09312659817082532, 0.09664272698362368, 0.09917359872179196, 0.10076984552387559,
+      0.10133000701479154},
+     {0.03075324199611727, 0.07036604748810812, 0.10715922046717194, 0.13957067792615432, 0.16626920581699392,
+      0.1861610000155622, 0.19843148532711158, 0.2025782419255613}}};
 
 int mbma_kronrod(int count, double *nodes, double *kronrod, double *gauss) {
     if (count != 21 && count != 31)

@@ -15,8 +15,10 @@ from mbma_tables.core import ARITHMETIC
 from mbma_tables.tablefiles.schema import ISLAND4D, UNIVERSAL
 
 SOLVER = (
+    "mbma_tables/core/eight.h",
     "mbma_tables/core/elementary.h",
     "mbma_tables/core/height_coefficients.h",
+    "mbma_tables/core/heights.h",
     "mbma_tables/core/newton.c",
     "mbma_tables.islands.spectral",
     "mbma_tables.islands.greenwood_tripp",
