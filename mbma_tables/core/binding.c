@@ -247,14 +247,10 @@ WRAP(damped_steps, "dddddiDwwwl",
 
 /* ---- law.c ---- */
 static mbma_law law_in(const argument *block) {
-    mbma_law law;
-    mbma_law_open(block->data, block->n, &law);
-    return law;
+    return mbma_law_open(block->data, block->n);
 }
 static mbma_inverse inverse_in(const argument *block) {
-    mbma_inverse inverse;
-    mbma_inverse_open(block->data, block->n, &inverse);
-    return inverse;
+    return mbma_inverse_open(block->data, block->n);
 }
 static bool is_law(const argument *a) { return law_in(a).head != NULL; }
 /* whether arrays are as long as the first, or not wanted */
@@ -483,14 +479,14 @@ WRAP(spline_pieces, SPLINE "w",
      fits_spline(a, false) && !a[7].data && a[8].n == a[3].n * 6 * (size_t)((int64_t *)a[2].data)[2], spline_pieces(a))
 WRAP(calibrated_ends, SPLINE "w", fits_spline(a, true) && a[8].n == 2 * a[3].n, calibrated_ends(a))
 WRAP(calibrated_contact, SPLINE "LDwww",
-     fits_spline(a, true) && a[6].n == 2 * a[3].n && a[9].n == a[8].n && a[10].n == a[8].n && a[11].n == a[8].n &&
+     fits_spline(a, true) && a[3].n > 0 && a[6].n == 2 * a[3].n && a[9].n == a[8].n && a[10].n == a[8].n && a[11].n == a[8].n &&
          a[12].n == a[8].n,
      calibrated_contact(a))
 WRAP(calibrated_separation, SPLINE "LDw",
-     fits_spline(a, true) && a[6].n == 2 * a[3].n && a[9].n == a[8].n && a[10].n == a[8].n, calibrated_separation(a))
+     fits_spline(a, true) && a[3].n > 0 && a[6].n == 2 * a[3].n && a[9].n == a[8].n && a[10].n == a[8].n, calibrated_separation(a))
 WRAP(calibrated_slopes, SPLINE "Dw", fits_spline(a, true) && !a[7].data && a[8].n == a[3].n && a[9].n == 10 * a[3].n,
      calibrated_slopes(a))
-WRAP(flow, SPLINE "LDDw", fits_spline(a, false) && a[9].n == a[8].n && a[10].n == a[8].n && a[11].n == a[8].n, flow(a))
+WRAP(flow, SPLINE "LDDw", fits_spline(a, false) && a[3].n > 0 && a[9].n == a[8].n && a[10].n == a[8].n && a[11].n == a[8].n, flow(a))
 WRAP(self_affine, "DDww", a[0].n == a[1].n && a[0].n == a[2].n && a[0].n == a[3].n,
      mbma_self_affine(a[0].n, a[0].data, a[1].data, a[2].data, a[3].data))
 
