@@ -26,6 +26,17 @@ MBMA_INLINE void quintic(double u, double w[6]) {
     w[5] = u2 * u2 * u * part;
 }
 
+/* Their derivatives by u. */
+static void quintic_slopes(double u, double w[6]) {
+    const double v = 1.0 - u, u2 = u * u, v2 = v * v;
+    w[0] = -v2 * v2 / 24.0;
+    w[1] = (-50.0 + u * (40.0 + u * (60.0 + u * (-80.0 + 25.0 * u)))) / 120.0;
+    w[2] = u * (-120.0 + u2 * (120.0 - 50.0 * u)) / 120.0;
+    w[3] = -v * (-120.0 + v2 * (120.0 - 50.0 * v)) / 120.0;
+    w[4] = -(-50.0 + v * (40.0 + v * (60.0 + v * (-80.0 + 25.0 * v)))) / 120.0;
+    w[5] = u2 * u2 / 24.0;
+}
+
 /* From coefficients of B-splines to those of powers. */
 MBMA_INLINE void to_powers(const double c[6], double p[6]) {
     const double part = 1.0 / 120.0, outer = c[0] + c[4], inner = c[1] + c[3];
@@ -83,12 +94,11 @@ static void weigh(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c,
             for (int m = 0; m < 6; m++)
                 c->w[axis][m][n] = w[m];
         }
-        for (int m = 0; m < 6 && axis == steep; m++) {
-            double one[6] = {0.0}, p[6];
-            one[m] = 1.0;
-            to_powers(one, p);
-            for (size_t n = 0; n < c->count; n++)
-                c->w[axis][m][n] = power_slope(p, c->z[axis][n]) * s->rate[axis];
+        for (size_t n = 0; n < c->count && axis == steep; n++) {
+            double w[6];
+            quintic_slopes(c->z[axis][n], w);
+            for (int m = 0; m < 6; m++)
+                c->w[axis][m][n] = w[m] * s->rate[axis];
         }
     }
 }

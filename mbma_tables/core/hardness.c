@@ -48,8 +48,7 @@ static void mills(double x, double *ratio, double *rest) {
 static plane deep_plane(double u) {
     /* a fit in ln z, z the level of that density, leaves 1e-3 */
     const double log_u = log(u), z = sqrt(-2.0 * (log_u + LOG_SQRT_2PI)), t = log(z);
-    double x = z + mbma_fma(mbma_fma(mbma_fma(mbma_fma(0.01149149, t, -0.1315785), t, 0.508909), t, -0.5419618), t,
-                            -0.6321294);
+    double x = z + mbma_horner(0.01149149, t, -0.1315785, 0.508909, -0.5419618, -0.6321294);
     double ratio = 0.0, rest = 1.0, move = 1.0;
     for (int step = 0; step < 4 && fabs(move) > 1e-7; step++) {
         mills(x, &ratio, &rest);
@@ -70,29 +69,13 @@ static plane deep_plane(double u) {
 
 /* The plane whose mean gap is u: a fit to 3e-4, then one step of fourth order, which leaves rounding. */
 static plane plane_at(double u) {
-    if (u != u) {
-        const plane none = {NAN, NAN, NAN, NAN};
-        return none;
-    }
-    if (u <= LEAST_GAP) {
-        const plane closed = {-INFINITY, 0.0, 0.0, 1.0};
-        return closed;
-    }
+    const plane closed = {-INFINITY, 0.0, 0.0, 1.0};
     if (u < DEEP_GAP)
-        return deep_plane(u);
+        return u > LEAST_GAP ? deep_plane(u) : closed;
     double d = u;
     if (u < NEAR_GAP) {
-        const double v = sqrt(sqrt(u));
-        d = 9.929421;
-        d = mbma_fma(d, v, -75.30938);
-        d = mbma_fma(d, v, 245.7741);
-        d = mbma_fma(d, v, -452.8998);
-        d = mbma_fma(d, v, 521.9537);
-        d = mbma_fma(d, v, -393.3206);
-        d = mbma_fma(d, v, 198.2552);
-        d = mbma_fma(d, v, -67.49275);
-        d = mbma_fma(d, v, 18.72423);
-        d = mbma_fma(d, v, -4.71472);
+        const double v = sqrt(sqrt(u)), high = mbma_horner(9.929421, v, -75.30938, 245.7741, -452.8998, 521.9537);
+        d = mbma_fma(mbma_horner(high, v, -393.3206, 198.2552, -67.49275, 18.72423), v, -4.71472);
     }
     const double density = exp(-0.5 * d * d) * SQRT_1_2PI, tail = 0.5 * erfc(fabs(d) * SQRT1_2);
     if (u >= STRAIGHT_GAP) {

@@ -305,8 +305,8 @@ size_t mbma_inverse_nodes(size_t n, const double *wanted, const mbma_law *law, m
     return 0;
 }
 
-/* Each by a polynomial and one step of third order; iteration finds those for which one step may not be enough. Loops
- * of their own find records, which vectorises, and keep more entries in flight. */
+/* Each of a chunk by a polynomial and one step of third order; iteration finds those for which one step may not be
+ * enough. Loops of their own find records, which vectorises, and keep more entries in flight. */
 MBMA_INLINE size_t invert(const mbma_law *law, const mbma_inverse *inverse, mbma_quantity which, size_t n,
                           const double *wanted, double *d, double *area, double *stiffness) {
     const mbma_law_head head = *law->head;

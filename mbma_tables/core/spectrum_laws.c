@@ -151,12 +151,12 @@ typedef struct {
     double *log_g, *fall, *share, *sums[TERMS + 1];
 } wave_sum;
 
-/* The first wave whose ln y is below a limit. */
-static size_t first_below(const wave_sum *w, double log_force, double limit) {
-    size_t low = 0, high = w->count;
+/* How many numbers, of so many that rise, do not exceed a limit; of such that fall, with `sign` -1, are at least it. */
+static size_t count_up_to(size_t n, const double *x, double sign, double limit) {
+    size_t low = 0, high = n;
     while (low < high) {
         const size_t middle = low + (high - low) / 2;
-        if (log_force - w->log_g[middle] >= limit)
+        if (sign * x[middle] <= sign * limit)
             low = middle + 1;
         else
             high = middle;
@@ -167,7 +167,7 @@ static size_t first_below(const wave_sum *w, double log_force, double limit) {
 /* ln u + 2 F^2. */
 static double sum_at(const wave_sum *w, double log_force) {
     const double square = 2.0 * exp(2.0 * log_force), far = 0.5 * log(NOTHING / square + 1.0);
-    const size_t light = first_below(w, log_force, LOWEST);
+    const size_t light = count_up_to(w->count, w->log_g, 1.0, log_force - LOWEST);
     double lanes[LANES] = {0.0}, part[CHUNK], place[CHUNK], total = 0.0, power = exp(square);
     int32_t cell[CHUNK];
     if (light < w->count) {
@@ -178,7 +178,8 @@ static double sum_at(const wave_sum *w, double log_force) {
             total += power * w->light[k] * w->sums[k][light];
         }
     }
-    for (size_t first = first_below(w, log_force, fmin(HIGHEST, log_force + far)); first < light; first += CHUNK) {
+    const size_t heavy = count_up_to(light, w->log_g, 1.0, log_force - fmin(HIGHEST, log_force + far));
+    for (size_t first = heavy; first < light; first += CHUNK) {
         const size_t count = light - first < (size_t)CHUNK ? light - first : (size_t)CHUNK;
         const double *log_g = w->log_g + first, *fall = w->fall + first, *share = w->share + first;
         for (size_t k = 0; k < count; k++) {
@@ -233,23 +234,10 @@ static double log_u_in(const mbma_spectrum_law *law, size_t panel, double log_fo
     return value - square;
 }
 
-/* The panel of a number among falling or rising ones. */
-static size_t panel_of(const double *edges, size_t panels, double sign, double x) {
-    size_t low = 0, high = panels;
-    while (high - low > 1) {
-        const size_t middle = low + (high - low) / 2;
-        if (sign * edges[middle] <= sign * x)
-            low = middle;
-        else
-            high = middle;
-    }
-    return low;
-}
-
 /* ln F at a mean separation before the tail's factor, by Newton's method in a bracket, and d ln u/d ln F. */
 static double log_force_of(const mbma_spectrum_law *law, double u, double *slope) {
     const double log_u = log(u), *edge = law->edge, *ends = law->log_u;
-    const size_t panel = panel_of(ends, law->panels, -1.0, log_u);
+    const size_t panel = count_up_to(law->panels - 1, ends + 1, -1.0, log_u);
     if (u >= law->lightest[0]) {
         *slope = law->lightest[1] / u;
         return edge[0] + (u - law->lightest[0]) / law->lightest[1];
@@ -278,7 +266,8 @@ static double separation_of(const mbma_spectrum_law *law, double log_force, doub
     *slope = 0.0;
     if (log_force >= law->edge[law->panels])
         return 0.0;
-    const double u = exp(log_u_in(law, panel_of(law->edge, law->panels, 1.0, log_force), log_force, slope));
+    const size_t panel = count_up_to(law->panels - 1, law->edge + 1, 1.0, log_force);
+    const double u = exp(log_u_in(law, panel, log_force, slope));
     *slope *= u;
     return u;
 }
