@@ -66,10 +66,9 @@ static bool take(PyObject *given, char kind, argument *a) {
 /* Whether an array has the size that is said from *kinds on, if there is any: a product of a number and of the letters
  * k, m and n, each the size of the first array that has it; ? allows None. */
 static bool has_size(const argument *a, const char **kinds, size_t letters[4]) {
-    const char *const end = *kinds + strspn(*kinds, "0123456789kmn?");
-    bool any = *kinds == end;
+    bool any = **kinds == ' ' || **kinds == '\0';
     size_t number = 0, product = 1;
-    for (; *kinds < end; ++*kinds)
+    for (; **kinds != ' ' && **kinds != '\0'; ++*kinds)
         if (**kinds == '?')
             any = a->data == NULL;
         else if (**kinds <= '9')
@@ -121,7 +120,6 @@ static bool take_all(PyObject *const *given, Py_ssize_t count, const char *kinds
         release(a, count); \
         return good ? PyLong_FromLongLong(found) : NULL; \
     }
-#define ENTRY(name) {#name, (PyCFunction)(void (*)(void))py_##name, METH_FASTCALL, NULL}
 
 /* Of an argument its items, how many, a double, a whole number; how many doubles a structure has. */
 #define P(k) a[k].data
@@ -137,9 +135,6 @@ static size_t elementary(int64_t which, size_t n, const double *x, double *out) 
                  : which == 3 ? mbma_log1p(x[k]) : mbma_erf(x[k]);
     return 0;
 }
-WRAP(elementary, "i Dn wn", true, elementary(I(0), N(1), P(1), P(2)))
-
-/* ---- phi.c ---- */
 
 /* The table from three arrays: cells, places, and X_low, X_high, X_rate, mu_high, first_bucket, buckets. */
 static mbma_cells cells_of(const argument *a) {
@@ -162,11 +157,6 @@ static bool is_table(const argument *a) {
     }
     return true;
 }
-WRAP(table_fits, "D J D", true, N(2) == 6 && is_table(a))
-WRAP(phi, "Dn Dn D J D6 i w b?n", N(6) == N(0) * (I(5) ? 7 : 3),
-     mbma_phi(N(0), P(0), P(1), CELLS(2), (int)I(5), P(6), P(7)))
-
-/* ---- totals.c ---- */
 
 /* From density_divisor, beta, phi, floor_d, floor_u, offset, summit_sigma, printed. */
 static mbma_variant variant_of(const argument *a) {
@@ -174,13 +164,6 @@ static mbma_variant variant_of(const argument *a) {
     return (mbma_variant){n[0], n[1], n[2], n[3], n[4], n[5] != 0.0, n[6] != 0.0, n[7] != 0.0};
 }
 #define VARIANT(k) ((const mbma_variant[]){variant_of(a + (k))})
-WRAP(totals, "Dn Dn Dn Dn d D8 D J D6 i w wn bn l1", N(10) == N(0) * (I(9) ? 2 * MBMA_TOTALS_COLUMNS : 2),
-     mbma_totals(N(0), P(0), P(1), P(2), P(3), X(4), VARIANT(5), CELLS(6), (int)I(9), P(10), P(11), P(12), P(13)))
-WRAP(island_geometry, "d d d D8 w", N(4) == WORDS(mbma_island),
-     mbma_island_geometry(X(0), X(1), X(2), VARIANT(3), P(4)))
-WRAP(kronrod, "i wn wn wn", I(0) > 0 && I(0) < 32 && N(1) == (size_t)I(0), mbma_kronrod((int)I(0), P(1), P(2), P(3)))
-
-/* ---- profile.c ---- */
 
 enum { PLACES = MBMA_PANEL_NODES + MBMA_PANEL_CHECKS, SERIES_TERMS = 2 * MBMA_PANEL_GAPS };
 
@@ -194,21 +177,7 @@ static bool are_panels(const argument *a) {
             return false;
     return true;
 }
-WRAP(profile_islands, "Dn d d d D8 D J D6 w4n w1", true,
-     mbma_profile_islands(N(0), P(0), X(1), X(2), X(3), VARIANT(4), CELLS(5), P(8), P(9)))
-WRAP(profile_missed, "D Ln Dn Dn D i d wn", are_panels(a),
-     (mbma_profile_missed(P(0), N(1), P(1), P(2), P(3), P(4), (int)I(5), X(6), P(7)), 0))
 #define NODES(k) ((const mbma_nodes[]){{(int64_t)N((k) + 1), P(k), P((k) + 1), P((k) + 2)}})
-WRAP(profile_series, "D Ln Dn Dn D i w wn w wm wm l",
-     are_panels(a) && N(6) == N(1) * (size_t)I(5) * SERIES_TERMS && N(9) == N(1) * MBMA_PANEL_NODES &&
-         N(8) == (size_t)I(5) * N(9) && N(11) == N(1) + 1,
-     (mbma_profile_series(P(0), N(1), P(1), P(2), P(3), P(4), (int)I(5), P(6), P(7), NODES(8), P(11)), 0))
-WRAP(profile_totals, "D D D i i w",
-     N(1) > 1 && I(3) > 0 && I(3) <= MBMA_PANEL_ROWS && N(2) == (N(1) - 1) * (size_t)I(3) * SERIES_TERMS &&
-         N(5) == N(0) * (size_t)I(3) * (I(4) ? 2 : 1),
-     (mbma_profile_totals(N(0), P(0), N(1) - 1, P(1), P(2), (int)I(3), (int)I(4), P(5)), 0))
-
-/* ---- spline4.c ---- */
 
 /* How many coefficients a table of so many nodes has; 0 of one that cannot be. */
 static size_t coefficients_of(const argument *nodes) {
@@ -218,35 +187,138 @@ static size_t coefficients_of(const argument *nodes) {
         product *= count[k] >= 2 && count[k] < 4096 ? (size_t)(count[k] + 2) : 0;
     return product;
 }
-WRAP(spline4, "D D L4 i w",
-     N(1) > 0 && N(1) == coefficients_of(&a[2]) && N(0) % 4 == 0 && N(4) == N(0) / 4 * (I(3) ? 10 : 2),
-     mbma_spline4(N(0) / 4, P(0), P(1), P(2), I(3) != 0, P(4)))
-WRAP(four_numbers, "Dn Dn Dn d i w4n", true, mbma_four_numbers(N(0), P(0), P(1), P(2), X(3), I(4) != 0, P(5)))
 
-/* ---- newton.c ---- */
 #define BASIS(k) ((const mbma_basis[]){{N(k), P(k), P((k) + 1), P((k) + 2), P((k) + 3)}})
-WRAP(height_integrals, "i Dn wn", true, mbma_height_integrals(I(0), N(1), P(1), P(2)))
-WRAP(islands_work, "i", I(0) >= 0 && I(0) < 1 << 20, MBMA_ISLANDS_WORK(I(0)))
-WRAP(solve_islands, "Dn Dn d Dk Dk Dkk Dkk Dm Dm Dmm Dmm w3n ln bn w?nk w?nk w?nk w",
-     N(15) == N(14) && N(16) == N(14) && N(17) >= MBMA_ISLANDS_WORK(N(3)),
-     mbma_solve_islands(N(0), P(0), P(1), X(2), BASIS(3), BASIS(7), P(11), P(12), P(13), P(14), P(15), P(16), P(17)))
-WRAP(island_extents, "Dn Dn d wn", true, mbma_island_extents(N(0), P(0), P(1), X(2), P(3)))
-WRAP(damped_steps, "d d d d d i D wn wn w2 l1", N(7) > 0 && N(6) == N(7) * N(7),
-     mbma_damped_steps(X(0), X(1), X(2), X(3), X(4), I(5), N(7), P(6), P(7), P(8), P(9), P(10)))
-
-/* ---- law.c ---- */
 #define LAW(k) ((const mbma_law[]){mbma_law_open(P(k), N(k))})
 #define INVERSE(k) ((const mbma_inverse[]){mbma_inverse_open(P(k), N(k))})
-WRAP(law_fill, "Dn D w?n w?n w?n w?n w?n", LAW(1)->head,
-     mbma_law_fill(N(0), P(0), LAW(1), P(2), P(3), P(4), P(5), P(6)))
-WRAP(law_records, "Dn Dn D ln", LAW(2)->head, mbma_law_records(N(0), P(0), P(1), LAW(2), P(3)))
-WRAP(inverse_nodes, "Dn D i d wn wn", LAW(1)->head,
-     mbma_inverse_nodes(N(0), P(0), LAW(1), (mbma_quantity)I(2), X(3), P(4), P(5)))
-WRAP(law_invert, "Dn D D i wn w?n w?n", LAW(1)->head && INVERSE(2)->head,
-     mbma_law_invert(N(0), P(0), LAW(1), INVERSE(2), (mbma_quantity)I(3), P(4), P(5), P(6)))
-WRAP(law_flow_fill, "Dn D d d wn", LAW(1)->head, mbma_law_flow_fill(N(0), P(0), LAW(1), X(2), X(3), P(4)))
-WRAP(law_fit, "Dn D16n D256 D32 D81 w", N(0) % 2 == 0 && N(5) == N(0) / 2 * (WORDS(mbma_law_record) + 3),
-     mbma_law_fit(N(0) / 2, P(0), P(1), P(2), P(3), P(4), P(5)))
+
+/* First in all calls: coefficients; first nodes, rates, ends of what is covered, three constants; cells; of surfaces
+ * Hurst exponents and ln zeta_1. Then their h_max, ends and pieces, or None. */
+#define SPLINE "F D13 L3 Dn Dn "
+static bool fits_spline(const argument *a) {
+    const int64_t *const c = P(2);
+    for (int k = 0; k < 3; k++)
+        if (c[k] < 1 || c[k] > 100000)
+            return false;
+    const size_t coefficients = (size_t)(c[0] + 5) * (size_t)(c[1] + 5) * (size_t)(c[2] + 5) + 2;
+    return P(7) ? N(7) == N(3) * 6 * (size_t)c[2] : N(0) >= coefficients;
+}
+static mbma_spline spline_of(const argument *a) {
+    const int64_t *const c = P(2);
+    const double *const x = P(1);
+    return (mbma_spline){P(0), {(size_t)c[0], (size_t)c[1], (size_t)c[2]}, {x[0], x[1], x[2]}, {x[3], x[4], x[5]},
+                         {x[6], x[8]}, {x[7], x[9]}};
+}
+#define CONSTANT(k) ((const double *)P(1))[10 + (k)]
+#define LOG_FORCE ((const mbma_spline[]){spline_of(a)})
+#define CALIBRATED ((const mbma_calibrated_table[]){{spline_of(a), CONSTANT(0), CONSTANT(1), CONSTANT(2)}})
+#define FLOW ((const mbma_flow_table[]){{spline_of(a), CONSTANT(0), CONSTANT(1)}})
+#define SURFACES ((const mbma_surfaces[]){{N(3), P(3), P(4), P(5), P(6), P(7)}})
+
+/* Of a law: gradient and alpha, seven constants and h_max. */
+#define WAVES ((const mbma_waves[]){{N(1), P(1), P(2), P(3), NUMBER(0), NUMBER(1)}})
+#define NUMBER(k) ((const double *)P(4))[k]
+#define CONSTANTS \
+    ((const mbma_law_constants[]){{NUMBER(2), NUMBER(3), NUMBER(4), NUMBER(5), NUMBER(6), NUMBER(7), NUMBER(8)}})
+
+/* Every function: its name, the kinds of its arguments, what else their sizes must be, and the call. */
+#define FUNCTIONS(FN) \
+    /* elementary.h */ \
+    FN(elementary, "i Dn wn", true, elementary(I(0), N(1), P(1), P(2))) \
+    /* phi.c */ \
+    FN(table_fits, "D J D", true, N(2) == 6 && is_table(a)) \
+    FN(phi, "Dn Dn D J D6 i w b?n", N(6) == N(0) * (I(5) ? 7 : 3), \
+       mbma_phi(N(0), P(0), P(1), CELLS(2), (int)I(5), P(6), P(7))) \
+    /* totals.c */ \
+    FN(totals, "Dn Dn Dn Dn d D8 D J D6 i w wn bn l1", N(10) == N(0) * (I(9) ? 2 * MBMA_TOTALS_COLUMNS : 2), \
+       mbma_totals(N(0), P(0), P(1), P(2), P(3), X(4), VARIANT(5), CELLS(6), (int)I(9), P(10), P(11), P(12), P(13))) \
+    FN(island_geometry, "d d d D8 w", N(4) == WORDS(mbma_island), \
+       mbma_island_geometry(X(0), X(1), X(2), VARIANT(3), P(4))) \
+    FN(kronrod, "i wn wn wn", I(0) > 0 && I(0) < 32 && N(1) == (size_t)I(0), \
+       mbma_kronrod((int)I(0), P(1), P(2), P(3))) \
+    /* profile.c */ \
+    FN(profile_islands, "Dn d d d D8 D J D6 w4n w1", true, \
+       mbma_profile_islands(N(0), P(0), X(1), X(2), X(3), VARIANT(4), CELLS(5), P(8), P(9))) \
+    FN(profile_missed, "D Ln Dn Dn D i d wn", are_panels(a), \
+       (mbma_profile_missed(P(0), N(1), P(1), P(2), P(3), P(4), (int)I(5), X(6), P(7)), 0)) \
+    FN(profile_series, "D Ln Dn Dn D i w wn w wm wm l", \
+       are_panels(a) && N(6) == N(1) * (size_t)I(5) * SERIES_TERMS && N(9) == N(1) * MBMA_PANEL_NODES && \
+       N(8) == (size_t)I(5) * N(9) && N(11) == N(1) + 1, \
+       (mbma_profile_series(P(0), N(1), P(1), P(2), P(3), P(4), (int)I(5), P(6), P(7), NODES(8), P(11)), 0)) \
+    FN(profile_totals, "D D D i i w", \
+       N(1) > 1 && I(3) > 0 && I(3) <= MBMA_PANEL_ROWS && N(2) == (N(1) - 1) * (size_t)I(3) * SERIES_TERMS && \
+       N(5) == N(0) * (size_t)I(3) * (I(4) ? 2 : 1), \
+       (mbma_profile_totals(N(0), P(0), N(1) - 1, P(1), P(2), (int)I(3), (int)I(4), P(5)), 0)) \
+    /* spline4.c */ \
+    FN(spline4, "D D L4 i w", \
+       N(1) > 0 && N(1) == coefficients_of(&a[2]) && N(0) % 4 == 0 && N(4) == N(0) / 4 * (I(3) ? 10 : 2), \
+       mbma_spline4(N(0) / 4, P(0), P(1), P(2), I(3) != 0, P(4))) \
+    FN(four_numbers, "Dn Dn Dn d i w4n", true, mbma_four_numbers(N(0), P(0), P(1), P(2), X(3), I(4) != 0, P(5))) \
+    /* newton.c */ \
+    FN(height_integrals, "i Dn wn", true, mbma_height_integrals(I(0), N(1), P(1), P(2))) \
+    FN(islands_work, "i", I(0) >= 0 && I(0) < 1 << 20, MBMA_ISLANDS_WORK(I(0))) \
+    FN(solve_islands, "Dn Dn d Dk Dk Dkk Dkk Dm Dm Dmm Dmm w3n ln bn w?nk w?nk w?nk w", \
+       N(15) == N(14) && N(16) == N(14) && N(17) >= MBMA_ISLANDS_WORK(N(3)), \
+       mbma_solve_islands(N(0), P(0), P(1), X(2), BASIS(3), BASIS(7), P(11), P(12), P(13), P(14), P(15), P(16), \
+                          P(17))) \
+    FN(island_extents, "Dn Dn d wn", true, mbma_island_extents(N(0), P(0), P(1), X(2), P(3))) \
+    FN(damped_steps, "d d d d d i D wn wn w2 l1", N(7) > 0 && N(6) == N(7) * N(7), \
+       mbma_damped_steps(X(0), X(1), X(2), X(3), X(4), I(5), N(7), P(6), P(7), P(8), P(9), P(10))) \
+    /* law.c */ \
+    FN(law_fill, "Dn D w?n w?n w?n w?n w?n", LAW(1)->head, \
+       mbma_law_fill(N(0), P(0), LAW(1), P(2), P(3), P(4), P(5), P(6))) \
+    FN(law_records, "Dn Dn D ln", LAW(2)->head, mbma_law_records(N(0), P(0), P(1), LAW(2), P(3))) \
+    FN(inverse_nodes, "Dn D i d wn wn", LAW(1)->head, \
+       mbma_inverse_nodes(N(0), P(0), LAW(1), (mbma_quantity)I(2), X(3), P(4), P(5))) \
+    FN(law_invert, "Dn D D i wn w?n w?n", LAW(1)->head && INVERSE(2)->head, \
+       mbma_law_invert(N(0), P(0), LAW(1), INVERSE(2), (mbma_quantity)I(3), P(4), P(5), P(6))) \
+    FN(law_flow_fill, "Dn D d d wn", LAW(1)->head, mbma_law_flow_fill(N(0), P(0), LAW(1), X(2), X(3), P(4))) \
+    FN(law_fit, "Dn D16n D256 D32 D81 w", N(0) % 2 == 0 && N(5) == N(0) / 2 * (WORDS(mbma_law_record) + 3), \
+       mbma_law_fit(N(0) / 2, P(0), P(1), P(2), P(3), P(4), P(5))) \
+    /* calibrated.c */ \
+    FN(contact_area, "Dn Dn d wn", true, mbma_contact_area(N(0), P(0), P(1), X(2), P(3))) \
+    FN(spline_pieces, SPLINE "D D D w", fits_spline(a) && !P(7) && N(8) == N(3) * 6 * (size_t)((int64_t *)P(2))[2], \
+       mbma_spline_pieces(LOG_FORCE, SURFACES, P(8))) \
+    FN(calibrated_ends, SPLINE "Dn D D w2n", fits_spline(a), mbma_calibrated_ends(CALIBRATED, SURFACES, P(8))) \
+    FN(calibrated_contact, SPLINE "Dn D2n D Lm Dm wm wm wm", fits_spline(a) && N(3) > 0, \
+       mbma_calibrated_contact(CALIBRATED, SURFACES, N(8), P(8), P(9), P(10), P(11), P(12))) \
+    FN(calibrated_separation, SPLINE "Dn D2n D Lm Dm wm", fits_spline(a) && N(3) > 0, \
+       mbma_calibrated_separation(CALIBRATED, SURFACES, N(8), P(8), P(9), P(10))) \
+    FN(calibrated_slopes, SPLINE "Dn D D Dn w10n", fits_spline(a) && !P(7), \
+       mbma_calibrated_slopes(CALIBRATED, SURFACES, P(8), P(9))) \
+    FN(flow, SPLINE "D D D Lm Dm Dm wm", fits_spline(a) && N(3) > 0, \
+       mbma_flow(FLOW, SURFACES, N(8), P(8), P(9), P(10), P(11))) \
+    FN(self_affine, "Dn Dn wn wn", true, mbma_self_affine(N(0), P(0), P(1), P(2), P(3))) \
+    /* spectrum_laws.c */ \
+    FN(words_of_inner, "", true, WORDS(mbma_inner)) \
+    FN(words_of_spectrum_law, "", true, WORDS(mbma_spectrum_law)) \
+    FN(inner_integrals, "w", N(0) == WORDS(mbma_inner), (mbma_inner_integrals(P(0)), 0)) \
+    FN(spectrum_waves, "Dn Dn wm wm wm w4", true, mbma_spectrum_waves(N(0), P(0), P(1), N(2), P(2), P(3), P(4), P(5))) \
+    FN(spectrum_law_of, "D Dn Dn Dn D10 w9n w", N(0) == WORDS(mbma_inner) && N(6) == WORDS(mbma_spectrum_law), \
+       mbma_spectrum_law_of(P(0), WAVES, CONSTANTS, NUMBER(9), P(5), P(6))) \
+    FN(spectrum_law_persson, "D Dn wn wn", N(0) == WORDS(mbma_spectrum_law), \
+       mbma_spectrum_law_persson(P(0), N(1), P(1), P(2), P(3))) \
+    FN(spectrum_law_contact, "D Dn wn wn wn", N(0) == WORDS(mbma_spectrum_law), \
+       mbma_spectrum_law_contact(P(0), N(1), P(1), P(2), P(3), P(4))) \
+    FN(spectrum_law_separation, "D Dn wn", N(0) == WORDS(mbma_spectrum_law), \
+       mbma_spectrum_law_separation(P(0), N(1), P(1), P(2))) \
+    /* hardness.c */ \
+    FN(gaussian_level, "Dn wn", true, mbma_gaussian_level(N(0), P(0), P(1))) \
+    FN(bearing_share, "Dn Dn wn wn", true, mbma_bearing_share(N(0), P(0), P(1), P(2), P(3))) \
+    FN(diffused, "Dn Dn i wn", true, mbma_diffused(N(0), P(0), P(1), I(2) != 0, P(3))) \
+    FN(capped_area, "Dn Dn Dn d d i wn", true, mbma_capped_area(N(0), P(0), P(1), P(2), X(3), X(4), I(5) != 0, P(6))) \
+    FN(capped_force, "Dn Dn Dn Dn Dn d d d wn wn", true, \
+       mbma_capped_force(N(0), P(0), P(1), P(2), P(3), P(4), X(5), X(6), X(7), P(8), P(9))) \
+    FN(gap_start, "i Dm Dm Dm i Dn Dn w6n", \
+       I(0) > 0 && (I(0) == 1 || (uint64_t)I(0) == N(5)) && N(1) > 0 && N(1) % (size_t)I(0) == 0, \
+       mbma_gap_start(N(5), N(1) / (size_t)I(0), (size_t)I(0), P(1), P(2), P(3), I(4) != 0, P(5), P(6), P(7))) \
+    FN(gap_step, "Dn Dn i Ln Dm Dm w6m bn", true, \
+       mbma_gap_step(N(0), P(0), P(1), I(2) != 0, P(3), N(4), P(4), P(5), P(6), P(7)))
+FUNCTIONS(WRAP)
+#define ENTRY(name, kinds, fits, call) {#name, (PyCFunction)(void (*)(void))py_##name, METH_FASTCALL, NULL},
+static PyMethodDef METHODS[] = {FUNCTIONS(ENTRY){NULL, NULL, 0, NULL}};
+
+/* ---- laws as objects ---- */
 
 enum { FEW = 1000 }; /* gaps, for which the interpreter lock is kept */
 
@@ -334,38 +406,34 @@ static PyObject *ask_law(PyObject *self, PyObject *const *given, Py_ssize_t coun
     return found != NULL ? found : PyObject_CallMethod(self, "_ask_one", "iOO", what, by[0], by[1]);
 }
 
-#define ASK(name, what) \
+#define QUANTITIES(OF) \
+    OF(force, MBMA_FORCE, "F/A0 in the unit of E_star at d; where contact ends at h_max, zero from there on.") \
+    OF(area, MBMA_AREA, "A/A0 at d; where contact ends at h_max, zero from there on.") \
+    OF(stiffness, MBMA_STIFFNESS, \
+       "-dF/du per nominal area, against the mean separation u = (h_max + d)/2: -2 dF/dd.\n\n" \
+       "MBMA's jumps where zeta_d reaches its floor, and belongs to the larger gap there.") \
+    OF(area_slope, MBMA_AREA_SLOPE, "-d(A/A0)/dd.") \
+    OF(energy, MBMA_ENERGY, "Elastic energy per nominal area, the integral of F/A0 over u to last contact.")
+#define ASK(name, what, text) \
     static PyObject *law_##name(PyObject *self, PyObject *const *given, Py_ssize_t count, PyObject *names) { \
         return ask_law(self, given, count, names, what); \
     } \
     static double call_##name(double d, void *law) { return mbma_law_at((const mbma_law *)law, what, d); }
-ASK(force, MBMA_FORCE)
-ASK(area, MBMA_AREA)
-ASK(stiffness, MBMA_STIFFNESS)
-ASK(area_slope, MBMA_AREA_SLOPE)
-ASK(energy, MBMA_ENERGY)
+QUANTITIES(ASK)
 
 /* Addresses of the functions of (d, data) that answer one quantity each, and data, which lives as long as the law. */
 static PyObject *law_addresses(PyObject *self, PyObject *nothing) {
     const mbma_law *const law = law_of(self);
     (void)nothing;
-#define ADDRESS(of) (unsigned long long)(uintptr_t)(of)
-    return law == NULL ? NULL
-                       : Py_BuildValue("(KKKKK)K", ADDRESS(call_force), ADDRESS(call_area), ADDRESS(call_stiffness),
-                                       ADDRESS(call_area_slope), ADDRESS(call_energy), ADDRESS(law));
+#define ADDRESS(name, what, text) (unsigned long long)(uintptr_t)call_##name,
+    return law ? Py_BuildValue("(KKKKK)K", QUANTITIES(ADDRESS) (unsigned long long)(uintptr_t)law) : NULL;
 }
 
-#define GAP "($self, separation=None, *, u=None)\n--\n\n"
-#define METHOD(name, text) \
-    {#name, (PyCFunction)(void (*)(void))law_##name, METH_FASTCALL | METH_KEYWORDS, #name GAP text}
+#define METHOD(name, what, text) \
+    {#name, (PyCFunction)(void (*)(void))law_##name, METH_FASTCALL | METH_KEYWORDS, \
+     #name "($self, separation=None, *, u=None)\n--\n\n" text},
 static PyMethodDef LAW_METHODS[] = {
-    METHOD(force, "F/A0 in the unit of E_star at d; where contact ends at h_max, zero from there on."),
-    METHOD(area, "A/A0 at d; where contact ends at h_max, zero from there on."),
-    METHOD(stiffness, "-dF/du per nominal area, against the mean separation u = (h_max + d)/2: -2 dF/dd.\n\n"
-                      "MBMA's jumps where zeta_d reaches its floor, and belongs to the larger gap there."),
-    METHOD(area_slope, "-d(A/A0)/dd."),
-    METHOD(energy, "Elastic energy per nominal area, the integral of F/A0 over u to last contact."),
-    {"_addresses", law_addresses, METH_NOARGS, NULL},
+    QUANTITIES(METHOD){"_addresses", law_addresses, METH_NOARGS, NULL},
     {NULL, NULL, 0, NULL},
 };
 static PyType_Slot LAW_SLOTS[] = {
@@ -376,106 +444,6 @@ static PyType_Slot LAW_SLOTS[] = {
 };
 static PyType_Spec LAW_TYPE = {"mbma_tables.core.Law", sizeof(law_object), 0, Py_TPFLAGS_DEFAULT | Py_TPFLAGS_BASETYPE,
                                LAW_SLOTS};
-
-/* ---- calibrated.c ---- */
-
-/* First in all calls: coefficients; first nodes, rates, ends of what is covered, three constants; cells; of surfaces
- * Hurst exponents and ln zeta_1. Then their h_max, ends and pieces, or None. */
-#define SPLINE "F D13 L3 Dn Dn "
-static bool fits_spline(const argument *a) {
-    const int64_t *const c = P(2);
-    for (int k = 0; k < 3; k++)
-        if (c[k] < 1 || c[k] > 100000)
-            return false;
-    const size_t coefficients = (size_t)(c[0] + 5) * (size_t)(c[1] + 5) * (size_t)(c[2] + 5) + 2;
-    return P(7) ? N(7) == N(3) * 6 * (size_t)c[2] : N(0) >= coefficients;
-}
-static mbma_spline spline_of(const argument *a) {
-    const int64_t *const c = P(2);
-    const double *const x = P(1);
-    return (mbma_spline){P(0), {(size_t)c[0], (size_t)c[1], (size_t)c[2]}, {x[0], x[1], x[2]}, {x[3], x[4], x[5]},
-                         {x[6], x[8]}, {x[7], x[9]}};
-}
-#define CONSTANT(k) ((const double *)P(1))[10 + (k)]
-#define LOG_FORCE ((const mbma_spline[]){spline_of(a)})
-#define CALIBRATED ((const mbma_calibrated_table[]){{spline_of(a), CONSTANT(0), CONSTANT(1), CONSTANT(2)}})
-#define FLOW ((const mbma_flow_table[]){{spline_of(a), CONSTANT(0), CONSTANT(1)}})
-#define SURFACES ((const mbma_surfaces[]){{N(3), P(3), P(4), P(5), P(6), P(7)}})
-WRAP(contact_area, "Dn Dn d wn", true, mbma_contact_area(N(0), P(0), P(1), X(2), P(3)))
-WRAP(spline_pieces, SPLINE "D D D w", fits_spline(a) && !P(7) && N(8) == N(3) * 6 * (size_t)((int64_t *)P(2))[2],
-     mbma_spline_pieces(LOG_FORCE, SURFACES, P(8)))
-WRAP(calibrated_ends, SPLINE "Dn D D w2n", fits_spline(a), mbma_calibrated_ends(CALIBRATED, SURFACES, P(8)))
-WRAP(calibrated_contact, SPLINE "Dn D2n D Lm Dm wm wm wm", fits_spline(a) && N(3) > 0,
-     mbma_calibrated_contact(CALIBRATED, SURFACES, N(8), P(8), P(9), P(10), P(11), P(12)))
-WRAP(calibrated_separation, SPLINE "Dn D2n D Lm Dm wm", fits_spline(a) && N(3) > 0,
-     mbma_calibrated_separation(CALIBRATED, SURFACES, N(8), P(8), P(9), P(10)))
-WRAP(calibrated_slopes, SPLINE "Dn D D Dn w10n", fits_spline(a) && !P(7),
-     mbma_calibrated_slopes(CALIBRATED, SURFACES, P(8), P(9)))
-WRAP(flow, SPLINE "D D D Lm Dm Dm wm", fits_spline(a) && N(3) > 0,
-     mbma_flow(FLOW, SURFACES, N(8), P(8), P(9), P(10), P(11)))
-WRAP(self_affine, "Dn Dn wn wn", true, mbma_self_affine(N(0), P(0), P(1), P(2), P(3)))
-
-/* ---- spectrum_laws.c ---- */
-
-/* Of a law: gradient and alpha, seven constants and h_max. */
-#define WAVES ((const mbma_waves[]){{N(1), P(1), P(2), P(3), NUMBER(0), NUMBER(1)}})
-#define NUMBER(k) ((const double *)P(4))[k]
-#define CONSTANTS \
-    ((const mbma_law_constants[]){{NUMBER(2), NUMBER(3), NUMBER(4), NUMBER(5), NUMBER(6), NUMBER(7), NUMBER(8)}})
-WRAP(words_of_inner, "", true, WORDS(mbma_inner))
-WRAP(words_of_spectrum_law, "", true, WORDS(mbma_spectrum_law))
-WRAP(inner_integrals, "w", N(0) == WORDS(mbma_inner), (mbma_inner_integrals(P(0)), 0))
-WRAP(spectrum_waves, "Dn Dn wm wm wm w4", true,
-     mbma_spectrum_waves(N(0), P(0), P(1), N(2), P(2), P(3), P(4), P(5)))
-WRAP(spectrum_law_of, "D Dn Dn Dn D10 w9n w", N(0) == WORDS(mbma_inner) && N(6) == WORDS(mbma_spectrum_law),
-     mbma_spectrum_law_of(P(0), WAVES, CONSTANTS, NUMBER(9), P(5), P(6)))
-WRAP(spectrum_law_persson, "D Dn wn wn", N(0) == WORDS(mbma_spectrum_law),
-     mbma_spectrum_law_persson(P(0), N(1), P(1), P(2), P(3)))
-WRAP(spectrum_law_contact, "D Dn wn wn wn", N(0) == WORDS(mbma_spectrum_law),
-     mbma_spectrum_law_contact(P(0), N(1), P(1), P(2), P(3), P(4)))
-WRAP(spectrum_law_separation, "D Dn wn", N(0) == WORDS(mbma_spectrum_law),
-     mbma_spectrum_law_separation(P(0), N(1), P(1), P(2)))
-
-/* ---- hardness.c ---- */
-
-WRAP(gaussian_level, "Dn wn", true, mbma_gaussian_level(N(0), P(0), P(1)))
-WRAP(bearing_share, "Dn Dn wn wn", true, mbma_bearing_share(N(0), P(0), P(1), P(2), P(3)))
-WRAP(diffused, "Dn Dn i wn", true, mbma_diffused(N(0), P(0), P(1), I(2) != 0, P(3)))
-WRAP(capped_area, "Dn Dn Dn d d i wn", true,
-     mbma_capped_area(N(0), P(0), P(1), P(2), X(3), X(4), I(5) != 0, P(6)))
-WRAP(capped_force, "Dn Dn Dn Dn Dn d d d wn wn", true,
-     mbma_capped_force(N(0), P(0), P(1), P(2), P(3), P(4), X(5), X(6), X(7), P(8), P(9)))
-WRAP(gap_start, "i Dm Dm Dm i Dn Dn w6n",
-     I(0) > 0 && (I(0) == 1 || (uint64_t)I(0) == N(5)) && N(1) > 0 && N(1) % (size_t)I(0) == 0,
-     mbma_gap_start(N(5), N(1) / (size_t)I(0), (size_t)I(0), P(1), P(2), P(3), I(4) != 0, P(5), P(6), P(7)))
-WRAP(gap_step, "Dn Dn i Ln Dm Dm w6m bn", true,
-     mbma_gap_step(N(0), P(0), P(1), I(2) != 0, P(3), N(4), P(4), P(5), P(6), P(7)))
-
-static PyMethodDef METHODS[] = {
-    ENTRY(elementary),
-    /* phi.c */
-    ENTRY(table_fits), ENTRY(phi),
-    /* totals.c */
-    ENTRY(totals), ENTRY(island_geometry), ENTRY(kronrod),
-    /* profile.c */
-    ENTRY(profile_islands), ENTRY(profile_missed), ENTRY(profile_series), ENTRY(profile_totals),
-    /* spline4.c */
-    ENTRY(spline4), ENTRY(four_numbers),
-    /* newton.c */
-    ENTRY(height_integrals), ENTRY(islands_work), ENTRY(solve_islands), ENTRY(island_extents), ENTRY(damped_steps),
-    /* law.c */
-    ENTRY(law_fill), ENTRY(law_records), ENTRY(inverse_nodes), ENTRY(law_invert), ENTRY(law_flow_fill), ENTRY(law_fit),
-    /* calibrated.c */
-    ENTRY(contact_area), ENTRY(spline_pieces), ENTRY(calibrated_ends), ENTRY(calibrated_contact),
-    ENTRY(calibrated_separation), ENTRY(calibrated_slopes), ENTRY(flow), ENTRY(self_affine),
-    /* spectrum_laws.c */
-    ENTRY(words_of_inner), ENTRY(words_of_spectrum_law), ENTRY(inner_integrals), ENTRY(spectrum_waves),
-    ENTRY(spectrum_law_of), ENTRY(spectrum_law_persson), ENTRY(spectrum_law_contact), ENTRY(spectrum_law_separation),
-    /* hardness.c */
-    ENTRY(gaussian_level), ENTRY(bearing_share), ENTRY(diffused), ENTRY(capped_area), ENTRY(capped_force),
-    ENTRY(gap_start), ENTRY(gap_step),
-    {NULL, NULL, 0, NULL},
-};
 
 #if defined(__x86_64__) || defined(_M_X64)
 __attribute__((target("xsave"))) static uint64_t enabled_registers(void) { return (uint64_t)_xgetbv(0); }

@@ -109,24 +109,20 @@ size_t mbma_gaussian_level(size_t n, const double *u, double *level) {
 size_t mbma_bearing_share(size_t n, const double *u, const double *h_max, double *share, double *slope) {
     double last = NAN;
     plane end = plane_at(NAN);
-    size_t missed = 0;
     for (size_t k = 0; k < n; k++) {
         if (h_max[k] != last) {
             last = h_max[k];
             end = plane_at(last);
         }
-        share[k] = slope[k] = 0.0;
-        if (u[k] != u[k] || !(last > LEAST_GAP)) {
-            share[k] = slope[k] = NAN;
-            missed++;
-        } else if (u[k] < last) {
+        share[k] = slope[k] = u[k] == u[k] && last > LEAST_GAP ? 0.0 : NAN;
+        if (share[k] == 0.0 && u[k] < last) {
             const plane at = plane_at(u[k]);
             const double between = end.d > 0.0 ? at.above - end.above : end.below - at.below;
             share[k] = mbma_max(between, 0.0) / end.below;
             slope[k] = at.below > 0.0 ? -at.density / at.below / end.below : -INFINITY;
         }
     }
-    return missed;
+    return count_missing(n, share);
 }
 
 enum { TERMS = 9 };     /* of the series where images converge slower */
@@ -174,14 +170,12 @@ static double ended(double x, double tau, double reach, bool at_one) {
 }
 
 size_t mbma_diffused(size_t n, const double *x, const double *tau, int at_one, double *out) {
-    size_t missed = 0;
     for (size_t k = 0; k < n; k++) {
         const bool good = x[k] >= 0.0 && x[k] <= 1.0 && tau[k] >= 0.0;
         const double reach = 0.5 * x[k] / sqrt(mbma_max(tau[k], SHARPEST));
         out[k] = good ? ended(x[k], tau[k], reach, at_one != 0) : NAN;
-        missed += !good;
     }
-    return missed;
+    return count_missing(n, out);
 }
 
 size_t mbma_capped_area(size_t n, const double *load, const double *spread, const double *eta, double power,
@@ -311,7 +305,6 @@ static double through(double value, const place *known, int n) {
 
 size_t mbma_gap_start(size_t n, size_t m, size_t columns, const double *u, const double *value, const double *steep,
                       int exact, const double *wanted, const double *end, double *state) {
-    size_t missed = 0;
     for (size_t k = 0; k < n; k++) {
         double *const gap = state + k, *const low = gap + n, *const high = low + n, *const kept = high + n;
         const size_t column = columns == n ? k : 0;
@@ -357,9 +350,8 @@ size_t mbma_gap_start(size_t n, size_t m, size_t columns, const double *u, const
         kept[0] = from.value;
         kept[n] = from.y;
         kept[2 * n] = from.rate;
-        missed += *gap != *gap;
     }
-    return missed;
+    return count_missing(n, state);
 }
 
 size_t mbma_gap_step(size_t n, const double *value, const double *steep, int exact, const int64_t *places, size_t total,

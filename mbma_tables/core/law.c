@@ -305,70 +305,65 @@ size_t mbma_inverse_nodes(size_t n, const double *wanted, const mbma_law *law, m
     return 0;
 }
 
-/* Each of a chunk by a polynomial and one step of third order; iteration finds those for which one step may not be
- * enough. Loops of their own find records, which vectorises, and keep more entries in flight. */
-MBMA_INLINE size_t invert(const mbma_law *law, const mbma_inverse *inverse, mbma_quantity which, size_t n,
-                          const double *wanted, double *d, double *area, double *stiffness) {
-    const mbma_law_head head = *law->head;
-    const mbma_inverse_head of = *inverse->head;
-    const mbma_inverse_record *guesses[CHUNK];
-    double width = 1.0 / head.scale, guessed[CHUNK];
-    places at;
-    size_t bad = 0, unsure = 0;
-    for (size_t k = 0; k < n; k++) {
-        const double inside = mbma_held(wanted[k], of.low, of.high);
-        const int64_t number = (mbma_bits(inside) >> (52 - INVERSE_BITS)) - of.first_bucket + (inside > of.turn);
-        guesses[k] = &inverse->records[number_held(number, inverse->last)];
-        at.t[k] = (inside - guesses[k]->centre) * guesses[k]->rate;
-    }
-    for (size_t k = 0; k < n; k++) {
-        double x = guesses[k]->x[MBMA_INVERSE_DEGREE];
-        for (int j = MBMA_INVERSE_DEGREE - 1; j >= 0; j--)
-            x = mbma_fma(x, at.t[k], guesses[k]->x[j]);
-        at.beyond[k] = mbma_held(x, head.low, head.high);
-        guessed[k] = (at.beyond[k] * width - head.h_max) * guesses[k]->side;
-    }
-    for (size_t k = 0; k < n; k++) {
-        const place p = place_of(law, at.beyond[k], guessed[k]);
-        at.record[k] = p.record, at.t[k] = p.t, at.q[k] = p.q;
-    }
-    for (size_t k = 0; k < n; k++) {
-        const mbma_law_record *const record = at.record[k];
-        const double t = at.t[k], q = at.q[k], y0 = wanted[k];
-        const taylor y = taylor_of(which, record, t);
-        const double per_slope = 1.0 / y.slope, first = (y0 - y.value) * per_slope;
-        const double step = first - y.bend * per_slope * first * first;
-        const bool sure = fabs(step) < SURE && y0 >= of.low && y0 <= of.high;
-        unsure += !sure;
-        d[k] = sure ? mbma_max(guessed[k] - step / q, of.end) : (double)NAN;
-        if (area)
-            area[k] = polynomial(record->area, t + step).value;
-        if (stiffness) {
-            const taylor force = which == MBMA_AREA ? polynomial(record->force, t) : y;
-            stiffness[k] = 2.0 * (force.slope + 2.0 * force.bend * step) * q;
-        }
-    }
-    for (size_t k = 0; unsure > 0 && k < n; k++)
-        if (isnan(d[k])) {
-            const bool good = of.least <= wanted[k] && wanted[k] <= of.high;
-            bad += !good;
-            if (good)
-                d[k] = mbma_max(head.h_max - 2.0 * overclosure(law, which, wanted[k], of.end), of.end);
-            if (area)
-                area[k] = mbma_law_at(law, MBMA_AREA, d[k]);
-            if (stiffness)
-                stiffness[k] = mbma_law_at(law, MBMA_STIFFNESS, d[k]);
-        }
-    return bad;
-}
-
+/* Each by a polynomial and one step of third order; iteration finds those for which one step may not be enough. Loops
+ * of their own find records, which vectorises, and keep more entries in flight. */
 size_t mbma_law_invert(size_t n, const double *wanted, const mbma_law *law, const mbma_inverse *inverse,
                        mbma_quantity which, double *d, double *area, double *stiffness) {
+    const mbma_law_head head = *law->head;
+    const mbma_inverse_head of = *inverse->head;
+    const double width = 1.0 / head.scale;
     size_t bad = 0;
-    for (size_t first = 0; first < n; first += CHUNK) {
-        const size_t some = n - first < (size_t)CHUNK ? n - first : (size_t)CHUNK;
-        bad += invert(law, inverse, which, some, wanted + first, d + first, area ? area + first : NULL,
-                      stiffness ? stiffness + first : NULL);
+    for (size_t first = 0, some; first < n; first += some) {
+        const mbma_inverse_record *guesses[CHUNK];
+        const double *const y0 = wanted + first;
+        double guessed[CHUNK], *const found = d + first;
+        bool unsure = false;
+        places at;
+        some = n - first < (size_t)CHUNK ? n - first : (size_t)CHUNK;
+        for (size_t k = 0; k < some; k++) {
+            const double inside = mbma_held(y0[k], of.low, of.high);
+            const int64_t number = (mbma_bits(inside) >> (52 - INVERSE_BITS)) - of.first_bucket + (inside > of.turn);
+            guesses[k] = &inverse->records[number_held(number, inverse->last)];
+            at.t[k] = (inside - guesses[k]->centre) * guesses[k]->rate;
+        }
+        for (size_t k = 0; k < some; k++) {
+            double x = guesses[k]->x[MBMA_INVERSE_DEGREE];
+            for (int j = MBMA_INVERSE_DEGREE - 1; j >= 0; j--)
+                x = mbma_fma(x, at.t[k], guesses[k]->x[j]);
+            at.beyond[k] = mbma_held(x, head.low, head.high);
+            guessed[k] = (at.beyond[k] * width - head.h_max) * guesses[k]->side;
+        }
+        for (size_t k = 0; k < some; k++) {
+            const place p = place_of(law, at.beyond[k], guessed[k]);
+            at.record[k] = p.record, at.t[k] = p.t, at.q[k] = p.q;
+        }
+        for (size_t k = 0; k < some; k++) {
+            const mbma_law_record *const record = at.record[k];
+            const double t = at.t[k], q = at.q[k];
+            const taylor y = taylor_of(which, record, t);
+            const double per_slope = 1.0 / y.slope, newton = (y0[k] - y.value) * per_slope;
+            const double step = newton - y.bend * per_slope * newton * newton;
+            const bool sure = fabs(step) < SURE && y0[k] >= of.low && y0[k] <= of.high;
+            unsure |= !sure;
+            found[k] = sure ? mbma_max(guessed[k] - step / q, of.end) : (double)NAN;
+            if (area)
+                area[first + k] = polynomial(record->area, t + step).value;
+            if (stiffness) {
+                const taylor force = which == MBMA_AREA ? polynomial(record->force, t) : y;
+                stiffness[first + k] = 2.0 * (force.slope + 2.0 * force.bend * step) * q;
+            }
+        }
+        for (size_t k = 0; unsure && k < some; k++)
+            if (isnan(found[k])) {
+                const bool good = of.least <= y0[k] && y0[k] <= of.high;
+                bad += !good;
+                if (good)
+                    found[k] = mbma_max(head.h_max - 2.0 * overclosure(law, which, y0[k], of.end), of.end);
+                if (area)
+                    area[first + k] = mbma_law_at(law, MBMA_AREA, found[k]);
+                if (stiffness)
+                    stiffness[first + k] = mbma_law_at(law, MBMA_STIFFNESS, found[k]);
+            }
     }
     return bad;
 }

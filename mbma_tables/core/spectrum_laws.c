@@ -2,7 +2,7 @@
  *
  * With g(x) the rms gradient of the waves below x and y = F g/g(x), a wave's part in the mean separation is a function
  * of y alone: u(F) = sum of share I(y), I(y) = integral from y to infinity of dW/y', where W is a polynomial of
- * P = erf(sqrt(2) y). A law keeps ln u + 2 F^2, which is smooth, as polynomials of ln F; F is over g(x) of the last wave.
+ * P = erf(sqrt(2) y). A law keeps ln u + 2 F^2, which is smooth, as polynomials of ln F, F over g(x) of the last wave.
  */
 #include "elementary.h"
 #include "mbma.h"
@@ -279,15 +279,10 @@ mbma_status mbma_spectrum_law_of(const mbma_inner *inner, const mbma_waves *wave
                                  double h_max, double *work, mbma_spectrum_law *law) {
     const size_t n = waves->count;
     double mean = 0.0, inverse = 0.0, slope;
-    wave_sum w;
+    wave_sum w = {{{0.0}}, {0.0}, n, work, work + n, work + 2 * n, {NULL}};
     bool good = n > 0 && h_max > 0.0 && waves->gradient > 0.0 && waves->gradient < INFINITY && waves->alpha > 0.0;
     fit f;
     memset(law, 0, sizeof *law);
-    memset(&w, 0, sizeof w);
-    w.count = n;
-    w.log_g = work;
-    w.fall = work + n;
-    w.share = work + 2 * n;
     for (size_t k = 0; k <= TERMS; k++)
         w.sums[k] = work + (3 + k) * n;
     for (size_t k = 0; k < n && good; k++) {
@@ -385,7 +380,7 @@ size_t mbma_spectrum_law_contact(const mbma_spectrum_law *law, size_t n, const d
     return bad;
 }
 
-/* ln(F + F at h_max) is ln F of a surface without end, before the tail's factor ln F + tail: Newton's method for that. */
+/* ln(F + F at h_max) is ln F of a surface without end, before the tail's factor ln F + tail: Newton's method for it. */
 static double separation_at(const mbma_spectrum_law *law, double log_force) {
     const double over = log_force - law->end, heaviest = law->edge[law->panels];
     const double goal = over < 700.0 ? law->end + fmax(over, 0.0) + log1p(exp(-fabs(over))) : log_force;
@@ -441,9 +436,9 @@ static double part_of(const piece *s, int order, double rise) {
     return s->content * exp(order * s->start) * rise * growth((s->power + order) * rise);
 }
 
-/* Where the panel that begins at t = ln x ends, and by which rule it is integrated. Panels are graded towards the longest
- * wave, where the gradient of longer ones vanishes, and the shortest, which carry heavy loads; over one, neither what it
- * holds nor the gradient changes much. `before` is the gradient's square up to the piece. */
+/* Where the panel that begins at t = ln x ends, and by which rule it is integrated. Panels are graded towards the
+ * longest wave, where the gradient of longer ones vanishes, and the shortest, which carry heavy loads; over one,
+ * neither what it holds nor the gradient changes much. `before` is the gradient's square up to the piece. */
 static double panel_end(const piece *s, double t, double last, double before, int *rule) {
     const double first = fmin(last, 1.0), left = last - t, rise = t - s->start, power = fabs(s->power) + 2.0;
     const double low = t > 0.0 ? fmax(t * exp(2.0), first * exp(-40.0)) : first * exp(-40.0);
