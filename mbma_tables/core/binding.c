@@ -81,26 +81,23 @@ static bool has_size(const argument *a, const char **kinds, size_t letters[4]) {
     return any || a->n == (number ? number : 1) * product;
 }
 
-/* All arguments: "Dn w3n w?n" are numbers, three answers for each, and if wanted one more. */
-static bool take_all(PyObject *const *given, Py_ssize_t count, const char *kinds, argument *a, const char *name) {
+/* All arguments: "Dn w3n w?n" are numbers, three answers for each, and if wanted one more; `fit`: their sizes do. */
+static bool take_all(PyObject *const *given, Py_ssize_t count, const char *kinds, argument *a, const char *name,
+                     bool *fit) {
     size_t letters[4] = {SIZE_MAX, SIZE_MAX, SIZE_MAX, SIZE_MAX};
-    bool fit = true;
     Py_ssize_t k = 0;
-    for (; k < count && *kinds; k++, kinds += *kinds == ' ') {
+    for (*fit = true; k < count && *kinds; k++, kinds += *kinds == ' ') {
         if (!take(given[k], *kinds++, &a[k])) {
             release(a, k);
             return false;
         }
-        fit = has_size(&a[k], &kinds, letters) && fit;
+        *fit = has_size(&a[k], &kinds, letters) && *fit;
     }
-    const bool complete = k == count && *kinds == '\0';
-    if (!complete)
-        PyErr_Format(PyExc_TypeError, "core: %s does not take %d arguments", name, (int)count);
-    else if (!fit)
-        PyErr_Format(PyExc_ValueError, "core: sizes of the arrays of %s do not match", name);
-    if (!complete || !fit)
-        release(a, k);
-    return complete && fit;
+    if (k == count && *kinds == '\0')
+        return true;
+    PyErr_Format(PyExc_TypeError, "core: %s does not take %d arguments", name, (int)count);
+    release(a, k);
+    return false;
 }
 
 /* A function `name` of arguments by their kinds; `fits` says of sizes what kinds cannot, `call` is a whole number. */
@@ -108,10 +105,11 @@ static bool take_all(PyObject *const *given, Py_ssize_t count, const char *kinds
     static PyObject *py_##name(PyObject *module, PyObject *const *given, Py_ssize_t count) { \
         argument a[MOST_ARGUMENTS]; \
         long long found = 0; \
+        bool good; \
         (void)module; \
-        if (!take_all(given, count, kinds, a, #name)) \
+        if (!take_all(given, count, kinds, a, #name, &good)) \
             return NULL; \
-        const bool good = (fits); \
+        good = good && (fits); \
         if (good) { \
             Py_BEGIN_ALLOW_THREADS found = (long long)(call); \
             Py_END_ALLOW_THREADS \

@@ -136,19 +136,14 @@ MBMA_INLINE double quantity_at(mbma_quantity what, place p, double power) {
     return what == MBMA_STIFFNESS ? 2.0 * slope : slope;
 }
 
-/* The same below `low`. */
-static double in_first_record(const mbma_law *law, mbma_quantity what, double x) {
-    const mbma_law_head *const head = law->head;
-    if (x <= 0.0 && head->ends)
-        return 0.0;
-    const double power = of_area(what) ? head->power_area : head->power_force;
-    return quantity_at(what, place_in(head, law->records, x, head->plus), power);
-}
-
 MBMA_INLINE double at(const mbma_law *law, mbma_quantity what, double x, double d) {
-    if (!(law->head->lowest <= d && d <= law->head->highest))
+    const mbma_law_head *const head = law->head;
+    if (!(head->lowest <= d && d <= head->highest))
         return (double)NAN;
-    return x < law->head->low ? in_first_record(law, what, x) : quantity_at(what, place_of(law, x, d), 0.0);
+    if (!(x < head->low))
+        return quantity_at(what, place_of(law, x, d), 0.0);
+    const double power = of_area(what) ? head->power_area : head->power_force;
+    return x <= 0.0 && head->ends ? 0.0 : quantity_at(what, place_in(head, law->records, x, head->plus), power);
 }
 
 /* each with its own constants to the compiler */

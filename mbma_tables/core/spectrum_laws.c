@@ -348,34 +348,23 @@ size_t mbma_spectrum_law_persson(const mbma_spectrum_law *law, size_t n, const d
     return bad;
 }
 
-/* At 0 < u < h_max, where full contact and none are far: force, area and stiffness. */
-static void contact_at(const mbma_spectrum_law *law, double u, double found[3]) {
-    double slope;
-    const double value = log_force_of(law, u, &slope) + law->shift - tail_at(law, u), endless = exp(value);
-    const double F = -endless * expm1(law->end - value), over = F / law->t0;
-    found[0] = F;
-    found[1] = mbma_erf(F * sqrt(2.0 * (1.0 + over) / (law->s0 + over)));
-    found[2] = (3.0 * tail_at(law, u) / u - 1.0 / (slope * u)) * endless;
-}
-
 size_t mbma_spectrum_law_contact(const mbma_spectrum_law *law, size_t n, const double *u, double *force, double *area,
                                  double *stiffness) {
     const bool ready = is_prepared(law);
     size_t bad = 0;
     for (size_t k = 0; k < n; k++) {
-        double found[3] = {NAN, NAN, NAN};
-        if (ready && u[k] <= 0.0) {
-            found[0] = found[2] = INFINITY;
-            found[1] = 1.0;
-        } else if (ready && (u[k] >= law->h_max || u[k] > FARTHEST)) {
-            found[0] = found[1] = found[2] = 0.0;
-        } else if (ready && u[k] > 0.0) {
-            contact_at(law, u[k], found);
+        const double gap = u[k], known = ready && gap == gap ? 0.0 : NAN;
+        force[k] = stiffness[k] = (gap <= 0.0 ? INFINITY : 0.0) + known;
+        area[k] = (gap <= 0.0 ? 1.0 : 0.0) + known;
+        if (ready && gap > 0.0 && gap < law->h_max && gap <= FARTHEST) {
+            double slope;
+            const double value = log_force_of(law, gap, &slope) + law->shift - tail_at(law, gap), endless = exp(value);
+            const double F = -endless * expm1(law->end - value), over = F / law->t0;
+            force[k] = F;
+            area[k] = mbma_erf(F * sqrt(2.0 * (1.0 + over) / (law->s0 + over)));
+            stiffness[k] = (3.0 * tail_at(law, gap) / gap - 1.0 / (slope * gap)) * endless;
         }
-        bad += found[0] != found[0];
-        force[k] = found[0];
-        area[k] = found[1];
-        stiffness[k] = found[2];
+        bad += force[k] != force[k];
     }
     return bad;
 }
