@@ -333,14 +333,14 @@ size_t mbma_gap_start(size_t n, size_t m, size_t columns, const double *u, const
         place from = {NAN, NAN, NAN};
         if (count > 0) {
             const bool inside = before > 0 && before < count;
-            const int lighter = before > 0 ? before - 1 : 0, other = inside ? before : lighter;
-            from = known[inside && known[before].value - goal < goal - known[lighter].value ? before : lighter];
+            const place *const light = &known[before > 0 ? before - 1 : 0], *const heavy = light + 1;
+            from = inside && heavy->value - goal < goal - light->value ? *heavy : *light;
             double y = from.y + from.rate * (goal - from.value);
             if (inside) {
-                const double way = (goal - known[lighter].value) / (known[other].value - known[lighter].value);
-                const double straight = known[lighter].y + way * (known[other].y - known[lighter].y);
+                const double way = (goal - light->value) / (heavy->value - light->value);
+                const double straight = light->y + way * (heavy->y - light->y);
                 y = exact ? through(goal, known, count) : straight;
-                if (!(y <= known[lighter].y && y >= known[other].y))
+                if (!(y <= light->y && y >= heavy->y))
                     y = straight;
             }
             *gap = gap_of(from.y + mbma_held(y - from.y, -FARTHEST, FARTHEST), end[k]);

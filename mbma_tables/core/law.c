@@ -1,7 +1,4 @@
 /* Contact laws: quantities at a gap, the gap at a force or area, leakage, and the fit of a law's polynomials. */
-#include <math.h>
-#include <string.h>
-
 #include "elementary.h"
 #include "mbma.h"
 
