@@ -46,7 +46,7 @@ def command(folder: str) -> list[str]:
     zig = [sys.executable, "-m", "ziglang"]
     if "windows" in TARGET:
         # an import library holds nothing but names
-        names = re.findall(r"^PyAPI_(FUNC|DATA)\(.*?\) (\w+)", (CORE / "stable_abi.h").read_text("utf-8"), re.MULTILINE)
+        names = re.findall(r"PyAPI_(FUNC|DATA)\([\w *]+\) (_?Py\w+)", (CORE / "stable_abi.h").read_text("utf-8"))
         exported = "\n".join(f"{name} DATA" if kind == "DATA" else name for kind, name in names)
         definition, library = pathlib.Path(folder, "python3.def"), f"{folder}/python3.lib"
         definition.write_text(f"LIBRARY python3.dll\nEXPORTS\n{exported}\n", encoding="utf-8")

@@ -4,29 +4,16 @@
  * Sums over the first two axes are made in the same order for one entry and for all cells of the third axis, so that
  * answers do not depend on what is asked beside them.
  */
+#include <float.h>
+
 #include "elementary.h"
 #include "mbma.h"
 
-#include <float.h>
-
-enum { CHUNK = 128, COLUMNS = 8, MOST_STEPS = 100 };
+enum { CHUNK = 128, COLUMNS = 8, MOST_STEPS = 100, NONE = -1 };
 
 #define LEAST 1e-300                /* u that counts as none */
 #define LEAST_LOG_SEPARATION -690.0 /* ln u at which full contact counts as reached */
 #define CLOSE 1e-9                  /* of ln F: the next miss would be about the square of this one */
-
-typedef struct {
-    int32_t cell;
-    double z; /* in [0, 1] of it */
-} place;
-
-/* Where x lies among the cells of an axis; beyond them at their end, and NaN at the first. */
-MBMA_INLINE place place_of(const mbma_spline *s, int axis, double x) {
-    const double at = mbma_held((x - s->first[axis]) * s->rate[axis], 0.0, (double)s->cells[axis]);
-    const int32_t cell = (int32_t)mbma_min(at, (double)s->cells[axis] - 1.0);
-    const place found = {cell, at - cell};
-    return found;
-}
 
 /* The six cardinal quintic B-splines that reach a cell, at u in [0, 1] of it. */
 MBMA_INLINE void quintic(double u, double w[6]) {
@@ -39,7 +26,7 @@ MBMA_INLINE void quintic(double u, double w[6]) {
     w[5] = u2 * u2 * u * part;
 }
 
-/* Their derivatives. */
+/* Their derivatives by u. */
 static void quintic_slopes(double u, double w[6]) {
     const double v = 1.0 - u, u2 = u * u, v2 = v * v;
     w[0] = -v2 * v2 / 24.0;
@@ -70,26 +57,6 @@ MBMA_INLINE double power_slope(const double p[6], double z) {
     return mbma_fma(mbma_fma(high, z, 2.0 * p[2]), z, p[1]);
 }
 
-MBMA_INLINE double row_sum(const float *c, size_t row, const double w[6], int k) {
-    double sum = w[0] * (double)c[k];
-    for (size_t b = 1; b < 6; b++)
-        sum = mbma_fma(w[b], (double)c[b * row + (size_t)k], sum);
-    return sum;
-}
-
-/* Sums over the first two axes for the coefficients that reach a cell, and two more. */
-static void patch(const mbma_spline *s, size_t i, size_t j, size_t cell, const double a[6], const double b[6],
-                  double sums[COLUMNS]) {
-    const size_t row = s->cells[2] + 5, plane = (s->cells[1] + 5) * row;
-    const float *c = s->coefficients + i * plane + j * row + cell;
-    double total[COLUMNS] = {0.0};
-    for (int m = 0; m < 6; m++, c += plane)
-        for (int k = 0; k < COLUMNS; k++)
-            total[k] = mbma_fma(a[m], row_sum(c, row, b, k), total[k]);
-    for (int k = 0; k < COLUMNS; k++)
-        sums[k] = total[k];
-}
-
 static bool covers(const mbma_spline *s, double hurst, double log_zeta_1) {
     return s->low[0] <= hurst && hurst <= s->high[0] && s->low[1] <= log_zeta_1 && log_zeta_1 <= s->high[1];
 }
@@ -104,45 +71,67 @@ typedef struct {
 
 static size_t chunk_of(size_t n) { return n < (size_t)CHUNK ? n : (size_t)CHUNK; }
 
-static void place_chunk(const mbma_spline *s, chunk *c, int axis, const double *x) {
+/* Cells of an axis, and places z in [0, 1] of them; beyond the axis at its end, and NaN at the first. */
+static void find_places(const mbma_spline *s, chunk *c, int axis, const double *x) {
     for (size_t n = 0; n < c->count; n++) {
-        const place at = place_of(s, axis, x[n]);
-        c->cell[axis][n] = at.cell;
-        c->z[axis][n] = at.z;
+        const double at = mbma_held((x[n] - s->first[axis]) * s->rate[axis], 0.0, (double)s->cells[axis]);
+        c->cell[axis][n] = (int32_t)mbma_min(at, (double)s->cells[axis] - 1.0);
+        c->z[axis][n] = at - c->cell[axis][n];
     }
 }
 
-/* Where surfaces lie, by which sums are weighted. */
-static void weigh(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c) {
-    for (int axis = 0; axis < 2 && !surfaces->pieces; axis++) {
-        const double *given = axis == 0 ? surfaces->hurst : surfaces->log_zeta_1;
+/* Where surfaces lie, by which sums are weighted; along the axis `steep`, for the derivative by it. */
+static void weigh(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c, int steep) {
+    for (int axis = 0; axis < 2; axis++) {
+        const double *const given = axis == 0 ? surfaces->hurst : surfaces->log_zeta_1;
         double x[CHUNK];
         for (size_t n = 0; n < c->count; n++)
             x[n] = given[c->owner[n]];
-        place_chunk(s, c, axis, x);
+        find_places(s, c, axis, x);
         for (size_t n = 0; n < c->count; n++) {
             double w[6];
             quintic(c->z[axis][n], w);
             for (int m = 0; m < 6; m++)
                 c->w[axis][m][n] = w[m];
         }
+        for (size_t n = 0; n < c->count && axis == steep; n++) {
+            double w[6];
+            quintic_slopes(c->z[axis][n], w);
+            for (int m = 0; m < 6; m++)
+                c->w[axis][m][n] = w[m] * s->rate[axis];
+        }
     }
 }
 
-static void look_up(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c) {
-    place_chunk(s, c, 2, c->x);
-    for (size_t n = 0; n < c->count; n++) {
-        double a[6], b[6], sums[COLUMNS];
-        const double *six = sums;
-        if (surfaces->pieces) {
-            six = surfaces->pieces + (c->owner[n] * s->cells[2] + (size_t)c->cell[2][n]) * 6;
-        } else {
-            for (int m = 0; m < 6; m++) {
-                a[m] = c->w[0][m][n];
-                b[m] = c->w[1][m][n];
-            }
-            patch(s, (size_t)c->cell[0][n], (size_t)c->cell[1][n], (size_t)c->cell[2][n], a, b, sums);
+/* Sums over the first two axes for the coefficients that reach a cell of the third, and two more. */
+static void patch(const mbma_spline *s, const chunk *c, size_t n, size_t cell, double sums[COLUMNS]) {
+    const size_t row = s->cells[2] + 5, plane = (s->cells[1] + 5) * row;
+    const float *at = s->coefficients + (size_t)c->cell[0][n] * plane + (size_t)c->cell[1][n] * row + cell;
+    double total[COLUMNS] = {0.0}, b[6];
+    for (int m = 0; m < 6; m++)
+        b[m] = c->w[1][m][n];
+    for (int m = 0; m < 6; m++, at += plane)
+        for (size_t k = 0; k < COLUMNS; k++) {
+            double sum = b[0] * (double)at[k];
+            for (size_t j = 1; j < 6; j++)
+                sum = mbma_fma(b[j], (double)at[j * row + k], sum);
+            total[k] = mbma_fma(c->w[0][m][n], sum, total[k]);
         }
+    memcpy(sums, total, sizeof total);
+}
+
+/* Values and slopes of the spline, or of its derivative by the axis `steep`. */
+static void look_up(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c, int steep) {
+    const bool direct = surfaces->pieces == NULL;
+    if (direct)
+        weigh(s, surfaces, c, steep);
+    find_places(s, c, 2, c->x);
+    for (size_t n = 0; n < c->count; n++) {
+        const size_t cell = (size_t)c->cell[2][n];
+        double sums[COLUMNS];
+        if (direct)
+            patch(s, c, n, cell, sums);
+        const double *const six = direct ? sums : surfaces->pieces + (c->owner[n] * s->cells[2] + cell) * 6;
         for (int m = 0; m < 6; m++)
             c->p[m][n] = six[m];
     }
@@ -150,7 +139,7 @@ static void look_up(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *
         double given[6], p[6];
         for (int m = 0; m < 6; m++)
             p[m] = given[m] = c->p[m][n];
-        if (!surfaces->pieces)
+        if (direct)
             to_powers(given, p);
         c->value[n] = power_value(p, c->z[2][n]);
         c->slope[n] = power_slope(p, c->z[2][n]) * s->rate[2];
@@ -158,22 +147,16 @@ static void look_up(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *
 }
 
 size_t mbma_spline_pieces(const mbma_spline *s, const mbma_surfaces *surfaces, double *pieces) {
-    mbma_surfaces direct = *surfaces;
-    chunk c;
     size_t bad = 0;
-    direct.pieces = NULL;
+    chunk c;
     c.count = 1;
     for (size_t k = 0; k < surfaces->count; k++) {
         const bool good = covers(s, surfaces->hurst[k], surfaces->log_zeta_1[k]);
-        double a[6], b[6], sums[COLUMNS];
         c.owner[0] = k;
-        weigh(s, &direct, &c);
-        for (int m = 0; m < 6; m++) {
-            a[m] = c.w[0][m][0];
-            b[m] = c.w[1][m][0];
-        }
+        weigh(s, surfaces, &c, NONE);
         for (size_t cell = 0; cell < s->cells[2]; cell++, pieces += 6) {
-            patch(s, (size_t)c.cell[0][0], (size_t)c.cell[1][0], cell, a, b, sums);
+            double sums[COLUMNS];
+            patch(s, &c, 0, cell, sums);
             to_powers(sums, pieces);
             for (int m = 0; m < 6 && !good; m++)
                 pieces[m] = NAN;
@@ -195,16 +178,32 @@ MBMA_INLINE void continued(const mbma_spline *s, double log_u, double *value, do
 
 /* ln F of surfaces without end. */
 static void log_forces(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c) {
-    double low = last_of(s), high = s->first[2];
-    const double last = low, first = high;
-    look_up(s, surfaces, c);
-    for (size_t n = 0; n < c->count; n++) {
-        low = mbma_min(low, c->x[n]);
-        high = mbma_max(high, c->x[n]);
-    }
+    const double first = s->first[2], last = last_of(s);
+    double low = last, high = first;
+    look_up(s, surfaces, c, NONE);
+    for (size_t n = 0; n < c->count; n++)
+        low = mbma_min(low, c->x[n]), high = mbma_max(high, c->x[n]);
     if (low < first || high > last)
         for (size_t n = 0; n < c->count; n++)
             continued(s, c->x[n], &c->value[n], &c->slope[n]);
+}
+
+/* Likewise, and derivatives by ln u, H and ln zeta_1. */
+static void log_force_slopes(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c, double by[][3]) {
+    double rate[CHUNK][3];
+    for (int axis = 1; axis >= NONE; axis--) {
+        look_up(s, surfaces, c, axis);
+        for (size_t n = 0; n < c->count; n++)
+            by[n][1 + axis] = c->value[n], rate[n][1 + axis] = c->slope[n];
+    }
+    for (size_t n = 0; n < c->count; n++) {
+        const double beyond = mbma_expm1(mbma_max(c->x[n] - last_of(s), 0.0));
+        const double below = mbma_min(c->x[n] - s->first[2], 0.0), square = 1.0 + 2.0 * rate[n][0] * below;
+        for (int m = 1; m < 3; m++)
+            by[n][m] += rate[n][m] * (beyond + below / square);
+        continued(s, c->x[n], &c->value[n], &c->slope[n]);
+        by[n][0] = c->slope[n];
+    }
 }
 
 /* ---- the calibrated law ------------------------------------------------------------------------------------------ */
@@ -280,33 +279,23 @@ static void take(const mbma_surfaces *surfaces, const int64_t *owner, const doub
     }
 }
 
-/* No answers. */
-static size_t none(size_t n, double *out) {
-    for (size_t k = 0; k < n; k++)
-        out[k] = NAN;
-    return n;
-}
-
 size_t mbma_calibrated_ends(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, double *ends) {
     size_t bad = 0;
     for (size_t begin = 0; begin < surfaces->count; begin += CHUNK) {
         const double *H = surfaces->hurst + begin, *L = surfaces->log_zeta_1 + begin, *h_max = surfaces->h_max + begin;
-        double s0[CHUNK];
+        double s0[CHUNK], gradient;
         chunk c;
         c.count = chunk_of(surfaces->count - begin);
         for (size_t n = 0; n < c.count; n++) {
-            double gradient;
+            c.owner[n] = begin + n;
             s0[n] = light_factor(t, self_affine(H[n], L[n], &gradient));
             c.x[n] = mbma_log(mbma_max(h_max[n], LEAST));
         }
-        for (size_t n = 0; n < c.count; n++)
-            c.owner[n] = begin + n;
-        weigh(&t->log_force, surfaces, &c);
         log_forces(&t->log_force, surfaces, &c);
-        for (size_t n = 0; n < c.count; n++) {
+        for (size_t n = 0; n < c.count; n++, ends += 2) {
             const bool good = covers(&t->log_force, H[n], L[n]) && h_max[n] >= LEAST;
-            ends[2 * (begin + n)] = good ? s0[n] : NAN;
-            ends[2 * (begin + n) + 1] = good ? c.value[n] : NAN;
+            ends[0] = good ? s0[n] : NAN;
+            ends[1] = good ? c.value[n] : NAN;
             bad += !good;
         }
     }
@@ -314,24 +303,20 @@ size_t mbma_calibrated_ends(const mbma_calibrated_table *t, const mbma_surfaces 
 }
 
 size_t mbma_calibrated_contact(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, size_t n,
-                               const int64_t *owner, const double *u, double *force, double *area, double *stiffness) {
+                               const int64_t *owner, const double *u, double *restrict force, double *restrict area,
+                               double *restrict stiffness) {
     size_t bad = 0;
-    if (surfaces->count == 0)
-        return none(n, force), none(n, area), none(n, stiffness);
     for (size_t begin = 0; begin < n; begin += CHUNK) {
-        double gap[CHUNK], h_max[CHUNK], s0[CHUNK], end[CHUNK], held[CHUNK], F[CHUNK], A[CHUNK], K[CHUNK];
+        double gap[CHUNK], h_max[CHUNK], s0[CHUNK], end[CHUNK], held[CHUNK];
         chunk c;
         take(surfaces, owner + begin, u + begin, n - begin, &c, gap);
         for (size_t k = 0; k < c.count; k++) {
             h_max[k] = surfaces->h_max[c.owner[k]];
             s0[k] = surfaces->ends[2 * c.owner[k]];
             end[k] = surfaces->ends[2 * c.owner[k] + 1];
-        }
-        for (size_t k = 0; k < c.count; k++) {
             held[k] = mbma_held(gap[k], LEAST, h_max[k]);
             c.x[k] = mbma_log(held[k]);
         }
-        weigh(&t->log_force, surfaces, &c);
         log_forces(&t->log_force, surfaces, &c);
         for (size_t k = 0; k < c.count; k++) {
             const double value = c.value[k], endless = value < -700.0 ? 0.0 : mbma_exp(value);
@@ -340,17 +325,13 @@ size_t mbma_calibrated_contact(const mbma_calibrated_table *t, const mbma_surfac
             const double known = gap[k] == gap[k] && end[k] == end[k] ? 0.0 : NAN;
             const double touching = gap[k] >= h_max[k] ? 0.0 : 1.0;
             const bool full = gap[k] <= 0.0;
-            F[k] = (full ? INFINITY : touching * load) + known;
-            A[k] = (full ? 1.0 : touching * share) + known;
-            K[k] = (full ? INFINITY : touching * (-c.slope[k] * endless / held[k])) + known;
-        }
-        for (size_t k = 0; k < c.count; k++) {
-            force[begin + k] = F[k];
-            area[begin + k] = A[k];
-            stiffness[begin + k] = K[k];
-            bad += F[k] != F[k];
+            force[begin + k] = (full ? INFINITY : touching * load) + known;
+            area[begin + k] = (full ? 1.0 : touching * share) + known;
+            stiffness[begin + k] = (full ? INFINITY : touching * (-c.slope[k] * endless / held[k])) + known;
         }
     }
+    for (size_t k = 0; k < n; k++)
+        bad += force[k] != force[k];
     return bad;
 }
 
@@ -362,17 +343,15 @@ typedef struct {
 
 size_t mbma_calibrated_separation(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, size_t n,
                                   const int64_t *owner, const double *force, double *u) {
-    if (surfaces->count == 0)
-        return none(n, u);
+    size_t bad = 0;
     for (size_t begin = 0; begin < n; begin += CHUNK) {
-        double asked[CHUNK], *out = u + begin;
+        double asked[CHUNK], *const out = u + begin;
         search left[CHUNK];
         size_t searched = 0;
         chunk c;
         take(surfaces, owner + begin, force + begin, n - begin, &c, asked);
         for (size_t k = 0; k < c.count; k++)
             c.x[k] = LEAST_LOG_SEPARATION;
-        weigh(&t->log_force, surfaces, &c);
         log_forces(&t->log_force, surfaces, &c);
         for (size_t k = 0; k < c.count; k++) {
             const size_t own = c.owner[k];
@@ -385,21 +364,20 @@ size_t mbma_calibrated_separation(const mbma_calibrated_table *t, const mbma_sur
                 c.x[searched] = mbma_log(mbma_held(-0.3 * goal, 1e-3, 0.99 * surfaces->h_max[own]));
                 c.owner[searched] = own;
                 left[searched++] = one;
-            }
+            } else
+                bad++;
         }
         for (int step = 0; step < MOST_STEPS && searched > 0; step++) {
             c.count = searched;
             searched = 0;
-            weigh(&t->log_force, surfaces, &c);
             log_forces(&t->log_force, surfaces, &c);
             for (size_t k = 0; k < c.count; k++) {
                 search one = left[k];
                 const double x = c.x[k], miss = c.value[k] - one.goal, following = x - miss / c.slope[k];
                 const bool near = fabs(miss) <= CLOSE;
                 *(miss > 0.0 ? &one.low : &one.high) = x;
-                const bool inside = following > one.low && following < one.high;
                 const double middle = near ? mbma_held(following, one.low, one.high) : 0.5 * (one.low + one.high);
-                c.x[searched] = inside ? following : middle;
+                c.x[searched] = following > one.low && following < one.high ? following : middle;
                 if (near || one.high - one.low <= 2e-16) {
                     out[one.entry] = mbma_exp(c.x[searched]);
                 } else {
@@ -408,55 +386,32 @@ size_t mbma_calibrated_separation(const mbma_calibrated_table *t, const mbma_sur
                 }
             }
         }
+        bad += searched;
     }
-    size_t bad = 0;
-    for (size_t k = 0; k < n; k++)
-        bad += u[k] != u[k];
     return bad;
-}
-
-/* ln F of a surface without end, and its derivatives by ln u, H and ln zeta_1. */
-static double log_force_slopes(const mbma_spline *s, const mbma_surfaces *surfaces, size_t k, double log_u,
-                               double by[3]) {
-    double value[3], rate[3];
-    chunk c;
-    c.count = 1;
-    c.owner[0] = k;
-    c.x[0] = log_u;
-    for (int m = 0; m < 3; m++) {
-        double slopes[6];
-        weigh(s, surfaces, &c);
-        quintic_slopes(m > 0 ? c.z[m - 1][0] : 0.0, slopes);
-        for (int i = 0; i < 6 && m > 0; i++)
-            c.w[m - 1][i][0] = slopes[i] * s->rate[m - 1];
-        look_up(s, surfaces, &c);
-        value[m] = c.value[0];
-        rate[m] = c.slope[0];
-    }
-    const double below = mbma_min(log_u - s->first[2], 0.0), square = 1.0 + 2.0 * rate[0] * below;
-    for (int m = 1; m < 3; m++)
-        by[m] = value[m] + rate[m] * (mbma_expm1(mbma_max(log_u - last_of(s), 0.0)) + below / square);
-    continued(s, log_u, &value[0], &rate[0]);
-    by[0] = rate[0];
-    return value[0];
 }
 
 size_t mbma_calibrated_slopes(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, const double *u,
                               double *out) {
-    mbma_surfaces direct = *surfaces;
     size_t bad = 0;
-    direct.pieces = NULL;
     for (size_t k = 0; k < surfaces->count; k++, out += 10) {
         const double H = surfaces->hurst[k], L = surfaces->log_zeta_1[k], h_max = surfaces->h_max[k];
         const bool good = covers(&t->log_force, H, L) && h_max >= LEAST && h_max < INFINITY && u[k] > 0.0;
-        double gradient, alpha_by[2], gradient_by[2], by[3], end_by[3], F_by[4] = {0.0}, *A_by = out + 6;
+        const double held = mbma_held(u[k], LEAST, h_max);
+        double gradient, alpha_by[2], gradient_by[2], by[2][3], F_by[4] = {0.0}, *const A_by = out + 6;
+        chunk c;
         if (!good) {
-            bad += none(10, out) > 0;
+            for (int p = 0; p < 10; p++)
+                out[p] = NAN;
+            bad++;
             continue;
         }
-        const double s0 = light_factor(t, self_affine(H, L, &gradient)), held = mbma_held(u[k], LEAST, h_max);
-        const double end = log_force_slopes(&t->log_force, &direct, k, mbma_log(h_max), end_by);
-        const double value = log_force_slopes(&t->log_force, &direct, k, mbma_log(held), by), endless = exp(value);
+        c.count = 2;
+        c.owner[0] = c.owner[1] = k;
+        c.x[0] = mbma_log(held), c.x[1] = mbma_log(h_max);
+        log_force_slopes(&t->log_force, surfaces, &c, by);
+        const double value = c.value[0], end = c.value[1], endless = exp(value);
+        const double s0 = light_factor(t, self_affine(H, L, &gradient));
         const double F = -endless * mbma_expm1(end - value), over = F / t->area_t0;
         const double root = sqrt(2.0 * (1.0 + over) / (s0 + over));
         const double bell = 2.0 / sqrt(MBMA_PI) * exp(-F * root * F * root);
@@ -464,10 +419,10 @@ size_t mbma_calibrated_slopes(const mbma_calibrated_table *t, const mbma_surface
         const double by_F = bell * root * (1.0 + 0.5 * over * (s0 - 1.0) / ((1.0 + over) * (s0 + over)));
         self_affine_slopes(H, L, alpha_by, gradient_by);
         if (u[k] < h_max) {
-            F_by[0] = by[0] / held * endless;
-            F_by[1] = -end_by[0] / h_max * exp(end);
+            F_by[0] = by[0][0] / held * endless;
+            F_by[1] = -by[1][0] / h_max * exp(end);
             for (int p = 1; p < 3; p++)
-                F_by[1 + p] = endless * (by[p] - end_by[p]) + F * end_by[p];
+                F_by[1 + p] = endless * (by[0][p] - by[1][p]) + F * by[1][p];
         }
         out[0] = gradient * F;
         out[5] = mbma_erf(F * root);
@@ -482,36 +437,31 @@ size_t mbma_calibrated_slopes(const mbma_calibrated_table *t, const mbma_surface
 /* ---- flow through gaps ------------------------------------------------------------------------------------------- */
 
 size_t mbma_flow(const mbma_flow_table *t, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
-                 const double *u, const double *area, double *k) {
-    const mbma_spline *s = &t->log_factor;
+                 const double *u, const double *area, double *restrict k) {
+    const mbma_spline *const s = &t->log_factor;
     size_t bad = 0;
-    if (surfaces->count == 0)
-        return none(n, k);
     for (size_t begin = 0; begin < n; begin += CHUNK) {
-        double gap[CHUNK], found[CHUNK];
-        bool inside[CHUNK];
-        const double *A = area + begin;
+        const double *const A = area + begin;
+        double gap[CHUNK];
         chunk c;
         take(surfaces, owner + begin, u + begin, n - begin, &c, gap);
         for (size_t m = 0; m < c.count; m++) {
             const size_t own = c.owner[m];
-            inside[m] = surfaces->pieces || covers(s, surfaces->hurst[own], surfaces->log_zeta_1[own]);
+            if (!surfaces->pieces && !covers(s, surfaces->hurst[own], surfaces->log_zeta_1[own]))
+                gap[m] = NAN;
             /* contact fractions of Greenwood and Williamson exceed 1 */
             c.x[m] = mbma_log(mbma_max(A[m], LEAST) / mbma_max(t->threshold - A[m], LEAST));
         }
-        weigh(s, surfaces, &c);
-        look_up(s, surfaces, &c);
+        look_up(s, surfaces, &c, NONE);
         for (size_t m = 0; m < c.count; m++) {
             const double beyond = mbma_fma(c.slope[m], mbma_max(c.x[m] - last_of(s), 0.0), c.value[m]);
             const double log_factor = beyond * mbma_exp(t->obstruction * mbma_min(c.x[m] - s->first[2], 0.0));
             const double wide = gap[m] * gap[m] * gap[m] * (1.0 - 1.5 / mbma_fma(gap[m], gap[m], 4.0));
-            const double known = gap[m] == gap[m] && A[m] == A[m] && inside[m] ? 0.0 : NAN;
-            found[m] = (A[m] < t->threshold ? wide * mbma_exp(mbma_min(log_factor, 0.0)) : 0.0) + known;
-        }
-        for (size_t m = 0; m < c.count; m++) {
-            k[begin + m] = found[m];
-            bad += found[m] != found[m];
+            const double known = gap[m] == gap[m] && A[m] == A[m] ? 0.0 : NAN;
+            k[begin + m] = (A[m] < t->threshold ? wide * mbma_exp(mbma_min(log_factor, 0.0)) : 0.0) + known;
         }
     }
+    for (size_t m = 0; m < n; m++)
+        bad += k[m] != k[m];
     return bad;
 }

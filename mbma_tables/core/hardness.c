@@ -48,8 +48,7 @@ static void mills(double x, double *ratio, double *rest) {
 static plane deep_plane(double u) {
     /* a fit in ln z, z the level of that density, leaves 1e-3 */
     const double log_u = log(u), z = sqrt(-2.0 * (log_u + LOG_SQRT_2PI)), t = log(z);
-    double x = z + mbma_fma(mbma_fma(mbma_fma(mbma_fma(0.01149149, t, -0.1315785), t, 0.508909), t, -0.5419618), t,
-                            -0.6321294);
+    double x = z + mbma_horner(0.01149149, t, -0.1315785, 0.508909, -0.5419618, -0.6321294);
     double ratio = 0.0, rest = 1.0, move = 1.0;
     for (int step = 0; step < 4 && fabs(move) > 1e-7; step++) {
         mills(x, &ratio, &rest);
@@ -70,29 +69,13 @@ static plane deep_plane(double u) {
 
 /* The plane whose mean gap is u: a fit to 3e-4, then one step of fourth order, which leaves rounding. */
 static plane plane_at(double u) {
-    if (u != u) {
-        const plane none = {NAN, NAN, NAN, NAN};
-        return none;
-    }
-    if (u <= LEAST_GAP) {
-        const plane closed = {-INFINITY, 0.0, 0.0, 1.0};
-        return closed;
-    }
+    const plane closed = {-INFINITY, 0.0, 0.0, 1.0};
     if (u < DEEP_GAP)
-        return deep_plane(u);
+        return u > LEAST_GAP ? deep_plane(u) : closed;
     double d = u;
     if (u < NEAR_GAP) {
-        const double v = sqrt(sqrt(u));
-        d = 9.929421;
-        d = mbma_fma(d, v, -75.30938);
-        d = mbma_fma(d, v, 245.7741);
-        d = mbma_fma(d, v, -452.8998);
-        d = mbma_fma(d, v, 521.9537);
-        d = mbma_fma(d, v, -393.3206);
-        d = mbma_fma(d, v, 198.2552);
-        d = mbma_fma(d, v, -67.49275);
-        d = mbma_fma(d, v, 18.72423);
-        d = mbma_fma(d, v, -4.71472);
+        const double v = sqrt(sqrt(u)), high = mbma_horner(9.929421, v, -75.30938, 245.7741, -452.8998, 521.9537);
+        d = mbma_fma(mbma_horner(high, v, -393.3206, 198.2552, -67.49275, 18.72423), v, -4.71472);
     }
     const double density = exp(-0.5 * d * d) * SQRT_1_2PI, tail = 0.5 * erfc(fabs(d) * SQRT1_2);
     if (u >= STRAIGHT_GAP) {
@@ -126,24 +109,20 @@ size_t mbma_gaussian_level(size_t n, const double *u, double *level) {
 size_t mbma_bearing_share(size_t n, const double *u, const double *h_max, double *share, double *slope) {
     double last = NAN;
     plane end = plane_at(NAN);
-    size_t missed = 0;
     for (size_t k = 0; k < n; k++) {
         if (h_max[k] != last) {
             last = h_max[k];
             end = plane_at(last);
         }
-        share[k] = slope[k] = 0.0;
-        if (u[k] != u[k] || !(last > LEAST_GAP)) {
-            share[k] = slope[k] = NAN;
-            missed++;
-        } else if (u[k] < last) {
+        share[k] = slope[k] = u[k] == u[k] && last > LEAST_GAP ? 0.0 : NAN;
+        if (share[k] == 0.0 && u[k] < last) {
             const plane at = plane_at(u[k]);
             const double between = end.d > 0.0 ? at.above - end.above : end.below - at.below;
             share[k] = mbma_max(between, 0.0) / end.below;
             slope[k] = at.below > 0.0 ? -at.density / at.below / end.below : -INFINITY;
         }
     }
-    return missed;
+    return count_missing(n, share);
 }
 
 enum { TERMS = 9 };     /* of the series where images converge slower */
@@ -191,14 +170,12 @@ static double ended(double x, double tau, double reach, bool at_one) {
 }
 
 size_t mbma_diffused(size_t n, const double *x, const double *tau, int at_one, double *out) {
-    size_t missed = 0;
     for (size_t k = 0; k < n; k++) {
         const bool good = x[k] >= 0.0 && x[k] <= 1.0 && tau[k] >= 0.0;
         const double reach = 0.5 * x[k] / sqrt(mbma_max(tau[k], SHARPEST));
         out[k] = good ? ended(x[k], tau[k], reach, at_one != 0) : NAN;
-        missed += !good;
     }
-    return missed;
+    return count_missing(n, out);
 }
 
 size_t mbma_capped_area(size_t n, const double *load, const double *spread, const double *eta, double power,
@@ -328,7 +305,6 @@ static double through(double value, const place *known, int n) {
 
 size_t mbma_gap_start(size_t n, size_t m, size_t columns, const double *u, const double *value, const double *steep,
                       int exact, const double *wanted, const double *end, double *state) {
-    size_t missed = 0;
     for (size_t k = 0; k < n; k++) {
         double *const gap = state + k, *const low = gap + n, *const high = low + n, *const kept = high + n;
         const size_t column = columns == n ? k : 0;
@@ -357,14 +333,14 @@ size_t mbma_gap_start(size_t n, size_t m, size_t columns, const double *u, const
         place from = {NAN, NAN, NAN};
         if (count > 0) {
             const bool inside = before > 0 && before < count;
-            const int lighter = before > 0 ? before - 1 : 0, other = inside ? before : lighter;
-            from = known[inside && known[before].value - goal < goal - known[lighter].value ? before : lighter];
+            const place *const light = &known[before > 0 ? before - 1 : 0], *const heavy = light + 1;
+            from = inside && heavy->value - goal < goal - light->value ? *heavy : *light;
             double y = from.y + from.rate * (goal - from.value);
             if (inside) {
-                const double way = (goal - known[lighter].value) / (known[other].value - known[lighter].value);
-                const double straight = known[lighter].y + way * (known[other].y - known[lighter].y);
+                const double way = (goal - light->value) / (heavy->value - light->value);
+                const double straight = light->y + way * (heavy->y - light->y);
                 y = exact ? through(goal, known, count) : straight;
-                if (!(y <= known[lighter].y && y >= known[other].y))
+                if (!(y <= light->y && y >= heavy->y))
                     y = straight;
             }
             *gap = gap_of(from.y + mbma_held(y - from.y, -FARTHEST, FARTHEST), end[k]);
@@ -374,9 +350,8 @@ size_t mbma_gap_start(size_t n, size_t m, size_t columns, const double *u, const
         kept[0] = from.value;
         kept[n] = from.y;
         kept[2 * n] = from.rate;
-        missed += *gap != *gap;
     }
-    return missed;
+    return count_missing(n, state);
 }
 
 size_t mbma_gap_step(size_t n, const double *value, const double *steep, int exact, const int64_t *places, size_t total,

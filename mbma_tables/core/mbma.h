@@ -227,8 +227,8 @@ typedef enum {
     MBMA_CURVATURE = 5   /* d2F/du2 = d2F/dc2 */
 } mbma_quantity;
 
-/* The parts of a block of so many words; 0 where they do not fit together. The block must outlive the law. */
-int mbma_law_open(const void *block, size_t words, mbma_law *law);
+/* The parts of a block of so many words, which must outlive the law; `head` is NULL where they do not fit together. */
+mbma_law mbma_law_open(const void *block, size_t words);
 
 /* One quantity at a separation, or at an overclosure, which keeps its digits next to first contact; NaN outside. */
 double mbma_law_at(const mbma_law *law, mbma_quantity what, double d);
@@ -265,7 +265,7 @@ typedef struct {
     int64_t last;
 } mbma_inverse;
 
-int mbma_inverse_open(const void *block, size_t words, mbma_inverse *inverse);
+mbma_inverse mbma_inverse_open(const void *block, size_t words); /* likewise */
 
 /* x, and s there, at values of force or area, down to the separation `end`: nodes of an inverse that is to be made. */
 size_t mbma_inverse_nodes(size_t n, const double *wanted, const mbma_law *law, mbma_quantity which, double end,
@@ -311,11 +311,11 @@ typedef struct {
 
 /* Surfaces that entries of calls share. */
 typedef struct {
-    size_t count;
+    size_t count; /* at least 1 where entries ask for them */
     const double *hurst, *log_zeta_1;
     const double *h_max;  /* of the calibrated law alone, */
     const double *ends;   /* and two numbers each by mbma_calibrated_ends */
-    const double *pieces; /* by mbma_spline_pieces; NULL where that does not pay */
+    const double *pieces; /* by mbma_spline_pieces; NULL where that does not pay, and where they and slopes are made */
 } mbma_surfaces;
 
 /* Nayak's alpha of self-affine surfaces, and their rms gradient over q0 h_rms. */

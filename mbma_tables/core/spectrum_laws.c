@@ -2,7 +2,7 @@
  *
  * With g(x) the rms gradient of the waves below x and y = F g/g(x), a wave's part in the mean separation is a function
  * of y alone: u(F) = sum of share I(y), I(y) = integral from y to infinity of dW/y', where W is a polynomial of
- * P = erf(sqrt(2) y). A law keeps ln u + 2 F^2, which is smooth, as polynomials of ln F; F is over g(x) of the last wave.
+ * P = erf(sqrt(2) y). A law keeps ln u + 2 F^2, which is smooth, as polynomials of ln F, F over g(x) of the last wave.
  */
 #include "elementary.h"
 #include "mbma.h"
@@ -151,12 +151,12 @@ typedef struct {
     double *log_g, *fall, *share, *sums[TERMS + 1];
 } wave_sum;
 
-/* The first wave whose ln y is below a limit. */
-static size_t first_below(const wave_sum *w, double log_force, double limit) {
-    size_t low = 0, high = w->count;
+/* How many numbers, of so many that rise, do not exceed a limit; of such that fall, with `sign` -1, are at least it. */
+static size_t count_up_to(size_t n, const double *x, double sign, double limit) {
+    size_t low = 0, high = n;
     while (low < high) {
         const size_t middle = low + (high - low) / 2;
-        if (log_force - w->log_g[middle] >= limit)
+        if (sign * x[middle] <= sign * limit)
             low = middle + 1;
         else
             high = middle;
@@ -167,7 +167,7 @@ static size_t first_below(const wave_sum *w, double log_force, double limit) {
 /* ln u + 2 F^2. */
 static double sum_at(const wave_sum *w, double log_force) {
     const double square = 2.0 * exp(2.0 * log_force), far = 0.5 * log(NOTHING / square + 1.0);
-    const size_t light = first_below(w, log_force, LOWEST);
+    const size_t light = count_up_to(w->count, w->log_g, 1.0, log_force - LOWEST);
     double lanes[LANES] = {0.0}, part[CHUNK], place[CHUNK], total = 0.0, power = exp(square);
     int32_t cell[CHUNK];
     if (light < w->count) {
@@ -178,7 +178,8 @@ static double sum_at(const wave_sum *w, double log_force) {
             total += power * w->light[k] * w->sums[k][light];
         }
     }
-    for (size_t first = first_below(w, log_force, fmin(HIGHEST, log_force + far)); first < light; first += CHUNK) {
+    const size_t heavy = count_up_to(light, w->log_g, 1.0, log_force - fmin(HIGHEST, log_force + far));
+    for (size_t first = heavy; first < light; first += CHUNK) {
         const size_t count = light - first < (size_t)CHUNK ? light - first : (size_t)CHUNK;
         const double *log_g = w->log_g + first, *fall = w->fall + first, *share = w->share + first;
         for (size_t k = 0; k < count; k++) {
@@ -233,23 +234,10 @@ static double log_u_in(const mbma_spectrum_law *law, size_t panel, double log_fo
     return value - square;
 }
 
-/* The panel of a number among falling or rising ones. */
-static size_t panel_of(const double *edges, size_t panels, double sign, double x) {
-    size_t low = 0, high = panels;
-    while (high - low > 1) {
-        const size_t middle = low + (high - low) / 2;
-        if (sign * edges[middle] <= sign * x)
-            low = middle;
-        else
-            high = middle;
-    }
-    return low;
-}
-
 /* ln F at a mean separation before the tail's factor, by Newton's method in a bracket, and d ln u/d ln F. */
 static double log_force_of(const mbma_spectrum_law *law, double u, double *slope) {
     const double log_u = log(u), *edge = law->edge, *ends = law->log_u;
-    const size_t panel = panel_of(ends, law->panels, -1.0, log_u);
+    const size_t panel = count_up_to(law->panels - 1, ends + 1, -1.0, log_u);
     if (u >= law->lightest[0]) {
         *slope = law->lightest[1] / u;
         return edge[0] + (u - law->lightest[0]) / law->lightest[1];
@@ -278,7 +266,8 @@ static double separation_of(const mbma_spectrum_law *law, double log_force, doub
     *slope = 0.0;
     if (log_force >= law->edge[law->panels])
         return 0.0;
-    const double u = exp(log_u_in(law, panel_of(law->edge, law->panels, 1.0, log_force), log_force, slope));
+    const size_t panel = count_up_to(law->panels - 1, law->edge + 1, 1.0, log_force);
+    const double u = exp(log_u_in(law, panel, log_force, slope));
     *slope *= u;
     return u;
 }
@@ -290,15 +279,10 @@ mbma_status mbma_spectrum_law_of(const mbma_inner *inner, const mbma_waves *wave
                                  double h_max, double *work, mbma_spectrum_law *law) {
     const size_t n = waves->count;
     double mean = 0.0, inverse = 0.0, slope;
-    wave_sum w;
+    wave_sum w = {{{0.0}}, {0.0}, n, work, work + n, work + 2 * n, {NULL}};
     bool good = n > 0 && h_max > 0.0 && waves->gradient > 0.0 && waves->gradient < INFINITY && waves->alpha > 0.0;
     fit f;
     memset(law, 0, sizeof *law);
-    memset(&w, 0, sizeof w);
-    w.count = n;
-    w.log_g = work;
-    w.fall = work + n;
-    w.share = work + 2 * n;
     for (size_t k = 0; k <= TERMS; k++)
         w.sums[k] = work + (3 + k) * n;
     for (size_t k = 0; k < n && good; k++) {
@@ -364,39 +348,28 @@ size_t mbma_spectrum_law_persson(const mbma_spectrum_law *law, size_t n, const d
     return bad;
 }
 
-/* At 0 < u < h_max, where full contact and none are far: force, area and stiffness. */
-static void contact_at(const mbma_spectrum_law *law, double u, double found[3]) {
-    double slope;
-    const double value = log_force_of(law, u, &slope) + law->shift - tail_at(law, u), endless = exp(value);
-    const double F = -endless * expm1(law->end - value), over = F / law->t0;
-    found[0] = F;
-    found[1] = mbma_erf(F * sqrt(2.0 * (1.0 + over) / (law->s0 + over)));
-    found[2] = (3.0 * tail_at(law, u) / u - 1.0 / (slope * u)) * endless;
-}
-
 size_t mbma_spectrum_law_contact(const mbma_spectrum_law *law, size_t n, const double *u, double *force, double *area,
                                  double *stiffness) {
     const bool ready = is_prepared(law);
     size_t bad = 0;
     for (size_t k = 0; k < n; k++) {
-        double found[3] = {NAN, NAN, NAN};
-        if (ready && u[k] <= 0.0) {
-            found[0] = found[2] = INFINITY;
-            found[1] = 1.0;
-        } else if (ready && (u[k] >= law->h_max || u[k] > FARTHEST)) {
-            found[0] = found[1] = found[2] = 0.0;
-        } else if (ready && u[k] > 0.0) {
-            contact_at(law, u[k], found);
+        const double gap = u[k], known = ready && gap == gap ? 0.0 : NAN;
+        force[k] = stiffness[k] = (gap <= 0.0 ? INFINITY : 0.0) + known;
+        area[k] = (gap <= 0.0 ? 1.0 : 0.0) + known;
+        if (ready && gap > 0.0 && gap < law->h_max && gap <= FARTHEST) {
+            double slope;
+            const double value = log_force_of(law, gap, &slope) + law->shift - tail_at(law, gap), endless = exp(value);
+            const double F = -endless * expm1(law->end - value), over = F / law->t0;
+            force[k] = F;
+            area[k] = mbma_erf(F * sqrt(2.0 * (1.0 + over) / (law->s0 + over)));
+            stiffness[k] = (3.0 * tail_at(law, gap) / gap - 1.0 / (slope * gap)) * endless;
         }
-        bad += found[0] != found[0];
-        force[k] = found[0];
-        area[k] = found[1];
-        stiffness[k] = found[2];
+        bad += force[k] != force[k];
     }
     return bad;
 }
 
-/* ln(F + F at h_max) is ln F of a surface without end, before the tail's factor ln F + tail: Newton's method for that. */
+/* ln(F + F at h_max) is ln F of a surface without end, before the tail's factor ln F + tail: Newton's method for it. */
 static double separation_at(const mbma_spectrum_law *law, double log_force) {
     const double over = log_force - law->end, heaviest = law->edge[law->panels];
     const double goal = over < 700.0 ? law->end + fmax(over, 0.0) + log1p(exp(-fabs(over))) : log_force;
@@ -452,9 +425,9 @@ static double part_of(const piece *s, int order, double rise) {
     return s->content * exp(order * s->start) * rise * growth((s->power + order) * rise);
 }
 
-/* Where the panel that begins at t = ln x ends, and by which rule it is integrated. Panels are graded towards the longest
- * wave, where the gradient of longer ones vanishes, and the shortest, which carry heavy loads; over one, neither what it
- * holds nor the gradient changes much. `before` is the gradient's square up to the piece. */
+/* Where the panel that begins at t = ln x ends, and by which rule it is integrated. Panels are graded towards the
+ * longest wave, where the gradient of longer ones vanishes, and the shortest, which carry heavy loads; over one,
+ * neither what it holds nor the gradient changes much. `before` is the gradient's square up to the piece. */
 static double panel_end(const piece *s, double t, double last, double before, int *rule) {
     const double first = fmin(last, 1.0), left = last - t, rise = t - s->start, power = fabs(s->power) + 2.0;
     const double low = t > 0.0 ? fmax(t * exp(2.0), first * exp(-40.0)) : first * exp(-40.0);

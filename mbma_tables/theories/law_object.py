@@ -40,7 +40,7 @@ if TYPE_CHECKING:
         stiffness: Callable[..., Numbers]
         area_slope: Callable[..., Numbers]
         energy: Callable[..., Numbers]
-        _addresses: Callable[[int], tuple[int, int]]
+        _addresses: Callable[[], tuple[tuple[int, ...], int]]
 
 else:
     Law = core.Law
@@ -407,7 +407,8 @@ class ContactLaw(Law, Displayed):
 
         if quantity not in QUANTITIES:
             raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
-        address, data = self._addresses(QUANTITIES.index(quantity))
+        addresses, data = self._addresses()
+        address = addresses[QUANTITIES.index(quantity)]
         given = ctypes.c_void_p(data)
         given.law = self  # type: ignore[attr-defined]
         return LowLevelCallable(ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_void_p)(address), given)

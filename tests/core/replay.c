@@ -28,9 +28,8 @@ PyObject *PyExc_TypeError = &type_error.head, *PyExc_ValueError = &value_error.h
 static PyThreadState *const STATE = NULL;
 
 PyObject *PyErr_Occurred(void) { return raised ? &type_error.head : NULL; }
-void PyErr_SetString(PyObject *type, const char *text) { raised = type != NULL && text != NULL; }
 PyObject *PyErr_Format(PyObject *type, const char *text, ...) {
-    PyErr_SetString(type, text);
+    raised = type != NULL && text != NULL;
     return NULL;
 }
 void PyErr_Clear(void) { raised = false; }
@@ -71,7 +70,6 @@ struct _typeobject {
 };
 PyTypeObject PyFloat_Type;
 PyObject *PyFloat_FromDouble(double value) { return value == value ? NULL : Py_None; }
-long PyLong_AsLong(PyObject *given) { return given == NULL; }
 int PyModule_AddIntConstant(PyObject *module, const char *name, long value) { return module && name && value; }
 int PyModule_AddObjectRef(PyObject *module, const char *name, PyObject *value) { return module && name && value; }
 int PyModule_AddStringConstant(PyObject *module, const char *name, const char *value) { return module && name && value; }

@@ -220,10 +220,10 @@ class TestAnyInput:
                 True
             ]
             assert np.isfinite(separations(rows, wrong, np.full(5, 0.1), used, pieces)).tolist() == [False] * 4 + [True]
-        nobody = np.empty((3, 0))
-        assert np.isnan(fill(nobody, wrong, np.full(5, 0.5), used)).all()
-        assert np.isnan(separations(nobody, wrong, np.full(5, 0.5), used)).all()
-        assert np.isnan(flow(nobody, wrong, np.full(5, 0.5), np.full(5, 0.5), used)).all()
+        nobody, half = np.empty((3, 0)), np.full(5, 0.5)
+        for ask, given in ((fill, (half,)), (separations, (half,)), (flow, (half, half))):
+            with pytest.raises(ValueError, match="sizes"):
+                ask(nobody, wrong, *given, used)
 
     def test_sizes_that_do_not_match_are_refused(self, used):
         rows, u = batch(5)

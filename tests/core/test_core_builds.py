@@ -118,8 +118,8 @@ def test_declarations_of_python_are_those_of_its_headers(tmp_path):
     if not pathlib.Path(include, "Python.h").exists():
         pytest.skip("Python's headers are not installed")
     text = (CORE / "stable_abi.h").read_text(encoding="utf-8")
-    assert set(re.findall(r"^} (\w+);", text, re.MULTILINE)) == set(FIELDS)
-    names = re.findall(r"^#define (METH_\w+|Py_mod_\w+|Py_tp_\w+|Py_TPFLAGS_\w+|PyBUF_\w+) ", text, re.MULTILINE)
+    assert set(re.findall(r"} (Py\w+);", text)) == set(FIELDS)
+    names = re.findall(r"\b(METH_\w+|Py_mod_\w+|Py_tp_\w+|Py_TPFLAGS_\w+|PyBUF_\w+) = ", text)
     assert len(names) > 10
     names += [f"sizeof({kind})" for kind in FIELDS]
     names += [f"offsetof({kind}, {field})" for kind, fields in FIELDS.items() for field in fields.split()]
