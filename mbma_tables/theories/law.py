@@ -37,8 +37,7 @@ from mbma_tables.theories.law_pieces import (
 )
 from mbma_tables.theories.mbma import Mbma, refuse_options_of_mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
-from mbma_tables.totals.island_sum import totals_of
-from mbma_tables.totals.pairs import Pairs
+from mbma_tables.totals.island_sum import Pairs, totals_of
 from mbma_tables.totals.profile import profile, source_of
 from mbma_tables.units import modulus_and_units
 

@@ -22,7 +22,7 @@ from mbma_tables.errors import InputError
 from mbma_tables.plots import Curve, draw_compression, force_label, theory_label
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import law_block as at
-from mbma_tables.theories.law_block import AREA, FORCE, QUANTITIES
+from mbma_tables.theories.law_block import AREA, FORCE, QUANTITIES, inverse_block
 from mbma_tables.theories.result import MEANINGS
 from mbma_tables.units import UNKNOWN, Units, unit_of
 
@@ -283,8 +283,6 @@ class ContactLaw(Law, Displayed):
 
     def _inverse_block(self, name: str) -> FloatArray:
         """Polynomials of x over force or area, made when first asked for."""
-        from mbma_tables.theories.law_inverse import inverse_block
-
         made: dict[str, FloatArray] = self.__dict__.setdefault("_inverses", {})
         if name not in made:
             turn = self.turning_point if name == "force" else self.area_turning_point

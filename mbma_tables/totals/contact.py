@@ -35,8 +35,7 @@ from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.totals.island_sum import BY_COMPRESSION, QUADRATURE_SHARE, sums_by_table, totals_of
-from mbma_tables.totals.pairs import Pairs
+from mbma_tables.totals.island_sum import BY_COMPRESSION, QUADRATURE_SHARE, Pairs, sums_by_table, totals_of
 from mbma_tables.totals.profile import Profile, profile
 
 # surfaces whose islands are kept as a profile, in numpy; of more, those with so many gaps each that it costs less

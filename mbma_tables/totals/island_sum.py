@@ -2,29 +2,48 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.arguments import FloatArray, spread
 from mbma_tables.core import OK, REASONS, UNRESOLVED, core, in_blocks
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.islands.geometry import floor_offset, geometry
 from mbma_tables.models import AREA, BOTH, FORCE, AnyModel, answer_islands, exact_model
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.readings import Reading
+from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.gauss_kronrod import integrate
 from mbma_tables.totals.island import scale_area, scale_force
-from mbma_tables.totals.pairs import STRETCH, Pairs, island_density, island_height, jacobian_below
 
 QUADRATURE_SHARE = 0.9  # of the tolerance asked for; a table's own error comes on top
 SUM_SHARE = 0.5  # where islands are solved to a share of it
 BLOCK = 256  # pairs between two looks for Ctrl-C
-COLUMNS, BY_COMPRESSION = (
-    5,
-    3,
-)  # of force and area with their derivatives: value, by hurst, ln(zeta_1), compression, peak
+STRETCH = 8.0  # scale of the approach's map, in boundary layers zeta_1^(-H), as in the core
+# of force and area with their derivatives: value, by hurst, ln(zeta_1), compression, peak
+COLUMNS, BY_COMPRESSION = 5, 3
+
+
+class Pairs(NamedTuple):
+    """Flat (surface, gap) pairs in units of h_rms and 1/q0."""
+
+    hurst: FloatArray
+    zeta_1: FloatArray
+    compression: FloatArray  # (h_max - d)/h_rms
+    peak: FloatArray  # h_max/h_rms
+
+    @classmethod
+    def of(cls, surface: Surface, depth: FloatArray) -> Pairs:
+        """Of a surface, or a batch, at h_max - d = `depth` [length], of the shape that both broadcast to."""
+        scaled = depth / surface.h_rms, surface.h_max / surface.h_rms
+        return cls(*(spread(f, depth.shape).flatten() for f in (surface.hurst, surface.zeta_1, *scaled)))
+
+    def some(self, chosen: Any) -> Pairs:
+        """The pairs at these places."""
+        return Pairs(*(field[chosen] for field in self))
 
 
 class Totals(NamedTuple):
@@ -37,6 +56,17 @@ class Totals(NamedTuple):
     area: FloatArray
     error: FloatArray
     islands: int
+
+
+def island_density(height: Any, D_d: Any, sigma_d: Any) -> Any:
+    """Islands per nominal area and delta/s (42, 43), without K1."""
+    return D_d * np.exp(-0.5 * height * height) / (math.sqrt(2.0 * math.pi) * sigma_d)
+
+
+def jacobian_below(rms_over_s: Any, reading: Reading) -> Any:
+    """K1 (47) below the kink, or what (46) gives."""
+    printed = reading.jacobian == "printed"
+    return 1.0 - 4.0 / 3.0 * reading.beta / (1.0 if printed else rms_over_s) if printed or reading.offset else 1.0
 
 
 def kinks(hurst: Any, zeta_1: Any, reading: Reading) -> tuple[Any, Any]:
@@ -73,10 +103,10 @@ def sum_islands(
             raise type(fault)(f"an island failed: {fault}", failed) from fault
         with np.errstate(invalid="ignore"):
             np.maximum.at(worst_island, owner, phi.error.max(axis=1))
-        height = island_height(approach, g["h_d"], g["sigma_d"], own, rms_over_s)
+        # z'/sigma_d (41); z_max is counted down from h_max, so nothing cancels at first contact
+        height = ((own.peak - (own.compression - approach)) * rms_over_s - g["h_d"]) / g["sigma_d"]
         weight = island_density(height, g["D_d"], g["sigma_d"]) * rms_over_s * stretch
-        K1 = jacobian_below(rms_over_s, reading.beta, reading.jacobian == "printed", reading.offset)
-        weight *= np.where(approach < own_kink, K1, 1.0)
+        weight *= np.where(approach < own_kink, jacobian_below(rms_over_s, reading), 1.0)
         parts = {FORCE: scale_force(g) * phi.phi_F, AREA: scale_area(g) * phi.phi_A}
         return np.stack([part * weight for name, part in parts.items() if which in (name, BOTH)], axis=-1)
 

@@ -27,8 +27,7 @@ from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.power_laws import Place
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
-from mbma_tables.totals.island_sum import kinks
-from mbma_tables.totals.pairs import island_density, jacobian_below
+from mbma_tables.totals.island_sum import island_density, jacobian_below, kinks
 from mbma_tables.totals.panels import COUNTED, NARROW, POWERS, SHARES, Nodes, Panels
 
 KEPT = 64  # profiles, for whoever asks the same surface again
@@ -69,7 +68,6 @@ def source_of(surface: tuple[float, float, float] | MeasuredSurface, reading: Re
     OutOfRangeError
         Where a spectrum ends below the floor of zeta_u.
     """
-    printed = reading.jacobian == "printed"
     if not isinstance(surface, MeasuredSurface):
         hurst, zeta_1, peak = surface
         h_rms = math.sqrt(-math.expm1(-2 * hurst * math.log(zeta_1)))
@@ -78,14 +76,14 @@ def source_of(surface: tuple[float, float, float] | MeasuredSurface, reading: Re
         def islands(x: FloatArray) -> dict[str, FloatArray]:
             return geometry(x, hurst, zeta_1, reading) | {"hurst": np.full(x.size, hurst)}
 
-        jacobian = float(jacobian_below(h_rms, reading.beta, printed, reading.offset))
+        jacobian = float(jacobian_below(h_rms, reading))
         return Source(islands, h_rms, peak, zeta_1**-hurst, float(breaks[0]), breaks, jacobian)
     own, h_rms, laws, floors = surface, float(surface.h_rms), surface.laws, floors_of(surface, reading)
     roots = np.sqrt(laws.above(Place(np.arange(laws.width.size), laws.width)))
     samples = [roots[roots < floors.root_d] / floors.slope_d, roots[roots < floors.root_u] / floors.slope_u]
     # T is a straight line up to a part of it
     layer = math.sqrt(2 * math.pi * surface.C[-1]) * float(surface.q1) / floors.slope_d
-    jacobian = float(jacobian_below(1 / s_over_h_rms(surface), reading.beta, printed, reading.offset))
+    jacobian = float(jacobian_below(1 / s_over_h_rms(surface), reading))
     return Source(
         lambda x: measured_islands(own, x * h_rms, reading), h_rms, float(surface.h_max) / h_rms, layer / h_rms,
         floors.kinks[0] / h_rms, np.concatenate([*samples, floors.kinks]) / h_rms, jacobian,

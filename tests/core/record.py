@@ -75,7 +75,7 @@ class Recorder:
 def use():
     """Call every function, by the library where it does."""
     from mbma_tables import Surface, contact, contact_law, greenwood_tripp, hardness, open_table
-    from mbma_tables.bearing_curve import FRACTIONS, BearingCurve
+    from mbma_tables.hardness import FRACTIONS, BearingCurve
     from mbma_tables.islands import classical
     from mbma_tables.theories.calibrated_table import shipped
 
