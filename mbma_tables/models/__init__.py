@@ -143,7 +143,7 @@ def exact_model(rtol: float) -> ExactModel:
 
 def tier_name(tier: str | AnyModel) -> str:
     """What results call a tier: its name, or that of the model."""
-    return tier if isinstance(tier, str) else tier.name
+    return tier if isinstance(tier, str) else getattr(tier, "name", "")
 
 
 def get_model(tier: str | AnyModel, rtol: float, reading: Reading) -> AnyModel:

@@ -31,7 +31,6 @@ from mbma_tables.theories.mbma import Mbma, refuse_options_of_mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.theories.result import Contact, Source, named
 from mbma_tables.theories.sensitivity import differentiate
-from mbma_tables.totals.contact import wanted_quantities
 from mbma_tables.units import modulus_and_units
 
 KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by
@@ -157,6 +156,14 @@ def contact(
     return _contact(surface, value, E_star, hardness, **options)
 
 
+def wanted_quantities(quantities: Iterable[str]) -> tuple[str, ...]:
+    """The quantities asked for, each once, in the order of `QUANTITIES`."""
+    asked = {quantities} if isinstance(quantities, str) else set(quantities)
+    if not asked or not asked <= set(QUANTITIES):
+        raise InputError(f"quantities must be some of {QUANTITIES}, got {quantities!r}")
+    return tuple(filter(asked.__contains__, QUANTITIES))
+
+
 def one_known(**given: Any) -> tuple[str, Any]:
     """The one of `KNOWN` that is given."""
     known = {name: value for name, value in given.items() if value is not None}
@@ -178,11 +185,7 @@ def _contact(
 ) -> Contact:
     """`contact` of plain arrays."""
     theory = source.theory_at(E_star, hardness)
-    places: dict[str, Any] = {}
-    lighter = None
-    if by != "separation" or not isinstance(theory, Mbma):
-        unit = source.units.stress
-        value, E_star, places, lighter = _places(surface, value, E_star, hardness, by, theory, unit)
+    value, E_star, places, lighter = _places(surface, value, E_star, hardness, by, theory, source.units.stress)
     held = {"pressure": "force", "area": "area"}.get(by)
     capped: Any = theory
     by_log_modulus: dict[str, Any] = {"force": 0.0, "area": 0.0}
@@ -190,7 +193,7 @@ def _contact(
         require(by, value, np.asarray(value) > 0, "positive where derivatives are asked for: a gap has no slope there")
     if isinstance(theory, Mbma):
         wanted = QUANTITIES if derivatives else quantities
-        totals = theory.totals(surface, places.get("separation", value), E_star, derivatives, wanted)
+        totals = theory.totals(surface, places["separation"], E_star, derivatives, wanted)
         fields = vars(totals) | places
     else:
         u = np.asarray(places["mean_separation"])
@@ -228,7 +231,7 @@ def _places(
         require(by, asked, asked >= 0, "at least 0")
     if by == "separation":
         average = (h_max + asked) / 2
-        require(by, asked, asked >= -h_max, "at least -h_max, which is full compression")
+        require(by, asked, asked >= -h_max, "at least -h_max, where the model ends at full compression")
     elif by == "mean_separation":
         average = asked
     else:

@@ -118,7 +118,7 @@ class Profile:
     islands: int
     nodes: Nodes
 
-    @property
+    @functools.cached_property
     def end(self) -> float:
         """The largest compression that it answers."""
         return float(self.edges[-1]) * (1 + 1e-14)
@@ -255,24 +255,7 @@ def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float) -> Pr
     raise ConvergenceError(f"a profile of islands did not reach {rtol:.1e}", np.array(True))
 
 
-@functools.lru_cache(maxsize=KEPT)
-def _profile(surface: Any, model: Any, reading: Reading, rtol: float, exact: bool, rows: int) -> Profile:
-    source = source_of(surface, reading)
-    if rows == 2 and isinstance(surface, tuple) and isinstance(model, UniversalModel):
-        fields = _fields_by_table(surface, model, reading)
-    else:
-        fields = _fields(source, model, "exact" if exact else "nan", rows)
-    edges = _edges(source, 2 * source.peak)
-    # what underflows is right
-    with np.errstate(under="ignore"):
-        try:
-            return _built(source, fields, edges, rtol)
-        except _EndOfTable as fault:
-            end = fault.args[0]
-            return _built(source, fields, np.append(edges[edges < end * (1 - 1e-12)], end), rtol)
-
-
-def profile(
+def _profile(
     surface: tuple[float, float, float] | MeasuredSurface,
     model: AnyModel,
     reading: Reading,
@@ -291,5 +274,19 @@ def profile(
     """
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)
-    given: Any = surface, model, reading, rtol, outside == "exact", rows
-    return _profile(*given)
+    source = source_of(surface, reading)
+    if rows == 2 and isinstance(surface, tuple) and isinstance(model, UniversalModel):
+        fields = _fields_by_table(surface, model, reading)
+    else:
+        fields = _fields(source, model, "exact" if outside == "exact" else "nan", rows)
+    edges = _edges(source, 2 * source.peak)
+    # underflow to zero is correct here
+    with np.errstate(under="ignore"):
+        try:
+            return _built(source, fields, edges, rtol)
+        except _EndOfTable as fault:
+            end = fault.args[0]
+            return _built(source, fields, np.append(edges[edges < end * (1 - 1e-12)], end), rtol)
+
+
+profile: Callable[..., Profile] = functools.lru_cache(maxsize=KEPT)(_profile)
