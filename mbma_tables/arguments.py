@@ -134,6 +134,13 @@ def rows(*given: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
     return table.reshape(len(arrays), -1), shape
 
 
+def grouped(owner: NDArray[np.intp]) -> list[tuple[int, NDArray[np.intp]]]:
+    """The numbers that occur among owners, each with its places."""
+    order = np.argsort(owner, kind="stable")
+    known, first = np.unique(owner[order], return_index=True)
+    return list(zip(known.tolist(), np.split(order, first[1:]), strict=False))
+
+
 def require(name: str, value: FloatArray, good: Any, allowed: str, unit: str = "") -> None:
     """Refuse the entries of `value` where `good` is false; `allowed` says what would have been right, `unit` theirs."""
     if isinstance(good, np.bool_) and good:

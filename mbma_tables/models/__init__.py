@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, number_in
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, number_in, require
 from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.height_integrals import height_integral
@@ -77,15 +78,7 @@ AnyModel = IslandModel | GeometryModel
 def answer_islands(
     model: AnyModel, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH
 ) -> IslandAnswer:
-    """Phi_F and Phi_A of islands by any model; what a model of two numbers answers is checked.
-
-    Raises
-    ------
-    InputError
-        Where an answer is not of the arguments' shape.
-    OutOfRangeError
-        Where it is not finite and `outside` is not "nan".
-    """
+    """Phi_F and Phi_A of islands by any model; what a model of two numbers answers is checked."""
     if isinstance(model, GeometryModel):
         return model.of_islands(islands, outside, which)
     shape = islands["X"].shape
@@ -136,6 +129,38 @@ class RigidModel:
         return IslandAnswer(force, area, np.full(X.shape, CLOSED_FORM_ERROR))
 
 
+class Ranged:
+    """A model of X and mu in `ranges`: what lies outside is refused, solved exactly, or NaN."""
+
+    ranges: Mapping[str, tuple[float, float]]
+    holds = ""  # what a refusal says beside a range
+
+    def _inside(
+        self, X: ArrayLike, mu: ArrayLike, refuse: bool = True
+    ) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
+        """Flat arguments and their common shape, refused where the model does not reach."""
+        given = {"X": finite_array("X", X), "mu": finite_array("mu", mu)}
+        for name, array in given.items() if refuse else ():
+            low, high = self.ranges[name]
+            require(name, array, (array >= low) & (array <= high), f"in [{low:g}, {high:g}]{self.holds}")
+        require("mu", given["mu"], given["mu"] >= 0, "at least 0")
+        shape = broadcast_shape(**given)
+        flat_X, flat_mu = (np.ascontiguousarray(np.broadcast_to(a, shape)).ravel() for a in given.values())
+        return flat_X, flat_mu, shape
+
+    def _answered(
+        self, X: ArrayLike, mu: ArrayLike, outside: str, fill: Callable[[FloatArray, FloatArray], FloatArray]
+    ) -> IslandAnswer:
+        """Rows that `fill` answers of flat arguments, NaN outside of the ranges."""
+        check_outside(outside)
+        flat_X, flat_mu, shape = self._inside(X, mu, outside == "raise")
+        out = fill(flat_X, flat_mu)
+        missing = np.isnan(out[2])
+        if outside == "exact" and missing.any():
+            out[:, missing] = SOLVER.answer(flat_X[missing], flat_mu[missing])
+        return IslandAnswer(*(row.reshape(shape)[()] for row in out))
+
+
 def exact_model(rtol: float) -> ExactModel:
     """The exact solver, accurate enough for totals at `rtol`."""
     return ExactModel(max(0.1 * rtol, greenwood_tripp.MIN_SOLVER_RTOL))
@@ -149,20 +174,8 @@ def tier_name(tier: str | AnyModel) -> str:
 def get_model(tier: str | AnyModel, rtol: float, reading: Reading) -> AnyModel:
     """The island model of a tier, accurate enough for results at `rtol`; a table is what its certificate says.
 
-    Parameters
-    ----------
-    tier : str or island model
-        One of `TIERS`, or an object with a `name` and ``answer(X, mu)``, which is checked and returned: a table from
-        `open_table`, or a model of one's own (`IslandModel`, `GeometryModel`).
-    rtol : float
-        Relative error asked of the results, in [1e-11, 0.1].
-    reading : Reading
-        A model that was made for one reading says so by its `reading`.
-
-    Raises
-    ------
-    InputError
-        For an unknown tier, an object that is no island model, an `rtol` out of range, or another reading.
+    `tier` is one of `TIERS`, or a model (`IslandModel`, `GeometryModel`), which is checked and returned. One that was
+    made for one reading says so by its `reading`.
     """
     asked = number_in("rtol", rtol, MIN_RTOL, MAX_RTOL)
     if isinstance(tier, str) and tier in TIERS:

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.arguments import FloatArray, finite_array
 from mbma_tables.core import core, in_blocks
 from mbma_tables.display import Displayed, Variable
 from mbma_tables.errors import TableFileError
-from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
+from mbma_tables.models import BOTH, IslandAnswer, Ranged
 from mbma_tables.plots import draw_lines
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
 
@@ -28,7 +28,7 @@ TERMS = 8  # of each polynomial along each axis
 RECORD = 8 + 2 * TERMS**2  # doubles of a cell, `mbma_cell` of mbma.h
 
 
-class UniversalModel(Displayed):
+class UniversalModel(Ranged, Displayed):
     """Phi_F and Phi_A from a universal table.
 
     Parameters
@@ -52,6 +52,7 @@ class UniversalModel(Displayed):
     def __init__(self, content: TableContent) -> None:
         self.content = content
         self._X, self._mu = content.axes
+        self.ranges = {"X": (self._X.low, self._X.high), "mu": (0.0, self._mu.high)}
 
     def _facts(self) -> dict[str, str]:
         return self.content.facts()
@@ -83,13 +84,8 @@ class UniversalModel(Displayed):
         ------
         InputError, OutOfRangeError
         """
-        check_outside(outside)
-        flat_X, flat_mu, shape = self._inside(X, mu, outside == "raise")
-        out = self._filled(flat_X, flat_mu, False, (os.cpu_count() or 1) if parallel else 1)
-        missing = np.isnan(out[:, 0])
-        if outside == "exact" and missing.any():
-            out[missing] = np.stack(SOLVER.answer(flat_X[missing], flat_mu[missing]), axis=-1)
-        return IslandAnswer(*(column.reshape(shape)[()] for column in out.T))
+        workers = (os.cpu_count() or 1) if parallel else 1
+        return self._answered(X, mu, outside, lambda flat_X, flat_mu: self._filled(flat_X, flat_mu, False, workers).T)
 
     def _filled(self, X: FloatArray, mu: FloatArray, slopes: bool, workers: int = 1) -> FloatArray:
         """Rows of Phi_F, Phi_A, error, and with `slopes` of the derivatives by X and mu; NaN outside."""
@@ -115,20 +111,6 @@ class UniversalModel(Displayed):
     def status(self, X: ArrayLike, mu: ArrayLike) -> tuple[Any, Any]:
         """Where arguments lie on each axis: -1 below, 0 inside, 1 above. Below in mu is answered, to first order."""
         return self._X.side(finite_array("X", X)), self._mu.side(finite_array("mu", mu))
-
-    def _inside(
-        self, X: ArrayLike, mu: ArrayLike, refuse: bool = True
-    ) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
-        """Flat arguments and their common shape, refused where the table does not reach."""
-        given_X, given_mu = finite_array("X", X), finite_array("mu", mu)
-        low, high = self._X.low, self._X.high
-        if refuse:
-            require("X", given_X, (given_X >= low) & (given_X <= high), f"in [{low:g}, {high:g}]")
-            require("mu", given_mu, (given_mu >= 0) & (given_mu <= self._mu.high), f"in [0, {self._mu.high:g}]")
-        require("mu", given_mu, given_mu >= 0, "at least 0")
-        shape = broadcast_shape(X=given_X, mu=given_mu)
-        flat_X, flat_mu = (np.ascontiguousarray(np.broadcast_to(a, shape)).ravel() for a in (given_X, given_mu))
-        return flat_X, flat_mu, shape
 
     @functools.cached_property
     def cells(self) -> tuple[FloatArray, NDArray[np.int32], FloatArray]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, require, spread
+from mbma_tables.arguments import FloatArray, grouped, require, spread
 from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, force_of
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.surface import Surface
@@ -40,7 +40,8 @@ class Places:
 
     def outside(self, mask: Any) -> list[tuple[int, Any]]:
         """Surfaces that have entries under a mask, with these."""
-        return [(int(row), np.flatnonzero(mask & (self.owner == row))) for row in np.unique(self.owner[mask])]
+        chosen = np.flatnonzero(mask)
+        return [(row, chosen[mine]) for row, mine in grouped(self.owner[chosen])]
 
     def law(self, row: int) -> Law:
         """The law of one surface."""

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.arguments import FloatArray, require
+from mbma_tables.arguments import FloatArray, grouped, require
 from mbma_tables.core import in_blocks
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.models import AREA, BOTH, FORCE, AnyModel
@@ -125,10 +125,7 @@ def _by_profiles(
         shapes = list(map(tuple, numbers.reshape(3, -1).T.tolist()))
     if len(shapes) > 1:
         number = np.broadcast_to(np.arange(len(shapes)).reshape(surface.shape), depth.shape).ravel()[touching]
-        order = np.argsort(number, kind="stable")
-        known, first = np.unique(number[order], return_index=True)
-        # where nothing touches, one group is split off no surface
-        groups = dict(zip(known.tolist(), np.split(touching[order], first[1:]), strict=False))
+        groups = {k: touching[mine] for k, mine in grouped(number)}
     for k, places in groups.items():
         if not places.size:
             continue

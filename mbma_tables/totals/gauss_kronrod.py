@@ -62,29 +62,10 @@ def _apply_rule(
 def integrate(
     integrand: Integrand, owner: NDArray[np.intp], low: FloatArray, high: FloatArray, count: int, rtol: float
 ) -> Integrals:
-    """Integrate `count` positive integrands, each over the intervals that it owns.
+    """Integrate `count` positive integrands, each over the intervals that it owns, every component to `rtol`.
 
-    Parameters
-    ----------
-    integrand : callable
-        ``integrand(owner, points)`` with `owner` (n,) and `points` (n, 21) gives (n, 21, components).
-    owner : (n,) int array
-        Which integral an interval belongs to, 0 ... count - 1.
-    low, high : (n,) arrays
-        The intervals: break points, and whatever start suits the integrand.
-    count : int
-        Number of integrals; one that owns no interval is 0.
-    rtol : float
-        Relative tolerance, met by the estimates of every component of every integral.
-
-    Returns
-    -------
-    Integrals
-
-    Raises
-    ------
-    ConvergenceError
-        Where `DEPTH` halvings, or `MOST` intervals, did not suffice; `mask` is true for these integrals.
+    ``integrand(owner, points)`` with `owner` (n,) and `points` (n, 21) gives (n, 21, components); an integral that owns
+    no interval is 0. A ConvergenceError's `mask` says where `DEPTH` halvings, or `MOST` intervals, did not suffice.
     """
     if owner.size == 0:
         # one component stands for all

@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, hinted, is_labelled, require
+from mbma_tables.arguments import (
+    FloatArray,
+    Numbers,
+    broadcast_shape,
+    finite_array,
+    hinted,
+    is_labelled,
+    positive_modulus,
+    require,
+)
 from mbma_tables.errors import InputError
 from mbma_tables.islands.geometry import geometry, measured_islands
 from mbma_tables.models import AnyModel, answer_islands, get_model, tier_name
@@ -126,8 +135,7 @@ def island(
         return _of_labelled(surface, delta, tier, reading, E_star, rtol)
     approach = finite_array("delta", delta)
     require("delta", approach, approach > 0, "positive")
-    modulus = finite_array("E_star", E_star)
-    require("E_star", modulus, modulus > 0, "positive")
+    modulus = positive_modulus(E_star)
     rule = get_reading(reading)
     model = get_model(tier, rtol, rule)
     broadcast_shape(delta=approach, surface=surface.h_rms, E_star=modulus)

@@ -61,13 +61,7 @@ class Source(NamedTuple):
 
 
 def source_of(surface: tuple[float, float, float] | MeasuredSurface, reading: Reading) -> Source:
-    """The islands of a surface; of a self-affine one by hurst, zeta_1 and h_max/h_rms.
-
-    Raises
-    ------
-    OutOfRangeError
-        Where a spectrum ends below the floor of zeta_u.
-    """
+    """The islands of a surface; of a self-affine one by hurst, zeta_1 and h_max/h_rms."""
     if not isinstance(surface, MeasuredSurface):
         hurst, zeta_1, peak = surface
         h_rms = math.sqrt(-math.expm1(-2 * hurst * math.log(zeta_1)))
@@ -92,31 +86,16 @@ def source_of(surface: tuple[float, float, float] | MeasuredSurface, reading: Re
 
 @dataclasses.dataclass(frozen=True)
 class Profile:
-    """Totals of one surface at any gap.
+    """Totals of one surface at any gap."""
 
-    Attributes
-    ----------
-    source : Source
-        The surface's islands.
-    edges : ndarray, shape (panels + 1,)
-        Ends of the panels, delta/h_rms; the last is 2 h_max/h_rms, or less where a table ends.
-    series : ndarray, shape (panels, rows, terms)
-        ln(F), ln(A) and so on as Chebyshev series of the compression. In the first panel they lack the logarithms of
-        the powers that they begin with.
-    error : float
-        Bound on the relative error of totals, of panels and islands together.
-    islands : int
-        Islands answered for it.
-    nodes : Nodes
-        The islands of the panels.
-    """
-
-    source: Source
-    edges: FloatArray
+    source: Source  # the surface's islands
+    edges: FloatArray  # ends of the panels, delta/h_rms; the last is 2 h_max/h_rms, or less where a table ends
+    # ln(F), ln(A) and so on as Chebyshev series of the compression, (panels, rows, terms); in the first panel without
+    # the logarithms of the powers that they begin with
     series: Any
-    error: float
-    islands: int
-    nodes: Nodes
+    error: float  # bound on the relative error of totals, of panels and islands together
+    islands: int  # answered for it
+    nodes: Nodes  # the islands of the panels
 
     @functools.cached_property
     def end(self) -> float:
@@ -205,12 +184,7 @@ def _fields_by_table(shape: tuple[float, float, float], model: UniversalModel, r
 def _answered(
     fields: Fields, kind: NDArray[np.intp], low: FloatArray, high: FloatArray, last: float
 ) -> tuple[Panels, FloatArray, int, float]:
-    """Panels and their errors, the number of islands, and their own error.
-
-    Raises
-    ------
-    _EndOfTable
-    """
+    """Panels and their errors, the number of islands, and their own error."""
     x, used = low[:, None] + (high - low)[:, None] * SHARES[kind], COUNTED[kind]
     found, error = fields(x, used)
     if not (found[:-2] >= 0).all():
@@ -267,10 +241,6 @@ def _profile(
 
     `outside` is "exact" to solve islands that a table does not cover; else the profile ends with the table. The number
     of islands and their Hertz area are the third and fourth of `rows`.
-
-    Raises
-    ------
-    InputError, OutOfRangeError, ConvergenceError
     """
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)
