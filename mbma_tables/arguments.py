@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mbma_tables.core import in_blocks
 from mbma_tables.errors import InputError, MbmaError, OutOfRangeError
 
 SHOWN = 3  # offending entries quoted in a message
+BLOCK = 1 << 16  # entries between two looks for Ctrl-C
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -132,6 +134,14 @@ def rows(*given: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
     for k, array in enumerate(arrays):
         table[k] = array
     return table.reshape(len(arrays), -1), shape
+
+
+def answered(fill: Callable[..., Any], given: tuple[ArrayLike, ...], outputs: int = 1, *more: Any) -> FloatArray:
+    """Rows that a loop of the core, ``fill(*given, *more, *rows)``, makes of what is given, of its broadcast shape."""
+    known, shape = rows(*given)
+    out = np.empty((outputs, known.shape[1]))
+    in_blocks(lambda some: fill(*known[:, some], *more, *out[:, some]), known.shape[1], BLOCK)
+    return out.reshape(outputs, *shape)
 
 
 def grouped(owner: NDArray[np.intp]) -> list[tuple[int, NDArray[np.intp]]]:

@@ -24,13 +24,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.core import core, in_blocks
+from mbma_tables.arguments import FloatArray, answered
+from mbma_tables.core import core
 from mbma_tables.errors import ConvergenceError, InputError
 
 POWERS = (1, 3, 16)  # of the cover in the weight W
 NARROWNESS = 0.65  # that W's slope refers to
-BLOCK = 65536  # numbers answered between two chances of Ctrl-C
 UNRESOLVED = 4  # the core's status where a quadrature did not reach its tolerance
 
 
@@ -63,10 +62,7 @@ def area_persson(force: ArrayLike) -> FloatArray:
 
 
 def _area(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
-    load, light = np.broadcast_arrays(np.asarray(force, float), s0)
-    out = np.empty(load.shape)
-    core.contact_area(np.ascontiguousarray(load), np.ascontiguousarray(light), t0, out)
-    return out
+    return np.asarray(answered(core.contact_area, (force, s0), 1, t0)[0])
 
 
 def force_of(e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
@@ -177,12 +173,9 @@ class Law:
             raise InputError("a spectrum has rising positive wavenumbers and shares of variance that are not negative")
         return law
 
-    def _asked(self, function: Any, given: ArrayLike, rows: int) -> list[FloatArray]:
+    def _asked(self, function: Any, given: ArrayLike, rows: int) -> FloatArray:
         """Rows of what a function of the core answers of an array."""
-        values = np.asarray(given, float)
-        flat, out = np.ascontiguousarray(values).ravel(), np.empty((rows, values.size))
-        in_blocks(lambda k: function(self._prepared, flat[k], *out[:, k]), flat.size, BLOCK)
-        return [row.reshape(values.shape) for row in out]
+        return answered(lambda *entries: function(self._prepared, *entries), (given,), rows)
 
     def energy(self, force: ArrayLike) -> FloatArray:
         """Elastic energy U of the endless Gaussian surface, before its tail factor."""
@@ -214,7 +207,7 @@ class Law:
 
     def separation(self, force: ArrayLike) -> FloatArray:
         """Mean separation u [h_rms] at F/(A0 E* g): the inverse of `force`."""
-        return self._asked(core.spectrum_law_separation, force, 1)[0]
+        return np.asarray(self._asked(core.spectrum_law_separation, force, 1)[0])
 
     def area(self, force: ArrayLike) -> FloatArray:
         """A/A0 at F/(A0 E* g)."""

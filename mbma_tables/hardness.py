@@ -19,20 +19,17 @@ A = A_yield = x and F = eta Q(u), as it falls.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 from scipy.special import erfinv, ndtr, ndtri
 
-from mbma_tables.arguments import FloatArray, rows
+from mbma_tables.arguments import FloatArray, answered
 from mbma_tables.bearing import FRACTIONS
-from mbma_tables.core import core, in_blocks
+from mbma_tables.core import core
 from mbma_tables.errors import InputError
 
-BLOCK = 1 << 16  # entries between two looks for Ctrl-C
 MOST_SHARE = 0.9  # of a map's heights up to which a node stands for its own
 DEPTH = 30.0  # of a map's valleys below the last node, in levels
 MIN_SPACING = 0.02  # relative, of mean gaps between nodes of a map's bearing curve
@@ -54,34 +51,22 @@ class Constants:
     plane_eta: float = 3.375  # between mean planes interpenetration falls as exp(-(plane_eta - plane_load x) eta)
     plane_load: float = 2.505
 
-    @property
-    def exponent(self) -> tuple[float, float, float]:
-        """n0, c and d."""
-        return self.force_light, self.force_eta, self.force_share
-
 
 CONSTANTS = Constants()
 
 
 def area(force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """A/A0 at F/(A0 E* g), at most eta, from the elastic A/A0 at that force; above 1 only where that is."""
-    return np.maximum(elastic_area, 1.0) * _between_walls(
-        force, elastic_area, eta, (constants.area_power, constants.area_scale), 0
-    )
+    given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
+    return np.maximum(elastic_area, 1.0) * answered(core.capped_area, given, 1, c.area_power, c.area_scale, 0)[0]
 
 
 def yielded_area(
     force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS
 ) -> FloatArray:
     """Yielded part of A/A0, likewise."""
-    return _between_walls(force, elastic_area, eta, (constants.yield_power, constants.yield_scale), 1)
-
-
-def _between_walls(
-    force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, numbers: tuple[float, float], yielded: int
-) -> FloatArray:
-    known, shape = rows(force, erfinv(np.minimum(elastic_area, 1.0)), eta)
-    return filled(core.capped_area, known, np.empty(known.shape[1]), *numbers, yielded).reshape(shape)
+    given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
+    return np.asarray(answered(core.capped_area, given, 1, c.yield_power, c.yield_scale, 1)[0])
 
 
 def diffused(x: ArrayLike, tau: ArrayLike, sign: float) -> FloatArray:
@@ -89,8 +74,7 @@ def diffused(x: ArrayLike, tau: ArrayLike, sign: float) -> FloatArray:
 
     What has not ended at 0, or with a negative `sign` what has ended at 1.
     """
-    known, shape = rows(x, tau)
-    return filled(core.diffused, known, np.empty(known.shape[1]), int(sign < 0)).reshape(shape)
+    return np.asarray(answered(core.diffused, (x, tau), 1, int(sign < 0))[0])
 
 
 def force(
@@ -102,9 +86,9 @@ def force(
     constants: Constants = CONSTANTS,
 ) -> tuple[FloatArray, FloatArray]:
     """F/(A0 E* g) at a mean gap u and -dF/du, from the elastic force and stiffness, and from Q and dQ/du, there."""
-    known, shape = rows(elastic_force, stiffness, share, slope, eta)
-    found, steep = filled(core.capped_force, known, np.empty((2, known.shape[1])), *constants.exponent)
-    return found.reshape(shape), steep.reshape(shape)
+    exponent = constants.force_light, constants.force_eta, constants.force_share
+    found, steep = answered(core.capped_force, (elastic_force, stiffness, share, slope, eta), 2, *exponent)
+    return found, steep
 
 
 def frozen_factor(eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
@@ -121,31 +105,15 @@ def plane_separation(u: ArrayLike, load: ArrayLike, eta: ArrayLike, constants: C
     return np.asarray(u - flattened * np.exp(-(constants.plane_eta - constants.plane_load * x) * cap))
 
 
-def filled(fill: Callable[..., int], known: FloatArray, out: FloatArray, *more: Any) -> FloatArray:
-    """Rows of `out`, one or several, by a loop of the compiled core over rows of as many entries."""
-    own = [out] if out.ndim == 1 else out
-    if out.shape[-1] <= BLOCK:
-        fill(*known, *more, *own)
-        return out
-
-    def block(some: slice) -> int:
-        return fill(*(row[some] for row in known), *more, *(row[some] for row in own))
-
-    in_blocks(block, out.shape[-1], BLOCK)
-    return out
-
-
 def bearing_share(u: ArrayLike, h_max: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
     """Q(u), share of Gaussian heights above the level of mean gap u [h_rms], and dQ/du; with `h_max` it ends there."""
-    known, shape = rows(u, np.inf if h_max is None else h_max)
-    share, slope = filled(core.bearing_share, known, np.empty_like(known))
-    return share.reshape(shape), slope.reshape(shape)
+    share, slope = answered(core.bearing_share, (u, np.inf if h_max is None else h_max), 2)
+    return share, slope
 
 
 def _levels(u: FloatArray) -> FloatArray:
     """Levels of Gaussian heights at mean gaps [h_rms]."""
-    known, shape = rows(u)
-    return filled(core.gaussian_level, known, np.empty(known.shape[1])).reshape(shape)
+    return np.asarray(answered(core.gaussian_level, (u,))[0])
 
 
 class BearingCurve:

@@ -202,7 +202,7 @@ def _contact(
         source = dataclasses.replace(source, answer=found, loaded=loaded)
         error = spread(found.error, np.shape(found.force))[()]
         fields = {"force": (E_star * found.force)[()], "area": found.area[()], "error": error} | places
-        fields |= {**_labels(source.theory), "islands": None}
+        fields["islands"] = None
         if derivatives:
             force_by, area_by = differentiate(theory, surface, u, lighter)
             by_log_modulus = {"force": force_by.pop("E_star", 0.0), "area": area_by.pop("E_star", 0.0)}
@@ -216,7 +216,8 @@ def _contact(
     for name in QUANTITIES:
         if name not in quantities:
             fields |= {name: None, f"{name}_by": None}
-    return Contact(theory=theory.name, _source=source, **fields)
+    own = source.theory
+    return Contact(theory=own.name, reading=own.reading_name, tier=own.tier_name, _source=source, **fields)
 
 
 def _places(
@@ -308,12 +309,7 @@ def _of_labelled(surface: AnySurface, value: Any, E_star: Any, hardness: Any, op
         fields |= {by: value, "mean_separation": named((surface.h_max + value) / 2, "mean_separation", units)}
     elif by == "mean_separation":
         fields |= {by: value, "separation": named(2 * value - surface.h_max, "separation", units)}
-    fields |= _labels(theory)
-    return Contact(theory=theory.name, islands=None, _source=options["source"], **fields)
-
-
-def _labels(theory: Theory) -> dict[str, str]:
-    """Reading and tier of MBMA, with a hardness or without."""
-    if not isinstance(theory, Mbma):
-        return {"reading": "", "tier": ""}
-    return {"reading": theory.reading.name, "tier": theory.tier_name}
+    source = options["source"]
+    return Contact(
+        theory=theory.name, reading=theory.reading_name, tier=theory.tier_name, islands=None, _source=source, **fields
+    )

@@ -51,7 +51,7 @@ class Mbma(Theory):
         check_outside(outside)
         self.tier, self.reading, self.rtol, self.outside = tier, get_reading(reading), rtol, outside
         self.workers = whole_number_in("workers", workers, 1, MOST_WORKERS)
-        self.tier_name = tier_name(tier)
+        self.reading_name, self.tier_name = self.reading.name, tier_name(tier)
 
     @functools.cached_property
     def model(self) -> AnyModel:

@@ -46,9 +46,7 @@ class Totals:
     force: Any
     area: Any
     error: Any
-    reading: str
-    tier: str
-    islands: int | None
+    islands: int
     force_by: dict[str, Any] | None = None
     area_by: dict[str, Any] | None = None
 
@@ -62,7 +60,6 @@ def totals_at(
     require("separation", gap, gap >= -h_max, "at least -h_max, where the model ends at full compression")
     depth = np.asarray(h_max - gap)
     force_by = area_by = None
-    by_depth: tuple[FloatArray, ...] = ()
     try:
         stress = modulus
         if isinstance(surface, Surface):
@@ -76,12 +73,13 @@ def totals_at(
             force, area = sums[:, 0, 0], sums[:, 1, 0]
             force_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
         else:
-            (force, area, *slopes), error, islands = _totals(
+            sums, error, islands = _totals(
                 model, surface, depth, reading, rtol, outside, which, bool(derivatives), workers
             )
-            by_depth = tuple(slope.reshape(shape) / surface.h_rms for slope in slopes)
-        if derivatives and by_depth:
-            force_by, area_by = {"separation": -stress * by_depth[0]}, {"separation": -by_depth[1]}
+            force, area = sums[:2]
+            if derivatives:
+                force_slope, area_slope = sums[2:].reshape(2, *shape) / surface.h_rms
+                force_by, area_by = {"separation": -stress * force_slope}, {"separation": -area_slope}
         if area_by is not None and reading.addition == "cover":
             kept = np.exp(-area.reshape(shape))  # dA = exp(-sum) dsum
             area_by = {name: (slope * kept)[()] for name, slope in area_by.items()}
@@ -97,8 +95,6 @@ def totals_at(
         force=(force.reshape(shape) * stress)[()] if which != AREA else None,
         area=reading.area_of(area).reshape(shape)[()] if which != FORCE else None,
         error=error.reshape(shape)[()],
-        reading=reading.name,
-        tier=model.name,
         islands=islands,
         force_by=force_by if which != AREA else None,
         area_by=area_by if which != FORCE else None,
