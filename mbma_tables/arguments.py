@@ -136,12 +136,12 @@ def rows(*given: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
     return table.reshape(len(arrays), -1), shape
 
 
-def answered(fill: Callable[..., Any], given: tuple[ArrayLike, ...], outputs: int = 1, *more: Any) -> FloatArray:
+def answered(fill: Callable[..., Any], given: tuple[ArrayLike, ...], outputs: int = 1, *more: Any) -> list[FloatArray]:
     """Rows that a loop of the core, ``fill(*given, *more, *rows)``, makes of what is given, of its broadcast shape."""
     known, shape = rows(*given)
     out = np.empty((outputs, known.shape[1]))
     in_blocks(lambda some: fill(*known[:, some], *more, *out[:, some]), known.shape[1], BLOCK)
-    return out.reshape(outputs, *shape)
+    return list(out.reshape(outputs, *shape))
 
 
 def grouped(owner: NDArray[np.intp]) -> list[tuple[int, NDArray[np.intp]]]:

@@ -62,7 +62,7 @@ def area_persson(force: ArrayLike) -> FloatArray:
 
 
 def _area(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
-    return np.asarray(answered(core.contact_area, (force, s0), 1, t0)[0])
+    return answered(core.contact_area, (force, s0), 1, t0)[0]
 
 
 def force_of(e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
@@ -173,7 +173,7 @@ class Law:
             raise InputError("a spectrum has rising positive wavenumbers and shares of variance that are not negative")
         return law
 
-    def _asked(self, function: Any, given: ArrayLike, rows: int) -> FloatArray:
+    def _asked(self, function: Any, given: ArrayLike, rows: int) -> list[FloatArray]:
         """Rows of what a function of the core answers of an array."""
         return answered(lambda *entries: function(self._prepared, *entries), (given,), rows)
 
@@ -207,7 +207,7 @@ class Law:
 
     def separation(self, force: ArrayLike) -> FloatArray:
         """Mean separation u [h_rms] at F/(A0 E* g): the inverse of `force`."""
-        return np.asarray(self._asked(core.spectrum_law_separation, force, 1)[0])
+        return self._asked(core.spectrum_law_separation, force, 1)[0]
 
     def area(self, force: ArrayLike) -> FloatArray:
         """A/A0 at F/(A0 E* g)."""

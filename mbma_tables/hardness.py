@@ -58,7 +58,8 @@ CONSTANTS = Constants()
 def area(force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """A/A0 at F/(A0 E* g), at most eta, from the elastic A/A0 at that force; above 1 only where that is."""
     given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
-    return np.maximum(elastic_area, 1.0) * answered(core.capped_area, given, 1, c.area_power, c.area_scale, 0)[0]
+    share = answered(core.capped_area, given, 1, c.area_power, c.area_scale, 0)[0]
+    return share * np.maximum(elastic_area, 1.0)
 
 
 def yielded_area(
@@ -66,7 +67,7 @@ def yielded_area(
 ) -> FloatArray:
     """Yielded part of A/A0, likewise."""
     given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
-    return np.asarray(answered(core.capped_area, given, 1, c.yield_power, c.yield_scale, 1)[0])
+    return answered(core.capped_area, given, 1, c.yield_power, c.yield_scale, 1)[0]
 
 
 def diffused(x: ArrayLike, tau: ArrayLike, sign: float) -> FloatArray:
@@ -74,7 +75,7 @@ def diffused(x: ArrayLike, tau: ArrayLike, sign: float) -> FloatArray:
 
     What has not ended at 0, or with a negative `sign` what has ended at 1.
     """
-    return np.asarray(answered(core.diffused, (x, tau), 1, int(sign < 0))[0])
+    return answered(core.diffused, (x, tau), 1, int(sign < 0))[0]
 
 
 def force(
@@ -113,7 +114,7 @@ def bearing_share(u: ArrayLike, h_max: ArrayLike | None = None) -> tuple[FloatAr
 
 def _levels(u: FloatArray) -> FloatArray:
     """Levels of Gaussian heights at mean gaps [h_rms]."""
-    return np.asarray(answered(core.gaussian_level, (u,))[0])
+    return answered(core.gaussian_level, (u,))[0]
 
 
 class BearingCurve:

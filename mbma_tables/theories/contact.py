@@ -29,8 +29,9 @@ from mbma_tables.surfaces.readings import Reading
 from mbma_tables.theories import get_theory
 from mbma_tables.theories.mbma import Mbma, refuse_options_of_mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
-from mbma_tables.theories.result import Contact, Source, named
+from mbma_tables.theories.result import Contact
 from mbma_tables.theories.sensitivity import differentiate
+from mbma_tables.theories.source import Source, named
 from mbma_tables.units import modulus_and_units
 
 KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by

@@ -23,7 +23,7 @@ from mbma_tables.plots import Curve, draw_compression, force_label, theory_label
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import law_block as at
 from mbma_tables.theories.law_block import AREA, FORCE, QUANTITIES, inverse_block
-from mbma_tables.theories.result import MEANINGS
+from mbma_tables.theories.source import MEANINGS
 from mbma_tables.units import UNKNOWN, Units, unit_of
 
 if TYPE_CHECKING:
@@ -162,9 +162,7 @@ class ContactLaw(Law, Displayed):
         return int(self.block.view(np.int64)[at.RECORDS])
 
     def gaps(self, separation: Any, u: Any) -> FloatArray:
-        """Separations d, checked, of separations or of mean separations."""
-        if separation is not None and u is not None:
-            raise InputError("separation and u: give one of them")
+        """Separations d, checked, of separations or of mean separations, one of them."""
         separation, u = (self.units.number("separation", gap) for gap in (separation, u))
         d = finite_array("separation", separation) if u is None else 2 * finite_array("u", u) - self.h_max
         # ends that are no round numbers are met but for rounding
@@ -182,12 +180,8 @@ class ContactLaw(Law, Displayed):
         if is_labelled(given):
             from mbma_tables.labels import apply
 
-            def answer(block: Any) -> Any:
-                found = self._ask(block, count, check, fill, plain)
-                return found if count > 1 else found[0]
-
-            found = apply(answer, (given,), count)
-            return found if count > 1 else (found,)
+            found: tuple[Any, ...] = apply(lambda block: self._ask(block, count, check, fill, plain), (given,), count)
+            return found
         # entries of plain arrays are checked as they are answered
         plain = plain and type(given) is np.ndarray and given.dtype == np.float64 and given.size > 0
         known = given if plain else check(given)

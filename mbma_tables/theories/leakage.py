@@ -26,7 +26,8 @@ from mbma_tables.units import unit_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mbma_tables.theories.result import Contact, Source
+    from mbma_tables.theories.result import Contact
+    from mbma_tables.theories.source import Source
 
 LARGEST_KNUDSEN = 0.1  # mean free path over the channel, to which slip of first order holds
 SLIP = 6.0  # of a plane channel: flow is 1 + 6 Kn times that without slip
