@@ -87,6 +87,11 @@ def is_labelled(value: Any) -> bool:
     return xarray is not None and isinstance(value, xarray.DataArray)
 
 
+def any_labelled(surface: Any, *values: Any) -> bool:
+    """Whether a surface or any value is of DataArrays."""
+    return "xarray" in sys.modules and (surface.labelled or any(map(is_labelled, values)))
+
+
 def finite_array(name: str, value: ArrayLike) -> FloatArray:
     """`value` as a float64 array; empty, masked, complex, non-numeric, NaN or infinite input is refused.
 

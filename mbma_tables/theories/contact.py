@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import (
     FloatArray,
+    any_labelled,
     broadcast_shape,
     describe_entries,
     finite_array,
     hinted,
-    is_labelled,
     positive_modulus,
     require,
     spread,
@@ -152,7 +152,7 @@ def contact(
         "derivatives": derivatives,
         "quantities": wanted_quantities(quantities),
     }
-    if surface.labelled or any(map(is_labelled, (value, E_star, hardness))):
+    if any_labelled(surface, value, E_star, hardness):
         return _of_labelled(surface, value, E_star, hardness, options)
     return _contact(surface, value, E_star, hardness, **options)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 from collections.abc import Callable
 from typing import Any
@@ -171,7 +172,8 @@ class Mbma(Theory):
     def _maximum(self, surface: AnySurface, quantity: str, otherwise: FloatArray) -> FloatArray:
         """Mean separation of the first local maximum of a quantity under compression, or `otherwise`."""
         # where some islands are not covered, it is looked for among the rest
-        theory = self if self.outside == "exact" else Mbma(self.model, self.reading, self.rtol, "nan")
+        theory = copy.copy(self)
+        theory.outside = "exact" if self.outside == "exact" else "nan"
         depth = np.arange(1, SCAN + 1) / SCAN
         h_max = np.asarray(surface.h_max, dtype=float)
         batch = select(surface, surface.shape, np.arange(h_max.size).reshape(*surface.shape, 1))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, Numbers, is_labelled
+from mbma_tables.arguments import FloatArray, Numbers, any_labelled, is_labelled
 from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
 from mbma_tables.materials import ELASTIC_PSI
@@ -95,7 +95,7 @@ class Contact(Displayed):
         for name in ("mean_separation", "force", "area"):
             if getattr(self, name) is not None:
                 facts[name] = shown(getattr(self, name), units[name])
-        if source.surface.labelled or is_labelled(self.mean_separation) or np.size(self.error) > MOST_SHOWN:
+        if any_labelled(source.surface, self.mean_separation) or np.size(self.error) > MOST_SHOWN:
             return facts
         facts["separation_scatter"] = shown(self.separation_scatter, units["separation_scatter"])
         more = {name: getattr(self, name) for name in ("error", "scatter", "stiffness_scatter", "valid")}

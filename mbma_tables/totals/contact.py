@@ -63,9 +63,8 @@ def totals_at(
     try:
         stress = modulus
         if isinstance(surface, Surface):
-            stress = modulus * surface.q0 * surface.s
+            stress, zeta_1 = modulus * surface.q0 * surface.s, np.asarray(surface.zeta_1)
             allowed = f"greater than {reading.floor_u:g}, the reading's floor of zeta_u"
-            zeta_1 = np.asarray(surface.zeta_1)
             require("q1/q0", zeta_1, zeta_1 > reading.floor_u, allowed)
         if isinstance(surface, Surface) and derivatives is True:
             pairs = Pairs.of(surface, depth)

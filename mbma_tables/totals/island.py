@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from mbma_tables.arguments import (
     FloatArray,
     Numbers,
+    any_labelled,
     broadcast_shape,
     finite_array,
     hinted,
-    is_labelled,
     positive_modulus,
     require,
 )
@@ -131,7 +131,7 @@ def island(
     """
     E_star, units = modulus_and_units(E_star, surface)
     delta = units.number("delta", delta)
-    if surface.labelled or is_labelled(delta) or is_labelled(E_star):
+    if any_labelled(surface, delta, E_star):
         return _of_labelled(surface, delta, tier, reading, E_star, rtol)
     approach = finite_array("delta", delta)
     require("delta", approach, approach > 0, "positive")
