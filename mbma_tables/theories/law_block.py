@@ -1,4 +1,4 @@
-"""A contact law's block, whose layout `core/mbma.h` describes: places in it, and the block of the law's inverse.
+"""A contact law's block, whose layout `core/mbma.h` describes: its places, its inverse, and softening.
 
 The inverse is polynomials of x in buckets of force or area, found from their bits: `INVERSE_HEAD` numbers, then records
 of centre, rate, the sign of the side and INVERSE_DEGREE + 1 coefficients. They are guesses, which a Newton step on the
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,7 @@ INVERSE_HEAD = 6
 Y_LEAST, Y_LOW, Y_HIGH, Y_TURN, FIRST_BUCKET, END = range(INVERSE_HEAD)
 OCTAVES = 100  # below the largest value; lighter loads are found by iteration
 LEAST = float(np.finfo(float).tiny)
+SCAN = 49  # gaps at which a law's stiffness is looked at for its maximum
 
 
 @functools.cache
@@ -77,3 +79,22 @@ def inverse_block(which: int, block: FloatArray, end: float) -> FloatArray:
     head[[Y_LOW, Y_HIGH, Y_TURN, END]] = bottom, most, turn, end
     head.view(np.int64)[FIRST_BUCKET] = first
     return np.concatenate([head, records.ravel()])
+
+
+def softening(stiffness: Callable[[Any], Any], h_max: float, lowest: float, noise: float) -> float | None:
+    """Mean separation at which stiffness first falls with compression by more than `noise`, relatively; or None."""
+    from scipy.optimize import minimize_scalar
+
+    step = (h_max - lowest) / 2 / SCAN
+    u = h_max - step * np.arange(1, SCAN + 1)
+    u[-1] = max(u[-1], (h_max + lowest) / 2)
+    values = np.asarray(stiffness(u))
+    falls = values[1:] < values[:-1] * (1 - noise)
+    if not falls.any():
+        return None
+    peak = int(falls.argmax())
+    low, high = u[peak + 1], min(u[peak] + step, h_max)
+    found = minimize_scalar(
+        lambda x: -stiffness(x), bounds=(low, high), method="bounded", options={"xatol": 1e-7 * high}
+    )
+    return float(found.x)
