@@ -131,7 +131,8 @@ def _nodes_needed(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
     return wanted
 
 
-def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None) -> dict[str, Any]:
+def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None) -> tuple[Any, ...]:
+    """Phi_F, Phi_A and error (entries, 3), steps, nodes, and which entries failed."""
     phi = np.full((X.size, 3), np.nan)
     steps = np.zeros(X.size, dtype=np.int64)
     used = np.zeros(X.size, dtype=np.int64)
@@ -147,12 +148,13 @@ def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None)
         steps[now] += taken
         # nodes that were asked for give what they give
         failed[now] = ~(found[:, 2] <= (rtol if nodes is None else np.inf))
-    return {"phi": phi, "iterations": steps, "nodes": used, "failed": failed | ~np.isfinite(phi).all(axis=1)}
+    return phi, steps, used, failed | ~np.isfinite(phi).all(axis=1)
 
 
 def _solve_classical(
     X: FloatArray, mu: FloatArray, rtol: float, rings: int, damping: float, max_iterations: int
-) -> dict[str, Any]:
+) -> tuple[Any, ...]:
+    """The same by the damped iteration."""
     phi = np.full((X.size, 3), np.nan)
     steps = np.zeros(X.size, dtype=np.int64)
     failed = np.ones(X.size, dtype=bool)
@@ -164,7 +166,7 @@ def _solve_classical(
         change = [abs(c / f - 1) if f else 0.0 for f, c in zip(fine[2:4], coarse[2:4], strict=True)]
         phi[k, 2] = max(change) + rtol
         failed[k] = not (fine[1] and coarse[1])
-    return {"phi": phi, "iterations": steps, "nodes": np.full(X.size, rings), "failed": failed}
+    return phi, steps, np.full(X.size, rings), failed
 
 
 def ring_matrix(rings: int) -> FloatArray:
@@ -280,32 +282,22 @@ def solve(
     damping = number_in("damping", damping, 1e-6, 1.0)
     max_iterations = whole_number_in("max_iterations", max_iterations, 1, 10**9)
     shape = broadcast_shape(X=approach, mu=stiffness)
-    flat_X = np.broadcast_to(approach, shape).ravel()
-    flat_mu = np.broadcast_to(stiffness, shape).ravel()
+    flat_X, flat_mu = (np.broadcast_to(each, shape).ravel() for each in (approach, stiffness))
     if method == "newton":
-        found = _solve_newton(flat_X, flat_mu, rtol, nodes)
+        phi, steps, used, missed = _solve_newton(flat_X, flat_mu, rtol, nodes)
     else:
-        found = _solve_classical(flat_X, flat_mu, rtol, nodes or CLASSICAL_RINGS, damping, max_iterations)
-    result = IslandSolution(
-        X=flat_X.reshape(shape),
-        mu=flat_mu.reshape(shape),
-        phi_F=found["phi"][:, 0].reshape(shape),
-        phi_A=found["phi"][:, 1].reshape(shape),
-        error=found["phi"][:, 2].reshape(shape),
-        iterations=found["iterations"].reshape(shape),
-        nodes=found["nodes"].reshape(shape),
-        method=method,
-        rtol=rtol,
-        damping=damping,
-        max_iterations=max_iterations,
-    )
-    failed = found["failed"].reshape(shape)
+        rings = nodes or CLASSICAL_RINGS
+        phi, steps, used, missed = _solve_classical(flat_X, flat_mu, rtol, rings, damping, max_iterations)
+    fields: list[Any] = [part.reshape(shape) for part in (flat_X, flat_mu, *phi.T, steps, used)]
+    fields += [method, rtol, damping, max_iterations]
+    result = IslandSolution(*fields)
+    failed = missed.reshape(shape)
     if failed.any():
-        first = int(np.flatnonzero(failed.ravel())[0])
+        first = int(np.flatnonzero(missed)[0])
         raise ConvergenceError(
             f"{method} did not reach the accuracy asked for at {int(failed.sum())} of {failed.size} "
             f"entries, the first at X = {flat_X[first]:.6g}, mu = {flat_mu[first]:.6g} "
-            f"(reached {found['phi'][first, 2]:.1e}, asked {rtol:.1e})",
+            f"(reached {phi[first, 2]:.1e}, asked {rtol:.1e})",
             failed,
             result,
         )

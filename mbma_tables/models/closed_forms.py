@@ -54,20 +54,9 @@ class FormulaModel(Ranged):
         self.form, self.ranges, self.holds = form, RANGES[form], f", where the {form} form holds"
 
     def answer(self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise", which: int = BOTH) -> IslandAnswer:
-        """Phi_F and Phi_A with the largest error that the form's certificate states.
+        """Phi_F and Phi_A with the largest error that the form's certificate states, as `UniversalModel.answer`.
 
-        Parameters
-        ----------
-        X, mu : array_like
-            They broadcast.
-        outside : {"raise", "exact", "nan"}
-            Where X or mu is outside the form's range: an error, the exact solver, or NaN.
-        which : int
-            FORCE, AREA or BOTH; what is not asked for is NaN.
-
-        Raises
-        ------
-        InputError, OutOfRangeError
+        `which` is FORCE, AREA or BOTH; what is not asked for is NaN.
         """
         wanted = RESULTS if which == BOTH else (RESULTS[which],)
 
@@ -100,12 +89,8 @@ def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1
 
     Parameters
     ----------
-    surface : Surface
-        One surface or a batch; it broadcasts against `separation`.
-    separation : array_like
-        d between the rigid plane and the mid-plane [length].
-    E_star : array_like
-        Effective modulus; force is in its unit.
+    surface, separation, E_star
+        As for `mbma_tables.contact`, plain numbers.
 
     Returns
     -------

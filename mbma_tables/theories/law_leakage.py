@@ -27,29 +27,16 @@ MOST_OCTAVES = 20  # of gaps, from the blocked one on, next to which the flow is
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LeakageLaw:
-    """Flow conductance k h_rms^3 [length^3] of one surface against its gap, as `ContactLaw.leakage` has it.
+    """Flow conductance k h_rms^3 [length^3] of one surface against its gap, as `ContactLaw.leakage` has it."""
 
-    Attributes
-    ----------
-    law : ContactLaw
-        Whose area and mean separation it is of.
-    h_rms : float
-        Rms height [length].
-    blocked_at : float
-        Gap d at and below which contact percolates and the conductance is 0; -infinity where it never does.
-    error : float
-        Bound on the relative error of the polynomials, against the flow at the law's area. Errors of that area come on
-        top, times -d ln k/d ln A, which grows without limit towards `blocked_at`.
-    block : ndarray
-        In the layout of a law's block: the conductance in place of force, and its cube root, the
-        gap of parallel plates that pass as much, in place of area; of gaps from `blocked_at` to h_max, or to the end
-        of a law without last contact.
-    """
-
-    law: ContactLaw
-    h_rms: float
-    blocked_at: float
+    law: ContactLaw  # whose area and mean separation it is of
+    h_rms: float  # [length]
+    blocked_at: float  # gap d at and below which contact percolates and nothing flows; -infinity where it never does
+    # bound on the relative error of the polynomials, against the flow at the law's area; errors of that area come on
+    # top, times -d ln k/d ln A, which grows without limit towards `blocked_at`
     error: float
+    # in the layout of a law's block: the conductance in place of force, and its cube root, the gap of parallel plates
+    # that pass as much, in place of area; from `blocked_at` to h_max, or to the end of a law without last contact
     block: FloatArray
 
     def __call__(

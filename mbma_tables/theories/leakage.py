@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, require
+from mbma_tables.calibrated import spectrum_of
 from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
 from mbma_tables.labels import agree
@@ -20,7 +21,6 @@ from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.theories.leakage_table import flow_of_spectrum, self_affine, shipped_flow
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory
-from mbma_tables.theories.spectrum_laws import spectrum_of
 from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:

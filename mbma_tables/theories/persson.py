@@ -14,13 +14,12 @@ from typing import Literal
 import numpy as np
 
 from mbma_tables.arguments import FloatArray, finite_array, grouped, require
-from mbma_tables.calibrated import YANG_PERSSON, Law, area_persson
+from mbma_tables.calibrated import LAW_ERROR, YANG_PERSSON, Law, area_persson, self_affine_law, spectrum_of
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer, select
-from mbma_tables.theories.spectrum_laws import LAW_ERROR, self_affine_law, spectrum_of
 
 Method = Literal["full", "simplified"]
 
