@@ -216,7 +216,7 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[st
     answer(lowest + (highest - lowest) * (np.arange(LOOKED_AT) + 0.5) / LOOKED_AT)
     # where it has far larger errors at some gaps, as at the lightest contact of a small map, these tell of no others
     tolerance = max(min(rtol, RESOLVED), SHARE * float(np.median(errors[0])))
-    bends = np.asarray(theory.bends(surface), dtype=float)
+    bends = np.asarray(theory.elastic.bends(surface), dtype=float)
 
     width = highest if not ends else h_max / 2 if lowest else h_max
     above = fit.Side(1, lowest / width, lambda x: answer(width * x), tuple(bends / width))

@@ -142,7 +142,7 @@ class Theory(abc.ABC):
         high = np.broadcast_to(self.interval(surface)[1], u.shape)
         low = np.minimum(u, high)
         # from bend to bend, across which no rule converges
-        edges = np.sort([low, *(np.clip(bend, low, high) for bend in self.bends(surface)), high], axis=0)
+        edges = np.sort([low, *(np.clip(bend, low, high) for bend in self.elastic.bends(surface)), high], axis=0)
         found = tanhsinh(
             lambda x, place: self.at(u.shape, place).answer(select(surface, u.shape, place), x).force,
             edges[:-1],

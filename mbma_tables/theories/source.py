@@ -98,7 +98,7 @@ def concerns(theory: Theory, surface: AnySurface, u: FloatArray, answer: TheoryA
     """Every reason against a theory's answers, with its mask."""
     steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.force))
     text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"
-    measured = dict.fromkeys(theory.departures(surface), np.ones(np.shape(answer.force), dtype=bool))
+    measured = dict.fromkeys(theory.elastic.departures(surface), np.ones(np.shape(answer.force), dtype=bool))
     return {text: steep, **measured, **theory.concerns(surface, answer, u)}
 
 

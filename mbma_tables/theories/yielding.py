@@ -129,14 +129,6 @@ class Yielding(Theory):
         other.__dict__.update(self.__dict__ | fields)
         return other
 
-    def departures(self, surface: AnySurface) -> tuple[str, ...]:
-        """As of the elastic theory."""
-        return self._elastic.departures(surface)
-
-    def scatter_name(self, surface: AnySurface) -> str:
-        """The elastic theory's."""
-        return self._elastic.scatter_name(surface)
-
     @property
     def elastic(self) -> Theory:
         """The theory of the elastic contact."""
@@ -152,10 +144,6 @@ class Yielding(Theory):
     def stiffer(self, times: FloatArray) -> Theory:
         """With hardnesses that are less of the modulus."""
         return self.changed(hardness=np.asarray(self.hardness / times))
-
-    def bends(self, surface: AnySurface) -> FloatArray:
-        """Where derivatives of the elastic force jump."""
-        return self._elastic.bends(surface)
 
     def _eta(self, surface: AnySurface) -> FloatArray:
         """p_m/(E* g)."""
@@ -207,10 +195,6 @@ class Yielding(Theory):
         least = 0.0 if self.ends_at_h_max else np.finfo(float).tiny
         return self._elastic.inverted(surface, "force", np.maximum(force, least))[0]
 
-    def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The elastic theory's."""
-        return self._elastic.bearing_share(surface, mean_separation)
-
     def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which the elastic force falls, and Gaussian heights end in numbers."""
         low, high = self._elastic.interval(surface, "force")
@@ -259,7 +243,7 @@ class Yielding(Theory):
         Those of the calibrated law are measured; others are what the elastic theory's become, and the hardness law's
         own beside it. NaN where the elastic theory's is not known.
         """
-        eta, table, name = self._eta(surface), shipped(), self.scatter_name(surface)
+        eta, table, name = self._eta(surface), shipped(), self._elastic.scatter_name(surface)
         force, contact = self._elastic.scatter(surface, area)
         found = table.standard_deviation(name, "force", eta, area, force)
         return found, table.standard_deviation(name, "area", eta, area, contact)
@@ -267,7 +251,7 @@ class Yielding(Theory):
     def stiffness_scatter(self, surface: AnySurface, area: FloatArray) -> FloatArray:
         """Standard deviation of ln of the frozen contact's stiffness at given F; NaN where it was not measured."""
         eta, elastic = self._eta(surface), self._elastic.stiffness_scatter(surface, area)
-        return shipped().standard_deviation(self.scatter_name(surface), "stiffness", eta, area, elastic)
+        return shipped().standard_deviation(self._elastic.scatter_name(surface), "stiffness", eta, area, elastic)
 
     def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """The elastic theory's reasons, and hardnesses below those that were simulated."""
