@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, number_in, require
+from mbma_tables.arguments import FloatArray, number_in
 from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.height_integrals import height_integral
@@ -127,38 +126,6 @@ class RigidModel:
         force = none if which == AREA else math.pi / 5 * mu * height_integral(2.5, -X)
         area = none if which == FORCE else math.pi / 2 * height_integral(2.0, -X)
         return IslandAnswer(force, area, np.full(X.shape, CLOSED_FORM_ERROR))
-
-
-class Ranged:
-    """A model of X and mu in `ranges`: what lies outside is refused, solved exactly, or NaN."""
-
-    ranges: Mapping[str, tuple[float, float]]
-    holds = ""  # what a refusal says beside a range
-
-    def _inside(
-        self, X: ArrayLike, mu: ArrayLike, refuse: bool = True
-    ) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
-        """Flat arguments and their common shape, refused where the model does not reach."""
-        given = {"X": finite_array("X", X), "mu": finite_array("mu", mu)}
-        for name, array in given.items() if refuse else ():
-            low, high = self.ranges[name]
-            require(name, array, (array >= low) & (array <= high), f"in [{low:g}, {high:g}]{self.holds}")
-        require("mu", given["mu"], given["mu"] >= 0, "at least 0")
-        shape = broadcast_shape(**given)
-        flat_X, flat_mu = (np.ascontiguousarray(np.broadcast_to(a, shape)).ravel() for a in given.values())
-        return flat_X, flat_mu, shape
-
-    def _answered(
-        self, X: ArrayLike, mu: ArrayLike, outside: str, fill: Callable[[FloatArray, FloatArray], FloatArray]
-    ) -> IslandAnswer:
-        """Rows that `fill` answers of flat arguments, NaN outside of the ranges."""
-        check_outside(outside)
-        flat_X, flat_mu, shape = self._inside(X, mu, outside == "raise")
-        out = fill(flat_X, flat_mu)
-        missing = np.isnan(out[2])
-        if outside == "exact" and missing.any():
-            out[:, missing] = SOLVER.answer(flat_X[missing], flat_mu[missing])
-        return IslandAnswer(*(row.reshape(shape)[()] for row in out))
 
 
 def exact_model(rtol: float) -> ExactModel:

@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, positive_modulus, require
 from mbma_tables.errors import InputError
-from mbma_tables.models import BOTH, IslandAnswer, Ranged
+from mbma_tables.models import BOTH, IslandAnswer
 from mbma_tables.models import closed_form_functions as printed
 from mbma_tables.models.closed_form_functions import CERTIFICATES, RANGES
+from mbma_tables.models.universal import Ranged
 from mbma_tables.surfaces.surface import Surface
 
 ISLAND_FORMS = ("pocket", "standard", "long")

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.arguments import FloatArray, finite_array
+from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
 from mbma_tables.core import core, in_blocks
 from mbma_tables.display import Displayed, Variable
 from mbma_tables.errors import TableFileError
-from mbma_tables.models import BOTH, IslandAnswer, Ranged
+from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
 from mbma_tables.plots import draw_lines
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
 
@@ -26,6 +26,38 @@ SHOWN = 65  # places along an axis of the table as a Dataset
 BLOCK = 1 << 16  # islands between two looks for Ctrl-C
 TERMS = 8  # of each polynomial along each axis
 RECORD = 8 + 2 * TERMS**2  # doubles of a cell, `mbma_cell` of mbma.h
+
+
+class Ranged:
+    """A model of X and mu in `ranges`: what lies outside is refused, solved exactly, or NaN."""
+
+    ranges: Mapping[str, tuple[float, float]]
+    holds = ""  # what a refusal says beside a range
+
+    def _inside(
+        self, X: ArrayLike, mu: ArrayLike, refuse: bool = True
+    ) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
+        """Flat arguments and their common shape, refused where the model does not reach."""
+        given = {"X": finite_array("X", X), "mu": finite_array("mu", mu)}
+        for name, array in given.items() if refuse else ():
+            low, high = self.ranges[name]
+            require(name, array, (array >= low) & (array <= high), f"in [{low:g}, {high:g}]{self.holds}")
+        require("mu", given["mu"], given["mu"] >= 0, "at least 0")
+        shape = broadcast_shape(**given)
+        flat_X, flat_mu = (np.ascontiguousarray(np.broadcast_to(a, shape)).ravel() for a in given.values())
+        return flat_X, flat_mu, shape
+
+    def _answered(
+        self, X: ArrayLike, mu: ArrayLike, outside: str, fill: Callable[[FloatArray, FloatArray], FloatArray]
+    ) -> IslandAnswer:
+        """Rows that `fill` answers of flat arguments, NaN outside of the ranges."""
+        check_outside(outside)
+        flat_X, flat_mu, shape = self._inside(X, mu, outside == "raise")
+        out = fill(flat_X, flat_mu)
+        missing = np.isnan(out[2])
+        if outside == "exact" and missing.any():
+            out[:, missing] = SOLVER.answer(flat_X[missing], flat_mu[missing])
+        return IslandAnswer(*(row.reshape(shape)[()] for row in out))
 
 
 class UniversalModel(Ranged, Displayed):

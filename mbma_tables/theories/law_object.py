@@ -214,8 +214,10 @@ class ContactLaw(Law, Displayed):
 
         def check(given: Any) -> FloatArray:
             wanted = finite_array(name, given)
+            if ((wanted >= max(least, 0.0)) & (wanted <= most)).all():
+                return wanted
             known = self.units.length, self.units.stress if key == "force" else None
-            length, unit = ("" if name in (None, "1") else f" {name}" for name in known)
+            length, unit = ("" if own in (None, "1") else f" {own}" for own in known)
             low, high = f"at least {least:.6g}{unit}", f"at most {most:.6g}{unit}"
             require(name, wanted, wanted >= 0, "at least 0")
             require(name, wanted, wanted >= least, f"{low}, where the law of {self.theory!r} ends", unit)
