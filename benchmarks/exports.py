@@ -16,7 +16,7 @@ from benchmarks.rows import microseconds, report, rounds, times_faster
 from mbma_tables import Surface, contact, open_table
 from mbma_tables.export.c_code import FLAGS
 from mbma_tables.export.code import SOURCES, write_code
-from mbma_tables.totals.contact import totals_at
+from mbma_tables.theories import Mbma
 from mbma_tables.totals.island_sum import QUADRATURE_SHARE
 
 POINTS, SURFACES, GAPS = 20_000, 2000, 200
@@ -59,13 +59,13 @@ def exported(rng: np.random.Generator) -> None:
             "C totals": lambda: library.mbma_totals(
                 many, *map(at, known), share, reading, table, 0, at(sums), at(bound), at(status), ctypes.byref(seen)
             ),
-            "derivatives": lambda: totals_at(surface, gaps, rtol=RTOL, derivatives=True),
+            "derivatives": lambda: Mbma(rtol=RTOL).totals(surface, gaps, derivatives=True),
             "C derivatives": lambda: library.mbma_totals_of(
                 at(numbers), count, at(gaps), one, rtol, at(contacts), at(by[0]), at(by[1]), None
             ),
         }
     )
-    phi, total, near = model.answer(X, mu), contact(surfaces, apart, rtol=RTOL), totals_at(surface, gaps, rtol=RTOL)
+    phi, total, near = model.answer(X, mu), contact(surfaces, apart, rtol=RTOL), Mbma(rtol=RTOL).totals(surface, gaps)
     unit = surfaces.q0 * surfaces.s
     click.echo(f"\nExported C, {' '.join(FLAGS[1:])} -march=native")
     for name, entries, found, right in (

@@ -46,7 +46,7 @@ TURN = 0.01  # of ln A_el, for derivatives
 FOLDS = 5
 REFERENCE = pathlib.Path(__file__).parents[1] / "docs" / "data" / "hardness.csv"  # another code's surfaces
 WAVES = 3  # longest waves a side: with fewer h_max says little of the highest heights
-MODULES = ("mbma_tables.hardness", "mbma_tables.bearing_curve", "generate.calibrated_hardness")
+MODULES = ("mbma_tables.hardness", "generate.calibrated_hardness")
 
 
 def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> FloatArray:

@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mbma_tables.core import in_blocks
 from mbma_tables.errors import InputError, MbmaError, OutOfRangeError
 
 SHOWN = 3  # offending entries quoted in a message
+BLOCK = 1 << 16  # entries between two looks for Ctrl-C
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,6 +87,11 @@ def is_labelled(value: Any) -> bool:
     return xarray is not None and isinstance(value, xarray.DataArray)
 
 
+def any_labelled(surface: Any, *values: Any) -> bool:
+    """Whether a surface or any value is of DataArrays."""
+    return "xarray" in sys.modules and (surface.labelled or any(map(is_labelled, values)))
+
+
 def finite_array(name: str, value: ArrayLike) -> FloatArray:
     """`value` as a float64 array; empty, masked, complex, non-numeric, NaN or infinite input is refused.
 
@@ -132,6 +139,21 @@ def rows(*given: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
     for k, array in enumerate(arrays):
         table[k] = array
     return table.reshape(len(arrays), -1), shape
+
+
+def answered(fill: Callable[..., Any], given: tuple[ArrayLike, ...], outputs: int = 1, *more: Any) -> list[FloatArray]:
+    """Rows that a loop of the core, ``fill(*given, *more, *rows)``, makes of what is given, of its broadcast shape."""
+    known, shape = rows(*given)
+    out = np.empty((outputs, known.shape[1]))
+    in_blocks(lambda some: fill(*known[:, some], *more, *out[:, some]), known.shape[1], BLOCK)
+    return list(out.reshape(outputs, *shape))
+
+
+def grouped(owner: NDArray[np.intp]) -> list[tuple[int, NDArray[np.intp]]]:
+    """The numbers that occur among owners, each with its places."""
+    order = np.argsort(owner, kind="stable")
+    known, first = np.unique(owner[order], return_index=True)
+    return list(zip(known.tolist(), np.split(order, first[1:]), strict=False))
 
 
 def require(name: str, value: FloatArray, good: Any, allowed: str, unit: str = "") -> None:

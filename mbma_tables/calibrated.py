@@ -24,13 +24,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.core import core, in_blocks
+from mbma_tables.arguments import FloatArray, answered, require
+from mbma_tables.core import core
 from mbma_tables.errors import ConvergenceError, InputError
 
 POWERS = (1, 3, 16)  # of the cover in the weight W
 NARROWNESS = 0.65  # that W's slope refers to
-BLOCK = 65536  # numbers answered between two chances of Ctrl-C
+LAW_ERROR = 1e-7  # of a measured spectrum's law
+TESTED_AREA = (1e-3, 0.97)  # A/A0 that was simulated
+KEPT = 256  # spectra and laws of surfaces that are kept while these are asked again
 UNRESOLVED = 4  # the core's status where a quadrature did not reach its tolerance
 
 
@@ -63,10 +65,7 @@ def area_persson(force: ArrayLike) -> FloatArray:
 
 
 def _area(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
-    load, light = np.broadcast_arrays(np.asarray(force, float), s0)
-    out = np.empty(load.shape)
-    core.contact_area(np.ascontiguousarray(load), np.ascontiguousarray(light), t0, out)
-    return out
+    return answered(core.contact_area, (force, s0), 1, t0)[0]
 
 
 def force_of(e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
@@ -179,10 +178,7 @@ class Law:
 
     def _asked(self, function: Any, given: ArrayLike, rows: int) -> list[FloatArray]:
         """Rows of what a function of the core answers of an array."""
-        values = np.asarray(given, float)
-        flat, out = np.ascontiguousarray(values).ravel(), np.empty((rows, values.size))
-        in_blocks(lambda k: function(self._prepared, flat[k], *out[:, k]), flat.size, BLOCK)
-        return [row.reshape(values.shape) for row in out]
+        return answered(lambda *entries: function(self._prepared, *entries), (given,), rows)
 
     def energy(self, force: ArrayLike) -> FloatArray:
         """Elastic energy U of the endless Gaussian surface, before its tail factor."""
@@ -219,6 +215,27 @@ class Law:
     def area(self, force: ArrayLike) -> FloatArray:
         """A/A0 at F/(A0 E* g)."""
         return area(force, self.spectrum.alpha, self.constants)
+
+
+@functools.lru_cache(KEPT)
+def self_affine_law(hurst: float, zeta_1: float, h_max: float | None, constants: Constants = CONSTANTS) -> Law:
+    """The law of a self-affine surface, kept while it is asked again."""
+    return Law(Spectrum.self_affine(hurst, zeta_1), h_max, constants)
+
+
+@functools.lru_cache(KEPT)
+def spectrum_of(surface: Any) -> Spectrum:
+    """The spectrum of a `MeasuredSurface`."""
+    return Spectrum.from_samples(*(np.ascontiguousarray(part, float) for part in (surface.q, surface.C)))
+
+
+def force_at_area(area: ArrayLike, light: ArrayLike) -> FloatArray:
+    """F/(A0 E* g) at A/A0."""
+    from scipy.special import erfinv
+
+    share = np.asarray(area, float)
+    require("area", share, (share >= 0) & (share < 1), "below 1, which is reached at infinite load")
+    return force_of(erfinv(share), light)
 
 
 def mean_top_height(share: ArrayLike) -> FloatArray:

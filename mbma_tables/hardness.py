@@ -22,13 +22,17 @@ import dataclasses
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import erfinv, ndtri
+from scipy.interpolate import PchipInterpolator
+from scipy.special import erfinv, ndtr, ndtri
 
-from mbma_tables.arguments import FloatArray, rows
-from mbma_tables.bearing_curve import BearingCurve as BearingCurve
-from mbma_tables.bearing_curve import bearing_share as bearing_share
-from mbma_tables.bearing_curve import filled
+from mbma_tables.arguments import FloatArray, answered
+from mbma_tables.bearing import FRACTIONS
 from mbma_tables.core import core
+from mbma_tables.errors import InputError
+
+MOST_SHARE = 0.9  # of a map's heights up to which a node stands for its own
+DEPTH = 30.0  # of a map's valleys below the last node, in levels
+MIN_SPACING = 0.02  # relative, of mean gaps between nodes of a map's bearing curve
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,34 +51,23 @@ class Constants:
     plane_eta: float = 3.375  # between mean planes interpenetration falls as exp(-(plane_eta - plane_load x) eta)
     plane_load: float = 2.505
 
-    @property
-    def exponent(self) -> tuple[float, float, float]:
-        """n0, c and d."""
-        return self.force_light, self.force_eta, self.force_share
-
 
 CONSTANTS = Constants()
 
 
 def area(force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """A/A0 at F/(A0 E* g), at most eta, from the elastic A/A0 at that force; above 1 only where that is."""
-    return np.maximum(elastic_area, 1.0) * _between_walls(
-        force, elastic_area, eta, (constants.area_power, constants.area_scale), 0
-    )
+    given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
+    share = answered(core.capped_area, given, 1, c.area_power, c.area_scale, 0)[0]
+    return share * np.maximum(elastic_area, 1.0)
 
 
 def yielded_area(
     force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS
 ) -> FloatArray:
     """Yielded part of A/A0, likewise."""
-    return _between_walls(force, elastic_area, eta, (constants.yield_power, constants.yield_scale), 1)
-
-
-def _between_walls(
-    force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, numbers: tuple[float, float], yielded: int
-) -> FloatArray:
-    known, shape = rows(force, erfinv(np.minimum(elastic_area, 1.0)), eta)
-    return filled(core.capped_area, known, np.empty(known.shape[1]), *numbers, yielded).reshape(shape)
+    given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
+    return answered(core.capped_area, given, 1, c.yield_power, c.yield_scale, 1)[0]
 
 
 def diffused(x: ArrayLike, tau: ArrayLike, sign: float) -> FloatArray:
@@ -82,8 +75,7 @@ def diffused(x: ArrayLike, tau: ArrayLike, sign: float) -> FloatArray:
 
     What has not ended at 0, or with a negative `sign` what has ended at 1.
     """
-    known, shape = rows(x, tau)
-    return filled(core.diffused, known, np.empty(known.shape[1]), int(sign < 0)).reshape(shape)
+    return answered(core.diffused, (x, tau), 1, int(sign < 0))[0]
 
 
 def force(
@@ -95,9 +87,9 @@ def force(
     constants: Constants = CONSTANTS,
 ) -> tuple[FloatArray, FloatArray]:
     """F/(A0 E* g) at a mean gap u and -dF/du, from the elastic force and stiffness, and from Q and dQ/du, there."""
-    known, shape = rows(elastic_force, stiffness, share, slope, eta)
-    found, steep = filled(core.capped_force, known, np.empty((2, known.shape[1])), *constants.exponent)
-    return found.reshape(shape), steep.reshape(shape)
+    exponent = constants.force_light, constants.force_eta, constants.force_share
+    found, steep = answered(core.capped_force, (elastic_force, stiffness, share, slope, eta), 2, *exponent)
+    return found, steep
 
 
 def frozen_factor(eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
@@ -112,3 +104,50 @@ def plane_separation(u: ArrayLike, load: ArrayLike, eta: ArrayLike, constants: C
     with np.errstate(invalid="ignore"):
         flattened = np.where(x > 0, np.exp(-d * d / 2) / np.sqrt(2 * np.pi) - d * x, 0.0)
     return np.asarray(u - flattened * np.exp(-(constants.plane_eta - constants.plane_load * x) * cap))
+
+
+def bearing_share(u: ArrayLike, h_max: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
+    """Q(u), share of Gaussian heights above the level of mean gap u [h_rms], and dQ/du; with `h_max` it ends there."""
+    share, slope = answered(core.bearing_share, (u, np.inf if h_max is None else h_max), 2)
+    return share, slope
+
+
+def _levels(u: FloatArray) -> FloatArray:
+    """Levels of Gaussian heights at mean gaps [h_rms]."""
+    return answered(core.gaussian_level, (u,))[0]
+
+
+class BearingCurve:
+    """Q(u) of a map's own heights: of M(a) [h_rms] of `mbma_tables.bearing`, a = `FRACTIONS`, and its highest point."""
+
+    def __init__(self, mean_height: FloatArray, h_max: float) -> None:
+        above = FRACTIONS * mean_height
+        # d(a M)/da is the level z(a), and the mean gap below it is z (1 - a) + a M
+        level = np.minimum.accumulate(np.diff(above) / np.diff(FRACTIONS))
+        share = np.sqrt(FRACTIONS[1:] * FRACTIONS[:-1])
+        gap = level * (1 - share) + np.interp(share, FRACTIONS, above)
+        # the smallest shares are single points: nodes as close as theirs would make steps; the last one ends at valleys
+        kept, last = np.zeros(gap.size, bool), h_max
+        for k, own in enumerate(gap):
+            if 0 < own < (1 - MIN_SPACING) * last and share[k] < MOST_SHARE:
+                kept[k], last = True, own
+        if not kept.any():
+            raise InputError(
+                f"nearly {MOST_SHARE:.0%} of the map or more is its highest point: it has no bearing curve"
+            )
+        self._top, self._lightest, self._h_max = float(gap[kept][0]), float(share[kept][0]), h_max
+        # against Gaussian heights; valleys below the last node as deep as theirs
+        level, own = _levels(gap[kept][::-1]), -ndtri(share[kept][::-1])
+        self._deepest = float(level[0]) - DEPTH
+        self._level = PchipInterpolator(np.append(self._deepest, level), np.append(own[0] - DEPTH, own))
+        self._rate = self._level.derivative()
+
+    def __call__(self, u: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Q and dQ/du at mean gaps [h_rms]; straight to zero at the highest point above the first share."""
+        gap = np.asarray(u, float)
+        d = np.maximum(_levels(np.clip(gap, 0.0, self._top)), self._deepest)
+        own = self._level(d)
+        share, slope = ndtr(-own), -np.exp(-own * own / 2) / np.sqrt(2 * np.pi) * self._rate(d) / ndtr(d)
+        steep = -self._lightest / (self._h_max - self._top)
+        light, rest = gap > self._top, np.maximum(self._h_max - gap, 0.0)
+        return np.where(light, -steep * rest, share), np.where(light, np.where(rest > 0, steep, 0.0), slope)

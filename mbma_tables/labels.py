@@ -16,7 +16,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 
 
 def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
-    """`function` of broadcast arguments, block by block where they are dask arrays."""
+    """The tuple that `function` answers of broadcast arguments, block by block where they are dask arrays."""
     # xarray comes in with its own objects
     import xarray as xr
 
@@ -25,11 +25,12 @@ def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
     def block(*fields: Any) -> Any:
         if whole and not all(np.size(field) for field in fields):
             # a chunk of a dask array may be empty, an array may not
-            empty = np.empty(np.broadcast_shapes(*(np.shape(field) for field in fields)))
-            return empty if outputs == 1 else (empty,) * outputs
-        return function(*fields)
+            found = (np.empty(np.broadcast_shapes(*map(np.shape, fields))),) * outputs
+        else:
+            found = function(*fields)
+        return found[0] if outputs == 1 else found
 
-    return xr.apply_ufunc(
+    found = xr.apply_ufunc(
         block,
         *arguments,
         input_core_dims=[[]] * len(arguments),
@@ -39,6 +40,7 @@ def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
         join="exact",
         keep_attrs=False,
     )
+    return (found,) if outputs == 1 else found
 
 
 def refuse_plain(arguments: Mapping[str, Any]) -> None:
@@ -63,8 +65,6 @@ def apply_to_surface(answer: Any, surface: AnySurface, arrays: Mapping[str, Any]
     refuse_plain(arguments)
 
     def block(*numbers: Any) -> Any:
-        found = answer(surface.with_numbers(*numbers[:count]), *numbers[count:])
-        return found[0] if outputs == 1 else found
+        return answer(surface.with_numbers(*numbers[:count]), *numbers[count:])
 
-    found = apply(block, tuple(arguments.values()), outputs)
-    return (found,) if outputs == 1 else found
+    return apply(block, tuple(arguments.values()), outputs)

@@ -33,7 +33,6 @@ from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, area
 LARGEST_AREA = 0.3  # above it cells of one spectrum differ by factors
 BANDS = 64  # of a spectrum, graded towards both ends
 NODES, LOWEST_GAP, REACH = 80, 1e-6, 8.0  # quadrature in ln(h/s), from u1/s - 8 or 1e-6 to u1/s + 8
-ITERATIONS, TOLERANCE = 80, 1e-12
 NO_COVER = 1e-13  # share of the surface between two magnifications
 NEAREST = 1e-4  # of A/A0 to the threshold
 LOADS = 4000  # between which the load of a contact fraction is interpolated
@@ -173,18 +172,13 @@ def log_factor(found: Gaps, flow: FlowConstants) -> FloatArray:
 
 
 def effective_medium(share: FloatArray, log_cube: FloatArray, blocked: FloatArray) -> FloatArray:
-    """ln k of sum share (h^3 - k)/(h^3 + k) = blocked: Newton's method within a bracket."""
-    low, high = log_cube.min(axis=1), log_cube.max(axis=1)
-    log_k = np.log(np.sum(share * np.exp(log_cube), axis=1))
-    for turn in range(ITERATIONS):
-        ratio = np.tanh((log_cube - log_k[:, None]) / 2)
-        miss = np.sum(share * ratio, axis=1) - blocked
-        low, high = np.where(miss > 0, log_k, low), np.where(miss > 0, high, log_k)
-        step = 2 * miss / np.sum(share * (1 - ratio**2), axis=1)
-        following = log_k + step
-        # halved in every third turn: on steps of the sum Newton's method hardly moves
-        inside = (following > low) & (following < high) & (turn % 3 < 2)
-        log_k = np.where(inside, following, (low + high) / 2)
-        if np.all((np.abs(step) < TOLERANCE) | (high - low < TOLERANCE)):
-            break
-    return np.asarray(log_k)
+    """ln k of sum share (h^3 - k)/(h^3 + k) = blocked."""
+    from scipy.optimize.elementwise import find_root
+
+    def miss(log_k: FloatArray, load: FloatArray) -> FloatArray:
+        row = load.astype(int)
+        return np.asarray(np.sum(share[row] * np.tanh((log_cube[row] - log_k[..., None]) / 2), axis=-1) - blocked[row])
+
+    return np.asarray(
+        find_root(miss, (log_cube.min(axis=1), log_cube.max(axis=1)), args=(np.arange(float(len(share))),)).x
+    )

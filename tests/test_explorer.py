@@ -19,7 +19,7 @@ from helpers import random_map, refused, run
 
 from mbma_tables import InputError, Surface, contact
 from mbma_tables.export.explorer import MODULE, c_sources, digest_of, explorer_page, packed, page_file
-from mbma_tables.totals.contact import totals_at
+from mbma_tables.theories import Mbma
 
 QUANTITIES = {"gap": "mean_separation", "force": "force", "area": "area", "stiffness": "stiffness"}
 NAMES = ("hurst", "q0", "q1", "h_rms", "h_max")
@@ -125,7 +125,7 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
         if theory == "mbma":
             # islands summed gap by gap, as the page does it, and with their derivatives
             gap = 2 * options["mean_separation"] - surface.h_max
-            sums = totals_at(surface, gap, reading=state["reading"], rtol=1e-11, derivatives=True)
+            sums = Mbma(reading=state["reading"], rtol=1e-11).totals(surface, gap, derivatives=True)
             E_star = state["E_star"]
             force, area, stiffness = E_star * sums.force, sums.area, -2 * E_star * sums.force_by["separation"]
         for name, values in {"force": force, "area": area, "stiffness": stiffness}.items():

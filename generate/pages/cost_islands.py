@@ -15,8 +15,8 @@ from generate.timing import measure, variant
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.classical import iterate, radius, ring_matrix
 from mbma_tables.islands.geometry import geometry
+from mbma_tables.islands.greenwood_tripp import iterate, radius, ring_matrix
 from mbma_tables.models import TIERS, answer_islands, get_model
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.scenes.costs import Row

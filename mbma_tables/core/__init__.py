@@ -40,6 +40,8 @@ def in_blocks(fill: Callable[[slice], Answer], count: int, size: int, workers: i
 
     Blocks are the same whatever the number of threads, `workers`, and so are the bits of what they fill.
     """
+    if 0 < count <= size:
+        return [fill(slice(0, count))]
     blocks = [slice(first, min(first + size, count)) for first in range(0, count, size)]
     others = min(workers, len(blocks)) - 1
     if others <= 0:

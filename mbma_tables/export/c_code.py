@@ -20,14 +20,14 @@ import numpy as np
 
 from mbma_tables import __version__
 from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import YANG_PERSSON
+from mbma_tables.calibrated import LAW_ERROR, YANG_PERSSON
 from mbma_tables.errors import InputError
 from mbma_tables.export.text import filled, opening
 from mbma_tables.models import closed_form_functions
 from mbma_tables.models.universal import RECORD, UniversalModel
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1
-from mbma_tables.theories import calibrated_table, persson, spectrum_laws
+from mbma_tables.theories import calibrated_table, persson
 from mbma_tables.totals.island_sum import QUADRATURE_SHARE
 
 FORM = "standard"  # that of tier "formula"
@@ -101,7 +101,7 @@ def model_texts(heads: dict[str, str]) -> dict[str, str]:
         "MAX_RTOL": repr(MAX_RTOL),
         "QUADRATURE_SHARE": repr(QUADRATURE_SHARE),
         "CALIBRATED_ERROR": repr(calibrated_table.shipped().error),
-        "LAW_ERROR": repr(spectrum_laws.LAW_ERROR),
+        "LAW_ERROR": repr(LAW_ERROR),
         "PERSSON_ERROR": repr(persson.INVERSE_RTOL),
     }
     return {name: filled(name, **parts, HEADER=heads[name]) for name in ("mbma_model.h", "mbma_model.c")}

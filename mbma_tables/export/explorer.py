@@ -19,6 +19,7 @@ import numpy as np
 
 from mbma_tables import __version__
 from mbma_tables.arguments import number_in, positive_modulus
+from mbma_tables.calibrated import TESTED_AREA
 from mbma_tables.errors import InputError
 from mbma_tables.export import c_code
 from mbma_tables.export.code import web_assembly
@@ -27,8 +28,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import FITTED, PRINTED, REPORTED, get_reading
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.theories import calibrated, calibrated_table, mbma, result
-from mbma_tables.theories.spectrum_laws import TESTED_AREA
+from mbma_tables.theories import calibrated, calibrated_table, mbma, source
 from mbma_tables.units import Units
 
 MODULE = "explorer.wasm"
@@ -115,7 +115,7 @@ def _limits() -> dict[str, Any]:
             }
             for name, rows in table.scatter.items()
         },
-        "gradient": result.MAX_GRADIENT,
+        "gradient": source.MAX_GRADIENT,
         "mbma_area": mbma.MAX_AREA,
         "hurst": calibrated.TESTED_HURST,
         "zeta_1": calibrated.TESTED_ZETA_1,

@@ -120,13 +120,7 @@ def s_over_h_rms(surface: MeasuredSurface) -> float:
 
 
 def floors_of(surface: MeasuredSurface, reading: Reading) -> Floors:
-    """The floors of a reading.
-
-    Raises
-    ------
-    OutOfRangeError
-        Where the spectrum ends below the floor of q_u.
-    """
+    """The floors of a reading, refused where the spectrum ends below that of q_u."""
     if not surface.q1 > reading.floor_u * surface.longest:
         raise OutOfRangeError(
             f"the spectrum ends at q = {surface.q1:.4g}, and MBMA's smallest band at {reading.floor_u:g} times "

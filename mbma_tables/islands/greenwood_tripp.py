@@ -4,7 +4,9 @@ Heights are in units of the summits' standard deviation sigma, radii in units of
 
     d(rho) = rho^2 - X + w(rho),   p = (mu/2) F_{3/2}(d),   w = (4/pi) integral t/(t + rho) p K(k) dt
 
-so that every island of every surface is one point of two functions Phi_F(X, mu) and Phi_A(X, mu).
+so that every island of every surface is one point of two functions Phi_F(X, mu) and Phi_A(X, mu). The classical method
+is the paper's, the damped iteration of Greenwood and Tripp: rings of equal width, the pressure taken constant over
+each, and w <- w + damping (w[p] - w) until nothing changes. It slows down and then diverges as mu grows.
 """
 
 from __future__ import annotations
@@ -20,7 +22,6 @@ from numpy.typing import ArrayLike, NDArray
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, number_in, require, whole_number_in
 from mbma_tables.core import core, in_blocks
 from mbma_tables.errors import ConvergenceError, InputError
-from mbma_tables.islands.classical import solve_classical
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.islands.spectral import basis
 
@@ -32,6 +33,7 @@ MAX_NODES = {"newton": 1024, "classical": 2048}  # a few seconds for an island
 CLASSICAL_RINGS = 200
 BLOCK = 1 << 22  # islands times nodes^2 in one call of the core, well under a second, which no signal interrupts
 COARSE_NODES = 12  # of the first guess
+PRODUCTS = 1 << 26  # of a ring and a ring between two looks for Ctrl-C, at most about 0.1 s
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -129,7 +131,8 @@ def _nodes_needed(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
     return wanted
 
 
-def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None) -> dict[str, Any]:
+def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None) -> tuple[Any, ...]:
+    """Phi_F, Phi_A and error (entries, 3), steps, nodes, and which entries failed."""
     phi = np.full((X.size, 3), np.nan)
     steps = np.zeros(X.size, dtype=np.int64)
     used = np.zeros(X.size, dtype=np.int64)
@@ -145,12 +148,13 @@ def _solve_newton(X: FloatArray, mu: FloatArray, rtol: float, nodes: int | None)
         steps[now] += taken
         # nodes that were asked for give what they give
         failed[now] = ~(found[:, 2] <= (rtol if nodes is None else np.inf))
-    return {"phi": phi, "iterations": steps, "nodes": used, "failed": failed | ~np.isfinite(phi).all(axis=1)}
+    return phi, steps, used, failed | ~np.isfinite(phi).all(axis=1)
 
 
 def _solve_classical(
     X: FloatArray, mu: FloatArray, rtol: float, rings: int, damping: float, max_iterations: int
-) -> dict[str, Any]:
+) -> tuple[Any, ...]:
+    """The same by the damped iteration."""
     phi = np.full((X.size, 3), np.nan)
     steps = np.zeros(X.size, dtype=np.int64)
     failed = np.ones(X.size, dtype=bool)
@@ -162,7 +166,63 @@ def _solve_classical(
         change = [abs(c / f - 1) if f else 0.0 for f, c in zip(fine[2:4], coarse[2:4], strict=True)]
         phi[k, 2] = max(change) + rtol
         failed[k] = not (fine[1] and coarse[1])
-    return {"phi": phi, "iterations": steps, "nodes": np.full(X.size, rings), "failed": failed}
+    return phi, steps, np.full(X.size, rings), failed
+
+
+def ring_matrix(rings: int) -> FloatArray:
+    """w at the rings' middles per unit radius a, from pressures on `rings` rings of equal width (Eq. 37)."""
+    from scipy.special import ellipkm1
+
+    r = (np.arange(rings) + 0.5) / rings
+    t, rho = r[None, :], r[:, None]
+    complement = ((t - rho) / (t + rho)) ** 2
+    np.fill_diagonal(complement, 1.0)
+    matrix: FloatArray = 4 / np.pi * t / (t + rho) * ellipkm1(complement) / rings
+    # the midpoint rule across ln|t - rho| is of second order with ln(h/2 pi) in the ring itself
+    np.fill_diagonal(matrix, 2 / np.pi * np.log(16 * np.pi * r * rings) / rings)
+    return matrix
+
+
+def iterate(
+    X: float,
+    mu: float,
+    a: float,
+    matrix: FloatArray,
+    damping: float,
+    tolerance: float,
+    max_iterations: int,
+    w: FloatArray,
+    p: FloatArray,
+) -> tuple[int, bool, float, float]:
+    """Iterate from w = 0; returns iterations, whether it converged, Phi_F and Phi_A, NaN where it diverged."""
+    w[:] = 0.0
+    phi, used = np.zeros(2), np.zeros(1, dtype=np.int64)
+    iterations, converged = 0, False
+    # the core does not look for Ctrl-C: it gets a fraction of a second of work at a time
+    block = max(1, PRODUCTS // w.size**2)
+    while iterations < max_iterations and not converged and not np.isnan(phi[0]):
+        most = min(block, max_iterations - iterations)
+        converged = core.damped_steps(X, mu, a, damping, tolerance, most, matrix, w, p, phi, used) == 0
+        iterations += int(used[0])
+    return iterations, converged, float(phi[0]), float(phi[1])
+
+
+def radius(X: float, mu: float, rtol: float) -> float:
+    """Where an island ends, as far as a relative error `rtol` tells."""
+    squared = np.empty(1)
+    core.island_extents(np.array([X]), np.array([mu]), 0.03 * rtol, squared)
+    return math.sqrt(squared[0])
+
+
+def solve_classical(
+    X: float, mu: float, rings: int, damping: float, rtol: float, max_iterations: int
+) -> tuple[int, bool, float, float, FloatArray, FloatArray, FloatArray]:
+    """One island; returns iterations, converged, Phi_F, Phi_A, rho, pressure, gap."""
+    a = radius(X, mu, rtol)
+    w, p = np.zeros(rings), np.zeros(rings)
+    rho = a * (np.arange(rings) + 0.5) / rings
+    steps, converged, force, area = iterate(X, mu, a, ring_matrix(rings), damping, rtol, max_iterations, w, p)
+    return steps, converged, force, area, rho, p, rho**2 - X + w
 
 
 def solve(
@@ -222,32 +282,22 @@ def solve(
     damping = number_in("damping", damping, 1e-6, 1.0)
     max_iterations = whole_number_in("max_iterations", max_iterations, 1, 10**9)
     shape = broadcast_shape(X=approach, mu=stiffness)
-    flat_X = np.broadcast_to(approach, shape).ravel()
-    flat_mu = np.broadcast_to(stiffness, shape).ravel()
+    flat_X, flat_mu = (np.broadcast_to(each, shape).ravel() for each in (approach, stiffness))
     if method == "newton":
-        found = _solve_newton(flat_X, flat_mu, rtol, nodes)
+        phi, steps, used, missed = _solve_newton(flat_X, flat_mu, rtol, nodes)
     else:
-        found = _solve_classical(flat_X, flat_mu, rtol, nodes or CLASSICAL_RINGS, damping, max_iterations)
-    result = IslandSolution(
-        X=flat_X.reshape(shape),
-        mu=flat_mu.reshape(shape),
-        phi_F=found["phi"][:, 0].reshape(shape),
-        phi_A=found["phi"][:, 1].reshape(shape),
-        error=found["phi"][:, 2].reshape(shape),
-        iterations=found["iterations"].reshape(shape),
-        nodes=found["nodes"].reshape(shape),
-        method=method,
-        rtol=rtol,
-        damping=damping,
-        max_iterations=max_iterations,
-    )
-    failed = found["failed"].reshape(shape)
+        rings = nodes or CLASSICAL_RINGS
+        phi, steps, used, missed = _solve_classical(flat_X, flat_mu, rtol, rings, damping, max_iterations)
+    fields: list[Any] = [part.reshape(shape) for part in (flat_X, flat_mu, *phi.T, steps, used)]
+    fields += [method, rtol, damping, max_iterations]
+    result = IslandSolution(*fields)
+    failed = missed.reshape(shape)
     if failed.any():
-        first = int(np.flatnonzero(failed.ravel())[0])
+        first = int(np.flatnonzero(missed)[0])
         raise ConvergenceError(
             f"{method} did not reach the accuracy asked for at {int(failed.sum())} of {failed.size} "
             f"entries, the first at X = {flat_X[first]:.6g}, mu = {flat_mu[first]:.6g} "
-            f"(reached {found['phi'][first, 2]:.1e}, asked {rtol:.1e})",
+            f"(reached {phi[first, 2]:.1e}, asked {rtol:.1e})",
             failed,
             result,
         )

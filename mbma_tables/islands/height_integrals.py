@@ -12,16 +12,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import finite_array
-from mbma_tables.core import core, in_blocks
+from mbma_tables.arguments import answered, finite_array
+from mbma_tables.core import core
 from mbma_tables.errors import InputError
 
 ORDERS = (0.5, 1.0, 1.5, 2.0, 2.5)
-
-BLOCK = 1 << 20  # entries between two looks for Ctrl-C, about 0.03 s
 
 
 def height_integral(n: float, x: ArrayLike) -> Any:
@@ -53,7 +50,4 @@ def height_integral(n: float, x: ArrayLike) -> Any:
     if n not in ORDERS:
         raise InputError(f"n must be one of {ORDERS}, got {n!r}")
     argument = finite_array("x", x)
-    flat = argument.ravel()
-    found = np.empty(flat.size)
-    in_blocks(lambda part: core.height_integrals(int(2 * n), flat[part], found[part]), flat.size, BLOCK)
-    return found.reshape(argument.shape)[()]
+    return answered(lambda part, found: core.height_integrals(int(2 * n), part, found), (argument,))[0][()]

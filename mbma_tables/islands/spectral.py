@@ -20,24 +20,12 @@ from mbma_tables.arguments import FloatArray
 
 
 class Basis(NamedTuple):
-    """Gauss nodes on [0, 1] and the half-space operator in them, for one node count.
+    """Gauss nodes on [0, 1] and the half-space operator in them, for one node count."""
 
-    Attributes
-    ----------
-    v : (n,) array
-        Gauss nodes in v = (rho/a)^2.
-    root_weights : (n,) array
-        Square roots of their weights; vectors of the solver are values times these.
-    modes : (n, n) array
-        Row k takes such a vector to its k-th orthonormal Legendre coefficient.
-    operator : (n, n) array
-        w = a * operator @ p in such vectors; symmetric, positive definite.
-    """
-
-    v: FloatArray
-    root_weights: FloatArray
-    modes: FloatArray
-    operator: FloatArray
+    v: FloatArray  # Gauss nodes in v = (rho/a)^2
+    root_weights: FloatArray  # square roots of their weights; vectors of the solver are values times these
+    modes: FloatArray  # row k takes such a vector to its k-th orthonormal Legendre coefficient
+    operator: FloatArray  # w = a * operator @ p in such vectors; symmetric, positive definite
 
 
 def gauss_legendre(n: int) -> tuple[FloatArray, FloatArray]:

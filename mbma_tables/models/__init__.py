@@ -77,15 +77,7 @@ AnyModel = IslandModel | GeometryModel
 def answer_islands(
     model: AnyModel, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH
 ) -> IslandAnswer:
-    """Phi_F and Phi_A of islands by any model; what a model of two numbers answers is checked.
-
-    Raises
-    ------
-    InputError
-        Where an answer is not of the arguments' shape.
-    OutOfRangeError
-        Where it is not finite and `outside` is not "nan".
-    """
+    """Phi_F and Phi_A of islands by any model; what a model of two numbers answers is checked."""
     if isinstance(model, GeometryModel):
         return model.of_islands(islands, outside, which)
     shape = islands["X"].shape
@@ -143,26 +135,14 @@ def exact_model(rtol: float) -> ExactModel:
 
 def tier_name(tier: str | AnyModel) -> str:
     """What results call a tier: its name, or that of the model."""
-    return tier if isinstance(tier, str) else tier.name
+    return tier if isinstance(tier, str) else getattr(tier, "name", "")
 
 
 def get_model(tier: str | AnyModel, rtol: float, reading: Reading) -> AnyModel:
     """The island model of a tier, accurate enough for results at `rtol`; a table is what its certificate says.
 
-    Parameters
-    ----------
-    tier : str or island model
-        One of `TIERS`, or an object with a `name` and ``answer(X, mu)``, which is checked and returned: a table from
-        `open_table`, or a model of one's own (`IslandModel`, `GeometryModel`).
-    rtol : float
-        Relative error asked of the results, in [1e-11, 0.1].
-    reading : Reading
-        A model that was made for one reading says so by its `reading`.
-
-    Raises
-    ------
-    InputError
-        For an unknown tier, an object that is no island model, an `rtol` out of range, or another reading.
+    `tier` is one of `TIERS`, or a model (`IslandModel`, `GeometryModel`), which is checked and returned. One that was
+    made for one reading says so by its `reading`.
     """
     asked = number_in("rtol", rtol, MIN_RTOL, MAX_RTOL)
     if isinstance(tier, str) and tier in TIERS:

@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, positive_modulus, require
 from mbma_tables.errors import InputError
-from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
+from mbma_tables.models import BOTH, IslandAnswer
 from mbma_tables.models import closed_form_functions as printed
 from mbma_tables.models.closed_form_functions import CERTIFICATES, RANGES
+from mbma_tables.models.universal import Ranged
 from mbma_tables.surfaces.surface import Surface
 
 ISLAND_FORMS = ("pocket", "standard", "long")
@@ -24,7 +25,7 @@ RESULTS = ("phi_F", "phi_A")
 FUNCTIONS = {form: {name: getattr(printed, f"{form}_{name}") for name in own} for form, own in CERTIFICATES.items()}
 
 
-class FormulaModel:
+class FormulaModel(Ranged):
     """Phi_F and Phi_A by a closed form; exact as mu goes to 0 but for the approximation of the rigid sphere.
 
     Parameters
@@ -51,44 +52,25 @@ class FormulaModel:
     def __init__(self, form: str = "standard") -> None:
         if form not in ISLAND_FORMS:
             raise InputError(f"form must be one of {ISLAND_FORMS}, got {form!r}")
-        self.form = form
+        self.form, self.ranges, self.holds = form, RANGES[form], f", where the {form} form holds"
 
     def answer(self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise", which: int = BOTH) -> IslandAnswer:
-        """Phi_F and Phi_A with the largest error that the form's certificate states.
+        """Phi_F and Phi_A with the largest error that the form's certificate states, as `UniversalModel.answer`.
 
-        Parameters
-        ----------
-        X, mu : array_like
-            They broadcast.
-        outside : {"raise", "exact", "nan"}
-            Where X or mu is outside the form's range: an error, the exact solver, or NaN.
-        which : int
-            FORCE, AREA or BOTH; what is not asked for is NaN.
-
-        Raises
-        ------
-        InputError, OutOfRangeError
+        `which` is FORCE, AREA or BOTH; what is not asked for is NaN.
         """
-        check_outside(outside)
-        given = {"X": finite_array("X", X), "mu": finite_array("mu", mu)}
-        require("mu", given["mu"], given["mu"] >= 0, "at least 0")
-        shape = broadcast_shape(**given)
-        inside = np.ones(shape, dtype=bool)
-        for name, array in given.items():
-            low, high = RANGES[self.form][name]
-            covered = (array >= low) & (array <= high)
-            if outside == "raise":
-                require(name, array, covered, f"in [{low:g}, {high:g}], where the {self.form} form holds")
-            inside &= covered
-        every_X, every_mu = (np.broadcast_to(array, shape) for array in given.values())
         wanted = RESULTS if which == BOTH else (RESULTS[which],)
-        out = np.full((3, *shape), np.nan)
-        for name in wanted:
-            out[RESULTS.index(name), inside] = FUNCTIONS[self.form][name](every_X[inside], every_mu[inside])
-        out[2, inside] = max(CERTIFICATES[self.form][name].largest for name in wanted)
-        if outside == "exact" and not inside.all():
-            out[:, ~inside] = SOLVER.answer(every_X[~inside], every_mu[~inside])
-        return IslandAnswer(*(row[()] for row in out))
+
+        def fill(flat_X: FloatArray, flat_mu: FloatArray) -> FloatArray:
+            out = np.full((3, flat_X.size), np.nan)
+            (low, high), (least, most) = self.ranges["X"], self.ranges["mu"]
+            inside = (flat_X >= low) & (flat_X <= high) & (flat_mu >= least) & (flat_mu <= most)
+            for name in wanted:
+                out[RESULTS.index(name), inside] = FUNCTIONS[self.form][name](flat_X[inside], flat_mu[inside])
+            out[2, inside] = max(CERTIFICATES[self.form][name].largest for name in wanted)
+            return out
+
+        return self._answered(X, mu, outside, fill)
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
         """Phi_F and Phi_A of islands, or the one asked for."""
@@ -108,12 +90,8 @@ def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1
 
     Parameters
     ----------
-    surface : Surface
-        One surface or a batch; it broadcasts against `separation`.
-    separation : array_like
-        d between the rigid plane and the mid-plane [length].
-    E_star : array_like
-        Effective modulus; force is in its unit.
+    surface, separation, E_star
+        As for `mbma_tables.contact`, plain numbers.
 
     Returns
     -------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,7 +28,39 @@ TERMS = 8  # of each polynomial along each axis
 RECORD = 8 + 2 * TERMS**2  # doubles of a cell, `mbma_cell` of mbma.h
 
 
-class UniversalModel(Displayed):
+class Ranged:
+    """A model of X and mu in `ranges`: what lies outside is refused, solved exactly, or NaN."""
+
+    ranges: Mapping[str, tuple[float, float]]
+    holds = ""  # what a refusal says beside a range
+
+    def _inside(
+        self, X: ArrayLike, mu: ArrayLike, refuse: bool = True
+    ) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
+        """Flat arguments and their common shape, refused where the model does not reach."""
+        given = {"X": finite_array("X", X), "mu": finite_array("mu", mu)}
+        for name, array in given.items() if refuse else ():
+            low, high = self.ranges[name]
+            require(name, array, (array >= low) & (array <= high), f"in [{low:g}, {high:g}]{self.holds}")
+        require("mu", given["mu"], given["mu"] >= 0, "at least 0")
+        shape = broadcast_shape(**given)
+        flat_X, flat_mu = (np.ascontiguousarray(np.broadcast_to(a, shape)).ravel() for a in given.values())
+        return flat_X, flat_mu, shape
+
+    def _answered(
+        self, X: ArrayLike, mu: ArrayLike, outside: str, fill: Callable[[FloatArray, FloatArray], FloatArray]
+    ) -> IslandAnswer:
+        """Rows that `fill` answers of flat arguments, NaN outside of the ranges."""
+        check_outside(outside)
+        flat_X, flat_mu, shape = self._inside(X, mu, outside == "raise")
+        out = fill(flat_X, flat_mu)
+        missing = np.isnan(out[2])
+        if outside == "exact" and missing.any():
+            out[:, missing] = SOLVER.answer(flat_X[missing], flat_mu[missing])
+        return IslandAnswer(*(row.reshape(shape)[()] for row in out))
+
+
+class UniversalModel(Ranged, Displayed):
     """Phi_F and Phi_A from a universal table.
 
     Parameters
@@ -52,6 +84,7 @@ class UniversalModel(Displayed):
     def __init__(self, content: TableContent) -> None:
         self.content = content
         self._X, self._mu = content.axes
+        self.ranges = {"X": (self._X.low, self._X.high), "mu": (0.0, self._mu.high)}
 
     def _facts(self) -> dict[str, str]:
         return self.content.facts()
@@ -83,13 +116,8 @@ class UniversalModel(Displayed):
         ------
         InputError, OutOfRangeError
         """
-        check_outside(outside)
-        flat_X, flat_mu, shape = self._inside(X, mu, outside == "raise")
-        out = self._filled(flat_X, flat_mu, False, (os.cpu_count() or 1) if parallel else 1)
-        missing = np.isnan(out[:, 0])
-        if outside == "exact" and missing.any():
-            out[missing] = np.stack(SOLVER.answer(flat_X[missing], flat_mu[missing]), axis=-1)
-        return IslandAnswer(*(column.reshape(shape)[()] for column in out.T))
+        workers = (os.cpu_count() or 1) if parallel else 1
+        return self._answered(X, mu, outside, lambda flat_X, flat_mu: self._filled(flat_X, flat_mu, False, workers).T)
 
     def _filled(self, X: FloatArray, mu: FloatArray, slopes: bool, workers: int = 1) -> FloatArray:
         """Rows of Phi_F, Phi_A, error, and with `slopes` of the derivatives by X and mu; NaN outside."""
@@ -115,20 +143,6 @@ class UniversalModel(Displayed):
     def status(self, X: ArrayLike, mu: ArrayLike) -> tuple[Any, Any]:
         """Where arguments lie on each axis: -1 below, 0 inside, 1 above. Below in mu is answered, to first order."""
         return self._X.side(finite_array("X", X)), self._mu.side(finite_array("mu", mu))
-
-    def _inside(
-        self, X: ArrayLike, mu: ArrayLike, refuse: bool = True
-    ) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
-        """Flat arguments and their common shape, refused where the table does not reach."""
-        given_X, given_mu = finite_array("X", X), finite_array("mu", mu)
-        low, high = self._X.low, self._X.high
-        if refuse:
-            require("X", given_X, (given_X >= low) & (given_X <= high), f"in [{low:g}, {high:g}]")
-            require("mu", given_mu, (given_mu >= 0) & (given_mu <= self._mu.high), f"in [0, {self._mu.high:g}]")
-        require("mu", given_mu, given_mu >= 0, "at least 0")
-        shape = broadcast_shape(X=given_X, mu=given_mu)
-        flat_X, flat_mu = (np.ascontiguousarray(np.broadcast_to(a, shape)).ravel() for a in (given_X, given_mu))
-        return flat_X, flat_mu, shape
 
     @functools.cached_property
     def cells(self) -> tuple[FloatArray, NDArray[np.int32], FloatArray]:

@@ -10,7 +10,7 @@ from mbma_tables.scenes.effects import CORRELATIONS
 from mbma_tables.scenes.plan import Plan
 from mbma_tables.scenes.problem import Problem
 from mbma_tables.surfaces.readings import get_reading
-from mbma_tables.theories.result import MEANINGS
+from mbma_tables.theories.source import MEANINGS
 from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:

@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, require
+from mbma_tables.arguments import FloatArray, grouped, require, spread
+from mbma_tables.calibrated import TESTED_AREA, Law, force_at_area, light_factor, self_affine_law
 from mbma_tables.calibrated import area as law_area
-from mbma_tables.calibrated import light_factor
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import calibrated_table
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
-from mbma_tables.theories.spectrum_laws import TESTED_AREA, Places, area_concerns, force_at_area
 
 if TYPE_CHECKING:
     from mbma_tables.theories.calibrated_curves import OwnLaw
@@ -38,6 +38,45 @@ def _error(stated: float, nearer: float, share: FloatArray) -> FloatArray:
     error = np.full(share.shape, stated)
     error[near] = nearer + ROUNDING / (1 - share[near])
     return error
+
+
+class Places:
+    """A batch of surfaces and numbers that broadcast with it, flat."""
+
+    def __init__(self, surface: Surface, value: ArrayLike) -> None:
+        self.shape = np.broadcast_shapes(np.shape(value), surface.shape)
+        self.flat = np.ascontiguousarray(spread(np.asarray(value, float), self.shape)).ravel()
+        hurst = np.asarray(surface.hurst, float).ravel()
+        zeta_1, h_rms = np.asarray(surface.zeta_1, float).ravel(), np.asarray(surface.h_rms, float).ravel()
+        self.columns = np.array([hurst, np.log(zeta_1), np.asarray(surface.h_max, float).ravel() / h_rms])
+        number = np.arange(hurst.size).reshape(surface.shape)
+        self.owner = np.ascontiguousarray(spread(number, self.shape)).ravel()
+        self.h_rms = h_rms[self.owner] if hurst.size > 1 else h_rms
+        gradient = np.asarray(surface.rms_gradient, float).ravel()
+        self.gradient = gradient[self.owner] if hurst.size > 1 else gradient
+
+    def covered(self, table: calibrated_table.Table) -> Any:
+        """Whether the table holds each surface."""
+        return table.covers(*self.columns[:2])
+
+    def outside(self, mask: Any) -> list[tuple[int, Any]]:
+        """Surfaces that have entries under a mask, with these."""
+        chosen = np.flatnonzero(mask)
+        return [(row, chosen[mine]) for row, mine in grouped(self.owner[chosen])]
+
+    def law(self, row: int) -> Law:
+        """The law of one surface."""
+        hurst, log_zeta, heights = self.columns[:, row]
+        return self_affine_law(float(hurst), float(np.exp(log_zeta)), float(heights))
+
+
+def area_concerns(area: FloatArray) -> dict[str, Any]:
+    """Contact fractions that were not simulated, or hardly."""
+    low, high = TESTED_AREA
+    return {
+        f"A/A0 is below {low:g}": (area > 0) & (area < low),
+        f"A/A0 is above {high:g}": area > high,
+    }
 
 
 class Calibrated(Theory):

@@ -14,11 +14,10 @@ from scipy.special import erfc, ndtri
 
 from mbma_tables.arguments import FloatArray, require
 from mbma_tables.bearing import FRACTIONS
-from mbma_tables.calibrated import Law, light_factor
+from mbma_tables.calibrated import LAW_ERROR, TESTED_AREA, Law, force_at_area, light_factor, spectrum_of
 from mbma_tables.calibrated_map import LOG_FORCE, MapLaw, convex
 from mbma_tables.surfaces.heights import SHARES
 from mbma_tables.surfaces.measured import MeasuredSurface
-from mbma_tables.theories.spectrum_laws import LAW_ERROR, TESTED_AREA, force_at_area, spectrum_of
 
 if TYPE_CHECKING:
     from mbma_tables.hardness import BearingCurve

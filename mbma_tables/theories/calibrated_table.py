@@ -33,21 +33,12 @@ Owners = NDArray[np.int64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SurfaceSpline:
-    """Quintic B-splines over Hurst exponent, ln zeta_1 and a last axis, for the compiled core.
+    """Quintic B-splines over Hurst exponent, ln zeta_1 and a last axis, for the compiled core."""
 
-    Attributes
-    ----------
-    first, step : numpy.ndarray, shape (3,)
-        Of the equally spaced nodes along the axes.
-    covered : numpy.ndarray, shape (3, 2) or (2, 2)
-        First and last that are answered.
-    coefficients : numpy.ndarray of float32
-    """
-
-    first: FloatArray
-    step: FloatArray
-    covered: FloatArray
-    coefficients: FloatArray
+    first: FloatArray  # of the equally spaced nodes along the axes,
+    step: FloatArray  # and their distance, shape (3,)
+    covered: FloatArray  # first and last that are answered, shape (3, 2) or (2, 2)
+    coefficients: FloatArray  # float32
 
     @functools.cached_property
     def cells(self) -> Any:
@@ -87,24 +78,12 @@ class SurfaceSpline:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Table(SurfaceSpline):
-    """The shipped table in memory: ln F_G, in single precision.
+    """The shipped table in memory: ln F_G, in single precision."""
 
-    Attributes
-    ----------
-    constants : Constants
-        Of the law.
-    error : float
-        Largest relative error of force against the law's own quadrature, at held-out points.
-    scatter : dict
-        By theory: ln of root mean squares of ln(theory/simulation), shape (3, bins), rows `QUANTITIES`.
-    log_area : numpy.ndarray, shape (bins,)
-        ln of the contact fractions that they belong to.
-    """
-
-    constants: Constants
-    error: float
-    scatter: dict[str, FloatArray]
-    log_area: FloatArray
+    constants: Constants  # of the law
+    error: float  # largest relative error of force against the law's own quadrature, at held-out points
+    scatter: dict[str, FloatArray]  # by theory: ln of rms of ln(theory/simulation), rows `QUANTITIES`, by
+    log_area: FloatArray  # ln of contact fractions
 
     @property
     def law_constants(self) -> tuple[float, float, float]:
@@ -117,11 +96,7 @@ class Table(SurfaceSpline):
         return *self.core_table, *surfaces, ends, self.shared(surfaces, entries)
 
     def fill(self, surfaces: FloatArray, owner: Owners, u: FloatArray) -> FloatArray:
-        """Force, area and -dF/du, shape (3, n), of mean separations u [h_rms]; NaN for surfaces outside the table.
-
-        `surfaces` has a column of Hurst exponent, ln zeta_1 and h_max/h_rms for each surface, `owner` its number for
-        each separation.
-        """
+        """Force, area and -dF/du, shape (3, n), at u [h_rms] of surfaces (columns: H, ln zeta_1, h_max/h_rms)."""
         given, out = self._given(surfaces, u.size), np.empty((3, u.size))
         in_blocks(lambda k: core.calibrated_contact(*given, owner[k], u[k], *out[:, k]), u.size, BLOCK)
         return out
@@ -168,13 +143,7 @@ def _read(path: pathlib.Path, group: str = "") -> tuple[dict[str, FloatArray], d
 
 
 def load(path: pathlib.Path) -> Table:
-    """Read a table file.
-
-    Raises
-    ------
-    TableFileError
-        Where it is damaged or is another file.
-    """
+    """Read a table file; one that is damaged, or is another file, is a TableFileError."""
     values, facts, covered = _read(path)
     return Table(
         *nodes_of([values[name] for name in AXES]),

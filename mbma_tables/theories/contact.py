@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import (
     FloatArray,
+    any_labelled,
     broadcast_shape,
     describe_entries,
     finite_array,
     hinted,
-    is_labelled,
     positive_modulus,
     require,
     spread,
@@ -29,9 +29,9 @@ from mbma_tables.surfaces.readings import Reading
 from mbma_tables.theories import get_theory
 from mbma_tables.theories.mbma import Mbma, refuse_options_of_mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
-from mbma_tables.theories.result import Contact, Source, named
+from mbma_tables.theories.result import Contact
 from mbma_tables.theories.sensitivity import differentiate
-from mbma_tables.totals.contact import wanted_quantities
+from mbma_tables.theories.source import Source, named
 from mbma_tables.units import modulus_and_units
 
 KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by
@@ -152,9 +152,17 @@ def contact(
         "derivatives": derivatives,
         "quantities": wanted_quantities(quantities),
     }
-    if surface.labelled or any(map(is_labelled, (value, E_star, hardness))):
+    if any_labelled(surface, value, E_star, hardness):
         return _of_labelled(surface, value, E_star, hardness, options)
     return _contact(surface, value, E_star, hardness, **options)
+
+
+def wanted_quantities(quantities: Iterable[str]) -> tuple[str, ...]:
+    """The quantities asked for, each once, in the order of `QUANTITIES`."""
+    asked = {quantities} if isinstance(quantities, str) else set(quantities)
+    if not asked or not asked <= set(QUANTITIES):
+        raise InputError(f"quantities must be some of {QUANTITIES}, got {quantities!r}")
+    return tuple(filter(asked.__contains__, QUANTITIES))
 
 
 def one_known(**given: Any) -> tuple[str, Any]:
@@ -178,11 +186,7 @@ def _contact(
 ) -> Contact:
     """`contact` of plain arrays."""
     theory = source.theory_at(E_star, hardness)
-    places: dict[str, Any] = {}
-    lighter = None
-    if by != "separation" or not isinstance(theory, Mbma):
-        unit = source.units.stress
-        value, E_star, places, lighter = _places(surface, value, E_star, hardness, by, theory, unit)
+    value, E_star, places, lighter = _places(surface, value, E_star, hardness, by, theory, source.units.stress)
     held = {"pressure": "force", "area": "area"}.get(by)
     capped: Any = theory
     by_log_modulus: dict[str, Any] = {"force": 0.0, "area": 0.0}
@@ -190,7 +194,7 @@ def _contact(
         require(by, value, np.asarray(value) > 0, "positive where derivatives are asked for: a gap has no slope there")
     if isinstance(theory, Mbma):
         wanted = QUANTITIES if derivatives else quantities
-        totals = theory.totals(surface, places.get("separation", value), E_star, derivatives, wanted)
+        totals = theory.totals(surface, places["separation"], E_star, derivatives, wanted)
         fields = vars(totals) | places
     else:
         u = np.asarray(places["mean_separation"])
@@ -199,7 +203,7 @@ def _contact(
         source = dataclasses.replace(source, answer=found, loaded=loaded)
         error = spread(found.error, np.shape(found.force))[()]
         fields = {"force": (E_star * found.force)[()], "area": found.area[()], "error": error} | places
-        fields |= {**_labels(source.theory), "islands": None}
+        fields["islands"] = None
         if derivatives:
             force_by, area_by = differentiate(theory, surface, u, lighter)
             by_log_modulus = {"force": force_by.pop("E_star", 0.0), "area": area_by.pop("E_star", 0.0)}
@@ -213,7 +217,8 @@ def _contact(
     for name in QUANTITIES:
         if name not in quantities:
             fields |= {name: None, f"{name}_by": None}
-    return Contact(theory=theory.name, _source=source, **fields)
+    own = source.theory
+    return Contact(theory=own.name, reading=own.reading_name, tier=own.tier_name, _source=source, **fields)
 
 
 def _places(
@@ -228,7 +233,7 @@ def _places(
         require(by, asked, asked >= 0, "at least 0")
     if by == "separation":
         average = (h_max + asked) / 2
-        require(by, asked, asked >= -h_max, "at least -h_max, which is full compression")
+        require(by, asked, asked >= -h_max, "at least -h_max, where the model ends at full compression")
     elif by == "mean_separation":
         average = asked
     else:
@@ -305,12 +310,7 @@ def _of_labelled(surface: AnySurface, value: Any, E_star: Any, hardness: Any, op
         fields |= {by: value, "mean_separation": named((surface.h_max + value) / 2, "mean_separation", units)}
     elif by == "mean_separation":
         fields |= {by: value, "separation": named(2 * value - surface.h_max, "separation", units)}
-    fields |= _labels(theory)
-    return Contact(theory=theory.name, islands=None, _source=options["source"], **fields)
-
-
-def _labels(theory: Theory) -> dict[str, str]:
-    """Reading and tier of MBMA, with a hardness or without."""
-    if not isinstance(theory, Mbma):
-        return {"reading": "", "tier": ""}
-    return {"reading": theory.reading.name, "tier": theory.tier_name}
+    source = options["source"]
+    return Contact(
+        theory=theory.name, reading=theory.reading_name, tier=theory.tier_name, islands=None, _source=source, **fields
+    )

@@ -20,25 +20,12 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import get_theory
-from mbma_tables.theories.law_block import AREA_AT, CENTRE, ENERGY_AT, FORCE_AT, RATE, RECORD
+from mbma_tables.theories import law_block as at
+from mbma_tables.theories import law_pieces as fit
 from mbma_tables.theories.law_object import ROUNDING, ContactLaw
-from mbma_tables.theories.law_pieces import (
-    First,
-    Pieces,
-    Side,
-    assemble,
-    fill_energies,
-    first_falls,
-    first_record,
-    order_of,
-    power_record,
-    side_pieces,
-    straight_record,
-)
 from mbma_tables.theories.mbma import Mbma, refuse_options_of_mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
-from mbma_tables.totals.island_sum import totals_of
-from mbma_tables.totals.pairs import Pairs
+from mbma_tables.totals.island_sum import Pairs, totals_of
 from mbma_tables.totals.profile import profile, source_of
 from mbma_tables.units import modulus_and_units
 
@@ -157,9 +144,9 @@ def _mbma_law(surface: AnySurface, tier: Any, reading: Reading, rtol: float, fac
     places = [kink / end for kink in islands.kinks]
     tolerance = min(rtol, RESOLVED)
     octaves = range(math.ceil(-math.log2(min(LAYER_SHARE * islands.layer / end, *places))), 1100)
-    start, first = first_record(lambda start: power_record(values, start, POWERS), octaves, tolerance)
+    start, first = fit.first_record(lambda start: fit.power_record(values, start, POWERS), octaves, tolerance)
     facts |= {"theory": "mbma", "reading": reading.name, "tier": model.name}
-    side, limits = Side(-1, start, values, tuple(places)), (h_max - end, math.inf)
+    side, limits = fit.Side(-1, start, values, tuple(places)), (h_max - end, math.inf)
     return _finish(1 / end, [side], tolerance, first, limits, 0.0, lambda: max(errors), islands.leverage, facts)
 
 
@@ -229,19 +216,21 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[st
     answer(lowest + (highest - lowest) * (np.arange(LOOKED_AT) + 0.5) / LOOKED_AT)
     # where it has far larger errors at some gaps, as at the lightest contact of a small map, these tell of no others
     tolerance = max(min(rtol, RESOLVED), SHARE * float(np.median(errors[0])))
-    bends = np.asarray(theory.bends(surface), dtype=float)
+    bends = np.asarray(theory.elastic.bends(surface), dtype=float)
 
     width = highest if not ends else h_max / 2 if lowest else h_max
-    above = Side(1, lowest / width, lambda x: answer(width * x), tuple(bends / width))
+    above = fit.Side(1, lowest / width, lambda x: answer(width * x), tuple(bends / width))
     if ends:
         start = 2.0**-FIRST_OCTAVES
-        below = Side(-1, start, lambda x: answer(h_max - width * x), tuple((h_max - bends) / width))
-        sides, first = [below, above] if lowest else [below], straight_record(below.values, start)
+        below = fit.Side(-1, start, lambda x: answer(h_max - width * x), tuple((h_max - bends) / width))
+        sides, first = [below, above] if lowest else [below], fit.straight_record(below.values, start)
     elif lowest > 0:
-        sides, first = [above], (np.zeros(RECORD), np.zeros(2), (0.0, 0.0))
+        sides, first = [above], (np.zeros(at.RECORD), np.zeros(2), (0.0, 0.0))
     else:
         octaves = range(3, MOST_OCTAVES)
-        start, first = first_record(lambda start: power_record(above.values, start, (0.0, 0.0)), octaves, tolerance)
+        start, first = fit.first_record(
+            lambda start: fit.power_record(above.values, start, (0.0, 0.0)), octaves, tolerance
+        )
         sides = [above._replace(start=start)]
     beyond = 0.0 if ends else 2 * float(theory.energy(surface, np.array(highest)))
     limits = 2 * lowest - h_max, math.inf if ends else 2 * highest - h_max
@@ -254,33 +243,33 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[st
 
 
 def _finish(
-    scale: float, sides: list[Side], tolerance: float, first: First, limits: tuple[float, float], beyond: float,
+    scale: float, sides: list[fit.Side], tolerance: float, first: fit.First, limits: tuple[float, float], beyond: float,
     own_error: Callable[[], float], leverage: float, facts: dict[str, Any],
 ) -> ContactLaw:  # fmt: skip
     """Fit the sides, put the block together, and look for turning points."""
     h_max, (lowest, highest) = float(facts["surface"].h_max), limits
     sides = [side._replace(kinks=tuple(kink for kink in side.kinks if side.start < kink < 1)) for side in sides]
-    pieces: list[Pieces] = [side_pieces(side, tolerance) for side in sides]
+    pieces: list[fit.Pieces] = [fit.side_pieces(side, tolerance) for side in sides]
     ends = (
         lowest if lowest == -h_max else lowest - ROUNDING * h_max,
         sys.float_info.max if highest == math.inf else highest * (1 + ROUNDING),
     )
-    block, records, errors = assemble(h_max, scale, sides, pieces, first, ends)
-    order, signs = order_of(sides, pieces)
-    fill_energies(records, order, signs, scale, first[2][0], beyond)
+    block, records, errors = fit.assemble(h_max, scale, sides, pieces, first, ends)
+    order, signs = fit.order_of(sides, pieces)
+    fit.fill_energies(records, order, signs, scale, first[2][0], beyond)
     in_order = records[order]
 
     def gap(turn: tuple[int, float] | None) -> float | None:
         if turn is None:
             return None
         place, t = turn
-        x = in_order[place, CENTRE] + t / in_order[place, RATE]
+        x = in_order[place, at.CENTRE] + t / in_order[place, at.RATE]
         return float(signs[place] * (x / scale - h_max))
 
-    turns = [gap(turn) for turn in first_falls(in_order, signs)]
+    turns = [gap(turn) for turn in fit.first_falls(in_order, signs)]
     # forces carry the modulus
-    records[:, FORCE_AT:AREA_AT] *= facts["E_star"]
-    records[:, ENERGY_AT] *= facts["E_star"]
+    records[:, at.FORCE_AT : at.AREA_AT] *= facts["E_star"]
+    records[:, at.ENERGY_AT] *= facts["E_star"]
     block.flags.writeable = False
     error, own = float(errors[:, 0].max()), own_error()
     return ContactLaw(

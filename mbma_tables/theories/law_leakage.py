@@ -13,27 +13,8 @@ from mbma_tables.core import core
 from mbma_tables.errors import ConvergenceError, InputError
 from mbma_tables.labels import apply
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories.law_block import (
-    AREA_AT,
-    CENTRE,
-    ENDS,
-    FORCE_AT,
-    KINK_SIGN,
-    KINK_SIGN_2,
-    LOWEST,
-    RATE,
-)
-from mbma_tables.theories.law_pieces import (
-    SAMPLES,
-    Pieces,
-    Side,
-    Values,
-    assemble,
-    first_record,
-    power_record,
-    side_pieces,
-    straight_record,
-)
+from mbma_tables.theories import law_block as at
+from mbma_tables.theories import law_pieces as fit
 from mbma_tables.theories.leakage import flow
 from mbma_tables.theories.leakage_table import shipped_flow
 
@@ -46,29 +27,16 @@ MOST_OCTAVES = 20  # of gaps, from the blocked one on, next to which the flow is
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LeakageLaw:
-    """Flow conductance k h_rms^3 [length^3] of one surface against its gap, as `ContactLaw.leakage` has it.
+    """Flow conductance k h_rms^3 [length^3] of one surface against its gap, as `ContactLaw.leakage` has it."""
 
-    Attributes
-    ----------
-    law : ContactLaw
-        Whose area and mean separation it is of.
-    h_rms : float
-        Rms height [length].
-    blocked_at : float
-        Gap d at and below which contact percolates and the conductance is 0; -infinity where it never does.
-    error : float
-        Bound on the relative error of the polynomials, against the flow at the law's area. Errors of that area come on
-        top, times -d ln k/d ln A, which grows without limit towards `blocked_at`.
-    block : ndarray
-        In the layout of a law's block: the conductance in place of force, and its cube root, the
-        gap of parallel plates that pass as much, in place of area; of gaps from `blocked_at` to h_max, or to the end
-        of a law without last contact.
-    """
-
-    law: ContactLaw
-    h_rms: float
-    blocked_at: float
+    law: ContactLaw  # whose area and mean separation it is of
+    h_rms: float  # [length]
+    blocked_at: float  # gap d at and below which contact percolates and nothing flows; -infinity where it never does
+    # bound on the relative error of the polynomials, against the flow at the law's area; errors of that area come on
+    # top, times -d ln k/d ln A, which grows without limit towards `blocked_at`
     error: float
+    # in the layout of a law's block: the conductance in place of force, and its cube root, the gap of parallel plates
+    # that pass as much, in place of area; from `blocked_at` to h_max, or to the end of a law without last contact
     block: FloatArray
 
     def __call__(
@@ -84,7 +52,7 @@ class LeakageLaw:
             raise InputError("give one of separation, u and pressure")
         if is_labelled(given[0]):
             name = "pressure" if pressure is not None else "separation" if u is None else "u"
-            return apply(lambda known: self(**{name: known}), (given[0],), 1)  # type: ignore[no-any-return]
+            return apply(lambda known: (self(**{name: known}),), (given[0],), 1)[0]  # type: ignore[no-any-return]
         d = self.law.separation(force=pressure) if pressure is not None else self.law.gaps(separation, u)
         flat = np.ascontiguousarray(d).reshape(-1)
         found = np.empty(flat.size)
@@ -99,7 +67,7 @@ def leakage_law(law: ContactLaw, surface: AnySurface) -> LeakageLaw:
     deepest = law.lowest if law.area_turning_point is None else law.area_turning_point
     blocked = bool(law.area(deepest) >= threshold)
     bottom = float(law.separation(area=threshold)) if blocked else law.lowest
-    top = min(law.h_max, law.highest) if law.block.view(np.int64)[ENDS] else law.highest
+    top = min(law.h_max, law.highest) if law.block.view(np.int64)[at.ENDS] else law.highest
     span = top - bottom
 
     def values(x: FloatArray) -> FloatArray:
@@ -109,30 +77,30 @@ def leakage_law(law: ContactLaw, surface: AnySurface) -> LeakageLaw:
 
     # gaps close as u under full compression
     known = (3.0, 1.0) if bottom == -law.h_max else (0.0, 0.0)
-    start, first = first_record(
-        lambda start: straight_record(values, start) if blocked else power_record(values, start, known),
+    start, first = fit.first_record(
+        lambda start: fit.straight_record(values, start) if blocked else fit.power_record(values, start, known),
         range(MOST_OCTAVES if blocked else 6, MOST_OCTAVES + 1),
         rtol,
     )
     head = law.block
-    kinks = [(head[at] * head[at + 1] - bottom) / span for at in (KINK_SIGN, KINK_SIGN_2) if head[at]]
-    side = Side(1, start, values, tuple(sorted(kink for kink in kinks if start < kink < 1)))
+    kinks = [(head[k] * head[k + 1] - bottom) / span for k in (at.KINK_SIGN, at.KINK_SIGN_2) if head[k]]
+    side = fit.Side(1, start, values, tuple(sorted(kink for kink in kinks if start < kink < 1)))
     try:
-        pieces = side_pieces(side, rtol)
+        pieces = fit.side_pieces(side, rtol)
     except ConvergenceError:
         # what the law's polynomials miss of each other where they meet grows towards the blocked gap
-        pieces = side_pieces(side, max(RTOL, law.error))
-    block, _, errors = assemble(-bottom, 1 / span, [side], [pieces], first, (law.block[LOWEST], top))
-    block.view(np.int64)[ENDS] = blocked
+        pieces = fit.side_pieces(side, max(RTOL, law.error))
+    block, _, errors = fit.assemble(-bottom, 1 / span, [side], [pieces], first, (law.block[at.LOWEST], top))
+    block.view(np.int64)[at.ENDS] = blocked
     block.flags.writeable = False
     error = float(errors[:, 0].max()) + _between_nodes(pieces, values)
     return LeakageLaw(law, h_rms, bottom if blocked else -np.inf, error, block)
 
 
-def _between_nodes(pieces: Pieces, values: Values) -> float:
+def _between_nodes(pieces: fit.Pieces, values: fit.Values) -> float:
     """Relative error midway between the nodes of the fit: kinks of the flow may show in no coefficient."""
-    t = np.cos(np.pi * np.arange(SAMPLES + 1) / SAMPLES)
+    t = np.cos(np.pi * np.arange(fit.SAMPLES + 1) / fit.SAMPLES)
     records = pieces.records
-    x = np.minimum(records[:, CENTRE, None] + t / records[:, RATE, None], 1.0)
-    found = np.polynomial.polynomial.polyval(t, records[:, FORCE_AT:AREA_AT].T)
+    x = np.minimum(records[:, at.CENTRE, None] + t / records[:, at.RATE, None], 1.0)
+    found = np.polynomial.polynomial.polyval(t, records[:, at.FORCE_AT : at.AREA_AT].T)
     return float(np.abs(found / values(x.ravel())[0].reshape(x.shape) - 1).max())

@@ -10,7 +10,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,8 +22,8 @@ from mbma_tables.errors import InputError
 from mbma_tables.plots import Curve, draw_compression, force_label, theory_label
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import law_block as at
-from mbma_tables.theories.law_block import AREA, FORCE, QUANTITIES
-from mbma_tables.theories.result import MEANINGS
+from mbma_tables.theories.law_block import AREA, FORCE, QUANTITIES, inverse_block, softening
+from mbma_tables.theories.source import MEANINGS, LawPoint, LawValues
 from mbma_tables.units import UNKNOWN, Units, unit_of
 
 if TYPE_CHECKING:
@@ -48,45 +48,8 @@ else:
 BLOCK = 1 << 16  # gaps between two looks for Ctrl-C
 SHOWN_POINTS = 200  # separations of a law as a Dataset, and of its picture
 SPACED = (1e-3, 0.2)  # of the way down: geometric up to here, then even
-SCAN = 49  # gaps at which a law's stiffness is looked at for its maximum
 ROUNDING = 4 * float(np.finfo(float).eps)
 DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polynomials'
-
-
-class _Point(NamedTuple):
-    separation: Any
-    mean_separation: Any
-    area: Any
-    stiffness: Any
-    force: Any
-
-
-class LawPoint(_Point):
-    """Where a law has a given pressure: separation d, mean separation u, A/A0, -dF/du and F/A0, of its shape.
-
-    `units` are the law's. What yields, and the incremental stiffness with it, no law holds: `contact` answers that.
-    """
-
-    units = Units()
-
-    def __repr__(self) -> str:
-        fields = self._asdict().items()
-        return f"LawPoint({', '.join(f'{name} {shown(value, unit_of(name, self.units))}' for name, value in fields)})"
-
-    @property
-    def mean_pressure(self) -> Any:
-        """Mean pressure in the contact, F/A; NaN where there is none."""
-        with np.errstate(invalid="ignore"):
-            return self.force / self.area
-
-
-class LawValues(NamedTuple):
-    """What a law answers at separations: F/A0, A/A0, -dF/du and the energy, of their shape."""
-
-    force: Any
-    area: Any
-    stiffness: Any
-    energy: Any
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -150,21 +113,15 @@ class ContactLaw(Law, Displayed):
     @property
     def rows(self) -> Any:
         """Shift and base of each octave of x, shape (octaves, 2)."""
-        return self.block[at.HEAD : self._first_word].view(np.int64).reshape(-1, 2)
+        return self.block[at.HEAD : self.block.view(np.int64)[at.RECORDS]].view(np.int64).reshape(-1, 2)
 
     @property
     def records(self) -> FloatArray:
         """Centre, rate, polynomials of force and area, and energy of each piece, shape (records, RECORD)."""
-        return self.block[self._first_word :].reshape(-1, at.RECORD)
-
-    @property
-    def _first_word(self) -> int:
-        return int(self.block.view(np.int64)[at.RECORDS])
+        return self.block[self.block.view(np.int64)[at.RECORDS] :].reshape(-1, at.RECORD)
 
     def gaps(self, separation: Any, u: Any) -> FloatArray:
-        """Separations d, checked, of separations or of mean separations."""
-        if separation is not None and u is not None:
-            raise InputError("separation and u: give one of them")
+        """Separations d, checked, of separations or of mean separations, one of them."""
         separation, u = (self.units.number("separation", gap) for gap in (separation, u))
         d = finite_array("separation", separation) if u is None else 2 * finite_array("u", u) - self.h_max
         # ends that are no round numbers are met but for rounding
@@ -182,12 +139,8 @@ class ContactLaw(Law, Displayed):
         if is_labelled(given):
             from mbma_tables.labels import apply
 
-            def answer(block: Any) -> Any:
-                found = self._ask(block, count, check, fill, plain)
-                return found if count > 1 else found[0]
-
-            found = apply(answer, (given,), count)
-            return found if count > 1 else (found,)
+            found: tuple[Any, ...] = apply(lambda block: self._ask(block, count, check, fill, plain), (given,), count)
+            return found
         # entries of plain arrays are checked as they are answered
         plain = plain and type(given) is np.ndarray and given.dtype == np.float64 and given.size > 0
         known = given if plain else check(given)
@@ -261,8 +214,10 @@ class ContactLaw(Law, Displayed):
 
         def check(given: Any) -> FloatArray:
             wanted = finite_array(name, given)
-            length, unit = self._unit_texts
-            unit = unit if key == "force" else ""
+            if ((wanted >= max(least, 0.0)) & (wanted <= most)).all():
+                return wanted
+            known = self.units.length, self.units.stress if key == "force" else None
+            length, unit = ("" if own in (None, "1") else f" {own}" for own in known)
             low, high = f"at least {least:.6g}{unit}", f"at most {most:.6g}{unit}"
             require(name, wanted, wanted >= 0, "at least 0")
             require(name, wanted, wanted >= least, f"{low}, where the law of {self.theory!r} ends", unit)
@@ -274,17 +229,8 @@ class ContactLaw(Law, Displayed):
 
         return self._ask(given, count, check, fill)
 
-    @functools.cached_property
-    def _unit_texts(self) -> tuple[str, str]:
-        """Units for messages, " um" and " GPa" for messages, nothing where a unit is not known."""
-        known = (self.units.length, self.units.stress)
-        length, stress = ("" if unit in (None, "1") else f" {unit}" for unit in known)
-        return length, stress
-
     def _inverse_block(self, name: str) -> FloatArray:
         """Polynomials of x over force or area, made when first asked for."""
-        from mbma_tables.theories.law_inverse import inverse_block
-
         made: dict[str, FloatArray] = self.__dict__.setdefault("_inverses", {})
         if name not in made:
             turn = self.turning_point if name == "force" else self.area_turning_point
@@ -295,21 +241,8 @@ class ContactLaw(Law, Displayed):
     @functools.cached_property
     def softening(self) -> float | None:
         """Mean separation u [length] below which stiffness falls with compression; None where it rises to the end."""
-        from scipy.optimize import minimize_scalar
-
-        step = (self.h_max - max(self.lowest, -self.h_max)) / 2 / SCAN
-        u = self.h_max - step * np.arange(1, SCAN + 1)
-        u[-1] = max(u[-1], (self.h_max + self.lowest) / 2)
-        values = np.asarray(self.stiffness(u=u))
-        falls = values[1:] < values[:-1] * (1 - DIGITS * self.error)
-        if not falls.any():
-            return None
-        peak = int(falls.argmax())
-        low, high = u[peak + 1], min(u[peak] + step, self.h_max)
-        found = minimize_scalar(
-            lambda x: -self.stiffness(u=x), bounds=(low, high), method="bounded", options={"xatol": 1e-7 * high}
-        )
-        return float(found.x)
+        noise = DIGITS * self.error
+        return softening(lambda u: self.stiffness(u=u), self.h_max, max(self.lowest, -self.h_max), noise)
 
     @functools.cached_property
     def leakage(self) -> LeakageLaw:

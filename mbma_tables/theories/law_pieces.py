@@ -19,17 +19,7 @@ from numpy.polynomial import chebyshev
 from mbma_tables.arguments import FloatArray
 from mbma_tables.core import core
 from mbma_tables.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.theories.law_block import (
-    AREA_AT,
-    CENTRE,
-    DEGREE,
-    ENERGY_AT,
-    EXPONENT,
-    FORCE_AT,
-    HEAD,
-    RATE,
-    RECORD,
-)
+from mbma_tables.theories import law_block as at
 
 SAMPLES = 16
 MAX_RECORDS = 4000
@@ -39,7 +29,7 @@ FIRST_BUCKETS = {-1: 16, -2: 8, -3: 4}  # of the octaves below x = 1, where Gaus
 SLOPES = 100.0  # times the tolerance of values: that of slopes, over F/x where they are smaller
 COARSE, COARSE_SLOPES = 1e-7, 10.0  # tolerance above which octaves begin with one bucket; and that of slopes there
 FOR_SLOPES = 4  # times more buckets are tried for the sake of slopes
-KEPT = DEGREE + 1
+KEPT = at.DEGREE + 1
 
 Values = Callable[[FloatArray], FloatArray]
 First = tuple[FloatArray, FloatArray, tuple[float, float]]  # record below where x begins, its errors, its powers
@@ -92,7 +82,7 @@ def _rule() -> Rule:
 
 def _fit_intervals(values: Values, ends: FloatArray) -> FloatArray:
     """Records of intervals (n, 2) of x and bounds on their errors, (n, RECORD + 3)."""
-    rule, made = _rule(), np.empty((len(ends), RECORD + 3))
+    rule, made = _rule(), np.empty((len(ends), at.RECORD + 3))
     found = np.ascontiguousarray(values((ends @ rule.places).ravel()))
     if core.law_fit(ends, found, rule.series, rule.bounds, rule.monomials, made):
         positive(found)
@@ -112,7 +102,7 @@ def side_pieces(side: Side, rtol: float) -> Pieces:
         cuts |= {e: _buckets(side, e, counts[e]) for e in pending}
         stops = list(itertools.accumulate(len(cuts[e]) for e in pending))
         made = _fit_intervals(side.values, np.array([ends for e in pending for ends in cuts[e]]))
-        worst = np.maximum.reduceat(made[:, RECORD:], [0, *stops[:-1]]).tolist()
+        worst = np.maximum.reduceat(made[:, at.RECORD :], [0, *stops[:-1]]).tolist()
         for e, stop, (value, _, slope) in zip(pending, stops, worst, strict=True):
             if value <= rtol:
                 enough.setdefault(e, FOR_SLOPES * counts[e])
@@ -135,7 +125,7 @@ def side_pieces(side: Side, rtol: float) -> Pieces:
         if high - low <= NEAR * low:
             # too narrow for slopes: what lies beside it, on the side that has no kink
             whole[k] = whole[min(max(k + 1 if low in side.kinks else k - 1, 0), place - 1)]
-    return Pieces(whole[:, :RECORD], whole[:, RECORD:-1], rows)
+    return Pieces(whole[:, : at.RECORD], whole[:, at.RECORD : -1], rows)
 
 
 @functools.cache
@@ -174,9 +164,11 @@ def power_record(values: Values, start: float, powers: tuple[float, float]) -> F
     """The record below `start` where force and area are these powers of x times polynomials."""
     exponents = np.array(powers)[:, None]
     made = _fit_intervals(lambda x: values(x) / (x / start) ** exponents, np.array([[0.0, start]]))[0]
-    record, (value, slope, _) = made[:RECORD], made[RECORD:]
-    record[CENTRE], record[RATE] = 0.0, 1 / start
-    record[FORCE_AT:ENERGY_AT] = (record[FORCE_AT:ENERGY_AT].reshape(2, KEPT) @ _rule().from_zero).ravel()
+    record, (value, slope, _) = made[: at.RECORD], made[at.RECORD :]
+    record[at.CENTRE], record[at.RATE] = 0.0, 1 / start
+    record[at.FORCE_AT : at.ENERGY_AT] = (
+        record[at.FORCE_AT : at.ENERGY_AT].reshape(2, KEPT) @ _rule().from_zero
+    ).ravel()
     return record, np.array([value, max(powers) * value + slope]), powers
 
 
@@ -188,9 +180,9 @@ def straight_record(values: Values, start: float) -> First:
     basis = np.stack([np.ones_like(t), np.log(t), t], axis=-1)
     constants, *_ = np.linalg.lstsq(basis, logs.T, rcond=None)
     missed = np.abs(basis @ constants - logs.T).max(axis=0)
-    record, lead = np.zeros(RECORD), np.exp(constants[0])
-    record[RATE] = 1 / start
-    record[[FORCE_AT, AREA_AT]], record[[FORCE_AT + 1, AREA_AT + 1]] = lead, lead * constants[2]
+    record, lead = np.zeros(at.RECORD), np.exp(constants[0])
+    record[at.RATE] = 1 / start
+    record[[at.FORCE_AT, at.AREA_AT]], record[[at.FORCE_AT + 1, at.AREA_AT + 1]] = lead, lead * constants[2]
     powers, value = (float(constants[1, 0]), float(constants[1, 1])), np.expm1(missed) + constants[2] ** 2
     return record, np.array([value.max(), (value * powers + 2 * missed).max()]), powers
 
@@ -232,33 +224,33 @@ def assemble(
     signs = sides[0].sign, sides[-1].sign
     head = np.array([h_max, scale, low, math.nextafter(1.0, 0.0), *signs, *kinks, *first[2], *ends, 0, 0, 0, 0])
     below = -lowest if len(sides) > 1 else 0
-    head.view(np.int64)[EXPONENT:] = lowest + 1023, below, HEAD + rows.size, signs[0] < 0
+    head.view(np.int64)[at.EXPONENT :] = lowest + 1023, below, at.HEAD + rows.size, signs[0] < 0
     parts = [head, rows.view(np.float64), first[0], *(piece.records for piece in pieces)]
     block = np.concatenate([part.ravel() for part in parts])
     errors = np.concatenate([first[1][None], *(piece.errors for piece in pieces)])
-    return Assembly(block, block[head.size + rows.size :].reshape(-1, RECORD), errors)
+    return Assembly(block, block[head.size + rows.size :].reshape(-1, at.RECORD), errors)
 
 
 def fill_energies(records: FloatArray, order: Any, signs: FloatArray, scale: float, power: float, last: float) -> None:
     """Energies, integrals of force over d, into the records; `last` is that beyond the gaps covered."""
     first, begins, k = records[0], signs[0] < 0, np.arange(1, KEPT + 1)
-    if not first[RATE]:
+    if not first[at.RATE]:
         # none is needed: what rounds below the law's end goes by the next one
         first[:] = records[1]
-    of_first = (first[FORCE_AT:AREA_AT] / (power + k)).sum() / (scale * first[RATE])
+    of_first = (first[at.FORCE_AT : at.AREA_AT] / (power + k)).sum() / (scale * first[at.RATE])
     own = records[order]
-    shares, per_d = own[:, FORCE_AT:AREA_AT] / k, scale * own[:, RATE]
+    shares, per_d = own[:, at.FORCE_AT : at.AREA_AT] / k, scale * own[:, at.RATE]
     # from t = 0 to either end, of which t = s faces last contact
     upper, lower = shares.sum(axis=1) / per_d, (shares * (-1.0) ** k).sum(axis=1) / per_d
     reached = np.concatenate([[of_first if begins else last], upper - lower]).cumsum()
-    records[order, ENERGY_AT] = reached[:-1] + np.where(signs > 0, upper, -lower)
+    records[order, at.ENERGY_AT] = reached[:-1] + np.where(signs > 0, upper, -lower)
     if not begins:
-        first[ENERGY_AT] = reached[-1] + of_first if first[CENTRE] == 0 else records[1, ENERGY_AT]
+        first[at.ENERGY_AT] = reached[-1] + of_first if first[at.CENTRE] == 0 else records[1, at.ENERGY_AT]
 
 
 def first_falls(own: FloatArray, signs: FloatArray) -> list[tuple[int, float] | None]:
     """Where force, and area, first stop rising with compression: place among records in its order, t; None if never."""
-    series = own[:, FORCE_AT:ENERGY_AT].reshape(-1, KEPT)
+    series = own[:, at.FORCE_AT : at.ENERGY_AT].reshape(-1, KEPT)
     found: list[tuple[int, float] | None] = [None, None]
     # a polynomial whose Bernstein coefficients are positive is positive
     for k in np.flatnonzero((series @ _bernstein() * -np.repeat(signs, 2)[:, None]).min(axis=1) <= 0).tolist():
@@ -284,7 +276,7 @@ def _first_fall(series: FloatArray, end: float) -> float | None:
 @functools.cache
 def _bernstein() -> FloatArray:
     """Monomials of degree DEGREE to the Bernstein coefficients of their derivative in [-1, 1]."""
-    n = DEGREE - 1
+    n = at.DEGREE - 1
     basis = [
         np.polynomial.Polynomial([0.5, -0.5]) ** (n - j) * np.polynomial.Polynomial([0.5, 0.5]) ** j * math.comb(n, j)
         for j in range(n + 1)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, require
+from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, require, rows
+from mbma_tables.calibrated import spectrum_of
 from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
 from mbma_tables.labels import agree
@@ -20,13 +21,13 @@ from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.theories.leakage_table import flow_of_spectrum, self_affine, shipped_flow
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory
-from mbma_tables.theories.spectrum_laws import spectrum_of
 from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mbma_tables.theories.result import Contact, Source
+    from mbma_tables.theories.result import Contact
+    from mbma_tables.theories.source import Source
 
 LARGEST_KNUDSEN = 0.1  # mean free path over the channel, to which slip of first order holds
 SLIP = 6.0  # of a plane channel: flow is 1 + 6 Kn times that without slip
@@ -90,7 +91,7 @@ class Leakage(Displayed):
 
         NaN where not known, and where blocked.
         """
-        return self._map(lambda theory, s, u, E, area: scatter(theory, area))
+        return self._map(lambda by, s, u, E, area: shipped_flow().standard_deviation(by.elastic.name, area))
 
     @functools.cached_property
     def closed_form(self) -> Numbers:
@@ -235,10 +236,7 @@ def leakage_of(source: Source, contact: Contact, area: Any) -> Leakage:
 
 def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatArray:
     """k of mean separations u [length] and A/A0; 0 where blocked."""
-    shape = np.broadcast_shapes(np.shape(mean_separation), np.shape(area), surface.shape)
-    contact = np.ascontiguousarray(np.broadcast_to(area, shape), float).ravel()
-    gap = np.broadcast_to(np.asarray(mean_separation) / np.asarray(surface.h_rms), shape)
-    u = np.ascontiguousarray(gap, float).ravel()
+    (u, contact), shape = rows(np.asarray(mean_separation) / np.asarray(surface.h_rms), area)
     if isinstance(surface, MeasuredSurface):
         return flow_of_spectrum(spectrum_of(surface), u, contact).reshape(shape)
     table = shipped_flow()
@@ -264,8 +262,3 @@ def concerns(theory: Theory, surface: Any, area: FloatArray) -> dict[str, Any]:
     if isinstance(theory.elastic, Mbma):
         found["leakage: the mean separation of 'mbma' is off by factors"] = np.ones(np.shape(area), bool)
     return found
-
-
-def scatter(theory: Theory, area: FloatArray) -> FloatArray:
-    """Standard deviation of ln k at contact fractions."""
-    return shipped_flow().standard_deviation(theory.elastic.name, area)

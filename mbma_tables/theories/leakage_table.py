@@ -28,23 +28,12 @@ KEPT = 64  # spectra whose factors are kept
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class FlowTable(SurfaceSpline):
-    """The group `leakage` of the shipped file: ln R.
-
-    Attributes
-    ----------
-    constants : FlowConstants
-    error : float
-        Largest error of ln R against the medium itself, at held-out surfaces.
-    scatter : dict
-        By theory: root mean squares of ln(k/simulation).
-    contact : numpy.ndarray
-        Contact fractions that they belong to.
-    """
+    """The group `leakage` of the shipped file: ln R."""
 
     constants: FlowConstants
-    error: float
-    scatter: dict[str, FloatArray]
-    contact: FloatArray
+    error: float  # largest error of ln R against the medium itself, at held-out surfaces
+    scatter: dict[str, FloatArray]  # by theory: root mean squares of ln(k/simulation)
+    contact: FloatArray  # at these contact fractions
 
     @property
     def law_constants(self) -> tuple[float, float, float]:

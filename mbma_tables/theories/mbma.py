@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import copy
+import functools
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.arguments import FloatArray, whole_number_in
 from mbma_tables.errors import InputError
-from mbma_tables.models import QUANTITIES, TIERS, AnyModel, get_model, tier_name
+from mbma_tables.models import BOTH, QUANTITIES, TIERS, AnyModel, check_outside, get_model, tier_name
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import NAMED, Reading, get_reading
@@ -23,6 +25,7 @@ from mbma_tables.totals.profile import profile
 
 GOLDEN = (5**0.5 - 1) / 2
 SECTIONS = 24  # of a scan's step, to 1e-6
+MOST_WORKERS = 1024
 MAX_AREA = 0.1  # above it islands begin to lie on one another (docs/fidelity.md)
 
 
@@ -46,13 +49,18 @@ class Mbma(Theory):
         outside: str = "raise",
         workers: int = 1,
     ) -> None:
+        check_outside(outside)
         self.tier, self.reading, self.rtol, self.outside = tier, get_reading(reading), rtol, outside
-        self.workers = workers
+        self.workers = whole_number_in("workers", workers, 1, MOST_WORKERS)
+        self.reading_name, self.tier_name = self.reading.name, tier_name(tier)
 
-    @property
-    def tier_name(self) -> str:
-        """What results call the tier."""
-        return tier_name(self.tier)
+    @functools.cached_property
+    def model(self) -> AnyModel:
+        """The island model of the tier."""
+        return get_model(self.tier, self.rtol, self.reading)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "model"}
 
     def totals(
         self,
@@ -62,10 +70,11 @@ class Mbma(Theory):
         derivatives: bool | str = False,
         quantities: tuple[str, ...] = QUANTITIES,
     ) -> Totals:
-        """Force and area at separations d [length]."""
+        """Force and area at separations d [length] of the surface's broadcast shape."""
+        which = BOTH if len(quantities) > 1 else QUANTITIES.index(quantities[0])
         return totals_at(
-            surface, separation, self.tier, self.reading, E_star, self.rtol, self.outside, derivatives, quantities,
-            self.workers,
+            surface, np.asarray(separation, float), self.model, self.reading, self.rtol, E_star, self.outside,
+            derivatives, which, self.workers,
         )  # fmt: skip
 
     def _has_slopes(self, surface: AnySurface) -> bool:
@@ -130,9 +139,8 @@ class Mbma(Theory):
         """Mean separations [length] from where force or area is largest, or the table ends, to first contact."""
         lowest = np.zeros(surface.shape)
         if isinstance(surface, MeasuredSurface):
-            model = get_model(self.tier, self.rtol, self.reading)
             # islands up to an approach of 2 h_max make u = 0
-            kept = profile(surface, model, self.reading, QUADRATURE_SHARE * self.rtol, self.outside)
+            kept = profile(surface, self.model, self.reading, QUADRATURE_SHARE * self.rtol, self.outside)
             end = float(kept.edges[-1]) / (2 * kept.source.peak)
             lowest = np.asarray(surface.h_max * (1 - end))
         return self._maximum(surface, quantity, lowest), np.asarray(surface.h_max, dtype=float)
@@ -164,7 +172,8 @@ class Mbma(Theory):
     def _maximum(self, surface: AnySurface, quantity: str, otherwise: FloatArray) -> FloatArray:
         """Mean separation of the first local maximum of a quantity under compression, or `otherwise`."""
         # where some islands are not covered, it is looked for among the rest
-        theory = self if self.outside == "exact" else Mbma(self.tier, self.reading, self.rtol, "nan")
+        theory = copy.copy(self)
+        theory.outside = "exact" if self.outside == "exact" else "nan"
         depth = np.arange(1, SCAN + 1) / SCAN
         h_max = np.asarray(surface.h_max, dtype=float)
         batch = select(surface, surface.shape, np.arange(h_max.size).reshape(*surface.shape, 1))

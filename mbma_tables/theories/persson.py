@@ -13,14 +13,13 @@ from typing import Literal
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, finite_array, require
-from mbma_tables.calibrated import YANG_PERSSON, Law, area_persson
+from mbma_tables.arguments import FloatArray, finite_array, grouped, require
+from mbma_tables.calibrated import LAW_ERROR, YANG_PERSSON, Law, area_persson, self_affine_law, spectrum_of
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer, select
-from mbma_tables.theories.spectrum_laws import LAW_ERROR, self_affine_law, spectrum_of
 
 Method = Literal["full", "simplified"]
 
@@ -63,12 +62,10 @@ def _by_law(surface: AnySurface, given: FloatArray, answer: Callable[[Law, Float
     shape = given.shape[1:]
     pairs = np.stack([np.broadcast_to(part, shape).ravel() for part in (surface.hurst, surface.zeta_1)])
     known, inverse = np.unique(pairs, axis=1, return_inverse=True)
-    owner, columns = inverse.ravel(), given.reshape(len(given), -1)
-    order = np.argsort(owner, kind="stable")
-    entries = np.split(order, np.searchsorted(owner[order], np.arange(1, known.shape[1])))
-    parts = [answer(_law(*pair), columns[:, mine]) for pair, mine in zip(known.T.tolist(), entries, strict=True)]
-    out = np.empty((len(parts[0]), owner.size))
-    out[:, order] = np.concatenate(parts, axis=1)
+    columns, groups = given.reshape(len(given), -1), grouped(inverse.ravel())
+    parts = [answer(_law(*known[:, k].tolist()), columns[:, mine]) for k, mine in groups]
+    out = np.empty((len(parts[0]), inverse.size))
+    out[:, np.concatenate([mine for _, mine in groups])] = np.concatenate(parts, axis=1)
     return out.reshape(-1, *shape)
 
 

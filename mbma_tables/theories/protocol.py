@@ -57,6 +57,7 @@ class Theory(abc.ABC):
     """A theory, and what follows from its forces."""
 
     name: str
+    reading_name = tier_name = ""  # what results call its reading of the paper and its island model
     advice = ""  # one line beside each answer
     reached = 0.0  # by how much, relatively, a wanted value may be more than the largest
     ends_at_h_max = True  # whether force vanishes at u = h_max; else its Gaussian heights have no end
@@ -141,12 +142,12 @@ class Theory(abc.ABC):
         high = np.broadcast_to(self.interval(surface)[1], u.shape)
         low = np.minimum(u, high)
         # from bend to bend, across which no rule converges
-        edges = np.sort([low, *(np.clip(bend, low, high) for bend in self.bends(surface)), high], axis=0)
+        edges = np.sort([low, *(np.clip(bend, low, high) for bend in self.elastic.bends(surface)), high], axis=0)
         found = tanhsinh(
             lambda x, place: self.at(u.shape, place).answer(select(surface, u.shape, place), x).force,
             edges[:-1],
             edges[1:],
-            args=(_places(u.shape),),
+            args=(np.arange(float(u.size)).reshape(u.shape),),  # of one type with x
             rtol=ENERGY_RTOL,
             minlevel=LEAST_LEVEL,
         )
@@ -243,11 +244,6 @@ class Theory(abc.ABC):
 def _shares(count: int) -> FloatArray:
     """Places from 1 to 0, closer together at either end."""
     return np.asarray(1 / (1 + np.exp(np.linspace(-LOOKED_AT, LOOKED_AT, count))))
-
-
-def _places(shape: tuple[int, ...]) -> FloatArray:
-    """Flat indices, as floats: scipy's elementwise functions pass arguments of one type."""
-    return np.arange(int(np.prod(shape)), dtype=float).reshape(shape)
 
 
 def select(surface: AnySurface, shape: tuple[int, ...], place: Any) -> AnySurface:

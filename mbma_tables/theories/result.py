@@ -4,59 +4,32 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, checked_hardness, is_labelled
+from mbma_tables.arguments import FloatArray, Numbers, any_labelled, is_labelled
 from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
-from mbma_tables.labels import apply_to_surface
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.plots import Curve, draw_compression, force_label, theory_label
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
-from mbma_tables.units import Units, unit_of
+from mbma_tables.theories.source import MEANINGS, Source, concerns, named
+from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from mbma_tables.theories.leakage import Leakage
-    from mbma_tables.theories.yielding import Loaded
 
 OF_HARDNESS = ("yielded", "incremental_stiffness", "plane_separation")
 MOST_SHOWN = 10_000  # entries up to which a line says how far to trust them
-MEANINGS = {
-    "separation": "d, rigid plane to mid-plane",
-    "mean_separation": "u = (h_max + d)/2",
-    "force": "force over nominal area",
-    "area": "real over nominal contact area",
-    "stiffness": "-dF/du per nominal area",
-    "energy": "elastic energy per nominal area",
-    "mean_pressure": "mean pressure in the contact",
-    "yielded": "share of the contact area at the hardness",
-    "incremental_stiffness": "-dF/du per nominal area of a small unloading",
-    "plane_separation": "gap between mean planes",
-    "error": "bound on the relative numerical error against the theory",
-    "scatter": "standard deviation of ln F at this mean separation from simulation to simulation",
-    "area_scatter": "standard deviation of ln A at this force from simulation to simulation",
-    "stiffness_scatter": "standard deviation of ln of the incremental stiffness at this force, likewise",
-    "separation_scatter": "standard deviation of the mean separation at this force, likewise",
-    "valid": "whether the theory was tested for contacts such as these",
-}
-MAX_GRADIENT = 1.0  # rms gradient above which heights and wavenumbers are hardly in one unit
 
 
-def named(value: Any, name: str, units: Units) -> Any:
-    """A quantity of a contact; a DataArray of it knows its name, meaning and unit."""
-    if not is_labelled(value):
-        return value
-    return value.rename(name).assign_attrs(long_name=MEANINGS[name], units=unit_of(name, units))
-
-
-def described(method: Callable[[Any], Numbers]) -> functools.cached_property[Numbers]:
+def described(method: Callable[[Any], Any]) -> functools.cached_property[Numbers]:
     """A quantity of a contact that is kept when it was read."""
 
     @functools.wraps(method)
@@ -122,7 +95,7 @@ class Contact(Displayed):
         for name in ("mean_separation", "force", "area"):
             if getattr(self, name) is not None:
                 facts[name] = shown(getattr(self, name), units[name])
-        if source.surface.labelled or is_labelled(self.mean_separation) or np.size(self.error) > MOST_SHOWN:
+        if any_labelled(source.surface, self.mean_separation) or np.size(self.error) > MOST_SHOWN:
             return facts
         facts["separation_scatter"] = shown(self.separation_scatter, units["separation_scatter"])
         more = {name: getattr(self, name) for name in ("error", "scatter", "stiffness_scatter", "valid")}
@@ -187,13 +160,12 @@ class Contact(Displayed):
         return self._answer.area if self.area is None else self.area
 
     @described
-    def stiffness(self) -> Numbers:
+    def stiffness(self) -> Any:
         """-d(F/A0)/du [stress/length] of loading, against the mean separation; computed when first read."""
-        found: Numbers = (self._source.E_star * self._answer.stiffness)[()]
-        return found
+        return (self._source.E_star * self._answer.stiffness)[()]
 
     @described
-    def energy(self) -> Numbers:
+    def energy(self) -> Any:
         """Elastic energy per nominal area [stress length], the integral of F/A0 over u; computed when first read."""
         if self._source.yields:
             raise InputError(
@@ -201,8 +173,7 @@ class Contact(Displayed):
                 "contact_law(..., hardness=...).energy is the work of loading, incremental_stiffness what a small "
                 "unloading starts with"
             )
-        found: Numbers = self._source.map(lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1)[0]
-        return found
+        return self._source.map(lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1)[0]
 
     def conductance(self, k1: ArrayLike | str, k2: ArrayLike | str | None = None) -> Numbers:
         """Conductance per nominal area of two bodies in contact, thermal or electrical, h = (k_s/E*) (-dF/du).
@@ -243,24 +214,22 @@ class Contact(Displayed):
             return (getattr(theory.loaded(surface, u), name),)
 
         known = self._source.loaded
-        found: Numbers = self._source.map(number, self, 1)[0] if known is None else getattr(known, name)[()]
-        return found
+        return self._source.map(number, self, 1)[0] if known is None else getattr(known, name)[()]
 
     @described
-    def yielded(self) -> Numbers:
+    def yielded(self) -> Any:
         """Share of the contact area at the hardness, 0 to 1."""
         return self._of_loading("yielded") if self._source.yields else 0.0 * self.mean_separation
 
     @described
-    def incremental_stiffness(self) -> Numbers:
+    def incremental_stiffness(self) -> Any:
         """-d(F/A0)/du [stress/length] of a small unloading, the contact area frozen; `stiffness` if nothing yields."""
         if not self._source.yields:
             return self.stiffness
-        found: Numbers = (self._source.E_star * self._of_loading("incremental_stiffness"))[()]
-        return found
+        return (self._source.E_star * self._of_loading("incremental_stiffness"))[()]
 
     @described
-    def plane_separation(self) -> Numbers:
+    def plane_separation(self) -> Any:
         """Gap between the mean planes [length]: u less what yielded points are flattened."""
         return self._of_loading("plane_separation") if self._source.yields else self.mean_separation
 
@@ -278,31 +247,31 @@ class Contact(Displayed):
         return found
 
     @described
-    def mean_pressure(self) -> Numbers:
+    def mean_pressure(self) -> Any:
         """Mean pressure in the contact, F/A [stress]; NaN where there is none."""
         force = self._source.E_star * self._answer.force if self.force is None else self.force
         with np.errstate(invalid="ignore"):
             return force / self._touching
 
     @described
-    def scatter(self) -> Numbers:
+    def scatter(self) -> Any:
         """Standard deviation of ln F at this mean separation from simulation to simulation; NaN where not known."""
         return self._scatter[0]
 
     @described
-    def area_scatter(self) -> Numbers:
+    def area_scatter(self) -> Any:
         """Standard deviation of ln A at this force, likewise."""
         return self._scatter[1]
 
     @described
-    def stiffness_scatter(self) -> Numbers:
+    def stiffness_scatter(self) -> Any:
         """Standard deviation of ln of `incremental_stiffness` at this force, likewise: of conductance, too."""
         more = {"area": self._touching}
         (found,) = self._source.map(lambda by, s, u, E, A: (by.stiffness_scatter(s, A),), self, 1, more)
         return found
 
     @described
-    def separation_scatter(self) -> Numbers:
+    def separation_scatter(self) -> Any:
         """Standard deviation of the mean separation at this force [length], `scatter` times F/(-dF/du)."""
         with np.errstate(invalid="ignore", divide="ignore"):
             return self.scatter * self._answer.force / np.abs(self._answer.stiffness)
@@ -319,7 +288,7 @@ class Contact(Displayed):
         return leakage_of(self._source, self, self._touching)
 
     @described
-    def valid(self) -> Numbers:
+    def valid(self) -> Any:
         """Whether the theory was tested for contacts such as these; `reasons` says where and why not."""
 
         def none(theory: Theory, s: AnySurface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[FloatArray]:
@@ -343,58 +312,3 @@ class Contact(Displayed):
         *known, u, E_star, hardness = map(np.asarray, fields[:7])
         found = concerns(source.theory_at(E_star, hardness), surface, u, TheoryAnswer(*known))
         return {reason: mask for reason, mask in found.items() if mask.any()}
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Source:
-    """What a `Contact` is of, for quantities that are computed when they are read."""
-
-    theory: Theory
-    surface: AnySurface
-    E_star: Any
-    hardness: Any
-    units: Units
-    answer: TheoryAnswer | None = None  # where it is known already
-    loaded: Loaded | None = None  # likewise, with a hardness
-
-    @property
-    def yields(self) -> bool:
-        """Whether a hardness is given."""
-        # an empty one is refused where it is checked
-        return is_labelled(self.hardness) or not np.size(self.hardness) or not np.equal(self.hardness, np.inf).all()
-
-    def theory_at(self, E_star: Any, hardness: Any) -> Theory:
-        """The theory, with the hardness where there is one."""
-        if not self.yields:
-            return self.theory
-        from mbma_tables.theories.yielding import Yielding
-
-        broadcast_shape(E_star=E_star, hardness=hardness)
-        return Yielding(self.theory, checked_hardness(hardness) / E_star)
-
-    def map(
-        self,
-        function: Callable[..., tuple[Any, ...]],
-        contact: Contact,
-        outputs: int,
-        more: Mapping[str, Any] | None = None,
-    ) -> tuple[Numbers, ...]:
-        """``function(theory, surface, u, E_star, *more)`` of the contact's entries."""
-        arrays = {"mean_separation": contact.mean_separation, "E_star": self.E_star, "hardness": self.hardness}
-        arrays |= more or {}
-
-        def block(surface: AnySurface, u: Any, E_star: Any, hardness: Any, *others: Any) -> tuple[Any, ...]:
-            return function(self.theory_at(E_star, hardness), surface, u, E_star, *others)
-
-        if self.surface.labelled or any(map(is_labelled, arrays.values())):
-            found: tuple[Numbers, ...] = apply_to_surface(block, self.surface, arrays, outputs)
-            return found
-        return tuple(part[()] for part in block(self.surface, *map(np.asarray, arrays.values())))
-
-
-def concerns(theory: Theory, surface: AnySurface, u: FloatArray, answer: TheoryAnswer) -> dict[str, Any]:
-    """Every reason against a theory's answers, with its mask."""
-    steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.force))
-    text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"
-    measured = dict.fromkeys(theory.departures(surface), np.ones(np.shape(answer.force), dtype=bool))
-    return {text: steep, **measured, **theory.concerns(surface, answer, u)}

@@ -129,14 +129,6 @@ class Yielding(Theory):
         other.__dict__.update(self.__dict__ | fields)
         return other
 
-    def departures(self, surface: AnySurface) -> tuple[str, ...]:
-        """As of the elastic theory."""
-        return self.elastic.departures(surface)
-
-    def scatter_name(self, surface: AnySurface) -> str:
-        """The elastic theory's."""
-        return self.elastic.scatter_name(surface)
-
     @property
     def elastic(self) -> Theory:
         """The theory of the elastic contact."""
@@ -152,10 +144,6 @@ class Yielding(Theory):
     def stiffer(self, times: FloatArray) -> Theory:
         """With hardnesses that are less of the modulus."""
         return self.changed(hardness=np.asarray(self.hardness / times))
-
-    def bends(self, surface: AnySurface) -> FloatArray:
-        """Where derivatives of the elastic force jump."""
-        return self.elastic.bends(surface)
 
     def _eta(self, surface: AnySurface) -> FloatArray:
         """p_m/(E* g)."""
@@ -174,9 +162,9 @@ class Yielding(Theory):
         u, h_rms = np.asarray(mean_separation, dtype=float), np.asarray(surface.h_rms)
         at_force: Any = None
         if lighter is None:
-            elastic = self.elastic.answer(surface, u)
+            elastic = self._elastic.answer(surface, u)
         else:
-            both = self.elastic.answer(surface, np.stack([u, lighter]))
+            both = self._elastic.answer(surface, np.stack([u, lighter]))
             elastic, (_, at_force, *_) = (TheoryAnswer(*(part[k] for part in both)) for k in range(2))
         eta, gradient, endless = self._eta(surface), np.asarray(surface.rms_gradient), np.isinf(self.hardness)
         if endless.all():
@@ -186,7 +174,7 @@ class Yielding(Theory):
             needed = (force > 0) & ~endless
             # where nothing yields or touches, a force that the theory is sure to reach
             known = np.minimum(np.where(needed, force, elastic.force), np.where(needed, HEAVIEST, 1.0) * gradient)
-            at_force = np.where(needed, self.elastic.area_at(surface, known), 0.0)
+            at_force = np.where(needed, self._elastic.area_at(surface, known), 0.0)
         # both of the elastic errors, force and area at that force, may add up
         area = law.area(force / gradient, at_force, eta)
         capped = TheoryAnswer(force, area, stiffness, 2 * elastic.error)
@@ -196,7 +184,7 @@ class Yielding(Theory):
 
     def _closed(self, surface: AnySurface, u: FloatArray, force: Any, stiffness: Any) -> tuple[FloatArray, FloatArray]:
         """Force over A0 E* and its -d/du between the elastic ones and the bearing curve."""
-        gradient, bearing = np.asarray(surface.rms_gradient), self.elastic.bearing_share(surface, u)
+        gradient, bearing = np.asarray(surface.rms_gradient), self._elastic.bearing_share(surface, u)
         load, steep = law.force(force / gradient, stiffness / gradient, *bearing, self._eta(surface))
         return load * gradient, steep * gradient
 
@@ -205,15 +193,11 @@ class Yielding(Theory):
         force, _, _ = self.values(surface, mean_separation, "force")
         # one without end has no gap without force
         least = 0.0 if self.ends_at_h_max else np.finfo(float).tiny
-        return self.elastic.inverted(surface, "force", np.maximum(force, least))[0]
-
-    def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The elastic theory's."""
-        return self.elastic.bearing_share(surface, mean_separation)
+        return self._elastic.inverted(surface, "force", np.maximum(force, least))[0]
 
     def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which the elastic force falls, and Gaussian heights end in numbers."""
-        low, high = self.elastic.interval(surface, "force")
+        low, high = self._elastic.interval(surface, "force")
         h_rms = np.asarray(surface.h_rms)
         # at zero, where a hardness leaves full contact, some theories have no finite force
         low = np.maximum(low, LEAST if self.ends_at_h_max else CLOSED * h_rms)
@@ -221,18 +205,18 @@ class Yielding(Theory):
 
     def looks(self, surface: AnySurface) -> int:
         """Few at many hardnesses, too."""
-        return FEW_LOOKS if self.hardness.size > MANY else self.elastic.looks(surface)
+        return FEW_LOOKS if self.hardness.size > MANY else self._elastic.looks(surface)
 
     def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
         """Force without the area, which follows from it."""
         if quantity != "force":
             return super().values(surface, mean_separation, quantity)
-        force, steep, exact = self.elastic.values(surface, mean_separation, quantity)
+        force, steep, exact = self._elastic.values(surface, mean_separation, quantity)
         return *self._closed(surface, mean_separation, force, steep), exact
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at which "force" (over A0 E*, below the hardness) or "area" has a wanted value."""
-        asked: Theory = self.elastic if np.isinf(self.hardness).all() else super()  # type: ignore[assignment]
+        asked: Theory = self._elastic if np.isinf(self.hardness).all() else super()  # type: ignore[assignment]
         return asked.mean_separation_at(surface, quantity, wanted)
 
     def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
@@ -259,21 +243,21 @@ class Yielding(Theory):
         Those of the calibrated law are measured; others are what the elastic theory's become, and the hardness law's
         own beside it. NaN where the elastic theory's is not known.
         """
-        eta, table, name = self._eta(surface), shipped(), self.scatter_name(surface)
-        force, contact = self.elastic.scatter(surface, area)
+        eta, table, name = self._eta(surface), shipped(), self._elastic.scatter_name(surface)
+        force, contact = self._elastic.scatter(surface, area)
         found = table.standard_deviation(name, "force", eta, area, force)
         return found, table.standard_deviation(name, "area", eta, area, contact)
 
     def stiffness_scatter(self, surface: AnySurface, area: FloatArray) -> FloatArray:
         """Standard deviation of ln of the frozen contact's stiffness at given F; NaN where it was not measured."""
-        eta, elastic = self._eta(surface), self.elastic.stiffness_scatter(surface, area)
-        return shipped().standard_deviation(self.scatter_name(surface), "stiffness", eta, area, elastic)
+        eta, elastic = self._eta(surface), self._elastic.stiffness_scatter(surface, area)
+        return shipped().standard_deviation(self._elastic.scatter_name(surface), "stiffness", eta, area, elastic)
 
     def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """The elastic theory's reasons, and hardnesses below those that were simulated."""
         soft = self._eta(surface) < TESTED_ETA * (1 - 1e-9)
         return {
-            **self.elastic.concerns(surface, answer, mean_separation),
+            **self._elastic.concerns(surface, answer, mean_separation),
             f"the hardness over E* times the rms gradient is below {TESTED_ETA:g}": np.broadcast_to(
                 soft, np.shape(answer.area)
             ),

@@ -13,36 +13,25 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from mbma_tables.arguments import (
-    FloatArray,
-    broadcast_shape,
-    finite_array,
-    positive_modulus,
-    require,
-    spread,
-    whole_number_in,
-)
+from mbma_tables.arguments import FloatArray, grouped, require
 from mbma_tables.core import in_blocks
-from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
-from mbma_tables.models import AREA, BOTH, FORCE, QUANTITIES, AnyModel, check_outside, get_model
+from mbma_tables.errors import ConvergenceError, OutOfRangeError
+from mbma_tables.models import AREA, BOTH, FORCE, AnyModel
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.readings import Reading, get_reading
+from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.totals.island_sum import BY_COMPRESSION, QUADRATURE_SHARE, sums_by_table, totals_of
-from mbma_tables.totals.pairs import Pairs
+from mbma_tables.totals.island_sum import BY_COMPRESSION, QUADRATURE_SHARE, Pairs, sums_by_table, totals_of
 from mbma_tables.totals.profile import Profile, profile
 
 # surfaces whose islands are kept as a profile, in numpy; of more, those with so many gaps each that it costs less
 FEW_SURFACES, MANY_GAPS = 16, 300
 BLOCK = 1 << 14  # gaps between two looks for Ctrl-C
-MOST_WORKERS = 1024
 LEAST, SUBNORMAL = 1e-290, float(np.finfo(float).smallest_subnormal)
 
 
@@ -54,71 +43,42 @@ class Totals:
     do not deform, far from elastic ones. Derivatives on a surface that is its own spectrum are by the separation alone.
     """
 
-    separation: Any
-    mean_separation: Any
     force: Any
     area: Any
     error: Any
-    reading: str
-    tier: str
-    islands: int | None
+    islands: int
     force_by: dict[str, Any] | None = None
     area_by: dict[str, Any] | None = None
 
 
-def wanted_quantities(quantities: Iterable[str]) -> tuple[str, ...]:
-    """The quantities asked for, each once, in the order of `QUANTITIES`."""
-    asked = (quantities,) if isinstance(quantities, str) else tuple(quantities)
-    if not asked or not set(asked) <= set(QUANTITIES):
-        raise InputError(f"quantities must be some of {QUANTITIES}, got {quantities!r}")
-    return tuple(name for name in QUANTITIES if name in asked)
-
-
 def totals_at(
-    surface: AnySurface,
-    separation: ArrayLike,
-    tier: str | AnyModel = "universal",
-    reading: str | Reading = "reported",
-    E_star: ArrayLike = 1.0,
-    rtol: float = 1e-8,
-    outside: str = "raise",
-    derivatives: bool | str = False,
-    quantities: Iterable[str] = QUANTITIES,
-    workers: int = 1,
-) -> Totals:
-    """Force and area of the MBMA model at separations d; what `mbma_tables.contact` says of them holds.
-
-    `derivatives` may be "separation", for those alone.
-    """
-    quantities, reading = wanted_quantities(quantities), get_reading(reading)
-    gap = finite_array("separation", separation)
-    modulus = positive_modulus(E_star)
-    check_outside(outside)
-    model, workers = get_model(tier, rtol, reading), whole_number_in("workers", workers, 1, MOST_WORKERS)
-    which = BOTH if len(quantities) > 1 else QUANTITIES.index(quantities[0])
-    shape = broadcast_shape(separation=gap, surface=surface.h_rms, E_star=modulus)
-    gap, h_max = spread(gap, shape), np.asarray(surface.h_max)
-    require("separation", gap, gap >= -h_max, "at least -h_max, where the model ends")
+    surface: AnySurface, gap: FloatArray, model: AnyModel, reading: Reading, rtol: float, modulus: Any = 1.0,
+    outside: str = "raise", derivatives: bool | str = False, which: int = BOTH, workers: int = 1,
+) -> Totals:  # fmt: skip
+    """Force and area at separations d of the surface's broadcast shape; `derivatives` "separation" are those alone."""
+    shape, h_max = gap.shape, surface.h_max
+    require("separation", gap, gap >= -h_max, "at least -h_max, where the model ends at full compression")
     depth = np.asarray(h_max - gap)
     force_by = area_by = None
-    by_depth: tuple[FloatArray, ...] = ()
     try:
-        stress = modulus * surface.q0 * surface.s if isinstance(surface, Surface) else modulus
+        stress = modulus
         if isinstance(surface, Surface):
+            stress, zeta_1 = modulus * surface.q0 * surface.s, np.asarray(surface.zeta_1)
             allowed = f"greater than {reading.floor_u:g}, the reading's floor of zeta_u"
-            require("q1/q0", np.asarray(surface.zeta_1), surface.zeta_1 > reading.floor_u, allowed)
+            require("q1/q0", zeta_1, zeta_1 > reading.floor_u, allowed)
         if isinstance(surface, Surface) and derivatives is True:
             pairs = Pairs.of(surface, depth)
             sums, error, islands, _ = sums_by_table(model, pairs, reading, rtol, outside, workers)
             force, area = sums[:, 0, 0], sums[:, 1, 0]
             force_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
         else:
-            (force, area, *slopes), error, islands = _totals(
+            sums, error, islands = _totals(
                 model, surface, depth, reading, rtol, outside, which, bool(derivatives), workers
             )
-            by_depth = tuple(slope.reshape(shape) / surface.h_rms for slope in slopes)
-        if derivatives and by_depth:
-            force_by, area_by = {"separation": -stress * by_depth[0]}, {"separation": -by_depth[1]}
+            force, area = sums[:2]
+            if derivatives:
+                force_slope, area_slope = sums[2:].reshape(2, *shape) / surface.h_rms
+                force_by, area_by = {"separation": -stress * force_slope}, {"separation": -area_slope}
         if area_by is not None and reading.addition == "cover":
             kept = np.exp(-area.reshape(shape))  # dA = exp(-sum) dsum
             area_by = {name: (slope * kept)[()] for name, slope in area_by.items()}
@@ -131,13 +91,9 @@ def totals_at(
     if tiny.any():
         error[tiny] = np.minimum(error[tiny] + SUBNORMAL / np.minimum(force, area)[tiny].clip(SUBNORMAL), 1.0)
     return Totals(
-        separation=gap[()],
-        mean_separation=((h_max + gap) / 2)[()],
         force=(force.reshape(shape) * stress)[()] if which != AREA else None,
         area=reading.area_of(area).reshape(shape)[()] if which != FORCE else None,
         error=error.reshape(shape)[()],
-        reading=reading.name,
-        tier=model.name,
         islands=islands,
         force_by=force_by if which != AREA else None,
         area_by=area_by if which != FORCE else None,
@@ -160,14 +116,11 @@ def _by_profiles(
     if isinstance(surface, Surface):
         # what lies outside of the table is solved gap by gap
         outside = "nan"
-        numbers = surface.hurst, surface.zeta_1, surface.h_max / surface.h_rms
-        shapes = list(zip(*(np.ravel(field).tolist() for field in numbers), strict=True))
+        numbers = np.array([surface.hurst, surface.zeta_1, surface.h_max / surface.h_rms])
+        shapes = list(map(tuple, numbers.reshape(3, -1).T.tolist()))
     if len(shapes) > 1:
         number = np.broadcast_to(np.arange(len(shapes)).reshape(surface.shape), depth.shape).ravel()[touching]
-        order = np.argsort(number, kind="stable")
-        known, first = np.unique(number[order], return_index=True)
-        # where nothing touches, one group is split off no surface
-        groups = dict(zip(known.tolist(), np.split(touching[order], first[1:]), strict=False))
+        groups = {k: touching[mine] for k, mine in grouped(number)}
     for k, places in groups.items():
         if not places.size:
             continue

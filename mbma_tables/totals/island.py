@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, Numbers, broadcast_shape, finite_array, hinted, is_labelled, require
+from mbma_tables.arguments import (
+    FloatArray,
+    Numbers,
+    any_labelled,
+    broadcast_shape,
+    finite_array,
+    hinted,
+    positive_modulus,
+    require,
+)
 from mbma_tables.errors import InputError
 from mbma_tables.islands.geometry import geometry, measured_islands
 from mbma_tables.models import AnyModel, answer_islands, get_model, tier_name
@@ -122,12 +131,11 @@ def island(
     """
     E_star, units = modulus_and_units(E_star, surface)
     delta = units.number("delta", delta)
-    if surface.labelled or is_labelled(delta) or is_labelled(E_star):
+    if any_labelled(surface, delta, E_star):
         return _of_labelled(surface, delta, tier, reading, E_star, rtol)
     approach = finite_array("delta", delta)
     require("delta", approach, approach > 0, "positive")
-    modulus = finite_array("E_star", E_star)
-    require("E_star", modulus, modulus > 0, "positive")
+    modulus = positive_modulus(E_star)
     rule = get_reading(reading)
     model = get_model(tier, rtol, rule)
     broadcast_shape(delta=approach, surface=surface.h_rms, E_star=modulus)

@@ -1,30 +1,54 @@
-"""The sum over islands (Eqs. 44-49): for any island model in numpy, for the universal table in the core."""
+"""The sum over islands (Eqs. 44-49): for any island model in numpy, for the universal table in the core.
+
+The adaptive quadrature has QUADPACK's rules (Piessens, de Doncker-Kapenga, Ueberhuber and Kahaner 1983). scipy's work
+on one integral, or refine a batch together to an absolute tolerance; here each integral has its own interval, is
+refined on its own and is judged by its own value.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.arguments import FloatArray, spread
 from mbma_tables.core import OK, REASONS, UNRESOLVED, core, in_blocks
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.islands.geometry import floor_offset, geometry
 from mbma_tables.models import AREA, BOTH, FORCE, AnyModel, answer_islands, exact_model
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.readings import Reading
-from mbma_tables.totals.gauss_kronrod import integrate
+from mbma_tables.surfaces.surface import Surface
 from mbma_tables.totals.island import scale_area, scale_force
-from mbma_tables.totals.pairs import STRETCH, Pairs, island_density, island_height, jacobian_below
 
 QUADRATURE_SHARE = 0.9  # of the tolerance asked for; a table's own error comes on top
 SUM_SHARE = 0.5  # where islands are solved to a share of it
 BLOCK = 256  # pairs between two looks for Ctrl-C
-COLUMNS, BY_COMPRESSION = (
-    5,
-    3,
-)  # of force and area with their derivatives: value, by hurst, ln(zeta_1), compression, peak
+STRETCH = 8.0  # scale of the approach's map, in boundary layers zeta_1^(-H), as in the core
+# of force and area with their derivatives: value, by hurst, ln(zeta_1), compression, peak
+COLUMNS, BY_COMPRESSION = 5, 3
+
+
+class Pairs(NamedTuple):
+    """Flat (surface, gap) pairs in units of h_rms and 1/q0."""
+
+    hurst: FloatArray
+    zeta_1: FloatArray
+    compression: FloatArray  # (h_max - d)/h_rms
+    peak: FloatArray  # h_max/h_rms
+
+    @classmethod
+    def of(cls, surface: Surface, depth: FloatArray) -> Pairs:
+        """Of a surface, or a batch, at h_max - d = `depth` [length], of the shape that both broadcast to."""
+        scaled = depth / surface.h_rms, surface.h_max / surface.h_rms
+        return cls(*(spread(f, depth.shape).flatten() for f in (surface.hurst, surface.zeta_1, *scaled)))
+
+    def some(self, chosen: Any) -> Pairs:
+        """The pairs at these places."""
+        return Pairs(*(field[chosen] for field in self))
 
 
 class Totals(NamedTuple):
@@ -39,12 +63,105 @@ class Totals(NamedTuple):
     islands: int
 
 
+def island_density(height: Any, D_d: Any, sigma_d: Any) -> Any:
+    """Islands per nominal area and delta/s (42, 43), without K1."""
+    return D_d * np.exp(-0.5 * height * height) / (math.sqrt(2.0 * math.pi) * sigma_d)
+
+
+def jacobian_below(rms_over_s: Any, reading: Reading) -> Any:
+    """K1 (47) below the kink, or what (46) gives."""
+    printed = reading.jacobian == "printed"
+    return 1.0 - 4.0 / 3.0 * reading.beta / (1.0 if printed else rms_over_s) if printed or reading.offset else 1.0
+
+
 def kinks(hurst: Any, zeta_1: Any, reading: Reading) -> tuple[Any, Any]:
     """delta/h_rms at which zeta_d (27) and zeta_u (30) reach their floors; arrays of one shape."""
     rms_over_s = np.sqrt(-np.expm1(-2 * hurst * np.log(zeta_1)))
     slope_d, slope_u = 4 / 3 * reading.beta, reading.phi / (1 + reading.phi) * rms_over_s
     at_d, at_u = (np.sqrt(floor_offset(hurst, zeta_1, floor)) for floor in (reading.floor_d, reading.floor_u))
     return (at_d / slope_d)[()], (at_u / slope_u)[()]
+
+
+def _rule(count: int) -> FloatArray:
+    """Nodes on [-1, 1], Kronrod weights, and Gauss weights, zero where that rule has no node."""
+    rule = np.empty((3, count))
+    core.kronrod(count, *rule)
+    return rule
+
+
+NODES_21, KRONROD_21, GAUSS_21 = _rule(21)
+
+BATCH = 2048  # intervals evaluated together: bounds the memory, not the work
+DEPTH = 64  # halvings of an interval before giving up
+MOST = 1000  # intervals of an integral, likewise
+LEAST = 1e-290  # of integrals: smaller ones have lost digits that no halving brings back
+
+Integrand = Callable[[NDArray[np.intp], FloatArray], FloatArray]
+
+
+class Integrals(NamedTuple):
+    """Values and relative error estimates, shape (integrals, components), and the points evaluated."""
+
+    value: FloatArray
+    error: FloatArray
+    evaluations: int
+
+
+def _apply_rule(
+    integrand: Integrand, owner: NDArray[np.intp], low: FloatArray, high: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Kronrod sums and error estimates of each interval, shape (intervals, components)."""
+    half = (high - low) / 2
+    points = (low + high)[:, None] / 2 + half[:, None] * NODES_21
+    values = integrand(owner, points) * half[:, None, None]
+    kronrod = np.einsum("kic,i->kc", values, KRONROD_21)
+    gauss = np.einsum("kic,i->kc", values, GAUSS_21)
+    spread = np.einsum("kic,i->kc", np.abs(values - kronrod[:, None, :] / 2), KRONROD_21)
+    difference = np.abs(kronrod - gauss)
+    # QUADPACK's estimate: the difference belongs to the Gauss rule, Kronrod's own error is far smaller
+    ratio = np.divide(difference, spread, out=np.zeros_like(spread), where=spread > 0)
+    return kronrod, np.where(spread > 0, spread * np.minimum(1, 200 * ratio) ** 1.5, difference)
+
+
+def integrate(
+    integrand: Integrand, owner: NDArray[np.intp], low: FloatArray, high: FloatArray, count: int, rtol: float
+) -> Integrals:
+    """Integrate `count` positive integrands, each over the intervals that it owns, every component to `rtol`.
+
+    ``integrand(owner, points)`` with `owner` (n,) and `points` (n, 21) gives (n, 21, components); an integral that owns
+    no interval is 0. A ConvergenceError's `mask` says where `DEPTH` halvings, or `MOST` intervals, did not suffice.
+    """
+    if owner.size == 0:
+        # one component stands for all
+        nothing = np.zeros((count, 1))
+        return Integrals(nothing, nothing, 0)
+    evaluations, kept = 0, list[Any]()
+    fresh: list[Any] = [owner, low, high]
+    for _ in range(DEPTH):
+        batches = [[part[k : k + BATCH] for part in fresh] for k in range(0, fresh[0].size, BATCH)]
+        fresh += map(np.concatenate, zip(*(_apply_rule(integrand, *batch) for batch in batches), strict=True))
+        evaluations += fresh[0].size * NODES_21.size
+        kept = [np.concatenate(both) for both in zip(kept, fresh, strict=True)] if kept else fresh
+        owner, low, high, value, error = kept
+        sums: Any = [np.stack([np.bincount(owner, x, count) for x in part.T], axis=1) for part in (value, error)]
+        total, bound = sums
+        relative = np.divide(bound, total, out=np.zeros_like(bound), where=total > 0)
+        unfinished = np.asarray(((relative > rtol) & (total > LEAST)).any(axis=1))
+        if not unfinished.any():
+            return Integrals(total, relative, evaluations)
+        # an interval is halved where it has more than its even share of the error allowed
+        counts = np.bincount(owner, minlength=count)
+        if (counts[unfinished] > MOST).any():
+            break
+        leaves = counts[owner, None]
+        split = unfinished[owner] & (error * leaves > rtol * total[owner]).any(axis=1)
+        middle = (low[split] + high[split]) / 2
+        halves = (low[split], middle), (middle, high[split])
+        fresh = [np.tile(owner[split], 2), *map(np.concatenate, halves)]
+        kept = [part[~split] for part in kept]
+    raise ConvergenceError(
+        f"quadrature did not reach {rtol:.1e} for {int(unfinished.sum())} of {count} integrals", unfinished
+    )
 
 
 def sum_islands(
@@ -73,10 +190,10 @@ def sum_islands(
             raise type(fault)(f"an island failed: {fault}", failed) from fault
         with np.errstate(invalid="ignore"):
             np.maximum.at(worst_island, owner, phi.error.max(axis=1))
-        height = island_height(approach, g["h_d"], g["sigma_d"], own, rms_over_s)
+        # z'/sigma_d (41); z_max is counted down from h_max, so nothing cancels at first contact
+        height = ((own.peak - (own.compression - approach)) * rms_over_s - g["h_d"]) / g["sigma_d"]
         weight = island_density(height, g["D_d"], g["sigma_d"]) * rms_over_s * stretch
-        K1 = jacobian_below(rms_over_s, reading.beta, reading.jacobian == "printed", reading.offset)
-        weight *= np.where(approach < own_kink, K1, 1.0)
+        weight *= np.where(approach < own_kink, jacobian_below(rms_over_s, reading), 1.0)
         parts = {FORCE: scale_force(g) * phi.phi_F, AREA: scale_area(g) * phi.phi_A}
         return np.stack([part * weight for name, part in parts.items() if which in (name, BOTH)], axis=-1)
 

@@ -27,8 +27,7 @@ from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.power_laws import Place
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
-from mbma_tables.totals.island_sum import kinks
-from mbma_tables.totals.pairs import island_density, jacobian_below
+from mbma_tables.totals.island_sum import island_density, jacobian_below, kinks
 from mbma_tables.totals.panels import COUNTED, NARROW, POWERS, SHARES, Nodes, Panels
 
 KEPT = 64  # profiles, for whoever asks the same surface again
@@ -62,14 +61,7 @@ class Source(NamedTuple):
 
 
 def source_of(surface: tuple[float, float, float] | MeasuredSurface, reading: Reading) -> Source:
-    """The islands of a surface; of a self-affine one by hurst, zeta_1 and h_max/h_rms.
-
-    Raises
-    ------
-    OutOfRangeError
-        Where a spectrum ends below the floor of zeta_u.
-    """
-    printed = reading.jacobian == "printed"
+    """The islands of a surface; of a self-affine one by hurst, zeta_1 and h_max/h_rms."""
     if not isinstance(surface, MeasuredSurface):
         hurst, zeta_1, peak = surface
         h_rms = math.sqrt(-math.expm1(-2 * hurst * math.log(zeta_1)))
@@ -78,14 +70,14 @@ def source_of(surface: tuple[float, float, float] | MeasuredSurface, reading: Re
         def islands(x: FloatArray) -> dict[str, FloatArray]:
             return geometry(x, hurst, zeta_1, reading) | {"hurst": np.full(x.size, hurst)}
 
-        jacobian = float(jacobian_below(h_rms, reading.beta, printed, reading.offset))
+        jacobian = float(jacobian_below(h_rms, reading))
         return Source(islands, h_rms, peak, zeta_1**-hurst, float(breaks[0]), breaks, jacobian)
     own, h_rms, laws, floors = surface, float(surface.h_rms), surface.laws, floors_of(surface, reading)
     roots = np.sqrt(laws.above(Place(np.arange(laws.width.size), laws.width)))
     samples = [roots[roots < floors.root_d] / floors.slope_d, roots[roots < floors.root_u] / floors.slope_u]
     # T is a straight line up to a part of it
     layer = math.sqrt(2 * math.pi * surface.C[-1]) * float(surface.q1) / floors.slope_d
-    jacobian = float(jacobian_below(1 / s_over_h_rms(surface), reading.beta, printed, reading.offset))
+    jacobian = float(jacobian_below(1 / s_over_h_rms(surface), reading))
     return Source(
         lambda x: measured_islands(own, x * h_rms, reading), h_rms, float(surface.h_max) / h_rms, layer / h_rms,
         floors.kinks[0] / h_rms, np.concatenate([*samples, floors.kinks]) / h_rms, jacobian,
@@ -94,33 +86,18 @@ def source_of(surface: tuple[float, float, float] | MeasuredSurface, reading: Re
 
 @dataclasses.dataclass(frozen=True)
 class Profile:
-    """Totals of one surface at any gap.
+    """Totals of one surface at any gap."""
 
-    Attributes
-    ----------
-    source : Source
-        The surface's islands.
-    edges : ndarray, shape (panels + 1,)
-        Ends of the panels, delta/h_rms; the last is 2 h_max/h_rms, or less where a table ends.
-    series : ndarray, shape (panels, rows, terms)
-        ln(F), ln(A) and so on as Chebyshev series of the compression. In the first panel they lack the logarithms of
-        the powers that they begin with.
-    error : float
-        Bound on the relative error of totals, of panels and islands together.
-    islands : int
-        Islands answered for it.
-    nodes : Nodes
-        The islands of the panels.
-    """
-
-    source: Source
-    edges: FloatArray
+    source: Source  # the surface's islands
+    edges: FloatArray  # ends of the panels, delta/h_rms; the last is 2 h_max/h_rms, or less where a table ends
+    # ln(F), ln(A) and so on as Chebyshev series of the compression, (panels, rows, terms); in the first panel without
+    # the logarithms of the powers that they begin with
     series: Any
-    error: float
-    islands: int
-    nodes: Nodes
+    error: float  # bound on the relative error of totals, of panels and islands together
+    islands: int  # answered for it
+    nodes: Nodes  # the islands of the panels
 
-    @property
+    @functools.cached_property
     def end(self) -> float:
         """The largest compression that it answers."""
         return float(self.edges[-1]) * (1 + 1e-14)
@@ -207,12 +184,7 @@ def _fields_by_table(shape: tuple[float, float, float], model: UniversalModel, r
 def _answered(
     fields: Fields, kind: NDArray[np.intp], low: FloatArray, high: FloatArray, last: float
 ) -> tuple[Panels, FloatArray, int, float]:
-    """Panels and their errors, the number of islands, and their own error.
-
-    Raises
-    ------
-    _EndOfTable
-    """
+    """Panels and their errors, the number of islands, and their own error."""
     x, used = low[:, None] + (high - low)[:, None] * SHARES[kind], COUNTED[kind]
     found, error = fields(x, used)
     if not (found[:-2] >= 0).all():
@@ -257,24 +229,7 @@ def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float) -> Pr
     raise ConvergenceError(f"a profile of islands did not reach {rtol:.1e}", np.array(True))
 
 
-@functools.lru_cache(maxsize=KEPT)
-def _profile(surface: Any, model: Any, reading: Reading, rtol: float, exact: bool, rows: int) -> Profile:
-    source = source_of(surface, reading)
-    if rows == 2 and isinstance(surface, tuple) and isinstance(model, UniversalModel):
-        fields = _fields_by_table(surface, model, reading)
-    else:
-        fields = _fields(source, model, "exact" if exact else "nan", rows)
-    edges = _edges(source, 2 * source.peak)
-    # what underflows is right
-    with np.errstate(under="ignore"):
-        try:
-            return _built(source, fields, edges, rtol)
-        except _EndOfTable as fault:
-            end = fault.args[0]
-            return _built(source, fields, np.append(edges[edges < end * (1 - 1e-12)], end), rtol)
-
-
-def profile(
+def _profile(
     surface: tuple[float, float, float] | MeasuredSurface,
     model: AnyModel,
     reading: Reading,
@@ -286,12 +241,22 @@ def profile(
 
     `outside` is "exact" to solve islands that a table does not cover; else the profile ends with the table. The number
     of islands and their Hertz area are the third and fourth of `rows`.
-
-    Raises
-    ------
-    InputError, OutOfRangeError, ConvergenceError
     """
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)
-    given: Any = surface, model, reading, rtol, outside == "exact", rows
-    return _profile(*given)
+    source = source_of(surface, reading)
+    if rows == 2 and isinstance(surface, tuple) and isinstance(model, UniversalModel):
+        fields = _fields_by_table(surface, model, reading)
+    else:
+        fields = _fields(source, model, "exact" if outside == "exact" else "nan", rows)
+    edges = _edges(source, 2 * source.peak)
+    # underflow to zero is correct here
+    with np.errstate(under="ignore"):
+        try:
+            return _built(source, fields, edges, rtol)
+        except _EndOfTable as fault:
+            end = fault.args[0]
+            return _built(source, fields, np.append(edges[edges < end * (1 - 1e-12)], end), rtol)
+
+
+profile: Callable[..., Profile] = functools.lru_cache(maxsize=KEPT)(_profile)

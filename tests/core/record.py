@@ -75,8 +75,7 @@ class Recorder:
 def use():
     """Call every function, by the library where it does."""
     from mbma_tables import Surface, contact, contact_law, greenwood_tripp, hardness, open_table
-    from mbma_tables.bearing_curve import FRACTIONS, BearingCurve
-    from mbma_tables.islands import classical
+    from mbma_tables.bearing import FRACTIONS
     from mbma_tables.theories.calibrated_table import shipped
 
     core = package.core
@@ -87,9 +86,9 @@ def use():
     surfaces = np.linspace(0.3, 0.9, 20), np.linspace(1.5, 6.0, 20), np.full(20, 3.0)
     core.calibrated_slopes(*shipped().core_table, *surfaces, None, None, np.linspace(0.3, 2.5, 20), np.empty((20, 10)))
     core.self_affine(*surfaces[:2], np.empty(20), np.empty(20))
-    classical.solve_classical(2.0, 0.5, 20, 0.3, 1e-6, 100)
+    greenwood_tripp.solve_classical(2.0, 0.5, 20, 0.3, 1e-6, 100)
     hardness.diffused(surfaces[0], 0.1, 1.0)
-    BearingCurve(np.linspace(3.0, 1.0, FRACTIONS.size), 3.0)
+    hardness.BearingCurve(np.linspace(3.0, 1.0, FRACTIONS.size), 3.0)
     u = np.geomspace(2.9, 0.1, 12)
     core.gap_start(1, u, np.exp(-u), np.exp(-u), 1, surfaces[0], surfaces[2], np.full((6, 20), 0.5))
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from mbma_tables.core import core
-from mbma_tables.islands.classical import radius, ring_matrix
-from mbma_tables.islands.greenwood_tripp import COARSE_NODES
+from mbma_tables.islands.greenwood_tripp import COARSE_NODES, radius, ring_matrix
 from mbma_tables.islands.spectral import basis
 
 OK, UNRESOLVED, INVALID = 0, 4, 5

@@ -18,8 +18,7 @@ from mbma_tables.scenes.effects import ELASTIC, OUTPUTS
 from mbma_tables.surfaces.readings import REPORTED
 from mbma_tables.theories import GreenwoodWilliamson, Persson
 from mbma_tables.theories.yielding import Yielding
-from mbma_tables.totals.island_sum import sum_islands
-from mbma_tables.totals.pairs import Pairs
+from mbma_tables.totals.island_sum import Pairs, sum_islands
 
 CONCRETE = Surface.named("concrete")
 GAPS = (0.2, 0.5, 0.9)

@@ -11,7 +11,7 @@ from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, 
 from mbma_tables import contact as contact_by_tier
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.surfaces.readings import get_reading
-from mbma_tables.totals.contact import totals_at
+from mbma_tables.theories import Mbma
 from mbma_tables.totals.island_sum import kinks
 
 contact = functools.partial(contact_by_tier, tier="exact")
@@ -239,7 +239,7 @@ def test_layout_does_not_matter(kind):
 def test_few_surfaces_keep_their_bound_with_any_reading(numbers, u):
     surface = Surface(*numbers)
     found = contact_by_tier(surface, mean_separation=u, reading="fitted")
-    known = totals_at(surface, 2 * u - surface.h_max, reading="fitted", rtol=1e-11, derivatives=True)
+    known = Mbma(reading="fitted", rtol=1e-11).totals(surface, 2 * u - surface.h_max, derivatives=True)
     assert abs(found.force / known.force - 1) <= found.error
 
 

@@ -19,8 +19,7 @@ from mbma_tables.models import get_model
 from mbma_tables.surfaces.readings import NAMED
 from mbma_tables.theories import law_pieces
 from mbma_tables.theories.law_block import CENTRE, DEGREE, FORCE_AT, RATE, RECORD
-from mbma_tables.totals.island_sum import totals_of
-from mbma_tables.totals.pairs import Pairs
+from mbma_tables.totals.island_sum import Pairs, totals_of
 from mbma_tables.totals.profile import profile
 
 # hurst, zeta_1, h_max/h_rms, reading

@@ -1,0 +1,138 @@
+"""What contacts and laws have in common: meanings of quantities; the source of a contact and reasons against it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from mbma_tables.arguments import FloatArray, Numbers, any_labelled, broadcast_shape, checked_hardness, is_labelled
+from mbma_tables.display import shown
+from mbma_tables.labels import apply_to_surface
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.theories.protocol import Theory, TheoryAnswer
+from mbma_tables.units import Units, unit_of
+
+if TYPE_CHECKING:
+    from mbma_tables.theories.result import Contact
+    from mbma_tables.theories.yielding import Loaded
+
+MEANINGS = {
+    "separation": "d, rigid plane to mid-plane",
+    "mean_separation": "u = (h_max + d)/2",
+    "force": "force over nominal area",
+    "area": "real over nominal contact area",
+    "stiffness": "-dF/du per nominal area",
+    "energy": "elastic energy per nominal area",
+    "mean_pressure": "mean pressure in the contact",
+    "yielded": "share of the contact area at the hardness",
+    "incremental_stiffness": "-dF/du per nominal area of a small unloading",
+    "plane_separation": "gap between mean planes",
+    "error": "bound on the relative numerical error against the theory",
+    "scatter": "standard deviation of ln F at this mean separation from simulation to simulation",
+    "area_scatter": "standard deviation of ln A at this force from simulation to simulation",
+    "stiffness_scatter": "standard deviation of ln of the incremental stiffness at this force, likewise",
+    "separation_scatter": "standard deviation of the mean separation at this force, likewise",
+    "valid": "whether the theory was tested for contacts such as these",
+}
+MAX_GRADIENT = 1.0  # rms gradient above which heights and wavenumbers are hardly in one unit
+
+
+def named(value: Any, name: str, units: Units) -> Any:
+    """A quantity of a contact; a DataArray of it knows its name, meaning and unit."""
+    if not is_labelled(value):
+        return value
+    return value.rename(name).assign_attrs(long_name=MEANINGS[name], units=unit_of(name, units))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Source:
+    """What a `Contact` is of, for quantities that are computed when they are read."""
+
+    theory: Theory
+    surface: AnySurface
+    E_star: Any
+    hardness: Any
+    units: Units
+    answer: TheoryAnswer | None = None  # where it is known already
+    loaded: Loaded | None = None  # likewise, with a hardness
+
+    @property
+    def yields(self) -> bool:
+        """Whether a hardness is given."""
+        # an empty one is refused where it is checked
+        return is_labelled(self.hardness) or not np.size(self.hardness) or not np.equal(self.hardness, np.inf).all()
+
+    def theory_at(self, E_star: Any, hardness: Any) -> Theory:
+        """The theory, with the hardness where there is one."""
+        if not self.yields:
+            return self.theory
+        from mbma_tables.theories.yielding import Yielding
+
+        broadcast_shape(E_star=E_star, hardness=hardness)
+        return Yielding(self.theory, checked_hardness(hardness) / E_star)
+
+    def map(
+        self,
+        function: Callable[..., tuple[Any, ...]],
+        contact: Contact,
+        outputs: int,
+        more: Mapping[str, Any] | None = None,
+    ) -> tuple[Numbers, ...]:
+        """``function(theory, surface, u, E_star, *more)`` of the contact's entries."""
+        arrays = {"mean_separation": contact.mean_separation, "E_star": self.E_star, "hardness": self.hardness}
+        arrays |= more or {}
+
+        def block(surface: AnySurface, u: Any, E_star: Any, hardness: Any, *others: Any) -> tuple[Any, ...]:
+            return function(self.theory_at(E_star, hardness), surface, u, E_star, *others)
+
+        if any_labelled(self.surface, *arrays.values()):
+            found: tuple[Numbers, ...] = apply_to_surface(block, self.surface, arrays, outputs)
+            return found
+        return tuple(part[()] for part in block(self.surface, *map(np.asarray, arrays.values())))
+
+
+def concerns(theory: Theory, surface: AnySurface, u: FloatArray, answer: TheoryAnswer) -> dict[str, Any]:
+    """Every reason against a theory's answers, with its mask."""
+    steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.force))
+    text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"
+    measured = dict.fromkeys(theory.elastic.departures(surface), np.ones(np.shape(answer.force), dtype=bool))
+    return {text: steep, **measured, **theory.concerns(surface, answer, u)}
+
+
+class _Point(NamedTuple):
+    separation: Any
+    mean_separation: Any
+    area: Any
+    stiffness: Any
+    force: Any
+
+
+class LawPoint(_Point):
+    """Where a law has a given pressure: separation d, mean separation u, A/A0, -dF/du and F/A0, of its shape.
+
+    `units` are the law's. What yields, and the incremental stiffness with it, no law holds: `contact` answers that.
+    """
+
+    units = Units()
+
+    def __repr__(self) -> str:
+        fields = self._asdict().items()
+        return f"LawPoint({', '.join(f'{name} {shown(value, unit_of(name, self.units))}' for name, value in fields)})"
+
+    @property
+    def mean_pressure(self) -> Any:
+        """Mean pressure in the contact, F/A; NaN where there is none."""
+        with np.errstate(invalid="ignore"):
+            return self.force / self.area
+
+
+class LawValues(NamedTuple):
+    """What a law answers at separations: F/A0, A/A0, -dF/du and the energy, of their shape."""
+
+    force: Any
+    area: Any
+    stiffness: Any
+    energy: Any
