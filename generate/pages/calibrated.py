@@ -15,14 +15,14 @@ from mbma_tables.files import shipped_file
 from mbma_tables.theories import THEORIES, get_theory
 
 SHOWN = {  # sets and forms of the accuracy table
-    "held_out_surface, 2-3 waves, spectrum": "new surfaces, 2-3 waves a side, spectrum",
-    "held_out_spectrum, 2-3 waves, spectrum": "new spectra, 2-3 waves, spectrum",
-    "held_out_surface, 4 waves, spectrum": "new surfaces, 4-8 waves, spectrum",
-    "held_out_spectrum, 4 waves, spectrum": "new spectra, 4-8 waves, spectrum",
-    "held_out_surface, 1 wave, spectrum": "new surfaces, 1 wave, spectrum",
-    "held_out_surface, 4 waves, map": "new surfaces, 4-8 waves, map",
-    "held_out_spectrum, 4 waves, map": "new spectra, 4-8 waves, map",
-    "held_out_spectrum, 2-3 waves, map": "new spectra, 2-3 waves, map",
+    "held_out_surface, 2-3 waves, spectrum": "new surfaces, 2-3 wavelengths a side, spectrum",
+    "held_out_spectrum, 2-3 waves, spectrum": "new spectra, 2-3 wavelengths, spectrum",
+    "held_out_surface, 4 waves, spectrum": "new surfaces, 4-8 wavelengths, spectrum",
+    "held_out_spectrum, 4 waves, spectrum": "new spectra, 4-8 wavelengths, spectrum",
+    "held_out_surface, 1 wave, spectrum": "new surfaces, 1 wavelength, spectrum",
+    "held_out_surface, 4 waves, map": "new surfaces, 4-8 wavelengths, map",
+    "held_out_spectrum, 4 waves, map": "new spectra, 4-8 wavelengths, map",
+    "held_out_spectrum, 2-3 waves, map": "new spectra, 2-3 wavelengths, map",
     "held_out_spectrum, stretched, map": "new spectra, stretched 1:3 to 1:12, map",
     "held_out_spectrum, transformed, map": "new spectra, transformed heights, map",
     "self-affine, mbma": "self-affine: MBMA `reported`",
@@ -101,7 +101,7 @@ def refinement(data: Any) -> str:
                 inside = (exact >= ends[part]) & (exact < ends[part + 1]) & (one[name].values[number] > 0)
                 cells = found.setdefault((spacing, part), [[], []])
                 cells[name == "area"] += list(np.log(one[name].values[number][inside] / exact[inside]))
-    header = ["grid points a shortest wave", *(f"{part}%" for part in spans(ends))]
+    header = ["grid points per shortest wavelength", *(f"{part}%" for part in spans(ends))]
     rows = []
     for spacing in sorted({key[0] for key in found}):
         pairs = [found[spacing, part] for part in range(len(ends) - 1)]
