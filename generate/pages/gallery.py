@@ -58,13 +58,13 @@ class Example:
 
 VARIABLE = "MBMA_REFERENCE_MAPS"
 EXAMPLES = (
-    Example("top-1.top", {"short_cutoff": "9.4nm"}, "A force microscope's map of 600 nm, 256 x 256 points."),
+    Example("top-1.top", {"short_cutoff": "9.4nm"}, "An AFM map of 600 nm x 600 nm, 256 x 256 points."),
     Example(
         "frt-2.frt",
         {"fill": "harmonic", "outliers": 10, "short_cutoff": "0.8mm"},
-        "An optical sensor's map of 30 mm x 60 mm, 150 x 300 points, of which 28% are undefined.",
+        "A map by an optical sensor of 30 mm x 60 mm, 150 x 300 points, of which 28% are undefined.",
     ),
-    Example("dektak-1.csv", {"outliers": 10, "long_cutoff": "100um"}, "A stylus's trace of 1.5 mm, 9600 points."),
+    Example("dektak-1.csv", {"outliers": 10, "long_cutoff": "100um"}, "A stylus profile of 1.5 mm length, 9600 points."),
 )
 REFINED, REFINED_LOADS = "di-1.di", 4  # whose light contacts are solved on a finer grid too
 # too large to be shipped; their boundary elements are
@@ -136,7 +136,7 @@ def compared(surface: MeasuredSurface, rows: FloatArray) -> str:
             found = np.full(u.size, np.nan), np.full(u.size, np.nan)
         columns += [[f"{ratio:.2f}".replace("nan", "-") for ratio in part] for part in found]
     return table(
-        ["contact", "calibrated: area at a pressure", "force at a separation", "MBMA: area", "force"],
+        ["contact", "calibrated: area at given pressure", "calibrated: force at given separation", "MBMA: area", "MBMA: force"],
         list(zip(*columns, strict=True)),
     )
 
@@ -161,7 +161,7 @@ def laws(surfaces: dict[str, MeasuredSurface]) -> str:
                 times.append(time.process_time() - started)
             low = (own.h_max + max(own.lowest, -own.h_max)) / 2 / own.h_max
             rows.append([name, theory, f"{low:.2g}", f"{own.error:.1e}", f"{min(times):.3f}"])
-    return table(["surface", "theory", "u/h_max from", "error", "made in [s]"], rows)
+    return table(["surface", "theory", "u/h_max from", "error", "time to make [s]"], rows)
 
 
 def measure() -> Measured:
