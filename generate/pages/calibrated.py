@@ -80,7 +80,11 @@ def bars(data: Any) -> str:
     for bar in json.loads(data.attrs["bars"]):
         over = bar["found"] - bar["limit"]
         judged = "met" if over <= 0 else f"missed by {100 * over:.1f}" if over > 0 else "no load there"
-        cells = [bar["what"], f"{100 * bar['limit']:g}%", f"{percent(bar['found'])}: {judged}"]
+        cells = [
+            bar["what"].replace("wave", "wavelength") + " a side",
+            f"{100 * bar['limit']:g}%",
+            f"{percent(bar['found'])}: {judged}",
+        ]
         cells += [f"{100 * bar['mean']:+.1f}%", str(bar["surfaces"])]
         rows.append([*cells, f"{percent(bar['large'])} ({bar['surfaces_large']})", percent(bar["noise"])])
     return table(["what", "limit", "nine in ten", "mean", "surfaces", "of 512 and 1024 points a side", "floor"], rows)

@@ -64,7 +64,9 @@ EXAMPLES = (
         {"fill": "harmonic", "outliers": 10, "short_cutoff": "0.8mm"},
         "A map by an optical sensor of 30 mm x 60 mm, 150 x 300 points, of which 28% are undefined.",
     ),
-    Example("dektak-1.csv", {"outliers": 10, "long_cutoff": "100um"}, "A stylus profile of 1.5 mm length, 9600 points."),
+    Example(
+        "dektak-1.csv", {"outliers": 10, "long_cutoff": "100um"}, "A stylus profile of 1.5 mm length, 9600 points."
+    ),
 )
 REFINED, REFINED_LOADS = "di-1.di", 4  # whose light contacts are solved on a finer grid too
 # too large to be shipped; their boundary elements are
@@ -136,7 +138,13 @@ def compared(surface: MeasuredSurface, rows: FloatArray) -> str:
             found = np.full(u.size, np.nan), np.full(u.size, np.nan)
         columns += [[f"{ratio:.2f}".replace("nan", "-") for ratio in part] for part in found]
     return table(
-        ["contact", "calibrated: area at given pressure", "calibrated: force at given separation", "MBMA: area", "MBMA: force"],
+        [
+            "contact",
+            "calibrated: area at given pressure",
+            "calibrated: force at given separation",
+            "MBMA: area",
+            "MBMA: force",
+        ],
         list(zip(*columns, strict=True)),
     )
 

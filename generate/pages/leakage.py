@@ -45,7 +45,13 @@ def accuracy() -> str:
     for name in (name for name in SHOWN_SETS if name in sets and name != "held out"):
         shown += [(law, name) for law in ("calibrated", "closed form")[: 2 if "zeta_1" in name else 1]]
     number = dict(zip(laws, itertools.count())) | {"calibrated": 0}
-    lines = [[f"{law}, {name}", *pooled(values["accuracy"][sets.index(name), number[law]])] for law, name in shown]
+    lines = [
+        [
+            f"{law}, {name}".replace("waves", "wavelengths a side"),
+            *pooled(values["accuracy"][sets.index(name), number[law]]),
+        ]
+        for law, name in shown
+    ]
     return table(["law, set", *(f"A {ends}%" for ends in spans(BINS, ".3g"))], lines)
 
 
@@ -80,8 +86,10 @@ def of_cells(seen: Sequence[Any]) -> str:
             "medium, simulated area and gap": [errors(f, f.medium(constants, f.one.area, f.one.u)) for f in flows],
         }
         for law, misses in laws.items():
-            lines.append([f"{law}, {name} waves", *(f"{rms:.2f} ({n:.0f})" for _, rms, n in summary(misses, BINS))])
-        lines.append([f"cells of one spectrum, {name} waves", *(f"{value:.2f}" for value in spread)])
+            lines.append(
+                [f"{law}, {name} wavelengths a side", *(f"{rms:.2f} ({n:.0f})" for _, rms, n in summary(misses, BINS))]
+            )
+        lines.append([f"cells of one spectrum, {name} wavelengths a side", *(f"{value:.2f}" for value in spread)])
     return table(["rms of ln k", *(f"A {ends}%" for ends in spans(BINS, ".3g"))], lines)
 
 

@@ -30,7 +30,7 @@ INDICES = np.geomspace(0.4, 40, 60)
 SETS = {
     "held_out_surface": "new surfaces of known spectra",
     "held_out_spectrum": "new spectra",
-    "three_waves": "of both, three longest waves a side or more",
+    "three_waves": "of both, three longest wavelengths a side or more",
     "stretched": "stretched",
 }
 RATIOS = ("elastic area over true", "elastic force over true")
