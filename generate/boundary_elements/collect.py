@@ -25,7 +25,6 @@ MODULES = (
     "mbma_tables.boundary_elements",
     "mbma_tables.bearing",
 )
-ENDS = bearing.BANDS + 2
 
 # name: (dimension beside the surface, what it is); all are numbers without a unit
 NUMBERS = {

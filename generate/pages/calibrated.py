@@ -1,30 +1,28 @@
-"""The measured parts of docs/calibrated.md: what `python -m generate calibrated` wrote, and a figure."""
+"""docs/calibrated.md: accuracy and constants that `python -m generate calibrated` stored, and a figure."""
 
 from __future__ import annotations
 
-import itertools
 import json
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from generate.boundary_elements.design import REFINEMENT, SPLITS
-from generate.pages.page import ROOT, pyplot, svg, table
+from generate.pages.page import DATA, Measured, dataset, panels, spans, svg, table
 from mbma_tables import Surface
 from mbma_tables.calibrated import CONSTANTS
 from mbma_tables.files import shipped_file
 from mbma_tables.theories import THEORIES, get_theory
 
 SHOWN = {  # sets and forms of the accuracy table
-    "held_out_surface, 2-3 waves, spectrum": "new surfaces, 2-3 waves a side, spectrum",
-    "held_out_spectrum, 2-3 waves, spectrum": "new spectra, 2-3 waves, spectrum",
-    "held_out_surface, 4 waves, spectrum": "new surfaces, 4-8 waves, spectrum",
-    "held_out_spectrum, 4 waves, spectrum": "new spectra, 4-8 waves, spectrum",
-    "held_out_surface, 1 wave, spectrum": "new surfaces, 1 wave, spectrum",
-    "held_out_surface, 4 waves, map": "new surfaces, 4-8 waves, map",
-    "held_out_spectrum, 4 waves, map": "new spectra, 4-8 waves, map",
-    "held_out_spectrum, 2-3 waves, map": "new spectra, 2-3 waves, map",
+    "held_out_surface, 2-3 waves, spectrum": "new surfaces, 2-3 wavelengths a side, spectrum",
+    "held_out_spectrum, 2-3 waves, spectrum": "new spectra, 2-3 wavelengths, spectrum",
+    "held_out_surface, 4 waves, spectrum": "new surfaces, 4-8 wavelengths, spectrum",
+    "held_out_spectrum, 4 waves, spectrum": "new spectra, 4-8 wavelengths, spectrum",
+    "held_out_surface, 1 wave, spectrum": "new surfaces, 1 wavelength, spectrum",
+    "held_out_surface, 4 waves, map": "new surfaces, 4-8 wavelengths, map",
+    "held_out_spectrum, 4 waves, map": "new spectra, 4-8 wavelengths, map",
+    "held_out_spectrum, 2-3 waves, map": "new spectra, 2-3 wavelengths, map",
     "held_out_spectrum, stretched, map": "new spectra, stretched 1:3 to 1:12, map",
     "held_out_spectrum, transformed, map": "new spectra, transformed heights, map",
     "self-affine, mbma": "self-affine: MBMA `reported`",
@@ -33,7 +31,6 @@ SHOWN = {  # sets and forms of the accuracy table
     "self-affine, persson": "self-affine: Persson",
     "self-affine, greenwood_williamson": "self-affine: Greenwood-Williamson",
 }
-DATA = ROOT / "docs" / "data" / "bem_hurst0.8_zeta64.csv"
 COLOURS = {
     "calibrated": "k",
     "calibrated_map": "0.5",
@@ -46,44 +43,34 @@ COLOURS = {
 }
 
 
-def accuracy(data: xr.Dataset, quantity: str) -> str:
-    """Bias and standard deviation in percent, by contact fraction."""
-    ends = zip(data.contact_low.values, data.contact_high.values, strict=True)
-    header = ["surfaces, and what is known of them", *(f"{100 * a:g}-{100 * b:g}%" for a, b in ends)]
-    sets, number = data.attrs["sets"].split("; "), data.attrs["quantities"].split().index(quantity)
-    rows = []
-    for name, label in SHOWN.items():
-        if name not in sets:
-            continue
+def accuracy(data: Any, number: int) -> str:
+    """Bias and standard deviation of a quantity in percent, by contact fraction."""
+    edges = (*data.contact_low.values, data.contact_high.values[-1])
+    header = ["surfaces, and what is known of them", *(f"{ends}%" for ends in spans(edges))]
+    sets, rows = data.attrs["sets"].split("; "), []
+    for name in (name for name in SHOWN if name in sets):
         cells = data.accuracy.values[sets.index(name), number]
-        told = [f"{100 * c[0]:+.0f} ± {100 * c[1]:.0f}" if c[3] >= 1 else "—" for c in cells]
-        rows.append([label, *told])
+        rows.append([SHOWN[name], *(f"{100 * c[0]:+.0f} ± {100 * c[1]:.0f}" if c[3] >= 1 else "—" for c in cells)])
     return table(header, rows)
 
 
-def numbers(data: xr.Dataset) -> str:
-    """Constants, the table's certificate, and how honest the stated scatter is."""
-    constants = [(f"`{name}`", f"{data.attrs[f'law_{name}']:.4g}") for name in vars(CONSTANTS)]
-    constants += [
-        (f"`{name.removeprefix('map_')}` (map)", f"{value:.4g}")
-        for name, value in data.attrs.items()
-        if name.startswith("map_")
-    ]
-    errors = [
-        (f"largest (99%) error of {what} by the table", f"{data.attrs[f'largest_error_{what}']:.1e}"
-         f" ({data.attrs[f'p99_error_{what}']:.1e})")
-        for what in ("force", "area", "stiffness")
-    ]  # fmt: skip
-    covered = [
-        (f"held-out errors of {what} within one and two of the stated", f"{one:.0%}, {two:.0%}")
-        for what, (one, two) in json.loads(data.attrs["coverage"]).items()
-    ]
-    evidence = json.loads(data.attrs["evidence"])
-    counts = [("surfaces simulated, of which in the training set", f"{evidence['surfaces']}, {evidence['training']}")]
-    return table(["what", "value"], [*constants, *counts, *errors, *covered])
+def numbers(data: Any) -> str:
+    """Constants, the table's certificate, and the coverage of the stated scatter."""
+    facts = data.attrs
+    rows = [(f"`{name}`", f"{facts[f'law_{name}']:.4g}") for name in vars(CONSTANTS)]
+    maps = {name.removeprefix("map_"): value for name, value in facts.items() if name.startswith("map_")}
+    rows += [(f"`{name}` (map)", f"{value:.4g}") for name, value in maps.items()]
+    evidence = json.loads(facts["evidence"])
+    rows += [("surfaces simulated, of which in the training set", f"{evidence['surfaces']}, {evidence['training']}")]
+    for what in ("force", "area", "stiffness"):
+        largest, most = facts[f"largest_error_{what}"], facts[f"p99_error_{what}"]
+        rows.append((f"largest (99%) error of {what} by the table", f"{largest:.1e} ({most:.1e})"))
+    for what, (one, two) in json.loads(facts["coverage"]).items():
+        rows.append((f"held-out errors of {what} within one and two of the stated", f"{one:.0%}, {two:.0%}"))
+    return table(["what", "value"], rows)
 
 
-def bars(data: xr.Dataset) -> str:
+def bars(data: Any) -> str:
     """Limits to nine errors in ten, what is reached, and the floor by surfaces of one spectrum."""
 
     def percent(value: float) -> str:
@@ -93,15 +80,17 @@ def bars(data: xr.Dataset) -> str:
     for bar in json.loads(data.attrs["bars"]):
         over = bar["found"] - bar["limit"]
         judged = "met" if over <= 0 else f"missed by {100 * over:.1f}" if over > 0 else "no load there"
-        verdict = f"{percent(bar['found'])}: {judged}"
-        rows.append([
-            bar["what"], f"{100 * bar['limit']:g}%", verdict, f"{100 * bar['mean']:+.1f}%",
-            str(bar["surfaces"]), f"{percent(bar['large'])} ({bar['surfaces_large']})", percent(bar["noise"]),
-        ])  # fmt: skip
+        cells = [
+            bar["what"].replace("wave", "wavelength") + " a side",
+            f"{100 * bar['limit']:g}%",
+            f"{percent(bar['found'])}: {judged}",
+        ]
+        cells += [f"{100 * bar['mean']:+.1f}%", str(bar["surfaces"])]
+        rows.append([*cells, f"{percent(bar['large'])} ({bar['surfaces_large']})", percent(bar["noise"])])
     return table(["what", "limit", "nine in ten", "mean", "surfaces", "of 512 and 1024 points a side", "floor"], rows)
 
 
-def refinement(data: xr.Dataset) -> str:
+def refinement(data: Any) -> str:
     """Errors of raw and corrected areas on coarse grids against the finest, by points a shortest wave and contact."""
     ends = (0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9)
     one = data.isel(surface=data.split.values == SPLITS.index(REFINEMENT))
@@ -116,7 +105,7 @@ def refinement(data: xr.Dataset) -> str:
                 inside = (exact >= ends[part]) & (exact < ends[part + 1]) & (one[name].values[number] > 0)
                 cells = found.setdefault((spacing, part), [[], []])
                 cells[name == "area"] += list(np.log(one[name].values[number][inside] / exact[inside]))
-    header = ["grid points a shortest wave", *(f"{100 * a:g}-{100 * b:g}%" for a, b in itertools.pairwise(ends))]
+    header = ["grid points per shortest wavelength", *(f"{part}%" for part in spans(ends))]
     rows = []
     for spacing in sorted({key[0] for key in found}):
         pairs = [found[spacing, part] for part in range(len(ends) - 1)]
@@ -125,10 +114,10 @@ def refinement(data: xr.Dataset) -> str:
     return table(header, rows)
 
 
-def draw(data: xr.Dataset) -> bytes:
+def draw(data: Any) -> bytes:
     """One surface's curves with the stated scatter as a band, and every theory's scatter of force."""
-    figure, (left, right) = pyplot().subplots(1, 2, figsize=(10, 3.6), layout="constrained")
-    force, _, _, u = np.loadtxt(DATA, delimiter=",", skiprows=4).T[:4]
+    figure, (left, right) = panels(1, 2, (10, 3.6))
+    force, _, _, u = np.loadtxt(DATA / "bem_hurst0.8_zeta64.csv", delimiter=",", skiprows=4).T[:4]
     surface = Surface(0.8, 1.0, 64.0, 1.0, 3.3973)
     gap = np.linspace(0.01, 3.38, 200)
     g = float(surface.rms_gradient)
@@ -149,12 +138,11 @@ def draw(data: xr.Dataset) -> bytes:
     return svg(figure)
 
 
-def measure() -> tuple[dict[str, str], dict[str, bytes]]:
-    """The measured parts of the page, and its figure."""
-    with xr.open_dataset(shipped_file("calibrated.nc")) as opened:
-        data: Any = opened.load()
-    with xr.open_dataset(ROOT / "docs" / "data" / "boundary_elements.nc") as opened:
-        evidence: Any = opened.load()
-    parts = {name: accuracy(data, name) for name in ("area", "force", "stiffness")}
-    parts |= {"numbers": numbers(data), "bars": bars(data), "refinement": refinement(evidence)}
+def measure() -> Measured:
+    """The measured blocks of the page, and its figure."""
+    data = dataset(shipped_file("calibrated.nc"))
+    quantities = data.attrs["quantities"].split()
+    parts = {name: accuracy(data, quantities.index(name)) for name in ("area", "force", "stiffness")}
+    parts |= {"numbers": numbers(data), "bars": bars(data)}
+    parts |= {"refinement": refinement(dataset(DATA / "boundary_elements.nc"))}
     return parts, {"docs/figures/calibrated.svg": draw(data)}

@@ -1,4 +1,4 @@
-"""Theories at given loads, gaps and areas, for what the paper quotes and shows."""
+"""Theories at given loads, separations and areas, for what the paper quotes and shows."""
 
 from __future__ import annotations
 
@@ -27,34 +27,32 @@ GAPS = 60  # a curve
 @functools.cache
 def sample(surface: Surface, theory: str) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mean separation, force and area from first contact to full compression, closer at first contact."""
-    # G-W's Gaussian has no end, and three more h_rms are sampled
+    # G-W's Gaussian heights are unbounded, and three more h_rms are sampled
     first = surface.h_max + (0.0 if theory in READINGS else 1.5 * surface.h_rms)
     u = first * (1 - np.append(np.geomspace(0.005, 0.1, GAPS // 2)[:-1], np.linspace(0.1, 1, GAPS)))
     found = SEPARATIONS[theory].answer(surface, u)
     return u, found.force, found.area
 
 
-def solve(surface: Surface, theory: str, kind: str, wanted: Any) -> tuple[FloatArray, FloatArray]:
+def solve(surface: Surface, theory: str, kind: str, wanted: Any) -> FloatArray:
     """Force and area where the force (or the area) is as wanted; NaN where the theory does not reach it."""
     targets = np.atleast_1d(np.asarray(wanted, dtype=float))
     if theory == "Persson":
         force = targets if kind == "force" else np.sqrt(surface.m2) * erfinv(targets)
-        return force, theories.Persson().area_at(surface, force)
-    result = np.full((2, targets.size), np.nan)
-    reached = np.ones(targets.size, dtype=bool)
+        return np.stack([force, theories.Persson().area_at(surface, force)])
+    result, reached = np.full((2, targets.size), np.nan), np.ones(targets.size, dtype=bool)
     try:
         u = SEPARATIONS[theory].mean_separation_at(surface, kind, targets)
     except OutOfRangeError as fault:
         reached = ~fault.mask
         if not reached.any():
-            return result[0], result[1]
+            return result
         u = SEPARATIONS[theory].mean_separation_at(surface, kind, targets[reached])
-    found = SEPARATIONS[theory].answer(surface, u)
-    result[:, reached] = found.force, found.area
-    return result[0], result[1]
+    result[:, reached] = SEPARATIONS[theory].answer(surface, u)[:2]
+    return result
 
 
-def force_at(surface: Surface, theory: str, ratio: Any) -> Any:
+def force_at(surface: Surface, theory: str, ratio: Any) -> FloatArray:
     """F/(A0 E*) at mean separations u = ratio * h_rms; NaN where the theory has none."""
     u = np.asarray(ratio, dtype=float) * surface.h_rms
     # at u = 0 the full form needs an infinite load

@@ -1,9 +1,7 @@
-"""What nearness to boundary elements costs: tables/distance.csv, the second half of docs/cost.md and its figure."""
+"""Second half of docs/cost.md: deviation from boundary elements against time, tables/distance.csv and its figure."""
 
 from __future__ import annotations
 
-import csv
-import io
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -13,8 +11,8 @@ from scipy.interpolate import PchipInterpolator
 
 from generate.boundary_elements.grids import GRIDS, STARTS
 from generate.boundary_elements.surfaces import Recipe, heights
-from generate.pages.distances import COVER, DATA, HIGH, HUES, LOW, THEORIES, TIERS, distances, held_out, summed_up
-from generate.pages.page import percent, pyplot, svg, table
+from generate.pages.distances import COVER, HIGH, HUES, LOW, THEORIES, TIERS, distances, held_out, summed_up
+from generate.pages.page import duration, panels, percent, read_csv, svg, table, to_csv
 from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.arguments import FloatArray
@@ -22,7 +20,7 @@ from mbma_tables.calibrated import Law, Spectrum, area
 from mbma_tables.scenes.costs import Distance
 from mbma_tables.theories import Persson
 
-DEEP = 0.1  # A/A0: distances are told from LOW to DEEP and from DEEP to HIGH
+DEEP = 0.1  # A/A0: deviations are given from LOW to DEEP and from DEEP to HIGH
 RANGES = ((LOW, DEEP), (DEEP, HIGH))
 SIMULATED = "boundary elements"
 POINTS, SLOW_POINTS = 1000, 50  # of each timed surface, in one call
@@ -38,18 +36,10 @@ HEAD = """\
 SHAPES = {"MBMA": "o", "calibrated": "s", "Persson": "^", "G-W": "v"}
 
 
-def surfaces() -> list[Surface]:
-    """The surfaces on which theories are timed."""
-    return [Surface(hurst, 1.0, zeta_1, 1.0, top) for hurst, zeta_1, top in TIMED]
-
-
-def _points(surface: Surface, count: int) -> FloatArray:
-    return np.linspace(0.02, 0.98, count) * float(surface.h_max)
-
-
 def _each(answer: Callable[[Surface, FloatArray], Any], count: int = POINTS) -> float:
-    """Cost of a point: force and area at mean separations of each surface, one call a surface."""
-    asked = [(surface, _points(surface, count)) for surface in surfaces()]
+    """Cost of a point: force and area at mean separations of each timed surface, one call a surface."""
+    surfaces = [Surface(hurst, 1.0, zeta_1, 1.0, top) for hurst, zeta_1, top in TIMED]
+    asked = [(surface, np.linspace(0.02, 0.98, count) * float(surface.h_max)) for surface in surfaces]
     cost, _ = measure(lambda: [answer(surface, u) for surface, u in asked])
     return cost / (len(asked) * count)
 
@@ -60,18 +50,19 @@ def _asked(**options: Any) -> Callable[[Surface, FloatArray], Any]:
 
 def _by_law(**options: Any) -> tuple[float, float]:
     """Costs of a point of a law, and of making it."""
-    laws = {surface.h_max: contact_law(surface, LAW_RTOL, **options) for surface in surfaces()}
+
+    def make() -> dict[float, Any]:
+        surfaces = (Surface(hurst, 1.0, zeta_1, 1.0, top) for hurst, zeta_1, top in TIMED)
+        return {float(surface.h_max): contact_law(surface, LAW_RTOL, **options) for surface in surfaces}
+
+    laws = make()
 
     def answer(surface: Surface, u: FloatArray) -> Any:
-        law = laws[surface.h_max]
+        law = laws[float(surface.h_max)]
         return law.force(u=u), law.area(u=u)
 
-    made, _ = measure(lambda: [contact_law(surface, LAW_RTOL, **options) for surface in surfaces()])
-    return _each(answer), made / len(laws)
-
-
-def _closed_form(surface: Surface, force: FloatArray) -> Any:
-    return area(force, surface.alpha)
+    made = measure(make)[0] / len(laws)
+    return _each(answer), made
 
 
 def _quadrature(surface: Surface, u: FloatArray) -> Any:
@@ -92,14 +83,15 @@ def _by_map() -> tuple[float, float]:
         return found
 
     surface = made()
-    u = _points(surface, POINTS)
+    u = np.linspace(0.02, 0.98, POINTS) * float(surface.h_max)
     answer = measure(lambda: contact(surface, mean_separation=u, theory="calibrated"))[0] / POINTS
     return answer, measure(made)[0]
 
 
 def ways() -> Iterator[tuple[str, str, str, float, float]]:
-    """Theory, way to it, name of its distances, cost of a point and once a surface."""
-    yield "calibrated", "closed form, area of a force", "area alone", _each(_closed_form), 0
+    """Theory, way to it, name of its deviations, cost of a point and once a surface."""
+    closed_form = _each(lambda surface, force: area(force, surface.alpha))
+    yield "calibrated", "closed form, area of a force", "area alone", closed_form, 0
     yield "calibrated", "quadrature", "calibrated", _each(_quadrature), 0
     yield "calibrated", "table", "calibrated", _each(_asked(theory="calibrated")), 0
     yield "calibrated", "law", "calibrated", *_by_law(theory="calibrated")
@@ -122,23 +114,18 @@ def ways() -> Iterator[tuple[str, str, str, float, float]]:
 
 
 def study() -> list[Distance]:
-    """Every theory, with its distances from all held-out surfaces, and boundary elements on coarser grids."""
-    return [*theory_rows(), *grid_rows()]
-
-
-def theory_rows() -> list[Distance]:
-    """Every theory, with its distances from all held-out surfaces."""
+    """Every theory with its deviations on all held-out surfaces, and boundary elements on coarser grids."""
     seen, known = held_out(), dict[str, list[float]]()
     for name, theory in (THEORIES | TIERS).items():
         found = distances(seen, theory)
         parts = [summed_up(seen, found[quantity], *ends) for quantity in ("area", "force") for ends in RANGES]
         known[name] = [part[0] for part in parts] + [part[2] for part in parts[:2]]
     known["area alone"] = [*known["calibrated"][:2], np.nan, np.nan, 1, 1]
-    return [Distance(label, way, cost, once, *known[name]) for label, way, name, cost, once in ways()]
+    return [*(Distance(label, way, cost, once, *known[name]) for label, way, name, cost, once in ways()), *grid_rows()]
 
 
 def _missed(own: Any) -> Iterator[tuple[int, str, FloatArray]]:
-    """Contact and distance of each load of one surface, by grid and quantity, from what its finest two converge to."""
+    """Contact and deviation of each load of one surface, by grid and quantity, from what its finest two converge to."""
     on = {grid: own[own["points"] == grid] for grid in GRIDS}
     on = {grid: rows[rows["start"] == rows["start"][0]] for grid, rows in on.items() if rows.size}
     coarse, fine = list(on.values())[-2:]
@@ -153,8 +140,7 @@ def _missed(own: Any) -> Iterator[tuple[int, str, FloatArray]]:
 
 def grid_rows() -> list[Distance]:
     """Boundary elements on their own grids."""
-    lines = (DATA / "boundary_element_grids.csv").read_text(encoding="utf-8").splitlines()
-    data = np.genfromtxt([s for s in lines if not s.startswith("#")], delimiter=",", names=True, dtype=None)
+    data = read_csv("boundary_element_grids.csv")
     missed: dict[tuple[int, str], list[FloatArray]] = {}
     for seed in np.unique(data["seed"]):
         for grid, quantity, values in _missed(data[data["seed"] == seed]):
@@ -167,27 +153,15 @@ def grid_rows() -> list[Distance]:
             contacts, values = np.concatenate(missed[grid, quantity], axis=1)
             kept = [values[(contacts >= low) & (contacts <= high)] for low, high in RANGES]
             parts += [float(np.sqrt(np.mean(part**2))) for part in kept]
-        parts += [1.0, 1.0]
         if timed.size:
-            rows.append(Distance(SIMULATED, f"{grid} x {grid}, {start}", float(timed.mean()), 0, *parts))
+            rows.append(Distance(SIMULATED, f"{grid} x {grid}, {start}", float(timed.mean()), 0, *[*parts, 1.0, 1.0]))
     return rows
 
 
-def to_csv(rows: Sequence[Distance]) -> str:
-    """The rows as text."""
-    text = io.StringIO()
-    text.write(HEAD)
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(Distance._fields)
-    for row in rows:
-        writer.writerow(f"{v:.4g}" if isinstance(v, float | int) else v for v in row)
-    return text.getvalue()
-
-
-def duration(seconds: float) -> str:
-    """A time to two digits, in its unit."""
-    unit, size = next(((u, s) for u, s in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)) if seconds >= s), ("ns", 1e-9))
-    return f"{float(f'{seconds / size:.2g}'):g} {unit}"
+def file_of(rows: Sequence[Distance]) -> bytes:
+    """The rows as tables/distance.csv."""
+    cells = ([f"{v:.4g}" if isinstance(v, float | int) else v for v in row] for row in rows)
+    return to_csv(HEAD, Distance._fields, cells)
 
 
 def to_table(rows: Sequence[Distance], unit: float) -> str:
@@ -208,20 +182,19 @@ def to_table(rows: Sequence[Distance], unit: float) -> str:
 
 
 def draw(rows: Sequence[Distance], unit: float) -> bytes:
-    """Distance against time: area above, force below, light contact left, deep contact right."""
-    figure, axes = pyplot().subplots(2, 2, figsize=(9, 7.4), dpi=100, layout="constrained", sharex=True, sharey=True)
-    fields = (("area_light", "area_deep"), ("force_light", "force_deep"))
-    for line, names in zip(axes, fields, strict=True):
-        for panel, name in zip(line, names, strict=True):
-            for theory, colour in (HUES | {SIMULATED: "C5"}).items():
-                marker = next((shape for start, shape in SHAPES.items() if theory.startswith(start)), "*")
-                own = [row for row in rows if row.theory == theory]
-                x, y = [row.cost * unit for row in own], [100 * getattr(row, name) for row in own]
-                panel.loglog(x, y, marker, color=colour, ls="none", ms=6, label=theory)
-                for row, a, b in zip(own, x, y, strict=True):
-                    if theory == SIMULATED and row.way.endswith("cold"):
-                        panel.annotate(row.way.split()[0], (a, b), (4, 3), textcoords="offset points", fontsize=7)
-            panel.grid(alpha=0.3)
+    """Deviation against time: area above, force below, light contact left, deep contact right."""
+    figure, axes = panels(2, 2, (9, 7.4), sharex=True, sharey=True)
+    names = ("area_light", "area_deep", "force_light", "force_deep")
+    for panel, name in zip(axes.flat, names, strict=True):
+        for theory, colour in (HUES | {SIMULATED: "C5"}).items():
+            marker = next((shape for start, shape in SHAPES.items() if theory.startswith(start)), "*")
+            own = [row for row in rows if row.theory == theory]
+            x, y = [row.cost * unit for row in own], [100 * getattr(row, name) for row in own]
+            panel.loglog(x, y, marker, color=colour, ls="none", ms=6, label=theory)
+            for row, a, b in zip(own, x, y, strict=True):
+                if theory == SIMULATED and row.way.endswith("cold"):
+                    panel.annotate(row.way.split()[0], (a, b), (4, 3), textcoords="offset points", fontsize=7)
+        panel.grid(alpha=0.3)
     for panel, title in zip(axes[0], ("1-10% contact", "10-97% contact"), strict=True):
         panel.set_title(title)
     axes[0, 0].set_ylabel("area at equal force, rms distance [%]")

@@ -1,4 +1,4 @@
-"""What islands cost: every way to solve or look up one, on islands that made no table."""
+"""docs/cost.md: cost of an island by every way to solve it or look it up, on islands that no table was made from."""
 
 from __future__ import annotations
 
@@ -97,23 +97,19 @@ def newton_rows() -> Iterator[Row]:
     held = held_out()
     chosen = np.arange(0, ISLANDS, 4)
     X, mu = held.islands["X"][chosen], held.islands["mu"][chosen]
-    ways: list[tuple[str, dict[str, Any]]] = [
-        (variant("island", rtol), {"rtol": max(0.1 * rtol, greenwood_tripp.MIN_SOLVER_RTOL)}) for rtol in NEWTON_RTOLS
-    ]
-    ways += [(f"nodes={nodes}", {"rtol": 1e-11, "nodes": nodes}) for nodes in NEWTON_NODES]
-    for name, options in ways:
-        solved = greenwood_tripp.solve(X, mu, **options)
-        cost, _ = measure(functools.partial(greenwood_tripp.solve, X, mu, **options))
+    ways: dict[str, dict[str, Any]] = {
+        variant("island", rtol): {"rtol": max(0.1 * rtol, greenwood_tripp.MIN_SOLVER_RTOL)} for rtol in NEWTON_RTOLS
+    }
+    ways |= {f"nodes={nodes}": {"rtol": 1e-11, "nodes": nodes} for nodes in NEWTON_NODES}
+    for name, options in ways.items():
+        run = functools.partial(greenwood_tripp.solve, X, mu, **options)
+        solved, (cost, _) = run(), measure(run)
         pressures = float((solved.nodes * (solved.iterations + 1)).mean())
         error = held.error(solved.phi_F, solved.phi_A, chosen)
         yield Row("exact", name, "both", error, cost / X.size, pressures)
     for rtol in (1e-4, 1e-8):
-        cost, _ = measure(functools.partial(_profiles, X[:PROFILES], mu[:PROFILES], rtol))
+        cost, _ = measure(lambda rtol=rtol: greenwood_tripp.solve(X[:PROFILES], mu[:PROFILES], rtol=rtol).pressure)  # type: ignore[misc]
         yield Row("exact", variant("profile", rtol), "both", None, cost / PROFILES)
-
-
-def _profiles(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
-    return greenwood_tripp.solve(X, mu, rtol=rtol).pressure
 
 
 def model_rows() -> Iterator[Row]:

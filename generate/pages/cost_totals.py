@@ -1,4 +1,4 @@
-"""What totals cost: tiers, laws, theories, first use, and force alone."""
+"""docs/cost.md: cost of totals by tiers, laws and theories, of first use, and of force alone."""
 
 from __future__ import annotations
 
@@ -112,13 +112,13 @@ def law_rows() -> Iterator[Row]:
     for tier in TIERS:
         tolerances = LAW_RTOLS if tier == "universal" else SLOW_LAW_RTOLS
         for rtol in tolerances:
-            laws = _make_laws(surfaces, rtol, tier)
+            laws: list[Any] = [contact_law(surface, rtol, tier=tier) for surface in surfaces]
             answers = [
                 {"force": law.force(gap), "area": law.area(gap)}
                 for law, (_, gap, _) in zip(laws, reference(), strict=True)
             ]
             timed = surfaces[:2] if tier == "exact" else surfaces
-            cost, _ = measure(functools.partial(_make_laws, timed, rtol, tier))
+            cost, _ = measure(lambda t=timed, r=rtol, n=tier: [contact_law(s, r, tier=n) for s in t])  # type: ignore[misc]
             yield Row(tier, variant("law", rtol), "both", largest_error(answers), cost / len(timed))
     surface = surfaces[3]
     law, gaps = contact_law(surface), measured_gaps(surface, 10_000)
@@ -131,10 +131,6 @@ def law_rows() -> Iterator[Row]:
     }
     for (name, quantity), run in ways.items():
         yield Row("law", name, quantity, None, measure(run)[0] / gaps.size)
-
-
-def _make_laws(surfaces: Sequence[Surface], rtol: float, tier: str) -> list[Any]:
-    return [contact_law(surface, rtol, tier=tier) for surface in surfaces]
 
 
 def theory_rows() -> Iterator[Row]:

@@ -1,25 +1,23 @@
-"""How far theories are from simulated contacts: every theory on every data set.
+"""Deviations of theories from simulated contacts: every theory on every data set.
 
-Distances are ln(theory/simulation) of three quantities: area at equal force, force at equal mean separation, stiffness
-at equal force. None is a numerical error: all theories are solved to 1e-6 or better, but for the map's law.
+Deviations are ln(theory/simulation) of three quantities: area at equal force, force at equal mean separation, stiffness
+at equal force. They are model errors: the theories are solved to 1e-6 or better, except for the map's law.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
-from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case, cases
+from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case
 from generate.calibrated import QUANTITIES, errors
 from generate.calibrated_table import DEPTHS
-from generate.pages.page import ROOT
+from generate.pages.page import DATA, evidence, read_csv
 from mbma_tables import Surface, theories
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import CONSTANTS, YANG_PERSSON, Law, Spectrum
@@ -30,7 +28,6 @@ from mbma_tables.surfaces.maps import matched
 from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import REPORTED, Reading
 
-DATA = ROOT / "docs" / "data"
 LOW, HIGH = 0.01, 0.97  # A/A0 of the simulations between which distances are summed up
 COVER = dataclasses.replace(REPORTED, name="reported, areas as a cover", addition="cover")
 MEASURED = {"al3d-1": "measured: optical map", "di-1": "measured: AFM map"}
@@ -120,17 +117,7 @@ THEORIES: dict[str, Callable[[Case], Any]] = {
     "Persson simplified": _theory(theories.Persson("simplified")),
     "G-W": _theory(theories.GreenwoodWilliamson()),
 }
-HUES = {
-    "MBMA reported": "C0",
-    "MBMA printed": "C1",
-    "MBMA fitted": "C9",
-    "MBMA cover": "C4",
-    "calibrated": "k",
-    "calibrated, map": "0.5",
-    "Persson": "C3",
-    "Persson simplified": "C6",
-    "G-W": "C2",
-}
+HUES = dict(zip(THEORIES, ("C0", "C1", "C9", "C4", "k", "0.5", "C3", "C6", "C2"), strict=True))
 TIERS = {"formula": _mbma("reported", "formula"), "rigid": _mbma("reported", "rigid")}
 FITTED_TO = {"training": ("calibrated", "calibrated, map"), "earlier": ("MBMA fitted",)}
 
@@ -164,22 +151,9 @@ def distances(seen: Sequence[Case], theory: Callable[[Case], Any]) -> dict[str, 
     return {name: np.concatenate(values) for name, values in parts.items()}
 
 
-@functools.cache
-def evidence() -> tuple[Case, ...]:
-    """The surfaces of docs/data/boundary_elements.nc."""
-    with xr.open_dataset(DATA / "boundary_elements.nc") as opened:
-        data: Any = opened.load()
-    return tuple(cases(data))
-
-
 def held_out() -> list[Case]:
     """Self-affine surfaces of two or more longest waves a side that no fit saw."""
     return [one for one in evidence() if one.kind == "self_affine" and one.gaussian and one.split != TRAINING]
-
-
-def _columns(name: str) -> Any:
-    lines = (DATA / name).read_text(encoding="utf-8").splitlines()
-    return np.genfromtxt([line for line in lines if not line.startswith("#")], delimiter=",", names=True)
 
 
 def _simulated(kind: str, spectrum: Spectrum, h_max: float, rows: Any, hurst: float = 0.8, zeta_1: float = 0) -> Case:
@@ -195,7 +169,7 @@ def _self_affine(hurst: float, zeta_1: float, h_max: float, rows: Any) -> Case:
 
 def earlier() -> list[Case]:
     """The 105 surfaces of docs/data/boundary_elements.csv, to which the reading `fitted` was fitted."""
-    table, keys = _columns("boundary_elements.csv"), ("hurst", "L_over_lambda0", "zeta_1", "seed", "n")
+    table, keys = read_csv("boundary_elements.csv"), ("hurst", "L_over_lambda0", "zeta_1", "seed", "n")
     found = []
     for node in dict.fromkeys(zip(*(table[key] for key in keys), strict=True)):
         own = table[np.logical_and.reduce([table[key] == value for key, value in zip(keys, node, strict=True)])]
@@ -211,7 +185,7 @@ def older(name: str) -> Case:
         "gfmd": ("gfmd_hurst0.8_zeta100.csv", 100.0, 0.2766, 3.4),
         "challenge": ("challenge.csv", 200.0, 1.0, 3.45),
     }[name]
-    table = _columns(file)
+    table = read_csv(file)
     rows = [table["force"] / gradient, table["area"], table["mean_separation_over_h_rms"]]
     if name != "challenge":
         return _self_affine(0.8, zeta_1, h_max, rows)
@@ -225,7 +199,7 @@ def older(name: str) -> Case:
 def rolloff(number: int) -> Case:
     """A surface with a plateau by its map's own spectrum."""
     force, area, _, u = np.loadtxt(DATA / f"rolloff_{number}.csv", delimiter=",").T[:4]
-    table = _columns("rolloff_spectra.csv")
+    table = read_csv("rolloff_spectra.csv")
     own = table[table["map"] == number]
     spectrum, h_rms = Spectrum.from_shares(own["q"], own["variance"]), np.sqrt(own["variance"].sum())
     # wavenumbers over h_rms: their unit cancels

@@ -1,4 +1,4 @@
-"""The measured part of docs/explorer.md: its size, how long it takes, and what it looks like."""
+"""docs/explorer.md: size and speed of the explorer's page in a browser, and its picture."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Iterator
 from typing import Any
 
-from generate.pages.page import table
+from generate.pages.page import Measured, table
 from mbma_tables import Surface
 from mbma_tables.export.explorer import explorer_page
 
@@ -27,14 +27,14 @@ STEP = """async (place) => {
 
 
 class Processor:
-    """Milliseconds of processor time that a tab's main thread has spent, which other programs do not lengthen."""
+    """Processor time of a tab's main thread, which is independent of other programs' load."""
 
     def __init__(self, tab: Any) -> None:
         self._session = tab.context.new_cdp_session(tab)
         self._session.send("Performance.enable", {"timeDomain": "threadTicks"})
 
     def spent(self) -> float:
-        """Since the page began."""
+        """Milliseconds since the page began."""
         metrics = {each["name"]: each["value"] for each in self._session.send("Performance.getMetrics")["metrics"]}
         return 1e3 * float(metrics["TaskDuration"])
 
@@ -64,50 +64,49 @@ def visit(opened: Any, address: str, **options: Any) -> Any:
 
 
 def go(tab: Any, address: str) -> None:
-    """To the page in a tab, and wait until it has drawn."""
+    """Open the page in a tab, and wait until it has drawn."""
     tab.goto(address)
     tab.wait_for_selector("html[data-ready]", state="attached")
 
 
-def steps(opened: Any, address: str) -> list[tuple[float, float]]:
+def openings(opened: Any, address: str) -> Iterator[tuple[float, float]]:
+    """Milliseconds of each opening to the first curves, by the clock and of the processor."""
+    for _ in range(OPENINGS):
+        tab = opened.new_page()
+        processor = Processor(tab)
+        go(tab, address)
+        yield float(tab.evaluate("document.documentElement.dataset.ready")), processor.spent()
+        tab.close()
+
+
+def steps(opened: Any, address: str) -> Iterator[tuple[float, float]]:
     """Milliseconds of each step of a slider, by the clock and of the processor."""
-    tab, found = visit(opened, address), []
+    tab = visit(opened, address)
     processor = Processor(tab)
-    # a hand is not faster than that
     tab.wait_for_timeout(1000)
     for k in range(STEPS):
         before = processor.spent()
-        found.append((tab.evaluate(STEP, 400 + 10 * k), processor.spent() - before))
+        yield tab.evaluate(STEP, 400 + 10 * k), processor.spent() - before
     tab.context.close()
-    return found
 
 
-def measure() -> tuple[dict[str, str], dict[str, bytes]]:
-    """The measured part of the page, and its picture."""
+def measure() -> Measured:
+    """The measured block of the page, and its picture."""
     text = explorer_page(Surface.named("concrete"), 13.3, "MPa", "calibrated", title="concrete road of Lorenz")
+    rows = [["size of the file", f"{len(text.encode()) / 1e6:.2f} MB", "", ""]]
     with tempfile.TemporaryDirectory() as folder, browser() as opened:
         path = pathlib.Path(folder, "explorer.html")
         path.write_text(text, encoding="utf-8")
-        first = []
-        for _ in range(OPENINGS):
-            tab = opened.new_page()
-            processor = Processor(tab)
-            go(tab, path.as_uri())
-            first.append((float(tab.evaluate("document.documentElement.dataset.ready")), processor.spent()))
-            tab.close()
-        timed = {
-            f"a slider's step, three theories against {against}": steps(
-                opened, f"{path.as_uri()}#against={against}&beside=mbma,calibrated,persson"
-            )
-            for against in ("gap", "pressure")
-        }
+        timed = {"opening to the first curves": openings(opened, path.as_uri())}
+        for against in ("gap", "pressure"):
+            address = f"{path.as_uri()}#against={against}&beside=mbma,calibrated,persson"
+            timed[f"a slider's step, three theories against {against}"] = steps(opened, address)
+        for name, found in timed.items():
+            clock, spent = zip(*found, strict=True)
+            numbers = (statistics.median(clock), max(clock), statistics.median(spent))
+            rows.append([name, *(f"{milliseconds:.0f} ms" for milliseconds in numbers)])
         tab = visit(opened, path.as_uri())
         tab.locator(".chart").first.hover(position={"x": 200, "y": 100})
         picture = tab.screenshot()
-    rows = [["size of the file", f"{len(text.encode()) / 1e6:.2f} MB", "", ""]]
-    for name, found in {"opening to the first curves": first, **timed}.items():
-        clock, spent = zip(*found, strict=True)
-        numbers = (statistics.median(clock), max(clock), statistics.median(spent))
-        rows.append([name, *(f"{milliseconds:.0f} ms" for milliseconds in numbers)])
     header = ["what", "median", "largest", "processor time of the page, median"]
     return {"numbers": table(header, rows)}, {"docs/figures/explorer.png": picture}

@@ -1,4 +1,4 @@
-"""The measured parts of docs/export.md: laws as code, what rows chosen by their error are worth, and the figure."""
+"""docs/export.md: sizes and accuracy of laws as code, rows chosen by their error, and the figure."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from generate.pages.page import pyplot, svg, table
+from generate.pages.page import Measured, panels, svg, table
 from mbma_tables import Surface, contact_law
 from mbma_tables.export import LAWS
 from mbma_tables.export.law_code import law_text
@@ -20,6 +20,21 @@ NAMES = ("concrete", "asphalt", "yang-persson", "challenge")
 ROWS = (20, 50, 200)
 E_STAR = 13.3
 THEORIES = ("mbma", "calibrated", "persson")
+# sums pressure and tangent at random overclosures, in nanoseconds a value; the differences of single ones follow
+LOOP = """
+#include <time.h>
+double law_loop(const double *c, int count, int times, double *sum) {
+    clock_t start = clock();
+    double total = 0, tangent;
+    for (int n = 0; n < times; ++n)
+        for (int k = 0; k < count; ++k) {
+            total += law_with_tangent(c[k], &tangent);
+            total += tangent;
+        }
+    *sum = total;
+    return 1e9 * (double)(clock() - start) / CLOCKS_PER_SEC / count / times;
+}
+"""
 
 
 def law(name: str, rows: int, evenly: bool = False) -> LawTable:
@@ -40,73 +55,45 @@ def errors() -> str:
 def sizes() -> str:
     """Characters of laws as code, in thousands."""
     heat: dict[str, Any] = {"conductivity": 1.0, "conductivity_unit": "W/(m K)", "stress_unit": "MPa"}
-    texts = {
-        (target, theory): len(law_text(target, Surface.named(NAMES[0]), E_STAR, theory=theory, **heat))
-        for target in LAWS
-        for theory in THEORIES
-    }
-    lines = [[target, *(f"{texts[target, theory] / 1e3:.1f}" for theory in THEORIES)] for target in LAWS]
+
+    def size(target: str, theory: str) -> str:
+        return f"{len(law_text(target, Surface.named(NAMES[0]), E_STAR, theory=theory, **heat)) / 1e3:.1f}"
+
+    lines = [[target, *(size(target, theory) for theory in THEORIES)] for target in LAWS]
     return table(["target", *(f"{theory} [kB]" for theory in THEORIES)], lines)
-
-
-# sums pressure and tangent at random overclosures, in nanoseconds a value; the differences of single ones follow
-LOOP = """
-#include <time.h>
-double law_loop(const double *c, int count, int times, double *sum) {
-    clock_t start = clock();
-    double total = 0, tangent;
-    for (int n = 0; n < times; ++n)
-        for (int k = 0; k < count; ++k) {
-            total += law_with_tangent(c[k], &tangent);
-            total += tangent;
-        }
-    *sum = total;
-    return 1e9 * (double)(clock() - start) / CLOCKS_PER_SEC / count / times;
-}
-"""
 
 
 def compiled() -> str:
     """Laws in C, by gcc -O2: largest differences from the library's law, and the time of a value with its tangent."""
-    lines = []
+    lines, pairs = [], {"pressure": "force", "area": "area", "energy": "energy", "tangent": "stiffness"}
     for theory in THEORIES:
-        law = contact_law(Surface.named(NAMES[0]), E_star=E_STAR, theory=theory)
-        rng = np.random.default_rng(18)
-        d = np.concatenate(
-            [law.h_max * (1 - 10 ** rng.uniform(-12, -0.3, 5000)), rng.uniform(-0.99, 1, 5000) * law.h_max]
-        )
-        c = (law.h_max - d) / 2
+        own, rng = contact_law(Surface.named(NAMES[0]), E_star=E_STAR, theory=theory), np.random.default_rng(18)
+        depths = (1 - 10 ** rng.uniform(-12, -0.3, 5000), rng.uniform(-0.99, 1, 5000))
+        d = own.h_max * np.concatenate(depths)
+        c = (own.h_max - d) / 2
         with tempfile.TemporaryDirectory() as folder:
             source = law_text("c-law", Surface.named(NAMES[0]), E_STAR, theory=theory, stress_unit="MPa") + LOOP
             pathlib.Path(folder, "law.c").write_text(source, encoding="utf-8")
             command = ["gcc", "-std=c99", "-O2", "-shared", "-fPIC", "law.c", "-lm", "-o", "law.so"]
             subprocess.run(command, cwd=folder, check=True)
             library = ctypes.CDLL(f"{folder}/law.so")
-        for name in ("law_pressure", "law_tangent", "law_area", "law_energy"):
-            function = getattr(library, name)
+        known, cells = own.values(d), []
+        for name, field in pairs.items():
+            function = getattr(library, f"law_{name}")
             function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
+            ratios = [abs(function(x) / y - 1) for x, y in zip(c, getattr(known, field), strict=True)]
+            cells.append(f"{max(ratios):.1e}")
         library.law_loop.restype = ctypes.c_double
-        known = law.values(d)
-        pairs = {
-            "pressure": known.force,
-            "area": known.area,
-            "energy": known.energy,
-            "tangent": known.stiffness,
-        }
-        differences = [
-            max(abs(getattr(library, f"law_{name}")(x) / y - 1) for x, y in zip(c, values, strict=True))
-            for name, values in pairs.items()
-        ]
         even = c[5000:].copy()
         address, total = even.ctypes.data_as(ctypes.c_void_p), ctypes.byref(ctypes.c_double())
         time = min(library.law_loop(address, even.size, 200, total) for _ in range(5))
-        lines.append([theory, *(f"{found:.1e}" for found in differences), f"{time:.0f} ns"])
+        lines.append([theory, *cells, f"{time:.0f} ns"])
     return table(["theory", *pairs, "a value with its tangent"], lines)
 
 
 def draw() -> bytes:
     """Rows of the concrete road, chosen by error and equally spaced, on the curve."""
-    figure, axes = pyplot().subplots(figsize=(6, 4), layout="constrained")
+    figure, axes = panels(size=(6, 4))
     fine = law("concrete", 500)
     axes.semilogy(fine.x[1:], fine.y[1:], "k-", lw=0.8, label="model")
     for evenly, mark, label in ((False, "o", "chosen"), (True, "x", "equally spaced")):
@@ -118,6 +105,6 @@ def draw() -> bytes:
     return svg(figure)
 
 
-def measure() -> tuple[dict[str, str], dict[str, bytes]]:
-    """The measured part of the page, and its figure."""
+def measure() -> Measured:
+    """The measured blocks of the page, and its figure."""
     return {"errors": errors(), "sizes": sizes(), "compiled": compiled()}, {"docs/figures/export.svg": draw()}

@@ -1,4 +1,4 @@
-"""The measured parts of docs/fidelity.md: what the paper quotes, and brute force, beside what the library computes."""
+"""docs/fidelity.md: what the paper quotes, and simulations, beside what the library computes."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from generate.calibrated import QUANTITIES
 from generate.pages import distances
 from generate.pages.comparisons import AREA_THEORIES, PERSSON, READINGS, THEORIES, force_at, kappa
 from generate.pages.fidelity_figures import RESOLUTIONS, drawn
-from generate.pages.page import percent, svg, table
+from generate.pages.page import Measured, percent, svg, table
 from mbma_tables import Surface
 
 STEEL = 200e3  # MPa, the E* at which the paper's 3.5e-4 E* is its 70 MPa
 HEIGHTS = (3.0, 3.4, 4.0)  # h_max/h_rms
 Values = dict[str, Any]
+Quoted = tuple[str, str, float | str, Iterable[str], Values]  # case, what, the paper's, theories it is about, values
 
 
 def show(value: Any, quoted: float | None = None) -> str:
@@ -38,23 +39,17 @@ def over(values: Values, unit: float) -> Values:
     return {t: v / unit for t, v in values.items()}
 
 
-def kappas(road: Surface, area: float) -> Values:
-    """Kappa of every theory at a contact area."""
-    values = {t: kappa(road, t, area)[0] for t in AREA_THEORIES}
-    return values | dict.fromkeys(PERSSON, values["Persson"])
-
-
-Quoted = tuple[str, str, float | str, Iterable[str], Values]  # case, what, the paper's, theories it is about, values
-
-
-def quoted_forces() -> Iterable[Quoted]:
-    """Forces that the paper quotes."""
+def quoted_numbers() -> Iterable[Quoted]:
+    """Numbers that the paper quotes, beside every theory's."""
     case, md = "yang-persson", Surface.named("yang-persson")
     at = {ratio: forces(md, ratio) for ratio in (0.0, 2.0, 2.5, 3.0)}
-    yield case, "F/(A0 E*), u = 2.5 h_rms: MBMA", 2.2e-4, READINGS, at[2.5]
-    yield case, "F/(A0 E*), u = 2 h_rms: MBMA", 2.9e-3, READINGS, at[2.0]
-    yield case, "F/(A0 E*), u = 3 h_rms: Persson", 3.5e-4, PERSSON, at[3.0]
-    yield case, "F/(A0 E*), u = 2.5 h_rms: Persson", 1e-3, PERSSON, at[2.5]
+    for ratio, name, quoted, subject in (
+        (2.5, "MBMA", 2.2e-4, READINGS),
+        (2.0, "MBMA", 2.9e-3, READINGS),
+        (3.0, "Persson", 3.5e-4, PERSSON),
+        (2.5, "Persson", 1e-3, PERSSON),
+    ):
+        yield case, f"F/(A0 E*), u = {ratio:g} h_rms: {name}", quoted, subject, at[ratio]
     yield case, "F/A0 in MPa, steel, u = 3 h_rms: Persson", 70.0, PERSSON, over(at[3.0], 1 / STEEL)
     meets = over(at[0.0], at[0.0]["Persson simplified"])
     yield case, "F over Persson simplified, u = 0: MBMA meets it", 1.0, READINGS, meets
@@ -66,15 +61,13 @@ def quoted_forces() -> Iterable[Quoted]:
             what = f"F over boundary elements, u = {u:.4g} h_rms: MBMA"
             yield "papangelo", what, "within 2x", (), over(forces(other, u), force * other.rms_gradient)
 
-
-def quoted_slopes() -> Iterable[Quoted]:
-    """First contact and kappa of the roads, the challenge at full contact, and the study of resolution."""
     for name, top, slope in (("concrete", 4.1, 1.98), ("asphalt", 4.5, 1.75)):
         road = Surface.named(name)
-        first = dict.fromkeys(READINGS, road.h_max / road.h_rms)
-        yield name, "u/h_rms at first contact", top, READINGS, first
-        yield name, "kappa, here at A/A0 = 1%: MBMA", slope, READINGS, kappas(road, 0.01)
-        light, what = kappas(road, 1e-4), "kappa at light load, here at A/A0 = 0.01%"
+        yield name, "u/h_rms at first contact", top, READINGS, dict.fromkeys(READINGS, road.h_max / road.h_rms)
+        heavy, light = ({t: kappa(road, t, area)[0] for t in AREA_THEORIES} for area in (0.01, 1e-4))
+        light |= dict.fromkeys(PERSSON, light["Persson"])
+        yield name, "kappa, here at A/A0 = 1%: MBMA", slope, READINGS, heavy | dict.fromkeys(PERSSON, heavy["Persson"])
+        what = "kappa at light load, here at A/A0 = 0.01%"
         yield name, what + ": G-W", math.sqrt(2 * math.pi), ["G-W"], light
         yield name, what + ": Persson", math.sqrt(8 / math.pi), PERSSON, light
 
@@ -82,7 +75,7 @@ def quoted_slopes() -> Iterable[Quoted]:
     what = "F over Persson full, u = 0.01 h_rms: MBMA"
     yield "challenge", what, "within 4x", (), over(full, full["Persson full"])
     coarse, fine = (Surface.named(f"resolution-{z}") for z in (RESOLUTIONS[0], RESOLUTIONS[-1]))
-    for ratio, expected in ((2.5, "sensitive: MBMA, G-W"), (0.2, "1, but for G-W")):
+    for ratio, expected in ((2.5, "sensitive: MBMA, G-W"), (0.2, "1, except for G-W")):
         below, above = forces(coarse, ratio), forces(fine, ratio)
         what = f"F at zeta_1 = {RESOLUTIONS[-1]} over {RESOLUTIONS[0]}, u = {ratio:g} h_rms"
         yield "resolution", what, expected, (), {t: above[t] / below[t] for t in THEORIES}
@@ -91,7 +84,7 @@ def quoted_slopes() -> Iterable[Quoted]:
 def quoted_table() -> str:
     """What the paper quotes beside what every theory gives."""
     rows = []
-    for case, what, quoted, subject, values in (*quoted_forces(), *quoted_slopes()):
+    for case, what, quoted, subject, values in quoted_numbers():
         unit = {t: quoted for t in subject if isinstance(quoted, float)}
         cells = [show(values.get(t, np.nan), unit.get(t)) for t in THEORIES]
         rows.append([case, what, quoted if isinstance(quoted, str) else show(quoted), *cells])
@@ -99,16 +92,16 @@ def quoted_table() -> str:
 
 
 def summary_table(sets: Iterable[distances.DataSet]) -> str:
-    """Root mean square distances of every theory from data sets: area, force and stiffness."""
+    """Root mean square deviations of every theory from data sets: area, force and stiffness."""
     rows = []
     for one in sets:
         cells = []
         for name, theory in distances.THEORIES.items():
             found = distances.distances(one.seen, theory)
-            told = [distances.summed_up(one.seen, values) for values in found.values()]
-            text = " / ".join(percent(rms) for rms, _, _ in told)
+            sums = [distances.summed_up(one.seen, values) for values in found.values()]
+            text = " / ".join(percent(rms) for rms, _, _ in sums)
             # stiffness may be missing at a last load by itself
-            short = " †" if 0 < told[0][2] < 0.995 else ""
+            short = " †" if 0 < sums[0][2] < 0.995 else ""
             cells.append("—" if text == "— / — / —" else f"{text}{'*' if name in one.fitted else ''}{short}")
         rows.append([f"{one.title} ({len(one.seen)})", *cells])
     return table(["simulated surfaces (number)", *distances.THEORIES], rows)
@@ -128,9 +121,8 @@ def challenge_table() -> str:
 
 
 def heights_table() -> str:
-    """What another h_max would do to the distance of force at equal separation."""
-    names = ("MBMA reported", "MBMA fitted", "calibrated")
-    rows = []
+    """The deviation of force at equal separation for other values of h_max."""
+    names, rows = ("MBMA reported", "MBMA fitted", "calibrated"), []
     for key, title in (("bem", "older set"), ("gfmd", "molecular dynamics")):
         for h_max in HEIGHTS:
             one = dataclasses.replace(distances.older(key), h_max=h_max)
@@ -139,8 +131,8 @@ def heights_table() -> str:
     return table(["data", "h_max/h_rms", *names], rows)
 
 
-def measure() -> tuple[dict[str, str], dict[str, bytes]]:
-    """The measured parts of the page, and its figures."""
+def measure() -> Measured:
+    """The measured blocks of the page, and its figures."""
     parts = {
         "summary": summary_table(distances.data_sets().values()),
         "challenge": challenge_table(),

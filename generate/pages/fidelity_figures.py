@@ -1,8 +1,7 @@
-"""Figures of the page on fidelity: ratios to brute force, and the paper's Figures 11-17."""
+"""Figures of docs/fidelity.md: ratios to simulations, and the paper's Figures 11-17."""
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
@@ -10,16 +9,8 @@ import numpy as np
 
 from generate.calibrated import QUANTITIES
 from generate.pages import distances
-from generate.pages.comparisons import (
-    AREA_THEORIES,
-    GAPS,
-    PERSSON,
-    READINGS,
-    THEORIES,
-    force_at,
-    sample,
-)
-from generate.pages.page import pyplot
+from generate.pages.comparisons import AREA_THEORIES, GAPS, PERSSON, READINGS, THEORIES, force_at, sample
+from generate.pages.page import panels
 from mbma_tables import Surface, theories
 
 COLOURS = dict(zip((*THEORIES, "Persson"), ("C0", "C1", "C2", "C3", "C4", "C3"), strict=True))
@@ -27,13 +18,7 @@ BANDED = ("MBMA reported", "calibrated")
 BINS = (0.0005, 0.002, 0.005, 0.01, 0.03, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 0.9, 0.98)
 ROADS = ("concrete", "asphalt")
 RESOLUTIONS = (125, 250, 500, 1000)
-
-
-def new(rows: int = 1, columns: int = 2, **options: Any) -> tuple[Any, Any]:
-    """A figure of 900 pixels' width and its axes."""
-    height = 3.4 if rows == 1 else 6.4
-    figure, axes = pyplot().subplots(rows, columns, figsize=(9, height), dpi=100, layout="constrained", **options)
-    return figure, axes
+Figures = Iterator[tuple[str, Any]]
 
 
 def by_gap(ax: Any, surface: Surface, low: float, names: Iterable[str] = THEORIES, **style: Any) -> None:
@@ -50,8 +35,8 @@ def by_gap(ax: Any, surface: Surface, low: float, names: Iterable[str] = THEORIE
     ax.set(xlabel=r"$u/h_{rms}$", ylabel=r"$F/(A_0 E^*)$", ylim=(low, None), xlim=(0, 1.1 * top))
 
 
-def by_force(ax: Any, surface: Surface, ordinate: Callable[[Any, Any], Any], **style: Any) -> None:
-    """Something of force and area against force."""
+def by_force(ax: Any, surface: Surface, ratio: Callable[[Any, Any], Any] | None = None, **style: Any) -> None:
+    """Area, or a ratio of area and force, against force."""
     for name in AREA_THEORIES:
         if name == "Persson":
             force = np.geomspace(1e-5, 3, GAPS) * np.sqrt(surface.m2)
@@ -59,17 +44,16 @@ def by_force(ax: Any, surface: Surface, ordinate: Callable[[Any, Any], Any], **s
         else:
             _, force, area = sample(surface, name)
         shown = (area > 1e-5) & (area < 1.2)
-        ax.plot(force[shown], ordinate(force, area)[shown], color=COLOURS[name], **{"label": name, **style})
+        values = ratio(force, area) if ratio else area
+        ax.plot(force[shown], values[shown], color=COLOURS[name], **{"label": name, **style})
     ax.set(xscale="log", xlabel=r"$F/(A_0 E^*)$")
+    if ratio is None:
+        ax.set(yscale="log", ylabel=r"$A/A_0$")
 
 
-def _kappa(gradient: Any, force: Any, area: Any) -> Any:
-    return area / force * gradient
-
-
-def simulations() -> Iterator[tuple[str, Any]]:
+def simulations() -> Figures:
     """Figures 11, 12 and 15."""
-    figure, axes = new()
+    figure, axes = panels(1, 2)
     by_gap(axes[0], Surface.named("yang-persson"), 1e-7)
     by_gap(axes[1], Surface.named("yang-persson"), 1e-6)
     axes[1].set(xlim=(1.8, 3.1), ylim=(1e-6, 1e-2))
@@ -81,56 +65,53 @@ def simulations() -> Iterator[tuple[str, Any]]:
 
     for name, key, title in (("papangelo", "bem", "fig12"), ("challenge", "challenge", "fig15")):
         surface, data = Surface.named(name), distances.older(key)
-        figure, axes = new(columns=2 if key == "challenge" else 1, squeeze=False)
+        figure, axes = panels(1, 2 if key == "challenge" else 1, squeeze=False)
         scaled = data.force * surface.rms_gradient
         by_gap(axes[0, 0], surface, 1e-6)
         axes[0, 0].plot(data.u, scaled, "k.", label="boundary elements")
         axes[0, 0].legend(fontsize="small")
         for ax in axes[0, 1:]:
-            by_force(ax, surface, lambda force, area: area)
+            by_force(ax, surface)
             ax.plot(scaled, data.area, "k.")
-            ax.set(yscale="log", ylabel=r"$A/A_0$")
         yield title, figure
 
 
-def roads() -> Iterator[tuple[str, Any]]:
+def roads() -> Figures:
     """Figures 13 and 14."""
-    gap_figure, gap_axes = new()
-    area_figure, area_axes = new()
+    (gap_figure, gap_axes), (area_figure, area_axes) = panels(1, 2), panels(1, 2)
     for gap_ax, ax, name in zip(gap_axes, area_axes, ROADS, strict=True):
         surface = Surface.named(name)
         by_gap(gap_ax, surface, 1e-6)
         gap_ax.set_title(name)
-        by_force(ax, surface, lambda force, area: area)
+        by_force(ax, surface)
         force = np.geomspace(1e-5, 0.3, 2) * surface.rms_gradient
         ax.plot(force, 2 * force / surface.rms_gradient, "k:", label="kappa = 2")
-        ax.set(yscale="log", ylabel=r"$A/A_0$", title=name)
+        ax.set(title=name)
     for figure, axes, title in ((gap_figure, gap_axes, "fig13"), (area_figure, area_axes, "fig14")):
         axes[0].legend(fontsize="small")
         yield title, figure
 
 
-def resolution() -> Iterator[tuple[str, Any]]:
+def resolution() -> Figures:
     """Figures 16 and 17."""
-    gap_figure, ax = new(columns=1)
-    area_figure, pair = new()
-    for zeta_1, style in zip(RESOLUTIONS, ("-", "--", "-.", ":"), strict=True):
+    (gap_figure, ax), (area_figure, pair) = panels(), panels(1, 2)
+    for zeta_1, dashes in zip(RESOLUTIONS, ("-", "--", "-.", ":"), strict=True):
         surface = Surface.named(f"resolution-{zeta_1}")
-        first = {} if zeta_1 == RESOLUTIONS[0] else {"label": "_"}
-        by_gap(ax, surface, 1e-7, (*READINGS, "G-W", "Persson simplified"), ls=style, lw=1, **first)
-        by_force(pair[0], surface, lambda force, area: area, ls=style, lw=1, **first)
-        by_force(pair[1], surface, functools.partial(_kappa, surface.rms_gradient), ls=style, lw=1, **first)
+        style: dict[str, Any] = {"ls": dashes, "lw": 1} | ({} if zeta_1 == RESOLUTIONS[0] else {"label": "_"})
+        by_gap(ax, surface, 1e-7, (*READINGS, "G-W", "Persson simplified"), **style)
+        by_force(pair[0], surface, **style)
+        gradient = surface.rms_gradient
+        by_force(pair[1], surface, lambda force, area, g=gradient: area / force * g, **style)  # type: ignore[misc]
         for panel in (ax, pair[0]):
-            panel.plot([], [], "k", ls=style, label=f"zeta_1 = {zeta_1}")
-    pair[0].set(yscale="log", ylabel=r"$A/A_0$")
+            panel.plot([], [], "k", ls=dashes, label=f"zeta_1 = {zeta_1}")
     pair[1].set(ylabel=r"$\kappa = A\sqrt{2 m_2} E^*/F$", ylim=(0, 3))
     for panel, figure, title in ((ax, gap_figure, "fig16"), (pair[0], area_figure, "fig17")):
         panel.legend(fontsize="small")
         yield title, figure
 
 
-def _ratio_axes(axes: Any, titles: Iterable[str]) -> None:
-    """Labels of panels, one row for each quantity."""
+def _ratio_axes(figure: Any, axes: Any, titles: Iterable[str]) -> None:
+    """Labels of panels, one row for each quantity, and a legend below, where it hides no curve."""
     for line, quantity in zip(axes, QUANTITIES, strict=True):
         for ax in line:
             ax.axhline(1, color="k", lw=0.5)
@@ -142,54 +123,47 @@ def _ratio_axes(axes: Any, titles: Iterable[str]) -> None:
         ax.set_title(title, fontsize="small")
     for ax in axes[-1]:
         ax.set_xlabel(r"$A/A_0$ simulated")
+    if axes.shape[1] > 1:
+        for ax in axes.flat:
+            ax.minorticks_off()
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
 
 
-def held_out() -> Iterator[tuple[str, Any]]:
+def held_out() -> Figures:
     """Geometric mean of ratios on held-out surfaces by contact fraction, one standard deviation as a band."""
     seen = distances.held_out()
-    area = np.concatenate([one.area for one in seen])
-    bins = np.digitize(area, BINS) - 1
-    figure, axes = new(3, 1, sharex=True, squeeze=False)
-    figure.set_size_inches(9, 9)
+    bins = np.digitize(np.concatenate([one.area for one in seen]), BINS) - 1
+    figure, axes = panels(3, 1, (9, 9), sharex=True, squeeze=False)
     for name, theory in distances.THEORIES.items():
-        found = distances.distances(seen, theory)
-        for ax, values in zip(axes[:, 0], found.values(), strict=True):
+        for ax, values in zip(axes[:, 0], distances.distances(seen, theory).values(), strict=True):
             parts = [values[(bins == k) & np.isfinite(values)] for k in range(len(BINS) - 1)]
             known = [k for k, part in enumerate(parts) if len(part) > 4]
             x = [np.sqrt(BINS[k] * BINS[k + 1]) for k in known]
             mean, spread = (np.array([measure(parts[k]) for k in known]) for measure in (np.mean, np.std))
             ax.plot(x, np.exp(mean), ".-", color=distances.HUES[name], label=name)
             if name in BANDED:
-                ax.fill_between(
-                    x, np.exp(mean - spread), np.exp(mean + spread), color=distances.HUES[name], alpha=0.15, lw=0
-                )
-    _ratio_axes(axes, [f"{len(seen)} held-out self-affine surfaces"])
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
+                band = np.exp(mean - spread), np.exp(mean + spread)
+                ax.fill_between(x, *band, color=distances.HUES[name], alpha=0.15, lw=0)
+    _ratio_axes(figure, axes, [f"{len(seen)} held-out self-affine surfaces"])
     yield "fidelity", figure
 
 
-def by_data_set() -> Iterator[tuple[str, Any]]:
+def by_data_set() -> Figures:
     """Ratios to the data of others, and to measured maps."""
     sets = distances.data_sets()
     for name, keys in (("reference", ("bem", "gfmd", "challenge", "rolloff")), ("maps", tuple(distances.MEASURED))):
-        figure, axes = new(3, len(keys), sharex=True, sharey="row")
-        figure.set_size_inches(9, 7.5)
+        figure, axes = panels(3, len(keys), (9, 7.5), sharex=True, sharey="row")
         for column, key in zip(axes.T, keys, strict=True):
             for theory, make in distances.THEORIES.items():
-                for one in sets[key].seen:
-                    found = distances.distances([one], make)
-                    for ax, values in zip(column, found.values(), strict=True):
-                        label = theory if one is sets[key].seen[0] else "_"
-                        ax.plot(one.area, np.exp(values), ".-", color=distances.HUES[theory], label=label, lw=1, ms=4)
-        _ratio_axes(axes, [sets[key].title for key in keys])
-        for ax in axes.flat:
-            ax.minorticks_off()
-        # below the panels, where it hides no curve
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
+                for k, one in enumerate(sets[key].seen):
+                    style = {"color": distances.HUES[theory], "label": "_" if k else theory, "lw": 1, "ms": 4}
+                    for ax, values in zip(column, distances.distances([one], make).values(), strict=True):
+                        ax.plot(one.area, np.exp(values), ".-", **style)
+        _ratio_axes(figure, axes, [sets[key].title for key in keys])
         yield name, figure
 
 
-def drawn() -> Iterator[tuple[str, Any]]:
+def drawn() -> Figures:
     """All figures by name."""
     for part in (held_out, by_data_set, simulations, roads, resolution):
         yield from part()

@@ -1,48 +1,21 @@
-"""The measured parts of docs/formula.md: closed forms with their certificates."""
+"""docs/formula.md: closed forms with their certificates, and errors of the pocket laws."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-import xarray as xr
 from scipy.special import erf
 
 from generate.boundary_elements.design import TRAINING
-from generate.boundary_elements.evidence import MIN_WAVES, cases
+from generate.boundary_elements.evidence import MIN_WAVES
 from generate.formulas.printing import MODULE, latex_steps, read_functions
-from generate.pages.page import ROOT, table
+from generate.pages.page import Measured, evidence, table
 from mbma_tables.arguments import FloatArray
 from mbma_tables.models.closed_form_functions import CERTIFICATES, RANGES
 
 SHOWN = ("pocket", "standard", "totals")
-POCKET_AREAS = (0.01, 0.97)  # contact fractions at which the pocket laws are held to simulations
-HEADER = ("form", "function", "coefficients", "largest error", "median", "worst at")
-
-
-def certificates() -> str:
-    """What each function's certificate states."""
-    rows = []
-    for form, results in CERTIFICATES.items():
-        for result, found in results.items():
-            worst = ", ".join(f"{name} = {value:g}" for name, value in found.worst_at.items())
-            rows.append([form, result, str(found.coefficients), f"{found.largest:g}", f"{found.median:.2g}", worst])
-    return table(HEADER, rows)
-
-
-def ranges() -> str:
-    """Where each form holds."""
-    return "\n".join(
-        f"- {form}: {', '.join(f'`{low:g} <= {name} <= {high:g}`' for name, (low, high) in found.items())}"
-        for form, found in RANGES.items()
-    )
-
-
-def equations(form: str) -> str:
-    """The equations of a form, steps that its functions share once."""
-    functions = read_functions(MODULE.read_text(encoding="utf-8"))
-    lines = [line for function in functions.values() if function.form == form for line in latex_steps(function)]
-    return "\n\n".join(f"$${line}$$" for line in dict.fromkeys(lines))
+POCKET_AREAS = (0.01, 0.97)  # contact fractions at which the pocket laws are compared with simulations
 
 
 def pocket_area(pressure: FloatArray, alpha: float) -> FloatArray:
@@ -58,12 +31,8 @@ def pocket_pressure(u: FloatArray, nu: float) -> FloatArray:
 
 
 def pocket_errors() -> tuple[dict[str, tuple[float, ...]], int]:
-    """Median, nine in ten and largest error [%] of both on surfaces that they were not fitted to, and how many."""
-    seen = [
-        one
-        for one in cases(xr.open_dataset(ROOT / "docs" / "data" / "boundary_elements.nc"))
-        if one.split != TRAINING and one.kind == "self_affine" and one.waves >= MIN_WAVES
-    ]
+    """Median, 90% quantile and largest error [%] of both laws on held-out surfaces, and the number of surfaces."""
+    seen = [o for o in evidence() if o.split != TRAINING and o.kind == "self_affine" and o.waves >= MIN_WAVES]
     area, pressure = [], []
     for one in seen:
         inside = (one.area >= POCKET_AREAS[0]) & (one.area <= POCKET_AREAS[1])
@@ -71,20 +40,35 @@ def pocket_errors() -> tuple[dict[str, tuple[float, ...]], int]:
         area.append(pocket_area(force, float(spectrum.alpha)) / one.area[inside] - 1)
         law = pocket_pressure(one.u[inside], float(spectrum.narrowness)) / float(spectrum.gradient)
         pressure.append(law / force - 1)
-    told = {"area at a pressure": area, "pressure at a separation": pressure}
+    found = {"area at given pressure": area, "pressure at given separation": pressure}
     shares = (0.5, 0.9, 1.0)
-    return {k: tuple(100 * np.quantile(np.abs(np.concatenate(v)), shares)) for k, v in told.items()}, len(seen)
+    return {k: tuple(100 * np.quantile(np.abs(np.concatenate(v)), shares)) for k, v in found.items()}, len(seen)
 
 
 def pocket_laws() -> str:
     """The same as a table."""
-    told, count = pocket_errors()
-    rows = [[what, *(f"{error:.2g}%" for error in errors), str(count)] for what, errors in told.items()]
-    return table(("pocket law", "half of errors below", "nine in ten", "largest", "surfaces"), rows)
+    found, count = pocket_errors()
+    rows = [[what, *(f"{error:.2g}%" for error in errors), str(count)] for what, errors in found.items()]
+    return table(("pocket law", "median error", "90% of errors below", "largest", "surfaces"), rows)
 
 
-def measure() -> tuple[dict[str, str], dict[str, bytes]]:
-    """The measured parts of the page."""
-    return {"laws": pocket_laws(), "certificates": certificates(), "ranges": ranges()} | {
-        form: equations(form) for form in SHOWN
-    }, {}
+def measure() -> Measured:
+    """Certificates, ranges and equations of the closed forms."""
+    rows = []
+    for form, results in CERTIFICATES.items():
+        for result, found in results.items():
+            worst = ", ".join(f"{name} = {value:g}" for name, value in found.worst_at.items())
+            rows.append([form, result, str(found.coefficients), f"{found.largest:g}", f"{found.median:.2g}", worst])
+    ranges = [
+        f"- {form}: {', '.join(f'`{low:g} <= {name} <= {high:g}`' for name, (low, high) in limits.items())}"
+        for form, limits in RANGES.items()
+    ]
+    functions = read_functions(MODULE.read_text(encoding="utf-8")).values()
+    # steps that functions of a form share are printed once
+    steps = {
+        form: dict.fromkeys(line for function in functions if function.form == form for line in latex_steps(function))
+        for form in SHOWN
+    }
+    header = ("form", "function", "coefficients", "largest error", "median", "worst at")
+    parts = {"laws": pocket_laws(), "certificates": table(header, rows), "ranges": "\n".join(ranges)}
+    return parts | {form: "\n\n".join(f"$${line}$$" for line in lines) for form, lines in steps.items()}, {}

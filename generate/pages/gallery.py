@@ -1,10 +1,8 @@
-"""`docs/gallery.md`: measured maps from file to contact law, with boundary elements on the very map."""
+"""docs/gallery.md: measured maps from file to contact law, with boundary elements on the same map."""
 
 from __future__ import annotations
 
-import csv
 import dataclasses
-import io
 import os
 import pathlib
 import time
@@ -13,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import resample
 
-from generate.pages.page import ROOT, svg, table
+from generate.pages.page import ROOT, Measured, read_csv, svg, table, to_csv
 from mbma_tables import contact_law
 from mbma_tables.arguments import FloatArray
 from mbma_tables.boundary_elements import LOADS
@@ -30,6 +28,10 @@ FOLDER = "docs/data/maps"
 ROWS = f"{FOLDER}/boundary_elements.csv"
 LAWS = ("mbma", "calibrated", "persson")
 COLUMNS = ("force", "area", "mean_separation", "energy")
+HEAD = """\
+# boundary elements on measured maps (Tamaas), plane removed, continued by mirror images, waves below
+# four sampling steps removed; force over A0 E*, lengths in the map's unit
+"""
 SHOWN = (0.002, 0.01, 0.1, 0.3, 0.6)  # contact
 GAPS = np.append(np.geomspace(1e-6, 0.1, 90)[:-1], np.linspace(0.1, 0.995, 300))  # u/h_max
 
@@ -56,13 +58,15 @@ class Example:
 
 VARIABLE = "MBMA_REFERENCE_MAPS"
 EXAMPLES = (
-    Example("top-1.top", {"short_cutoff": "9.4nm"}, "A force microscope's map of 600 nm, 256 x 256 points."),
+    Example("top-1.top", {"short_cutoff": "9.4nm"}, "An AFM map of 600 nm x 600 nm, 256 x 256 points."),
     Example(
         "frt-2.frt",
         {"fill": "harmonic", "outliers": 10, "short_cutoff": "0.8mm"},
-        "An optical sensor's map of 30 mm x 60 mm, 150 x 300 points, of which 28% are undefined.",
+        "A map by an optical sensor of 30 mm x 60 mm, 150 x 300 points, of which 28% are undefined.",
     ),
-    Example("dektak-1.csv", {"outliers": 10, "long_cutoff": "100um"}, "A stylus's trace of 1.5 mm, 9600 points."),
+    Example(
+        "dektak-1.csv", {"outliers": 10, "long_cutoff": "100um"}, "A stylus profile of 1.5 mm length, 9600 points."
+    ),
 )
 REFINED, REFINED_LOADS = "di-1.di", 4  # whose light contacts are solved on a finer grid too
 # too large to be shipped; their boundary elements are
@@ -74,28 +78,17 @@ BARS = (
 
 def read_rows() -> dict[str, FloatArray]:
     """Boundary elements by map: `COLUMNS`, shape (4, n), lengths in the file's unit."""
-    path = ROOT / ROWS
-    if not path.is_file():
+    if not (ROOT / ROWS).is_file():
         return {}
-    lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
-    found: dict[str, list[list[float]]] = {}
-    for row in csv.DictReader(lines):
-        found.setdefault(row["map"], []).append([float(row[name]) for name in COLUMNS])
-    return {name: np.array(rows).T for name, rows in found.items()}
+    rows = read_csv("maps/boundary_elements.csv")
+    numbers = np.stack([rows[name] for name in COLUMNS])
+    return {str(name): numbers[:, rows["map"] == name] for name in np.unique(rows["map"])}
 
 
 def written(rows: dict[str, FloatArray]) -> bytes:
     """The same as a file."""
-    text = io.StringIO()
-    text.write(
-        "# boundary elements on measured maps (Tamaas), plane removed, continued by mirror images, waves below\n"
-    )
-    text.write("# four sampling steps removed; force over A0 E*, lengths in the map's unit\n")
-    lines = csv.writer(text, lineterminator="\n")
-    lines.writerow(["map", *COLUMNS])
-    for name, columns in sorted(rows.items()):
-        lines.writerows([name, *(f"{number:.9g}" for number in row)] for row in columns.T)
-    return text.getvalue().encode()
+    lines = ([name, *(f"{x:.9g}" for x in row)] for name, columns in sorted(rows.items()) for row in columns.T)
+    return to_csv(HEAD, ["map", *COLUMNS], lines)
 
 
 def refined(path: pathlib.Path, options: dict[str, Any]) -> FloatArray:
@@ -145,7 +138,13 @@ def compared(surface: MeasuredSurface, rows: FloatArray) -> str:
             found = np.full(u.size, np.nan), np.full(u.size, np.nan)
         columns += [[f"{ratio:.2f}".replace("nan", "-") for ratio in part] for part in found]
     return table(
-        ["contact", "calibrated: area at a pressure", "force at a separation", "MBMA: area", "force"],
+        [
+            "contact",
+            "calibrated: area at given pressure",
+            "calibrated: force at given separation",
+            "MBMA: area",
+            "MBMA: force",
+        ],
         list(zip(*columns, strict=True)),
     )
 
@@ -170,33 +169,30 @@ def laws(surfaces: dict[str, MeasuredSurface]) -> str:
                 times.append(time.process_time() - started)
             low = (own.h_max + max(own.lowest, -own.h_max)) / 2 / own.h_max
             rows.append([name, theory, f"{low:.2g}", f"{own.error:.1e}", f"{min(times):.3f}"])
-    return table(["surface", "theory", "u/h_max from", "error", "made in [s]"], rows)
+    return table(["surface", "theory", "u/h_max from", "error", "time to make [s]"], rows)
 
 
-def measure() -> tuple[dict[str, str], dict[str, bytes]]:
-    """Parts of the page, and its figures and data."""
-    rows = read_rows()
-    text, files, surfaces = [], {}, {}
+def measure() -> Measured:
+    """The block of the page, and its figures and data."""
+    rows, surfaces = read_rows(), {}
+    text, files = [], {}
     for example in EXAMPLES:
-        path = example.path()
+        path, found = example.path(), simulated(example, rows)
         assert path is not None
         treated, surface = measured(path, example.options)
-        surfaces[example.name] = surface
-        found = simulated(example, rows)
-        stem = example.name.split(".")[0]
+        surfaces[example.name], stem = surface, example.name.split(".")[0]
         points = None if found is None else dict(zip(COLUMNS, found, strict=True))
         picture = draw(treated, surface, curves(surface), example.name, "pressure  F/(A0 E*)", points)
         files[f"docs/figures/gallery_{stem}.svg"] = svg(picture)
-        said = "\n".join(described(surface))
-        text += [f"## {example.name}", example.about, f"```\n$ {example.command} --plot {stem}.png\n{said}\n```"]
+        printed = "\n".join(described(surface))
+        text += [f"## {example.name}", example.about, f"```\n$ {example.command} --plot {stem}.png\n{printed}\n```"]
         text += [f"![{example.name}](figures/gallery_{stem}.svg)"]
         if found is not None:
-            text += ["Over boundary elements on this map:", compared(surface, found)]
+            text += ["Ratios to boundary elements on this map:", compared(surface, found)]
     for example in BARS:
         simulated(example, rows)
         path = example.path()
         if example.name == REFINED and path is not None and f"{REFINED} refined" not in rows:
             rows[f"{REFINED} refined"] = refined(path, example.options)
-    files[ROWS] = written(rows)
     text += ["## Their contact laws", laws(surfaces | {"2,000 scattered samples": scattered()})]
-    return {"maps": "\n\n".join(text)}, files
+    return {"maps": "\n\n".join(text)}, files | {ROWS: written(rows)}

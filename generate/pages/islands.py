@@ -1,6 +1,6 @@
-"""The second measured part of docs/stability.md: the island solver beside `GreenwoodTripp` of ContactMechanics.
+"""Second block of docs/stability.md: the island solver beside `GreenwoodTripp` of ContactMechanics.
 
-Both solve (34), (36), (37). Theirs takes the gap in the middle, d(0), instead of X, and counts pressure in
+Both solve (34), (36), (37). ContactMechanics takes the gap in the middle, d(0), instead of X, and scales pressure by
 E* sqrt(sigma/8B), which is half of E* sigma/L.
 """
 
@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import Any
 
 import numpy as np
 from scipy.integrate import simpson
 from scipy.interpolate import BarycentricInterpolator
 
-from generate.pages.page import pyplot, svg, table
+from generate.pages.page import Measured, panels, svg, table
 from mbma_tables import greenwood_tripp
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands.greenwood_tripp import IslandSolution
@@ -26,7 +25,7 @@ TOLERANCE, MAX_ITERATIONS = 1e-9, 10_000
 
 
 def theirs(solution: IslandSolution, points: int) -> tuple[FloatArray, FloatArray, float]:
-    """Radii over L, pressure over E* sigma/L and Phi_F that ContactMechanics finds with so many points."""
+    """Radii over L, pressure over E* sigma/L and Phi_F by ContactMechanics on so many points."""
     with warnings.catch_warnings():
         # of its own optional parts
         warnings.simplefilter("ignore")
@@ -40,14 +39,23 @@ def theirs(solution: IslandSolution, points: int) -> tuple[FloatArray, FloatArra
     return rho, pressure / 2, math.pi * float(simpson(rho * pressure, x=rho))
 
 
-def draw(profiles: list[tuple[IslandSolution, FloatArray, FloatArray]], differences: FloatArray) -> bytes:
-    """Pressure of both solvers, and the difference of their forces against the other's number of points."""
-    figure, (left, right) = pyplot().subplots(1, 2, figsize=(10, 4), layout="constrained")
-    for (solution, rho, pressure), row in zip(profiles, differences, strict=True):
-        name = f"X = {solution.X:g}, mu = {solution.mu:g}"
-        (line,) = left.plot(solution.rho, solution.pressure / pressure[0], label=name)
+def measure() -> Measured:
+    """Forces and pressures of both solvers, and their differences against the other's number of points."""
+    figure, (left, right) = panels(1, 2, (10, 4))
+    rows, differences = [], []
+    for X, mu in CASES:
+        solution = greenwood_tripp.solve(X, mu)
+        found = [theirs(solution, points) for points in POINTS]
+        forces = np.array([force for _, _, force in found])
+        differences.append(forces / solution.phi_F - 1)
+        # what is left of an error of third order
+        extrapolated = abs((8 * forces[-1] - forces[-2]) / 7 / solution.phi_F - 1)
+        numbers = [f"{error:.1e}" for error in (solution.error, *differences[-1], extrapolated)]
+        rows.append([f"{X:g}", f"{mu:g}", f"{solution.phi_F:.10f}", *numbers])
+        rho, pressure, _ = found[1]
+        (line,) = left.plot(solution.rho, solution.pressure / pressure[0], label=f"X = {X:g}, mu = {mu:g}")
         left.plot(rho[::3], pressure[::3] / pressure[0], ".", color=line.get_color())
-        right.loglog(POINTS, np.abs(row), ".-", color=line.get_color())
+        right.loglog(POINTS, np.abs(differences[-1]), ".-", color=line.get_color())
     right.loglog(POINTS, np.abs(differences).max() * (POINTS[0] / np.array(POINTS)) ** 3, "k:", label="third order")
     left.set(xlabel="radius  rho/L", ylabel="pressure  p/p(0)", title="lines: this library; dots: ContactMechanics")
     right.set(xlabel="points of ContactMechanics", ylabel="relative difference of force")
@@ -55,27 +63,5 @@ def draw(profiles: list[tuple[IslandSolution, FloatArray, FloatArray]], differen
     right.minorticks_off()
     left.legend()
     right.legend()
-    return svg(figure)
-
-
-def measure() -> tuple[dict[str, str], dict[str, bytes]]:
-    """The part of the page, and its figure."""
-    rows: list[list[str]] = []
-    profiles: list[Any] = []
-    differences = np.empty((len(CASES), len(POINTS)))
-    for k, (X, mu) in enumerate(CASES):
-        solution = greenwood_tripp.solve(X, mu)
-        found = [theirs(solution, points) for points in POINTS]
-        forces = np.array([force for _, _, force in found])
-        differences[k] = forces / solution.phi_F - 1
-        # what is left of an error of third order
-        extrapolated = abs((8 * forces[-1] - forces[-2]) / 7 / solution.phi_F - 1)
-        profiles.append((solution, *found[1][:2]))
-        rows.append(
-            [f"{X:g}", f"{mu:g}", f"{solution.phi_F:.10f}", f"{solution.error:.1e}"]
-            + [f"{difference:.1e}" for difference in differences[k]]
-            + [f"{extrapolated:.1e}"]
-        )
     header = ["X", "mu", "Phi_F", "its error", *(f"{points} points" for points in POINTS), "extrapolated"]
-    parts = {"comparison": table(header, rows)}
-    return parts, {"docs/figures/islands.svg": draw(profiles, differences)}
+    return {"comparison": table(header, rows)}, {"docs/figures/islands.svg": svg(figure)}

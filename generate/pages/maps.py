@@ -1,16 +1,15 @@
-"""`docs/maps.md`: theories on surfaces that are not isotropic or not Gaussian, over boundary elements on them."""
+"""docs/maps.md: theories on anisotropic and non-Gaussian surfaces, relative to boundary elements."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 import numpy as np
-import xarray as xr
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, SPLITS
 from generate.boundary_elements.surfaces import Recipe, heights
 from generate.pages.gallery import BARS, EXAMPLES, ratios, read_rows
-from generate.pages.page import ROOT, table
+from generate.pages.page import DATA, Measured, dataset, table
 from mbma_tables import Surface, contact
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import MbmaError
@@ -29,7 +28,7 @@ Seen = tuple[str, MeasuredSurface, FloatArray]
 
 def simulated() -> Iterator[Seen]:
     """Held-out surfaces by name, as maps, with F/(A0 E*), A/A0 and u of boundary elements."""
-    data = xr.load_dataset(ROOT / "docs/data/boundary_elements.nc")
+    data = dataset(DATA / "boundary_elements.nc")
     kinds = data.kind.attrs["flag_meanings"].split()
     order = [KINDS.index(kinds[k]) if kinds[k] in KINDS else -1 for k in data.kind.values]
     for number in np.lexsort((data["shape"].values, np.array(order))):
@@ -83,7 +82,7 @@ def summary(seen: list[Seen]) -> list[str]:
 
 
 def extrapolation() -> str:
-    """A measured spectrum as it is and continued, by a theory that asks for nothing else."""
+    """A measured spectrum as it is and extrapolated, by a theory that needs the spectrum only."""
     path, options = EXAMPLES[0].path(), EXAMPLES[0].options
     assert path is not None
     known, longer = (measured(path, options | more)[1] for more in ({}, EXTRAPOLATED))
@@ -91,25 +90,21 @@ def extrapolation() -> str:
     for pressure in PRESSURES:
         one, other = (contact(s, pressure=pressure, theory="persson") for s in (known, longer))
         # conductance over conductivity is stiffness over E*
-        cells = [
-            f"{x:.3g} | {y:.3g} | {y / x:.2f}" for x, y in ((one.area, other.area), (one.stiffness, other.stiffness))
-        ]
-        rows.append([f"{pressure:g}", *cells])
-    header = [
-        "pressure/E*",
-        "area",
-        "continued",
-        "ratio",
-        "stiffness/E* and conductance/k [1/nm]",
-        "continued",
-        "ratio",
-    ]
-    told = next(entry["told"] for entry in longer.provenance if entry["step"] == "extrapolated")
-    return table(header, rows) + f"\n\nReported with it: {told}."
+        pairs = ((one.area, other.area), (one.stiffness, other.stiffness))
+        rows.append(
+            [
+                f"{pressure:g}",
+                *(f"{number:.{digits}}" for x, y in pairs for number, digits in ((x, "3g"), (y, "3g"), (y / x, "2f"))),
+            ]
+        )
+    names = ("area", "stiffness/E* and conductance/k [1/nm]")
+    header = ["pressure/E*", *(cell for name in names for cell in (name, "extrapolated", "ratio"))]
+    note = next(entry["told"] for entry in longer.provenance if entry["step"] == "extrapolated")
+    return table(header, rows) + f"\n\nReported with it: {note}."
 
 
-def measure() -> tuple[dict[str, str], dict[str, bytes]]:
-    """Parts of the page; no other files."""
+def measure() -> Measured:
+    """Blocks of the page; no other files."""
     groups: dict[str, list[Seen]] = {}
     for one in (*simulated(), *from_files()):
         groups.setdefault(one[0], []).append(one)

@@ -1,6 +1,6 @@
-"""The measured parts of docs/stability.md, the stability atlas: corners of parameter space, counted and drawn.
+"""docs/stability.md: corners of parameter space, counted and drawn.
 
-Truth is mpmath at 40 digits or more where a closed form exists, else the exact tier at a tighter tolerance.
+The reference is mpmath at 40 digits or more where a closed form exists, else the exact tier at a tighter tolerance.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import mpmath as mp
 import numpy as np
 
 from generate.pages import islands as another_program
-from generate.pages.page import pyplot, svg, table
+from generate.pages.page import Measured, panels, svg, table
 from generate.tables.exact_geometry import DOUBLES, divisor, exact_island
 from mbma_tables import Surface, contact, greenwood_tripp
 from mbma_tables.arguments import FloatArray
@@ -103,12 +103,12 @@ def rigid_truth(X: float) -> tuple[mp.mpf, mp.mpf]:
     """(pi/5) F_{5/2}(-X) and (pi/2) F_2(-X) by mpmath: parabolic cylinder functions."""
     with mp.workdps(DIGITS):
         x = -mp.mpf(float(X))
-
-        def integral(n: mp.mpf) -> mp.mpf:
-            # F_n(x) = Gamma(n + 1) exp(-x^2/4) U(n + 1/2, x)/sqrt(2 pi)
-            return mp.gamma(n + 1) * mp.exp(-x * x / 4) * mp.pcfu(n + mp.mpf(1) / 2, x) / mp.sqrt(2 * mp.pi)
-
-        return mp.pi / 5 * integral(mp.mpf(5) / 2), mp.pi / 2 * integral(mp.mpf(2))
+        # F_n(x) = Gamma(n + 1) exp(-x^2/4) U(n + 1/2, x)/sqrt(2 pi)
+        force, area = (
+            mp.gamma(n + 1) * mp.exp(-x * x / 4) * mp.pcfu(n + mp.mpf(1) / 2, x) / mp.sqrt(2 * mp.pi)
+            for n in (mp.mpf(5) / 2, mp.mpf(2))
+        )
+        return mp.pi / 5 * force, mp.pi / 2 * area
 
 
 def island_truth(X: float, mu: float) -> tuple[Any, Any] | None:
@@ -199,22 +199,19 @@ def totals() -> list[Tally]:
 
 def draw(geometry_maps: dict[str, FloatArray], island_maps: dict[str, FloatArray]) -> bytes:
     """Maps of error: geometry by the paper's formulas as printed and by the library, and islands."""
-    from matplotlib import colors
+    from matplotlib import colormaps, colors
 
-    plt = pyplot()
-    figure, axes = plt.subplots(2, 2, figsize=(10, 8), layout="constrained")
-    norm = colors.LogNorm(MIN_ERROR, MAX_ERROR)
-    colormap = plt.get_cmap("viridis").with_extremes(bad="white")
-    titles = {"direct": "geometry: the paper's formulas as printed", "library": "geometry: the library"}
-    mesh: Any = None
-    for panel, (name, title) in zip(axes[0], titles.items(), strict=True):
-        field = np.maximum(geometry_maps[name], MIN_ERROR)
-        mesh = panel.pcolormesh(BANDS, APPROACHES, field, norm=norm, cmap=colormap, shading="nearest", rasterized=True)
-        panel.set(xscale="log", yscale="log", xlabel="zeta_1", ylabel="delta/h_rms", title=title)
+    figure, axes = panels(2, 2, (10, 8))
+    colormap = colormaps["viridis"].with_extremes(bad="white")
+    style = {"norm": colors.LogNorm(MIN_ERROR, MAX_ERROR), "cmap": colormap, "shading": "nearest", "rasterized": True}
     places = np.arange(MU_CORNERS.size), np.arange(X_CORNERS.size)
+    for panel, name, title in zip(
+        axes[0], ("direct", "library"), ("the paper's formulas as printed", "the library"), strict=True
+    ):
+        panel.pcolormesh(BANDS, APPROACHES, np.maximum(geometry_maps[name], MIN_ERROR), **style)
+        panel.set(xscale="log", yscale="log", xlabel="zeta_1", ylabel="delta/h_rms", title=f"geometry: {title}")
     for panel, tier in zip(axes[1], ("exact", "universal"), strict=True):
-        field = np.maximum(island_maps[tier], MIN_ERROR)
-        mesh = panel.pcolormesh(*places, field, norm=norm, cmap=colormap, shading="nearest", rasterized=True)
+        mesh = panel.pcolormesh(*places, np.maximum(island_maps[tier], MIN_ERROR), **style)
         panel.set(xlabel="mu", ylabel="X", title=f"islands: tier {tier} (white: refused)")
         panel.set_xticks(places[0][::4], [f"{mu:.0e}" for mu in MU_CORNERS[::4]], rotation=45)
         panel.set_yticks(places[1][::4], [f"{X:.3g}" for X in X_CORNERS[::4]])
@@ -233,10 +230,9 @@ def corners(tallies: Sequence[Tally]) -> str:
     return table(header, rows)
 
 
-def measure() -> tuple[dict[str, str], dict[str, bytes]]:
-    """The measured parts of the page, and its figures."""
-    island_tallies, island_maps = islands()
-    geometry_tallies, geometry_maps = island_geometry()
+def measure() -> Measured:
+    """The measured blocks of the page, and its figures."""
+    (island_tallies, island_maps), (geometry_tallies, geometry_maps) = islands(), island_geometry()
     parts, files = another_program.measure()
     parts |= {"corners": corners([*island_tallies, *geometry_tallies, *totals()])}
     return parts, files | {"docs/figures/stability.svg": draw(geometry_maps, island_maps)}

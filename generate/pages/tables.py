@@ -1,16 +1,14 @@
-"""The measured parts of docs/tables.md: what the shipped files hold, and one lookup in each, step by step."""
+"""docs/tables.md: content of the shipped files, and one lookup in each, step by step."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from generate.pages.page import pyplot, svg, table
+from generate.pages.page import Measured, panels, svg, table
 from generate.tables.build import evaluate
-from mbma_tables.arguments import FloatArray
 from mbma_tables.islands.four_numbers import to_axes
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models.tables import shipped
@@ -28,11 +26,10 @@ def sizes() -> str:
     rows = []
     for kind in KINDS:
         content = read_table(shipped(kind), kind)
-        found = content.attributes
+        size = f"{shipped(kind).stat().st_size / 1e6:.2f} MB"
         for f in ("F", "A"):
             names = (f"largest_error_{f}", f"p99_error_{f}", f"median_error_{f}", f"visited_largest_error_{f}")
-            size = f"{shipped(kind).stat().st_size / 1e6:.2f} MB"
-            rows.append([kind, content.size, size, f, *(f"{found[name]:.1e}" for name in names)])
+            rows.append([kind, content.size, size, f, *(f"{content.attributes[name]:.1e}" for name in names)])
     header = ["table", "cells or nodes", "file", "of", "largest error", "99% below", "half below", "largest at islands"]
     return table(header, rows)
 
@@ -64,36 +61,23 @@ def cells() -> str:
     return table(["", "range", "cells"], rows)
 
 
-def _example(content: TableContent, rows: list[list[str]], coordinates: Sequence[float], X: float, mu: float) -> str:
-    """A worked example: `rows` lead to the coordinates, these to Phi_F and Phi_A."""
-    positions = [np.array([float(axis.position(x))]) for axis, x in zip(content.axes, coordinates, strict=True)]
-    cells = [min(int(p[0]), axis.nodes - 2) for axis, p in zip(content.axes, positions, strict=True)]
-    for axis, p, cell in zip(content.axes, positions, cells, strict=True):
-        rows.append([f"position, cell and u on {axis.name}", f"{p[0]:.12f}, {cell}, {p[0] - cell:.12f}"])
-    g = evaluate(content.coefficients, positions)[0]
-    F_52, F_2 = (float(height_integral(n, -X)) for n in (2.5, 2.0))
-    shape = content.local_error.shape[:-1]
-    where = tuple(int(error_cell(a, c, p[0])) for a, c, p in zip(content.axes, shape, positions, strict=True))
-    rows += [
-        ["g_F, g_A", f"{g[0]:.12e}, {g[1]:.12e}"],
-        ["F_5/2(-X), F_2(-X)", f"{F_52:.12e}, {F_2:.12e}"],
-        ["Phi_F = exp(g_F) pi mu F_5/2(-X)/5", f"{math.exp(g[0]) * math.pi * mu * F_52 / 5:.12e}"],
-        ["Phi_A = exp(g_A) pi F_2(-X)/2", f"{math.exp(g[1]) * math.pi * F_2 / 2:.12e}"],
-        [
-            "cell of the error field, error_F, error_A there",
-            f"{where}, " + ", ".join(f"{bound:.2e}" for bound in content.local_error[where]),
-        ],
-    ]
-    return _with_stored(content, rows)
+def numbers(*values: float) -> str:
+    """Numbers to thirteen digits."""
+    return ", ".join(f"{value:.12e}" for value in values)
+
+
+def bounds(values: np.ndarray) -> str:
+    """Bounds on errors."""
+    return ", ".join(f"{bound:.2e}" for bound in values)
 
 
 def _with_stored(content: TableContent, rows: list[list[str]]) -> str:
     points = content.conformance
     rows += [
-        ["stored table_F, table_A", ", ".join(f"{points[f'table_{f}'][EXAMPLE]:.12e}" for f in "FA")],
-        ["stored exact_F, exact_A", ", ".join(f"{points[f'exact_{f}'][EXAMPLE]:.12e}" for f in "FA")],
-        ["tolerance", f"{points['tolerance'][EXAMPLE]:.2e}"],
+        [f"stored {what}_F, {what}_A", numbers(*(points[f"{what}_{f}"][EXAMPLE] for f in "FA"))]
+        for what in ("table", "exact")
     ]
+    rows.append(["tolerance", f"{points['tolerance'][EXAMPLE]:.2e}"])
     return f"Conformance point {EXAMPLE} (counted from 0):\n\n" + table(["step", "number"], rows)
 
 
@@ -115,9 +99,9 @@ def example_universal() -> str:
         ["X_low, X_high, mu_low, mu_high", ", ".join(f"{edge:.10g}" for edge in edges[:, cell])],
         ["x, y", f"{x:.12f}, {y:.12f}"],
         ["first row of chebyshev_F", ", ".join(f"{term:.6e}" for term in content.coefficients[cell, 0, :, 0])],
-        ["Phi_F = mu times the sum of chebyshev_F", f"{mu * sums[0]:.12e}"],
-        ["Phi_A = the sum of chebyshev_A", f"{sums[1]:.12e}"],
-        ["error_F, error_A", ", ".join(f"{bound:.2e}" for bound in content.local_error[cell])],
+        ["Phi_F = mu times the sum of chebyshev_F", numbers(mu * sums[0])],
+        ["Phi_A = the sum of chebyshev_A", numbers(sums[1])],
+        ["error_F, error_A", bounds(content.local_error[cell])],
     ]
     return _with_stored(content, rows)
 
@@ -126,23 +110,37 @@ def example_island4d() -> str:
     """One conformance point of the four-parameter table, step by step."""
     content = read_table(shipped(ISLAND4D), ISLAND4D)
     names = ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")
-    raw: list[FloatArray] = [np.atleast_1d(content.conformance[name][EXAMPLE]) for name in names]
-    reading = get_reading(content.attributes["reading"])
-    place = to_axes(raw[0], raw[1], raw[2], raw[3], reading)
+    raw = [np.atleast_1d(content.conformance[name][EXAMPLE]) for name in names]
+    place = to_axes(raw[0], raw[1], raw[2], raw[3], get_reading(content.attributes["reading"]))
     X, mu, spread, sphere, sigma = (float(a[0]) for a in (place.X, place.mu, place.spread, place.sphere, place.sigma))
-    scales = [float(place.force[0]), float(place.area[0])]
+    positions = [axis.position(x) for axis, x in zip(content.axes, (X, spread, sphere, float(raw[3][0])), strict=True)]
+    p = [float(position) for position in positions]
+    nodes = [min(int(t), axis.nodes - 2) for axis, t in zip(content.axes, p, strict=True)]
+    g = evaluate(content.coefficients, [np.array([t]) for t in p])[0]
+    F_52, F_2 = (float(height_integral(n, -X)) for n in (2.5, 2.0))
+    shape = content.local_error.shape[:-1]
+    where = tuple(int(error_cell(a, c, t)) for a, c, t in zip(content.axes, shape, p, strict=True))
     rows = [[name, repr(float(value[0]))] for name, value in zip(names, raw, strict=True)]
     rows += [
-        ["spread, sphere", f"{spread:.12e}, {sphere:.12e}"],
-        ["sigma, mu, X", f"{sigma:.12e}, {mu:.12e}, {X:.12f}"],
-        ["F_hat/Phi_F = S sqrt(2 R_d S)", f"{scales[0]:.12e}"],
-        ["A_hat/Phi_A = 2 pi D R_u R_d S^2", f"{scales[1]:.12e}"],
+        ["spread, sphere", numbers(spread, sphere)],
+        ["sigma, mu, X", f"{numbers(sigma, mu)}, {X:.12f}"],
+        ["F_hat/Phi_F = S sqrt(2 R_d S)", numbers(float(place.force[0]))],
+        ["A_hat/Phi_A = 2 pi D R_u R_d S^2", numbers(float(place.area[0]))],
     ]
-    return _example(content, rows, (X, spread, sphere, float(raw[3][0])), X, mu)
+    for axis, t, node in zip(content.axes, p, nodes, strict=True):
+        rows.append([f"position, cell and u on {axis.name}", f"{t:.12f}, {node}, {t - node:.12f}"])
+    rows += [
+        ["g_F, g_A", numbers(*g)],
+        ["F_5/2(-X), F_2(-X)", numbers(F_52, F_2)],
+        ["Phi_F = exp(g_F) pi mu F_5/2(-X)/5", numbers(math.exp(g[0]) * math.pi * mu * F_52 / 5)],
+        ["Phi_A = exp(g_A) pi F_2(-X)/2", numbers(math.exp(g[1]) * math.pi * F_2 / 2)],
+        ["cell of the error field, error_F, error_A there", f"{where}, {bounds(content.local_error[where])}"],
+    ]
+    return _with_stored(content, rows)
 
 
 def figure() -> bytes:
-    """Bound on the relative error of the universal table over X and mu, an SVG file."""
+    """Bound on the relative error of the universal table over X and mu."""
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import LogNorm
 
@@ -150,26 +148,21 @@ def figure() -> bytes:
     X_low, X_high, mu_low, mu_high = (content.auxiliary[name][1] for name in CELL_EDGES)
     bottom = np.maximum(mu_low, LEAST_DRAWN)
     corners = [X_low, bottom, X_high, bottom, X_high, mu_high, X_low, mu_high]
-    drawn, panels = pyplot().subplots(1, 2, figsize=(9, 3.6), dpi=100, layout="constrained", sharey=True)
+    drawn, plots = panels(1, 2, (9, 3.6), sharey=True)
     norm = LogNorm(content.local_error.min(), content.local_error.max())
-    for panel, number, name in zip(panels, (0, 1), (r"$\Phi_F$", r"$\Phi_A$"), strict=True):
-        image = PolyCollection(list(np.stack(corners, axis=-1).reshape(-1, 4, 2)), array=content.local_error[:, number])
+    for plot, errors, name in zip(plots, content.local_error.T, (r"$\Phi_F$", r"$\Phi_A$"), strict=True):
+        image = PolyCollection(list(np.stack(corners, axis=-1).reshape(-1, 4, 2)), array=errors)
         image.set(norm=norm, edgecolor="white", linewidth=0.2, rasterized=True)
-        panel.add_collection(image)
+        plot.add_collection(image)
         title = f"bound on the relative error of {name}"
-        panel.set(yscale="log", xlim=(X_low[0], 12), ylim=(LEAST_DRAWN, mu_high[-1]), xlabel="X", title=title)
-    panels[0].set_ylabel(r"$\mu$")
-    drawn.colorbar(image, ax=panels)
+        plot.set(yscale="log", xlim=(X_low[0], 12), ylim=(LEAST_DRAWN, mu_high[-1]), xlabel="X", title=title)
+    plots[0].set_ylabel(r"$\mu$")
+    drawn.colorbar(image, ax=plots)
     return svg(drawn)
 
 
-def measure() -> tuple[dict[str, str], dict[str, bytes]]:
-    """The measured parts of the page by name, and its figure by path."""
-    parts = {
-        "sizes": sizes(),
-        "cells": cells(),
-        "axes": axes(),
-        "universal": example_universal(),
-        "island4d": example_island4d(),
-    }
+def measure() -> Measured:
+    """The measured blocks of the page, and its figure."""
+    parts = {"sizes": sizes(), "cells": cells(), "axes": axes()}
+    parts |= {"universal": example_universal(), "island4d": example_island4d()}
     return parts, {"docs/figures/tables_universal_error.svg": figure()}

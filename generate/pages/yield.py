@@ -1,4 +1,4 @@
-"""The measured parts of docs/yield.md: when a contact is elastic, how close the law is, what metals do."""
+"""docs/yield.md: when a contact is elastic, how accurate the law is, metals."""
 
 from __future__ import annotations
 
@@ -8,18 +8,17 @@ import time
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
-from generate.boundary_elements.evidence import capped
+from generate.boundary_elements.evidence import Capped, capped
 from generate.calibrated_hardness import BARS, blind
-from generate.pages.page import ROOT, pyplot, svg, table
+from generate.pages.page import DATA, Measured, dataset, panels, spans, svg, table
 from mbma_tables import Surface, contact, materials
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import OutOfRangeError
 from mbma_tables.theories.calibrated_table import shipped_part
 from mbma_tables.totals.conductance import conductance
 
-EVIDENCE = "docs/data/hardness.nc"
+EVIDENCE = DATA / "hardness.nc"
 BINS = (0.002, 0.01, 0.03, 0.1, 0.3, 0.6)  # A/A0 by which stiffness is compared, at these hardnesses
 HARDNESSES = (0.05, 0.2, 0.8)
 CONTACT = (0.01, 0.1)  # A/A0 at which elastic answers are compared
@@ -31,22 +30,19 @@ INDICES = np.geomspace(0.4, 40, 60)
 SETS = {
     "held_out_surface": "new surfaces of known spectra",
     "held_out_spectrum": "new spectra",
-    "three_waves": "of both, three longest waves a side or more",
+    "three_waves": "of both, three longest wavelengths a side or more",
     "stretched": "stretched",
 }
+RATIOS = ("elastic area over true", "elastic force over true")
 
 
-def simulated() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def simulated() -> FloatArray:
     """psi of every simulation, and means over contacts of A_el/A at equal force, F_el/F at equal gap, yielded share."""
-    with xr.open_dataset(ROOT / EVIDENCE) as opened:
-        data = opened.load()
+    data, rows = dataset(EVIDENCE), []
     stretched = data.kind.attrs["flag_meanings"].split().index("stretched")
-    rows = []
+    names = ("force", "area", "mean_separation", "area_yielded")
     for k in np.flatnonzero(data.kind.values != stretched):
-        one = data.isel(surface=int(k))
-        force, area, u, yielded = (
-            one[name].values.astype(float) for name in ("force", "area", "mean_separation", "area_yielded")
-        )
+        force, area, u, yielded = (data[name].values[k].astype(float) for name in names)
         for row, eta in enumerate(data.eta.values[:-1]):
             kept = (area[row] > CONTACT[0]) & (area[row] < CONTACT[1])
             # where the elastic contact was pressed as lightly
@@ -56,11 +52,11 @@ def simulated() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
                 load = np.exp(np.interp(-u[row], -u[-1], np.log(force[-1])))
                 ratios = (elastic / area[row], load / force[row], yielded[row] / area[row])
                 rows.append((1 / eta, *(float(ratio[kept].mean()) for ratio in ratios)))
-    return tuple(np.array(rows).T)
+    return np.array(rows).T
 
 
 def by_law() -> tuple[FloatArray, FloatArray]:
-    """The same of the law, on a surface of 32 magnifications, at 3% contact."""
+    """The same ratios of area and force by the law, on a surface of 32 magnifications, at 3% contact."""
     hardness = float(SURFACE.rms_gradient) / INDICES
     found = contact(SURFACE, area=0.03, theory="calibrated", hardness=hardness)
     elastic = contact(SURFACE, pressure=found.force, theory="calibrated")
@@ -70,40 +66,30 @@ def by_law() -> tuple[FloatArray, FloatArray]:
 
 def when() -> str:
     """Simulated ratios by psi."""
-    psi, area, force, yielded = simulated()
+    psi, *found = simulated()
     rows = []
     for index in np.unique(psi):
-        own = psi == index
-        rows.append(
-            [
-                f"{index:.3g}",
-                *(f"{values[own].mean():.2f} ± {values[own].std():.2f}" for values in (area, force, yielded)),
-            ]
-        )
-    return table(
-        ["psi", "elastic area over true, equal force", "elastic force over true, equal u", "yielded share"], rows
-    )
-
-
-def _cell(bias: float, spread: float, share: float, largest: float) -> str:
-    return f"{100 * bias:+.1f} ± {100 * spread:.1f}; {100 * share:.1f}; {100 * largest:.0f}"
+        own = [values[psi == index] for values in found]
+        rows.append([f"{index:.3g}", *(f"{values.mean():.2f} ± {values.std():.2f}" for values in own)])
+    return table(["psi", f"{RATIOS[0]}, equal force", f"{RATIOS[1]}, equal u", "yielded share"], rows)
 
 
 def held_out() -> str:
-    """Errors of the law on surfaces that no fit saw."""
+    """Errors of the law on held-out surfaces."""
+
+    def cell(bias: float, spread: float, share: float, largest: float) -> str:
+        return f"{100 * bias:+.1f} ± {100 * spread:.1f}; {100 * share:.1f}; {100 * largest:.0f}"
+
     variables, attributes = shipped_part("hardness")
-    sets, quantities = attributes["sets"].split(), attributes["quantities"].split()
-    rows = []
-    for name, words in SETS.items():
-        for form, words_of_form in enumerate(("`h_max`", "the map's heights")):
-            rows.append(
-                [words, words_of_form, *(_cell(*row[:4]) for row in variables["accuracy"][sets.index(name), form])]
-            )
+    sets, rows = attributes["sets"].split(), []
+    for (name, words), (form, known) in itertools.product(SETS.items(), enumerate(("`h_max`", "the map's heights"))):
+        found = variables["accuracy"][sets.index(name), form]
+        rows.append([words, known, *(cell(*row[:4]) for row in found)])
     errors, cells = blind(), []
-    for quantity in quantities:
+    for quantity in attributes["quantities"].split():
         e = errors[quantity]
         size = np.abs(e)
-        cells.append(_cell(e.mean(), e.std(), np.mean(size < BARS[quantity]), size.max()))
+        cells.append(cell(e.mean(), e.std(), float(np.mean(size < BARS[quantity])), size.max()))
     rows.append(["another code's (`docs/data/hardness.csv`)", "`h_max`", *cells])
     names = ["area at equal force", "yielded share", "force at equal u", "frozen stiffness at equal force"]
     return table(["surfaces", "law with", *(f"{name} [%]" for name in names)], rows)
@@ -111,36 +97,39 @@ def held_out() -> str:
 
 def frozen() -> str:
     """Frozen stiffness at equal force of theories against every self-affine simulation, by hardness and contact."""
-    with xr.open_dataset(ROOT / EVIDENCE) as opened:
-        seen = [one for one in capped(opened.load()) if one.kind == "self_affine"]
-    rows = []
+
+    def deviations(theory: str, one: Capped) -> Any:
+        """Area, deviation and stated scatter at each load."""
+        surface = Surface(one.node[1], 1.0, one.zeta_1, 1.0, one.h_max)
+        g = float(surface.rms_gradient)
+        for k in np.flatnonzero(one.area > BINS[0]):
+            try:
+                by = contact(surface, pressure=one.force[k] * g, theory=theory, hardness=one.eta * g)
+            except OutOfRangeError:  # MBMA ends before
+                break
+            yield one.area[k], np.log(by.incremental_stiffness / (one.frozen[k] * g)), by.stiffness_scatter
+
+    seen, rows = [one for one in capped(dataset(EVIDENCE)) if one.kind == "self_affine"], []
     for theory, eta in itertools.product(("mbma", "calibrated"), HARDNESSES):
-        found = []
-        for one in (one for one in seen if one.eta == eta):
-            surface = Surface(one.node[1], 1.0, one.zeta_1, 1.0, one.h_max)
-            g, touching = float(surface.rms_gradient), np.flatnonzero(one.area > BINS[0])
-            for k in touching:
-                try:
-                    by = contact(surface, pressure=one.force[k] * g, theory=theory, hardness=eta * g)
-                except OutOfRangeError:  # MBMA ends before
-                    break
-                found.append(
-                    (one.area[k], np.log(by.incremental_stiffness / (one.frozen[k] * g)), by.stiffness_scatter)
-                )
-        area, error, stated = np.array(found).T
+        area, error, stated = np.array([row for one in seen if one.eta == eta for row in deviations(theory, one)]).T
         bins = [error[(area > low) & (area < high)] for low, high in itertools.pairwise(BINS)]
         cells = [f"{100 * own.mean():+.0f} ± {100 * own.std():.0f}" for own in bins]
         sizes = (np.abs(error) / stated)[np.isfinite(stated)]
         within = [f"{np.mean(sizes < n):.0%}" for n in (1, 2)]
         rows.append([f"`{theory}`", f"{eta:g}", *cells, " / ".join(within)])
-    header = [f"{100 * low:g}-{100 * high:g}%" for low, high in itertools.pairwise(BINS)]
+    header = [f"{ends}%" for ends in spans(BINS)]
     return table(["theory", "eta", *header, "within one / two of `stiffness_scatter`"], rows)
+
+
+def stored(name: str) -> Any:
+    """A summary that the fit stored with the law."""
+    return json.loads(shipped_part("hardness")[1][name])
 
 
 def coverage() -> str:
     """Shares of held-out errors within one and two stated standard deviations."""
     rows: dict[str, list[str]] = {}
-    for name, shares in json.loads(shipped_part("hardness")[1]["coverage"]).items():
+    for name, shares in stored("coverage").items():
         theory = name.split()[0]
         rows.setdefault(theory, [f"`{theory}`"]).append(" / ".join(f"{share:.0%}" for share in shares))
     return table(["theory", "area at equal force", "force at equal u", "frozen stiffness"], list(rows.values()))
@@ -148,11 +137,13 @@ def coverage() -> str:
 
 def drift() -> str:
     """Mean errors of the parts by zeta_1."""
-    rows = [
-        [zeta_1, *(f"{100 * e:+.1f}" for e in row)]
-        for zeta_1, row in json.loads(shipped_part("hardness")[1]["drift"]).items()
-    ]
+    rows = [[zeta_1, *(f"{100 * e:+.1f}" for e in row)] for zeta_1, row in stored("drift").items()]
     return table(["zeta_1", *(f"{name} [%]" for name in ("area", "yielded share", "force", "frozen stiffness"))], rows)
+
+
+def own_modulus(metal: Any) -> float:
+    """E* of a metal pressed on itself."""
+    return float(materials.effective_modulus(metal.E, metal.nu, metal.E, metal.nu))
 
 
 def metals() -> str:
@@ -160,11 +151,11 @@ def metals() -> str:
     rows = []
     for name in materials.METALS:
         metal = materials.get(name)
-        modulus = float(materials.effective_modulus(metal.E, metal.nu, metal.E, metal.nu))
+        modulus = own_modulus(metal)
         psi = [modulus * GRADIENT / hardness for hardness in metal.hardness]
         limit = [materials.ELASTIC_PSI * hardness / modulus for hardness in metal.hardness]
-        spans = (metal.hardness, "g"), (metal.conductivity, "g"), (psi[::-1], ".1f"), (limit, ".3f")
-        cells = (" to ".join(dict.fromkeys(format(number, form) for number in span)) for span, form in spans)
+        ends = (metal.hardness, "g"), (metal.conductivity, "g"), (psi[::-1], ".1f"), (limit, ".3f")
+        cells = (" to ".join(dict.fromkeys(format(number, form) for number in pair)) for pair, form in ends)
         rows.append([f"`{name}`", f"{metal.E:g}", *cells])
     header = ["metal", "E [GPa]", "hardness [GPa]", "conductivity [W/(m K)]", f"psi at gradient {GRADIENT:g}"]
     return table([*header, "elastic up to gradient"], rows)
@@ -172,59 +163,44 @@ def metals() -> str:
 
 def cost() -> str:
     """Times of pressure to gap, area and conductance, with a hardness over without."""
-    rng = np.random.default_rng(5)
-    rows = []
+    rng, g, rows = np.random.default_rng(5), float(SURFACE.rms_gradient), []
     for count in COUNTS:
-        pressure = float(SURFACE.rms_gradient) * 0.3 * 10 ** rng.uniform(-3, -0.1, count)
-        spent: dict[float, list[float]] = {np.inf: [], 0.3 * float(SURFACE.rms_gradient): []}
-        for _ in range(REPEATS):
-            for hardness, times in spent.items():
-                start = time.thread_time()
-                found = contact(SURFACE, pressure=pressure, theory="calibrated", hardness=hardness)
-                _ = found.area, conductance(found.incremental_stiffness, 1.0, 1.0)
-                times.append(time.thread_time() - start)
-        elastic, capped = (min(times) for times in spent.values())
-        rows.append([f"{count}", f"{capped / elastic:.1f}"])
+        pressure = g * 0.3 * 10 ** rng.uniform(-3, -0.1, count)
+        spent: dict[float, list[float]] = {np.inf: [], 0.3 * g: []}
+        for _, (hardness, times) in itertools.product(range(REPEATS), spent.items()):
+            start = time.thread_time()
+            found = contact(SURFACE, pressure=pressure, theory="calibrated", hardness=hardness)
+            _ = found.area, conductance(found.incremental_stiffness, 1.0, 1.0)
+            times.append(time.thread_time() - start)
+        elastic, plastic = (min(times) for times in spent.values())
+        rows.append([f"{count}", f"{plastic / elastic:.1f}"])
     return table(["pressures in a call", "time with a hardness over elastic"], rows)
 
 
 def draw() -> bytes:
-    """Area and force of elastic answers over the truth against psi, with metals below."""
-    psi, area, force, _ = simulated()
-    line_area, line_force = by_law()
-    figure, axes = pyplot().subplots(3, 1, figsize=(7, 8), sharex=True, height_ratios=(3, 3, 2), layout="constrained")
-    drawn: list[tuple[Any, FloatArray, FloatArray, str]] = [
-        (axes[0], area, line_area, "elastic area over true,\nequal force"),
-        (axes[1], force, line_force, "elastic force over true,\nequal mean gap"),
-    ]
-    for axis, points, line, label in drawn:
+    """Area and force of elastic answers over the simulated ones against psi, with metals below."""
+    psi, *points, _ = simulated()
+    figure, axes = panels(3, 1, (7, 8), sharex=True, height_ratios=(3, 3, 2))
+    labels = (f"{RATIOS[0]},\nequal force", f"{RATIOS[1]},\nequal mean gap")
+    for axis, dots, line, label in zip(axes, points, by_law(), labels, strict=False):
         axis.axhspan(0.95, 1.05, color="tab:green", alpha=0.2, label="within 5%")
-        axis.semilogx(psi, points, ".", color="grey", alpha=0.6, label="boundary elements, 1% to 10% contact")
+        axis.semilogx(psi, dots, ".", color="grey", alpha=0.6, label="boundary elements, 1% to 10% contact")
         axis.semilogx(INDICES, line, label="law at 3% contact")
         axis.axvline(materials.ELASTIC_PSI, color="black", linestyle=":")
         axis.set_ylabel(label)
         axis.grid(True, alpha=0.3)
     axes[1].set_yscale("log")
     axes[0].legend(fontsize=8, loc="lower left")
-    for place, name in enumerate(SHOWN):
-        metal = materials.get(name)
-        modulus = float(materials.effective_modulus(metal.E, metal.nu, metal.E, metal.nu))
-        axes[2].plot([modulus * GRADIENT / hardness for hardness in metal.hardness], [place, place], linewidth=6)
+    for place, metal in enumerate(map(materials.get, SHOWN)):
+        ends = [own_modulus(metal) * GRADIENT / hardness for hardness in metal.hardness]
+        axes[2].plot(ends, [place, place], linewidth=6)
     axes[2].axvline(materials.ELASTIC_PSI, color="black", linestyle=":")
     axes[2].set_yticks(range(len(SHOWN)), [f"{name} on itself" for name in SHOWN], fontsize=8)
     axes[2].set_xlabel(f"psi = E* g/p_m; metals at rms gradient {GRADIENT:g}, hard to soft")
     return svg(figure)
 
 
-def measure() -> tuple[dict[str, str], dict[str, bytes]]:
-    """The measured parts of the page, and its figure."""
-    parts = {
-        "when": when(),
-        "held_out": held_out(),
-        "frozen": frozen(),
-        "coverage": coverage(),
-        "drift": drift(),
-        "metals": metals(),
-        "cost": cost(),
-    }
-    return parts, {"docs/figures/yield.svg": draw()}
+def measure() -> Measured:
+    """The measured blocks of the page, and its figure."""
+    parts = (when, held_out, frozen, coverage, drift, metals, cost)
+    return {part.__name__: part() for part in parts}, {"docs/figures/yield.svg": draw()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -109,7 +110,7 @@ def test_the_page_of_theories_lists_them_all():
 @pytest.mark.slow
 def test_every_figure_of_the_fidelity_page():
     drawn = dict(fidelity_figures.drawn())
-    fidelity_figures.pyplot().close("all")
+    plt.close("all")
     shown = re.findall(r"figures/(\w+)\.svg", (ROOT / "docs" / "fidelity.md").read_text(encoding="utf-8"))
     assert set(drawn) == set(shown)
 
