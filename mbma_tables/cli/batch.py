@@ -26,7 +26,8 @@ from mbma_tables.cli.progress import doing
 from mbma_tables.errors import InputError
 from mbma_tables.files import read_file
 from mbma_tables.scenes.specimen import MATERIAL, NUMBERS, Specimen, effective_modulus_of, from_name, from_numbers
-from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.surfaces.self_affine import PARAMETERS
+from mbma_tables.surfaces.surface import Surface
 
 MAX_BYTES = 64 * 2**20
 LOADS = ("separation", "mean_separation", "pressure", "area")

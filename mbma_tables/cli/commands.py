@@ -33,7 +33,7 @@ from mbma_tables.surfaces.surface import Surface
 from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
-    from mbma_tables.scenes.run import OtherTheory
+    from mbma_tables.scenes.steps import OtherTheory
     from mbma_tables.theories.result import Contact
 
 MIN_DEPTH = 1e-3  # (h_max - d)/h_max at a curve's second point
@@ -148,7 +148,7 @@ def curve_command(
     """
     check_plot(plot, output.out)
     from mbma_tables.scenes.effects import COMPARED
-    from mbma_tables.scenes.run import other_theory
+    from mbma_tables.scenes.steps import other_theory
     from mbma_tables.theories.contact import contact
 
     surface, asked = specimen.surface, contact_keywords(model, specimen)

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from mbma_tables.cli.format import Report, to_columns, to_json
+from mbma_tables.cli.options import json_option
 from mbma_tables.cli.progress import echo
 from mbma_tables.errors import InputError
 
@@ -15,7 +16,7 @@ from mbma_tables.errors import InputError
 @click.command("cost", short_help="What accuracy costs, in time.")
 @click.option("--tier", help="Rows of this tier alone.")
 @click.option("--distance", is_flag=True, help="Theories' distance from brute force in place of numerical error.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
+@json_option("a table")
 def cost_command(tier: str | None, distance: bool, as_json: bool) -> None:
     """Error and time of everything that answers, as measured on held-out surfaces.
 

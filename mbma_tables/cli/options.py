@@ -143,76 +143,90 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
     return specimen.in_units(length, stress)
 
 
-# in the words of `mbma_tables.surfaces.treatment.Treatment`
-_MAP_OPTIONS = (
-    quantity_option("--dx", "dx", help="Sampling step [length], of a map whose file has none;"),
-    quantity_option("--dy", "dy", help="and along its second axis, if another."),
-    click.option("--channel", type=int, help="Number of the map's channel in its file."),
-    click.option("--periodic/--not-periodic", "periodic", default=None, help="Whether the map continues periodically."),
-    click.option(
-        "--detrend", metavar="MODE", help="What to subtract: mean, plane, quadratic, or a mode of SurfaceTopography."
-    ),
-    click.option("--outliers", type=float, metavar="N", help="Take out points N standard deviations off; try 10."),
-    click.option("--fill", metavar="harmonic", help="Fill undefined points, however many."),
-    quantity_option("--short-cutoff", "short_cutoff", help="Shortest wavelength to keep [length], the resolution."),
-    quantity_option("--long-cutoff", "long_cutoff", help="Longest wavelength to keep [length]."),
-    quantity_option("--tip-radius", "tip_radius", help="Of the probe or stylus [length]: keep what it can follow."),
-    click.option("--reliable/--all-waves", "reliable", default=None, help="Whether the file's own resolution counts."),
-    click.option("--window", metavar="NAME", help="Window of the power spectrum, hann by default."),
-    quantity_option("--extrapolate-to", "extrapolate_to", help="Continue the spectrum to this wavelength [length],"),
-    click.option("--extrapolate-hurst", "extrapolate_hurst", type=float, help="by this Hurst exponent."),
+def _option(name: str, help: str, **kind: Any) -> Decorator:
+    """The option of one argument of the library, by its name; of a quantity where no other kind is said."""
+    flag = f"--{name.replace('_', '-')}"
+    return (
+        click.option(flag, name.partition("/")[0], help=help, **kind)
+        if kind
+        else quantity_option(flag, name, help=help)
+    )
+
+
+def _options(table: Mapping[str, str | tuple[str, dict[str, Any]]]) -> tuple[Decorator, ...]:
+    """Options of a table: by argument its help, and its kind where it is no quantity."""
+    rows = {name: row if isinstance(row, tuple) else (row, {}) for name, row in table.items()}
+    return tuple(_option(name, help, **kind) for name, (help, kind) in rows.items())
+
+
+NUMBER: dict[str, Any] = {"type": float}
+PATH: Any = click.Path(path_type=Path)
+# of `MAP_OPTIONS`, in the words of `mbma_tables.surfaces.treatment.Treatment`
+_MAP_OPTIONS = _options(
+    {
+        "dx": "Sampling step [length], of a map whose file has none;",
+        "dy": "and along its second axis, if another.",
+        "channel": ("Number of the map's channel in its file.", {"type": int}),
+        "periodic/--not-periodic": ("Whether the map continues periodically.", {"default": None}),
+        "detrend": ("What to subtract: mean, plane, quadratic, or a mode of SurfaceTopography.", {"metavar": "MODE"}),
+        "outliers": ("Take out points N standard deviations off; try 10.", NUMBER | {"metavar": "N"}),
+        "fill": ("Fill undefined points, however many.", {"metavar": "harmonic"}),
+        "short_cutoff": "Shortest wavelength to keep [length], the resolution.",
+        "long_cutoff": "Longest wavelength to keep [length].",
+        "tip_radius": "Of the probe or stylus [length]: keep what it can follow.",
+        "reliable/--all-waves": ("Whether the file's own resolution counts.", {"default": None}),
+        "window": ("Window of the power spectrum, hann by default.", {"metavar": "NAME"}),
+        "extrapolate_to": "Continue the spectrum to this wavelength [length],",
+        "extrapolate_hurst": ("by this Hurst exponent.", NUMBER),
+    }
 )
-
-
 length_unit = functools.partial(
     click.option, "--length-unit", metavar="UNIT", help="Unit of plain lengths and of the answer, such as mm."
 )
-stress_unit_option = click.option(
-    "--stress-unit", metavar="UNIT", help="Unit of plain moduli and of the answer, such as MPa."
-)
-over_h_rms = click.option("--over-h-rms", is_flag=True, help="The lengths given are multiples of h_rms.")
+stress_unit_option = _option("stress_unit", "Unit of plain moduli and of the answer, such as MPa.", metavar="UNIT")
+over_h_rms = _option("over_h_rms", "The lengths given are multiples of h_rms.", is_flag=True)
 
 _SPECIMEN_OPTIONS = (
-    click.option(
-        "--surface",
-        type=click.Choice(list(CASES)),
+    _option(
+        "surface",
+        "Surface: a case of the paper; `mbma surfaces` lists them.",
+        type=click.Choice([*CASES]),
         metavar="NAME",
-        help="Surface: a case of the paper; `mbma surfaces` lists them.",
     ),
-    click.option("--file", type=click.Path(path_type=Path), metavar="TOML", help="Surface: a TOML file."),
-    click.option("--map", type=click.Path(path_type=Path), metavar="MAP", help="Surface: a measured map or line scan."),
+    _option("file", "Surface: a TOML file.", type=PATH, metavar="TOML"),
+    _option("map", "Surface: a measured map or line scan.", type=PATH, metavar="MAP"),
     *_MAP_OPTIONS,
-    click.option(
-        "--model", type=click.Choice(("measured", "self-affine")), help="Of a map: its own spectrum, or five numbers."
+    _option("model", "Of a map: its own spectrum, or five numbers.", type=click.Choice(("measured", "self-affine"))),
+    *_options(
+        {
+            "hurst": ("Surface in numbers: Hurst exponent, in (0, 1].", NUMBER),
+            "q0": "Smallest wavenumber [1/length].",
+            "q1": "Largest wavenumber [1/length]; or give --zeta-1.",
+            "zeta_1": ("Largest magnification q1/q0, above 3.", NUMBER),
+            "h_rms": "Root-mean-square height [length].",
+            "h_max": "Highest point above the mid-plane [length].",
+            "m0": "Surface by moments: hurst, h_max, variance of height [length^2],",
+            "m2": ("variance of a profile's slope,", NUMBER),
+            "m4": "variance of a profile's second derivative [1/length^2].",
+            "Rq": "Surface by a drawing: rms height of a profile [length], with hurst, h_max,",
+            "Ra": "or its mean absolute height,",
+            "Sq": "or rms height of a map,",
+            "Sa": "or mean absolute height of a map;",
+            "Rdq": "rms slope of a profile,",
+            "Sdq": "or rms gradient of a map,",
+            "Rsm": "or mean spacing of a profile's elements [length];",
+            "longest": "longest wave [length],",
+            "shortest": "or shortest wave [length],",
+            "Sds": "or summits per area [1/length^2],",
+            "Spd": "the same by its newer name;",
+            "Sp": "highest point of a map [length] in place of --h-max.",
+            "E_star": "Effective modulus; export needs one, elsewhere forces are over E* without it.",
+            "E1": "Instead of --E-star: Young's modulus,",
+            "nu1": ("and Poisson's ratio of one body,", NUMBER),
+            "E2": "Young's modulus of the other,",
+            "nu2": ("and its Poisson's ratio.", NUMBER),
+        }
     ),
-    click.option("--hurst", type=float, help="Surface in numbers: Hurst exponent, in (0, 1]."),
-    quantity_option("--q0", help="Smallest wavenumber [1/length]."),
-    quantity_option("--q1", help="Largest wavenumber [1/length]; or give --zeta-1."),
-    click.option("--zeta-1", "zeta_1", type=float, help="Largest magnification q1/q0, above 3."),
-    quantity_option("--h-rms", "h_rms", help="Root-mean-square height [length]."),
-    quantity_option("--h-max", "h_max", help="Highest point above the mid-plane [length]."),
-    quantity_option("--m0", help="Surface by moments: hurst, h_max, variance of height [length^2],"),
-    click.option("--m2", type=float, help="variance of a profile's slope,"),
-    quantity_option("--m4", help="variance of a profile's second derivative [1/length^2]."),
-    quantity_option("--Rq", "Rq", help="Surface by a drawing: rms height of a profile [length], with hurst, h_max,"),
-    quantity_option("--Ra", "Ra", help="or its mean absolute height,"),
-    quantity_option("--Sq", "Sq", help="or rms height of a map,"),
-    quantity_option("--Sa", "Sa", help="or mean absolute height of a map;"),
-    quantity_option("--Rdq", "Rdq", help="rms slope of a profile,"),
-    quantity_option("--Sdq", "Sdq", help="or rms gradient of a map,"),
-    quantity_option("--Rsm", "Rsm", help="or mean spacing of a profile's elements [length];"),
-    quantity_option("--longest", help="longest wave [length],"),
-    quantity_option("--shortest", help="or shortest wave [length],"),
-    quantity_option("--Sds", "Sds", help="or summits per area [1/length^2],"),
-    quantity_option("--Spd", "Spd", help="the same by its newer name;"),
-    quantity_option("--Sp", "Sp", help="highest point of a map [length] in place of --h-max."),
-    quantity_option(
-        "--E-star", "E_star", help="Effective modulus; export needs one, elsewhere forces are over E* without it."
-    ),
-    quantity_option("--E1", "E1", help="Instead of --E-star: Young's modulus,"),
-    click.option("--nu1", "nu1", type=float, help="and Poisson's ratio of one body,"),
-    quantity_option("--E2", "E2", help="Young's modulus of the other,"),
-    click.option("--nu2", "nu2", type=float, help="and its Poisson's ratio."),
     length_unit(),
     stress_unit_option,
 )
@@ -236,52 +250,41 @@ def load_options(option: Callable[..., Decorator]) -> Decorator:
     )
 
 
-reading_option = click.option(
-    "--reading",
-    default="reported",
-    show_default=True,
-    type=click.Choice(list(NAMED)),
-    help="Reading of the paper's equations, of mbma.",
-)
+def json_option(instead: str) -> Decorator:
+    """The option that prints JSON in place of a table, or of text."""
+    return click.option("--json", "as_json", is_flag=True, help=f"Print one JSON object instead of {instead}.")
 
+
+SHOWN: dict[str, Any] = {"show_default": True}
+reading_option = _option(
+    "reading", "Reading of the paper's equations, of mbma.", default="reported", type=click.Choice([*NAMED]), **SHOWN
+)
 _MODEL_OPTIONS = (
     reading_option,
-    click.option(
-        "--tier",
-        default="universal",
-        show_default=True,
-        type=click.Choice(TIERS),
-        help="Island model.",
-    ),
-    click.option(
-        "--rtol", type=float, default=DEFAULT_RTOL, show_default=True, help="Numerical relative error asked for."
-    ),
+    _option("tier", "Island model.", default="universal", type=click.Choice(TIERS), **SHOWN),
+    _option("rtol", "Numerical relative error asked for.", type=float, default=DEFAULT_RTOL, **SHOWN),
 )
-theory_option = click.option(
-    "--theory",
+theory_option = _option(
+    "theory",
+    "Theory; the others have no tier, reading or rtol.",
     default="mbma",
-    show_default=True,
-    type=click.Choice(list(THEORIES)),
-    help="Theory; the others have no tier, reading or rtol.",
+    type=click.Choice([*THEORIES]),
+    **SHOWN,
 )
 # of islands, which MBMA alone has
 model_options = _group("model", lambda given: Model(**given), *_MODEL_OPTIONS)
-hardness_option = quantity_option("--hardness", help="Largest pressure that the softer body bears; none: elastic.")
-
+hardness_option = _option("hardness", "Largest pressure that the softer body bears; none: elastic.")
 theory_options = _group("model", lambda given: Model(**_given(given)), theory_option, *_MODEL_OPTIONS, hardness_option)
 
 output_options = _group(
     "output",
     lambda given: Output(**given),
-    click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table."),
+    json_option("a table"),
     click.option("--csv", "as_csv", is_flag=True, help="Print CSV with '#' comments instead of a table."),
-    click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write to a file instead."),
+    _option("out", "Write to a file instead.", type=PATH, metavar="FILE"),
 )
-
-leakage_option = click.option("--leakage", is_flag=True, help="Add the flow conductance of the gaps [length^3].")
-plot_option = click.option(
-    "--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw a picture: FILE.png, .svg or .pdf."
-)
+leakage_option = _option("leakage", "Add the flow conductance of the gaps [length^3].", is_flag=True)
+plot_option = _option("plot", "Draw a picture: FILE.png, .svg or .pdf.", type=PATH, metavar="FILE")
 
 
 def check_plot(plot: Path | None, out: Path | None) -> None:

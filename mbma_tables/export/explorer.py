@@ -24,9 +24,8 @@ from mbma_tables.export import c_code
 from mbma_tables.export.code import web_assembly
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import FITTED, PRINTED, REPORTED, get_reading
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import calibrated, calibrated_table, mbma, result
 from mbma_tables.theories.spectrum_laws import TESTED_AREA
 from mbma_tables.units import Units

@@ -18,12 +18,11 @@ from mbma_tables.materials import effective_modulus
 from mbma_tables.scenes.toml_file import check, read_toml, schema
 from mbma_tables.surfaces.cases import get_case
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.units import Units, factor, in_unit, known, resolve
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.any_surface import AnySurface
-    from mbma_tables.surfaces.measured import MeasuredSurface
     from mbma_tables.surfaces.treatment import Treated
 
 BAND = ("hurst", "q0", "q1", "h_rms", "h_max")
@@ -93,7 +92,7 @@ def measured(path: pathlib.Path, treatment: Mapping[str, Any]) -> tuple[Treated,
     options = dict(treatment)
     further = [options.pop(name, None) for name in ("extrapolate_to", "extrapolate_hurst")]
     treated = prepared(path, options, None)
-    return treated, measured_surface(treated, None, *further)
+    return treated, MeasuredSurface.of(measured_surface(treated, None, *further))
 
 
 def _printable(path: pathlib.Path) -> str:

@@ -19,8 +19,6 @@ from mbma_tables.units import Units, factor, unit_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mbma_tables.surfaces.measured import MeasuredSurface
-
 
 def frozen(values: Any) -> Any:
     """The same numbers, which nobody can write to where they are a plain array."""
@@ -97,7 +95,7 @@ class AnySurface(Displayed, abc.ABC):
         """C(q) [length^4] as h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), zero outside [q0, q1]."""
 
     @abc.abstractmethod
-    def sampled(self) -> MeasuredSurface:
+    def sampled(self) -> Any:
         """The same surface by samples of its spectrum; of a batch there are none."""
 
     @abc.abstractmethod
@@ -183,7 +181,7 @@ class AnySurface(Displayed, abc.ABC):
         label = f"wavenumber q [1/{length}]"
         return draw_lines({"spectrum": (q, self.power_spectrum(q))}, label, f"spectrum C(q) [{length}^4]")
 
-    def combined(self, other: AnySurface) -> MeasuredSurface:
+    def combined(self, other: AnySurface) -> Any:
         """The one rough surface that stands for two that touch: spectra add, heights convolve.
 
         Parameters
@@ -211,6 +209,4 @@ class AnySurface(Displayed, abc.ABC):
         >>> f"h_rms = {both.h_rms:.2f}, h_max = {both.h_max:.1f}, q from {both.q0:g} to {both.q1:g}"
         'h_rms = 5.00, h_max = 15.0, q from 0.01 to 5'
         """
-        from mbma_tables.surfaces.measured import combination
-
-        return combination(self.sampled(), other.sampled())
+        return self.sampled().added(other.sampled())

@@ -25,7 +25,12 @@ MIN_GRID = 32  # points along each side: 16 wavenumbers, of which a window spoil
 FREE_HOLES = 0.05  # share of undefined points that is filled unasked
 MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
 USUAL, USUAL_DEVIATES = 0.99, 2.576  # share of points that set the scale of differences, and where it ends if Gaussian
+MIN_POWER = 1e-24  # of the strongest wave: below it rounding, not a measured wave
 LENGTHS = ("short_cutoff", "long_cutoff", "tip_radius")  # options that are lengths
+OPTIONS = (
+    *("unit", "dx", "dy", "channel", "periodic", "detrend", "outliers", "fill", "short_cutoff", "long_cutoff"),
+    *("tip_radius", "reliable", "window"),
+)  # of `Surface.from_map` and `Surface.from_profile`, about what is read and done to it
 Provenance = tuple[Mapping[str, Any], ...]
 
 
@@ -273,7 +278,7 @@ def _within(known: Treated, short: float | None, long: float | None) -> Treated:
         scan = wrapped(values, known.steps, True, known.unit)
         values = np.asarray(getattr(scan, method)(cutoff_wavelength=wavelength).heights(), float)
         after = squares(values, known.steps)
-        if not after[0] > 1e-24 * before[0]:
+        if not after[0] > MIN_POWER * before[0]:
             raise InputError(f"{name} {wavelength:g} leaves no wave of the measurement")
         of_variance, of_gradient = (max(1 - b / a, 0.0) for a, b in zip(before, after, strict=True))
         length = f"{wavelength:.4g} {known.unit or ''}".rstrip()

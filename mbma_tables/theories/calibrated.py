@@ -10,8 +10,7 @@ from mbma_tables.arguments import FloatArray, require
 from mbma_tables.calibrated import area as law_area
 from mbma_tables.calibrated import light_factor
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.measured import MeasuredSurface
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import calibrated_table
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 from mbma_tables.theories.spectrum_laws import TESTED_AREA, Places, area_concerns, force_at_area

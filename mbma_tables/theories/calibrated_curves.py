@@ -17,7 +17,7 @@ from mbma_tables.bearing import FRACTIONS
 from mbma_tables.calibrated import Law, light_factor
 from mbma_tables.calibrated_map import LOG_FORCE, MapLaw, convex
 from mbma_tables.surfaces.heights import SHARES
-from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.spectrum_laws import LAW_ERROR, TESTED_AREA, force_at_area, spectrum_of
 
 if TYPE_CHECKING:

@@ -17,8 +17,7 @@ from mbma_tables.arguments import FloatArray, finite_array, require
 from mbma_tables.calibrated import YANG_PERSSON, Law, area_persson
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.measured import MeasuredSurface
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer, select
 from mbma_tables.theories.spectrum_laws import LAW_ERROR, self_affine_law, spectrum_of
 

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, require, spread
 from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, force_of
-from mbma_tables.surfaces.measured import MeasuredSurface
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import calibrated_table
 
 TESTED_AREA = (1e-3, 0.97)
