@@ -17,10 +17,15 @@ import click
 from mbma_tables import __version__
 from mbma_tables.cli import progress
 from mbma_tables.cli.batch import batch_command
-from mbma_tables.cli.commands import contact_command, curve_command, island_command, surfaces_command
-from mbma_tables.cli.cost import cost_command
+from mbma_tables.cli.commands import (
+    contact_command,
+    cost_command,
+    curve_command,
+    fit_command,
+    island_command,
+    surfaces_command,
+)
 from mbma_tables.cli.export import explore_command, export_command
-from mbma_tables.cli.fit import fit_command
 from mbma_tables.cli.scene import plan_command, run_command
 from mbma_tables.cli.sensitivity import sensitivity_command
 from mbma_tables.cli.tables import tables_group

@@ -204,10 +204,7 @@ def report_answer(
     if specimen.E_star is not None:
         scale = f"E* is {specimen.E_star:.6g} {specimen.stress_unit or ''}".rstrip()
     made = f", reading {answer.reading}, tier {answer.tier}, rtol {model.rtol:g}" if answer.reading else ""
-    notes += [
-        f"theory {model.theory}{made}; {scale}",
-        "error: relative, numerical, beside the theory's scatter",
-    ]
+    notes += [f"theory {model.theory}{made}; {scale}", "error: relative, numerical, beside the theory's scatter"]
     if hasattr(answer, "elastic_hardness"):
         limit = f"{answer.elastic_hardness:.4g} {specimen.stress_unit or ''}".rstrip()
         if model.hardness == math.inf:

@@ -113,10 +113,7 @@ def _given(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _specimen(given: Mapping[str, Any]) -> Specimen:
-    """The surface that the options describe, with its modulus; a modulus option overrides that of a file.
-
-    Plain numbers are in --length-unit and --stress-unit where those are given, else in the units known from a file.
-    """
+    """The surface that the options describe, with its modulus; a modulus option overrides that of a file."""
     length, stress = given["length_unit"], given["stress_unit"]
     numbers = {key: given[key] for key in NUMBERS if given[key] is not None}
     used = [f"--{key}" for key in ("surface", "file", "map") if given[key] is not None] + ["numbers"] * bool(numbers)

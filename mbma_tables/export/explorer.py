@@ -152,30 +152,9 @@ def explorer_page(
 ) -> str:
     """A page of HTML that shows how a surface touches, with sliders; it needs neither a server nor a network.
 
-    Parameters
-    ----------
-    surface : Surface or MeasuredSurface
-        What the page begins with. Of a measured one it takes the spectrum and h_max: heights and maps, which the
-        calibrated law goes by in Python, are not in it.
-    E_star : float, optional
-        Effective modulus; without one stresses are over E*.
-    stress_unit : str, optional
-        Unit of the modulus.
-    theory : {"mbma", "calibrated", "persson"}, optional
-        The one drawn with its scatter at first; MBMA if not given, of a spectrum the calibrated law.
-    reading : {"reported", "printed", "fitted"}
-        Of the paper's equations, at first.
-    title : str
-        What the surface is.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    InputError
-        For a batch, a spectrum of more than 500 samples or with MBMA, an unknown theory or reading.
+    Of a measured surface it takes the spectrum, of at most 500 samples, and h_max: heights and maps, which the
+    calibrated law goes by in Python, are not in it. Without a modulus stresses are over E*. Theory and reading are those
+    drawn at first, by default MBMA, of a spectrum the calibrated law.
 
     Examples
     --------

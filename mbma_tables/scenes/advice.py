@@ -18,11 +18,7 @@ QUANTITIES = {"stiffness": "stiffness", "conductance": "stiffness", "force": "fo
 
 
 def advice(problem: Problem) -> str:
-    """One line about a gap, stiffness or conductance asked of MBMA; empty where there is nothing to say.
-
-    Distances are those of `tables/calibrated.nc` at the contact that the calibrated law expects, in the middle of what
-    is prescribed.
-    """
+    """One line about a gap, stiffness or conductance asked of MBMA; empty where there is nothing to say."""
     asked = {name: quantity for name, quantity in QUANTITIES.items() if name in problem.outputs}
     if problem.prescribed in INVERTED:
         asked = {"gap": "force"} | {name: quantity for name, quantity in asked.items() if quantity == "stiffness"}
@@ -35,6 +31,7 @@ def advice(problem: Problem) -> str:
 
     # stiffness first: it is the more telling where both are asked
     name, quantity = next((pair for pair in asked.items() if pair[1] == "stiffness"), next(iter(asked.items())))
+    # distances at the contact that the calibrated law expects, in the middle of what is prescribed
     area = float(np.median(contacts))
     rows = {"mbma": Mbma(reading=problem.reading).scatter_name(problem.surface), **{row: row for row in CANDIDATES}}
     spread = {

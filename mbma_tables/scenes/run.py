@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from mbma_tables.errors import ConvergenceError
 from mbma_tables.materials import ELASTIC_PSI
-from mbma_tables.scenes.effects import CORRELATIONS
 from mbma_tables.scenes.plan import Plan
-from mbma_tables.scenes.problem import INVERTED, Problem
+from mbma_tables.scenes.problem import CORRELATIONS, INVERTED, Problem
 from mbma_tables.scenes.steps import STEPS, TABLES, Progress, Run, comparison
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.surfaces.self_affine import PARAMETERS
@@ -23,10 +22,7 @@ if TYPE_CHECKING:
 
 
 def run_plan(problem: Problem, plan: Plan, progress: Progress | None = None) -> xr.Dataset:
-    """The quantities of a problem, each with its unit; what made them in the attributes.
-
-    A step whose error bound exceeds the tolerance is a ConvergenceError.
-    """
+    """The quantities of a problem with their units, and what made them; an error above the tolerance is refused."""
     surface, h_max = problem.surface, float(problem.surface.h_max)
     if "finite_height" in problem.dropped:
         plain: Any = surface

@@ -28,7 +28,7 @@ class Scene(Problem):
     surface : Surface
         One surface, not a batch.
     effects : sequence of str
-        Effects asked for, names of `mbma_tables.scenes.effects.OUTPUTS`.
+        Effects asked for, names of `mbma_tables.scenes.problem.OUTPUTS`.
     without : sequence of str
         Refinements of the model switched off: "subscale_area", "sphere_deformation", "finite_height".
     separations, mean_separations, pressures, areas : array_like, one of them

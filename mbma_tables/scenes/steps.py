@@ -11,9 +11,8 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import OutOfRangeError
-from mbma_tables.scenes.effects import CORRELATIONS
 from mbma_tables.scenes.plan import Step
-from mbma_tables.scenes.problem import INVERTED, Problem
+from mbma_tables.scenes.problem import CORRELATIONS, INVERTED, Problem
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.any_surface import AnySurface

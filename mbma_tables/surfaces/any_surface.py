@@ -42,35 +42,19 @@ MEANINGS = {
 
 
 class AnySurface(Displayed, abc.ABC):
-    """A rough surface, or a batch: what theories and everything above them ask.
+    """A rough surface, or a batch: what theories and everything above them ask."""
 
-    Attributes
-    ----------
-    q0, q1 : array_like
-        Smallest and largest wavenumber of its roughness [1/length].
-    h_rms, h_max : array_like
-        Root-mean-square height, and highest point above the mid-plane [length].
-    m2, m4 : array_like
-        Variance of a profile's slope, and of its second derivative [1/length^2], Eq. (1).
-    unit : str or None
-        The unit of length; None where it is not known.
-    provenance : tuple of mapping
-        Where it comes from, a plain record each step.
-    parameters : tuple of str
-        Names of the numbers that make it; none where it is its own spectrum.
-    """
+    parameters: ClassVar[tuple[str, ...]] = ()  # names of the numbers that make it; none where a spectrum does
 
-    parameters: ClassVar[tuple[str, ...]] = ()
-
-    # plain fields of one class, properties of the other
+    # plain fields of one class, properties of the other; `MEANINGS` says what they are
     q0: Any
     q1: Any
     h_rms: Any
     h_max: Any
     m2: Any
     m4: Any
-    unit: str | None
-    provenance: tuple[Mapping[str, Any], ...]
+    unit: str | None  # of length; None where it is not known
+    provenance: tuple[Mapping[str, Any], ...]  # where it comes from, a plain record each step
 
     @property
     def shape(self) -> tuple[int, ...]:

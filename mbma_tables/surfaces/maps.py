@@ -185,11 +185,7 @@ def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> Floa
 def _unwindowed(
     q: FloatArray, C: FloatArray, variance: float, slopes: float, seen: float, parts: tuple[float, float]
 ) -> tuple[FloatArray, dict[str, Any]]:
-    """C under a window as that of the whole map, and what was done.
-
-    Short waves are scaled to their own mean squared gradient, `parts` of what is `seen` under the window and of the
-    map's `slopes`; what is left of h_rms and of the gradient is up to the longest waves.
-    """
+    """C under a window as that of the whole map, and what was done; `parts` are those of short waves."""
     rougher = parts[1] / parts[0] if min(parts) > 0 else 1.0
     under = math.sqrt(PowerLaws(q, C).moment(0) / variance)
     C = raised(q, C * rougher, variance, slopes)

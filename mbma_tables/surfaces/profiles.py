@@ -170,12 +170,7 @@ def _limits(found: ProfileSpectrum, length: float) -> tuple[dict[str, Any], ...]
         f"small. Its highest point is a line's: a Gaussian square of its length reaches about {level:.1f} h_rms"
     )
     notes = [
-        {
-            "step": "errors",
-            "h_rms": found.h_rms_error,
-            "rms_gradient": found.gradient_error,
-            "told": errors,
-        },
+        {"step": "errors", "h_rms": found.h_rms_error, "rms_gradient": found.gradient_error, "told": errors},
         {"step": "unseen", "h_max": level, "told": unseen},
     ]
     if found.longest > ROLLED_OFF:

@@ -73,14 +73,7 @@ class SelfAffine(AnySurface):
     @classmethod
     @hinted
     def from_moments(
-        cls,
-        *,
-        hurst: ArrayLike,
-        m0: ArrayLike,
-        m2: ArrayLike,
-        m4: ArrayLike,
-        h_max: ArrayLike,
-        unit: str | None = None,
+        cls, *, hurst: ArrayLike, m0: ArrayLike, m2: ArrayLike, m4: ArrayLike, h_max: ArrayLike, unit: str | None = None
     ) -> Self:
         """The surface with these spectral moments (Eqs. 1, 7).
 

@@ -19,28 +19,9 @@ import numpy as np
 
 from mbma_tables.errors import InputError, TableFileError
 from mbma_tables.files import read_file, write_file, written_bytes
+from mbma_tables.tablefiles import schema
 from mbma_tables.tablefiles.checks import REQUIRED, check_attribute, check_content
 from mbma_tables.tablefiles.provenance import MODULES, digest_arrays, digest_json, source_digest, versions
-from mbma_tables.tablefiles.schema import (
-    ANSWERS,
-    AXES,
-    AXIS_ERRORS,
-    COEFFICIENTS,
-    CONVENTIONS,
-    DEGREE,
-    DOCUMENTATION,
-    ERROR_FIELD,
-    FORMAT_VERSIONS,
-    FUNCTIONS,
-    HEIGHT_INTEGRALS,
-    ISLAND4D,
-    KINDS,
-    OUT_OF_RANGE,
-    WEIGHTS,
-    Axis,
-    TableContent,
-    dimensions,
-)
 
 SEAL = b"\nmbma-table sha256 "
 SEAL_LENGTH = len(SEAL) + 64 + 1
@@ -51,10 +32,10 @@ MEANING = {
     "error": "bound on the relative error of Phi_{f} in this part of the table",
 }
 OF_SPLINES = {
-    "spline_degree": DEGREE,
-    "spline_weights": WEIGHTS,
-    "height_integrals": HEIGHT_INTEGRALS,
-    "certificate": DOCUMENTATION["certificate"] + AXIS_ERRORS,
+    "spline_degree": schema.DEGREE,
+    "spline_weights": schema.WEIGHTS,
+    "height_integrals": schema.HEIGHT_INTEGRALS,
+    "certificate": schema.DOCUMENTATION["certificate"] + schema.AXIS_ERRORS,
 }
 CONFORMANCE = {
     "table": "{answer} by this table, at the conformance points",
@@ -83,7 +64,7 @@ def attributes_digest(dataset: netCDF4.Dataset) -> str:
     return digest_json(content)
 
 
-def _fill(dataset: netCDF4.Dataset, content: TableContent) -> None:
+def _fill(dataset: netCDF4.Dataset, content: schema.TableContent) -> None:
     def add(name: str, dimensions: tuple[str, ...], values: Any, attributes: dict[str, Any]) -> None:
         variable = dataset.createVariable(
             name, "f8", dimensions, zlib=True, complevel=6, shuffle=True, endian="little", fill_value=False
@@ -91,7 +72,7 @@ def _fill(dataset: netCDF4.Dataset, content: TableContent) -> None:
         variable.setncatts(attributes)
         variable[...] = values
 
-    over_coefficients, over_cells = dimensions(content.kind)
+    over_coefficients, over_cells = schema.dimensions(content.kind)
     names = tuple(axis.name for axis in content.axes)
     for axis in content.axes:
         dataset.createDimension(axis.name, axis.nodes)
@@ -99,9 +80,9 @@ def _fill(dataset: netCDF4.Dataset, content: TableContent) -> None:
     sizes = dict(zip(over_cells, content.local_error.shape, strict=False))
     for name, size in (sizes | dict(zip(over_coefficients, content.coefficients.shape, strict=False))).items():
         dataset.createDimension(name, size)
-    for number, function in enumerate(FUNCTIONS):
+    for number, function in enumerate(schema.FUNCTIONS):
         for what, over, array in (
-            (COEFFICIENTS[content.kind], over_coefficients, content.coefficients),
+            (schema.COEFFICIENTS[content.kind], over_coefficients, content.coefficients),
             ("error", over_cells, content.local_error),
         ):
             text = MEANING[what].format(f=function, chebyshev=("Phi_F/mu", "Phi_A")[number])
@@ -114,29 +95,29 @@ def _fill(dataset: netCDF4.Dataset, content: TableContent) -> None:
     for name, values in content.conformance.items():
         what, _, function = name.rpartition("_") if name[-2:] in ("_F", "_A") else (name, "", "")
         text = CONFORMANCE.get(what, f"argument {name} of the conformance points")
-        meaning = {"long_name": text.format(answer=ANSWERS[content.kind].format(f=function)), "units": "1"}
+        meaning = {"long_name": text.format(answer=schema.ANSWERS[content.kind].format(f=function)), "units": "1"}
         add(f"conformance_{name}", ("conformance",), values, meaning)
 
 
-def write_table(path: os.PathLike[str] | str, content: TableContent) -> pathlib.Path:
+def write_table(path: os.PathLike[str] | str, content: schema.TableContent) -> pathlib.Path:
     """Write a table file, whole or not at all."""
     target = pathlib.Path(path)
     check_content(content)
     digest = digest_arrays(content.arrays())
     attributes = {
-        "Conventions": CONVENTIONS,
+        "Conventions": schema.CONVENTIONS,
         # where the values came from, unless the table was read from a file that says so
         "source_sha256": source_digest(MODULES[content.kind]),
         "source_modules": " ".join(MODULES[content.kind]),
         "versions": json.dumps(versions(), sort_keys=True),
         **{name: value for name, value in content.attributes.items() if name != "attributes_sha256"},
         "mbma_kind": content.kind,
-        "format_version": FORMAT_VERSIONS[content.kind],
+        "format_version": schema.FORMAT_VERSIONS[content.kind],
         "data_version": digest[:12],
-        "out_of_range": OUT_OF_RANGE[content.kind],
-        "error_field": ERROR_FIELD[content.kind],
-        **DOCUMENTATION,
-        **(OF_SPLINES if content.kind == ISLAND4D else {}),
+        "out_of_range": schema.OUT_OF_RANGE[content.kind],
+        "error_field": schema.ERROR_FIELD[content.kind],
+        **schema.DOCUMENTATION,
+        **(OF_SPLINES if content.kind == schema.ISLAND4D else {}),
         "values_sha256": digest,
     }
 
@@ -172,7 +153,7 @@ def read_sealed(path: pathlib.Path) -> bytes:
     return body
 
 
-def _content(dataset: netCDF4.Dataset, kind: str) -> TableContent:
+def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
     """The table in an open file whose kind and format are known."""
     # values as they are stored, for their hash
     dataset.set_auto_maskandscale(False)
@@ -193,21 +174,23 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> TableContent:
     # the stored axes, not recomputed ones: another processor's logarithm may differ in the last bit
     if digest_arrays(values) != own["values_sha256"]:
         raise ValueError("has values that do not match their hash")
-    names = [name for name, _ in AXES[kind]]
+    names = [name for name, _ in schema.AXES[kind]]
     axes = tuple(
-        Axis(name, text["long_name"], text["transform"], text["offset"], text["first"], text["last"], values[name].size)
+        schema.Axis(
+            name, text["long_name"], text["transform"], text["offset"], text["first"], text["last"], values[name].size
+        )
         for name, text in ((name, described[name]) for name in names)
     )
-    fields = COEFFICIENTS[kind], "error"
-    for what, over in zip(fields, dimensions(kind), strict=True):
-        if any(dataset[f"{what}_{function}"].dimensions != over for function in FUNCTIONS):
+    fields = schema.COEFFICIENTS[kind], "error"
+    for what, over in zip(fields, schema.dimensions(kind), strict=True):
+        if any(dataset[f"{what}_{function}"].dimensions != over for function in schema.FUNCTIONS):
             raise ValueError(f"has {what} over other dimensions than {', '.join(over)}")
     coefficients, local_error = (
-        np.stack([values[f"{what}_{function}"] for function in FUNCTIONS], axis=-1) for what in fields
+        np.stack([values[f"{what}_{function}"] for function in schema.FUNCTIONS], axis=-1) for what in fields
     )
-    main = {f"{what}_{function}" for what in fields for function in FUNCTIONS} | set(names)
+    main = {f"{what}_{function}" for what in fields for function in schema.FUNCTIONS} | set(names)
     beside = [name for name in values if name not in main and not name.startswith("conformance_")]
-    return TableContent(
+    return schema.TableContent(
         kind=kind,
         axes=axes,
         coefficients=coefficients,
@@ -222,18 +205,18 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> TableContent:
     )
 
 
-def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> TableContent:
+def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> schema.TableContent:
     """Open and check a table file, which must be of a `kind` where one is given."""
     source = pathlib.Path(path)
     body = read_sealed(source)
     try:
         with HDF5_LOCK, netCDF4.Dataset(source.name, memory=body) as dataset:
             found = getattr(dataset, "mbma_kind", None)
-            if found not in KINDS or (kind is not None and found != kind):
-                raise ValueError(f"holds a table of kind {found!r}, not {kind or ' or '.join(KINDS)}")
+            if found not in schema.KINDS or (kind is not None and found != kind):
+                raise ValueError(f"holds a table of kind {found!r}, not {kind or ' or '.join(schema.KINDS)}")
             version = getattr(dataset, "format_version", None)
-            if version != FORMAT_VERSIONS[found]:
-                raise ValueError(f"has format {version}, this library reads {FORMAT_VERSIONS[found]}")
+            if version != schema.FORMAT_VERSIONS[found]:
+                raise ValueError(f"has format {version}, this library reads {schema.FORMAT_VERSIONS[found]}")
             content = _content(dataset, found)
         check_content(content)
     except ValueError as fault:
