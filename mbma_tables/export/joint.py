@@ -52,7 +52,7 @@ class Joint:
         return contact(self.surface, mean_separation=u, E_star=self.modulus, theory=self.theory, hardness=self.hardness)
 
     def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
-        """Lines of a file's head: what it holds, range, error, validity up to `end`; with `leakage` those of flow, too."""
+        """Lines of a file's head: what it holds, range, error, validity up to `end`, and with `leakage` of flow."""
         law, stress = self.law, self.stress
         names = self.surface.parameters or OWN_NUMBERS
         numbers = ", ".join(f"{name} = {float(getattr(self.surface, name)):.10g}" for name in names)

@@ -12,8 +12,7 @@ from mbma_tables.arguments import finite_array, needed
 from mbma_tables.errors import InputError
 from mbma_tables.scenes.plan import Plan, make_plan
 from mbma_tables.scenes.problem import INVERTED, PRESCRIBED, Problem
-from mbma_tables.scenes.specimen import from_tables
-from mbma_tables.scenes.toml_file import check, read_toml, schema
+from mbma_tables.scenes.specimen import check, from_tables, read_toml, schema
 
 if TYPE_CHECKING:
     import xarray
