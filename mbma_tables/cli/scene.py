@@ -30,8 +30,7 @@ def plan_command(file: Path, as_json: bool) -> None:
 
     Example: mbma plan examples/scene_joint.toml
     """
-    from mbma_tables.scenes.advice import advice
-    from mbma_tables.scenes.scene import Scene
+    from mbma_tables.scenes.scene import Scene, advice
 
     scene = Scene.from_toml(file)
     if not as_json:

@@ -71,16 +71,13 @@ def law_text(
 
 
 class AskedLaw(NamedTuple):
-    """A law and what every file of it says; conductance is `ratio` times the tangent, NaN where it was not asked.
-
-    `more` has the units of what was asked of `MORE`.
-    """
+    """A law and what every file of it says."""
 
     joint: Joint
     numbers: LawNumbers
     flow: FlowNumbers | None
-    ratio: float
-    more: dict[str, str]
+    ratio: float  # of conductance to the tangent; NaN where it was not asked
+    more: dict[str, str]  # units of what was asked of `MORE`
     said: tuple[str, ...]
 
 
@@ -213,10 +210,7 @@ def _example(joint: Joint, language: Language) -> str:
 
 
 def core_text(sources: Iterable[str], prefix: str) -> str:
-    """Sources of the core and their headers as one text, unchanged but for the lines that include them.
-
-    Their functions begin with a prefix there, so that a program may hold several such texts.
-    """
+    """Sources of the core and their headers as one text; a prefix to their functions lets a program hold several."""
     texts = {name: core_file(name) for name in ("mbma.h", "elementary.h", *sources)}
     made = (name for text in texts.values() for name in _MADE.findall(text))
     renamed = [f"#define {name} {prefix}_{name}" for name in made]

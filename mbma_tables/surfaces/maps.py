@@ -75,10 +75,7 @@ def _refuse_edges(heights: FloatArray) -> None:
 
 
 def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2) -> Treated:
-    """A map, or a line scan, of a file, an array or a topography, treated; options as of `Surface.from_map`.
-
-    Without a number of `dimensions`, a file decides.
-    """
+    """A map or line scan, treated, with options of `Surface.from_map`; without `dimensions` a file decides which."""
     given = {name: value for name, value in options.items() if value is not None}
     for name in given.keys() & {"periodic", "reliable"}:
         if not isinstance(given[name], bool | np.bool_):
@@ -140,10 +137,7 @@ TOLD = 0.05  # relative difference of rms gradients that is told, and half of th
 
 
 def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> FloatArray:
-    """C of averaged samples, tilted a little so that its variance and mean square wavenumber are those of all waves.
-
-    The longest waves of a map are few, and samples do not reach half way to the next ones.
-    """
+    """C of averaged samples, tilted a little to the variance and mean square wavenumber of all waves."""
     from scipy.optimize import brentq
 
     def excess(tilt: float) -> float:
@@ -159,12 +153,10 @@ def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> Flo
 
 
 def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> FloatArray:
-    """C with another variance and mean squared gradient, by waves that are few: the longest, of a rough surface.
-
-    The likeliest change, where ln C is known as the inverse of the number of waves: it goes like C times 1 and q^2.
-    """
+    """C with another variance and mean squared gradient, by waves that are few: the longest, of a rough surface."""
     from scipy.optimize import least_squares
 
+    # the likeliest change, where ln C is known as the inverse of the number of waves: it goes like C times 1 and q^2
     ways = np.stack([C / C.max(), C * q**2 / (C * q**2).max()])
 
     def misses(by: FloatArray) -> FloatArray:
@@ -274,10 +266,8 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
         1 / (1 / bins.weight - SCATTER**2),
         curves.anisotropy,
     ).scaled(scale, treated.unit)
-    edges = "periodic" if treated.plain else "under a window for the spectrum"
-    edges += "" if treated.periodic else ", mirrored for the curves"
     return dataclasses.replace(
-        known, provenance=(treated.read, *treated.provenance, {"step": "edges", "kind": edges}, *notes)
+        known, provenance=treated.history(*notes, more="" if treated.periodic else ", mirrored for the curves")
     )
 
 

@@ -149,10 +149,8 @@ def measured_profile(treated: Treated, h_max: Any) -> SpectralSurface:
         heights,
         samples=np.interp(np.log(q), np.log(found.edges[:-1]), found.count),
     ).scaled(scale, treated.unit)
-    edges = "periodic" if treated.plain else "under a window for the spectrum"
     notes = _limits(found, steps[0] * scaled.heights.size)
-    provenance = (treated.read, *treated.provenance, {"step": "edges", "kind": edges}, *notes)
-    return dataclasses.replace(surface, provenance=provenance)
+    return dataclasses.replace(surface, provenance=treated.history(*notes))
 
 
 def _limits(found: ProfileSpectrum, length: float) -> tuple[dict[str, Any], ...]:

@@ -32,11 +32,7 @@ def measured_surface(
 
 
 def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
-    """A measured spectrum continued to a shorter wavelength [length] by a power law that is stated, not measured.
-
-    C goes like q^(-2-2H), from the mean level of the last measured octave; the record says what that changes. Curves of
-    the map's tops and valleys are left out: they are not known of the waves added.
-    """
+    """A measured spectrum continued to a shorter wavelength [length] by a power law that is stated, not measured."""
     wave, exponent = (
         number_in("extrapolate_to", Units(surface.unit).number("extrapolate_to", shortest), 1e-30, 1e30),
         number_in("extrapolate_hurst", hurst, 0.0, 1.0),
@@ -46,12 +42,14 @@ def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
         raise InputError(
             f"extrapolate_to must be below the shortest measured wavelength, {2 * math.pi / last:.6g}, got {wave:g}"
         )
+    # from the mean level of the last measured octave
     slope = 2 + 2 * exponent
     octave = last / 2 * 2 ** ((np.arange(STEPS_PER_OCTAVE) + 0.5) / STEPS_PER_OCTAVE)
     known = np.asarray(surface.power_spectrum(octave))
     level = float(np.mean(np.log(known[known > 0]) + slope * np.log(octave[known > 0])))
     q = np.geomspace(last, end, max(2, math.ceil(math.log2(end / last) * STEPS_PER_OCTAVE) + 1))
     samples = None if surface.samples is None else np.append(surface.samples, np.full(q.size, surface.samples[-1]))
+    # curves of the map's tops and valleys are not known of the waves added
     C = np.append(surface.C, np.exp(level - slope * np.log(q)))
     longer = dataclasses.replace(surface, q=np.append(surface.q, q), C=C, samples=samples, bearing=None, bands=None)
     area = float(surface.rms_gradient / longer.rms_gradient)

@@ -173,13 +173,7 @@ class SpectralSurface(AnySurface):
         return float(q[self.laws.between(0, start, end).argmax()])
 
     def departures(self, by_map: bool = False) -> tuple[str, ...]:
-        """Why it lies outside of the surfaces that boundary elements were compared with.
-
-        Parameters
-        ----------
-        by_map : bool
-            Whether the answer takes the map's tops and valleys; else it is of an isotropic Gaussian surface.
-        """
+        """Why it lies outside of the surfaces that BEM was compared with, as a map or as an isotropic Gaussian one."""
         tested = BY_MAP if by_map else BY_SPECTRUM
         known = {"skewness of heights": self.skewness, "kurtosis of heights": self.kurtosis}
         if self.bearing is not None:

@@ -108,6 +108,11 @@ class Treated:
         record = {"step": "read", "points": list(shape), "steps": list(self.steps), "unit": self.unit}
         return record | {"told": told}
 
+    def history(self, *notes: Mapping[str, Any], more: str = "") -> Provenance:
+        """All steps of a surface made of it: reading, treatment, what was done at the edges, and notes."""
+        edges = ("periodic" if self.plain else "under a window for the spectrum") + more
+        return (self.read, *self.provenance, {"step": "edges", "kind": edges}, *notes)
+
     @property
     def plain(self) -> bool:
         """Whether the spectrum is taken without a window: where periodic, unless one is asked for."""
@@ -138,10 +143,7 @@ def treat(
     unit: str | None = None,
     info: Mapping[str, Any] | None = None,
 ) -> Treated:
-    """Heights [length] made ready for their spectrum, of a map or a line scan; NaN and masked points are undefined.
-
-    `info` is what the file says of its instrument, as in SurfaceTopography.
-    """
+    """Heights [length] made ready for their spectrum; NaN and masked points are undefined, `info` is the file's."""
     heights = heights_of(grid, len(steps))
     if min(heights.shape) < MIN_GRID:
         raise InputError(
