@@ -142,40 +142,27 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
 
 def _option(name: str, help: str, **kind: Any) -> Decorator:
     """The option of one argument of the library, by its name; of a quantity where no other kind is said."""
-    flag = f"--{name.replace('_', '-')}"
-    return (
-        click.option(flag, name.partition("/")[0], help=help, **kind)
-        if kind
-        else quantity_option(flag, name, help=help)
-    )
+    flag, kind = f"--{name.replace('_', '-')}", kind or {"callback": _parse_number, "metavar": "X[UNIT]"}
+    return click.option(flag, name.partition("/")[0], help=help, **kind)
 
 
-def _options(table: Mapping[str, str | tuple[str, dict[str, Any]]]) -> tuple[Decorator, ...]:
-    """Options of a table: by argument its help, and its kind where it is no quantity."""
-    rows = {name: row if isinstance(row, tuple) else (row, {}) for name, row in table.items()}
-    return tuple(_option(name, help, **kind) for name, (help, kind) in rows.items())
-
-
-NUMBER: dict[str, Any] = {"type": float}
 PATH: Any = click.Path(path_type=Path)
 # of `MAP_OPTIONS`, in the words of `mbma_tables.surfaces.treatment.Treatment`
-_MAP_OPTIONS = _options(
-    {
-        "dx": "Sampling step [length], of a map whose file has none;",
-        "dy": "and along its second axis, if another.",
-        "channel": ("Number of the map's channel in its file.", {"type": int}),
-        "periodic/--not-periodic": ("Whether the map continues periodically.", {"default": None}),
-        "detrend": ("What to subtract: mean, plane, quadratic, or a mode of SurfaceTopography.", {"metavar": "MODE"}),
-        "outliers": ("Take out points N standard deviations off; try 10.", NUMBER | {"metavar": "N"}),
-        "fill": ("Fill undefined points, however many.", {"metavar": "harmonic"}),
-        "short_cutoff": "Shortest wavelength to keep [length], the resolution.",
-        "long_cutoff": "Longest wavelength to keep [length].",
-        "tip_radius": "Of the probe or stylus [length]: keep what it can follow.",
-        "reliable/--all-waves": ("Whether the file's own resolution counts.", {"default": None}),
-        "window": ("Window of the power spectrum, hann by default.", {"metavar": "NAME"}),
-        "extrapolate_to": "Continue the spectrum to this wavelength [length],",
-        "extrapolate_hurst": ("by this Hurst exponent.", NUMBER),
-    }
+_MAP_OPTIONS = (
+    _option("dx", "Sampling step [length], of a map whose file has none;"),
+    _option("dy", "and along its second axis, if another."),
+    _option("channel", "Number of the map's channel in its file.", type=int),
+    _option("periodic/--not-periodic", "Whether the map continues periodically.", default=None),
+    _option("detrend", "What to subtract: mean, plane, quadratic, or a mode of SurfaceTopography.", metavar="MODE"),
+    _option("outliers", "Take out points N standard deviations off; try 10.", type=float, metavar="N"),
+    _option("fill", "Fill undefined points, however many.", metavar="harmonic"),
+    _option("short_cutoff", "Shortest wavelength to keep [length], the resolution."),
+    _option("long_cutoff", "Longest wavelength to keep [length]."),
+    _option("tip_radius", "Of the probe or stylus [length]: keep what it can follow."),
+    _option("reliable/--all-waves", "Whether the file's own resolution counts.", default=None),
+    _option("window", "Window of the power spectrum, hann by default.", metavar="NAME"),
+    _option("extrapolate_to", "Continue the spectrum to this wavelength [length],"),
+    _option("extrapolate_hurst", "by this Hurst exponent.", type=float),
 )
 length_unit = functools.partial(
     click.option, "--length-unit", metavar="UNIT", help="Unit of plain lengths and of the answer, such as mm."
@@ -194,36 +181,32 @@ _SPECIMEN_OPTIONS = (
     _option("map", "Surface: a measured map or line scan.", type=PATH, metavar="MAP"),
     *_MAP_OPTIONS,
     _option("model", "Of a map: its own spectrum, or five numbers.", type=click.Choice(("measured", "self-affine"))),
-    *_options(
-        {
-            "hurst": ("Surface in numbers: Hurst exponent, in (0, 1].", NUMBER),
-            "q0": "Smallest wavenumber [1/length].",
-            "q1": "Largest wavenumber [1/length]; or give --zeta-1.",
-            "zeta_1": ("Largest magnification q1/q0, above 3.", NUMBER),
-            "h_rms": "Root-mean-square height [length].",
-            "h_max": "Highest point above the mid-plane [length].",
-            "m0": "Surface by moments: hurst, h_max, variance of height [length^2],",
-            "m2": ("variance of a profile's slope,", NUMBER),
-            "m4": "variance of a profile's second derivative [1/length^2].",
-            "Rq": "Surface by a drawing: rms height of a profile [length], with hurst, h_max,",
-            "Ra": "or its mean absolute height,",
-            "Sq": "or rms height of a map,",
-            "Sa": "or mean absolute height of a map;",
-            "Rdq": "rms slope of a profile,",
-            "Sdq": "or rms gradient of a map,",
-            "Rsm": "or mean spacing of a profile's elements [length];",
-            "longest": "longest wave [length],",
-            "shortest": "or shortest wave [length],",
-            "Sds": "or summits per area [1/length^2],",
-            "Spd": "the same by its newer name;",
-            "Sp": "highest point of a map [length] in place of --h-max.",
-            "E_star": "Effective modulus; export needs one, elsewhere forces are over E* without it.",
-            "E1": "Instead of --E-star: Young's modulus,",
-            "nu1": ("and Poisson's ratio of one body,", NUMBER),
-            "E2": "Young's modulus of the other,",
-            "nu2": ("and its Poisson's ratio.", NUMBER),
-        }
-    ),
+    _option("hurst", "Surface in numbers: Hurst exponent, in (0, 1].", type=float),
+    _option("q0", "Smallest wavenumber [1/length]."),
+    _option("q1", "Largest wavenumber [1/length]; or give --zeta-1."),
+    _option("zeta_1", "Largest magnification q1/q0, above 3.", type=float),
+    _option("h_rms", "Root-mean-square height [length]."),
+    _option("h_max", "Highest point above the mid-plane [length]."),
+    _option("m0", "Surface by moments: hurst, h_max, variance of height [length^2],"),
+    _option("m2", "variance of a profile's slope,", type=float),
+    _option("m4", "variance of a profile's second derivative [1/length^2]."),
+    _option("Rq", "Surface by a drawing: rms height of a profile [length], with hurst, h_max,"),
+    _option("Ra", "or its mean absolute height,"),
+    _option("Sq", "or rms height of a map,"),
+    _option("Sa", "or mean absolute height of a map;"),
+    _option("Rdq", "rms slope of a profile,"),
+    _option("Sdq", "or rms gradient of a map,"),
+    _option("Rsm", "or mean spacing of a profile's elements [length];"),
+    _option("longest", "longest wave [length],"),
+    _option("shortest", "or shortest wave [length],"),
+    _option("Sds", "or summits per area [1/length^2],"),
+    _option("Spd", "the same by its newer name;"),
+    _option("Sp", "highest point of a map [length] in place of --h-max."),
+    _option("E_star", "Effective modulus; export needs one, elsewhere forces are over E* without it."),
+    _option("E1", "Instead of --E-star: Young's modulus,"),
+    _option("nu1", "and Poisson's ratio of one body,", type=float),
+    _option("E2", "Young's modulus of the other,"),
+    _option("nu2", "and its Poisson's ratio.", type=float),
     length_unit(),
     stress_unit_option,
 )
