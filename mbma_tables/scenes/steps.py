@@ -95,21 +95,16 @@ def _keep(run: Run, quantity: Callable[[str], Any]) -> None:
     values: dict[str, Any] = {}
     if problem.prescribed in INVERTED:
         values["nominal_pressure" if problem.prescribed == "pressures" else "prescribed_area"] = problem.gaps
-    if "force" in wanted:
-        values["force"] = quantity("force")
-    if "area" in wanted and "subscale_area" not in problem.dropped:
-        values["area"] = quantity("area")
-    if "stiffness" in wanted:
-        values["stiffness"] = quantity("stiffness")
-    if "conductance" in wanted:
-        from mbma_tables.totals.conductance import conductance, mean_conductivity
+    for name in ("force", "area", "stiffness", "conductance", "energy"):
+        if name == "conductance" and name in wanted:
+            from mbma_tables.totals.conductance import conductance, mean_conductivity
 
-        assert problem.conductivities is not None
-        # yielded points unload elastically
-        slope = quantity("stiffness" if problem.hardness is None else "incremental_stiffness")
-        values["conductance"] = conductance(slope, mean_conductivity(*problem.conductivities), problem.E_star)
-    if "energy" in wanted:
-        values["energy"] = quantity("energy")
+            assert problem.conductivities is not None
+            # yielded points unload elastically
+            slope = quantity("stiffness" if problem.hardness is None else "incremental_stiffness")
+            values[name] = conductance(slope, mean_conductivity(*problem.conductivities), problem.E_star)
+        elif name in wanted and not (name == "area" and "subscale_area" in problem.dropped):
+            values[name] = quantity(name)
     run.found |= {name: (("gap",), array) for name, array in values.items()}
 
 

@@ -27,10 +27,6 @@ MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
 USUAL, USUAL_DEVIATES = 0.99, 2.576  # share of points that set the scale of differences, and where it ends if Gaussian
 MIN_POWER = 1e-24  # of the strongest wave: below it rounding, not a measured wave
 LENGTHS = ("short_cutoff", "long_cutoff", "tip_radius")  # options that are lengths
-OPTIONS = (
-    *("unit", "dx", "dy", "channel", "periodic", "detrend", "outliers", "fill", "short_cutoff", "long_cutoff"),
-    *("tip_radius", "reliable", "window"),
-)  # of `Surface.from_map` and `Surface.from_profile`, about what is read and done to it
 Provenance = tuple[Mapping[str, Any], ...]
 
 
@@ -76,6 +72,10 @@ class Treatment:
         for name, allowed in (("fill", FILLS), ("detrend", DETRENDS)):
             if getattr(self, name) not in (None, *allowed):
                 raise InputError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
+
+
+# of `Surface.from_map` and `Surface.from_profile`, about what is read and done to it
+OPTIONS = ("unit", "dx", "dy", "channel", "periodic", *(field.name for field in dataclasses.fields(Treatment)))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
