@@ -1,4 +1,4 @@
-"""Node values of uniform tensor splines to B-spline coefficients; `mbma_tables.tablefiles.splines` evaluates them.
+"""Node values of uniform tensor splines to B-spline coefficients; `models.island4d` evaluates them.
 
 On an axis of n equally spaced nodes a spline of odd degree k has n + k - 1 coefficients of cardinal B-splines,
 centred at the nodes and at (k - 1)/2 places beyond either end. Interpolation and not-a-knot conditions fix them.
@@ -11,9 +11,13 @@ import functools
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.tablefiles.splines import padding
 
 TAPS = {3: (1 / 6, 4 / 6, 1 / 6), 5: (1 / 120, 26 / 120, 66 / 120, 26 / 120, 1 / 120)}
+
+
+def padding(degree: int) -> int:
+    """Coefficients beyond each end of an axis."""
+    return (degree - 1) // 2
 
 
 @functools.lru_cache(maxsize=32)

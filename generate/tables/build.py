@@ -20,9 +20,9 @@ from generate.tables.writing import error_cells, labels_of_nodes
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import MbmaError
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.models.island4d import at_places
 from mbma_tables.tablefiles.checks import check_content
 from mbma_tables.tablefiles.schema import DEGREE, FUNCTIONS, Axis, TableContent, error_cell
-from mbma_tables.tablefiles.splines import at_places
 
 BLAS_THREADS = 2  # as when the shipped tables were made
 LINES = 24  # sample lines along an axis that decide its resolution

@@ -13,7 +13,6 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.tablefiles import schema
-from mbma_tables.tablefiles.splines import padding
 
 MAX_LOG_RATIO = 100.0  # of a ratio to the rigid sphere; those of the shipped tables are below 20
 MAX_BUCKETS, MAX_STEPS = 4096, 30_000  # of mu, eight an octave, and of X
@@ -64,7 +63,7 @@ def _check_axis(axis: schema.Axis) -> None:
 def _check_nodes(content: schema.TableContent) -> None:
     """Raise ValueError where the values of a table are not over the nodes of its axes."""
     nodes = tuple(axis.nodes for axis in content.axes)
-    knots = tuple(count + 2 * padding(schema.DEGREE) for count in nodes)
+    knots = tuple(count + schema.DEGREE - 1 for count in nodes)
     cells = content.local_error.shape[:-1]
     values = [content.auxiliary[f"log_ratio_{function}"][1] for function in schema.FUNCTIONS]
     if any(array.shape != nodes for array in values) or content.coefficients.shape[:-1] != knots:
