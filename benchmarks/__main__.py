@@ -37,8 +37,8 @@ from generate.pages import page
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
 from mbma_tables.calibrated import Law, Spectrum
 from mbma_tables.files import shipped_file
+from mbma_tables.models.island4d import at_places
 from mbma_tables.tablefiles.schema import TableContent
-from mbma_tables.tablefiles.splines import at_places
 from mbma_tables.theories import Calibrated
 from mbma_tables.theories.calibrated_table import shipped
 

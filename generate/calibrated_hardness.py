@@ -18,10 +18,10 @@ from scipy.optimize import least_squares
 from generate.boundary_elements.design import SPLITS, TRAINING
 from generate.boundary_elements.evidence import GAUSSIAN, LEVELS, Capped, capped
 from generate.calibrated_file import write_part
+from generate.provenance import source_digest, versions
 from mbma_tables import Surface, contact
 from mbma_tables import hardness as cap
 from mbma_tables.arguments import FloatArray
-from mbma_tables.tablefiles.provenance import source_digest, versions
 from mbma_tables.theories import calibrated_table, get_theory
 from mbma_tables.theories.yielding import GROUP, QUANTITIES, Scatter, Yielding
 

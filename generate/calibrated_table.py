@@ -18,11 +18,11 @@ from scipy.interpolate import PchipInterpolator, make_interp_spline
 
 from generate.boundary_elements.evidence import Case
 from generate.calibrated_file import write_part
+from generate.provenance import source_digest, versions
+from generate.splines import coefficients
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import Constants, Law, Spectrum
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.tablefiles.provenance import source_digest, versions
-from mbma_tables.tablefiles.splines import coefficients
 from mbma_tables.theories.asperities import GreenwoodWilliamson
 from mbma_tables.theories.calibrated_table import AXES, QUANTITIES, load
 from mbma_tables.theories.mbma import Mbma

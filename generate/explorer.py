@@ -2,13 +2,45 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import pathlib
+from typing import Any
 
 import click
 
 from generate.pages.page import ROOT
-from mbma_tables.export.explorer import MODULE, c_sources, compiled
+from mbma_tables.export import c_code
+from mbma_tables.export.code import web_assembly
+from mbma_tables.export.explorer import MODULE
 from mbma_tables.files import write_file
+from mbma_tables.models.tables import universal_model
+from mbma_tables.surfaces.readings import REPORTED
+
+FUNCTIONS = (
+    *("mbma_total_of", "mbma_calibrated_of", "mbma_message", "mbma_spectrum_of", "mbma_surface_spectrum_of"),
+    *("mbma_spectrum_contact_of", "mbma_spectrum_separation_of"),
+)
+
+
+def c_sources() -> tuple[dict[str, str], dict[str, Any]]:
+    """The C of the page by file, and the tables that are variables in it by name."""
+    model, heads = universal_model(), dict.fromkeys(c_code.MODEL, "")
+    data = {"mbma_data.c": c_code.data_text(model, REPORTED, later=True)}
+    return c_code.core_texts() | c_code.model_texts(heads) | data, c_code.tables(model)
+
+
+def compiled(texts: dict[str, str], names: list[str]) -> bytes:
+    """The module, with the digest of what it was compiled from in a section of its own at the end."""
+    section = b"\x06digest" + digest_of(texts)
+    # two numbers at a time, which browsers have learned by 2023
+    module = web_assembly(texts, [*FUNCTIONS, "MBMA_READING", *names], "-msimd128")
+    return module + bytes([0, len(section)]) + section
+
+
+def digest_of(texts: dict[str, str]) -> bytes:
+    """Of what the module is compiled from."""
+    return hashlib.sha256(json.dumps(texts, sort_keys=True).encode()).digest()
 
 
 @click.command()

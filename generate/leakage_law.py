@@ -21,12 +21,12 @@ from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFAC
 from generate.calibrated_file import write_part
 from generate.calibrated_table import TheoryCurve
 from generate.leakage_flow import MIN_WAVES, Case, Flow, cases, log_odds
+from generate.provenance import source_digest, versions
+from generate.splines import coefficients
 from mbma_tables import leakage
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import Constants, Spectrum
 from mbma_tables.leakage import FlowConstants
-from mbma_tables.tablefiles.provenance import source_digest, versions
-from mbma_tables.tablefiles.splines import coefficients
 from mbma_tables.theories.asperities import GreenwoodWilliamson
 from mbma_tables.theories.calibrated_table import load
 from mbma_tables.theories.mbma import Mbma

@@ -8,32 +8,32 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from mbma_tables.errors import (
-    ConvergenceError,
-    InputError,
-    MbmaError,
-    NotSelfAffineError,
-    OutOfRangeError,
-    TableFileError,
-)
+from mbma_tables.errors import ConvergenceError as ConvergenceError
+from mbma_tables.errors import InputError as InputError
+from mbma_tables.errors import MbmaError as MbmaError
+from mbma_tables.errors import NotSelfAffineError as NotSelfAffineError
+from mbma_tables.errors import OutOfRangeError as OutOfRangeError
+from mbma_tables.errors import TableFileError as TableFileError
 
 if TYPE_CHECKING:
-    from mbma_tables import theories
-    from mbma_tables.islands import greenwood_tripp
-    from mbma_tables.islands.height_integrals import height_integral
-    from mbma_tables.models.tables import open_table
-    from mbma_tables.scenes.scene import Scene
-    from mbma_tables.surfaces.readings import Reading
-    from mbma_tables.surfaces.surface import Surface
-    from mbma_tables.theories.contact import contact
-    from mbma_tables.theories.law import contact_law
-    from mbma_tables.theories.law_object import ContactLaw
-    from mbma_tables.theories.result import Contact
-    from mbma_tables.theories.unknowns import sensitivity
-    from mbma_tables.totals.island import Island, island
+    from mbma_tables import theories as theories
+    from mbma_tables.islands import greenwood_tripp as greenwood_tripp
+    from mbma_tables.islands.height_integrals import height_integral as height_integral
+    from mbma_tables.models.tables import open_table as open_table
+    from mbma_tables.scenes.scene import Scene as Scene
+    from mbma_tables.surfaces.readings import Reading as Reading
+    from mbma_tables.surfaces.surface import Surface as Surface
+    from mbma_tables.theories.contact import contact as contact
+    from mbma_tables.theories.law import contact_law as contact_law
+    from mbma_tables.theories.law_object import ContactLaw as ContactLaw
+    from mbma_tables.theories.result import Contact as Contact
+    from mbma_tables.theories.unknowns import sensitivity as sensitivity
+    from mbma_tables.totals.island import Island as Island
+    from mbma_tables.totals.island import island as island
 
 __version__ = "0.1.0"
 
+_ERRORS = tuple(name for name in globals() if name.endswith("Error"))
 _HOMES = {
     "Contact": "mbma_tables.theories.result",
     "Island": "mbma_tables.totals.island",
@@ -48,33 +48,9 @@ _HOMES = {
     "open_table": "mbma_tables.models.tables",
     "sensitivity": "mbma_tables.theories.unknowns",
 }
-_MODULES = {
-    "greenwood_tripp": "mbma_tables.islands.greenwood_tripp",
-    "theories": "mbma_tables.theories",
-}
+_MODULES = {"greenwood_tripp": "mbma_tables.islands.greenwood_tripp", "theories": "mbma_tables.theories"}
 
-__all__ = [
-    "Contact",
-    "ContactLaw",
-    "ConvergenceError",
-    "InputError",
-    "Island",
-    "MbmaError",
-    "NotSelfAffineError",
-    "OutOfRangeError",
-    "Reading",
-    "Scene",
-    "Surface",
-    "TableFileError",
-    "contact",
-    "contact_law",
-    "greenwood_tripp",
-    "height_integral",
-    "island",
-    "open_table",
-    "sensitivity",
-    "theories",
-]
+__all__ = sorted([*_ERRORS, *_HOMES, *_MODULES])
 
 
 def __getattr__(name: str) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import MbmaError, NotSelfAffineError, OutOfRangeError
 from mbma_tables.plots import new_figure, theory_label
-from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories import get_theory
 from mbma_tables.theories.protocol import answer_where_finite

@@ -74,12 +74,7 @@ _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(.*)", re.D
 
 
 def known(unit: Any, kind: str = "length") -> str:
-    """A unit's name as this package writes it.
-
-    Raises
-    ------
-    InputError
-        For what is no unit of that kind; the message names the nearest ones.
+    """A unit's name as this package writes it; what is no unit of that kind is refused with the nearest ones.
 
     Examples
     --------
@@ -111,11 +106,6 @@ def factor(have: str, want: str, kind: str = "length", power: int = 1) -> float:
 
 def read(name: str, text: str) -> tuple[float, str | None]:
     """A number and the unit of length or stress that a text gives it, None where it gives none.
-
-    Raises
-    ------
-    InputError
-        For what is no number, and for a unit that `name` cannot have.
 
     Examples
     --------
@@ -162,11 +152,6 @@ class Units:
 
     def number(self, name: str, value: Any) -> Any:
         """`value` in these units: plain numbers as they are, "0.8 um" converted, lists entry by entry.
-
-        Raises
-        ------
-        InputError
-            Where a unit is given and none is known.
 
         Examples
         --------
@@ -233,11 +218,6 @@ def resolve(
     given: Mapping[str, Any], asked: str | None = None, kind: str = "length"
 ) -> tuple[dict[str, Any], str | None]:
     """Numbers in one unit of length or stress, and that unit: the one asked for, else the first that is named.
-
-    Raises
-    ------
-    InputError
-        Where some name a unit and others, which need one too, do not, and none is asked for.
 
     Examples
     --------

@@ -16,7 +16,7 @@ import xarray
 from independent_reader import Reader, height_integral, seal_matches
 from small_tables import KINDS, small_table
 
-from mbma_tables.tablefiles.netcdf import write_table
+from generate.tables.writing import write_table
 
 SHIPPED = pathlib.Path(__file__).parents[1] / "tables"
 

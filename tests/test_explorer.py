@@ -17,8 +17,9 @@ import numpy as np
 import pytest
 from helpers import random_map, refused, run
 
+from generate.explorer import c_sources, digest_of
 from mbma_tables import InputError, Surface, contact
-from mbma_tables.export.explorer import MODULE, c_sources, digest_of, explorer_page, packed, page_file
+from mbma_tables.export.explorer import MODULE, explorer_page, packed, page_file
 from mbma_tables.theories import Mbma
 
 QUANTITIES = {"gap": "mean_separation", "force": "force", "area": "area", "stiffness": "stiffness"}

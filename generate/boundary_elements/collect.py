@@ -14,10 +14,10 @@ import xarray as xr
 
 from generate.boundary_elements import capped
 from generate.boundary_elements.design import SPLITS, Task
+from generate.provenance import source_digest, versions
 from mbma_tables import bearing
 from mbma_tables.boundary_elements import TOLERANCE
 from mbma_tables.errors import InputError
-from mbma_tables.tablefiles.provenance import source_digest, versions
 
 MODULES = (
     "generate.boundary_elements.surfaces",

@@ -25,8 +25,8 @@ from mbma_tables.calibrated_map import MAP_CONSTANTS
 from mbma_tables.errors import MbmaError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import matched
-from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import REPORTED, Reading
+from mbma_tables.surfaces.surface import MeasuredSurface
 
 LOW, HIGH = 0.01, 0.97  # A/A0 of the simulations between which distances are summed up
 COVER = dataclasses.replace(REPORTED, name="reported, areas as a cover", addition="cover")

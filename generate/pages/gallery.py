@@ -19,7 +19,7 @@ from mbma_tables.errors import MbmaError
 from mbma_tables.files import write_file
 from mbma_tables.measurement import curves, described, draw
 from mbma_tables.scenes.specimen import measured
-from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import BoundaryElements, get_theory
 from mbma_tables.theories.protocol import Theory, answer_where_finite
 from mbma_tables.theories.simulated import continued

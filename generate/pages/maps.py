@@ -14,7 +14,7 @@ from mbma_tables import Surface, contact
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import MbmaError
 from mbma_tables.scenes.specimen import measured
-from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import get_theory
 
 KINDS = ("stretched", "peaks", "valleys", "patchy", "worn")

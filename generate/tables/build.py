@@ -13,22 +13,16 @@ import scipy.ndimage
 from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
+from generate.splines import coefficients
 from generate.tables.chunks import ChunkedSolver
 from generate.tables.configuration import Configuration
+from generate.tables.writing import error_cells, labels_of_nodes
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import MbmaError
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.models.island4d import at_places
 from mbma_tables.tablefiles.checks import check_content
-from mbma_tables.tablefiles.schema import (
-    DEGREE,
-    FUNCTIONS,
-    Axis,
-    TableContent,
-    error_cell,
-    error_cells,
-    labels_of_nodes,
-)
-from mbma_tables.tablefiles.splines import at_places, coefficients
+from mbma_tables.tablefiles.schema import DEGREE, FUNCTIONS, Axis, TableContent, error_cell
 
 BLAS_THREADS = 2  # as when the shipped tables were made
 LINES = 24  # sample lines along an axis that decide its resolution

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from generate.provenance import SOLVER, source_digest, versions
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import MbmaError
 from mbma_tables.files import write_file
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.tablefiles.provenance import SOLVER, digest_arrays, digest_json, source_digest, versions
+from mbma_tables.tablefiles.netcdf import digest_arrays, digest_json
 
 CHUNK = 2000
 Work = Callable[..., FloatArray]

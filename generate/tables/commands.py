@@ -18,8 +18,8 @@ from generate.tables.chunks import ChunkedSolver, WorkerError
 from generate.tables.configuration import MIN_SHIPPED_POINTS, Configuration, load
 from generate.tables.island4d import Island4d
 from generate.tables.universal import Universal
+from generate.tables.writing import write_table
 from mbma_tables.errors import InputError
-from mbma_tables.tablefiles.netcdf import write_table
 from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL, TableContent
 
 TABLES = pathlib.Path(__file__).parents[2] / "tables"

@@ -12,7 +12,7 @@ from mbma_tables.arguments import number_in, whole_number_in
 from mbma_tables.errors import InputError
 from mbma_tables.files import read_file
 from mbma_tables.surfaces.readings import get_reading
-from mbma_tables.tablefiles.provenance import digest_json
+from mbma_tables.tablefiles.netcdf import digest_json
 from mbma_tables.tablefiles.schema import AXES, ISLAND4D, UNIVERSAL, Axis
 
 HERE = pathlib.Path(__file__).parent

@@ -20,13 +20,14 @@ from numpy.typing import NDArray
 from generate.tables.build import ConformancePoints, UncertifiedError, evaluate
 from generate.tables.configuration import Configuration, make_axis
 from generate.tables.universal import MAX_DRAWS, visited_surfaces
+from generate.tables.writing import SYMBOLS, numbered
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, band_fields, from_axes, to_axes
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.surfaces.spectrum import BROADENING
-from mbma_tables.tablefiles.schema import SYMBOLS, Axis, TableContent, numbered
+from mbma_tables.tablefiles.schema import Axis, TableContent
 
 LOOKUP = (
     "given delta_over_h_rms, zeta_d, zeta_u, hurst; delta_over_h_rms is the approach read at zeta_1 without bound, "

@@ -21,22 +21,14 @@ from generate.tables.build import (
 )
 from generate.tables.chunks import ChunkedSolver, phi
 from generate.tables.configuration import Configuration
+from generate.tables.writing import SYMBOLS, labels_of_cells, numbered
 from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.models.universal import TERMS, UniversalModel, fractions_of_mu
 from mbma_tables.surfaces.readings import READINGS
 from mbma_tables.tablefiles.checks import check_content
-from mbma_tables.tablefiles.schema import (
-    BUCKET_BITS,
-    CELL_EDGES,
-    SYMBOLS,
-    X_STEPS,
-    Axis,
-    TableContent,
-    labels_of_cells,
-    numbered,
-)
+from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, Axis, TableContent
 
 LOOKUP = (
     "X = (delta - h_d)/sigma and mu = (8/3) D sigma sqrt(2 R_u R_d) of the island, in any consistent units",

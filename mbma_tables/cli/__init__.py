@@ -15,15 +15,7 @@ from typing import Any
 import click
 
 from mbma_tables import __version__
-from mbma_tables.cli import progress
-from mbma_tables.cli.batch import batch_command
-from mbma_tables.cli.commands import contact_command, curve_command, island_command, surfaces_command
-from mbma_tables.cli.cost import cost_command
-from mbma_tables.cli.export import explore_command, export_command
-from mbma_tables.cli.fit import fit_command
-from mbma_tables.cli.scene import plan_command, run_command
-from mbma_tables.cli.sensitivity import sensitivity_command
-from mbma_tables.cli.tables import tables_group
+from mbma_tables.cli import batch, commands, export, progress, scene, sensitivity, tables
 from mbma_tables.errors import MbmaError
 
 BAD_INPUT = 2
@@ -125,18 +117,18 @@ def main(context: click.Context) -> None:
 
 
 for command in (
-    contact_command,
-    curve_command,
-    batch_command,
-    island_command,
-    surfaces_command,
-    fit_command,
-    sensitivity_command,
-    tables_group,
-    plan_command,
-    run_command,
-    cost_command,
-    export_command,
-    explore_command,
+    commands.contact_command,
+    commands.curve_command,
+    batch.batch_command,
+    commands.island_command,
+    commands.surfaces_command,
+    commands.fit_command,
+    sensitivity.sensitivity_command,
+    tables.tables_group,
+    scene.plan_command,
+    scene.run_command,
+    commands.cost_command,
+    export.export_command,
+    export.explore_command,
 ):
     main.add_command(command)

@@ -10,23 +10,15 @@ from typing import Any
 
 import click
 
+from mbma_tables.cli import options
 from mbma_tables.cli.commands import COLUMNS, contact_keywords
 from mbma_tables.cli.format import Report, shown_unit, to_columns
-from mbma_tables.cli.options import (
-    Model,
-    Output,
-    length_unit,
-    load_options,
-    output_options,
-    quantity_option,
-    stress_unit_option,
-    theory_options,
-)
 from mbma_tables.cli.progress import doing
 from mbma_tables.errors import InputError
 from mbma_tables.files import read_file
 from mbma_tables.scenes.specimen import MATERIAL, NUMBERS, Specimen, effective_modulus_of, from_name, from_numbers
-from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.surfaces.self_affine import PARAMETERS
+from mbma_tables.surfaces.surface import Surface
 
 MAX_BYTES = 64 * 2**20
 LOADS = ("separation", "mean_separation", "pressure", "area")
@@ -34,22 +26,22 @@ LOADS = ("separation", "mean_separation", "pressure", "area")
 
 @click.command("batch", short_help="Many surfaces from a CSV file.")
 @click.argument("file", metavar="SURFACES.csv", type=click.Path(path_type=Path))
-@load_options(quantity_option)
-@quantity_option(
+@options.load_options(options.quantity_option)
+@options.quantity_option(
     "--E-star", "E_star", help="Effective modulus of lines that name none; without one forces are over E*."
 )
-@length_unit()
-@stress_unit_option
-@theory_options
-@output_options
+@options.length_unit()
+@options.stress_unit_option
+@options.theory_options
+@options.output_options
 def batch_command(
     file: Path,
     loads: dict[str, Any],
     E_star: Any,
     length_unit: str | None,
     stress_unit: str | None,
-    model: Model,
-    output: Output,
+    model: options.Model,
+    output: options.Output,
 ) -> None:
     """A row of the answer for each line of SURFACES.csv.
 

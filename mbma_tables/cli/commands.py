@@ -1,9 +1,9 @@
-"""The commands `mbma contact`, `curve`, `island` and `surfaces`."""
+"""The commands `mbma contact`, `curve`, `island`, `surfaces`, `fit` and `cost`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,21 +11,9 @@ import click
 import numpy as np
 
 from mbma_tables.arguments import finite_array
-from mbma_tables.cli.format import SURFACE_NUMBERS, Report, report_answer, shown_unit, to_columns
-from mbma_tables.cli.options import (
-    Model,
-    Output,
-    check_plot,
-    leakage_option,
-    load_options,
-    model_options,
-    numbers_option,
-    output_options,
-    over_h_rms,
-    plot_option,
-    specimen_options,
-    theory_options,
-)
+from mbma_tables.cli import options
+from mbma_tables.cli.format import SURFACE_NUMBERS, Report, report_answer, shown_unit, to_columns, to_json
+from mbma_tables.cli.progress import echo
 from mbma_tables.errors import InputError
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.cases import CASES
@@ -33,7 +21,7 @@ from mbma_tables.surfaces.surface import Surface
 from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
-    from mbma_tables.scenes.run import OtherTheory
+    from mbma_tables.scenes.steps import OtherTheory
     from mbma_tables.theories.result import Contact
 
 MIN_DEPTH = 1e-3  # (h_max - d)/h_max at a curve's second point
@@ -54,7 +42,7 @@ def _numbers(name: str, given: list[float | str], specimen: Specimen, over_h_rms
     return finite_array(name, given) * specimen.surface.h_rms
 
 
-def contact_keywords(model: Model, specimen: Specimen) -> dict[str, Any]:
+def contact_keywords(model: options.Model, specimen: Specimen) -> dict[str, Any]:
     """Keywords for `contact`."""
     asked = {**vars(model), "E_star": 1.0 if specimen.E_star is None else specimen.E_star}
     cap = asked.pop("hardness")
@@ -62,21 +50,23 @@ def contact_keywords(model: Model, specimen: Specimen) -> dict[str, Any]:
 
 
 @click.command("contact", short_help="Force and area at given gaps, pressures or areas.")
-@load_options(numbers_option)
-@over_h_rms
-@leakage_option
-@numbers_option("--conductivity", help="Of both bodies, or of each: adds conductance. In W/(m^2 K) of '45 W/(m K)'.")
-@specimen_options
-@theory_options
-@output_options
+@options.load_options(options.numbers_option)
+@options.over_h_rms
+@options.leakage_option
+@options.numbers_option(
+    "--conductivity", help="Of both bodies, or of each: adds conductance. In W/(m^2 K) of '45 W/(m K)'."
+)
+@options.specimen_options
+@options.theory_options
+@options.output_options
 def contact_command(
     loads: dict[str, list[float | str]],
     over_h_rms: bool,
     leakage: bool,
     conductivity: list[float | str] | None,
     specimen: Specimen,
-    model: Model,
-    output: Output,
+    model: options.Model,
+    output: options.Output,
 ) -> None:
     """Force, real contact area and stiffness -dF/du at given gaps, pressures or areas.
 
@@ -129,13 +119,19 @@ def curve_gaps(h_max: float, points: int) -> Any:
 @click.command("curve", short_help="Force and area from first contact to full compression.")
 @click.option("--points", type=click.IntRange(min=MIN_POINTS), default=41, show_default=True, help="How many gaps.")
 @click.option("--compare", is_flag=True, help="Add all other theories, and Persson's simplified form.")
-@leakage_option
-@plot_option
-@specimen_options
-@theory_options
-@output_options
+@options.leakage_option
+@options.plot_option
+@options.specimen_options
+@options.theory_options
+@options.output_options
 def curve_command(
-    points: int, compare: bool, leakage: bool, plot: Path | None, specimen: Specimen, model: Model, output: Output
+    points: int,
+    compare: bool,
+    leakage: bool,
+    plot: Path | None,
+    specimen: Specimen,
+    model: options.Model,
+    output: options.Output,
 ) -> None:
     """Force and area from first contact (d = h_max) to full compression (d = -h_max).
 
@@ -146,9 +142,9 @@ def curve_command(
 
     Example: mbma curve --surface concrete --plot concrete.png
     """
-    check_plot(plot, output.out)
-    from mbma_tables.scenes.effects import COMPARED
-    from mbma_tables.scenes.run import other_theory
+    options.check_plot(plot, output.out)
+    from mbma_tables.scenes.problem import COMPARED
+    from mbma_tables.scenes.steps import other_theory
     from mbma_tables.theories.contact import contact
 
     surface, asked = specimen.surface, contact_keywords(model, specimen)
@@ -187,13 +183,13 @@ def _draw(
 
 
 @click.command("island", short_help="Contact islands at given approaches.")
-@numbers_option("--delta", help="Approach z_max - d of an island [length], positive; may be repeated.")
-@over_h_rms
-@specimen_options
-@model_options
-@output_options
+@options.numbers_option("--delta", help="Approach z_max - d of an island [length], positive; may be repeated.")
+@options.over_h_rms
+@options.specimen_options
+@options.model_options
+@options.output_options
 def island_command(
-    delta: list[float | str] | None, over_h_rms: bool, specimen: Specimen, model: Model, output: Output
+    delta: list[float | str] | None, over_h_rms: bool, specimen: Specimen, model: options.Model, output: options.Output
 ) -> None:
     """Band, radii, densities, force and area of contact islands at given approaches.
 
@@ -214,11 +210,100 @@ def island_command(
 
 
 @click.command("surfaces", short_help="The named surfaces.")
-@output_options
-def surfaces_command(output: Output) -> None:
+@options.output_options
+def surfaces_command(output: options.Output) -> None:
     """The paper's surfaces by name, with their numbers, each in its own unit of length."""
     cases, surfaces = CASES.values(), [Surface.named(name) for name in CASES]
     values: dict[str, Any] = {"name": list(CASES), "length_unit": [case.length_unit for case in cases]}
     values |= {name: [getattr(surface, name) for surface in surfaces] for name in SURFACE_NUMBERS}
     values["title"] = [case.title for case in cases]
     Report("surfaces", "the paper's cases", [], {}, to_columns(values, {})).write(output)
+
+
+@click.command("fit", short_help="What a measured map or line scan says, and how it touches.")
+@click.argument("measurement", metavar="MAP", type=click.Path(path_type=Path))
+@options.quantity_option("--E-star", "E_star", help="Effective modulus; without one pressures are over E*.")
+@options.plot_option
+@options.map_options
+@options.output_options
+def fit_command(
+    measurement: Path, E_star: Any, plot: Path | None, treatment: dict[str, Any], output: options.Output
+) -> None:
+    """Read a map or line scan, say what was found in it and done to it, and how it touches a flat.
+
+    The table is by the calibrated law, with its distance from boundary elements (scatter: standard deviation of ln A at
+    a pressure and of ln F at a separation). The picture has the map, its spectrum, its heights, and area and
+    separation against pressure.
+
+    Example: mbma fit wafer.sur --short-cutoff 2um --plot wafer.png
+    """
+    options.check_plot(plot, output.out)
+    from mbma_tables.measurement import curves, described, draw, table_of_loads
+    from mbma_tables.plots import to_picture
+    from mbma_tables.scenes.specimen import effective_modulus_of, measured
+    from mbma_tables.units import Units, unit_of
+
+    modulus, stress_unit = effective_modulus_of({} if E_star is None else {"E_star": E_star})
+    treated, surface = measured(measurement, treatment)
+    scale = 1.0 if modulus is None else modulus
+    columns, told = table_of_loads(surface, scale)
+    units = Units(surface.unit, "1" if modulus is None else stress_unit)
+    facts = {
+        "length_unit": surface.unit,
+        "stress_unit": stress_unit,
+        "h_rms": float(surface.h_rms),
+        "h_max": float(surface.h_max),
+        "rms_gradient": float(surface.rms_gradient),
+        "skewness": surface.skewness,
+        "kurtosis": surface.kurtosis,
+        "anisotropy": surface.anisotropy,
+        "provenance": list(surface.provenance),
+        "notes": told,
+    }
+    title = measurement.name
+    own = {name: unit_of(name, units) or "-" for name in columns} | {"area": "A/A0", "force": unit_of("force", units)}
+    report = Report("fit", title, [*described(surface), *told], facts, to_columns(columns, own))
+    picture = b""
+    if plot is not None:
+        label = "pressure  F/(A0 E*)" if modulus is None else f"pressure [{stress_unit or 'stress'}]"
+        picture = to_picture(draw(treated, surface, curves(surface, scale), title, label), plot.suffix[1:])
+    report.write(output, plot, picture)
+
+
+@click.command("cost", short_help="What accuracy costs, in time.")
+@click.option("--tier", help="Rows of this tier alone.")
+@click.option("--distance", is_flag=True, help="Theories' distance from brute force in place of numerical error.")
+@options.json_option("a table")
+def cost_command(tier: str | None, distance: bool, as_json: bool) -> None:
+    """Error and time of everything that answers, as measured on held-out surfaces.
+
+    Costs are times over that of a fixed piece of work; seconds are those of the machine that measured. docs/cost.md
+    says what each row is. With --distance: root mean squares of ln(theory/boundary elements), of area at equal force
+    and force at equal separation, light at 1-10% contact and deep at 10-97%.
+
+    Example: mbma cost --tier universal
+    """
+    from mbma_tables.scenes.costs import UNIT, shipped_costs, shipped_distances
+
+    costs = shipped_costs()
+    if distance:
+        if tier is not None:
+            raise InputError("--tier is about numerical error: leave it or --distance out")
+        _show("distance", shipped_distances(), costs.seconds, as_json)
+        return
+    rows = [row for row in costs.rows if row.tier != UNIT]
+    if tier is not None:
+        known = tuple(dict.fromkeys(row.tier for row in rows))
+        rows = [row for row in rows if row.tier == tier]
+        if not rows:
+            raise InputError(f"--tier must be one of {known}, got {tier!r}")
+    _show("cost", rows, costs.seconds, as_json)
+
+
+def _show(title: str, rows: Sequence[Any], unit: float, as_json: bool) -> None:
+    records = [row._asdict() | {"seconds": row.cost * unit} for row in rows]
+    if as_json:
+        echo(to_json({"unit_seconds": unit, "rows": records}))
+        return
+    columns = to_columns({name: [record[name] for record in records] for name in records[0]}, {})
+    echo(Report(title, f"fixed piece of work {unit:.3g} s", [], {}, columns).to_table(), nl=False)

@@ -9,14 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mbma_tables.arguments import nearest
-from mbma_tables.cli.options import (
-    hardness_option,
-    optional_specimen_options,
-    quantity_option,
-    reading_option,
-    specimen_options,
-    theory_option,
-)
+from mbma_tables.cli import options
 from mbma_tables.cli.progress import echo
 from mbma_tables.errors import InputError
 from mbma_tables.export import CODE, DATA, FMUS, GRAPHS, LAWS, SOLVERS, SUBROUTINES
@@ -50,16 +43,14 @@ class _Target(click.Choice[str]):
 
 
 @click.command(
-    "export",
-    short_help="A contact law, or the whole model, for other codes.",
-    epilog=f"Targets: {', '.join(TARGETS)}.",
+    "export", short_help="A contact law, or the whole model, for other codes.", epilog=f"Targets: {', '.join(TARGETS)}."
 )
 @click.argument("target", metavar="TARGET", type=_Target(TARGETS))
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write; a folder for source code.")
-@optional_specimen_options
+@options.optional_specimen_options
 @click.option("--rows", type=int, help="How many rows of a table; else as few as --rtol needs.")
 @click.option("--rtol", type=float, help="Largest relative error of linear interpolation; 1e-3 by default.")
-@quantity_option("--largest-overclosure", help="Where the rows end; else at full compression.")
+@options.quantity_option("--largest-overclosure", help="Where the rows end; else at full compression.")
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure, or as well.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
 @click.option("--leakage", is_flag=True, help="Flow conductance of the gaps: rows of it alone, laws as code with it.")
@@ -68,11 +59,11 @@ class _Target(click.Choice[str]):
 )
 @click.option("--name", help="Of the interaction, table, functions or module.")
 @click.option("--exponential", is_flag=True, help="For calculix: Persson's exponential law instead of rows.")
-@theory_option
-@hardness_option
-@reading_option
+@options.theory_option
+@options.hardness_option
+@options.reading_option
 @click.option("--check", is_flag=True, help="Of the whole model: build it and replay its conformance points.")
-def export_command(target: str, out: Path, **options: Any) -> None:
+def export_command(target: str, out: Path, **values: Any) -> None:
     """Write TARGET to a file.
 
     Solvers and data take a surface, a modulus and units, and so do laws as code (-law), subroutines of solvers
@@ -81,10 +72,10 @@ def export_command(target: str, out: Path, **options: Any) -> None:
 
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
     """
-    given = {name: value for name, value in options.items() if value is not None and value != DEFAULTS.get(name)}
+    given = {name: value for name, value in values.items() if value is not None and value != DEFAULTS.get(name)}
     _refuse_unused(target, given)
     if target in CODE:
-        _export_code(target, out, options["reading"], "check" in given)
+        _export_code(target, out, values["reading"], "check" in given)
         return
     specimen: Specimen | None = given.pop("specimen", None)
     if specimen is None:
@@ -115,11 +106,14 @@ def _refuse_unused(target: str, given: Mapping[str, Any]) -> None:
 
 def _law_files(target: str, out: Path, joint: dict[str, Any], given: dict[str, Any]) -> dict[Path, bytes]:
     """What is written of one surface's law, by its files."""
-    from mbma_tables.export import fmu, law_code, onnx, solvers
+    from mbma_tables.export import fmu, law_code, law_languages, onnx, solvers
     from mbma_tables.export.law_rows import describe_law
 
     if target in LAWS:
-        files, beside = {out: law_code.law_text(target, **joint, **given).encode()}, law_code.LANGUAGES[target].beside
+        files, beside = (
+            {out: law_code.law_text(target, **joint, **given).encode()},
+            law_languages.LANGUAGES[target].beside,
+        )
         if beside and str(out) == "-":
             raise InputError(f"{target} is two files: --out must be that of the first")
         if beside:
@@ -188,9 +182,9 @@ def _export_code(target: str, folder: Path, reading: str, check: bool) -> None:
 
 @click.command("explore", short_help="A page to explore a surface in a browser.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="The page, such as explorer.html.")
-@specimen_options
+@options.specimen_options
 @click.option("--theory", metavar="mbma|calibrated|persson", help="Drawn first; calibrated for a map, else mbma.")
-@reading_option
+@options.reading_option
 def explore_command(out: Path, specimen: Specimen, theory: str | None, reading: str) -> None:
     """Write a page with sliders for the surface, its modulus, theory and reading, or a pasted spectrum.
 

@@ -165,28 +165,22 @@ def _validity(answer: Contact) -> tuple[list[str], dict[str, Any]]:
     if reasons:
         listed = "; ".join(f"{reason} ({int(mask.sum())})" for reason, mask in reasons.items())
         notes.append(f"not valid at {int((~valid).sum())} of {valid.size}: {listed}")
-    names = ("scatter", "area_scatter", "stiffness_scatter", "separation_scatter")
-    scatter = {name: np.atleast_1d(getattr(answer, name)) for name in names}
+    texts = {
+        "scatter": "ln force {} at a separation",
+        "area_scatter": "ln area {} at a force",
+        "stiffness_scatter": "ln stiffness {}",
+        "separation_scatter": f"u {{}} {answer.units['separation']}",
+    }
+    scatter = {name: np.atleast_1d(getattr(answer, name)) for name in texts}
     known = {name: values[np.isfinite(values)] for name, values in scatter.items()}
-    what = (
-        "ln force {} at a separation",
-        "ln area {} at a force",
-        "ln stiffness {}",
-        f"u {{}} {answer.units['separation']}",
-    )
-    said = [
-        text.format(f"{values.min():.2g} to {values.max():.2g}")
-        for text, values in zip(what, known.values(), strict=True)
-        if values.size
-    ]
+    said = [texts[name].format(f"{v.min():.2g} to {v.max():.2g}") for name, v in known.items() if v.size]
     if said:
         notes.append(f"scatter against simulations: {', '.join(said)}")
     facts: dict[str, Any] = {
         "valid": valid.tolist(),
         "reasons": {reason: np.flatnonzero(mask).tolist() for reason, mask in reasons.items()},
     }
-    for name, values in scatter.items():
-        facts[name] = [number if np.isfinite(number) else None for number in values.tolist()]
+    facts |= {name: v.tolist() for name, v in scatter.items()}  # NaN is null in JSON
     return notes, facts
 
 
@@ -204,10 +198,7 @@ def report_answer(
     if specimen.E_star is not None:
         scale = f"E* is {specimen.E_star:.6g} {specimen.stress_unit or ''}".rstrip()
     made = f", reading {answer.reading}, tier {answer.tier}, rtol {model.rtol:g}" if answer.reading else ""
-    notes += [
-        f"theory {model.theory}{made}; {scale}",
-        "error: relative, numerical, beside the theory's scatter",
-    ]
+    notes += [f"theory {model.theory}{made}; {scale}", "error: relative, numerical, beside the theory's scatter"]
     if hasattr(answer, "elastic_hardness"):
         limit = f"{answer.elastic_hardness:.4g} {specimen.stress_unit or ''}".rstrip()
         if model.hardness == math.inf:

@@ -113,10 +113,7 @@ def _given(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _specimen(given: Mapping[str, Any]) -> Specimen:
-    """The surface that the options describe, with its modulus; a modulus option overrides that of a file.
-
-    Plain numbers are in --length-unit and --stress-unit where those are given, else in the units known from a file.
-    """
+    """The surface that the options describe, with its modulus; a modulus option overrides that of a file."""
     length, stress = given["length_unit"], given["stress_unit"]
     numbers = {key: given[key] for key in NUMBERS if given[key] is not None}
     used = [f"--{key}" for key in ("surface", "file", "map") if given[key] is not None] + ["numbers"] * bool(numbers)
@@ -143,76 +140,73 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
     return specimen.in_units(length, stress)
 
 
-# in the words of `mbma_tables.surfaces.treatment.Treatment`
+def _option(name: str, help: str, **kind: Any) -> Decorator:
+    """The option of one argument of the library, by its name; of a quantity where no other kind is said."""
+    flag, kind = f"--{name.replace('_', '-')}", kind or {"callback": _parse_number, "metavar": "X[UNIT]"}
+    return click.option(flag, name.partition("/")[0], help=help, **kind)
+
+
+PATH: Any = click.Path(path_type=Path)
+# of `MAP_OPTIONS`, in the words of `mbma_tables.surfaces.treatment.Treatment`
 _MAP_OPTIONS = (
-    quantity_option("--dx", "dx", help="Sampling step [length], of a map whose file has none;"),
-    quantity_option("--dy", "dy", help="and along its second axis, if another."),
-    click.option("--channel", type=int, help="Number of the map's channel in its file."),
-    click.option("--periodic/--not-periodic", "periodic", default=None, help="Whether the map continues periodically."),
-    click.option(
-        "--detrend", metavar="MODE", help="What to subtract: mean, plane, quadratic, or a mode of SurfaceTopography."
-    ),
-    click.option("--outliers", type=float, metavar="N", help="Take out points N standard deviations off; try 10."),
-    click.option("--fill", metavar="harmonic", help="Fill undefined points, however many."),
-    quantity_option("--short-cutoff", "short_cutoff", help="Shortest wavelength to keep [length], the resolution."),
-    quantity_option("--long-cutoff", "long_cutoff", help="Longest wavelength to keep [length]."),
-    quantity_option("--tip-radius", "tip_radius", help="Of the probe or stylus [length]: keep what it can follow."),
-    click.option("--reliable/--all-waves", "reliable", default=None, help="Whether the file's own resolution counts."),
-    click.option("--window", metavar="NAME", help="Window of the power spectrum, hann by default."),
-    quantity_option("--extrapolate-to", "extrapolate_to", help="Continue the spectrum to this wavelength [length],"),
-    click.option("--extrapolate-hurst", "extrapolate_hurst", type=float, help="by this Hurst exponent."),
+    _option("dx", "Sampling step [length], of a map whose file has none;"),
+    _option("dy", "and along its second axis, if another."),
+    _option("channel", "Number of the map's channel in its file.", type=int),
+    _option("periodic/--not-periodic", "Whether the map continues periodically.", default=None),
+    _option("detrend", "What to subtract: mean, plane, quadratic, or a mode of SurfaceTopography.", metavar="MODE"),
+    _option("outliers", "Take out points N standard deviations off; try 10.", type=float, metavar="N"),
+    _option("fill", "Fill undefined points, however many.", metavar="harmonic"),
+    _option("short_cutoff", "Shortest wavelength to keep [length], the resolution."),
+    _option("long_cutoff", "Longest wavelength to keep [length]."),
+    _option("tip_radius", "Of the probe or stylus [length]: keep what it can follow."),
+    _option("reliable/--all-waves", "Whether the file's own resolution counts.", default=None),
+    _option("window", "Window of the power spectrum, hann by default.", metavar="NAME"),
+    _option("extrapolate_to", "Continue the spectrum to this wavelength [length],"),
+    _option("extrapolate_hurst", "by this Hurst exponent.", type=float),
 )
-
-
 length_unit = functools.partial(
     click.option, "--length-unit", metavar="UNIT", help="Unit of plain lengths and of the answer, such as mm."
 )
-stress_unit_option = click.option(
-    "--stress-unit", metavar="UNIT", help="Unit of plain moduli and of the answer, such as MPa."
-)
-over_h_rms = click.option("--over-h-rms", is_flag=True, help="The lengths given are multiples of h_rms.")
+stress_unit_option = _option("stress_unit", "Unit of plain moduli and of the answer, such as MPa.", metavar="UNIT")
+over_h_rms = _option("over_h_rms", "The lengths given are multiples of h_rms.", is_flag=True)
 
 _SPECIMEN_OPTIONS = (
-    click.option(
-        "--surface",
-        type=click.Choice(list(CASES)),
+    _option(
+        "surface",
+        "Surface: a case of the paper; `mbma surfaces` lists them.",
+        type=click.Choice([*CASES]),
         metavar="NAME",
-        help="Surface: a case of the paper; `mbma surfaces` lists them.",
     ),
-    click.option("--file", type=click.Path(path_type=Path), metavar="TOML", help="Surface: a TOML file."),
-    click.option("--map", type=click.Path(path_type=Path), metavar="MAP", help="Surface: a measured map or line scan."),
+    _option("file", "Surface: a TOML file.", type=PATH, metavar="TOML"),
+    _option("map", "Surface: a measured map or line scan.", type=PATH, metavar="MAP"),
     *_MAP_OPTIONS,
-    click.option(
-        "--model", type=click.Choice(("measured", "self-affine")), help="Of a map: its own spectrum, or five numbers."
-    ),
-    click.option("--hurst", type=float, help="Surface in numbers: Hurst exponent, in (0, 1]."),
-    quantity_option("--q0", help="Smallest wavenumber [1/length]."),
-    quantity_option("--q1", help="Largest wavenumber [1/length]; or give --zeta-1."),
-    click.option("--zeta-1", "zeta_1", type=float, help="Largest magnification q1/q0, above 3."),
-    quantity_option("--h-rms", "h_rms", help="Root-mean-square height [length]."),
-    quantity_option("--h-max", "h_max", help="Highest point above the mid-plane [length]."),
-    quantity_option("--m0", help="Surface by moments: hurst, h_max, variance of height [length^2],"),
-    click.option("--m2", type=float, help="variance of a profile's slope,"),
-    quantity_option("--m4", help="variance of a profile's second derivative [1/length^2]."),
-    quantity_option("--Rq", "Rq", help="Surface by a drawing: rms height of a profile [length], with hurst, h_max,"),
-    quantity_option("--Ra", "Ra", help="or its mean absolute height,"),
-    quantity_option("--Sq", "Sq", help="or rms height of a map,"),
-    quantity_option("--Sa", "Sa", help="or mean absolute height of a map;"),
-    quantity_option("--Rdq", "Rdq", help="rms slope of a profile,"),
-    quantity_option("--Sdq", "Sdq", help="or rms gradient of a map,"),
-    quantity_option("--Rsm", "Rsm", help="or mean spacing of a profile's elements [length];"),
-    quantity_option("--longest", help="longest wave [length],"),
-    quantity_option("--shortest", help="or shortest wave [length],"),
-    quantity_option("--Sds", "Sds", help="or summits per area [1/length^2],"),
-    quantity_option("--Spd", "Spd", help="the same by its newer name;"),
-    quantity_option("--Sp", "Sp", help="highest point of a map [length] in place of --h-max."),
-    quantity_option(
-        "--E-star", "E_star", help="Effective modulus; export needs one, elsewhere forces are over E* without it."
-    ),
-    quantity_option("--E1", "E1", help="Instead of --E-star: Young's modulus,"),
-    click.option("--nu1", "nu1", type=float, help="and Poisson's ratio of one body,"),
-    quantity_option("--E2", "E2", help="Young's modulus of the other,"),
-    click.option("--nu2", "nu2", type=float, help="and its Poisson's ratio."),
+    _option("model", "Of a map: its own spectrum, or five numbers.", type=click.Choice(("measured", "self-affine"))),
+    _option("hurst", "Surface in numbers: Hurst exponent, in (0, 1].", type=float),
+    _option("q0", "Smallest wavenumber [1/length]."),
+    _option("q1", "Largest wavenumber [1/length]; or give --zeta-1."),
+    _option("zeta_1", "Largest magnification q1/q0, above 3.", type=float),
+    _option("h_rms", "Root-mean-square height [length]."),
+    _option("h_max", "Highest point above the mid-plane [length]."),
+    _option("m0", "Surface by moments: hurst, h_max, variance of height [length^2],"),
+    _option("m2", "variance of a profile's slope,", type=float),
+    _option("m4", "variance of a profile's second derivative [1/length^2]."),
+    _option("Rq", "Surface by a drawing: rms height of a profile [length], with hurst, h_max,"),
+    _option("Ra", "or its mean absolute height,"),
+    _option("Sq", "or rms height of a map,"),
+    _option("Sa", "or mean absolute height of a map;"),
+    _option("Rdq", "rms slope of a profile,"),
+    _option("Sdq", "or rms gradient of a map,"),
+    _option("Rsm", "or mean spacing of a profile's elements [length];"),
+    _option("longest", "longest wave [length],"),
+    _option("shortest", "or shortest wave [length],"),
+    _option("Sds", "or summits per area [1/length^2],"),
+    _option("Spd", "the same by its newer name;"),
+    _option("Sp", "highest point of a map [length] in place of --h-max."),
+    _option("E_star", "Effective modulus; export needs one, elsewhere forces are over E* without it."),
+    _option("E1", "Instead of --E-star: Young's modulus,"),
+    _option("nu1", "and Poisson's ratio of one body,", type=float),
+    _option("E2", "Young's modulus of the other,"),
+    _option("nu2", "and its Poisson's ratio.", type=float),
     length_unit(),
     stress_unit_option,
 )
@@ -236,52 +230,41 @@ def load_options(option: Callable[..., Decorator]) -> Decorator:
     )
 
 
-reading_option = click.option(
-    "--reading",
-    default="reported",
-    show_default=True,
-    type=click.Choice(list(NAMED)),
-    help="Reading of the paper's equations, of mbma.",
-)
+def json_option(instead: str) -> Decorator:
+    """The option that prints JSON in place of a table, or of text."""
+    return click.option("--json", "as_json", is_flag=True, help=f"Print one JSON object instead of {instead}.")
 
+
+SHOWN: dict[str, Any] = {"show_default": True}
+reading_option = _option(
+    "reading", "Reading of the paper's equations, of mbma.", default="reported", type=click.Choice([*NAMED]), **SHOWN
+)
 _MODEL_OPTIONS = (
     reading_option,
-    click.option(
-        "--tier",
-        default="universal",
-        show_default=True,
-        type=click.Choice(TIERS),
-        help="Island model.",
-    ),
-    click.option(
-        "--rtol", type=float, default=DEFAULT_RTOL, show_default=True, help="Numerical relative error asked for."
-    ),
+    _option("tier", "Island model.", default="universal", type=click.Choice(TIERS), **SHOWN),
+    _option("rtol", "Numerical relative error asked for.", type=float, default=DEFAULT_RTOL, **SHOWN),
 )
-theory_option = click.option(
-    "--theory",
+theory_option = _option(
+    "theory",
+    "Theory; the others have no tier, reading or rtol.",
     default="mbma",
-    show_default=True,
-    type=click.Choice(list(THEORIES)),
-    help="Theory; the others have no tier, reading or rtol.",
+    type=click.Choice([*THEORIES]),
+    **SHOWN,
 )
 # of islands, which MBMA alone has
 model_options = _group("model", lambda given: Model(**given), *_MODEL_OPTIONS)
-hardness_option = quantity_option("--hardness", help="Largest pressure that the softer body bears; none: elastic.")
-
+hardness_option = _option("hardness", "Largest pressure that the softer body bears; none: elastic.")
 theory_options = _group("model", lambda given: Model(**_given(given)), theory_option, *_MODEL_OPTIONS, hardness_option)
 
 output_options = _group(
     "output",
     lambda given: Output(**given),
-    click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table."),
+    json_option("a table"),
     click.option("--csv", "as_csv", is_flag=True, help="Print CSV with '#' comments instead of a table."),
-    click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write to a file instead."),
+    _option("out", "Write to a file instead.", type=PATH, metavar="FILE"),
 )
-
-leakage_option = click.option("--leakage", is_flag=True, help="Add the flow conductance of the gaps [length^3].")
-plot_option = click.option(
-    "--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw a picture: FILE.png, .svg or .pdf."
-)
+leakage_option = _option("leakage", "Add the flow conductance of the gaps [length^3].", is_flag=True)
+plot_option = _option("plot", "Draw a picture: FILE.png, .svg or .pdf.", type=PATH, metavar="FILE")
 
 
 def check_plot(plot: Path | None, out: Path | None) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mbma_tables.cli.format import Report, to_columns, to_json
-from mbma_tables.cli.options import check_plot, plot_option
+from mbma_tables.cli.options import check_plot, json_option, plot_option
 from mbma_tables.cli.progress import doing, echo
 from mbma_tables.errors import InputError
 from mbma_tables.files import write_file, written_bytes
@@ -24,14 +24,13 @@ scene_file = click.argument("file", type=click.Path(path_type=Path))
 
 @click.command("plan", short_help="How a scene would be computed, at what error and price.")
 @scene_file
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
+@json_option("text")
 def plan_command(file: Path, as_json: bool) -> None:
     """How the scene in FILE would be computed: steps, why each is there, certified error and measured cost.
 
     Example: mbma plan examples/scene_joint.toml
     """
-    from mbma_tables.scenes.advice import advice
-    from mbma_tables.scenes.scene import Scene
+    from mbma_tables.scenes.scene import Scene, advice
 
     scene = Scene.from_toml(file)
     if not as_json:
@@ -60,7 +59,7 @@ def plan_command(file: Path, as_json: bool) -> None:
     help="Write it to result.nc or result.csv; - for CSV to stdout.",
 )
 @plot_option
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
+@json_option("a table")
 def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) -> None:
     """Compute the scene in FILE, and nothing that it does not ask for.
 

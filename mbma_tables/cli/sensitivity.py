@@ -7,16 +7,8 @@ from typing import Any
 
 import click
 
+from mbma_tables.cli import options
 from mbma_tables.cli.format import Column, Report, shown_unit, to_columns
-from mbma_tables.cli.options import (
-    Model,
-    Output,
-    load_options,
-    output_options,
-    quantity_option,
-    specimen_options,
-    theory_options,
-)
 from mbma_tables.errors import InputError
 from mbma_tables.scenes.specimen import Specimen
 
@@ -30,15 +22,15 @@ def _pair(text: str) -> tuple[str, tuple[str, str]]:
 
 
 @click.command("sensitivity", short_help="How much each unknown matters.")
-@load_options(quantity_option)
+@options.load_options(options.quantity_option)
 @click.option(
     "--range", "ranges", multiple=True, metavar="NAME=X:X", help="Where a parameter may lie; may be repeated."
 )
-@specimen_options
-@theory_options
-@output_options
+@options.specimen_options
+@options.theory_options
+@options.output_options
 def sensitivity_command(
-    loads: dict[str, Any], ranges: tuple[str, ...], specimen: Specimen, model: Model, output: Output
+    loads: dict[str, Any], ranges: tuple[str, ...], specimen: Specimen, model: options.Model, output: options.Output
 ) -> None:
     """d ln(answer)/d ln(parameter) of force, area, stiffness and conductance, what is given being held.
 
@@ -50,13 +42,13 @@ def sensitivity_command(
     """
     from mbma_tables.theories.unknowns import sensitivity
 
-    options = vars(model).copy()
-    if options.pop("hardness") != math.inf:
+    asked = vars(model).copy()
+    if asked.pop("hardness") != math.inf:
         raise InputError("sensitivity is of elastic contacts: leave --hardness out")
     modulus: Any = 1.0 if specimen.E_star is None else specimen.E_star
     if specimen.stress_unit is not None:
         modulus = f"{modulus!r} {specimen.stress_unit}"
-    found = sensitivity(specimen.surface, **loads, E_star=modulus, ranges=dict(map(_pair, ranges)), **options)
+    found = sensitivity(specimen.surface, **loads, E_star=modulus, ranges=dict(map(_pair, ranges)), **asked)
     parameters = list(found.parameters)
     columns = [
         Column("parameter", "-", parameters),

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ast
 import dataclasses
-import importlib.resources
 import inspect
 import math
 import re
@@ -22,7 +21,7 @@ from mbma_tables import __version__
 from mbma_tables.arguments import FloatArray
 from mbma_tables.calibrated import LAW_ERROR, YANG_PERSSON
 from mbma_tables.errors import InputError
-from mbma_tables.export.text import filled, opening
+from mbma_tables.export.text import core_file, filled, opening
 from mbma_tables.models import closed_form_functions
 from mbma_tables.models.universal import RECORD, UniversalModel
 from mbma_tables.surfaces.readings import Reading
@@ -58,11 +57,6 @@ CONVENTIONS = (
     "separation is u = (h_max + d)/2. Geometry and X, mu are as the table's documentation has them: heights in "
     "units of s = h_rms/sqrt(1 - zeta_1^(-2 H)), lengths in 1/q0, zeta_1 = q1/q0."
 )
-
-
-def core_file(name: str) -> str:
-    """The text of a file of the core."""
-    return (importlib.resources.files("mbma_tables.core") / name).read_text(encoding="utf-8")
 
 
 def core_texts() -> dict[str, str]:

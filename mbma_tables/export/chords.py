@@ -30,11 +30,8 @@ def chosen_rows(
     evenly: bool = False,
     jump: bool = False,
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Rows of a curve on fine points, as a file holds them, and their largest relative error where y is above `floor`.
-
-    As many as `rows`, or as few as `rtol` needs; 1e-3 where neither is given. With a `jump` the first two fine points
-    are rows.
-    """
+    """Rows of a curve on fine points, as a file holds them, and their largest relative error above `floor`."""
+    # with a jump the first two fine points are rows
     begin = fine_x[:1], fine_y[:1]
     if jump:
         fine_x, fine_y = fine_x[1:], fine_y[1:]

@@ -84,30 +84,9 @@ def write_code(
 ) -> list[pathlib.Path]:
     """Write the model as code into a folder, with conformance points and a self-test that replays them.
 
-    Parameters
-    ----------
-    target : {"c", "fortran", "javascript"}
-        C11, which C++ compiles too; a Fortran 2008 module over that C; or an ECMAScript module with that C in it as
-        WebAssembly, which the package ziglang compiles.
-    folder : path
-        Where the files go; it is made where it is missing. Files of the same names are replaced.
-    reading : {"reported", "printed"} or Reading
-        Which reading of the paper's equations the geometry and the totals have.
-    table : path
-        A universal table; the shipped one by default.
-
-    Returns
-    -------
-    list of pathlib.Path
-        The files written.
-
-    Raises
-    ------
-    InputError
-        For an unknown target or reading, a table that is not a universal one, a folder that cannot be written, and
-        JavaScript without ziglang.
-    TableFileError
-        Where the table cannot be read.
+    The target "c" is C11, which C++ compiles too; "fortran" a Fortran 2008 module over that C; "javascript" an
+    ECMAScript module with that C in it as WebAssembly, which the package ziglang compiles. A missing folder is made,
+    files of the same names are replaced; the table is a universal one. Returns the files written.
 
     Examples
     --------
@@ -177,25 +156,7 @@ class Replay:
 
 
 def check(target: str, folder: os.PathLike[str] | str, points: os.PathLike[str] | str | None = None) -> Replay:
-    """Build exported code where its compiler is installed, and replay the points in it.
-
-    Parameters
-    ----------
-    target : {"c", "fortran", "javascript"}
-    folder : path
-        Where `write_code` wrote; nothing is written there.
-    points : path, optional
-        Another file of points than the one beside the code.
-
-    Returns
-    -------
-    Replay
-
-    Raises
-    ------
-    InputError
-        For an unknown target, or a folder without the code.
-    """
+    """Build what `write_code` wrote where its compiler is installed, and replay the points beside it, or others."""
     if target not in CODE:
         raise InputError(f"target must be one of {CODE}, got {target!r}")
     place = pathlib.Path(folder).absolute()

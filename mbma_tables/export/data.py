@@ -62,13 +62,7 @@ def _content(law: LawTable) -> dict[str, Any]:
 
 
 def from_json(content: str | bytes) -> LawTable:
-    """The law in a file of `to_json`.
-
-    Raises
-    ------
-    InputError
-        For what is no such file.
-    """
+    """The law in a file of `to_json`; anything else is refused."""
     try:
         return _law_of(json.loads(content))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:

@@ -7,7 +7,6 @@ the tables of the day, so that writing one needs no compiler.
 from __future__ import annotations
 
 import base64
-import hashlib
 import html
 import importlib.resources
 import json
@@ -22,22 +21,16 @@ from mbma_tables.arguments import number_in, positive_modulus
 from mbma_tables.calibrated import TESTED_AREA
 from mbma_tables.errors import InputError
 from mbma_tables.export import c_code
-from mbma_tables.export.code import web_assembly
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import FITTED, PRINTED, REPORTED, get_reading
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import calibrated, calibrated_table, mbma, source
 from mbma_tables.units import Units
 
 MODULE = "explorer.wasm"
 THEORIES = ("mbma", "calibrated", "persson")
 SHOWN_READINGS = (REPORTED, PRINTED, FITTED)
-FUNCTIONS = (
-    *("mbma_total_of", "mbma_calibrated_of", "mbma_message", "mbma_spectrum_of", "mbma_surface_spectrum_of"),
-    *("mbma_spectrum_contact_of", "mbma_spectrum_separation_of"),
-)
 SCRIPTS = ("model.js", "state.js", "curves.js", "downloads.js", "charts.js", "main.js")
 FEW = 1000  # numbers up to which they stay doubles
 FRACTION_BITS, ORDER = 43, 3  # of packed tables: steps of 1e-13; times that differences are taken
@@ -51,26 +44,6 @@ MAX_SAMPLES = 500  # of a spectrum, for a step of a slider to stay short
 def page_file(name: str) -> bytes:
     """A file of the page's sources."""
     return (importlib.resources.files("mbma_tables.export") / "page" / name).read_bytes()
-
-
-def c_sources() -> tuple[dict[str, str], dict[str, Any]]:
-    """The C of the page by file, and the tables that are variables in it by name."""
-    model, heads = universal_model(), dict.fromkeys(c_code.MODEL, "")
-    data = {"mbma_data.c": c_code.data_text(model, REPORTED, later=True)}
-    return c_code.core_texts() | c_code.model_texts(heads) | data, c_code.tables(model)
-
-
-def compiled(texts: dict[str, str], names: list[str]) -> bytes:
-    """The module, with the digest of what it was compiled from in a section of its own at the end."""
-    section = b"\x06digest" + digest_of(texts)
-    # two numbers at a time, which browsers have learned by 2023
-    module = web_assembly(texts, [*FUNCTIONS, "MBMA_READING", *names], "-msimd128")
-    return module + bytes([0, len(section)]) + section
-
-
-def digest_of(texts: dict[str, str]) -> bytes:
-    """Of what the module is compiled from."""
-    return hashlib.sha256(json.dumps(texts, sort_keys=True).encode()).digest()
 
 
 def packed(values: Any) -> dict[str, Any]:
@@ -153,30 +126,9 @@ def explorer_page(
 ) -> str:
     """A page of HTML that shows how a surface touches, with sliders; it needs neither a server nor a network.
 
-    Parameters
-    ----------
-    surface : Surface or MeasuredSurface
-        What the page begins with. Of a measured one it takes the spectrum and h_max: heights and maps, which the
-        calibrated law goes by in Python, are not in it.
-    E_star : float, optional
-        Effective modulus; without one stresses are over E*.
-    stress_unit : str, optional
-        Unit of the modulus.
-    theory : {"mbma", "calibrated", "persson"}, optional
-        The one drawn with its scatter at first; MBMA if not given, of a spectrum the calibrated law.
-    reading : {"reported", "printed", "fitted"}
-        Of the paper's equations, at first.
-    title : str
-        What the surface is.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    InputError
-        For a batch, a spectrum of more than 500 samples or with MBMA, an unknown theory or reading.
+    Of a measured surface it takes the spectrum, of at most 500 samples, and h_max: heights and maps, which the
+    calibrated law goes by in Python, are not in it. Without a modulus stresses are over E*. Theory and reading are
+    those drawn at first, by default MBMA, of a spectrum the calibrated law.
 
     Examples
     --------

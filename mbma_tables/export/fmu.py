@@ -31,14 +31,7 @@ SAID = {
 INPUT = 1  # value reference of overclosure, after time
 
 
-def fmu(
-    target: str,
-    surface: AnySurface,
-    E_star: float | str,
-    *,
-    name: str = "law",
-    **asked: Any,
-) -> bytes:
+def fmu(target: str, surface: AnySurface, E_star: float | str, *, name: str = "law", **asked: Any) -> bytes:
     """A contact law as an FMU of sources: overclosure in; pressure, tangent, area and energy out.
 
     Parameters

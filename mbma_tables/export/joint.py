@@ -1,8 +1,4 @@
-"""A joint: the law of one surface with its units, and what every file that is written of it says at its head.
-
-Overclosure is c = h_max - u with the mean separation u = (h_max + d)/2 (50): zero at first contact, rising as bodies
-approach, so that -dp/du = dp/dc.
-"""
+"""A joint: the law of one surface with its units, and what every file that is written of it says at its head."""
 
 from __future__ import annotations
 
@@ -36,30 +32,15 @@ OWN_NUMBERS = ("q0", "q1", "h_rms", "h_max", "rms_gradient")  # said of a surfac
 
 @dataclasses.dataclass(frozen=True)
 class Joint:
-    """One surface's law, whose units are known.
+    """One surface's law, whose units are known."""
 
-    Attributes
-    ----------
-    surface : Surface
-        In the units of the law.
-    law : ContactLaw
-    theory : theory
-        What the law was made from, without the hardness.
-    modulus : float
-        E*.
-    hardness : float
-        Infinite where the contact is elastic.
-    length, stress : str
-        Their units.
-    """
-
-    surface: AnySurface
+    surface: AnySurface  # in the units of the law
     law: ContactLaw
-    theory: Theory
-    modulus: float
-    hardness: float
-    length: str
-    stress: str
+    theory: Theory  # what the law was made from, without the hardness
+    modulus: float  # E*
+    hardness: float  # infinite where the contact is elastic
+    length: str  # unit of length,
+    stress: str  # and of stress
 
     @property
     def units(self) -> Units:
@@ -71,10 +52,7 @@ class Joint:
         return contact(self.surface, mean_separation=u, E_star=self.modulus, theory=self.theory, hardness=self.hardness)
 
     def header(self, what: str, range_: str, *more: str, end: float, leakage: bool = False) -> tuple[str, ...]:
-        """Lines at the head of a file: what is in it, its range, its own error; validity up to an overclosure `end`.
-
-        With `leakage` those of the flow conductance, too.
-        """
+        """Lines of a file's head: what it holds, range, error, validity up to `end`, and with `leakage` of flow."""
         law, stress = self.law, self.stress
         names = self.surface.parameters or OWN_NUMBERS
         numbers = ", ".join(f"{name} = {float(getattr(self.surface, name)):.10g}" for name in names)
@@ -200,13 +178,7 @@ def frozen_joint(
     theory: str | Theory | UserTheory = "mbma",
     hardness: float | str = np.inf,
 ) -> Joint:
-    """The law of one surface in known units, as `describe_law` and `write_law` take them.
-
-    Raises
-    ------
-    InputError, OutOfRangeError
-        For a batch of surfaces and missing units, and as `contact_law`.
-    """
+    """The law of one surface in known units; a batch of surfaces and missing units are refused."""
     surface = in_unit(surface, length_unit)
     plain, stress_unit = resolve({"E_star": E_star}, stress_unit, "stress")
     length, stress = _known("length_unit", surface.unit), _known("stress_unit", stress_unit)

@@ -6,82 +6,40 @@ import dataclasses
 import functools
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.polynomial.polynomial import polyder, polyval
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError
-from mbma_tables.export.core_text import block_rows, block_text, core_text
 from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
+from mbma_tables.export.law_languages import FORTRAN_FUNCTION, FORTRAN_INTERFACE, LANGUAGES, Columns, Language
 from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers, flow_numbers, law_numbers
-from mbma_tables.export.text import checked_name, filled, opening, template, wrapped
+from mbma_tables.export.text import checked_name, core_file, filled, opening, template, wrapped
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.readings import Reading
-from mbma_tables.theories.protocol import Theory, UserTheory
+from mbma_tables.theories import law_block as at
 
 MAX_NAME = 31  # letters, as Fortran and C99 read them
-# steps of coefficients over the least value and the least slope of a polynomial; flatter ones count as so steep
-VALUES, SLOPES, FLAT = 2e-14, 4e-13, 1e-4
 MORE = ("conductance", "leakage")  # asked for
 FUNCTIONS = ("pressure", "tangent", "with_tangent", "curvature", "area", "energy", "overclosure", *MORE)
-
-Columns = dict[str, FloatArray]
-
-
-class Language(NamedTuple):
-    """How a law is written in one language.
-
-    `call` is a function's call with {name}, {what} and {x}; `number` writes a float, `arrays` columns of numbers and
-    rows of polynomials by their places in the template, whose names begin with a prefix; None where the law is read by
-    the core's C. `subroutine` is the template of a solver's user subroutine that calls the law, `parts` what else is
-    filled in. `own_name` has key words where the law's name stands alone, as that of a module or package. `beside` is
-    the target that it calls, of the same name, in a file of its own; `inverts` whether it has `overclosure`.
-    """
-
-    template: str
-    mark: str  # of comments
-    usage: str
-    call: str
-    number: Callable[[float], str]
-    arrays: Callable[[str, Columns, Columns], dict[str, str]] | None = None
-    subroutine: str = ""
-    parts: tuple[tuple[str, str], ...] = ()
-    only_conductance: bool = False
-    own_name: str = ""
-    beside: str = ""
-    inverts: bool = True
+# functions that other files see, where they are made
+_MADE = re.compile(r"^(?!static|typedef|MBMA_INLINE)\w[\w *]*\b(mbma_\w+)\([^{;]*\{$", re.M)
 
 
 def law_text(
-    target: str,
-    surface: AnySurface,
-    E_star: float | str,
-    *,
-    name: str = "law",
-    length_unit: str | None = None,
-    stress_unit: str | None = None,
-    conductivity: float | None = None,
-    conductivity_unit: str | None = None,
-    reading: str | Reading = "reported",
-    theory: str | Theory | UserTheory = "mbma",
-    hardness: float | str = math.inf,
-    leakage: bool = False,
+    target: str, surface: AnySurface, E_star: float | str, *, name: str = "law", leakage: bool = False, **asked: Any
 ) -> str:
     """A contact law as source code: pressure, tangent, area, energy and the overclosure at a pressure.
 
     Parameters
     ----------
     target : str
-        One of `mbma_tables.export.LAWS`.
-    surface, E_star, length_unit, stress_unit, reading, theory, hardness
-        As for `describe_law`.
+        One of `mbma_tables.export.LAWS`; a conductivity adds the function `conductance`.
+    surface, E_star, **asked
+        As for `describe_law`: length_unit, stress_unit, reading, theory, hardness, conductivity, conductivity_unit.
     name : str
         What functions, modules or packages are called, or begin with.
-    conductivity, conductivity_unit
-        k_s = 2 k1 k2/(k1 + k2) with its unit, for the function `conductance` as well.
     leakage : bool
         The function `leakage` as well, the flow conductance K of the gaps [length^3], as `ContactLaw.leakage`.
 
@@ -105,25 +63,21 @@ def law_text(
     """
     if target not in LANGUAGES:
         raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
-    name, heat = code_name(name, target), (conductivity, conductivity_unit, leakage, LANGUAGES[target].only_conductance)
-    if leakage and LANGUAGES[target].subroutine:
+    name, language = code_name(name, target), LANGUAGES[target]
+    if leakage and language.subroutine:
         raise InputError(f"{target} has no place for leakage: leave it out")
-    units: dict[str, Any] = {"length_unit": length_unit, "stress_unit": stress_unit}
-    asked = asked_law(surface, E_star, *heat, **units, reading=reading, theory=theory, hardness=hardness)
-    return text_of(target, name, asked)
+    asked |= {"leakage": leakage, "only_conductance": language.only_conductance}
+    return text_of(target, name, asked_law(surface, E_star, **asked))
 
 
 class AskedLaw(NamedTuple):
-    """A law and what every file of it says; conductance is `ratio` times the tangent, NaN where it was not asked.
-
-    `more` has the units of what was asked of `MORE`.
-    """
+    """A law and what every file of it says."""
 
     joint: Joint
     numbers: LawNumbers
     flow: FlowNumbers | None
-    ratio: float
-    more: dict[str, str]
+    ratio: float  # of conductance to the tangent; NaN where it was not asked
+    more: dict[str, str]  # units of what was asked of `MORE`
     said: tuple[str, ...]
 
 
@@ -255,163 +209,34 @@ def _example(joint: Joint, language: Language) -> str:
     return f"Example: {said}"
 
 
-def _lists(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
-    """Arrays in brackets, as Python and JavaScript have them."""
-    flat = {name: f"[{wrapped(map(repr, column.tolist()))}]" for name, column in columns.items()}
-    rows = {name: f"[\n{_lines(_decimals(rows), '[', '],')}\n]" for name, rows in polynomials.items()}
-    return {f"{prefix}{name}".upper(): text for name, text in (flat | rows).items()}
+def core_text(sources: Iterable[str], prefix: str) -> str:
+    """Sources of the core and their headers as one text; a prefix to their functions lets a program hold several."""
+    texts = {name: core_file(name) for name in ("mbma.h", "elementary.h", *sources)}
+    made = (name for text in texts.values() for name in _MADE.findall(text))
+    renamed = [f"#define {name} {prefix}_{name}" for name in made]
+    parts = [re.sub(r'^#include ".*"\n', "", text, flags=re.M) for text in texts.values()]
+    return "\n".join(["/* functions of the core, which this file holds, under names of its own */", *renamed, *parts])
 
 
-def _braces(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
-    """The same in braces, as Modelica has them."""
-    return {
-        place: text.replace("[", "{").replace("]", "}").replace(",\n}", "\n}")
-        for place, text in _lists(prefix, columns, polynomials).items()
-    }
+def block_rows(block: FloatArray) -> tuple[int, int]:
+    """How many rows and records a law's block has."""
+    first = int(block.view(np.int64)[at.RECORDS])
+    return (first - at.HEAD) // 2, (block.size - first) // at.RECORD
 
 
-def _matrices(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
-    """Columns and matrices of MATLAB."""
-    matrices = {name: column[:, None] for name, column in columns.items()}
-    matrices |= {name: _decimals(rows) for name, rows in polynomials.items()}
-    return {f"{prefix}{name}".upper(): f"[\n{_lines(rows, '', ';')}]" for name, rows in matrices.items()}
+def block_text(block: FloatArray) -> str:
+    """A law's block as the initializer of head, rows and records in C, every number as it is."""
+    rows, _ = block_rows(block)
+    whole = block.view(np.int64)
+    head = [*map(repr, block[: at.EXPONENT].tolist()), *map(str, whole[at.EXPONENT : at.HEAD].tolist())]
+    pairs = whole[at.HEAD : at.HEAD + 2 * rows].reshape(-1, 2).tolist()
+    records = block[at.HEAD + 2 * rows :].reshape(-1, at.RECORD)
+    lines = [f"{{{wrapped(head)}}},", f"{{{wrapped(f'{{{shift}, {base}}}' for shift, base in pairs)}}},"]
+    return "\n".join([*lines, "{", *(f"{wrapped(_record(row.tolist()))}," for row in records), "}"])
 
 
-def _lines(rows: FloatArray, begin: str, end: str) -> str:
-    return "\n".join(f"{begin}{', '.join(map(repr, row))}{end}" for row in rows.tolist())
-
-
-def _step(row: FloatArray) -> float:
-    """The step in which coefficients are written: values are then right to 1e-13, slopes to about 1e-11."""
-    values, slopes = (polyval([-1, 0, 1], a) for a in (row, polyder(row)))
-    value = float(np.abs(values).min())
-    # about a maximum slopes are small, though not at the ends
-    slope = float(np.abs(slopes).min()) if slopes.min() * slopes.max() > 0 else 0.0
-    return min(VALUES * value, SLOPES * max(slope, FLAT * value))
-
-
-def _decimals(rows: FloatArray) -> FloatArray:
-    """Coefficients in decimal steps."""
-    places = [-math.floor(math.log10(_step(row))) for row in rows]
-    return np.array([[round(value, k) for value in row.tolist()] for row, k in zip(rows, places, strict=True)])
-
-
-def _fortran_number(value: float) -> str:
-    text = repr(float(value))
-    return text.replace("e", "d") if "e" in text else f"{text}d0"
-
-
-def _with_infinity(text: str) -> Callable[[float], str]:
-    return lambda value: text if value == -math.inf else repr(float(value))
-
-
-NAN = "Outside the range: NaN."
-C = Language(
-    "law.c",
-    "/*",
-    "C99, also C++11: cc -O2 -c {name}.c, link with -lm; declare what you call as where they are declared below. The "
-    f"C of the library itself, and the law's own numbers. {NAN}",
-    "{name}_{what}({x})",
-    repr,
-)
-FORTRAN_INTERFACE = """\
-    pure function c_{what}(x) bind(c, name="{name}_{what}") result(y)
-      import :: dp
-      real(dp), intent(in), value :: x
-      real(dp) :: y
-    end function c_{what}"""
-FORTRAN_FUNCTION = """\
-  elemental function {what}(x) result(y)
-    real(dp), intent(in) :: x
-    real(dp) :: y
-    y = c_{what}(x)
-  end function {what}
-"""
-SUBROUTINE = (
-    "{name}.c is C99, also C++11. Written from the manual's list of arguments and called with it by a program of the "
-    "tests; not run in the solver."
-)
-GAPCON = C._replace(subroutine="gapcon.c", only_conductance=True)
-LANGUAGES = {
-    "c-law": C,
-    "fortran-law": Language(
-        "law.f90",
-        "!",
-        "Fortran 2008 on top of {name}_c.c, which is written beside it, by `mbma export c-law`: cc -O2 -c {name}_c.c, "
-        f"gfortran -c {{name}}.f90, then use {{name}}; functions are elemental, of real(c_double). {NAN}",
-        "{what}({x})",
-        _fortran_number,
-        own_name="import program pure result value x y",
-        beside="c-law",
-    ),
-    "javascript-law": Language(
-        "law.mjs",
-        "/*",
-        "An ECMAScript module: import {{ pressure, withTangent, area, energy, overclosure }} from './{name}.mjs'. "
-        "Outside the range a RangeError, of what is no number a TypeError is thrown.",
-        "{what}({x})",
-        _with_infinity("-Infinity"),
-        _lists,
-    ),
-    "python-law": Language(
-        "law.py",
-        "#",
-        "Python with numpy alone: import {name}; arrays of any shape. Outside the range: ValueError.",
-        "{name}.{what}({x})",
-        _with_infinity("-np.inf"),
-        _lists,
-        parts=(("NP", "np"), ("NUMPY", "asked"), ("JAX", "")),
-    ),
-    "jax-law": Language(
-        "law.py",
-        "#",
-        "Python with jax alone, differentiable by c, p and the pytree LAW. Set jax_enable_x64 before the import, or "
-        f"answers are in single precision. {NAN}",
-        "{name}.{what}({x})",
-        _with_infinity("-jnp.inf"),
-        _lists,
-        parts=(("NP", "jnp"), ("NUMPY", ""), ("JAX", "asked")),
-    ),
-    "matlab-law": Language(
-        "law.m",
-        "%",
-        "MATLAB and Octave: law = {name}(); arrays of any shape. Outside the range: an error.",
-        "law.{what}({x})",
-        _with_infinity("-Inf"),
-        _matrices,
-        own_name="case catch classdef continue elseif global otherwise parfor return spmd switch try while",
-    ),
-    "modelica-law": Language(
-        "law.mo",
-        "//",
-        "A Modelica package: p = {name}.pressure(c), with its derivative; where p is known a tool solves this for c. "
-        "Outside the range an assertion fails.",
-        "{name}.{what}({x})",
-        _with_infinity("-1e300"),
-        _braces,
-        inverts=False,
-        own_name="and block class connect connector der discrete each elsewhen encapsulated enumeration equation "
-        "expandable extends external false final flow impure import initial inner model operator or outer partial "
-        "public pure record redeclare replaceable return stream then time true type when while within",
-    ),
-    "abaqus-uinter": C._replace(
-        usage="*SURFACE INTERACTION, NAME=..., USER: abaqus job=... user={name}.c. Place the bodies so that their "
-        "surfaces touch where the mean planes are h_max apart. Beyond the law's range the increment is tried again "
-        "with a smaller step. Without friction. A linear perturbation step stops the program: for "
-        "modes of a preloaded joint take the tangent at its pressure, from this file, as a spring's stiffness. "
-        f"{SUBROUTINE} Arguments: Abaqus 2017, user subroutines, UINTER.",
-        subroutine="uinter.c",
-    ),
-    "abaqus-gapcon": GAPCON._replace(
-        usage="*GAP CONDUCTANCE, USER: abaqus job=... user={name}.c, beside a table of pressures. A pressure beyond "
-        f"the law's range stops the program. {SUBROUTINE} Arguments: Abaqus 6.5 to 2017, user subroutines, GAPCON.",
-        parts=(("SOLVER", "Abaqus/Standard"),),
-    ),
-    "calculix-gapcon": GAPCON._replace(
-        usage="*GAP CONDUCTANCE, USER, in place of CalculiX's gapcon.f: in its sources cc -O2 -c {name}.c -o gapcon.o, "
-        "ar r ccx_2.20.a gapcon.o, and link ccx anew. Use it with *CONTACT PAIR, TYPE=SURFACE TO SURFACE and a closure "
-        "that is LINEAR or EXPONENTIAL: 2.20 takes wrong conductances with NODE TO SURFACE, and none with TABULAR. A "
-        f"pressure beyond the law's range stops the program. {SUBROUTINE} Arguments: CalculiX 2.7 to 2.20, gapcon.f.",
-        parts=(("SOLVER", "CalculiX"),),
-    ),
-}
+def _record(row: list[float]) -> Iterator[str]:
+    """The numbers of a record with the braces of its structure."""
+    begins, ends = (at.CENTRE, at.FORCE_AT, at.AREA_AT), (at.AREA_AT - 1, at.ENERGY_AT - 1, at.ENERGY_AT)
+    for k, value in enumerate(row):
+        yield f"{'{' if k in begins else ''}{value!r}{'}' if k in ends else ''}"

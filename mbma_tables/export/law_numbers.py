@@ -28,41 +28,23 @@ from mbma_tables.theories.law_object import ROUNDING, ContactLaw
 
 @dataclasses.dataclass(frozen=True)
 class LawNumbers:
-    """Numbers of a law against overclosure c, from first contact at 0 (see the module).
-
-    Attributes
-    ----------
-    h_max : float
-    c_least, c_turn, c_most : float
-        The law's range; inverses end at c_turn, where pressure turns down, or at c_most.
-    ends : bool
-        Whether contact ends at c = 0: pressure is zero below, and c_least is minus infinity.
-    side : int
-        How many records count from first contact; the others count from full compression.
-    scale : float
-    power_p, power_a : float
-        Of pressure and area in the first record; zero where contact does not end.
-    edges : ndarray, shape (records - 1,)
-        Of scale c.
-    centre, rate, energies : ndarray, shape (records,)
-    force, area : ndarray, shape (records, 9)
-    """
+    """Numbers of a law against overclosure c, from first contact at 0 (see the module)."""
 
     h_max: float
-    c_least: float
-    c_turn: float
-    c_most: float
-    ends: bool
-    side: int
+    c_least: float  # the law's range: minus infinity where contact ends at c = 0,
+    c_turn: float  # where inverses end as pressure turns down, or c_most,
+    c_most: float  # and its end
+    ends: bool  # whether contact ends at c = 0, and pressure is zero below
+    side: int  # how many records count from first contact; the others count from full compression
     scale: float
-    power_p: float
+    power_p: float  # of pressure and of area in the first record; zero where contact does not end
     power_a: float
-    edges: FloatArray
-    centre: FloatArray
+    edges: FloatArray  # of scale c, shape (records - 1,)
+    centre: FloatArray  # this and the next two of shape (records,)
     rate: FloatArray
     energies: FloatArray
-    force: FloatArray
-    area: FloatArray
+    force: FloatArray  # shape (records, 9)
+    area: FloatArray  # likewise
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,25 +53,16 @@ class FlowNumbers:
 
     The first record, x < edges[0], is multiplied by t^power; with a power K is zero at and below x = 0. Where bodies
     are apart, d > h_max of a law that ends there, K is u^3 (1 - 1.5/((u/h_rms)^2 + 4)).
-
-    Attributes
-    ----------
-    blocked : float
-        Gap d from which x counts.
-    scale, power, h_rms : float
-    edges : ndarray, shape (records - 1,)
-    centre, rate : ndarray, shape (records,)
-    force : ndarray, shape (records, 9)
     """
 
-    blocked: float
+    blocked: float  # gap d from which x counts
     scale: float
     power: float
     h_rms: float
-    edges: FloatArray
-    centre: FloatArray
-    rate: FloatArray
-    force: FloatArray
+    edges: FloatArray  # shape (records - 1,)
+    centre: FloatArray  # shape (records,)
+    rate: FloatArray  # likewise
+    force: FloatArray  # shape (records, 9)
 
 
 def flow_numbers(leakage: LeakageLaw) -> FlowNumbers:

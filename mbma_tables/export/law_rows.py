@@ -38,38 +38,19 @@ LAST_SHARE, NEAREST_END = 1e-2, 1e-9  # of h_max, mean separations of the last p
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class LawTable(Displayed):
-    """Rows of a contact law, ready to be written.
+    """Rows of a contact law, ready to be written."""
 
-    Attributes
-    ----------
-    x, y : ndarray
-        Overclosure and pressure, or pressure and conductance; both start at zero and rise. Or pressure and the flow
-        conductance of the gaps, which falls to zero where contact blocks them.
-    x_name, y_name, x_unit, y_unit : str
-    largest_error : float
-        Largest relative error of linear interpolation between the rows as written against the model, where y
-        is above `floor`.
-    comments : tuple of str
-        What a reader of the file must know.
-    theory : str
-        Whose law it is.
-    floor : float
-        Value below which errors are relative to it.
-    behaviour : LawTable or None
-        The pressure of the same joint, with its conductance.
-    """
-
-    x: FloatArray
-    y: FloatArray
+    x: FloatArray  # overclosure, or pressure: zero, then rising
+    y: FloatArray  # pressure or conductance, rising from zero; or flow, which falls, to zero where contact blocks it
     x_name: str
     y_name: str
     x_unit: str
     y_unit: str
-    largest_error: float
-    comments: tuple[str, ...]
-    theory: str = "mbma"
-    floor: float = 0.0
-    behaviour: LawTable | None = None
+    largest_error: float  # relative, of linear interpolation between rows as written, where y is above `floor`
+    comments: tuple[str, ...]  # what a reader of the file must know
+    theory: str = "mbma"  # whose law it is
+    floor: float = 0.0  # value below which errors are relative to it
+    behaviour: LawTable | None = None  # the pressure of the same joint, with its conductance
 
     def _facts(self) -> dict[str, str]:
         columns = {self.x_name: shown(self.x, self.x_unit), self.y_name: shown(self.y, self.y_unit)}

@@ -36,13 +36,7 @@ class _Graph:
         return f"k{len(self.constants) - 1}"
 
 
-def onnx(
-    surface: AnySurface,
-    E_star: float | str,
-    *,
-    name: str = "law",
-    **asked: Any,
-) -> bytes:
+def onnx(surface: AnySurface, E_star: float | str, *, name: str = "law", **asked: Any) -> bytes:
     """A contact law as a file of ONNX: overclosure of shape (n,) in; pressure, tangent, area and energy out.
 
     Outside the range answers are NaN. Everything is float64.

@@ -68,6 +68,11 @@ def template(name: str) -> str:
     return (importlib.resources.files("mbma_tables.export") / "templates" / f"{name}.in").read_text(encoding="utf-8")
 
 
+def core_file(name: str) -> str:
+    """A file of the core, as the library is compiled from it."""
+    return (importlib.resources.files("mbma_tables.core") / name).read_text(encoding="utf-8")
+
+
 def filled(name: str, **parts: str) -> str:
     """A template with its places, such as @HEADER@, filled in; @IF PLACE@ ... @END@ stays where that is not empty."""
     chosen = re.compile(r"@IF ([A-Z]+)@(\n)?(.*?)@END@(?(2)\n)", re.S)

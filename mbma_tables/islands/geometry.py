@@ -24,10 +24,10 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import OutOfRangeError
-from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.power_laws import Place
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, alpha_of, m0_of, m4_of, summit_rate
+from mbma_tables.surfaces.surface import MeasuredSurface
 
 # of an island in units of s and 1/q0: zeta_d (27), zeta_u (30), R_d (26), R_u (29), D and sigma (32), h_d (B.3),
 # h_u (B.12), eta (39), X = (h_rms/s delta/h_rms - h_d)/sigma, mu = 8/3 D sigma sqrt(2 R_u R_d), D_d and sigma_d (43),

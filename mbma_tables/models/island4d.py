@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
-from mbma_tables.core import in_blocks
+from mbma_tables.core import core, in_blocks
 from mbma_tables.display import Displayed, Variable
 from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
@@ -21,7 +21,6 @@ from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
 from mbma_tables.plots import draw_lines
 from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.tablefiles.schema import TableContent, error_cell
-from mbma_tables.tablefiles.splines import at_places
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,6 +35,17 @@ def _broadcast(*values: ArrayLike) -> tuple[tuple[int, ...], list[FloatArray]]:
     given = {name: finite_array(name, value) for name, value in zip(RAW, values, strict=True)}
     shape = broadcast_shape(**given)
     return shape, [np.ascontiguousarray(np.broadcast_to(array, shape)) for array in given.values()]
+
+
+def at_places(coefs: FloatArray, places: FloatArray, slopes: bool = False) -> FloatArray:
+    """Two cubic functions of four axes, (2, entries), at positions in node units, (4, entries); NaN beyond the axes.
+
+    With `slopes` the values come with derivatives by the positions, (2, 5, entries).
+    """
+    nodes, given = np.array(coefs.shape[:4]) - 2, np.ascontiguousarray(places, dtype=float)
+    out = np.empty((2, 5, given.shape[1]) if slopes else (2, given.shape[1]))
+    core.spline4(given, np.ascontiguousarray(coefs), nodes, slopes, out)
+    return out
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -47,12 +47,9 @@ class Costs(NamedTuple):
     seconds: float
 
     def of(self, tier: str, what: str, rtol: float | None = None, quantity: str = "both") -> float:
-        """Seconds on the machine that measured; NaN where nothing was measured.
-
-        The row is that of the loosest measured tolerance that meets `rtol`, else of the tightest. A quantity that was
-        not measured alone costs what both do.
-        """
+        """Seconds at the loosest measured tolerance that meets `rtol`, else the tightest; NaN if none was measured."""
         rows = [row for row in self.rows if row.tier == tier and row.what == what]
+        # a quantity that was not measured alone costs what both do
         rows = [row for row in rows if row.quantity == quantity] or [row for row in rows if row.quantity == "both"]
         if not rows:
             return math.nan

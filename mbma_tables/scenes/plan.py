@@ -17,8 +17,7 @@ import numpy as np
 
 from mbma_tables.errors import InputError
 from mbma_tables.scenes.costs import Costs, shipped_costs
-from mbma_tables.scenes.effects import OF_LAW, OUTPUTS, REFINEMENTS
-from mbma_tables.scenes.problem import INVERTED, Problem
+from mbma_tables.scenes.problem import INVERTED, OF_LAW, OUTPUTS, REFINEMENTS, Problem
 
 if TYPE_CHECKING:
     from mbma_tables.models import AnyModel

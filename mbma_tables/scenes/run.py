@@ -1,60 +1,28 @@
-"""Carry a plan out: each step imports, reads and evaluates what it needs and nothing else."""
+"""Carry a plan out, and say what was found: an xarray Dataset of quantities with their units, and what made them."""
 
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.scenes.dataset import TABLES, to_dataset
-from mbma_tables.scenes.effects import CORRELATIONS
-from mbma_tables.scenes.plan import Plan, Step
-from mbma_tables.scenes.problem import INVERTED, Problem
+from mbma_tables.errors import ConvergenceError
+from mbma_tables.materials import ELASTIC_PSI
+from mbma_tables.scenes.plan import Plan
+from mbma_tables.scenes.problem import CORRELATIONS, INVERTED, Problem
+from mbma_tables.scenes.steps import STEPS, TABLES, Progress, Run, comparison
+from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.surfaces.self_affine import PARAMETERS
+from mbma_tables.theories.source import MEANINGS
+from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from mbma_tables.surfaces.any_surface import AnySurface
-    from mbma_tables.theories.law_object import ContactLaw
-    from mbma_tables.theories.protocol import Theory
-    from mbma_tables.theories.result import Contact
-
-Progress = Callable[[str, int, int], None]
-BLOCK = 64  # gaps between two reports of progress, where a gap is slow
-MAX_SLOPE_OF_STIFFNESS = 3.0  # of log(stiffness) by log(h_max - d); 5/2 next to first contact
-
-
-@dataclasses.dataclass
-class Run:
-    """A plan on its way: what steps hand on, and what they found."""
-
-    problem: Problem
-    surface: AnySurface
-    rtol: float
-    progress: Progress
-    gap: Any = None
-    found: dict[str, tuple[tuple[str, ...], Any]] = dataclasses.field(default_factory=dict)
-    errors: dict[str, float] = dataclasses.field(default_factory=dict)
-    tiers: dict[str, str] = dataclasses.field(default_factory=dict)
-    reasons: dict[str, list[int]] | None = None
-
-    def close(self, step: Step, error: float, tier: str | None) -> None:
-        """Note the error bound that a step reached, and its island model."""
-        self.errors[step.name] = error
-        if tier is not None:
-            self.tiers[step.name] = tier
-
 
 def run_plan(problem: Problem, plan: Plan, progress: Progress | None = None) -> xr.Dataset:
-    """The quantities of a problem, each with its unit; what made them in the attributes.
-
-    A step whose error bound exceeds the tolerance is a ConvergenceError.
-    """
+    """The quantities of a problem with their units, and what made them; an error above the tolerance is refused."""
     surface, h_max = problem.surface, float(problem.surface.h_max)
     if "finite_height" in problem.dropped:
         plain: Any = surface
@@ -64,7 +32,7 @@ def run_plan(problem: Problem, plan: Plan, progress: Progress | None = None) -> 
         run.gap = problem.gaps if problem.prescribed == "separations" else 2 * problem.gaps - h_max
     for step in plan.steps:
         run.progress(step.name, 0, step.count)
-        _STEPS.get(step.name, _comparison)(run, step)
+        STEPS.get(step.name, comparison)(run, step)
         run.progress(step.name, step.count, step.count)
     error = max(run.errors.values(), default=0.0)
     if error > plan.rtol:
@@ -85,221 +53,81 @@ def height_without_end(problem: Problem, rtol: float) -> float:
     return max(float(gap), 0.0) + tail * float(getattr(problem.surface, "s", problem.surface.h_rms))
 
 
-def _law(run: Run, step: Step) -> None:
-    """Through a law, for MBMA one tight enough for the slopes and gaps that are asked."""
-    from mbma_tables.theories.law import MIN_LAW_RTOL, contact_law
-
-    problem, wanted = run.problem, run.problem.outputs
-    assert step.rtol is not None
-    inverse = problem.prescribed in INVERTED
-    tier, asked = step.tier, step.rtol
-    while True:
-        own: dict[str, Any] = {"theory": problem.theory} if step.theory else {"tier": tier, "reading": problem.reading}
-        try:
-            law = contact_law(run.surface, asked, E_star=problem.E_star, **own)
-        except OutOfRangeError:
-            if not isinstance(tier, str) or tier not in TABLES:
-                raise
-            tier = "exact"
-            continue
-        error = _find_gaps(run, law) if inverse else law.error
-        if wanted & {"stiffness", "conductance"}:
-            error = max(error, _slope_error(law, run.gap, inverse))
-        if step.theory or error <= run.rtol or asked <= MIN_LAW_RTOL:
-            break
-        asked = max(0.1 * asked, MIN_LAW_RTOL)
-    _keep(run, lambda name: getattr(law, name)(run.gap))
-    run.close(step, error, dataclasses.replace(step, tier=tier).tier_name)
-
-
-def _find_gaps(run: Run, law: ContactLaw) -> float:
-    """Gaps at the pressures or areas prescribed; the bound on the error of force and area there."""
-    if run.problem.prescribed == "pressures":
-        run.gap = law.separation(force=run.problem.gaps)
-        # a gap found by force carries the error of the force, and area falls less steeply
-        return 2 * law.error
-    run.gap = law.separation(area=run.problem.gaps)
-    gap = run.gap[law.area(run.gap) > 0]
-    if not gap.size:
-        return law.error
-    # area falls by d, half as fast as by u
-    ratio = law.stiffness(gap) / 2 * law.area(gap) / (law.force(gap) * law.area_slope(gap))
-    return (1 + max(1.0, float(ratio.max(initial=0.0)))) * law.error
-
-
-def _keep(run: Run, quantity: Callable[[str], Any]) -> None:
-    """What was prescribed, and the quantities at gaps that were asked for, by name."""
-    problem, wanted = run.problem, run.problem.outputs
-    values: dict[str, Any] = {}
-    if problem.prescribed in INVERTED:
-        values["nominal_pressure" if problem.prescribed == "pressures" else "prescribed_area"] = problem.gaps
-    if "force" in wanted:
-        values["force"] = quantity("force")
-    if "area" in wanted and "subscale_area" not in problem.dropped:
-        values["area"] = quantity("area")
-    if "stiffness" in wanted:
-        values["stiffness"] = quantity("stiffness")
-    if "conductance" in wanted:
-        from mbma_tables.totals.conductance import conductance, mean_conductivity
-
-        assert problem.conductivities is not None
-        # yielded points unload elastically
-        slope = quantity("stiffness" if problem.hardness is None else "incremental_stiffness")
-        values["conductance"] = conductance(slope, mean_conductivity(*problem.conductivities), problem.E_star)
-    if "energy" in wanted:
-        values["energy"] = quantity("energy")
-    run.found |= {name: (("gap",), array) for name, array in values.items()}
-
-
-def _contact(run: Run, step: Step) -> None:
-    """Another theory, or one with a hardness, at the gaps themselves."""
-    from mbma_tables.theories.contact import contact
-
-    problem = run.problem
-    assert problem.prescribed is not None
-    known: dict[str, Any] = {problem.prescribed[:-1]: problem.gaps}
-    if problem.hardness is not None:
-        known["hardness"] = problem.hardness
-        if problem.theory == "mbma":
-            known |= {"reading": problem.reading, "rtol": step.rtol, "tier": step.tier}
-    found = contact(run.surface, E_star=problem.E_star, theory=problem.theory, **known)
-    run.gap = found.separation
-    _keep(run, lambda name: getattr(found, name))
-    if problem.hardness is not None:
-        names = ("yielded", "mean_pressure", "plane_separation", "incremental_stiffness")
-        run.found |= {name: (("gap",), getattr(found, name)) for name in names}
-    run.close(step, float(found.error.max()), step.tier_name)
-
-
-def _asked(run: Run) -> Contact:
-    """The scene's contact, with what follows from it."""
-    from mbma_tables.theories.contact import contact
-    from mbma_tables.theories.mbma import Mbma
-
-    problem = run.problem
-    theory = Mbma(reading=problem.reading, outside="nan") if problem.theory == "mbma" else problem.theory
-    yields = {} if problem.hardness is None else {"hardness": problem.hardness, "E_star": problem.E_star}
-    return contact(run.problem.surface, run.gap, theory=theory, **yields)
-
-
-def _leakage(run: Run, step: Step) -> None:
-    found = _asked(run).leakage
-    fields = {"": found.conductance, "_valid": found.valid, "_scatter": found.scatter, "_blocked": found.blocked}
-    run.found |= {f"leakage{end}": (("gap",), values) for end, values in fields.items()}
-
-
-def _validity(run: Run, step: Step) -> None:
-    found = _asked(run)
-    names = ("valid", "scatter", "area_scatter", "stiffness_scatter", "separation_scatter")
-    run.found |= {name: (("gap",), getattr(found, name)) for name in names}
-    run.reasons = {reason: np.flatnonzero(mask).tolist() for reason, mask in found.reasons.items()}
-
-
-def _slope_error(law: ContactLaw, gap: Any, inverted: bool) -> float:
-    """Bound on the relative error of the stiffness at these gaps, and of force, area and energy."""
-    touching = gap[gap < law.h_max]
-    if touching.size == 0:
-        return law.error
-    # F/l over the stiffness: large only next to a turning point
-    ratio = 2 * law.force(touching) / ((law.h_max - touching) * np.abs(law.stiffness(touching)))
-    moved = MAX_SLOPE_OF_STIFFNESS * law.error if inverted else 0.0
-    return max(2 * law.error, float(((law.slope_error(touching) + moved) * ratio).max()))
-
-
-def _totals(run: Run, step: Step) -> None:
-    from mbma_tables.theories.contact import contact
-
-    problem = run.problem
-    assert step.rtol is not None
-    assert step.tier is not None
-    own = {"force"} if "subscale_area" in problem.dropped else {"force", "area"}
-    wanted = tuple(sorted(problem.outputs & own, reverse=True))
-    block = run.gap.size if step.tier_name in ("universal", "rigid") else BLOCK
-    answers = []
-    for first in range(0, run.gap.size, block):
-        answer = contact(
-            run.surface,
-            run.gap[first : first + block],
-            tier=step.tier,
-            reading=problem.reading,
-            E_star=problem.E_star,
-            rtol=step.rtol,
-            outside="exact" if step.tier_name in TABLES else "raise",
-            quantities=wanted,
-        )
-        answers.append(answer)
-        run.progress(step.name, min(first + block, run.gap.size), run.gap.size)
-    for name in wanted:
-        run.found[name] = (("gap",), np.concatenate([getattr(answer, name) for answer in answers]))
-    run.close(step, max(float(answer.error.max()) for answer in answers), step.tier_name)
-
-
-def _islands(run: Run, step: Step) -> None:
-    from mbma_tables.scenes import statistics
-
-    functions = {
-        "hertz area": statistics.hertz_area,
-        "island statistics": statistics.island_statistics,
-        "profiles": statistics.profiles,
+def _units(problem: Problem) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of every quantity that a scene can hold."""
+    hertz = "subscale_area" in problem.dropped
+    # the name that has its unit, and what it is
+    quantities = {name: (name, text) for name, text in MEANINGS.items()} | {
+        "nominal_pressure": ("pressure", "F/A0 as prescribed"),
+        "prescribed_area": ("area", "A/A0 as prescribed"),
+        "area": ("area", "Hertz area of the summits over A0 (eta = 1)" if hertz else "real contact area A/A0"),
+        "leakage": ("leakage", "flow conductance k h_rms^3: flow per length of seal is it dp/(12 viscosity width)"),
+        "leakage_valid": ("valid", "whether flow through such contacts was simulated"),
+        "leakage_scatter": ("scatter", "standard deviation of ln of the flow conductance between simulations"),
+        "leakage_blocked": ("valid", "whether contact percolates"),
+        "island_number": ("D", "islands in contact per nominal area (Eq. 42)"),
+        "island_delta": ("delta", "approach of an island"),
+        "island_force": ("island_force", "load of an island at that approach"),
+        "island_area": ("island_area", "contact area of an island at that approach"),
+        "island_density": ("island_density", "islands per nominal area and approach"),
+        "profile_delta": ("delta", "approach of the island"),
+        "profile_radius": ("R_d", "radius r in the island"),
+        "profile_pressure": ("pressure", "pressure p(r) (Eq. 36)"),
+        "profile_gap": ("separation", "d(r), deformed sphere to mid-plane of the summits (Eq. 34)"),
     }
-    fields, error = functions[step.name](run.problem, run.surface, run.gap, step)
-    run.found |= fields
-    run.close(step, error, step.tier_name)
+    for name in problem.theories:
+        quantities |= {f"{name}_force": ("force", f"F/A0 by {name}"), f"{name}_area": ("area", f"A/A0 by {name}")}
+    units = {name: (unit_of(like, problem.units), meaning) for name, (like, meaning) in quantities.items()}
+    unit = problem.conductance_unit
+    correlations = {f"{name}_conductance": (unit, f"conductance by {name}") for name in CORRELATIONS}
+    return units | correlations | {"conductance": (unit, "conductance per nominal area")}
 
 
-class OtherTheory(NamedTuple):
-    """Force and area by a theory, and standard deviations of their logarithms; NaN where there is no answer."""
+def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
+    """Quantities that were found; coordinates are gaps and what was prescribed."""
+    import xarray as xr
 
-    force: FloatArray
-    area: FloatArray
-    scatter: FloatArray
-    area_scatter: FloatArray
-
-
-def other_theory(
-    name: str, surface: AnySurface, gap: FloatArray, E_star: float, hardness: float = math.inf
-) -> OtherTheory:
-    """A theory, one of `effects.COMPARED`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
-    from mbma_tables.theories import get_theory
-    from mbma_tables.theories.protocol import answer_where_finite
-
-    if name == "persson_simplified":
-        from mbma_tables.theories.persson import Persson
-
-        theory: Theory = Persson("simplified")
+    problem, units = run.problem, _units(run.problem)
+    variables = {
+        name: xr.Variable(dims, values, {"units": units[name][0], "long_name": units[name][1]})
+        for name, (dims, values) in run.found.items()
+    }
+    named = ("separation", "mean_separation", "nominal_pressure", "prescribed_area", "profile_delta", "island_delta")
+    facts: dict[str, Any] = {
+        "title": problem.title,
+        "plan": plan.text(),
+        "rtol": plan.rtol,
+        "error": max(run.errors.values(), default=0.0),
+        "errors": json.dumps(run.errors),
+        "theory": problem.theory_name,
+        "reading": get_reading(problem.reading).name if problem.theory == "mbma" else "",
+        "tiers": json.dumps(run.tiers),
+        "switched_off": " ".join(sorted(problem.dropped)),
+        "E_star": float(problem.E_star),
+        "table_hashes": json.dumps(_hashes(problem, set(run.tiers.values()))),
+    }
+    # psi times the hardness
+    stress = float(problem.E_star * problem.surface.rms_gradient)
+    if problem.hardness is None:
+        facts["elastic_hardness"] = stress / ELASTIC_PSI
     else:
-        theory = get_theory(name)
-    if hardness < math.inf:
-        from mbma_tables.theories.yielding import Yielding
-
-        theory = Yielding(theory, hardness / E_star)
-    found = answer_where_finite(theory, surface, (float(surface.h_max) + gap) / 2)
-    return OtherTheory(E_star * found.force, found.area, *theory.scatter(surface, found.area))
-
-
-def _comparison(run: Run, step: Step) -> None:
-    if step.name in CORRELATIONS:
-        from mbma_tables.totals import conductance
-
-        problem = run.problem
-        assert problem.conductivities is not None
-        pressure = (run.found.get("nominal_pressure") or run.found["force"])[1]
-        k_s, cap = conductance.mean_conductivity(*problem.conductivities), problem.hardness or np.inf
-        found = getattr(conductance, step.name)(problem.surface, pressure, k_s, problem.E_star, cap)
-        run.found[f"{step.name}_conductance"] = (("gap",), found)
-        return
-    cap = math.inf if run.problem.hardness is None else run.problem.hardness
-    other = other_theory(step.name, run.problem.surface, run.gap, run.problem.E_star, cap)
-    run.found |= {f"{step.name}_force": (("gap",), other.force), f"{step.name}_area": (("gap",), other.area)}
+        facts |= {"hardness": float(problem.hardness), "psi": stress / float(problem.hardness)}
+    if run.reasons is not None:
+        facts["reasons"] = json.dumps(run.reasons)
+    known = {name: getattr(problem.surface, name) for name in PARAMETERS}
+    # a spectrum that is no power law has no Hurst exponent
+    facts |= {f"surface_{name}": float(number) for name, number in known.items() if number is not None}
+    return xr.Dataset(variables, attrs=facts).set_coords([name for name in named if name in variables])
 
 
-_STEPS = {
-    "law": _law,
-    "contact": _contact,
-    "totals": _totals,
-    "hertz area": _islands,
-    "island statistics": _islands,
-    "validity": _validity,
-    "leakage": _leakage,
-    "profiles": _islands,
-}
+def _hashes(problem: Problem, tiers: set[str]) -> dict[str, str]:
+    """Hashes of the values of the tables that answered."""
+    used = sorted(tiers & set(TABLES))
+    if not used:
+        return {}
+    from mbma_tables.models.tables import open_table
+
+    tables: dict[str, Any] = {name: open_table(name) for name in used}
+    if not isinstance(problem.tier, str | None):
+        tables[problem.tier.name] = problem.tier
+    return {name: str(table.content.attributes["values_sha256"]) for name, table in tables.items() if name in used}

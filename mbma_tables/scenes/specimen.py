@@ -3,40 +3,38 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import json
 import os
 import pathlib
+import tomllib
 import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbma_tables.arguments import one_number, require
+from mbma_tables.arguments import nearest, one_number, require
 from mbma_tables.errors import InputError
 from mbma_tables.files import read_file
 from mbma_tables.materials import effective_modulus
-from mbma_tables.scenes.toml_file import check, read_toml, schema
 from mbma_tables.surfaces.cases import get_case
+from mbma_tables.surfaces.roughness import ROUGHNESS
+from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
+from mbma_tables.surfaces.treatment import OPTIONS, Treated
 from mbma_tables.units import Units, factor, in_unit, known, resolve
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.any_surface import AnySurface
-    from mbma_tables.surfaces.measured import MeasuredSurface
-    from mbma_tables.surfaces.treatment import Treated
 
-BAND = ("hurst", "q0", "q1", "h_rms", "h_max")
 MAGNIFICATION = ("hurst", "q0", "zeta_1", "h_rms", "h_max")
 MOMENTS = ("hurst", "m0", "m2", "m4", "h_max")
-ROUGHNESS = ("Rq", "Ra", "Sq", "Sa", "Rdq", "Sdq", "Rsm", "Sds", "Spd", "Sp", "longest", "shortest")
-NUMBERS = tuple(dict.fromkeys(BAND + MAGNIFICATION + MOMENTS + ROUGHNESS))
+NUMBERS = tuple(dict.fromkeys(PARAMETERS + MAGNIFICATION + MOMENTS + ROUGHNESS))
 MATERIAL = ("E_star", "E1", "nu1", "E2", "nu2")
-MAP_OPTIONS = (
-    *("dx", "dy", "channel", "periodic", "detrend", "outliers", "fill", "short_cutoff", "long_cutoff", "tip_radius"),
-    *("reliable", "window", "extrapolate_to", "extrapolate_hurst"),
-)  # of a measured map, in the words of `Surface.from_map`
-MAX_SPECTRUM_BYTES = 16 * 2**20
+MAP_OPTIONS = (*OPTIONS[1:], "extrapolate_to", "extrapolate_hurst")  # of a measured map; its unit has its own
+MAX_TOML_BYTES, MAX_SPECTRUM_BYTES = 2**20, 16 * 2**20
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,7 +91,7 @@ def measured(path: pathlib.Path, treatment: Mapping[str, Any]) -> tuple[Treated,
     options = dict(treatment)
     further = [options.pop(name, None) for name in ("extrapolate_to", "extrapolate_hurst")]
     treated = prepared(path, options, None)
-    return treated, measured_surface(treated, None, *further)
+    return treated, MeasuredSurface.of(measured_surface(treated, None, *further))
 
 
 def _printable(path: pathlib.Path) -> str:
@@ -112,9 +110,9 @@ def from_numbers(
                 f"{', '.join(alien)} beside numbers of a drawing: leave them out, or give longest or shortest"
             )
         return Specimen(Surface.from_roughness(**{"hurst": None, **given}, unit=unit), title)
-    if set(given) not in (set(BAND), set(MAGNIFICATION), set(MOMENTS)):
+    if set(given) not in (set(PARAMETERS), set(MAGNIFICATION), set(MOMENTS)):
         raise InputError(
-            f"a surface needs {', '.join(BAND)} (or zeta_1 for q1), or {', '.join(MOMENTS)}, or "
+            f"a surface needs {', '.join(PARAMETERS)} (or zeta_1 for q1), or {', '.join(MOMENTS)}, or "
             f"roughness (Rq, ...); got {', '.join(given) or 'none of them'}"
         )
     plain, unit = resolve(given, unit)
@@ -215,3 +213,51 @@ def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str, u
         columns[:, 0], columns[:, 1], h_max=h_max, convention=convention, unit=unit, model=model
     )
     return Specimen(surface, f"fitted to {path.name}" if convention == "profile" else f"spectrum {path.name}")
+
+
+def read_toml(path: pathlib.Path, what: str) -> dict[str, Any]:
+    """The entries of a TOML file; `what` says of which kind it should be."""
+    try:
+        content = read_file(path, MAX_TOML_BYTES)
+    except InputError as fault:
+        raise InputError(f"{fault}; give the path of a {what} file") from None
+    try:
+        entries = tomllib.loads(content.decode("utf-8"))
+        # refuses whole numbers and nesting that no message could quote
+        repr(entries)
+    except (ValueError, RecursionError) as fault:
+        raise InputError(f"{path} is not a TOML file: {fault}") from None
+    return entries
+
+
+@functools.cache
+def schema() -> dict[str, Any]:
+    """The JSON schema of scene files, as published in the package."""
+    path = pathlib.Path(__file__).with_name("scene.schema.json")
+    content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return content
+
+
+def check(entries: Mapping[str, Any], rules: Mapping[str, Any]) -> None:
+    """Refuse what a JSON schema does not allow, with its place and what to write instead."""
+    import jsonschema
+
+    faults = list(jsonschema.Draft202012Validator(rules).iter_errors(entries))
+    # a misspelt name is the cause of a missing one
+    fault = jsonschema.exceptions.best_match([f for f in faults if f.validator == "additionalProperties"] or faults)
+    if fault is None:
+        return
+    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in fault.absolute_path)[1:]
+    table = f"[{place}]" if place else "top level"
+    if fault.validator == "additionalProperties":
+        known = fault.schema["properties"]
+        unknown = next(name for name in fault.instance if name not in known)
+        tables = [name for name, entry in schema()["properties"].items() if unknown in entry.get("properties", ())]
+        hint = f"it belongs to [{' or ['.join(f'{name}]' for name in tables)}" if tables else nearest(unknown, known)
+        raise InputError(f"{table}: unknown key {unknown!r}; {hint}")
+    if fault.validator == "enum":
+        raise InputError(
+            f"{place}: {fault.instance!r} is not known; {nearest(str(fault.instance), fault.schema['enum'])}"
+        )
+    hint = f"; write [{place}]" if fault.validator == "type" and fault.schema["type"] == "object" else ""
+    raise InputError(f"{place or table}: {fault.message}{hint}")

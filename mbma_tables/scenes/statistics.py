@@ -50,10 +50,7 @@ def hertz_area(problem: Problem, surface: AnySurface, gap: FloatArray, step: Ste
 
 
 def island_statistics(problem: Problem, surface: AnySurface, gap: FloatArray, step: Step) -> tuple[Fields, float]:
-    """Number of islands at every gap; load, area and density of islands along their approach (Eqs. 40, 42).
-
-    The density is zero beyond h_max - d. Also returns the bound on the relative error.
-    """
+    """Number of islands at every gap; load, area, density along their approach (Eqs. 40, 42), and the error's bound."""
     reading, rtol, tier = _asked(problem, step)
     model, h_rms = get_model(tier, rtol, reading), float(surface.h_rms)
     depth = np.asarray(surface.h_max - gap) / h_rms

@@ -19,8 +19,6 @@ from mbma_tables.units import Units, factor, unit_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mbma_tables.surfaces.measured import MeasuredSurface
-
 
 def frozen(values: Any) -> Any:
     """The same numbers, which nobody can write to where they are a plain array."""
@@ -44,35 +42,19 @@ MEANINGS = {
 
 
 class AnySurface(Displayed, abc.ABC):
-    """A rough surface, or a batch: what theories and everything above them ask.
+    """A rough surface, or a batch: what theories and everything above them ask."""
 
-    Attributes
-    ----------
-    q0, q1 : array_like
-        Smallest and largest wavenumber of its roughness [1/length].
-    h_rms, h_max : array_like
-        Root-mean-square height, and highest point above the mid-plane [length].
-    m2, m4 : array_like
-        Variance of a profile's slope, and of its second derivative [1/length^2], Eq. (1).
-    unit : str or None
-        The unit of length; None where it is not known.
-    provenance : tuple of mapping
-        Where it comes from, a plain record each step.
-    parameters : tuple of str
-        Names of the numbers that make it; none where it is its own spectrum.
-    """
+    parameters: ClassVar[tuple[str, ...]] = ()  # names of the numbers that make it; none where a spectrum does
 
-    parameters: ClassVar[tuple[str, ...]] = ()
-
-    # plain fields of one class, properties of the other
+    # plain fields of one class, properties of the other; `MEANINGS` says what they are
     q0: Any
     q1: Any
     h_rms: Any
     h_max: Any
     m2: Any
     m4: Any
-    unit: str | None
-    provenance: tuple[Mapping[str, Any], ...]
+    unit: str | None  # of length; None where it is not known
+    provenance: tuple[Mapping[str, Any], ...]  # where it comes from, a plain record each step
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -97,7 +79,7 @@ class AnySurface(Displayed, abc.ABC):
         """C(q) [length^4] as h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), zero outside [q0, q1]."""
 
     @abc.abstractmethod
-    def sampled(self) -> MeasuredSurface:
+    def sampled(self) -> Any:
         """The same surface by samples of its spectrum; of a batch there are none."""
 
     @abc.abstractmethod
@@ -183,7 +165,7 @@ class AnySurface(Displayed, abc.ABC):
         label = f"wavenumber q [1/{length}]"
         return draw_lines({"spectrum": (q, self.power_spectrum(q))}, label, f"spectrum C(q) [{length}^4]")
 
-    def combined(self, other: AnySurface) -> MeasuredSurface:
+    def combined(self, other: AnySurface) -> Any:
         """The one rough surface that stands for two that touch: spectra add, heights convolve.
 
         Parameters
@@ -211,6 +193,4 @@ class AnySurface(Displayed, abc.ABC):
         >>> f"h_rms = {both.h_rms:.2f}, h_max = {both.h_max:.1f}, q from {both.q0:g} to {both.q1:g}"
         'h_rms = 5.00, h_max = 15.0, q from 0.01 to 5'
         """
-        from mbma_tables.surfaces.measured import combination
-
-        return combination(self.sampled(), other.sampled())
+        return self.sampled().added(other.sampled())

@@ -15,19 +15,17 @@ from mbma_tables import bearing
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError, NotSelfAffineError
 from mbma_tables.surfaces.heights import Heights, one_height
-from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.measurements import grid_of, read_measurement
 from mbma_tables.surfaces.power_law import SCATTER, log_bins
 from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.psd import check_band, fit_spectrum
-from mbma_tables.surfaces.surface import Surface
-from mbma_tables.surfaces.treatment import LENGTHS, Treated, Treatment, mirrored, squares, treat
+from mbma_tables.surfaces.spectral import SpectralSurface
+from mbma_tables.surfaces.treatment import LENGTHS, MIN_POWER, Treated, Treatment, mirrored, squares, treat
 from mbma_tables.units import Units, factor, known, resolve
 
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
 WINDOW_LOBE = 2.0  # half-width of a Hann window's main lobe, in grid steps: closer to q = 0 it mixes with the mean
 WINDOW_OVERLAP = (35 / 18) ** 2  # waves under that window that carry what one independent wave does
-MIN_POWER = 1e-24  # of the strongest wave: below it rounding, not a measured wave
 MAX_KURTOSIS = 50.0  # all slopes on 2% of the points; Gaussian surfaces have 3, worn or scratched ones up to 10 or 20
 MAX_ANISOTROPY = 0.3  # of a cosine around the circle: four times the power one way than across it
 
@@ -77,10 +75,7 @@ def _refuse_edges(heights: FloatArray) -> None:
 
 
 def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2) -> Treated:
-    """A map, or a line scan, of a file, an array or a topography, treated; options as of `Surface.from_map`.
-
-    Without a number of `dimensions`, a file decides.
-    """
+    """A map or line scan, treated, with options of `Surface.from_map`; without `dimensions` a file decides which."""
     given = {name: value for name, value in options.items() if value is not None}
     for name in given.keys() & {"periodic", "reliable"}:
         if not isinstance(given[name], bool | np.bool_):
@@ -106,8 +101,8 @@ def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2
     return treat(grid, steps, whole, Treatment(**given), own, info)
 
 
-def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | None) -> Surface:
-    """The self-affine surface fitted to a height map; see `Surface.from_map`."""
+def fit_map(treated: Treated, h_max: float | None, band: tuple[float, float] | None) -> dict[str, Any]:
+    """Arguments of the `Surface` fitted to a height map; see `Surface.from_map`."""
     top = None if h_max is None else one_height(h_max)
     _refuse_edges(treated.heights)
     # heights of order one, so that their squares neither underflow nor overflow
@@ -142,10 +137,7 @@ TOLD = 0.05  # relative difference of rms gradients that is told, and half of th
 
 
 def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> FloatArray:
-    """C of averaged samples, tilted a little so that its variance and mean square wavenumber are those of all waves.
-
-    The longest waves of a map are few, and samples do not reach half way to the next ones.
-    """
+    """C of averaged samples, tilted a little to the variance and mean square wavenumber of all waves."""
     from scipy.optimize import brentq
 
     def excess(tilt: float) -> float:
@@ -161,12 +153,10 @@ def matched(q: FloatArray, C: FloatArray, variance: float, square: float) -> Flo
 
 
 def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> FloatArray:
-    """C with another variance and mean squared gradient, by waves that are few: the longest, of a rough surface.
-
-    The likeliest change, where ln C is known as the inverse of the number of waves: it goes like C times 1 and q^2.
-    """
+    """C with another variance and mean squared gradient, by waves that are few: the longest, of a rough surface."""
     from scipy.optimize import least_squares
 
+    # the likeliest change, where ln C is known as the inverse of the number of waves: it goes like C times 1 and q^2
     ways = np.stack([C / C.max(), C * q**2 / (C * q**2).max()])
 
     def misses(by: FloatArray) -> FloatArray:
@@ -187,11 +177,7 @@ def raised(q: FloatArray, C: FloatArray, variance: float, slopes: float) -> Floa
 def _unwindowed(
     q: FloatArray, C: FloatArray, variance: float, slopes: float, seen: float, parts: tuple[float, float]
 ) -> tuple[FloatArray, dict[str, Any]]:
-    """C under a window as that of the whole map, and what was done.
-
-    Short waves are scaled to their own mean squared gradient, `parts` of what is `seen` under the window and of the
-    map's `slopes`; what is left of h_rms and of the gradient is up to the longest waves.
-    """
+    """C under a window as that of the whole map, and what was done; `parts` are those of short waves."""
     rougher = parts[1] / parts[0] if min(parts) > 0 else 1.0
     under = math.sqrt(PowerLaws(q, C).moment(0) / variance)
     C = raised(q, C * rougher, variance, slopes)
@@ -231,7 +217,7 @@ def _within_band(treated: Treated, scale: float, spectrum: tuple[Any, ...]) -> t
     return tuple(part[..., held] for part in spectrum)
 
 
-def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
+def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
     """A height map as its own radial spectrum, heights and curves; see `Surface.from_map`."""
     # lengths of order one, so that their powers neither underflow nor overflow
     scale = float(np.abs(treated.heights).max())
@@ -270,7 +256,7 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
             f"would be {rougher:.2f} times as large"
         )
         notes.append({"step": "corners", "rms_gradient": rougher, "told": told})
-    known = MeasuredSurface(
+    known = SpectralSurface(
         bins.q,
         C_bins,
         None if h_max is None else one_height(h_max) / scale,
@@ -280,26 +266,23 @@ def measured_map(treated: Treated, h_max: float | None) -> MeasuredSurface:
         1 / (1 / bins.weight - SCATTER**2),
         curves.anisotropy,
     ).scaled(scale, treated.unit)
-    edges = "periodic" if treated.plain else "under a window for the spectrum"
-    edges += "" if treated.periodic else ", mirrored for the curves"
     return dataclasses.replace(
-        known, provenance=(treated.read, *treated.provenance, {"step": "edges", "kind": edges}, *notes)
+        known, provenance=treated.history(*notes, more="" if treated.periodic else ", mirrored for the curves")
     )
 
 
 def _with_anisotropy(
-    fitted: Surface, q: FloatArray, strength: FloatArray, directions: NDArray[np.complex128]
-) -> Surface:
+    fitted: dict[str, Any], q: FloatArray, strength: FloatArray, directions: NDArray[np.complex128]
+) -> dict[str, Any]:
     """The same with its anisotropy noted; refused where its fitted waves favour a direction."""
-    fit = fitted.fit
-    assert fit is not None
+    fit = fitted["fit"]
     inside = (q >= fit.q_low) & (q <= fit.q_high)
     # whitened by the law, and between every wave alike (the shortest decide) and every octave alike (the longest)
-    weight = strength[inside] * q[inside] ** (1 + 2 * fitted.hurst)
+    weight = strength[inside] * q[inside] ** (1 + 2 * fitted["hurst"])
     anisotropy = float(np.abs(directions[:, inside] @ weight).max() / weight.sum())
     if anisotropy > MAX_ANISOTROPY:
         raise NotSelfAffineError(
             f"the map is not isotropic: an anisotropy of {anisotropy:.2g} between q = {fit.q_low:.4g} and "
             f"{fit.q_high:.4g}, more than {MAX_ANISOTROPY} (1: all power in one direction)"
         )
-    return dataclasses.replace(fitted, fit=dataclasses.replace(fit, anisotropy=anisotropy), unit=fit.length_unit)
+    return fitted | {"fit": dataclasses.replace(fit, anisotropy=anisotropy), "unit": fit.length_unit}

@@ -35,6 +35,18 @@ def two_columns(q: ArrayLike, C: ArrayLike) -> tuple[FloatArray, FloatArray]:
     return wavenumber, spectrum
 
 
+def sorted_spectrum(q: ArrayLike, C: ArrayLike, convention: str) -> tuple[FloatArray, FloatArray]:
+    """An isotropic spectrum in the order of its wavenumbers and in the paper's convention."""
+    if convention not in ("paper", "isotropic"):
+        raise InputError(
+            f"convention must be 'paper' or 'isotropic', got {convention!r}: a profile's spectrum can be fitted, "
+            "with model='self-affine'"
+        )
+    wavenumber, spectrum = two_columns(q, C)
+    order = np.argsort(wavenumber, kind="stable")
+    return wavenumber[order], spectrum[order] * (1.0 if convention == "paper" else 1 / (4 * math.pi**2))
+
+
 def growth(x: FloatArray) -> FloatArray:
     """(exp(x) - 1)/x, 1 at x = 0."""
     zero = x == 0

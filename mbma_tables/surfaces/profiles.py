@@ -17,10 +17,9 @@ import numpy as np
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces.heights import Heights, one_height
-from mbma_tables.surfaces.maps import MIN_POWER
-from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.power_laws import PowerLaws
-from mbma_tables.surfaces.treatment import Treated
+from mbma_tables.surfaces.spectral import SpectralSurface
+from mbma_tables.surfaces.treatment import MIN_POWER, Treated
 
 PER_DECADE = 10  # nodes of the spectrum
 PANELS = 8  # between two nodes
@@ -128,7 +127,7 @@ def _panels(edges: FloatArray) -> FloatArray:
     return np.asarray(np.exp(np.interp(place, np.arange(edges.size), np.log(edges))))
 
 
-def measured_profile(treated: Treated, h_max: Any) -> MeasuredSurface:
+def measured_profile(treated: Treated, h_max: Any) -> SpectralSurface:
     """The isotropic surface of a treated line scan; see `Surface.from_profile`."""
     # lengths of order one, so that their powers neither underflow nor overflow
     scale = float(np.abs(treated.heights).max())
@@ -143,17 +142,15 @@ def measured_profile(treated: Treated, h_max: Any) -> MeasuredSurface:
         heights = Heights.gaussian(found.h_rms, heights.h_max)
     end = min(waves[1], float(found.edges[-1]))
     q = np.append(found.edges[found.edges < end], end)
-    surface = MeasuredSurface(
+    surface = SpectralSurface(
         q,
         PowerLaws(found.edges, found.isotropic()).at(q),
         None if h_max is None else one_height(h_max) / scale,
         heights,
         samples=np.interp(np.log(q), np.log(found.edges[:-1]), found.count),
     ).scaled(scale, treated.unit)
-    edges = "periodic" if treated.plain else "under a window for the spectrum"
     notes = _limits(found, steps[0] * scaled.heights.size)
-    provenance = (treated.read, *treated.provenance, {"step": "edges", "kind": edges}, *notes)
-    return dataclasses.replace(surface, provenance=provenance)
+    return dataclasses.replace(surface, provenance=treated.history(*notes))
 
 
 def _limits(found: ProfileSpectrum, length: float) -> tuple[dict[str, Any], ...]:
@@ -171,12 +168,7 @@ def _limits(found: ProfileSpectrum, length: float) -> tuple[dict[str, Any], ...]
         f"small. Its highest point is a line's: a Gaussian square of its length reaches about {level:.1f} h_rms"
     )
     notes = [
-        {
-            "step": "errors",
-            "h_rms": found.h_rms_error,
-            "rms_gradient": found.gradient_error,
-            "told": errors,
-        },
+        {"step": "errors", "h_rms": found.h_rms_error, "rms_gradient": found.gradient_error, "told": errors},
         {"step": "unseen", "h_max": level, "told": unseen},
     ]
     if found.longest > ROLLED_OFF:

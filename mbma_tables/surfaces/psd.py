@@ -26,8 +26,8 @@ from mbma_tables.surfaces.power_law import (
     with_end_of_profile,
 )
 from mbma_tables.surfaces.power_laws import two_columns
+from mbma_tables.surfaces.spectral import SpectralSurface
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
-from mbma_tables.surfaces.surface import Surface
 
 CONVENTIONS = ("paper", "isotropic", "profile")
 MAX_RESIDUAL = 0.2  # of log10 C, a factor 1.6: beyond it the law says little about any one scale
@@ -89,8 +89,8 @@ def check_band(band: Any, low: float, high: float) -> tuple[float, float] | None
     return float(pair[0]), float(pair[1])
 
 
-def fit_psd(q: ArrayLike, C: ArrayLike, h_max: float, convention: str, band: tuple[float, float] | None) -> Surface:
-    """The self-affine surface fitted to a measured spectrum; see `Surface.from_spectrum`.
+def fit_psd(q: ArrayLike, C: ArrayLike, h_max: Any, convention: str, band: Any) -> dict[str, Any]:
+    """Arguments of the `Surface` fitted to a measured spectrum; see `Surface.from_spectrum`.
 
     Notes
     -----
@@ -99,6 +99,8 @@ def fit_psd(q: ArrayLike, C: ArrayLike, h_max: float, convention: str, band: tup
     too; the surface's q1 is where it ends if that is within 1.25 of the largest wavenumber, which else is q1.
     A profile mixes long waves with longer ones, so its roll-off is placed to a factor of 1.5 only.
     """
+    if h_max is None:
+        raise InputError("h_max is missing: the highest point above the mid-plane, or heights= of the surface")
     if convention not in CONVENTIONS:
         raise InputError(f"convention must be one of {', '.join(CONVENTIONS)}, got {convention!r}")
     height = one_height(h_max)
@@ -107,8 +109,7 @@ def fit_psd(q: ArrayLike, C: ArrayLike, h_max: float, convention: str, band: tup
         spectrum = spectrum / (4 * math.pi**2)
     # (4)-(6): h_rms^2 = 2 pi integral C q dq; of a profile, integral C dq / pi
     density = spectrum / math.pi if convention == "profile" else 2 * math.pi * spectrum * wavenumber
-    steps = np.diff(wavenumber, prepend=wavenumber[0]) + np.diff(wavenumber, append=wavenumber[-1])
-    variances = density * steps / 2
+    variances = density * _steps(wavenumber) / 2
     ends = float(wavenumber[0]), float(wavenumber[-1])
     return fit_spectrum(
         wavenumber,
@@ -120,6 +121,28 @@ def fit_psd(q: ArrayLike, C: ArrayLike, h_max: float, convention: str, band: tup
         band=check_band(band, *ends),
         power=float(variances.sum()),
         convention=convention,
+    )
+
+
+def _steps(q: FloatArray) -> FloatArray:
+    """Twice the width of wavenumbers that each sample stands for."""
+    return np.asarray(np.diff(q, prepend=q[0]) + np.diff(q, append=q[-1]))
+
+
+def fit_samples(surface: SpectralSurface, band: Any) -> dict[str, Any]:
+    """Arguments of the `Surface` fitted to a surface's own spectrum; see `MeasuredSurface.fit`."""
+    q, C, ends = surface.q, surface.C, (float(surface.q0), float(surface.q1))
+    positive = C > 0
+    return fit_spectrum(
+        q[positive],
+        C[positive],
+        (np.ones(q.size) if surface.samples is None else surface.samples)[positive],
+        (math.pi * C * q * _steps(q))[positive],
+        h_max=float(surface.h_max),
+        usable=ends,
+        band=check_band(band, *ends),
+        power=float(surface.m0),
+        convention="paper",
     )
 
 
@@ -158,8 +181,8 @@ def fit_spectrum(
     power: float,
     convention: str,
     **known: Any,
-) -> Surface:
-    """The surface whose band fits C, in the paper's convention or a profile's; for spectra and maps alike.
+) -> dict[str, Any]:
+    """Arguments of the `Surface` whose band fits C, in the paper's convention or a profile's.
 
     `counts` and `variances` are independent samples and variance of height of each entry; `power` is the sum of all
     variances, `usable` the range to be trusted, `known` further fields of `SpectrumFit`.
@@ -196,7 +219,8 @@ def fit_spectrum(
     scale = math.exp(law.log_k) / (2 * math.pi * beta(exponent + 0.5, 0.5) * unit if profile else 1.0)
     z0, z1 = q0 / unit, q1 / unit
     growth = -math.expm1(-2 * exponent * math.log(z1 / z0)) * z0 ** (-2 * exponent)
-    return Surface(exponent, q0, q1, unit * math.sqrt(math.pi * scale * growth / exponent), h_max, fit=fit)
+    h_rms = unit * math.sqrt(math.pi * scale * growth / exponent)
+    return {"hurst": exponent, "q0": q0, "q1": q1, "h_rms": h_rms, "h_max": h_max, "fit": fit}
 
 
 def _law_of(bins: Bins, unit: float, profile: bool, breaks: bool) -> tuple[PowerLaw, float, float]:

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from mbma_tables.arguments import number_in
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces.maps import measured_map
-from mbma_tables.surfaces.measured import MeasuredSurface, resolution
 from mbma_tables.surfaces.profiles import measured_profile
+from mbma_tables.surfaces.spectral import SpectralSurface, resolution
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.units import Units
 
+S = TypeVar("S", bound=SpectralSurface)
 STEPS_PER_OCTAVE = 8  # of an extrapolated spectrum
 
 
 def measured_surface(
     treated: Treated, h_max: float | None = None, shortest: Any = None, hurst: Any = None
-) -> MeasuredSurface:
+) -> SpectralSurface:
     """The surface of a treated map or line scan, continued to a shorter wavelength where that is asked for."""
     if (shortest is None) != (hurst is None):
         raise InputError("extrapolate_to and extrapolate_hurst: give both or neither")
@@ -30,12 +31,8 @@ def measured_surface(
     return known if shortest is None else extrapolated(known, shortest, hurst)
 
 
-def extrapolated(surface: MeasuredSurface, shortest: Any, hurst: Any) -> MeasuredSurface:
-    """A measured spectrum continued to a shorter wavelength [length] by a power law that is stated, not measured.
-
-    C goes like q^(-2-2H), from the mean level of the last measured octave; the record says what that changes. Curves of
-    the map's tops and valleys are left out: they are not known of the waves added.
-    """
+def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
+    """A measured spectrum continued to a shorter wavelength [length] by a power law that is stated, not measured."""
     wave, exponent = (
         number_in("extrapolate_to", Units(surface.unit).number("extrapolate_to", shortest), 1e-30, 1e30),
         number_in("extrapolate_hurst", hurst, 0.0, 1.0),
@@ -45,21 +42,16 @@ def extrapolated(surface: MeasuredSurface, shortest: Any, hurst: Any) -> Measure
         raise InputError(
             f"extrapolate_to must be below the shortest measured wavelength, {2 * math.pi / last:.6g}, got {wave:g}"
         )
+    # from the mean level of the last measured octave
     slope = 2 + 2 * exponent
     octave = last / 2 * 2 ** ((np.arange(STEPS_PER_OCTAVE) + 0.5) / STEPS_PER_OCTAVE)
     known = np.asarray(surface.power_spectrum(octave))
     level = float(np.mean(np.log(known[known > 0]) + slope * np.log(octave[known > 0])))
     q = np.geomspace(last, end, max(2, math.ceil(math.log2(end / last) * STEPS_PER_OCTAVE) + 1))
     samples = None if surface.samples is None else np.append(surface.samples, np.full(q.size, surface.samples[-1]))
-    longer = MeasuredSurface(
-        np.append(surface.q, q),
-        np.append(surface.C, np.exp(level - slope * np.log(q))),
-        surface.h_max,
-        surface.heights,
-        samples=samples,
-        anisotropy=surface.anisotropy,
-        unit=surface.unit,
-    )
+    # curves of the map's tops and valleys are not known of the waves added
+    C = np.append(surface.C, np.exp(level - slope * np.log(q)))
+    longer = dataclasses.replace(surface, q=np.append(surface.q, q), C=C, samples=samples, bearing=None, bands=None)
     area = float(surface.rms_gradient / longer.rms_gradient)
     stiffness = float(surface.h_rms / longer.h_rms)
     told = (

@@ -25,6 +25,7 @@ MIN_GRID = 32  # points along each side: 16 wavenumbers, of which a window spoil
 FREE_HOLES = 0.05  # share of undefined points that is filled unasked
 MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
 USUAL, USUAL_DEVIATES = 0.99, 2.576  # share of points that set the scale of differences, and where it ends if Gaussian
+MIN_POWER = 1e-24  # of the strongest wave: below it rounding, not a measured wave
 LENGTHS = ("short_cutoff", "long_cutoff", "tip_radius")  # options that are lengths
 Provenance = tuple[Mapping[str, Any], ...]
 
@@ -73,6 +74,10 @@ class Treatment:
                 raise InputError(f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}")
 
 
+# of `Surface.from_map` and `Surface.from_profile`, about what is read and done to it
+OPTIONS = ("unit", "dx", "dy", "channel", "periodic", *(field.name for field in dataclasses.fields(Treatment)))
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Treated:
     """Heights as they go into a spectrum, and how they came about."""
@@ -102,6 +107,11 @@ class Treated:
         )
         record = {"step": "read", "points": list(shape), "steps": list(self.steps), "unit": self.unit}
         return record | {"told": told}
+
+    def history(self, *notes: Mapping[str, Any], more: str = "") -> Provenance:
+        """All steps of a surface made of it: reading, treatment, what was done at the edges, and notes."""
+        edges = ("periodic" if self.plain else "under a window for the spectrum") + more
+        return (self.read, *self.provenance, {"step": "edges", "kind": edges}, *notes)
 
     @property
     def plain(self) -> bool:
@@ -133,10 +143,7 @@ def treat(
     unit: str | None = None,
     info: Mapping[str, Any] | None = None,
 ) -> Treated:
-    """Heights [length] made ready for their spectrum, of a map or a line scan; NaN and masked points are undefined.
-
-    `info` is what the file says of its instrument, as in SurfaceTopography.
-    """
+    """Heights [length] made ready for their spectrum; NaN and masked points are undefined, `info` is the file's."""
     heights = heights_of(grid, len(steps))
     if min(heights.shape) < MIN_GRID:
         raise InputError(
@@ -273,7 +280,7 @@ def _within(known: Treated, short: float | None, long: float | None) -> Treated:
         scan = wrapped(values, known.steps, True, known.unit)
         values = np.asarray(getattr(scan, method)(cutoff_wavelength=wavelength).heights(), float)
         after = squares(values, known.steps)
-        if not after[0] > 1e-24 * before[0]:
+        if not after[0] > MIN_POWER * before[0]:
             raise InputError(f"{name} {wavelength:g} leaves no wave of the measurement")
         of_variance, of_gradient = (max(1 - b / a, 0.0) for a, b in zip(before, after, strict=True))
         length = f"{wavelength:.4g} {known.unit or ''}".rstrip()

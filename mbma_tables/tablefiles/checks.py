@@ -12,29 +12,16 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.tablefiles.schema import (
-    AXES,
-    BUCKET_BITS,
-    CELL_EDGES,
-    COEFFICIENTS,
-    DEGREE,
-    FUNCTIONS,
-    ISLAND4D,
-    UNIVERSAL,
-    X_STEPS,
-    Axis,
-    TableContent,
-)
-from mbma_tables.tablefiles.splines import padding
+from mbma_tables.tablefiles import schema
 
 MAX_LOG_RATIO = 100.0  # of a ratio to the rigid sphere; those of the shipped tables are below 20
 MAX_BUCKETS, MAX_STEPS = 4096, 30_000  # of mu, eight an octave, and of X
 TERMS = 8  # of a Chebyshev series
 LIMITS = {"mu": (0.0, np.inf), "spread": (0.0, np.inf), "sphere": (0.0, 1.0), "hurst": (0.0, 1.0)}
-ARGUMENTS = {UNIVERSAL: ("X", "mu"), ISLAND4D: ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")}
+ARGUMENTS = {schema.UNIVERSAL: ("X", "mu"), schema.ISLAND4D: ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")}
 REQUIRED = (
     *("reading", "data_version", "values_sha256", "source_sha256", "certificate_points"),
-    *(f"largest_error_{function}" for function in FUNCTIONS),
+    *(f"largest_error_{function}" for function in schema.FUNCTIONS),
 )
 
 
@@ -62,7 +49,7 @@ def check_attribute(owner: str, name: str, value: Any) -> None:
         raise ValueError(f"has attribute {owner + ':' if owner else ''}{name} = {shown}, which must be {text}")
 
 
-def _check_axis(axis: Axis) -> None:
+def _check_axis(axis: schema.Axis) -> None:
     low, high = LIMITS.get(axis.name, (-np.inf, np.inf))
     positive = axis.low + axis.offset > 0 or axis.transform == "linear"
     # lookups know an offset of X alone
@@ -73,12 +60,12 @@ def _check_axis(axis: Axis) -> None:
         raise ValueError(f"has axis {axis.name}, which does not increase")
 
 
-def _check_nodes(content: TableContent) -> None:
+def _check_nodes(content: schema.TableContent) -> None:
     """Raise ValueError where the values of a table are not over the nodes of its axes."""
     nodes = tuple(axis.nodes for axis in content.axes)
-    knots = tuple(count + 2 * padding(DEGREE) for count in nodes)
+    knots = tuple(count + schema.DEGREE - 1 for count in nodes)
     cells = content.local_error.shape[:-1]
-    values = [content.auxiliary[f"log_ratio_{function}"][1] for function in FUNCTIONS]
+    values = [content.auxiliary[f"log_ratio_{function}"][1] for function in schema.FUNCTIONS]
     if any(array.shape != nodes for array in values) or content.coefficients.shape[:-1] != knots:
         raise ValueError("has values or coefficients that are not over its axes")
     if len(cells) != len(nodes) or not all(0 < count < most for count, most in zip(cells, nodes, strict=True)):
@@ -87,14 +74,14 @@ def _check_nodes(content: TableContent) -> None:
         raise ValueError("has values that are not logarithms of ratios")
 
 
-def _check_cells(content: TableContent) -> None:
+def _check_cells(content: schema.TableContent) -> None:
     """Raise ValueError unless the cells fill the range in strips of X, in order, each from mu = 0 upwards."""
     X, mu = content.axes
-    edges: list[FloatArray] = [content.auxiliary[name][1] for name in CELL_EDGES]
+    edges: list[FloatArray] = [content.auxiliary[name][1] for name in schema.CELL_EDGES]
     cells = edges[0].size
     shapes = {array.shape for array in edges}
     if shapes != {(cells,)} or content.coefficients.shape != (cells, TERMS, TERMS, 2) or cells == 0:
-        raise ValueError(f"has {COEFFICIENTS[content.kind]} coefficients that are not over its cells")
+        raise ValueError(f"has {schema.COEFFICIENTS[content.kind]} coefficients that are not over its cells")
     if content.local_error.shape != (cells, 2):
         raise ValueError("has error bounds that are not over its cells")
     X_low, X_high, mu_low, mu_high = edges
@@ -106,24 +93,24 @@ def _check_cells(content: TableContent) -> None:
     grows = (X_high > X_low) & (mu_high > mu_low)
     if not (ends and grows.all() and np.where(starts[1:], onwards, upwards).all()):
         raise ValueError("has cells that do not fill its range one after the other")
-    steps = (X_low - X.low) * X_STEPS
+    steps = (X_low - X.low) * schema.X_STEPS
     lower = mu_low[~starts].view(np.int64)
-    if (steps != np.round(steps)).any() or (lower & ((1 << BUCKET_BITS) - 1)).any():
+    if (steps != np.round(steps)).any() or (lower & ((1 << schema.BUCKET_BITS) - 1)).any():
         raise ValueError("has cells whose edges are not where they can be found by arithmetic")
-    if np.ptp(np.append(mu_high, mu.high).view(np.int64) >> BUCKET_BITS) >= MAX_BUCKETS or steps[-1] > MAX_STEPS:
+    if np.ptp(np.append(mu_high, mu.high).view(np.int64) >> schema.BUCKET_BITS) >= MAX_BUCKETS or steps[-1] > MAX_STEPS:
         raise ValueError("has cells over too wide a range")
 
 
 @np.errstate(all="ignore")
-def check_content(content: TableContent) -> None:
+def check_content(content: schema.TableContent) -> None:
     """Raise ValueError where the parts of a table do not fit one another."""
     axes = tuple((axis.name, axis.transform) for axis in content.axes)
-    if axes != AXES[content.kind]:
-        raise ValueError(f"has axes {axes}, not {AXES[content.kind]}")
+    if axes != schema.AXES[content.kind]:
+        raise ValueError(f"has axes {axes}, not {schema.AXES[content.kind]}")
     for axis in content.axes:
         _check_axis(axis)
-    (_check_cells if content.kind == UNIVERSAL else _check_nodes)(content)
-    answers = {f"{which}_{function}" for which in ("table", "exact") for function in FUNCTIONS} | {"tolerance"}
+    (_check_cells if content.kind == schema.UNIVERSAL else _check_nodes)(content)
+    answers = {f"{which}_{function}" for which in ("table", "exact") for function in schema.FUNCTIONS} | {"tolerance"}
     sizes = {values.shape for values in content.conformance.values()}
     if set(content.conformance) != answers | set(ARGUMENTS[content.kind]) or len(sizes) != 1 or len(*sizes) != 1:
         raise ValueError("has incomplete conformance points")

@@ -1,4 +1,4 @@
-"""Write, open and check table files (netCDF-4).
+"""Open and check table files (netCDF-4); `generate.tables.writing` writes them.
 
 A file ends in a line with the SHA-256 of all bytes before it. The file is read whole and checked against that line,
 and only then opened by the HDF5 library, which may crash on damaged bytes. HDF5 ignores what follows its own end of
@@ -18,54 +18,34 @@ import netCDF4
 import numpy as np
 
 from mbma_tables.errors import InputError, TableFileError
-from mbma_tables.files import read_file, write_file, written_bytes
+from mbma_tables.files import read_file
+from mbma_tables.tablefiles import schema
 from mbma_tables.tablefiles.checks import REQUIRED, check_attribute, check_content
-from mbma_tables.tablefiles.provenance import MODULES, digest_arrays, digest_json, source_digest, versions
-from mbma_tables.tablefiles.schema import (
-    ANSWERS,
-    AXES,
-    AXIS_ERRORS,
-    COEFFICIENTS,
-    CONVENTIONS,
-    DEGREE,
-    DOCUMENTATION,
-    ERROR_FIELD,
-    FORMAT_VERSIONS,
-    FUNCTIONS,
-    HEIGHT_INTEGRALS,
-    ISLAND4D,
-    KINDS,
-    OUT_OF_RANGE,
-    WEIGHTS,
-    Axis,
-    TableContent,
-    dimensions,
-)
 
 SEAL = b"\nmbma-table sha256 "
 SEAL_LENGTH = len(SEAL) + 64 + 1
 MAX_BYTES = 256 * 2**20  # of a file, and of its values
-MEANING = {
-    "chebyshev": "coefficients of Chebyshev polynomials of X and of mu in each cell, of {chebyshev}",
-    "spline": "coefficients of cardinal B-splines that interpolate log_ratio_{f}",
-    "error": "bound on the relative error of Phi_{f} in this part of the table",
-}
-OF_SPLINES = {
-    "spline_degree": DEGREE,
-    "spline_weights": WEIGHTS,
-    "height_integrals": HEIGHT_INTEGRALS,
-    "certificate": DOCUMENTATION["certificate"] + AXIS_ERRORS,
-}
-CONFORMANCE = {
-    "table": "{answer} by this table, at the conformance points",
-    "exact": "{answer} by the solver, at the conformance points",
-    "tolerance": "largest relative difference to allow at the conformance points",
-}
-
 # the HDF5 library crashes where threads enter it together, and a child must not be forked while one is in it
 HDF5_LOCK = threading.RLock()
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(before=HDF5_LOCK.acquire, after_in_parent=HDF5_LOCK.release, after_in_child=HDF5_LOCK.release)
+
+
+def digest_json(content: Any) -> str:
+    """SHA-256 of a JSON value in its canonical form."""
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def digest_arrays(arrays: dict[str, Any]) -> str:
+    """SHA-256 of named arrays: names, shapes, and bytes in little-endian order."""
+    digest = hashlib.sha256()
+    for name in sorted(arrays):
+        array = np.asarray(arrays[name])
+        plain = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
+        digest.update(f"{name}:{plain.dtype.str}:{plain.shape};".encode())
+        digest.update(plain.tobytes())
+    return digest.hexdigest()
 
 
 def _attributes_of(owner: Any) -> dict[str, Any]:
@@ -81,77 +61,6 @@ def attributes_digest(dataset: netCDF4.Dataset) -> str:
     for name, variable in dataset.variables.items():
         content[name] = _attributes_of(variable) | {"dimensions": list(variable.dimensions)}
     return digest_json(content)
-
-
-def _fill(dataset: netCDF4.Dataset, content: TableContent) -> None:
-    def add(name: str, dimensions: tuple[str, ...], values: Any, attributes: dict[str, Any]) -> None:
-        variable = dataset.createVariable(
-            name, "f8", dimensions, zlib=True, complevel=6, shuffle=True, endian="little", fill_value=False
-        )
-        variable.setncatts(attributes)
-        variable[...] = values
-
-    over_coefficients, over_cells = dimensions(content.kind)
-    names = tuple(axis.name for axis in content.axes)
-    for axis in content.axes:
-        dataset.createDimension(axis.name, axis.nodes)
-        add(axis.name, (axis.name,), axis.values, axis.attributes())
-    sizes = dict(zip(over_cells, content.local_error.shape, strict=False))
-    for name, size in (sizes | dict(zip(over_coefficients, content.coefficients.shape, strict=False))).items():
-        dataset.createDimension(name, size)
-    for number, function in enumerate(FUNCTIONS):
-        for what, over, array in (
-            (COEFFICIENTS[content.kind], over_coefficients, content.coefficients),
-            ("error", over_cells, content.local_error),
-        ):
-            text = MEANING[what].format(f=function, chebyshev=("Phi_F/mu", "Phi_A")[number])
-            add(f"{what}_{function}", over, array[..., number], {"long_name": text, "units": "1"})
-    beside = " ".join(n for n, entry in content.auxiliary.items() if set(entry[0]) < set(names))
-    for name, (over, values, attributes) in content.auxiliary.items():
-        add(name, over, values, attributes | ({"coordinates": beside} if over == names and beside else {}))
-    points = next(iter(content.conformance.values())).size
-    dataset.createDimension("conformance", points)
-    for name, values in content.conformance.items():
-        what, _, function = name.rpartition("_") if name[-2:] in ("_F", "_A") else (name, "", "")
-        text = CONFORMANCE.get(what, f"argument {name} of the conformance points")
-        meaning = {"long_name": text.format(answer=ANSWERS[content.kind].format(f=function)), "units": "1"}
-        add(f"conformance_{name}", ("conformance",), values, meaning)
-
-
-def write_table(path: os.PathLike[str] | str, content: TableContent) -> pathlib.Path:
-    """Write a table file, whole or not at all."""
-    target = pathlib.Path(path)
-    check_content(content)
-    digest = digest_arrays(content.arrays())
-    attributes = {
-        "Conventions": CONVENTIONS,
-        # where the values came from, unless the table was read from a file that says so
-        "source_sha256": source_digest(MODULES[content.kind]),
-        "source_modules": " ".join(MODULES[content.kind]),
-        "versions": json.dumps(versions(), sort_keys=True),
-        **{name: value for name, value in content.attributes.items() if name != "attributes_sha256"},
-        "mbma_kind": content.kind,
-        "format_version": FORMAT_VERSIONS[content.kind],
-        "data_version": digest[:12],
-        "out_of_range": OUT_OF_RANGE[content.kind],
-        "error_field": ERROR_FIELD[content.kind],
-        **DOCUMENTATION,
-        **(OF_SPLINES if content.kind == ISLAND4D else {}),
-        "values_sha256": digest,
-    }
-
-    def write(path: str) -> None:
-        with HDF5_LOCK, netCDF4.Dataset(path, "w", format="NETCDF4") as dataset:
-            _fill(dataset, content)
-            dataset.setncatts(attributes)
-            dataset.setncattr("attributes_sha256", attributes_digest(dataset))
-
-    try:
-        body = written_bytes(target.name, write)
-        write_file(target, body + SEAL + hashlib.sha256(body).hexdigest().encode() + b"\n")
-    except (InputError, OSError) as fault:
-        raise TableFileError(f"cannot write {target}: {fault}") from None
-    return target
 
 
 def _refuse(path: pathlib.Path, why: str, kind: str = "all") -> TableFileError:
@@ -172,7 +81,7 @@ def read_sealed(path: pathlib.Path) -> bytes:
     return body
 
 
-def _content(dataset: netCDF4.Dataset, kind: str) -> TableContent:
+def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
     """The table in an open file whose kind and format are known."""
     # values as they are stored, for their hash
     dataset.set_auto_maskandscale(False)
@@ -193,21 +102,23 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> TableContent:
     # the stored axes, not recomputed ones: another processor's logarithm may differ in the last bit
     if digest_arrays(values) != own["values_sha256"]:
         raise ValueError("has values that do not match their hash")
-    names = [name for name, _ in AXES[kind]]
+    names = [name for name, _ in schema.AXES[kind]]
     axes = tuple(
-        Axis(name, text["long_name"], text["transform"], text["offset"], text["first"], text["last"], values[name].size)
+        schema.Axis(
+            name, text["long_name"], text["transform"], text["offset"], text["first"], text["last"], values[name].size
+        )
         for name, text in ((name, described[name]) for name in names)
     )
-    fields = COEFFICIENTS[kind], "error"
-    for what, over in zip(fields, dimensions(kind), strict=True):
-        if any(dataset[f"{what}_{function}"].dimensions != over for function in FUNCTIONS):
+    fields = schema.COEFFICIENTS[kind], "error"
+    for what, over in zip(fields, schema.dimensions(kind), strict=True):
+        if any(dataset[f"{what}_{function}"].dimensions != over for function in schema.FUNCTIONS):
             raise ValueError(f"has {what} over other dimensions than {', '.join(over)}")
     coefficients, local_error = (
-        np.stack([values[f"{what}_{function}"] for function in FUNCTIONS], axis=-1) for what in fields
+        np.stack([values[f"{what}_{function}"] for function in schema.FUNCTIONS], axis=-1) for what in fields
     )
-    main = {f"{what}_{function}" for what in fields for function in FUNCTIONS} | set(names)
+    main = {f"{what}_{function}" for what in fields for function in schema.FUNCTIONS} | set(names)
     beside = [name for name in values if name not in main and not name.startswith("conformance_")]
-    return TableContent(
+    return schema.TableContent(
         kind=kind,
         axes=axes,
         coefficients=coefficients,
@@ -222,18 +133,18 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> TableContent:
     )
 
 
-def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> TableContent:
+def read_table(path: os.PathLike[str] | str, kind: str | None = None) -> schema.TableContent:
     """Open and check a table file, which must be of a `kind` where one is given."""
     source = pathlib.Path(path)
     body = read_sealed(source)
     try:
         with HDF5_LOCK, netCDF4.Dataset(source.name, memory=body) as dataset:
             found = getattr(dataset, "mbma_kind", None)
-            if found not in KINDS or (kind is not None and found != kind):
-                raise ValueError(f"holds a table of kind {found!r}, not {kind or ' or '.join(KINDS)}")
+            if found not in schema.KINDS or (kind is not None and found != kind):
+                raise ValueError(f"holds a table of kind {found!r}, not {kind or ' or '.join(schema.KINDS)}")
             version = getattr(dataset, "format_version", None)
-            if version != FORMAT_VERSIONS[found]:
-                raise ValueError(f"has format {version}, this library reads {FORMAT_VERSIONS[found]}")
+            if version != schema.FORMAT_VERSIONS[found]:
+                raise ValueError(f"has format {version}, this library reads {schema.FORMAT_VERSIONS[found]}")
             content = _content(dataset, found)
         check_content(content)
     except ValueError as fault:

@@ -9,14 +9,12 @@ of it came from. `docs/tables.md` describes the format for readers in other lang
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
 
-CONVENTIONS = "CF-1.11"
 FUNCTIONS = ("F", "A")
 UNIVERSAL = "universal"
 ISLAND4D = "island4d"
@@ -28,17 +26,6 @@ AXES = {
     UNIVERSAL: (("X", "linear"), ("mu", "linear")),
     ISLAND4D: (("X", "log"), ("spread", "log"), ("sphere", "linear"), ("hurst", "linear")),
 }
-ANSWERS = {UNIVERSAL: "Phi_{f}", ISLAND4D: "{f}_hat"}
-
-OUT_OF_RANGE = {
-    UNIVERSAL: "outside the cells there is no answer: never clamp, never extrapolate",
-    ISLAND4D: (
-        "below the smallest spread, g = g(X, first spread, sphere, hurst) mu/mu(first spread, sphere, hurst): first "
-        "order about the rigid sphere, within the stated error; anywhere else outside the axes there is no answer: "
-        "never clamp, never extrapolate"
-    ),
-}
-
 # edges of cells: of X at whole multiples of 1/X_STEPS from the first, of mu where the last bits of a double are 0,
 # eight to an octave, so that a cell is found without a search; the last edge of each is the end of the range
 X_STEPS = 16
@@ -49,53 +36,6 @@ CELL_EDGES = {
     "mu_low": "least mu of a cell",
     "mu_high": "largest mu of a cell",
 }
-WEIGHTS = "w0 = v^3/6, w1 = 2/3 - u^2 (1 - u/2), w2 = 2/3 - v^2 (1 - v/2), w3 = u^3/6, with v = 1 - u"
-HEIGHT_INTEGRALS = (
-    "F_n(x) = integral from x to infinity of (z - x)^n phi(z) dz, phi(z) = exp(-z^2/2)/sqrt(2 pi). To 1e-13 for "
-    "-42 <= x <= 7 and n = 2 or 5/2: F_n(x) = h sum over k = -192 ... 272 of "
-    "t^(n + 1) (1 + exp(-u)) phi(x + t), with h = 1/64, u = k h, t = exp(u - exp(-u))"
-)
-SYMBOLS = (
-    "delta approach of the island, h_d how far its top stands below the highest; R_d radius of the sphere "
-    "(band [1, zeta_d]); R_u radius of its summits (band [1, zeta_u]); D density, sigma standard deviation of height "
-    "of its summits (band [zeta_d, zeta_u]); eta share of a summit's contact that is real; E* contact modulus; "
-    "q0 smallest wave number; zeta_1 largest magnification"
-)
-ERROR_FIELD = {
-    UNIVERSAL: "error_F and error_A bound the relative error in each cell",
-    ISLAND4D: (
-        "error_F and error_A bound the relative error, each over one cell of a coarser grid: an axis of n nodes has "
-        "c equal cells in position, and cell k holds the positions with k = min(floor(position c/(n - 1)), c - 1)"
-    ),
-}
-AXIS_ERRORS = ". axis_errors: largest error (F, A) from interpolating along one axis alone"
-# what every file says about its parts
-DOCUMENTATION = {
-    "certificate": (
-        "largest_error, p99_error and median_error are relative errors of the table on certificate_points held-out "
-        "points, solved on twice the nodes that made the table: half over the whole box, half (visited) at islands "
-        "of random surfaces"
-    ),
-    "conformance": (
-        "Points to replay in any language: conformance_ and the name of an argument; table_F, table_A: what this table "
-        "answers; exact_F, exact_A: what the solver answers; tolerance: largest relative difference to allow between "
-        "a reader's answers and table_F, table_A, or a solver's and exact_F, exact_A"
-    ),
-    "hashes": (
-        "values_sha256: for each variable, sorted by name, the text name:<f8:shape; (shape as (3,) or (3, 4)) and "
-        "then its values as little-endian doubles, last dimension fastest. attributes_sha256: the JSON text of "
-        "{variable: {attribute: value}}, with 'dimensions' as a further attribute of each, '' for the global ones "
-        "without attributes_sha256; keys sorted, no spaces, non-ASCII escaped, shortest floats. configuration_sha256: "
-        "the same form of the list of configuration and reading_numbers. data_version: the first 12 digits of "
-        "values_sha256. source_sha256: the bytes of the files of source_modules, one after the other, when the table "
-        "was made; a record only"
-    ),
-    "seal": (
-        "the netCDF bytes are followed by one line: a newline, 'mbma-table sha256 ', the SHA-256 of all bytes before "
-        "that newline in 64 hexadecimal digits, a newline; netCDF readers ignore it"
-    ),
-}
-
 Transform = Literal["linear", "log"]
 
 
@@ -211,45 +151,6 @@ def dimensions(kind: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
         return ("cell", "degree_X", "degree_mu"), ("cell",)
     names = [name for name, _ in AXES[kind]]
     return tuple(f"{name}_knot" for name in names), tuple(f"{name}_cell" for name in names)
-
-
-def labels_of_cells(edges: FloatArray) -> dict[str, Any]:
-    """The edges of the universal table's cells, (4, cells) in the order of `CELL_EDGES`, as auxiliary variables."""
-    rows = zip(CELL_EDGES.items(), edges, strict=True)
-    return {name: (("cell",), row, _label(text)) for (name, text), row in rows}
-
-
-def labels_of_nodes(axes: tuple[Axis, ...], log_ratio: FloatArray) -> dict[str, Any]:
-    """Of a table over nodes: `log_ratio` there, and coordinates of coefficients and of the error field's cells."""
-    names = tuple(axis.name for axis in axes)
-    labels: dict[str, Any] = {}
-    for number, f in enumerate(FUNCTIONS):
-        text = f"natural logarithm of Phi_{f} over its value for a rigid sphere, at the nodes"
-        labels[f"log_ratio_{f}"] = (names, log_ratio[..., number], _label(text))
-    for axis in axes:
-        pad = (DEGREE - 1) // 2
-        cells = error_cells(axis)
-        middles = (np.arange(cells) + 0.5) * ((axis.nodes - 1) / cells)
-        knots = np.arange(-pad, axis.nodes + pad, dtype=float)
-        text = f"middle of the error field's cells along {axis.name}, as {axis.name}"
-        labels[f"{axis.name}_cell"] = ((f"{axis.name}_cell",), axis.coordinate(middles), _label(text))
-        text = f"position along {axis.name}, in node units, of the middle of a coefficient's B-spline"
-        labels[f"{axis.name}_knot"] = ((f"{axis.name}_knot",), knots, _label(text))
-    return labels
-
-
-def _label(text: str) -> dict[str, Any]:
-    return {"long_name": text, "units": "1"}
-
-
-def numbered(name: str, lines: Sequence[str]) -> dict[str, str]:
-    """Steps as attributes in their order, one line of a header each."""
-    return {f"{name}_{number:02d}": line for number, line in enumerate(lines, 1)}
-
-
-def error_cells(axis: Axis, largest: int = 32) -> int:
-    """Cells of the error field along an axis: as the nodes where those are few."""
-    return min(axis.nodes - 1, largest)
 
 
 def error_cell(axis: Axis, cells: int, position: Any) -> Any:

@@ -11,8 +11,7 @@ from mbma_tables.arguments import FloatArray, grouped, require, spread
 from mbma_tables.calibrated import TESTED_AREA, Law, force_at_area, light_factor, self_affine_law
 from mbma_tables.calibrated import area as law_area
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.measured import MeasuredSurface
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import calibrated_table
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 

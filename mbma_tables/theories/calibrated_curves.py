@@ -17,7 +17,7 @@ from mbma_tables.bearing import FRACTIONS
 from mbma_tables.calibrated import LAW_ERROR, TESTED_AREA, Law, force_at_area, light_factor, spectrum_of
 from mbma_tables.calibrated_map import LOG_FORCE, MapLaw, convex
 from mbma_tables.surfaces.heights import SHARES
-from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.surfaces.surface import MeasuredSurface
 
 if TYPE_CHECKING:
     from mbma_tables.hardness import BearingCurve

@@ -17,7 +17,7 @@ from mbma_tables.errors import InputError
 from mbma_tables.labels import agree
 from mbma_tables.leakage import LARGEST_AREA
 from mbma_tables.plots import draw_compression, force_label, leakage_label
-from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.leakage_table import flow_of_spectrum, self_affine, shipped_flow
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory

@@ -14,9 +14,8 @@ from mbma_tables.arguments import FloatArray, whole_number_in
 from mbma_tables.errors import InputError
 from mbma_tables.models import BOTH, QUANTITIES, TIERS, AnyModel, check_outside, get_model, tier_name
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import NAMED, Reading, get_reading
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.differences import differences
 from mbma_tables.theories.protocol import FEW_LOOKS, SCAN, Theory, TheoryAnswer, select
 from mbma_tables.totals.contact import Totals, totals_at

@@ -17,8 +17,7 @@ from mbma_tables.arguments import FloatArray, finite_array, grouped, require
 from mbma_tables.calibrated import LAW_ERROR, YANG_PERSSON, Law, area_persson, self_affine_law, spectrum_of
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.measured import MeasuredSurface
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer, select
 
 Method = Literal["full", "simplified"]

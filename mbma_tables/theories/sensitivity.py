@@ -15,8 +15,8 @@ import numpy as np
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import ConvergenceError
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1
-from mbma_tables.surfaces.surface import PARAMETERS
 from mbma_tables.theories.differences import differences
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 

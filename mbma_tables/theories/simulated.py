@@ -13,6 +13,7 @@ from mbma_tables.boundary_elements import LOADS, Contact
 from mbma_tables.errors import InputError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import measured_map, prepared
+from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated, mirrored
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
@@ -128,7 +129,7 @@ class BoundaryElements(Theory):
         'u = 0.71 h_rms'
         """
         treated = prepared(heights, {"dx": dx, "dy": dy, "periodic": periodic, "detrend": detrend, **treatment})
-        surface = measured_map(treated, None)
+        surface = MeasuredSurface.of(measured_map(treated, None))
         values, sizes = continued(treated)
         wanted = finite_array("loads", loads)
         require("loads", wanted, (wanted > 0) & (np.diff(wanted, prepend=0) > 0), "positive and rising")

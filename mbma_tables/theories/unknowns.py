@@ -17,10 +17,10 @@ from mbma_tables.errors import InputError
 from mbma_tables.models import AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights
-from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.resolution import extrapolated
-from mbma_tables.surfaces.surface import PARAMETERS, Surface
+from mbma_tables.surfaces.self_affine import PARAMETERS
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.contact import contact, one_known
 from mbma_tables.theories.differences import differences

@@ -23,9 +23,8 @@ from mbma_tables.errors import InputError
 from mbma_tables.islands.geometry import geometry, measured_islands
 from mbma_tables.models import AnyModel, answer_islands, get_model, tier_name
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import Reading, get_reading
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.units import modulus_and_units
 
 

@@ -23,9 +23,9 @@ from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.islands.geometry import floors_of, geometry, measured_islands, s_over_h_rms
 from mbma_tables.models import AnyModel, answer_islands
 from mbma_tables.models.universal import UniversalModel
-from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.power_laws import Place
 from mbma_tables.surfaces.readings import Reading
+from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
 from mbma_tables.totals.island_sum import island_density, jacobian_below, kinks
 from mbma_tables.totals.panels import COUNTED, NARROW, POWERS, SHARES, Nodes, Panels

@@ -1,4 +1,5 @@
 import csv
+import inspect
 import json
 import os
 import signal
@@ -15,6 +16,7 @@ from helpers import random_map, run
 from mbma_tables import Surface, contact, island, theories
 from mbma_tables.cli import main
 from mbma_tables.materials import effective_modulus
+from mbma_tables.scenes.specimen import MAP_OPTIONS, MATERIAL, NUMBERS, schema
 from mbma_tables.surfaces.cases import CASES
 from mbma_tables.theories import THEORIES
 
@@ -166,6 +168,18 @@ def test_every_source_is_the_same_surface(folder):
             assert found["surface"][name] == pytest.approx(getattr(surface, name), rel=1e-11), (source, name)
         assert found["columns"]["force"] == pytest.approx(expected.force.tolist(), rel=2e-8)
         assert found["columns"]["area"] == pytest.approx(expected.area.tolist(), rel=2e-8)
+
+
+def test_options_of_a_surface_are_arguments_of_the_library_and_names_of_scene_files():
+    options = {parameter.name for parameter in main.commands["contact"].params}
+    surface, material = (set(schema()["properties"][name]["properties"]) for name in ("surface", "material"))
+    assert set(NUMBERS) | set(MAP_OPTIONS) | set(MATERIAL) <= options
+    assert surface - {"name", "psd", "convention"} <= options
+    assert set(NUMBERS) | set(MAP_OPTIONS) <= surface
+    assert material == {*MATERIAL, "stress_unit"}
+    made_by = (Surface, Surface.from_moments, Surface.from_roughness, Surface.from_map)
+    arguments = set().union(*(inspect.signature(make).parameters for make in made_by))
+    assert set(NUMBERS) | set(MAP_OPTIONS) <= arguments | {"zeta_1"}
 
 
 def test_material_from_options_and_from_a_file(folder):

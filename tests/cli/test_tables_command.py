@@ -7,9 +7,10 @@ import pytest
 from helpers import refused, run
 from small_tables import small_table
 
+from generate.tables.writing import write_table
 from mbma_tables.models import tables as tabulated
-from mbma_tables.tablefiles.netcdf import FORMAT_VERSIONS, read_table, write_table
-from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL
+from mbma_tables.tablefiles.netcdf import read_table
+from mbma_tables.tablefiles.schema import FORMAT_VERSIONS, KINDS, UNIVERSAL
 
 
 @pytest.fixture

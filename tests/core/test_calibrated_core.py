@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import NdBSpline
 
+from generate.splines import TAPS
 from mbma_tables.calibrated import Spectrum
 from mbma_tables.core import GENERATIONS, core
-from mbma_tables.tablefiles.splines import TAPS
 from mbma_tables.theories.calibrated_table import FEW, shipped
 from mbma_tables.theories.leakage_table import shipped_flow
 

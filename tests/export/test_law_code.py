@@ -20,9 +20,10 @@ from law_points import ASKED, CONDUCTIVITY, VALUES, needs, points
 from mbma_tables import InputError, Surface, contact_law
 from mbma_tables.core import core
 from mbma_tables.export import LAWS, SUBROUTINES
-from mbma_tables.export.core_text import core_file, core_text
-from mbma_tables.export.law_code import LANGUAGES, code_name, law_text
+from mbma_tables.export.law_code import code_name, core_text, law_text
+from mbma_tables.export.law_languages import LANGUAGES
 from mbma_tables.export.onnx import onnx
+from mbma_tables.export.text import core_file
 
 QUANTITIES = ("pressure", "tangent", "area", "energy", "leakage")
 FIELDS = {"pressure": "p"}  # of points, where they have another name

@@ -6,11 +6,11 @@ from fuzzing import finite
 from helpers import SCALE
 from small_tables import edited, small_table
 
+from generate.tables.writing import write_table
 from mbma_tables.models.island4d import Island4dModel
 from mbma_tables.models.tables import verify
 from mbma_tables.models.universal import UniversalModel
-from mbma_tables.tablefiles.netcdf import attributes_digest, read_table, write_table
-from mbma_tables.tablefiles.provenance import digest_arrays
+from mbma_tables.tablefiles.netcdf import attributes_digest, digest_arrays, read_table
 from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL
 
 SPECIAL = (np.nan, np.inf, -np.inf, 0.0, -1.0, 1e300, 700.1, 5e-324)

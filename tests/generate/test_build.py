@@ -14,9 +14,10 @@ from generate.tables.chunks import ChunkedSolver
 from generate.tables.commands import built as build_table
 from generate.tables.configuration import load
 from generate.tables.universal import AIM, Strip
+from generate.tables.writing import write_table
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models.universal import UniversalModel
-from mbma_tables.tablefiles.netcdf import read_table, write_table
+from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, UNIVERSAL, error_cell
 
 FRESH = 4000

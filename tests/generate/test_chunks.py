@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from small_tables import SMALL
 
+from generate.provenance import versions
 from generate.tables import chunks, commands
 from generate.tables.chunks import ChunkedSolver, WorkerError, phi
 from mbma_tables.models.tables import shipped
 from mbma_tables.tablefiles.netcdf import read_table
-from mbma_tables.tablefiles.provenance import versions
 
 ROOT = pathlib.Path(chunks.__file__).parents[2]
 COUNT = 4

@@ -8,7 +8,7 @@ from generate.boundary_elements.measured_maps import LARGEST, measured_maps, mid
 from generate.pages import distances
 from mbma_tables import Surface, contact
 from mbma_tables.surfaces.maps import prepared
-from mbma_tables.surfaces.measured import MeasuredSurface
+from mbma_tables.surfaces.surface import MeasuredSurface
 
 
 def test_the_middle_of_a_map_is_kept():

@@ -6,8 +6,7 @@ import pytest
 
 from mbma_tables.models.tables import shipped, verify
 from mbma_tables.surfaces.readings import get_reading
-from mbma_tables.tablefiles.netcdf import read_table
-from mbma_tables.tablefiles.provenance import digest_json
+from mbma_tables.tablefiles.netcdf import digest_json, read_table
 from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL
 
 LARGEST_BYTES = {UNIVERSAL: 2e6, ISLAND4D: 16e6}

@@ -7,11 +7,12 @@ import pytest
 from numpy.polynomial.chebyshev import chebval2d
 from small_tables import small_table
 
+from generate.tables.writing import write_table
 from mbma_tables import OutOfRangeError, greenwood_tripp
 from mbma_tables.models import tables as tabulated
 from mbma_tables.models.tables import open_table, universal_model
 from mbma_tables.models.universal import UniversalModel
-from mbma_tables.tablefiles.netcdf import read_table, write_table
+from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import CELL_EDGES, ISLAND4D, UNIVERSAL
 
 

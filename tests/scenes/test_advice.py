@@ -9,7 +9,7 @@ import xarray as xr
 
 from mbma_tables import Scene, Surface
 from mbma_tables.files import shipped_file
-from mbma_tables.scenes.advice import advice
+from mbma_tables.scenes.scene import advice
 from mbma_tables.surfaces.readings import get_reading
 
 SURFACE = Surface(hurst=0.8, q0=0.01, q1=0.64, h_rms=1.0, h_max=3.3)

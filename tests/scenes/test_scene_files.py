@@ -7,8 +7,8 @@ import pytest
 
 from mbma_tables import Scene
 from mbma_tables.errors import InputError, MbmaError
-from mbma_tables.scenes.effects import EFFECTS, REFINEMENTS
-from mbma_tables.scenes.toml_file import schema
+from mbma_tables.scenes.problem import EFFECTS, REFINEMENTS
+from mbma_tables.scenes.specimen import schema
 
 EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
 SURFACE = '[surface]\nname = "concrete"\n'

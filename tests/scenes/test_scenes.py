@@ -14,7 +14,7 @@ from mbma_tables.errors import InputError
 from mbma_tables.models import answer_islands
 from mbma_tables.scenes import plan as plans
 from mbma_tables.scenes import statistics as islands
-from mbma_tables.scenes.effects import ELASTIC, OUTPUTS
+from mbma_tables.scenes.problem import ELASTIC, OUTPUTS
 from mbma_tables.surfaces.readings import REPORTED
 from mbma_tables.theories import GreenwoodWilliamson, Persson
 from mbma_tables.theories.yielding import Yielding

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from mbma_tables import InputError, Surface
 from mbma_tables.surfaces.heights import SHARES, Heights
-from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.power_laws import PowerLaws
+from mbma_tables.surfaces.surface import MeasuredSurface
 
 FIVE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.5, h_max=4.0)
 # a plateau, a rise, a jump and a gap

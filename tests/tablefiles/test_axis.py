@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mbma_tables.tablefiles.schema import Axis, error_cell, error_cells
+from generate.tables.writing import error_cells
+from mbma_tables.tablefiles.schema import Axis, error_cell
 
 
 @st.composite

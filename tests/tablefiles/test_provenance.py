@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import mbma_tables
-from mbma_tables.tablefiles.provenance import MODULES, digest_arrays, digest_json, source_digest
+from generate.provenance import MODULES, source_digest
+from mbma_tables.tablefiles.netcdf import digest_arrays, digest_json
 from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL
 
 PACKAGE = pathlib.Path(mbma_tables.__file__).parent

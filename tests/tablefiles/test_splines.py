@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
 
+from generate.splines import coefficients, padding
 from mbma_tables.core import core
-from mbma_tables.tablefiles.splines import at_places, coefficients, padding
+from mbma_tables.models.island4d import at_places
 
 SHAPE = (8, 7, 6, 5)
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from small_tables import small_table
 
+from generate.tables.writing import write_table
 from mbma_tables.errors import TableFileError
-from mbma_tables.tablefiles.netcdf import read_table, write_table
+from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL
 
 

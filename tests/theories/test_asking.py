@@ -12,7 +12,7 @@ import xarray as xr
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.files import shipped_file
-from mbma_tables.surfaces.surface import PARAMETERS
+from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.theories import THEORIES, Calibrated, Mbma
 
 SURFACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)

@@ -20,8 +20,8 @@ from mbma_tables.calibrated import CONSTANTS, Law, Spectrum
 from mbma_tables.calibrated_map import MAP_CONSTANTS
 from mbma_tables.files import shipped_file
 from mbma_tables.surfaces.heights import Heights
-from mbma_tables.surfaces.measured import MeasuredSurface
 from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import Calibrated, Mbma, Persson, get_theory
 from mbma_tables.theories.calibrated_table import NAME, QUANTITIES, load, shipped
 

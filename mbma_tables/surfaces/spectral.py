@@ -1,4 +1,4 @@
-"""A surface that is its own spectrum: what was measured, or stated in samples, with no fit in between."""
+"""A surface given by its spectrum: what was measured, or stated in samples, with no fit in between."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +19,6 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.power_laws import PowerLaws, two_columns
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
-from mbma_tables.surfaces.surface import Surface
 from mbma_tables.units import Units
 
 # of the surfaces of docs/data/boundary_elements.nc. As isotropic Gaussian ones they give area within 20% between 1% and
@@ -39,8 +38,8 @@ SIDE = 1e-12  # beside a wavenumber, relative
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class MeasuredSurface(AnySurface):
-    """A surface that is its own isotropic spectrum; `Surface.from_spectrum`, `from_map` and `combined` make one.
+class SpectralSurface(AnySurface):
+    """A surface given by its isotropic spectrum; `Surface.from_spectrum`, `from_map` and `combined` make one.
 
     Parameters
     ----------
@@ -129,7 +128,7 @@ class MeasuredSurface(AnySurface):
     def __repr__(self) -> str:
         numbers = f"h_rms={self.h_rms:.4g}, h_max={self.h_max:.4g}, rms gradient {self.rms_gradient:.4g}"
         unit = "" if self.unit is None else f", unit={self.unit!r}"
-        return f"MeasuredSurface({self.q.size} waves from q = {self.q0:.4g} to {self.q1:.4g}, {numbers}{unit})"
+        return f"{type(self).__name__}({self.q.size} waves from q = {self.q0:.4g} to {self.q1:.4g}, {numbers}{unit})"
 
     def _variables(self) -> dict[str, Variable]:
         length = self.unit or "length"
@@ -173,59 +172,8 @@ class MeasuredSurface(AnySurface):
         start, end = self.laws.place(q), self.laws.place(np.minimum(WIDEST * q, self.q1))
         return float(q[self.laws.between(0, start, end).argmax()])
 
-    def fit(self, band: tuple[float, float] | None = None) -> Surface:
-        """The self-affine surface nearest to it: five numbers, and how well they describe the spectrum.
-
-        Parameters
-        ----------
-        band : tuple of float, optional
-            (q0, q1) to fit and to take, as a plain power law; else a roll-off below and a departure above are found
-            and left out.
-
-        Returns
-        -------
-        Surface
-            With `fit`, a `SpectrumFit`. Its h_rms is that of the fitted law between q0 and q1.
-
-        Raises
-        ------
-        NotSelfAffineError
-            Where no power law with 0 < H <= 1 describes it; the message has the numbers.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from mbma_tables import Surface
-        >>> q = np.geomspace(0.2, 50, 200)  # a plateau up to 1, then H = 0.8
-        >>> nearest = Surface.from_spectrum(q, 0.01 * np.minimum(1, q**-3.6), h_max=1.1).fit()
-        >>> f"H = {nearest.hurst:.2f} from q = {nearest.q0:.2f}, {nearest.fit.variance_share:.0%} of the variance"
-        'H = 0.80 from q = 1.00, 58% of the variance'
-        """
-        from mbma_tables.surfaces.psd import check_band, fit_spectrum
-
-        steps = np.diff(self.q, prepend=self.q[0]) + np.diff(self.q, append=self.q[-1])
-        positive = self.C > 0
-        fitted = fit_spectrum(
-            self.q[positive],
-            self.C[positive],
-            (np.ones(self.q.size) if self.samples is None else self.samples)[positive],
-            (math.pi * self.C * self.q * steps)[positive],
-            h_max=float(self.h_max),
-            usable=(float(self.q0), float(self.q1)),
-            band=check_band(band, float(self.q0), float(self.q1)),
-            power=float(self.m0),
-            convention="paper",
-        )
-        return dataclasses.replace(fitted, unit=self.unit)
-
     def departures(self, by_map: bool = False) -> tuple[str, ...]:
-        """Why it lies outside of the surfaces that boundary elements were compared with.
-
-        Parameters
-        ----------
-        by_map : bool
-            Whether the answer takes the map's tops and valleys; else it is of an isotropic Gaussian surface.
-        """
+        """Why it lies outside of the surfaces that BEM was compared with, as a map or as an isotropic Gaussian one."""
         tested = BY_MAP if by_map else BY_SPECTRUM
         known = {"skewness of heights": self.skewness, "kurtosis of heights": self.kurtosis}
         if self.bearing is not None:
@@ -246,15 +194,15 @@ class MeasuredSurface(AnySurface):
         require("q", wavenumber, wavenumber > 0, "positive")
         return self.laws.at(wavenumber)[()]
 
-    def sampled(self) -> MeasuredSurface:
+    def sampled(self) -> Self:
         """Itself."""
         return self
 
-    def scaled(self, factor: float, unit: str | None) -> MeasuredSurface:
+    def scaled(self, factor: float, unit: str | None) -> Self:
         """The same surface in another length unit, of which the old one is `factor`."""
         return dataclasses.replace(self.resized(factor, factor), unit=unit)
 
-    def resized(self, up: float, along: float) -> MeasuredSurface:
+    def resized(self, up: float, along: float) -> Self:
         """The surface with its heights `up` times as large, and its lengths along the plane `along` times."""
         known, bands, slope = self.bearing, self.bands, up / along
         if known is not None:
@@ -280,7 +228,7 @@ class MeasuredSurface(AnySurface):
             bands=bands,
         )
 
-    def between(self, low: float, high: float) -> MeasuredSurface:
+    def between(self, low: float, high: float) -> Self:
         """The waves from one wavenumber to another, without the curves of a map; heights shrink in proportion."""
         inside = (self.q > low) & (self.q < high)
         q = np.concatenate([[low], self.q[inside], [high]])
@@ -294,8 +242,44 @@ class MeasuredSurface(AnySurface):
         )
         return dataclasses.replace(less, heights=self.heights.scaled(float(less.h_rms / self.h_rms)))
 
+    def added(self, other: SpectralSurface) -> Self:
+        """The surface that stands for two; see `AnySurface.combined`."""
+        if (self.unit is None) != (other.unit is None):
+            raise InputError(
+                f"one surface is in {self.unit or other.unit!r}, the unit of the other is not known: "
+                "make it with unit=..."
+            )
+        if self.unit is not None:
+            other = other.to(self.unit)
+        low, high = min(self.q0, other.q0), max(self.q1, other.q1)
+        fine = np.geomspace(low, high, math.ceil(math.log(high / low) / math.log(FINE)) + 1)
+        grid = np.unique(np.clip(np.concatenate([fine, self.q, other.q]), low, high))
+        # both sides of every wavenumber, for where a band ends the sum jumps
+        above, below = (
+            self.laws.at(side) + other.laws.at(side) for side in (grid[:-1] * (1 + SIDE), grid[1:] * (1 - SIDE))
+        )
+        q, C = np.repeat(grid, 2)[1:-1], np.stack([above, below], axis=1).ravel()
+        kept = np.append(True, (np.diff(q) > 0) | (np.abs(np.diff(C)) > 1e-9 * C[1:]))
+        told = []
+        if self.bearing is not None or other.bearing is not None:
+            told = ["curves of a map's tops and valleys are left out, since how the two lie on each other is not known"]
+        if (stretch := _anisotropy(self, other)) is not None:
+            told.append(f"lays are taken to be parallel: anisotropy {stretch:.3g} at most")
+        record = {"step": "combined", "of": [list(self.provenance), list(other.provenance)]}
+        both = type(self)(
+            q[kept],
+            C[kept],
+            heights=self.heights.convolved(other.heights),
+            anisotropy=stretch,
+            unit=self.unit,
+            provenance=(record | ({"told": "two rough faces: " + "; ".join(told)} if told else {}),),
+        )
+        if not self.resolution and not other.resolution:
+            return both
+        return dataclasses.replace(both, provenance=(*both.provenance, resolution(both)))
 
-def resolution(surface: MeasuredSurface) -> dict[str, Any]:
+
+def resolution(surface: SpectralSurface) -> dict[str, Any]:
     """A record of how much the shortest octave of a measured spectrum matters."""
     laws, q = surface.laws, surface.q
     below = laws.below(2, laws.place(q))
@@ -312,41 +296,7 @@ def resolution(surface: MeasuredSurface) -> dict[str, Any]:
     return {"step": "resolution", "shortest": shortest, "area_without_last_octave": factor, "told": told}
 
 
-def combination(one: MeasuredSurface, other: MeasuredSurface) -> MeasuredSurface:
-    """The surface that stands for two; see `AnySurface.combined`."""
-    if (one.unit is None) != (other.unit is None):
-        raise InputError(
-            f"one surface is in {one.unit or other.unit!r}, the unit of the other is not known: make it with unit=..."
-        )
-    if one.unit is not None:
-        other = other.to(one.unit)
-    low, high = min(one.q0, other.q0), max(one.q1, other.q1)
-    fine = np.geomspace(low, high, math.ceil(math.log(high / low) / math.log(FINE)) + 1)
-    grid = np.unique(np.clip(np.concatenate([fine, one.q, other.q]), low, high))
-    # both sides of every wavenumber, for where a band ends the sum jumps
-    above, below = (one.laws.at(side) + other.laws.at(side) for side in (grid[:-1] * (1 + SIDE), grid[1:] * (1 - SIDE)))
-    q, C = np.repeat(grid, 2)[1:-1], np.stack([above, below], axis=1).ravel()
-    kept = np.append(True, (np.diff(q) > 0) | (np.abs(np.diff(C)) > 1e-9 * C[1:]))
-    told = []
-    if one.bearing is not None or other.bearing is not None:
-        told = ["curves of a map's tops and valleys are left out, since how the two lie on each other is not known"]
-    if (stretch := _anisotropy(one, other)) is not None:
-        told.append(f"lays are taken to be parallel: anisotropy {stretch:.3g} at most")
-    record = {"step": "combined", "of": [list(one.provenance), list(other.provenance)]}
-    both = MeasuredSurface(
-        q[kept],
-        C[kept],
-        heights=one.heights.convolved(other.heights),
-        anisotropy=stretch,
-        unit=one.unit,
-        provenance=(record | ({"told": "two rough faces: " + "; ".join(told)} if told else {}),),
-    )
-    if not one.resolution and not other.resolution:
-        return both
-    return dataclasses.replace(both, provenance=(*both.provenance, resolution(both)))
-
-
-def _anisotropy(one: MeasuredSurface, other: MeasuredSurface) -> float | None:
+def _anisotropy(one: SpectralSurface, other: SpectralSurface) -> float | None:
     """The largest anisotropy of a sum: parallel, their tensors of mean gradients have the same axes."""
     if one.anisotropy is None and other.anisotropy is None:
         return None

@@ -1,13 +1,11 @@
-"""Hashes of values and attributes, and where values came from: versions, arithmetic, source files."""
+"""Where values came from: versions, arithmetic, source files."""
 
 from __future__ import annotations
 
 import hashlib
 import importlib.util
-import json
 import pathlib
 import platform
-from typing import Any
 
 import numpy as np
 
@@ -27,28 +25,11 @@ GEOMETRY = ("mbma_tables.surfaces.spectrum", "mbma_tables.islands.geometry", "mb
 MODULES = {UNIVERSAL: SOLVER, ISLAND4D: SOLVER + GEOMETRY}
 
 
-def digest_json(content: Any) -> str:
-    """SHA-256 of a JSON value in its canonical form."""
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def digest_arrays(arrays: dict[str, Any]) -> str:
-    """SHA-256 of named arrays: names, shapes, and bytes in little-endian order."""
-    digest = hashlib.sha256()
-    for name in sorted(arrays):
-        array = np.asarray(arrays[name])
-        plain = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
-        digest.update(f"{name}:{plain.dtype.str}:{plain.shape};".encode())
-        digest.update(plain.tobytes())
-    return digest.hexdigest()
-
-
 def source_digest(modules: tuple[str, ...]) -> str:
     """SHA-256 of the files of modules, or of C sources, as bytes: a record of what ran, compared with nothing."""
     digest = hashlib.sha256()
     for module in modules:
-        path: str | pathlib.Path = pathlib.Path(__file__).parents[2] / module
+        path: str | pathlib.Path = pathlib.Path(__file__).parents[1] / module
         if "/" not in module:
             spec = importlib.util.find_spec(module)
             if spec is None or spec.origin is None:

@@ -1,4 +1,4 @@
-"""Uniform tensor splines: node values to B-spline coefficients, and these to values.
+"""Node values of uniform tensor splines to B-spline coefficients; `models.island4d` evaluates them.
 
 On an axis of n equally spaced nodes a spline of odd degree k has n + k - 1 coefficients of cardinal B-splines,
 centred at the nodes and at (k - 1)/2 places beyond either end. Interpolation and not-a-knot conditions fix them.
@@ -11,7 +11,6 @@ import functools
 import numpy as np
 
 from mbma_tables.arguments import FloatArray
-from mbma_tables.core import core
 
 TAPS = {3: (1 / 6, 4 / 6, 1 / 6), 5: (1 / 120, 26 / 120, 66 / 120, 26 / 120, 1 / 120)}
 
@@ -58,14 +57,3 @@ def coefficients(values: FloatArray, degree: int, axes: int) -> FloatArray:
             solved[:, column] = scipy.linalg.lu_solve(factors, right[:, column], check_finite=False)
         result = np.moveaxis(solved.reshape(-1, *moved.shape[1:]), 0, axis)
     return np.ascontiguousarray(result)
-
-
-def at_places(coefs: FloatArray, places: FloatArray, slopes: bool = False) -> FloatArray:
-    """Two cubic functions of four axes, (2, entries), at positions in node units, (4, entries); NaN beyond the axes.
-
-    With `slopes` the values come with derivatives by the positions, (2, 5, entries).
-    """
-    nodes, given = np.array(coefs.shape[:4]) - 2, np.ascontiguousarray(places, dtype=float)
-    out = np.empty((2, 5, given.shape[1]) if slopes else (2, given.shape[1]))
-    core.spline4(given, np.ascontiguousarray(coefs), nodes, slopes, out)
-    return out

@@ -1,0 +1,44 @@
+"""Circles of imports among a package's modules, those inside functions and under TYPE_CHECKING counted.
+
+`python benchmarks/import_circles.py [package]` prints one line a circle, and ends with 1 where there is one.
+"""
+
+from __future__ import annotations
+
+import ast
+import pathlib
+import sys
+
+
+def imports_of(name: str, path: pathlib.Path, known: set[str]) -> set[str]:
+    """Modules among the known ones that a file imports anywhere, but for the packages that it lies in."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            inner = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= inner & known or {node.module}
+    return {other for other in found & known if other != name}
+
+
+def circles(package: pathlib.Path) -> list[list[str]]:
+    """Groups of modules that reach one another."""
+    files = {".".join(p.with_suffix("").parts).removesuffix(".__init__"): p for p in sorted(package.rglob("*.py"))}
+    # the package itself, which names all that is public, is asked for its version alone
+    del files[package.name]
+    graph = {name: imports_of(name, path, set(files)) for name, path in files.items()}
+    reached = {name: set(others) for name, others in graph.items()}
+    for middle in graph:
+        for others in reached.values():
+            if middle in others:
+                others |= reached[middle]
+    groups = {tuple(n for n in graph if n in reached[name] and name in reached[n]) for name in graph}
+    return [list(group) for group in sorted(groups) if group]
+
+
+if __name__ == "__main__":
+    found = circles(pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else "mbma_tables"))
+    for group in found:
+        print(" ".join(group))
+    sys.exit(bool(found))

@@ -1,0 +1,249 @@
+"""Five numbers that make a self-affine surface, or arrays of them, and what follows from them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.arguments import broadcast_shape, finite_array, hinted, is_labelled, require, spread
+from mbma_tables.display import shown
+from mbma_tables.errors import InputError
+from mbma_tables.surfaces import spectrum
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.cases import get_case
+from mbma_tables.surfaces.roughness import surface_of_roughness
+from mbma_tables.units import Units
+
+if TYPE_CHECKING:
+    from mbma_tables.surfaces.psd import SpectrumFit
+
+SHOWN = 6  # entries of a batch that are printed
+PARAMETERS = ("hurst", "q0", "q1", "h_rms", "h_max")
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class SelfAffine(AnySurface):
+    """The numbers of `Surface`, checked, and the constructors that need no measurement."""
+
+    hurst: Any
+    q0: Any
+    q1: Any
+    h_rms: Any
+    h_max: Any
+    parameters = PARAMETERS
+    unit: str | None = dataclasses.field(default=None, kw_only=True)
+    fit: SpectrumFit | None = dataclasses.field(default=None, repr=False, kw_only=True)
+    provenance: tuple[Mapping[str, Any], ...] = dataclasses.field(default=(), repr=False, kw_only=True)
+
+    def __post_init__(self) -> None:
+        units = Units(self.unit)
+        object.__setattr__(self, "unit", units.length)
+        if self.labelled:
+            for name in PARAMETERS:
+                units.number(name, getattr(self, name))
+            # perhaps lazy: checked block by block, where numbers are computed
+            return
+        given = {name: finite_array(name, getattr(self, name)) for name in PARAMETERS}
+        require("hurst", given["hurst"], (given["hurst"] > 0) & (given["hurst"] <= 1), "in (0, 1]")
+        for name in ("q0", "q1", "h_rms", "h_max"):
+            require(name, given[name], given[name] > 0, "positive")
+        shape = broadcast_shape(**given)
+        for name, array in given.items():
+            kept = np.array(spread(array, shape))
+            kept.setflags(write=False)
+            object.__setattr__(self, name, kept[()])
+        zeta_1 = np.asarray(self.zeta_1)
+        require("q1/q0", zeta_1, zeta_1 > spectrum.MIN_ZETA_1, "greater than 3: q1 is the largest wavenumber")
+        require("q1/q0", zeta_1, zeta_1 <= spectrum.MAX_ZETA_1, "at most 1e8")
+
+    def __repr__(self) -> str:
+        numbers = [f"{name}={_shown(getattr(self, name))}" for name in PARAMETERS]
+        return f"Surface({', '.join([*numbers, *([f'unit={self.unit!r}'] if self.unit else [])])})"
+
+    def scaled(self, factor: float, unit: str | None) -> Self:
+        """The same surface in another length unit, of which the old one is `factor`."""
+        waves, lengths = (self.q0 / factor, self.q1 / factor), (self.h_rms * factor, self.h_max * factor)
+        return dataclasses.replace(self, q0=waves[0], q1=waves[1], h_rms=lengths[0], h_max=lengths[1], unit=unit)
+
+    @classmethod
+    @hinted
+    def from_moments(
+        cls, *, hurst: ArrayLike, m0: ArrayLike, m2: ArrayLike, m4: ArrayLike, h_max: ArrayLike, unit: str | None = None
+    ) -> Self:
+        """The surface with these spectral moments (Eqs. 1, 7).
+
+        Parameters
+        ----------
+        hurst : array_like
+            Hurst exponent, in (0, 1].
+        m0, m2, m4 : array_like
+            Variance of height [length^2], of a profile's slope, of its second derivative [1/length^2].
+        h_max : array_like
+            Height of the highest point above the mid-plane [length].
+        unit : str, optional
+            The unit of length.
+
+        Returns
+        -------
+        Surface
+            zeta_1 from alpha = m0 m4/m2^2, which rises with it, then q0 from m2/m0.
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            Where no band with 3 < zeta_1 <= 1e8 has that alpha, and as `Surface` itself.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface
+        >>> road = Surface.from_moments(hurst=0.7, m0=0.071, m2=0.27, m4=62.0, h_max=1.1)
+        >>> print(f"zeta_1 = {road.zeta_1:.4f}, q0 = {road.q0:.6f}")
+        zeta_1 = 64.8598, q0 = 0.538132
+        """
+        return cls(hurst, *spectrum.band_from_moments(hurst, m0, m2, m4), h_max, unit=unit)
+
+    @classmethod
+    @hinted
+    def from_roughness(
+        cls,
+        *,
+        hurst: Any,
+        h_max: Any = None,
+        Sp: Any = None,
+        Rq: Any = None,
+        Ra: Any = None,
+        Sq: Any = None,
+        Sa: Any = None,
+        Rdq: Any = None,
+        Sdq: Any = None,
+        Rsm: Any = None,
+        Sds: Any = None,
+        Spd: Any = None,
+        longest: Any = None,
+        shortest: Any = None,
+        unit: str | None = None,
+    ) -> Self:
+        """The self-affine surface that numbers of a drawing or a profilometer describe.
+
+        One height, one highest point, a Hurst exponent, and two of slope, longest wave and shortest wave (or slope and
+        density of summits). What a drawing does not tell is to be given: nothing is filled in. `provenance` holds
+        what each number was taken to mean; docs/surfaces.md has typical values. Lengths are numbers in one unit, or
+        texts with theirs.
+
+        Parameters
+        ----------
+        hurst : array_like
+            Hurst exponent, in (0, 1].
+        h_max, Sp : array_like, one of them
+            Height of the highest point above the mid-plane [length].
+        Rq, Ra, Sq, Sa : array_like, one of them
+            Root-mean-square or mean absolute height of a profile or of a map [length].
+        Rdq, Sdq, Rsm : array_like, one of them, optional
+            Root-mean-square slope of a profile, gradient of a map, or mean spacing of a profile's elements [length].
+        Sds, Spd : array_like, one of them, optional
+            Summits per area [1/length^2].
+        longest, shortest : array_like, optional
+            Wavelengths at which the roughness ends [length].
+        unit : str, optional
+            The unit of length.
+
+        Returns
+        -------
+        Surface
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            For too few or too many numbers, and for those that no band with 3 < q1/q0 <= 1e8 has.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface
+        >>> ground = Surface.from_roughness(Ra="0.4 um", Rdq=0.1, longest="100 um", hurst=0.8, h_max="1.8 um")
+        >>> print(f"h_rms = {ground.h_rms:.3f} {ground.unit}, shortest wave {6.2832 / ground.q1:.2f} {ground.unit}")
+        h_rms = 0.501 um, shortest wave 1.12 um
+        >>> ground.provenance[0]["assumed"][2]
+        'h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered'
+        """
+        given = {name: value for name, value in locals().items() if name not in ("cls", "unit")}
+        return cls(**surface_of_roughness(unit, given))
+
+    @classmethod
+    def named(cls, name: str) -> Self:
+        """One of the paper's cases, in the paper's unit of length where it has one.
+
+        Raises
+        ------
+        InputError
+            For an unknown name; the message lists those there are.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface
+        >>> challenge = Surface.named("challenge")
+        >>> float(challenge.h_rms), challenge.unit
+        (0.762, 'um')
+        """
+        case = get_case(name)
+        make: Any = cls.from_moments if "m0" in case.numbers else cls
+        surface: Self = make(**case.numbers, unit=case.length_unit)
+        return surface
+
+    @property
+    def labelled(self) -> bool:
+        """Whether any parameter is an xarray DataArray."""
+        return any(is_labelled(getattr(self, name)) for name in PARAMETERS)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the batch; () for one surface."""
+        return np.shape(self.hurst)
+
+    @property
+    def s(self) -> Any:
+        """Unit of height, h_rms/sqrt(1 - zeta_1^(-2H)) [length]."""
+        return self.h_rms / np.sqrt(-np.expm1(-2 * self.hurst * np.log(self.zeta_1)))
+
+    @property
+    def m2(self) -> Any:
+        """Variance of a profile's slope, Eq. (7)."""
+        return (self.s * self.q0) ** 2 * spectrum.band_moment(2, self.hurst, 1.0, self.zeta_1)
+
+    @property
+    def m4(self) -> Any:
+        """Variance of a profile's second derivative [1/length^2], Eq. (7)."""
+        return (self.s * self.q0**2) ** 2 * spectrum.band_moment(4, self.hurst, 1.0, self.zeta_1)
+
+    def with_numbers(self, *numbers: Any) -> Self:
+        """Another surface, in the same unit."""
+        return type(self)(*numbers, unit=self.unit)
+
+    def power_spectrum(self, q: ArrayLike) -> Any:
+        """C(q) of Eq. (6) [length^4], zero outside [q0, q1]; for one surface or broadcasting against it."""
+        wavenumber = finite_array("q", q)
+        require("q", wavenumber, wavenumber > 0, "positive")
+        scale = self.hurst / math.pi * (self.s / self.q0) ** 2
+        inside = (wavenumber >= self.q0) & (wavenumber <= self.q1)
+        return np.where(inside, scale * (wavenumber / self.q0) ** (-2 - 2 * self.hurst), 0.0)[()]
+
+
+def check_model(model: str, band: Any) -> None:
+    """Refuse an unknown model of a measurement, and a band to be fitted where nothing is."""
+    if model not in ("measured", "self-affine"):
+        raise InputError(f"model must be 'measured' or 'self-affine', got {model!r}")
+    if model == "measured" and band is not None:
+        raise InputError("band belongs to model='self-affine': a measured surface is not fitted")
+
+
+def _shown(value: Any) -> str:
+    """A number as Python prints it, a DataArray by its sizes."""
+    if is_labelled(value):
+        return f"<DataArray {dict(value.sizes)}>"
+    if np.size(value) > SHOWN:
+        return f"<{'x'.join(map(str, np.shape(value)))} numbers, {shown(value)}>"
+    return repr(np.asarray(value).item()) if np.ndim(value) == 0 else repr(value)
