@@ -2,7 +2,7 @@
 
 ``python -m benchmarks`` prints them, ``--write`` puts them into docs/lookup.md too. One core; every ratio is of two
 processor times taken in turn, the median over the rounds, so that what else the machine does falls on both.
-docs/cost.md has error against time of every tier.
+docs/cost.md has error against time of every island model.
 """
 
 from __future__ import annotations
@@ -148,20 +148,20 @@ def totals(rng: np.random.Generator) -> None:
     surfaces, gaps = held_out(SURFACES, rng)
     taken = rounds(
         {
-            "exact": lambda: contact(surfaces, gaps, tier="exact"),
+            "exact": lambda: contact(surfaces, gaps, island_model="exact"),
             "value": lambda: contact(surfaces, gaps),
             "slopes": lambda: contact(surfaces, gaps, derivatives=True),
         },
         3,
     )
-    exact = contact(surfaces, gaps, tier="exact").islands
+    exact = contact(surfaces, gaps, island_model="exact").islands
     looked_up = contact(surfaces, gaps).islands
     click.echo(f"\ncontact at 1e-8, one gap on each of {SURFACES} surfaces")
     report("time a total", microseconds(taken["value"], SURFACES), "us", at_most=7)
     rate = exact / statistics.median(taken["exact"])
     report("islands solved by exact, a second", rate, "1/s")
     report("islands looked up, a second", looked_up / statistics.median(taken["value"]), "1/s")
-    report("faster than our own exact tier", times_faster(taken, "exact", "value"), "x", 150)
+    report("faster than our own exact island model", times_faster(taken, "exact", "value"), "x", 150)
     nominal = exact / NOMINAL_EXACT / statistics.median(taken["value"])
     report(f"faster than a solver of {NOMINAL_EXACT} islands/s at exact's island count", nominal, "x")
     report("derivatives=True against the value alone", times_faster(taken, "slopes", "value"), "x", at_most=2)
@@ -300,7 +300,7 @@ FIRST = {
     "100,000 gaps of a law": "m.contact_law(S()).force(np.linspace(-2.9, 2.9, 100_000))",
     "10,000 surfaces": "m.contact(S(10_000), 1.0)",
     "10,000 surfaces with derivatives": "m.contact(S(10_000), 1.0, derivatives=True)",
-    "an exact total": "m.contact(S(), 1.0, tier='exact')",
+    "an exact total": "m.contact(S(), 1.0, island_model='exact')",
 }
 
 

@@ -44,9 +44,9 @@ def exported(rng: np.random.Generator) -> None:
         sources = [str(folder / name) for name in SOURCES if name != "mbma_selftest.c"]
         subprocess.run([*COMPILER, *sources, "-lm", "-o", str(folder / "model.so")], check=True)
         library: Any = ctypes.CDLL(str(folder / "model.so"))
-    for function in (library.mbma_table, library.mbma_reading):
+    for function in (library.mbma_table, library.mbma_variant):
         function.restype = ctypes.c_void_p
-    table, reading = (ctypes.c_void_p(function()) for function in (library.mbma_table, library.mbma_reading))
+    table, variant = (ctypes.c_void_p(function()) for function in (library.mbma_table, library.mbma_variant))
     size, many, count = (ctypes.c_size_t(number) for number in (POINTS, SURFACES, GAPS))
     one, rtol, share = (ctypes.c_double(number) for number in (1.0, RTOL, QUADRATURE_SHARE * RTOL))
     known = [np.ascontiguousarray(column, dtype=float) for column in (surfaces.hurst, surfaces.zeta_1, *heights)]
@@ -57,7 +57,7 @@ def exported(rng: np.random.Generator) -> None:
             "C islands": lambda: library.mbma_phi(size, at(X), at(mu), table, 0, at(islands), None),
             "totals": lambda: contact(surfaces, apart, rtol=RTOL),
             "C totals": lambda: library.mbma_totals(
-                many, *map(at, known), share, reading, table, 0, at(sums), at(bound), at(status), ctypes.byref(seen)
+                many, *map(at, known), share, variant, table, 0, at(sums), at(bound), at(status), ctypes.byref(seen)
             ),
             "derivatives": lambda: Mbma(rtol=RTOL).totals(surface, gaps, derivatives=True),
             "C derivatives": lambda: library.mbma_totals_of(

@@ -21,7 +21,7 @@ from scipy.special import erf
 
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.surfaces.variants import get_variant
 
 MANY, SURFACES, DESIGNS, SOME, CALLS = 100_000, 2_000, 20, 1_000, 2_000
 SEED, ROUNDS = 7, 9
@@ -69,7 +69,7 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
     rng = np.random.default_rng(SEED)
     universal, four = open_table("universal"), open_table("island4d")
     X, mu = rng.uniform(-6.25, 41.0, MANY), 10 ** rng.uniform(-8, 6, MANY)
-    fields = geometry(np.linspace(1e-3, 4, MANY), np.full(MANY, 0.8), np.full(MANY, 200.0), get_reading("reported"))
+    fields = geometry(np.linspace(1e-3, 4, MANY), np.full(MANY, 0.8), np.full(MANY, 200.0), get_variant("reported"))
     path = [np.ascontiguousarray(fields[name]) for name in ("X", "mu")]
     raw = (
         10 ** rng.uniform(-2, 0.5, MANY),

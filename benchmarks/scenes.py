@@ -28,7 +28,7 @@ EFFECTS = (
 def truth(surface: Surface, gaps: np.ndarray, name: str) -> np.ndarray:
     """Exact force and area; stiffness and energy by other means than a law's."""
     if name in ("force", "area"):
-        return np.asarray(getattr(contact(surface, gaps, tier="exact", rtol=1e-10), name))
+        return np.asarray(getattr(contact(surface, gaps, island_model="exact", rtol=1e-10), name))
     if name == "stiffness":
         return -2 * contact(surface, gaps, rtol=1e-10, derivatives=True).force_by["separation"]
     span = surface.h_max - gaps

@@ -102,8 +102,8 @@ def _known(curves: dict[int, TheoryCurve]) -> Callable[[Case], TheoryCurve]:
 def others(found: Sequence[Case], summary: Summary) -> dict[str, dict[str, Any]]:
     """Errors of theories that nothing was fitted for, on all self-affine surfaces of two or more waves a side."""
     told = {}
-    readings = [Mbma(reading=name, outside="nan") for name in ("reported", "printed", "fitted")]
-    for theory in (*readings, Persson(), Persson("simplified"), GreenwoodWilliamson()):
+    variants = [Mbma(variant=name, outside="nan") for name in ("reported", "printed", "fitted")]
+    for theory in (*variants, Persson(), Persson("simplified"), GreenwoodWilliamson()):
         seen, curves = [], {}
         for one in found:
             if one.kind != "self_affine" or not one.gaussian:

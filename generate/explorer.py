@@ -15,7 +15,7 @@ from mbma_tables.export.code import web_assembly
 from mbma_tables.export.explorer import MODULE
 from mbma_tables.files import write_file
 from mbma_tables.models.tables import universal_model
-from mbma_tables.surfaces.readings import REPORTED
+from mbma_tables.surfaces.variants import REPORTED
 
 FUNCTIONS = (
     *("mbma_total_of", "mbma_calibrated_of", "mbma_message", "mbma_spectrum_of", "mbma_surface_spectrum_of"),

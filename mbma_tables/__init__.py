@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from mbma_tables.islands.height_integrals import height_integral as height_integral
     from mbma_tables.models.tables import open_table as open_table
     from mbma_tables.scenes.scene import Scene as Scene
-    from mbma_tables.surfaces.readings import Reading as Reading
     from mbma_tables.surfaces.surface import Surface as Surface
+    from mbma_tables.surfaces.variants import Variant as Variant
     from mbma_tables.theories.contact import contact as contact
     from mbma_tables.theories.law import contact_law as contact_law
     from mbma_tables.theories.law_object import ContactLaw as ContactLaw
@@ -37,7 +37,7 @@ _ERRORS = tuple(name for name in globals() if name.endswith("Error"))
 _HOMES = {
     "Contact": "mbma_tables.theories.result",
     "Island": "mbma_tables.totals.island",
-    "Reading": "mbma_tables.surfaces.readings",
+    "Variant": "mbma_tables.surfaces.variants",
     "Surface": "mbma_tables.surfaces.surface",
     "ContactLaw": "mbma_tables.theories.law_object",
     "Scene": "mbma_tables.scenes.scene",

@@ -1,4 +1,4 @@
-"""Random surfaces and gaps by a seed, and readings of one's own."""
+"""Random surfaces and gaps by a seed, and variants of one's own."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 
 from mbma_tables import Surface
-from mbma_tables.surfaces.readings import PRINTED, REPORTED
+from mbma_tables.surfaces.variants import PRINTED, REPORTED
 
-# readings of one's own: other numbers, and other formulas
+# variants of one's own: other numbers, and other formulas
 OWN = dataclasses.replace(PRINTED, name="own", jacobian="exact", beta=0.3, phi=0.08, floor_d=1.6, floor_u=3.5)
 LEVEL = dataclasses.replace(REPORTED, name="level", jacobian="exact", offset=False, summit_sigma=False)
 

@@ -79,7 +79,7 @@ class Reader:
         return _json_digest(content)
 
     def configuration_sha256(self):
-        return _json_digest([json.loads(self.attributes[name]) for name in ("configuration", "reading_numbers")])
+        return _json_digest([json.loads(self.attributes[name]) for name in ("configuration", "variant_numbers")])
 
     # lookup
 
@@ -153,7 +153,7 @@ class Reader:
         growth = g(power) / g(2 - 2 * hurst)
         alpha = 1.5 * g(-2 * hurst) * growth / g(2 - 2 * hurst)
         sigma = math.sqrt((1 - 0.8968 / alpha) * 2 * hurst * w * g(-2 * hurst))
-        rate = 0.75 * growth / json.loads(self.attributes["reading_numbers"])[0]
+        rate = 0.75 * growth / json.loads(self.attributes["variant_numbers"])[0]
         inverse = sphere * 1.25**-power
         c = 0.75 * hurst / power
         m4_d, m4_u = c * (1 - inverse), c * (math.exp(power * w) - inverse)

@@ -105,7 +105,7 @@ def random_state(rng: np.random.Generator) -> dict:
         **dict(zip(NAMES, map(float, numbers), strict=True)),
         "E_star": float(np.exp(rng.uniform(-5, 12))),
         "theory": str(rng.choice(["mbma", "calibrated", "persson"])),
-        "reading": str(rng.choice(["reported", "printed", "fitted"])),
+        "variant": str(rng.choice(["reported", "printed", "fitted"])),
         "against": str(rng.choice(["gap", "pressure"])),
         "beside": "mbma,calibrated,persson",
     }
@@ -119,14 +119,14 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
         answered = np.flatnonzero(np.isfinite(known["gap"]))[rows]
         assert answered.size > 3
         options = {"mean_separation": known["gap"][answered], "E_star": state["E_star"], "theory": theory}
-        expected = contact(surface, **options, **({"reading": state["reading"]} if theory == "mbma" else {}))
+        expected = contact(surface, **options, **({"variant": state["variant"]} if theory == "mbma" else {}))
         np.testing.assert_allclose(found[f"{theory} scatter of ln force"][answered], expected.scatter, rtol=1e-6)
         np.testing.assert_allclose(found[f"{theory} scatter of ln area"][answered], expected.area_scatter, rtol=1e-6)
         force, area, stiffness = expected.force, expected.area, expected.stiffness
         if theory == "mbma":
             # islands summed gap by gap, as the page does it, and with their derivatives
             gap = 2 * options["mean_separation"] - surface.h_max
-            sums = Mbma(reading=state["reading"], rtol=1e-11).totals(surface, gap, derivatives=True)
+            sums = Mbma(variant=state["variant"], rtol=1e-11).totals(surface, gap, derivatives=True)
             E_star = state["E_star"]
             force, area, stiffness = E_star * sums.force, sums.area, -2 * E_star * sums.force_by["separation"]
         for name, values in {"force": force, "area": area, "stiffness": stiffness}.items():
@@ -184,7 +184,7 @@ def test_one_file_of_at_most_four_megabytes_that_asks_for_nothing():
     ("arguments", "said"),
     [
         (["--surface", "concrete", "--theory", "greenwood_williamson"], "the page has the theories"),
-        (["--surface", "concrete", "--reading", "mine"], "'mine' is not one of"),
+        (["--surface", "concrete", "--variant", "mine"], "'mine' is not one of"),
         (["--hurst", "0.8"], "--h-max"),
         ([], "one surface is needed"),
     ],
@@ -247,7 +247,7 @@ def test_bad_numbers_are_told_beside_their_field(visit):
 def test_bad_addresses_are_told(visit):
     assert "theory must be one of" in visit("theory=hertz").inner_text("#error-theory")
     assert "nothing here" in visit("color=red").inner_text("#error-theory")
-    assert "more than 5.14 q₀" in visit("reading=fitted&q1=2.5&theory=mbma").inner_text("#error-q1")
+    assert "more than 5.14 q₀" in visit("variant=fitted&q1=2.5&theory=mbma").inner_text("#error-q1")
 
 
 SAMPLES = np.geomspace(0.2, 50, 60)

@@ -13,8 +13,8 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from mbma_tables import OutOfRangeError, Scene, Surface, contact, contact_law, island
-from mbma_tables.models import TIERS
-from mbma_tables.surfaces.readings import PRINTED, READINGS
+from mbma_tables.models import ISLAND_MODELS
+from mbma_tables.surfaces.variants import PRINTED, VARIANTS
 
 EPS = np.finfo(float).eps
 
@@ -23,7 +23,7 @@ zetas = st.floats(math.log10(3.6), 6).map(lambda power: 10**power)
 tops = st.floats(2.5, 4.7)
 # (h_max - d)/h_max, from first contact to full compression
 depths = st.one_of(st.floats(-9, 0).map(lambda power: 10**power), st.floats(0.01, 2))
-readings = st.sampled_from([*READINGS.values(), OWN, LEVEL])
+variants = st.sampled_from([*VARIANTS.values(), OWN, LEVEL])
 seeds = st.integers(0, 2**32 - 1)
 
 
@@ -83,22 +83,24 @@ SLOPE_DIMENSIONS = {"separation": -1, "hurst": 0, "q0": 1, "q1": 1, "h_rms": -1,
 
 
 @invariant(
-    12, surface=surfaces, share=depths, reading=readings, power=st.integers(-40, 40), stress=st.integers(-40, 40)
+    12, surface=surfaces, share=depths, variant=variants, power=st.integers(-40, 40), stress=st.integers(-40, 40)
 )
-def test_units_that_are_powers_of_two_change_no_bit(surface, share, reading, power, stress):
+def test_units_that_are_powers_of_two_change_no_bit(surface, share, variant, power, stress):
     unit, modulus = 2.0**power, 2.0**stress
     other, gap = in_unit(surface, unit), gaps_of(surface, share)
     for name, degree in DIMENSIONS.items():
         assert getattr(other, name) == getattr(surface, name) * unit**degree, name
-    one_island = island(surface, surface.h_max - gap, reading=reading)
-    other_island = island(other, (surface.h_max - gap) * unit, reading=reading, E_star=modulus)
+    one_island = island(surface, surface.h_max - gap, variant=variant)
+    other_island = island(other, (surface.h_max - gap) * unit, variant=variant, E_star=modulus)
     assert other_island.force == one_island.force * modulus * unit**2
     for name, degree in ISLAND_DIMENSIONS.items():
         assert getattr(other_island, name) == getattr(one_island, name) * unit**degree, name
-    for tier in ("universal", "rigid"):
-        derivatives = tier == "universal"
-        one = contact(surface, gap, tier=tier, reading=reading, derivatives=derivatives)
-        found = contact(other, gap * unit, tier=tier, reading=reading, E_star=modulus, derivatives=derivatives)
+    for island_model in ("universal", "rigid"):
+        derivatives = island_model == "universal"
+        one = contact(surface, gap, island_model=island_model, variant=variant, derivatives=derivatives)
+        found = contact(
+            other, gap * unit, island_model=island_model, variant=variant, E_star=modulus, derivatives=derivatives
+        )
         assert (found.force, found.area, found.error) == (one.force * modulus, one.area, one.error)
         for name, degree in SLOPE_DIMENSIONS.items() if derivatives else ():
             assert found.force_by[name] == one.force_by[name] * modulus * unit**degree, name
@@ -134,12 +136,12 @@ def test_scenes_in_any_unit(surface, share, power, stress):
         np.testing.assert_allclose(other[name], expected, rtol=2e-6, err_msg=name)
 
 
-@invariant(12, surface=surfaces, reading=readings)
-def test_force_and_area_fall_in_the_gap(surface, reading):
+@invariant(12, surface=surfaces, variant=variants)
+def test_force_and_area_fall_in_the_gap(surface, variant):
     """Down to the model's own turning point, which is never above d = 0; beyond it they rise."""
-    law = contact_law(surface, 1e-6, reading=reading)
+    law = contact_law(surface, 1e-6, variant=variant)
     gaps = gaps_of(surface, np.append(10 ** np.linspace(-9, 0, 40), np.linspace(1, 2, 200)[1:]))
-    found = contact(surface, gaps, reading=reading, derivatives=True)
+    found = contact(surface, gaps, variant=variant, derivatives=True)
     cell = 1.001 * surface.h_max / 199
     for values, slopes, turn in (
         (found.force, found.force_by["separation"], law.turning_point),
@@ -197,16 +199,16 @@ def first_contact(surface, rule):
     return force * q0 * s / s**3.5 * 2 / 7, area / s ** (10 / 3) * 3 / 10
 
 
-@invariant(20, surface=plain_surfaces, reading=readings)
-def test_first_contact_is_a_power_law(surface, reading):
+@invariant(20, surface=plain_surfaces, variant=variants)
+def test_first_contact_is_a_power_law(surface, variant):
     """F ~ l^(7/2) and A ~ l^(10/3), with the factors of the limit; what is missing goes with l."""
     layer = surface.h_rms * surface.zeta_1**-surface.hurst
     depth = layer * 2.0 ** -np.array([8.0, 9.0, 18.0, 19.0])
     gaps = surface.h_max - depth
     depth = surface.h_max - gaps
-    found = contact(surface, gaps, reading=reading, rtol=1e-11)
+    found = contact(surface, gaps, variant=variant, rtol=1e-11)
     for values, exponent, factor in zip(
-        (found.force, found.area), (3.5, 10 / 3), first_contact(surface, reading), strict=True
+        (found.force, found.area), (3.5, 10 / 3), first_contact(surface, variant), strict=True
     ):
         off = np.log(values / (factor * depth**exponent))
         slope = np.diff(np.log(values))[::2] / np.diff(np.log(depth))[::2]
@@ -217,28 +219,28 @@ def test_first_contact_is_a_power_law(surface, reading):
         assert abs(off[2]) < 1e-2
 
 
-@invariant(10, surface=plain_surfaces, share=st.floats(0.02, 1.5), reading=readings, seed=seeds)
-def test_random_islands_add_up(surface, share, reading, seed):
+@invariant(10, surface=plain_surfaces, share=st.floats(0.02, 1.5), variant=variants, seed=seeds)
+def test_random_islands_add_up(surface, share, variant, seed):
     """The sum over islands by chance: two in each of many layers of approach, so that their scatter is known."""
     gap = float(gaps_of(surface, share))
     reach = surface.h_max - gap
     # K1 steps where zeta_d reaches its floor: no layer holds both sides of that
-    floor = reading.floor_d ** (-2 * surface.hurst) - surface.zeta_1 ** (-2 * surface.hurst)
-    step = math.sqrt(floor) / (4 / 3 * reading.beta) * surface.h_rms
+    floor = variant.floor_d ** (-2 * surface.hurst) - surface.zeta_1 ** (-2 * surface.hurst)
+    step = math.sqrt(floor) / (4 / 3 * variant.beta) * surface.h_rms
     edges = np.unique(np.append(np.linspace(0, 1, 3000), math.sqrt(min(step / reach, 1))))
     # near first contact islands are as many and carry less
     places = edges[:-1] + np.diff(edges) * np.random.default_rng(seed).uniform(size=(2, edges.size - 1))
     delta, measure = reach * places**2, 2 * reach * places * np.diff(edges)
-    found = island(surface, delta, reading=reading)
-    D, sigma = summits(surface.hurst, found.zeta_d, reading)
+    found = island(surface, delta, variant=variant)
+    D, sigma = summits(surface.hurst, found.zeta_d, variant)
     D, sigma = D * surface.q0**2, sigma * surface.s
-    slope = 4 / 3 * reading.beta
-    if reading.jacobian == "exact":
-        slope = slope * surface.s / surface.h_rms if reading.offset else 0
-    K1 = np.where(found.zeta_d > reading.floor_d, 1 - slope, 1)
-    height = gap + delta - (found.h_d if reading.offset else 0)
+    slope = 4 / 3 * variant.beta
+    if variant.jacobian == "exact":
+        slope = slope * surface.s / surface.h_rms if variant.offset else 0
+    K1 = np.where(found.zeta_d > variant.floor_d, 1 - slope, 1)
+    height = gap + delta - (found.h_d if variant.offset else 0)
     weight = measure * K1 * D * np.exp(-0.5 * (height / sigma) ** 2) / (math.sqrt(2 * math.pi) * sigma)
-    total = contact(surface, gap, reading=reading)
+    total = contact(surface, gap, variant=variant)
     for carried, whole in ((found.force, total.force), (found.area, total.area)):
         terms = carried * weight
         scatter = math.sqrt(np.sum((terms[0] - terms[1]) ** 2)) / 2
@@ -246,12 +248,16 @@ def test_random_islands_add_up(surface, share, reading, seed):
         assert abs(terms.mean(axis=0).sum() - whole) <= 6 * scatter
 
 
-@invariant(25, surface=surfaces, shares=st.lists(depths, min_size=1, max_size=8), reading=readings)
-def test_spheres_that_deform_carry_less(surface, shares, reading):
+@invariant(25, surface=surfaces, shares=st.lists(depths, min_size=1, max_size=8), variant=variants)
+def test_spheres_that_deform_carry_less(surface, shares, variant):
     gaps = gaps_of(surface, shares)
     delta = surface.h_max - gaps
-    pairs = [(island(surface, delta, tier=tier, reading=reading)) for tier in ("rigid", "universal")]
-    totals = [contact(surface, gaps, tier=tier, reading=reading) for tier in ("rigid", "universal")]
+    pairs = [
+        (island(surface, delta, island_model=island_model, variant=variant)) for island_model in ("rigid", "universal")
+    ]
+    totals = [
+        contact(surface, gaps, island_model=island_model, variant=variant) for island_model in ("rigid", "universal")
+    ]
     for rigid, elastic in (pairs, totals):
         room = 1 + rigid.error + elastic.error
         assert (elastic.force <= rigid.force * room).all()
@@ -259,11 +265,11 @@ def test_spheres_that_deform_carry_less(surface, shares, reading):
 
 
 @invariant(
-    12, surface=surfaces, shares=st.lists(depths, min_size=1, max_size=30), reading=readings, digits=st.integers(2, 9)
+    12, surface=surfaces, shares=st.lists(depths, min_size=1, max_size=30), variant=variants, digits=st.integers(2, 9)
 )
-def test_a_law_and_its_inverse(surface, shares, reading, digits):
+def test_a_law_and_its_inverse(surface, shares, variant, digits):
     """Both ways, on the branch of first contact."""
-    law = contact_law(surface, 10.0**-digits, reading=reading)
+    law = contact_law(surface, 10.0**-digits, variant=variant)
     for name, value, slope, turn in (
         ("force", law.force, lambda d: law.stiffness(d) / 2, law.turning_point),
         ("area", law.area, law.area_slope, law.area_turning_point),
@@ -278,24 +284,24 @@ def test_a_law_and_its_inverse(surface, shares, reading, digits):
         assert (np.abs(back - gaps) * slope(gaps) <= 2 * rounded * there)[slope(gaps) * span > 0.01 * there].all()
 
 
-@invariant(12, surface=rough_surfaces, share=depths, reading=st.sampled_from(list(READINGS.values())))
-def test_tiers_are_within_their_bounds_of_each_other(surface, share, reading):
+@invariant(12, surface=rough_surfaces, share=depths, variant=st.sampled_from(list(VARIANTS.values())))
+def test_tiers_are_within_their_bounds_of_each_other(surface, share, variant):
     gap = float(gaps_of(surface, share))
-    exact = contact(surface, gap, tier="exact", reading=reading, rtol=1e-9)
+    exact = contact(surface, gap, island_model="exact", variant=variant, rtol=1e-9)
     refused = 0
-    for tier, rtol in (("universal", 1e-9), ("island4d", 1e-5), ("formula", 1e-4)):
-        if tier == "island4d" and reading is PRINTED:
+    for island_model, rtol in (("universal", 1e-9), ("island4d", 1e-5), ("formula", 1e-4)):
+        if island_model == "island4d" and variant is PRINTED:
             continue
         try:
-            found = contact(surface, gap, tier=tier, reading=reading, rtol=rtol)
+            found = contact(surface, gap, island_model=island_model, variant=variant, rtol=rtol)
         except OutOfRangeError:
             # closed forms and the four-parameter table end earlier
-            assert tier != "universal"
+            assert island_model != "universal"
             refused += 1
             continue
-        assert abs(found.force / exact.force - 1) <= found.error + exact.error, tier
-        assert abs(found.area / exact.area - 1) <= found.error + exact.error, tier
-    rigid = contact(surface, gap, tier="rigid", reading=reading)
+        assert abs(found.force / exact.force - 1) <= found.error + exact.error, island_model
+        assert abs(found.area / exact.area - 1) <= found.error + exact.error, island_model
+    rigid = contact(surface, gap, island_model="rigid", variant=variant)
     # a sphere that gives way carries less
     assert exact.force <= rigid.force * (1 + rigid.error + exact.error)
     return refused
@@ -312,8 +318,8 @@ def some_of(numbers, chosen):
     return [np.broadcast_to(n, numbers[0].shape)[chosen] for n in numbers]
 
 
-@invariant(8, tier=st.sampled_from(TIERS), seed=seeds)
-def test_no_entry_knows_the_others(tier, seed):
+@invariant(8, island_model=st.sampled_from(ISLAND_MODELS), seed=seeds)
+def test_no_entry_knows_the_others(island_model, seed):
     """Order, shape and company change no bit; totals of few surfaces are summed in another way, within the errors."""
     rng = np.random.default_rng(seed)
     numbers, gaps = batch_of(rng, 30)
@@ -321,10 +327,18 @@ def test_no_entry_knows_the_others(tier, seed):
     E_star = rng.uniform(1, 2, 30)
 
     def totals(chosen):
-        return contact(Surface(*some_of(numbers, chosen)), gaps[chosen], tier=tier, E_star=E_star[chosen], rtol=1e-4)
+        return contact(
+            Surface(*some_of(numbers, chosen)),
+            gaps[chosen],
+            island_model=island_model,
+            E_star=E_star[chosen],
+            rtol=1e-4,
+        )
 
     def islands(chosen):
-        return island(Surface(*some_of(numbers, chosen)), 0.1 + 0.2 * E_star[chosen], tier=tier, rtol=1e-4)
+        return island(
+            Surface(*some_of(numbers, chosen)), 0.1 + 0.2 * E_star[chosen], island_model=island_model, rtol=1e-4
+        )
 
     for answer, names in (
         (totals, ("force", "area", "error")),
@@ -336,7 +350,7 @@ def test_no_entry_knows_the_others(tier, seed):
             np.testing.assert_array_equal(getattr(folded, name), getattr(whole, name)[order].reshape(5, 6))
         for k in rng.integers(30, size=(3, 1)):
             alone = answer(k)
-            if answer is totals and tier == "universal":
+            if answer is totals and island_model == "universal":
                 for name in names[:2]:
                     one, among = getattr(alone, name), getattr(whole, name)[k]
                     assert (np.abs(one - among) <= (alone.error + whole.error[k]) * among).all()
@@ -345,27 +359,29 @@ def test_no_entry_knows_the_others(tier, seed):
                 np.testing.assert_array_equal(getattr(alone, name), getattr(whole, name)[k])
 
 
-@invariant(6, tier=st.sampled_from(TIERS), seed=seeds, chunks=st.tuples(st.integers(1, 9), st.integers(1, 5)))
-def test_chunks_change_no_answer(tier, seed, chunks):
+@invariant(
+    6, island_model=st.sampled_from(ISLAND_MODELS), seed=seeds, chunks=st.tuples(st.integers(1, 9), st.integers(1, 5))
+)
+def test_chunks_change_no_answer(island_model, seed, chunks):
     rng = np.random.default_rng(seed)
     numbers, gaps = batch_of(rng, 9)
     named = [xr.DataArray(n, dims="surface") for n in some_of(numbers, slice(None))]
     shares = xr.DataArray([0.0, 0.1, 0.5, 0.9, 1.0], dims="gap")
     d = xr.DataArray(gaps, dims="surface") * (1 - shares) + named[4] * shares
-    eager = contact(Surface(*named), d, tier=tier, rtol=1e-4)
+    eager = contact(Surface(*named), d, island_model=island_model, rtol=1e-4)
     lazy = contact(
         Surface(*(n.chunk(surface=chunks[0]) for n in named)),
         d.chunk(surface=chunks[0], gap=chunks[1]),
-        tier=tier,
+        island_model=island_model,
         rtol=1e-4,
     )
-    plain = contact(Surface(*(n.values[:, None] for n in named)), d.values, tier=tier, rtol=1e-4)
+    plain = contact(Surface(*(n.values[:, None] for n in named)), d.values, island_model=island_model, rtol=1e-4)
     for name in ("force", "area", "error"):
         with dask.config.set(scheduler="synchronous"):
             computed = getattr(lazy, name).transpose("surface", "gap").compute()
         whole = getattr(eager, name).transpose("surface", "gap")
         np.testing.assert_array_equal(whole, getattr(plain, name))
-        if tier != "universal":
+        if island_model != "universal":
             np.testing.assert_array_equal(computed, whole)
         elif name != "error":
             assert (np.abs(computed - whole) <= (lazy.error + eager.error).transpose("surface", "gap") * whole).all()

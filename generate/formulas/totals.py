@@ -3,7 +3,7 @@
 The branches meet where the largest islands reach the floor of zeta_d, at r = k with r = (h_max - d)/h_rms. Below it the
 end of the integral decides, F ~ r^(7/2) and A ~ r^(10/3) at first contact; above it hardly more than the gap does. The
 logarithms are sums of products of a few variables of order one: terms by backward elimination and annealing,
-coefficients of least largest error. Force is over E* q0 h_rms, reading "reported".
+coefficients of least largest error. Force is over E* q0 h_rms, variant "reported".
 """
 
 from __future__ import annotations

@@ -12,15 +12,15 @@ from mbma_tables import Surface, theories
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import OutOfRangeError
 
-READINGS = {"MBMA reported": "reported", "MBMA printed": "printed"}
+VARIANTS = {"MBMA reported": "reported", "MBMA printed": "printed"}
 PERSSON: dict[str, theories.Method] = {"Persson full": "full", "Persson simplified": "simplified"}
 SEPARATIONS: dict[str, theories.Theory] = {
-    **{name: theories.Mbma(reading=reading) for name, reading in READINGS.items()},
+    **{name: theories.Mbma(variant=variant) for name, variant in VARIANTS.items()},
     "G-W": theories.GreenwoodWilliamson(),
     **{name: theories.Persson(method) for name, method in PERSSON.items()},
 }
 THEORIES = tuple(SEPARATIONS)
-AREA_THEORIES = (*READINGS, "G-W", "Persson")  # (18) is Persson's area in full and simplified alike
+AREA_THEORIES = (*VARIANTS, "G-W", "Persson")  # (18) is Persson's area in full and simplified alike
 GAPS = 60  # a curve
 
 
@@ -28,7 +28,7 @@ GAPS = 60  # a curve
 def sample(surface: Surface, theory: str) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mean separation, force and area from first contact to full compression, closer at first contact."""
     # G-W's Gaussian heights are unbounded, and three more h_rms are sampled
-    first = surface.h_max + (0.0 if theory in READINGS else 1.5 * surface.h_rms)
+    first = surface.h_max + (0.0 if theory in VARIANTS else 1.5 * surface.h_rms)
     u = first * (1 - np.append(np.geomspace(0.005, 0.1, GAPS // 2)[:-1], np.linspace(0.1, 1, GAPS)))
     found = SEPARATIONS[theory].answer(surface, u)
     return u, found.force, found.area

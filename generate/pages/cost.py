@@ -24,7 +24,7 @@ LIBRARIES = ("numpy", "scipy")
 SHOWN_RTOLS = ("1e-02", "1e-05", "1e-08")
 HEAD = """\
 # What accuracy costs, measured by python -m generate pages cost; docs/cost.md says how. Costs are times over that of a
-# fixed piece of work in the same run; the row of tier unit has its seconds.
+# fixed piece of work in the same run; the row of island model unit has its seconds.
 """
 
 
@@ -61,19 +61,19 @@ def groups(costs: Costs) -> dict[str, list[Row]]:
     gaps = [row for row in known if row.quantity == "both" and row.what == "gap"]
     # a law's errors go with the price of evaluating it
     lookup = costs.of("law", "lookup") / costs.seconds
-    laws = [row for row in known if row.tier == "universal" and row.what == "law"]
+    laws = [row for row in known if row.island_model == "universal" and row.what == "law"]
     gaps += [Row("law", row.variant.replace("law", "lookup"), "both", row.error, lookup, 0) for row in laws]
     return {"one island": islands, "one gap of a surface": gaps}
 
 
 def method(row: Row) -> str:
     """What a row is called on the page."""
-    return METHODS.get(row.tier, row.tier)
+    return METHODS.get(row.island_model, row.island_model)
 
 
 def family(row: Row) -> str:
     """The series that a point of the figure belongs to."""
-    return f"{method(row)}, by nodes" if row.tier == "exact" and row.what.startswith("nodes=") else method(row)
+    return f"{method(row)}, by nodes" if row.island_model == "exact" and row.what.startswith("nodes=") else method(row)
 
 
 def rows_table(rows: Iterable[Row], front: Sequence[Row] = ()) -> str:
@@ -96,14 +96,17 @@ def ranked(rows: Sequence[Row]) -> str:
 
 
 def single_table(costs: Costs) -> str:
-    """Time of force or area alone over that of both, by tier, over all tolerances."""
-    both = {(row.tier, row.variant): row.cost for row in costs.rows if row.quantity == "both"}
+    """Time of force or area alone over that of both, by island model, over all tolerances."""
+    both = {(row.island_model, row.variant): row.cost for row in costs.rows if row.quantity == "both"}
     ratios: dict[str, dict[str, list[float]]] = {}
     for row in costs.rows:
         if row.quantity != "both" and row.what == "gap":
-            of_tier = ratios.setdefault(method(row), {"force": [], "area": []})
-            of_tier[row.quantity].append(row.cost / both[row.tier, row.variant])
-    cells = [[tier, *(f"{min(own):.2f} to {max(own):.2f}" for own in found.values())] for tier, found in ratios.items()]
+            of_island_model = ratios.setdefault(method(row), {"force": [], "area": []})
+            of_island_model[row.quantity].append(row.cost / both[row.island_model, row.variant])
+    cells = [
+        [island_model, *(f"{min(own):.2f} to {max(own):.2f}" for own in found.values())]
+        for island_model, found in ratios.items()
+    ]
     return table(["what", "force alone", "area alone"], cells)
 
 
@@ -112,9 +115,9 @@ def parts_of(costs: Costs, distances: Sequence[Distance]) -> dict[str, str]:
     names = ("import", "call", "law", "profile", "lookup", "invert")
     # of several tolerances the tightest, which is listed last
     once = {
-        (row.tier, row.what): row
+        (row.island_model, row.what): row
         for row in costs.rows
-        if (row.what in names and row.quantity == "both") or row.what == "invert" or row.tier in THEORIES
+        if (row.what in names and row.quantity == "both") or row.what == "invert" or row.island_model in THEORIES
     }
     return {
         "unit": f"Here the fixed work took {1e6 * costs.seconds:.0f} us, on one core.",

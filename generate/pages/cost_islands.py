@@ -17,10 +17,10 @@ from mbma_tables.errors import ConvergenceError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.greenwood_tripp import iterate, radius, ring_matrix
-from mbma_tables.models import TIERS, answer_islands, get_model
+from mbma_tables.models import ISLAND_MODELS, answer_islands, get_model
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.scenes.costs import Row
-from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.surfaces.variants import get_variant
 
 ISLANDS = 1000  # evaluated in a batch
 HARD = 12  # of them, for the classical iteration
@@ -57,9 +57,9 @@ class HeldOut:
 
 @functools.cache
 def held_out(count: int = ISLANDS) -> HeldOut:
-    """Islands of random surfaces, reading reported."""
+    """Islands of random surfaces, variant reported."""
     hurst, log_zeta, log_approach = qmc.scale(qmc.Halton(3, seed=SEED).random(count), *RANGES).T
-    fields = geometry(10**log_approach, hurst, 10**log_zeta, get_reading("reported"))
+    fields = geometry(10**log_approach, hurst, 10**log_zeta, get_variant("reported"))
     found = chunks.phi(fields["X"], fields["mu"], REFERENCE_RTOL, 2)
     return HeldOut(fields | {"hurst": hurst}, found.T)
 
@@ -116,13 +116,15 @@ def model_rows() -> Iterator[Row]:
     """Models that do not solve: the shipped ones and each closed form."""
     held = held_out()
     models: list[tuple[str, str, Any]] = [
-        (tier, "island", get_model(tier, 1e-8, get_reading("reported"))) for tier in TIERS if tier != "exact"
+        (island_model, "island", get_model(island_model, 1e-8, get_variant("reported")))
+        for island_model in ISLAND_MODELS
+        if island_model != "exact"
     ]
     models += [("formula", f"island form={name}", FormulaModel(name)) for name in FORMS]
-    for tier, name, model in models:
+    for island_model, name, model in models:
         answer = answer_islands(model, held.islands)
         cost, _ = measure(functools.partial(answer_islands, model, held.islands))
-        yield Row(tier, name, "both", held.error(answer.phi_F, answer.phi_A), cost / ISLANDS, 2)
+        yield Row(island_model, name, "both", held.error(answer.phi_F, answer.phi_A), cost / ISLANDS, 2)
 
 
 def island_rows() -> list[Row]:

@@ -1,4 +1,4 @@
-"""docs/cost.md: cost of totals by tiers, laws and theories, of first use, and of force alone."""
+"""docs/cost.md: cost of totals by island models, laws and theories, of first use, and of force alone."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from generate.tables import chunks
 from generate.timing import GAPS, held_out_surfaces, measure, measured_gaps, variant
 from mbma_tables import Scene, Surface, contact, contact_law, theories
 from mbma_tables.arguments import FloatArray
-from mbma_tables.models import TIERS, IslandAnswer
+from mbma_tables.models import ISLAND_MODELS, IslandAnswer
 from mbma_tables.scenes.costs import Row
 
 EVERY = 5  # of the timed gaps, one is compared with the reference
@@ -28,7 +28,7 @@ THEORY_LAW_RTOLS = (1e-3, 1e-5, 1e-7)
 SLOW_LAW_RTOLS = (1e-2, 1e-4)
 FIRST_USE = (
     "import mbma_tables, numpy, time; s = mbma_tables.Surface(0.74, 1.0, 330.0, 0.1, 0.3); t = time.process_time(); "
-    "mbma_tables.contact(s, 0.1, tier={tier!r}, rtol=1e-2); print(time.process_time() - t)"
+    "mbma_tables.contact(s, 0.1, island_model={island_model!r}, rtol=1e-2); print(time.process_time() - t)"
 )
 # keywords of `contact` by quantity, and the answers that these give
 QUANTITIES: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
@@ -57,7 +57,7 @@ def reference() -> tuple[tuple[Surface, FloatArray, dict[str, FloatArray]], ...]
     rows = []
     for surface in held_out_surfaces():
         gap = measured_gaps(surface)[::EVERY]
-        found = contact(surface, gap, tier=Doubled(), rtol=REFERENCE_RTOL)
+        found = contact(surface, gap, island_model=Doubled(), rtol=REFERENCE_RTOL)
         rows.append((surface, gap, {"force": np.asarray(found.force), "area": np.asarray(found.area)}))
     return tuple(rows)
 
@@ -80,46 +80,46 @@ def scene_rows() -> Iterator[Row]:
     yield Row("scene", "call", "both", None, max(whole - step, 0.0))
 
 
-def gap_batch(tier: str, rtol: float, count: int = GAPS, **options: Any) -> list[Any]:
+def gap_batch(island_model: str, rtol: float, count: int = GAPS, **options: Any) -> list[Any]:
     """Totals at `count` gaps of each held-out surface, one call a surface."""
     pairs = [(surface, measured_gaps(surface, count)) for surface in held_out_surfaces()]
-    return [contact(surface, gap, tier=tier, rtol=rtol, **options) for surface, gap in pairs]
+    return [contact(surface, gap, island_model=island_model, rtol=rtol, **options) for surface, gap in pairs]
 
 
 def gap_rows() -> Iterator[Row]:
-    """Totals of each tier at several tolerances: the call, and each further gap."""
+    """Totals of each island model at several tolerances: the call, and each further gap."""
     surfaces = held_out_surfaces()
-    for tier in TIERS:
+    for island_model in ISLAND_MODELS:
         for quantity, (options, names) in QUANTITIES.items():
-            one = measure(functools.partial(gap_batch, tier, 1e-2, 1, **options))[0] / len(surfaces)
-            batch = measure(functools.partial(gap_batch, tier, 1e-2, **options))[0] / len(surfaces)
+            one = measure(functools.partial(gap_batch, island_model, 1e-2, 1, **options))[0] / len(surfaces)
+            batch = measure(functools.partial(gap_batch, island_model, 1e-2, **options))[0] / len(surfaces)
             fixed = max((GAPS * one - batch) / (GAPS - 1), 1e-3 * one)
-            yield Row(tier, "call", quantity, None, fixed)
-            tolerances = EXACT_RTOLS if tier == "exact" else RTOLS
+            yield Row(island_model, "call", quantity, None, fixed)
+            tolerances = EXACT_RTOLS if island_model == "exact" else RTOLS
             for rtol in tolerances[1::3] if quantity != "both" else tolerances:
-                asked: Callable[..., Any] = functools.partial(contact, tier=tier, rtol=rtol, **options)
-                run = functools.partial(gap_batch, tier, rtol, **options)
+                asked: Callable[..., Any] = functools.partial(contact, island_model=island_model, rtol=rtol, **options)
+                run = functools.partial(gap_batch, island_model, rtol, **options)
                 count = sum(found.islands for found in run()) / (len(surfaces) * GAPS)
                 cost = max(measure(run)[0] / len(surfaces) - fixed, 1e-9) / GAPS
                 answers = [asked(surface, gap) for surface, gap, _ in reference()]
                 error = largest_error([{name: getattr(found, name) for name in names} for found in answers])
-                yield Row(tier, variant("gap", rtol), quantity, error, cost, count)
+                yield Row(island_model, variant("gap", rtol), quantity, error, cost, count)
 
 
 def law_rows() -> Iterator[Row]:
     """Making laws, and evaluating them."""
     surfaces = held_out_surfaces()
-    for tier in TIERS:
-        tolerances = LAW_RTOLS if tier == "universal" else SLOW_LAW_RTOLS
+    for island_model in ISLAND_MODELS:
+        tolerances = LAW_RTOLS if island_model == "universal" else SLOW_LAW_RTOLS
         for rtol in tolerances:
-            laws: list[Any] = [contact_law(surface, rtol, tier=tier) for surface in surfaces]
+            laws: list[Any] = [contact_law(surface, rtol, island_model=island_model) for surface in surfaces]
             answers = [
                 {"force": law.force(gap), "area": law.area(gap)}
                 for law, (_, gap, _) in zip(laws, reference(), strict=True)
             ]
-            timed = surfaces[:2] if tier == "exact" else surfaces
-            cost, _ = measure(lambda t=timed, r=rtol, n=tier: [contact_law(s, r, tier=n) for s in t])  # type: ignore[misc]
-            yield Row(tier, variant("law", rtol), "both", largest_error(answers), cost / len(timed))
+            timed = surfaces[:2] if island_model == "exact" else surfaces
+            cost, _ = measure(lambda t=timed, r=rtol, n=island_model: [contact_law(s, r, island_model=n) for s in t])  # type: ignore[misc]
+            yield Row(island_model, variant("law", rtol), "both", largest_error(answers), cost / len(timed))
     surface = surfaces[3]
     law, gaps = contact_law(surface), measured_gaps(surface, 10_000)
     loads = law.force(gaps)
@@ -158,11 +158,11 @@ def theory_rows() -> Iterator[Row]:
 def first_use_rows() -> Iterator[Row]:
     """First use in a new process."""
     seconds = measure(lambda: None)[1]
-    for tier in TIERS:
-        command = [sys.executable, "-c", FIRST_USE.format(tier=tier)]
+    for island_model in ISLAND_MODELS:
+        command = [sys.executable, "-c", FIRST_USE.format(island_model=island_model)]
         taken = [float(subprocess.run(command, check=True, capture_output=True).stdout) for _ in range(4)]
         # the first fills the caches of the system
-        yield Row(tier, "import", "both", None, min(taken[1:]) / seconds)
+        yield Row(island_model, "import", "both", None, min(taken[1:]) / seconds)
 
 
 def total_rows() -> list[Row]:

@@ -25,8 +25,8 @@ from mbma_tables.calibrated_map import MAP_CONSTANTS
 from mbma_tables.errors import MbmaError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import matched
-from mbma_tables.surfaces.readings import REPORTED, Reading
 from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.surfaces.variants import REPORTED, Variant
 
 LOW, HIGH = 0.01, 0.97  # A/A0 of the simulations between which distances are summed up
 COVER = dataclasses.replace(REPORTED, name="reported, areas as a cover", addition="cover")
@@ -86,8 +86,10 @@ def surface_of(one: Case) -> AnySurface:
     return MeasuredSurface(q, matched(q, C, 1.0, one.own_spectrum.gradient**2), one.h_max)
 
 
-def _mbma(reading: str | Reading, tier: str = "universal") -> Callable[[Case], Any]:
-    theory = theories.Mbma(tier, reading, 1e-6, outside="nan" if tier in ("universal", "island4d") else "raise")
+def _mbma(variant: str | Variant, island_model: str = "universal") -> Callable[[Case], Any]:
+    theory = theories.Mbma(
+        island_model, variant, 1e-6, outside="nan" if island_model in ("universal", "island4d") else "raise"
+    )
 
     def answer(surface: AnySurface, u: FloatArray) -> Any:
         found = theory.totals(surface, 2 * u - np.asarray(surface.h_max))
@@ -118,7 +120,7 @@ THEORIES: dict[str, Callable[[Case], Any]] = {
     "G-W": _theory(theories.GreenwoodWilliamson()),
 }
 HUES = dict(zip(THEORIES, ("C0", "C1", "C9", "C4", "k", "0.5", "C3", "C6", "C2"), strict=True))
-TIERS = {"formula": _mbma("reported", "formula"), "rigid": _mbma("reported", "rigid")}
+ISLAND_MODELS = {"formula": _mbma("reported", "formula"), "rigid": _mbma("reported", "rigid")}
 FITTED_TO = {"training": ("calibrated", "calibrated, map"), "earlier": ("MBMA fitted",)}
 
 
@@ -168,7 +170,7 @@ def _self_affine(hurst: float, zeta_1: float, h_max: float, rows: Any) -> Case:
 
 
 def earlier() -> list[Case]:
-    """The 105 surfaces of docs/data/boundary_elements.csv, to which the reading `fitted` was fitted."""
+    """The 105 surfaces of docs/data/boundary_elements.csv, to which the variant `fitted` was fitted."""
     table, keys = read_csv("boundary_elements.csv"), ("hurst", "L_over_lambda0", "zeta_1", "seed", "n")
     found = []
     for node in dict.fromkeys(zip(*(table[key] for key in keys), strict=True)):

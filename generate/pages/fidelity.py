@@ -11,7 +11,7 @@ import numpy as np
 
 from generate.calibrated import QUANTITIES
 from generate.pages import distances
-from generate.pages.comparisons import AREA_THEORIES, PERSSON, READINGS, THEORIES, force_at, kappa
+from generate.pages.comparisons import AREA_THEORIES, PERSSON, THEORIES, VARIANTS, force_at, kappa
 from generate.pages.fidelity_figures import RESOLUTIONS, drawn
 from generate.pages.page import Measured, percent, svg, table
 from mbma_tables import Surface
@@ -44,15 +44,15 @@ def quoted_numbers() -> Iterable[Quoted]:
     case, md = "yang-persson", Surface.named("yang-persson")
     at = {ratio: forces(md, ratio) for ratio in (0.0, 2.0, 2.5, 3.0)}
     for ratio, name, quoted, subject in (
-        (2.5, "MBMA", 2.2e-4, READINGS),
-        (2.0, "MBMA", 2.9e-3, READINGS),
+        (2.5, "MBMA", 2.2e-4, VARIANTS),
+        (2.0, "MBMA", 2.9e-3, VARIANTS),
         (3.0, "Persson", 3.5e-4, PERSSON),
         (2.5, "Persson", 1e-3, PERSSON),
     ):
         yield case, f"F/(A0 E*), u = {ratio:g} h_rms: {name}", quoted, subject, at[ratio]
     yield case, "F/A0 in MPa, steel, u = 3 h_rms: Persson", 70.0, PERSSON, over(at[3.0], 1 / STEEL)
     meets = over(at[0.0], at[0.0]["Persson simplified"])
-    yield case, "F over Persson simplified, u = 0: MBMA meets it", 1.0, READINGS, meets
+    yield case, "F over Persson simplified, u = 0: MBMA meets it", 1.0, VARIANTS, meets
     yield case, "the same: G-W", "orders of magnitude", (), meets
 
     other, bem = Surface.named("papangelo"), distances.older("bem")
@@ -63,10 +63,10 @@ def quoted_numbers() -> Iterable[Quoted]:
 
     for name, top, slope in (("concrete", 4.1, 1.98), ("asphalt", 4.5, 1.75)):
         road = Surface.named(name)
-        yield name, "u/h_rms at first contact", top, READINGS, dict.fromkeys(READINGS, road.h_max / road.h_rms)
+        yield name, "u/h_rms at first contact", top, VARIANTS, dict.fromkeys(VARIANTS, road.h_max / road.h_rms)
         heavy, light = ({t: kappa(road, t, area)[0] for t in AREA_THEORIES} for area in (0.01, 1e-4))
         light |= dict.fromkeys(PERSSON, light["Persson"])
-        yield name, "kappa, here at A/A0 = 1%: MBMA", slope, READINGS, heavy | dict.fromkeys(PERSSON, heavy["Persson"])
+        yield name, "kappa, here at A/A0 = 1%: MBMA", slope, VARIANTS, heavy | dict.fromkeys(PERSSON, heavy["Persson"])
         what = "kappa at light load, here at A/A0 = 0.01%"
         yield name, what + ": G-W", math.sqrt(2 * math.pi), ["G-W"], light
         yield name, what + ": Persson", math.sqrt(8 / math.pi), PERSSON, light

@@ -9,7 +9,7 @@ import numpy as np
 
 from generate.calibrated import QUANTITIES
 from generate.pages import distances
-from generate.pages.comparisons import AREA_THEORIES, GAPS, PERSSON, READINGS, THEORIES, force_at, sample
+from generate.pages.comparisons import AREA_THEORIES, GAPS, PERSSON, THEORIES, VARIANTS, force_at, sample
 from generate.pages.page import panels
 from mbma_tables import Surface, theories
 
@@ -98,7 +98,7 @@ def resolution() -> Figures:
     for zeta_1, dashes in zip(RESOLUTIONS, ("-", "--", "-.", ":"), strict=True):
         surface = Surface.named(f"resolution-{zeta_1}")
         style: dict[str, Any] = {"ls": dashes, "lw": 1} | ({} if zeta_1 == RESOLUTIONS[0] else {"label": "_"})
-        by_gap(ax, surface, 1e-7, (*READINGS, "G-W", "Persson simplified"), **style)
+        by_gap(ax, surface, 1e-7, (*VARIANTS, "G-W", "Persson simplified"), **style)
         by_force(pair[0], surface, **style)
         gradient = surface.rms_gradient
         by_force(pair[1], surface, lambda force, area, g=gradient: area / force * g, **style)  # type: ignore[misc]

@@ -1,6 +1,6 @@
 """docs/stability.md: corners of parameter space, counted and drawn.
 
-The reference is mpmath at 40 digits or more where a closed form exists, else the exact tier at a tighter tolerance.
+The reference is mpmath at 40 digits or more where a closed form exists, else the exact solver at a tighter tolerance.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import MbmaError
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.models import answer_islands, get_model
-from mbma_tables.surfaces.readings import Reading, get_reading
+from mbma_tables.surfaces.variants import Variant, get_variant
 from mbma_tables.totals.island_sum import kinks
 
 DIGITS = 40
@@ -37,7 +37,7 @@ X_CORNERS = np.concatenate([-np.geomspace(40, 0.5, 9), [0.0], np.geomspace(0.5, 
 MU_CORNERS = np.concatenate([[0.0], 10.0 ** np.array([-300, -200, -100, -30, -16]), np.geomspace(1e-12, 1e12, 25)])
 RIGID_MU = 1e-13  # below it mu Q is less than 1e-9 up to X = 1e4
 SOLVED, ISLAND_TRUTH = 1e-9, 1e-11
-TIERS = ("exact", "universal", "formula", "rigid")
+ISLAND_MODELS = ("exact", "universal", "formula", "rigid")
 
 # geometry
 APPROACHES = np.geomspace(1e-12, 30, 44)
@@ -124,10 +124,12 @@ def island_truth(X: float, mu: float) -> tuple[Any, Any] | None:
 
 
 def islands() -> tuple[list[Tally], dict[str, FloatArray]]:
-    """Every tier at every corner of (X, mu); maps of the larger error of both functions, NaN where refused."""
-    tallies = {tier: Tally(f"islands by {tier}") for tier in TIERS}
-    models = {tier: get_model(tier, 10 * SOLVED, get_reading("reported")) for tier in TIERS}
-    maps = {tier: np.full((X_CORNERS.size, MU_CORNERS.size), np.nan) for tier in TIERS}
+    """Every island model at every corner of (X, mu); maps of the larger error of both functions, NaN where refused."""
+    tallies = {island_model: Tally(f"islands by {island_model}") for island_model in ISLAND_MODELS}
+    models = {
+        island_model: get_model(island_model, 10 * SOLVED, get_variant("reported")) for island_model in ISLAND_MODELS
+    }
+    maps = {island_model: np.full((X_CORNERS.size, MU_CORNERS.size), np.nan) for island_model in ISLAND_MODELS}
 
     def ask(model: Any, X: float, mu: float) -> Answer:
         found = answer_islands(model, {"X": np.array([X]), "mu": np.array([mu])})
@@ -135,18 +137,18 @@ def islands() -> tuple[list[Tally], dict[str, FloatArray]]:
 
     for (i, X), (j, mu) in itertools.product(enumerate(X_CORNERS), enumerate(MU_CORNERS)):
         truth = island_truth(X, mu)
-        for tier, model in models.items():
+        for island_model, model in models.items():
             # rigid spheres do not claim to be elastic ones
-            maps[tier][i, j] = tallies[tier].add(
-                functools.partial(ask, model, X, mu), None if tier == "rigid" else truth
+            maps[island_model][i, j] = tallies[island_model].add(
+                functools.partial(ask, model, X, mu), None if island_model == "rigid" else truth
             )
     return list(tallies.values()), maps
 
 
-def _approaches(hurst: float, zeta_1: float, reading: Reading) -> Iterator[float]:
+def _approaches(hurst: float, zeta_1: float, variant: Variant) -> Iterator[float]:
     """Values of delta/h_rms: those of the map, then one ulp around the floors of zeta_d and zeta_u."""
     yield from map(float, APPROACHES)
-    yield from (float(kink) * (1 + side * ULP) for kink in kinks(hurst, zeta_1, reading) for side in (-1, 0, 1))
+    yield from (float(kink) * (1 + side * ULP) for kink in kinks(hurst, zeta_1, variant) for side in (-1, 0, 1))
 
 
 def island_geometry() -> tuple[list[Tally], dict[str, FloatArray]]:
@@ -154,45 +156,46 @@ def island_geometry() -> tuple[list[Tally], dict[str, FloatArray]]:
     maps = {name: np.full((APPROACHES.size, BANDS.size), np.nan) for name in ("library", "direct")}
     tallies = {"library": Tally("geometry, library"), "direct": Tally("geometry, the paper's formulas as printed")}
 
-    def library(approach: float, hurst: float, zeta_1: float, reading: str) -> Answer:
-        found = geometry(np.array([approach]), np.array([hurst]), np.array([zeta_1]), get_reading(reading))
+    def library(approach: float, hurst: float, zeta_1: float, variant: str) -> Answer:
+        found = geometry(np.array([approach]), np.array([hurst]), np.array([zeta_1]), get_variant(variant))
         return [float(found[name][0]) for name in FIELDS], math.inf
 
-    def direct(approach: float, hurst: float, zeta_1: float, reading: str) -> Answer:
-        found = exact_island(approach, hurst, zeta_1, float(divisor(reading)), DOUBLES)
+    def direct(approach: float, hurst: float, zeta_1: float, variant: str) -> Answer:
+        found = exact_island(approach, hurst, zeta_1, float(divisor(variant)), DOUBLES)
         return [found[name] for name in FIELDS], math.inf
 
-    for hurst, reading, (j, zeta_1) in itertools.product(HURSTS, ("reported", "printed"), enumerate(map(float, BANDS))):
-        for i, approach in enumerate(_approaches(hurst, zeta_1, get_reading(reading))):
-            exact = exact_island(approach, hurst, zeta_1, divisor(reading))
+    for hurst, variant, (j, zeta_1) in itertools.product(HURSTS, ("reported", "printed"), enumerate(map(float, BANDS))):
+        for i, approach in enumerate(_approaches(hurst, zeta_1, get_variant(variant))):
+            exact = exact_island(approach, hurst, zeta_1, divisor(variant))
             for name, way in (("library", library), ("direct", direct)):
                 error = tallies[name].add(
-                    functools.partial(way, approach, hurst, zeta_1, reading), [exact[field] for field in FIELDS]
+                    functools.partial(way, approach, hurst, zeta_1, variant), [exact[field] for field in FIELDS]
                 )
-                if hurst == MAP_HURST and reading == "reported" and i < APPROACHES.size:
+                if hurst == MAP_HURST and variant == "reported" and i < APPROACHES.size:
                     maps[name][i, j] = error
     return list(tallies.values()), maps
 
 
 def totals() -> list[Tally]:
-    """Totals of every tier at corners of surfaces and gaps, both readings, against the exact tier at 1e-10."""
-    tallies = {tier: Tally(f"totals by {tier}") for tier in (*TIERS, "island4d")}
+    """Totals of every island model at corners of surfaces and gaps, both variants, against the exact one at 1e-10."""
+    tallies = {island_model: Tally(f"totals by {island_model}") for island_model in (*ISLAND_MODELS, "island4d")}
 
-    def ask(surface: Surface, depth: float, tier: str, reading: str, rtol: float) -> Answer:
-        found = contact(surface, TOP - depth, tier=tier, reading=reading, rtol=rtol)
+    def ask(surface: Surface, depth: float, island_model: str, variant: str, rtol: float) -> Answer:
+        found = contact(surface, TOP - depth, island_model=island_model, variant=variant, rtol=rtol)
         return (float(found.force), float(found.area)), float(found.error) + TOTAL_TRUTH
 
-    for reading, hurst, zeta_1, depth in itertools.product(("reported", "printed"), TOTAL_HURSTS, TOTAL_BANDS, DEPTHS):
+    for variant, hurst, zeta_1, depth in itertools.product(("reported", "printed"), TOTAL_HURSTS, TOTAL_BANDS, DEPTHS):
         surface = Surface(hurst, 1.0, zeta_1, 1.0, TOP)
         try:
-            truth = ask(surface, depth, "exact", reading, TOTAL_TRUTH)[0]
+            truth = ask(surface, depth, "exact", variant, TOTAL_TRUTH)[0]
         except MbmaError:
             truth = None
-        for tier, tally in tallies.items():
-            # the four-number table is of one reading
-            if tier != "island4d" or reading == "reported":
+        for island_model, tally in tallies.items():
+            # the four-number table is of one variant
+            if island_model != "island4d" or variant == "reported":
                 tally.add(
-                    functools.partial(ask, surface, depth, tier, reading, 1e-8), None if tier == "rigid" else truth
+                    functools.partial(ask, surface, depth, island_model, variant, 1e-8),
+                    None if island_model == "rigid" else truth,
                 )
     return list(tallies.values())
 
@@ -210,9 +213,9 @@ def draw(geometry_maps: dict[str, FloatArray], island_maps: dict[str, FloatArray
     ):
         panel.pcolormesh(BANDS, APPROACHES, np.maximum(geometry_maps[name], MIN_ERROR), **style)
         panel.set(xscale="log", yscale="log", xlabel="zeta_1", ylabel="delta/h_rms", title=f"geometry: {title}")
-    for panel, tier in zip(axes[1], ("exact", "universal"), strict=True):
-        mesh = panel.pcolormesh(*places, np.maximum(island_maps[tier], MIN_ERROR), **style)
-        panel.set(xlabel="mu", ylabel="X", title=f"islands: tier {tier} (white: refused)")
+    for panel, island_model in zip(axes[1], ("exact", "universal"), strict=True):
+        mesh = panel.pcolormesh(*places, np.maximum(island_maps[island_model], MIN_ERROR), **style)
+        panel.set(xlabel="mu", ylabel="X", title=f"islands: island model {island_model} (white: refused)")
         panel.set_xticks(places[0][::4], [f"{mu:.0e}" for mu in MU_CORNERS[::4]], rotation=45)
         panel.set_yticks(places[1][::4], [f"{X:.3g}" for X in X_CORNERS[::4]])
     figure.colorbar(mesh, ax=axes, label="largest relative error")

@@ -13,7 +13,7 @@ from mbma_tables.islands.four_numbers import to_axes
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models.tables import shipped
 from mbma_tables.models.universal import fractions_of_mu
-from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import CELL_EDGES, ISLAND4D, KINDS, UNIVERSAL, TableContent, error_cell
 
@@ -111,7 +111,7 @@ def example_island4d() -> str:
     content = read_table(shipped(ISLAND4D), ISLAND4D)
     names = ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")
     raw = [np.atleast_1d(content.conformance[name][EXAMPLE]) for name in names]
-    place = to_axes(raw[0], raw[1], raw[2], raw[3], get_reading(content.attributes["reading"]))
+    place = to_axes(raw[0], raw[1], raw[2], raw[3], get_variant(content.attributes["variant"]))
     X, mu, spread, sphere, sigma = (float(a[0]) for a in (place.X, place.mu, place.spread, place.sphere, place.sigma))
     positions = [axis.position(x) for axis, x in zip(content.axes, (X, spread, sphere, float(raw[3][0])), strict=True)]
     p = [float(position) for position in positions]

@@ -11,7 +11,7 @@ from typing import Any
 from mbma_tables.arguments import number_in, whole_number_in
 from mbma_tables.errors import InputError
 from mbma_tables.files import read_file
-from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.tablefiles.netcdf import digest_json
 from mbma_tables.tablefiles.schema import AXES, ISLAND4D, UNIVERSAL, Axis
 
@@ -55,8 +55,8 @@ class Configuration:
         Largest relative error allowed on held-out points.
     max_nodes : int
         Size limit: nodes of the whole table.
-    reading : str
-        Reading of an island4d table; a universal one serves all.
+    variant : str
+        Variant of an island4d table; a universal one serves all.
     certificate_points : int
         Held-out points, at least 100; 5,000 for a table that goes into the shipped folder.
     seed : int
@@ -67,14 +67,14 @@ class Configuration:
     kind: str
     target: float
     max_nodes: int
-    reading: str
+    variant: str
     certificate_points: int
     seed: int
     axes: dict[str, AxisRange]
 
     def digest(self) -> str:
-        """SHA-256 of the configuration, the reading's numbers included."""
-        numbers = get_reading(self.reading).recorded if self.kind == ISLAND4D else []
+        """SHA-256 of the configuration, the variant's numbers included."""
+        numbers = get_variant(self.variant).recorded if self.kind == ISLAND4D else []
         return digest_json([dataclasses.asdict(self), numbers])
 
 
@@ -143,7 +143,7 @@ def _configuration(kind: str, own: dict[str, Any], target: float | None) -> Conf
         kind=kind,
         target=wanted,
         max_nodes=max_nodes,
-        reading=get_reading(given["reading"]).name,
+        variant=get_variant(given["variant"]).name,
         certificate_points=whole_number_in("certificate_points", given["certificate_points"], MIN_POINTS, MAX_POINTS),
         seed=whole_number_in("seed", given["seed"], 0, 2**63),
         axes=axes,

@@ -70,7 +70,7 @@ def exact_island(
         }
 
 
-def divisor(reading: str) -> mpmath.mpf:
+def divisor(variant: str) -> mpmath.mpf:
     """Nayak's 6 pi sqrt(3), without its pi in `reported`."""
     with mpmath.workdps(DIGITS):
-        return 6 * mpmath.sqrt(3) * (mpmath.pi if reading == "printed" else 1)
+        return 6 * mpmath.sqrt(3) * (mpmath.pi if variant == "printed" else 1)

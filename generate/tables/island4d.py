@@ -25,8 +25,8 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, band_fields, from_axes, to_axes
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.surfaces.spectrum import BROADENING
+from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.tablefiles.schema import Axis, TableContent
 
 LOOKUP = (
@@ -59,7 +59,7 @@ class Island4d:
 
     def __init__(self, configuration: Configuration) -> None:
         self.configuration = configuration
-        self.reading = get_reading(configuration.reading)
+        self.variant = get_variant(configuration.variant)
 
     def axes(self, nodes: dict[str, int]) -> tuple[Axis, ...]:
         """X and spread on logarithms, sphere and hurst as they are."""
@@ -75,7 +75,7 @@ class Island4d:
     def arguments(self, *coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
         """X is a coordinate, mu follows from the other three."""
         X, spread, sphere, hurst = (np.ascontiguousarray(c, dtype=float) for c in np.broadcast_arrays(*coordinates))
-        mu = band_fields(spread, sphere, hurst, self.reading)[0]
+        mu = band_fields(spread, sphere, hurst, self.variant)[0]
         return X, mu
 
     def manifold(self, count: int) -> list[FloatArray]:
@@ -95,7 +95,7 @@ class Island4d:
         own = self.configuration.axes["hurst"]
         ranges = VISITED | {"hurst": (own.low, own.high)}
         hurst, zeta_1, approach = visited_surfaces(draw, self.configuration.seed + 7, ranges)
-        fields = geometry(approach, hurst, zeta_1, self.reading)
+        fields = geometry(approach, hurst, zeta_1, self.variant)
         spread = np.expm1(np.log(fields["zeta_u"]) - np.log(fields["zeta_d"]))
         sphere = (SPHERE_FLOOR / fields["zeta_d"]) ** (4 - 2 * hurst)
         places = [fields["X"], spread, sphere, hurst]
@@ -122,7 +122,7 @@ class Island4d:
         """The raw parameters on the grid, and the numbers that turn a ratio into a force."""
         _, spread, sphere, hurst = (axis.values for axis in axes)
         grid = np.meshgrid(spread, sphere, hurst, indexing="ij")
-        mu, sigma, _, _ = band_fields(*grid, self.reading)
+        mu, sigma, _, _ = band_fields(*grid, self.variant)
         zeta_d = from_axes(sphere[:, None], hurst)
         names = tuple(axis.name for axis in axes)
         return {
@@ -147,8 +147,8 @@ class Island4d:
         """Attributes of the file."""
         numbers = {
             "floor": SPHERE_FLOOR,
-            "divisor": self.reading.density_divisor,
-            "sigma": f"sqrt((1 - {BROADENING}/alpha) m0)" if self.reading.summit_sigma else "sqrt(m0)",
+            "divisor": self.variant.density_divisor,
+            "sigma": f"sqrt((1 - {BROADENING}/alpha) m0)" if self.variant.summit_sigma else "sqrt(m0)",
         }
         return {
             "title": "Contact islands of the MBMA model of rough contact over its four parameters",
@@ -169,9 +169,9 @@ class Island4d:
             **numbered("lookup", [line.format(**numbers) for line in LOOKUP]),
             "delta_over_h_rms": "(1 + X sigma) inverse_zeta_d^hurst, at any node",
             "zeta_u": "(1 + spread)/inverse_zeta_d, at any node; no bound at sphere = 0, where inverse_zeta_d = 0",
-            "reading": self.reading.name,
-            "reading_numbers": json.dumps(self.reading.recorded),
-            "reading_numbers_meaning": (
+            "variant": self.variant.name,
+            "variant_numbers": json.dumps(self.variant.recorded),
+            "variant_numbers_meaning": (
                 "density divisor n of the summit density m4/(n m2), beta, phi, floor of zeta_d, floor of zeta_u, "
                 "islands stand h_d below the top, sigma is the summits'"
             ),
@@ -182,14 +182,14 @@ class Island4d:
         """The four raw numbers, and the coordinates that these numbers as stored have."""
         X, spread, sphere, hurst = places
         zeta_d = from_axes(sphere, hurst)
-        sigma = band_fields(spread, sphere, hurst, self.reading)[1]
+        sigma = band_fields(spread, sphere, hurst, self.variant)[1]
         raw = {
             "delta_over_h_rms": (X * sigma + 1) * zeta_d**-hurst,
             "zeta_d": zeta_d,
             "zeta_u": zeta_d * (1 + spread),
             "hurst": hurst,
         }
-        found = to_axes(raw["delta_over_h_rms"], zeta_d, raw["zeta_u"], hurst, self.reading)
+        found = to_axes(raw["delta_over_h_rms"], zeta_d, raw["zeta_u"], hurst, self.variant)
         conditioning = 1e-4 * (1 + found.X) / found.sigma
         scales = np.stack([found.force, found.area])
         return ConformancePoints(raw, found[:4], found.X, found.mu, scales, conditioning)

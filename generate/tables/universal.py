@@ -26,7 +26,7 @@ from mbma_tables.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.models.universal import TERMS, UniversalModel, fractions_of_mu
-from mbma_tables.surfaces.readings import READINGS
+from mbma_tables.surfaces.variants import VARIANTS
 from mbma_tables.tablefiles.checks import check_content
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, Axis, TableContent
 
@@ -252,14 +252,14 @@ class Universal:
         return found
 
     def manifold(self, count: int) -> list[FloatArray]:
-        """(X, mu) of islands of random surfaces, both readings, as far as the table covers them."""
+        """(X, mu) of islands of random surfaces, both variants, as far as the table covers them."""
         X = mu = np.empty(0)
         draw = 4 * count
         while X.size < count:
             if draw > MAX_DRAWS * count:
                 raise UncertifiedError("universal: hardly a surface visits these axes, so there is nothing to certify")
             hurst, zeta_1, approach = visited_surfaces(draw, self.configuration.seed + 7, VISITED)
-            fields = [geometry(approach, hurst, zeta_1, reading) for reading in READINGS.values()]
+            fields = [geometry(approach, hurst, zeta_1, variant) for variant in VARIANTS.values()]
             X, mu = (np.concatenate([f[name] for f in fields]) for name in ("X", "mu"))
             inside = (self.X.low < X) & (self.X.high > X) & (mu > 0) & (mu < self.mu.high)
             X, mu = X[inside], mu[inside]
@@ -287,8 +287,8 @@ class Universal:
             ),
             "symbols": SYMBOLS,
             **numbered("lookup", LOOKUP),
-            "reading": "any",
-            "reading_numbers": "[]",
+            "variant": "any",
+            "variant_numbers": "[]",
             "target": self.configuration.target,
             "configuration": json.dumps(dataclasses.asdict(self.configuration), sort_keys=True),
             "configuration_sha256": self.configuration.digest(),

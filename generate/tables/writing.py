@@ -68,7 +68,7 @@ DOCUMENTATION = {
         "then its values as little-endian doubles, last dimension fastest. attributes_sha256: the JSON text of "
         "{variable: {attribute: value}}, with 'dimensions' as a further attribute of each, '' for the global ones "
         "without attributes_sha256; keys sorted, no spaces, non-ASCII escaped, shortest floats. configuration_sha256: "
-        "the same form of the list of configuration and reading_numbers. data_version: the first 12 digits of "
+        "the same form of the list of configuration and variant_numbers. data_version: the first 12 digits of "
         "values_sha256. source_sha256: the bytes of the files of source_modules, one after the other, when the table "
         "was made; a record only"
     ),

@@ -37,7 +37,7 @@ def _describe(fault: Exception) -> str:
 # of Python, in a shell
 SAID = {
     "surface.fit()": "--model self-affine",
-    "outside='exact'": "--tier exact",
+    "outside='exact'": "--island-model exact",
     "ask method='full', or ": "give ",
     "Surface.from_profile takes line scans": "--model measured takes line scans",
     "give the surface its unit": "give --length-unit",

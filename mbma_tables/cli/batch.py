@@ -92,7 +92,7 @@ def batch_command(
         "scatter: of ln force at a separation, by simulations",
     ]
     shown = {name: shown_unit(name, first.units) for name in found}
-    facts = {"theory": answer.theory, "reading": answer.reading or None, "tier": answer.tier or None}
+    facts = {"theory": answer.theory, "variant": answer.variant or None, "island_model": answer.island_model or None}
     Report("batch", file.name, notes, facts, to_columns(found, shown)).write(output)
 
 

@@ -271,32 +271,32 @@ def fit_command(
 
 
 @click.command("cost", short_help="What accuracy costs, in time.")
-@click.option("--tier", help="Rows of this tier alone.")
+@click.option("--island-model", help="Rows of this island model alone.")
 @click.option("--distance", is_flag=True, help="Theories' distance from brute force in place of numerical error.")
 @options.json_option("a table")
-def cost_command(tier: str | None, distance: bool, as_json: bool) -> None:
+def cost_command(island_model: str | None, distance: bool, as_json: bool) -> None:
     """Error and time of everything that answers, as measured on held-out surfaces.
 
     Costs are times over that of a fixed piece of work; seconds are those of the machine that measured. docs/cost.md
     says what each row is. With --distance: root mean squares of ln(theory/boundary elements), of area at equal force
     and force at equal separation, light at 1-10% contact and deep at 10-97%.
 
-    Example: mbma cost --tier universal
+    Example: mbma cost --island-model universal
     """
     from mbma_tables.scenes.costs import UNIT, shipped_costs, shipped_distances
 
     costs = shipped_costs()
     if distance:
-        if tier is not None:
-            raise InputError("--tier is about numerical error: leave it or --distance out")
+        if island_model is not None:
+            raise InputError("--island-model is about numerical error: leave it or --distance out")
         _show("distance", shipped_distances(), costs.seconds, as_json)
         return
-    rows = [row for row in costs.rows if row.tier != UNIT]
-    if tier is not None:
-        known = tuple(dict.fromkeys(row.tier for row in rows))
-        rows = [row for row in rows if row.tier == tier]
+    rows = [row for row in costs.rows if row.island_model != UNIT]
+    if island_model is not None:
+        known = tuple(dict.fromkeys(row.island_model for row in rows))
+        rows = [row for row in rows if row.island_model == island_model]
         if not rows:
-            raise InputError(f"--tier must be one of {known}, got {tier!r}")
+            raise InputError(f"--island-model must be one of {known}, got {island_model!r}")
     _show("cost", rows, costs.seconds, as_json)
 
 

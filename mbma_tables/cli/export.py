@@ -19,18 +19,18 @@ from mbma_tables.scenes.specimen import Specimen
 if TYPE_CHECKING:
     from mbma_tables.export.law_rows import LawTable
 
-LAW_OPTIONS = frozenset({"specimen", "theory", "reading", "hardness", "conductivity", "conductivity_unit"})
+LAW_OPTIONS = frozenset({"specimen", "theory", "variant", "hardness", "conductivity", "conductivity_unit"})
 ROW_OPTIONS = {"rows", "rtol", "largest_overclosure", "pressures", "leakage"}
 OPTIONS = {
     **dict.fromkeys((*SOLVERS, *DATA), LAW_OPTIONS | ROW_OPTIONS),
     **dict.fromkeys(("calculix", "abaqus", "modelica"), LAW_OPTIONS | ROW_OPTIONS | {"name"}),
     **dict.fromkeys((*LAWS, *FMUS, *GRAPHS), LAW_OPTIONS | {"name", "leakage"}),
     **dict.fromkeys(SUBROUTINES, LAW_OPTIONS | {"name"}),
-    **dict.fromkeys(CODE, frozenset({"reading", "check"})),
+    **dict.fromkeys(CODE, frozenset({"variant", "check"})),
     "calculix --exponential": frozenset({"specimen", "name", "exponential"}),
 }
 TARGETS = (*SOLVERS, *DATA, *LAWS, *FMUS, *GRAPHS, *CODE)
-DEFAULTS = {"theory": "mbma", "reading": "reported", "exponential": False, "leakage": False, "check": False}
+DEFAULTS = {"theory": "mbma", "variant": "reported", "exponential": False, "leakage": False, "check": False}
 
 
 class _Target(click.Choice[str]):
@@ -61,21 +61,21 @@ class _Target(click.Choice[str]):
 @click.option("--exponential", is_flag=True, help="For calculix: Persson's exponential law instead of rows.")
 @options.theory_option
 @options.hardness_option
-@options.reading_option
+@options.variant_option
 @click.option("--check", is_flag=True, help="Of the whole model: build it and replay its conformance points.")
 def export_command(target: str, out: Path, **values: Any) -> None:
     """Write TARGET to a file.
 
     Solvers and data take a surface, a modulus and units, and so do laws as code (-law), subroutines of solvers
     (abaqus-uinter, abaqus-gapcon, calculix-gapcon), an FMU of FMI 2 (fmu) or 3 (fmu3), and onnx; c, fortran and
-    javascript are the whole model as code, of the paper's readings reported and printed.
+    javascript are the whole model as code, of the paper's variants reported and printed.
 
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
     """
     given = {name: value for name, value in values.items() if value is not None and value != DEFAULTS.get(name)}
     _refuse_unused(target, given)
     if target in CODE:
-        _export_code(target, out, values["reading"], "check" in given)
+        _export_code(target, out, values["variant"], "check" in given)
         return
     specimen: Specimen | None = given.pop("specimen", None)
     if specimen is None:
@@ -165,10 +165,10 @@ def _data_files(target: str, out: Path, law: LawTable) -> dict[Path, bytes]:
     return {out: getattr(data, f"to_{target}")(law)}
 
 
-def _export_code(target: str, folder: Path, reading: str, check: bool) -> None:
+def _export_code(target: str, folder: Path, variant: str, check: bool) -> None:
     from mbma_tables.export import code
 
-    for path in code.write_code(target, folder, reading):
+    for path in code.write_code(target, folder, variant):
         echo(path)
     if check:
         found = code.check(target, folder)
@@ -184,9 +184,9 @@ def _export_code(target: str, folder: Path, reading: str, check: bool) -> None:
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="The page, such as explorer.html.")
 @options.specimen_options
 @click.option("--theory", metavar="mbma|calibrated|persson", help="Drawn first; calibrated for a map, else mbma.")
-@options.reading_option
-def explore_command(out: Path, specimen: Specimen, theory: str | None, reading: str) -> None:
-    """Write a page with sliders for the surface, its modulus, theory and reading, or a pasted spectrum.
+@options.variant_option
+def explore_command(out: Path, specimen: Specimen, theory: str | None, variant: str) -> None:
+    """Write a page with sliders for the surface, its modulus, theory and variant, or a pasted spectrum.
 
     One file that needs neither a server nor a network: force, area, stiffness and conductance against gap or pressure.
 
@@ -194,5 +194,5 @@ def explore_command(out: Path, specimen: Specimen, theory: str | None, reading: 
     """
     from mbma_tables.export.explorer import explorer_page
 
-    page = explorer_page(specimen.surface, specimen.E_star, specimen.stress_unit, theory, reading, specimen.title)
+    page = explorer_page(specimen.surface, specimen.E_star, specimen.stress_unit, theory, variant, specimen.title)
     _write({out: page.encode()})

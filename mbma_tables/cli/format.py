@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 DIGITS = 6  # significant digits of a table; JSON and CSV keep all
 SURFACE_NUMBERS = ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "m0", "m2", "m4", "alpha")
 # options that say where the answer goes, or that the report names by themselves
-NOT_ARGUMENTS = ("as_json", "as_csv", "out", "plot", "theory", "reading", "tier", "rtol")
+NOT_ARGUMENTS = ("as_json", "as_csv", "out", "plot", "theory", "variant", "island_model", "rtol")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -197,7 +197,9 @@ def report_answer(
     scale = "forces are over E*, none was given"
     if specimen.E_star is not None:
         scale = f"E* is {specimen.E_star:.6g} {specimen.stress_unit or ''}".rstrip()
-    made = f", reading {answer.reading}, tier {answer.tier}, rtol {model.rtol:g}" if answer.reading else ""
+    made = (
+        f", variant {answer.variant}, island model {answer.island_model}, rtol {model.rtol:g}" if answer.variant else ""
+    )
     notes += [f"theory {model.theory}{made}; {scale}", "error: relative, numerical, beside the theory's scatter"]
     if hasattr(answer, "elastic_hardness"):
         limit = f"{answer.elastic_hardness:.4g} {specimen.stress_unit or ''}".rstrip()
@@ -212,8 +214,8 @@ def report_answer(
             if key not in NOT_ARGUMENTS and value is not None and value is not False
         },
         "theory": model.theory,
-        "reading": answer.reading or None,
-        "tier": answer.tier or None,
+        "variant": answer.variant or None,
+        "island_model": answer.island_model or None,
         "rtol": model.rtol if model.theory == "mbma" else None,
         "hardness": None if model.hardness == math.inf else model.hardness,
         "E_star": specimen.E_star,

@@ -24,13 +24,13 @@ from mbma_tables.scenes.specimen import (
     read_specimen,
 )
 from mbma_tables.surfaces.cases import CASES
-from mbma_tables.surfaces.readings import NAMED
+from mbma_tables.surfaces.variants import NAMED
 from mbma_tables.theories import THEORIES
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 DEFAULT_RTOL = 1e-8
-TIERS = ("exact", "universal", "island4d", "formula", "rigid")
+ISLAND_MODELS = ("exact", "universal", "island4d", "formula", "rigid")
 PICTURES = (".png", ".svg", ".pdf")
 
 
@@ -38,8 +38,8 @@ PICTURES = (".png", ".svg", ".pdf")
 class Model:
     """What `contact` and `island` are asked for besides the surface and the gap."""
 
-    tier: str
-    reading: str
+    island_model: str
+    variant: str
     rtol: float
     theory: str = "mbma"
     hardness: float | str = math.inf
@@ -236,17 +236,17 @@ def json_option(instead: str) -> Decorator:
 
 
 SHOWN: dict[str, Any] = {"show_default": True}
-reading_option = _option(
-    "reading", "Reading of the paper's equations, of mbma.", default="reported", type=click.Choice([*NAMED]), **SHOWN
+variant_option = _option(
+    "variant", "Variant of the paper's equations, of mbma.", default="reported", type=click.Choice([*NAMED]), **SHOWN
 )
 _MODEL_OPTIONS = (
-    reading_option,
-    _option("tier", "Island model.", default="universal", type=click.Choice(TIERS), **SHOWN),
+    variant_option,
+    _option("island_model", "Island model.", default="universal", type=click.Choice(ISLAND_MODELS), **SHOWN),
     _option("rtol", "Numerical relative error asked for.", type=float, default=DEFAULT_RTOL, **SHOWN),
 )
 theory_option = _option(
     "theory",
-    "Theory; the others have no tier, reading or rtol.",
+    "Theory; the others have no island model, variant or rtol.",
     default="mbma",
     type=click.Choice([*THEORIES]),
     **SHOWN,

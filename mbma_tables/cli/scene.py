@@ -42,7 +42,7 @@ def plan_command(file: Path, as_json: bool) -> None:
         "error": plan.error,
         "seconds": plan.seconds,
         "first_use_seconds": plan.first_use,
-        "steps": [vars(step) | {"tier": step.tier_name} for step in plan.steps],
+        "steps": [vars(step) | {"island_model": step.island_model_name} for step in plan.steps],
         "left_out": plan.left_out,
         "switched_off": plan.switched_off,
         "advice": advice(scene).strip(),
@@ -104,7 +104,7 @@ def _report(found: xarray.Dataset) -> Report:
         {name: field.attrs["units"] for name, field in fields.items()},
     )
     facts = found.attrs
-    made = f"reading {facts['reading']}" if facts["reading"] else f"theory {facts['theory']}"
+    made = f"variant {facts['variant']}" if facts["variant"] else f"theory {facts['theory']}"
     error = f"error at most {facts['error']:.2g}" if math.isfinite(facts["error"]) else "error not known"
     notes = [f"{made}, rtol {facts['rtol']:.3g}, {error}"]
     return Report("run", str(facts["title"]), notes, dict(facts), columns)
@@ -114,8 +114,8 @@ def _picture(found: xarray.Dataset, kind: str) -> bytes:
     from mbma_tables.plots import Curve, draw_compression, force_label, theory_label, to_picture
 
     gap = found["mean_separation"].values / found.attrs["surface_h_rms"]
-    reading = found.attrs["reading"]
-    label = theory_label(found.attrs["theory"]) + (f", {reading}" if reading else "")
+    variant = found.attrs["variant"]
+    label = theory_label(found.attrs["theory"]) + (f", {variant}" if variant else "")
     bands = [found[name].values if name in found else None for name in ("scatter", "area_scatter")]
     curves: list[Any] = [Curve(label, gap, found["force"].values, found["area"].values, *bands)]
     unit = found["force"].attrs["units"]

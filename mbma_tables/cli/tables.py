@@ -46,7 +46,7 @@ def list_command(as_json: bool) -> None:
                 "path": str(path),
                 "bytes": path.stat().st_size,
                 "size": content.size,
-                "reading": content.attributes["reading"],
+                "variant": content.attributes["variant"],
                 "data_version": content.attributes["data_version"],
                 "largest_error": {f: content.attributes[f"largest_error_{f}"] for f in ("F", "A")},
             }
@@ -57,7 +57,7 @@ def list_command(as_json: bool) -> None:
     for row in rows:
         errors = ", ".join(f"{f} {error:.2g}" for f, error in row["largest_error"].items())
         echo(
-            f"{row['kind']}: {row['size']}; reading {row['reading']}; largest held-out error {errors}; "
+            f"{row['kind']}: {row['size']}; variant {row['variant']}; largest held-out error {errors}; "
             f"{row['bytes']} bytes; data {row['data_version']}; {row['path']}"
         )
 

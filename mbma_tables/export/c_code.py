@@ -24,12 +24,12 @@ from mbma_tables.errors import InputError
 from mbma_tables.export.text import core_file, filled, opening
 from mbma_tables.models import closed_form_functions
 from mbma_tables.models.universal import RECORD, UniversalModel
-from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1
+from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import calibrated_table, persson
 from mbma_tables.totals.island_sum import QUADRATURE_SHARE
 
-FORM = "standard"  # that of tier "formula"
+FORM = "standard"  # that of island model "formula"
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # as `contact` allows
 CORE = ("phi.c", "totals.c", "calibrated.c", "spectrum_laws.c")  # and the headers that they include
 MODEL = {
@@ -71,13 +71,13 @@ def core_texts() -> dict[str, str]:
     return dict(sorted(texts.items()))
 
 
-def c_texts(model: UniversalModel, reading: Reading) -> dict[str, str]:
+def c_texts(model: UniversalModel, variant: Variant) -> dict[str, str]:
     """Names and texts of the C sources, the self-test apart."""
-    if reading.addition != "sum":
-        raise InputError(f"exported code adds the areas of islands: reading {reading.name!r} takes their cover")
-    about = about_model(model, reading) + about_theories()
+    if variant.addition != "sum":
+        raise InputError(f"exported code adds the areas of islands: variant {variant.name!r} takes their cover")
+    about = about_model(model, variant) + about_theories()
     heads = {name: opening(header(f"{name}: {title}", USAGE, about), "/*") for name, title in MODEL.items()}
-    return core_texts() | model_texts(heads) | {"mbma_data.c": f"{heads['mbma_data.c']}\n{data_text(model, reading)}"}
+    return core_texts() | model_texts(heads) | {"mbma_data.c": f"{heads['mbma_data.c']}\n{data_text(model, variant)}"}
 
 
 def model_texts(heads: dict[str, str]) -> dict[str, str]:
@@ -137,20 +137,20 @@ def tables(model: UniversalModel) -> dict[str, Any]:
     return {"MBMA_CELLS": cells.reshape(-1, RECORD), "MBMA_PLACES": places, "MBMA_SPLINE": spline}
 
 
-def data_text(model: UniversalModel, reading: Reading, later: bool = False) -> str:
-    """The tables, and the reading of the equations; with `later` as variables, for a program to fill in."""
+def data_text(model: UniversalModel, variant: Variant, later: bool = False) -> str:
+    """The tables, and the variant of the equations; with `later` as variables, for a program to fill in."""
     lines, law = ['#include "mbma_model.h"'], calibrated_table.shipped()
     for (name, values), kind in zip(tables(model).items(), ("mbma_cell", "int32_t", "float"), strict=True):
         head, body = f"{kind} {name}[{len(values)}]", _cells if kind == "mbma_cell" else _items
         lines += ["", f"{head};"] if later else ["", f"static const {head} = {{", *body(values), "};"]
-    X, buckets, flags = model.cells[2][:4], model.cells[2][4:].astype(int), reading.numbers[5:].astype(int)
+    X, buckets, flags = model.cells[2][:4], model.cells[2][4:].astype(int), variant.numbers[5:].astype(int)
     spline = "MBMA_SPLINE", law.cells, law.first, 1 / law.step, law.covered[:2, 0], law.covered[:2, 1]
     theories = [np.array(dataclasses.astuple(constants)) for constants in (YANG_PERSSON, law.constants)]
     values = {
         "mbma_cells CELLS": _braces("MBMA_CELLS", "MBMA_PLACES", *_numbers(X), *_numbers(buckets)),
         "mbma_calibrated_table LAW": _braces(_braces(*spline), *_numbers(theories[1][:3])),
         "mbma_law_constants THEORIES[]": _braces(*theories),
-        "mbma_variant MBMA_READING": _braces(*_numbers(reading.numbers[:5]), *_numbers(flags)),
+        "mbma_variant MBMA_READING": _braces(*_numbers(variant.numbers[:5]), *_numbers(flags)),
     }
     held = (f"{'' if later and 'MBMA' in name else 'static const '}{name} = {text};" for name, text in values.items())
     lines += [
@@ -200,8 +200,8 @@ def header(title: str, usage: str, about: list[str]) -> list[str]:
     return [title, f"Written by mbma_tables {__version__}. {usage}", *about, CONVENTIONS, *LICENCE]
 
 
-def about_model(model: UniversalModel, reading: Reading) -> list[str]:
-    """The MBMA model, its reading, range and error."""
+def about_model(model: UniversalModel, variant: Variant) -> list[str]:
+    """The MBMA model, its variant, range and error."""
     content = model.content
     found, (X, mu) = content.attributes, content.axes
     worst, visited = (
@@ -211,9 +211,9 @@ def about_model(model: UniversalModel, reading: Reading) -> list[str]:
     return [
         "MBMA model of rough contact (Guo, Ma and Zhu): Phi_F and Phi_A of a contact island over (X, mu) by local "
         "polynomials or a closed form, islands of a self-affine surface, and the surface's force and area at a gap.",
-        f"Reading: {reading.name} (density divisor {reading.density_divisor:.17g}, beta {reading.beta:.17g}, phi "
-        f"{reading.phi:g}, floors {reading.floor_d:g} and {reading.floor_u:g}, Jacobian {reading.jacobian}, offset "
-        f"{'on' if reading.offset else 'off'}, sigma of {'summits' if reading.summit_sigma else 'all heights'}).",
+        f"Variant: {variant.name} (density divisor {variant.density_divisor:.17g}, beta {variant.beta:.17g}, phi "
+        f"{variant.phi:g}, floors {variant.floor_d:g} and {variant.floor_u:g}, Jacobian {variant.jacobian}, offset "
+        f"{'on' if variant.offset else 'off'}, sigma of {'summits' if variant.summit_sigma else 'all heights'}).",
         f"Table: data {found['values_sha256']}",
         f"Range: {X.low:g} <= X <= {X.high:g}, 0 <= mu <= {mu.high:g}; H in (0, 1], zeta_1 up to {MAX_ZETA_1:g}.",
         f"Largest relative error of the table against the solved model: {worst:.2g} on {found['certificate_points']} "

@@ -22,7 +22,7 @@ from mbma_tables.export.text import filled, opening
 from mbma_tables.files import write_file
 from mbma_tables.models.tables import open_table
 from mbma_tables.models.universal import UniversalModel
-from mbma_tables.surfaces.readings import Reading, get_reading
+from mbma_tables.surfaces.variants import Variant, get_variant
 
 TIMEOUT = 300.0  # seconds, of a build or a replay
 ZIG = ("-m", "ziglang", "cc", "-target", "wasm32-wasi", "-mexec-model=reactor", *c_code.FLAGS, "-s")
@@ -79,7 +79,7 @@ LANGUAGES = {
 def write_code(
     target: str,
     folder: os.PathLike[str] | str,
-    reading: str | Reading = "reported",
+    variant: str | Variant = "reported",
     table: os.PathLike[str] | str = "universal",
 ) -> list[pathlib.Path]:
     """Write the model as code into a folder, with conformance points and a self-test that replays them.
@@ -96,7 +96,7 @@ def write_code(
     """
     if target not in CODE:
         raise InputError(f"target must be one of {CODE}, got {target!r}")
-    rule = get_reading(reading)
+    rule = get_variant(variant)
     model = open_table(table)
     if not isinstance(model, UniversalModel):
         raise InputError(f"code is written from a universal table, and {os.fspath(table)} is not one")
@@ -106,12 +106,12 @@ def write_code(
     return [pathlib.Path(folder, name) for name in texts]
 
 
-def source_texts(target: str, model: UniversalModel, reading: Reading) -> dict[str, str]:
+def source_texts(target: str, model: UniversalModel, variant: Variant) -> dict[str, str]:
     """Names and texts of a target's source files."""
     language = LANGUAGES[target]
-    c_texts = c_code.c_texts(model, reading)
+    c_texts = c_code.c_texts(model, variant)
     texts = {} if target == "javascript" else c_texts
-    about = c_code.about_model(model, reading) + c_code.about_theories()
+    about = c_code.about_model(model, variant) + c_code.about_theories()
     declarations = c_texts["mbma.h"] + c_texts["mbma_model.h"]
     for name, title in language.titles.items():
         lines = c_code.header(f"{name}: {title}", language.usage, about)

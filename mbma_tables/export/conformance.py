@@ -19,8 +19,8 @@ from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.models.closed_form_functions import CERTIFICATES, RANGES
 from mbma_tables.models.closed_forms import FUNCTIONS
 from mbma_tables.models.universal import UniversalModel
-from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories.contact import contact
 from mbma_tables.theories.result import Contact
 
@@ -76,16 +76,16 @@ def phi_rows(model: UniversalModel, X: FloatArray, mu: FloatArray) -> Rows:
     yield from rows("slopes", (X, mu), (*values, *slopes), (*values, *scales))
 
 
-def geometry_rows(approach: FloatArray, hurst: Any, zeta_1: Any, reading: Reading) -> Rows:
+def geometry_rows(approach: FloatArray, hurst: Any, zeta_1: Any, variant: Variant) -> Rows:
     """Islands by the library."""
-    fields = geometry(approach, hurst, zeta_1, reading)
+    fields = geometry(approach, hurst, zeta_1, variant)
     yield from rows("geometry", (approach, hurst, zeta_1), [fields[name] for name in FIELDS])
 
 
-def total_rows(surface: tuple[float, ...], separations: Any, reading: Reading, rtol: float = RTOL) -> Rows:
+def total_rows(surface: tuple[float, ...], separations: Any, variant: Variant, rtol: float = RTOL) -> Rows:
     """Totals of one surface and their derivatives by the compiled runtime."""
     gaps = np.asarray(separations)
-    found = contact(Surface(*surface), gaps, reading=reading, rtol=rtol, derivatives=True)
+    found = contact(Surface(*surface), gaps, variant=variant, rtol=rtol, derivatives=True)
     slopes = _slopes_of(found)
     # at a maximum of force, stiffness is 0
     stiffness = -2 * slopes[0, 0]
@@ -147,12 +147,12 @@ def formula_rows(X: FloatArray, mu: FloatArray) -> Rows:
     yield from rows("formula", place, (functions["phi_F"](*place), functions["phi_A"](*place), error))
 
 
-def points_text(model: UniversalModel, reading: Reading) -> str:
+def points_text(model: UniversalModel, variant: Variant) -> str:
     """The points' file: the table's own, and the runtime's slopes, islands, totals, refusals and calibrated law."""
     points = model.content.conformance
     places = points["X"], points["mu"]
     head = [
-        f"conformance points of the MBMA model, reading {reading.name}",
+        f"conformance points of the MBMA model, variant {variant.name}",
         f"data {model.content.attributes['values_sha256']}",
         "a row: kind, tolerance, how many arguments, these; each answer and what its difference is taken relative to",
         *(f"{kind}: {meaning}" for kind, meaning in KINDS.items()),
@@ -172,8 +172,8 @@ def points_text(model: UniversalModel, reading: Reading) -> str:
     ]
     for surface in SURFACES:
         zeta_1 = surface[2] / surface[1]
-        if zeta_1 > max(3.0, reading.floor_u):
-            lines += geometry_rows(np.geomspace(1e-3, 2 * surface[4] / surface[3], 8), surface[0], zeta_1, reading)
-            lines += total_rows(surface, surface[4] * (1 - np.array(DEPTHS)), reading)
+        if zeta_1 > max(3.0, variant.floor_u):
+            lines += geometry_rows(np.geomspace(1e-3, 2 * surface[4] / surface[3], 8), surface[0], zeta_1, variant)
+            lines += total_rows(surface, surface[4] * (1 - np.array(DEPTHS)), variant)
             lines += calibrated_rows(surface, SHARES)
     return comment(head, "#") + "\n".join(lines) + "\n"

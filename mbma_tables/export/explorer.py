@@ -23,8 +23,8 @@ from mbma_tables.errors import InputError
 from mbma_tables.export import c_code
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.readings import FITTED, PRINTED, REPORTED, get_reading
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
+from mbma_tables.surfaces.variants import FITTED, PRINTED, REPORTED, get_variant
 from mbma_tables.theories import calibrated, calibrated_table, mbma, source
 from mbma_tables.units import Units
 
@@ -69,9 +69,9 @@ def _model(values: dict[str, Any]) -> dict[str, Any]:
     return {
         "module": base64.b64encode(page_file(MODULE)).decode("ascii"),
         "tables": {name: packed(value) for name, value in values.items()},
-        "readings": {
-            reading.name: {"numbers": reading.numbers.tolist(), "cover": reading.addition == "cover"}
-            for reading in SHOWN_READINGS
+        "variants": {
+            variant.name: {"numbers": variant.numbers.tolist(), "cover": variant.addition == "cover"}
+            for variant in SHOWN_READINGS
         },
     }
 
@@ -121,13 +121,13 @@ def explorer_page(
     E_star: float | None = None,
     stress_unit: str | None = None,
     theory: str | None = None,
-    reading: str = "reported",
+    variant: str = "reported",
     title: str = "",
 ) -> str:
     """A page of HTML that shows how a surface touches, with sliders; it needs neither a server nor a network.
 
     Of a measured surface it takes the spectrum, of at most 500 samples, and h_max: heights and maps, which the
-    calibrated law goes by in Python, are not in it. Without a modulus stresses are over E*. Theory and reading are
+    calibrated law goes by in Python, are not in it. Without a modulus stresses are over E*. Theory and variant are
     those drawn at first, by default MBMA, of a spectrum the calibrated law.
 
     Examples
@@ -143,11 +143,11 @@ def explorer_page(
         raise InputError("MBMA in the page is of five numbers: take another theory, or surface.fit()")
     if theory not in THEORIES:
         raise InputError(f"the page has the theories {THEORIES}, got {theory!r}")
-    if get_reading(reading) not in SHOWN_READINGS:
-        raise InputError(f"the page has the readings {tuple(shown.name for shown in SHOWN_READINGS)}, got {reading!r}")
+    if get_variant(variant) not in SHOWN_READINGS:
+        raise InputError(f"the page has the variants {tuple(shown.name for shown in SHOWN_READINGS)}, got {variant!r}")
     modulus = 1.0 if E_star is None else number_in("E_star", float(positive_modulus(E_star)), 1e-300, 1e300)
     units = Units(surface.unit, "1" if E_star is None else stress_unit)
-    start = _start(surface) | {"E_star": modulus, "k_s": 1.0, "theory": theory, "reading": get_reading(reading).name}
+    start = _start(surface) | {"E_star": modulus, "k_s": 1.0, "theory": theory, "variant": get_variant(variant).name}
     data = {
         "version": __version__,
         "title": title,

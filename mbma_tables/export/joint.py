@@ -13,7 +13,7 @@ from mbma_tables.arguments import FloatArray, Numbers, number_in
 from mbma_tables.errors import InputError
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.readings import Reading
+from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import get_theory
 from mbma_tables.theories.contact import contact
 from mbma_tables.theories.law import contact_law
@@ -56,7 +56,7 @@ class Joint:
         law, stress = self.law, self.stress
         names = self.surface.parameters or OWN_NUMBERS
         numbers = ", ".join(f"{name} = {float(getattr(self.surface, name)):.10g}" for name in names)
-        model = f"MBMA model, reading {law.reading!r}" if law.theory == Mbma.name else f"theory {law.theory!r}"
+        model = f"MBMA model, variant {law.variant!r}" if law.theory == Mbma.name else f"theory {law.theory!r}"
         gradient = self.modulus * float(self.surface.rms_gradient)
         plastic = f"elastic: within 5% in area for hardnesses from {gradient / ELASTIC_PSI:.4g} {stress} on"
         if self.hardness < np.inf:
@@ -174,7 +174,7 @@ def frozen_joint(
     E_star: float | str,
     length_unit: str | None = None,
     stress_unit: str | None = None,
-    reading: str | Reading = "reported",
+    variant: str | Variant = "reported",
     theory: str | Theory | UserTheory = "mbma",
     hardness: float | str = np.inf,
 ) -> Joint:
@@ -186,9 +186,9 @@ def frozen_joint(
         raise InputError("a contact law is of one surface, not of a batch")
     modulus = number_in("E_star", plain["E_star"], 1e-300, 1e300)
     cap = Units(length, stress).number("hardness", hardness)
-    law = contact_law(surface, LAW_RTOL, reading=reading, E_star=modulus, theory=theory, hardness=cap)
+    law = contact_law(surface, LAW_RTOL, variant=variant, E_star=modulus, theory=theory, hardness=cap)
     law = dataclasses.replace(law, units=Units(length, stress))
-    own = Mbma(reading=reading) if theory == Mbma.name else get_theory(theory)
+    own = Mbma(variant=variant) if theory == Mbma.name else get_theory(theory)
     return Joint(surface, law, own, modulus, float(cap), length, stress)
 
 

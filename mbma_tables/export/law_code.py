@@ -37,7 +37,7 @@ def law_text(
     target : str
         One of `mbma_tables.export.LAWS`; a conductivity adds the function `conductance`.
     surface, E_star, **asked
-        As for `describe_law`: length_unit, stress_unit, reading, theory, hardness, conductivity, conductivity_unit.
+        As for `describe_law`: length_unit, stress_unit, variant, theory, hardness, conductivity, conductivity_unit.
     name : str
         What functions, modules or packages are called, or begin with.
     leakage : bool

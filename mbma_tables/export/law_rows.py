@@ -21,7 +21,7 @@ from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
 from mbma_tables.leakage import LARGEST_AREA
 from mbma_tables.plots import draw_lines
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.readings import Reading
+from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories.law_object import ROUNDING, ContactLaw
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.totals.conductance import conductance
@@ -106,7 +106,7 @@ def describe_law(
     pressures: tuple[float | str, float | str] | None = None,
     conductivity: float | None = None,
     conductivity_unit: str | None = None,
-    reading: str | Reading = "reported",
+    variant: str | Variant = "reported",
     evenly: bool = False,
     theory: str | Theory | UserTheory = "mbma",
     hardness: float | str = np.inf,
@@ -136,7 +136,7 @@ def describe_law(
         smallest on. Not with `largest_overclosure`.
     conductivity : float, optional
         k_s = 2 k1 k2/(k1 + k2) for conductance, thermal or electrical, with its unit.
-    reading : str or Reading
+    variant : str or Variant
         Of the MBMA model.
     theory : str or theory
         As for `contact`.
@@ -160,7 +160,7 @@ def describe_law(
     """
     if quantity not in QUANTITIES:
         raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
-    joint = frozen_joint(surface, E_star, length_unit, stress_unit, reading, theory, hardness)
+    joint = frozen_joint(surface, E_star, length_unit, stress_unit, variant, theory, hardness)
     law, units = joint.law, joint.units
     least, end = _range(law, units.number("overclosure", largest_overclosure), pressures, units)
     k_s, names = 1.0, (own := ("overclosure", "pressure", joint.length, joint.stress))

@@ -8,7 +8,7 @@ import numpy as np
 
 from mbma_tables.arguments import FloatArray
 from mbma_tables.core import core
-from mbma_tables.surfaces.readings import Reading
+from mbma_tables.surfaces.variants import Variant
 
 SPHERE_FLOOR = 1.25  # zeta_d at the end of the axis `sphere`, below the paper's floor of 1.5
 
@@ -19,14 +19,14 @@ def from_axes(sphere: Any, hurst: Any) -> Any:
         return SPHERE_FLOOR * np.asarray(sphere, dtype=float) ** (-1 / (4 - 2 * np.asarray(hurst)))
 
 
-def band_fields(spread: FloatArray, sphere: FloatArray, hurst: FloatArray, reading: Reading) -> FloatArray:
+def band_fields(spread: FloatArray, sphere: FloatArray, hurst: FloatArray, variant: Variant) -> FloatArray:
     """(mu, sigma zeta_d^H, F_hat zeta_d^(1+H) per Phi_F, A_hat zeta_d^2 per Phi_A), stacked first.
 
     Arrays of one shape. All are finite for every zeta_d, in which powers of it cancel.
     """
     out = np.empty((4, *spread.shape))
     given = (np.ascontiguousarray(x, dtype=float) for x in (spread, sphere, hurst))
-    core.four_numbers(*given, reading.density_divisor, reading.summit_sigma, out)
+    core.four_numbers(*given, variant.density_divisor, variant.summit_sigma, out)
     return out
 
 
@@ -48,12 +48,12 @@ class Coordinates(NamedTuple):
 
 
 def to_axes(
-    delta_over_h_rms: FloatArray, zeta_d: FloatArray, zeta_u: FloatArray, hurst: FloatArray, reading: Reading
+    delta_over_h_rms: FloatArray, zeta_d: FloatArray, zeta_u: FloatArray, hurst: FloatArray, variant: Variant
 ) -> Coordinates:
     """Table coordinates of the paper's four numbers, flat arrays with zeta_u > zeta_d."""
     spread = (zeta_u - zeta_d) / zeta_d
     sphere = (SPHERE_FLOOR / zeta_d) ** (4 - 2 * hurst)
-    mu, sigma, force, area = band_fields(spread, sphere, hurst, reading)
+    mu, sigma, force, area = band_fields(spread, sphere, hurst, variant)
     wide = zeta_d**hurst
     X = (delta_over_h_rms * wide - 1) / sigma
     return Coordinates(X, spread, sphere, hurst, mu, sigma, force / (zeta_d * wide), area / zeta_d**2)

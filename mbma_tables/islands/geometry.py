@@ -25,9 +25,9 @@ import numpy as np
 from mbma_tables.arguments import FloatArray
 from mbma_tables.errors import OutOfRangeError
 from mbma_tables.surfaces.power_laws import Place
-from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, alpha_of, m0_of, m4_of, summit_rate
 from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.surfaces.variants import Variant
 
 # of an island in units of s and 1/q0: zeta_d (27), zeta_u (30), R_d (26), R_u (29), D and sigma (32), h_d (B.3),
 # h_u (B.12), eta (39), X = (h_rms/s delta/h_rms - h_d)/sigma, mu = 8/3 D sigma sqrt(2 R_u R_d), D_d and sigma_d (43),
@@ -43,12 +43,12 @@ def floor_offset(hurst: Any, zeta_1: Any, floor: float) -> Any:
 
 
 def summit_sigma(m0: Any, alpha: Any, summits: bool) -> Any:
-    """Standard deviation of summit heights (2), or of all heights where a reading says so."""
+    """Standard deviation of summit heights (2), or of all heights where a variant says so."""
     return np.sqrt((1.0 - (BROADENING / alpha if summits else 0.0)) * m0)
 
 
 @np.errstate(under="ignore", over="ignore")  # a square that overflows lies beyond the floors
-def geometry(approach: FloatArray, hurst: Any, zeta_1: Any, reading: Reading) -> dict[str, FloatArray]:
+def geometry(approach: FloatArray, hurst: Any, zeta_1: Any, variant: Variant) -> dict[str, FloatArray]:
     """`FIELDS` of islands at delta/h_rms = approach > 0; arguments of one shape, or numbers for one surface."""
     log_zeta_1 = np.log(zeta_1)
     e = np.exp(-2.0 * hurst * log_zeta_1)
@@ -66,31 +66,31 @@ def geometry(approach: FloatArray, hurst: Any, zeta_1: Any, reading: Reading) ->
             np.where(held, floor, np.exp(log_zeta)),
         )
 
-    root_a, a, log_d, zeta_d = end(4.0 / 3.0 * reading.beta * approach, reading.floor_d)
-    root_b, b, log_u, zeta_u = end(reading.phi / (1.0 + reading.phi) * h_rms * approach, reading.floor_u)
+    root_a, a, log_d, zeta_d = end(4.0 / 3.0 * variant.beta * approach, variant.floor_d)
+    root_b, b, log_u, zeta_u = end(variant.phi / (1.0 + variant.phi) * h_rms * approach, variant.floor_u)
     # the band [zeta_d, zeta_u]; m0 = a - b, and alpha from the width alone
     width = np.log1p((a - b) / (e + b)) / (2.0 * hurst)
-    D = summit_rate(hurst, log_d, width) / reading.density_divisor
+    D = summit_rate(hurst, log_d, width) / variant.density_divisor
     # a and b may underflow where their roots do not
     m0_root = np.sqrt(root_a - root_b) * np.sqrt(root_a + root_b)
-    sigma = m0_root * summit_sigma(1.0, alpha_of(hurst, width), reading.summit_sigma)
+    sigma = m0_root * summit_sigma(1.0, alpha_of(hurst, width), variant.summit_sigma)
     R_d, R_u, R_top = (RADIUS / np.sqrt(m4_of(hurst, 0.0, log)) for log in (log_d, log_u, log_zeta_1))
-    D_top = summit_rate(hurst, 0.0, log_zeta_1) / reading.density_divisor
-    D_d = summit_rate(hurst, 0.0, log_d) / reading.density_divisor
-    sigma_d = summit_sigma(m0_of(hurst, 0.0, log_d), alpha_of(hurst, log_d), reading.summit_sigma)
+    D_top = summit_rate(hurst, 0.0, log_zeta_1) / variant.density_divisor
+    D_d = summit_rate(hurst, 0.0, log_d) / variant.density_divisor
+    sigma_d = summit_sigma(m0_of(hurst, 0.0, log_d), alpha_of(hurst, log_d), variant.summit_sigma)
     bands = zeta_d, zeta_u, R_d, R_u, D, sigma, root_a, root_b, D_d, sigma_d, width
-    return _fields(h_rms * approach, bands, D_top, R_top, reading)
+    return _fields(h_rms * approach, bands, D_top, R_top, variant)
 
 
 def _fields(
-    delta: FloatArray, bands: tuple[FloatArray, ...], D_top: Any, R_top: Any, reading: Reading
+    delta: FloatArray, bands: tuple[FloatArray, ...], D_top: Any, R_top: Any, variant: Variant
 ) -> dict[str, FloatArray]:
     """`FIELDS` of islands from their bands, and the summits of all waves (top)."""
     _, _, R_d, R_u, D, sigma, root_a, root_b, _, _, _ = bands
-    h_d = root_a if reading.offset else np.zeros_like(root_a)
+    h_d = root_a if variant.offset else np.zeros_like(root_a)
     return dict(zip(BANDS, bands, strict=True)) | {
         "h_d": h_d,
-        "eta": 0.75 * np.cbrt(np.pi * D_top) * np.cbrt(1.5 * R_top) ** 2 * np.cbrt(root_b / (reading.phi * R_u)),
+        "eta": 0.75 * np.cbrt(np.pi * D_top) * np.cbrt(1.5 * R_top) ** 2 * np.cbrt(root_b / (variant.phi * R_u)),
         "X": (delta - h_d) / sigma,
         "mu": 8.0 / 3.0 * D * sigma * np.sqrt(2.0 * R_u * R_d),
     }
@@ -119,22 +119,22 @@ def s_over_h_rms(surface: MeasuredSurface) -> float:
     return float(1 / np.sqrt(-np.expm1(-2 * surface.hurst * np.log(surface.zeta_1))))
 
 
-def floors_of(surface: MeasuredSurface, reading: Reading) -> Floors:
-    """The floors of a reading, refused where the spectrum ends below that of q_u."""
-    if not surface.q1 > reading.floor_u * surface.longest:
+def floors_of(surface: MeasuredSurface, variant: Variant) -> Floors:
+    """The floors of a variant, refused where the spectrum ends below that of q_u."""
+    if not surface.q1 > variant.floor_u * surface.longest:
         raise OutOfRangeError(
-            f"the spectrum ends at q = {surface.q1:.4g}, and MBMA's smallest band at {reading.floor_u:g} times "
+            f"the spectrum ends at q = {surface.q1:.4g}, and MBMA's smallest band at {variant.floor_u:g} times "
             f"{surface.longest:.4g}, where most height is: measure shorter waves, or ask another theory"
         )
-    at_d, at_u = (surface.laws.place(floor * surface.longest) for floor in (reading.floor_d, reading.floor_u))
+    at_d, at_u = (surface.laws.place(floor * surface.longest) for floor in (variant.floor_d, variant.floor_u))
     root_d, root_u = (float(np.sqrt(surface.laws.above(place))) for place in (at_d, at_u))
-    slope_u = reading.phi / (1 + reading.phi)
-    return Floors(at_d, at_u, root_d, root_u, 4 / 3 * reading.beta * s_over_h_rms(surface), slope_u)
+    slope_u = variant.phi / (1 + variant.phi)
+    return Floors(at_d, at_u, root_d, root_u, 4 / 3 * variant.beta * s_over_h_rms(surface), slope_u)
 
 
-def measured_islands(surface: MeasuredSurface, delta: FloatArray, reading: Reading) -> dict[str, FloatArray]:
+def measured_islands(surface: MeasuredSurface, delta: FloatArray, variant: Variant) -> dict[str, FloatArray]:
     """`islands.geometry.FIELDS` of islands at approaches delta > 0 [length], in powers of length."""
-    laws, floors = surface.laws, floors_of(surface, reading)
+    laws, floors = surface.laws, floors_of(surface, variant)
 
     def place(root: FloatArray, largest: float, floor: Place) -> Place:
         free = laws.where_above_is(np.minimum(root, largest) ** 2)
@@ -147,18 +147,18 @@ def measured_islands(surface: MeasuredSurface, delta: FloatArray, reading: Readi
 
     def sigma_of(m0: FloatArray, m2: FloatArray, m4: FloatArray) -> FloatArray:
         # (m2/m0) (m2/m4): squares of small moments might underflow
-        share = 1 - BROADENING * (m2 / m0) * (m2 / m4) if reading.summit_sigma else 1.0
+        share = 1 - BROADENING * (m2 / m0) * (m2 / m4) if variant.summit_sigma else 1.0
         return np.sqrt(m0 * share)
 
     m2, m4 = (laws.between(order, at_d, at_u) for order in (2, 4))
     below_0, below_2, below_4 = (laws.below(order, at_d) for order in (0, 2, 4))
-    D = m4 / m2 / reading.density_divisor
+    D = m4 / m2 / variant.density_divisor
     sigma = sigma_of((root_a - root_b) * (root_a + root_b), m2, m4)
     R_d, R_u = RADIUS / np.sqrt(below_4), RADIUS / np.sqrt(laws.below(4, at_u))
-    D_top, R_top = surface.m4 / surface.m2 / reading.density_divisor, RADIUS / np.sqrt(surface.m4)
+    D_top, R_top = surface.m4 / surface.m2 / variant.density_divisor, RADIUS / np.sqrt(surface.m4)
     log_d, log_u = laws.log_q(at_d), laws.log_q(at_u)
-    D_d, sigma_d = below_4 / below_2 / reading.density_divisor, sigma_of(below_0, below_2, below_4)
+    D_d, sigma_d = below_4 / below_2 / variant.density_divisor, sigma_of(below_0, below_2, below_4)
     width = np.where(at_d.piece == at_u.piece, at_d.rest - at_u.rest, log_u - log_d)
     zeta_d, zeta_u = np.exp(log_d) / surface.q0, np.exp(log_u) / surface.q0
     bands = zeta_d, zeta_u, R_d, R_u, D, sigma, root_a, root_b, D_d, sigma_d, width
-    return _fields(delta, bands, D_top, R_top, reading)
+    return _fields(delta, bands, D_top, R_top, variant)

@@ -17,9 +17,9 @@ from mbma_tables.arguments import FloatArray, number_in
 from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.height_integrals import height_integral
-from mbma_tables.surfaces.readings import Reading
+from mbma_tables.surfaces.variants import Variant
 
-TIERS = ("exact", "universal", "island4d", "formula", "rigid")
+ISLAND_MODELS = ("exact", "universal", "island4d", "formula", "rigid")
 OUTSIDE = ("raise", "exact", "nan")  # what to do about islands that a table does not cover
 QUANTITIES = ("force", "area")
 FORCE, AREA, BOTH = 0, 1, 2  # which of them is asked for
@@ -46,7 +46,7 @@ class IslandAnswer(NamedTuple):
 
 @runtime_checkable
 class IslandModel(Protocol):
-    """An island model: `contact`, `contact_law`, `island` and `Scene` take any such object as their `tier`."""
+    """An island model: `contact`, `contact_law`, `island` and `Scene` take any such object as their `island_model`."""
 
     @property
     def name(self) -> str:
@@ -133,43 +133,50 @@ def exact_model(rtol: float) -> ExactModel:
     return ExactModel(max(0.1 * rtol, greenwood_tripp.MIN_SOLVER_RTOL))
 
 
-def tier_name(tier: str | AnyModel) -> str:
-    """What results call a tier: its name, or that of the model."""
-    return tier if isinstance(tier, str) else getattr(tier, "name", "")
+def island_model_name(island_model: str | AnyModel) -> str:
+    """The name that results give an island model."""
+    return island_model if isinstance(island_model, str) else getattr(island_model, "name", "")
 
 
-def get_model(tier: str | AnyModel, rtol: float, reading: Reading) -> AnyModel:
-    """The island model of a tier, accurate enough for results at `rtol`; a table is what its certificate says.
+def get_model(island_model: str | AnyModel, rtol: float, variant: Variant) -> AnyModel:
+    """The island model by a name or an object, accurate enough for results at `rtol`.
 
-    `tier` is one of `TIERS`, or a model (`IslandModel`, `GeometryModel`), which is checked and returned. One that was
-    made for one reading says so by its `reading`.
+    `island_model` is one of `ISLAND_MODELS`, or a model (`IslandModel`, `GeometryModel`), which is checked. A model
+    made for one variant has the attribute `variant`.
     """
     asked = number_in("rtol", rtol, MIN_RTOL, MAX_RTOL)
-    if isinstance(tier, str) and tier in TIERS:
-        model = _named(tier, asked)
-    elif isinstance(tier, IslandModel | GeometryModel) and not isinstance(tier, type) and isinstance(tier.name, str):
-        model = tier
+    if isinstance(island_model, str) and island_model in ISLAND_MODELS:
+        model = _named(island_model, asked)
+    elif (
+        isinstance(island_model, IslandModel | GeometryModel)
+        and not isinstance(island_model, type)
+        and isinstance(island_model.name, str)
+    ):
+        model = island_model
     else:
-        raise InputError(f"tier must be one of {TIERS} or an object with a name and answer(X, mu), got {tier!r}")
-    own = getattr(model, "reading", None)
-    if isinstance(own, Reading) and (
-        own.density_divisor != reading.density_divisor or own.summit_sigma != reading.summit_sigma
+        raise InputError(
+            f"island_model must be one of {ISLAND_MODELS} or an object with a name and answer(X, mu), "
+            f"got {island_model!r}"
+        )
+    own = getattr(model, "variant", None)
+    if isinstance(own, Variant) and (
+        own.density_divisor != variant.density_divisor or own.summit_sigma != variant.summit_sigma
     ):
         raise InputError(
-            f"the {model.name} table was made for the reading {own.name!r}, not for {reading.name!r}; "
-            "tier 'universal' serves every reading"
+            f"the {model.name} table was made for the variant {own.name!r}, not for {variant.name!r}; "
+            "island model 'universal' serves every variant"
         )
     return model
 
 
-def _named(tier: str, rtol: float) -> AnyModel:
-    if tier in ("exact", "rigid"):
-        return exact_model(rtol) if tier == "exact" else RigidModel()
+def _named(island_model: str, rtol: float) -> AnyModel:
+    if island_model in ("exact", "rigid"):
+        return exact_model(rtol) if island_model == "exact" else RigidModel()
     # closed forms and netCDF come in where they are asked for
-    if tier == "formula":
+    if island_model == "formula":
         from mbma_tables.models.closed_forms import FormulaModel
 
         return FormulaModel()
     from mbma_tables.models.tables import open_table
 
-    return open_table(tier)
+    return open_table(island_model)

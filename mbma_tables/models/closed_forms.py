@@ -1,4 +1,4 @@
-"""Closed forms: the island model of tier "formula", and total force and area without a sum over islands.
+"""Closed forms: the island model "formula", and total force and area without a sum over islands.
 
 The functions themselves are in `closed_form_functions`, which the generator writes; docs/formula.md shows them.
 """
@@ -86,7 +86,7 @@ class ClosedTotals(NamedTuple):
 
 
 def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1.0) -> ClosedTotals:
-    """Total force and area by the closed totals, reading "reported".
+    """Total force and area by the closed totals, variant "reported".
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from mbma_tables.islands.four_numbers import SPHERE_FLOOR, Coordinates, band_fie
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
 from mbma_tables.plots import draw_lines
-from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.tablefiles.schema import TableContent, error_cell
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class Island4dModel(Displayed):
 
     def __init__(self, content: TableContent) -> None:
         self.content = content
-        self.reading = get_reading(content.attributes["reading"])
+        self.variant = get_variant(content.attributes["variant"])
         self._X, self._spread, _, self._hurst = content.axes
         self._error: FloatArray = content.local_error.max(axis=-1)
 
@@ -147,7 +147,7 @@ class Island4dModel(Displayed):
             self._refuse_ends(raw[3], raw[1])
         require("zeta_u", raw[2], raw[2] > raw[1], "above zeta_d")
         delta, low, high, H = (array.ravel() for array in raw)
-        place = to_axes(delta, low, high, H, self.reading)
+        place = to_axes(delta, low, high, H, self.variant)
         inside = self._covers(place)
         if outside == "raise":
             self._refuse(place, inside, shape)
@@ -172,7 +172,7 @@ class Island4dModel(Displayed):
         """
         shape, raw = _broadcast(delta_over_h_rms, zeta_d, zeta_u, hurst)
         delta, low, high, H = (array.ravel() for array in raw)
-        place = to_axes(delta, low, high, H, self.reading)
+        place = to_axes(delta, low, high, H, self.variant)
         return tuple(axis.side(x.reshape(shape)) for axis, x in zip(self.content.axes, place, strict=False))
 
     def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
@@ -235,7 +235,7 @@ class Island4dModel(Displayed):
     def _share(self, place: Coordinates) -> FloatArray:
         """mu over mu at the least spread, below it; 1 elsewhere."""
         low = self._spread.low
-        edge = band_fields(np.maximum(place.spread, low), place.sphere, place.hurst, self.reading)[0]
+        edge = band_fields(np.maximum(place.spread, low), place.sphere, place.hurst, self.variant)[0]
         return np.where(place.spread < low, place.mu / edge, 1.0)
 
     def log_ratio(self, place: Coordinates, parallel: bool = False) -> FloatArray:
@@ -257,7 +257,7 @@ class Island4dModel(Displayed):
     def _moving(self, raw: Any, below: NDArray[np.bool_]) -> FloatArray:
         """What log F_hat and log A_hat follow: positions on the axes, log(mu), X, and the logarithms of both scales."""
         delta, zeta_d, zeta_u, hurst = raw
-        at = to_axes(delta, zeta_d, zeta_u, hurst, self.reading)
+        at = to_axes(delta, zeta_d, zeta_u, hurst, self.variant)
         places, log_mu = self._positions(at), np.log(at.mu)
         # below the table only mu moves the logarithm
         places[1] = np.where(below, 0.0, places[1])

@@ -35,7 +35,7 @@ def _opened(kind: str) -> UniversalModel | Island4dModel:
 
 
 def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Island4dModel:
-    """A table as an island model, for `contact`, `contact_law`, `island` and `Scene` to take as their `tier`.
+    """A table as an island model, for `contact`, `contact_law`, `island` and `Scene` to take as their `island_model`.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Is
     >>> phi_F, phi_A, error = table.answer(2.0, 1e-3)
     >>> round(float(phi_F), 6), round(float(phi_A), 4)
     (0.005178, 7.8328)
-    >>> float(contact(Surface(0.8, 1.0, 200.0, 0.1, 0.3), 0.1, tier=table).error) < 1e-8
+    >>> float(contact(Surface(0.8, 1.0, 200.0, 0.1, 0.3), 0.1, island_model=table).error) < 1e-8
     True
     """
     if table in (UNIVERSAL, ISLAND4D):
@@ -89,7 +89,7 @@ def _replay(content: TableContent) -> tuple[FloatArray, FloatArray]:
     else:
         delta, zeta_d, zeta_u, hurst = (points[name] for name in ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst"))
         found = model.lookup(delta, zeta_d, zeta_u, hurst)
-        place = to_axes(delta, zeta_d, zeta_u, hurst, model.reading)
+        place = to_axes(delta, zeta_d, zeta_u, hurst, model.variant)
         X, mu, scales = place.X, place.mu, np.stack([place.force, place.area])
         table = np.stack([found.F_hat, found.A_hat])
     solved = greenwood_tripp.solve(X, mu, rtol=greenwood_tripp.MIN_SOLVER_RTOL)

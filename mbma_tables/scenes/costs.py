@@ -1,6 +1,6 @@
 """What each way to an answer costs: the measurements shipped in tables/cost.csv.
 
-A cost is a time divided by that of a fixed piece of work timed in the same run; the row of tier "unit" has the seconds
+A cost is a time divided by that of a fixed piece of work timed in the same run; the row "unit" has the seconds
 of that work on the machine that measured. `python -m generate pages cost` measures.
 """
 
@@ -15,17 +15,17 @@ from typing import Any, NamedTuple
 from mbma_tables.files import shipped_file
 
 UNIT = "unit"
-TEXTS = ("tier", "variant", "quantity", "theory", "way")  # fields that are no numbers
+TEXTS = ("island_model", "variant", "quantity", "theory", "way")  # fields that are no numbers
 
 
 class Row(NamedTuple):
     """One measurement: what answered, what was asked of it, largest relative error found, time and evaluations."""
 
-    tier: str
+    island_model: str
     variant: str  # "gap rtol=1e-06", "island", "open"
     quantity: str  # "both", "force" or "area"
     error: float | None
-    cost: float  # time over that of the fixed work; seconds in the row of tier `UNIT`
+    cost: float  # time over that of the fixed work; seconds in the row of island model `UNIT`
     evaluations: float | None = None  # islands for a gap, pressures for an exact island, height integrals for a table
 
     @property
@@ -46,9 +46,9 @@ class Costs(NamedTuple):
     rows: tuple[Row, ...]
     seconds: float
 
-    def of(self, tier: str, what: str, rtol: float | None = None, quantity: str = "both") -> float:
+    def of(self, island_model: str, what: str, rtol: float | None = None, quantity: str = "both") -> float:
         """Seconds at the loosest measured tolerance that meets `rtol`, else the tightest; NaN if none was measured."""
-        rows = [row for row in self.rows if row.tier == tier and row.what == what]
+        rows = [row for row in self.rows if row.island_model == island_model and row.what == what]
         # a quantity that was not measured alone costs what both do
         rows = [row for row in rows if row.quantity == quantity] or [row for row in rows if row.quantity == "both"]
         if not rows:
@@ -102,7 +102,7 @@ def shipped_distances() -> tuple[Distance, ...]:
 def read_costs(path: pathlib.Path) -> Costs:
     """Costs from a CSV file."""
     rows = _records(Row, path)
-    (seconds,) = (row.cost for row in rows if row.tier == UNIT)
+    (seconds,) = (row.cost for row in rows if row.island_model == UNIT)
     return Costs(rows, seconds)
 
 

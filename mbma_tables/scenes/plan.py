@@ -42,7 +42,7 @@ class Step:
     name: str
     why: str  # which effects asked for it
     what: str  # what it evaluates
-    tier: str | AnyModel | None
+    island_model: str | AnyModel | None
     rtol: float | None  # asked of the totals, the law or the solver
     count: int  # gaps, islands or points evaluated
     error: float  # certified beforehand; NaN where only the answers can say
@@ -50,9 +50,13 @@ class Step:
     theory: str | None = None  # the scene's, where it is not MBMA, in a step that asks it
 
     @property
-    def tier_name(self) -> str | None:
+    def island_model_name(self) -> str | None:
         """The island model's name."""
-        return self.tier if self.tier is None or isinstance(self.tier, str) else self.tier.name
+        return (
+            self.island_model
+            if self.island_model is None or isinstance(self.island_model, str)
+            else self.island_model.name
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,14 +79,14 @@ class Plan:
     @property
     def error(self) -> float:
         """Largest error of a step of the scene's theory; those compared state their own."""
-        return max((step.error for step in self.steps if step.tier is not None or step.theory), default=0.0)
+        return max((step.error for step in self.steps if step.island_model is not None or step.theory), default=0.0)
 
     def text(self) -> str:
         """As a database prints a query plan."""
         times = f"time={duration(self.seconds)}, first use in a process {duration(self.first_use)} more"
         lines = [f"Scene  (rtol={self.rtol:.1e}, {_bound(self.error)}, {times})", f"  theory: {self.theory}"]
         for step in self.steps:
-            source = step.theory or step.tier_name
+            source = step.theory or step.island_model_name
             by = "" if source is None else f" by {source}"
             asked = "" if step.rtol is None else f", rtol={step.rtol:.1e}"
             numbers = f"(count={step.count}{asked}, {_bound(step.error)}, time={duration(step.seconds)})"
@@ -135,15 +139,17 @@ def seconds_by_theory(costs: Costs, theory: str, count: int, inverse: bool, ener
     return costs.of(theory, "call") + count * each
 
 
-def certified_error(tier: str | AnyModel, asked: float) -> float:
-    """Bound on the relative error of a tier's islands, for results at `asked`; NaN where only the answers can say."""
-    if tier == "universal":
+def certified_error(island_model: str | AnyModel, asked: float) -> float:
+    """Bound on the relative error of islands, for results at `asked`; NaN where it is known after the fact only."""
+    if island_model == "universal":
         from mbma_tables.models.tables import open_table
 
-        certificate = open_table(tier).content.attributes
+        certificate = open_table(island_model).content.attributes
         return max(float(certificate["largest_error_F"]), float(certificate["largest_error_A"]))
     # the exact solver works to a tenth of what is asked
-    return {"exact": 0.1 * asked, "rigid": 0.0}.get(tier, math.nan) if isinstance(tier, str) else math.nan
+    return (
+        {"exact": 0.1 * asked, "rigid": 0.0}.get(island_model, math.nan) if isinstance(island_model, str) else math.nan
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -158,10 +164,10 @@ class _Planner:
     def count(self) -> int:
         return 0 if self.problem.gaps is None else int(self.problem.gaps.size)
 
-    def tier(self, tolerance: float) -> str | AnyModel:
+    def island_model(self, tolerance: float) -> str | AnyModel:
         """The island model for a step with that tolerance."""
-        if self.problem.tier is not None:
-            return self.problem.tier
+        if self.problem.island_model is not None:
+            return self.problem.island_model
         if "sphere_deformation" in self.problem.dropped:
             return "rigid"
         share = ISLAND_SHARE * tolerance
@@ -202,13 +208,13 @@ class _Planner:
         theory = self.problem.theory_name
         left_out = tuple(name for name in OUTPUTS if name not in outputs)
         switched_off = tuple(name for name in REFINEMENTS if name in dropped)
-        tiers = {step.tier for step in steps if isinstance(step.tier, str)}
-        first_use = max((self.costs.of(tier, "import") for tier in tiers), default=0.0)
+        island_models = {step.island_model for step in steps if isinstance(step.island_model, str)}
+        first_use = max((self.costs.of(island_model, "import") for island_model in island_models), default=0.0)
         return Plan(tuple(steps), left_out, switched_off, self.rtol, self.costs.of("scene", "call"), first_use, theory)
 
     def many_gaps(self) -> bool:
         """Whether totals at the prescribed gaps cost more than a law, where there is one."""
-        fewest = MIN_LAW_GAPS.get(_name(self.tier(self.rtol)), MIN_LAW_GAPS_OF_OTHERS)
+        fewest = MIN_LAW_GAPS.get(_name(self.island_model(self.rtol)), MIN_LAW_GAPS_OF_OTHERS)
         if self.count < fewest or "finite_height" in self.problem.dropped:
             return False
         from mbma_tables.theories.law import MIN_LAW_RTOL
@@ -226,24 +232,26 @@ class _Planner:
         if asked < MIN_LAW_RTOL:
             best = factor * MIN_LAW_RTOL / (1 - ISLAND_SHARE)
             raise InputError(f"rtol = {self.rtol:g} is too tight for {', '.join(why)}: a law meets {best:.0e} at best")
-        tier = self.tier(tolerance)
+        island_model = self.island_model(tolerance)
         each = self.costs.of("law", "lookup") + (self.costs.of("law", "invert", quantity="force") if inverse else 0.0)
-        seconds = self.costs.of(_name(tier), "law", asked) + self.count * each
-        error = factor * (asked + certified_error(tier, asked))
+        seconds = self.costs.of(_name(island_model), "law", asked) + self.count * each
+        error = factor * (asked + certified_error(island_model, asked))
         what = "the surface's force and area as piecewise polynomials of the gap, evaluated at every gap"
-        return Step("law", ", ".join(why), what, tier, asked, self.count, error, seconds)
+        return Step("law", ", ".join(why), what, island_model, asked, self.count, error, seconds)
 
     def totals(self, why: Sequence[str]) -> Step:
         what = f"sum over islands at {self.count} gaps (Eqs. 48, 49)"
         return self.summed("totals", ", ".join(why), what, None, why[0] if len(why) == 1 else "both")
 
     def summed(self, name: str, why: str, what: str, priced_as: str | None, quantity: str = "both") -> Step:
-        """A sum over islands at every gap; `priced_as` is a tier whose totals cost about the same."""
-        tier = self.tier(self.rtol)
+        """A sum over islands at every gap; `priced_as` is an island model whose totals cost about the same."""
+        island_model = self.island_model(self.rtol)
         asked = (1 - ISLAND_SHARE) * self.rtol
-        priced = priced_as or _name(tier)
+        priced = priced_as or _name(island_model)
         seconds = self.costs.of(priced, "call") + self.count * self.costs.of(priced, "gap", asked, quantity)
-        return Step(name, why, what, tier, asked, self.count, asked + certified_error(tier, asked), seconds)
+        return Step(
+            name, why, what, island_model, asked, self.count, asked + certified_error(island_model, asked), seconds
+        )
 
     def profiles(self) -> Step:
         islands, asked = int(np.size(self.problem.deltas)), ISLAND_SHARE * self.rtol / AMPLIFICATION["profile"]
@@ -276,10 +284,10 @@ class _Planner:
         each = seconds_by_theory(self.costs, theory, self.count, inverse) - call
         seconds = math.nan if mbma else YIELDING_CALL * call + YIELDING_GAP * each
         # the elastic errors of force and of area at that force may add up
-        tier, asked = (self.tier(self.rtol / 2), ISLAND_SHARE * self.rtol / 2) if mbma else (None, None)
-        error = 2 * (asked + certified_error(tier, asked) if tier and asked else self.own_error())
+        island_model, asked = (self.island_model(self.rtol / 2), ISLAND_SHARE * self.rtol / 2) if mbma else (None, None)
+        error = 2 * (asked + certified_error(island_model, asked) if island_model and asked else self.own_error())
         what = f"force, area and what yields at {self.count} gaps"
-        return Step("contact", ", ".join(why), what, tier, asked, self.count, error, seconds, theory=theory)
+        return Step("contact", ", ".join(why), what, island_model, asked, self.count, error, seconds, theory=theory)
 
     def own_error(self) -> float:
         """The numerical error that the scene's theory states of an answer."""
@@ -301,6 +309,6 @@ class _Planner:
         return Step(name, "comparison", what, None, None, self.count, 1e-14 if closed else 1e-9, seconds)
 
 
-def _name(tier: Any) -> str:
-    """What measured costs call a tier; they know no model of one's own."""
-    return tier if isinstance(tier, str) else ""
+def _name(island_model: Any) -> str:
+    """The name of an island model in the table of measured costs, which holds the shipped ones."""
+    return island_model if isinstance(island_model, str) else ""

@@ -10,14 +10,14 @@ import numpy as np
 
 from mbma_tables.arguments import finite_array, nearest, number_in, require, whole_number_in
 from mbma_tables.errors import InputError
-from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.theories import THEORIES, get_theory
 from mbma_tables.units import Units, in_unit, known, modulus_and_units
 
 if TYPE_CHECKING:
     from mbma_tables.models import AnyModel
     from mbma_tables.surfaces.any_surface import AnySurface
-    from mbma_tables.surfaces.readings import Reading
+    from mbma_tables.surfaces.variants import Variant
     from mbma_tables.theories.protocol import Theory, UserTheory
 
 # effects; docs/scenes.md says what each is
@@ -98,8 +98,8 @@ class Problem:
     hardness: Any = None
     rtol: float | None = None
     seconds: float | None = None
-    reading: str | Reading = "reported"
-    tier: str | AnyModel | None = None
+    variant: str | Variant = "reported"
+    island_model: str | AnyModel | None = None
     theory: str | Theory | UserTheory = "mbma"
     conductivities: tuple[float | str, float | str] | None = None
     deltas: Any = None
@@ -134,7 +134,7 @@ class Problem:
         whole_number_in("points", self.points, 2, 10_000)
         derived = {
             "rtol": rtol,
-            "reading": get_reading(self.reading),
+            "variant": get_variant(self.variant),
             "outputs": outputs,
             "dropped": dropped,
             "theories": tuple(self.theories),
@@ -143,7 +143,7 @@ class Problem:
             object.__setattr__(self, name, value)
         object.__setattr__(self, "gaps", self._checked_gaps(outputs - {"pressure_profile"}))
         self._check_parameters_of_effects()
-        self._check_tier()
+        self._check_island_model()
         self._check_theory()
 
     def _set_units(self) -> None:
@@ -226,16 +226,18 @@ class Problem:
             elif name not in COMPARED:
                 raise InputError(f"no theory is named {name!r}; {nearest(str(name), (*COMPARED, *CORRELATIONS))}")
 
-    def _check_tier(self) -> None:
-        if self.tier is None:
+    def _check_island_model(self) -> None:
+        if self.island_model is None:
             return
-        from mbma_tables.models import TIERS
+        from mbma_tables.models import ISLAND_MODELS
 
         if "sphere_deformation" in self.dropped:
-            raise InputError("sphere_deformation is off, which is the rigid sphere: leave tier out")
-        if isinstance(self.tier, str) and self.tier not in TIERS:
-            raise InputError(f"no tier is named {self.tier!r}; {nearest(self.tier, TIERS)}")
-        if self.seconds is not None and not isinstance(self.tier, str):
+            raise InputError("sphere_deformation is off, which is the rigid sphere: leave island model out")
+        if isinstance(self.island_model, str) and self.island_model not in ISLAND_MODELS:
+            raise InputError(
+                f"no island model is named {self.island_model!r}; {nearest(self.island_model, ISLAND_MODELS)}"
+            )
+        if self.seconds is not None and not isinstance(self.island_model, str):
             raise InputError("the cost of your own island model is not known: give rtol instead of seconds")
 
     def _check_theory(self) -> None:
@@ -250,8 +252,8 @@ class Problem:
         if self.theory == "mbma":
             return
         own = {
-            "tier": self.tier is not None,
-            "reading": self.reading != get_reading("reported"),
+            "island_model": self.island_model is not None,
+            "variant": self.variant != get_variant("reported"),
             "without": bool(self.dropped),
         }
         own |= {f"effect {name!r}": name in self.outputs for name in OF_ISLANDS}

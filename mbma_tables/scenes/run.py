@@ -12,8 +12,8 @@ from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.scenes.plan import Plan
 from mbma_tables.scenes.problem import CORRELATIONS, INVERTED, Problem
 from mbma_tables.scenes.steps import STEPS, TABLES, Progress, Run, comparison
-from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.surfaces.self_affine import PARAMETERS
+from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.theories.source import MEANINGS
 from mbma_tables.units import unit_of
 
@@ -100,11 +100,11 @@ def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
         "error": max(run.errors.values(), default=0.0),
         "errors": json.dumps(run.errors),
         "theory": problem.theory_name,
-        "reading": get_reading(problem.reading).name if problem.theory == "mbma" else "",
-        "tiers": json.dumps(run.tiers),
+        "variant": get_variant(problem.variant).name if problem.theory == "mbma" else "",
+        "island_models": json.dumps(run.island_models),
         "switched_off": " ".join(sorted(problem.dropped)),
         "E_star": float(problem.E_star),
-        "table_hashes": json.dumps(_hashes(problem, set(run.tiers.values()))),
+        "table_hashes": json.dumps(_hashes(problem, set(run.island_models.values()))),
     }
     # psi times the hardness
     stress = float(problem.E_star * problem.surface.rms_gradient)
@@ -120,14 +120,14 @@ def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
     return xr.Dataset(variables, attrs=facts).set_coords([name for name in named if name in variables])
 
 
-def _hashes(problem: Problem, tiers: set[str]) -> dict[str, str]:
+def _hashes(problem: Problem, island_models: set[str]) -> dict[str, str]:
     """Hashes of the values of the tables that answered."""
-    used = sorted(tiers & set(TABLES))
+    used = sorted(island_models & set(TABLES))
     if not used:
         return {}
     from mbma_tables.models.tables import open_table
 
     tables: dict[str, Any] = {name: open_table(name) for name in used}
-    if not isinstance(problem.tier, str | None):
-        tables[problem.tier.name] = problem.tier
+    if not isinstance(problem.island_model, str | None):
+        tables[problem.island_model.name] = problem.island_model
     return {name: str(table.content.attributes["values_sha256"]) for name, table in tables.items() if name in used}

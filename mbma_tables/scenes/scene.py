@@ -51,13 +51,13 @@ class Scene(Problem):
         Relative error asked for, in [1e-10, 0.1]; 1e-6 where no `seconds` are given either, 1e-4 of other theories.
     seconds : float, optional
         Instead of `rtol`: a time budget, spent on as much accuracy as the measured costs allow.
-    reading : str or Reading
-        Which reading of the paper's equations.
-    tier : str or IslandModel, optional
+    variant : str or Variant
+        Which variant of the paper's equations.
+    island_model : str or IslandModel, optional
         Island model, as for `contact`; without it the plan chooses between "universal" and "exact".
     theory : str or theory
-        "mbma", another one of `mbma_tables.theories.THEORIES`, or an object, as for `contact`. Refinements, tier,
-        reading and islands are MBMA's.
+        "mbma", another one of `mbma_tables.theories.THEORIES`, or an object, as for `contact`. Refinements, island
+        model and variant are MBMA's.
     conductivities : pair of float or str, optional
         Of the two bodies, thermal or electrical, for "conductance", as for `Contact.conductance`.
     deltas : array_like, optional
@@ -131,7 +131,7 @@ class Scene(Problem):
         Returns
         -------
         xarray.Dataset
-            Quantities with units; in its attributes the plan, the error bound reached, the reading and the hashes
+            Quantities with units; in its attributes the plan, the error bound reached, the variant and the hashes
             of the tables that were used.
 
         Raises
@@ -172,7 +172,7 @@ def _arguments(content: Mapping[str, Any], folder: pathlib.Path, title: str) -> 
         "stress_unit": specimen.stress_unit,
         "title": title,
     }
-    found |= {name: content[name] for name in ("title", "theory", "reading") if name in content}
+    found |= {name: content[name] for name in ("title", "theory", "variant") if name in content}
     found |= lengths(prescribed) | lengths(dict(content.get("pressure_profile", {})))
     found |= dict(content.get("accuracy", {})) | statistics | content.get("comparison", {})
     found |= content.get("yield", {})
@@ -197,7 +197,7 @@ def advice(problem: Problem) -> str:
     name, quantity = next((pair for pair in asked.items() if pair[1] == "stiffness"), next(iter(asked.items())))
     # distances at the contact that the calibrated law expects, in the middle of what is prescribed
     area = float(np.median(contacts))
-    rows = {"mbma": Mbma(reading=problem.reading).scatter_name(problem.surface), **{row: row for row in CANDIDATES}}
+    rows = {"mbma": Mbma(variant=problem.variant).scatter_name(problem.surface), **{row: row for row in CANDIDATES}}
     spread = {
         theory: float(shipped().standard_deviation(row, quantity, np.asarray(area))) for theory, row in rows.items()
     }

@@ -37,14 +37,14 @@ class Run:
     gap: Any = None
     found: dict[str, tuple[tuple[str, ...], Any]] = dataclasses.field(default_factory=dict)
     errors: dict[str, float] = dataclasses.field(default_factory=dict)
-    tiers: dict[str, str] = dataclasses.field(default_factory=dict)
+    island_models: dict[str, str] = dataclasses.field(default_factory=dict)
     reasons: dict[str, list[int]] | None = None
 
-    def close(self, step: Step, error: float, tier: str | None) -> None:
+    def close(self, step: Step, error: float, island_model: str | None) -> None:
         """Note the error bound that a step reached, and its island model."""
         self.errors[step.name] = error
-        if tier is not None:
-            self.tiers[step.name] = tier
+        if island_model is not None:
+            self.island_models[step.name] = island_model
 
 
 def _law(run: Run, step: Step) -> None:
@@ -54,15 +54,17 @@ def _law(run: Run, step: Step) -> None:
     problem, wanted = run.problem, run.problem.outputs
     assert step.rtol is not None
     inverse = problem.prescribed in INVERTED
-    tier, asked = step.tier, step.rtol
+    island_model, asked = step.island_model, step.rtol
     while True:
-        own: dict[str, Any] = {"theory": problem.theory} if step.theory else {"tier": tier, "reading": problem.reading}
+        own: dict[str, Any] = (
+            {"theory": problem.theory} if step.theory else {"island_model": island_model, "variant": problem.variant}
+        )
         try:
             law = contact_law(run.surface, asked, E_star=problem.E_star, **own)
         except OutOfRangeError:
-            if not isinstance(tier, str) or tier not in TABLES:
+            if not isinstance(island_model, str) or island_model not in TABLES:
                 raise
-            tier = "exact"
+            island_model = "exact"
             continue
         error = _find_gaps(run, law) if inverse else law.error
         if wanted & {"stiffness", "conductance"}:
@@ -71,7 +73,7 @@ def _law(run: Run, step: Step) -> None:
             break
         asked = max(0.1 * asked, MIN_LAW_RTOL)
     _keep(run, lambda name: getattr(law, name)(run.gap))
-    run.close(step, error, dataclasses.replace(step, tier=tier).tier_name)
+    run.close(step, error, dataclasses.replace(step, island_model=island_model).island_model_name)
 
 
 def _find_gaps(run: Run, law: ContactLaw) -> float:
@@ -118,14 +120,14 @@ def _contact(run: Run, step: Step) -> None:
     if problem.hardness is not None:
         known["hardness"] = problem.hardness
         if problem.theory == "mbma":
-            known |= {"reading": problem.reading, "rtol": step.rtol, "tier": step.tier}
+            known |= {"variant": problem.variant, "rtol": step.rtol, "island_model": step.island_model}
     found = contact(run.surface, E_star=problem.E_star, theory=problem.theory, **known)
     run.gap = found.separation
     _keep(run, lambda name: getattr(found, name))
     if problem.hardness is not None:
         names = ("yielded", "mean_pressure", "plane_separation", "incremental_stiffness")
         run.found |= {name: (("gap",), getattr(found, name)) for name in names}
-    run.close(step, float(found.error.max()), step.tier_name)
+    run.close(step, float(found.error.max()), step.island_model_name)
 
 
 def _asked(run: Run) -> Contact:
@@ -134,7 +136,7 @@ def _asked(run: Run) -> Contact:
     from mbma_tables.theories.mbma import Mbma
 
     problem = run.problem
-    theory = Mbma(reading=problem.reading, outside="nan") if problem.theory == "mbma" else problem.theory
+    theory = Mbma(variant=problem.variant, outside="nan") if problem.theory == "mbma" else problem.theory
     yields = {} if problem.hardness is None else {"hardness": problem.hardness, "E_star": problem.E_star}
     return contact(run.problem.surface, run.gap, theory=theory, **yields)
 
@@ -168,27 +170,27 @@ def _totals(run: Run, step: Step) -> None:
 
     problem = run.problem
     assert step.rtol is not None
-    assert step.tier is not None
+    assert step.island_model is not None
     own = {"force"} if "subscale_area" in problem.dropped else {"force", "area"}
     wanted = tuple(sorted(problem.outputs & own, reverse=True))
-    block = run.gap.size if step.tier_name in ("universal", "rigid") else BLOCK
+    block = run.gap.size if step.island_model_name in ("universal", "rigid") else BLOCK
     answers = []
     for first in range(0, run.gap.size, block):
         answer = contact(
             run.surface,
             run.gap[first : first + block],
-            tier=step.tier,
-            reading=problem.reading,
+            island_model=step.island_model,
+            variant=problem.variant,
             E_star=problem.E_star,
             rtol=step.rtol,
-            outside="exact" if step.tier_name in TABLES else "raise",
+            outside="exact" if step.island_model_name in TABLES else "raise",
             quantities=wanted,
         )
         answers.append(answer)
         run.progress(step.name, min(first + block, run.gap.size), run.gap.size)
     for name in wanted:
         run.found[name] = (("gap",), np.concatenate([getattr(answer, name) for answer in answers]))
-    run.close(step, max(float(answer.error.max()) for answer in answers), step.tier_name)
+    run.close(step, max(float(answer.error.max()) for answer in answers), step.island_model_name)
 
 
 def _islands(run: Run, step: Step) -> None:
@@ -201,7 +203,7 @@ def _islands(run: Run, step: Step) -> None:
     }
     fields, error = functions[step.name](run.problem, run.surface, run.gap, step)
     run.found |= fields
-    run.close(step, error, step.tier_name)
+    run.close(step, error, step.island_model_name)
 
 
 class OtherTheory(NamedTuple):

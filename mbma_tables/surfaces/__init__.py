@@ -1,1 +1,1 @@
-"""Rough surfaces: spectra, surfaces, readings, measured maps, the paper's cases."""
+"""Rough surfaces: spectra, surfaces, variants, measured maps, the paper's cases."""

@@ -109,7 +109,7 @@ class Treated:
         return record | {"told": told}
 
     def history(self, *notes: Mapping[str, Any], more: str = "") -> Provenance:
-        """All steps of a surface made of it: reading, treatment, what was done at the edges, and notes."""
+        """All steps of a surface made of it: variant, treatment, what was done at the edges, and notes."""
         edges = ("periodic" if self.plain else "under a window for the spectrum") + more
         return (self.read, *self.provenance, {"step": "edges", "kind": edges}, *notes)
 

@@ -20,7 +20,7 @@ TERMS = 8  # of a Chebyshev series
 LIMITS = {"mu": (0.0, np.inf), "spread": (0.0, np.inf), "sphere": (0.0, 1.0), "hurst": (0.0, 1.0)}
 ARGUMENTS = {schema.UNIVERSAL: ("X", "mu"), schema.ISLAND4D: ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")}
 REQUIRED = (
-    *("reading", "data_version", "values_sha256", "source_sha256", "certificate_points"),
+    *("variant", "data_version", "values_sha256", "source_sha256", "certificate_points"),
     *(f"largest_error_{function}" for function in schema.FUNCTIONS),
 )
 
@@ -36,7 +36,7 @@ ATTRIBUTES: tuple[tuple[str, type, Callable[[Any], bool], str], ...] = (
     ("offset|first|last", float, np.isfinite, "a finite number"),
     (".*_sha256", str, _matches("[0-9a-f]{64}"), "64 hexadecimal digits"),
     ("data_version", str, _matches("[0-9a-f]{12}"), "12 hexadecimal digits"),
-    ("reading|mbma_kind|transform", str, _matches("[A-Za-z][A-Za-z0-9_]{0,39}"), "a name"),
+    ("variant|mbma_kind|transform", str, _matches("[A-Za-z][A-Za-z0-9_]{0,39}"), "a name"),
     (".*", str, str.isprintable, "printable text"),
 )
 

@@ -25,7 +25,7 @@ from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.labels import apply_to_surface
 from mbma_tables.models import QUANTITIES, AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.readings import Reading
+from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import get_theory
 from mbma_tables.theories.mbma import Mbma, refuse_options_of_mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
@@ -41,8 +41,8 @@ KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact 
 def contact(
     surface: AnySurface,
     separation: ArrayLike | None = None,
-    tier: str | AnyModel = "universal",
-    reading: str | Reading = "reported",
+    island_model: str | AnyModel = "universal",
+    variant: str | Variant = "reported",
     E_star: ArrayLike = 1.0,
     rtol: float = 1e-8,
     outside: str = "raise",
@@ -79,11 +79,11 @@ def contact(
         Largest pressure p_m that the softer body bears, in the unit of `E_star` (of E* itself where that is 1). The
         theory's elastic answer goes through `mbma_tables.hardness`; u is then the mean gap with yielded points
         flattened. Infinite: nothing yields.
-    tier : {"universal", "island4d", "exact", "formula", "rigid"} or island model
+    island_model : {"universal", "island4d", "exact", "formula", "rigid"} or island model
         MBMA's island model: a table, the full solver, a closed form, or spheres that do not deform; or an object: a
         table from `open_table`, or a model of one's own with a `name` and ``answer(X, mu)``.
-    reading : {"reported", "printed", "fitted"} or Reading
-        Which reading of the paper's equations MBMA takes.
+    variant : {"reported", "printed", "fitted"} or Variant
+        Which variant of the paper's equations MBMA takes.
     E_star : array_like or str
         Effective modulus, (1 - nu1^2)/E1 + (1 - nu2^2)/E2 inverted; force is in its unit, which "100 GPa" names.
     rtol : float
@@ -139,12 +139,12 @@ def contact(
     E_star, units = modulus_and_units(E_star, surface)
     value, hardness = units.number(by, value), units.number("hardness", hardness)
     if theory == Mbma.name:
-        chosen: Theory = Mbma(tier, reading, rtol, outside, workers)
+        chosen: Theory = Mbma(island_model, variant, rtol, outside, workers)
     else:
         chosen = get_theory(theory)
         refuse_options_of_mbma(
-            tier=tier != "universal", reading=reading != "reported", rtol=rtol != 1e-8, outside=outside != "raise",
-            workers=workers != 1,
+            island_model=island_model != "universal", variant=variant != "reported", rtol=rtol != 1e-8,
+            outside=outside != "raise", workers=workers != 1,
         )  # fmt: skip
     options: dict[str, Any] = {
         "by": by,
@@ -218,7 +218,9 @@ def _contact(
         if name not in quantities:
             fields |= {name: None, f"{name}_by": None}
     own = source.theory
-    return Contact(theory=own.name, reading=own.reading_name, tier=own.tier_name, _source=source, **fields)
+    return Contact(
+        theory=own.name, variant=own.variant_name, island_model=own.island_model_name, _source=source, **fields
+    )
 
 
 def _places(
@@ -312,5 +314,10 @@ def _of_labelled(surface: AnySurface, value: Any, E_star: Any, hardness: Any, op
         fields |= {by: value, "separation": named(2 * value - surface.h_max, "separation", units)}
     source = options["source"]
     return Contact(
-        theory=theory.name, reading=theory.reading_name, tier=theory.tier_name, islands=None, _source=source, **fields
+        theory=theory.name,
+        variant=theory.variant_name,
+        island_model=theory.island_model_name,
+        islands=None,
+        _source=source,
+        **fields,
     )

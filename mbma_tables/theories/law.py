@@ -17,8 +17,8 @@ from mbma_tables.arguments import FloatArray, checked_hardness, hinted, number_i
 from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.models import MAX_RTOL, MIN_RTOL, AnyModel, get_model
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import get_theory
 from mbma_tables.theories import law_block as at
 from mbma_tables.theories import law_pieces as fit
@@ -46,8 +46,8 @@ SHARE = 0.1  # of the median of a theory's own errors: the polynomials need not 
 def contact_law(
     surface: AnySurface,
     rtol: float = 1e-8,
-    tier: str | AnyModel = "universal",
-    reading: str | Reading = "reported",
+    island_model: str | AnyModel = "universal",
+    variant: str | Variant = "reported",
     E_star: float | str = 1.0,
     *,
     theory: str | Theory | UserTheory = "mbma",
@@ -60,10 +60,10 @@ def contact_law(
     surface : Surface
         One surface, not a batch.
     rtol : float
-        Relative error asked of the polynomials against the theory (MBMA's tier), in [1e-9, 0.1]; no more than a
+        Relative error asked of the polynomials against the theory (MBMA's island model), in [1e-9, 0.1]; no more than a
         tenth of its own error, the median over gaps, is asked of another theory's.
-    tier, reading, E_star
-        As for `contact`; `tier` may be an island model of one's own.
+    island model, variant, E_star
+        As for `contact`; `island_model` may be an island model of one's own.
     theory : str or theory
         By name, one of `mbma_tables.theories.THEORIES`, or an object, as for `contact`.
     hardness : float
@@ -93,9 +93,9 @@ def contact_law(
     given, units = modulus_and_units(E_star, surface)
     modulus = number_in("E_star", given, sys.float_info.min, sys.float_info.max)
     if theory == Mbma.name:
-        chosen: Theory = Mbma(tier, reading)
+        chosen: Theory = Mbma(island_model, variant)
     else:
-        refuse_options_of_mbma(tier=tier != "universal", reading=reading != "reported")
+        refuse_options_of_mbma(island_model=island_model != "universal", variant=variant != "reported")
         chosen = get_theory(theory)
     if hardness is not math.inf:
         cap = checked_hardness(units.number("hardness", hardness))
@@ -113,22 +113,24 @@ def contact_law(
     asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
     facts = {"surface": one, "E_star": modulus, "units": units}
     if isinstance(chosen, Mbma):
-        return _mbma_law(one, chosen.tier, chosen.reading, asked, facts)
+        return _mbma_law(one, chosen.island_model, chosen.variant, asked, facts)
     try:
         return _theory_law(one, chosen, asked, facts)
     except ConvergenceError as fault:
         raise ConvergenceError(f"theory {chosen.name!r}: {fault}; ask for a larger rtol", fault.mask) from None
 
 
-def _mbma_law(surface: AnySurface, tier: Any, reading: Reading, rtol: float, facts: dict[str, Any]) -> ContactLaw:
+def _mbma_law(
+    surface: AnySurface, island_model: Any, variant: Variant, rtol: float, facts: dict[str, Any]
+) -> ContactLaw:
     """A law of the MBMA model: x = (h_max - d)/(2 h_max), powers of it below half of the boundary layer.
 
-    Where the tier's table does not cover the islands of full compression, the law ends with the table.
+    Where the island model's table does not cover the islands of full compression, the law ends with the table.
     """
     inner = max(0.1 * rtol, MIN_RTOL)
-    model = get_model(tier, inner, reading)
+    model = get_model(island_model, inner, variant)
     h_max = float(surface.h_max)
-    islands = _islands(surface, model, reading, inner)
+    islands = _islands(surface, model, variant, inner)
     end = islands.end
     errors: list[float] = []
 
@@ -138,14 +140,14 @@ def _mbma_law(surface: AnySurface, tier: Any, reading: Reading, rtol: float, fac
         if not found.all():
             high = h_max / float(surface.h_rms)
             raise OutOfRangeError(f"h_max is {high:g} h_rms, so high that force or area underflow")
-        found[1] = reading.area_of(found[1])
+        found[1] = variant.area_of(found[1])
         return found
 
     places = [kink / end for kink in islands.kinks]
     tolerance = min(rtol, RESOLVED)
     octaves = range(math.ceil(-math.log2(min(LAYER_SHARE * islands.layer / end, *places))), 1100)
     start, first = fit.first_record(lambda start: fit.power_record(values, start, POWERS), octaves, tolerance)
-    facts |= {"theory": "mbma", "reading": reading.name, "tier": model.name}
+    facts |= {"theory": "mbma", "variant": variant.name, "island_model": model.name}
     side, limits = fit.Side(-1, start, values, tuple(places)), (h_max - end, math.inf)
     return _finish(1 / end, [side], tolerance, first, limits, 0.0, lambda: max(errors), islands.leverage, facts)
 
@@ -160,12 +162,12 @@ class Islands(NamedTuple):
     totals: Callable[[FloatArray], tuple[FloatArray, float]]  # force with E* = 1, sum of areas; error, at h_max - d
 
 
-def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float) -> Islands:
+def _islands(surface: AnySurface, model: AnyModel, variant: Variant, rtol: float) -> Islands:
     h_rms, stress = float(surface.h_rms), 1.0
     shape: Any = surface
     if isinstance(surface, Surface):
-        if not surface.zeta_1 > reading.floor_u:
-            raise OutOfRangeError(f"q1/q0 must be greater than {reading.floor_u:g}, the reading's floor of zeta_u")
+        if not surface.zeta_1 > variant.floor_u:
+            raise OutOfRangeError(f"q1/q0 must be greater than {variant.floor_u:g}, the variant's floor of zeta_u")
         stress = float(surface.q0 * surface.s)
         shape = float(surface.hurst), float(surface.zeta_1), float(surface.h_max) / h_rms
     end = 2 * float(surface.h_max)
@@ -176,7 +178,7 @@ def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float
         return found, kept.error
 
     try:
-        kept = profile(shape, model, reading, rtol)
+        kept = profile(shape, model, variant, rtol)
     except ConvergenceError:
         if not isinstance(surface, Surface):
             raise
@@ -184,10 +186,10 @@ def _islands(surface: AnySurface, model: AnyModel, reading: Reading, rtol: float
         one = surface
 
         def of_gaps(depth: FloatArray) -> tuple[FloatArray, float]:
-            found = totals_of(model, Pairs.of(one, depth), reading, max(0.03 * rtol, MIN_RTOL))
+            found = totals_of(model, Pairs.of(one, depth), variant, max(0.03 * rtol, MIN_RTOL))
             return np.stack([found.force * stress, found.area]), float(found.error.max())
 
-        source, leverage, totals = source_of(shape, reading), ROUGH_LEVERAGE, of_gaps
+        source, leverage, totals = source_of(shape, variant), ROUGH_LEVERAGE, of_gaps
     else:
         # rounding may pass full compression
         end = min(float(kept.edges[-1]) * h_rms, end)
@@ -234,7 +236,7 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[st
         sides = [above._replace(start=start)]
     beyond = 0.0 if ends else 2 * float(theory.energy(surface, np.array(highest)))
     limits = 2 * lowest - h_max, math.inf if ends else 2 * highest - h_max
-    facts |= {"theory": theory.name, "reading": "", "tier": ""}
+    facts |= {"theory": theory.name, "variant": "", "island_model": ""}
 
     def own_error() -> float:
         return max(float(each.max()) for each in errors)

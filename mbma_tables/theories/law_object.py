@@ -72,8 +72,8 @@ class ContactLaw(Law, Displayed):
         With a hardness it does not hold within 1e-6 h_max of last contact, where islands turn elastic one by one.
     turning_point, area_turning_point : float or None
         Gap below which force, or area, falls again, where it does; inverses end there.
-    theory, reading, tier : str
-        What made it; reading and tier are empty where the theory is not MBMA.
+    theory, variant, island_model : str
+        What made it; variant and island model are empty where the theory is not MBMA.
     block : ndarray
         The polynomials, in the layout that `mbma_tables/core/mbma.h` describes.
     errors : ndarray, shape (records, 2)
@@ -103,8 +103,8 @@ class ContactLaw(Law, Displayed):
     turning_point: float | None
     area_turning_point: float | None
     theory: str
-    reading: str
-    tier: str
+    variant: str
+    island_model: str
     block: FloatArray
     errors: FloatArray
     units: Units = UNKNOWN
@@ -286,7 +286,7 @@ class ContactLaw(Law, Displayed):
 
     def _facts(self) -> dict[str, str]:
         unit, modulus = self.units.length or "1", unit_of("force", self.units)
-        known = {"theory": self.theory, "reading": self.reading, "tier": self.tier}
+        known = {"theory": self.theory, "variant": self.variant, "island_model": self.island_model}
         ends = np.array([max(self.lowest, -self.h_max), self.h_max if math.isinf(self.highest) else self.highest])
         known["resolution"] = "" if self.surface is None else self.surface.resolution
         facts = {name: text for name, text in known.items() if text}

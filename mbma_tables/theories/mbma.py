@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.arguments import FloatArray, whole_number_in
 from mbma_tables.errors import InputError
-from mbma_tables.models import BOTH, QUANTITIES, TIERS, AnyModel, check_outside, get_model, tier_name
+from mbma_tables.models import BOTH, ISLAND_MODELS, QUANTITIES, AnyModel, check_outside, get_model, island_model_name
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.readings import NAMED, Reading, get_reading
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
+from mbma_tables.surfaces.variants import NAMED, Variant, get_variant
 from mbma_tables.theories.differences import differences
 from mbma_tables.theories.protocol import FEW_LOOKS, SCAN, Theory, TheoryAnswer, select
 from mbma_tables.totals.contact import Totals, totals_at
@@ -29,11 +29,11 @@ MAX_AREA = 0.1  # above it islands begin to lie on one another (docs/fidelity.md
 
 
 class Mbma(Theory):
-    """The MBMA model of one tier and reading.
+    """The MBMA model of one island model and variant.
 
     Parameters
     ----------
-    tier, reading, rtol, outside, workers
+    island model, variant, rtol, outside, workers
         As for `mbma_tables.contact`.
     """
 
@@ -42,21 +42,21 @@ class Mbma(Theory):
 
     def __init__(
         self,
-        tier: str | AnyModel = "universal",
-        reading: str | Reading = "reported",
+        island_model: str | AnyModel = "universal",
+        variant: str | Variant = "reported",
         rtol: float = 1e-8,
         outside: str = "raise",
         workers: int = 1,
     ) -> None:
         check_outside(outside)
-        self.tier, self.reading, self.rtol, self.outside = tier, get_reading(reading), rtol, outside
+        self.island_model, self.variant, self.rtol, self.outside = island_model, get_variant(variant), rtol, outside
         self.workers = whole_number_in("workers", workers, 1, MOST_WORKERS)
-        self.reading_name, self.tier_name = self.reading.name, tier_name(tier)
+        self.variant_name, self.island_model_name = self.variant.name, island_model_name(island_model)
 
     @functools.cached_property
     def model(self) -> AnyModel:
-        """The island model of the tier."""
-        return get_model(self.tier, self.rtol, self.reading)
+        """The island model as an object."""
+        return get_model(self.island_model, self.rtol, self.variant)
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if name != "model"}
@@ -72,12 +72,12 @@ class Mbma(Theory):
         """Force and area at separations d [length] of the surface's broadcast shape."""
         which = BOTH if len(quantities) > 1 else QUANTITIES.index(quantities[0])
         return totals_at(
-            surface, np.asarray(separation, float), self.model, self.reading, self.rtol, E_star, self.outside,
+            surface, np.asarray(separation, float), self.model, self.variant, self.rtol, E_star, self.outside,
             derivatives, which, self.workers,
         )  # fmt: skip
 
     def _has_slopes(self, surface: AnySurface) -> bool:
-        by_table = self.tier_name == "universal" and self.outside != "exact"
+        by_table = self.island_model_name == "universal" and self.outside != "exact"
         return by_table or isinstance(surface, MeasuredSurface)
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
@@ -99,7 +99,7 @@ class Mbma(Theory):
         return tuple(_at_mean_separation(by) for by in (found.force_by, found.area_by))
 
     def looks(self, surface: AnySurface) -> int:
-        """Few of tiers that take long."""
+        """Few of island models that take long."""
         return super().looks(surface) if self._has_slopes(surface) else FEW_LOOKS
 
     def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
@@ -111,7 +111,7 @@ class Mbma(Theory):
         return found, np.full(found.shape, np.nan), False
 
     def _differences(self, surface: AnySurface, u: FloatArray) -> FloatArray:
-        """-dF/du by differences, for tiers without derivatives."""
+        """-dF/du by differences, for island models without derivatives."""
         h_max, shape = np.asarray(surface.h_max), np.broadcast_shapes(u.shape, surface.shape)
         gap, depth = (np.broadcast_to(each, shape).ravel() for each in (2 * u - h_max, h_max - u))
 
@@ -130,7 +130,7 @@ class Mbma(Theory):
         """Mean separations [length] at which the largest island reaches the floor of zeta_d, and of zeta_u."""
         if not isinstance(surface, Surface):
             return np.empty(0)
-        places = np.array(kinks(surface.hurst, surface.zeta_1, self.reading)) * np.asarray(surface.h_rms)
+        places = np.array(kinks(surface.hurst, surface.zeta_1, self.variant)) * np.asarray(surface.h_rms)
         u = np.asarray(surface.h_max) - places / 2
         return np.asarray(u[u > 0] if surface.shape == () else np.maximum(u, 0))
 
@@ -139,7 +139,7 @@ class Mbma(Theory):
         lowest = np.zeros(surface.shape)
         if isinstance(surface, MeasuredSurface):
             # islands up to an approach of 2 h_max make u = 0
-            kept = profile(surface, self.model, self.reading, QUADRATURE_SHARE * self.rtol, self.outside)
+            kept = profile(surface, self.model, self.variant, QUADRATURE_SHARE * self.rtol, self.outside)
             end = float(kept.edges[-1]) / (2 * kept.source.peak)
             lowest = np.asarray(surface.h_max * (1 - end))
         return self._maximum(surface, quantity, lowest), np.asarray(surface.h_max, dtype=float)
@@ -147,23 +147,27 @@ class Mbma(Theory):
     def softening(self, surface: AnySurface) -> FloatArray:
         """Mean separation [length] below which stiffness falls with compression; NaN where it does not."""
         unknown = np.full(surface.shape, np.nan)
-        if self._has_slopes(surface) or self.tier_name not in TIERS or self.tier_name == "rigid":
+        if (
+            self._has_slopes(surface)
+            or self.island_model_name not in ISLAND_MODELS
+            or self.island_model_name == "rigid"
+        ):
             return self._maximum(surface, "stiffness", unknown)
         # of the same islands by the table, whose derivatives are at hand
-        return Mbma("universal", self.reading, outside="nan")._maximum(surface, "stiffness", unknown)
+        return Mbma("universal", self.variant, outside="nan")._maximum(surface, "stiffness", unknown)
 
     def scatter_name(self, surface: AnySurface) -> str:
-        """That of the reading: those with a name were compared with boundary elements, no other was."""
-        name = self.reading.name
-        if self.reading not in NAMED.values():
-            return f"{self.name}, a reading of one's own"
+        """That of the variant: those with a name were compared with boundary elements, no other was."""
+        name = self.variant.name
+        if self.variant not in NAMED.values():
+            return f"{self.name}, a variant of one's own"
         return self.name if name == "reported" else f"{self.name}_{name}"
 
     def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> dict[str, Any]:
         """Where the paper's own assumptions fail."""
         return {
             f"areas of islands are added, A/A0 is above {MAX_AREA:g}": (answer.area > MAX_AREA)
-            & (self.reading.addition == "sum"),
+            & (self.variant.addition == "sum"),
             "stiffness falls with compression here, which no simulation shows": mean_separation
             < self.softening(surface),
         }

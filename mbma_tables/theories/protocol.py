@@ -57,7 +57,7 @@ class Theory(abc.ABC):
     """A theory, and what follows from its forces."""
 
     name: str
-    reading_name = tier_name = ""  # what results call its reading of the paper and its island model
+    variant_name = island_model_name = ""  # what results call its variant of the paper and its island model
     advice = ""  # one line beside each answer
     reached = 0.0  # by how much, relatively, a wanted value may be more than the largest
     ends_at_h_max = True  # whether force vanishes at u = h_max; else its Gaussian heights have no end

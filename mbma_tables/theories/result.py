@@ -55,10 +55,10 @@ class Contact(Displayed):
     area : ndarray or None
         A/A0, None where not asked for. MBMA does not end at 1 under full compression, and this is not clamped.
     error : ndarray
-        Bound on the relative numerical error of both against the theory (for "mbma" against what the tier stands
-        for), NaN where not known. The theory's own distance from simulation is another number, `scatter`.
-    theory, reading, tier : str
-        What made them; reading and tier are empty where the theory is not MBMA.
+        Bound on the relative numerical error of both against the theory (for "mbma" against its island model),
+        NaN where not known. The theory's own distance from simulation is another number, `scatter`.
+    theory, variant, island_model : str
+        What made them; variant and island model are empty where the theory is not MBMA.
     islands : int or None
         Islands evaluated; None where that is left to dask, or where there are none.
     force_by, area_by, separation_by : dict of ndarray, or None
@@ -73,8 +73,8 @@ class Contact(Displayed):
     area: Numbers
     error: Numbers
     theory: str
-    reading: str
-    tier: str
+    variant: str
+    island_model: str
     islands: int | None
     force_by: dict[str, Numbers] | None = None
     area_by: dict[str, Numbers] | None = None
@@ -89,7 +89,7 @@ class Contact(Displayed):
 
     def _facts(self) -> dict[str, str]:
         units, source = self.units, self._source
-        known = {"theory": self.theory, "reading": self.reading, "tier": self.tier}
+        known = {"theory": self.theory, "variant": self.variant, "island_model": self.island_model}
         known["resolution"] = source.surface.resolution
         facts = {name: text for name, text in known.items() if text}
         for name in ("mean_separation", "force", "area"):
@@ -142,7 +142,7 @@ class Contact(Displayed):
         fields = [self.mean_separation / surface.h_rms, self.force, self.area, self.scatter, self.area_scatter]
         if leakage:
             fields += [self.leakage.conductance, self.leakage.scatter]
-        label = theory_label(self.theory) + (f", {self.reading}" if self.reading else "")
+        label = theory_label(self.theory) + (f", {self.variant}" if self.variant else "")
         return Curve(label, *(np.ravel(field)[order] for field in fields))
 
     @functools.cached_property

@@ -17,10 +17,10 @@ from mbma_tables.errors import InputError
 from mbma_tables.models import AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights
-from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.resolution import extrapolated
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
+from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.contact import contact, one_known
 from mbma_tables.theories.differences import differences
@@ -92,8 +92,8 @@ def sensitivity(
     E_star: float | str = 1.0,
     ranges: Mapping[str, tuple[Any, Any]] | None = None,
     theory: str | Theory | UserTheory = "mbma",
-    tier: str | AnyModel = "universal",
-    reading: str | Reading = "reported",
+    island_model: str | AnyModel = "universal",
+    variant: str | Variant = "reported",
     rtol: float = 1e-8,
 ) -> Sensitivity:
     """How much each number of a surface matters to force, area, stiffness and conductance, by any theory.
@@ -113,7 +113,7 @@ def sensitivity(
         Effective modulus, as for `contact`.
     ranges : mapping of pairs, optional
         Between what a parameter may lie: {"hurst": (0.6, 0.9), "h_max": ("2 um", "4 um")}.
-    theory, tier, reading, rtol : optional
+    theory, island_model, variant, rtol : optional
         As for `contact`.
 
     Returns
@@ -136,7 +136,7 @@ def sensitivity(
     >>> f"stiffness {low:.3g} to {high:.3g} {unit_of('stiffness', found.units)}"
     'stiffness 0.0885 to 0.094 GPa/um'
     """
-    options: Any = {"theory": theory, "tier": tier, "reading": reading, "rtol": rtol}
+    options: Any = {"theory": theory, "island_model": island_model, "variant": variant, "rtol": rtol}
     by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
     modulus, units = modulus_and_units(E_star, surface)
     make, parameters = _parameters(surface) if isinstance(surface, Surface) else _of_spectrum(surface, theory)

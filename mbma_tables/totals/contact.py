@@ -24,8 +24,8 @@ from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.models import AREA, BOTH, FORCE, AnyModel
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.variants import Variant
 from mbma_tables.totals.island_sum import BY_COMPRESSION, QUADRATURE_SHARE, Pairs, sums_by_table, totals_of
 from mbma_tables.totals.profile import Profile, profile
 
@@ -39,7 +39,7 @@ LEAST, SUBNORMAL = 1e-290, float(np.finfo(float).smallest_subnormal)
 class Totals:
     """Force and area of the MBMA model at given separations, its fields those of `Contact`.
 
-    `error` is of quadrature and islands together, against the model that the tier stands for: for "rigid" spheres that
+    `error` is of quadrature and islands together, against the island model: for "rigid" spheres that
     do not deform, far from elastic ones. Derivatives on a surface that is its own spectrum are by the separation alone.
     """
 
@@ -52,7 +52,7 @@ class Totals:
 
 
 def totals_at(
-    surface: AnySurface, gap: FloatArray, model: AnyModel, reading: Reading, rtol: float, modulus: Any = 1.0,
+    surface: AnySurface, gap: FloatArray, model: AnyModel, variant: Variant, rtol: float, modulus: Any = 1.0,
     outside: str = "raise", derivatives: bool | str = False, which: int = BOTH, workers: int = 1,
 ) -> Totals:  # fmt: skip
     """Force and area at separations d of the surface's broadcast shape; `derivatives` "separation" are those alone."""
@@ -64,22 +64,22 @@ def totals_at(
         stress = modulus
         if isinstance(surface, Surface):
             stress, zeta_1 = modulus * surface.q0 * surface.s, np.asarray(surface.zeta_1)
-            allowed = f"greater than {reading.floor_u:g}, the reading's floor of zeta_u"
-            require("q1/q0", zeta_1, zeta_1 > reading.floor_u, allowed)
+            allowed = f"greater than {variant.floor_u:g}, the variant's floor of zeta_u"
+            require("q1/q0", zeta_1, zeta_1 > variant.floor_u, allowed)
         if isinstance(surface, Surface) and derivatives is True:
             pairs = Pairs.of(surface, depth)
-            sums, error, islands, _ = sums_by_table(model, pairs, reading, rtol, outside, workers)
+            sums, error, islands, _ = sums_by_table(model, pairs, variant, rtol, outside, workers)
             force, area = sums[:, 0, 0], sums[:, 1, 0]
             force_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
         else:
             sums, error, islands = _totals(
-                model, surface, depth, reading, rtol, outside, which, bool(derivatives), workers
+                model, surface, depth, variant, rtol, outside, which, bool(derivatives), workers
             )
             force, area = sums[:2]
             if derivatives:
                 force_slope, area_slope = sums[2:].reshape(2, *shape) / surface.h_rms
                 force_by, area_by = {"separation": -stress * force_slope}, {"separation": -area_slope}
-        if area_by is not None and reading.addition == "cover":
+        if area_by is not None and variant.addition == "cover":
             kept = np.exp(-area.reshape(shape))  # dA = exp(-sum) dsum
             area_by = {name: (slope * kept)[()] for name, slope in area_by.items()}
     except (ConvergenceError, OutOfRangeError) as fault:
@@ -92,7 +92,7 @@ def totals_at(
         error[tiny] = np.minimum(error[tiny] + SUBNORMAL / np.minimum(force, area)[tiny].clip(SUBNORMAL), 1.0)
     return Totals(
         force=(force.reshape(shape) * stress)[()] if which != AREA else None,
-        area=reading.area_of(area).reshape(shape)[()] if which != FORCE else None,
+        area=variant.area_of(area).reshape(shape)[()] if which != FORCE else None,
         error=error.reshape(shape)[()],
         islands=islands,
         force_by=force_by if which != AREA else None,
@@ -101,7 +101,7 @@ def totals_at(
 
 
 def _by_profiles(
-    model: AnyModel, surface: AnySurface, depth: FloatArray, reading: Reading, rtol: float, outside: str, slopes: bool,
+    model: AnyModel, surface: AnySurface, depth: FloatArray, variant: Variant, rtol: float, outside: str, slopes: bool,
     workers: int,
 ) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:  # fmt: skip
     """Sums, perhaps their slopes by the compression, error and islands, by profiles of the surfaces.
@@ -125,7 +125,7 @@ def _by_profiles(
         if not places.size:
             continue
         try:
-            kept = profile(shapes[k], model, reading, QUADRATURE_SHARE * rtol, outside)
+            kept = profile(shapes[k], model, variant, QUADRATURE_SHARE * rtol, outside)
         except (ConvergenceError, OutOfRangeError):
             if not isinstance(surface, Surface):
                 raise
@@ -144,7 +144,7 @@ def _by_profiles(
 
 
 def _totals(
-    model: AnyModel, surface: AnySurface, depth: FloatArray, reading: Reading, rtol: float, outside: str, which: int,
+    model: AnyModel, surface: AnySurface, depth: FloatArray, variant: Variant, rtol: float, outside: str, which: int,
     slopes: bool, workers: int,
 ) -> tuple[FloatArray, FloatArray, int]:  # fmt: skip
     """Force, area and perhaps slopes of both by the compression as rows, their error, islands.
@@ -154,7 +154,7 @@ def _totals(
     count, size = math.prod(surface.shape), depth.size
     own = not isinstance(surface, Surface)
     if own or (isinstance(model, UniversalModel) and count <= max(FEW_SURFACES, size // MANY_GAPS)):
-        sums, error, islands, left = _by_profiles(model, surface, depth, reading, rtol, outside, slopes, workers)
+        sums, error, islands, left = _by_profiles(model, surface, depth, variant, rtol, outside, slopes, workers)
     else:
         sums, error, islands, left = np.empty((4 if slopes else 2, size)), np.empty(size), 0, np.arange(size)
     if not left.size:
@@ -163,7 +163,7 @@ def _totals(
         sums[:, left] = error[left] = np.nan
         if outside == "raise":
             raise OutOfRangeError(
-                f"islands of {left.size} of {size} entries lie outside of tier {model.name!r}, the first at "
+                f"islands of {left.size} of {size} entries lie outside of island model {model.name!r}, the first at "
                 f"h_max - d = {depth.ravel()[left[0]]:g}; outside='exact' solves these",
                 np.isin(np.arange(size), left),
             )
@@ -173,10 +173,10 @@ def _totals(
     rest = rest if left.size == size else rest.some(left)
     try:
         if slopes:
-            columns, error[left], more, _ = sums_by_table(model, rest, reading, rtol, outside, workers)
+            columns, error[left], more, _ = sums_by_table(model, rest, variant, rtol, outside, workers)
             sums[:, left] = columns[:, :, [0, BY_COMPRESSION]].T.reshape(4, -1)
         else:
-            found = totals_of(model, rest, reading, rtol, outside, which, workers)
+            found = totals_of(model, rest, variant, rtol, outside, which, workers)
             sums[0, left], sums[1, left], error[left], more = found
     except (ConvergenceError, OutOfRangeError) as fault:
         mask = np.zeros(size, dtype=bool)

@@ -21,10 +21,10 @@ from mbma_tables.arguments import (
 )
 from mbma_tables.errors import InputError
 from mbma_tables.islands.geometry import geometry, measured_islands
-from mbma_tables.models import AnyModel, answer_islands, get_model, tier_name
+from mbma_tables.models import AnyModel, answer_islands, get_model, island_model_name
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.readings import Reading, get_reading
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
+from mbma_tables.surfaces.variants import Variant, get_variant
 from mbma_tables.units import modulus_and_units
 
 
@@ -52,7 +52,7 @@ class Island:
         F^i [E_star length^2] and A^i [length^2] (40).
     error : ndarray
         Bound on the relative error of both.
-    reading, tier : str
+    variant, island_model : str
         What made them.
     """
 
@@ -70,8 +70,8 @@ class Island:
     force: Numbers
     area: Numbers
     error: Numbers
-    reading: str
-    tier: str
+    variant: str
+    island_model: str
 
 
 GEOMETRY = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
@@ -91,8 +91,8 @@ def scale_area(g: dict[str, FloatArray]) -> FloatArray:
 def island(
     surface: AnySurface,
     delta: ArrayLike,
-    tier: str | AnyModel = "universal",
-    reading: str | Reading = "reported",
+    island_model: str | AnyModel = "universal",
+    variant: str | Variant = "reported",
     E_star: ArrayLike = 1.0,
     rtol: float = 1e-9,
 ) -> Island:
@@ -104,10 +104,10 @@ def island(
         One surface or a batch; it broadcasts against `delta`.
     delta : array_like
         Approach z_max - d of the island, positive, in the surface's unit or, as text, with its own.
-    tier : {"universal", "island4d", "exact", "formula", "rigid"} or island model
+    island_model : {"universal", "island4d", "exact", "formula", "rigid"} or island model
         The island model, by name or an object, as for `contact`.
-    reading : {"reported", "printed", "fitted"} or Reading
-        Which reading of the paper's equations.
+    variant : {"reported", "printed", "fitted"} or Variant
+        Which variant of the paper's equations.
     E_star : array_like or str
         Effective modulus, perhaps with its unit, "100 GPa"; force is in that unit times length squared.
     rtol : float
@@ -131,12 +131,12 @@ def island(
     E_star, units = modulus_and_units(E_star, surface)
     delta = units.number("delta", delta)
     if any_labelled(surface, delta, E_star):
-        return _of_labelled(surface, delta, tier, reading, E_star, rtol)
+        return _of_labelled(surface, delta, island_model, variant, E_star, rtol)
     approach = finite_array("delta", delta)
     require("delta", approach, approach > 0, "positive")
     modulus = positive_modulus(E_star)
-    rule = get_reading(reading)
-    model = get_model(tier, rtol, rule)
+    rule = get_variant(variant)
+    model = get_model(island_model, rtol, rule)
     broadcast_shape(delta=approach, surface=surface.h_rms, E_star=modulus)
     shape = broadcast_shape(delta=approach, surface=surface.h_rms)
     g, s, q0 = islands_of(surface, np.broadcast_to(approach, shape), rule)
@@ -150,22 +150,22 @@ def island(
         force=(modulus * s / q0 * scale_force(g) * phi.phi_F)[()],
         area=(scale_area(g) * phi.phi_A / q0**2)[()],
         error=np.asarray(phi.error)[()],
-        reading=rule.name,
-        tier=model.name,
+        variant=rule.name,
+        island_model=model.name,
         **values,
     )
 
 
-def islands_of(surface: AnySurface, delta: FloatArray, reading: Reading) -> tuple[dict[str, FloatArray], Any, Any]:
+def islands_of(surface: AnySurface, delta: FloatArray, variant: Variant) -> tuple[dict[str, FloatArray], Any, Any]:
     """`FIELDS` of islands at approaches > 0 [length], their Hurst exponent where they have one, and units s and q0."""
     if isinstance(surface, MeasuredSurface):
-        return measured_islands(surface, delta, reading), 1.0, 1.0
+        return measured_islands(surface, delta, variant), 1.0, 1.0
     assert isinstance(surface, Surface)
     largest = np.asarray(surface.zeta_1)
-    allowed = f"above floor_u = {reading.floor_u:g} of the reading {reading.name!r}"
-    require("q1/q0", largest, largest > reading.floor_u, allowed)
+    allowed = f"above floor_u = {variant.floor_u:g} of the variant {variant.name!r}"
+    require("q1/q0", largest, largest > variant.floor_u, allowed)
     hurst, zeta_1 = (np.broadcast_to(array, delta.shape) for array in (surface.hurst, surface.zeta_1))
-    g = geometry(np.asarray(delta / surface.h_rms), hurst, zeta_1, reading)
+    g = geometry(np.asarray(delta / surface.h_rms), hurst, zeta_1, variant)
     return g | {"hurst": hurst}, surface.s, surface.q0
 
 
@@ -173,13 +173,13 @@ def refuse_bands(model: AnyModel) -> None:
     """Refuse an island model of self-affine bands alone."""
     if model.name == "island4d":
         raise InputError(
-            f"tier {model.name!r} holds islands of self-affine surfaces alone: ask tier 'universal' or 'exact', "
+            f"island model {model.name!r} holds islands of self-affine surfaces alone: use 'universal' or 'exact', "
             "or surface.fit()"
         )
 
 
 def _of_labelled(
-    surface: AnySurface, delta: Any, tier: str | AnyModel, reading: str | Reading, E_star: Any, rtol: float
+    surface: AnySurface, delta: Any, island_model: str | AnyModel, variant: str | Variant, E_star: Any, rtol: float
 ) -> Island:
     """`island` of DataArrays, lazily where they are."""
     # xarray comes in with its own objects
@@ -188,9 +188,11 @@ def _of_labelled(
     names = (*GEOMETRY, "force", "area", "error")
 
     def answer(block: AnySurface, own: Any, modulus: Any) -> tuple[Any, ...]:
-        found = island(block, own, tier, reading, modulus, rtol)
+        found = island(block, own, island_model, variant, modulus, rtol)
         return tuple(np.broadcast_to(getattr(found, name), np.shape(found.force)) for name in names)
 
     outputs = apply_to_surface(answer, surface, {"delta": delta, "E_star": E_star}, len(names))
     values = {name: found.rename(name) for name, found in zip(names, outputs, strict=True)}
-    return Island(delta=delta, reading=get_reading(reading).name, tier=tier_name(tier), **values)
+    return Island(
+        delta=delta, variant=get_variant(variant).name, island_model=island_model_name(island_model), **values
+    )

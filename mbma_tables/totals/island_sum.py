@@ -20,8 +20,8 @@ from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.islands.geometry import floor_offset, geometry
 from mbma_tables.models import AREA, BOTH, FORCE, AnyModel, answer_islands, exact_model
 from mbma_tables.models.universal import UniversalModel
-from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.surfaces.variants import Variant
 from mbma_tables.totals.island import scale_area, scale_force
 
 QUADRATURE_SHARE = 0.9  # of the tolerance asked for; a table's own error comes on top
@@ -68,17 +68,17 @@ def island_density(height: Any, D_d: Any, sigma_d: Any) -> Any:
     return D_d * np.exp(-0.5 * height * height) / (math.sqrt(2.0 * math.pi) * sigma_d)
 
 
-def jacobian_below(rms_over_s: Any, reading: Reading) -> Any:
+def jacobian_below(rms_over_s: Any, variant: Variant) -> Any:
     """K1 (47) below the kink, or what (46) gives."""
-    printed = reading.jacobian == "printed"
-    return 1.0 - 4.0 / 3.0 * reading.beta / (1.0 if printed else rms_over_s) if printed or reading.offset else 1.0
+    printed = variant.jacobian == "printed"
+    return 1.0 - 4.0 / 3.0 * variant.beta / (1.0 if printed else rms_over_s) if printed or variant.offset else 1.0
 
 
-def kinks(hurst: Any, zeta_1: Any, reading: Reading) -> tuple[Any, Any]:
+def kinks(hurst: Any, zeta_1: Any, variant: Variant) -> tuple[Any, Any]:
     """delta/h_rms at which zeta_d (27) and zeta_u (30) reach their floors; arrays of one shape."""
     rms_over_s = np.sqrt(-np.expm1(-2 * hurst * np.log(zeta_1)))
-    slope_d, slope_u = 4 / 3 * reading.beta, reading.phi / (1 + reading.phi) * rms_over_s
-    at_d, at_u = (np.sqrt(floor_offset(hurst, zeta_1, floor)) for floor in (reading.floor_d, reading.floor_u))
+    slope_d, slope_u = 4 / 3 * variant.beta, variant.phi / (1 + variant.phi) * rms_over_s
+    at_d, at_u = (np.sqrt(floor_offset(hurst, zeta_1, floor)) for floor in (variant.floor_d, variant.floor_u))
     return (at_d / slope_d)[()], (at_u / slope_u)[()]
 
 
@@ -165,11 +165,11 @@ def integrate(
 
 
 def sum_islands(
-    pairs: Pairs, reading: Reading, model: AnyModel, rtol: float, outside: str = "raise", which: int = BOTH
+    pairs: Pairs, variant: Variant, model: AnyModel, rtol: float, outside: str = "raise", which: int = BOTH
 ) -> Totals:
     """Totals by any island model: adaptive quadrature of a batch of pairs to `rtol`."""
     count = pairs.compression.size
-    kink_d, kink_u = kinks(pairs.hurst, pairs.zeta_1, reading)
+    kink_d, kink_u = kinks(pairs.hurst, pairs.zeta_1, variant)
     worst_island = np.zeros(count)
     # as in the core: approach = scale sinh(t)^2 up to the floor of zeta_d, and from there on as it is
     scale = STRETCH * pairs.zeta_1**-pairs.hurst
@@ -182,7 +182,7 @@ def sum_islands(
         curved = np.minimum(t, own_turn)
         approach = np.where(t < own_turn, own_scale * np.sinh(curved) ** 2, own_kink + (t - own_turn))
         stretch = np.where(t < own_turn, own_scale * np.sinh(2 * curved), 1.0)
-        g = geometry(approach, own.hurst, own.zeta_1, reading)
+        g = geometry(approach, own.hurst, own.zeta_1, variant)
         try:
             phi = answer_islands(model, g | {"hurst": np.broadcast_to(own.hurst, t.shape)}, outside, which)
         except (ConvergenceError, OutOfRangeError) as fault:
@@ -193,7 +193,7 @@ def sum_islands(
         # z'/sigma_d (41); z_max is counted down from h_max, so nothing cancels at first contact
         height = ((own.peak - (own.compression - approach)) * rms_over_s - g["h_d"]) / g["sigma_d"]
         weight = island_density(height, g["D_d"], g["sigma_d"]) * rms_over_s * stretch
-        weight *= np.where(approach < own_kink, jacobian_below(rms_over_s, reading), 1.0)
+        weight *= np.where(approach < own_kink, jacobian_below(rms_over_s, variant), 1.0)
         parts = {FORCE: scale_force(g) * phi.phi_F, AREA: scale_area(g) * phi.phi_A}
         return np.stack([part * weight for name, part in parts.items() if which in (name, BOTH)], axis=-1)
 
@@ -210,7 +210,7 @@ def sum_islands(
 
 
 def totals_of(
-    model: AnyModel, pairs: Pairs, reading: Reading, rtol: float, outside: str = "raise", which: int = BOTH,
+    model: AnyModel, pairs: Pairs, variant: Variant, rtol: float, outside: str = "raise", which: int = BOTH,
     workers: int = 1,
 ) -> Totals:  # fmt: skip
     """Totals by an island model, in the way that suits its class; errors carry a mask of the pairs.
@@ -218,12 +218,12 @@ def totals_of(
     `workers` threads share the pairs of the universal table.
     """
     if not isinstance(model, UniversalModel):
-        return sum_islands(pairs, reading, model, SUM_SHARE * rtol, outside, which)
-    out, error, islands, missing = sums_by_table(model, pairs, reading, rtol, outside, workers, slopes=False)
+        return sum_islands(pairs, variant, model, SUM_SHARE * rtol, outside, which)
+    out, error, islands, missing = sums_by_table(model, pairs, variant, rtol, outside, workers, slopes=False)
     force, area = out[:, :, 0].T
     if missing.size and outside == "exact":
         try:
-            found = sum_islands(pairs.some(missing), reading, exact_model(rtol), SUM_SHARE * rtol, which=which)
+            found = sum_islands(pairs.some(missing), variant, exact_model(rtol), SUM_SHARE * rtol, which=which)
         except ConvergenceError as fault:
             fault.mask = np.isin(np.arange(error.size), missing[fault.mask])
             raise
@@ -233,17 +233,17 @@ def totals_of(
 
 
 def sums_by_table(
-    model: AnyModel, pairs: Pairs, reading: Reading, rtol: float, outside: str, workers: int, slopes: bool = True
+    model: AnyModel, pairs: Pairs, variant: Variant, rtol: float, outside: str, workers: int, slopes: bool = True
 ) -> tuple[FloatArray, FloatArray, int, NDArray[np.intp]]:
     """Totals, (pairs, 2, COLUMNS or 1) with or without derivatives, the bound on their error, and the islands.
 
     The last are the pairs that the table does not cover, which are NaN.
     """
     if not isinstance(model, UniversalModel):
-        raise InputError(f"derivatives come from tier 'universal', {model.name!r} has none")
+        raise InputError(f"derivatives come from island model 'universal', {model.name!r} has none")
     if slopes and outside == "exact":
         raise InputError("derivatives come from the universal table: outside must be 'raise' or 'nan' with them")
-    count, numbers = pairs.compression.size, reading.numbers
+    count, numbers = pairs.compression.size, variant.numbers
     status, bound = np.empty(count, np.uint8), np.empty(count)
     out = np.empty((count, 2, COLUMNS if slopes else 1))
 

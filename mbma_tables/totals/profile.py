@@ -24,8 +24,8 @@ from mbma_tables.islands.geometry import floors_of, geometry, measured_islands, 
 from mbma_tables.models import AnyModel, answer_islands
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.power_laws import Place
-from mbma_tables.surfaces.readings import Reading
 from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.surfaces.variants import Variant
 from mbma_tables.totals.island import refuse_bands, scale_area, scale_force
 from mbma_tables.totals.island_sum import island_density, jacobian_below, kinks
 from mbma_tables.totals.panels import COUNTED, NARROW, POWERS, SHARES, Nodes, Panels
@@ -60,26 +60,26 @@ class Source(NamedTuple):
         return ((self.peak + x) * self.h_rms - g["h_d"]) / g["sigma_d"], self.h_rms / g["sigma_d"]
 
 
-def source_of(surface: tuple[float, float, float] | MeasuredSurface, reading: Reading) -> Source:
+def source_of(surface: tuple[float, float, float] | MeasuredSurface, variant: Variant) -> Source:
     """The islands of a surface; of a self-affine one by hurst, zeta_1 and h_max/h_rms."""
     if not isinstance(surface, MeasuredSurface):
         hurst, zeta_1, peak = surface
         h_rms = math.sqrt(-math.expm1(-2 * hurst * math.log(zeta_1)))
-        breaks = np.array(kinks(hurst, zeta_1, reading))
+        breaks = np.array(kinks(hurst, zeta_1, variant))
 
         def islands(x: FloatArray) -> dict[str, FloatArray]:
-            return geometry(x, hurst, zeta_1, reading) | {"hurst": np.full(x.size, hurst)}
+            return geometry(x, hurst, zeta_1, variant) | {"hurst": np.full(x.size, hurst)}
 
-        jacobian = float(jacobian_below(h_rms, reading))
+        jacobian = float(jacobian_below(h_rms, variant))
         return Source(islands, h_rms, peak, zeta_1**-hurst, float(breaks[0]), breaks, jacobian)
-    own, h_rms, laws, floors = surface, float(surface.h_rms), surface.laws, floors_of(surface, reading)
+    own, h_rms, laws, floors = surface, float(surface.h_rms), surface.laws, floors_of(surface, variant)
     roots = np.sqrt(laws.above(Place(np.arange(laws.width.size), laws.width)))
     samples = [roots[roots < floors.root_d] / floors.slope_d, roots[roots < floors.root_u] / floors.slope_u]
     # T is a straight line up to a part of it
     layer = math.sqrt(2 * math.pi * surface.C[-1]) * float(surface.q1) / floors.slope_d
-    jacobian = float(jacobian_below(1 / s_over_h_rms(surface), reading))
+    jacobian = float(jacobian_below(1 / s_over_h_rms(surface), variant))
     return Source(
-        lambda x: measured_islands(own, x * h_rms, reading), h_rms, float(surface.h_max) / h_rms, layer / h_rms,
+        lambda x: measured_islands(own, x * h_rms, variant), h_rms, float(surface.h_max) / h_rms, layer / h_rms,
         floors.kinks[0] / h_rms, np.concatenate([*samples, floors.kinks]) / h_rms, jacobian,
     )  # fmt: skip
 
@@ -169,13 +169,13 @@ def _fields(source: Source, model: AnyModel, outside: str, rows: int) -> Fields:
     return fields
 
 
-def _fields_by_table(shape: tuple[float, float, float], model: UniversalModel, reading: Reading) -> Fields:
+def _fields_by_table(shape: tuple[float, float, float], model: UniversalModel, variant: Variant) -> Fields:
     """The same of a self-affine surface and the universal table, of force and area, in one pass."""
     hurst, zeta_1, peak = shape
 
     def fields(x: FloatArray, used: NDArray[np.bool_]) -> tuple[FloatArray, float]:
         found, error = np.empty((4, x.size)), np.empty(1)
-        core.profile_islands(x.ravel(), peak, hurst, zeta_1, reading.numbers, *model.cells, found, error)
+        core.profile_islands(x.ravel(), peak, hurst, zeta_1, variant.numbers, *model.cells, found, error)
         return found.reshape(4, *x.shape), float(error[0])
 
     return fields
@@ -232,7 +232,7 @@ def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float) -> Pr
 def _profile(
     surface: tuple[float, float, float] | MeasuredSurface,
     model: AnyModel,
-    reading: Reading,
+    variant: Variant,
     rtol: float,
     outside: str = "nan",
     rows: int = 2,
@@ -244,9 +244,9 @@ def _profile(
     """
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)
-    source = source_of(surface, reading)
+    source = source_of(surface, variant)
     if rows == 2 and isinstance(surface, tuple) and isinstance(model, UniversalModel):
-        fields = _fields_by_table(surface, model, reading)
+        fields = _fields_by_table(surface, model, variant)
     else:
         fields = _fields(source, model, "exact" if outside == "exact" else "nan", rows)
     edges = _edges(source, 2 * source.peak)

@@ -52,23 +52,23 @@ def table_rows(text: str) -> list[list[str]]:
 
 
 def test_contact_gives_the_closed_check_values():
-    text = run("contact", "--surface", "yang-persson", "-d", "2", "--over-h-rms", "--reading", "printed")
+    text = run("contact", "--surface", "yang-persson", "-d", "2", "--over-h-rms", "--variant", "printed")
     names, units, row = table_rows(text)
     found = dict(zip(names, row, strict=True))
     assert float(found["force"]) == pytest.approx(2.5114e-5, rel=2e-5)
     assert float(found["area"]) == pytest.approx(3.1145e-5, rel=2e-5)
     assert float(found["mean_separation"]) == 2.5
-    assert "reading printed, tier universal" in text
+    assert "variant printed, island model universal" in text
     assert units[:2] == ["nm", "nm"]
 
 
 def test_contact_json_is_the_librarys_answer_digit_for_digit():
-    arguments = ("-d", "0.5,-0.2", "-d", "-1.1", "--tier", "rigid", "--rtol", "1e-6", "--E-star", "7.5")
+    arguments = ("-d", "0.5,-0.2", "-d", "-1.1", "--island-model", "rigid", "--rtol", "1e-6", "--E-star", "7.5")
     found = json.loads(run("contact", "--surface", "concrete", *arguments, "--json"))
-    answer = contact(Surface.named("concrete"), [0.5, -0.2, -1.1], tier="rigid", E_star=7.5, rtol=1e-6)
+    answer = contact(Surface.named("concrete"), [0.5, -0.2, -1.1], island_model="rigid", E_star=7.5, rtol=1e-6)
     for name in ("separation", "mean_separation", "force", "area", "error"):
         assert found["columns"][name] == getattr(answer, name).tolist()
-    assert (found["reading"], found["tier"], found["rtol"], found["E_star"]) == ("reported", "rigid", 1e-6, 7.5)
+    assert (found["variant"], found["island_model"], found["rtol"], found["E_star"]) == ("reported", "rigid", 1e-6, 7.5)
     assert found["arguments"] == {"separation": [0.5, -0.2, -1.1], "surface": "concrete", "E_star": 7.5}
     assert found["units"]["separation"] == "mm"
     assert found["units"]["force"] == "stress"
@@ -128,7 +128,7 @@ def test_curve_of_any_theory(folder, theory):
     assert columns["force"] == answer.force.tolist()
     assert columns["area"] == answer.area.tolist()
     assert found["theory"] == theory
-    assert (found["reading"] is None) == (theory != "mbma")
+    assert (found["variant"] is None) == (theory != "mbma")
 
 
 def test_csv_holds_every_digit():
@@ -139,7 +139,7 @@ def test_csv_holds_every_digit():
     answer = contact(Surface.named("asphalt"), [0.9, 0.1])
     for name in ("separation", "force", "area", "error"):
         assert [float(row[name]) for row in rows] == getattr(answer, name).tolist()
-    assert any("reading reported" in line for line in comments)
+    assert any("variant reported" in line for line in comments)
     assert any("force [-]" in line for line in comments)
 
 
@@ -268,7 +268,7 @@ def test_out_holds_what_stdout_would(folder):
         (["--surface", "concrete", "--file", "s.toml"], "got --surface and --file"),
         (["--file", "missing.toml"], "missing.toml cannot be read: No such file"),
         (["--file", "."], "not a regular file"),
-        (["--surface", "concrete", "--reading", "mine"], "Invalid value for '--reading': 'mine' is not one of"),
+        (["--surface", "concrete", "--variant", "mine"], "Invalid value for '--variant': 'mine' is not one of"),
         (["--surface", "concrete", "--rtol", "0"], "rtol must be a number in"),
         (["--surface", "concrete", "--E-star", "0"], "--E-star must be positive"),
         (["--surface", "concrete", "--E-star", "1", "--E1", "1"], "a material is --E-star alone"),
@@ -296,8 +296,11 @@ def test_bad_input_of_every_command(folder, arguments, message):
         (["contact", "-d", "1", "--conductivity", "-1"], "--conductivity must be positive"),
         (["contact", "-p", "1e5", "--theory", "calibrated"], "--pressure must be less"),
         (["contact", "-d", "1", "--theory", "person"], "'person' is not one of 'mbma', "),
-        (["contact", "-d", "1", "--theory", "persson", "--tier", "exact"], "tier: options of theory 'mbma'"),
-        (["curve", "--theory", "persson", "--reading", "printed"], "reading: options of theory 'mbma'"),
+        (
+            ["contact", "-d", "1", "--theory", "persson", "--island-model", "exact"],
+            "island model: options of theory 'mbma'",
+        ),
+        (["curve", "--theory", "persson", "--variant", "printed"], "variant: options of theory 'mbma'"),
         (["contact"], "one of --separation, --mean-separation, --pressure and --area"),
         (["contact", "-d", "1", "-u", "1"], "one of --separation, --mean-separation, --pressure and --area"),
         (["curve", "--points", "4"], "--points"),
@@ -434,7 +437,7 @@ def test_a_terminal_sees_that_work_goes_on():
 def test_control_c_ends_it_with_130(folder, module):
     # while modules are imported, and with the last of them in place
     command = [sys.executable, "-X", "importtime", "-m", "mbma_tables", "curve", "--surface", "concrete"]
-    command += ["--tier", "exact", "--points", "100000"]
+    command += ["--island-model", "exact", "--points", "100000"]
 
     def heeding():
         # where the tests themselves run in the background, SIGINT is ignored, and would be by the program
@@ -476,7 +479,7 @@ def test_names_are_completed_in_a_shell():
 
     assert completed("mbma contact --surface con") == ["concrete"]
     assert completed("mbma curve --theory per") == ["persson"]
-    assert completed("mbma curve --tier ex") == ["exact"]
+    assert completed("mbma curve --island-model ex") == ["exact"]
 
 
 def test_missing_matplotlib_leaves_nothing(folder, monkeypatch):
@@ -493,7 +496,7 @@ def test_unknown_commands(folder):
 def test_a_terminal_without_the_units_letters(folder):
     name = os.fsdecode(b"caf\xc3\xa9\xff.toml")
     (folder / name).write_text("[surface]\nlength_unit = 'µm'\n" + toml(CONCRETE).partition("\n")[2], encoding="utf-8")
-    command = [sys.executable, "-m", "mbma_tables", "contact", "--file", name, "-d", "0.5", "--tier", "rigid"]
+    command = [sys.executable, "-m", "mbma_tables", "contact", "--file", name, "-d", "0.5", "--island-model", "rigid"]
     environment = os.environ | {"PYTHONIOENCODING": "ascii"}
     found = subprocess.run(command, capture_output=True, check=False, env=environment)
     assert (found.returncode, found.stderr) == (0, b"")

@@ -9,15 +9,15 @@ from mbma_tables.scenes.costs import Distance, shipped_costs, shipped_distances
 
 
 def test_the_table_has_a_line_for_each_row():
-    title, _, header, *lines = run("cost", "--tier", "universal").splitlines()
-    assert len(lines) == sum(row.tier == "universal" for row in shipped_costs().rows)
+    title, _, header, *lines = run("cost", "--island-model", "universal").splitlines()
+    assert len(lines) == sum(row.island_model == "universal" for row in shipped_costs().rows)
     assert "fixed piece of work" in title
-    assert header.split() == ["tier", "variant", "quantity", "error", "cost", "evaluations", "seconds"]
+    assert header.split() == ["island_model", "variant", "quantity", "error", "cost", "evaluations", "seconds"]
     assert all(line.startswith("universal") for line in lines)
 
 
 def test_an_unknown_tier_is_refused():
-    assert "--tier must be one of" in refused("cost", "--tier", "best")
+    assert "--island-model must be one of" in refused("cost", "--island-model", "best")
 
 
 def test_distances_are_told_beside_times():
@@ -31,4 +31,4 @@ def test_distances_are_told_beside_times():
     for row, expected in zip(found["rows"], shipped_distances(), strict=True):
         assert (row["theory"], row["way"]) == (expected.theory, expected.way)
         assert row["seconds"] == pytest.approx(expected.cost * found["unit_seconds"], rel=1e-12, abs=0)
-    assert "leave it or --distance out" in refused("cost", "--distance", "--tier", "exact")
+    assert "leave it or --distance out" in refused("cost", "--distance", "--island-model", "exact")

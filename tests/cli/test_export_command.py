@@ -124,7 +124,7 @@ WITHOUT = {name: [v for k, v in enumerate(LAW) if LAW[k] != name and LAW[k - 1] 
         ),
         (["cobol", "--out", "law", *LAW], "cobol"),
         (["c_law", "--out", "law", *LAW], "no target is called 'c_law': did you mean 'c-law'?"),
-        (["c", "--out", "code", "--reading", "other"], "reading"),
+        (["c", "--out", "code", "--variant", "other"], "variant"),
         (["c", "--out", "code", "--rows", "3", "--exponential"], "leave --rows and --exponential out"),
         (["calculix", "--out", "law", *LAW, "--exponential"], "leave --rows out"),
         (["calculix", "--out", "law", *LAW[:-2], "--exponential", "--theory", "persson"], "leave --theory out"),
@@ -159,7 +159,7 @@ ANY = {
     "--exponential": [],
     "--theory": ["calibrated"],
     "--hardness": ["2MPa", "--theory", "calibrated"],
-    "--reading": ["printed"],
+    "--variant": ["printed"],
     "--check": [],
 }
 

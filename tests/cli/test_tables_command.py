@@ -25,8 +25,8 @@ def folder(tmp_path, monkeypatch):
 def test_list(folder):
     lines = run("tables", "list").splitlines()
     assert [line.partition(":")[0] for line in lines] == list(KINDS)
-    assert re.search(r"universal: \d+ cells; reading any", lines[0])
-    assert "8 X x 12 spread x 8 sphere x 8 hurst; reading reported" in lines[1]
+    assert re.search(r"universal: \d+ cells; variant any", lines[0])
+    assert "8 X x 12 spread x 8 sphere x 8 hurst; variant reported" in lines[1]
     rows = json.loads(run("tables", "list", "--json"))["tables"]
     for row, kind, line in zip(rows, KINDS, lines, strict=True):
         content = read_table(folder / f"{kind}.nc")
@@ -35,7 +35,7 @@ def test_list(folder):
             "path": str(folder / f"{kind}.nc"),
             "bytes": (folder / f"{kind}.nc").stat().st_size,
             "size": content.size,
-            "reading": content.attributes["reading"],
+            "variant": content.attributes["variant"],
             "data_version": content.attributes["data_version"],
             "largest_error": {f: content.attributes[f"largest_error_{f}"] for f in ("F", "A")},
         }

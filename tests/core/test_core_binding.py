@@ -86,7 +86,7 @@ requests = {
     "totals": lambda: contact(many, 1.0),
     "derivatives": lambda: contact(many, 1.0, derivatives=True),
     "workers": lambda: contact(many, 1.0, derivatives=True, workers=2),
-    "exact": lambda: contact(one, np.linspace(0, 2, 2000), tier="exact"),
+    "exact": lambda: contact(one, np.linspace(0, 2, 2000), island_model="exact"),
     "islands": lambda: greenwood_tripp.solve(X, 1.0),
     "four numbers": lambda: four.lookup(np.linspace(1, 2, 3_000_000), 3.0, 20.0, 0.8),
     "a law's inverse": lambda: law.at_pressure(law.force(np.linspace(-2, 2.5, 3_000_000))),

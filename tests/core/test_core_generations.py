@@ -20,7 +20,7 @@ QUICK = [
         "tablefiles/test_splines.py",
         "test_elementary.py",
     ),
-    *("test_hardness.py", "totals/test_kernel.py", "totals/test_law_core.py", "totals/test_tiers.py"),
+    *("test_hardness.py", "totals/test_kernel.py", "totals/test_law_core.py", "totals/test_island_models.py"),
 ]
 MORE = ["islands/test_island.py", "models", "test_calibrated.py", "theories/test_yielding.py", "totals/test_contact.py"]
 pytestmark = pytest.mark.slow

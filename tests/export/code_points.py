@@ -19,7 +19,7 @@ from mbma_tables.export.conformance import (
 )
 from mbma_tables.models import closed_form_functions
 from mbma_tables.models.tables import universal_model
-from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.surfaces.variants import get_variant
 
 POINTS = 10_000
 SURFACES = 60
@@ -72,9 +72,9 @@ def random_surfaces() -> list[tuple[float, ...]]:
 
 
 @functools.cache
-def points_text(reading: str = "reported") -> str:
+def points_text(variant: str = "reported") -> str:
     """The points' file, made once."""
-    model, rule = universal_model(), get_reading(reading)
+    model, rule = universal_model(), get_variant(variant)
     lines = [*phi_rows(model, *random_islands()), *status_rows(model), *formula_rows(*random_formula_islands())]
     lines += geometry_rows(*random_approaches(), rule)
     for surface in random_surfaces():
@@ -89,10 +89,10 @@ def calibrated_text() -> str:
     return "\n".join(line for surface in held for line in calibrated_rows(surface, SHARES, 7.5)) + "\n"
 
 
-def write_points(folder: pathlib.Path, reading: str = "reported") -> pathlib.Path:
+def write_points(folder: pathlib.Path, variant: str = "reported") -> pathlib.Path:
     """The points' file in a folder."""
     path = folder / "many_points.csv"
-    path.write_text(points_text(reading) + calibrated_text(), encoding="utf-8")
+    path.write_text(points_text(variant) + calibrated_text(), encoding="utf-8")
     return path
 
 

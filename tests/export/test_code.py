@@ -118,11 +118,11 @@ def test_javascript_equals_the_runtime(js_folder: pathlib.Path, tmp_path: pathli
 
 @pytest.mark.slow
 @needs("cc")
-def test_the_printed_reading(tmp_path: pathlib.Path) -> None:
-    write_code("c", tmp_path, reading="printed")
+def test_the_printed_variant(tmp_path: pathlib.Path) -> None:
+    write_code("c", tmp_path, variant="printed")
     found = check("c", tmp_path, code_points.write_points(tmp_path, "printed"))
     code_points.assert_equal_to_runtime(found)
-    # and the points of one reading are refused by the code of another
+    # and the points of one variant are refused by the code of another
     assert check("c", tmp_path, code_points.write_points(tmp_path, "reported")).failed > code_points.SURFACES
 
 

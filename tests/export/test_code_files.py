@@ -13,7 +13,7 @@ from mbma_tables import InputError, __version__
 from mbma_tables.export import CODE, code, conformance
 from mbma_tables.export.code import Replay, check, write_code
 from mbma_tables.models.tables import universal_model
-from mbma_tables.surfaces.readings import Reading
+from mbma_tables.surfaces.variants import Variant
 
 
 @pytest.fixture
@@ -25,11 +25,11 @@ def no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("target", CODE)
 def test_every_file_says_what_it_is(target: str, tmp_path: pathlib.Path) -> None:
     attributes = universal_model().content.attributes
-    written = write_code(target, tmp_path / "code", reading="printed")
+    written = write_code(target, tmp_path / "code", variant="printed")
     assert sorted(written) == sorted((tmp_path / "code").iterdir())
     largest = max(attributes["largest_error_F"], attributes["largest_error_A"])
     core = pathlib.Path(mbma_tables.core.__file__).parent
-    of_all = (f"mbma_tables {__version__}", "force is per nominal area", "BSD-3-Clause", "Reading: printed")
+    of_all = (f"mbma_tables {__version__}", "force is per nominal area", "BSD-3-Clause", "Variant: printed")
     of_tables = ("-6.25 <= X <= 41", f"{largest:.2g} on", "zeta_1 in [3, 1e+05]", "of the table against the law")
     for path in written:
         if (core / path.name).is_file():
@@ -55,9 +55,9 @@ def test_a_wrong_number_is_seen(tmp_path: pathlib.Path) -> None:
     write_code("c", tmp_path)
     table = tmp_path / "mbma_data.c"
     text = table.read_text(encoding="utf-8")
-    before, reading = text.split("mbma_variant MBMA_READING")
-    assert reading.count(", 0.05, ") == 1
-    changed = reading.replace(", 0.05, ", ", 0.0500000001, ")
+    before, variant = text.split("mbma_variant MBMA_READING")
+    assert variant.count(", 0.05, ") == 1
+    changed = variant.replace(", 0.05, ", ", 0.0500000001, ")
     table.write_text(f"{before}mbma_variant MBMA_READING{changed}", encoding="utf-8")
     found = check("c", tmp_path)
     assert found.failed > 0
@@ -88,7 +88,7 @@ def test_check_names_what_is_missing(tmp_path: pathlib.Path, monkeypatch: pytest
     ("arguments", "message"),
     [
         (("cobol", "code"), "target must be one of"),
-        (("c", "code", "guessed"), "reading must be one of"),
+        (("c", "code", "guessed"), "variant must be one of"),
         (("c", "a_file"), "a_file"),
         (("c", "code", "reported", "island4d"), "universal"),
     ],
@@ -105,11 +105,11 @@ def test_bad_requests_leave_no_file(
     assert (tmp_path / "a_file").read_text(encoding="utf-8") == "kept"
 
 
-def test_points_of_a_reading_with_high_floors() -> None:
+def test_points_of_a_variant_with_high_floors() -> None:
     """A surface below a floor has no islands, and so no points."""
     each = len(conformance.DEPTHS)
     ratios = [surface[2] / surface[1] for surface in conformance.SURFACES]
     for floor in (3.0, 150.0, 500.0):
-        text = conformance.points_text(universal_model(), Reading("high floors", floor_u=floor))
+        text = conformance.points_text(universal_model(), Variant("high floors", floor_u=floor))
         count = sum(line.startswith("total,") for line in text.splitlines())
         assert count == each * sum(ratio > floor for ratio in ratios), floor

@@ -12,7 +12,7 @@ from mbma_tables import InputError, MbmaError, Surface, contact, contact_law
 from mbma_tables.export import DATA, SOLVERS, chords, data, solvers
 from mbma_tables.export.law_rows import FLOOR, describe_law
 from mbma_tables.export.solvers import calculix, exponential, optistruct
-from mbma_tables.surfaces.readings import PRINTED
+from mbma_tables.surfaces.variants import PRINTED
 from mbma_tables.theories import THEORIES
 
 UNITS = {"length_unit": "mm", "stress_unit": "MPa"}
@@ -63,7 +63,7 @@ def test_the_header_says_up_to_where_a_law_is_valid():
     assert root * 0.999 <= said <= root
     assert any("scatter" in line and "ln p at a given c" in line for line in law_of().comments)
     own = dataclasses.replace(PRINTED, name="own", beta=0.3)
-    assert any("scatter" in line and "not known" in line for line in law_of(reading=own).comments)
+    assert any("scatter" in line and "not known" in line for line in law_of(variant=own).comments)
 
 
 @pytest.mark.parametrize("name", ["concrete", "asphalt", "challenge"])
@@ -165,7 +165,7 @@ def test_text_holds_the_rows(target, rows):
     law = law_of(rows=rows)
     text = getattr(solvers, target)(law)
     np.testing.assert_allclose(parse(target, text), np.stack([law.x, law.y], 1), rtol=1e-9)
-    for word in ("reading 'reported'", "E* = 13.3", "[MPa]", "[mm]", "h_max - u", "largest error", "table: data"):
+    for word in ("variant 'reported'", "E* = 13.3", "[MPa]", "[mm]", "h_max - u", "largest error", "table: data"):
         assert word in text
 
 
@@ -254,9 +254,9 @@ def test_data_come_back(target, tmp_path):
         ),
         ({"quantity": "stiffness"}, "quantity must be one of"),
         ({"quantity": "conductance"}, "conductance needs"),
-        ({"reading": "other"}, "reading"),
+        ({"variant": "other"}, "variant"),
         ({"theory": "other"}, "theory must be one of"),
-        ({"theory": "persson", "reading": "printed"}, "options of theory 'mbma'"),
+        ({"theory": "persson", "variant": "printed"}, "options of theory 'mbma'"),
     ],
 )
 def test_refused(changed, said):

@@ -1,4 +1,4 @@
-"""Nothing that a table, a reading or a user says becomes code: hostile text leaves the same code as plain text."""
+"""Nothing that a table, a variant or a user says becomes code: hostile text leaves the same code as plain text."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mbma_tables.export.law_rows import LawTable, describe_law
 from mbma_tables.export.text import checked_name
 from mbma_tables.models.tables import universal_model
 from mbma_tables.models.universal import UniversalModel
-from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.surfaces.variants import get_variant
 
 HOSTILE = (
     "x */ int evil(void); /* \n*INCLUDE, INPUT=evil\r\nsystem('evil') ??/\u2028evil()\x0cevil\x85"
@@ -44,7 +44,7 @@ def test_source_code(target: str, monkeypatch: pytest.MonkeyPatch) -> None:
     texts = {name: HOSTILE for name, value in content.attributes.items() if isinstance(value, str)}
     attributes = content.attributes | texts | {"certificate_points": HOSTILE}
     model = UniversalModel(dataclasses.replace(content, attributes=attributes))
-    reading = dataclasses.replace(get_reading("reported"), name=HOSTILE)
+    variant = dataclasses.replace(get_variant("reported"), name=HOSTILE)
 
     def live(texts: dict[str, str]) -> list[str]:
         return [
@@ -54,14 +54,14 @@ def test_source_code(target: str, monkeypatch: pytest.MonkeyPatch) -> None:
             if line.strip() and not (line.startswith("!") and name.endswith(".f90"))
         ]
 
-    found = code.source_texts(target, model, reading)
+    found = code.source_texts(target, model, variant)
     assert any("int evil" in text for text in found.values())
-    assert live(found) == live(code.source_texts(target, universal_model(), get_reading("reported")))
+    assert live(found) == live(code.source_texts(target, universal_model(), get_variant("reported")))
     assert all(text.isascii() for text in found.values())
     assert "</script" not in found.get("mbma.mjs", "")
     points, plain = (
         [line for line in conformance.points_text(*of).splitlines() if not line.startswith("#")]
-        for of in ((model, reading), (universal_model(), get_reading("reported")))
+        for of in ((model, variant), (universal_model(), get_variant("reported")))
     )
     assert points == plain
 

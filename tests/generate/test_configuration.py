@@ -9,7 +9,7 @@ from generate.tables.commands import TABLES
 from generate.tables.configuration import LIMITS, MIN_NODES, MIN_SHIPPED_POINTS, load
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import band_fields
-from mbma_tables.surfaces.readings import READINGS
+from mbma_tables.surfaces.variants import VARIANTS
 
 
 def refused(kind, folder, *arguments):
@@ -43,10 +43,10 @@ UNIVERSAL = [
     ("target = 1e-12", "target must be a number in [1e-11, 0.1], got 1e-12"),
     ("max_nodes = 1e5", "max_nodes must be a whole number in"),
     ("certificate_points = 99", "certificate_points must be a whole number in [100, "),
-    ("reading = 'rubbed'", "reading must be one of ['fitted', 'printed', 'reported']"),
+    ("variant = 'rubbed'", "variant must be one of ['fitted', 'printed', 'reported']"),
     ("[axes.mu]\nhigh = 1e11", "axes.mu.high must be a number in [0, 1e+10]"),
     ("[axes.X]\nlow = 5.0\nhigh = 2.0", "axes.X must have low < high"),
-    (b"reading = '\xff'", "is not a TOML file"),
+    (b"variant = '\xff'", "is not a TOML file"),
     ("#" * 100_000, "has more than 65536 bytes"),
 ]
 ISLAND4D = [
@@ -124,7 +124,7 @@ def test_the_solver_works_on_every_corner_that_the_limits_allow():
 def test_the_limits_of_island4d_stay_within_those_of_mu():
     corners = np.meshgrid(*(LIMITS[name] for name in ("spread", "sphere", "hurst")))
     flat = [corner.ravel().astype(float) for corner in corners]
-    for reading in READINGS.values():
-        mu = band_fields(*flat, reading)[0]
+    for variant in VARIANTS.values():
+        mu = band_fields(*flat, variant)[0]
         assert (mu >= 1e-30).all()
         assert (mu <= LIMITS["mu"][1]).all()

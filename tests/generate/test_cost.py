@@ -25,14 +25,14 @@ def once(run, budget=0.5):
 
 
 def by_variant(rows):
-    return {(row.tier, row.variant, row.quantity): row for row in rows}
+    return {(row.island_model, row.variant, row.quantity): row for row in rows}
 
 
 def test_references_agree_with_the_solver():
     found = cost_totals.reference()
     assert len(found) == len(timing.HELD_OUT)
     surface, gap, truth = found[3]
-    answer = contact(surface, gap, tier="exact", rtol=1e-10)
+    answer = contact(surface, gap, island_model="exact", rtol=1e-10)
     assert answer.force == pytest.approx(truth["force"], rel=1e-10, abs=0)
     assert answer.area == pytest.approx(truth["area"], rel=1e-10, abs=0)
     answers = [truth for _, _, truth in found]
@@ -48,7 +48,7 @@ def test_references_agree_with_the_solver():
 @pytest.fixture
 def few_totals(monkeypatch):
     small = {
-        "TIERS": ("universal", "rigid"),
+        "ISLAND_MODELS": ("universal", "rigid"),
         "RTOLS": (1e-1, 1e-2, 1e-4),
         "LAW_RTOLS": (1e-2,),
         "SLOW_LAW_RTOLS": (1e-1,),
@@ -75,13 +75,13 @@ def test_totals(few_totals):
 
 def test_laws_theories_and_scenes(few_totals, monkeypatch):
     rows = by_variant(cost_totals.law_rows())
-    assert [tier for tier, name, _ in rows if name.startswith("law rtol")] == ["universal", "rigid"]
+    assert [island_model for island_model, name, _ in rows if name.startswith("law rtol")] == ["universal", "rigid"]
     assert rows["universal", "law rtol=1e-02", "both"].error < 1e-2
     assert rows["law", "lookup", "both"].cost == COST / 10_000
-    assert {name for tier, name, _ in rows if tier == "law"} == {"lookup", "invert"}
+    assert {name for island_model, name, _ in rows if island_model == "law"} == {"lookup", "invert"}
     monkeypatch.setattr(cost_totals, "THEORY_GAPS", dict.fromkeys(THEORIES, 5))
     rows = by_variant(cost_totals.theory_rows())
-    assert {tier for tier, _, _ in rows} == {"calibrated", "persson", "greenwood_williamson"}
+    assert {island_model for island_model, _, _ in rows} == {"calibrated", "persson", "greenwood_williamson"}
     whats = {"call", "gap", "invert", "energy", "law"}
     assert {row.what for row in rows.values()} == whats
     assert rows["persson", "law rtol=1e-05", "both"].cost == COST
@@ -93,7 +93,7 @@ def test_laws_theories_and_scenes(few_totals, monkeypatch):
 
 def test_a_study_becomes_data_page_and_figure(tmp_path, monkeypatch):
     shipped = shipped_costs()
-    own = [row for row in shipped.rows if row.tier != "unit"]
+    own = [row for row in shipped.rows if row.island_model != "unit"]
     monkeypatch.setattr(cost, "island_rows", lambda: own[:20])
     monkeypatch.setattr(cost, "total_rows", lambda: own[20:])
     seconds = iter([3.0, shipped.seconds, 2.0])
@@ -131,7 +131,7 @@ def test_points_of_theories_are_priced(monkeypatch):
     monkeypatch.setattr(cost_distances, "measure", once)
     monkeypatch.setattr(cost_distances, "SLOW_POINTS", 2)
     found = list(cost_distances.ways())
-    known = {*distances.THEORIES, *distances.TIERS, "area alone"}
+    known = {*distances.THEORIES, *distances.ISLAND_MODELS, "area alone"}
     assert {name for _, _, name, _, _ in found} <= known
     assert {label for label, *_ in found} == set(distances.THEORIES)
     prices = {(label, way): (cost, made) for label, way, _, cost, made in found}
@@ -164,6 +164,6 @@ def test_the_shipped_distances_are_those_of_the_theories():
         for ends, kind in zip(cost_distances.RANGES, ("light", "deep"), strict=True):
             expected = distances.summed_up(seen, found[quantity], *ends)[0]
             assert getattr(row, f"{quantity}_{kind}") == pytest.approx(expected, rel=1e-3)
-    # tiers solve one theory
-    tiers = [shipped["MBMA reported", way] for way in ("universal", "exact", "law")]
-    assert len({(row.area_light, row.force_deep) for row in tiers}) == 1
+    # island models solve one theory
+    island_models = [shipped["MBMA reported", way] for way in ("universal", "exact", "law")]
+    assert len({(row.area_light, row.force_deep) for row in island_models}) == 1

@@ -8,8 +8,8 @@ import pytest
 
 from mbma_tables.core import core
 from mbma_tables.islands.four_numbers import band_fields
-from mbma_tables.surfaces.readings import REPORTED
 from mbma_tables.surfaces.spectrum import BROADENING
+from mbma_tables.surfaces.variants import REPORTED
 
 
 def exact(spread, sphere, hurst, summits):

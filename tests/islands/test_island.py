@@ -1,4 +1,4 @@
-"""`island`: units, scales, shapes, tiers and bad input."""
+"""`island`: units, scales, shapes, island models and bad input."""
 
 import dataclasses
 import math
@@ -8,7 +8,7 @@ import pytest
 
 from generate.tables.exact_geometry import divisor, exact_island
 from mbma_tables import InputError, OutOfRangeError, Surface, greenwood_tripp, island
-from mbma_tables.surfaces.readings import PRINTED
+from mbma_tables.surfaces.variants import PRINTED
 
 NUMBERS = ("zeta_d", "zeta_u", "eta", "X", "mu")
 
@@ -18,11 +18,11 @@ def surface():
     return Surface(0.8, 0.18125, 0.18125 * 216, 1.3, 3.9)
 
 
-@pytest.mark.parametrize("reading", ["reported", "printed"])
-def test_units(surface, reading):
+@pytest.mark.parametrize("variant", ["reported", "printed"])
+def test_units(surface, variant):
     for approach in (1e-9, 0.02, 0.7, 8.0):
-        found = island(surface, approach * surface.h_rms, reading=reading)
-        exact = exact_island(approach, surface.hurst, surface.zeta_1, divisor(reading))
+        found = island(surface, approach * surface.h_rms, variant=variant)
+        exact = exact_island(approach, surface.hurst, surface.zeta_1, divisor(variant))
         # the unit of height and of length that the paper's geometry is in
         s, length = surface.s, 1 / surface.q0
         units = {"R_d": length**2 / s, "R_u": length**2 / s, "D": length**-2, "sigma": s, "h_d": s}
@@ -31,10 +31,10 @@ def test_units(surface, reading):
             assert getattr(found, name) == pytest.approx(known, rel=2e-12, abs=0), name
 
 
-@pytest.mark.parametrize("reading", ["reported", "printed"])
-def test_force_and_area(surface, reading):
+@pytest.mark.parametrize("variant", ["reported", "printed"])
+def test_force_and_area(surface, variant):
     delta = np.array([1e-6, 0.1, 1.0, 6.0])
-    found = island(surface, delta, reading=reading, E_star=7.0)
+    found = island(surface, delta, variant=variant, E_star=7.0)
     solved = greenwood_tripp.solve(found.X, found.mu, rtol=1e-12)
     L = np.sqrt(2 * found.R_d * found.sigma)
     force = 7.0 * found.sigma * L * solved.phi_F
@@ -42,8 +42,8 @@ def test_force_and_area(surface, reading):
     assert np.abs(found.force / force - 1).max() <= 1e-9
     assert np.abs(found.area / area - 1).max() <= 1e-9
     assert (np.abs(found.force / force - 1) <= found.error).all()
-    assert found.reading == reading
-    assert found.tier == "universal"
+    assert found.variant == variant
+    assert found.island_model == "universal"
 
 
 @pytest.mark.parametrize("delta", [0.0, -1.0, [1.0, -0.5]])
@@ -57,8 +57,8 @@ def test_no_approach(surface, delta):
 @pytest.mark.parametrize(
     ("option", "value"),
     [
-        ("tier", "magic"),
-        ("reading", "guessed"),
+        ("island_model", "magic"),
+        ("variant", "guessed"),
         ("E_star", 0.0),
         ("E_star", -1.0),
         ("E_star", math.nan),
@@ -76,8 +76,8 @@ def test_bad_options(surface, option, value):
 def test_a_band_that_ends_at_the_floor_of_zeta_u_is_refused():
     own = dataclasses.replace(PRINTED, name="own", floor_u=3.5)
     with pytest.raises(OutOfRangeError, match=r"q1/q0 must be above floor_u = 3\.5"):
-        island(Surface(0.8, 1.0, 3.5, 1.0, 3.0), 1.0, reading=own)
-    assert island(Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), 1.0, reading=own).force > 0
+        island(Surface(0.8, 1.0, 3.5, 1.0, 3.0), 1.0, variant=own)
+    assert island(Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), 1.0, variant=own).force > 0
 
 
 def test_E_star_broadcasts(surface):

@@ -50,7 +50,7 @@ def test_errors_of_totals_are_as_certified(count):
 def test_totals_are_within_a_tenth_of_the_exact_solver_in_the_corners():
     h_max, zeta_1, hurst = np.array(list(itertools.product((3.0, 4.5), (10.0, 1000.0), (0.5, 1.0)))).T[:, :, None]
     gap = h_max * np.linspace(-1, 0.9, 40)
-    exact = contact(Surface(hurst, 1.0, zeta_1, 1.0, h_max), gap, tier="exact", rtol=1e-6)
+    exact = contact(Surface(hurst, 1.0, zeta_1, 1.0, h_max), gap, island_model="exact", rtol=1e-6)
     some = exact.area > RANGES[TOTALS]["area"][0]
     for name, function in FUNCTIONS[TOTALS].items():
         assert np.abs(function(gap, h_max, zeta_1, hurst) / getattr(exact, name) - 1)[some].max() <= 0.1
@@ -93,7 +93,7 @@ def test_totals_by_the_tier_are_within_one_percent():
     zeta_1, h_max = 10 ** rng.uniform(0.5, 4, 150), rng.uniform(2.5, 4.5, 150)
     surface = Surface(rng.uniform(0.35, 1, 150), 1.0, zeta_1, 1.0, h_max)
     gap = rng.uniform(-1, 0.999, 150) * h_max
-    found, exact = contact(surface, gap, tier="formula", rtol=1e-3), contact(surface, gap)
+    found, exact = contact(surface, gap, island_model="formula", rtol=1e-3), contact(surface, gap)
     for name in ("force", "area"):
         error = np.abs(getattr(found, name) / getattr(exact, name) - 1)
         assert error.max() <= 0.01
@@ -144,7 +144,7 @@ def test_scalars_are_answered_as_arrays_are():
     one, many = FormulaModel().answer(1.0, 1.0), FormulaModel().answer([1.0], [1.0])
     assert (one.phi_F, one.phi_A, one.error) == (many.phi_F[0], many.phi_A[0], many.error[0])
     surface = Surface(0.8, 1.0, 100.0, 1.0, 3.0)
-    assert island(surface, 0.5, tier="formula").force == island(surface, [0.5], tier="formula").force[0]
+    assert island(surface, 0.5, island_model="formula").force == island(surface, [0.5], island_model="formula").force[0]
     assert np.ndim(closed_totals(surface, 0.3).force) == 0
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from mbma_tables.islands.four_numbers import to_axes
 from mbma_tables.models.tables import open_table, universal_model
-from mbma_tables.surfaces.readings import REPORTED
+from mbma_tables.surfaces.variants import REPORTED
 
 ZETA_D, HURST, X = 3.7, 0.8, 3.0
 

@@ -11,7 +11,7 @@ from mbma_tables.islands.four_numbers import SPHERE_FLOOR, to_axes
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.models import tables as tabulated
 from mbma_tables.models.island4d import Island4dModel
-from mbma_tables.surfaces.readings import REPORTED
+from mbma_tables.surfaces.variants import REPORTED
 from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import ISLAND4D
 

@@ -6,7 +6,7 @@ import pytest
 from mbma_tables import InputError, OutOfRangeError, TableFileError, greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.models.tables import open_table
-from mbma_tables.surfaces.readings import REPORTED
+from mbma_tables.surfaces.variants import REPORTED
 from mbma_tables.totals.island import scale_area, scale_force
 
 NAMES = ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")

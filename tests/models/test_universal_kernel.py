@@ -10,7 +10,7 @@ from helpers import difference_weights
 from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.models.tables import open_table, universal_model
-from mbma_tables.surfaces.readings import REPORTED
+from mbma_tables.surfaces.variants import REPORTED
 
 
 def scattered(count, seed, low=1e-8):

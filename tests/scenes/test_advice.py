@@ -10,7 +10,7 @@ import xarray as xr
 from mbma_tables import Scene, Surface
 from mbma_tables.files import shipped_file
 from mbma_tables.scenes.scene import advice
-from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.surfaces.variants import get_variant
 
 SURFACE = Surface(hurst=0.8, q0=0.01, q1=0.64, h_rms=1.0, h_max=3.3)
 
@@ -68,8 +68,8 @@ def test_where_there_is_nothing_to_say():
     assert [advice(scene) for scene in quiet] == [""] * 4
 
 
-def test_a_reading_that_was_not_compared_and_a_contact_that_was_not_simulated():
-    own = dataclasses.replace(get_reading("printed"), name="own", beta=0.3)
-    line = advice(Scene(SURFACE, effects=["stiffness"], areas=[1e-4], reading=own))
+def test_a_variant_that_was_not_compared_and_a_contact_that_was_not_simulated():
+    own = dataclasses.replace(get_variant("printed"), name="own", beta=0.3)
+    line = advice(Scene(SURFACE, effects=["stiffness"], areas=[1e-4], variant=own))
     assert "instead of an unknown distance at 0.01% contact" in line
     assert "not tested there: A/A0 is below" in line

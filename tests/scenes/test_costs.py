@@ -46,13 +46,17 @@ def test_costs_are_those_of_the_measured_row(tmp_path, asked, cost):
 
 def test_shipped_costs_have_what_plans_need():
     costs = shipped_costs()
-    needed = [(tier, what) for tier in ("exact", "universal", "rigid") for what in ("gap", "call", "import", "law")]
+    needed = [
+        (island_model, what)
+        for island_model in ("exact", "universal", "rigid")
+        for what in ("gap", "call", "import", "law")
+    ]
     needed += [("law", "lookup"), ("law", "invert"), ("exact", "profile"), ("scene", "call")]
     needed += [(name, what) for name in THEORIES[1:] for what in ("gap", "call", "invert", "energy", "law")]
     needed += [("island4d", "gap")]
-    for tier, what in needed:
-        assert 0 < costs.of(tier, what, 1e-4, "force") < 10, (tier, what)
-    errors = [row.error for row in costs.rows if row.tier == "universal" and row.what == "gap"]
+    for island_model, what in needed:
+        assert 0 < costs.of(island_model, what, 1e-4, "force") < 10, (island_model, what)
+    errors = [row.error for row in costs.rows if row.island_model == "universal" and row.what == "gap"]
     assert 0 < max(errors) <= 1e-8
     assert costs.of("exact", "gap", 1e-8) > 3 * costs.of("universal", "gap", 1e-8)
     assert read_costs(shipped_file("cost.csv")) == costs

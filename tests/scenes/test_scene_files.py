@@ -25,7 +25,7 @@ MISTAKES = {
     "unknown effect": (SURFACE + '[effects]\non = ["forse"]\n' + AT, "did you mean 'force'"),
     "unknown refinement": (SURFACE + '[effects]\non = ["force"]\noff = ["subscale"]\n' + AT, "subscale_area"),
     "unknown surface": ('[surface]\nname = "concret"\n' + ON + AT, "there are yang-persson"),
-    "unknown reading": ('reading = "printd"\n' + SURFACE + ON + AT, "did you mean 'printed'"),
+    "unknown variant": ('variant = "printd"\n' + SURFACE + ON + AT, "did you mean 'printed'"),
     "unknown theory": (
         SURFACE + '[effects]\non = ["comparison"]\n' + AT + '[comparison]\ntheories = ["person"]\n',
         "did you mean 'persson'",
@@ -64,9 +64,9 @@ MISTAKES = {
     "nothing prescribed": (SURFACE + ON, "give one of separations"),
     "unknown theory of the scene": ('theory = "persons"\n' + SURFACE + ON + AT, "did you mean 'persson'"),
     "areas over h_rms": (SURFACE + ON + "[prescribed]\nareas = [0.01]\nover_h_rms = true\n", "areas have none"),
-    "reading of another theory": (
+    "variant of another theory": (
         'theory = "persson"\nreading = "printed"\n' + SURFACE + ON + AT,
-        "reading: of theory 'mbma', not of 'persson'",
+        "variant: of theory 'mbma', not of 'persson'",
     ),
     "empty prescribed": (SURFACE + ON + "[prescribed]\n", "give one of separations, mean_separations"),
     "pressure and separation": (

@@ -28,29 +28,32 @@ def scene_of(surface=CONCRETE, **given):
     return Scene(surface, **({"effects": ("force",), "separations": (0.2, 0.5)} | given))
 
 
-def tiered(scene, tier):
-    """The scene's plan with that tier in every step of the model."""
+def tiered(scene, island_model):
+    """The scene's plan with that island model in every step of the model."""
     plan = scene.plan()
-    steps = tuple(step if step.tier is None else dataclasses.replace(step, tier=tier) for step in plan.steps)
+    steps = tuple(
+        step if step.island_model is None else dataclasses.replace(step, island_model=island_model)
+        for step in plan.steps
+    )
     return dataclasses.replace(plan, steps=steps)
 
 
-@pytest.mark.parametrize("tier", ["universal", "island4d"])
-def test_beyond_a_table_totals_are_solved(tier):
+@pytest.mark.parametrize("island_model", ["universal", "island4d"])
+def test_beyond_a_table_totals_are_solved(island_model):
     scene = scene_of(DEEP, separations=(-44.0, 44.0), rtol=1e-3)
     with pytest.raises(OutOfRangeError):
-        contact(DEEP, -44.0, tier)
-    found = run_plan(scene, tiered(scene, tier))
-    truth = contact(DEEP, [-44.0, 44.0], tier="exact", rtol=1e-6).force
+        contact(DEEP, -44.0, island_model)
+    found = run_plan(scene, tiered(scene, island_model))
+    truth = contact(DEEP, [-44.0, 44.0], island_model="exact", rtol=1e-6).force
     np.testing.assert_allclose(found["force"], truth, rtol=1e-3, atol=0)
 
 
 def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
     made = []
 
-    def law(surface, rtol, tier, **rest):
-        made.append(tier)
-        if tier != "exact":
+    def law(surface, rtol, island_model, **rest):
+        made.append(island_model)
+        if island_model != "exact":
             raise OutOfRangeError("islands outside", True)
         # as good, and quicker
         return contact_law(surface, rtol, "universal", **rest)
@@ -59,7 +62,7 @@ def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
     scene = scene_of(effects=("energy",), rtol=1e-2)
     found = run_plan(scene, tiered(scene, "universal"))
     assert made == ["universal", "exact"]
-    assert found.attrs["tiers"] == '{"law": "exact"}'
+    assert found.attrs["island_models"] == '{"law": "exact"}'
     np.testing.assert_allclose(found["energy"], contact_law(CONCRETE).energy([0.2, 0.5]), rtol=1e-2, atol=0)
 
 
@@ -96,9 +99,9 @@ def test_progress_in_blocks():
         ({"effects": ("conductance",), "conductivities": (1.0, -2.0)}, "positive"),
         ({"effects": ("comparison",), "theories": ("person",)}, "did you mean 'persson'"),
         ({"effects": ("pressure_profile",), "deltas": (0.1,)}, "are not needed by any effect"),
-        ({"tier": "exakt"}, "did you mean 'exact'"),
-        ({"tier": "exact", "without": ("sphere_deformation",)}, "leave tier out"),
-        ({"tier": object(), "seconds": 1.0}, "give rtol instead of seconds"),
+        ({"island_model": "exakt"}, "did you mean 'exact'"),
+        ({"island_model": "exact", "without": ("sphere_deformation",)}, "leave island model out"),
+        ({"island_model": object(), "seconds": 1.0}, "give rtol instead of seconds"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
@@ -119,12 +122,12 @@ def test_a_budget_below_every_plan_is_refused():
 
 def test_a_tier_of_choice():
     """Given by name it is taken as it is, and a bound above the tolerance is an error."""
-    found = scene_of(tier="island4d", rtol=1e-3).run()
-    assert found.attrs["tiers"] == '{"totals": "island4d"}'
-    alone = contact(CONCRETE, [0.2, 0.5], tier="island4d", rtol=5e-4, quantities=["force"])
+    found = scene_of(island_model="island4d", rtol=1e-3).run()
+    assert found.attrs["island_models"] == '{"totals": "island4d"}'
+    alone = contact(CONCRETE, [0.2, 0.5], island_model="island4d", rtol=5e-4, quantities=["force"])
     np.testing.assert_array_equal(found["force"], alone.force)
     with pytest.raises(ConvergenceError, match=r"above rtol = 1\.00e-06: give a larger rtol"):
-        scene_of(tier="formula", rtol=1e-6).run()
+        scene_of(island_model="formula", rtol=1e-6).run()
 
 
 class Hertzian:
@@ -139,20 +142,20 @@ class Hertzian:
 
 def test_island_models_as_objects():
     effects = ("force", "area", "island_statistics")
-    scene = scene_of(effects=effects, tier=Hertzian(), rtol=1e-5)
+    scene = scene_of(effects=effects, island_model=Hertzian(), rtol=1e-5)
     assert "by hertzian  (count=2, rtol=5.0e-06, error not certified, time=not measured)" in scene.explain()
-    found, truth = scene.run(), scene_of(effects=effects, tier="exact", rtol=1e-8).run()
+    found, truth = scene.run(), scene_of(effects=effects, island_model="exact", rtol=1e-8).run()
     for name in ("force", "area", "island_number", "island_force"):
         np.testing.assert_allclose(found[name], truth[name], rtol=1e-5)
-    assert found.attrs["tiers"] == '{"totals": "hertzian", "island statistics": "hertzian"}'
+    assert found.attrs["island_models"] == '{"totals": "hertzian", "island statistics": "hertzian"}'
     assert found.attrs["table_hashes"] == "{}"
-    law = scene_of(effects=("energy",), tier=Hertzian(), rtol=1e-2).run()
+    law = scene_of(effects=("energy",), island_model=Hertzian(), rtol=1e-2).run()
     np.testing.assert_allclose(law["energy"], contact_law(CONCRETE).energy([0.2, 0.5]), rtol=1e-2)
 
 
 def test_a_table_as_an_object_is_the_tier_with_its_name():
     table = open_table("universal")
-    found, same = scene_of(tier=table).run(), scene_of(tier="universal").run()
+    found, same = scene_of(island_model=table).run(), scene_of(island_model="universal").run()
     np.testing.assert_array_equal(found["force"], same["force"])
     assert found.attrs["table_hashes"] == same.attrs["table_hashes"]
 

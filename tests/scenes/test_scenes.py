@@ -15,7 +15,7 @@ from mbma_tables.models import answer_islands
 from mbma_tables.scenes import plan as plans
 from mbma_tables.scenes import statistics as islands
 from mbma_tables.scenes.problem import ELASTIC, OUTPUTS
-from mbma_tables.surfaces.readings import REPORTED
+from mbma_tables.surfaces.variants import REPORTED
 from mbma_tables.theories import GreenwoodWilliamson, Persson
 from mbma_tables.theories.yielding import Yielding
 from mbma_tables.totals.island_sum import Pairs, sum_islands
@@ -40,7 +40,7 @@ def scene_of(*effects, **more):
 @pytest.mark.parametrize("rtol", [1e-1, 1e-3, 1e-5, 1e-7, 1e-9])
 def test_totals_are_within_the_tolerance(rtol):
     found = scene_of("force", "area", rtol=rtol).run()
-    truth = contact(CONCRETE, GAPS, tier="exact", rtol=1e-10)
+    truth = contact(CONCRETE, GAPS, island_model="exact", rtol=1e-10)
     np.testing.assert_allclose(found["force"], truth.force, rtol=rtol)
     np.testing.assert_allclose(found["area"], truth.area, rtol=rtol)
     assert found.attrs["error"] <= rtol
@@ -98,7 +98,7 @@ def test_the_whole_gaussian_adds_force_and_reaches_beyond_h_max():
     assert cut["force"][2] == 0
     # a higher top adds nothing any more
     higher = Surface(CONCRETE.hurst, CONCRETE.q0, CONCRETE.q1, CONCRETE.h_rms, 4.0)
-    truth = contact(higher, gaps, tier="exact", rtol=1e-8)
+    truth = contact(higher, gaps, island_model="exact", rtol=1e-8)
     np.testing.assert_allclose(whole["force"], truth.force, rtol=1e-5)
 
 
@@ -139,25 +139,29 @@ def test_explain_names_steps_and_what_is_left_out():
 
 
 def test_many_gaps_go_through_a_law():
-    for tier in ("universal", "exact", "rigid"):
-        fewest = plans.MIN_LAW_GAPS.get(tier, plans.MIN_LAW_GAPS_OF_OTHERS)
+    for island_model in ("universal", "exact", "rigid"):
+        fewest = plans.MIN_LAW_GAPS.get(island_model, plans.MIN_LAW_GAPS_OF_OTHERS)
         for count, name in ((fewest - 1, "totals"), (fewest, "law")):
-            (step,) = scene_of("force", separations=np.linspace(0, 1, count), rtol=1e-6, tier=tier).plan().steps
-            assert (step.name, step.tier) == (name, tier)
+            (step,) = (
+                scene_of("force", separations=np.linspace(0, 1, count), rtol=1e-6, island_model=island_model)
+                .plan()
+                .steps
+            )
+            assert (step.name, step.island_model) == (name, island_model)
     fewest = plans.MIN_LAW_GAPS["universal"]
     # closer than a law can be
     (step,) = scene_of("force", separations=np.linspace(0, 1, fewest), rtol=1.5e-10).plan().steps
-    assert (step.name, step.tier) == ("totals", "exact")
+    assert (step.name, step.island_model) == ("totals", "exact")
 
 
 def test_the_certificate_decides_between_table_and_solver(monkeypatch):
     bound = plans.certified_error("universal", 1.0)
     certificate = open_table("universal").content.attributes
     assert bound == max(certificate["largest_error_F"], certificate["largest_error_A"])
-    for rtol, tier in ((2.02 * bound, "universal"), (1.98 * bound, "exact")):
-        assert scene_of("force", rtol=rtol).plan().steps[0].tier == tier
+    for rtol, island_model in ((2.02 * bound, "universal"), (1.98 * bound, "exact")):
+        assert scene_of("force", rtol=rtol).plan().steps[0].island_model == island_model
     monkeypatch.setitem(certificate, "largest_error_A", 1e-3)
-    assert scene_of("force", rtol=1e-4).plan().steps[0].tier == "exact"
+    assert scene_of("force", rtol=1e-4).plan().steps[0].island_model == "exact"
 
 
 HISTORY = """
@@ -168,8 +172,8 @@ from mbma_tables import Scene, Surface, contact, contact_law, open_table
 concrete = Surface.named("concrete")
 if sys.argv[1] == "used":
     open_table("island4d")
-    for tier in ("exact", "universal", "island4d", "formula", "rigid"):
-        contact(concrete, [0.1, 0.7], tier=tier, rtol=1e-3)
+    for island model in ("exact", "universal", "island4d", "formula", "rigid"):
+        contact(concrete, [0.1, 0.7], island_model=island model, rtol=1e-3)
     contact_law(concrete, 1e-4)
     Scene(Surface.named("asphalt"), effects=["force", "energy"], separations=[0.1], rtol=0.05).run()
     Scene(concrete, effects=["pressure_profile"], deltas=[0.2]).run()
@@ -183,7 +187,7 @@ for arguments in (
 ):
     scene = Scene(concrete, separations=[0.2, 0.5, 0.9], **arguments)
     found = scene.run()
-    print(scene.explain(), found.attrs["error"].hex(), found.attrs["tiers"])
+    print(scene.explain(), found.attrs["error"].hex(), found.attrs["island_models"])
     for name in sorted(found.variables):
         print(name, found[name].values.tobytes().hex())
 """
@@ -199,9 +203,9 @@ def test_answers_do_not_depend_on_what_ran_before():
 
 
 def test_a_result_names_what_made_it():
-    found = scene_of("force", rtol=1e-8, reading="printed").run()
-    assert found.attrs["reading"] == "printed"
-    assert set(json.loads(found.attrs["table_hashes"])) <= set(json.loads(found.attrs["tiers"]).values())
+    found = scene_of("force", rtol=1e-8, variant="printed").run()
+    assert found.attrs["variant"] == "printed"
+    assert set(json.loads(found.attrs["table_hashes"])) <= set(json.loads(found.attrs["island_models"]).values())
     assert found["force"].attrs["units"] == "1"
     assert found["separation"].attrs["units"] == "mm"
 

@@ -38,7 +38,7 @@ def test_quantities_at_a_pressure_are_the_contacts(theory):
     for name, values in expected.items():
         assert found[name].values == pytest.approx(values, rel=1e-4), name
     assert found.attrs["theory"] == getattr(theory, "name", theory)
-    assert (found.attrs["reading"] == "") == (theory != "mbma")
+    assert (found.attrs["variant"] == "") == (theory != "mbma")
 
 
 @each
@@ -119,8 +119,8 @@ def test_theories_beside_one_another():
     ("more", "match"),
     [
         ({"theory": "person"}, "no theory is named 'person'; did you mean 'persson'"),
-        ({"tier": "exact"}, "tier: of theory 'mbma', not of 'persson'"),
-        ({"reading": "printed"}, "reading: of theory 'mbma'"),
+        ({"island_model": "exact"}, "island model: of theory 'mbma', not of 'persson'"),
+        ({"variant": "printed"}, "variant: of theory 'mbma'"),
         ({"without": ("sphere_deformation",)}, "without: of theory 'mbma'"),
         ({"effects": ("island_statistics",)}, "effect 'island_statistics': of theory 'mbma'"),
         ({"effects": ("comparison",), "theories": ("persson",)}, "by theory 'persson' itself"),

@@ -138,12 +138,12 @@ def test_older_conductances_beside():
 
 def test_a_plan_of_mbma_that_yields_keeps_the_tolerance():
     known = {"surface": SURFACE, "mean_separations": [1.0], "effects": ["force", "yield"], "hardness": 0.01}
-    for rtol, tier in ((1e-6, "universal"), (1e-10, "exact")):
+    for rtol, island_model in ((1e-6, "universal"), (1e-10, "exact")):
         scene = Scene(**known, rtol=rtol)
         assert scene.plan().error <= rtol
         found = scene.run()
         assert found.attrs["error"] <= rtol
-        assert json.loads(found.attrs["tiers"]) == {"contact": tier}
-        assert list(json.loads(found.attrs["table_hashes"])) == [tier] * (tier == "universal")
+        assert json.loads(found.attrs["island_models"]) == {"contact": island_model}
+        assert list(json.loads(found.attrs["table_hashes"])) == [island_model] * (island_model == "universal")
     with pytest.raises(InputError, match="the cost of theory 'mbma' is not known"):
         Scene(**known, seconds=10.0).plan()

@@ -201,8 +201,8 @@ INJECTION = "5 */ int main(void) { system(0); } /*"
         ("", "source_sha256", INJECTION),
         ("", "values_sha256", "0" * 63 + "g"),
         ("", "data_version", INJECTION),
-        ("", "reading", INJECTION),
-        ("", "reading", "reported\nEND"),
+        ("", "variant", INJECTION),
+        ("", "variant", "reported\nEND"),
         ("", "title", "one\ntwo"),
         ("", "title", 3),
         ("", "title", [1.5, 2.5]),
@@ -224,7 +224,7 @@ def test_an_attribute_of_another_type_is_refused_by_its_name(owner, name, value,
     assert f"has attribute {owner + ':' if owner else ''}{name} = " in refused(path)
 
 
-@pytest.mark.parametrize("name", ["reading", "source_sha256", "certificate_points", "largest_error_F"])
+@pytest.mark.parametrize("name", ["variant", "source_sha256", "certificate_points", "largest_error_F"])
 def test_an_attribute_that_is_missing_is_refused_by_its_name(name, sources, tmp_path):
     path = rehashed(tmp_path / "table.nc", sources[UNIVERSAL], lambda dataset: dataset.delncattr(name))
     assert f"lacks attribute {name}" in refused(path)

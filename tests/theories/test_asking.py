@@ -43,15 +43,17 @@ def test_stiffness_and_energy_are_those_of_the_law():
     assert found.mean_pressure == pytest.approx(found.force / found.area, rel=1e-15)
 
 
-@pytest.mark.parametrize("tier", ["exact", "formula", "island4d"])
-def test_other_tiers_have_stiffness_and_validity_too(tier):
+@pytest.mark.parametrize("island_model", ["exact", "formula", "island4d"])
+def test_other_tiers_have_stiffness_and_validity_too(island_model):
     u = [0.0, 0.05, 0.3, 1.0, 2.0, 2.99, 3.0]
-    table, other = (contact(SURFACE, mean_separation=u, tier=t) for t in ("universal", tier))
-    assert other.stiffness == pytest.approx(table.stiffness, rel={"exact": 1e-6}.get(tier, 5e-3))
+    table, other = (contact(SURFACE, mean_separation=u, island_model=t) for t in ("universal", island_model))
+    assert other.stiffness == pytest.approx(table.stiffness, rel={"exact": 1e-6}.get(island_model, 5e-3))
     assert other.valid.tolist() == table.valid.tolist()
     assert set(other.reasons) == set(table.reasons)
-    rigid = contact(SURFACE, mean_separation=[1.0, 2.0], tier="rigid")
-    assert rigid.stiffness == pytest.approx(contact_law(SURFACE, tier="rigid").stiffness(u=[1.0, 2.0]), rel=1e-6)
+    rigid = contact(SURFACE, mean_separation=[1.0, 2.0], island_model="rigid")
+    assert rigid.stiffness == pytest.approx(
+        contact_law(SURFACE, island_model="rigid").stiffness(u=[1.0, 2.0]), rel=1e-6
+    )
 
 
 def test_surfaces_beyond_the_table_have_validity():
@@ -249,8 +251,8 @@ def test_units_that_do_not_fit_are_noticed(theory):
         ({}, "exactly one of separation, mean_separation, pressure, area; got none"),
         ({"separation": 1.0, "pressure": 1.0}, "got separation and pressure"),
         ({"pressure": 1.0, "theory": "hertz"}, "theory must be one of"),
-        ({"pressure": 1.0, "theory": "persson", "tier": "exact"}, "tier: options of theory 'mbma'"),
-        ({"separation": 1.0, "theory": Mbma(), "reading": "printed"}, "reading: options of theory 'mbma' alone"),
+        ({"pressure": 1.0, "theory": "persson", "island_model": "exact"}, "island model: options of theory 'mbma'"),
+        ({"separation": 1.0, "theory": Mbma(), "variant": "printed"}, "variant: options of theory 'mbma' alone"),
         ({"pressure": np.nan}, "pressure must be finite"),
         ({"pressure": -1.0}, "pressure must be at least 0"),
         ({"mean_separation": -1.0}, "mean_separation must be at least 0, got -1"),
@@ -264,9 +266,9 @@ def test_what_cannot_be_asked(asked, match):
 
 def test_a_theory_object_with_its_own_options():
     by_object = contact(SURFACE, 1.0, theory=Mbma("rigid", "printed"))
-    by_name = contact(SURFACE, 1.0, tier="rigid", reading="printed")
+    by_name = contact(SURFACE, 1.0, island_model="rigid", variant="printed")
     assert by_object.force == by_name.force
-    assert (by_object.tier, by_object.reading, by_object.theory) == ("rigid", "printed", "mbma")
+    assert (by_object.island_model, by_object.variant, by_object.theory) == ("rigid", "printed", "mbma")
 
 
 @pytest.mark.parametrize("theory", ["persson", "greenwood_williamson"])

@@ -20,8 +20,8 @@ from mbma_tables.calibrated import CONSTANTS, Law, Spectrum
 from mbma_tables.calibrated_map import MAP_CONSTANTS
 from mbma_tables.files import shipped_file
 from mbma_tables.surfaces.heights import Heights
-from mbma_tables.surfaces.readings import get_reading
 from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.theories import Calibrated, Mbma, Persson, get_theory
 from mbma_tables.theories.calibrated_table import NAME, QUANTITIES, load, shipped
 
@@ -195,10 +195,10 @@ class TestScatter:
             other = get_theory(name).scatter(SURFACE, np.array([0.05]))
             assert other[0] > found.scatter[1]
             assert other[1] > found.area_scatter[1]
-        fitted, printed = (Mbma(reading=name).scatter(SURFACE, np.array(0.05)) for name in ("fitted", "printed"))
+        fitted, printed = (Mbma(variant=name).scatter(SURFACE, np.array(0.05)) for name in ("fitted", "printed"))
         assert fitted[1] < get_theory("mbma").scatter(SURFACE, np.array(0.05))[1] < printed[1]  # as area is
-        own = dataclasses.replace(get_reading("printed"), beta=0.3)
-        assert np.isnan(Mbma(reading=own).scatter(SURFACE, np.array(0.05))).all()
+        own = dataclasses.replace(get_variant("printed"), beta=0.3)
+        assert np.isnan(Mbma(variant=own).scatter(SURFACE, np.array(0.05))).all()
 
 
 @pytest.mark.parametrize("number", [0, 1])

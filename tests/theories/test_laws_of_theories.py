@@ -71,7 +71,7 @@ def test_within_its_bound_of_the_theory(theory, surface, rtol):
         assert np.abs(found / wanted - 1).max() <= law.error
     if isinstance(chosen, Persson | GreenwoodWilliamson) and rtol == 1e-8:
         assert law.stiffness(u=u) / MODULUS == pytest.approx(true.stiffness, rel=2e-6)
-    assert (law.theory, law.reading, law.tier) == (chosen.name, "", "")
+    assert (law.theory, law.variant, law.island_model) == (chosen.name, "", "")
 
 
 @each
@@ -216,8 +216,8 @@ class Negative:
     ("asked", "match"),
     [
         ({"theory": "hertz"}, "theory must be one of"),
-        ({"theory": "persson", "tier": "exact"}, "tier: options of theory 'mbma'"),
-        ({"theory": Mbma(), "reading": "printed"}, "reading: options of theory 'mbma' alone"),
+        ({"theory": "persson", "island_model": "exact"}, "island model: options of theory 'mbma'"),
+        ({"theory": Mbma(), "variant": "printed"}, "variant: options of theory 'mbma' alone"),
         ({"theory": "persson", "rtol": 1e-10}, "rtol"),
         ({"theory": "persson", "surface": Surface([0.5, 0.8], 0.2, 40.0, 1.0, 3.0)}, "one surface, got a batch"),
         ({"theory": Negative()}, "no positive force and area"),

@@ -357,9 +357,9 @@ def test_a_row_of_hardnesses_some_infinite_answers_areas():
     assert found.area == pytest.approx([0.1, 0.3, 0.5], rel=1e-10)
 
 
-def test_a_hardness_leaves_mbma_its_reading_and_tier():
-    found = contact(SURFACE, 0.5, reading="printed", hardness=0.02)
-    assert (found.reading, found.tier) == ("printed", "universal")
+def test_a_hardness_leaves_mbma_its_variant_and_island_model():
+    found = contact(SURFACE, 0.5, variant="printed", hardness=0.02)
+    assert (found.variant, found.island_model) == ("printed", "universal")
 
 
 def test_the_lightest_pressures_are_held():

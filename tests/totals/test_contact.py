@@ -8,18 +8,18 @@ import pytest
 from catalogue import LEVEL, OWN, random_gaps, random_surfaces
 
 from mbma_tables import ConvergenceError, InputError, OutOfRangeError, Surface, greenwood_tripp
-from mbma_tables import contact as contact_by_tier
+from mbma_tables import contact as contact_by_island_model
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.theories import Mbma
 from mbma_tables.totals.island_sum import kinks
 
-contact = functools.partial(contact_by_tier, tier="exact")
+contact = functools.partial(contact_by_island_model, island_model="exact")
 
 
-def brute(surface, separation, reading):
+def brute(surface, separation, variant):
     """(48) and (49) in units of E* q0 s and 1, by composite Gauss rules far finer than needed."""
-    rule = get_reading(reading)
+    rule = get_variant(variant)
     hurst, zeta_1, h_rms = surface.hurst, surface.zeta_1, surface.h_rms
     room = h_rms / surface.s
     reach = (surface.h_max - separation) / h_rms
@@ -80,31 +80,31 @@ BRUTE_POINTS = [
 ]
 
 
-@pytest.mark.parametrize(("hurst", "zeta_1", "share", "reading"), BRUTE_POINTS)
-def test_against_brute_force(hurst, zeta_1, share, reading):
+@pytest.mark.parametrize(("hurst", "zeta_1", "share", "variant"), BRUTE_POINTS)
+def test_against_brute_force(hurst, zeta_1, share, variant):
     surface = one_surface(hurst, zeta_1, h_max=3.3, h_rms=0.7)
     separation = share * surface.h_max
-    found = contact(surface, separation, reading=reading, rtol=1e-9)
-    force, area = brute(surface, separation, reading)
+    found = contact(surface, separation, variant=variant, rtol=1e-9)
+    force, area = brute(surface, separation, variant)
     assert abs(found.force / force - 1) <= 1e-9
     assert abs(found.area / area - 1) <= 1e-9
     assert max(abs(found.force / force - 1), abs(found.area / area - 1)) <= found.error + 5e-12
 
 
 @functools.cache
-def fine_contact(reading, count):
+def fine_contact(variant, count):
     surfaces = random_surfaces(count, seed=11)
     separation = random_gaps(surfaces, seed=12)
-    return surfaces, separation, contact(surfaces, separation, reading=reading, rtol=2e-11)
+    return surfaces, separation, contact(surfaces, separation, variant=variant, rtol=2e-11)
 
 
 @pytest.mark.parametrize(
-    ("reading", "count", "rtol"),
+    ("variant", "count", "rtol"),
     [("reported", 150, 1e-4), ("reported", 150, 1e-8), ("printed", 50, 1e-4), ("printed", 50, 1e-8)],
 )
-def test_bound_covers_the_true_error(reading, count, rtol):
-    surfaces, separation, fine = fine_contact(reading, count)
-    found = contact(surfaces, separation, reading=reading, rtol=rtol)
+def test_bound_covers_the_true_error(variant, count, rtol):
+    surfaces, separation, fine = fine_contact(variant, count)
+    found = contact(surfaces, separation, variant=variant, rtol=rtol)
     error = np.maximum(np.abs(found.force / fine.force - 1), np.abs(found.area / fine.area - 1))
     assert fine.error.max() <= 2e-11
     assert found.error.max() <= rtol
@@ -112,11 +112,11 @@ def test_bound_covers_the_true_error(reading, count, rtol):
 
 
 def test_the_papers_yang_persson_case():
-    found = contact(Surface.named("yang-persson"), 2.0, reading="printed")
+    found = contact(Surface.named("yang-persson"), 2.0, variant="printed")
     assert found.force == pytest.approx(2.5114e-5, abs=5e-10)
     assert found.area == pytest.approx(3.1145e-5, abs=5e-10)
     assert found.mean_separation == 2.5
-    assert (found.reading, found.tier) == ("printed", "exact")
+    assert (found.variant, found.island_model) == ("printed", "exact")
 
 
 def test_no_cancellation_next_to_first_contact():
@@ -127,14 +127,14 @@ def test_no_cancellation_next_to_first_contact():
     assert found.force[0] / found.force[1] == pytest.approx((2.0**-28) ** 3.5, rel=1e-3, abs=0)
 
 
-@pytest.mark.parametrize("tier", ["exact", "rigid"])
-def test_no_contact_is_exactly_zero(tier):
+@pytest.mark.parametrize("island_model", ["exact", "rigid"])
+def test_no_contact_is_exactly_zero(island_model):
     surface = one_surface(0.8, 216.0)
-    found = contact(surface, [3.0, math.nextafter(3, 4), 50.0, 1e300], tier=tier)
+    found = contact(surface, [3.0, math.nextafter(3, 4), 50.0, 1e300], island_model=island_model)
     assert found.force.tolist() == [0.0] * 4
     assert found.area.tolist() == [0.0] * 4
     assert found.error.tolist() == [0.0] * 4
-    assert contact(surface, math.nextafter(3, 2), tier=tier).force > 0
+    assert contact(surface, math.nextafter(3, 2), island_model=island_model).force > 0
 
 
 def test_the_argument_stays():
@@ -175,9 +175,9 @@ def test_no_number(value):
         ("rtol", 0.5),
         ("rtol", math.nan),
         ("rtol", "tight"),
-        ("tier", "magic"),
-        ("tier", None),
-        ("reading", "guessed"),
+        ("island_model", "magic"),
+        ("island_model", None),
+        ("variant", "guessed"),
         ("E_star", 0.0),
         ("E_star", -2.0),
     ],
@@ -187,13 +187,13 @@ def test_bad_options(option, value):
         contact(one_surface(0.8, 216.0), 1.0, **{option: value})
 
 
-@pytest.mark.parametrize("tier", ["universal", "exact", "rigid", "island4d"])
+@pytest.mark.parametrize("island_model", ["universal", "exact", "rigid", "island4d"])
 @pytest.mark.parametrize("wanted", ["force", "area"])
-def test_one_quantity_alone(tier, wanted):
+def test_one_quantity_alone(island_model, wanted):
     surface = Surface([0.5, 0.8], 1.0, 100.0, 1.0, 3.0)
     gaps = [1.0, -2.0]
-    both = contact_by_tier(surface, gaps, tier=tier)
-    alone = contact_by_tier(surface, gaps, tier=tier, quantities=[wanted])
+    both = contact_by_island_model(surface, gaps, island_model=island_model)
+    alone = contact_by_island_model(surface, gaps, island_model=island_model, quantities=[wanted])
     other = "area" if wanted == "force" else "force"
     assert getattr(alone, other) is None
     np.testing.assert_allclose(getattr(alone, wanted), getattr(both, wanted), rtol=max(1e-8, 2 * both.error.max()))
@@ -203,7 +203,7 @@ def test_one_quantity_alone(tier, wanted):
 @pytest.mark.parametrize("wanted", [(), ["force", "stiffness"], "energy"])
 def test_unknown_quantities(wanted):
     with pytest.raises(InputError, match="quantities must be some of"):
-        contact_by_tier(Surface(0.8, 1.0, 100.0, 1.0, 3.0), 1.0, quantities=wanted)
+        contact_by_island_model(Surface(0.8, 1.0, 100.0, 1.0, 3.0), 1.0, quantities=wanted)
 
 
 ROUGH = Surface(0.8, 1.0, 216.0, 1.0, 3.0)
@@ -227,7 +227,7 @@ KINDS = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_layout_does_not_matter(kind):
-    found, expected = contact_by_tier(ROUGH, KINDS[kind]), contact_by_tier(ROUGH, GAPS)
+    found, expected = contact_by_island_model(ROUGH, KINDS[kind]), contact_by_island_model(ROUGH, GAPS)
     np.testing.assert_array_equal(np.ravel(found.force), expected.force)
     np.testing.assert_array_equal(np.ravel(found.area), expected.area)
 
@@ -236,26 +236,26 @@ def test_layout_does_not_matter(kind):
     ("numbers", "u"),
     [((0.10728780315018954, 1.0, 7214.690040008648, 6.1258690298472525, 22.168540357796594), 4.433708071559319)],
 )
-def test_few_surfaces_keep_their_bound_with_any_reading(numbers, u):
+def test_few_surfaces_keep_their_bound_with_any_variant(numbers, u):
     surface = Surface(*numbers)
-    found = contact_by_tier(surface, mean_separation=u, reading="fitted")
-    known = Mbma(reading="fitted", rtol=1e-11).totals(surface, 2 * u - surface.h_max, derivatives=True)
+    found = contact_by_island_model(surface, mean_separation=u, variant="fitted")
+    known = Mbma(variant="fitted", rtol=1e-11).totals(surface, 2 * u - surface.h_max, derivatives=True)
     assert abs(found.force / known.force - 1) <= found.error
 
 
 @pytest.mark.parametrize(
-    ("reading", "numbers", "compression", "rtol"),
+    ("variant", "numbers", "compression", "rtol"),
     [
         ("printed", (0.531947294354621, 716405.4119302577, 3.982572903065155), 1.67147, 1e-8),
         ("printed", (0.5913947825075665, 463746.61320114444, 3.708447610995201), 1.26928, 1e-5),
         ("fitted", (0.24255115327802002, 31377.867654901776, 0.8042366230900542), 1.21085, 1e-5),
     ],
 )
-def test_many_surfaces_keep_their_bound_where_sums_agree_by_chance(reading, numbers, compression, rtol):
+def test_many_surfaces_keep_their_bound_where_sums_agree_by_chance(variant, numbers, compression, rtol):
     hurst, zeta_1, top = numbers
     surfaces = Surface(hurst, 1.0, zeta_1, 1.0, np.full((30, 1), top))
     gaps = top - compression * (1 + np.linspace(-1e-3, 1e-3, 41))
-    found, known = (contact_by_tier(surfaces, gaps, reading=reading, rtol=asked) for asked in (rtol, 1e-11))
+    found, known = (contact_by_island_model(surfaces, gaps, variant=variant, rtol=asked) for asked in (rtol, 1e-11))
     for name in ("force", "area"):
         assert (np.abs(getattr(found, name) / getattr(known, name) - 1) <= found.error).all()
     assert found.error.max() <= rtol

@@ -18,7 +18,7 @@ from mbma_tables.models.closed_form_functions import RANGES
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.island4d import RAW
 from mbma_tables.models.tables import open_table, universal_model
-from mbma_tables.surfaces.readings import READINGS, REPORTED, get_reading
+from mbma_tables.surfaces.variants import REPORTED, VARIANTS, get_variant
 from mbma_tables.theories.law_block import CENTRE, RATE
 from mbma_tables.totals.island_sum import kinks
 
@@ -79,20 +79,20 @@ def apart(a, b, moved):
     return np.abs(np.log(b / a) - moved)
 
 
-@pytest.mark.parametrize("reading", sorted(READINGS))
+@pytest.mark.parametrize("variant", sorted(VARIANTS))
 @pytest.mark.parametrize("which", INPUTS)
 @pytest.mark.parametrize(
-    ("tier", "rtol", "count"), [("universal", 1e-8, 240), ("universal", 1e-10, 240), ("exact", 1e-9, 6)]
+    ("island_model", "rtol", "count"), [("universal", 1e-8, 240), ("universal", 1e-10, 240), ("exact", 1e-9, 6)]
 )
-def test_totals_do_not_jump(reading, which, tier, rtol, count, record_property):
+def test_totals_do_not_jump(variant, which, island_model, rtol, count, record_property):
     count *= SCALE
-    rng = np.random.default_rng([5, sorted(READINGS).index(reading), INPUTS.index(which), round(-math.log10(rtol))])
-    numbers = pressed(rng, count, get_reading(reading))
+    rng = np.random.default_rng([5, sorted(VARIANTS).index(variant), INPUTS.index(which), round(-math.log10(rtol))])
+    numbers = pressed(rng, count, get_variant(variant))
     below, above = (moved_by(numbers, which, sign * STEP / 2) for sign in (-1, 1))
     step = above[which] - below[which]
-    options = {"reading": reading, "outside": "nan"}
+    options = {"variant": variant, "outside": "nan"}
     slopes = [totals_of(side, derivatives=True, **options) for side in (below, above)]
-    one, other = (totals_of(side, tier=tier, rtol=rtol, **options) for side in (below, above))
+    one, other = (totals_of(side, island_model=island_model, rtol=rtol, **options) for side in (below, above))
     some = np.isfinite(slopes[0].force) & np.isfinite(slopes[1].force)
     assert some.mean() > 0.6
     rounded = 8 * EPS * numbers["h_max"] / (numbers["h_max"] - numbers["separation"])
@@ -105,22 +105,22 @@ def test_totals_do_not_jump(reading, which, tier, rtol, count, record_property):
 
 
 def own_motion(answer, name):
-    """How far a tier's answer moves over a step by itself: by differences a thousand steps wide."""
+    """How far an island model's answer moves over a step by itself: by differences a thousand steps wide."""
     centre = getattr(answer(0.0), name)
     return np.max([np.abs(getattr(answer(end), name) / centre - 1) for end in (-WIDE, WIDE)], axis=0) * STEP / WIDE
 
 
 @pytest.mark.parametrize("which", INPUTS)
-@pytest.mark.parametrize("tier", ["rigid", "island4d", "formula"])
-def test_totals_of_other_tiers_do_not_jump(tier, which, record_property):
+@pytest.mark.parametrize("island_model", ["rigid", "island4d", "formula"])
+def test_totals_of_other_tiers_do_not_jump(island_model, which, record_property):
     count = 18 * SCALE
-    numbers = pressed(np.random.default_rng([17, len(tier), INPUTS.index(which)]), count, REPORTED)
+    numbers = pressed(np.random.default_rng([17, len(island_model), INPUTS.index(which)]), count, REPORTED)
     numbers["hurst"] = np.clip(numbers["hurst"], 0.31, 1 - 2 * WIDE)
     depth = np.maximum(numbers["h_max"] - numbers["separation"], 1e-3 * numbers["h_max"])
     numbers["separation"] = numbers["h_max"] - np.minimum(depth, 2 * numbers["h_max"] * (1 - 10 * WIDE))
 
     def answer(share):
-        return totals_of(moved_by(numbers, which, share), tier=tier, rtol=1e-7, outside="exact")
+        return totals_of(moved_by(numbers, which, share), island_model=island_model, rtol=1e-7, outside="exact")
 
     one, other = answer(-STEP / 2), answer(STEP / 2)
     for name in ("force", "area"):
@@ -135,15 +135,15 @@ def test_totals_do_not_jump_where_the_solver_takes_over(record_property):
     rng = np.random.default_rng(8)
     shallow = dataclasses.replace(REPORTED, name="shallow", beta=0.01, phi=0.001)
     compared = 0
-    for reading, hurst in ((REPORTED, rng.uniform(0.05, 0.08, count)), (shallow, rng.uniform(0.7, 1, count))):
+    for variant, hurst in ((REPORTED, rng.uniform(0.05, 0.08, count)), (shallow, rng.uniform(0.7, 1, count))):
         surface = Surface(hurst, 1.0, 10 ** rng.uniform(7.5, 8, count), 1.0, 4.5)
         inside, outside = np.full(count, 4.5 - 1e-9), np.full(count, -4.4)
         for _ in range(60):
             middle = (inside + outside) / 2
-            gone = np.isnan(contact(surface, middle, reading=reading, outside="nan").force)
+            gone = np.isnan(contact(surface, middle, variant=variant, outside="nan").force)
             inside, outside = np.where(gone, inside, middle), np.where(gone, middle, outside)
-        one, other = (contact(surface, gap, reading=reading, outside="exact") for gap in (inside, outside))
-        left = np.isnan(contact(surface, outside, reading=reading, outside="nan").force)
+        one, other = (contact(surface, gap, variant=variant, outside="exact") for gap in (inside, outside))
+        left = np.isnan(contact(surface, outside, variant=variant, outside="nan").force)
         assert left.any()
         own = 10 * np.abs(inside - outside) / (4.5 - inside)
         for name in ("force", "area"):
@@ -154,10 +154,12 @@ def test_totals_do_not_jump_where_the_solver_takes_over(record_property):
 
 
 @pytest.mark.parametrize("which", ["delta", "hurst", "q0", "q1", "h_rms", "E_star"])
-@pytest.mark.parametrize(("tier", "rtol"), [("universal", 1e-8), ("exact", 1e-10), ("rigid", 1e-8), ("island4d", 1e-3)])
-def test_islands_do_not_jump(which, tier, rtol, record_property):
+@pytest.mark.parametrize(
+    ("island_model", "rtol"), [("universal", 1e-8), ("exact", 1e-10), ("rigid", 1e-8), ("island4d", 1e-3)]
+)
+def test_islands_do_not_jump(which, island_model, rtol, record_property):
     count = 90 * SCALE
-    rng = np.random.default_rng([9, len(which), len(tier)])
+    rng = np.random.default_rng([9, len(which), len(island_model)])
     hurst, zeta_1, _ = surfaces(rng, count)
     hurst = np.clip(hurst, 0.31, 1 - 2 * WIDE)
     approach = 10 ** rng.uniform(-9, 0.5, count)
@@ -170,7 +172,7 @@ def test_islands_do_not_jump(which, tier, rtol, record_property):
     def answer(share):
         own = moved_by(numbers, which, share)
         surface = Surface(own["hurst"], own["q0"], own["q1"], own["h_rms"], 9.0)
-        return island(surface, own["delta"], tier=tier, rtol=rtol, E_star=own["E_star"])
+        return island(surface, own["delta"], island_model=island_model, rtol=rtol, E_star=own["E_star"])
 
     one, other = answer(-STEP / 2), answer(STEP / 2)
     for name in ("force", "area", "zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "eta", "X", "mu"):
@@ -358,9 +360,9 @@ def test_the_four_parameter_table_joins_its_expansion(record_property):
 def test_laws_do_not_jump_at_their_breaks(rtol, record_property):
     rng, compared = np.random.default_rng(16), 0
     for _ in range(2 * SCALE):
-        reading = sorted(READINGS)[rng.integers(2)]
+        variant = sorted(VARIANTS)[rng.integers(2)]
         surface = Surface(rng.uniform(0.3, 1), 1.0, 10 ** rng.uniform(0.5, 4), 1.0, rng.uniform(2.5, 4.5))
-        law = contact_law(surface, rtol, reading=reading)
+        law = contact_law(surface, rtol, variant=variant)
         depth = 2 * law.h_max * (law.records[1:, CENTRE] - 1 / law.records[1:, RATE])
         gaps = law.h_max - depth
         sides = [gaps - sign * STEP * depth for sign in (-0.5, 0.5)]

@@ -1,4 +1,4 @@
-"""Readings that add areas of islands as a cover, and the one that is fitted to boundary elements."""
+"""Variants that add areas of islands as a cover, and the one that is fitted to boundary elements."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from mbma_tables import InputError, Surface, contact, contact_law
 from mbma_tables.export.code import write_code
-from mbma_tables.surfaces.readings import FITTED, REPORTED
+from mbma_tables.surfaces.variants import FITTED, REPORTED
 
 DATA = pathlib.Path(__file__).parents[2] / "docs" / "data" / "boundary_elements.csv"
 COVER = dataclasses.replace(REPORTED, name="cover", addition="cover")
@@ -20,19 +20,19 @@ GAPS = np.array([2.9, 2.0, 0.5, -1.0, -2.9])
 
 
 def test_cover_is_what_islands_at_random_leave_uncovered():
-    added, covered = (contact(SURFACE, GAPS, reading=r, derivatives=True) for r in (REPORTED, COVER))
+    added, covered = (contact(SURFACE, GAPS, variant=r, derivatives=True) for r in (REPORTED, COVER))
     assert covered.force == pytest.approx(added.force, rel=1e-15)
     assert covered.area == pytest.approx(-np.expm1(-added.area), rel=1e-15)
     for name, slope in added.area_by.items():
         assert covered.area_by[name] == pytest.approx(slope * np.exp(-added.area), rel=1e-14)
-    law = contact_law(SURFACE, reading=COVER)
+    law = contact_law(SURFACE, variant=COVER)
     assert law.area(GAPS) == pytest.approx(covered.area, rel=2e-8)
     assert not any("added" in reason for reason in covered.reasons)
 
 
 def test_exported_code_takes_no_cover(tmp_path):
     with pytest.raises(InputError, match="takes their cover"):
-        write_code("c", tmp_path, reading=FITTED)
+        write_code("c", tmp_path, variant=FITTED)
 
 
 def test_addition_is_one_of_two():
@@ -49,7 +49,7 @@ def test_fitted_area_at_equal_force_follows_boundary_elements():
     for seed in sorted({tuple(row[k] for k in keys) for row in rows if row["L_over_lambda0"] != "1"}):
         own = [row for row in rows if tuple(row[k] for k in keys) == seed]
         surface = Surface(float(seed[0]), 1.0, float(seed[2]), 1.0, float(own[0]["h_max_over_h_rms"]))
-        found = contact(surface, np.linspace(-1, 0.99, 200) * surface.h_max, reading="fitted", rtol=1e-5)
+        found = contact(surface, np.linspace(-1, 0.99, 200) * surface.h_max, variant="fitted", rtol=1e-5)
         branch = slice(int(np.argmax(found.force)), None)
         log_force, log_area = (np.log(x[branch][::-1]) for x in (found.force / surface.rms_gradient, found.area))
         for row in own:
@@ -63,5 +63,5 @@ def test_fitted_area_at_equal_force_follows_boundary_elements():
 
 def test_a_surface_below_the_floors_is_refused():
     for answer in (contact_law, lambda *given, **options: contact(*given, 1.0, **options)):
-        with pytest.raises(InputError, match=r"greater than 5\.14, the reading's floor of zeta_u"):
-            answer(Surface(0.8, 1.0, 5.0, 1.0, 3.0), reading="fitted")
+        with pytest.raises(InputError, match=r"greater than 5\.14, the variant's floor of zeta_u"):
+            answer(Surface(0.8, 1.0, 5.0, 1.0, 3.0), variant="fitted")

@@ -11,7 +11,7 @@ from mbma_tables import ConvergenceError, Surface, contact
 from mbma_tables.core import INVALID, OK, UNRESOLVED, core
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.models.tables import universal_model
-from mbma_tables.surfaces.readings import PRINTED, REPORTED
+from mbma_tables.surfaces.variants import PRINTED, REPORTED
 from mbma_tables.totals import island_sum
 from mbma_tables.totals.island_sum import kinks
 
@@ -33,18 +33,18 @@ def test_the_rules_by_their_degrees(points):
         assert (abs(gauss @ shape - integral) < 1e-14) == (degree <= 2 * n - 1)
 
 
-@pytest.mark.parametrize("reading", [REPORTED, PRINTED, LEVEL], ids=lambda reading: reading.name)
-def test_islands_are_those_of_geometry(reading):
+@pytest.mark.parametrize("variant", [REPORTED, PRINTED, LEVEL], ids=lambda variant: variant.name)
+def test_islands_are_those_of_geometry(variant):
     rng = np.random.default_rng(40)
     hurst = rng.uniform(0.1, 1, 3000)
     hurst[::10] = 1
     hurst[1::10] = 1 - 10 ** rng.uniform(-15, -3, 300)
-    zeta_1 = np.maximum(10 ** rng.uniform(math.log10(3.01), 8, 3000), 1.001 * reading.floor_u)
+    zeta_1 = np.maximum(10 ** rng.uniform(math.log10(3.01), 8, 3000), 1.001 * variant.floor_u)
     x = 10 ** rng.uniform(-12, 1, 3000)
-    g = geometry(x, hurst, zeta_1, reading)
+    g = geometry(x, hurst, zeta_1, variant)
     nodes = np.empty((3000, len(FIELDS)))
     for given in zip(x, hurst, zeta_1, nodes, strict=True):
-        assert core.island_geometry(*given[:3], reading.numbers, given[3]) == OK
+        assert core.island_geometry(*given[:3], variant.numbers, given[3]) == OK
     expected = np.stack([g[name] for name in FIELDS], axis=-1)
     np.testing.assert_allclose(nodes, expected, rtol=1e-11)
     assert np.median(np.abs(nodes / np.where(expected == 0, 1.0, expected) - (expected != 0))) < 1e-14
@@ -120,13 +120,13 @@ def test_bits_depend_neither_on_the_batch_nor_on_the_generation(slopes, generati
         assert phi[-1].tobytes() == phi[0].tobytes()
 
 
-@pytest.mark.parametrize("reading", [REPORTED, OWN], ids=lambda reading: reading.name)
-def test_kinks_are_where_geometry_reaches_its_floors(reading):
+@pytest.mark.parametrize("variant", [REPORTED, OWN], ids=lambda variant: variant.name)
+def test_kinks_are_where_geometry_reaches_its_floors(variant):
     rng = np.random.default_rng(6)
     hurst, zeta_1 = rng.uniform(0.1, 1, 200), 3.51 * 10 ** rng.uniform(0, 7, 200)
     for kink, name, floor in zip(
-        kinks(hurst, zeta_1, reading), ("zeta_d", "zeta_u"), (reading.floor_d, reading.floor_u), strict=True
+        kinks(hurst, zeta_1, variant), ("zeta_d", "zeta_u"), (variant.floor_d, variant.floor_u), strict=True
     ):
-        before, beyond = (geometry(kink * (1 + sign * 1e-9), hurst, zeta_1, reading)[name] for sign in (-1, 1))
+        before, beyond = (geometry(kink * (1 + sign * 1e-9), hurst, zeta_1, variant)[name] for sign in (-1, 1))
         assert (before > floor).all()
         assert (beyond == floor).all()

@@ -43,7 +43,7 @@ def test_dimensions_by_name():
         Surface(np.array([0.4, 0.7, 1.0])[:, None, None], 0.2, 40.0, 1.0, np.array([3.0, 3.2])[:, None]), gaps.values
     )
     assert found.islands is None
-    assert (found.tier, found.reading) == ("universal", "reported")
+    assert (found.island_model, found.variant) == ("universal", "reported")
     for name in FIELDS:
         values = getattr(found, name)
         assert isinstance(values, xr.DataArray)
@@ -147,9 +147,9 @@ def test_outside_and_tiers_go_through():
     assert np.isfinite(found.force.sel(s=1)).all()
     with pytest.raises(OutOfRangeError, match="outside the universal table"):
         contact(surfaces, gaps)
-    rigid = contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), gaps, tier="rigid", reading="printed", rtol=1e-4)
-    assert (rigid.tier, rigid.reading) == ("rigid", "printed")
-    plain = contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), gaps.values, tier="rigid", reading="printed", rtol=1e-4)
+    rigid = contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), gaps, island_model="rigid", variant="printed", rtol=1e-4)
+    assert (rigid.island_model, rigid.variant) == ("rigid", "printed")
+    plain = contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), gaps.values, island_model="rigid", variant="printed", rtol=1e-4)
     np.testing.assert_array_equal(rigid.force, plain.force)
 
 
@@ -187,7 +187,7 @@ from mbma_tables import Surface, contact
 gaps = xr.DataArray(np.linspace(-2.9, 3.1, 120), dims="gap")
 surface = Surface(xr.DataArray([0.5, 0.8], dims="surface").chunk(surface=1), 0.2, 40.0, 1.0, 3.0)
 with dask.config.set(scheduler="threads", num_workers=8):
-    lazy = contact(surface, gaps.chunk(gap=3)), contact(surface, gaps.chunk(gap=15), tier="island4d", rtol=1e-3)
+    lazy = contact(surface, gaps.chunk(gap=3)), contact(surface, gaps.chunk(gap=15), island_model="island4d", rtol=1e-3)
     first, second = dask.compute(lazy[0].force, lazy[1].force)
 assert (abs(first - second) <= 0.01 * first).all()
 from mbma_tables.models.tables import shipped

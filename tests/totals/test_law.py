@@ -16,13 +16,13 @@ from helpers import difference_weights, with_slopes
 
 from mbma_tables import ContactLaw, ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.models import get_model
-from mbma_tables.surfaces.readings import NAMED
+from mbma_tables.surfaces.variants import NAMED
 from mbma_tables.theories import law_pieces
 from mbma_tables.theories.law_block import CENTRE, DEGREE, FORCE_AT, RATE, RECORD
 from mbma_tables.totals.island_sum import Pairs, totals_of
 from mbma_tables.totals.profile import profile
 
-# hurst, zeta_1, h_max/h_rms, reading
+# hurst, zeta_1, h_max/h_rms, variant
 CASES = [
     (0.8, 216.0, 3.0, "reported"),
     (0.3, 1e4, 4.0, "reported"),
@@ -42,7 +42,7 @@ def surface_of(hurst, zeta_1, top):
 
 @functools.cache
 def law_of(case, rtol=1e-8):
-    return contact_law(surface_of(*case[:3]), rtol=rtol, reading=case[3])
+    return contact_law(surface_of(*case[:3]), rtol=rtol, variant=case[3])
 
 
 def depths(law, seed, least=1e-9):
@@ -62,23 +62,23 @@ def pieces_of(law):
 def test_within_its_tolerance_and_its_bound(case, rtol):
     law = law_of(case, rtol)
     gaps = law.h_max - depths(law, 50)
-    true = contact(surface_of(*case[:3]), gaps, rtol=1e-11, reading=case[3])
+    true = contact(surface_of(*case[:3]), gaps, rtol=1e-11, variant=case[3])
     error = np.maximum(np.abs(law.force(gaps) / true.force - 1), np.abs(law.area(gaps) / true.area - 1))
     assert error.max() <= rtol + 1e-11
     assert (error <= law.error + 1e-11).all()
     assert law.error <= 1.1 * rtol + 1e-9
-    assert (law.reading, law.tier) == (case[3], "universal")
+    assert (law.variant, law.island_model) == (case[3], "universal")
 
 
-@pytest.mark.parametrize("tier", ["exact", "rigid", "island4d"])
-def test_of_any_tier(tier):
+@pytest.mark.parametrize("island_model", ["exact", "rigid", "island4d"])
+def test_of_any_island_model(island_model):
     surface = surface_of(*CASES[0][:3])
-    law = contact_law(surface, rtol=1e-5, tier=tier)
+    law = contact_law(surface, rtol=1e-5, island_model=island_model)
     gaps = law.h_max * (1 - np.array([1e-5, 0.01, 0.3, 0.9, 1.7]))
-    true = contact(surface, gaps, tier=tier, rtol=1e-8)
+    true = contact(surface, gaps, island_model=island_model, rtol=1e-8)
     np.testing.assert_allclose(law.force(gaps), true.force, rtol=1.1e-5)
     np.testing.assert_allclose(law.area(gaps), true.area, rtol=1.1e-5)
-    assert law.tier == tier
+    assert law.island_model == island_model
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -210,7 +210,7 @@ def test_a_turn_within_a_hundredth_of_the_range(rtol):
 
 def test_area_may_turn_too():
     surface = Surface(0.2, 0.3, 0.3e7, 0.7, 2.1)
-    law = contact_law(surface, reading="printed")
+    law = contact_law(surface, variant="printed")
     turn = law.area_turning_point
     assert law.turning_point > turn > -law.h_max
     assert (np.diff(law.area(np.linspace(law.h_max, turn, 200))) > 0).all()
@@ -302,8 +302,8 @@ def test_many_gaps_agree_with_single_ones(case, rtol):
     """A profile of the islands against the quadrature of each gap, at gaps of every size and beyond contact."""
     surface = surface_of(*case[:3])
     gaps = float(surface.h_max) * np.append(1 - 2 * np.geomspace(1e-12, 1, 400), [1.0, 1.5])
-    many = contact(surface, gaps, rtol=rtol, reading=case[3])
-    few = [contact(surface, part, rtol=1e-11, reading=case[3]) for part in np.array_split(gaps, 4)]
+    many = contact(surface, gaps, rtol=rtol, variant=case[3])
+    few = [contact(surface, part, rtol=1e-11, variant=case[3]) for part in np.array_split(gaps, 4)]
     for name in ("force", "area"):
         single = np.concatenate([getattr(part, name) for part in few])
         assert (np.abs(getattr(many, name) - single) <= (many.error + 1e-11) * single).all()
@@ -327,10 +327,10 @@ def test_many_gaps_agree_with_single_ones(case, rtol):
     ],
 )
 def test_bounds_of_a_profile_where_a_search_found_them_exceeded(numbers, c, rtol):
-    surface, reading = Surface(numbers[0], 1.0, numbers[1], 1.0, numbers[2]), NAMED["fitted"]
-    model, c = get_model("universal", 1e-8, reading), np.linspace(*c, 40)
-    kept = profile(numbers, model, reading, 0.9 * rtol)
-    single = totals_of(model, Pairs.of(surface, c), reading, 1e-11)
+    surface, variant = Surface(numbers[0], 1.0, numbers[1], 1.0, numbers[2]), NAMED["fitted"]
+    model, c = get_model("universal", 1e-8, variant), np.linspace(*c, 40)
+    kept = profile(numbers, model, variant, 0.9 * rtol)
+    single = totals_of(model, Pairs.of(surface, c), variant, 1e-11)
     assert np.abs(kept.totals(c) / np.stack([single.force, single.area]) - 1).max() <= kept.error
 
 
@@ -339,14 +339,14 @@ def test_no_bound_of_a_profile_is_exceeded_on_300_surfaces():
     rng = np.random.default_rng(5)
     for number in range(300):
         zeta_1, top = 5.2 + 10 ** rng.uniform(-3, 6), rng.uniform(1.5, 6)
-        reading = list(NAMED.values())[number % 3]
+        variant = list(NAMED.values())[number % 3]
         surface = Surface(rng.uniform(0.2, 1.0), 1.0, zeta_1, 1.0, top)
         shape = float(surface.hurst), zeta_1, top
-        model = get_model("universal", 1e-8, reading)
-        kept = profile(shape, model, reading, 10 ** rng.uniform(-10, -3))
+        model = get_model("universal", 1e-8, variant)
+        kept = profile(shape, model, variant, 10 ** rng.uniform(-10, -3))
         c = np.append(2 * top * 10 ** rng.uniform(-8, 0, 20), rng.uniform(0, 2 * top, 20))
         c = c[c < kept.end]
-        single = totals_of(model, Pairs.of(surface, c), reading, 1e-11)
+        single = totals_of(model, Pairs.of(surface, c), variant, 1e-11)
         assert np.abs(kept.totals(c) / np.stack([single.force, single.area]) - 1).max() <= kept.error
 
 
@@ -357,12 +357,12 @@ def test_no_bound_is_exceeded_on_fresh_points_of_300_laws():
         top, rtol = rng.uniform(2.0, 5.0), 10 ** rng.uniform(-9, -2)
         zeta_1 = 3 + 10 ** rng.uniform(-6, 5)
         surface = Surface(rng.uniform(0.25, 1.0), 1.0, zeta_1, 1.0, top)
-        law = contact_law(surface, rtol, reading=("reported", "printed")[rng.integers(2)])
+        law = contact_law(surface, rtol, variant=("reported", "printed")[rng.integers(2)])
         gap = top - 2 * top * np.append(10 ** rng.uniform(-6, 0, 40), rng.uniform(0, 1, 40))
-        truth = contact(surface, np.maximum(gap, -top), rtol=1e-10, reading=law.reading)
+        truth = contact(surface, np.maximum(gap, -top), rtol=1e-10, variant=law.variant)
         assert np.abs(law.force(truth.separation) / truth.force - 1).max() <= law.error
         assert np.abs(law.area(truth.separation) / truth.area - 1).max() <= law.error
-        for missed in slope_misses(surface, law, gap, law.reading):
+        for missed in slope_misses(surface, law, gap, law.variant):
             assert (missed <= law.slope_error(gap)).all()
 
 
@@ -443,10 +443,10 @@ def test_bad_laws(monkeypatch):
     for modulus in (0.0, -1.0, math.inf, math.nan, [1.0, 2.0]):
         with pytest.raises(InputError, match="E_star"):
             contact_law(surface, E_star=modulus)
-    with pytest.raises(InputError, match="tier"):
-        contact_law(surface, tier="magic")
-    with pytest.raises(InputError, match="reading"):
-        contact_law(surface, reading="guessed")
+    with pytest.raises(InputError, match="island_model"):
+        contact_law(surface, island_model="magic")
+    with pytest.raises(InputError, match="variant"):
+        contact_law(surface, variant="guessed")
     # the table ends before full compression, and so does the law
     assert -3 < contact_law(Surface(0.05, 0.2, 0.2e8, 1.0, 3.0)).lowest < 3
     monkeypatch.setattr(law_pieces, "MAX_RECORDS", 3)
@@ -515,9 +515,9 @@ def test_a_narrow_dip_is_a_turning_point(at, width, sign):
     assert law_pieces.first_falls(above, np.array([float(sign)]))[0] is None
 
 
-def slope_misses(surface, law, gap, reading="reported"):
+def slope_misses(surface, law, gap, variant="reported"):
     """Errors of the law's slopes over F/l and A/l, against derivatives of totals."""
-    truth = contact(surface, gap, rtol=1e-11, derivatives=True, reading=reading)
+    truth = contact(surface, gap, rtol=1e-11, derivatives=True, variant=variant)
     for slope, by, value in (
         (law.stiffness(gap) / 2, truth.force_by, truth.force),
         (law.area_slope(gap), truth.area_by, truth.area),
@@ -562,7 +562,7 @@ def test_a_steep_and_high_surface_has_a_law():
     np.testing.assert_allclose(law.force(gap), truth.force, rtol=law.error + 1e-9)
     assert law.error < 2e-8
     with pytest.raises(OutOfRangeError, match="so high that force or area underflow"):
-        contact_law(Surface(1.0, 1.0, 100.0, 1.0, 60.0), 1e-3, tier="rigid")
+        contact_law(Surface(1.0, 1.0, 100.0, 1.0, 60.0), 1e-3, island_model="rigid")
 
 
 def test_inverses_stay_within_the_law():

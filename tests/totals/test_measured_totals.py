@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law, island
 from mbma_tables.islands.geometry import floors_of, measured_islands
 from mbma_tables.models import answer_islands, get_model
-from mbma_tables.surfaces.readings import FITTED, PRINTED, REPORTED, get_reading
+from mbma_tables.surfaces.variants import FITTED, PRINTED, REPORTED, get_variant
 from mbma_tables.totals.profile import profile, source_of
 
 DATA = pathlib.Path(__file__).parents[1] / "data"
@@ -38,14 +38,14 @@ def rough(seed=1, count=60, h_max=3.5, gap=True):
     return Surface.from_spectrum(q, C / unit**2, h_max=h_max)
 
 
-@pytest.mark.parametrize("reading", [REPORTED, PRINTED, FITTED], ids=lambda r: r.name)
+@pytest.mark.parametrize("variant", [REPORTED, PRINTED, FITTED], ids=lambda r: r.name)
 @pytest.mark.parametrize(("hurst", "zeta_1"), [(0.8, 200.0), (0.5, 30.0), (1.0, 1000.0), (0.3, 64.0), (0.9, 6.0)])
-def test_a_sampled_power_law_has_the_totals_of_its_five_numbers(reading, hurst, zeta_1):
+def test_a_sampled_power_law_has_the_totals_of_its_five_numbers(variant, hurst, zeta_1):
     surface = five_numbers(hurst, zeta_1)
     d = surface.h_max * (1 - DEPTHS[1:])
-    plain = contact(surface, d, reading=reading, derivatives=True)
+    plain = contact(surface, d, variant=variant, derivatives=True)
     for count in (2, 200):
-        found = contact(sampled(surface, count), d, reading=reading, derivatives=True)
+        found = contact(sampled(surface, count), d, variant=variant, derivatives=True)
         bound = float(np.max(plain.error + found.error))
         for name in ("force", "area"):
             np.testing.assert_allclose(getattr(found, name), getattr(plain, name), rtol=bound)
@@ -57,16 +57,16 @@ def test_a_sampled_power_law_has_the_totals_of_its_five_numbers(reading, hurst, 
 def test_exact_and_universal_tiers_agree():
     surface = rough(count=24)
     d = surface.h_max * (1 - DEPTHS[1:])
-    exact, table = (contact(surface, d, tier=tier) for tier in ("exact", "universal"))
+    exact, table = (contact(surface, d, island_model=island_model) for island_model in ("exact", "universal"))
     np.testing.assert_allclose(table.force, exact.force, rtol=1e-7)
     np.testing.assert_allclose(table.area, exact.area, rtol=1e-7)
 
 
-@pytest.mark.parametrize("reading", ["reported", "printed", "fitted"])
+@pytest.mark.parametrize("variant", ["reported", "printed", "fitted"])
 @pytest.mark.parametrize(("gap", "rtol"), [(False, 2e-7), (True, 3e-5)], ids=["whole", "gap"])
-def test_totals_are_the_integral_over_islands(reading, gap, rtol):
+def test_totals_are_the_integral_over_islands(variant, gap, rtol):
     # ten thousand panels that know nothing of samples, nor of the jump that a gap in the spectrum makes
-    surface, rule = rough(gap=gap), get_reading(reading)
+    surface, rule = rough(gap=gap), get_variant(variant)
     model = get_model("rigid", 1e-8, rule)
     kept = profile(surface, model, rule, 1e-8, rows=3)
     kink = floors_of(surface, rule).kinks[0]
@@ -146,7 +146,7 @@ def test_a_law_is_the_contacts(count, h_max):
     found = contact(surface, d)
     np.testing.assert_allclose(law.force(d), found.force, rtol=2 * law.error)
     np.testing.assert_allclose(law.area(d), found.area, rtol=2 * law.error)
-    assert (law.theory, law.reading, law.tier) == ("mbma", "reported", "universal")
+    assert (law.theory, law.variant, law.island_model) == ("mbma", "reported", "universal")
 
 
 def test_a_law_ends_with_the_table():
@@ -179,17 +179,17 @@ def test_islands():
 
 def test_what_mbma_cannot_use_is_refused_with_the_mend():
     surface = rough()
-    with pytest.raises(InputError, match=r"ask tier 'universal' or 'exact', or surface\.fit\(\)"):
-        contact(surface, 1.0, tier="island4d")
+    with pytest.raises(InputError, match=r"use 'universal' or 'exact', or surface\.fit\(\)"):
+        contact(surface, 1.0, island_model="island4d")
     with pytest.raises(InputError, match=r"surface\.fit\(\)"):
-        island(surface, 1.0, tier="island4d")
+        island(surface, 1.0, island_model="island4d")
     q = np.geomspace(1, 10, 30)
     blue = Surface.from_spectrum(q, q, h_max=3000.0)
     with pytest.raises(OutOfRangeError, match="measure shorter waves, or ask another theory"):
         contact(blue, 1.0)
     assert contact(blue, mean_separation=500.0, theory="calibrated").force > 0
     steep = Surface.from_spectrum(np.geomspace(1, 30, 50), np.geomspace(1, 30, 50) ** -2.1, h_max=30.0)
-    deep = contact(steep, -29.0, tier="universal", outside="nan").force
+    deep = contact(steep, -29.0, island_model="universal", outside="nan").force
     assert deep > 0 or np.isnan(deep)
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from mbma_tables import ConvergenceError, Surface
 from mbma_tables.models import get_model
-from mbma_tables.surfaces.readings import get_reading
+from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.totals.island_sum import GAUSS_21, KRONROD_21, NODES_21, Pairs, integrate, totals_of
 
 
@@ -88,12 +88,12 @@ def test_the_estimate_is_of_the_kronrod_sum():
 @pytest.mark.parametrize("name", ["reported", "printed", "fitted"])
 def test_stated_errors_of_totals(name):
     # of a force and an area that are nearly proportional both differences between the rules may vanish by chance
-    rng, reading, count = np.random.default_rng(1), get_reading(name), 100_000
-    low, high = (0.1, np.log(max(3.1, 1.01 * reading.floor_u)), 2.5, 0), (1, np.log(1e4), 5.5, 1)
+    rng, variant, count = np.random.default_rng(1), get_variant(name), 100_000
+    low, high = (0.1, np.log(max(3.1, 1.01 * variant.floor_u)), 2.5, 0), (1, np.log(1e4), 5.5, 1)
     hurst, log_zeta, peak, share = rng.uniform(low, high, (count, 4)).T
     surface = Surface(hurst, np.ones(count), np.exp(log_zeta), np.ones(count), peak)
     pairs = Pairs.of(surface, 2 * peak * share**1.5)
-    found, known = (totals_of(get_model("universal", 1e-8, reading), pairs, reading, rtol) for rtol in (1e-8, 1e-12))
+    found, known = (totals_of(get_model("universal", 1e-8, variant), pairs, variant, rtol) for rtol in (1e-8, 1e-12))
     with np.errstate(invalid="ignore"):
         off = [np.nan_to_num(np.abs(a / b - 1)) for a, b in ((found.force, known.force), (found.area, known.area))]
     assert (np.max(off, axis=0) <= found.error).all()

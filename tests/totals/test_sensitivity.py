@@ -14,7 +14,7 @@ from helpers import difference_weights
 from generate.tables.exact_geometry import divisor, exact_island
 from mbma_tables import Surface, contact
 from mbma_tables.models.tables import universal_model
-from mbma_tables.surfaces.readings import REPORTED, get_reading
+from mbma_tables.surfaces.variants import REPORTED, get_variant
 from mbma_tables.totals.island_sum import kinks
 
 # each of two flags by itself
@@ -36,8 +36,8 @@ CASES = [
 AT_KINKS = [(0.9, 100.0, 0, 0.95), (0.9, 100.0, 0, 1.05), (0.9, 100.0, 1, 0.97), (0.9, 100.0, 1, 1.03)]
 
 
-def differences(numbers, reading, step):
-    """Values and derivatives of force and area by high-order differences of tier "exact"; numbers as `NAMES`."""
+def differences(numbers, variant, step):
+    """Values and derivatives of force and area by high-order differences of exact islands; numbers as `NAMES`."""
     shifted, spans = [], []
     for place, name in enumerate(NAMES):
         backward = name == "hurst" and numbers[place] == 1
@@ -45,7 +45,7 @@ def differences(numbers, reading, step):
         span = step * numbers[place]
         if name in ("q0", "q1"):
             # next to the floor of zeta_u, area rises like a sixth root of zeta_1 - floor
-            span *= min(1.0, 10 * (numbers[2] / numbers[1] / get_reading(reading).floor_u - 1))
+            span *= min(1.0, 10 * (numbers[2] / numbers[1] / get_variant(variant).floor_u - 1))
         if name in ("separation", "h_max"):
             # the depth is what matters near first contact
             span = step * (numbers[4] - numbers[5])
@@ -54,7 +54,7 @@ def differences(numbers, reading, step):
         shifted.append(points)
         spans.append(difference_weights(offsets) / span)
     points = np.stack(shifted, axis=1)
-    found = contact(Surface(*points[:5]), points[5], tier="exact", reading=reading, rtol=1e-11)
+    found = contact(Surface(*points[:5]), points[5], island_model="exact", variant=variant, rtol=1e-11)
     return [np.einsum("nk,nk->n", spans, values) for values in (found.force, found.area)]
 
 
@@ -65,10 +65,10 @@ def numbers_of(case):
     return hurst, 0.3, 0.3 * zeta_1, h_rms, top * h_rms, (top - reach) * h_rms
 
 
-def against_differences(numbers, reading, step):
-    found = contact(Surface(*numbers[:5]), numbers[5], reading=reading, rtol=1e-10, derivatives=True)
+def against_differences(numbers, variant, step):
+    found = contact(Surface(*numbers[:5]), numbers[5], variant=variant, rtol=1e-10, derivatives=True)
     for value, by, true in zip(
-        (found.force, found.area), (found.force_by, found.area_by), differences(numbers, reading, step), strict=True
+        (found.force, found.area), (found.force_by, found.area_by), differences(numbers, variant, step), strict=True
     ):
         assert sorted(by) == sorted(NAMES)
         for name, parameter, slope in zip(NAMES, numbers, true, strict=True):
@@ -77,33 +77,33 @@ def against_differences(numbers, reading, step):
 
 
 @pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("reading", ["reported", "printed"])
-def test_against_differences(case, reading):
-    against_differences(numbers_of(case), reading, 4e-3)
+@pytest.mark.parametrize("variant", ["reported", "printed"])
+def test_against_differences(case, variant):
+    against_differences(numbers_of(case), variant, 4e-3)
 
 
 @pytest.mark.parametrize("case", [CASES[0], CASES[2], CASES[3]])
-@pytest.mark.parametrize("reading", [OWN, LEVEL, NO_OFFSET, OF_HEIGHTS], ids=lambda reading: reading.name)
-def test_a_reading_of_ones_own_against_differences(case, reading):
-    against_differences(numbers_of(case), reading, 4e-3)
+@pytest.mark.parametrize("variant", [OWN, LEVEL, NO_OFFSET, OF_HEIGHTS], ids=lambda variant: variant.name)
+def test_a_variant_of_ones_own_against_differences(case, variant):
+    against_differences(numbers_of(case), variant, 4e-3)
 
 
 @pytest.mark.parametrize(("hurst", "zeta_1", "which", "share"), AT_KINKS)
-@pytest.mark.parametrize("reading", ["reported", OWN], ids=["reported", "own"])
-def test_next_to_a_kink_against_differences(hurst, zeta_1, which, share, reading):
-    reach = share * kinks(hurst, zeta_1, get_reading(reading))[which]
-    against_differences(numbers_of((hurst, zeta_1, 4.7, reach)), reading, 2e-3)
+@pytest.mark.parametrize("variant", ["reported", OWN], ids=["reported", "own"])
+def test_next_to_a_kink_against_differences(hurst, zeta_1, which, share, variant):
+    reach = share * kinks(hurst, zeta_1, get_variant(variant))[which]
+    against_differences(numbers_of((hurst, zeta_1, 4.7, reach)), variant, 2e-3)
 
 
-@pytest.mark.parametrize("reading", ["reported", "printed", OWN, LEVEL], ids=["reported", "printed", "own", "level"])
-def test_lengths_scale_out(reading):
+@pytest.mark.parametrize("variant", ["reported", "printed", OWN, LEVEL], ids=["reported", "printed", "own", "level"])
+def test_lengths_scale_out(variant):
     """Force and area do not know the unit of length: Euler's identity for functions of degree 0."""
     rng = np.random.default_rng(70)
     hurst, top = rng.uniform(0.3, 1, 60), rng.uniform(2.5, 4.7, 60)
     zeta_1, share = 10 ** rng.uniform(0.56, 4, 60), rng.uniform(-1, 1, 60)
     share[::4] = 1 - 10 ** rng.uniform(-6, -1, 15)
     surface = Surface(hurst, 0.3, 0.3 * zeta_1, 0.7, 0.7 * top)
-    found = contact(surface, share * surface.h_max, reading=reading, derivatives=True)
+    found = contact(surface, share * surface.h_max, variant=variant, derivatives=True)
     for by in (found.force_by, found.area_by):
         terms = np.stack(
             [

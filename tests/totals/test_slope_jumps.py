@@ -16,12 +16,12 @@ from mbma_tables.islands.four_numbers import from_axes, to_axes
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.models.island4d import RAW
 from mbma_tables.models.tables import open_table, universal_model
-from mbma_tables.surfaces.readings import READINGS, REPORTED
 from mbma_tables.surfaces.spectrum import band_moment
+from mbma_tables.surfaces.variants import REPORTED, VARIANTS
 from mbma_tables.theories.law_block import CENTRE, RATE
 from mbma_tables.totals.island_sum import kinks
 
-EVERY = [*READINGS.values(), OWN, LEVEL]
+EVERY = [*VARIANTS.values(), OWN, LEVEL]
 PROMISED = 1e-6  # of derivatives
 STEP = 1e-9
 INPUTS = ("hurst", "q0", "q1", "h_rms", "h_max", "separation")
@@ -100,7 +100,7 @@ def changed(numbers, which, value):
 
 def totals_of(numbers, rule, **options):
     surface = Surface(*(numbers[name] for name in INPUTS[:-1]))
-    return contact(surface, numbers["separation"], reading=rule, **options)
+    return contact(surface, numbers["separation"], variant=rule, **options)
 
 
 def beyond_the_kink(numbers, rule):
@@ -121,7 +121,7 @@ def models_jump(numbers, name, rule):
     """Jump of dF/d(reach) or dA/d(reach) at the kink: the step of K1 times the islands at the upper limit (44, 48)."""
     hurst, zeta_1, h_rms = numbers["hurst"], numbers["q1"] / numbers["q0"], numbers["h_rms"]
     surface = Surface(*(numbers[key] for key in INPUTS[:-1]))
-    found = island(surface, kinks(hurst, zeta_1, rule)[0] * h_rms, reading=rule)
+    found = island(surface, kinks(hurst, zeta_1, rule)[0] * h_rms, variant=rule)
     m0, m2, m4 = (band_moment(order, hurst, 1.0, rule.floor_d) for order in (0, 2, 4))
     density = m4 / m2 / rule.density_divisor * numbers["q0"] ** 2
     sigma = surface.s * np.sqrt(m0 - (0.8968 * m2**2 / m4 if rule.summit_sigma else 0))
@@ -175,7 +175,7 @@ def test_totals_at_the_floors(floor, which, rule, record_property):
     record_property("pairs compared", count)
 
 
-@pytest.mark.parametrize("rule", READINGS.values(), ids=lambda rule: rule.name)
+@pytest.mark.parametrize("rule", VARIANTS.values(), ids=lambda rule: rule.name)
 @pytest.mark.parametrize("which", INPUTS)
 def test_totals_elsewhere(which, rule, record_property):
     """Given derivatives just either side of random places, and of where the code switches."""
@@ -243,9 +243,9 @@ def test_laws_at_their_breaks(rtol, record_property):
     """Polynomials of two pieces meet with slopes as far apart as their errors let them be, but for the model's jump."""
     rng, compared = np.random.default_rng(9), 0
     for _ in range(4 * SCALE):
-        rule = list(READINGS.values())[rng.integers(2)]
+        rule = list(VARIANTS.values())[rng.integers(2)]
         hurst, zeta_1, h_max = (float(numbers[0]) for numbers in surfaces(rng, 1))
-        law = contact_law(Surface(hurst, 1.0, zeta_1, 1.0, h_max), rtol, reading=rule)
+        law = contact_law(Surface(hurst, 1.0, zeta_1, 1.0, h_max), rtol, variant=rule)
         depth = 2 * h_max * (law.records[1:, CENTRE] - 1 / law.records[1:, RATE])
         clear = np.abs(depth / kinks(hurst, zeta_1, rule)[0] - 1) > 1e-9
         gaps = law.h_max - depth

@@ -98,8 +98,8 @@ function cubic(p, q, y) {
 
 // Standard deviations of logarithms, as `Contact.scatter`: by contact fraction, null where not known.
 function scatterOf(state, curve) {
-  const other = curve.theory === "mbma" && state.reading !== "reported",
-    rows = LIMITS.scatter[other ? `mbma_${state.reading}` : curve.theory],
+  const other = curve.theory === "mbma" && state.variant !== "reported",
+    rows = LIMITS.scatter[other ? `mbma_${state.variant}` : curve.theory],
     nodes = LIMITS.log_area;
   const at = (quantity) => (area) => {
     const row = rows[quantity].map((value, k) => [nodes[k], value]).filter(([, value]) => value !== null);
@@ -129,7 +129,7 @@ function concernsOf(state, curve, h_rms, gradient) {
     const gap = softening(curve);
     reasons.push([
       `areas of islands are added, A/A0 is above ${LIMITS.mbma_area}`,
-      (k) => !DATA.model.readings[state.reading].cover && curve.area[k] > LIMITS.mbma_area,
+      (k) => !DATA.model.variants[state.variant].cover && curve.area[k] > LIMITS.mbma_area,
     ]);
     reasons.push(["stiffness falls with compression here, which no simulation shows", (k) => curve.gap[k] < gap]);
   } else if (curve.theory === "persson") {

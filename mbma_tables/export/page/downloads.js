@@ -21,7 +21,7 @@ function factsOf(state) {
     ...surface,
     `E* = ${state.E_star}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; k_s = ${state.k_s}`,
     `lengths in ${LENGTH ?? "the unit of the surface"}, stresses ${OVER_E ? "over E*" : `in ${STRESS ?? "the unit of E*"}`}; u is the mean separation of the mean planes, first contact at h_max`,
-    `theory ${state.theory}${state.theory === "mbma" ? `, reading ${state.reading}` : ""}`,
+    `theory ${state.theory}${state.theory === "mbma" ? `, variant ${state.variant}` : ""}`,
     `state ${addressOf(state)}`,
     "scatter: standard deviation of the logarithm from simulation to simulation, of the force at equal u, else at equal pressure; it is no numerical error",
   ].map((line) => line.replace(/[\r\n]+/g, " "));
@@ -110,7 +110,7 @@ function commandOf(state) {
   const units = `${LENGTH ? ` --length-unit ${LENGTH}` : ""}${STRESS && !OVER_E ? ` --stress-unit ${STRESS}` : ""}`;
   return state.samples
     ? "mbma_tables.export.law_code.law_text of Surface.from_spectrum(q, C, h_max)"
-    : `mbma export c-law ${numbers.join(" ")}${units} --theory ${state.theory}${state.theory === "mbma" ? ` --reading ${state.reading}` : ""} --out law.c`;
+    : `mbma export c-law ${numbers.join(" ")}${units} --theory ${state.theory}${state.theory === "mbma" ? ` --variant ${state.variant}` : ""} --out law.c`;
 }
 
 function lawOf(state) {

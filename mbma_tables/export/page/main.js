@@ -57,8 +57,8 @@ for (const [name, { label, unit, group, low, high, decades }] of Object.entries(
     placeSlider();
   };
 }
-for (const name of WORDS.reading) by("reading").append(new Option(name));
-for (const name of ["theory", "reading", "against", "convention"]) {
+for (const name of WORDS.variant) by("variant").append(new Option(name));
+for (const name of ["theory", "variant", "against", "convention"]) {
   by(name).addEventListener("change", () => {
     state[name] = by(name).value;
     update();
@@ -97,7 +97,7 @@ function showSource() {
 // The controls as the state has them.
 function show() {
   for (const { show: own } of Object.values(NUMBERS)) own();
-  for (const name of ["theory", "reading", "against", "convention"]) by(name).value = state[name];
+  for (const name of ["theory", "variant", "against", "convention"]) by(name).value = state[name];
   by("log").checked = state.log === "yes";
   for (const box of form.elements.beside) box.checked = state.beside.includes(box.value);
   if (state.spectrum !== "" || by("spectrum").value === "") by("spectrum").value = state.spectrum;

@@ -53,13 +53,13 @@ for (const [name, values] of tables) {
   new kind(C.memory.buffer, C[name].value, values.length).set(values);
 }
 
-// One surface, reading and modulus as functions of the mean separation, by theory.
+// One surface, variant and modulus as functions of the mean separation, by theory.
 function prepare(state) {
   const surface = ["hurst", "q0", "q1", "h_rms", "h_max"].map((name) => state[name]);
-  const reading = DATA.model.readings[state.reading];
+  const variant = DATA.model.variants[state.variant];
   // mbma_variant: five numbers and three flags
-  numbersAt(C.MBMA_READING.value, 5).set(reading.numbers.slice(0, 5));
-  new Int32Array(C.memory.buffer, C.MBMA_READING.value + 40, 3).set(reading.numbers.slice(5));
+  numbersAt(C.MBMA_READING.value, 5).set(variant.numbers.slice(0, 5));
+  new Int32Array(C.memory.buffer, C.MBMA_READING.value + 40, 3).set(variant.numbers.slice(5));
   numbersAt(ARGUMENTS, 5).set(surface);
   const samples = state.samples;
   if (samples) {
@@ -88,7 +88,7 @@ function prepare(state) {
   return {
     mbma(u) {
       const found = answer(C.mbma_total_of(ARGUMENTS, 2 * u - state.h_max, state.E_star, RTOL, ANSWER));
-      if (found && reading.cover) found.area = -Math.expm1(-found.area);
+      if (found && variant.cover) found.area = -Math.expm1(-found.area);
       return found;
     },
     calibrated(u) {

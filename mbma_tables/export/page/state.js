@@ -14,7 +14,7 @@ const NUMBERS = {
 };
 const WORDS = {
   theory: ["mbma", "calibrated", "persson"],
-  reading: Object.keys(DATA.model.readings),
+  variant: Object.keys(DATA.model.variants),
   against: ["gap", "pressure"],
   log: ["yes", "no"],
   convention: ["paper", "isotropic"],
@@ -88,7 +88,7 @@ function samplesOf(text, convention) {
 // Faults of a state by control, in words.
 function faultsOf(state) {
   const errors = {},
-    floor = Math.max(3, DATA.model.readings[state.reading].numbers[4]); // of zeta_u
+    floor = Math.max(3, DATA.model.variants[state.variant].numbers[4]); // of zeta_u
   for (const name of Object.keys(NUMBERS)) {
     const value = state[name];
     if (!Number.isFinite(value)) errors[name] = `${name} must be a number`;
@@ -110,7 +110,7 @@ function faultsOf(state) {
     const zeta_1 = state.q1 / state.q0,
       mbma = state.theory === "mbma" || state.beside.includes("mbma"),
       least = mbma ? floor : 3;
-    const which = least > 3 ? `, as reading ${state.reading} needs` : "";
+    const which = least > 3 ? `, as variant ${state.variant} needs` : "";
     if (!(zeta_1 > least)) errors.q1 = `q₁ must be more than ${least} q₀${which}; q₁/q₀ is ${shown(zeta_1)}`;
     else if (!(zeta_1 <= 1e8)) errors.q1 = `q₁ must be at most 1e8 q₀; q₁/q₀ is ${shown(zeta_1)}`;
   }

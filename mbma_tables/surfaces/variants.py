@@ -1,4 +1,4 @@
-"""Readings of the paper: the few choices that its text leaves open or prints wrongly, by name.
+"""Variants of the paper: the few choices that its text leaves open or prints wrongly, by name.
 
 `printed` is exactly the printed equations. `reported`, the default, takes every summit density without its
 pi, and so gives the results that the paper reports. Nothing else is tuned in these two. `fitted` has its constants
@@ -20,13 +20,13 @@ from mbma_tables.surfaces.spectrum import NAYAK
 
 
 @dataclasses.dataclass(frozen=True)
-class Reading:
-    """One reading of the paper's equations; make another with ``dataclasses.replace``.
+class Variant:
+    """One variant of the paper's equations; make another with ``dataclasses.replace``.
 
     Attributes
     ----------
     name : str
-        Every result says by it which reading made it.
+        Every result says by it which variant made it.
     density_divisor : float
         Summit density is m4/(density_divisor m2), wherever one enters (Eqs. 2, 32, 39, 43a).
     jacobian : {"printed", "exact"}
@@ -53,9 +53,9 @@ class Reading:
     --------
     >>> import dataclasses
     >>> from mbma_tables import Surface, contact
-    >>> from mbma_tables.surfaces.readings import PRINTED
+    >>> from mbma_tables.surfaces.variants import PRINTED
     >>> flat = dataclasses.replace(PRINTED, name="no offset", offset=False)
-    >>> contact(Surface.named("concrete"), 0.6, reading=flat).reading
+    >>> contact(Surface.named("concrete"), 0.6, variant=flat).variant
     'no offset'
     """
 
@@ -81,7 +81,7 @@ class Reading:
         }
         for rule, kept in allowed.items():
             if not kept:
-                raise InputError(f"reading {self.name!r}: {rule}")
+                raise InputError(f"variant {self.name!r}: {rule}")
 
     def area_of(self, area_sum: FloatArray) -> FloatArray:
         """A/A0 of the sum of islands' areas over A0; its relative error is at most the sum's."""
@@ -99,18 +99,18 @@ class Reading:
         return np.array([*self.recorded, self.jacobian == "printed"], dtype=float)
 
 
-PRINTED = Reading("printed")
-REPORTED = Reading("reported", density_divisor=NAYAK / math.pi)
+PRINTED = Variant("printed")
+REPORTED = Variant("reported", density_divisor=NAYAK / math.pi)
 # fitted to the area at equal force of 105 surfaces by boundary elements (docs/fidelity.md); effective, not physical
-FITTED = Reading("fitted", density_divisor=4.10, beta=0.656, phi=0.0274, floor_d=1.036, floor_u=5.14, addition="cover")
-READINGS = {reading.name: reading for reading in (REPORTED, PRINTED)}  # of the paper
-NAMED = READINGS | {FITTED.name: FITTED}
+FITTED = Variant("fitted", density_divisor=4.10, beta=0.656, phi=0.0274, floor_d=1.036, floor_u=5.14, addition="cover")
+VARIANTS = {variant.name: variant for variant in (REPORTED, PRINTED)}  # of the paper
+NAMED = VARIANTS | {FITTED.name: FITTED}
 
 
-def get_reading(reading: str | Reading) -> Reading:
-    """The reading of that name, or the reading itself."""
-    if isinstance(reading, Reading):
-        return reading
-    if not isinstance(reading, str) or reading not in NAMED:
-        raise InputError(f"reading must be one of {sorted(NAMED)} or a Reading, got {reading!r}")
-    return NAMED[reading]
+def get_variant(variant: str | Variant) -> Variant:
+    """The variant of that name, or the variant itself."""
+    if isinstance(variant, Variant):
+        return variant
+    if not isinstance(variant, str) or variant not in NAMED:
+        raise InputError(f"variant must be one of {sorted(NAMED)} or a Variant, got {variant!r}")
+    return NAMED[variant]

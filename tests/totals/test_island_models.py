@@ -1,4 +1,4 @@
-"""Tiers of `contact` against each other: tables within their certificate, readings, islands outside, bad options."""
+"""Island models of `contact` compared: tables within their certificate, variants, islands outside, bad options."""
 
 import dataclasses
 import functools
@@ -11,29 +11,29 @@ from helpers import fresh
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact
 from mbma_tables.core import core
-from mbma_tables.surfaces.readings import READINGS, REPORTED
+from mbma_tables.surfaces.variants import REPORTED, VARIANTS
 from mbma_tables.totals import island_sum
 
 OPEN = dataclasses.replace(REPORTED, name="open", floor_d=1.3, floor_u=2.2, density_divisor=11.0)
 
 
 @functools.cache
-def solved(reading):
+def solved(variant):
     surfaces = random_surfaces(80, seed=101, hurst=(0.3, 1.0), zeta_1=(3.01, 1e4))
     gaps = random_gaps(surfaces, seed=102)
-    return surfaces, gaps, contact(surfaces, gaps, tier="exact", reading=reading, rtol=1e-10)
+    return surfaces, gaps, contact(surfaces, gaps, island_model="exact", variant=variant, rtol=1e-10)
 
 
 def apart(found, true):
     return np.maximum(np.abs(found.force / true.force - 1), np.abs(found.area / true.area - 1))
 
 
-@pytest.mark.parametrize("reading", READINGS)
+@pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-8, 1e-10])
-def test_universal_within_1e7_and_its_tolerance_of_exact(reading, rtol):
-    surfaces, gaps, true = solved(reading)
-    found = contact(surfaces, gaps, reading=reading, rtol=rtol)
-    assert found.tier == "universal"
+def test_universal_within_1e7_and_its_tolerance_of_exact(variant, rtol):
+    surfaces, gaps, true = solved(variant)
+    found = contact(surfaces, gaps, variant=variant, rtol=rtol)
+    assert found.island_model == "universal"
     error = apart(found, true)
     assert (error <= found.error).all()
     assert found.error.max() <= rtol + 1e-7
@@ -42,50 +42,50 @@ def test_universal_within_1e7_and_its_tolerance_of_exact(reading, rtol):
 
 def test_island4d_within_1e3_of_exact():
     surfaces, gaps, true = solved("reported")
-    found = contact(surfaces, gaps, tier="island4d", rtol=1e-6)
-    assert found.tier == "island4d"
+    found = contact(surfaces, gaps, island_model="island4d", rtol=1e-6)
+    assert found.island_model == "island4d"
     assert (apart(found, true) <= found.error).all()
     assert found.error.max() <= 1e-3
     # a coarser table than the other
     assert np.median(apart(found, true)) > 1e-8
 
 
-@pytest.mark.parametrize("reading", [OWN, LEVEL, OPEN], ids=lambda reading: reading.name)
-def test_a_reading_of_ones_own(reading):
+@pytest.mark.parametrize("variant", [OWN, LEVEL, OPEN], ids=lambda variant: variant.name)
+def test_a_variant_of_ones_own(variant):
     surfaces = random_surfaces(25, seed=102, hurst=(0.4, 1.0), zeta_1=(3.6, 1e4))
     gaps = random_gaps(surfaces, seed=103)
-    true = contact(surfaces, gaps, tier="exact", reading=reading, rtol=1e-9)
-    found = contact(surfaces, gaps, reading=reading, rtol=1e-9)
-    assert (found.reading, true.reading) == (reading.name, reading.name)
+    true = contact(surfaces, gaps, island_model="exact", variant=variant, rtol=1e-9)
+    found = contact(surfaces, gaps, variant=variant, rtol=1e-9)
+    assert (found.variant, true.variant) == (variant.name, variant.name)
     error = apart(found, true)
     assert (error <= found.error + true.error).all()
     assert found.error.max() <= 1e-7
-    # the reading matters: its name alone did not decide
+    # the variant matters: its name alone did not decide
     assert (np.abs(contact(surfaces, gaps).area / found.area - 1) > 1e-3).any()
 
 
-@pytest.mark.parametrize("tier", ["universal", "exact", "rigid"])
-def test_a_floor_above_the_largest_magnification(tier):
+@pytest.mark.parametrize("island_model", ["universal", "exact", "rigid"])
+def test_a_floor_above_the_largest_magnification(island_model):
     surfaces = Surface([0.5, 0.8], 0.2, [0.68, 40.0], 1.0, 3.0)
-    with pytest.raises(OutOfRangeError, match=r"q1/q0 must be greater than 3\.5, the reading's floor") as caught:
-        contact(surfaces, 1.0, tier=tier, reading=OWN)
+    with pytest.raises(OutOfRangeError, match=r"q1/q0 must be greater than 3\.5, the variant's floor") as caught:
+        contact(surfaces, 1.0, island_model=island_model, variant=OWN)
     assert caught.value.mask.tolist() == [True, False]
 
 
 @pytest.mark.parametrize(
-    "reading", ["printed", LEVEL, dataclasses.replace(REPORTED, name="own", density_divisor=11.0)], ids=str
+    "variant", ["printed", LEVEL, dataclasses.replace(REPORTED, name="own", density_divisor=11.0)], ids=str
 )
-def test_the_four_parameter_table_is_of_one_reading(reading):
-    with pytest.raises(InputError, match=r"island4d table was made for the reading 'reported', not for .*'universal'"):
-        contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), 1.0, tier="island4d", reading=reading)
+def test_the_four_parameter_table_is_of_one_variant(variant):
+    with pytest.raises(InputError, match=r"island4d table was made for the variant 'reported', not for .*'universal'"):
+        contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), 1.0, island_model="island4d", variant=variant)
 
 
-def test_the_four_parameter_table_serves_readings_that_share_its_islands():
+def test_the_four_parameter_table_serves_variants_that_share_its_islands():
     # floors, beta and K1 move along the table's axes and do not change it
     near = dataclasses.replace(REPORTED, name="near", jacobian="exact", floor_d=1.6, beta=0.3)
     surface, gaps = Surface(0.7, 0.2, 40.0, 1.0, 3.0), np.array([2.5, 1.0, -2.0])
-    found = contact(surface, gaps, tier="island4d", reading=near, rtol=1e-6)
-    true = contact(surface, gaps, tier="exact", reading=near)
+    found = contact(surface, gaps, island_model="island4d", variant=near, rtol=1e-6)
+    true = contact(surface, gaps, island_model="exact", variant=near)
     assert (apart(found, true) <= found.error + true.error).all()
     assert found.error.max() <= 1e-3
 
@@ -97,7 +97,7 @@ MISSING = np.array([[False, True, True, False], [False] * 4])
 
 def test_outside_raises_with_a_mask_in_the_callers_shape():
     with pytest.raises(OutOfRangeError) as caught:
-        contact(ROUGH, GAPS, reading="reported")
+        contact(ROUGH, GAPS, variant="reported")
     np.testing.assert_array_equal(caught.value.mask, MISSING)
     message = str(caught.value)
     assert "2 of 8 entries" in message
@@ -109,7 +109,7 @@ def test_outside_raises_with_a_mask_in_the_callers_shape():
 
 def test_outside_answered_by_the_solver():
     found = contact(ROUGH, GAPS, outside="exact")
-    true = contact(ROUGH, GAPS, tier="exact")
+    true = contact(ROUGH, GAPS, island_model="exact")
     table = contact(ROUGH, GAPS, outside="nan")
     for name in ("force", "area", "error"):
         expected = np.where(MISSING, getattr(true, name), getattr(table, name))
@@ -132,14 +132,14 @@ def test_outside_as_nan(derivatives):
 
 
 def test_outside_in_X():
-    """A reading with hardly any deformation is deeper than the table at any gap."""
+    """A variant with hardly any deformation is deeper than the table at any gap."""
     shallow = dataclasses.replace(REPORTED, name="shallow", beta=0.01, phi=0.001)
     surface, gaps = Surface(0.9, 0.2, 400.0, 1.0, 4.7), np.array([4.6, -4.7, 4.8])
     with pytest.raises(OutOfRangeError, match=r"2 of 3 entries .*X above") as caught:
-        contact(surface, gaps, reading=shallow)
+        contact(surface, gaps, variant=shallow)
     assert caught.value.mask.tolist() == [True, True, False]
-    found = contact(surface, gaps, reading=shallow, outside="exact")
-    true = contact(surface, gaps, reading=shallow, tier="exact")
+    found = contact(surface, gaps, variant=shallow, outside="exact")
+    true = contact(surface, gaps, variant=shallow, island_model="exact")
     np.testing.assert_array_equal(found.force, true.force)
     np.testing.assert_array_equal(found.area, true.area)
 
@@ -157,11 +157,11 @@ def test_bad_options():
     surface = Surface(0.8, 0.2, 40.0, 1.0, 3.0)
     with pytest.raises(InputError, match="outside must be one of"):
         contact(surface, 1.0, outside="clamp")
-    with pytest.raises(InputError, match="tier must be one of"):
-        contact(surface, 1.0, tier="formula4")
-    for tier in ("exact", "island4d", "rigid"):
-        with pytest.raises(InputError, match="derivatives come from tier 'universal'"):
-            contact(surface, 1.0, tier=tier, derivatives=True)
+    with pytest.raises(InputError, match="island_model must be one of"):
+        contact(surface, 1.0, island_model="formula4")
+    for island_model in ("exact", "island4d", "rigid"):
+        with pytest.raises(InputError, match="derivatives come from island model 'universal'"):
+            contact(surface, 1.0, island_model=island_model, derivatives=True)
     with pytest.raises(InputError, match="outside must be 'raise' or 'nan'"):
         contact(surface, 1.0, outside="exact", derivatives=True)
 
@@ -192,11 +192,14 @@ print(json.dumps([traced / gaps.nbytes, grown / gaps.nbytes, found.islands / gap
 SURFACE = Surface(0.8, 0.3, 60.0, 0.7, 2.1)
 
 
-@pytest.mark.parametrize("tier", ["universal", "rigid"])
-def test_the_floor_of_zeta_u_itself_is_refused(tier):
+@pytest.mark.parametrize("island_model", ["universal", "rigid"])
+def test_the_floor_of_zeta_u_itself_is_refused(island_model):
     with pytest.raises(OutOfRangeError, match=r"q1/q0 must be greater than 3\.5"):
-        contact(Surface(0.8, 1.0, 3.5, 1.0, 3.0), 1.0, tier=tier, reading=OWN)
-    assert contact(Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), 1.0, tier=tier, reading=OWN).force > 0
+        contact(Surface(0.8, 1.0, 3.5, 1.0, 3.0), 1.0, island_model=island_model, variant=OWN)
+    assert (
+        contact(Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), 1.0, island_model=island_model, variant=OWN).force
+        > 0
+    )
 
 
 def test_one_gap_more_changes_no_bit():
@@ -241,11 +244,14 @@ def test_long_batches_run_in_blocks(monkeypatch, derivatives):
         contact(surfaces, 1.0, derivatives=derivatives)
 
 
-@pytest.mark.parametrize("tier", ["exact", "universal"])
-def test_what_is_nearly_nothing_ends_and_states_its_digits(tier):
+@pytest.mark.parametrize("island_model", ["exact", "universal"])
+def test_what_is_nearly_nothing_ends_and_states_its_digits(island_model):
     """Heights of 32 standard deviations: totals below the normal numbers, whose digits no halving brings back."""
     surface = Surface(0.12887275768129156, 1.0, 7.092276972058787, 1.0, 32.0)
     gaps = np.array([31.9, 31.998, 31.999])
-    found, known = contact(surface, gaps, tier=tier), contact(surface, gaps, tier="exact", rtol=1e-10)
+    found, known = (
+        contact(surface, gaps, island_model=island_model),
+        contact(surface, gaps, island_model="exact", rtol=1e-10),
+    )
     assert (np.abs(found.force - known.force) <= (found.error + known.error) * known.force).all()
     assert found.error[2] > 1e-7

@@ -1,4 +1,4 @@
-"""Readings: what they say, what they refuse."""
+"""Variants: what they say, what they refuse."""
 
 import dataclasses
 import math
@@ -6,15 +6,15 @@ import math
 import pytest
 
 from mbma_tables import InputError
-from mbma_tables.surfaces.readings import PRINTED, READINGS, REPORTED, get_reading
+from mbma_tables.surfaces.variants import PRINTED, REPORTED, VARIANTS, get_variant
 
 
-def test_the_two_readings_differ_by_pi_alone():
+def test_the_two_variants_differ_by_pi_alone():
     assert math.pi * REPORTED.density_divisor == pytest.approx(PRINTED.density_divisor, rel=1e-15, abs=0)
     assert PRINTED.density_divisor == pytest.approx(6 * math.pi * math.sqrt(3), rel=1e-15, abs=0)
     same = dataclasses.replace(REPORTED, name="printed", density_divisor=PRINTED.density_divisor)
     assert same == PRINTED
-    assert set(READINGS) == {"reported", "printed"}
+    assert set(VARIANTS) == {"reported", "printed"}
 
 
 def test_the_papers_constants():
@@ -26,17 +26,17 @@ def test_the_papers_constants():
 
 
 def test_by_name_or_own():
-    assert get_reading("printed") is PRINTED
+    assert get_variant("printed") is PRINTED
     own = dataclasses.replace(PRINTED, name="own", beta=0.3)
-    assert get_reading(own) is own
+    assert get_variant(own) is own
     assert own.recorded == [PRINTED.density_divisor, 0.3, 0.05, 1.5, 3.0, True, True]
     assert own.numbers.tolist() == [*own.recorded, True]
 
 
 @pytest.mark.parametrize("name", ["guessed", "", None, 3, ["printed"]])
 def test_unknown(name):
-    with pytest.raises(InputError, match="reading must be one of"):
-        get_reading(name)
+    with pytest.raises(InputError, match="variant must be one of"):
+        get_variant(name)
 
 
 @pytest.mark.parametrize(
@@ -60,5 +60,5 @@ def test_unknown(name):
     ],
 )
 def test_nonsense_is_refused(field, value):
-    with pytest.raises(InputError, match="reading 'own'"):
+    with pytest.raises(InputError, match="variant 'own'"):
         dataclasses.replace(PRINTED, name="own", **{field: value})
