@@ -150,7 +150,7 @@ def data_text(model: UniversalModel, variant: Variant, later: bool = False) -> s
         "mbma_cells CELLS": _braces("MBMA_CELLS", "MBMA_PLACES", *_numbers(X), *_numbers(buckets)),
         "mbma_calibrated_table LAW": _braces(_braces(*spline), *_numbers(theories[1][:3])),
         "mbma_law_constants THEORIES[]": _braces(*theories),
-        "mbma_variant MBMA_READING": _braces(*_numbers(variant.numbers[:5]), *_numbers(flags)),
+        "mbma_variant MBMA_VARIANT": _braces(*_numbers(variant.numbers[:5]), *_numbers(flags)),
     }
     held = (f"{'' if later and 'MBMA' in name else 'static const '}{name} = {text};" for name, text in values.items())
     lines += [
@@ -159,7 +159,7 @@ def data_text(model: UniversalModel, variant: Variant, later: bool = False) -> s
         "",
         "const mbma_cells *mbma_table(void) { return &CELLS; }",
         "const mbma_calibrated_table *mbma_law_table(void) { return &LAW; }",
-        "const mbma_variant *mbma_reading(void) { return &MBMA_READING; }",
+        "const mbma_variant *mbma_model_variant(void) { return &MBMA_VARIANT; }",
         "const mbma_law_constants *mbma_theory(int theory) { return &THEORIES[theory == MBMA_CALIBRATED]; }",
     ]
     return "\n".join([*lines, ""])
