@@ -34,7 +34,7 @@ def compiled(texts: dict[str, str], names: list[str]) -> bytes:
     """The module, with the digest of what it was compiled from in a section of its own at the end."""
     section = b"\x06digest" + digest_of(texts)
     # two numbers at a time, which browsers have learned by 2023
-    module = web_assembly(texts, [*FUNCTIONS, "MBMA_READING", *names], "-msimd128")
+    module = web_assembly(texts, [*FUNCTIONS, "MBMA_VARIANT", *names], "-msimd128")
     return module + bytes([0, len(section)]) + section
 
 

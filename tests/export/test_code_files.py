@@ -55,10 +55,10 @@ def test_a_wrong_number_is_seen(tmp_path: pathlib.Path) -> None:
     write_code("c", tmp_path)
     table = tmp_path / "mbma_data.c"
     text = table.read_text(encoding="utf-8")
-    before, variant = text.split("mbma_variant MBMA_READING")
+    before, variant = text.split("mbma_variant MBMA_VARIANT")
     assert variant.count(", 0.05, ") == 1
     changed = variant.replace(", 0.05, ", ", 0.0500000001, ")
-    table.write_text(f"{before}mbma_variant MBMA_READING{changed}", encoding="utf-8")
+    table.write_text(f"{before}mbma_variant MBMA_VARIANT{changed}", encoding="utf-8")
     found = check("c", tmp_path)
     assert found.failed > 0
     assert "tolerance" in found.reason

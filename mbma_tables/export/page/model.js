@@ -58,8 +58,8 @@ function prepare(state) {
   const surface = ["hurst", "q0", "q1", "h_rms", "h_max"].map((name) => state[name]);
   const variant = DATA.model.variants[state.variant];
   // mbma_variant: five numbers and three flags
-  numbersAt(C.MBMA_READING.value, 5).set(variant.numbers.slice(0, 5));
-  new Int32Array(C.memory.buffer, C.MBMA_READING.value + 40, 3).set(variant.numbers.slice(5));
+  numbersAt(C.MBMA_VARIANT.value, 5).set(variant.numbers.slice(0, 5));
+  new Int32Array(C.memory.buffer, C.MBMA_VARIANT.value + 40, 3).set(variant.numbers.slice(5));
   numbersAt(ARGUMENTS, 5).set(surface);
   const samples = state.samples;
   if (samples) {
