@@ -10,7 +10,6 @@ from scipy.special import erfinv
 
 from mbma_tables import Surface, theories
 from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import OutOfRangeError
 
 VARIANTS = {"MBMA reported": "reported", "MBMA printed": "printed"}
 PERSSON: dict[str, theories.Method] = {"Persson full": "full", "Persson simplified": "simplified"}
@@ -34,24 +33,6 @@ def sample(surface: Surface, theory: str) -> tuple[FloatArray, FloatArray, Float
     return u, found.force, found.area
 
 
-def solve(surface: Surface, theory: str, kind: str, wanted: Any) -> FloatArray:
-    """Force and area where the force (or the area) is as wanted; NaN where the theory does not reach it."""
-    targets = np.atleast_1d(np.asarray(wanted, dtype=float))
-    if theory == "Persson":
-        force = targets if kind == "force" else np.sqrt(surface.m2) * erfinv(targets)
-        return np.stack([force, theories.Persson().area_at(surface, force)])
-    result, reached = np.full((2, targets.size), np.nan), np.ones(targets.size, dtype=bool)
-    try:
-        u = SEPARATIONS[theory].mean_separation_at(surface, kind, targets)
-    except OutOfRangeError as fault:
-        reached = ~fault.mask
-        if not reached.any():
-            return result
-        u = SEPARATIONS[theory].mean_separation_at(surface, kind, targets[reached])
-    result[:, reached] = SEPARATIONS[theory].answer(surface, u)[:2]
-    return result
-
-
 def force_at(surface: Surface, theory: str, ratio: Any) -> FloatArray:
     """F/(A0 E*) at mean separations u = ratio * h_rms; NaN where the theory has none."""
     u = np.asarray(ratio, dtype=float) * surface.h_rms
@@ -63,7 +44,11 @@ def force_at(surface: Surface, theory: str, ratio: Any) -> FloatArray:
     return result
 
 
-def kappa(surface: Surface, theory: str, area: Any) -> FloatArray:
-    """A/F sqrt(2 m2) E*, Eq. (51), at the contact areas A/A0."""
-    force, reached = solve(surface, theory, "area", area)
-    return np.asarray(reached / force * surface.rms_gradient)
+def kappa(surface: Surface, theory: str, area: float) -> float:
+    """A/F sqrt(2 m2) E*, Eq. (51), at a contact area A/A0."""
+    if theory == "Persson":
+        force = np.sqrt(surface.m2) * erfinv(area)
+    else:
+        u = SEPARATIONS[theory].mean_separation_at(surface, "area", np.array([area]))
+        force = SEPARATIONS[theory].answer(surface, u).force[0]
+    return float(area / force * surface.rms_gradient)

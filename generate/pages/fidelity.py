@@ -64,7 +64,7 @@ def quoted_numbers() -> Iterable[Quoted]:
     for name, top, slope in (("concrete", 4.1, 1.98), ("asphalt", 4.5, 1.75)):
         road = Surface.named(name)
         yield name, "u/h_rms at first contact", top, VARIANTS, dict.fromkeys(VARIANTS, road.h_max / road.h_rms)
-        heavy, light = ({t: kappa(road, t, area)[0] for t in AREA_THEORIES} for area in (0.01, 1e-4))
+        heavy, light = ({t: kappa(road, t, area) for t in AREA_THEORIES} for area in (0.01, 1e-4))
         light |= dict.fromkeys(PERSSON, light["Persson"])
         yield name, "kappa, here at A/A0 = 1%: MBMA", slope, VARIANTS, heavy | dict.fromkeys(PERSSON, heavy["Persson"])
         what = "kappa at light load, here at A/A0 = 0.01%"

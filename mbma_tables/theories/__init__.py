@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
 from mbma_tables.errors import InputError
-from mbma_tables.theories.asperities import GreenwoodWilliamson
-from mbma_tables.theories.calibrated import Calibrated
-from mbma_tables.theories.mbma import Mbma
-from mbma_tables.theories.persson import Method, Persson
-from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory, Wrapped
 
 if TYPE_CHECKING:
+    from mbma_tables.theories.asperities import GreenwoodWilliamson
+    from mbma_tables.theories.calibrated import Calibrated
+    from mbma_tables.theories.mbma import Mbma
+    from mbma_tables.theories.persson import Method, Persson
+    from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
     from mbma_tables.theories.simulated import BoundaryElements
 
 __all__ = [
@@ -28,16 +29,28 @@ __all__ = [
     "get_theory",
 ]
 
-_NAMED: dict[Any, type[Theory]] = {theory.name: theory for theory in (Mbma, Calibrated, Persson, GreenwoodWilliamson)}
+# a theory's module is imported when it is first asked for
+_MODULES = {
+    "asperities": ("GreenwoodWilliamson",),
+    "calibrated": ("Calibrated",),
+    "mbma": ("Mbma",),
+    "persson": ("Method", "Persson"),
+    "protocol": ("Theory", "TheoryAnswer", "UserTheory"),
+    "simulated": ("BoundaryElements",),
+}
+_HOMES = {name: module for module, names in _MODULES.items() for name in names}
+_NAMED = {
+    "mbma": "Mbma",
+    "calibrated": "Calibrated",
+    "persson": "Persson",
+    "greenwood_williamson": "GreenwoodWilliamson",
+}
 THEORIES = tuple(_NAMED)
 
 
 def __getattr__(name: str) -> Any:
-    if name == "BoundaryElements":
-        # what it needs of scipy takes long to import
-        from mbma_tables.theories.simulated import BoundaryElements
-
-        return BoundaryElements
+    if name in _HOMES:
+        return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
@@ -55,7 +68,9 @@ def get_theory(theory: str | Theory | UserTheory) -> Theory:
     >>> get_theory("persson").name
     'persson'
     """
-    found: Any = _NAMED[theory]() if isinstance(theory, str) and theory in _NAMED else theory
+    from mbma_tables.theories.protocol import Theory, UserTheory, Wrapped
+
+    found: Any = __getattr__(_NAMED[theory])() if isinstance(theory, str) and theory in _NAMED else theory
     if isinstance(found, Theory):
         return found
     if isinstance(found, UserTheory) and not isinstance(found, type):
