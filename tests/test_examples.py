@@ -104,7 +104,7 @@ def test_seal_leaks_as_simulated(seal):
     assert abs(np.log(np.exp(found.result.fun) / simulated)) < 3 * scatter
 
 
-def test_scatter_is_the_exact_tier_sample_by_sample(scatter):
+def test_scatter_is_the_exact_island_model_sample_by_sample(scatter):
     module, spread, _ = scatter
     lazy = module.sample_surfaces(20)
     numbers = np.stack([getattr(lazy, name).compute() for name in ("hurst", "q1", "h_rms", "h_max")], axis=1)

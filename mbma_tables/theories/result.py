@@ -89,9 +89,10 @@ class Contact(Displayed):
 
     def _facts(self) -> dict[str, str]:
         units, source = self.units, self._source
-        known = {"theory": self.theory, "variant": self.variant, "island_model": self.island_model}
-        known["resolution"] = source.surface.resolution
-        facts = {name: text for name, text in known.items() if text}
+        chosen = f" ({self.variant}, {self.island_model})" if self.variant else ""
+        facts = {"theory": self.theory + chosen}
+        if source.surface.resolution:
+            facts["resolution"] = source.surface.resolution
         for name in ("mean_separation", "force", "area"):
             if getattr(self, name) is not None:
                 facts[name] = shown(getattr(self, name), units[name])

@@ -298,7 +298,7 @@ def test_bad_input_of_every_command(folder, arguments, message):
         (["contact", "-d", "1", "--theory", "person"], "'person' is not one of 'mbma', "),
         (
             ["contact", "-d", "1", "--theory", "persson", "--island-model", "exact"],
-            "island model: options of theory 'mbma'",
+            "--island-model: options of theory 'mbma'",
         ),
         (["curve", "--theory", "persson", "--variant", "printed"], "variant: options of theory 'mbma'"),
         (["contact"], "one of --separation, --mean-separation, --pressure and --area"),

@@ -16,7 +16,7 @@ def test_the_table_has_a_line_for_each_row():
     assert all(line.startswith("universal") for line in lines)
 
 
-def test_an_unknown_tier_is_refused():
+def test_an_unknown_island_model_is_refused():
     assert "--island-model must be one of" in refused("cost", "--island-model", "best")
 
 

@@ -88,7 +88,7 @@ def test_positive_and_rising_down_to_no_load(form):
         assert (np.diff(field[:, 3:], axis=0) > 0).all()
 
 
-def test_totals_by_the_tier_are_within_one_percent():
+def test_totals_by_the_island_model_are_within_one_percent():
     rng = np.random.default_rng(91)
     zeta_1, h_max = 10 ** rng.uniform(0.5, 4, 150), rng.uniform(2.5, 4.5, 150)
     surface = Surface(rng.uniform(0.35, 1, 150), 1.0, zeta_1, 1.0, h_max)

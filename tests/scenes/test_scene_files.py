@@ -65,7 +65,7 @@ MISTAKES = {
     "unknown theory of the scene": ('theory = "persons"\n' + SURFACE + ON + AT, "did you mean 'persson'"),
     "areas over h_rms": (SURFACE + ON + "[prescribed]\nareas = [0.01]\nover_h_rms = true\n", "areas have none"),
     "variant of another theory": (
-        'theory = "persson"\nreading = "printed"\n' + SURFACE + ON + AT,
+        'theory = "persson"\nvariant = "printed"\n' + SURFACE + ON + AT,
         "variant: of theory 'mbma', not of 'persson'",
     ),
     "empty prescribed": (SURFACE + ON + "[prescribed]\n", "give one of separations, mean_separations"),

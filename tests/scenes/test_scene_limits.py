@@ -28,7 +28,7 @@ def scene_of(surface=CONCRETE, **given):
     return Scene(surface, **({"effects": ("force",), "separations": (0.2, 0.5)} | given))
 
 
-def tiered(scene, island_model):
+def with_island_model(scene, island_model):
     """The scene's plan with that island model in every step of the model."""
     plan = scene.plan()
     steps = tuple(
@@ -43,7 +43,7 @@ def test_beyond_a_table_totals_are_solved(island_model):
     scene = scene_of(DEEP, separations=(-44.0, 44.0), rtol=1e-3)
     with pytest.raises(OutOfRangeError):
         contact(DEEP, -44.0, island_model)
-    found = run_plan(scene, tiered(scene, island_model))
+    found = run_plan(scene, with_island_model(scene, island_model))
     truth = contact(DEEP, [-44.0, 44.0], island_model="exact", rtol=1e-6).force
     np.testing.assert_allclose(found["force"], truth, rtol=1e-3, atol=0)
 
@@ -60,7 +60,7 @@ def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
 
     monkeypatch.setattr("mbma_tables.theories.law.contact_law", law)
     scene = scene_of(effects=("energy",), rtol=1e-2)
-    found = run_plan(scene, tiered(scene, "universal"))
+    found = run_plan(scene, with_island_model(scene, "universal"))
     assert made == ["universal", "exact"]
     assert found.attrs["island_models"] == '{"law": "exact"}'
     np.testing.assert_allclose(found["energy"], contact_law(CONCRETE).energy([0.2, 0.5]), rtol=1e-2, atol=0)
@@ -76,7 +76,7 @@ def test_progress_in_blocks():
     calls = []
     gaps = np.linspace(0.2, 1.0, 130)
     scene = scene_of(separations=gaps, rtol=1e-2)
-    run_plan(scene, tiered(scene, "exact"), lambda *step: calls.append(step))
+    run_plan(scene, with_island_model(scene, "exact"), lambda *step: calls.append(step))
     assert calls == [("totals", done, 130) for done in (0, 64, 128, 130, 130)]
 
 
@@ -120,7 +120,7 @@ def test_a_budget_below_every_plan_is_refused():
         scene_of(rtol=None, seconds=1e-7).plan()
 
 
-def test_a_tier_of_choice():
+def test_an_island_model_of_choice():
     """Given by name it is taken as it is, and a bound above the tolerance is an error."""
     found = scene_of(island_model="island4d", rtol=1e-3).run()
     assert found.attrs["island_models"] == '{"totals": "island4d"}'
@@ -153,7 +153,7 @@ def test_island_models_as_objects():
     np.testing.assert_allclose(law["energy"], contact_law(CONCRETE).energy([0.2, 0.5]), rtol=1e-2)
 
 
-def test_a_table_as_an_object_is_the_tier_with_its_name():
+def test_a_table_as_an_object_is_the_island_model_with_its_name():
     table = open_table("universal")
     found, same = scene_of(island_model=table).run(), scene_of(island_model="universal").run()
     np.testing.assert_array_equal(found["force"], same["force"])

@@ -172,8 +172,8 @@ from mbma_tables import Scene, Surface, contact, contact_law, open_table
 concrete = Surface.named("concrete")
 if sys.argv[1] == "used":
     open_table("island4d")
-    for island model in ("exact", "universal", "island4d", "formula", "rigid"):
-        contact(concrete, [0.1, 0.7], island_model=island model, rtol=1e-3)
+    for island_model in ("exact", "universal", "island4d", "formula", "rigid"):
+        contact(concrete, [0.1, 0.7], island_model=island_model, rtol=1e-3)
     contact_law(concrete, 1e-4)
     Scene(Surface.named("asphalt"), effects=["force", "energy"], separations=[0.1], rtol=0.05).run()
     Scene(concrete, effects=["pressure_profile"], deltas=[0.2]).run()

@@ -119,7 +119,7 @@ def test_theories_beside_one_another():
     ("more", "match"),
     [
         ({"theory": "person"}, "no theory is named 'person'; did you mean 'persson'"),
-        ({"island_model": "exact"}, "island model: of theory 'mbma', not of 'persson'"),
+        ({"island_model": "exact"}, "island_model: of theory 'mbma', not of 'persson'"),
         ({"variant": "printed"}, "variant: of theory 'mbma'"),
         ({"without": ("sphere_deformation",)}, "without: of theory 'mbma'"),
         ({"effects": ("island_statistics",)}, "effect 'island_statistics': of theory 'mbma'"),

@@ -44,7 +44,7 @@ def test_stiffness_and_energy_are_those_of_the_law():
 
 
 @pytest.mark.parametrize("island_model", ["exact", "formula", "island4d"])
-def test_other_tiers_have_stiffness_and_validity_too(island_model):
+def test_other_island_models_have_stiffness_and_validity_too(island_model):
     u = [0.0, 0.05, 0.3, 1.0, 2.0, 2.99, 3.0]
     table, other = (contact(SURFACE, mean_separation=u, island_model=t) for t in ("universal", island_model))
     assert other.stiffness == pytest.approx(table.stiffness, rel={"exact": 1e-6}.get(island_model, 5e-3))
@@ -251,7 +251,7 @@ def test_units_that_do_not_fit_are_noticed(theory):
         ({}, "exactly one of separation, mean_separation, pressure, area; got none"),
         ({"separation": 1.0, "pressure": 1.0}, "got separation and pressure"),
         ({"pressure": 1.0, "theory": "hertz"}, "theory must be one of"),
-        ({"pressure": 1.0, "theory": "persson", "island_model": "exact"}, "island model: options of theory 'mbma'"),
+        ({"pressure": 1.0, "theory": "persson", "island_model": "exact"}, "island_model: options of theory 'mbma'"),
         ({"separation": 1.0, "theory": Mbma(), "variant": "printed"}, "variant: options of theory 'mbma' alone"),
         ({"pressure": np.nan}, "pressure must be finite"),
         ({"pressure": -1.0}, "pressure must be at least 0"),

@@ -112,7 +112,7 @@ def own_motion(answer, name):
 
 @pytest.mark.parametrize("which", INPUTS)
 @pytest.mark.parametrize("island_model", ["rigid", "island4d", "formula"])
-def test_totals_of_other_tiers_do_not_jump(island_model, which, record_property):
+def test_totals_of_other_island_models_do_not_jump(island_model, which, record_property):
     count = 18 * SCALE
     numbers = pressed(np.random.default_rng([17, len(island_model), INPUTS.index(which)]), count, REPORTED)
     numbers["hurst"] = np.clip(numbers["hurst"], 0.31, 1 - 2 * WIDE)

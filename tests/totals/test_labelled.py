@@ -139,7 +139,7 @@ def test_chunks_without_entries():
         contact(surface, xr.DataArray(np.zeros(0), dims="gap"))
 
 
-def test_outside_and_tiers_go_through():
+def test_outside_and_island_models_go_through():
     surfaces = Surface(xr.DataArray([0.05, 0.8], dims="s"), 0.2, 0.2e8, 1.0, 3.0)
     gaps = gaps_over(3)
     found = contact(surfaces, gaps, outside="nan")

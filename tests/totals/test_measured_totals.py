@@ -54,7 +54,7 @@ def test_a_sampled_power_law_has_the_totals_of_its_five_numbers(variant, hurst, 
         np.testing.assert_allclose(*slopes, rtol=10 * bound)
 
 
-def test_exact_and_universal_tiers_agree():
+def test_exact_and_universal_island_models_agree():
     surface = rough(count=24)
     d = surface.h_max * (1 - DEPTHS[1:])
     exact, table = (contact(surface, d, island_model=island_model) for island_model in ("exact", "universal"))
