@@ -58,7 +58,7 @@ def reference() -> tuple[tuple[Surface, FloatArray, dict[str, FloatArray]], ...]
     for surface in held_out_surfaces():
         gap = measured_gaps(surface)[::EVERY]
         found = contact(surface, gap, island_model=Doubled(), rtol=REFERENCE_RTOL)
-        rows.append((surface, gap, {"force": np.asarray(found.force), "area": np.asarray(found.area)}))
+        rows.append((surface, gap, {"force": np.asarray(found.pressure), "area": np.asarray(found.area)}))
     return tuple(rows)
 
 
@@ -114,7 +114,7 @@ def law_rows() -> Iterator[Row]:
         for rtol in tolerances:
             laws: list[Any] = [contact_law(surface, rtol, island_model=island_model) for surface in surfaces]
             answers = [
-                {"force": law.force(gap), "area": law.area(gap)}
+                {"pressure": law.pressure(separation=gap), "area": law.area(separation=gap)}
                 for law, (_, gap, _) in zip(laws, reference(), strict=True)
             ]
             timed = surfaces[:2] if island_model == "exact" else surfaces
@@ -122,12 +122,12 @@ def law_rows() -> Iterator[Row]:
             yield Row(island_model, variant("law", rtol), "both", largest_error(answers), cost / len(timed))
     surface = surfaces[3]
     law, gaps = contact_law(surface), measured_gaps(surface, 10_000)
-    loads = law.force(gaps)
+    loads = law.pressure(separation=gaps)
     ways: dict[tuple[str, str], Callable[[], Any]] = {
-        ("lookup", "force"): lambda: law.force(gaps),
-        ("lookup", "area"): lambda: law.area(gaps),
-        ("lookup", "both"): lambda: (law.force(gaps), law.area(gaps)),
-        ("invert", "force"): lambda: law.separation(force=loads),
+        ("lookup", "force"): lambda: law.pressure(separation=gaps),
+        ("lookup", "area"): lambda: law.area(separation=gaps),
+        ("lookup", "both"): lambda: (law.pressure(separation=gaps), law.area(separation=gaps)),
+        ("invert", "force"): lambda: law.separation(pressure=loads),
     }
     for (name, quantity), run in ways.items():
         yield Row("law", name, quantity, None, measure(run)[0] / gaps.size)
@@ -141,7 +141,7 @@ def theory_rows() -> Iterator[Row]:
         ask = functools.partial(contact, surface, theory=name)
         known: dict[str, dict[str, Any]] = {
             "gap": {"mean_separation": u},
-            "invert": {"pressure": ask(mean_separation=u).force},
+            "invert": {"pressure": ask(mean_separation=u).pressure},
         }
         one = measure(functools.partial(ask, mean_separation=u[:1]))[0]
         batch = {what: measure(functools.partial(ask, **given))[0] for what, given in known.items()}

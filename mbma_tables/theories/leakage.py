@@ -16,7 +16,7 @@ from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
 from mbma_tables.labels import agree
 from mbma_tables.leakage import LARGEST_AREA
-from mbma_tables.plots import draw_compression, force_label, leakage_label
+from mbma_tables.plots import draw_compression, pressure_label, leakage_label
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.leakage_table import flow_of_spectrum, self_affine, shipped_flow
 from mbma_tables.theories.mbma import Mbma
@@ -76,7 +76,7 @@ class Leakage(Displayed):
     def _figure(self) -> Figure:
         return draw_compression(
             [self._contact.curve(leakage=True)],
-            force_label=force_label(self._contact.units["force"]),
+            pressure_label=pressure_label(self._contact.units["pressure"]),
             leakage_label=leakage_label(self.units["conductance"]),
         )
 
