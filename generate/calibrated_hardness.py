@@ -219,7 +219,9 @@ def told_errors(one: Capped, name: str, constants: cap.Constants) -> dict[str, F
     force, area = np.full(one.u.shape, np.nan), np.full(one.u.shape, np.nan)
     # what the theory reaches
     loads, low = one.force * gradient, np.asarray(theory.interval(surface)[0])
-    held = (one.u < one.h_max) & (one.area > EDGES[0]) & (loads < theory.answer(surface, np.maximum(low, LEAST)).pressure)
+    held = (
+        (one.u < one.h_max) & (one.area > EDGES[0]) & (loads < theory.answer(surface, np.maximum(low, LEAST)).pressure)
+    )
     force[held] = Yielding(theory, one.eta * gradient).answer(surface, one.u[held]).pressure / gradient
     area[held] = cap.area(one.force[held], theory.area_at(surface, loads[held]), one.eta, constants)
     frozen = frozen_errors(one, elastic_curve(one.node, one.zeta_1, one.h_max, name), constants)

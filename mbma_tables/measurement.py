@@ -174,7 +174,9 @@ def _by_pressure(
         )
         axes.fill_between(pressure[band], low[band], high[band], alpha=0.2, color=line.get_color(), lw=0)
     if simulated is not None:
-        axes.plot(simulated["pressure"], simulated[what], "ko", ms=4, mfc="none", label="boundary elements, this very map")
+        axes.plot(
+            simulated["pressure"], simulated[what], "ko", ms=4, mfc="none", label="boundary elements, this very map"
+        )
     axes.set_xscale("log")
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)

@@ -97,13 +97,18 @@ def test_units_that_are_powers_of_two_change_no_bit(surface, share, variant, pow
         assert getattr(other_island, name) == getattr(one_island, name) * unit**degree, name
     for island_model in ("universal", "rigid"):
         derivatives = island_model == "universal"
-        one = contact(surface, gap, island_model=island_model, variant=variant, derivatives=derivatives)
+        one = contact(surface, separation=gap, island_model=island_model, variant=variant, derivatives=derivatives)
         found = contact(
-            other, gap * unit, island_model=island_model, variant=variant, E_star=modulus, derivatives=derivatives
+            other,
+            separation=gap * unit,
+            island_model=island_model,
+            variant=variant,
+            E_star=modulus,
+            derivatives=derivatives,
         )
-        assert (found.force, found.area, found.error) == (one.force * modulus, one.area, one.error)
+        assert (found.pressure, found.area, found.error) == (one.pressure * modulus, one.area, one.error)
         for name, degree in SLOPE_DIMENSIONS.items() if derivatives else ():
-            assert found.force_by[name] == one.force_by[name] * modulus * unit**degree, name
+            assert found.pressure_by[name] == one.pressure_by[name] * modulus * unit**degree, name
             assert found.area_by[name] == one.area_by[name] * unit**degree, name
 
 
@@ -112,9 +117,9 @@ def test_laws_in_any_unit(surface, share, power, stress):
     unit, modulus, gap = 10**power, 10**stress, float(gaps_of(surface, share))
     law, other = contact_law(surface, 1e-9), contact_law(in_unit(surface, unit), 1e-9, E_star=modulus)
     room = law.error + other.error + lost_digits(surface, gap)
-    assert abs(other.force(gap * unit) / (law.force(gap) * modulus) - 1) <= room
-    assert abs(other.area(gap * unit) / law.area(gap) - 1) <= room
-    assert abs(other.energy(gap * unit) / (law.energy(gap) * modulus * unit) - 1) <= room
+    assert abs(other.pressure(separation=gap * unit) / (law.pressure(separation=gap) * modulus) - 1) <= room
+    assert abs(other.area(separation=gap * unit) / law.area(separation=gap) - 1) <= room
+    assert abs(other.energy(separation=gap * unit) / (law.energy(separation=gap) * modulus * unit) - 1) <= room
     assert (law.turning_point is None) == (other.turning_point is None)
     if law.turning_point is not None:
         # where force is flat, its error moves the end of the branch by a root
@@ -125,11 +130,11 @@ def test_laws_in_any_unit(surface, share, power, stress):
 @invariant(4, surface=surfaces, share=st.floats(0.05, 0.9), power=st.floats(-12, 12), stress=st.floats(-12, 12))
 def test_scenes_in_any_unit(surface, share, power, stress):
     unit, modulus, gap = 10**power, 10**stress, float(gaps_of(surface, share))
-    effects = ("force", "area", "stiffness", "energy", "conductance", "island_statistics")
+    effects = ("pressure", "area", "stiffness", "energy", "conductance", "island_statistics")
     parts = {"effects": effects, "rtol": 1e-6, "conductivities": (1.0, 3.0)}
     one = Scene(surface, separations=[gap], **parts).run()
     other = Scene(in_unit(surface, unit), separations=[gap * unit], E_star=modulus, **parts).run()
-    degrees = {"force": (1, 0), "area": (0, 0), "stiffness": (1, -1), "energy": (1, 1), "conductance": (0, -1)}
+    degrees = {"pressure": (1, 0), "area": (0, 0), "stiffness": (1, -1), "energy": (1, 1), "conductance": (0, -1)}
     degrees |= {"island_number": (0, -2), "island_delta": (0, 1), "island_force": (1, 2)}
     for name, (of_stress, of_length) in degrees.items():
         expected = one[name] * modulus**of_stress * unit**of_length
@@ -141,10 +146,10 @@ def test_force_and_area_fall_in_the_gap(surface, variant):
     """Down to the model's own turning point, which is never above d = 0; beyond it they rise."""
     law = contact_law(surface, 1e-6, variant=variant)
     gaps = gaps_of(surface, np.append(10 ** np.linspace(-9, 0, 40), np.linspace(1, 2, 200)[1:]))
-    found = contact(surface, gaps, variant=variant, derivatives=True)
+    found = contact(surface, separation=gaps, variant=variant, derivatives=True)
     cell = 1.001 * surface.h_max / 199
     for values, slopes, turn in (
-        (found.force, found.force_by["separation"], law.turning_point),
+        (found.pressure, found.pressure_by["separation"], law.turning_point),
         (found.area, found.area_by["separation"], law.area_turning_point),
     ):
         end = -surface.h_max if turn is None else turn
@@ -206,9 +211,9 @@ def test_first_contact_is_a_power_law(surface, variant):
     depth = layer * 2.0 ** -np.array([8.0, 9.0, 18.0, 19.0])
     gaps = surface.h_max - depth
     depth = surface.h_max - gaps
-    found = contact(surface, gaps, variant=variant, rtol=1e-11)
+    found = contact(surface, separation=gaps, variant=variant, rtol=1e-11)
     for values, exponent, factor in zip(
-        (found.force, found.area), (3.5, 10 / 3), first_contact(surface, variant), strict=True
+        (found.pressure, found.area), (3.5, 10 / 3), first_contact(surface, variant), strict=True
     ):
         off = np.log(values / (factor * depth**exponent))
         slope = np.diff(np.log(values))[::2] / np.diff(np.log(depth))[::2]
@@ -240,8 +245,8 @@ def test_random_islands_add_up(surface, share, variant, seed):
     K1 = np.where(found.zeta_d > variant.floor_d, 1 - slope, 1)
     height = gap + delta - (found.h_d if variant.offset else 0)
     weight = measure * K1 * D * np.exp(-0.5 * (height / sigma) ** 2) / (math.sqrt(2 * math.pi) * sigma)
-    total = contact(surface, gap, variant=variant)
-    for carried, whole in ((found.force, total.force), (found.area, total.area)):
+    total = contact(surface, separation=gap, variant=variant)
+    for carried, whole in ((found.force, total.pressure), (found.area, total.area)):
         terms = carried * weight
         scatter = math.sqrt(np.sum((terms[0] - terms[1]) ** 2)) / 2
         assert scatter <= 1e-3 * whole
@@ -256,11 +261,12 @@ def test_spheres_that_deform_carry_less(surface, shares, variant):
         (island(surface, delta, island_model=island_model, variant=variant)) for island_model in ("rigid", "universal")
     ]
     totals = [
-        contact(surface, gaps, island_model=island_model, variant=variant) for island_model in ("rigid", "universal")
+        contact(surface, separation=gaps, island_model=island_model, variant=variant)
+        for island_model in ("rigid", "universal")
     ]
     for rigid, elastic in (pairs, totals):
         room = 1 + rigid.error + elastic.error
-        assert (elastic.force <= rigid.force * room).all()
+        assert (elastic.pressure <= rigid.pressure * room).all()
         assert (elastic.area <= rigid.area * room).all()
 
 
@@ -271,39 +277,39 @@ def test_a_law_and_its_inverse(surface, shares, variant, digits):
     """Both ways, on the branch of first contact."""
     law = contact_law(surface, 10.0**-digits, variant=variant)
     for name, value, slope, turn in (
-        ("force", law.force, lambda d: law.stiffness(d) / 2, law.turning_point),
+        ("pressure", law.force, lambda d: law.stiffness(separation=d) / 2, law.turning_point),
         ("area", law.area, law.area_slope, law.area_turning_point),
     ):
         span = law.h_max - (-law.h_max if turn is None else turn)
         # seldom where pieces meet, which they do within the law's error alone
         gaps = law.h_max - span * np.minimum(np.asarray(shares) * 0.49, 0.99)
-        there = value(gaps)
+        there = value(separation=gaps)
         back = law.separation(**{name: there})
         rounded = 1e-12 + lost_digits(surface, gaps)
-        assert (np.abs(value(back) / there - 1) <= rounded).all()
+        assert (np.abs(value(separation=back) / there - 1) <= rounded).all()
         assert (np.abs(back - gaps) * slope(gaps) <= 2 * rounded * there)[slope(gaps) * span > 0.01 * there].all()
 
 
 @invariant(12, surface=rough_surfaces, share=depths, variant=st.sampled_from(list(VARIANTS.values())))
 def test_tiers_are_within_their_bounds_of_each_other(surface, share, variant):
     gap = float(gaps_of(surface, share))
-    exact = contact(surface, gap, island_model="exact", variant=variant, rtol=1e-9)
+    exact = contact(surface, separation=gap, island_model="exact", variant=variant, rtol=1e-9)
     refused = 0
     for island_model, rtol in (("universal", 1e-9), ("island4d", 1e-5), ("formula", 1e-4)):
         if island_model == "island4d" and variant is PRINTED:
             continue
         try:
-            found = contact(surface, gap, island_model=island_model, variant=variant, rtol=rtol)
+            found = contact(surface, separation=gap, island_model=island_model, variant=variant, rtol=rtol)
         except OutOfRangeError:
             # closed forms and the four-parameter table end earlier
             assert island_model != "universal"
             refused += 1
             continue
-        assert abs(found.force / exact.force - 1) <= found.error + exact.error, island_model
+        assert abs(found.pressure / exact.pressure - 1) <= found.error + exact.error, island_model
         assert abs(found.area / exact.area - 1) <= found.error + exact.error, island_model
-    rigid = contact(surface, gap, island_model="rigid", variant=variant)
+    rigid = contact(surface, separation=gap, island_model="rigid", variant=variant)
     # a sphere that gives way carries less
-    assert exact.force <= rigid.force * (1 + rigid.error + exact.error)
+    assert exact.pressure <= rigid.pressure * (1 + rigid.error + exact.error)
     return refused
 
 
@@ -329,7 +335,7 @@ def test_no_entry_knows_the_others(island_model, seed):
     def totals(chosen):
         return contact(
             Surface(*some_of(numbers, chosen)),
-            gaps[chosen],
+            separation=gaps[chosen],
             island_model=island_model,
             E_star=E_star[chosen],
             rtol=1e-4,
@@ -341,8 +347,8 @@ def test_no_entry_knows_the_others(island_model, seed):
         )
 
     for answer, names in (
-        (totals, ("force", "area", "error")),
-        (islands, ("force", "area", "error", "X", "mu", "eta")),
+        (totals, ("pressure", "area", "error")),
+        (islands, ("pressure", "area", "error", "X", "mu", "eta")),
     ):
         whole, mixed, folded = answer(np.arange(30)), answer(order), answer(order.reshape(5, 6))
         for name in names:
@@ -368,15 +374,17 @@ def test_chunks_change_no_answer(island_model, seed, chunks):
     named = [xr.DataArray(n, dims="surface") for n in some_of(numbers, slice(None))]
     shares = xr.DataArray([0.0, 0.1, 0.5, 0.9, 1.0], dims="gap")
     d = xr.DataArray(gaps, dims="surface") * (1 - shares) + named[4] * shares
-    eager = contact(Surface(*named), d, island_model=island_model, rtol=1e-4)
+    eager = contact(Surface(*named), separation=d, island_model=island_model, rtol=1e-4)
     lazy = contact(
         Surface(*(n.chunk(surface=chunks[0]) for n in named)),
-        d.chunk(surface=chunks[0], gap=chunks[1]),
+        separation=d.chunk(surface=chunks[0], gap=chunks[1]),
         island_model=island_model,
         rtol=1e-4,
     )
-    plain = contact(Surface(*(n.values[:, None] for n in named)), d.values, island_model=island_model, rtol=1e-4)
-    for name in ("force", "area", "error"):
+    plain = contact(
+        Surface(*(n.values[:, None] for n in named)), separation=d.values, island_model=island_model, rtol=1e-4
+    )
+    for name in ("pressure", "area", "error"):
         with dask.config.set(scheduler="synchronous"):
             computed = getattr(lazy, name).transpose("surface", "gap").compute()
         whole = getattr(eager, name).transpose("surface", "gap")

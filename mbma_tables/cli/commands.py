@@ -151,7 +151,7 @@ def curve_command(
     gap = curve_gaps(float(surface.h_max), points)
     if model.theory != "mbma":
         gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).pressure)]
-    answer = contact(surface, gap, **asked)
+    answer = contact(surface, separation=gap, **asked)
     values = {name: getattr(answer, name) for name in COLUMNS} | (_leakage(answer) if leakage else {})
     units = {}
     others = {
@@ -171,14 +171,17 @@ def curve_command(
 def _draw(
     specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory], kind: str, leakage: bool, title: str
 ) -> bytes:
-    from mbma_tables.plots import Curve, draw_compression, pressure_label, leakage_label, theory_label, to_picture
+    from mbma_tables.plots import Curve, draw_compression, leakage_label, pressure_label, theory_label, to_picture
 
     gap = np.asarray(answer.mean_separation / specimen.surface.h_rms)
     curves = [answer.curve(leakage)]
     for name, line in others.items():
         known = np.isfinite(line.pressure)
         curves.append(Curve(theory_label(name), gap[known], *(field[known] for field in line)))
-    pressure, flow = pressure_label(unit_of("pressure", specimen.units)), leakage_label(unit_of("leakage", specimen.units))
+    pressure, flow = (
+        pressure_label(unit_of("pressure", specimen.units)),
+        leakage_label(unit_of("leakage", specimen.units)),
+    )
     return to_picture(draw_compression(curves, title, pressure, leakage_label=flow), kind)
 
 
@@ -261,7 +264,10 @@ def fit_command(
         "notes": told,
     }
     title = measurement.name
-    own = {name: unit_of(name, units) or "-" for name in columns} | {"area": "A/A0", "pressure": unit_of("pressure", units)}
+    own = {name: unit_of(name, units) or "-" for name in columns} | {
+        "area": "A/A0",
+        "pressure": unit_of("pressure", units),
+    }
     report = Report("fit", title, [*described(surface), *told], facts, to_columns(columns, own))
     picture = b""
     if plot is not None:

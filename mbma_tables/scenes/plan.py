@@ -233,7 +233,9 @@ class _Planner:
             best = factor * MIN_LAW_RTOL / (1 - ISLAND_SHARE)
             raise InputError(f"rtol = {self.rtol:g} is too tight for {', '.join(why)}: a law meets {best:.0e} at best")
         island_model = self.island_model(tolerance)
-        each = self.costs.of("law", "lookup") + (self.costs.of("law", "invert", quantity="pressure") if inverse else 0.0)
+        each = self.costs.of("law", "lookup") + (
+            self.costs.of("law", "invert", quantity="pressure") if inverse else 0.0
+        )
         seconds = self.costs.of(_name(island_model), "law", asked) + self.count * each
         error = factor * (asked + certified_error(island_model, asked))
         what = "the surface's force and area as piecewise polynomials of the gap, evaluated at every gap"
@@ -265,7 +267,9 @@ class _Planner:
         inverse = self.problem.prescribed in INVERTED
         rtol = max((1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_THEORY_LAW_RTOL)
         direct = seconds_by_theory(self.costs, theory, self.count, inverse, "energy" in outputs)
-        each = self.costs.of("law", "lookup") + (self.costs.of("law", "invert", quantity="pressure") if inverse else 0.0)
+        each = self.costs.of("law", "lookup") + (
+            self.costs.of("law", "invert", quantity="pressure") if inverse else 0.0
+        )
         by_law = self.costs.of(theory, "law", rtol) + self.count * each
         pays = self.count >= MIN_LAW_GAPS_OF_OTHERS if math.isnan(direct) else by_law < direct
         own = self.own_error()

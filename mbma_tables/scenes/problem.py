@@ -219,7 +219,9 @@ class Problem:
             require("deltas", deltas, deltas > 0, "positive")
         for name in self.theories:
             if name in CORRELATIONS:
-                if "conductance" not in self.outputs or not ("pressure" in self.outputs or self.prescribed == "pressures"):
+                if "conductance" not in self.outputs or not (
+                    "pressure" in self.outputs or self.prescribed == "pressures"
+                ):
                     raise InputError(f"{name!r} is of conductance at a pressure: add effects 'conductance' and 'force'")
                 if name == CORRELATIONS[0] and self.hardness is None:
                     raise InputError(f"{name!r} needs a hardness: add effect 'yield'")

@@ -139,7 +139,7 @@ def _asked(run: Run) -> Contact:
     problem = run.problem
     theory = Mbma(variant=problem.variant, outside="nan") if problem.theory == "mbma" else problem.theory
     yields = {} if problem.hardness is None else {"hardness": problem.hardness, "E_star": problem.E_star}
-    return contact(run.problem.surface, run.gap, theory=theory, **yields)
+    return contact(run.problem.surface, separation=run.gap, theory=theory, **yields)
 
 
 def _leakage(run: Run, step: Step) -> None:
@@ -161,7 +161,9 @@ def _slope_error(law: ContactLaw, gap: Any, inverted: bool) -> float:
     if touching.size == 0:
         return law.error
     # F/l over the stiffness: large only next to a turning point
-    ratio = 2 * law.pressure(separation=touching) / ((law.h_max - touching) * np.abs(law.stiffness(separation=touching)))
+    ratio = (
+        2 * law.pressure(separation=touching) / ((law.h_max - touching) * np.abs(law.stiffness(separation=touching)))
+    )
     moved = MAX_SLOPE_OF_STIFFNESS * law.error if inverted else 0.0
     return max(2 * law.error, float(((law.slope_error(separation=touching) + moved) * ratio).max()))
 
@@ -179,7 +181,7 @@ def _totals(run: Run, step: Step) -> None:
     for first in range(0, run.gap.size, block):
         answer = contact(
             run.surface,
-            run.gap[first : first + block],
+            separation=run.gap[first : first + block],
             island_model=step.island_model,
             variant=problem.variant,
             E_star=problem.E_star,

@@ -99,7 +99,9 @@ class Calibrated(Theory):
             gap = np.asarray(mean_separation, float)
             require("mean_separation", gap, gap >= 0, "at least 0")
             (pressure, area, stiffness), own_error = _own_law(surface).answer(gap)
-            return TheoryAnswer(pressure, area, stiffness, _error(own_error, own_error, gap / np.asarray(surface.h_max)))
+            return TheoryAnswer(
+                pressure, area, stiffness, _error(own_error, own_error, gap / np.asarray(surface.h_max))
+            )
         assert isinstance(surface, Surface)
         table, places = calibrated_table.shipped(), Places(surface, mean_separation)
         u = places.flat / places.h_rms
@@ -112,7 +114,9 @@ class Calibrated(Theory):
         out[2] /= places.h_rms
         pressure, area, stiffness = out.reshape(3, *places.shape)
         share = u / places.columns[2][places.owner]
-        return TheoryAnswer(pressure, area, stiffness, _error(table.error, 2 * table.error, share.reshape(places.shape)))
+        return TheoryAnswer(
+            pressure, area, stiffness, _error(table.error, 2 * table.error, share.reshape(places.shape))
+        )
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* or an area below 1; h_max at zero."""
@@ -138,7 +142,9 @@ class Calibrated(Theory):
         """A/A0 at a force over A0 E*, but for a map in closed form."""
         if isinstance(surface, MeasuredSurface):
             return _own_law(surface).area(np.asarray(pressure, float))
-        return law_area(pressure / np.asarray(surface.rms_gradient), surface.alpha, calibrated_table.shipped().constants)
+        return law_area(
+            pressure / np.asarray(surface.rms_gradient), surface.alpha, calibrated_table.shipped().constants
+        )
 
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Share of heights above the level whose mean gap is u, and its derivative: measured heights, or Gaussian."""

@@ -118,7 +118,7 @@ def contact(
     --------
     >>> from mbma_tables import Surface, contact
     >>> surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)  # um
-    >>> found = contact(surface, [1.0, 0.5], E_star=100e3)  # MPa
+    >>> found = contact(surface, separation=[1.0, 0.5], E_star=100e3)  # MPa
     >>> [f"{pressure:.4g} MPa on {area:.3%}" for pressure, area in zip(found.pressure, found.area)]
     ['7.982 MPa on 0.287%', '20.28 MPa on 0.735%']
     >>> bool((found.error < 1e-8).all())

@@ -51,9 +51,15 @@ class LeakageLaw:
         if len(given) != 1:
             raise InputError("give one of mean_separation, separation and pressure")
         if is_labelled(given[0]):
-            name = "pressure" if pressure is not None else "separation" if mean_separation is None else "mean_separation"
+            name = (
+                "pressure" if pressure is not None else "separation" if mean_separation is None else "mean_separation"
+            )
             return apply(lambda known: (self(**{name: known}),), (given[0],), 1)[0]  # type: ignore[no-any-return]
-        d = self.law.separation(pressure=pressure) if pressure is not None else self.law.separations(mean_separation, separation)
+        d = (
+            self.law.separation(pressure=pressure)
+            if pressure is not None
+            else self.law.separations(mean_separation, separation)
+        )
         flat = np.ascontiguousarray(d).reshape(-1)
         found = np.empty(flat.size)
         core.law_flow_fill(flat, self.block, self.law.h_max, self.h_rms, found)

@@ -215,7 +215,9 @@ class ContactLaw(Law, Displayed):
         d, area, stiffness = self._inverse("pressure", pressure, 3)
         mean = d + self.h_max
         mean *= 0.5
-        point = LawPoint(d, mean, area, stiffness, pressure if is_labelled(pressure) else np.asarray(pressure, float)[()])
+        point = LawPoint(
+            d, mean, area, stiffness, pressure if is_labelled(pressure) else np.asarray(pressure, float)[()]
+        )
         point.units = self.units
         return point
 
@@ -319,7 +321,9 @@ class ContactLaw(Law, Displayed):
     def _figure(self) -> Figure:
         held = self._variables()
         unit = self.units.length or "length"
-        curve = Curve(theory_label(self.theory), *(held[name].values for name in ("mean_separation", "pressure", "area")))
+        curve = Curve(
+            theory_label(self.theory), *(held[name].values for name in ("mean_separation", "pressure", "area"))
+        )
         label = pressure_label(unit_of("pressure", self.units))
         return draw_compression([curve], pressure_label=label, gap_label=f"mean separation u [{unit}]")
 

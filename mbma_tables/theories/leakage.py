@@ -16,7 +16,7 @@ from mbma_tables.display import Displayed, Variable, shown
 from mbma_tables.errors import InputError
 from mbma_tables.labels import agree
 from mbma_tables.leakage import LARGEST_AREA
-from mbma_tables.plots import draw_compression, pressure_label, leakage_label
+from mbma_tables.plots import draw_compression, leakage_label, pressure_label
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.leakage_table import flow_of_spectrum, self_affine, shipped_flow
 from mbma_tables.theories.mbma import Mbma

@@ -182,7 +182,9 @@ class Yielding(Theory):
             capped = TheoryAnswer(*(np.where(endless, one, other) for one, other in zip(elastic, capped, strict=True)))
         return Loaded(u, h_rms, eta, capped.pressure / gradient, capped, elastic, at_force)
 
-    def _closed(self, surface: AnySurface, u: FloatArray, pressure: Any, stiffness: Any) -> tuple[FloatArray, FloatArray]:
+    def _closed(
+        self, surface: AnySurface, u: FloatArray, pressure: Any, stiffness: Any
+    ) -> tuple[FloatArray, FloatArray]:
         """Force over A0 E* and its -d/du between the elastic ones and the bearing curve."""
         gradient, bearing = np.asarray(surface.rms_gradient), self._elastic.bearing_share(surface, u)
         load, steep = law.force(pressure / gradient, stiffness / gradient, *bearing, self._eta(surface))
