@@ -295,7 +295,7 @@ def few_numbers(rng: np.random.Generator) -> None:
 
 
 FIRST = {
-    "import mbma_tables": "",
+    "import mbma_tables": "m",
     "an answer": "m.contact(m.Surface(0.8, 1.0, 200.0, 1.0, 3.0), 1.0)",
     "100,000 gaps of a law": "m.contact_law(S()).force(np.linspace(-2.9, 2.9, 100_000))",
     "10,000 surfaces": "m.contact(S(10_000), 1.0)",

@@ -181,7 +181,7 @@ def to_table(rows: Sequence[Distance], unit: float) -> str:
         for row in rows
     ]
     kinds = [f"{what}, {ends}" for what in ("area", "force") for ends in ("1-10%", "10-97%")]
-    return table(["theory", "way", "a point", "once a surface", *kinds, "reached"], lines)
+    return table(["theory", "method", "time per point", "time per surface", *kinds, "reached"], lines)
 
 
 def draw(rows: Sequence[Distance], unit: float) -> bytes:

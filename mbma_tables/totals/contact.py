@@ -87,9 +87,9 @@ def totals_at(
             fault.mask = fault.mask.reshape(shape)
         raise
     # what is nearly nothing has few digits
-    tiny = (np.minimum(force, area) < LEAST) & (np.maximum(force, area) > 0)
-    if tiny.any():
-        error[tiny] = np.minimum(error[tiny] + SUBNORMAL / np.minimum(force, area)[tiny].clip(SUBNORMAL), 1.0)
+    least = np.minimum(force, area)
+    if not least.min() >= LEAST and (tiny := (least < LEAST) & (np.maximum(force, area) > 0)).any():
+        error[tiny] = np.minimum(error[tiny] + SUBNORMAL / least[tiny].clip(SUBNORMAL), 1.0)
     return Totals(
         force=(force.reshape(shape) * stress)[()] if which != AREA else None,
         area=variant.area_of(area).reshape(shape)[()] if which != FORCE else None,
@@ -132,12 +132,17 @@ def _by_profiles(
             left.append(places)
             continue
         inside = compression[places] <= kept.end
-        left.append(places[~inside])
-        islands, places = islands + kept.islands, places[inside]
-        error[places] = kept.error
+        if not inside.all():
+            left.append(places[~inside])
+            places = places[inside]
+        islands += kept.islands
+        # most often all gaps are of one surface and touch, and slices are faster
+        whole = places.size == compression.size
+        error[slice(None) if whole else places] = kept.error
 
-        def fill(block: slice, own: NDArray[np.intp] = places, kept: Profile = kept) -> None:
-            sums[:, own[block]] = kept.totals(compression[own[block]], slopes)
+        def fill(block: slice, own: Any = None if whole else places, kept: Profile = kept) -> None:
+            chosen = block if own is None else own[block]
+            sums[:, chosen] = kept.totals(compression[chosen], slopes)
 
         in_blocks(fill, places.size, BLOCK, workers)
     return sums, error, islands, np.sort(np.concatenate(left))
