@@ -148,14 +148,14 @@ def totals(rng: np.random.Generator) -> None:
     surfaces, gaps = held_out(SURFACES, rng)
     taken = rounds(
         {
-            "exact": lambda: contact(surfaces, gaps, island_model="exact"),
-            "value": lambda: contact(surfaces, gaps),
-            "slopes": lambda: contact(surfaces, gaps, derivatives=True),
+            "exact": lambda: contact(surfaces, separation=gaps, island_model="exact"),
+            "value": lambda: contact(surfaces, separation=gaps),
+            "slopes": lambda: contact(surfaces, separation=gaps, derivatives=True),
         },
         3,
     )
-    exact = contact(surfaces, gaps, island_model="exact").islands
-    looked_up = contact(surfaces, gaps).islands
+    exact = contact(surfaces, separation=gaps, island_model="exact").islands
+    looked_up = contact(surfaces, separation=gaps).islands
     click.echo(f"\ncontact at 1e-8, one gap on each of {SURFACES} surfaces")
     report("time a total", microseconds(taken["value"], SURFACES), "us", at_most=7)
     rate = exact / statistics.median(taken["exact"])
@@ -168,14 +168,14 @@ def totals(rng: np.random.Generator) -> None:
     steps = one_step()
     if steps:
         one = Surface.named("concrete")
-        both = rounds({"contact": lambda: contact(one, 0.4)} | steps)
+        both = rounds({"contact": lambda: contact(one, separation=0.4)} | steps)
         for name in steps:
             report(f"one contact is faster than one step of {name}", times_faster(both, name, "contact"), "x")
     batch, gaps = held_out(10 * SURFACES, rng)
     walls: dict[int, list[float]] = {1: [], 2: []}
     for workers in (1, 2) * 4:
         start = time.perf_counter()
-        contact(batch, gaps, workers=workers)
+        contact(batch, separation=gaps, workers=workers)
         walls[workers].append(time.perf_counter() - start)
     report("two workers against one, by the clock", min(walls[1]) / min(walls[2]), "x", 1.8)
 
@@ -205,7 +205,7 @@ def laws(rng: np.random.Generator) -> None:
         }
     )
     some = gaps[:2000]
-    truth = contact(surface, some, rtol=1e-10).force
+    truth = contact(surface, separation=some, rtol=1e-10).force
     click.echo("\ncontact_law of one surface, asphalt")
     report("making the first law", spent, "s")
     report("making a law", 1e3 * statistics.median(taken["making"]), "ms", at_most=2)
@@ -296,11 +296,11 @@ def few_numbers(rng: np.random.Generator) -> None:
 
 FIRST = {
     "import mbma_tables": "m",
-    "an answer": "m.contact(m.Surface(0.8, 1.0, 200.0, 1.0, 3.0), 1.0)",
+    "an answer": "m.contact(m.Surface(0.8, 1.0, 200.0, 1.0, 3.0), separation=1.0)",
     "100,000 gaps of a law": "m.contact_law(S()).force(np.linspace(-2.9, 2.9, 100_000))",
-    "10,000 surfaces": "m.contact(S(10_000), 1.0)",
-    "10,000 surfaces with derivatives": "m.contact(S(10_000), 1.0, derivatives=True)",
-    "an exact total": "m.contact(S(), 1.0, island_model='exact')",
+    "10,000 surfaces": "m.contact(S(10_000), separation=1.0)",
+    "10,000 surfaces with derivatives": "m.contact(S(10_000), separation=1.0, derivatives=True)",
+    "an exact total": "m.contact(S(), separation=1.0, island_model='exact')",
 }
 
 

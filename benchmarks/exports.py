@@ -55,7 +55,7 @@ def exported(rng: np.random.Generator) -> None:
         {
             "islands": lambda: model.answer(X, mu),
             "C islands": lambda: library.mbma_phi(size, at(X), at(mu), table, 0, at(islands), None),
-            "totals": lambda: contact(surfaces, apart, rtol=RTOL),
+            "totals": lambda: contact(surfaces, separation=apart, rtol=RTOL),
             "C totals": lambda: library.mbma_totals(
                 many, *map(at, known), share, variant, table, 0, at(sums), at(bound), at(status), ctypes.byref(seen)
             ),
@@ -65,7 +65,11 @@ def exported(rng: np.random.Generator) -> None:
             ),
         }
     )
-    phi, total, near = model.answer(X, mu), contact(surfaces, apart, rtol=RTOL), Mbma(rtol=RTOL).totals(surface, gaps)
+    phi, total, near = (
+        model.answer(X, mu),
+        contact(surfaces, separation=apart, rtol=RTOL),
+        Mbma(rtol=RTOL).totals(surface, gaps),
+    )
     unit = surfaces.q0 * surfaces.s
     click.echo(f"\nExported C, {' '.join(FLAGS[1:])} -march=native")
     for name, entries, found, right in (

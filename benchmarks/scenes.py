@@ -28,14 +28,14 @@ EFFECTS = (
 def truth(surface: Surface, gaps: np.ndarray, name: str) -> np.ndarray:
     """Exact force and area; stiffness and energy by other means than a law's."""
     if name in ("force", "area"):
-        return np.asarray(getattr(contact(surface, gaps, island_model="exact", rtol=1e-10), name))
+        return np.asarray(getattr(contact(surface, separation=gaps, island_model="exact", rtol=1e-10), name))
     if name == "stiffness":
-        return -2 * contact(surface, gaps, rtol=1e-10, derivatives=True).force_by["separation"]
+        return -2 * contact(surface, separation=gaps, rtol=1e-10, derivatives=True).force_by["separation"]
     span = surface.h_max - gaps
 
     def integrand(t: float) -> np.ndarray:
         # t^2 for the power at first contact
-        return t * span * contact(surface, surface.h_max - span * t**2, rtol=1e-10).force
+        return t * span * contact(surface, separation=surface.h_max - span * t**2, rtol=1e-10).force
 
     return np.asarray(quad_vec(integrand, 0, 1, epsrel=1e-9, norm="max")[0])
 

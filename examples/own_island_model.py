@@ -44,10 +44,10 @@ def main(table_file: pathlib.Path) -> None:
     """Compare one's own model and one's own table with the shipped ones."""
     surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)  # um
     gaps = np.array([2.8, 2.0, 1.0])  # um
-    exact = contact(surface, gaps, island_model="exact")
+    exact = contact(surface, separation=gaps, island_model="exact")
     models = {"first order": FirstOrder(), "my table": open_table(table_file)}
     for name, model in models.items():
-        found = contact(surface, gaps, island_model=model, rtol=1e-6)
+        found = contact(surface, separation=gaps, island_model=model, rtol=1e-6)
         law = contact_law(surface, island_model=model, rtol=1e-6)
         one = island(surface, 0.01, island_model=model)
         off = ", ".join(f"{ratio:.1e}" for ratio in found.force / exact.force - 1)

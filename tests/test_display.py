@@ -18,7 +18,7 @@ SPECTRUM = Surface.from_spectrum(
 DISPLAYED = (
     lambda: ROAD,
     lambda: SPECTRUM,
-    lambda: contact(ROAD, np.linspace(1, -1, 9), E_star="13.3 MPa"),
+    lambda: contact(ROAD, separation=np.linspace(1, -1, 9), E_star="13.3 MPa"),
     lambda: contact(SPECTRUM, pressure=[0.001, 0.01], theory="calibrated"),
     lambda: contact_law(ROAD, E_star="13.3 MPa"),
     lambda: contact_law(ROAD, theory="calibrated"),
@@ -84,7 +84,7 @@ def test_every_variable_has_its_unit(thing):
 
 
 def test_a_dataset_holds_the_answers():
-    answer = contact(ROAD, [[0.8, 0.2], [0.1, 0.0]], E_star="13.3 MPa")
+    answer = contact(ROAD, separation=[[0.8, 0.2], [0.1, 0.0]], E_star="13.3 MPa")
     found = answer.to_dataset()
     for name in ("separation", "force", "area", "stiffness", "mean_pressure", "energy", "scatter", "valid", "error"):
         np.testing.assert_array_equal(found[name], getattr(answer, name))
@@ -92,9 +92,11 @@ def test_a_dataset_holds_the_answers():
     assert (found["stiffness"].units, found["force"].units) == ("MPa/mm", "MPa")
     assert found.attrs["surface"] == repr(ROAD)
     law = contact_law(ROAD, E_star=13.3).to_dataset()
-    np.testing.assert_allclose(law["force"], contact(ROAD, law["separation"].values, E_star=13.3).force, rtol=1e-8)
     np.testing.assert_allclose(
-        law["stiffness"], contact(ROAD, law["separation"].values, E_star=13.3).stiffness, rtol=1e-6
+        law["force"], contact(ROAD, separation=law["separation"].values, E_star=13.3).force, rtol=1e-8
+    )
+    np.testing.assert_allclose(
+        law["stiffness"], contact(ROAD, separation=law["separation"].values, E_star=13.3).stiffness, rtol=1e-6
     )
     np.testing.assert_array_equal(SPECTRUM.to_dataset()["C"], SPECTRUM.C)
 
@@ -107,7 +109,7 @@ def test_a_lazy_answer_stays_lazy():
         raise AssertionError("computed")
 
     gaps = xr.DataArray(da.ones(6, chunks=3).map_blocks(fail, dtype=float, meta=np.empty(0)), dims="gap")
-    answer = contact(ROAD, gaps)
+    answer = contact(ROAD, separation=gaps)
     assert "{'gap': 6}" in repr(answer)
     assert answer.to_dataset()["stiffness"].units == "1/mm" or answer.to_dataset()["stiffness"].dims == ("gap",)
     assert "<table>" in Surface(xr.DataArray([0.5, 0.8], dims="site"), 1, 100, 1, 3)._repr_html_()
@@ -116,10 +118,10 @@ def test_a_lazy_answer_stays_lazy():
 def test_batches_are_summed_up():
     batch = Surface(np.linspace(0.2, 0.9, 100), 1, 100, 1, 3)
     assert "hurst=<100 numbers, 0.2 to 0.9>" in repr(batch)
-    answer = contact(batch, 1.0)
+    answer = contact(batch, separation=1.0)
     assert "valid 0 of 100" in repr(answer)
     assert len(repr(answer)) < 360
-    for single in (batch, answer, contact(ROAD, 0.1)):
+    for single in (batch, answer, contact(ROAD, separation=0.1)):
         assert "<img" not in single._repr_html_()
         with pytest.raises(InputError):
             single.plot()

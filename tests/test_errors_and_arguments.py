@@ -81,7 +81,7 @@ def test_what_is_no_number_is_named(value, message):
         lambda x: finite_array("x", x),
         lambda x: height_integral(1.5, x),
         lambda x: Surface(0.8, 0.5, 100.0, x, 3.0),
-        lambda x: contact(Surface.named("concrete"), x),
+        lambda x: contact(Surface.named("concrete"), separation=x),
         lambda x: greenwood_tripp.solve(x, 1.0),
     ],
 )

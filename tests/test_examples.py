@@ -110,7 +110,7 @@ def test_scatter_is_the_exact_island_model_sample_by_sample(scatter):
     numbers = np.stack([getattr(lazy, name).compute() for name in ("hurst", "q1", "h_rms", "h_max")], axis=1)
     for k, (hurst, q1, h_rms, h_max) in enumerate(numbers):
         own = Surface(hurst, module.Q0, q1, h_rms, h_max)
-        exact = contact(own, module.GAP, island_model="exact", rtol=1e-7)
+        exact = contact(own, separation=module.GAP, island_model="exact", rtol=1e-7)
         assert spread.force[k] == pytest.approx(exact.force, rel=1.2e-6, abs=0)
 
 

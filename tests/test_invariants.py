@@ -97,9 +97,14 @@ def test_units_that_are_powers_of_two_change_no_bit(surface, share, variant, pow
         assert getattr(other_island, name) == getattr(one_island, name) * unit**degree, name
     for island_model in ("universal", "rigid"):
         derivatives = island_model == "universal"
-        one = contact(surface, gap, island_model=island_model, variant=variant, derivatives=derivatives)
+        one = contact(surface, separation=gap, island_model=island_model, variant=variant, derivatives=derivatives)
         found = contact(
-            other, gap * unit, island_model=island_model, variant=variant, E_star=modulus, derivatives=derivatives
+            other,
+            separation=gap * unit,
+            island_model=island_model,
+            variant=variant,
+            E_star=modulus,
+            derivatives=derivatives,
         )
         assert (found.force, found.area, found.error) == (one.force * modulus, one.area, one.error)
         for name, degree in SLOPE_DIMENSIONS.items() if derivatives else ():
@@ -141,7 +146,7 @@ def test_force_and_area_fall_in_the_gap(surface, variant):
     """Down to the model's own turning point, which is never above d = 0; beyond it they rise."""
     law = contact_law(surface, 1e-6, variant=variant)
     gaps = gaps_of(surface, np.append(10 ** np.linspace(-9, 0, 40), np.linspace(1, 2, 200)[1:]))
-    found = contact(surface, gaps, variant=variant, derivatives=True)
+    found = contact(surface, separation=gaps, variant=variant, derivatives=True)
     cell = 1.001 * surface.h_max / 199
     for values, slopes, turn in (
         (found.force, found.force_by["separation"], law.turning_point),
@@ -206,7 +211,7 @@ def test_first_contact_is_a_power_law(surface, variant):
     depth = layer * 2.0 ** -np.array([8.0, 9.0, 18.0, 19.0])
     gaps = surface.h_max - depth
     depth = surface.h_max - gaps
-    found = contact(surface, gaps, variant=variant, rtol=1e-11)
+    found = contact(surface, separation=gaps, variant=variant, rtol=1e-11)
     for values, exponent, factor in zip(
         (found.force, found.area), (3.5, 10 / 3), first_contact(surface, variant), strict=True
     ):
@@ -240,7 +245,7 @@ def test_random_islands_add_up(surface, share, variant, seed):
     K1 = np.where(found.zeta_d > variant.floor_d, 1 - slope, 1)
     height = gap + delta - (found.h_d if variant.offset else 0)
     weight = measure * K1 * D * np.exp(-0.5 * (height / sigma) ** 2) / (math.sqrt(2 * math.pi) * sigma)
-    total = contact(surface, gap, variant=variant)
+    total = contact(surface, separation=gap, variant=variant)
     for carried, whole in ((found.force, total.force), (found.area, total.area)):
         terms = carried * weight
         scatter = math.sqrt(np.sum((terms[0] - terms[1]) ** 2)) / 2
@@ -256,7 +261,8 @@ def test_spheres_that_deform_carry_less(surface, shares, variant):
         (island(surface, delta, island_model=island_model, variant=variant)) for island_model in ("rigid", "universal")
     ]
     totals = [
-        contact(surface, gaps, island_model=island_model, variant=variant) for island_model in ("rigid", "universal")
+        contact(surface, separation=gaps, island_model=island_model, variant=variant)
+        for island_model in ("rigid", "universal")
     ]
     for rigid, elastic in (pairs, totals):
         room = 1 + rigid.error + elastic.error
@@ -287,13 +293,13 @@ def test_a_law_and_its_inverse(surface, shares, variant, digits):
 @invariant(12, surface=rough_surfaces, share=depths, variant=st.sampled_from(list(VARIANTS.values())))
 def test_tiers_are_within_their_bounds_of_each_other(surface, share, variant):
     gap = float(gaps_of(surface, share))
-    exact = contact(surface, gap, island_model="exact", variant=variant, rtol=1e-9)
+    exact = contact(surface, separation=gap, island_model="exact", variant=variant, rtol=1e-9)
     refused = 0
     for island_model, rtol in (("universal", 1e-9), ("island4d", 1e-5), ("formula", 1e-4)):
         if island_model == "island4d" and variant is PRINTED:
             continue
         try:
-            found = contact(surface, gap, island_model=island_model, variant=variant, rtol=rtol)
+            found = contact(surface, separation=gap, island_model=island_model, variant=variant, rtol=rtol)
         except OutOfRangeError:
             # closed forms and the four-parameter table end earlier
             assert island_model != "universal"
@@ -301,7 +307,7 @@ def test_tiers_are_within_their_bounds_of_each_other(surface, share, variant):
             continue
         assert abs(found.force / exact.force - 1) <= found.error + exact.error, island_model
         assert abs(found.area / exact.area - 1) <= found.error + exact.error, island_model
-    rigid = contact(surface, gap, island_model="rigid", variant=variant)
+    rigid = contact(surface, separation=gap, island_model="rigid", variant=variant)
     # a sphere that gives way carries less
     assert exact.force <= rigid.force * (1 + rigid.error + exact.error)
     return refused
@@ -329,7 +335,7 @@ def test_no_entry_knows_the_others(island_model, seed):
     def totals(chosen):
         return contact(
             Surface(*some_of(numbers, chosen)),
-            gaps[chosen],
+            separation=gaps[chosen],
             island_model=island_model,
             E_star=E_star[chosen],
             rtol=1e-4,
@@ -368,14 +374,16 @@ def test_chunks_change_no_answer(island_model, seed, chunks):
     named = [xr.DataArray(n, dims="surface") for n in some_of(numbers, slice(None))]
     shares = xr.DataArray([0.0, 0.1, 0.5, 0.9, 1.0], dims="gap")
     d = xr.DataArray(gaps, dims="surface") * (1 - shares) + named[4] * shares
-    eager = contact(Surface(*named), d, island_model=island_model, rtol=1e-4)
+    eager = contact(Surface(*named), separation=d, island_model=island_model, rtol=1e-4)
     lazy = contact(
         Surface(*(n.chunk(surface=chunks[0]) for n in named)),
-        d.chunk(surface=chunks[0], gap=chunks[1]),
+        separation=d.chunk(surface=chunks[0], gap=chunks[1]),
         island_model=island_model,
         rtol=1e-4,
     )
-    plain = contact(Surface(*(n.values[:, None] for n in named)), d.values, island_model=island_model, rtol=1e-4)
+    plain = contact(
+        Surface(*(n.values[:, None] for n in named)), separation=d.values, island_model=island_model, rtol=1e-4
+    )
     for name in ("force", "area", "error"):
         with dask.config.set(scheduler="synchronous"):
             computed = getattr(lazy, name).transpose("surface", "gap").compute()

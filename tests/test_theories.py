@@ -188,7 +188,7 @@ def test_greenwood_williamson_equals_mpmath():
 
         force = mpmath.mpf(4) / 3 * density * mpmath.sqrt(radius) * mean(1.5)
         area = mpmath.pi * density * radius * mean(1)
-    found = contact(YANG_PERSSON, d, theory="greenwood_williamson", E_star=2.5)
+    found = contact(YANG_PERSSON, separation=d, theory="greenwood_williamson", E_star=2.5)
     assert relative(found.force, 2.5 * float(force)) < 1e-11
     assert relative(found.area, float(area)) < 1e-11
     assert found.mean_separation == (3 + d) / 2

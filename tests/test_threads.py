@@ -53,11 +53,11 @@ def questions():
         # 31 islands or more a gap
         rng = np.random.default_rng(seed)
         surfaces = Surface(rng.uniform(0.3, 1, 60), 0.2, 0.2 * 10 ** rng.uniform(0.5, 4, 60), 1.0, 3.0)
-        found = contact(surfaces, gaps(seed, 60), rtol=1e-6)
+        found = contact(surfaces, separation=gaps(seed, 60), rtol=1e-6)
         return [found.force, found.area, found.error]
 
     def gradients(seed):
-        found = contact(Surface(0.6, 0.2, 30.0, 1.0, 3.0), gaps(seed, 10), rtol=1e-6, derivatives=True)
+        found = contact(Surface(0.6, 0.2, 30.0, 1.0, 3.0), separation=gaps(seed, 10), rtol=1e-6, derivatives=True)
         return [*found.force_by.values(), *found.area_by.values()]
 
     return [values, slopes, law_values, inverses, batches, gradients]
@@ -156,13 +156,17 @@ def test_workers_change_no_bit(derivatives):
     rng, n = np.random.default_rng(5), 2000
     surfaces = Surface(rng.uniform(0.4, 1, n), 1.0, 10 ** rng.uniform(1, 4, n), 1.0, rng.uniform(2.5, 5, n))
     depth = surfaces.h_max * rng.uniform(0.3, 0.99, n)
-    one, two = (contact(surfaces, depth, rtol=1e-6, derivatives=derivatives, workers=workers) for workers in (1, 2))
+    one, two = (
+        contact(surfaces, separation=depth, rtol=1e-6, derivatives=derivatives, workers=workers) for workers in (1, 2)
+    )
     np.testing.assert_array_equal([two.force, two.area, two.error], [one.force, one.area, one.error])
     gaps = np.linspace(-2.9, 2.9, 40_000)
-    one, two = (contact(Surface(0.7, 0.2, 60.0, 1.0, 3.0), gaps, rtol=1e-6, workers=workers) for workers in (1, 2))
+    one, two = (
+        contact(Surface(0.7, 0.2, 60.0, 1.0, 3.0), separation=gaps, rtol=1e-6, workers=workers) for workers in (1, 2)
+    )
     np.testing.assert_array_equal([two.force, two.area], [one.force, one.area])
     with pytest.raises(InputError, match="workers must be a whole number"):
-        contact(surfaces, depth, workers=0)
+        contact(surfaces, separation=depth, workers=0)
 
 
 def test_workers_stop_at_an_interrupt():

@@ -311,8 +311,8 @@ def test_the_factor_is_rounded_once():
 
 @pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
 def test_a_contact_keeps_its_units(theory):
-    plain = contact(CONCRETE, [0.5, 0.2], E_star=13.3, theory=theory)
-    found = contact(CONCRETE.to("um"), ["0.5 mm", 200], E_star="0.0133 GPa", theory=theory)
+    plain = contact(CONCRETE, separation=[0.5, 0.2], E_star=13.3, theory=theory)
+    found = contact(CONCRETE.to("um"), separation=["0.5 mm", 200], E_star="0.0133 GPa", theory=theory)
     expected = {"separation": "um", "force": "GPa", "area": "1", "stiffness": "GPa/um", "energy": "GPa um"}
     assert expected.items() <= found.units.items()
     sizes = {"separation": 1e3, "force": 1e-3, "area": 1, "stiffness": 1e-6, "energy": 1, "mean_pressure": 1e-3}
@@ -321,17 +321,19 @@ def test_a_contact_keeps_its_units(theory):
     joint = contact(CONCRETE, pressure="10 kPa", E_star="13.3 MPa", theory=theory)
     assert joint.force == pytest.approx(0.01, rel=1e-9)
     assert plain.units["force"] == "stress"
-    assert contact(CONCRETE, 0.5, theory=theory).units["stiffness"] == "1/mm"
+    assert contact(CONCRETE, separation=0.5, theory=theory).units["stiffness"] == "1/mm"
 
 
 def test_a_labelled_contact_keeps_its_units():
     xr = pytest.importorskip("xarray")
     gaps = xr.DataArray([0.5, 0.2], dims="gap")
-    found = contact(CONCRETE, gaps, E_star="13.3 MPa")
+    found = contact(CONCRETE, separation=gaps, E_star="13.3 MPa")
     assert (found.force.attrs["units"], found.units["mean_separation"]) == ("MPa", "mm")
-    assert contact(CONCRETE, gaps.assign_attrs(units="mm")).force.values == pytest.approx(found.force.values / 13.3)
+    assert contact(CONCRETE, separation=gaps.assign_attrs(units="mm")).force.values == pytest.approx(
+        found.force.values / 13.3
+    )
     with pytest.raises(InputError, match="separation is in 'um' by its attribute units, and asked for in 'mm'"):
-        contact(CONCRETE, gaps.assign_attrs(units="um"))
+        contact(CONCRETE, separation=gaps.assign_attrs(units="um"))
 
 
 @pytest.mark.parametrize("theory", ["mbma", "persson"])

@@ -107,7 +107,7 @@ def samples(count: int, seed: int, min_area: float = MIN_AREA) -> tuple[dict[str
     """Arguments, and force and area by the universal table (error 1e-8), where contact is above `min_area`."""
     given = arguments(count, seed)
     surface = Surface(given["hurst"], 1.0, given["zeta_1"], 1.0, given["h_max_over_h_rms"])
-    found = contact(surface, given["d_over_h_rms"])
+    found = contact(surface, separation=given["d_over_h_rms"])
     kept = found.area > min_area
     return {name: a[kept] for name, a in given.items()}, {name: getattr(found, name)[kept] for name in NAMES}
 

@@ -57,7 +57,7 @@ def reference() -> tuple[tuple[Surface, FloatArray, dict[str, FloatArray]], ...]
     rows = []
     for surface in held_out_surfaces():
         gap = measured_gaps(surface)[::EVERY]
-        found = contact(surface, gap, island_model=Doubled(), rtol=REFERENCE_RTOL)
+        found = contact(surface, separation=gap, island_model=Doubled(), rtol=REFERENCE_RTOL)
         rows.append((surface, gap, {"force": np.asarray(found.force), "area": np.asarray(found.area)}))
     return tuple(rows)
 
@@ -76,14 +76,14 @@ def scene_rows() -> Iterator[Row]:
     surface = held_out_surfaces()[0]
     gap = 0.9 * float(surface.h_max)
     whole = measure(Scene(surface, effects=["force"], separations=gap, rtol=1e-4).run)[0]
-    step = measure(functools.partial(contact, surface, gap, rtol=1e-4, quantities=["force"]))[0]
+    step = measure(functools.partial(contact, surface, separation=gap, rtol=1e-4, quantities=["force"]))[0]
     yield Row("scene", "call", "both", None, max(whole - step, 0.0))
 
 
 def gap_batch(island_model: str, rtol: float, count: int = GAPS, **options: Any) -> list[Any]:
     """Totals at `count` gaps of each held-out surface, one call a surface."""
     pairs = [(surface, measured_gaps(surface, count)) for surface in held_out_surfaces()]
-    return [contact(surface, gap, island_model=island_model, rtol=rtol, **options) for surface, gap in pairs]
+    return [contact(surface, separation=gap, island_model=island_model, rtol=rtol, **options) for surface, gap in pairs]
 
 
 def gap_rows() -> Iterator[Row]:

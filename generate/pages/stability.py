@@ -181,7 +181,7 @@ def totals() -> list[Tally]:
     tallies = {island_model: Tally(f"totals by {island_model}") for island_model in (*ISLAND_MODELS, "island4d")}
 
     def ask(surface: Surface, depth: float, island_model: str, variant: str, rtol: float) -> Answer:
-        found = contact(surface, TOP - depth, island_model=island_model, variant=variant, rtol=rtol)
+        found = contact(surface, separation=TOP - depth, island_model=island_model, variant=variant, rtol=rtol)
         return (float(found.force), float(found.area)), float(found.error) + TOTAL_TRUTH
 
     for variant, hurst, zeta_1, depth in itertools.product(("reported", "printed"), TOTAL_HURSTS, TOTAL_BANDS, DEPTHS):

@@ -151,7 +151,7 @@ def curve_command(
     gap = curve_gaps(float(surface.h_max), points)
     if model.theory != "mbma":
         gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).force)]
-    answer = contact(surface, gap, **asked)
+    answer = contact(surface, separation=gap, **asked)
     values = {name: getattr(answer, name) for name in COLUMNS} | (_leakage(answer) if leakage else {})
     units = {}
     others = {

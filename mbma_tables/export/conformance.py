@@ -85,7 +85,7 @@ def geometry_rows(approach: FloatArray, hurst: Any, zeta_1: Any, variant: Varian
 def total_rows(surface: tuple[float, ...], separations: Any, variant: Variant, rtol: float = RTOL) -> Rows:
     """Totals of one surface and their derivatives by the compiled runtime."""
     gaps = np.asarray(separations)
-    found = contact(Surface(*surface), gaps, variant=variant, rtol=rtol, derivatives=True)
+    found = contact(Surface(*surface), separation=gaps, variant=variant, rtol=rtol, derivatives=True)
     slopes = _slopes_of(found)
     # at a maximum of force, stiffness is 0
     stiffness = -2 * slopes[0, 0]

@@ -54,7 +54,7 @@ def open_table(table: os.PathLike[str] | str = UNIVERSAL) -> UniversalModel | Is
     >>> phi_F, phi_A, error = table.answer(2.0, 1e-3)
     >>> round(float(phi_F), 6), round(float(phi_A), 4)
     (0.005178, 7.8328)
-    >>> float(contact(Surface(0.8, 1.0, 200.0, 0.1, 0.3), 0.1, island_model=table).error) < 1e-8
+    >>> float(contact(Surface(0.8, 1.0, 200.0, 0.1, 0.3), separation=0.1, island_model=table).error) < 1e-8
     True
     """
     if table in (UNIVERSAL, ISLAND4D):

@@ -138,7 +138,7 @@ def _asked(run: Run) -> Contact:
     problem = run.problem
     theory = Mbma(variant=problem.variant, outside="nan") if problem.theory == "mbma" else problem.theory
     yields = {} if problem.hardness is None else {"hardness": problem.hardness, "E_star": problem.E_star}
-    return contact(run.problem.surface, run.gap, theory=theory, **yields)
+    return contact(run.problem.surface, separation=run.gap, theory=theory, **yields)
 
 
 def _leakage(run: Run, step: Step) -> None:
@@ -178,7 +178,7 @@ def _totals(run: Run, step: Step) -> None:
     for first in range(0, run.gap.size, block):
         answer = contact(
             run.surface,
-            run.gap[first : first + block],
+            separation=run.gap[first : first + block],
             island_model=step.island_model,
             variant=problem.variant,
             E_star=problem.E_star,

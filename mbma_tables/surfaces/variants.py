@@ -55,7 +55,7 @@ class Variant:
     >>> from mbma_tables import Surface, contact
     >>> from mbma_tables.surfaces.variants import PRINTED
     >>> flat = dataclasses.replace(PRINTED, name="no offset", offset=False)
-    >>> contact(Surface.named("concrete"), 0.6, variant=flat).variant
+    >>> contact(Surface.named("concrete"), separation=0.6, variant=flat).variant
     'no offset'
     """
 

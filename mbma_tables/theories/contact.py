@@ -40,7 +40,13 @@ KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact 
 @hinted
 def contact(
     surface: AnySurface,
+    *,
     separation: ArrayLike | None = None,
+    mean_separation: ArrayLike | None = None,
+    pressure: ArrayLike | None = None,
+    area: ArrayLike | None = None,
+    theory: str | Theory | UserTheory = "mbma",
+    hardness: ArrayLike | str = np.inf,
     island_model: str | AnyModel = "universal",
     variant: str | Variant = "reported",
     E_star: ArrayLike = 1.0,
@@ -48,12 +54,6 @@ def contact(
     outside: str = "raise",
     derivatives: bool = False,
     quantities: Iterable[str] = QUANTITIES,
-    *,
-    mean_separation: ArrayLike | None = None,
-    pressure: ArrayLike | None = None,
-    area: ArrayLike | None = None,
-    theory: str | Theory | UserTheory = "mbma",
-    hardness: ArrayLike | str = np.inf,
     workers: int = 1,
 ) -> Contact:
     """Force, real contact area and stiffness of a surface, by what is known: separation, pressure or area.
@@ -118,7 +118,7 @@ def contact(
     --------
     >>> from mbma_tables import Surface, contact
     >>> surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)  # um
-    >>> found = contact(surface, [1.0, 0.5], E_star=100e3)  # MPa
+    >>> found = contact(surface, separation=[1.0, 0.5], E_star=100e3)  # MPa
     >>> [f"{force:.4g} MPa on {area:.3%}" for force, area in zip(found.force, found.area)]
     ['7.982 MPa on 0.287%', '20.28 MPa on 0.735%']
     >>> bool((found.error < 1e-8).all())

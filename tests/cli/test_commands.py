@@ -65,7 +65,9 @@ def test_contact_gives_the_closed_check_values():
 def test_contact_json_is_the_librarys_answer_digit_for_digit():
     arguments = ("-d", "0.5,-0.2", "-d", "-1.1", "--island-model", "rigid", "--rtol", "1e-6", "--E-star", "7.5")
     found = json.loads(run("contact", "--surface", "concrete", *arguments, "--json"))
-    answer = contact(Surface.named("concrete"), [0.5, -0.2, -1.1], island_model="rigid", E_star=7.5, rtol=1e-6)
+    answer = contact(
+        Surface.named("concrete"), separation=[0.5, -0.2, -1.1], island_model="rigid", E_star=7.5, rtol=1e-6
+    )
     for name in ("separation", "mean_separation", "force", "area", "error"):
         assert found["columns"][name] == getattr(answer, name).tolist()
     assert (found["variant"], found["island_model"], found["rtol"], found["E_star"]) == ("reported", "rigid", 1e-6, 7.5)
@@ -124,7 +126,7 @@ def test_curve_of_any_theory(folder, theory):
     # some, as Persson's, have no finite force at u = 0, the last gap
     assert len(columns["force"]) == len(found["valid"])
     assert len(columns["force"]) in ({8} if theory == "persson" else {9} if theory == "mbma" else {8, 9})
-    answer = contact(Surface.named("concrete"), columns["separation"], theory=theory)
+    answer = contact(Surface.named("concrete"), separation=columns["separation"], theory=theory)
     assert columns["force"] == answer.force.tolist()
     assert columns["area"] == answer.area.tolist()
     assert found["theory"] == theory
@@ -136,7 +138,7 @@ def test_csv_holds_every_digit():
     lines = text.splitlines()
     comments = [line for line in lines if line.startswith("#")]
     rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
-    answer = contact(Surface.named("asphalt"), [0.9, 0.1])
+    answer = contact(Surface.named("asphalt"), separation=[0.9, 0.1])
     for name in ("separation", "force", "area", "error"):
         assert [float(row[name]) for row in rows] == getattr(answer, name).tolist()
     assert any("variant reported" in line for line in comments)
@@ -161,7 +163,7 @@ def test_every_source_is_the_same_surface(folder):
         *(options(numbers) for numbers in (YANG_PERSSON, band, moments)),
         *(["--file", f"{name}.toml"] for name in files),
     ]
-    expected = contact(surface, [2.0, 0.5])
+    expected = contact(surface, separation=[2.0, 0.5])
     for source in sources:
         found = json.loads(run("contact", *source, "-d", "2,0.5", "--json"))
         for name in ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "m4", "alpha"):
@@ -188,7 +190,7 @@ def test_material_from_options_and_from_a_file(folder):
     (folder / "s.toml").write_text(toml(CONCRETE) + toml(material, "material"))
     (folder / "e.toml").write_text(toml(CONCRETE) + f"[material]\nE_star = {float(modulus)!r}\n")
     bodies = [part for key, value in material.items() for part in (f"--{key}", str(value))]
-    expected = float(contact(Surface.named("concrete"), 0.3, E_star=modulus).force)
+    expected = float(contact(Surface.named("concrete"), separation=0.3, E_star=modulus).force)
     for source in (["--surface", "concrete", *bodies], ["--file", "s.toml"], ["--file", "e.toml"]):
         found = json.loads(run("contact", *source, "-d", "0.3", "--json"))
         assert found["E_star"] == modulus
@@ -207,7 +209,7 @@ def test_curve_beside_other_theories(folder):
     found = json.loads(run("curve", *arguments, "--json"))["columns"]
     surface = Surface.named("concrete")
     average, gap = np.array(found["mean_separation"]), np.array(found["separation"])
-    asperities = contact(surface, gap, theory="greenwood_williamson", E_star=3.0)
+    asperities = contact(surface, separation=gap, theory="greenwood_williamson", E_star=3.0)
     np.testing.assert_allclose(found["greenwood_williamson_force"], asperities.force, rtol=1e-13)
     np.testing.assert_allclose(found["greenwood_williamson_area"], asperities.area, rtol=1e-13)
     assert found["persson_force"][-1] is None

@@ -55,7 +55,7 @@ many = Surface(np.linspace(0.3, 1.0, n), 0.2, np.geomspace(0.7, 4000, n), 1.0, 3
 
 def answers():
     law = contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0))
-    found = contact(many, 1.0, derivatives=True, workers=2).force, law.force(0.5), law.at_pressure(1e-3).area
+    found = contact(many, separation=1.0, derivatives=True, workers=2).force, law.force(0.5), law.at_pressure(1e-3).area
     return b"".join(np.asarray(one).tobytes() for one in found)
 
 known = answers()
@@ -83,10 +83,10 @@ many = Surface(np.linspace(0.3, 1.0, n), 0.2, np.geomspace(0.7, 4000, n), 1.0, 3
 law, four, X = contact_law(one), open_table("island4d"), np.linspace(-5, 40, 1_000_000)
 u, pressure = np.linspace(0.2, 2.5, 3_000_000), np.geomspace(1e-4, 1e-2, 1_000_000)
 requests = {
-    "totals": lambda: contact(many, 1.0),
-    "derivatives": lambda: contact(many, 1.0, derivatives=True),
-    "workers": lambda: contact(many, 1.0, derivatives=True, workers=2),
-    "exact": lambda: contact(one, np.linspace(0, 2, 2000), island_model="exact"),
+    "totals": lambda: contact(many, separation=1.0),
+    "derivatives": lambda: contact(many, separation=1.0, derivatives=True),
+    "workers": lambda: contact(many, separation=1.0, derivatives=True, workers=2),
+    "exact": lambda: contact(one, separation=np.linspace(0, 2, 2000), island_model="exact"),
     "islands": lambda: greenwood_tripp.solve(X, 1.0),
     "four numbers": lambda: four.lookup(np.linspace(1, 2, 3_000_000), 3.0, 20.0, 0.8),
     "a law's inverse": lambda: law.at_pressure(law.force(np.linspace(-2, 2.5, 3_000_000))),

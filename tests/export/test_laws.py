@@ -73,7 +73,7 @@ def test_the_stated_error_and_better_than_even_rows(name, rows):
     law = law_of(surface, rows=rows)
     # points of our own, through the totals
     x = np.random.default_rng(rows).uniform(0, law.x[-1], 2000)
-    model = contact(surface, np.maximum(surface.h_max - 2 * x, -surface.h_max), E_star=13.3, rtol=1e-9).force
+    model = contact(surface, separation=np.maximum(surface.h_max - 2 * x, -surface.h_max), E_star=13.3, rtol=1e-9).force
     kept = model > FLOOR * law.y[-1]
     error = np.abs(np.interp(x, law.x, law.y) / model - 1)[kept].max()
     assert error <= 1.02 * law.largest_error

@@ -112,7 +112,7 @@ def test_certificates_are_the_errors_at_held_out_points(small):
     assert [found.coefficients for found in form.certificates.values()] == [10, 8]
     given = totals.arguments(600, totals.HELD_OUT_SEED)
     surface = Surface(given["hurst"], 1.0, given["zeta_1"], 1.0, given["h_max_over_h_rms"])
-    found = contact(surface, given["d_over_h_rms"], island_model="exact", rtol=1e-6)
+    found = contact(surface, separation=given["d_over_h_rms"], island_model="exact", rtol=1e-6)
     some = found.area > totals.MIN_AREA
     exact = {name: getattr(found, name)[some] for name in totals.NAMES}
     agrees(form, {name: values[some] for name, values in given.items()}, exact)

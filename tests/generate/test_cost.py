@@ -32,7 +32,7 @@ def test_references_agree_with_the_solver():
     found = cost_totals.reference()
     assert len(found) == len(timing.HELD_OUT)
     surface, gap, truth = found[3]
-    answer = contact(surface, gap, island_model="exact", rtol=1e-10)
+    answer = contact(surface, separation=gap, island_model="exact", rtol=1e-10)
     assert answer.force == pytest.approx(truth["force"], rel=1e-10, abs=0)
     assert answer.area == pytest.approx(truth["area"], rel=1e-10, abs=0)
     answers = [truth for _, _, truth in found]

@@ -40,7 +40,7 @@ def test_errors_of_totals_are_as_certified(count):
     zeta_1 = np.exp(rng.uniform(np.log(10), np.log(1000), count))
     surface = Surface(rng.uniform(0.5, 1, count), 1.0, zeta_1, 1.0, rng.uniform(3, 4.5, count))
     gap = surface.h_max - np.exp(rng.uniform(np.log(0.1), np.log(2 * surface.h_max)))
-    exact = contact(surface, gap)
+    exact = contact(surface, separation=gap)
     some = exact.area > RANGES[TOTALS]["area"][0]
     for name, function in FUNCTIONS[TOTALS].items():
         error = np.abs(function(gap, surface.h_max, zeta_1, surface.hurst) / getattr(exact, name) - 1)[some].max()
@@ -50,7 +50,7 @@ def test_errors_of_totals_are_as_certified(count):
 def test_totals_are_within_a_tenth_of_the_exact_solver_in_the_corners():
     h_max, zeta_1, hurst = np.array(list(itertools.product((3.0, 4.5), (10.0, 1000.0), (0.5, 1.0)))).T[:, :, None]
     gap = h_max * np.linspace(-1, 0.9, 40)
-    exact = contact(Surface(hurst, 1.0, zeta_1, 1.0, h_max), gap, island_model="exact", rtol=1e-6)
+    exact = contact(Surface(hurst, 1.0, zeta_1, 1.0, h_max), separation=gap, island_model="exact", rtol=1e-6)
     some = exact.area > RANGES[TOTALS]["area"][0]
     for name, function in FUNCTIONS[TOTALS].items():
         assert np.abs(function(gap, h_max, zeta_1, hurst) / getattr(exact, name) - 1)[some].max() <= 0.1
@@ -93,7 +93,7 @@ def test_totals_by_the_island_model_are_within_one_percent():
     zeta_1, h_max = 10 ** rng.uniform(0.5, 4, 150), rng.uniform(2.5, 4.5, 150)
     surface = Surface(rng.uniform(0.35, 1, 150), 1.0, zeta_1, 1.0, h_max)
     gap = rng.uniform(-1, 0.999, 150) * h_max
-    found, exact = contact(surface, gap, island_model="formula", rtol=1e-3), contact(surface, gap)
+    found, exact = contact(surface, separation=gap, island_model="formula", rtol=1e-3), contact(surface, separation=gap)
     for name in ("force", "area"):
         error = np.abs(getattr(found, name) / getattr(exact, name) - 1)
         assert error.max() <= 0.01
@@ -152,7 +152,7 @@ def test_units_and_shapes_of_closed_totals():
     surface = Surface(0.8, [[0.1], [0.2]], [[10.0], [20.0]], 0.5, 1.7)
     gaps = np.array([0.3, 0.9, -1.0])
     force, area, error = closed_totals(surface, gaps, 200.0)
-    exact = contact(surface, gaps, E_star=200.0)
+    exact = contact(surface, separation=gaps, E_star=200.0)
     assert force.shape == area.shape == (2, 3)
     assert np.abs(force / exact.force - 1).max() < error
     assert np.abs(area / exact.area - 1).max() < error

@@ -42,9 +42,9 @@ def with_island_model(scene, island_model):
 def test_beyond_a_table_totals_are_solved(island_model):
     scene = scene_of(DEEP, separations=(-44.0, 44.0), rtol=1e-3)
     with pytest.raises(OutOfRangeError):
-        contact(DEEP, -44.0, island_model)
+        contact(DEEP, separation=-44.0, island_model=island_model)
     found = run_plan(scene, with_island_model(scene, island_model))
-    truth = contact(DEEP, [-44.0, 44.0], island_model="exact", rtol=1e-6).force
+    truth = contact(DEEP, separation=[-44.0, 44.0], island_model="exact", rtol=1e-6).force
     np.testing.assert_allclose(found["force"], truth, rtol=1e-3, atol=0)
 
 
@@ -124,7 +124,7 @@ def test_an_island_model_of_choice():
     """Given by name it is taken as it is, and a bound above the tolerance is an error."""
     found = scene_of(island_model="island4d", rtol=1e-3).run()
     assert found.attrs["island_models"] == '{"totals": "island4d"}'
-    alone = contact(CONCRETE, [0.2, 0.5], island_model="island4d", rtol=5e-4, quantities=["force"])
+    alone = contact(CONCRETE, separation=[0.2, 0.5], island_model="island4d", rtol=5e-4, quantities=["force"])
     np.testing.assert_array_equal(found["force"], alone.force)
     with pytest.raises(ConvergenceError, match=r"above rtol = 1\.00e-06: give a larger rtol"):
         scene_of(island_model="formula", rtol=1e-6).run()

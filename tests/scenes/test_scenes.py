@@ -40,7 +40,7 @@ def scene_of(*effects, **more):
 @pytest.mark.parametrize("rtol", [1e-1, 1e-3, 1e-5, 1e-7, 1e-9])
 def test_totals_are_within_the_tolerance(rtol):
     found = scene_of("force", "area", rtol=rtol).run()
-    truth = contact(CONCRETE, GAPS, island_model="exact", rtol=1e-10)
+    truth = contact(CONCRETE, separation=GAPS, island_model="exact", rtol=1e-10)
     np.testing.assert_allclose(found["force"], truth.force, rtol=rtol)
     np.testing.assert_allclose(found["area"], truth.area, rtol=rtol)
     assert found.attrs["error"] <= rtol
@@ -55,7 +55,7 @@ def test_pressures_stiffness_and_energy(rtol):
     np.testing.assert_allclose(found["area"], exact.area(np.array(GAPS)), rtol=rtol)
     # central differences of fresh totals, with an error of h^2
     h = 1e-4
-    ends = [contact(CONCRETE, np.array(GAPS) + s * h, E_star=2.0, rtol=1e-10).force for s in (1, -1)]
+    ends = [contact(CONCRETE, separation=np.array(GAPS) + s * h, E_star=2.0, rtol=1e-10).force for s in (1, -1)]
     slope = (ends[1] - ends[0]) / h  # by u, which moves half as far
     np.testing.assert_allclose(found["stiffness"], slope, rtol=rtol + 2e-6)
     np.testing.assert_allclose(found["conductance"], 1.5 / 2 * slope, rtol=rtol + 2e-6)
@@ -98,7 +98,7 @@ def test_the_whole_gaussian_adds_force_and_reaches_beyond_h_max():
     assert cut["force"][2] == 0
     # a higher top adds nothing any more
     higher = Surface(CONCRETE.hurst, CONCRETE.q0, CONCRETE.q1, CONCRETE.h_rms, 4.0)
-    truth = contact(higher, gaps, island_model="exact", rtol=1e-8)
+    truth = contact(higher, separation=gaps, island_model="exact", rtol=1e-8)
     np.testing.assert_allclose(whole["force"], truth.force, rtol=1e-5)
 
 
@@ -173,7 +173,7 @@ concrete = Surface.named("concrete")
 if sys.argv[1] == "used":
     open_table("island4d")
     for island_model in ("exact", "universal", "island4d", "formula", "rigid"):
-        contact(concrete, [0.1, 0.7], island_model=island_model, rtol=1e-3)
+        contact(concrete, separation=[0.1, 0.7], island_model=island_model, rtol=1e-3)
     contact_law(concrete, 1e-4)
     Scene(Surface.named("asphalt"), effects=["force", "energy"], separations=[0.1], rtol=0.05).run()
     Scene(concrete, effects=["pressure_profile"], deltas=[0.2]).run()
@@ -340,7 +340,7 @@ def test_tables_are_not_read_where_nothing_looks_up(name, monkeypatch):
 )
 def test_stiffness_at_the_end_of_a_laws_piece(surface, gap, rtol):
     found = Scene(surface, effects=("stiffness",), separations=[gap], rtol=rtol).run()
-    truth = -2 * contact(surface, gap, rtol=1e-11, derivatives=True).force_by["separation"]
+    truth = -2 * contact(surface, separation=gap, rtol=1e-11, derivatives=True).force_by["separation"]
     assert abs(float(found["stiffness"][0]) / truth - 1) <= found.attrs["error"] <= rtol
 
 

@@ -112,7 +112,9 @@ def test_validity_is_an_effect(theory):
 def test_theories_beside_one_another():
     found = scene_of("persson", effects=("force", "comparison"), theories=("mbma",), separations=[0.2]).run()
     for theory, name in (("persson", "force"), ("mbma", "mbma_force")):
-        assert found[name].item() == pytest.approx(contact(CONCRETE, 0.2, E_star=MODULUS, theory=theory).force)
+        assert found[name].item() == pytest.approx(
+            contact(CONCRETE, separation=0.2, E_star=MODULUS, theory=theory).force
+        )
 
 
 @pytest.mark.parametrize(

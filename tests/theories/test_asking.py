@@ -265,8 +265,8 @@ def test_what_cannot_be_asked(asked, match):
 
 
 def test_a_theory_object_with_its_own_options():
-    by_object = contact(SURFACE, 1.0, theory=Mbma("rigid", "printed"))
-    by_name = contact(SURFACE, 1.0, island_model="rigid", variant="printed")
+    by_object = contact(SURFACE, separation=1.0, theory=Mbma("rigid", "printed"))
+    by_name = contact(SURFACE, separation=1.0, island_model="rigid", variant="printed")
     assert by_object.force == by_name.force
     assert (by_object.island_model, by_object.variant, by_object.theory) == ("rigid", "printed", "mbma")
 
@@ -280,7 +280,7 @@ def test_heights_without_an_end(theory):
 
 
 def test_energy_without_contact_is_no_negative_zero():
-    assert not np.signbit(contact(SURFACE, 3.0, theory="calibrated").energy)
+    assert not np.signbit(contact(SURFACE, separation=3.0, theory="calibrated").energy)
 
 
 def test_a_modulus_names_its_unit_in_lists_and_attributes():
@@ -293,7 +293,10 @@ def test_a_modulus_names_its_unit_in_lists_and_attributes():
 
 
 def test_one_quantity_alone_has_a_mean_pressure_and_a_dataset():
-    both, one = contact(SURFACE, 0.5, E_star=MODULUS), contact(SURFACE, 0.5, E_star=MODULUS, quantities=("area",))
+    both, one = (
+        contact(SURFACE, separation=0.5, E_star=MODULUS),
+        contact(SURFACE, separation=0.5, E_star=MODULUS, quantities=("area",)),
+    )
     assert one.mean_pressure == pytest.approx(both.mean_pressure, rel=1e-8)
     assert "mean_pressure" in one.to_dataset()
 
@@ -301,14 +304,14 @@ def test_one_quantity_alone_has_a_mean_pressure_and_a_dataset():
 @each
 def test_what_is_asked_is_what_a_refusal_names(theory):
     with pytest.raises(OutOfRangeError, match=r"^separation must be at least -h_max"):
-        contact(SURFACE, -3.1, theory=theory)
+        contact(SURFACE, separation=-3.1, theory=theory)
     with pytest.raises(InputError, match="hardness is empty"):
-        contact(SURFACE, 0.5, theory=theory, hardness=[])
+        contact(SURFACE, separation=0.5, theory=theory, hardness=[])
 
 
 def test_what_is_read_of_named_arrays_has_its_unit():
     gaps = xr.DataArray([0.5, 1.0], dims="gap", name="mine")
-    found = contact(dataclasses.replace(SURFACE, unit="um"), gaps, E_star="100 GPa", hardness="1.5 GPa")
+    found = contact(dataclasses.replace(SURFACE, unit="um"), separation=gaps, E_star="100 GPa", hardness="1.5 GPa")
     expected = {"stiffness": "GPa/um", "mean_pressure": "GPa", "mean_separation": "um", "separation_scatter": "um"}
     for name, unit in expected.items():
         quantity = getattr(found, name)

@@ -177,7 +177,7 @@ class TestLaw:
         rng = np.random.default_rng(6)
         # from 1e-4 of the law above its blocked gap: nearer, the law's own error of the area is more than the rest
         d = low + (high - low) * np.concatenate([rng.uniform(1e-4, 1, 100), 10 ** rng.uniform(-4, 0, 100)])
-        found, expected = law.leakage(d), contact(surface, d, theory=theory).leakage.conductance
+        found, expected = law.leakage(d), contact(surface, separation=d, theory=theory).leakage.conductance
         np.testing.assert_allclose(found, expected, rtol=law.leakage.error + 2e-5)
         assert law.leakage.error < 2e-4
         np.testing.assert_allclose(law.leakage(u=(d + law.h_max) / 2), found, rtol=1e-9)
@@ -190,7 +190,7 @@ class TestLaw:
         assert law.leakage(at + 1e-6) > 0
         apart = np.array([3.5, 4.0, 400.0])
         np.testing.assert_allclose(
-            law.leakage(apart), contact(SEAL, apart, theory="calibrated").leakage.conductance, rtol=1e-4
+            law.leakage(apart), contact(SEAL, separation=apart, theory="calibrated").leakage.conductance, rtol=1e-4
         )
 
     def test_falls_with_pressure_in_units_and_labels(self):

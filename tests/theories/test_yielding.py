@@ -358,7 +358,7 @@ def test_a_row_of_hardnesses_some_infinite_answers_areas():
 
 
 def test_a_hardness_leaves_mbma_its_variant_and_island_model():
-    found = contact(SURFACE, 0.5, variant="printed", hardness=0.02)
+    found = contact(SURFACE, separation=0.5, variant="printed", hardness=0.02)
     assert (found.variant, found.island_model) == ("printed", "universal")
 
 

@@ -84,7 +84,7 @@ BRUTE_POINTS = [
 def test_against_brute_force(hurst, zeta_1, share, variant):
     surface = one_surface(hurst, zeta_1, h_max=3.3, h_rms=0.7)
     separation = share * surface.h_max
-    found = contact(surface, separation, variant=variant, rtol=1e-9)
+    found = contact(surface, separation=separation, variant=variant, rtol=1e-9)
     force, area = brute(surface, separation, variant)
     assert abs(found.force / force - 1) <= 1e-9
     assert abs(found.area / area - 1) <= 1e-9
@@ -95,7 +95,7 @@ def test_against_brute_force(hurst, zeta_1, share, variant):
 def fine_contact(variant, count):
     surfaces = random_surfaces(count, seed=11)
     separation = random_gaps(surfaces, seed=12)
-    return surfaces, separation, contact(surfaces, separation, variant=variant, rtol=2e-11)
+    return surfaces, separation, contact(surfaces, separation=separation, variant=variant, rtol=2e-11)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def fine_contact(variant, count):
 )
 def test_bound_covers_the_true_error(variant, count, rtol):
     surfaces, separation, fine = fine_contact(variant, count)
-    found = contact(surfaces, separation, variant=variant, rtol=rtol)
+    found = contact(surfaces, separation=separation, variant=variant, rtol=rtol)
     error = np.maximum(np.abs(found.force / fine.force - 1), np.abs(found.area / fine.area - 1))
     assert fine.error.max() <= 2e-11
     assert found.error.max() <= rtol
@@ -112,7 +112,7 @@ def test_bound_covers_the_true_error(variant, count, rtol):
 
 
 def test_the_papers_yang_persson_case():
-    found = contact(Surface.named("yang-persson"), 2.0, variant="printed")
+    found = contact(Surface.named("yang-persson"), separation=2.0, variant="printed")
     assert found.force == pytest.approx(2.5114e-5, abs=5e-10)
     assert found.area == pytest.approx(3.1145e-5, abs=5e-10)
     assert found.mean_separation == 2.5
@@ -123,30 +123,30 @@ def test_no_cancellation_next_to_first_contact():
     # the law holds where the depth is a few units in the last place of the separation
     surface = one_surface(0.8, 216.0, h_max=4.0)
     depth = np.array([2.0**-48, 2.0**-20])
-    found = contact(surface, 4.0 - depth, rtol=1e-10)
+    found = contact(surface, separation=4.0 - depth, rtol=1e-10)
     assert found.force[0] / found.force[1] == pytest.approx((2.0**-28) ** 3.5, rel=1e-3, abs=0)
 
 
 @pytest.mark.parametrize("island_model", ["exact", "rigid"])
 def test_no_contact_is_exactly_zero(island_model):
     surface = one_surface(0.8, 216.0)
-    found = contact(surface, [3.0, math.nextafter(3, 4), 50.0, 1e300], island_model=island_model)
+    found = contact(surface, separation=[3.0, math.nextafter(3, 4), 50.0, 1e300], island_model=island_model)
     assert found.force.tolist() == [0.0] * 4
     assert found.area.tolist() == [0.0] * 4
     assert found.error.tolist() == [0.0] * 4
-    assert contact(surface, math.nextafter(3, 2), island_model=island_model).force > 0
+    assert contact(surface, separation=math.nextafter(3, 2), island_model=island_model).force > 0
 
 
 def test_the_argument_stays():
     separation = np.array([1.0, 2.0])
-    contact(one_surface(0.8, 216.0), separation, rtol=1e-3)
+    contact(one_surface(0.8, 216.0), separation=separation, rtol=1e-3)
     assert separation.tolist() == [1.0, 2.0]
 
 
 def test_below_full_compression():
     surfaces = Surface([[0.5], [0.8]], 0.2, 40.0, 1.0, [[3.0], [4.0]])
     with pytest.raises(OutOfRangeError, match="at least -h_max, where the model ends") as caught:
-        contact(surfaces, [0.0, -3.5, -5.0])
+        contact(surfaces, separation=[0.0, -3.5, -5.0])
     assert caught.value.mask.tolist() == [[False, True, True], [False, False, True]]
 
 
@@ -154,7 +154,7 @@ def test_failure_has_the_shape_of_the_arguments(monkeypatch):
     monkeypatch.setattr(greenwood_tripp, "LEVELS", np.array([12]))  # too few nodes for any island at 1e-8
     surfaces = Surface([[0.5], [0.8]], 0.2, 40.0, 1.0, [[3.0], [4.0]])
     with pytest.raises(ConvergenceError) as caught:
-        contact(surfaces, [0.0, 3.5, 1.0])
+        contact(surfaces, separation=[0.0, 3.5, 1.0])
     assert caught.value.mask.tolist() == [[True, False, True], [True, True, True]]
 
 
@@ -162,9 +162,9 @@ def test_failure_has_the_shape_of_the_arguments(monkeypatch):
 def test_no_number(value):
     surface = one_surface(0.8, 216.0)
     with pytest.raises(InputError, match=r"^give exactly one" if value is None else r"^separation "):
-        contact(surface, value)
+        contact(surface, separation=value)
     with pytest.raises(InputError, match=r"^E_star "):
-        contact(surface, 1.0, E_star=value)
+        contact(surface, separation=1.0, E_star=value)
 
 
 @pytest.mark.parametrize(
@@ -184,7 +184,7 @@ def test_no_number(value):
 )
 def test_bad_options(option, value):
     with pytest.raises(InputError, match=option):
-        contact(one_surface(0.8, 216.0), 1.0, **{option: value})
+        contact(one_surface(0.8, 216.0), separation=1.0, **{option: value})
 
 
 @pytest.mark.parametrize("island_model", ["universal", "exact", "rigid", "island4d"])
@@ -192,8 +192,8 @@ def test_bad_options(option, value):
 def test_one_quantity_alone(island_model, wanted):
     surface = Surface([0.5, 0.8], 1.0, 100.0, 1.0, 3.0)
     gaps = [1.0, -2.0]
-    both = contact_by_island_model(surface, gaps, island_model=island_model)
-    alone = contact_by_island_model(surface, gaps, island_model=island_model, quantities=[wanted])
+    both = contact_by_island_model(surface, separation=gaps, island_model=island_model)
+    alone = contact_by_island_model(surface, separation=gaps, island_model=island_model, quantities=[wanted])
     other = "area" if wanted == "force" else "force"
     assert getattr(alone, other) is None
     np.testing.assert_allclose(getattr(alone, wanted), getattr(both, wanted), rtol=max(1e-8, 2 * both.error.max()))
@@ -203,7 +203,7 @@ def test_one_quantity_alone(island_model, wanted):
 @pytest.mark.parametrize("wanted", [(), ["force", "stiffness"], "energy"])
 def test_unknown_quantities(wanted):
     with pytest.raises(InputError, match="quantities must be some of"):
-        contact_by_island_model(Surface(0.8, 1.0, 100.0, 1.0, 3.0), 1.0, quantities=wanted)
+        contact_by_island_model(Surface(0.8, 1.0, 100.0, 1.0, 3.0), separation=1.0, quantities=wanted)
 
 
 ROUGH = Surface(0.8, 1.0, 216.0, 1.0, 3.0)
@@ -227,7 +227,10 @@ KINDS = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_layout_does_not_matter(kind):
-    found, expected = contact_by_island_model(ROUGH, KINDS[kind]), contact_by_island_model(ROUGH, GAPS)
+    found, expected = (
+        contact_by_island_model(ROUGH, separation=KINDS[kind]),
+        contact_by_island_model(ROUGH, separation=GAPS),
+    )
     np.testing.assert_array_equal(np.ravel(found.force), expected.force)
     np.testing.assert_array_equal(np.ravel(found.area), expected.area)
 
@@ -255,7 +258,9 @@ def test_many_surfaces_keep_their_bound_where_sums_agree_by_chance(variant, numb
     hurst, zeta_1, top = numbers
     surfaces = Surface(hurst, 1.0, zeta_1, 1.0, np.full((30, 1), top))
     gaps = top - compression * (1 + np.linspace(-1e-3, 1e-3, 41))
-    found, known = (contact_by_island_model(surfaces, gaps, variant=variant, rtol=asked) for asked in (rtol, 1e-11))
+    found, known = (
+        contact_by_island_model(surfaces, separation=gaps, variant=variant, rtol=asked) for asked in (rtol, 1e-11)
+    )
     for name in ("force", "area"):
         assert (np.abs(getattr(found, name) / getattr(known, name) - 1) <= found.error).all()
     assert found.error.max() <= rtol

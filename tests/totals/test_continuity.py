@@ -71,7 +71,7 @@ def moved_by(numbers, which, share):
 
 
 def totals_of(numbers, **options):
-    return contact(Surface(*(numbers[name] for name in INPUTS[:-1])), numbers["separation"], **options)
+    return contact(Surface(*(numbers[name] for name in INPUTS[:-1])), separation=numbers["separation"], **options)
 
 
 def apart(a, b, moved):
@@ -140,10 +140,10 @@ def test_totals_do_not_jump_where_the_solver_takes_over(record_property):
         inside, outside = np.full(count, 4.5 - 1e-9), np.full(count, -4.4)
         for _ in range(60):
             middle = (inside + outside) / 2
-            gone = np.isnan(contact(surface, middle, variant=variant, outside="nan").force)
+            gone = np.isnan(contact(surface, separation=middle, variant=variant, outside="nan").force)
             inside, outside = np.where(gone, inside, middle), np.where(gone, middle, outside)
-        one, other = (contact(surface, gap, variant=variant, outside="exact") for gap in (inside, outside))
-        left = np.isnan(contact(surface, outside, variant=variant, outside="nan").force)
+        one, other = (contact(surface, separation=gap, variant=variant, outside="exact") for gap in (inside, outside))
+        left = np.isnan(contact(surface, separation=outside, variant=variant, outside="nan").force)
         assert left.any()
         own = 10 * np.abs(inside - outside) / (4.5 - inside)
         for name in ("force", "area"):

@@ -20,7 +20,7 @@ GAPS = np.array([2.9, 2.0, 0.5, -1.0, -2.9])
 
 
 def test_cover_is_what_islands_at_random_leave_uncovered():
-    added, covered = (contact(SURFACE, GAPS, variant=r, derivatives=True) for r in (REPORTED, COVER))
+    added, covered = (contact(SURFACE, separation=GAPS, variant=r, derivatives=True) for r in (REPORTED, COVER))
     assert covered.force == pytest.approx(added.force, rel=1e-15)
     assert covered.area == pytest.approx(-np.expm1(-added.area), rel=1e-15)
     for name, slope in added.area_by.items():
@@ -49,7 +49,7 @@ def test_fitted_area_at_equal_force_follows_boundary_elements():
     for seed in sorted({tuple(row[k] for k in keys) for row in rows if row["L_over_lambda0"] != "1"}):
         own = [row for row in rows if tuple(row[k] for k in keys) == seed]
         surface = Surface(float(seed[0]), 1.0, float(seed[2]), 1.0, float(own[0]["h_max_over_h_rms"]))
-        found = contact(surface, np.linspace(-1, 0.99, 200) * surface.h_max, variant="fitted", rtol=1e-5)
+        found = contact(surface, separation=np.linspace(-1, 0.99, 200) * surface.h_max, variant="fitted", rtol=1e-5)
         branch = slice(int(np.argmax(found.force)), None)
         log_force, log_area = (np.log(x[branch][::-1]) for x in (found.force / surface.rms_gradient, found.area))
         for row in own:
@@ -62,6 +62,6 @@ def test_fitted_area_at_equal_force_follows_boundary_elements():
 
 
 def test_a_surface_below_the_floors_is_refused():
-    for answer in (contact_law, lambda *given, **options: contact(*given, 1.0, **options)):
+    for answer in (contact_law, lambda *given, **options: contact(*given, separation=1.0, **options)):
         with pytest.raises(InputError, match=r"greater than 5\.14, the variant's floor of zeta_u"):
             answer(Surface(0.8, 1.0, 5.0, 1.0, 3.0), variant="fitted")

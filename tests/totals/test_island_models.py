@@ -21,7 +21,7 @@ OPEN = dataclasses.replace(REPORTED, name="open", floor_d=1.3, floor_u=2.2, dens
 def solved(variant):
     surfaces = random_surfaces(80, seed=101, hurst=(0.3, 1.0), zeta_1=(3.01, 1e4))
     gaps = random_gaps(surfaces, seed=102)
-    return surfaces, gaps, contact(surfaces, gaps, island_model="exact", variant=variant, rtol=1e-10)
+    return surfaces, gaps, contact(surfaces, separation=gaps, island_model="exact", variant=variant, rtol=1e-10)
 
 
 def apart(found, true):
@@ -32,7 +32,7 @@ def apart(found, true):
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-8, 1e-10])
 def test_universal_within_1e7_and_its_tolerance_of_exact(variant, rtol):
     surfaces, gaps, true = solved(variant)
-    found = contact(surfaces, gaps, variant=variant, rtol=rtol)
+    found = contact(surfaces, separation=gaps, variant=variant, rtol=rtol)
     assert found.island_model == "universal"
     error = apart(found, true)
     assert (error <= found.error).all()
@@ -42,7 +42,7 @@ def test_universal_within_1e7_and_its_tolerance_of_exact(variant, rtol):
 
 def test_island4d_within_1e3_of_exact():
     surfaces, gaps, true = solved("reported")
-    found = contact(surfaces, gaps, island_model="island4d", rtol=1e-6)
+    found = contact(surfaces, separation=gaps, island_model="island4d", rtol=1e-6)
     assert found.island_model == "island4d"
     assert (apart(found, true) <= found.error).all()
     assert found.error.max() <= 1e-3
@@ -54,21 +54,21 @@ def test_island4d_within_1e3_of_exact():
 def test_a_variant_of_ones_own(variant):
     surfaces = random_surfaces(25, seed=102, hurst=(0.4, 1.0), zeta_1=(3.6, 1e4))
     gaps = random_gaps(surfaces, seed=103)
-    true = contact(surfaces, gaps, island_model="exact", variant=variant, rtol=1e-9)
-    found = contact(surfaces, gaps, variant=variant, rtol=1e-9)
+    true = contact(surfaces, separation=gaps, island_model="exact", variant=variant, rtol=1e-9)
+    found = contact(surfaces, separation=gaps, variant=variant, rtol=1e-9)
     assert (found.variant, true.variant) == (variant.name, variant.name)
     error = apart(found, true)
     assert (error <= found.error + true.error).all()
     assert found.error.max() <= 1e-7
     # the variant matters: its name alone did not decide
-    assert (np.abs(contact(surfaces, gaps).area / found.area - 1) > 1e-3).any()
+    assert (np.abs(contact(surfaces, separation=gaps).area / found.area - 1) > 1e-3).any()
 
 
 @pytest.mark.parametrize("island_model", ["universal", "exact", "rigid"])
 def test_a_floor_above_the_largest_magnification(island_model):
     surfaces = Surface([0.5, 0.8], 0.2, [0.68, 40.0], 1.0, 3.0)
     with pytest.raises(OutOfRangeError, match=r"q1/q0 must be greater than 3\.5, the variant's floor") as caught:
-        contact(surfaces, 1.0, island_model=island_model, variant=OWN)
+        contact(surfaces, separation=1.0, island_model=island_model, variant=OWN)
     assert caught.value.mask.tolist() == [True, False]
 
 
@@ -77,15 +77,15 @@ def test_a_floor_above_the_largest_magnification(island_model):
 )
 def test_the_four_parameter_table_is_of_one_variant(variant):
     with pytest.raises(InputError, match=r"island4d table was made for the variant 'reported', not for .*'universal'"):
-        contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), 1.0, island_model="island4d", variant=variant)
+        contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=1.0, island_model="island4d", variant=variant)
 
 
 def test_the_four_parameter_table_serves_variants_that_share_its_islands():
     # floors, beta and K1 move along the table's axes and do not change it
     near = dataclasses.replace(REPORTED, name="near", jacobian="exact", floor_d=1.6, beta=0.3)
     surface, gaps = Surface(0.7, 0.2, 40.0, 1.0, 3.0), np.array([2.5, 1.0, -2.0])
-    found = contact(surface, gaps, island_model="island4d", variant=near, rtol=1e-6)
-    true = contact(surface, gaps, island_model="exact", variant=near)
+    found = contact(surface, separation=gaps, island_model="island4d", variant=near, rtol=1e-6)
+    true = contact(surface, separation=gaps, island_model="exact", variant=near)
     assert (apart(found, true) <= found.error + true.error).all()
     assert found.error.max() <= 1e-3
 
@@ -97,7 +97,7 @@ MISSING = np.array([[False, True, True, False], [False] * 4])
 
 def test_outside_raises_with_a_mask_in_the_callers_shape():
     with pytest.raises(OutOfRangeError) as caught:
-        contact(ROUGH, GAPS, variant="reported")
+        contact(ROUGH, separation=GAPS, variant="reported")
     np.testing.assert_array_equal(caught.value.mask, MISSING)
     message = str(caught.value)
     assert "2 of 8 entries" in message
@@ -108,9 +108,9 @@ def test_outside_raises_with_a_mask_in_the_callers_shape():
 
 
 def test_outside_answered_by_the_solver():
-    found = contact(ROUGH, GAPS, outside="exact")
-    true = contact(ROUGH, GAPS, island_model="exact")
-    table = contact(ROUGH, GAPS, outside="nan")
+    found = contact(ROUGH, separation=GAPS, outside="exact")
+    true = contact(ROUGH, separation=GAPS, island_model="exact")
+    table = contact(ROUGH, separation=GAPS, outside="nan")
     for name in ("force", "area", "error"):
         expected = np.where(MISSING, getattr(true, name), getattr(table, name))
         np.testing.assert_array_equal(getattr(found, name), expected)
@@ -119,8 +119,8 @@ def test_outside_answered_by_the_solver():
 
 @pytest.mark.parametrize("derivatives", [False, True])
 def test_outside_as_nan(derivatives):
-    found = contact(ROUGH, GAPS, outside="nan", derivatives=derivatives)
-    inside = contact(Surface(0.8, 0.2, 0.2 * 1e8, 1.0, 3.0), GAPS, derivatives=derivatives)
+    found = contact(ROUGH, separation=GAPS, outside="nan", derivatives=derivatives)
+    inside = contact(Surface(0.8, 0.2, 0.2 * 1e8, 1.0, 3.0), separation=GAPS, derivatives=derivatives)
     for name in ("force", "area", "error"):
         np.testing.assert_array_equal(np.isnan(getattr(found, name)), MISSING)
         np.testing.assert_array_equal(getattr(found, name)[1], getattr(inside, name))
@@ -136,10 +136,10 @@ def test_outside_in_X():
     shallow = dataclasses.replace(REPORTED, name="shallow", beta=0.01, phi=0.001)
     surface, gaps = Surface(0.9, 0.2, 400.0, 1.0, 4.7), np.array([4.6, -4.7, 4.8])
     with pytest.raises(OutOfRangeError, match=r"2 of 3 entries .*X above") as caught:
-        contact(surface, gaps, variant=shallow)
+        contact(surface, separation=gaps, variant=shallow)
     assert caught.value.mask.tolist() == [True, True, False]
-    found = contact(surface, gaps, variant=shallow, outside="exact")
-    true = contact(surface, gaps, variant=shallow, island_model="exact")
+    found = contact(surface, separation=gaps, variant=shallow, outside="exact")
+    true = contact(surface, separation=gaps, variant=shallow, island_model="exact")
     np.testing.assert_array_equal(found.force, true.force)
     np.testing.assert_array_equal(found.area, true.area)
 
@@ -147,23 +147,23 @@ def test_outside_in_X():
 def test_one_entry_outside_has_a_mask_without_dimensions():
     surface = Surface(0.05, 0.2, 0.2 * 1e8, 1.0, 3.0)
     with pytest.raises(OutOfRangeError) as caught:
-        contact(surface, 0.0)
+        contact(surface, separation=0.0)
     assert caught.value.mask.shape == ()
     assert caught.value.mask
-    assert math.isnan(contact(surface, 0.0, outside="nan").force)
+    assert math.isnan(contact(surface, separation=0.0, outside="nan").force)
 
 
 def test_bad_options():
     surface = Surface(0.8, 0.2, 40.0, 1.0, 3.0)
     with pytest.raises(InputError, match="outside must be one of"):
-        contact(surface, 1.0, outside="clamp")
+        contact(surface, separation=1.0, outside="clamp")
     with pytest.raises(InputError, match="island_model must be one of"):
-        contact(surface, 1.0, island_model="formula4")
+        contact(surface, separation=1.0, island_model="formula4")
     for island_model in ("exact", "island4d", "rigid"):
         with pytest.raises(InputError, match="derivatives come from island model 'universal'"):
-            contact(surface, 1.0, island_model=island_model, derivatives=True)
+            contact(surface, separation=1.0, island_model=island_model, derivatives=True)
     with pytest.raises(InputError, match="outside must be 'raise' or 'nan'"):
-        contact(surface, 1.0, outside="exact", derivatives=True)
+        contact(surface, separation=1.0, outside="exact", derivatives=True)
 
 
 @pytest.mark.slow
@@ -177,7 +177,7 @@ surface = Surface(0.8, 0.2, 40.0, np.linspace(0.9, 1.1, gaps.size), 3.0)
 contact(Surface(0.8, 0.2, 40.0, np.linspace(0.9, 1.1, 1000), 3.0), gaps[:1000])
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 tracemalloc.start()
-found = contact(surface, gaps)
+found = contact(surface, separation=gaps)
 traced = tracemalloc.get_traced_memory()[1]
 grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024
 print(json.dumps([traced / gaps.nbytes, grown / gaps.nbytes, found.islands / gaps.size]))
@@ -195,9 +195,11 @@ SURFACE = Surface(0.8, 0.3, 60.0, 0.7, 2.1)
 @pytest.mark.parametrize("island_model", ["universal", "rigid"])
 def test_the_floor_of_zeta_u_itself_is_refused(island_model):
     with pytest.raises(OutOfRangeError, match=r"q1/q0 must be greater than 3\.5"):
-        contact(Surface(0.8, 1.0, 3.5, 1.0, 3.0), 1.0, island_model=island_model, variant=OWN)
+        contact(Surface(0.8, 1.0, 3.5, 1.0, 3.0), separation=1.0, island_model=island_model, variant=OWN)
     assert (
-        contact(Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), 1.0, island_model=island_model, variant=OWN).force
+        contact(
+            Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), separation=1.0, island_model=island_model, variant=OWN
+        ).force
         > 0
     )
 
@@ -205,9 +207,9 @@ def test_the_floor_of_zeta_u_itself_is_refused(island_model):
 def test_one_gap_more_changes_no_bit():
     """Gaps of one surface share a profile, which depends on none of them: many, few and single ones have equal bits."""
     gaps = np.linspace(-2.1, 2.2, 4096)
-    many, fewer = contact(SURFACE, gaps, rtol=1e-4), contact(SURFACE, gaps[:-1], rtol=1e-4)
-    few = contact(SURFACE, gaps[::40], rtol=1e-4)
-    single = contact(SURFACE, gaps[80], rtol=1e-4)
+    many, fewer = contact(SURFACE, separation=gaps, rtol=1e-4), contact(SURFACE, separation=gaps[:-1], rtol=1e-4)
+    few = contact(SURFACE, separation=gaps[::40], rtol=1e-4)
+    single = contact(SURFACE, separation=gaps[80], rtol=1e-4)
     for name in ("force", "area", "error"):
         np.testing.assert_array_equal(getattr(fewer, name), getattr(many, name)[:-1])
         np.testing.assert_array_equal(getattr(few, name), getattr(many, name)[::40])
@@ -232,16 +234,16 @@ class Counted:
 def test_long_batches_run_in_blocks(monkeypatch, derivatives):
     """Between two blocks Ctrl-C is honoured; the bits are those of one block."""
     surfaces = Surface(0.8, 0.3, 60.0, 0.7, np.linspace(2.1, 2.2, 50))
-    whole, counted = contact(surfaces, 1.0, derivatives=derivatives), Counted()
+    whole, counted = contact(surfaces, separation=1.0, derivatives=derivatives), Counted()
     monkeypatch.setattr(island_sum, "core", counted)
     monkeypatch.setattr(island_sum, "BLOCK", 16)
-    cut = contact(surfaces, 1.0, derivatives=derivatives)
+    cut = contact(surfaces, separation=1.0, derivatives=derivatives)
     assert counted.calls == 4
     np.testing.assert_array_equal(cut.force, whole.force)
     assert cut.islands == whole.islands
     monkeypatch.setattr(island_sum, "core", Counted(interrupted=True))
     with pytest.raises(KeyboardInterrupt):
-        contact(surfaces, 1.0, derivatives=derivatives)
+        contact(surfaces, separation=1.0, derivatives=derivatives)
 
 
 @pytest.mark.parametrize("island_model", ["exact", "universal"])
@@ -250,8 +252,8 @@ def test_what_is_nearly_nothing_ends_and_states_its_digits(island_model):
     surface = Surface(0.12887275768129156, 1.0, 7.092276972058787, 1.0, 32.0)
     gaps = np.array([31.9, 31.998, 31.999])
     found, known = (
-        contact(surface, gaps, island_model=island_model),
-        contact(surface, gaps, island_model="exact", rtol=1e-10),
+        contact(surface, separation=gaps, island_model=island_model),
+        contact(surface, separation=gaps, island_model="exact", rtol=1e-10),
     )
     assert (np.abs(found.force - known.force) <= (found.error + known.error) * known.force).all()
     assert found.error[2] > 1e-7

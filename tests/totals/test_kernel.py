@@ -101,7 +101,7 @@ def test_what_cannot_be_resolved_is_said(monkeypatch):
 
     monkeypatch.setattr(island_sum, "core", Unresolved())
     with pytest.raises(ConvergenceError, match="quadrature did not reach its tolerance") as caught:
-        contact(surface, [0.0, 1.0], outside="nan")
+        contact(surface, separation=[0.0, 1.0], outside="nan")
     assert np.argwhere(caught.value.mask).tolist() == [[1, 1]]
 
 

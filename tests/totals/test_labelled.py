@@ -38,9 +38,10 @@ class Tasks(Callback):
 
 def test_dimensions_by_name():
     gaps = gaps_over(7, attrs={"units": "mm", "long_name": "separation"})
-    found = contact(surfaces_over(), gaps)
+    found = contact(surfaces_over(), separation=gaps)
     plain = contact(
-        Surface(np.array([0.4, 0.7, 1.0])[:, None, None], 0.2, 40.0, 1.0, np.array([3.0, 3.2])[:, None]), gaps.values
+        Surface(np.array([0.4, 0.7, 1.0])[:, None, None], 0.2, 40.0, 1.0, np.array([3.0, 3.2])[:, None]),
+        separation=gaps.values,
     )
     assert found.islands is None
     assert (found.island_model, found.variant) == ("universal", "reported")
@@ -70,27 +71,27 @@ def test_one_labelled_argument_is_enough(which):
     )}  # fmt: skip
     found = contact(
         Surface(label["surface"]([0.5, 0.8]), 0.2, 40.0, 1.0, 3.0),
-        label["separation"]([0.5, 1.5]),
+        separation=label["separation"]([0.5, 1.5]),
         E_star=label["E_star"]([1.0, 2.0]),
     )
     assert found.force.dims == ("t",)
-    assert found.force.values[1] == contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), 1.5, E_star=2.0).force
+    assert found.force.values[1] == contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=1.5, E_star=2.0).force
 
 
 def test_no_dimensions_at_all():
-    found = contact(Surface(xr.DataArray(0.8), 0.2, 40.0, 1.0, 3.0), 1.0)
+    found = contact(Surface(xr.DataArray(0.8), 0.2, 40.0, 1.0, 3.0), separation=1.0)
     assert found.force.shape == ()
-    assert float(found.force) == contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), 1.0).force
+    assert float(found.force) == contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=1.0).force
 
 
 @pytest.mark.parametrize("scheduler", ["synchronous", "threads"])
 @pytest.mark.parametrize("derivatives", [False, True])
 def test_dask_is_lazy_and_gives_the_same_answers(scheduler, derivatives):
     gaps, surfaces = gaps_over(50), surfaces_over()
-    eager = contact(surfaces, gaps, derivatives=derivatives)
+    eager = contact(surfaces, separation=gaps, derivatives=derivatives)
     lazy_surfaces = Surface(surfaces.hurst.chunk(surface=2), 0.2, 40.0, 1.0, surfaces.h_max.chunk(case=1))
     with Tasks() as tasks:
-        lazy = contact(lazy_surfaces, gaps.chunk(gap=11), derivatives=derivatives)
+        lazy = contact(lazy_surfaces, separation=gaps.chunk(gap=11), derivatives=derivatives)
         outputs = {name: getattr(lazy, name) for name in (*FIELDS, "mean_separation", "separation")}
         if derivatives:
             outputs |= {f"force_{name}": slope for name, slope in lazy.force_by.items()}
@@ -118,11 +119,11 @@ def test_dask_is_lazy_and_gives_the_same_answers(scheduler, derivatives):
 
 def test_the_bits_of_one_surface_depend_neither_on_the_kind_of_argument_nor_on_the_chunks():
     surface, gaps = Surface(0.8, 0.2, 40.0, 1.0, 3.0), gaps_over(5000)
-    eager, plain = contact(surface, gaps), contact(surface, gaps.values)
+    eager, plain = contact(surface, separation=gaps), contact(surface, separation=gaps.values)
     for k in (0, 17, 2500, 4999):
-        one = contact(surface, float(gaps[k]))
+        one = contact(surface, separation=float(gaps[k]))
         assert (one.force, one.area, one.error) == (plain.force[k], plain.area[k], plain.error[k])
-    lazy = contact(surface, gaps.chunk(gap=(7, 493, 4500)))
+    lazy = contact(surface, separation=gaps.chunk(gap=(7, 493, 4500)))
     with dask.config.set(scheduler="threads", num_workers=4):
         for name in FIELDS:
             np.testing.assert_array_equal(getattr(plain, name), getattr(eager, name))
@@ -132,24 +133,28 @@ def test_the_bits_of_one_surface_depend_neither_on_the_kind_of_argument_nor_on_t
 def test_chunks_without_entries():
     gaps = gaps_over(12).chunk(gap=(5, 0, 7))
     surface = Surface(0.8, 0.2, 40.0, 1.0, 3.0)
-    found = contact(surface, gaps).force.compute()
-    np.testing.assert_array_equal(found, contact(surface, gaps.values).force)
+    found = contact(surface, separation=gaps).force.compute()
+    np.testing.assert_array_equal(found, contact(surface, separation=gaps.values).force)
     np.testing.assert_array_equal(contact_law(surface).area(gaps).compute(), contact_law(surface).area(gaps.values))
     with pytest.raises(InputError, match="separation is empty"):
-        contact(surface, xr.DataArray(np.zeros(0), dims="gap"))
+        contact(surface, separation=xr.DataArray(np.zeros(0), dims="gap"))
 
 
 def test_outside_and_island_models_go_through():
     surfaces = Surface(xr.DataArray([0.05, 0.8], dims="s"), 0.2, 0.2e8, 1.0, 3.0)
     gaps = gaps_over(3)
-    found = contact(surfaces, gaps, outside="nan")
+    found = contact(surfaces, separation=gaps, outside="nan")
     assert np.isnan(found.force.sel(s=0)).values.tolist() == [True, True, False]
     assert np.isfinite(found.force.sel(s=1)).all()
     with pytest.raises(OutOfRangeError, match="outside the universal table"):
-        contact(surfaces, gaps)
-    rigid = contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), gaps, island_model="rigid", variant="printed", rtol=1e-4)
+        contact(surfaces, separation=gaps)
+    rigid = contact(
+        Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=gaps, island_model="rigid", variant="printed", rtol=1e-4
+    )
     assert (rigid.island_model, rigid.variant) == ("rigid", "printed")
-    plain = contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), gaps.values, island_model="rigid", variant="printed", rtol=1e-4)
+    plain = contact(
+        Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=gaps.values, island_model="rigid", variant="printed", rtol=1e-4
+    )
     np.testing.assert_array_equal(rigid.force, plain.force)
 
 
@@ -157,26 +162,28 @@ def test_bad_input_is_refused_when_it_is_computed():
     surface = Surface(0.8, 0.2, 40.0, 1.0, 3.0)
     bad = xr.DataArray([1.0, np.nan], dims="t")
     with pytest.raises(InputError, match=r"separation must be finite, got nan at \(1,\)"):
-        contact(surface, bad)
-    lazy = contact(surface, bad.chunk(t=1)).force
+        contact(surface, separation=bad)
+    lazy = contact(surface, separation=bad.chunk(t=1)).force
     with pytest.raises(InputError, match="separation must be finite"):
         lazy.compute(scheduler="synchronous")
     wrong = Surface(xr.DataArray([0.8, 1.2], dims="s"), 0.2, 40.0, 1.0, 3.0)
     with pytest.raises(OutOfRangeError, match=r"hurst must be in \(0, 1\]"):
-        contact(wrong, 1.0)
+        contact(wrong, separation=1.0)
 
 
 def test_arrays_without_names_beside_named_ones():
     with pytest.raises(InputError, match=r"beside DataArrays, separation must be one or a scalar, got shape \(3,\)"):
-        contact(surfaces_over(), [0.0, 1.0, 2.0])
+        contact(surfaces_over(), separation=[0.0, 1.0, 2.0])
     with pytest.raises(InputError, match=r"beside DataArrays, h_rms must be"):
-        contact(Surface(xr.DataArray([0.8, 0.9], dims="s"), 0.2, 40.0, np.ones(2), 3.0), 1.0)
+        contact(Surface(xr.DataArray([0.8, 0.9], dims="s"), 0.2, 40.0, np.ones(2), 3.0), separation=1.0)
 
 
 def test_coordinates_that_differ_are_not_joined():
     hurst = xr.DataArray([0.8, 0.9], dims="t", coords={"t": [0, 1]})
     with pytest.raises(ValueError, match=r"join|align"):
-        contact(Surface(hurst, 0.2, 40.0, 1.0, 3.0), xr.DataArray([1.0, 2.0], dims="t", coords={"t": [1, 2]}))
+        contact(
+            Surface(hurst, 0.2, 40.0, 1.0, 3.0), separation=xr.DataArray([1.0, 2.0], dims="t", coords={"t": [1, 2]})
+        )
 
 
 COLD = """
@@ -231,12 +238,12 @@ LABELLED_GAPS = xr.DataArray([-1.0, 0.4, 2.0], dims="d")
 
 @pytest.mark.parametrize(("wanted", "other"), [("force", "area"), ("area", "force")])
 def test_slopes_of_one_quantity_of_labelled_surfaces(wanted, other):
-    found = contact(LABELLED, LABELLED_GAPS, derivatives=True, quantities=[wanted])
-    both = contact(LABELLED, LABELLED_GAPS, derivatives=True)
+    found = contact(LABELLED, separation=LABELLED_GAPS, derivatives=True, quantities=[wanted])
+    both = contact(LABELLED, separation=LABELLED_GAPS, derivatives=True)
     for name, slope in getattr(both, f"{wanted}_by").items():
         np.testing.assert_array_equal(getattr(found, f"{wanted}_by")[name], slope)
     assert getattr(found, other) is getattr(found, f"{other}_by") is None
-    none = contact(LABELLED, LABELLED_GAPS)
+    none = contact(LABELLED, separation=LABELLED_GAPS)
     assert none.force_by is none.area_by is None
 
 
@@ -250,6 +257,6 @@ def test_theories_of_labelled_surfaces(method):
     assert lazy.chunks is not None
     plain = Surface(0.8, 1.0, 100.0, np.array([1.0, 1.5, 2.0])[:, None], 6.0)
     np.testing.assert_array_equal(lazy.compute(), contact(plain, mean_separation=gaps.values, theory=theory).force)
-    summits = contact(Surface(0.8, 1.0, 100.0, h_rms, 6.0), gaps, theory="greenwood_williamson")
-    expected = contact(plain, gaps.values, theory="greenwood_williamson")
+    summits = contact(Surface(0.8, 1.0, 100.0, h_rms, 6.0), separation=gaps, theory="greenwood_williamson")
+    expected = contact(plain, separation=gaps.values, theory="greenwood_williamson")
     np.testing.assert_array_equal(summits.area.compute(), expected.area)

@@ -62,7 +62,7 @@ def pieces_of(law):
 def test_within_its_tolerance_and_its_bound(case, rtol):
     law = law_of(case, rtol)
     gaps = law.h_max - depths(law, 50)
-    true = contact(surface_of(*case[:3]), gaps, rtol=1e-11, variant=case[3])
+    true = contact(surface_of(*case[:3]), separation=gaps, rtol=1e-11, variant=case[3])
     error = np.maximum(np.abs(law.force(gaps) / true.force - 1), np.abs(law.area(gaps) / true.area - 1))
     assert error.max() <= rtol + 1e-11
     assert (error <= law.error + 1e-11).all()
@@ -75,7 +75,7 @@ def test_of_any_island_model(island_model):
     surface = surface_of(*CASES[0][:3])
     law = contact_law(surface, rtol=1e-5, island_model=island_model)
     gaps = law.h_max * (1 - np.array([1e-5, 0.01, 0.3, 0.9, 1.7]))
-    true = contact(surface, gaps, island_model=island_model, rtol=1e-8)
+    true = contact(surface, separation=gaps, island_model=island_model, rtol=1e-8)
     np.testing.assert_allclose(law.force(gaps), true.force, rtol=1.1e-5)
     np.testing.assert_allclose(law.area(gaps), true.area, rtol=1.1e-5)
     assert law.island_model == island_model
@@ -183,7 +183,7 @@ def test_the_turning_point_at_low_hurst():
     assert (np.diff(law.force(beyond)) < 0).all()
     # it is the model's, not the polynomials'
     near = turn + np.array([-0.02, 0.0, 0.02]) * law.h_max
-    totals = contact(surface, near, rtol=1e-11).force
+    totals = contact(surface, separation=near, rtol=1e-11).force
     assert totals[1] > max(totals[0], totals[2])
     peak = law.force(turn)
     gaps = law.separation(force=peak * np.array([0.5, 0.999, 1 - 1e-6]))
@@ -201,7 +201,7 @@ def test_a_turn_within_a_hundredth_of_the_range(rtol):
     surface = Surface(0.5, 0.2, 0.2 * 334390.7992055036, 0.3, 0.3 * 3.163258089330122)
     law = contact_law(surface, rtol)
     gaps = np.linspace(-0.53, -0.49, 4001)
-    falls = contact(surface, gaps, rtol=1e-9, derivatives=True).force_by["separation"] >= 0
+    falls = contact(surface, separation=gaps, rtol=1e-9, derivatives=True).force_by["separation"] >= 0
     assert 0 < falls.sum() < 1000
     assert law.turning_point == pytest.approx(gaps[falls][-1], rel=1e-4, abs=0)
     with pytest.raises(OutOfRangeError):
@@ -302,8 +302,8 @@ def test_many_gaps_agree_with_single_ones(case, rtol):
     """A profile of the islands against the quadrature of each gap, at gaps of every size and beyond contact."""
     surface = surface_of(*case[:3])
     gaps = float(surface.h_max) * np.append(1 - 2 * np.geomspace(1e-12, 1, 400), [1.0, 1.5])
-    many = contact(surface, gaps, rtol=rtol, variant=case[3])
-    few = [contact(surface, part, rtol=1e-11, variant=case[3]) for part in np.array_split(gaps, 4)]
+    many = contact(surface, separation=gaps, rtol=rtol, variant=case[3])
+    few = [contact(surface, separation=part, rtol=1e-11, variant=case[3]) for part in np.array_split(gaps, 4)]
     for name in ("force", "area"):
         single = np.concatenate([getattr(part, name) for part in few])
         assert (np.abs(getattr(many, name) - single) <= (many.error + 1e-11) * single).all()
@@ -359,7 +359,7 @@ def test_no_bound_is_exceeded_on_fresh_points_of_300_laws():
         surface = Surface(rng.uniform(0.25, 1.0), 1.0, zeta_1, 1.0, top)
         law = contact_law(surface, rtol, variant=("reported", "printed")[rng.integers(2)])
         gap = top - 2 * top * np.append(10 ** rng.uniform(-6, 0, 40), rng.uniform(0, 1, 40))
-        truth = contact(surface, np.maximum(gap, -top), rtol=1e-10, variant=law.variant)
+        truth = contact(surface, separation=np.maximum(gap, -top), rtol=1e-10, variant=law.variant)
         assert np.abs(law.force(truth.separation) / truth.force - 1).max() <= law.error
         assert np.abs(law.area(truth.separation) / truth.area - 1).max() <= law.error
         for missed in slope_misses(surface, law, gap, law.variant):
@@ -467,7 +467,7 @@ def test_the_error_bounds_what_samples_miss():
     """Between its samples a polynomial errs by more than at them; both are next to their worst."""
     surface = Surface(0.7981690190189619, 0.2, 0.2 * 3.6, 0.3, 0.3 * 3.2804122866615386)
     law = contact_law(surface, 0.1)
-    truth = contact(surface, 0.0, rtol=1e-10).force
+    truth = contact(surface, separation=0.0, rtol=1e-10).force
     assert abs(law.force(0.0) / truth - 1) <= law.error
 
 
@@ -517,7 +517,7 @@ def test_a_narrow_dip_is_a_turning_point(at, width, sign):
 
 def slope_misses(surface, law, gap, variant="reported"):
     """Errors of the law's slopes over F/l and A/l, against derivatives of totals."""
-    truth = contact(surface, gap, rtol=1e-11, derivatives=True, variant=variant)
+    truth = contact(surface, separation=gap, rtol=1e-11, derivatives=True, variant=variant)
     for slope, by, value in (
         (law.stiffness(gap) / 2, truth.force_by, truth.force),
         (law.area_slope(gap), truth.area_by, truth.area),
@@ -548,7 +548,7 @@ def test_the_error_at_loose_tolerances_next_to_the_floor_of_zeta_u():
         surface = Surface(hurst, 1.0, 3.0 + left, 1.0, h_max)
         law = contact_law(surface, rtol)
         gap = h_max - 2 * h_max * np.geomspace(1e-9, 1, 2000)
-        truth = contact(surface, np.maximum(gap, -h_max), rtol=1e-9)
+        truth = contact(surface, separation=np.maximum(gap, -h_max), rtol=1e-9)
         for value, true in ((law.force(truth.separation), truth.force), (law.area(truth.separation), truth.area)):
             assert np.abs(value / true - 1).max() <= law.error <= rtol
 
@@ -558,7 +558,7 @@ def test_a_steep_and_high_surface_has_a_law():
     surface = Surface(1.0, 1.0, 1e8, 1.0, 7.547388914185743)
     law = contact_law(surface)
     gap = 7.5 - np.geomspace(1e-6, 14, 30)
-    truth = contact(surface, gap, rtol=1e-10)
+    truth = contact(surface, separation=gap, rtol=1e-10)
     np.testing.assert_allclose(law.force(gap), truth.force, rtol=law.error + 1e-9)
     assert law.error < 2e-8
     with pytest.raises(OutOfRangeError, match="so high that force or area underflow"):

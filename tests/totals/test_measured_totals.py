@@ -43,9 +43,9 @@ def rough(seed=1, count=60, h_max=3.5, gap=True):
 def test_a_sampled_power_law_has_the_totals_of_its_five_numbers(variant, hurst, zeta_1):
     surface = five_numbers(hurst, zeta_1)
     d = surface.h_max * (1 - DEPTHS[1:])
-    plain = contact(surface, d, variant=variant, derivatives=True)
+    plain = contact(surface, separation=d, variant=variant, derivatives=True)
     for count in (2, 200):
-        found = contact(sampled(surface, count), d, variant=variant, derivatives=True)
+        found = contact(sampled(surface, count), separation=d, variant=variant, derivatives=True)
         bound = float(np.max(plain.error + found.error))
         for name in ("force", "area"):
             np.testing.assert_allclose(getattr(found, name), getattr(plain, name), rtol=bound)
@@ -57,7 +57,9 @@ def test_a_sampled_power_law_has_the_totals_of_its_five_numbers(variant, hurst, 
 def test_exact_and_universal_island_models_agree():
     surface = rough(count=24)
     d = surface.h_max * (1 - DEPTHS[1:])
-    exact, table = (contact(surface, d, island_model=island_model) for island_model in ("exact", "universal"))
+    exact, table = (
+        contact(surface, separation=d, island_model=island_model) for island_model in ("exact", "universal")
+    )
     np.testing.assert_allclose(table.force, exact.force, rtol=1e-7)
     np.testing.assert_allclose(table.area, exact.area, rtol=1e-7)
 
@@ -130,10 +132,10 @@ def test_slopes_hold_in_thin_panels():
 
 def test_first_contact_is_a_power_of_depth():
     surface = rough()
-    found = contact(surface, surface.h_max - np.array([2**-44, 2**-43]))
+    found = contact(surface, separation=surface.h_max - np.array([2**-44, 2**-43]))
     assert np.log2(found.force[1] / found.force[0]) == pytest.approx(7 / 2, rel=1e-6)
     assert np.log2(found.area[1] / found.area[0]) == pytest.approx(10 / 3, rel=1e-6)
-    nothing = contact(surface, surface.h_max + np.array([0.0, 1.0]))
+    nothing = contact(surface, separation=surface.h_max + np.array([0.0, 1.0]))
     assert nothing.force.tolist() == nothing.area.tolist() == nothing.error.tolist() == [0, 0]
 
 
@@ -143,7 +145,7 @@ def test_a_law_is_the_contacts(count, h_max):
     law = contact_law(surface)
     d = surface.h_max * (1 - DEPTHS)
     d = d[d >= law.lowest]
-    found = contact(surface, d)
+    found = contact(surface, separation=d)
     np.testing.assert_allclose(law.force(d), found.force, rtol=2 * law.error)
     np.testing.assert_allclose(law.area(d), found.area, rtol=2 * law.error)
     assert (law.theory, law.variant, law.island_model) == ("mbma", "reported", "universal")
@@ -155,7 +157,7 @@ def test_a_law_ends_with_the_table():
     law = contact_law(surface)
     assert -surface.h_max < law.lowest < surface.h_max / 2
     d = law.lowest + np.array([1e-9, 0.1, 1.0])
-    np.testing.assert_allclose(law.force(d), contact(surface, d).force, rtol=2 * law.error)
+    np.testing.assert_allclose(law.force(d), contact(surface, separation=d).force, rtol=2 * law.error)
     with pytest.raises(OutOfRangeError, match="where the theory ends"):
         law.force(law.lowest - 0.1)
     np.testing.assert_allclose(law.separation(force=law.force(d)), d, rtol=1e-6)
@@ -180,16 +182,16 @@ def test_islands():
 def test_what_mbma_cannot_use_is_refused_with_the_mend():
     surface = rough()
     with pytest.raises(InputError, match=r"use 'universal' or 'exact', or surface\.fit\(\)"):
-        contact(surface, 1.0, island_model="island4d")
+        contact(surface, separation=1.0, island_model="island4d")
     with pytest.raises(InputError, match=r"surface\.fit\(\)"):
         island(surface, 1.0, island_model="island4d")
     q = np.geomspace(1, 10, 30)
     blue = Surface.from_spectrum(q, q, h_max=3000.0)
     with pytest.raises(OutOfRangeError, match="measure shorter waves, or ask another theory"):
-        contact(blue, 1.0)
+        contact(blue, separation=1.0)
     assert contact(blue, mean_separation=500.0, theory="calibrated").force > 0
     steep = Surface.from_spectrum(np.geomspace(1, 30, 50), np.geomspace(1, 30, 50) ** -2.1, h_max=30.0)
-    deep = contact(steep, -29.0, island_model="universal", outside="nan").force
+    deep = contact(steep, separation=-29.0, island_model="universal", outside="nan").force
     assert deep > 0 or np.isnan(deep)
 
 

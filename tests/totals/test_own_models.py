@@ -28,7 +28,10 @@ class Own:
 
 def test_totals_laws_islands_and_scenes():
     for found, known in (
-        (contact(SURFACE, GAPS, island_model=Own()), contact(SURFACE, GAPS, island_model="rigid")),
+        (
+            contact(SURFACE, separation=GAPS, island_model=Own()),
+            contact(SURFACE, separation=GAPS, island_model="rigid"),
+        ),
         (island(SURFACE, [0.1, 1.0], island_model=Own()), island(SURFACE, [0.1, 1.0], island_model="rigid")),
     ):
         assert found.island_model == "own"
@@ -38,14 +41,16 @@ def test_totals_laws_islands_and_scenes():
     assert law.island_model == "own"
     np.testing.assert_allclose(law.force(GAPS), known.force(GAPS), rtol=1e-12)
     scene = Scene(SURFACE, effects=("force",), separations=[1.0], rtol=1e-4, island_model=Own()).run()
-    assert float(scene["force"][0]) == pytest.approx(contact(SURFACE, 1.0, island_model="rigid").force, rel=1e-4, abs=0)
+    assert float(scene["force"][0]) == pytest.approx(
+        contact(SURFACE, separation=1.0, island_model="rigid").force, rel=1e-4, abs=0
+    )
 
 
 def test_a_table_from_a_file_is_the_shipped_one(tmp_path):
     table = open_table(shipped("universal"))
     for derivatives in (False, True):
         found, known = (
-            contact(SURFACE, GAPS, island_model=island_model, derivatives=derivatives)
+            contact(SURFACE, separation=GAPS, island_model=island_model, derivatives=derivatives)
             for island_model in (table, "universal")
         )
         np.testing.assert_array_equal(found.force, known.force)
@@ -56,7 +61,7 @@ def test_a_table_from_a_file_is_the_shipped_one(tmp_path):
 @pytest.mark.parametrize("bad", [None, 3, Own, object(), "unknown", type("Nameless", (), {"answer": 1})()])
 def test_what_is_no_island_model(bad):
     with pytest.raises(InputError, match="island_model must be one of"):
-        contact(SURFACE, 1.0, island_model=bad)
+        contact(SURFACE, separation=1.0, island_model=bad)
     with pytest.raises(InputError, match="island_model must be one of"):
         contact_law(SURFACE, island_model=bad)
     with pytest.raises(InputError, match="island_model must be one of"):
@@ -65,24 +70,27 @@ def test_what_is_no_island_model(bad):
 
 def test_answers_are_checked():
     with pytest.raises(InputError, match=r"'own' must answer Phi_F, Phi_A and error of shape"):
-        contact(SURFACE, 1.0, island_model=Own(lambda F, A, error: (F[0, :3], A, error)))
+        contact(SURFACE, separation=1.0, island_model=Own(lambda F, A, error: (F[0, :3], A, error)))
     with pytest.raises(InputError, match=r"'own' must answer"):
-        contact(SURFACE, 1.0, island_model=Own(lambda F, A, error: F))
+        contact(SURFACE, separation=1.0, island_model=Own(lambda F, A, error: F))
     silent = Own(lambda F, A, error: (np.where(np.median(F) < F, np.nan, F), A, error))
     with pytest.raises(OutOfRangeError, match="'own' has no answer for") as caught:
-        contact(SURFACE, [2.5, 1.0], island_model=silent)
+        contact(SURFACE, separation=[2.5, 1.0], island_model=silent)
     assert caught.value.mask.tolist() == [False, True]
-    assert np.isnan(contact(SURFACE, [2.5, 1.0], island_model=silent, outside="nan").force).tolist() == [False, True]
+    assert np.isnan(contact(SURFACE, separation=[2.5, 1.0], island_model=silent, outside="nan").force).tolist() == [
+        False,
+        True,
+    ]
     # one number for all islands is enough
-    one = contact(SURFACE, 1.0, island_model=Own(lambda F, A, error: (F, A, 1e-3)))
+    one = contact(SURFACE, separation=1.0, island_model=Own(lambda F, A, error: (F, A, 1e-3)))
     assert 1e-3 <= one.error < 1.1e-3
 
 
 def test_derivatives_and_variants_that_a_model_does_not_have():
     with pytest.raises(InputError, match="derivatives come from island model 'universal', 'own' has none"):
-        contact(SURFACE, 1.0, island_model=Own(), derivatives=True)
+        contact(SURFACE, separation=1.0, island_model=Own(), derivatives=True)
     with pytest.raises(InputError, match="made for the variant 'reported', not for 'printed'"):
-        contact(SURFACE, 1.0, island_model=open_table("island4d"), variant="printed")
+        contact(SURFACE, separation=1.0, island_model=open_table("island4d"), variant="printed")
 
 
 @pytest.mark.slow

@@ -54,7 +54,7 @@ def differences(numbers, variant, step):
         shifted.append(points)
         spans.append(difference_weights(offsets) / span)
     points = np.stack(shifted, axis=1)
-    found = contact(Surface(*points[:5]), points[5], island_model="exact", variant=variant, rtol=1e-11)
+    found = contact(Surface(*points[:5]), separation=points[5], island_model="exact", variant=variant, rtol=1e-11)
     return [np.einsum("nk,nk->n", spans, values) for values in (found.force, found.area)]
 
 
@@ -66,7 +66,7 @@ def numbers_of(case):
 
 
 def against_differences(numbers, variant, step):
-    found = contact(Surface(*numbers[:5]), numbers[5], variant=variant, rtol=1e-10, derivatives=True)
+    found = contact(Surface(*numbers[:5]), separation=numbers[5], variant=variant, rtol=1e-10, derivatives=True)
     for value, by, true in zip(
         (found.force, found.area), (found.force_by, found.area_by), differences(numbers, variant, step), strict=True
     ):
@@ -103,7 +103,7 @@ def test_lengths_scale_out(variant):
     zeta_1, share = 10 ** rng.uniform(0.56, 4, 60), rng.uniform(-1, 1, 60)
     share[::4] = 1 - 10 ** rng.uniform(-6, -1, 15)
     surface = Surface(hurst, 0.3, 0.3 * zeta_1, 0.7, 0.7 * top)
-    found = contact(surface, share * surface.h_max, variant=variant, derivatives=True)
+    found = contact(surface, separation=share * surface.h_max, variant=variant, derivatives=True)
     for by in (found.force_by, found.area_by):
         terms = np.stack(
             [
@@ -121,7 +121,7 @@ def test_slopes_scale_out():
     """Heights alone: force is of degree 1 in them, area of degree 0; wavenumbers likewise."""
     surface = Surface([0.3, 0.7, 1.0], 0.3, [3.0, 60.0, 2e3], 0.7, 2.4)
     gap = np.array([2.39, 1.0, -2.0])
-    found = contact(surface, gap, derivatives=True)
+    found = contact(surface, separation=gap, derivatives=True)
     for value, by, degree in ((found.force, found.force_by, 1), (found.area, found.area_by, 0)):
         heights = surface.h_rms * by["h_rms"] + surface.h_max * by["h_max"] + gap * by["separation"]
         waves = surface.q0 * by["q0"] + surface.q1 * by["q1"]
@@ -181,7 +181,7 @@ def by_zeta_1(hurst, zeta_1, h_max, depth):
 def test_next_to_the_floor_of_zeta_u(hurst, left, h_max, depth):
     """Down to zeta_1 = 3.0000001, where area goes with the sixth root of what is left."""
     surface = Surface(hurst, 1.0, 3.0 + left, 1.0, h_max)
-    found = contact(surface, h_max - depth, derivatives=True)
+    found = contact(surface, separation=h_max - depth, derivatives=True)
     true = by_zeta_1(hurst, surface.zeta_1, h_max, float(h_max - found.separation))
     for by, value, slope in zip((found.force_by, found.area_by), (found.force, found.area), true, strict=True):
         assert abs(by["q1"] - slope) <= 1e-6 * max(abs(slope), value / 3)
@@ -193,8 +193,8 @@ def test_next_to_the_floor_of_zeta_u(hurst, left, h_max, depth):
 def test_units_shapes_and_no_contact():
     surface = Surface([[0.5], [1.0]], 0.3, 30.0, 0.7, 2.4)
     gap = np.array([1.0, 2.4, 5.0])
-    found = contact(surface, gap, derivatives=True)
-    stiff = contact(surface, gap, E_star=[2.0, 3.0, 4.0], derivatives=True)
+    found = contact(surface, separation=gap, derivatives=True)
+    stiff = contact(surface, separation=gap, E_star=[2.0, 3.0, 4.0], derivatives=True)
     for name in NAMES:
         assert found.force_by[name].shape == found.area_by[name].shape == (2, 3)
         # no contact is flat
@@ -202,7 +202,7 @@ def test_units_shapes_and_no_contact():
         assert (found.area_by[name][:, 1:] == 0).all()
         np.testing.assert_allclose(stiff.force_by[name][:, 0], 2 * found.force_by[name][:, 0], rtol=1e-15)
         np.testing.assert_array_equal(stiff.area_by[name], found.area_by[name])
-    one = contact(Surface(0.5, 0.3, 30.0, 0.7, 2.4), 1.0, derivatives=True)
+    one = contact(Surface(0.5, 0.3, 30.0, 0.7, 2.4), separation=1.0, derivatives=True)
     for name in NAMES:
         assert np.shape(one.force_by[name]) == ()
         assert one.force_by[name] == found.force_by[name][0, 0]
@@ -214,8 +214,8 @@ def test_slopes_refine_as_totals_do(rtol):
     rng = np.random.default_rng(5)
     hurst, top, share = rng.uniform(0.3, 1, 40), rng.uniform(2.5, 4.5, 40), rng.uniform(-1, 1, 40)
     surfaces = Surface(hurst, 0.3, 0.3 * 10 ** rng.uniform(0.5, 4, 40), 0.7, 0.7 * top)
-    plain = contact(surfaces, share * surfaces.h_max, rtol=rtol)
-    slopes = contact(surfaces, share * surfaces.h_max, rtol=rtol, derivatives=True)
+    plain = contact(surfaces, separation=share * surfaces.h_max, rtol=rtol)
+    slopes = contact(surfaces, separation=share * surfaces.h_max, rtol=rtol, derivatives=True)
     assert slopes.islands == plain.islands
     np.testing.assert_allclose(slopes.error, plain.error, rtol=1e-6)
     np.testing.assert_allclose(slopes.force, plain.force, rtol=1e-12)

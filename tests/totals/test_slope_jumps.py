@@ -100,7 +100,7 @@ def changed(numbers, which, value):
 
 def totals_of(numbers, rule, **options):
     surface = Surface(*(numbers[name] for name in INPUTS[:-1]))
-    return contact(surface, numbers["separation"], variant=rule, **options)
+    return contact(surface, separation=numbers["separation"], variant=rule, **options)
 
 
 def beyond_the_kink(numbers, rule):
