@@ -28,7 +28,7 @@ THEORY_LAW_RTOLS = (1e-3, 1e-5, 1e-7)
 SLOW_LAW_RTOLS = (1e-2, 1e-4)
 FIRST_USE = (
     "import mbma_tables, numpy, time; s = mbma_tables.Surface(0.74, 1.0, 330.0, 0.1, 0.3); t = time.process_time(); "
-    "mbma_tables.contact(s, 0.1, island_model={island_model!r}, rtol=1e-2); print(time.process_time() - t)"
+    "mbma_tables.contact(s, separation=0.1, island_model={island_model!r}, rtol=1e-2); print(time.process_time() - t)"
 )
 # keywords of `contact` by quantity, and the answers that these give
 QUANTITIES: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
@@ -101,7 +101,7 @@ def gap_rows() -> Iterator[Row]:
                 run = functools.partial(gap_batch, island_model, rtol, **options)
                 count = sum(found.islands for found in run()) / (len(surfaces) * GAPS)
                 cost = max(measure(run)[0] / len(surfaces) - fixed, 1e-9) / GAPS
-                answers = [asked(surface, gap) for surface, gap, _ in reference()]
+                answers = [asked(surface, separation=gap) for surface, gap, _ in reference()]
                 error = largest_error([{name: getattr(found, name) for name in names} for found in answers])
                 yield Row(island_model, variant("gap", rtol), quantity, error, cost, count)
 
