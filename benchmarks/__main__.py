@@ -35,8 +35,8 @@ from benchmarks.rows import LINES, microseconds, report, rounds, times_faster
 from benchmarks.scenes import scenes
 from generate.pages import page
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
-from mbma_tables.calibrated import Law, Spectrum
-from mbma_tables.files import shipped_file
+from mbma_tables.common.files import shipped_file
+from mbma_tables.laws.calibrated import Law, Spectrum
 from mbma_tables.models.island4d import at_places
 from mbma_tables.tablefiles.schema import TableContent
 from mbma_tables.theories import Calibrated

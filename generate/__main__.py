@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from generate.pages.page import PAGES, ROOT, write
-from mbma_tables.errors import MbmaError
+from mbma_tables.common.errors import MbmaError
 
 # imported when asked for: each needs packages of the extra "generate"
 GROUPS = {

@@ -10,10 +10,10 @@ from typing import Any
 import click
 
 from generate.pages.page import ROOT
+from mbma_tables.common.files import write_file
 from mbma_tables.export import c_code
 from mbma_tables.export.code import web_assembly
 from mbma_tables.export.explorer import MODULE
-from mbma_tables.files import write_file
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.variants import REPORTED
 

@@ -20,7 +20,7 @@ from mbma_tables import (
     height_integral,
     island,
 )
-from mbma_tables.arguments import SHOWN, broadcast_shape, finite_array, require
+from mbma_tables.common.arguments import SHOWN, broadcast_shape, finite_array, require
 from mbma_tables.materials import effective_modulus
 
 

@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbma_tables import InputError, Scene, Surface, contact, contact_law, island
+from mbma_tables.common.units import ALIASES, DIMENSIONS, SIZES, Units, factor, known, read, resolve, unit_of
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.units import ALIASES, DIMENSIONS, SIZES, Units, factor, known, read, resolve, unit_of
 
 # in metres and pascals, written down again: 1 in = 25.4 mm, 1 lbf = 4.4482216152605 N
 METRES = {"m": 1, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "angstrom": 1e-10, "pm": 1e-12}

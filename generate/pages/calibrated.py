@@ -10,8 +10,8 @@ import numpy as np
 from generate.boundary_elements.design import REFINEMENT, SPLITS
 from generate.pages.page import DATA, Measured, dataset, panels, spans, svg, table
 from mbma_tables import Surface
-from mbma_tables.calibrated import CONSTANTS
-from mbma_tables.files import shipped_file
+from mbma_tables.common.files import shipped_file
+from mbma_tables.laws.calibrated import CONSTANTS
 from mbma_tables.theories import THEORIES, get_theory
 
 SHOWN = {  # sets and forms of the accuracy table

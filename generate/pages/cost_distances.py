@@ -15,8 +15,8 @@ from generate.pages.distances import COVER, HIGH, HUES, ISLAND_MODELS, LOW, THEO
 from generate.pages.page import duration, panels, percent, read_csv, svg, table, to_csv
 from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
-from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import Law, Spectrum, area
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.laws.calibrated import Law, Spectrum, area
 from mbma_tables.scenes.costs import Distance
 from mbma_tables.theories import Persson
 

@@ -12,8 +12,8 @@ from scipy.stats import qmc
 
 from generate.tables import chunks
 from generate.timing import measure, variant
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import ConvergenceError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.greenwood_tripp import iterate, radius, ring_matrix

@@ -13,7 +13,7 @@ import numpy as np
 from generate.tables import chunks
 from generate.timing import GAPS, held_out_surfaces, measure, measured_gaps, variant
 from mbma_tables import Scene, Surface, contact, contact_law, theories
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.models import ISLAND_MODELS, IslandAnswer
 from mbma_tables.scenes.costs import Row
 

@@ -17,16 +17,17 @@ from typing import Any
 import numpy as np
 
 from mbma_tables import __version__
-from mbma_tables.arguments import number_in, positive_modulus
-from mbma_tables.calibrated import TESTED_AREA
-from mbma_tables.errors import InputError
+from mbma_tables.answers import source
+from mbma_tables.common.arguments import number_in, positive_modulus
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import Units
 from mbma_tables.export import c_code
+from mbma_tables.laws.calibrated import TESTED_AREA
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import FITTED, PRINTED, REPORTED, get_variant
-from mbma_tables.theories import calibrated, calibrated_table, mbma, source
-from mbma_tables.units import Units
+from mbma_tables.theories import calibrated, calibrated_table, mbma
 
 MODULE = "explorer.wasm"
 THEORIES = ("mbma", "calibrated", "persson")

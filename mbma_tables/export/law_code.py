@@ -11,14 +11,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import InputError
 from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
 from mbma_tables.export.law_languages import FORTRAN_FUNCTION, FORTRAN_INTERFACE, LANGUAGES, Columns, Language
 from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers, flow_numbers, law_numbers
 from mbma_tables.export.text import checked_name, core_file, filled, opening, template, wrapped
+from mbma_tables.law import block as at
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories import law_block as at
 
 MAX_NAME = 31  # letters, as Fortran and C99 read them
 MORE = ("conductance", "leakage")  # asked for

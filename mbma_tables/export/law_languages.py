@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.export.text import wrapped
 
 # steps of coefficients over the least value and the least slope of a polynomial; flatter ones count as so steep

@@ -7,7 +7,7 @@ import re
 import textwrap
 from collections.abc import Iterable
 
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 
 COMMENT_WIDTH = 108
 DIGITS = 10  # of the numbers in a law's file

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, number_in
-from mbma_tables.errors import InputError, OutOfRangeError
+from mbma_tables.common.arguments import FloatArray, number_in
+from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.surfaces.variants import Variant

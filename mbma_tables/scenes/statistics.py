@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models import AnyModel, RigidModel, answer_islands, get_model, island_model_name
 from mbma_tables.scenes.plan import Step

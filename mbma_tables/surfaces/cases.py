@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from math import pi
 
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 
 
 @dataclasses.dataclass(frozen=True)

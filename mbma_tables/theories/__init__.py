@@ -5,11 +5,11 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 
 if TYPE_CHECKING:
-    from mbma_tables.theories.asperities import GreenwoodWilliamson
     from mbma_tables.theories.calibrated import Calibrated
+    from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
     from mbma_tables.theories.mbma import Mbma
     from mbma_tables.theories.persson import Method, Persson
     from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
@@ -31,7 +31,7 @@ __all__ = [
 
 # a theory's module is imported when it is first asked for
 _MODULES = {
-    "asperities": ("GreenwoodWilliamson",),
+    "greenwood_williamson": ("GreenwoodWilliamson",),
     "calibrated": ("Calibrated",),
     "mbma": ("Mbma",),
     "persson": ("Method", "Persson"),

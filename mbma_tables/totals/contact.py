@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.arguments import FloatArray, grouped, require
+from mbma_tables.common.arguments import FloatArray, grouped, require
+from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.core import in_blocks
-from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.models import AREA, BOTH, FORCE, AnyModel
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, Numbers, is_labelled
+from mbma_tables.answers.leakage import flow
+from mbma_tables.answers.leakage_table import shipped_flow
+from mbma_tables.common.arguments import FloatArray, Numbers, is_labelled
+from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.core import core
-from mbma_tables.errors import ConvergenceError, InputError
-from mbma_tables.labels import apply
+from mbma_tables.law import block as at
+from mbma_tables.law import pieces as fit
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories import law_block as at
-from mbma_tables.theories import law_pieces as fit
-from mbma_tables.theories.leakage import flow
-from mbma_tables.theories.leakage_table import shipped_flow
+from mbma_tables.surfaces.labels import apply
 
 if TYPE_CHECKING:
-    from mbma_tables.theories.law_object import ContactLaw
+    from mbma_tables.law.law import ContactLaw
 
 RTOL, SHARE = 1e-4, 0.1  # of the polynomials, or this share of the law's own error
 MOST_OCTAVES = 20  # of gaps, from the blocked one on, next to which the flow is a power

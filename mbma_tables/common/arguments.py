@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mbma_tables.common.errors import InputError, MbmaError, OutOfRangeError
 from mbma_tables.core import in_blocks
-from mbma_tables.errors import InputError, MbmaError, OutOfRangeError
 
 SHOWN = 3  # offending entries quoted in a message
 BLOCK = 1 << 16  # entries between two looks for Ctrl-C

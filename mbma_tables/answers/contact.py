@@ -10,7 +10,10 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import (
+from mbma_tables.answers.derivatives import differentiate
+from mbma_tables.answers.result import Contact
+from mbma_tables.answers.source import Source, named
+from mbma_tables.common.arguments import (
     FloatArray,
     any_labelled,
     broadcast_shape,
@@ -21,18 +24,15 @@ from mbma_tables.arguments import (
     require,
     spread,
 )
-from mbma_tables.errors import InputError, OutOfRangeError
-from mbma_tables.labels import apply_to_surface
+from mbma_tables.common.errors import InputError, OutOfRangeError
+from mbma_tables.common.units import modulus_and_units
 from mbma_tables.models import QUANTITIES, AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.labels import apply_to_surface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import get_theory
 from mbma_tables.theories.mbma import Mbma, refuse_options_of_mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
-from mbma_tables.theories.result import Contact
-from mbma_tables.theories.sensitivity import differentiate
-from mbma_tables.theories.source import Source, named
-from mbma_tables.units import modulus_and_units
 
 KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by
 
@@ -77,7 +77,7 @@ def contact(
         `name` and ``answer(surface, u)``.
     hardness : array_like
         Largest pressure p_m that the softer body bears, in the unit of `E_star` (of E* itself where that is 1). The
-        theory's elastic answer goes through `mbma_tables.hardness`; u is then the mean gap with yielded points
+        theory's elastic answer goes through `mbma_tables.laws.hardness`; u is then the mean gap with yielded points
         flattened. Infinite: nothing yields.
     island_model : {"universal", "island4d", "exact", "formula", "rigid"} or island model
         MBMA's island model: a table, the full solver, a closed form, or spheres that do not deform; or an object: a

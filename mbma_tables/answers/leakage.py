@@ -10,24 +10,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, require, rows
-from mbma_tables.calibrated import spectrum_of
-from mbma_tables.display import Displayed, Variable, shown
-from mbma_tables.errors import InputError
-from mbma_tables.labels import agree
-from mbma_tables.leakage import LARGEST_AREA
-from mbma_tables.plots import draw_compression, force_label, leakage_label
+from mbma_tables.answers.leakage_table import flow_of_spectrum, self_affine, shipped_flow
+from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, require, rows
+from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.plots import draw_compression, force_label, leakage_label
+from mbma_tables.common.units import unit_of
+from mbma_tables.laws.calibrated import spectrum_of
+from mbma_tables.laws.effective_medium import LARGEST_AREA
+from mbma_tables.surfaces.labels import agree
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories.leakage_table import flow_of_spectrum, self_affine, shipped_flow
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory
-from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mbma_tables.theories.result import Contact
-    from mbma_tables.theories.source import Source
+    from mbma_tables.answers.result import Contact
+    from mbma_tables.answers.source import Source
 
 LARGEST_KNUDSEN = 0.1  # mean free path over the channel, to which slip of first order holds
 SLIP = 6.0  # of a plane channel: flow is 1 + 6 Kn times that without slip

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 
 _POUND_PER_INCH = Fraction("4.4482216152605") / Fraction("0.0254") ** 2
 SIZES: dict[str, dict[str, Fraction]] = {
@@ -78,7 +78,7 @@ def known(unit: Any, kind: str = "length") -> str:
 
     Examples
     --------
-    >>> from mbma_tables.units import known
+    >>> from mbma_tables.common.units import known
     >>> known("µm"), known("N/mm^2", "stress")
     ('um', 'MPa')
     """
@@ -97,7 +97,7 @@ def factor(have: str, want: str, kind: str = "length", power: int = 1) -> float:
 
     Examples
     --------
-    >>> from mbma_tables.units import factor
+    >>> from mbma_tables.common.units import factor
     >>> factor("um", "mm"), factor("GPa", "MPa", "stress"), factor("mm", "m", power=-1)
     (0.001, 1000.0, 1000.0)
     """
@@ -109,7 +109,7 @@ def read(name: str, text: str) -> tuple[float, str | None]:
 
     Examples
     --------
-    >>> from mbma_tables.units import read
+    >>> from mbma_tables.common.units import read
     >>> read("h_rms", "0.8um"), read("q0", "6.28/mm"), read("m4", "62 1/mm^2"), read("E1", "210 GPa")
     ((0.8, 'um'), (6.28, 'mm'), (62.0, 'mm'), (210.0, 'GPa'))
     """
@@ -155,7 +155,7 @@ class Units:
 
         Examples
         --------
-        >>> from mbma_tables.units import Units
+        >>> from mbma_tables.common.units import Units
         >>> Units("um", "MPa").number("separation", [2, "1.5e-3 mm"])
         [2, 1.5]
         """
@@ -186,7 +186,7 @@ class Units:
 
         Examples
         --------
-        >>> from mbma_tables.units import Units
+        >>> from mbma_tables.common.units import Units
         >>> Units("mm").conductivities(45.0, 167.0), Units("mm").conductivities("45 W/(m K)", "167 W/(m K)")
         (([45.0, 167.0], 'conductivity/mm'), ([45000.0, 167000.0], 'W/(m^2 K)'))
         """
@@ -221,7 +221,7 @@ def resolve(
 
     Examples
     --------
-    >>> from mbma_tables.units import resolve
+    >>> from mbma_tables.common.units import resolve
     >>> resolve({"hurst": 0.8, "h_rms": "0.8 um", "h_max": "3e-3 mm"})
     ({'hurst': 0.8, 'h_rms': 0.8, 'h_max': 3.0}, 'um')
     """
@@ -258,7 +258,7 @@ def unit_of(name: str, units: Units) -> str:
 
     Examples
     --------
-    >>> from mbma_tables.units import Units, unit_of
+    >>> from mbma_tables.common.units import Units, unit_of
     >>> unit_of("stiffness", Units("um", "MPa")), unit_of("m4", Units("mm")), unit_of("energy", Units("mm"))
     ('MPa/um', '1/mm^2', 'stress mm')
     """
