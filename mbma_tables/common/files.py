@@ -1,4 +1,4 @@
-"""Files: where the shipped data are, variant with a size limit, and writing a file whole or not at all."""
+"""Files: where the shipped data are, reading with a size limit, and writing a file whole or not at all."""
 
 from __future__ import annotations
 

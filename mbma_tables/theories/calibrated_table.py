@@ -1,8 +1,8 @@
 """The calibrated law's table: ln F_G over Hurst exponent, zeta_1 and mean separation, and errors against simulations.
 
 F_G is the force of `mbma_tables.laws.calibrated` on a surface without end. The end at h_max and the area are closed
-forms, applied here. Below the table's least separation full contact rules, F^2 linear in ln u; above its largest ln F is
-linear in u.
+forms, applied here. Below the table's least separation full contact rules, F^2 linear in ln u; above its largest ln F
+is linear in u.
 """
 
 from __future__ import annotations
