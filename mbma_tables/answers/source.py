@@ -23,7 +23,6 @@ from mbma_tables.surfaces.labels import apply_to_surface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
 
 if TYPE_CHECKING:
-    from mbma_tables.answers.result import Contact
     from mbma_tables.theories.yielding import Loaded
 
 MEANINGS = {
@@ -84,7 +83,7 @@ class Source:
     def map(
         self,
         function: Callable[..., tuple[Any, ...]],
-        contact: Contact,
+        contact: Any,  # whose mean separations it is asked at
         outputs: int,
         more: Mapping[str, Any] | None = None,
     ) -> tuple[Numbers, ...]:
