@@ -22,6 +22,7 @@ from mbma_tables.common.arguments import (
     hinted,
     positive_modulus,
     require,
+    require_flag,
     spread,
 )
 from mbma_tables.common.errors import InputError, OutOfRangeError
@@ -138,7 +139,8 @@ def contact(
     by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
     E_star, units = modulus_and_units(E_star, surface)
     value, hardness = units.number(by, value), units.number("hardness", hardness)
-    if theory == Mbma.name:
+    require_flag("derivatives", derivatives)
+    if isinstance(theory, str) and theory == Mbma.name:
         chosen: Theory = Mbma(island_model, variant, rtol, outside, workers)
     else:
         chosen = get_theory(theory)
@@ -159,7 +161,7 @@ def contact(
 
 def wanted_quantities(quantities: Iterable[str]) -> tuple[str, ...]:
     """The quantities asked for, each once, in the order of `QUANTITIES`."""
-    asked = {quantities} if isinstance(quantities, str) else set(quantities)
+    asked = {quantities} if isinstance(quantities, str) or not isinstance(quantities, Iterable) else set(quantities)
     if not asked or not asked <= set(QUANTITIES):
         raise InputError(f"quantities must be some of {QUANTITIES}, got {quantities!r}")
     return tuple(filter(asked.__contains__, QUANTITIES))

@@ -83,6 +83,12 @@ def hinted(function: Callable[P, R]) -> Callable[P, R]:
     return checked
 
 
+def require_flag(name: str, value: Any) -> None:
+    """Refuse what is neither True nor False."""
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{name} must be True or False, got {value!r}")
+
+
 def needed(module: str, extra: str) -> Any:
     """A module of an extra; where it is not installed, the error says what installs it."""
     try:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import re
+import reprlib
 from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
@@ -86,6 +87,8 @@ def known(unit: Any, kind: str = "length") -> str:
         raise InputError(f"a unit of {kind} is a text such as {next(iter(SIZES[kind]))!r}, got {unit!r}")
     plain = ALIASES.get(unit.strip(), unit.strip().translate(_ASCII))
     plain = ALIASES.get(plain, plain)
+    if kind == "length" and plain in SIZES["stress"]:
+        raise InputError(f"{unit!r} is no known unit of length but one of stress, as pressure= takes")
     if plain not in SIZES[kind]:
         near = difflib.get_close_matches(plain, SIZES[kind], 3, 0.6) or SIZES[kind]
         raise InputError(f"{unit!r} is no known unit of {kind}: write {' or '.join(near)}")
@@ -156,10 +159,14 @@ class Units:
         Examples
         --------
         >>> from mbma_tables.common.units import Units
-        >>> Units("um", "MPa").number("separation", [2, "1.5e-3 mm"])
-        [2, 1.5]
+        >>> Units("um", "MPa").number("separation", ["2 um", "1.5e-3 mm"])
+        [2.0, 1.5]
         """
         if isinstance(value, list | tuple):
+            flat = [entry for entry in value if not isinstance(entry, list | tuple)]
+            bare = [entry for entry in flat if not isinstance(entry, str) or read(name, entry)[1] is None]
+            if 0 < len(bare) < len(flat):
+                raise InputError(f"{name}: {bare[0]!r} has no unit beside others that have: write it to each")
             return [self.number(name, entry) for entry in value]
         length, power = DIMENSIONS.get(name, (0, 0))
         kind, own = ("length", self.length) if length else ("stress", self.stress)
@@ -247,6 +254,9 @@ def _named(name: str, value: Any, kind: str) -> str | None:
 
 def modulus_and_units(E_star: Any, surface: Any, asked: str | None = None) -> tuple[Any, Units]:
     """A modulus as a number, and the units of results: the surface's, and the one asked for or named by "100 GPa"."""
+    if not hasattr(surface, "unit"):
+        hint = "; a named one is Surface.named(...)" if isinstance(surface, str) else ""
+        raise InputError(f"surface must be a Surface, got {reprlib.repr(surface)}{hint}")
     given, stress = resolve({"E_star": E_star}, asked, "stress")
     # without a modulus, stresses are over it
     absent = stress is None and isinstance(E_star, int | float) and E_star == 1.0

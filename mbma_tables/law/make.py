@@ -93,7 +93,7 @@ def contact_law(
     """
     given, units = modulus_and_units(E_star, surface)
     modulus = number_in("E_star", given, sys.float_info.min, sys.float_info.max)
-    if theory == Mbma.name:
+    if isinstance(theory, str) and theory == Mbma.name:
         chosen: Theory = Mbma(island_model, variant)
     else:
         refuse_options_of_mbma(island_model=island_model != "universal", variant=variant != "reported")

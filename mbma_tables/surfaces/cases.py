@@ -55,6 +55,6 @@ CASES = {
 
 def get_case(name: str) -> Case:
     """The case of that name."""
-    if name not in CASES:
+    if not isinstance(name, str) or name not in CASES:
         raise InputError(f"no surface is named {name!r}; there are {', '.join(CASES)}")
     return CASES[name]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import reprlib
 from typing import TYPE_CHECKING, Any
 
 from mbma_tables.common.errors import InputError
@@ -76,5 +77,5 @@ def get_theory(theory: str | Theory | UserTheory) -> Theory:
     if isinstance(found, UserTheory) and not isinstance(found, type):
         return Wrapped(found)
     raise InputError(
-        f"theory must be one of {THEORIES} or an object with a name and answer(surface, u), got {theory!r}"
+        f"theory must be one of {THEORIES} or an object with a name and answer(surface, u), got {reprlib.repr(theory)}"
     )
