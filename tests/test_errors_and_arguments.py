@@ -185,6 +185,6 @@ def test_natural_mistakes_have_a_message_with_the_remedy(asked, message):
 
 def test_what_is_given_by_place_but_has_a_name_is_refused_with_the_names():
     with pytest.raises(
-        TypeError, match="contact takes 1 argument by position, got 2; .* separation=, mean_separation="
+        TypeError, match=r"contact takes 1 argument by position, got 2; .* separation=, mean_separation="
     ):
         contact(ROAD, 1.0)
