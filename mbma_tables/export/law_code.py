@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
 import functools
 import math
@@ -16,10 +17,11 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
 from mbma_tables.export.law_languages import FORTRAN_FUNCTION, FORTRAN_INTERFACE, LANGUAGES, Columns, Language
 from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers, flow_numbers, law_numbers
-from mbma_tables.export.text import checked_name, core_file, filled, opening, template, wrapped
+from mbma_tables.export.text import checked_name, core_file, filled, opening, page_file, template, wrapped
 from mbma_tables.law import block as at
 from mbma_tables.surfaces.any_surface import AnySurface
 
+LAW_MODULE = "law.wasm"  # the core's laws for JavaScript
 MAX_NAME = 31  # letters, as Fortran and C99 read them
 MORE = ("conductance", "leakage")  # asked for
 FUNCTIONS = ("pressure", "tangent", "with_tangent", "curvature", "area", "energy", "overclosure", *MORE)
@@ -152,7 +154,9 @@ def _core(name: str, asked: AskedLaw, number: Callable[[float], str]) -> dict[st
     law, numbers = asked.joint.law, asked.numbers
     first = 0.0 if numbers.ends else (law.h_max - law.highest) / 2
     ends = {"H_MAX": law.h_max, "FIRST": first, "TURN": numbers.c_turn}
+    ends |= {"C_LEAST": numbers.c_least, "C_MOST": numbers.c_most}
     parts = {place: number(value) for place, value in ends.items()} | {"CORE": core_text(["law.c"], name)}
+    parts["WASM"] = base64.b64encode(page_file(LAW_MODULE)).decode("ascii")
     whats = [what for what in FUNCTIONS if what != "with_tangent" and (what in asked.more or what not in MORE)]
     parts["INTERFACES"] = "\n".join(FORTRAN_INTERFACE.format(name=name, what=what) for what in whats)
     parts["FUNCTIONS"] = "\n".join(FORTRAN_FUNCTION.format(what=what) for what in whats)
@@ -161,6 +165,7 @@ def _core(name: str, asked: AskedLaw, number: Callable[[float], str]) -> dict[st
         blocks["FLOW_"], parts["FLOW_H_RMS"] = law.leakage.block, number(asked.flow.h_rms)
     for prefix, block in blocks.items():
         rows, records = block_rows(block)
+        parts[f"{prefix}BLOCK"] = base64.b64encode(block.astype("<f8", copy=False).tobytes()).decode("ascii")
         parts |= {f"{prefix}ROWS": str(rows), f"{prefix}RECORDS": str(records), f"{prefix}DATA": block_text(block)}
     return parts
 

@@ -73,6 +73,11 @@ def core_file(name: str) -> str:
     return (importlib.resources.files("mbma_tables.core") / name).read_text(encoding="utf-8")
 
 
+def page_file(name: str) -> bytes:
+    """A file of the explorer's page, or a compiled module beside it."""
+    return (importlib.resources.files("mbma_tables.export") / "page" / name).read_bytes()
+
+
 def filled(name: str, **parts: str) -> str:
     """A template with its places, such as @HEADER@, filled in; @IF PLACE@ ... @END@ stays where that is not empty."""
     chosen = re.compile(r"@IF ([A-Z]+)@(\n)?(.*?)@END@(?(2)\n)", re.S)
