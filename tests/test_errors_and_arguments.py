@@ -174,6 +174,7 @@ BAND = {"longest": "100 um", "shortest": "2 um", "hurst": 0.8, "h_max": "9 um"}
             "'MPa' is no known unit of length but one of stress",
         ),
         (lambda: contact(ROAD, pressure=["5 MPa", 50], E_star="1 GPa"), "pressure: 50 has no unit beside others"),
+        (lambda: contact(ROAD, pressure=[["5 MPa"], [50]], E_star="1 GPa"), "pressure: 50 has no unit beside others"),
         (lambda: contact(ROAD, separation=["1 um", "2"]), "separation: '2' has no unit beside others that have"),
         (lambda: Surface.from_roughness(Rq=["1.6 um", 2.0], **BAND), "Rq: 2.0 has no unit beside others"),
     ],

@@ -11,7 +11,7 @@ import dataclasses
 import difflib
 import re
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -163,7 +163,7 @@ class Units:
         [2.0, 1.5]
         """
         if isinstance(value, list | tuple):
-            flat = [entry for entry in value if not isinstance(entry, list | tuple)]
+            flat = list(_entries(value))
             bare = [entry for entry in flat if not isinstance(entry, str) or read(name, entry)[1] is None]
             if 0 < len(bare) < len(flat):
                 raise InputError(f"{name}: {bare[0]!r} has no unit beside others that have: write it to each")
@@ -240,6 +240,12 @@ def resolve(
             raise InputError(f"{', '.join(plain)} without a unit beside numbers in {unit}: write the unit to each")
     own = Units(length=unit) if kind == "length" else Units(stress=unit)
     return {name: own.number(name, value) for name, value in given.items()}, unit
+
+
+def _entries(value: Any) -> Iterator[Any]:
+    """What a list holds, and the lists in it."""
+    for entry in value:
+        yield from _entries(entry) if isinstance(entry, list | tuple) else (entry,)
 
 
 def _named(name: str, value: Any, kind: str) -> str | None:

@@ -139,7 +139,7 @@ def text_of(target: str, name: str, asked: AskedLaw) -> str:
         **{quantity.upper(): asked.more.get(quantity, "") and language.number(asked.ratio) for quantity in MORE},
     }
     if language.arrays is None:
-        parts |= _core(name, asked, language.number)
+        parts |= _core(target, name, asked, language.number)
     else:
         parts |= _numbers("", numbers, {"p": numbers.force, "a": numbers.area}, language, language.arrays)
         if flow:
@@ -149,23 +149,26 @@ def text_of(target: str, name: str, asked: AskedLaw) -> str:
     return filled(language.template, **parts)
 
 
-def _core(name: str, asked: AskedLaw, number: Callable[[float], str]) -> dict[str, str]:
-    """The core's C and the law's own blocks, and what the glue about them needs."""
+def _core(target: str, name: str, asked: AskedLaw, number: Callable[[float], str]) -> dict[str, str]:
+    """The core, as C or compiled, the law's own blocks, and what the glue about them needs."""
     law, numbers = asked.joint.law, asked.numbers
     first = 0.0 if numbers.ends else (law.h_max - law.highest) / 2
     ends = {"H_MAX": law.h_max, "FIRST": first, "TURN": numbers.c_turn}
     ends |= {"C_LEAST": numbers.c_least, "C_MOST": numbers.c_most}
-    parts = {place: number(value) for place, value in ends.items()} | {"CORE": core_text(["law.c"], name)}
-    parts["WASM"] = base64.b64encode(page_file(LAW_MODULE)).decode("ascii")
-    whats = [what for what in FUNCTIONS if what != "with_tangent" and (what in asked.more or what not in MORE)]
-    parts["INTERFACES"] = "\n".join(FORTRAN_INTERFACE.format(name=name, what=what) for what in whats)
-    parts["FUNCTIONS"] = "\n".join(FORTRAN_FUNCTION.format(what=what) for what in whats)
+    parts = {place: number(value) for place, value in ends.items()}
     blocks = {"": law.block}
     if asked.flow:
         blocks["FLOW_"], parts["FLOW_H_RMS"] = law.leakage.block, number(asked.flow.h_rms)
+    if target == "javascript-law":
+        held = {"WASM": page_file(LAW_MODULE)}
+        held |= {f"{prefix}BLOCK": block.astype("<f8", copy=False).tobytes() for prefix, block in blocks.items()}
+        return parts | {place: base64.b64encode(content).decode("ascii") for place, content in held.items()}
+    parts["CORE"] = core_text(["law.c"], name)
+    whats = [what for what in FUNCTIONS if what != "with_tangent" and (what in asked.more or what not in MORE)]
+    parts["INTERFACES"] = "\n".join(FORTRAN_INTERFACE.format(name=name, what=what) for what in whats)
+    parts["FUNCTIONS"] = "\n".join(FORTRAN_FUNCTION.format(what=what) for what in whats)
     for prefix, block in blocks.items():
         rows, records = block_rows(block)
-        parts[f"{prefix}BLOCK"] = base64.b64encode(block.astype("<f8", copy=False).tobytes()).decode("ascii")
         parts |= {f"{prefix}ROWS": str(rows), f"{prefix}RECORDS": str(records), f"{prefix}DATA": block_text(block)}
     return parts
 
