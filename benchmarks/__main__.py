@@ -35,8 +35,8 @@ from benchmarks.rows import LINES, microseconds, report, rounds, times_faster
 from benchmarks.scenes import scenes
 from generate.pages import page
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
-from mbma_tables.calibrated import Law, Spectrum
-from mbma_tables.files import shipped_file
+from mbma_tables.common.files import shipped_file
+from mbma_tables.laws.calibrated import Law, Spectrum
 from mbma_tables.models.island4d import at_places
 from mbma_tables.tablefiles.schema import TableContent
 from mbma_tables.theories import Calibrated
@@ -295,12 +295,12 @@ def few_numbers(rng: np.random.Generator) -> None:
 
 
 FIRST = {
-    "import mbma_tables": "",
-    "an answer": "m.contact(m.Surface(0.8, 1.0, 200.0, 1.0, 3.0), 1.0)",
+    "import mbma_tables": "m",
+    "an answer": "m.contact(m.Surface(0.8, 1.0, 200.0, 1.0, 3.0), separation=1.0)",
     "100,000 gaps of a law": "m.contact_law(S()).force(np.linspace(-2.9, 2.9, 100_000))",
-    "10,000 surfaces": "m.contact(S(10_000), 1.0)",
-    "10,000 surfaces with derivatives": "m.contact(S(10_000), 1.0, derivatives=True)",
-    "an exact total": "m.contact(S(), 1.0, island_model='exact')",
+    "10,000 surfaces": "m.contact(S(10_000), separation=1.0)",
+    "10,000 surfaces with derivatives": "m.contact(S(10_000), separation=1.0, derivatives=True)",
+    "an exact total": "m.contact(S(), separation=1.0, island_model='exact')",
 }
 
 

@@ -44,9 +44,9 @@ def exported(rng: np.random.Generator) -> None:
         sources = [str(folder / name) for name in SOURCES if name != "mbma_selftest.c"]
         subprocess.run([*COMPILER, *sources, "-lm", "-o", str(folder / "model.so")], check=True)
         library: Any = ctypes.CDLL(str(folder / "model.so"))
-    for function in (library.mbma_table, library.mbma_variant):
+    for function in (library.mbma_table, library.mbma_model_variant):
         function.restype = ctypes.c_void_p
-    table, variant = (ctypes.c_void_p(function()) for function in (library.mbma_table, library.mbma_variant))
+    table, variant = (ctypes.c_void_p(function()) for function in (library.mbma_table, library.mbma_model_variant))
     size, many, count = (ctypes.c_size_t(number) for number in (POINTS, SURFACES, GAPS))
     one, rtol, share = (ctypes.c_double(number) for number in (1.0, RTOL, QUADRATURE_SHARE * RTOL))
     known = [np.ascontiguousarray(column, dtype=float) for column in (surfaces.hurst, surfaces.zeta_1, *heights)]

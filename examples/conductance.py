@@ -24,7 +24,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mbma_tables import Surface, contact, materials
-from mbma_tables.plots import to_picture
+from mbma_tables.common.plots import to_picture
 from mbma_tables.totals.conductance import conductance, cooper_mikic_yovanovich, mean_conductivity, mikic
 
 # both faces' roughness in one

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from scipy.special import ndtr, ndtri
 
 from mbma_tables import Surface, contact
-from mbma_tables.plots import to_picture
+from mbma_tables.common.plots import to_picture
 
 BLOCK = 10_000
 SEED = 20260101

@@ -20,9 +20,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import OptimizeResult, minimize
 
-from mbma_tables import Contact, Surface, boundary_elements, contact
-from mbma_tables.plots import to_picture
-from mbma_tables.reynolds import flow_conductance
+from mbma_tables import Contact, Surface, contact
+from mbma_tables.common.plots import to_picture
+from mbma_tables.laws import boundary_elements
+from mbma_tables.laws.reynolds import flow_conductance
 
 LONGEST = 500.0  # um
 Q0 = 2 * np.pi / LONGEST

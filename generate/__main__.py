@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from generate.pages.page import PAGES, ROOT, write
-from mbma_tables.errors import MbmaError
+from mbma_tables.common.errors import MbmaError
 
 # imported when asked for: each needs packages of the extra "generate"
 GROUPS = {
@@ -68,7 +68,7 @@ def main() -> None:
 @click.argument("names", nargs=-1, required=True, type=click.Choice([*PAGES, "all"]))
 @click.option("--out", type=click.Path(path_type=pathlib.Path, file_okay=False), default=ROOT, help="The checkout.")
 def pages(names: tuple[str, ...], out: pathlib.Path) -> None:
-    """Measure what pages of the documentation say; write them with their figures."""
+    """Write the measured tables and the figures of pages of the documentation."""
     for name in PAGES if "all" in names else names:
         page = importlib.import_module(f"generate.pages.{name}")
         parts, files = page.measure()

@@ -19,9 +19,9 @@ from generate.boundary_elements.evidence import GAUSSIAN, MAX_AREA, MIN_WAVES, C
 from generate.calibrated_bars import measure
 from generate.calibrated_table import write as write_table
 from generate.leakage_law import write as write_leakage
-from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum
-from mbma_tables.calibrated_map import MAP_CONSTANTS, MapConstants, MapLaw
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.laws.calibrated import CONSTANTS, Constants, Law, Spectrum
+from mbma_tables.laws.map_curves import MAP_CONSTANTS, MapConstants, MapLaw
 
 QUANTITIES = ("area", "force", "stiffness")
 EDGES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9, MAX_AREA)  # contact fractions between which errors are told

@@ -11,7 +11,7 @@ import numpy as np
 
 from generate.boundary_elements.design import TRAINING
 from generate.boundary_elements.evidence import Case
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 
 LARGE = 512  # points a side from which on surfaces are told apart
 MIN_SURFACES = 2  # of a spectrum, for what its surfaces differ by

@@ -9,7 +9,7 @@ import pathlib
 import netCDF4
 import xarray as xr
 
-from mbma_tables.files import write_file, written_bytes
+from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, SEAL, read_sealed
 
 

@@ -20,8 +20,8 @@ from generate.boundary_elements.evidence import GAUSSIAN, LEVELS, Capped, capped
 from generate.calibrated_file import write_part
 from generate.provenance import source_digest, versions
 from mbma_tables import Surface, contact
-from mbma_tables import hardness as cap
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.laws import hardness as cap
 from mbma_tables.theories import calibrated_table, get_theory
 from mbma_tables.theories.yielding import GROUP, QUANTITIES, Scatter, Yielding
 
@@ -46,7 +46,7 @@ TURN = 0.01  # of ln A_el, for derivatives
 FOLDS = 5
 REFERENCE = pathlib.Path(__file__).parents[1] / "docs" / "data" / "hardness.csv"  # another code's surfaces
 WAVES = 3  # longest waves a side: with fewer h_max says little of the highest heights
-MODULES = ("mbma_tables.hardness", "generate.calibrated_hardness")
+MODULES = ("mbma_tables.laws.hardness", "generate.calibrated_hardness")
 
 
 def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> FloatArray:
@@ -322,7 +322,7 @@ def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[ca
     covered = coverage([one for one in plain if one.split != TRAINING], constants, scatter)
     data = dataset(scatter, accuracy(groups, constants))
     data.attrs = {
-        "title": "Contact with a hardness: constants of mbma_tables.hardness, and errors against boundary elements",
+        "title": "Contact with a hardness: constants of mbma_tables.laws.hardness, and errors against BEM",
         "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate calibrated --hardness",
         "references": "docs/yield.md",
         "comment": f"accuracy: contacts from {LIGHTEST:g} to {EDGES[-1]:g}; bars {json.dumps(BARS)}. area, yielded "

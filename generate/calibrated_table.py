@@ -20,11 +20,11 @@ from generate.boundary_elements.evidence import Case
 from generate.calibrated_file import write_part
 from generate.provenance import source_digest, versions
 from generate.splines import coefficients
-from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import Constants, Law, Spectrum
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.laws.calibrated import Constants, Law, Spectrum
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.theories.asperities import GreenwoodWilliamson
 from mbma_tables.theories.calibrated_table import AXES, QUANTITIES, load
+from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.persson import Persson
 from mbma_tables.theories.protocol import Theory
@@ -44,8 +44,8 @@ SELF_AFFINE = Surface(0.8, 1.0, 100.0, 1.0, 3.0)  # any: theories' scatter has o
 MIN_ERRORS = 5  # that state a scatter
 STATISTICS = ("bias", "standard_deviation", "largest_of_nine_in_ten", "number")
 MODULES = (
-    "mbma_tables.calibrated",
-    "mbma_tables.calibrated_map",
+    "mbma_tables.laws.calibrated",
+    "mbma_tables.laws.map_curves",
     "generate.calibrated",
     "generate.calibrated_bars",
     "generate.calibrated_table",
@@ -185,7 +185,7 @@ def _attributes(told: dict[str, Any], constants: Constants, theories: list[str],
         "Conventions": "CF-1.11",
         "title": "Contact of rough surfaces: Persson's energy integral calibrated on boundary elements, tabulated",
         "institution": "mbma_tables contributors",
-        "source": "mbma_tables.calibrated, its constants fitted to the training set of the boundary-element campaign",
+        "source": "mbma_tables.laws.calibrated, constants fitted to the training set of the boundary-element campaign",
         "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate calibrated",
         "references": "docs/calibrated.md",
         "comment": "F(u) = F_G(u) - F_G(h_max); lengths in h_rms. "

@@ -5,21 +5,27 @@ from __future__ import annotations
 import hashlib
 import json
 import pathlib
+from collections.abc import Iterable
 from typing import Any
 
 import click
 
 from generate.pages.page import ROOT
+from mbma_tables.common.files import write_file
 from mbma_tables.export import c_code
 from mbma_tables.export.code import web_assembly
 from mbma_tables.export.explorer import MODULE
-from mbma_tables.files import write_file
+from mbma_tables.export.law_code import LAW_MODULE
+from mbma_tables.export.text import core_file
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.variants import REPORTED
 
 FUNCTIONS = (
     *("mbma_total_of", "mbma_calibrated_of", "mbma_message", "mbma_spectrum_of", "mbma_surface_spectrum_of"),
     *("mbma_spectrum_contact_of", "mbma_spectrum_separation_of"),
+)
+LAW_FUNCTIONS = (
+    *("mbma_law_open", "mbma_law_at_overclosure", "mbma_law_and_slope", "mbma_law_overclosure", "mbma_law_flow"),
 )
 
 
@@ -30,11 +36,16 @@ def c_sources() -> tuple[dict[str, str], dict[str, Any]]:
     return c_code.core_texts() | c_code.model_texts(heads) | data, c_code.tables(model)
 
 
-def compiled(texts: dict[str, str], names: list[str]) -> bytes:
+def law_sources() -> dict[str, str]:
+    """The C of laws in JavaScript."""
+    return {name: core_file(name) for name in ("mbma.h", "elementary.h", "law.c")}
+
+
+def compiled(texts: dict[str, str], names: Iterable[str]) -> bytes:
     """The module, with the digest of what it was compiled from in a section of its own at the end."""
     section = b"\x06digest" + digest_of(texts)
     # two numbers at a time, which browsers have learned by 2023
-    module = web_assembly(texts, [*FUNCTIONS, "MBMA_VARIANT", *names], "-msimd128")
+    module = web_assembly(texts, names, "-msimd128")
     return module + bytes([0, len(section)]) + section
 
 
@@ -45,8 +56,9 @@ def digest_of(texts: dict[str, str]) -> bytes:
 
 @click.command()
 def explorer() -> None:
-    """Compile the C of the page to mbma_tables/export/page/explorer.wasm; needs ziglang."""
+    """Compile the C of the page and of laws in JavaScript into mbma_tables/export/page; needs ziglang."""
     texts, values = c_sources()
-    path = pathlib.Path(ROOT, "mbma_tables", "export", "page", MODULE)
-    write_file(path, compiled(texts, list(values)))
-    click.echo(path)
+    folder = pathlib.Path(ROOT, "mbma_tables", "export", "page")
+    write_file(folder / MODULE, compiled(texts, [*FUNCTIONS, "MBMA_VARIANT", *values]))
+    write_file(folder / LAW_MODULE, compiled(law_sources(), LAW_FUNCTIONS))
+    click.echo(f"{folder / MODULE}\n{folder / LAW_MODULE}")

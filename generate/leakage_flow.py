@@ -10,10 +10,10 @@ import xarray as xr
 
 from generate.boundary_elements.evidence import Simulated, simulated
 from generate.calibrated_table import TheoryCurve
-from mbma_tables import leakage
-from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import Constants, Law
-from mbma_tables.leakage import FlowConstants
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.laws import effective_medium as leakage
+from mbma_tables.laws.calibrated import Constants, Law
+from mbma_tables.laws.effective_medium import FlowConstants
 from mbma_tables.theories import get_theory
 from mbma_tables.theories.yielding import Yielding
 

@@ -23,12 +23,12 @@ from generate.calibrated_table import TheoryCurve
 from generate.leakage_flow import MIN_WAVES, Case, Flow, cases, log_odds
 from generate.provenance import source_digest, versions
 from generate.splines import coefficients
-from mbma_tables import leakage
-from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import Constants, Spectrum
-from mbma_tables.leakage import FlowConstants
-from mbma_tables.theories.asperities import GreenwoodWilliamson
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.laws import effective_medium as leakage
+from mbma_tables.laws.calibrated import Constants, Spectrum
+from mbma_tables.laws.effective_medium import FlowConstants
 from mbma_tables.theories.calibrated_table import load
+from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.persson import Persson
 
@@ -51,7 +51,7 @@ LONG_NAMES = {
     "log_zeta_1": "natural logarithm of q1/q0",
     "log_odds": "ln A/(Ac - A), A = A/A0 and Ac = flow_threshold",
 }
-MODULES = ("mbma_tables.calibrated", "mbma_tables.leakage", "generate.leakage_law")
+MODULES = ("mbma_tables.laws.calibrated", "mbma_tables.laws.effective_medium", "generate.leakage_law")
 PROCESSES = 2
 ROOT = pathlib.Path(__file__).parents[1]
 TABLE = ROOT / "tables" / "calibrated.nc"
@@ -234,7 +234,7 @@ def dataset(found: Sequence[Case], contact: Constants) -> xr.Dataset:
     )
     data.attrs = {
         "title": "Flow conductance of gaps: contact factor of an effective medium, and its errors against simulation",
-        "source": "mbma_tables.leakage, its constants fitted to the training set of docs/data/leakage.nc",
+        "source": "mbma_tables.laws.effective_medium, its constants fitted to the training set of docs/data/leakage.nc",
         "references": "docs/leakage.md",
         "theories": " ".join(stated),
         "laws": "; ".join(LAWS),

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import erfcx
 
 from mbma_tables import Surface
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 
 WORK_SIZE = 2**15
 ROUNDS = (2, 25)  # of a measurement, at least and at most

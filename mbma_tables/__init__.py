@@ -8,26 +8,26 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from mbma_tables.errors import ConvergenceError as ConvergenceError
-from mbma_tables.errors import InputError as InputError
-from mbma_tables.errors import MbmaError as MbmaError
-from mbma_tables.errors import NotSelfAffineError as NotSelfAffineError
-from mbma_tables.errors import OutOfRangeError as OutOfRangeError
-from mbma_tables.errors import TableFileError as TableFileError
+from mbma_tables.common.errors import ConvergenceError as ConvergenceError
+from mbma_tables.common.errors import InputError as InputError
+from mbma_tables.common.errors import MbmaError as MbmaError
+from mbma_tables.common.errors import NotSelfAffineError as NotSelfAffineError
+from mbma_tables.common.errors import OutOfRangeError as OutOfRangeError
+from mbma_tables.common.errors import TableFileError as TableFileError
 
 if TYPE_CHECKING:
     from mbma_tables import theories as theories
+    from mbma_tables.answers.contact import contact as contact
+    from mbma_tables.answers.result import Contact as Contact
+    from mbma_tables.answers.sensitivity import sensitivity as sensitivity
     from mbma_tables.islands import greenwood_tripp as greenwood_tripp
     from mbma_tables.islands.height_integrals import height_integral as height_integral
+    from mbma_tables.law.law import ContactLaw as ContactLaw
+    from mbma_tables.law.make import contact_law as contact_law
     from mbma_tables.models.tables import open_table as open_table
     from mbma_tables.scenes.scene import Scene as Scene
     from mbma_tables.surfaces.surface import Surface as Surface
     from mbma_tables.surfaces.variants import Variant as Variant
-    from mbma_tables.theories.contact import contact as contact
-    from mbma_tables.theories.law import contact_law as contact_law
-    from mbma_tables.theories.law_object import ContactLaw as ContactLaw
-    from mbma_tables.theories.result import Contact as Contact
-    from mbma_tables.theories.unknowns import sensitivity as sensitivity
     from mbma_tables.totals.island import Island as Island
     from mbma_tables.totals.island import island as island
 
@@ -35,18 +35,18 @@ __version__ = "0.1.0"
 
 _ERRORS = tuple(name for name in globals() if name.endswith("Error"))
 _HOMES = {
-    "Contact": "mbma_tables.theories.result",
+    "Contact": "mbma_tables.answers.result",
     "Island": "mbma_tables.totals.island",
     "Variant": "mbma_tables.surfaces.variants",
     "Surface": "mbma_tables.surfaces.surface",
-    "ContactLaw": "mbma_tables.theories.law_object",
+    "ContactLaw": "mbma_tables.law.law",
     "Scene": "mbma_tables.scenes.scene",
-    "contact": "mbma_tables.theories.contact",
-    "contact_law": "mbma_tables.theories.law",
+    "contact": "mbma_tables.answers.contact",
+    "contact_law": "mbma_tables.law.make",
     "height_integral": "mbma_tables.islands.height_integrals",
     "island": "mbma_tables.totals.island",
     "open_table": "mbma_tables.models.tables",
-    "sensitivity": "mbma_tables.theories.unknowns",
+    "sensitivity": "mbma_tables.answers.sensitivity",
 }
 _MODULES = {"greenwood_tripp": "mbma_tables.islands.greenwood_tripp", "theories": "mbma_tables.theories"}
 

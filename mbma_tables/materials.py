@@ -15,10 +15,10 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import broadcast_shape, finite_array, one_number, require
-from mbma_tables.errors import InputError
-from mbma_tables.files import shipped_file
-from mbma_tables.units import resolve
+from mbma_tables.common.arguments import broadcast_shape, finite_array, one_number, require
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.files import shipped_file
+from mbma_tables.common.units import resolve
 
 ELASTIC_PSI = 1.1  # plasticity index E* g/p_m up to which elastic areas are within 5% of those with a hardness
 

@@ -8,9 +8,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import erf
 
-from mbma_tables.bearing import FRACTIONS, bearing, radial_spectrum
-from mbma_tables.calibrated import PERSSON, YANG_PERSSON, Law, Spectrum, mean_top_height
-from mbma_tables.calibrated_map import MapLaw, hertz_ellipse
+from mbma_tables.laws.bearing_curve import FRACTIONS, bearing, radial_spectrum
+from mbma_tables.laws.calibrated import PERSSON, YANG_PERSSON, Law, Spectrum, mean_top_height
+from mbma_tables.laws.map_curves import MapLaw, hertz_ellipse
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import Persson
 from mbma_tables.theories.calibrated_table import shipped

@@ -16,11 +16,12 @@ from mbma_tables import (
     OutOfRangeError,
     Surface,
     contact,
+    contact_law,
     greenwood_tripp,
     height_integral,
     island,
 )
-from mbma_tables.arguments import SHOWN, broadcast_shape, finite_array, require
+from mbma_tables.common.arguments import SHOWN, broadcast_shape, finite_array, require
 from mbma_tables.materials import effective_modulus
 
 
@@ -152,3 +153,39 @@ def test_broadcast_shape():
     assert broadcast_shape(a=np.ones((2, 1)), b=np.ones(3), c=1.0) == (2, 3)
     with pytest.raises(InputError, match=r"^arguments do not broadcast: a \(2,\), b \(3,\)$"):
         broadcast_shape(a=np.ones(2), b=np.ones(3))
+
+
+ROAD = Surface(0.8, 0.2, 40.0, 1.0, 3.0, unit="um")
+BAND = {"longest": "100 um", "shortest": "2 um", "hurst": 0.8, "h_max": "9 um"}
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        (lambda: contact("concrete", separation=1.0), "surface must be a Surface, got 'concrete'; a named"),
+        (lambda: contact_law(None), "surface must be a Surface, got None"),
+        (lambda: Surface.named([]), r"no surface is named \[\]; there are"),
+        (lambda: contact(ROAD, separation=1.0, quantities=None), r"quantities must be some of .* got None"),
+        (lambda: contact(ROAD, separation=1.0, derivatives="no"), "derivatives must be True or False, got 'no'"),
+        (lambda: contact(ROAD, separation=1.0, theory=np.ones(3)), r"theory must be one of .* got array\(\[1"),
+        (lambda: contact_law(ROAD, theory=np.ones(3)), r"theory must be one of .* got array\(\[1"),
+        (
+            lambda: contact(ROAD, separation="50 MPa"),
+            "'MPa' is no known unit of length but one of stress",
+        ),
+        (lambda: contact(ROAD, pressure=["5 MPa", 50], E_star="1 GPa"), "pressure: 50 has no unit beside others"),
+        (lambda: contact(ROAD, pressure=[["5 MPa"], [50]], E_star="1 GPa"), "pressure: 50 has no unit beside others"),
+        (lambda: contact(ROAD, separation=["1 um", "2"]), "separation: '2' has no unit beside others that have"),
+        (lambda: Surface.from_roughness(Rq=["1.6 um", 2.0], **BAND), "Rq: 2.0 has no unit beside others"),
+    ],
+)
+def test_natural_mistakes_have_a_message_with_the_remedy(asked, message):
+    with pytest.raises(InputError, match=message):
+        asked()
+
+
+def test_what_is_given_by_place_but_has_a_name_is_refused_with_the_names():
+    with pytest.raises(
+        TypeError, match=r"contact takes 1 argument by position, got 2; .* separation=, mean_separation="
+    ):
+        contact(ROAD, 1.0)

@@ -17,9 +17,11 @@ import numpy as np
 import pytest
 from helpers import random_map, refused, run
 
-from generate.explorer import c_sources, digest_of
+from generate.explorer import c_sources, digest_of, law_sources
 from mbma_tables import InputError, Surface, contact
-from mbma_tables.export.explorer import MODULE, explorer_page, packed, page_file
+from mbma_tables.export.explorer import MODULE, explorer_page, packed
+from mbma_tables.export.law_code import LAW_MODULE
+from mbma_tables.export.text import page_file
 from mbma_tables.theories import Mbma
 
 QUANTITIES = {"gap": "mean_separation", "pressure": "pressure", "area": "area", "stiffness": "stiffness"}
@@ -152,9 +154,9 @@ def test_curves_are_those_of_the_library(number, visit):
     assert max(worst) < 1e-9
 
 
-def test_the_module_is_of_this_c():
-    texts, _ = c_sources()
-    assert page_file(MODULE).endswith(digest_of(texts)), "run: python -m generate explorer"
+@pytest.mark.parametrize(("module", "texts"), [(MODULE, c_sources()[0]), (LAW_MODULE, law_sources())])
+def test_the_modules_are_of_this_c(module, texts):
+    assert page_file(module).endswith(digest_of(texts)), "run: python -m generate explorer"
 
 
 def test_tables_are_packed_to_the_last_digits_that_count():

@@ -10,9 +10,9 @@ import signal
 import pytest
 
 import mbma_tables
-from mbma_tables import files
-from mbma_tables.errors import InputError
-from mbma_tables.files import read_file, write_file
+from mbma_tables.common import files
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.files import read_file, write_file
 
 ROOT = pathlib.Path(mbma_tables.__file__).parents[1]
 

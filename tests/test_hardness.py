@@ -13,12 +13,12 @@ from scipy.differentiate import derivative
 from generate.boundary_elements.capped import CappedContact, project
 from generate.boundary_elements.surfaces import Recipe, heights
 from generate.calibrated_hardness import BARS, FORMS, OTHERS, blind
-from mbma_tables import hardness
-from mbma_tables.bearing import bearing
-from mbma_tables.boundary_elements import Contact as Elastic
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.files import shipped_file
 from mbma_tables.core import core
-from mbma_tables.errors import InputError
-from mbma_tables.files import shipped_file
+from mbma_tables.laws import hardness
+from mbma_tables.laws.bearing_curve import bearing
+from mbma_tables.laws.boundary_elements import Contact as Elastic
 from mbma_tables.theories.calibrated_table import shipped_part
 
 

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mbma_tables import Surface, contact, materials
-from mbma_tables.errors import InputError, OutOfRangeError
+from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.materials import effective_modulus
 
 moduli = st.floats(1e-6, 1e12)

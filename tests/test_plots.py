@@ -3,8 +3,8 @@ import sys
 import numpy as np
 import pytest
 
-from mbma_tables.errors import InputError, MbmaError
-from mbma_tables.plots import Curve, draw_compression, to_picture
+from mbma_tables.common.errors import InputError, MbmaError
+from mbma_tables.common.plots import Curve, draw_compression, to_picture
 
 GAP = np.array([3.0, 2.0, 1.0, 0.0])
 FORCE = np.array([0.0, 2e-5, 3e-4, 2e-2])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from helpers import random_map
 
-from mbma_tables.errors import InputError, OutOfRangeError
-from mbma_tables.reynolds import flow_conductance, open_ways
+from mbma_tables.common.errors import InputError, OutOfRangeError
+from mbma_tables.laws.reynolds import flow_conductance, open_ways
 
 POINTS = 96
 X = (np.arange(POINTS) + 0.5) / POINTS

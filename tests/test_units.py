@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbma_tables import InputError, Scene, Surface, contact, contact_law, island
+from mbma_tables.common.units import ALIASES, DIMENSIONS, SIZES, Units, factor, known, read, resolve, unit_of
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.units import ALIASES, DIMENSIONS, SIZES, Units, factor, known, read, resolve, unit_of
 
 # in metres and pascals, written down again: 1 in = 25.4 mm, 1 lbf = 4.4482216152605 N
 METRES = {"m": 1, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "angstrom": 1e-10, "pm": 1e-12}
@@ -253,7 +253,7 @@ def test_a_scene_file_with_units(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(
         SURFACE + 'h_max = "2.4 mm"\nlength_unit = "um"\n'
-        '[material]\nE_star = "0.1 GPa"\n[prescribed]\npressures = ["100 kPa", 2e-4]\n'
+        '[material]\nE_star = "0.1 GPa"\n[prescribed]\npressures = ["100 kPa", "200 kPa"]\n'
         '[effects]\non = ["force", "stiffness"]\n[accuracy]\nrtol = 1e-4\n'
     )
     found = Scene.from_toml(path).run()
@@ -312,7 +312,7 @@ def test_the_factor_is_rounded_once():
 @pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
 def test_a_contact_keeps_its_units(theory):
     plain = contact(CONCRETE, separation=[0.5, 0.2], E_star=13.3, theory=theory)
-    found = contact(CONCRETE.to("um"), separation=["0.5 mm", 200], E_star="0.0133 GPa", theory=theory)
+    found = contact(CONCRETE.to("um"), separation=["0.5 mm", "200 um"], E_star="0.0133 GPa", theory=theory)
     expected = {"separation": "um", "pressure": "GPa", "area": "1", "stiffness": "GPa/um", "energy": "GPa um"}
     assert expected.items() <= found.units.items()
     sizes = {"separation": 1e3, "pressure": 1e-3, "area": 1, "stiffness": 1e-6, "energy": 1, "mean_pressure": 1e-3}
@@ -353,7 +353,7 @@ def test_a_law_keeps_its_units(theory):
 
 def test_islands_take_units():
     plain = island(CONCRETE, [0.1, 0.3], E_star=13.3)
-    found = island(CONCRETE.to("um"), ["0.1 mm", 300.0], E_star="13.3 MPa")
+    found = island(CONCRETE.to("um"), ["0.1 mm", "300 um"], E_star="13.3 MPa")
     np.testing.assert_allclose(found.force, 1e6 * plain.force, rtol=1e-12)
 
 

@@ -17,9 +17,9 @@ from scipy.special import erfinv
 
 from generate.boundary_elements.solve import prepared
 from generate.boundary_elements.surfaces import Recipe, heights
-from mbma_tables.arguments import FloatArray
-from mbma_tables.bearing import wavevectors
-from mbma_tables.boundary_elements import CORRECTION
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.laws.bearing_curve import wavevectors
+from mbma_tables.laws.boundary_elements import CORRECTION
 
 TOLERANCE = 1e-6  # mean complementarity error over mean pressure times h_rms
 MAX_ITERATIONS = 3000

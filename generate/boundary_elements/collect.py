@@ -15,15 +15,15 @@ import xarray as xr
 from generate.boundary_elements import capped
 from generate.boundary_elements.design import SPLITS, Task
 from generate.provenance import source_digest, versions
-from mbma_tables import bearing
-from mbma_tables.boundary_elements import TOLERANCE
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
+from mbma_tables.laws import bearing_curve as bearing
+from mbma_tables.laws.boundary_elements import TOLERANCE
 
 MODULES = (
     "generate.boundary_elements.surfaces",
     "generate.boundary_elements.solve",
-    "mbma_tables.boundary_elements",
-    "mbma_tables.bearing",
+    "mbma_tables.laws.boundary_elements",
+    "mbma_tables.laws.bearing_curve",
 )
 
 # name: (dimension beside the surface, what it is); all are numbers without a unit
@@ -168,7 +168,7 @@ KEPT = {
         OF_LEAKAGE,
         "Flow through the gaps of random rough surfaces pressed flat, by boundary elements and Reynolds' equation",
         ". Loads end where both axes are blocked.",
-        (*MODULES, "mbma_tables.reynolds"),
+        (*MODULES, "mbma_tables.laws.reynolds"),
     ),
 }
 

@@ -13,10 +13,10 @@ from scipy.interpolate import PchipInterpolator
 from scipy.special import erf, erfinv
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, SPLITS, TRAINING
-from mbma_tables import hardness
-from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import Constants, Law, Spectrum
-from mbma_tables.calibrated_map import MapConstants, MapLaw
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.laws import hardness
+from mbma_tables.laws.calibrated import Constants, Law, Spectrum
+from mbma_tables.laws.map_curves import MapConstants, MapLaw
 from mbma_tables.theories.calibrated_curves import Curve
 
 GAUSSIAN = ("self_affine", "plateau", "filtered")

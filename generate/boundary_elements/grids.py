@@ -22,8 +22,8 @@ from generate.boundary_elements.design import HELD_OUT_SPECTRUM, campaign
 from generate.boundary_elements.solve import LOADS, Contact
 from generate.boundary_elements.surfaces import Recipe, heights
 from generate.timing import fixed_work
-from mbma_tables.bearing import bearing
-from mbma_tables.files import write_file
+from mbma_tables.common.files import write_file
+from mbma_tables.laws.bearing_curve import bearing
 
 HERE, TARGET = pathlib.Path("boundary_elements"), pathlib.Path("docs/data/boundary_element_grids.csv")
 CHOSEN = ((0.3, 12.0), (0.9, 12.0))  # H and zeta_1 of held-out spectra, their first surfaces

@@ -10,7 +10,7 @@ import numpy as np
 from generate.boundary_elements.capped import CappedContact, load_at
 from generate.boundary_elements.solve import Contact, prepared
 from generate.boundary_elements.surfaces import Recipe, heights
-from mbma_tables.reynolds import flow_conductance
+from mbma_tables.laws.reynolds import flow_conductance
 
 # F/(A0 E* g): 0.5% to 42% contact, where the last cells are blocked
 LOADS = (0.0025, 0.005, 0.01, 0.02, 0.035, 0.055, 0.08, 0.105, 0.13, 0.155, 0.18, 0.2, 0.22)

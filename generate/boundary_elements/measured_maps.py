@@ -10,7 +10,7 @@ import click
 import numpy as np
 
 from generate.boundary_elements.solve import pressed
-from mbma_tables.files import write_file
+from mbma_tables.common.files import write_file
 from mbma_tables.surfaces.maps import prepared
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories.simulated import continued

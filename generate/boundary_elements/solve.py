@@ -11,11 +11,18 @@ from typing import Any
 import numpy as np
 
 from generate.boundary_elements.surfaces import Recipe, heights
-from mbma_tables.arguments import FloatArray
-from mbma_tables.bearing import BANDS, RadialSpectrum, bearing, half_plane_weights, radial_spectrum, wavevectors
-from mbma_tables.boundary_elements import LOADS as LOADS
-from mbma_tables.boundary_elements import Contact as Contact
-from mbma_tables.errors import ConvergenceError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import ConvergenceError
+from mbma_tables.laws.bearing_curve import (
+    BANDS,
+    RadialSpectrum,
+    bearing,
+    half_plane_weights,
+    radial_spectrum,
+    wavevectors,
+)
+from mbma_tables.laws.boundary_elements import LOADS as LOADS
+from mbma_tables.laws.boundary_elements import Contact as Contact
 
 # beyond LOADS, where heavy tails of the gradient keep gaps open
 HIGHER_LOADS = (1.5, 2.1, 3.0)

@@ -10,7 +10,7 @@ import dataclasses
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 
 PATCH_WAVES = 2  # a patchy surface's amplitude varies over waves down to 1/PATCH_WAVES of its longest
 WORN_WIDTH = 0.3  # heights over which a worn surface's slope turns from 1 to WORN_SLOPE [h_rms]

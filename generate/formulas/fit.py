@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.models.closed_form_functions import Certificate
 
 DATA_DIGITS = 10

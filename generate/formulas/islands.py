@@ -20,7 +20,7 @@ import sympy
 from generate.formulas.fit import DATA_DIGITS, MAX_DIGITS, certificate, fewest_digits, least_largest, rounded
 from generate.formulas.printing import Form, Function, Step, evaluate, needed
 from generate.formulas.terms import FORCE, Fit, Samples, fit
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.height_integrals import height_integral
 

@@ -21,8 +21,8 @@ from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.precedence import PRECEDENCE
 
 import mbma_tables
-from mbma_tables.arguments import FloatArray
-from mbma_tables.files import write_file
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.files import write_file
 from mbma_tables.models.closed_form_functions import Certificate
 
 PACKAGE = pathlib.Path(mbma_tables.__file__).parent
@@ -50,7 +50,7 @@ from typing import NamedTuple
 
 from numpy import {", ".join(NUMPY_NAMES)}
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 
 
 class Certificate(NamedTuple):

@@ -27,7 +27,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MaxAbsScaler
 
 from generate.formulas.fit import least_largest, rounded, score
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 
 FORCE, AREA = 0, 1
 # Phi_rigid mu^-1/(limit of Phi) at large X: (pi/5) X^(5/2) over (4/3) X^(3/2)/sqrt(2), and (pi/2) X^2 over

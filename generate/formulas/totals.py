@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 from generate.formulas.fit import DATA_DIGITS, certificate, fewest_digits, least_largest, rounded, score
 from generate.formulas.printing import Form, Function, Step, evaluate, needed, steps_of
 from mbma_tables import Surface, contact
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 
 NAMES = ("force", "area")
 RANGES = {

@@ -10,8 +10,8 @@ import numpy as np
 from generate.boundary_elements.design import REFINEMENT, SPLITS
 from generate.pages.page import DATA, Measured, dataset, panels, spans, svg, table
 from mbma_tables import Surface
-from mbma_tables.calibrated import CONSTANTS
-from mbma_tables.files import shipped_file
+from mbma_tables.common.files import shipped_file
+from mbma_tables.laws.calibrated import CONSTANTS
 from mbma_tables.theories import THEORIES, get_theory
 
 SHOWN = {  # sets and forms of the accuracy table
@@ -67,7 +67,7 @@ def numbers(data: Any) -> str:
         rows.append((f"largest (99%) error of {what} by the table", f"{largest:.1e} ({most:.1e})"))
     for what, (one, two) in json.loads(facts["coverage"]).items():
         rows.append((f"held-out errors of {what} within one and two of the stated", f"{one:.0%}, {two:.0%}"))
-    return table(["what", "value"], rows)
+    return table(["quantity", "value"], rows)
 
 
 def bars(data: Any) -> str:
@@ -76,6 +76,8 @@ def bars(data: Any) -> str:
     def percent(value: float) -> str:
         return f"{100 * value:.1f}%" if np.isfinite(value) else "—"
 
+    large = "90% quantile on 512 and 1024 points a side"
+    header = ["case", "limit", "90% quantile", "mean", "surfaces", large, "lower bound"]
     rows = []
     for bar in json.loads(data.attrs["bars"]):
         over = bar["found"] - bar["limit"]
@@ -87,7 +89,7 @@ def bars(data: Any) -> str:
         ]
         cells += [f"{100 * bar['mean']:+.1f}%", str(bar["surfaces"])]
         rows.append([*cells, f"{percent(bar['large'])} ({bar['surfaces_large']})", percent(bar["noise"])])
-    return table(["what", "limit", "nine in ten", "mean", "surfaces", "of 512 and 1024 points a side", "floor"], rows)
+    return table(header, rows)
 
 
 def refinement(data: Any) -> str:

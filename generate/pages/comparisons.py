@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import erfinv
 
 from mbma_tables import Surface, theories
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 
 VARIANTS = {"MBMA reported": "reported", "MBMA printed": "printed"}
 PERSSON: dict[str, theories.Method] = {"Persson full": "full", "Persson simplified": "simplified"}

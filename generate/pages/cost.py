@@ -83,7 +83,7 @@ def rows_table(rows: Iterable[Row], front: Sequence[Row] = ()) -> str:
         error = "" if row.error is None else f"{row.error:.1e}"
         numbers = ["" if x is None else f"{x:.3g}" for x in (row.cost, row.evaluations)]
         cells.append([method(row), row.variant, error, *numbers, "front" if row in front else ""])
-    return table(["what", "asked", "largest error", "cost", "evaluations", ""], cells)
+    return table(["method", "variant", "largest error", "cost", "evaluations", ""], cells)
 
 
 def ranked(rows: Sequence[Row]) -> str:
@@ -107,7 +107,7 @@ def single_table(costs: Costs) -> str:
         [island_model, *(f"{min(own):.2f} to {max(own):.2f}" for own in found.values())]
         for island_model, found in ratios.items()
     ]
-    return table(["what", "force alone", "area alone"], cells)
+    return table(["method", "force alone", "area alone"], cells)
 
 
 def parts_of(costs: Costs, distances: Sequence[Distance]) -> dict[str, str]:

@@ -15,8 +15,8 @@ from generate.pages.distances import COVER, HIGH, HUES, ISLAND_MODELS, LOW, THEO
 from generate.pages.page import duration, panels, percent, read_csv, svg, table, to_csv
 from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
-from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import Law, Spectrum, area
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.laws.calibrated import Law, Spectrum, area
 from mbma_tables.scenes.costs import Distance
 from mbma_tables.theories import Persson
 
@@ -181,7 +181,7 @@ def to_table(rows: Sequence[Distance], unit: float) -> str:
         for row in rows
     ]
     kinds = [f"{what}, {ends}" for what in ("area", "force") for ends in ("1-10%", "10-97%")]
-    return table(["theory", "way", "a point", "once a surface", *kinds, "reached"], lines)
+    return table(["theory", "method", "time per point", "time per surface", *kinds, "reached"], lines)
 
 
 def draw(rows: Sequence[Distance], unit: float) -> bytes:

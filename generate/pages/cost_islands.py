@@ -12,13 +12,14 @@ from scipy.stats import qmc
 
 from generate.tables import chunks
 from generate.timing import measure, variant
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import ConvergenceError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.greenwood_tripp import iterate, radius, ring_matrix
-from mbma_tables.models import ISLAND_MODELS, answer_islands, get_model
+from mbma_tables.models import ISLAND_MODELS, answer_islands
 from mbma_tables.models.closed_forms import FormulaModel
+from mbma_tables.models.named import get_model
 from mbma_tables.scenes.costs import Row
 from mbma_tables.surfaces.variants import get_variant
 

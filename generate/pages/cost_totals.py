@@ -13,7 +13,7 @@ import numpy as np
 from generate.tables import chunks
 from generate.timing import GAPS, held_out_surfaces, measure, measured_gaps, variant
 from mbma_tables import Scene, Surface, contact, contact_law, theories
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.models import ISLAND_MODELS, IslandAnswer
 from mbma_tables.scenes.costs import Row
 
@@ -28,7 +28,7 @@ THEORY_LAW_RTOLS = (1e-3, 1e-5, 1e-7)
 SLOW_LAW_RTOLS = (1e-2, 1e-4)
 FIRST_USE = (
     "import mbma_tables, numpy, time; s = mbma_tables.Surface(0.74, 1.0, 330.0, 0.1, 0.3); t = time.process_time(); "
-    "mbma_tables.contact(s, 0.1, island_model={island_model!r}, rtol=1e-2); print(time.process_time() - t)"
+    "mbma_tables.contact(s, separation=0.1, island_model={island_model!r}, rtol=1e-2); print(time.process_time() - t)"
 )
 # keywords of `contact` by quantity, and the answers that these give
 QUANTITIES: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
@@ -76,7 +76,7 @@ def scene_rows() -> Iterator[Row]:
     surface = held_out_surfaces()[0]
     gap = 0.9 * float(surface.h_max)
     whole = measure(Scene(surface, effects=["force"], separations=gap, rtol=1e-4).run)[0]
-    step = measure(functools.partial(contact, surface, gap, rtol=1e-4, quantities=["force"]))[0]
+    step = measure(functools.partial(contact, surface, separation=gap, rtol=1e-4, quantities=["force"]))[0]
     yield Row("scene", "call", "both", None, max(whole - step, 0.0))
 
 
@@ -101,7 +101,7 @@ def gap_rows() -> Iterator[Row]:
                 run = functools.partial(gap_batch, island_model, rtol, **options)
                 count = sum(found.islands for found in run()) / (len(surfaces) * GAPS)
                 cost = max(measure(run)[0] / len(surfaces) - fixed, 1e-9) / GAPS
-                answers = [asked(surface, gap) for surface, gap, _ in reference()]
+                answers = [asked(surface, separation=gap) for surface, gap, _ in reference()]
                 error = largest_error([{name: getattr(found, name) for name in names} for found in answers])
                 yield Row(island_model, variant("gap", rtol), quantity, error, cost, count)
 

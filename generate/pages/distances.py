@@ -19,10 +19,10 @@ from generate.calibrated import QUANTITIES, errors
 from generate.calibrated_table import DEPTHS
 from generate.pages.page import DATA, evidence, read_csv
 from mbma_tables import Surface, theories
-from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import CONSTANTS, YANG_PERSSON, Law, Spectrum
-from mbma_tables.calibrated_map import MAP_CONSTANTS
-from mbma_tables.errors import MbmaError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import MbmaError
+from mbma_tables.laws.calibrated import CONSTANTS, YANG_PERSSON, Law, Spectrum
+from mbma_tables.laws.map_curves import MAP_CONSTANTS
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import matched
 from mbma_tables.surfaces.surface import MeasuredSurface

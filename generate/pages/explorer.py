@@ -108,5 +108,5 @@ def measure() -> Measured:
         tab = visit(opened, path.as_uri())
         tab.locator(".chart").first.hover(position={"x": 200, "y": 100})
         picture = tab.screenshot()
-    header = ["what", "median", "largest", "processor time of the page, median"]
+    header = ["quantity", "median", "largest", "processor time of the page, median"]
     return {"numbers": table(header, rows)}, {"docs/figures/explorer.png": picture}

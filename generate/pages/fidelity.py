@@ -88,7 +88,7 @@ def quoted_table() -> str:
         unit = {t: quoted for t in subject if isinstance(quoted, float)}
         cells = [show(values.get(t, np.nan), unit.get(t)) for t in THEORIES]
         rows.append([case, what, quoted if isinstance(quoted, str) else show(quoted), *cells])
-    return table(["case", "what", "paper", *THEORIES], rows)
+    return table(["case", "quantity", "paper", *THEORIES], rows)
 
 
 def summary_table(sets: Iterable[distances.DataSet]) -> str:

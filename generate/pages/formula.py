@@ -11,7 +11,7 @@ from generate.boundary_elements.design import TRAINING
 from generate.boundary_elements.evidence import MIN_WAVES
 from generate.formulas.printing import MODULE, latex_steps, read_functions
 from generate.pages.page import Measured, evidence, table
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.models.closed_form_functions import CERTIFICATES, RANGES
 
 SHOWN = ("pocket", "standard", "totals")

@@ -13,11 +13,11 @@ from scipy.signal import resample
 
 from generate.pages.page import ROOT, Measured, read_csv, svg, table, to_csv
 from mbma_tables import contact_law
-from mbma_tables.arguments import FloatArray
-from mbma_tables.boundary_elements import LOADS
-from mbma_tables.errors import MbmaError
-from mbma_tables.files import write_file
-from mbma_tables.measurement import curves, described, draw
+from mbma_tables.answers.measurement import curves, described, draw
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import MbmaError
+from mbma_tables.common.files import write_file
+from mbma_tables.laws.boundary_elements import LOADS
 from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import BoundaryElements, get_theory

@@ -15,7 +15,7 @@ from scipy.interpolate import BarycentricInterpolator
 
 from generate.pages.page import Measured, panels, svg, table
 from mbma_tables import greenwood_tripp
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands.greenwood_tripp import IslandSolution
 
 CASES = ((2.0, 0.1), (0.0, 1.0), (5.0, 1.0), (8.0, 0.3), (5.0, 4.0))

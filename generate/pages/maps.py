@@ -11,8 +11,8 @@ from generate.boundary_elements.surfaces import Recipe, heights
 from generate.pages.gallery import BARS, EXAMPLES, ratios, read_rows
 from generate.pages.page import DATA, Measured, dataset, table
 from mbma_tables import Surface, contact
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import MbmaError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import MbmaError
 from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import get_theory

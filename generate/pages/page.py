@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from mbma_tables.files import write_file
+from mbma_tables.common.files import write_file
 
 if TYPE_CHECKING:
     from generate.boundary_elements.evidence import Case
@@ -121,7 +121,7 @@ def svg(figure: Any) -> bytes:
     """A figure as the content of an SVG file, the same bytes for the same figure; closes it."""
     from matplotlib import pyplot
 
-    from mbma_tables.plots import to_picture
+    from mbma_tables.common.plots import to_picture
 
     content = to_picture(figure, "svg", dpi=100, outlines=True)
     pyplot.close(figure)

@@ -10,7 +10,7 @@ import numpy as np
 from generate.pages.formula import pocket_errors
 from generate.pages.page import Measured, duration, evidence, svg, table, unmarked
 from mbma_tables import Surface, contact
-from mbma_tables.plots import Curve, draw_compression, theory_label
+from mbma_tables.common.plots import Curve, draw_compression, theory_label
 from mbma_tables.scenes.costs import shipped_costs, shipped_distances
 
 SHOWN = ("self_affine", 0.7, 24.0, 5, 0.0)  # a held-out spectrum: kind, H, zeta_1, wavelengths a side, shape

@@ -20,10 +20,11 @@ from generate.pages import islands as another_program
 from generate.pages.page import Measured, panels, svg, table
 from generate.tables.exact_geometry import DOUBLES, divisor, exact_island
 from mbma_tables import Surface, contact, greenwood_tripp
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import MbmaError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import MbmaError
 from mbma_tables.islands.geometry import geometry
-from mbma_tables.models import answer_islands, get_model
+from mbma_tables.models import answer_islands
+from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.variants import Variant, get_variant
 from mbma_tables.totals.island_sum import kinks
 

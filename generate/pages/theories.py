@@ -6,7 +6,7 @@ import numpy as np
 
 from generate.pages.page import Measured, svg, table, unmarked
 from mbma_tables import Surface, contact
-from mbma_tables.plots import Curve, draw_compression, theory_label
+from mbma_tables.common.plots import Curve, draw_compression, theory_label
 from mbma_tables.theories import THEORIES, get_theory
 from mbma_tables.theories.protocol import answer_where_finite
 

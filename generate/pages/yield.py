@@ -13,8 +13,8 @@ from generate.boundary_elements.evidence import Capped, capped
 from generate.calibrated_hardness import BARS, blind
 from generate.pages.page import DATA, Measured, dataset, panels, spans, svg, table
 from mbma_tables import Surface, contact, materials
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import OutOfRangeError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.theories.calibrated_table import shipped_part
 from mbma_tables.totals.conductance import conductance
 

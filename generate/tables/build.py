@@ -17,8 +17,8 @@ from generate.splines import coefficients
 from generate.tables.chunks import ChunkedSolver
 from generate.tables.configuration import Configuration
 from generate.tables.writing import error_cells, labels_of_nodes
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import MbmaError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import MbmaError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models.island4d import at_places
 from mbma_tables.tablefiles.checks import check_content

@@ -16,9 +16,9 @@ import numpy as np
 from tqdm import tqdm
 
 from generate.provenance import SOLVER, source_digest, versions
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import MbmaError
-from mbma_tables.files import write_file
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import MbmaError
+from mbma_tables.common.files import write_file
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.tablefiles.netcdf import digest_arrays, digest_json
 

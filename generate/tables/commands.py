@@ -19,7 +19,7 @@ from generate.tables.configuration import MIN_SHIPPED_POINTS, Configuration, loa
 from generate.tables.island4d import Island4d
 from generate.tables.universal import Universal
 from generate.tables.writing import write_table
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL, TableContent
 
 TABLES = pathlib.Path(__file__).parents[2] / "tables"

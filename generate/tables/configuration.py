@@ -8,9 +8,9 @@ import pathlib
 import tomllib
 from typing import Any
 
-from mbma_tables.arguments import number_in, whole_number_in
-from mbma_tables.errors import InputError
-from mbma_tables.files import read_file
+from mbma_tables.common.arguments import number_in, whole_number_in
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.files import read_file
 from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.tablefiles.netcdf import digest_json
 from mbma_tables.tablefiles.schema import AXES, ISLAND4D, UNIVERSAL, Axis

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import mpmath
 
-from mbma_tables.files import write_file
+from mbma_tables.common.files import write_file
 
 TARGET = pathlib.Path(__file__).parents[2] / "mbma_tables" / "core" / "height_coefficients.h"
 HEADER = """\

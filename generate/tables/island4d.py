@@ -21,7 +21,7 @@ from generate.tables.build import ConformancePoints, UncertifiedError, evaluate
 from generate.tables.configuration import Configuration, make_axis
 from generate.tables.universal import MAX_DRAWS, visited_surfaces
 from generate.tables.writing import SYMBOLS, numbered
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, band_fields, from_axes, to_axes
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.height_integrals import height_integral

@@ -22,7 +22,7 @@ from generate.tables.build import (
 from generate.tables.chunks import ChunkedSolver, phi
 from generate.tables.configuration import Configuration
 from generate.tables.writing import SYMBOLS, labels_of_cells, numbered
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.models.universal import TERMS, UniversalModel, fractions_of_mu

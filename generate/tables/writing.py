@@ -13,9 +13,9 @@ import netCDF4
 import numpy as np
 
 from generate.provenance import MODULES, source_digest, versions
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import InputError, TableFileError
-from mbma_tables.files import write_file, written_bytes
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import InputError, TableFileError
+from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.tablefiles import schema
 from mbma_tables.tablefiles.checks import check_content
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, SEAL, attributes_digest, digest_arrays

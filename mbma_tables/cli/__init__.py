@@ -16,7 +16,7 @@ import click
 
 from mbma_tables import __version__
 from mbma_tables.cli import batch, commands, export, progress, scene, sensitivity, tables
-from mbma_tables.errors import MbmaError
+from mbma_tables.common.errors import MbmaError
 
 BAD_INPUT = 2
 INTERRUPTED = 130  # as shells report Ctrl-C

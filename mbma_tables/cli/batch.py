@@ -14,8 +14,8 @@ from mbma_tables.cli import options
 from mbma_tables.cli.commands import COLUMNS, contact_keywords
 from mbma_tables.cli.format import Report, shown_unit, to_columns
 from mbma_tables.cli.progress import doing
-from mbma_tables.errors import InputError
-from mbma_tables.files import read_file
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.files import read_file
 from mbma_tables.scenes.specimen import MATERIAL, NUMBERS, Specimen, effective_modulus_of, from_name, from_numbers
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface
@@ -51,7 +51,7 @@ def batch_command(
 
     Example: mbma batch surfaces.csv --pressure 1MPa --theory calibrated --csv --out answers.csv
     """
-    from mbma_tables.theories.contact import contact
+    from mbma_tables.answers.contact import contact
 
     try:
         lines = list(_lines(file))

@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from mbma_tables.arguments import finite_array
 from mbma_tables.cli import options
 from mbma_tables.cli.format import SURFACE_NUMBERS, Report, report_answer, shown_unit, to_columns, to_json
 from mbma_tables.cli.progress import echo
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import finite_array
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import unit_of
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.cases import CASES
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
+    from mbma_tables.answers.result import Contact
     from mbma_tables.scenes.steps import OtherTheory
-    from mbma_tables.theories.result import Contact
 
 MIN_DEPTH = 1e-3  # (h_max - d)/h_max at a curve's second point
 EVEN_FROM = 0.2  # and where its points, geometric so far, become evenly spaced
@@ -82,7 +82,7 @@ def contact_command(
     (name, numbers), *_ = loads.items()
     if over_h_rms and name in ("pressure", "area"):
         raise InputError(f"--over-h-rms is about lengths: leave it out with --{name}")
-    from mbma_tables.theories.contact import contact
+    from mbma_tables.answers.contact import contact
 
     asked = _numbers(name, numbers, specimen, over_h_rms)
     answer = contact(specimen.surface, **{name: asked}, **contact_keywords(model, specimen))
@@ -143,9 +143,9 @@ def curve_command(
     Example: mbma curve --surface concrete --plot concrete.png
     """
     options.check_plot(plot, output.out)
+    from mbma_tables.answers.contact import contact
     from mbma_tables.scenes.problem import COMPARED
     from mbma_tables.scenes.steps import other_theory
-    from mbma_tables.theories.contact import contact
 
     surface, asked = specimen.surface, contact_keywords(model, specimen)
     gap = curve_gaps(float(surface.h_max), points)
@@ -171,7 +171,7 @@ def curve_command(
 def _draw(
     specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory], kind: str, leakage: bool, title: str
 ) -> bytes:
-    from mbma_tables.plots import Curve, draw_compression, leakage_label, pressure_label, theory_label, to_picture
+    from mbma_tables.common.plots import Curve, draw_compression, leakage_label, pressure_label, theory_label, to_picture
 
     gap = np.asarray(answer.mean_separation / specimen.surface.h_rms)
     curves = [answer.curve(leakage)]
@@ -241,10 +241,10 @@ def fit_command(
     Example: mbma fit wafer.sur --short-cutoff 2um --plot wafer.png
     """
     options.check_plot(plot, output.out)
-    from mbma_tables.measurement import curves, described, draw, table_of_loads
-    from mbma_tables.plots import to_picture
+    from mbma_tables.answers.measurement import curves, described, draw, table_of_loads
+    from mbma_tables.common.plots import to_picture
+    from mbma_tables.common.units import Units, unit_of
     from mbma_tables.scenes.specimen import effective_modulus_of, measured
-    from mbma_tables.units import Units, unit_of
 
     modulus, stress_unit = effective_modulus_of({} if E_star is None else {"E_star": E_star})
     treated, surface = measured(measurement, treatment)

@@ -18,14 +18,14 @@ import numpy as np
 from mbma_tables import __version__
 from mbma_tables.cli.options import Model, Output
 from mbma_tables.cli.progress import echo
-from mbma_tables.files import write_file
+from mbma_tables.common.files import write_file
+from mbma_tables.common.units import Units, unit_of
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.roughness import ASSUMED
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.units import Units, unit_of
 
 if TYPE_CHECKING:
-    from mbma_tables.theories.result import Contact
+    from mbma_tables.answers.result import Contact
 
 DIGITS = 6  # significant digits of a table; JSON and CSV keep all
 SURFACE_NUMBERS = ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "m0", "m2", "m4", "alpha")

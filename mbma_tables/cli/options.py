@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 from mbma_tables.scenes.specimen import (
     MAP_OPTIONS,
     MATERIAL,

@@ -12,8 +12,8 @@ import click
 from mbma_tables.cli.format import Report, to_columns, to_json
 from mbma_tables.cli.options import check_plot, json_option, plot_option
 from mbma_tables.cli.progress import doing, echo
-from mbma_tables.errors import InputError
-from mbma_tables.files import write_file, written_bytes
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.files import write_file, written_bytes
 
 if TYPE_CHECKING:
     import xarray
@@ -111,7 +111,7 @@ def _report(found: xarray.Dataset) -> Report:
 
 
 def _picture(found: xarray.Dataset, kind: str) -> bytes:
-    from mbma_tables.plots import Curve, draw_compression, pressure_label, theory_label, to_picture
+    from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label, to_picture
 
     gap = found["mean_separation"].values / found.attrs["surface_h_rms"]
     variant = found.attrs["variant"]

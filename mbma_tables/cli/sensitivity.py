@@ -9,7 +9,7 @@ import click
 
 from mbma_tables.cli import options
 from mbma_tables.cli.format import Column, Report, shown_unit, to_columns
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 from mbma_tables.scenes.specimen import Specimen
 
 
@@ -40,7 +40,7 @@ def sensitivity_command(
 
     Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa --range h_max=1:1.5 --range hurst=0.6:0.8
     """
-    from mbma_tables.theories.unknowns import sensitivity
+    from mbma_tables.answers.sensitivity import sensitivity
 
     asked = vars(model).copy()
     if asked.pop("hardness") != math.inf:

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from mbma_tables.cli.progress import echo
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 
 
 def _path(name: str) -> Path:

@@ -25,7 +25,13 @@ def _load() -> Any:
     wanted = os.environ.get("MBMA_TABLES_CORE")
     if wanted:
         return importlib.import_module(f"mbma_tables.core._{wanted}")
-    plain = importlib.import_module("mbma_tables.core._plain")
+    try:
+        plain = importlib.import_module("mbma_tables.core._plain")
+    except ModuleNotFoundError as missing:
+        raise ImportError(
+            f"the compiled core is not in {os.path.dirname(__file__)}: start Python outside of the checkout, or "
+            "install it there with `pip install -e .`"
+        ) from missing
     best = next(name for name, least in GENERATIONS.items() if plain.generation >= least)
     return plain if best == "plain" else importlib.import_module(f"mbma_tables.core._{best}")
 

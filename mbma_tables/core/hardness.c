@@ -1,7 +1,7 @@
 /* Contact whose pressure cannot exceed a hardness, from the elastic contact of the same surface.
  *
  * Lengths are in h_rms, forces in A0 E* g with g the rms gradient, hardnesses as eta = p_m/(E* g). The law is in
- * mbma_tables/hardness.py: force is closed between the elastic force and the bearing curve, area is that of pressures
+ * mbma_tables/laws/hardness.py: force is closed between the elastic force and the bearing curve, area is that of pressures
  * that diffuse between walls at zero and at the hardness.
  *
  * SPDX-License-Identifier: BSD-3-Clause. Copyright (c) 2026, mbma_tables contributors.

@@ -229,45 +229,59 @@ void mbma_profile_series(const mbma_rules *rules, size_t panels, const int64_t *
     }
 }
 
-/* Rows of a panel at one compression, and perhaps slopes; two rows alone are the most frequent, and constants then. */
-MBMA_INLINE void totals_at(double c, size_t panels, const double *edges, const double *series, int rows, bool slopes,
-                           double *out, size_t stride) {
-    /* the panel by halves, without branches that nothing foretells */
+/* The panel of a compression, by halves, without branches that nothing foretells. */
+MBMA_INLINE size_t panel_at(double c, size_t panels, const double *edges) {
     size_t first = 0, left = panels;
     while (left > 1) {
         const size_t half = left / 2;
         first += edges[first + half] <= c ? half : 0;
         left -= half;
     }
-    const double low = edges[first], high = edges[first + 1], width = high - low, x = (2.0 * c - low - high) / width;
-    const double *const own = series + first * (size_t)rows * TERMS;
-    double sums[ROWS], steep[ROWS];
-    series_at(own, rows, TERMS, x, sums, slopes ? steep : NULL);
-    /* beyond the profile, and for NaN, there is no answer */
-    const bool inside = c > 0.0 && x <= 1.0 + 1e-12 * high / width;
-    const double none = c <= 0.0 ? 0.0 : NAN;
-    for (int row = 0; row < rows; row++) {
-        const double begun = first == 0 ? c * lead(2.0, row, c) : 1.0;
-        double sum = mbma_exp(sums[row]) * begun;
-        /* subnormal numbers, digit by digit */
-        if (!(sums[row] > LEAST_LOG && sum > 1e-290))
-            sum = exp(sums[row] + (first == 0 ? BEGUN[row] * log(c) : 0.0));
-        out[(size_t)row * stride] = inside ? sum : none;
-        if (slopes)
-            out[(size_t)(rows + row) * stride] =
-                inside ? sum * (2.0 * steep[row] / width + (first == 0 ? BEGUN[row] / c : 0.0)) : none;
-    }
+    return first;
 }
 
 void mbma_profile_totals(size_t n, const double *compression, size_t panels, const double *edges, const double *series,
                          int rows, int slopes, double *out) {
-    for (size_t k = 0; k < n; k++)
-        if (slopes)
-            totals_at(compression[k], panels, edges, series, rows, true, out + k, n);
-        else if (rows == 2)
-            totals_at(compression[k], panels, edges, series, 2, false, out + k, n);
-        else
-            totals_at(compression[k], panels, edges, series, rows, false, out + k, n);
+    double logs[ROWS][CHUNK], steep[ROWS][CHUNK], value[CHUNK], x[CHUNK], width[CHUNK];
+    size_t panel[CHUNK];
+    for (size_t start = 0; start < n; start += CHUNK) {
+        const double *const c = compression + start;
+        const size_t count = n - start < CHUNK ? n - start : CHUNK;
+        for (size_t k = 0; k < count; k++) {
+            double sums[ROWS], steeps[ROWS];
+            panel[k] = panel_at(c[k], panels, edges);
+            const double low = edges[panel[k]], high = edges[panel[k] + 1];
+            const double *const own = series + panel[k] * (size_t)rows * TERMS;
+            width[k] = high - low;
+            x[k] = (2.0 * c[k] - low - high) / width[k];
+            if (!slopes && rows == 2) /* the most frequent, with constants */
+                series_at(own, 2, TERMS, x[k], sums, NULL);
+            else
+                series_at(own, rows, TERMS, x[k], sums, slopes ? steeps : NULL);
+            for (int row = 0; row < rows; row++) {
+                logs[row][k] = sums[row];
+                steep[row][k] = slopes ? steeps[row] : 0.0;
+            }
+        }
+        for (int row = 0; row < rows; row++) {
+            for (size_t k = 0; k < count; k++)
+                value[k] = mbma_exp(logs[row][k]);
+            for (size_t k = 0; k < count; k++) {
+                const bool begins = panel[k] == 0;
+                double sum = value[k] * (begins ? c[k] * lead(2.0, row, c[k]) : 1.0);
+                /* subnormal numbers, digit by digit */
+                if (!(logs[row][k] > LEAST_LOG && sum > 1e-290))
+                    sum = exp(logs[row][k] + (begins ? BEGUN[row] * log(c[k]) : 0.0));
+                /* beyond the profile, and for NaN, there is no answer */
+                const bool inside = c[k] > 0.0 && x[k] <= 1.0 + 1e-12 * edges[panel[k] + 1] / width[k];
+                const double none = c[k] <= 0.0 ? 0.0 : NAN;
+                out[(size_t)row * n + start + k] = inside ? sum : none;
+                if (slopes)
+                    out[(size_t)(rows + row) * n + start + k] =
+                        inside ? sum * (2.0 * steep[row][k] / width[k] + (begins ? BEGUN[row] / c[k] : 0.0)) : none;
+            }
+        }
+    }
 }
 
 /* Bound on the relative error of one panel: of what it interpolates, against islands, and of its sums. */

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 
 from mbma_tables import __version__
-from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import LAW_ERROR, YANG_PERSSON
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import InputError
 from mbma_tables.export.text import core_file, filled, opening
+from mbma_tables.laws.calibrated import LAW_ERROR, YANG_PERSSON
 from mbma_tables.models import closed_form_functions
 from mbma_tables.models.universal import RECORD, UniversalModel
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1

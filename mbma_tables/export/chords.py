@@ -12,8 +12,8 @@ from decimal import ROUND_CEILING, Context
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, number_in, whole_number_in
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray, number_in, whole_number_in
+from mbma_tables.common.errors import InputError
 from mbma_tables.export.text import DIGITS, number
 
 MIN_ROWS, MAX_ROWS = 3, 5000

@@ -14,12 +14,12 @@ import tempfile
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.files import write_file
 from mbma_tables.export import CODE, c_code
 from mbma_tables.export.conformance import KINDS, POINTS_FILE, points_text
 from mbma_tables.export.interfaces import Declared, fortran_interface, javascript_interface
 from mbma_tables.export.text import filled, opening
-from mbma_tables.files import write_file
 from mbma_tables.models.tables import open_table
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.variants import Variant, get_variant

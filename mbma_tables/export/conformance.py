@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.answers.contact import contact
+from mbma_tables.answers.result import Contact
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.export.c_code import FORM
 from mbma_tables.export.text import comment
 from mbma_tables.islands.geometry import FIELDS, geometry
@@ -21,8 +23,6 @@ from mbma_tables.models.closed_forms import FUNCTIONS
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories.contact import contact
-from mbma_tables.theories.result import Contact
 
 Rows = Iterator[str]
 POINTS_FILE = "mbma_conformance.csv"

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import finite_array, needed, number_in
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import finite_array, needed, number_in
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.files import written_bytes
 from mbma_tables.export.law_rows import LawTable
 from mbma_tables.export.text import checked_name, comment, csv_cell
-from mbma_tables.files import written_bytes
 
 MAX_MATLAB_NAME = 63
 READER = """function y = {name}(x)

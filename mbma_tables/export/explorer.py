@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import base64
 import html
-import importlib.resources
 import json
 import re
 import zlib
@@ -17,16 +16,18 @@ from typing import Any
 import numpy as np
 
 from mbma_tables import __version__
-from mbma_tables.arguments import number_in, positive_modulus
-from mbma_tables.calibrated import TESTED_AREA
-from mbma_tables.errors import InputError
+from mbma_tables.answers import source
+from mbma_tables.common.arguments import number_in, positive_modulus
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import Units
 from mbma_tables.export import c_code
+from mbma_tables.export.text import page_file
+from mbma_tables.laws.calibrated import TESTED_AREA
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import FITTED, PRINTED, REPORTED, get_variant
-from mbma_tables.theories import calibrated, calibrated_table, mbma, source
-from mbma_tables.units import Units
+from mbma_tables.theories import calibrated, calibrated_table, mbma
 
 MODULE = "explorer.wasm"
 THEORIES = ("mbma", "calibrated", "persson")
@@ -39,11 +40,6 @@ MAP_NOTE = (
     "By the map's spectrum and h_max alone: in Python the calibrated law goes by its heights, too, and is nearer."
 )
 MAX_SAMPLES = 500  # of a spectrum, for a step of a slider to stay short
-
-
-def page_file(name: str) -> bytes:
-    """A file of the page's sources."""
-    return (importlib.resources.files("mbma_tables.export") / "page" / name).read_bytes()
 
 
 def packed(values: Any) -> dict[str, Any]:

@@ -9,13 +9,13 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from mbma_tables import __version__
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import factor
 from mbma_tables.export.joint import Joint
 from mbma_tables.export.law_code import MORE, AskedLaw, asked_law, code_name, text_of
 from mbma_tables.export.law_numbers import LawNumbers
 from mbma_tables.export.text import filled
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.units import factor
 
 # what the C of both standards calls by different names
 STANDARDS = {

@@ -9,19 +9,19 @@ from typing import Any
 import numpy as np
 
 from mbma_tables import __version__
-from mbma_tables.arguments import FloatArray, Numbers, number_in
-from mbma_tables.errors import InputError
+from mbma_tables.answers.contact import contact
+from mbma_tables.answers.result import Contact
+from mbma_tables.common.arguments import FloatArray, Numbers, number_in
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import Units, factor, in_unit, resolve
+from mbma_tables.law.law import ContactLaw
+from mbma_tables.law.make import contact_law
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import get_theory
-from mbma_tables.theories.contact import contact
-from mbma_tables.theories.law import contact_law
-from mbma_tables.theories.law_object import ContactLaw
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
-from mbma_tables.theories.result import Contact
-from mbma_tables.units import Units, factor, in_unit, resolve
 
 LAW_RTOL = 1e-8
 LOOKED_AT = 200  # compressions at which validity and scatter are looked at

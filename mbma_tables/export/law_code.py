@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
 import functools
 import math
@@ -11,15 +12,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import InputError
 from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
 from mbma_tables.export.law_languages import FORTRAN_FUNCTION, FORTRAN_INTERFACE, LANGUAGES, Columns, Language
 from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers, flow_numbers, law_numbers
-from mbma_tables.export.text import checked_name, core_file, filled, opening, template, wrapped
+from mbma_tables.export.text import checked_name, core_file, filled, opening, page_file, template, wrapped
+from mbma_tables.law import block as at
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories import law_block as at
 
+LAW_MODULE = "law.wasm"  # the core's laws for JavaScript
 MAX_NAME = 31  # letters, as Fortran and C99 read them
 MORE = ("conductance", "leakage")  # asked for
 FUNCTIONS = ("pressure", "tangent", "with_tangent", "curvature", "area", "energy", "overclosure", *MORE)
@@ -137,7 +139,7 @@ def text_of(target: str, name: str, asked: AskedLaw) -> str:
         **{quantity.upper(): asked.more.get(quantity, "") and language.number(asked.ratio) for quantity in MORE},
     }
     if language.arrays is None:
-        parts |= _core(name, asked, language.number)
+        parts |= _core(target, name, asked, language.number)
     else:
         parts |= _numbers("", numbers, {"p": numbers.force, "a": numbers.area}, language, language.arrays)
         if flow:
@@ -147,18 +149,24 @@ def text_of(target: str, name: str, asked: AskedLaw) -> str:
     return filled(language.template, **parts)
 
 
-def _core(name: str, asked: AskedLaw, number: Callable[[float], str]) -> dict[str, str]:
-    """The core's C and the law's own blocks, and what the glue about them needs."""
+def _core(target: str, name: str, asked: AskedLaw, number: Callable[[float], str]) -> dict[str, str]:
+    """The core, as C or compiled, the law's own blocks, and what the glue about them needs."""
     law, numbers = asked.joint.law, asked.numbers
     first = 0.0 if numbers.ends else (law.h_max - law.highest) / 2
     ends = {"H_MAX": law.h_max, "FIRST": first, "TURN": numbers.c_turn}
-    parts = {place: number(value) for place, value in ends.items()} | {"CORE": core_text(["law.c"], name)}
-    whats = [what for what in FUNCTIONS if what != "with_tangent" and (what in asked.more or what not in MORE)]
-    parts["INTERFACES"] = "\n".join(FORTRAN_INTERFACE.format(name=name, what=what) for what in whats)
-    parts["FUNCTIONS"] = "\n".join(FORTRAN_FUNCTION.format(what=what) for what in whats)
+    ends |= {"C_LEAST": numbers.c_least, "C_MOST": numbers.c_most}
+    parts = {place: number(value) for place, value in ends.items()}
     blocks = {"": law.block}
     if asked.flow:
         blocks["FLOW_"], parts["FLOW_H_RMS"] = law.leakage.block, number(asked.flow.h_rms)
+    if target == "javascript-law":
+        held = {"WASM": page_file(LAW_MODULE)}
+        held |= {f"{prefix}BLOCK": block.astype("<f8", copy=False).tobytes() for prefix, block in blocks.items()}
+        return parts | {place: base64.b64encode(content).decode("ascii") for place, content in held.items()}
+    parts["CORE"] = core_text(["law.c"], name)
+    whats = [what for what in FUNCTIONS if what != "with_tangent" and (what in asked.more or what not in MORE)]
+    parts["INTERFACES"] = "\n".join(FORTRAN_INTERFACE.format(name=name, what=what) for what in whats)
+    parts["FUNCTIONS"] = "\n".join(FORTRAN_FUNCTION.format(what=what) for what in whats)
     for prefix, block in blocks.items():
         rows, records = block_rows(block)
         parts |= {f"{prefix}ROWS": str(rows), f"{prefix}RECORDS": str(records), f"{prefix}DATA": block_text(block)}

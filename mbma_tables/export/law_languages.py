@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.export.text import wrapped
 
 # steps of coefficients over the least value and the least slope of a polynomial; flatter ones count as so steep
@@ -43,7 +43,7 @@ class Language(NamedTuple):
 
 
 def _lists(prefix: str, columns: Columns, polynomials: Columns) -> dict[str, str]:
-    """Arrays in brackets, as Python and JavaScript have them."""
+    """Arrays in brackets, as Python has them."""
     flat = {name: f"[{wrapped(map(repr, column.tolist()))}]" for name, column in columns.items()}
     rows = {name: f"[\n{_lines(_decimals(rows), '[', '],')}\n]" for name, rows in polynomials.items()}
     return {f"{prefix}{name}".upper(): text for name, text in (flat | rows).items()}
@@ -135,10 +135,10 @@ LANGUAGES = {
         "law.mjs",
         "/*",
         "An ECMAScript module: import {{ pressure, withTangent, area, energy, overclosure }} from './{name}.mjs'. "
-        "Outside the range a RangeError, of what is no number a TypeError is thrown.",
+        "The C of the library itself as WebAssembly. Outside the range a RangeError is thrown, of what is no number a "
+        "TypeError.",
         "{what}({x})",
         _with_infinity("-Infinity"),
-        _lists,
     ),
     "python-law": Language(
         "law.py",

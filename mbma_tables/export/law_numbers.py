@@ -19,11 +19,11 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.theories import law_block as at
-from mbma_tables.theories.law_block import AREA_AT, CENTRE, ENERGY_AT, FORCE_AT, POWER_F, RATE, SCALE
-from mbma_tables.theories.law_leakage import LeakageLaw
-from mbma_tables.theories.law_object import ROUNDING, ContactLaw
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.law import block as at
+from mbma_tables.law.block import AREA_AT, CENTRE, ENERGY_AT, FORCE_AT, POWER_F, RATE, SCALE
+from mbma_tables.law.law import ROUNDING, ContactLaw
+from mbma_tables.law.leakage import LeakageLaw
 
 
 @dataclasses.dataclass(frozen=True)

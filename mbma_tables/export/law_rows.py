@@ -13,19 +13,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, hinted, number_in, one_number
-from mbma_tables.display import Displayed, Variable, shown
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray, hinted, number_in, one_number
+from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.plots import draw_lines
+from mbma_tables.common.units import Units
 from mbma_tables.export.chords import chosen_rows
 from mbma_tables.export.joint import Joint, checked_conductivity, frozen_joint
-from mbma_tables.leakage import LARGEST_AREA
-from mbma_tables.plots import draw_lines
+from mbma_tables.law.law import ROUNDING, ContactLaw
+from mbma_tables.laws.effective_medium import LARGEST_AREA
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories.law_object import ROUNDING, ContactLaw
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.totals.conductance import conductance
-from mbma_tables.units import Units
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

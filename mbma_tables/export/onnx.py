@@ -8,7 +8,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyder
 
 from mbma_tables import __version__
-from mbma_tables.arguments import FloatArray, needed
+from mbma_tables.common.arguments import FloatArray, needed
 from mbma_tables.export.law_code import MAX_NAME, AskedLaw, asked_law
 from mbma_tables.export.law_numbers import FlowNumbers, LawNumbers
 from mbma_tables.export.text import checked_name

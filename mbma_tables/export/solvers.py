@@ -10,12 +10,12 @@ import math
 import numpy as np
 
 from mbma_tables import __version__
-from mbma_tables.arguments import whole_number_in
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import whole_number_in
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import in_unit, modulus_and_units
 from mbma_tables.export.law_rows import LawTable
 from mbma_tables.export.text import DIGITS, checked_name, comment, number
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.units import in_unit, modulus_and_units
 
 MAX_CALCULIX_ROWS = 200
 MAX_CALCULIX_CONDUCTANCES = 20  # of more, 2.20 keeps the last twenty, without a message

@@ -7,7 +7,7 @@ import re
 import textwrap
 from collections.abc import Iterable
 
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 
 COMMENT_WIDTH = 108
 DIGITS = 10  # of the numbers in a law's file
@@ -71,6 +71,11 @@ def template(name: str) -> str:
 def core_file(name: str) -> str:
     """A file of the core, as the library is compiled from it."""
     return (importlib.resources.files("mbma_tables.core") / name).read_text(encoding="utf-8")
+
+
+def page_file(name: str) -> bytes:
+    """A file of the explorer's page, or a compiled module beside it."""
+    return (importlib.resources.files("mbma_tables.export") / "page" / name).read_bytes()
 
 
 def filled(name: str, **parts: str) -> str:

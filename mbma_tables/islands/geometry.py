@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import OutOfRangeError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.surfaces.power_laws import Place
 from mbma_tables.surfaces.spectrum import BROADENING, RADIUS, alpha_of, m0_of, m4_of, summit_rate
 from mbma_tables.surfaces.surface import MeasuredSurface

@@ -19,9 +19,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, number_in, require, whole_number_in
+from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, number_in, require, whole_number_in
+from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.core import core, in_blocks
-from mbma_tables.errors import ConvergenceError, InputError
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.islands.spectral import basis
 

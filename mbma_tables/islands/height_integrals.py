@@ -14,9 +14,9 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import answered, finite_array
+from mbma_tables.common.arguments import answered, finite_array
+from mbma_tables.common.errors import InputError
 from mbma_tables.core import core
-from mbma_tables.errors import InputError
 
 ORDERS = (0.5, 1.0, 1.5, 2.0, 2.5)
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import legendre
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 
 
 class Basis(NamedTuple):

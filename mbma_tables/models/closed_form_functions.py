@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from numpy import exp, log, pi, sqrt, where
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 
 
 class Certificate(NamedTuple):

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, positive_modulus, require
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, positive_modulus, require
+from mbma_tables.common.errors import InputError
 from mbma_tables.models import BOTH, IslandAnswer
 from mbma_tables.models import closed_form_functions as printed
 from mbma_tables.models.closed_form_functions import CERTIFICATES, RANGES

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.common.display import Displayed, Variable
+from mbma_tables.common.errors import InputError, OutOfRangeError
+from mbma_tables.common.plots import draw_lines
 from mbma_tables.core import core, in_blocks
-from mbma_tables.display import Displayed, Variable
-from mbma_tables.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import SPHERE_FLOOR, Coordinates, band_fields, to_axes
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
-from mbma_tables.plots import draw_lines
 from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.tablefiles.schema import TableContent, error_cell
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import TableFileError
-from mbma_tables.files import shipped_file
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import TableFileError
+from mbma_tables.common.files import shipped_file
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.four_numbers import to_axes
 from mbma_tables.models.island4d import Island4dModel

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, require
+from mbma_tables.common.display import Displayed, Variable
+from mbma_tables.common.errors import TableFileError
+from mbma_tables.common.plots import draw_lines
 from mbma_tables.core import core, in_blocks
-from mbma_tables.display import Displayed, Variable
-from mbma_tables.errors import TableFileError
 from mbma_tables.models import BOTH, SOLVER, IslandAnswer, check_outside
-from mbma_tables.plots import draw_lines
 from mbma_tables.tablefiles.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import math
 import pathlib
 from typing import Any, NamedTuple
 
-from mbma_tables.files import shipped_file
+from mbma_tables.common.files import shipped_file
 
 UNIT = "unit"
 TEXTS = ("island_model", "variant", "quantity", "theory", "way")  # fields that are no numbers

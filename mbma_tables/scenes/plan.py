@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 from mbma_tables.scenes.costs import Costs, shipped_costs
 from mbma_tables.scenes.problem import INVERTED, OF_LAW, OUTPUTS, REFINEMENTS, Problem
 
@@ -217,12 +217,12 @@ class _Planner:
         fewest = MIN_LAW_GAPS.get(_name(self.island_model(self.rtol)), MIN_LAW_GAPS_OF_OTHERS)
         if self.count < fewest or "finite_height" in self.problem.dropped:
             return False
-        from mbma_tables.theories.law import MIN_LAW_RTOL
+        from mbma_tables.law.make import MIN_LAW_RTOL
 
         return (1 - ISLAND_SHARE) * self.rtol >= MIN_LAW_RTOL
 
     def law(self, why: Sequence[str]) -> Step:
-        from mbma_tables.theories.law import MIN_LAW_RTOL
+        from mbma_tables.law.make import MIN_LAW_RTOL
 
         inverse = self.problem.prescribed in INVERTED
         slopes = self.problem.outputs & {"stiffness", "conductance"}

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbma_tables.arguments import finite_array, nearest, number_in, require, whole_number_in
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import finite_array, nearest, number_in, require, whole_number_in
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import Units, in_unit, known, modulus_and_units
 from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.theories import THEORIES, get_theory
-from mbma_tables.units import Units, in_unit, known, modulus_and_units
 
 if TYPE_CHECKING:
     from mbma_tables.models import AnyModel

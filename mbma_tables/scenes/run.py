@@ -7,15 +7,15 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-from mbma_tables.errors import ConvergenceError
+from mbma_tables.answers.source import MEANINGS
+from mbma_tables.common.errors import ConvergenceError
+from mbma_tables.common.units import unit_of
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.scenes.plan import Plan
 from mbma_tables.scenes.problem import CORRELATIONS, INVERTED, Problem
 from mbma_tables.scenes.steps import STEPS, TABLES, Progress, Run, comparison
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.variants import get_variant
-from mbma_tables.theories.source import MEANINGS
-from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbma_tables.arguments import finite_array, needed
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import finite_array, needed
+from mbma_tables.common.errors import InputError
 from mbma_tables.scenes.costs import shipped_costs
 from mbma_tables.scenes.plan import Plan, duration, make_plan, seconds_by_theory
 from mbma_tables.scenes.problem import INVERTED, PRESCRIBED, Problem
@@ -46,7 +46,7 @@ class Scene(Problem):
         Effective modulus; stresses come out in its unit. 1 gives them over E*. A text has its unit: "100 GPa".
     hardness : float or str, optional
         Largest pressure that the softer body bears, in the unit of `E_star`, for "yield": the theory's elastic answer
-        goes through `mbma_tables.hardness`, and conductance is that of the frozen contact.
+        goes through `mbma_tables.laws.hardness`, and conductance is that of the frozen contact.
     rtol : float, optional
         Relative error asked for, in [1e-10, 0.1]; 1e-6 where no `seconds` are given either, 1e-4 of other theories.
     seconds : float, optional
@@ -189,8 +189,8 @@ def advice(problem: Problem) -> str:
     contacts = _contacts(problem) if problem.theory == "mbma" and asked else np.empty(0)
     if not contacts.size:
         return ""
+    from mbma_tables.answers.contact import contact
     from mbma_tables.theories.calibrated_table import shipped
-    from mbma_tables.theories.contact import contact
     from mbma_tables.theories.mbma import Mbma
 
     # stiffness first: it is the more telling where both are asked
@@ -225,7 +225,7 @@ def _size(spread: float) -> str:
 
 def _contacts(problem: Problem) -> Any:
     """Contact fractions that the calibrated law expects where surfaces touch."""
-    from mbma_tables.calibrated import area
+    from mbma_tables.laws.calibrated import area
     from mbma_tables.theories import get_theory
 
     surface, known = problem.surface, problem.gaps

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbma_tables.arguments import nearest, one_number, require
-from mbma_tables.errors import InputError
-from mbma_tables.files import read_file
+from mbma_tables.common.arguments import nearest, one_number, require
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.files import read_file
+from mbma_tables.common.units import Units, factor, in_unit, known, resolve
 from mbma_tables.materials import effective_modulus
 from mbma_tables.surfaces.cases import get_case
 from mbma_tables.surfaces.roughness import ROUGHNESS
@@ -24,7 +25,6 @@ from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.treatment import OPTIONS, Treated
-from mbma_tables.units import Units, factor, in_unit, known, resolve
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.any_surface import AnySurface

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import OutOfRangeError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.scenes.plan import Step
 from mbma_tables.scenes.problem import CORRELATIONS, INVERTED, Problem
 
 if TYPE_CHECKING:
+    from mbma_tables.answers.result import Contact
+    from mbma_tables.law.law import ContactLaw
     from mbma_tables.surfaces.any_surface import AnySurface
-    from mbma_tables.theories.law_object import ContactLaw
     from mbma_tables.theories.protocol import Theory
-    from mbma_tables.theories.result import Contact
 
 Progress = Callable[[str, int, int], None]
 TABLES = ("universal", "island4d")  # island models that are tables
@@ -49,7 +49,7 @@ class Run:
 
 def _law(run: Run, step: Step) -> None:
     """Through a law, for MBMA one tight enough for the slopes and gaps that are asked."""
-    from mbma_tables.theories.law import MIN_LAW_RTOL, contact_law
+    from mbma_tables.law.make import MIN_LAW_RTOL, contact_law
 
     problem, wanted = run.problem, run.problem.outputs
     assert step.rtol is not None
@@ -113,7 +113,7 @@ def _keep(run: Run, quantity: Callable[[str], Any]) -> None:
 
 def _contact(run: Run, step: Step) -> None:
     """Another theory, or one with a hardness, at the gaps themselves."""
-    from mbma_tables.theories.contact import contact
+    from mbma_tables.answers.contact import contact
 
     problem = run.problem
     assert problem.prescribed is not None
@@ -133,7 +133,7 @@ def _contact(run: Run, step: Step) -> None:
 
 def _asked(run: Run) -> Contact:
     """The scene's contact, with what follows from it."""
-    from mbma_tables.theories.contact import contact
+    from mbma_tables.answers.contact import contact
     from mbma_tables.theories.mbma import Mbma
 
     problem = run.problem
@@ -169,7 +169,7 @@ def _slope_error(law: ContactLaw, gap: Any, inverted: bool) -> float:
 
 
 def _totals(run: Run, step: Step) -> None:
-    from mbma_tables.theories.contact import contact
+    from mbma_tables.answers.contact import contact
 
     problem = run.problem
     assert step.rtol is not None

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.display import Displayed, Variable, shown
-from mbma_tables.errors import InputError
-from mbma_tables.plots import draw_lines
+from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.plots import draw_lines
+from mbma_tables.common.units import Units, factor, unit_of
 from mbma_tables.surfaces import spectrum
-from mbma_tables.units import Units, factor, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

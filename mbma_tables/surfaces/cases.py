@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from math import pi
 
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,6 +55,6 @@ CASES = {
 
 def get_case(name: str) -> Case:
     """The case of that name."""
-    if name not in CASES:
+    if not isinstance(name, str) or name not in CASES:
         raise InputError(f"no surface is named {name!r}; there are {', '.join(CASES)}")
     return CASES[name]

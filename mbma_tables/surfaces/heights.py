@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, finite_array, one_number, require
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray, finite_array, one_number, require
+from mbma_tables.common.errors import InputError
 
 _TAIL = np.logspace(-6, -1, 61)[:-1]
 SHARES = np.concatenate([[0.0], _TAIL, np.linspace(0.1, 0.9, 81), 1 - _TAIL[::-1], [1.0]])  # of a surface, from its top

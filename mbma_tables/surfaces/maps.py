@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables import bearing
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import InputError, NotSelfAffineError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import InputError, NotSelfAffineError
+from mbma_tables.common.units import Units, factor, known, resolve
+from mbma_tables.laws import bearing_curve as bearing
 from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.measurements import grid_of, read_measurement
 from mbma_tables.surfaces.power_law import SCATTER, log_bins
@@ -21,7 +22,6 @@ from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.psd import check_band, fit_spectrum
 from mbma_tables.surfaces.spectral import SpectralSurface
 from mbma_tables.surfaces.treatment import LENGTHS, MIN_POWER, Treated, Treatment, mirrored, squares, treat
-from mbma_tables.units import Units, factor, known, resolve
 
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
 WINDOW_LOBE = 2.0  # half-width of a Hann window's main lobe, in grid steps: closer to q = 0 it mixes with the mean

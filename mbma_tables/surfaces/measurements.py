@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import finite_array, needed, one_number, require
-from mbma_tables.errors import InputError, MbmaError
-from mbma_tables.files import read_file
-from mbma_tables.units import factor, known
+from mbma_tables.common.arguments import finite_array, needed, one_number, require
+from mbma_tables.common.errors import InputError, MbmaError
+from mbma_tables.common.files import read_file
+from mbma_tables.common.units import factor, known
 
 LISTS = (2, 3)  # columns of a list of points, which is no matrix of heights
 MAX_TEXT_BYTES, MAX_HEADER_BYTES = 256 * 2**20, 2**14

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import betaincc
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 
 BINS_PER_DECADE = 20  # 12% wide: a break is placed to that, a dense spectrum still averages many entries

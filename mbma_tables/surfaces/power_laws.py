@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.arguments import FloatArray, finite_array
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray, finite_array
+from mbma_tables.common.errors import InputError
 
 SHARES = {0: 1.0, 2: 1 / 2, 4: 3 / 8}  # m_n = share 2 pi integral C q^(n + 1) dq, Eq. (7)
 

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.power_laws import PowerLaws
 from mbma_tables.surfaces.spectral import SpectralSurface

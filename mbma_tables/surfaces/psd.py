@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import beta
 
-from mbma_tables.arguments import FloatArray, finite_array, require
-from mbma_tables.errors import InputError, NotSelfAffineError
+from mbma_tables.common.arguments import FloatArray, finite_array, require
+from mbma_tables.common.errors import InputError, NotSelfAffineError
 from mbma_tables.surfaces.heights import one_height
 from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH
 from mbma_tables.surfaces.power_law import (

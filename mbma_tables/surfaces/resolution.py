@@ -8,13 +8,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mbma_tables.arguments import number_in
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import number_in
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import Units
 from mbma_tables.surfaces.maps import measured_map
 from mbma_tables.surfaces.profiles import measured_profile
 from mbma_tables.surfaces.spectral import SpectralSurface, resolution
 from mbma_tables.surfaces.treatment import Treated
-from mbma_tables.units import Units
 
 S = TypeVar("S", bound=SpectralSurface)
 STEPS_PER_OCTAVE = 8  # of an extrapolated spectrum

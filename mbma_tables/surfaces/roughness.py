@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, broadcast_shape, describe_entries, finite_array, require
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray, broadcast_shape, describe_entries, finite_array, require
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import resolve
 from mbma_tables.surfaces import spectrum
-from mbma_tables.units import resolve
 
 HEIGHTS = ("Rq", "Ra", "Sq", "Sa")
 SLOPES = ("Rdq", "Sdq", "Rsm")

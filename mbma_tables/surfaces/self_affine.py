@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import broadcast_shape, finite_array, hinted, is_labelled, require, spread
-from mbma_tables.display import shown
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import broadcast_shape, finite_array, hinted, is_labelled, require, spread
+from mbma_tables.common.display import shown
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import Units
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.cases import get_case
 from mbma_tables.surfaces.roughness import surface_of_roughness
-from mbma_tables.units import Units
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.psd import SpectrumFit

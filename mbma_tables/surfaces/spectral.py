@@ -11,15 +11,15 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import finite_array, require
-from mbma_tables.bearing import Bearing, RadialSpectrum
-from mbma_tables.display import Variable
-from mbma_tables.errors import InputError, OutOfRangeError
+from mbma_tables.common.arguments import finite_array, require
+from mbma_tables.common.display import Variable
+from mbma_tables.common.errors import InputError, OutOfRangeError
+from mbma_tables.common.units import Units
+from mbma_tables.laws.bearing_curve import Bearing, RadialSpectrum
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.power_laws import PowerLaws, two_columns
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
-from mbma_tables.units import Units
 
 # of the surfaces of docs/data/boundary_elements.nc. As isotropic Gaussian ones they give area within 20% between 1% and
 # 10% contact, and beyond these it is wrong by 30% to factors; by their maps all of them stay within 10%
@@ -53,7 +53,7 @@ class SpectralSurface(AnySurface):
     heights : Heights, optional
         Distribution of heights; a Gaussian that ends at h_max if not given.
     bearing : Bearing, optional
-        Curves of a periodic map: what its tops and valleys look like (`mbma_tables.bearing`).
+        Curves of a periodic map: what its tops and valleys look like (`mbma_tables.laws.bearing_curve`).
     bands : RadialSpectrum, optional
         The same map's spectrum by bands, unsmoothed; goes with `bearing`.
     samples : array_like, shape (n,), optional

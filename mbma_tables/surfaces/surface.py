@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import hinted
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import hinted
+from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.power_laws import sorted_spectrum
 from mbma_tables.surfaces.self_affine import SelfAffine, check_model

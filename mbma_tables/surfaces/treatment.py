@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, number_in
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray, number_in
+from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH, heights_of, wrapped
 
 DEGREES = {"mean": 0, "plane": 1, "quadratic": 2, "height": 1, "curvature": 2}  # of least-squares polynomials

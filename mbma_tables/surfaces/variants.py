@@ -14,8 +14,8 @@ from typing import Literal
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.spectrum import NAYAK
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.tablefiles import schema
 
 MAX_LOG_RATIO = 100.0  # of a ratio to the rigid sphere; those of the shipped tables are below 20

@@ -17,8 +17,8 @@ from typing import Any
 import netCDF4
 import numpy as np
 
-from mbma_tables.errors import InputError, TableFileError
-from mbma_tables.files import read_file
+from mbma_tables.common.errors import InputError, TableFileError
+from mbma_tables.common.files import read_file
 from mbma_tables.tablefiles import schema
 from mbma_tables.tablefiles.checks import REQUIRED, check_attribute, check_content
 

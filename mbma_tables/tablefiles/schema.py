@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 
 FUNCTIONS = ("F", "A")
 UNIVERSAL = "universal"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import importlib
+import reprlib
 from typing import TYPE_CHECKING, Any
 
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 
 if TYPE_CHECKING:
-    from mbma_tables.theories.asperities import GreenwoodWilliamson
     from mbma_tables.theories.calibrated import Calibrated
+    from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
     from mbma_tables.theories.mbma import Mbma
     from mbma_tables.theories.persson import Method, Persson
     from mbma_tables.theories.protocol import Theory, TheoryAnswer, UserTheory
@@ -31,7 +32,7 @@ __all__ = [
 
 # a theory's module is imported when it is first asked for
 _MODULES = {
-    "asperities": ("GreenwoodWilliamson",),
+    "greenwood_williamson": ("GreenwoodWilliamson",),
     "calibrated": ("Calibrated",),
     "mbma": ("Mbma",),
     "persson": ("Method", "Persson"),
@@ -76,5 +77,5 @@ def get_theory(theory: str | Theory | UserTheory) -> Theory:
     if isinstance(found, UserTheory) and not isinstance(found, type):
         return Wrapped(found)
     raise InputError(
-        f"theory must be one of {THEORIES} or an object with a name and answer(surface, u), got {theory!r}"
+        f"theory must be one of {THEORIES} or an object with a name and answer(surface, u), got {reprlib.repr(theory)}"
     )

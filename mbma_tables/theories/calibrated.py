@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, grouped, require, spread
-from mbma_tables.calibrated import TESTED_AREA, Law, force_at_area, light_factor, self_affine_law
-from mbma_tables.calibrated import area as law_area
+from mbma_tables.common.arguments import FloatArray, grouped, require, spread
+from mbma_tables.laws.calibrated import TESTED_AREA, Law, force_at_area, light_factor, self_affine_law
+from mbma_tables.laws.calibrated import area as law_area
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import calibrated_table

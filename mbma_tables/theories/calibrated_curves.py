@@ -12,15 +12,15 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.special import erfc, ndtri
 
-from mbma_tables.arguments import FloatArray, require
-from mbma_tables.bearing import FRACTIONS
-from mbma_tables.calibrated import LAW_ERROR, TESTED_AREA, Law, force_at_area, light_factor, spectrum_of
-from mbma_tables.calibrated_map import LOG_FORCE, MapLaw, convex
+from mbma_tables.common.arguments import FloatArray, require
+from mbma_tables.laws.bearing_curve import FRACTIONS
+from mbma_tables.laws.calibrated import LAW_ERROR, TESTED_AREA, Law, force_at_area, light_factor, spectrum_of
+from mbma_tables.laws.map_curves import LOG_FORCE, MapLaw, convex
 from mbma_tables.surfaces.heights import SHARES
 from mbma_tables.surfaces.surface import MeasuredSurface
 
 if TYPE_CHECKING:
-    from mbma_tables.hardness import BearingCurve
+    from mbma_tables.laws.hardness import BearingCurve
 
 MAP_ERROR = 3e-2  # of a map's curve, which is smoother than the nodes of its law: nine maps in ten
 STRAIGHT, SAME = 1.0, 1e-9  # of ln F, over which one stiffness is no curve; differences that are rounding
@@ -147,7 +147,7 @@ class OwnLaw:
     @functools.cached_property
     def heights(self) -> BearingCurve | None:
         """Its own bearing curve, for a hardness."""
-        from mbma_tables.hardness import BearingCurve
+        from mbma_tables.laws.hardness import BearingCurve
 
         return None if self._known is None else BearingCurve(self._known.mean_height, self.h_max / self.h_rms)
 

@@ -1,8 +1,8 @@
 """The calibrated law's table: ln F_G over Hurst exponent, zeta_1 and mean separation, and errors against simulations.
 
-F_G is the force of `mbma_tables.calibrated` on a surface without end. The end at h_max and the area are closed forms,
-applied here. Below the table's least separation full contact rules, F^2 linear in ln u; above its largest ln F is
-linear in u.
+F_G is the force of `mbma_tables.laws.calibrated` on a surface without end. The end at h_max and the area are closed
+forms, applied here. Below the table's least separation full contact rules, F^2 linear in ln u; above its largest ln F
+is linear in u.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import Constants
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import TableFileError
+from mbma_tables.common.files import shipped_file
 from mbma_tables.core import core, in_blocks
-from mbma_tables.errors import TableFileError
-from mbma_tables.files import shipped_file
+from mbma_tables.laws.calibrated import Constants
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, read_sealed
 
 NAME = "calibrated.nc"

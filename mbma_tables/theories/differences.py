@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 
 ENOUGH = 2e-8  # relative, of derivatives or of their scale
 HALVINGS = 10  # of the step, at most

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, whole_number_in
-from mbma_tables.errors import InputError
-from mbma_tables.models import BOTH, ISLAND_MODELS, QUANTITIES, AnyModel, check_outside, get_model, island_model_name
+from mbma_tables.common.arguments import FloatArray, whole_number_in
+from mbma_tables.common.errors import InputError
+from mbma_tables.models import BOTH, ISLAND_MODELS, QUANTITIES, AnyModel, check_outside, island_model_name
+from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import NAMED, Variant, get_variant

@@ -1,7 +1,7 @@
 """Persson's theory of area and average separation (Eqs. 18-21).
 
 The double integral (19) is the calibrated law's energy integral with the weight W = gamma P + (1 - gamma) P^3 and
-without its tail, u_P of `mbma_tables.calibrated`; u0 and lambda of (21) are sums over the same waves.
+without its tail, u_P of `mbma_tables.laws.calibrated`; u0 and lambda of (21) are sums over the same waves.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import Literal
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, finite_array, grouped, require
-from mbma_tables.calibrated import LAW_ERROR, YANG_PERSSON, Law, area_persson, self_affine_law, spectrum_of
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray, finite_array, grouped, require
+from mbma_tables.common.errors import InputError
+from mbma_tables.laws.calibrated import LAW_ERROR, YANG_PERSSON, Law, area_persson, self_affine_law, spectrum_of
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer, select

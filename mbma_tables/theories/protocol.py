@@ -15,9 +15,9 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.arguments import FloatArray, describe_entries, require, rows, spread
+from mbma_tables.common.arguments import FloatArray, describe_entries, require, rows, spread
+from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.core import core
-from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import calibrated_table
 from mbma_tables.theories.differences import differences
@@ -94,7 +94,7 @@ class Theory(abc.ABC):
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Share of heights above the level whose mean gap is u, and its derivative by u: Gaussian heights."""
         # what needs it is asked for a hardness alone
-        from mbma_tables import hardness
+        from mbma_tables.laws import hardness
 
         h_rms = np.asarray(surface.h_rms)
         end = np.asarray(surface.h_max) / h_rms if self.ends_at_h_max else None

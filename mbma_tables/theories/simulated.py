@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, finite_array, require
-from mbma_tables.boundary_elements import LOADS, Contact
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray, finite_array, require
+from mbma_tables.common.errors import InputError
+from mbma_tables.laws.boundary_elements import LOADS, Contact
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import measured_map, prepared
 from mbma_tables.surfaces.surface import MeasuredSurface

@@ -1,4 +1,4 @@
-"""Any theory with a hardness: its elastic answer goes through `mbma_tables.hardness`.
+"""Any theory with a hardness: its elastic answer goes through `mbma_tables.laws.hardness`.
 
 Force at a mean gap is closed between the elastic force and the bearing curve; area is that at equal force, with
 pressures capped at the hardness. u is the mean gap, points that yield flattened.
@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables import hardness as law
-from mbma_tables.arguments import FloatArray, checked_hardness
-from mbma_tables.errors import OutOfRangeError
+from mbma_tables.common.arguments import FloatArray, checked_hardness
+from mbma_tables.common.errors import OutOfRangeError
+from mbma_tables.laws import hardness as law
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.calibrated_table import at_contact, shipped_part
 from mbma_tables.theories.protocol import FEW_LOOKS, Theory, TheoryAnswer, refuse_unfinished

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import Numbers, broadcast_shape, finite_array, positive_modulus, require
+from mbma_tables.common.arguments import Numbers, broadcast_shape, finite_array, positive_modulus, require
 
 
 def mean_conductivity(k1: ArrayLike, k2: ArrayLike) -> Numbers:

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.arguments import FloatArray, grouped, require
+from mbma_tables.common.arguments import FloatArray, grouped, require
+from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.core import in_blocks
-from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.models import AREA, BOTH, FORCE, AnyModel
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -87,9 +87,9 @@ def totals_at(
             fault.mask = fault.mask.reshape(shape)
         raise
     # what is nearly nothing has few digits
-    tiny = (np.minimum(pressure, area) < LEAST) & (np.maximum(pressure, area) > 0)
-    if tiny.any():
-        error[tiny] = np.minimum(error[tiny] + SUBNORMAL / np.minimum(pressure, area)[tiny].clip(SUBNORMAL), 1.0)
+    least = np.minimum(pressure, area)
+    if not least.min() >= LEAST and (tiny := (least < LEAST) & (np.maximum(pressure, area) > 0)).any():
+        error[tiny] = np.minimum(error[tiny] + SUBNORMAL / least[tiny].clip(SUBNORMAL), 1.0)
     return Totals(
         pressure=(pressure.reshape(shape) * stress)[()] if which != AREA else None,
         area=variant.area_of(area).reshape(shape)[()] if which != FORCE else None,
@@ -132,12 +132,17 @@ def _by_profiles(
             left.append(places)
             continue
         inside = compression[places] <= kept.end
-        left.append(places[~inside])
-        islands, places = islands + kept.islands, places[inside]
-        error[places] = kept.error
+        if not inside.all():
+            left.append(places[~inside])
+            places = places[inside]
+        islands += kept.islands
+        # most often all gaps are of one surface and touch, and slices are faster
+        whole = places.size == compression.size
+        error[slice(None) if whole else places] = kept.error
 
-        def fill(block: slice, own: NDArray[np.intp] = places, kept: Profile = kept) -> None:
-            sums[:, own[block]] = kept.totals(compression[own[block]], slopes)
+        def fill(block: slice, own: Any = None if whole else places, kept: Profile = kept) -> None:
+            chosen = block if own is None else own[block]
+            sums[:, chosen] = kept.totals(compression[chosen], slopes)
 
         in_blocks(fill, places.size, BLOCK, workers)
     return sums, error, islands, np.sort(np.concatenate(left))

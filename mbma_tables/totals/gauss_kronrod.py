@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.core import core
-from mbma_tables.errors import ConvergenceError
 
 
 def _rule(count: int) -> FloatArray:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import (
+from mbma_tables.common.arguments import (
     FloatArray,
     Numbers,
     any_labelled,
@@ -19,13 +19,14 @@ from mbma_tables.arguments import (
     positive_modulus,
     require,
 )
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import modulus_and_units
 from mbma_tables.islands.geometry import geometry, measured_islands
-from mbma_tables.models import AnyModel, answer_islands, get_model, island_model_name
+from mbma_tables.models import AnyModel, answer_islands, island_model_name
+from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import Variant, get_variant
-from mbma_tables.units import modulus_and_units
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -183,7 +184,7 @@ def _of_labelled(
 ) -> Island:
     """`island` of DataArrays, lazily where they are."""
     # xarray comes in with its own objects
-    from mbma_tables.labels import apply_to_surface
+    from mbma_tables.surfaces.labels import apply_to_surface
 
     names = (*GEOMETRY, "force", "area", "error")
 

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.arguments import FloatArray, spread
+from mbma_tables.common.arguments import FloatArray, spread
+from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.core import OK, REASONS, UNRESOLVED, core, in_blocks
-from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.islands.geometry import floor_offset, geometry
 from mbma_tables.models import AREA, BOTH, FORCE, AnyModel, answer_islands, exact_model
 from mbma_tables.models.universal import UniversalModel

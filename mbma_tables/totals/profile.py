@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.core import core
-from mbma_tables.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.islands.geometry import floors_of, geometry, measured_islands, s_over_h_rms
 from mbma_tables.models import AnyModel, answer_islands
 from mbma_tables.models.universal import UniversalModel

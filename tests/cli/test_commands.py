@@ -376,7 +376,7 @@ def test_faults_of_the_system_are_one_line(folder, fault, said, monkeypatch):
     def fail(*_, **__):
         raise fault
 
-    monkeypatch.setattr("mbma_tables.theories.contact.contact", fail)
+    monkeypatch.setattr("mbma_tables.answers.contact.contact", fail)
     assert refused(folder, "contact", "--surface", "concrete", "-d", "0.1") == said
 
 

@@ -8,7 +8,7 @@ import pytest
 from helpers import random_map, refused, run
 
 from mbma_tables import Surface
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 from mbma_tables.scenes.specimen import read_specimen
 
 with warnings.catch_warnings():

@@ -74,8 +74,9 @@ class Recorder:
 
 def use():
     """Call every function, by the library where it does."""
-    from mbma_tables import Surface, contact, contact_law, greenwood_tripp, hardness, open_table
-    from mbma_tables.bearing import FRACTIONS
+    from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
+    from mbma_tables.laws import hardness
+    from mbma_tables.laws.bearing_curve import FRACTIONS
     from mbma_tables.theories.calibrated_table import shipped
 
     core = package.core

@@ -9,10 +9,10 @@ import pytest
 from scipy.interpolate import NdBSpline
 
 from generate.splines import TAPS
-from mbma_tables.calibrated import Spectrum
+from mbma_tables.answers.leakage_table import shipped_flow
 from mbma_tables.core import GENERATIONS, core
+from mbma_tables.laws.calibrated import Spectrum
 from mbma_tables.theories.calibrated_table import FEW, shipped
-from mbma_tables.theories.leakage_table import shipped_flow
 
 PLAIN = importlib.import_module("mbma_tables.core._plain")
 FUSED = [importlib.import_module(f"mbma_tables.core._{name}") for name, least in GENERATIONS.items()

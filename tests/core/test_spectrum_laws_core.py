@@ -9,8 +9,8 @@ import pytest
 from scipy.special import erf
 
 from mbma_tables import ConvergenceError, InputError, Surface
-from mbma_tables.calibrated import CONSTANTS, LAW_ERROR, PERSSON, YANG_PERSSON, Law, Spectrum, _inner_integrals
 from mbma_tables.core import GENERATIONS, core
+from mbma_tables.laws.calibrated import CONSTANTS, LAW_ERROR, PERSSON, YANG_PERSSON, Law, Spectrum, _inner_integrals
 
 PLAIN = importlib.import_module("mbma_tables.core._plain")
 FUSED = [importlib.import_module(f"mbma_tables.core._{name}") for name, least in GENERATIONS.items()

@@ -583,4 +583,4 @@ def test_a_unit_never_becomes_code(target: str) -> None:
         )
     ]
     assert live[0] == live[1]
-    assert len(live[0]) > 50
+    assert len(live[0]) > 40

@@ -16,7 +16,7 @@ from generate.boundary_elements.run import SOLVERS, boundary_elements, run
 from generate.boundary_elements.solve import Contact, simulate, simulate_to
 from generate.boundary_elements.surfaces import Recipe, heights
 from generate.pages.page import ROOT
-from mbma_tables.bearing import FRACTIONS, bearing
+from mbma_tables.laws.bearing_curve import FRACTIONS, bearing
 
 pytest.importorskip("tamaas")
 SQUARE = (1.0, 1.0)
@@ -167,7 +167,7 @@ class TestCampaign:
             assert len(campaign(kind)) == shipped.sizes["surface"]
 
     def test_failures_come_last_and_are_named(self, tmp_path, monkeypatch):
-        monkeypatch.setattr("mbma_tables.boundary_elements.MAX_ITERATIONS", 2)
+        monkeypatch.setattr("mbma_tables.laws.boundary_elements.MAX_ITERATIONS", 2)
         tasks = [Task(RECIPE, "training"), Task(dataclasses.replace(RECIPE, seed=6), "training")]
         with pytest.raises(RuntimeError, match=rf"2 of 2 surfaces failed: {RECIPE.name}"):
             run(tasks, tmp_path)

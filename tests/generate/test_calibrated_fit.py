@@ -11,8 +11,8 @@ from generate.boundary_elements.evidence import Case
 from generate.calibrated import EDGES, QUANTITIES, coverage, cross_validate, errors, fit, summary
 from generate.calibrated_bars import measure
 from generate.calibrated_file import read_parts, write_part
-from mbma_tables.calibrated import CONSTANTS, Law, Spectrum
-from mbma_tables.errors import TableFileError
+from mbma_tables.common.errors import TableFileError
+from mbma_tables.laws.calibrated import CONSTANTS, Law, Spectrum
 
 FORCES = np.geomspace(4e-4, 1.0, 15)
 TRUE = dataclasses.replace(

@@ -10,7 +10,7 @@ from scipy.special import erf
 
 from generate.pages import distances
 from mbma_tables import Surface, contact
-from mbma_tables.files import shipped_file
+from mbma_tables.common.files import shipped_file
 from mbma_tables.theories import Persson
 
 

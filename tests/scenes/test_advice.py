@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from mbma_tables import Scene, Surface
-from mbma_tables.files import shipped_file
+from mbma_tables.common.files import shipped_file
 from mbma_tables.scenes.scene import advice
 from mbma_tables.surfaces.variants import get_variant
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from mbma_tables.files import shipped_file
+from mbma_tables.common.files import shipped_file
 from mbma_tables.scenes.costs import Row, read_costs, shipped_costs
 from mbma_tables.theories import THEORIES
 

@@ -6,7 +6,7 @@ import pathlib
 import pytest
 
 from mbma_tables import Scene
-from mbma_tables.errors import InputError, MbmaError
+from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.scenes.problem import EFFECTS, REFINEMENTS
 from mbma_tables.scenes.specimen import schema
 

@@ -15,7 +15,7 @@ from mbma_tables import (
     greenwood_tripp,
     open_table,
 )
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 from mbma_tables.models import IslandAnswer
 from mbma_tables.scenes.run import run_plan
 
@@ -58,7 +58,7 @@ def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
         # as good, and quicker
         return contact_law(surface, rtol, "universal", **rest)
 
-    monkeypatch.setattr("mbma_tables.theories.law.contact_law", law)
+    monkeypatch.setattr("mbma_tables.law.make.contact_law", law)
     scene = scene_of(effects=("energy",), rtol=1e-2)
     found = run_plan(scene, with_island_model(scene, "universal"))
     assert made == ["universal", "exact"]

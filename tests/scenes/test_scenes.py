@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import quad
 
 from mbma_tables import Scene, Surface, contact, contact_law, island, open_table
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 from mbma_tables.models import answer_islands
 from mbma_tables.scenes import plan as plans
 from mbma_tables.scenes import statistics as islands
@@ -173,7 +173,7 @@ concrete = Surface.named("concrete")
 if sys.argv[1] == "used":
     open_table("island4d")
     for island_model in ("exact", "universal", "island4d", "formula", "rigid"):
-        contact(concrete, [0.1, 0.7], island_model=island_model, rtol=1e-3)
+        contact(concrete, separation=[0.1, 0.7], island_model=island_model, rtol=1e-3)
     contact_law(concrete, 1e-4)
     Scene(Surface.named("asphalt"), effects=["pressure", "energy"], separations=[0.1], rtol=0.05).run()
     Scene(concrete, effects=["pressure_profile"], deltas=[0.2]).run()
@@ -227,13 +227,13 @@ def test_python_mistakes(more, words):
 
 
 WATCHED = {
-    "mbma_tables.theories.contact": {"pressure", "area", "validity", "yield", "leakage"},
-    "mbma_tables.theories.law": {"stiffness", "energy", "conductance"},
-    "mbma_tables.theories.leakage": {"leakage"},
+    "mbma_tables.answers.contact": {"pressure", "area", "validity", "yield", "leakage"},
+    "mbma_tables.law.make": {"stiffness", "energy", "conductance"},
+    "mbma_tables.answers.leakage": {"leakage"},
     "mbma_tables.theories.yielding": {"yield"},
-    "mbma_tables.hardness": {"yield"},
+    "mbma_tables.laws.hardness": {"yield"},
     "mbma_tables.totals.conductance": {"conductance"},
-    "mbma_tables.theories.asperities": {"comparison"},
+    "mbma_tables.theories.greenwood_williamson": {"comparison"},
     "mbma_tables.theories.persson": set(),
     "mbma_tables.scenes.statistics": {"island_statistics", "pressure_profile"},
 }
@@ -272,8 +272,8 @@ def test_modules_of_an_effect_that_is_off_are_not_imported(name):
 
 @pytest.mark.parametrize("effects", COMBINATIONS, ids="+".join)
 def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
-    import mbma_tables.theories.contact as totals
-    import mbma_tables.theories.law as laws
+    import mbma_tables.answers.contact as totals
+    import mbma_tables.law.make as laws
 
     calls = {}
 

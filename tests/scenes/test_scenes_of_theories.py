@@ -114,6 +114,7 @@ def test_theories_beside_one_another():
     for theory, name in (("persson", "pressure"), ("mbma", "mbma_force")):
         assert found[name].item() == pytest.approx(
             contact(CONCRETE, separation=0.2, E_star=MODULUS, theory=theory).pressure
+        
         )
 
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from mbma_tables import Surface, contact
-from mbma_tables.errors import InputError, MbmaError, NotSelfAffineError, OutOfRangeError
+from mbma_tables.common.errors import InputError, MbmaError, NotSelfAffineError, OutOfRangeError
 from mbma_tables.surfaces.maps import radial_spectrum
 from mbma_tables.surfaces.measurements import read_measurement
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from mbma_tables import Surface
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.profiles import ProfileSpectrum
 from mbma_tables.surfaces.treatment import Treated
 

@@ -5,7 +5,7 @@ import pytest
 from helpers import random_map
 
 from mbma_tables import Surface, contact, contact_law
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.surfaces.resolution import extrapolated
 from mbma_tables.surfaces.spectral import resolution

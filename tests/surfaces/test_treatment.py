@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mbma_tables import Surface
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.measurements import read_measurement
 from mbma_tables.surfaces.treatment import Treatment, treat
 

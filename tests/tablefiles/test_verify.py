@@ -7,7 +7,7 @@ import pytest
 from small_tables import small_table
 
 from generate.tables.writing import write_table
-from mbma_tables.errors import TableFileError
+from mbma_tables.common.errors import TableFileError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.models.tables import verify
 from mbma_tables.tablefiles.schema import ISLAND4D, KINDS, UNIVERSAL

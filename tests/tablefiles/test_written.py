@@ -8,7 +8,7 @@ import pytest
 from small_tables import small_table
 
 from generate.tables.writing import write_table
-from mbma_tables.errors import TableFileError
+from mbma_tables.common.errors import TableFileError
 from mbma_tables.tablefiles.netcdf import read_table
 from mbma_tables.tablefiles.schema import KINDS, UNIVERSAL
 

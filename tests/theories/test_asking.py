@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
-from mbma_tables.files import shipped_file
+from mbma_tables.common.files import shipped_file
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.theories import THEORIES, Calibrated, Mbma
 

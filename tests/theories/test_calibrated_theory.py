@@ -15,10 +15,10 @@ from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFAC
 from generate.boundary_elements.evidence import cases
 from generate.calibrated import errors
 from mbma_tables import InputError, OutOfRangeError, Surface, TableFileError, contact, contact_law
-from mbma_tables.bearing import QUANTILES
-from mbma_tables.calibrated import CONSTANTS, Law, Spectrum
-from mbma_tables.calibrated_map import MAP_CONSTANTS
-from mbma_tables.files import shipped_file
+from mbma_tables.common.files import shipped_file
+from mbma_tables.laws.bearing_curve import QUANTILES
+from mbma_tables.laws.calibrated import CONSTANTS, Law, Spectrum
+from mbma_tables.laws.map_curves import MAP_CONSTANTS
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.variants import get_variant

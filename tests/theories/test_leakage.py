@@ -13,11 +13,12 @@ from helpers import random_map
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbma_tables import Surface, contact, contact_law, leakage
-from mbma_tables.calibrated import Spectrum
-from mbma_tables.errors import InputError, OutOfRangeError
-from mbma_tables.theories.leakage import flow
-from mbma_tables.theories.leakage_table import flow_of_spectrum, shipped_flow
+from mbma_tables import Surface, contact, contact_law
+from mbma_tables.answers.leakage import flow
+from mbma_tables.answers.leakage_table import flow_of_spectrum, shipped_flow
+from mbma_tables.common.errors import InputError, OutOfRangeError
+from mbma_tables.laws import effective_medium as leakage
+from mbma_tables.laws.calibrated import Spectrum
 
 SEAL = Surface(hurst=0.8, q0=0.01, q1=0.3, h_rms=1.0, h_max=3.5, unit="um")
 REFERENCE = pathlib.Path(__file__).parents[2] / "docs" / "data" / "leakage.csv"

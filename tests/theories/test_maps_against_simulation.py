@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 from generate.pages import maps
 from generate.pages.gallery import BARS, REFINED, ratios, read_rows
 from mbma_tables import Surface, contact, contact_law
-from mbma_tables.errors import OutOfRangeError
+from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.theories import BoundaryElements, Calibrated
 
 with warnings.catch_warnings():

@@ -5,8 +5,8 @@ import pytest
 from helpers import random_map
 
 from mbma_tables import Surface, contact, contact_law
-from mbma_tables.boundary_elements import LOADS as SHIPPED_LOADS
-from mbma_tables.errors import InputError, MbmaError, OutOfRangeError
+from mbma_tables.common.errors import InputError, MbmaError, OutOfRangeError
+from mbma_tables.laws.boundary_elements import LOADS as SHIPPED_LOADS
 from mbma_tables.theories import BoundaryElements
 
 pytest.importorskip("tamaas")

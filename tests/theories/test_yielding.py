@@ -9,7 +9,8 @@ import pytest
 import xarray as xr
 from helpers import random_map
 
-from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law, hardness
+from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
+from mbma_tables.laws import hardness
 from mbma_tables.theories import THEORIES, get_theory
 from mbma_tables.theories.calibrated_table import shipped
 from mbma_tables.theories.yielding import MANY, Yielding

@@ -192,8 +192,8 @@ def test_bad_options(option, value):
 def test_one_quantity_alone(island_model, wanted):
     surface = Surface([0.5, 0.8], 1.0, 100.0, 1.0, 3.0)
     gaps = [1.0, -2.0]
-    both = contact_by_island_model(surface, gaps, island_model=island_model)
-    alone = contact_by_island_model(surface, gaps, island_model=island_model, quantities=[wanted])
+    both = contact_by_island_model(surface, separation=gaps, island_model=island_model)
+    alone = contact_by_island_model(surface, separation=gaps, island_model=island_model, quantities=[wanted])
     other = "area" if wanted == "pressure" else "pressure"
     assert getattr(alone, other) is None
     np.testing.assert_allclose(getattr(alone, wanted), getattr(both, wanted), rtol=max(1e-8, 2 * both.error.max()))
@@ -203,7 +203,7 @@ def test_one_quantity_alone(island_model, wanted):
 @pytest.mark.parametrize("wanted", [(), ["pressure", "stiffness"], "energy"])
 def test_unknown_quantities(wanted):
     with pytest.raises(InputError, match="quantities must be some of"):
-        contact_by_island_model(Surface(0.8, 1.0, 100.0, 1.0, 3.0), 1.0, quantities=wanted)
+        contact_by_island_model(Surface(0.8, 1.0, 100.0, 1.0, 3.0), separation=1.0, quantities=wanted)
 
 
 ROUGH = Surface(0.8, 1.0, 216.0, 1.0, 3.0)
@@ -227,7 +227,10 @@ KINDS = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_layout_does_not_matter(kind):
-    found, expected = contact_by_island_model(ROUGH, KINDS[kind]), contact_by_island_model(ROUGH, GAPS)
+    found, expected = (
+        contact_by_island_model(ROUGH, separation=KINDS[kind]),
+        contact_by_island_model(ROUGH, separation=GAPS),
+    )
     np.testing.assert_array_equal(np.ravel(found.pressure), expected.pressure)
     np.testing.assert_array_equal(np.ravel(found.area), expected.area)
 
@@ -255,7 +258,9 @@ def test_many_surfaces_keep_their_bound_where_sums_agree_by_chance(variant, numb
     hurst, zeta_1, top = numbers
     surfaces = Surface(hurst, 1.0, zeta_1, 1.0, np.full((30, 1), top))
     gaps = top - compression * (1 + np.linspace(-1e-3, 1e-3, 41))
-    found, known = (contact_by_island_model(surfaces, gaps, variant=variant, rtol=asked) for asked in (rtol, 1e-11))
+    found, known = (
+        contact_by_island_model(surfaces, separation=gaps, variant=variant, rtol=asked) for asked in (rtol, 1e-11)
+    )
     for name in ("pressure", "area"):
         assert (np.abs(getattr(found, name) / getattr(known, name) - 1) <= found.error).all()
     assert found.error.max() <= rtol

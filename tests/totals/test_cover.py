@@ -62,6 +62,6 @@ def test_fitted_area_at_equal_force_follows_boundary_elements():
 
 
 def test_a_surface_below_the_floors_is_refused():
-    for answer in (contact_law, lambda *given, **options: contact(*given, 1.0, **options)):
+    for answer in (contact_law, lambda *given, **options: contact(*given, separation=1.0, **options)):
         with pytest.raises(InputError, match=r"greater than 5\.14, the variant's floor of zeta_u"):
             answer(Surface(0.8, 1.0, 5.0, 1.0, 3.0), variant="fitted")

@@ -174,10 +174,10 @@ import numpy as np
 from mbma_tables import Surface, contact
 gaps = np.linspace(2.5, 3.0, 200_000)
 surface = Surface(0.8, 0.2, 40.0, np.linspace(0.9, 1.1, gaps.size), 3.0)
-contact(Surface(0.8, 0.2, 40.0, np.linspace(0.9, 1.1, 1000), 3.0), gaps[:1000])
+contact(Surface(0.8, 0.2, 40.0, np.linspace(0.9, 1.1, 1000), 3.0), separation=gaps[:1000])
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 tracemalloc.start()
-found = contact(surface, gaps)
+found = contact(surface, separation=gaps)
 traced = tracemalloc.get_traced_memory()[1]
 grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024
 print(json.dumps([traced / gaps.nbytes, grown / gaps.nbytes, found.islands / gaps.size]))

@@ -196,7 +196,8 @@ from mbma_tables import Surface, contact
 gaps = xr.DataArray(np.linspace(-2.9, 3.1, 120), dims="gap")
 surface = Surface(xr.DataArray([0.5, 0.8], dims="surface").chunk(surface=1), 0.2, 40.0, 1.0, 3.0)
 with dask.config.set(scheduler="threads", num_workers=8):
-    lazy = contact(surface, gaps.chunk(gap=3)), contact(surface, gaps.chunk(gap=15), island_model="island4d", rtol=1e-3)
+    few, many = gaps.chunk(gap=3), gaps.chunk(gap=15)
+    lazy = contact(surface, separation=few), contact(surface, separation=many, island_model="island4d", rtol=1e-3)
     first, second = dask.compute(lazy[0].pressure, lazy[1].pressure)
 assert (abs(first - second) <= 0.01 * first).all()
 from mbma_tables.models.tables import shipped

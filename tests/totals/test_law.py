@@ -15,10 +15,10 @@ import xarray as xr
 from helpers import difference_weights, with_slopes
 
 from mbma_tables import ContactLaw, ConvergenceError, InputError, OutOfRangeError, Surface, contact, contact_law
-from mbma_tables.models import get_model
+from mbma_tables.law import pieces as law_pieces
+from mbma_tables.law.block import CENTRE, DEGREE, FORCE_AT, RATE, RECORD
+from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.variants import NAMED
-from mbma_tables.theories import law_pieces
-from mbma_tables.theories.law_block import CENTRE, DEGREE, FORCE_AT, RATE, RECORD
 from mbma_tables.totals.island_sum import Pairs, totals_of
 from mbma_tables.totals.profile import profile
 

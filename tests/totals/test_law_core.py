@@ -14,8 +14,7 @@ import xarray as xr
 
 from mbma_tables import OutOfRangeError, Surface, contact_law
 from mbma_tables.core import core
-from mbma_tables.leakage import wide_gap
-from mbma_tables.theories.law_block import (
+from mbma_tables.law.block import (
     AREA,
     EXPONENT,
     FORCE,
@@ -26,6 +25,7 @@ from mbma_tables.theories.law_block import (
     RECORD,
     RECORDS,
 )
+from mbma_tables.laws.effective_medium import wide_gap
 
 SURFACES = {
     "mbma": (Surface(0.8, 0.3, 64.8, 0.7, 2.1), {}),

@@ -14,11 +14,11 @@ from helpers import SCALE, difference_weights, with_slopes
 from mbma_tables import Surface, contact, contact_law, island
 from mbma_tables.islands.four_numbers import from_axes, to_axes
 from mbma_tables.islands.geometry import FIELDS, geometry
+from mbma_tables.law.block import CENTRE, RATE
 from mbma_tables.models.island4d import RAW
 from mbma_tables.models.tables import open_table, universal_model
 from mbma_tables.surfaces.spectrum import band_moment
 from mbma_tables.surfaces.variants import REPORTED, VARIANTS
-from mbma_tables.theories.law_block import CENTRE, RATE
 from mbma_tables.totals.island_sum import kinks
 
 EVERY = [*VARIANTS.values(), OWN, LEVEL]

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
 
 FRACTIONS = np.logspace(-4.5, 0, 91)  # shares of the map, from the highest point down
 MIN_TOP_POINTS = 16  # gradients are averaged over at least so many points

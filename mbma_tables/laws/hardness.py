@@ -25,10 +25,10 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 from scipy.special import erfinv, ndtr, ndtri
 
-from mbma_tables.arguments import FloatArray, answered
-from mbma_tables.bearing import FRACTIONS
+from mbma_tables.common.arguments import FloatArray, answered
+from mbma_tables.common.errors import InputError
 from mbma_tables.core import core
-from mbma_tables.errors import InputError
+from mbma_tables.laws.bearing_curve import FRACTIONS
 
 MOST_SHARE = 0.9  # of a map's heights up to which a node stands for its own
 DEPTH = 30.0  # of a map's valleys below the last node, in levels
@@ -118,7 +118,7 @@ def _levels(u: FloatArray) -> FloatArray:
 
 
 class BearingCurve:
-    """Q(u) of a map's own heights: of M(a) [h_rms] of `mbma_tables.bearing`, a = `FRACTIONS`, and its highest point."""
+    """Q(u) of a map's own heights: of M(a) [h_rms] of `laws.bearing_curve`, a = `FRACTIONS`, and its highest point."""
 
     def __init__(self, mean_height: FloatArray, h_max: float) -> None:
         above = FRACTIONS * mean_height

@@ -1,7 +1,8 @@
 """Flow conductance of contacts: the contact factor's table of self-affine surfaces, and its scatter.
 
-The table holds ln R of `mbma_tables.leakage` over Hurst exponent, ln zeta_1 and ln A/(Ac - A). Below its least contact
-ln R goes as A^m, as what obstructs; above its largest it is linear in the odds: R is a power of Ac - A.
+The table holds ln R of `mbma_tables.laws.effective_medium` over Hurst exponent, ln zeta_1 and ln A/(Ac - A).
+Below its least contact ln R goes as A^m, as what obstructs; above its largest it is linear in the odds: R is a power
+of Ac - A.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import Spectrum
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.core import core, in_blocks
-from mbma_tables.leakage import FlowConstants, contact_factor
+from mbma_tables.laws.calibrated import Spectrum
+from mbma_tables.laws.effective_medium import FlowConstants, contact_factor
 from mbma_tables.theories.calibrated_table import BLOCK, Owners, SurfaceSpline, nodes_of, shipped_part
 
 GROUP = "leakage"

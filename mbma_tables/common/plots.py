@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, finite_array, needed
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray, finite_array, needed
+from mbma_tables.common.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

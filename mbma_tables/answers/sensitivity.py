@@ -12,8 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, hinted, one_number
-from mbma_tables.errors import InputError
+from mbma_tables.answers.contact import contact, one_known
+from mbma_tables.answers.result import Contact
+from mbma_tables.common.arguments import FloatArray, hinted, one_number
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import Units, modulus_and_units, unit_of
 from mbma_tables.models import AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights
@@ -22,11 +25,8 @@ from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories.calibrated import Calibrated
-from mbma_tables.theories.contact import contact, one_known
 from mbma_tables.theories.differences import differences
 from mbma_tables.theories.protocol import Theory, UserTheory
-from mbma_tables.theories.result import Contact
-from mbma_tables.units import Units, modulus_and_units, unit_of
 
 STEP = 0.02  # of the logarithm of a parameter
 MAX_HURST = 0.9  # from which its steps go down: two of them, and 1 is the end

@@ -27,8 +27,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, area
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.laws.calibrated import CONSTANTS, Constants, Law, Spectrum, area
 
 LARGEST_AREA = 0.3  # above it cells of one spectrum differ by factors
 BANDS = 64  # of a spectrum, graded towards both ends

@@ -10,24 +10,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, require, rows
-from mbma_tables.calibrated import spectrum_of
-from mbma_tables.display import Displayed, Variable, shown
-from mbma_tables.errors import InputError
-from mbma_tables.labels import agree
-from mbma_tables.leakage import LARGEST_AREA
-from mbma_tables.plots import draw_compression, leakage_label, pressure_label
+from mbma_tables.answers.leakage_table import flow_of_spectrum, self_affine, shipped_flow
+from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, require, rows
+from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.plots import draw_compression, leakage_label, pressure_label
+from mbma_tables.common.units import unit_of
+from mbma_tables.laws.calibrated import spectrum_of
+from mbma_tables.laws.effective_medium import LARGEST_AREA
+from mbma_tables.surfaces.labels import agree
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories.leakage_table import flow_of_spectrum, self_affine, shipped_flow
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory
-from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mbma_tables.theories.result import Contact
-    from mbma_tables.theories.source import Source
+    from mbma_tables.answers.source import Source
 
 LARGEST_KNUDSEN = 0.1  # mean free path over the channel, to which slip of first order holds
 SLIP = 6.0  # of a plane channel: flow is 1 + 6 Kn times that without slip
@@ -54,7 +53,7 @@ class Leakage(Displayed):
     k: Numbers
     conductance: Numbers
     _source: Source = dataclasses.field(repr=False)
-    _contact: Contact = dataclasses.field(repr=False)
+    _contact: Any = dataclasses.field(repr=False)
     _area: Any = dataclasses.field(repr=False)
 
     def _facts(self) -> dict[str, str]:
@@ -71,7 +70,8 @@ class Leakage(Displayed):
         }
 
     def _origin(self) -> dict[str, str]:
-        return self._contact._origin()
+        origin: dict[str, str] = self._contact._origin()
+        return origin
 
     def _figure(self) -> Figure:
         return draw_compression(
@@ -114,7 +114,8 @@ class Leakage(Displayed):
         """What is against entries, each with its mask; of plain arrays."""
         source = self._source
         own = concerns(source.theory_at(source.E_star, source.hardness), source.surface, np.asarray(self._area))
-        return self._contact.reasons | {reason: mask for reason, mask in own.items() if mask.any()}
+        reasons: dict[str, Any] = self._contact.reasons
+        return reasons | {reason: mask for reason, mask in own.items() if mask.any()}
 
     def _map(self, function: Callable[..., FloatArray]) -> Numbers:
         found: Numbers = self._source.map(lambda *given: (function(*given),), self._contact, 1, {"area": self._area})[0]
@@ -221,7 +222,7 @@ class Leakage(Displayed):
         return value if is_labelled(value) else array
 
 
-def leakage_of(source: Source, contact: Contact, area: Any) -> Leakage:
+def leakage_of(source: Source, contact: Any, area: Any) -> Leakage:
     """The leakage of a contact."""
 
     def answer(

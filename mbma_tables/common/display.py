@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mbma_tables.arguments import is_labelled, needed
-from mbma_tables.errors import InputError, MbmaError
-from mbma_tables.files import write_file
-from mbma_tables.plots import KINDS, to_picture
+from mbma_tables.common.arguments import is_labelled, needed
+from mbma_tables.common.errors import InputError, MbmaError
+from mbma_tables.common.files import write_file
+from mbma_tables.common.plots import KINDS, to_picture
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,21 +13,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, checked_hardness, hinted, number_in
-from mbma_tables.errors import ConvergenceError, InputError, OutOfRangeError
-from mbma_tables.models import MAX_RTOL, MIN_RTOL, AnyModel, get_model
+from mbma_tables.common.arguments import FloatArray, checked_hardness, hinted, number_in
+from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
+from mbma_tables.common.units import modulus_and_units
+from mbma_tables.law import block as at
+from mbma_tables.law import pieces as fit
+from mbma_tables.law.law import ROUNDING, ContactLaw
+from mbma_tables.models import MAX_RTOL, MIN_RTOL, AnyModel
+from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import get_theory
-from mbma_tables.theories import law_block as at
-from mbma_tables.theories import law_pieces as fit
-from mbma_tables.theories.law_object import ROUNDING, ContactLaw
 from mbma_tables.theories.mbma import Mbma, refuse_options_of_mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.totals.island_sum import Pairs, totals_of
 from mbma_tables.totals.profile import profile, source_of
-from mbma_tables.units import modulus_and_units
 
 MIN_LAW_RTOL = 1e-9
 RESOLVED = 1e-3  # a polynomial this close is one whose error its coefficients show
@@ -92,7 +93,7 @@ def contact_law(
     """
     given, units = modulus_and_units(E_star, surface)
     modulus = number_in("E_star", given, sys.float_info.min, sys.float_info.max)
-    if theory == Mbma.name:
+    if isinstance(theory, str) and theory == Mbma.name:
         chosen: Theory = Mbma(island_model, variant)
     else:
         refuse_options_of_mbma(island_model=island_model != "universal", variant=variant != "reported")

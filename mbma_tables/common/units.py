@@ -10,11 +10,12 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import re
-from collections.abc import Mapping
+import reprlib
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from typing import Any
 
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 
 _POUND_PER_INCH = Fraction("4.4482216152605") / Fraction("0.0254") ** 2
 SIZES: dict[str, dict[str, Fraction]] = {
@@ -78,7 +79,7 @@ def known(unit: Any, kind: str = "length") -> str:
 
     Examples
     --------
-    >>> from mbma_tables.units import known
+    >>> from mbma_tables.common.units import known
     >>> known("µm"), known("N/mm^2", "stress")
     ('um', 'MPa')
     """
@@ -86,6 +87,8 @@ def known(unit: Any, kind: str = "length") -> str:
         raise InputError(f"a unit of {kind} is a text such as {next(iter(SIZES[kind]))!r}, got {unit!r}")
     plain = ALIASES.get(unit.strip(), unit.strip().translate(_ASCII))
     plain = ALIASES.get(plain, plain)
+    if kind == "length" and plain in SIZES["stress"]:
+        raise InputError(f"{unit!r} is no known unit of length but one of stress, as pressure= takes")
     if plain not in SIZES[kind]:
         near = difflib.get_close_matches(plain, SIZES[kind], 3, 0.6) or SIZES[kind]
         raise InputError(f"{unit!r} is no known unit of {kind}: write {' or '.join(near)}")
@@ -97,7 +100,7 @@ def factor(have: str, want: str, kind: str = "length", power: int = 1) -> float:
 
     Examples
     --------
-    >>> from mbma_tables.units import factor
+    >>> from mbma_tables.common.units import factor
     >>> factor("um", "mm"), factor("GPa", "MPa", "stress"), factor("mm", "m", power=-1)
     (0.001, 1000.0, 1000.0)
     """
@@ -109,7 +112,7 @@ def read(name: str, text: str) -> tuple[float, str | None]:
 
     Examples
     --------
-    >>> from mbma_tables.units import read
+    >>> from mbma_tables.common.units import read
     >>> read("h_rms", "0.8um"), read("q0", "6.28/mm"), read("m4", "62 1/mm^2"), read("E1", "210 GPa")
     ((0.8, 'um'), (6.28, 'mm'), (62.0, 'mm'), (210.0, 'GPa'))
     """
@@ -155,11 +158,15 @@ class Units:
 
         Examples
         --------
-        >>> from mbma_tables.units import Units
-        >>> Units("um", "MPa").number("separation", [2, "1.5e-3 mm"])
-        [2, 1.5]
+        >>> from mbma_tables.common.units import Units
+        >>> Units("um", "MPa").number("separation", ["2 um", "1.5e-3 mm"])
+        [2.0, 1.5]
         """
         if isinstance(value, list | tuple):
+            flat = list(_entries(value))
+            bare = [entry for entry in flat if not isinstance(entry, str) or read(name, entry)[1] is None]
+            if 0 < len(bare) < len(flat):
+                raise InputError(f"{name}: {bare[0]!r} has no unit beside others that have: write it to each")
             return [self.number(name, entry) for entry in value]
         length, power = DIMENSIONS.get(name, (0, 0))
         kind, own = ("length", self.length) if length else ("stress", self.stress)
@@ -186,7 +193,7 @@ class Units:
 
         Examples
         --------
-        >>> from mbma_tables.units import Units
+        >>> from mbma_tables.common.units import Units
         >>> Units("mm").conductivities(45.0, 167.0), Units("mm").conductivities("45 W/(m K)", "167 W/(m K)")
         (([45.0, 167.0], 'conductivity/mm'), ([45000.0, 167000.0], 'W/(m^2 K)'))
         """
@@ -221,7 +228,7 @@ def resolve(
 
     Examples
     --------
-    >>> from mbma_tables.units import resolve
+    >>> from mbma_tables.common.units import resolve
     >>> resolve({"hurst": 0.8, "h_rms": "0.8 um", "h_max": "3e-3 mm"})
     ({'hurst': 0.8, 'h_rms': 0.8, 'h_max': 3.0}, 'um')
     """
@@ -233,6 +240,12 @@ def resolve(
             raise InputError(f"{', '.join(plain)} without a unit beside numbers in {unit}: write the unit to each")
     own = Units(length=unit) if kind == "length" else Units(stress=unit)
     return {name: own.number(name, value) for name, value in given.items()}, unit
+
+
+def _entries(value: Any) -> Iterator[Any]:
+    """What a list holds, and the lists in it."""
+    for entry in value:
+        yield from _entries(entry) if isinstance(entry, list | tuple) else (entry,)
 
 
 def _named(name: str, value: Any, kind: str) -> str | None:
@@ -247,6 +260,9 @@ def _named(name: str, value: Any, kind: str) -> str | None:
 
 def modulus_and_units(E_star: Any, surface: Any, asked: str | None = None) -> tuple[Any, Units]:
     """A modulus as a number, and the units of results: the surface's, and the one asked for or named by "100 GPa"."""
+    if not hasattr(surface, "unit"):
+        hint = "; a named one is Surface.named(...)" if isinstance(surface, str) else ""
+        raise InputError(f"surface must be a Surface, got {reprlib.repr(surface)}{hint}")
     given, stress = resolve({"E_star": E_star}, asked, "stress")
     # without a modulus, stresses are over it
     absent = stress is None and isinstance(E_star, int | float) and E_star == 1.0
@@ -258,7 +274,7 @@ def unit_of(name: str, units: Units) -> str:
 
     Examples
     --------
-    >>> from mbma_tables.units import Units, unit_of
+    >>> from mbma_tables.common.units import Units, unit_of
     >>> unit_of("stiffness", Units("um", "MPa")), unit_of("m4", Units("mm")), unit_of("energy", Units("mm"))
     ('MPa/um', '1/mm^2', 'stress mm')
     """

@@ -7,8 +7,8 @@ import time
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, needed
-from mbma_tables.errors import ConvergenceError
+from mbma_tables.common.arguments import FloatArray, needed
+from mbma_tables.common.errors import ConvergenceError
 
 # F/(A0 E* g), g the rms gradient: from 0.1% to 97% contact of a Gaussian surface
 LOADS = (4.4e-4, 1e-3, 2e-3, 4.5e-3, 0.01, 0.02, 0.04, 0.07, 0.11, 0.17, 0.25, 0.37, 0.53, 0.75, 1.05)

@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, Numbers, any_labelled, is_labelled
-from mbma_tables.display import Displayed, Variable, shown
-from mbma_tables.errors import InputError
+from mbma_tables.answers.source import MEANINGS, Source, concerns, named
+from mbma_tables.common.arguments import FloatArray, Numbers, any_labelled, is_labelled
+from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
+from mbma_tables.common.units import unit_of
 from mbma_tables.materials import ELASTIC_PSI
-from mbma_tables.plots import Curve, draw_compression, pressure_label, theory_label
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
-from mbma_tables.theories.source import MEANINGS, Source, concerns, named
-from mbma_tables.units import unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mbma_tables.theories.leakage import Leakage
+    from mbma_tables.answers.leakage import Leakage
 
 OF_HARDNESS = ("yielded", "incremental_stiffness", "plane_separation")
 MOST_SHOWN = 10_000  # entries up to which a line says how far to trust them
@@ -284,7 +284,7 @@ class Contact(Displayed):
     @functools.cached_property
     def leakage(self) -> Leakage:
         """Flow through the gaps of the contact, `theories.leakage.Leakage`; computed when first read."""
-        from mbma_tables.theories.leakage import leakage_of
+        from mbma_tables.answers.leakage import leakage_of
 
         return leakage_of(self._source, self, self._touching)
 

@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from mbma_tables.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.core import core
-from mbma_tables.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.theories import law_block as at
+from mbma_tables.law import block as at
 
 SAMPLES = 16
 MAX_RECORDS = 4000

@@ -25,9 +25,18 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq, isotonic_regression
 from scipy.special import ellipe, ellipkm1, erf, expit, ndtr, ndtri
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.bearing import FRACTIONS, Bearing, RadialSpectrum
-from mbma_tables.calibrated import CONSTANTS, Constants, Law, Spectrum, area, force_of, light_factor, mean_top_height
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.laws.bearing_curve import FRACTIONS, Bearing, RadialSpectrum
+from mbma_tables.laws.calibrated import (
+    CONSTANTS,
+    Constants,
+    Law,
+    Spectrum,
+    area,
+    force_of,
+    light_factor,
+    mean_top_height,
+)
 
 LIGHTEST, HEAVIEST = -16.0, 1.4  # ln F^ of a map's curve
 NODES = 500

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, Numbers, is_labelled
+from mbma_tables.answers.leakage import flow
+from mbma_tables.answers.leakage_table import shipped_flow
+from mbma_tables.common.arguments import FloatArray, Numbers, is_labelled
+from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.core import core
-from mbma_tables.errors import ConvergenceError, InputError
-from mbma_tables.labels import apply
+from mbma_tables.law import block as at
+from mbma_tables.law import pieces as fit
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories import law_block as at
-from mbma_tables.theories import law_pieces as fit
-from mbma_tables.theories.leakage import flow
-from mbma_tables.theories.leakage_table import shipped_flow
-
-if TYPE_CHECKING:
-    from mbma_tables.theories.law_object import ContactLaw
+from mbma_tables.surfaces.labels import apply
 
 RTOL, SHARE = 1e-4, 0.1  # of the polynomials, or this share of the law's own error
 MOST_OCTAVES = 20  # of gaps, from the blocked one on, next to which the flow is a power
@@ -29,7 +26,7 @@ MOST_OCTAVES = 20  # of gaps, from the blocked one on, next to which the flow is
 class LeakageLaw:
     """Flow conductance k h_rms^3 [length^3] of one surface against its gap, as `ContactLaw.leakage` has it."""
 
-    law: ContactLaw  # whose area and mean separation it is of
+    law: Any  # the ContactLaw whose area and mean separation it is of
     h_rms: float  # [length]
     blocked_at: float  # gap d at and below which contact percolates and nothing flows; -infinity where it never does
     # bound on the relative error of the polynomials, against the flow at the law's area; errors of that area come on
@@ -66,7 +63,7 @@ class LeakageLaw:
         return found.reshape(np.shape(d))[()]
 
 
-def leakage_law(law: ContactLaw, surface: AnySurface) -> LeakageLaw:
+def leakage_law(law: Any, surface: AnySurface) -> LeakageLaw:
     """Leakage of a contact law's surface, as polynomials of the gap that begin where contact percolates."""
     threshold, h_rms = shipped_flow().constants.threshold, float(surface.h_rms)
     rtol = max(RTOL, SHARE * law.error)

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import ConvergenceError
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1

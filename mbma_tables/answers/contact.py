@@ -10,7 +10,10 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import (
+from mbma_tables.answers.derivatives import differentiate
+from mbma_tables.answers.result import Contact
+from mbma_tables.answers.source import Source, named
+from mbma_tables.common.arguments import (
     FloatArray,
     any_labelled,
     broadcast_shape,
@@ -19,20 +22,18 @@ from mbma_tables.arguments import (
     hinted,
     positive_modulus,
     require,
+    require_flag,
     spread,
 )
-from mbma_tables.errors import InputError, OutOfRangeError
-from mbma_tables.labels import apply_to_surface
+from mbma_tables.common.errors import InputError, OutOfRangeError
+from mbma_tables.common.units import modulus_and_units
 from mbma_tables.models import QUANTITIES, AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.labels import apply_to_surface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import get_theory
 from mbma_tables.theories.mbma import Mbma, refuse_options_of_mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
-from mbma_tables.theories.result import Contact
-from mbma_tables.theories.sensitivity import differentiate
-from mbma_tables.theories.source import Source, named
-from mbma_tables.units import modulus_and_units
 
 KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by
 
@@ -40,7 +41,13 @@ KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact 
 @hinted
 def contact(
     surface: AnySurface,
+    *,
     separation: ArrayLike | None = None,
+    mean_separation: ArrayLike | None = None,
+    pressure: ArrayLike | None = None,
+    area: ArrayLike | None = None,
+    theory: str | Theory | UserTheory = "mbma",
+    hardness: ArrayLike | str = np.inf,
     island_model: str | AnyModel = "universal",
     variant: str | Variant = "reported",
     E_star: ArrayLike = 1.0,
@@ -48,12 +55,6 @@ def contact(
     outside: str = "raise",
     derivatives: bool = False,
     quantities: Iterable[str] = QUANTITIES,
-    *,
-    mean_separation: ArrayLike | None = None,
-    pressure: ArrayLike | None = None,
-    area: ArrayLike | None = None,
-    theory: str | Theory | UserTheory = "mbma",
-    hardness: ArrayLike | str = np.inf,
     workers: int = 1,
 ) -> Contact:
     """Force, real contact area and stiffness of a surface, by what is known: separation, pressure or area.
@@ -77,7 +78,7 @@ def contact(
         `name` and ``answer(surface, u)``.
     hardness : array_like
         Largest pressure p_m that the softer body bears, in the unit of `E_star` (of E* itself where that is 1). The
-        theory's elastic answer goes through `mbma_tables.hardness`; u is then the mean gap with yielded points
+        theory's elastic answer goes through `mbma_tables.laws.hardness`; u is then the mean gap with yielded points
         flattened. Infinite: nothing yields.
     island_model : {"universal", "island4d", "exact", "formula", "rigid"} or island model
         MBMA's island model: a table, the full solver, a closed form, or spheres that do not deform; or an object: a
@@ -138,7 +139,8 @@ def contact(
     by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
     E_star, units = modulus_and_units(E_star, surface)
     value, hardness = units.number(by, value), units.number("hardness", hardness)
-    if theory == Mbma.name:
+    require_flag("derivatives", derivatives)
+    if isinstance(theory, str) and theory == Mbma.name:
         chosen: Theory = Mbma(island_model, variant, rtol, outside, workers)
     else:
         chosen = get_theory(theory)
@@ -159,7 +161,7 @@ def contact(
 
 def wanted_quantities(quantities: Iterable[str]) -> tuple[str, ...]:
     """The quantities asked for, each once, in the order of `QUANTITIES`."""
-    asked = {quantities} if isinstance(quantities, str) else set(quantities)
+    asked = {quantities} if isinstance(quantities, str) or not isinstance(quantities, Iterable) else set(quantities)
     if not asked or not asked <= set(QUANTITIES):
         raise InputError(f"quantities must be some of {QUANTITIES}, got {quantities!r}")
     return tuple(filter(asked.__contains__, QUANTITIES))

@@ -14,8 +14,8 @@ from scipy.ndimage import label
 from scipy.sparse import coo_array, diags_array
 from scipy.sparse.linalg import splu
 
-from mbma_tables.arguments import FloatArray, finite_array, require
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import FloatArray, finite_array, require
+from mbma_tables.common.errors import InputError
 
 
 def open_ways(gap: FloatArray) -> tuple[np.ndarray, tuple[bool, bool]]:
@@ -74,7 +74,7 @@ def flow_conductance(gap: ArrayLike, sizes: tuple[float, float] = (1.0, 1.0)) ->
     Examples
     --------
     >>> import numpy as np
-    >>> from mbma_tables.reynolds import flow_conductance
+    >>> from mbma_tables.laws.reynolds import flow_conductance
     >>> gap = np.full((8, 8), 2.0)
     >>> gap[:, 3] = 0.0  # a ridge in contact, along the first axis
     >>> flow_conductance(gap).round(3).tolist()

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.arguments import broadcast_shape, is_labelled
-from mbma_tables.errors import InputError
+from mbma_tables.common.arguments import broadcast_shape, is_labelled
+from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.any_surface import AnySurface
 
 

@@ -15,22 +15,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.arguments import FloatArray, Numbers, finite_array, is_labelled, require
+from mbma_tables.answers.source import MEANINGS, LawPoint, LawValues
+from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, require
+from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
+from mbma_tables.common.units import UNKNOWN, Units, unit_of
 from mbma_tables.core import core, in_blocks
-from mbma_tables.display import Displayed, Variable, shown
-from mbma_tables.errors import InputError
-from mbma_tables.plots import Curve, draw_compression, pressure_label, theory_label
+from mbma_tables.law import block as at
+from mbma_tables.law.block import AREA, FORCE, QUANTITIES, inverse_block, softening
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories import law_block as at
-from mbma_tables.theories.law_block import AREA, FORCE, QUANTITIES, inverse_block, softening
-from mbma_tables.theories.source import MEANINGS, LawPoint, LawValues
-from mbma_tables.units import UNKNOWN, Units, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from scipy import LowLevelCallable
 
-    from mbma_tables.theories.law_leakage import LeakageLaw
+    from mbma_tables.law.leakage import LeakageLaw
 
     class Law:
         """As `core/binding.c` has it, which answers floats and small arrays without Python."""
@@ -150,7 +150,7 @@ class ContactLaw(Law, Displayed):
     ) -> tuple[Any, ...]:
         """What `fill` writes of checked input, in blocks, where it says that all is in range; else `check` refuses."""
         if is_labelled(given):
-            from mbma_tables.labels import apply
+            from mbma_tables.surfaces.labels import apply
 
             found: tuple[Any, ...] = apply(lambda block: self._ask(block, count, check, fill), (given,), count)
             return found
@@ -261,7 +261,7 @@ class ContactLaw(Law, Displayed):
 
     @functools.cached_property
     def leakage(self) -> LeakageLaw:
-        """Flow conductance at a mean separation, ``separation=`` or ``pressure=``, a `theories.law_leakage.LeakageLaw`; made when read.
+        """Flow conductance at a mean separation, ``separation=`` or ``pressure=``, a `LeakageLaw`; made when read.
 
         Examples
         --------
@@ -271,7 +271,7 @@ class ContactLaw(Law, Displayed):
         >>> f"{law.leakage(pressure='0.05 MPa'):.1g} um^3"
         '0.001 um^3'
         """
-        from mbma_tables.theories.law_leakage import leakage_law
+        from mbma_tables.law.leakage import leakage_law
 
         if self.surface is None:
             raise InputError("leakage needs the surface, which this law does not hold")

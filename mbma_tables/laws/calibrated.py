@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.arguments import FloatArray, answered, require
+from mbma_tables.common.arguments import FloatArray, answered, require
+from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.core import core
-from mbma_tables.errors import ConvergenceError, InputError
 
 POWERS = (1, 3, 16)  # of the cover in the weight W
 NARROWNESS = 0.65  # that W's slope refers to

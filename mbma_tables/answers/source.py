@@ -8,15 +8,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray, Numbers, any_labelled, broadcast_shape, checked_hardness, is_labelled
-from mbma_tables.display import shown
-from mbma_tables.labels import apply_to_surface
+from mbma_tables.common.arguments import (
+    FloatArray,
+    Numbers,
+    any_labelled,
+    broadcast_shape,
+    checked_hardness,
+    is_labelled,
+)
+from mbma_tables.common.display import shown
+from mbma_tables.common.units import Units, unit_of
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.labels import apply_to_surface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
-from mbma_tables.units import Units, unit_of
 
 if TYPE_CHECKING:
-    from mbma_tables.theories.result import Contact
     from mbma_tables.theories.yielding import Loaded
 
 MEANINGS = {
@@ -77,7 +83,7 @@ class Source:
     def map(
         self,
         function: Callable[..., tuple[Any, ...]],
-        contact: Contact,
+        contact: Any,  # whose mean separations it is asked at
         outputs: int,
         more: Mapping[str, Any] | None = None,
     ) -> tuple[Numbers, ...]:

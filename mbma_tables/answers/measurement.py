@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbma_tables.arguments import FloatArray
-from mbma_tables.errors import MbmaError, NotSelfAffineError, OutOfRangeError
-from mbma_tables.plots import new_figure, theory_label
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import MbmaError, NotSelfAffineError, OutOfRangeError
+from mbma_tables.common.plots import new_figure, theory_label
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories import get_theory
@@ -185,7 +185,7 @@ def _by_pressure(
 
 def table_of_loads(surface: MeasuredSurface, E_star: float = 1.0) -> tuple[dict[str, Any], list[str]]:
     """Columns by the calibrated law at a few contacts, and lines on what is left out of them or not valid."""
-    from mbma_tables.theories.contact import contact
+    from mbma_tables.answers.contact import contact
 
     areas, told = AREAS, []
     try:

@@ -1,4 +1,4 @@
-"""Files: where the shipped data are, variant with a size limit, and writing a file whole or not at all."""
+"""Files: where the shipped data are, reading with a size limit, and writing a file whole or not at all."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import tempfile
 import uuid
 from collections.abc import Callable
 
-from mbma_tables.errors import InputError
+from mbma_tables.common.errors import InputError
 
 
 def shipped_file(name: str) -> pathlib.Path:
     """Path of a file of `tables`: in the installed package, or in a checkout's `tables` folder."""
-    package = pathlib.Path(__file__).parent
+    package = pathlib.Path(__file__).parents[1]
     inside = package / "tables" / name
     return inside if inside.exists() else package.parent / "tables" / name
 

@@ -1,0 +1,1 @@
+"""What every room uses: arguments, units, errors, files, display, plots."""

@@ -1,0 +1,1 @@
+"""A contact law: one surface and theory as polynomials of the gap."""

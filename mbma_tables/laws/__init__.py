@@ -1,0 +1,1 @@
+"""Formulas without a surface: the calibrated laws, hardness, the effective medium of leakage, bearing curves."""
