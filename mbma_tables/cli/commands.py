@@ -171,7 +171,14 @@ def curve_command(
 def _draw(
     specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory], kind: str, leakage: bool, title: str
 ) -> bytes:
-    from mbma_tables.common.plots import Curve, draw_compression, leakage_label, pressure_label, theory_label, to_picture
+    from mbma_tables.common.plots import (
+        Curve,
+        draw_compression,
+        leakage_label,
+        pressure_label,
+        theory_label,
+        to_picture,
+    )
 
     gap = np.asarray(answer.mean_separation / specimen.surface.h_rms)
     curves = [answer.curve(leakage)]
