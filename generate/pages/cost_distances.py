@@ -53,13 +53,13 @@ def _by_law(**options: Any) -> tuple[float, float]:
 
     def make() -> dict[float, Any]:
         surfaces = (Surface(hurst, 1.0, zeta_1, 1.0, top) for hurst, zeta_1, top in TIMED)
-        return {float(surface.h_max): contact_law(surface, LAW_RTOL, **options) for surface in surfaces}
+        return {float(surface.h_max): contact_law(surface, rtol=LAW_RTOL, **options) for surface in surfaces}
 
     laws = make()
 
     def answer(surface: Surface, u: FloatArray) -> Any:
         law = laws[float(surface.h_max)]
-        return law.force(u=u), law.area(u=u)
+        return law.pressure(u), law.area(u)
 
     made = measure(make)[0] / len(laws)
     return _each(answer), made

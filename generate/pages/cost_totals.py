@@ -112,13 +112,15 @@ def law_rows() -> Iterator[Row]:
     for island_model in ISLAND_MODELS:
         tolerances = LAW_RTOLS if island_model == "universal" else SLOW_LAW_RTOLS
         for rtol in tolerances:
-            laws: list[Any] = [contact_law(surface, rtol, island_model=island_model) for surface in surfaces]
+            laws: list[Any] = [contact_law(surface, rtol=rtol, island_model=island_model) for surface in surfaces]
             answers = [
                 {"pressure": law.pressure(separation=gap), "area": law.area(separation=gap)}
                 for law, (_, gap, _) in zip(laws, reference(), strict=True)
             ]
             timed = surfaces[:2] if island_model == "exact" else surfaces
-            cost, _ = measure(lambda t=timed, r=rtol, n=island_model: [contact_law(s, r, island_model=n) for s in t])  # type: ignore[misc]
+            cost, _ = measure(
+                lambda t=timed, r=rtol, n=island_model: [contact_law(s, rtol=r, island_model=n) for s in t]
+            )  # type: ignore[misc]
             yield Row(island_model, variant("law", rtol), "both", largest_error(answers), cost / len(timed))
     surface = surfaces[3]
     law, gaps = contact_law(surface), measured_gaps(surface, 10_000)
@@ -151,7 +153,7 @@ def theory_rows() -> Iterator[Row]:
         for what, cost in batch.items():
             yield Row(name, what, "both", None, max(cost - (0 if what == "energy" else fixed), 1e-9) / u.size)
         for rtol in THEORY_LAW_RTOLS:
-            cost, _ = measure(functools.partial(contact_law, surface, rtol, theory=name))
+            cost, _ = measure(functools.partial(contact_law, surface, rtol=rtol, theory=name))
             yield Row(name, variant("law", rtol), "both", None, cost)
 
 

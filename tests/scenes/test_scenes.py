@@ -48,7 +48,7 @@ def test_totals_are_within_the_tolerance(rtol):
 
 @pytest.mark.parametrize("rtol", [1e-2, 1e-5])
 def test_pressures_stiffness_and_energy(rtol):
-    exact = contact_law(CONCRETE, 1e-9, E_star=2.0)
+    exact = contact_law(CONCRETE, rtol=1e-9, E_star=2.0)
     pressures = exact.pressure(separation=np.array(GAPS))
     more = {"pressures": pressures, "E_star": 2.0, "rtol": rtol}
     found = scene_of("pressure", "area", "stiffness", "energy", "conductance", **more).run()
