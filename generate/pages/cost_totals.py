@@ -118,9 +118,8 @@ def law_rows() -> Iterator[Row]:
                 for law, (_, gap, _) in zip(laws, reference(), strict=True)
             ]
             timed = surfaces[:2] if island_model == "exact" else surfaces
-            cost, _ = measure(
-                lambda t=timed, r=rtol, n=island_model: [contact_law(s, rtol=r, island_model=n) for s in t]
-            )  # type: ignore[misc]
+            ask = functools.partial(contact_law, rtol=rtol, island_model=island_model)
+            cost, _ = measure(lambda t=timed, a=ask: [a(surface) for surface in t])  # type: ignore[misc]
             yield Row(island_model, variant("law", rtol), "both", largest_error(answers), cost / len(timed))
     surface = surfaces[3]
     law, gaps = contact_law(surface), measured_gaps(surface, 10_000)

@@ -44,7 +44,7 @@ class Model:
     island_model: str
     variant: str
     rtol: float
-    theory: str | None = None
+    theory: Any = None  # a name; by the surface where none is given
     hardness: float | str = math.inf
 
     def of(self, surface: AnySurface) -> Model:

@@ -234,7 +234,7 @@ def test_island_is_the_librarys_answer():
         *("delta", "zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu"),
         *("force", "area", "error"),
     }
-    assert found["units"] | {"D": "1/mm^2", "pressure": "mm^2", "X": "-", "R_d": "mm"} == found["units"]
+    assert found["units"] | {"D": "1/mm^2", "force": "mm^2", "X": "-", "R_d": "mm"} == found["units"]
 
 
 def test_surfaces_lists_every_case():

@@ -176,7 +176,7 @@ if sys.argv[1] == "used":
     open_table("island4d")
     for island_model in ("exact", "universal", "island4d", "formula", "rigid"):
         contact(concrete, separation=[0.1, 0.7], island_model=island_model, rtol=1e-3)
-    contact_law(concrete, 1e-4)
+    contact_law(concrete, rtol=1e-4)
     Scene(Surface.named("asphalt"), effects=["pressure", "energy"], separations=[0.1], rtol=0.05).run()
     Scene(concrete, effects=["pressure_profile"], deltas=[0.2]).run()
 for arguments in (
