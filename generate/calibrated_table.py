@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.interpolate import PchipInterpolator, make_interp_spline
+from scipy.interpolate import make_interp_spline
 
-from generate.boundary_elements.evidence import Case
+from generate.boundary_elements.evidence import Case, TheoryCurve
 from generate.calibrated_file import write_part
 from generate.provenance import source_digest, versions
 from generate.splines import coefficients
@@ -27,7 +27,6 @@ from mbma_tables.theories.calibrated_table import AXES, QUANTITIES, load
 from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.persson import Persson
-from mbma_tables.theories.protocol import Theory
 
 # answered inside; nodes reach further, since a spline is worst near its ends
 COVERED = {"hurst": (0.1, 1.0), "log_zeta_1": (np.log(3.0), np.log(1e5)), "log_separation": (np.log(1e-6), np.log(8.0))}
@@ -55,48 +54,12 @@ LONG_NAMES = {
     "log_zeta_1": "natural logarithm of q1/q0",
     "log_separation": "natural logarithm of the mean separation over h_rms",
 }
-# u/h_max at which a theory's curve is known
-DEPTHS = np.concatenate([1 - np.geomspace(1e-4, 0.5, 150), np.geomspace(0.5, 1e-6, 151)[1:]])
 
 Summary = Callable[[Sequence[Case], Callable[[Case], Any]], dict[str, Any]]
 
 
-class TheoryCurve:
-    """A theory on one simulated surface, in the units of the calibrated law."""
-
-    def __init__(self, theory: Theory, one: Case) -> None:
-        _, hurst, zeta_1, *_ = one.node
-        self._surface = Surface(float(hurst), 1.0, float(zeta_1), 1.0, one.h_max)
-        self._theory, self._gradient = theory, float(self._surface.rms_gradient)
-        low = float(theory.interval(self._surface)[0])
-        u = DEPTHS * one.h_max
-        u = u[u > low]
-        found = theory.answer(self._surface, u)
-        rising = np.append(True, np.diff(np.minimum(found.force, 1e300)) > 0) & (found.force > 0)
-        self._u = u[rising]
-        self._log_force = np.log(found.force[rising] / self._gradient)
-        self._log_area = np.log(found.area[rising])
-
-    def reaches(self, force: FloatArray) -> Any:
-        """Which loads lie on the theory's curve."""
-        log_force = np.log(force)
-        return (log_force > self._log_force[0]) & (log_force < self._log_force[-1])
-
-    def area(self, force: FloatArray) -> FloatArray:
-        """A/A0 at F/(A0 E* g)."""
-        return np.asarray(np.exp(PchipInterpolator(self._log_force, self._log_area)(np.log(force))))
-
-    def separation(self, force: FloatArray) -> FloatArray:
-        """Mean separation [h_rms] at F/(A0 E* g)."""
-        return np.asarray(PchipInterpolator(self._log_force, self._u)(np.log(force)))
-
-    def force(self, u: FloatArray) -> FloatArray:
-        """F/(A0 E* g) at mean separations [h_rms]."""
-        return self._theory.answer(self._surface, np.minimum(u, self._surface.h_max)).force / self._gradient
-
-
-def _known(curves: dict[int, TheoryCurve]) -> Callable[[Case], TheoryCurve]:
-    return lambda one: curves[id(one)]
+def _made(curves: dict[int, TheoryCurve], one: Case) -> TheoryCurve:
+    return curves[id(one)]
 
 
 def others(found: Sequence[Case], summary: Summary) -> dict[str, dict[str, Any]]:
@@ -104,17 +67,14 @@ def others(found: Sequence[Case], summary: Summary) -> dict[str, dict[str, Any]]
     told = {}
     variants = [Mbma(variant=name, outside="nan") for name in ("reported", "printed", "fitted")]
     for theory in (*variants, Persson(), Persson("simplified"), GreenwoodWilliamson()):
-        seen, curves = [], {}
-        for one in found:
-            if one.kind != "self_affine" or not one.gaussian:
-                continue
+        reached: list[tuple[Case, TheoryCurve]] = []
+        for one in (one for one in found if one.kind == "self_affine" and one.gaussian):
             curve = TheoryCurve(theory, one)
-            kept = curve.reaches(one.force)
+            kept = np.isfinite(curve.separation(one.force))
             if kept.sum() > 3:
-                part = dataclasses.replace(one, force=one.force[kept], area=one.area[kept], u=one.u[kept])
-                seen.append(part)
-                curves[id(part)] = curve
-        told[theory.scatter_name(SELF_AFFINE)] = summary(seen, _known(curves))
+                reached.append((one.at(kept), curve))
+        made = {id(one): curve for one, curve in reached}
+        told[theory.scatter_name(SELF_AFFINE)] = summary([one for one, _ in reached], functools.partial(_made, made))
     return told
 
 

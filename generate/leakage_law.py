@@ -9,7 +9,6 @@ import json
 import pathlib
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from typing import Any, cast
 
 import click
 import numpy as np
@@ -18,8 +17,8 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.optimize import least_squares
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
+from generate.boundary_elements.evidence import TheoryCurve
 from generate.calibrated_file import write_part
-from generate.calibrated_table import TheoryCurve
 from generate.leakage_flow import MIN_WAVES, Case, Flow, cases, log_odds
 from generate.provenance import source_digest, versions
 from generate.splines import coefficients
@@ -160,8 +159,8 @@ def of_theories(flows: Sequence[Flow], constants: FlowConstants) -> dict[str, Fl
             one = flow.one
             if one.kind != "self_affine" or not one.isotropic:
                 continue
-            curve = TheoryCurve(theory, cast(Any, one))
-            kept = curve.reaches(one.force)
+            curve = TheoryCurve(theory, one)
+            kept = np.isfinite(curve.separation(one.force))
             area, u = curve.area(one.force[kept]), curve.separation(one.force[kept])
             log_k = np.full(one.force.shape, -np.inf)
             log_k[kept] = flow.medium(constants, area, u)

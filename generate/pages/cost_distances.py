@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,8 @@ from scipy.interpolate import PchipInterpolator
 
 from generate.boundary_elements.grids import GRIDS, STARTS
 from generate.boundary_elements.surfaces import Recipe, heights
-from generate.pages.distances import COVER, HIGH, HUES, ISLAND_MODELS, LOW, THEORIES, distances, held_out, summed_up
-from generate.pages.page import duration, panels, percent, read_csv, svg, table, to_csv
+from generate.pages.distances import COVER, HIGH, ISLAND_MODELS, LOW, THEORIES, distances, held_out, summed_up
+from generate.pages.page import read_csv
 from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.common.arguments import FloatArray
@@ -33,7 +33,6 @@ HEAD = """\
 # at 10-97%; reached is the share of simulated loads there that the theory reaches. cost is of one point, once of what
 # is made beforehand for a surface, both over the fixed piece of work of cost.csv.
 """
-SHAPES = {"MBMA": "o", "calibrated": "s", "Persson": "^", "G-W": "v"}
 
 
 def _each(answer: Callable[[Surface, FloatArray], Any], count: int = POINTS) -> float:
@@ -122,7 +121,7 @@ def study() -> list[Distance]:
     for name, theory in (THEORIES | ISLAND_MODELS).items():
         found = distances(seen, theory)
         parts = [summed_up(seen, found[quantity], *ends) for quantity in ("area", "force") for ends in RANGES]
-        known[name] = [part[0] for part in parts] + [part[2] for part in parts[:2]]
+        known[name] = [rms for rms, _ in parts] + [reached for _, reached in parts[:2]]
     known["area alone"] = [*known["calibrated"][:2], np.nan, np.nan, 1, 1]
     return [*(Distance(label, way, cost, once, *known[name]) for label, way, name, cost, once in ways()), *grid_rows()]
 
@@ -159,50 +158,3 @@ def grid_rows() -> list[Distance]:
         if timed.size:
             rows.append(Distance(SIMULATED, f"{grid} x {grid}, {start}", float(timed.mean()), 0, *[*parts, 1.0, 1.0]))
     return rows
-
-
-def file_of(rows: Sequence[Distance]) -> bytes:
-    """The rows as tables/distance.csv."""
-    cells = ([f"{v:.4g}" if isinstance(v, float | int) else v for v in row] for row in rows)
-    return to_csv(HEAD, Distance._fields, cells)
-
-
-def to_table(rows: Sequence[Distance], unit: float) -> str:
-    """The rows as a Markdown table, times in seconds."""
-    lines = [
-        [
-            row.theory,
-            row.way,
-            duration(row.cost * unit),
-            duration(row.once * unit) if row.once else "",
-            *(percent(v, "%") for v in (row.area_light, row.area_deep, row.force_light, row.force_deep)),
-            "" if row.reached_deep > 0.995 else f"{row.reached_light:.0%}, {row.reached_deep:.0%}",
-        ]
-        for row in rows
-    ]
-    kinds = [f"{what}, {ends}" for what in ("area", "force") for ends in ("1-10%", "10-97%")]
-    return table(["theory", "method", "time per point", "time per surface", *kinds, "reached"], lines)
-
-
-def draw(rows: Sequence[Distance], unit: float) -> bytes:
-    """Deviation against time: area above, force below, light contact left, deep contact right."""
-    figure, axes = panels(2, 2, (9, 7.4), sharex=True, sharey=True)
-    names = ("area_light", "area_deep", "force_light", "force_deep")
-    for panel, name in zip(axes.flat, names, strict=True):
-        for theory, colour in (HUES | {SIMULATED: "C5"}).items():
-            marker = next((shape for start, shape in SHAPES.items() if theory.startswith(start)), "*")
-            own = [row for row in rows if row.theory == theory]
-            x, y = [row.cost * unit for row in own], [100 * getattr(row, name) for row in own]
-            panel.loglog(x, y, marker, color=colour, ls="none", ms=6, label=theory)
-            for row, a, b in zip(own, x, y, strict=True):
-                if theory == SIMULATED and row.way.endswith("cold"):
-                    panel.annotate(row.way.split()[0], (a, b), (4, 3), textcoords="offset points", fontsize=7)
-        panel.grid(alpha=0.3)
-    for panel, title in zip(axes[0], ("1-10% contact", "10-97% contact"), strict=True):
-        panel.set_title(title)
-    axes[0, 0].set_ylabel("area at equal force, rms distance [%]")
-    axes[1, 0].set_ylabel("force at equal separation, rms distance [%]")
-    for panel in axes[1]:
-        panel.set(xlabel="processor time a point [s]", xlim=(1e-8, 1e3))
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
-    return svg(figure)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
@@ -9,11 +10,27 @@ import numpy as np
 
 from generate.calibrated import QUANTITIES
 from generate.pages import distances
-from generate.pages.comparisons import AREA_THEORIES, GAPS, PERSSON, THEORIES, VARIANTS, force_at, sample
 from generate.pages.page import panels
 from mbma_tables import Surface, theories
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.theories.protocol import answer_where_finite
 
-COLOURS = dict(zip((*THEORIES, "Persson"), ("C0", "C1", "C2", "C3", "C4", "C3"), strict=True))
+THEORIES: dict[str, theories.Theory] = {
+    "MBMA reported": theories.Mbma(),
+    "MBMA printed": theories.Mbma(variant="printed"),
+    "G-W": theories.GreenwoodWilliamson(),
+    "Persson full": theories.Persson("full"),
+    "Persson simplified": theories.Persson("simplified"),
+}
+VARIANTS, PERSSON = ("MBMA reported", "MBMA printed"), ("Persson full", "Persson simplified")
+COLOURS = {name: f"C{k}" for k, name in enumerate(THEORIES)}
+# u/h_max, closer at first and at full contact; G-W's heights have no end
+DEPTHS = np.concatenate(
+    [
+        *(np.linspace(1.5, 1.005, 30), 1 - np.geomspace(0.002, 0.1, 30)[:-1]),
+        *(np.linspace(0.9, 0.0015, 60)[:-1], np.geomspace(0.0015, 1e-5, 10)),
+    ]
+)
 BANDED = ("MBMA reported", "calibrated")
 BINS = (0.0005, 0.002, 0.005, 0.01, 0.03, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 0.9, 0.98)
 ROADS = ("concrete", "asphalt")
@@ -21,31 +38,34 @@ RESOLUTIONS = (125, 250, 500, 1000)
 Figures = Iterator[tuple[str, Any]]
 
 
-def by_gap(ax: Any, surface: Surface, low: float, names: Iterable[str] = THEORIES, **style: Any) -> None:
+@functools.cache
+def curve(surface: Surface, theory: str) -> tuple[FloatArray, FloatArray]:
+    """Force and area at `DEPTHS`."""
+    found = answer_where_finite(THEORIES[theory], surface, DEPTHS * surface.h_max)
+    return found.force, found.area
+
+
+def force_at(surface: Surface, theory: str, ratio: Any) -> FloatArray:
+    """F/(A0 E*) at mean separations u = ratio * h_rms; NaN where the theory has none, as Persson's at u = 0."""
+    return answer_where_finite(THEORIES[theory], surface, np.atleast_1d(ratio) * surface.h_rms).force
+
+
+def by_gap(ax: Any, surface: Surface, low: float, names: Iterable[str] = tuple(THEORIES), **style: Any) -> None:
     """Force against mean separation."""
     top = surface.h_max / surface.h_rms
     for name in names:
-        if name in PERSSON:
-            ratio = np.linspace(0.005, 1.1 * top, GAPS)
-            force = force_at(surface, name, ratio)
-        else:
-            u, force, _ = sample(surface, name)
-            ratio = u / surface.h_rms
-        ax.semilogy(ratio, force, color=COLOURS[name], **{"label": name, **style})
+        ax.semilogy(top * DEPTHS, curve(surface, name)[0], color=COLOURS[name], **{"label": name, **style})
     ax.set(xlabel=r"$u/h_{rms}$", ylabel=r"$F/(A_0 E^*)$", ylim=(low, None), xlim=(0, 1.1 * top))
 
 
 def by_force(ax: Any, surface: Surface, ratio: Callable[[Any, Any], Any] | None = None, **style: Any) -> None:
-    """Area, or a ratio of area and force, against force."""
-    for name in AREA_THEORIES:
-        if name == "Persson":
-            force = np.geomspace(1e-5, 3, GAPS) * np.sqrt(surface.m2)
-            area = theories.Persson().area_at(surface, force)
-        else:
-            _, force, area = sample(surface, name)
+    """Area, or a ratio of area and force, against force; (18) is Persson's area in full and simplified."""
+    for name in (*VARIANTS, "G-W", "Persson full"):
+        force, area = curve(surface, name)
         shown = (area > 1e-5) & (area < 1.2)
+        force, area = force[shown], area[shown]
         values = ratio(force, area) if ratio else area
-        ax.plot(force[shown], values[shown], color=COLOURS[name], **{"label": name, **style})
+        ax.plot(force, values, color=COLOURS[name], **{"label": name.removesuffix(" full"), **style})
     ax.set(xscale="log", xlabel=r"$F/(A_0 E^*)$")
     if ratio is None:
         ax.set(yscale="log", ylabel=r"$A/A_0$")
