@@ -24,7 +24,10 @@ DEEP = 0.1  # A/A0: deviations are given from LOW to DEEP and from DEEP to HIGH
 RANGES = ((LOW, DEEP), (DEEP, HIGH))
 SIMULATED = "boundary elements"
 POINTS, SLOW_POINTS = 1000, 50  # of each timed surface, in one call
-TIMED = ((0.3, 12.0, 3.4), (0.5, 21.0, 3.6), (0.9, 12.0, 3.0))  # H, zeta_1, h_max/h_rms: those of the grids
+TIMED = tuple(  # those of the grids
+    Surface(hurst, 1.0, zeta_1, 1.0, top)
+    for hurst, zeta_1, top in ((0.3, 12.0, 3.4), (0.5, 21.0, 3.6), (0.9, 12.0, 3.0))
+)
 MAP = Recipe("self_affine", 0.8, 16.0, 4, 1, 256)
 LAW_RTOL = 1e-6
 HEAD = """\
@@ -35,43 +38,36 @@ HEAD = """\
 """
 
 
-def _each(answer: Callable[[Surface, FloatArray], Any], count: int = POINTS) -> float:
-    """Cost of a point: force and area at mean separations of each timed surface, one call a surface."""
-    surfaces = [Surface(hurst, 1.0, zeta_1, 1.0, top) for hurst, zeta_1, top in TIMED]
-    asked = [(surface, np.linspace(0.02, 0.98, count) * float(surface.h_max)) for surface in surfaces]
-    cost, _ = measure(lambda: [answer(surface, u) for surface, u in asked])
-    return cost / (len(asked) * count)
+def timed(answer: Callable[[Surface, FloatArray], Any], count: int = POINTS) -> tuple[float, float]:
+    """Cost of a point, of mean separations of each surface in one call a surface; nothing is made beforehand."""
+    pairs = [(surface, np.linspace(0.02, 0.98, count) * float(surface.h_max)) for surface in TIMED]
+    return measure(lambda: [answer(surface, u) for surface, u in pairs])[0] / (len(pairs) * count), 0.0
 
 
-def _asked(**options: Any) -> Callable[[Surface, FloatArray], Any]:
-    return lambda surface, u: contact(surface, mean_separation=u, **options)
+def asked(count: int = POINTS, **options: Any) -> tuple[float, float]:
+    """The same, of force and area by `contact`."""
+    return timed(lambda surface, u: contact(surface, mean_separation=u, **options), count)
 
 
-def _by_law(**options: Any) -> tuple[float, float]:
+def by_law(**options: Any) -> tuple[float, float]:
     """Costs of a point of a law, and of making it."""
 
-    def make() -> dict[float, Any]:
-        surfaces = (Surface(hurst, 1.0, zeta_1, 1.0, top) for hurst, zeta_1, top in TIMED)
-        return {float(surface.h_max): contact_law(surface, LAW_RTOL, **options) for surface in surfaces}
+    def make() -> dict[Surface, Any]:
+        return {surface: contact_law(surface, LAW_RTOL, **options) for surface in TIMED}
 
     laws = make()
-
-    def answer(surface: Surface, u: FloatArray) -> Any:
-        law = laws[float(surface.h_max)]
-        return law.force(u=u), law.area(u=u)
-
-    made = measure(make)[0] / len(laws)
-    return _each(answer), made
+    each, _ = timed(lambda surface, u: (laws[surface].force(u=u), laws[surface].area(u=u)))
+    return each, measure(make)[0] / len(laws)
 
 
-def _quadrature(surface: Surface, u: FloatArray) -> Any:
-    spectrum = Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1))
-    law = Law(spectrum, float(surface.h_max / surface.h_rms))
-    force = law.force(u / surface.h_rms)
+def quadrature(surface: Surface, u: FloatArray) -> Any:
+    """Force and area by the calibrated law's own integrals."""
+    law = Law(Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1)), float(surface.h_max))
+    force = law.force(u)
     return force, law.area(force)
 
 
-def _by_map() -> tuple[float, float]:
+def by_map() -> tuple[float, float]:
     """Costs of a point of the law of a map of 256 x 256 points, and of making it."""
     z = heights(MAP)
 
@@ -89,30 +85,26 @@ def _by_map() -> tuple[float, float]:
 
 def ways() -> Iterator[tuple[str, str, str, float, float]]:
     """Theory, way to it, name of its deviations, cost of a point and once a surface."""
-    closed_form = _each(lambda surface, force: area(force, surface.alpha))
-    yield "calibrated", "closed form, area of a force", "area alone", closed_form, 0
-    yield "calibrated", "quadrature", "calibrated", _each(_quadrature), 0
-    yield "calibrated", "table", "calibrated", _each(_asked(theory="calibrated")), 0
-    yield "calibrated", "law", "calibrated", *_by_law(theory="calibrated")
-    yield "calibrated, map", "map of 256 x 256", "calibrated, map", *_by_map()
-    yield "Persson", "inverse of (19)", "Persson", _each(_asked(theory="persson"), SLOW_POINTS), 0
-    yield "Persson", "law", "Persson", *_by_law(theory="persson")
-    name = "Persson simplified"
-    yield name, "inverse of (20)", name, _each(_asked(theory=Persson("simplified"))), 0
-    yield "G-W", "quadrature", "G-W", _each(_asked(theory="greenwood_williamson")), 0
-    yield "G-W", "law", "G-W", *_by_law(theory="greenwood_williamson")
-    for island_model in ("universal", "exact", "island4d", "formula", "rigid"):
-        count = SLOW_POINTS if island_model == "exact" else POINTS
-        known = island_model if island_model in ISLAND_MODELS else "MBMA reported"
-        options: dict[str, Any] = {
-            "island_model": island_model,
-            "rtol": 1e-4 if island_model in ("formula", "rigid") else LAW_RTOL,
-        }
-        yield "MBMA reported", island_model, known, _each(_asked(**options), count), 0
-    yield "MBMA reported", "law", "MBMA reported", *_by_law()
-    for name, variant in (("printed", "printed"), ("fitted", "fitted"), ("cover", COVER)):
-        cost = _each(_asked(variant=variant, rtol=LAW_RTOL))
-        yield f"MBMA {name}", "universal", f"MBMA {name}", cost, 0
+    area_alone = timed(lambda surface, force: area(force, surface.alpha))
+    yield "calibrated", "closed form, area of a force", "area alone", *area_alone
+    yield "calibrated", "quadrature", "calibrated", *timed(quadrature)
+    yield "calibrated", "table", "calibrated", *asked(theory="calibrated")
+    yield "calibrated", "law", "calibrated", *by_law(theory="calibrated")
+    yield "calibrated, map", "map of 256 x 256", "calibrated, map", *by_map()
+    yield "Persson", "inverse of (19)", "Persson", *asked(SLOW_POINTS, theory="persson")
+    yield "Persson", "law", "Persson", *by_law(theory="persson")
+    yield "Persson simplified", "inverse of (20)", "Persson simplified", *asked(theory=Persson("simplified"))
+    yield "G-W", "quadrature", "G-W", *asked(theory="greenwood_williamson")
+    yield "G-W", "law", "G-W", *by_law(theory="greenwood_williamson")
+    name = "MBMA reported"
+    yield name, "universal", name, *asked(rtol=LAW_RTOL)
+    yield name, "exact", name, *asked(SLOW_POINTS, island_model="exact", rtol=LAW_RTOL)
+    yield name, "island4d", name, *asked(island_model="island4d", rtol=LAW_RTOL)
+    for island_model in ISLAND_MODELS:
+        yield name, island_model, island_model, *asked(island_model=island_model, rtol=1e-4)
+    yield name, "law", name, *by_law()
+    for name, variant in (("MBMA printed", "printed"), ("MBMA fitted", "fitted"), ("MBMA cover", COVER)):
+        yield name, "universal", name, *asked(variant=variant, rtol=LAW_RTOL)
 
 
 def study() -> list[Distance]:

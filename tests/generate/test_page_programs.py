@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from generate.__main__ import main
-from generate.pages import fidelity_figures, maps
+from generate.pages import fidelity, maps
 from generate.pages import theories as theories_page
 from generate.pages.gallery import ratios
 from generate.pages.page import MARKED, ROOT, svg
@@ -108,7 +108,7 @@ def test_the_page_of_theories_lists_them_all():
 
 @pytest.mark.slow
 def test_every_figure_of_the_fidelity_page():
-    drawn = dict(fidelity_figures.drawn())
+    drawn = dict(fidelity.drawn())
     shown = re.findall(r"figures/(\w+)\.svg", (ROOT / "docs" / "fidelity.md").read_text(encoding="utf-8"))
     assert set(drawn) == set(shown)
 
