@@ -13,12 +13,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.optimize import least_squares
 
 from generate.boundary_elements.design import SPLITS, TRAINING
 from generate.boundary_elements.evidence import GAUSSIAN, LEVELS, Capped, capped
-from generate.calibrated_file import write_part
-from generate.provenance import source_digest, versions
+from generate.calibrated_file import fitted, made_by, variable, write_part
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws import hardness as cap
@@ -46,7 +44,7 @@ TURN = 0.01  # of ln A_el, for derivatives
 FOLDS = 5
 REFERENCE = pathlib.Path(__file__).parents[1] / "docs" / "data" / "hardness.csv"  # another code's surfaces
 WAVES = 3  # longest waves a side: with fewer h_max says little of the highest heights
-MODULES = ("mbma_tables.laws.hardness", "generate.calibrated_hardness")
+MODULES = ("mbma_tables.laws.hardness", "generate.calibrated_file", "generate.calibrated_hardness")
 
 
 def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> FloatArray:
@@ -62,26 +60,22 @@ def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> 
     return cap.plane_separation(one.u, one.force / one.eta, one.eta, constants) - one.planes
 
 
-def fitted(one: Capped) -> Any:
+def between(one: Capped) -> Any:
     """Loads that constants are fitted to."""
     return (one.area > LIGHTEST) & (one.area < HEAVIEST)
 
 
 def fit(seen: Sequence[Capped]) -> cap.Constants:
-    """Constants from these surfaces."""
-    start = cap.CONSTANTS
-    found: dict[str, float] = {}
+    """Constants from these surfaces, one part after the other."""
+
+    def residuals(part: str, noise: float, trial: cap.Constants) -> list[FloatArray]:
+        return [errors(one, part, trial)[between(one)] / noise for one in seen]
+
+    found = cap.CONSTANTS
     for part, (own, noise) in PARTS.items():
-
-        def residuals(
-            values: FloatArray, part: str = part, own: tuple[str, ...] = own, noise: float = noise
-        ) -> FloatArray:
-            trial = dataclasses.replace(start, **dict(zip(own, map(float, values), strict=True)))
-            return np.concatenate([errors(one, part, trial)[fitted(one)] / noise for one in seen])
-
-        best = least_squares(residuals, [getattr(start, name) for name in own], loss="soft_l1", x_scale="jac")
-        found |= {name: float(f"{value:.{DIGITS}g}") for name, value in zip(own, best.x, strict=True)}
-    return dataclasses.replace(start, **found)
+        best = fitted(cap.CONSTANTS, own, functools.partial(residuals, part, noise), x_scale="jac")
+        found = dataclasses.replace(found, **{name: float(f"{getattr(best, name):.{DIGITS}g}") for name in own})
+    return found
 
 
 def cross_validated(seen: Sequence[Capped]) -> list[cap.Constants]:
@@ -183,7 +177,7 @@ def by_magnification(seen: Sequence[Capped], constants: cap.Constants) -> dict[s
         own = [one for one in seen if one.zeta_1 == zeta_1]
         means = [
             [
-                np.concatenate([errors(one, q, constants)[fitted(one)] for one in own if one.eta == eta]).mean()
+                np.concatenate([errors(one, q, constants)[between(one)] for one in own if one.eta == eta]).mean()
                 for eta in sorted({one.eta for one in own})
             ]
             for q in QUANTITIES
@@ -278,30 +272,20 @@ def stated(training: Sequence[Capped], constants: cap.Constants) -> Scatter:
 
 def dataset(scatter: Scatter, told: FloatArray) -> xr.Dataset:
     """Variables of the library's file."""
-    unit = {"units": "1"}
+    known = "statistics of ln(law/simulation), of the difference for the yielded share"
+    stated = (
+        "root mean square of ln(law/simulation) on the training set, by constants from other spectra; of the theory "
+        "elastic with the simulated elastic contact; NaN: not measured"
+    )
+    passed_on = "root mean square of d ln(area, force) by d ln of the elastic one"
+    rms, weights = np.array([*scatter.rms.values()]), np.array([*scatter.weight.values()])
     return xr.Dataset(
         {
-            "accuracy": (
-                ("set", "form", "quantity", "statistic"),
-                told,
-                {"long_name": "statistics of ln(law/simulation), of the difference for the yielded share", **unit},
-            ),
-            "stated_scatter": (
-                ("theory", "quantity", "hardness", "contact"),
-                np.array([*scatter.rms.values()]),
-                {
-                    "long_name": "root mean square of ln(law/simulation) on the training set, by constants from other "
-                    "spectra; of the theory elastic with the simulated elastic contact; NaN: not measured",
-                    **unit,
-                },
-            ),
-            "elastic_weight": (
-                ("force_or_area", "hardness", "contact"),
-                np.array([*scatter.weight.values()]),
-                {"long_name": "root mean square of d ln(area, force) by d ln of the elastic one", **unit},
-            ),
-            "eta": ("hardness", scatter.eta, {"long_name": "p_m/(E* g)", **unit}),
-            "contact": ("contact", np.exp(scatter.log_area), {"long_name": "A/A0, middle of a bin", **unit}),
+            "accuracy": variable(("set", "form", "quantity", "statistic"), told, known),
+            "stated_scatter": variable(("theory", "quantity", "hardness", "contact"), rms, stated),
+            "elastic_weight": variable(("force_or_area", "hardness", "contact"), weights, passed_on),
+            "eta": variable("hardness", scatter.eta, "p_m/(E* g)"),
+            "contact": variable("contact", np.exp(scatter.log_area), "A/A0, middle of a bin"),
         }
     )
 
@@ -333,9 +317,7 @@ def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[ca
         "sets": " ".join(groups),
         **{f"law_{name}": value for name, value in dataclasses.asdict(constants).items()},
         "evidence": json.dumps({"code_sha256": evidence.attrs.get("code_sha256", ""), "contacts": len(found)}),
-        "versions": json.dumps(versions(), sort_keys=True),
-        "source_sha256": source_digest(MODULES),
-        "source_modules": " ".join(MODULES),
+        **made_by(MODULES),
     }
     if path is not None:
         write_part(path, data, GROUP)

@@ -17,8 +17,7 @@ import xarray as xr
 from scipy.interpolate import make_interp_spline
 
 from generate.boundary_elements.evidence import Case, TheoryCurve
-from generate.calibrated_file import write_part
-from generate.provenance import source_digest, versions
+from generate.calibrated_file import bins_of, made_by, nodes_of, variable, write_part
 from generate.splines import coefficients
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws.calibrated import Constants, Law, Spectrum
@@ -47,6 +46,7 @@ MODULES = (
     "mbma_tables.laws.map_curves",
     "generate.calibrated",
     "generate.calibrated_bars",
+    "generate.calibrated_file",
     "generate.calibrated_table",
 )
 LONG_NAMES = {
@@ -162,9 +162,7 @@ def _attributes(told: dict[str, Any], constants: Constants, theories: list[str],
         "coverage": json.dumps(told["coverage"]),
         "bars": json.dumps(told["bars"]),
         "evidence": json.dumps(told["evidence"]),
-        "versions": json.dumps(versions(), sort_keys=True),
-        "source_sha256": source_digest(MODULES),
-        "source_modules": " ".join(MODULES),
+        **made_by(MODULES),
     }
 
 
@@ -183,34 +181,20 @@ def dataset(told: dict[str, Any], found: Sequence[Case], summary: Summary) -> xr
     }
     rows = {f"{name}, {form}": content for name, forms in told["errors"].items() for form, content in forms.items()}
     rows |= {f"self-affine, {name}": content for name, content in known.items()}
-    text = {"units": "1"}
+    scatter = np.array([_stated(cells) for cells in stated.values()])
+    accuracy = np.array([_cells(content, bins) for content in rows.values()])
+    spline = "ln F_G, F/(A0 E* g) of a surface without end: cardinal quintic B-splines"
+    known_from = "statistics of ln(theory/simulation), and their number"
     data = xr.Dataset(
         {
-            "spline": (
-                tuple(f"{name}_knot" for name in AXES),
-                coefficients(values, DEGREE, 3),
-                {"long_name": "ln F_G, F/(A0 E* g) of a surface without end: cardinal quintic B-splines", **text},
+            "spline": variable([f"{name}_knot" for name in AXES], coefficients(values, DEGREE, 3), spline),
+            "stated_scatter": variable(
+                ("theory", "quantity", "contact"), scatter, "root mean square of ln(theory/simulation)"
             ),
-            "stated_scatter": (
-                ("theory", "quantity", "contact"),
-                np.array([_stated(cells) for cells in stated.values()]),
-                {"long_name": "root mean square of ln(theory/simulation)", **text},
-            ),
-            "accuracy": (
-                ("set", "quantity", "contact", "statistic"),
-                np.array([_cells(content, bins) for content in rows.values()]),
-                {"long_name": "statistics of ln(theory/simulation), and their number", **text},
-            ),
+            "accuracy": variable(("set", "quantity", "contact", "statistic"), accuracy, known_from),
         },
-        {
-            **{
-                name: (name, nodes, {"long_name": LONG_NAMES[name], **text, "covered": COVERED[name]})
-                for name, nodes in zip(AXES, (HURST, LOG_ZETA, LOG_U), strict=True)
-            },
-            "contact": ("contact", np.sqrt(edges[1:] * edges[:-1]), {"long_name": "A/A0, middle of a bin", **text}),
-            "contact_low": ("contact", edges[:-1], {"long_name": "A/A0, low end of a bin", **text}),
-            "contact_high": ("contact", edges[1:], {"long_name": "A/A0, high end of a bin", **text}),
-        },
+        nodes_of(dict(zip(AXES, (HURST, LOG_ZETA, LOG_U), strict=True)), LONG_NAMES, COVERED)
+        | bins_of(edges, np.sqrt(edges[1:] * edges[:-1])),
     )
     data.attrs = _attributes(told, constants, list(stated), list(rows))
     return data
