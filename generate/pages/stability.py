@@ -22,6 +22,7 @@ from scipy.interpolate import BarycentricInterpolator
 
 from generate.pages.page import Measured, panels, table
 from generate.tables.exact_geometry import DOUBLES, divisor, exact_island
+from generate.tables.height_coefficients import height_integral
 from mbma_tables import Surface, contact, greenwood_tripp
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
@@ -111,12 +112,7 @@ def relative_error(found: float, truth: Any) -> float:
 def rigid_truth(X: float) -> tuple[mp.mpf, mp.mpf]:
     """(pi/5) F_{5/2}(-X) and (pi/2) F_2(-X) by mpmath: parabolic cylinder functions."""
     with mp.workdps(DIGITS):
-        x = -mp.mpf(float(X))
-        # F_n(x) = Gamma(n + 1) exp(-x^2/4) U(n + 1/2, x)/sqrt(2 pi)
-        force, area = (
-            mp.gamma(n + 1) * mp.exp(-x * x / 4) * mp.pcfu(n + mp.mpf(1) / 2, x) / mp.sqrt(2 * mp.pi)
-            for n in (mp.mpf(5) / 2, mp.mpf(2))
-        )
+        force, area = (height_integral(mp.mpf(n), -mp.mpf(float(X))) for n in (2.5, 2))
         return mp.pi / 5 * force, mp.pi / 2 * area
 
 
