@@ -186,7 +186,7 @@ def by_magnification(seen: Sequence[Capped], constants: cap.Constants) -> dict[s
 
 
 def blind() -> dict[str, FloatArray]:
-    """Errors of `contact` on an independent code's surfaces, docs/data/hardness.csv, which no fit and no choice of a form saw."""
+    """Errors of `contact` on another code's surfaces, docs/data/hardness.csv, which no fit or choice of a form saw."""
     table = read_csv("hardness.csv")
     own = table[np.isfinite(table["eta"]) & (table["area"] > LIGHTEST) & (table["area"] < EDGES[-1])]
     surface = Surface(own["hurst"], 1.0, own["zeta_1"], 1.0, own["h_max_over_h_rms"])
