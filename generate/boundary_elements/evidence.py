@@ -80,9 +80,9 @@ class TheoryCurve:
         with np.errstate(all="ignore"):
             found = theory.answer(self._surface, u)
         # of a theory whose force falls again, the branch of first contact
-        end = np.flatnonzero(np.append(np.diff(found.force) <= 0, True))[0] + 1
-        kept = slice(int(np.argmax(found.force[:end] > 0)), end)
-        self._log_force, self._log_area = np.log(found.force[kept] / self._g), np.log(found.area[kept])
+        end = np.flatnonzero(np.append(np.diff(found.pressure) <= 0, True))[0] + 1
+        kept = slice(int(np.argmax(found.pressure[:end] > 0)), end)
+        self._log_force, self._log_area = np.log(found.pressure[kept] / self._g), np.log(found.area[kept])
         self._u = u[kept] / self._h_rms
 
     def _at(self, values: FloatArray, force: FloatArray) -> FloatArray:
@@ -98,7 +98,7 @@ class TheoryCurve:
 
     def force(self, u: FloatArray) -> FloatArray:
         """Force at mean separations."""
-        return self._theory.answer(self._surface, np.minimum(u * self._h_rms, self._surface.h_max)).force / self._g
+        return self._theory.answer(self._surface, np.minimum(u * self._h_rms, self._surface.h_max)).pressure / self._g
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -101,7 +101,7 @@ def alone(costs: Costs) -> str:
     ratios: dict[str, dict[str, list[float]]] = {}
     for row in costs.rows:
         if row.quantity != "both" and row.what == "gap":
-            own = ratios.setdefault(method(row), {"force": [], "area": []})
+            own = ratios.setdefault(method(row), {"pressure": [], "area": []})
             own[row.quantity].append(row.cost / both[row.island_model, row.variant])
     cells = ([name, *((min(own), max(own)) for own in found.values())] for name, found in ratios.items())
     return table("method | force alone | area alone", cells, "{} | {:.2f} to {:.2f}")

@@ -56,7 +56,7 @@ def by_law(**options: Any) -> tuple[float, float]:
         return {surface: contact_law(surface, LAW_RTOL, **options) for surface in TIMED}
 
     laws = make()
-    each, _ = timed(lambda surface, u: (laws[surface].force(u=u), laws[surface].area(u=u)))
+    each, _ = timed(lambda surface, u: (laws[surface].pressure(u), laws[surface].area(u)))
     return each, measure(make)[0] / len(laws)
 
 

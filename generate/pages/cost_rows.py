@@ -59,7 +59,7 @@ FIRST_USE = (
     "import mbma_tables, numpy, time; s = mbma_tables.Surface(0.74, 1.0, 330.0, 0.1, 0.3); t = time.process_time(); "
     "mbma_tables.contact(s, separation=0.1, island_model={island_model!r}, rtol=1e-2); print(time.process_time() - t)"
 )
-QUANTITIES = {"both": ("force", "area"), "force": ("force",), "area": ("area",)}
+QUANTITIES = {"both": ("pressure", "area"), "pressure": ("pressure",), "area": ("area",)}
 
 
 def at(what: str, rtol: float) -> str:
@@ -155,7 +155,7 @@ def reference() -> tuple[dict[str, FloatArray], ...]:
     """Force and area of every surface at every fifth of its gaps."""
     options: dict[str, Any] = {"island_model": Doubled(), "rtol": REFERENCE_RTOL}
     found = [contact(surface, separation=gaps_of(surface)[::EVERY], **options) for surface in SURFACES]
-    return tuple({"force": np.asarray(one.force), "area": np.asarray(one.area)} for one in found)
+    return tuple({"pressure": np.asarray(one.pressure), "area": np.asarray(one.area)} for one in found)
 
 
 def largest_error(answers: Sequence[dict[str, FloatArray]]) -> float:
@@ -168,8 +168,8 @@ def scene_rows() -> Iterator[Row]:
     """What a scene takes besides its steps: planning and making the result."""
     surface = SURFACES[0]
     gap = 0.9 * float(surface.h_max)
-    whole = measure(Scene(surface, effects=["force"], separations=gap, rtol=1e-4).run)[0]
-    step = measure(functools.partial(contact, surface, separation=gap, rtol=1e-4, quantities=["force"]))[0]
+    whole = measure(Scene(surface, effects=["pressure"], separations=gap, rtol=1e-4).run)[0]
+    step = measure(functools.partial(contact, surface, separation=gap, rtol=1e-4, quantities=["pressure"]))[0]
     yield Row("scene", "call", "both", None, max(whole - step, 0.0))
 
 
@@ -206,16 +206,19 @@ def law_rows() -> Iterator[Row]:
         for rtol in LAW_RTOLS if island_model == "universal" else SLOW_LAW_RTOLS:
             laws = make(island_model, rtol)
             places = [gaps_of(surface)[::EVERY] for surface in SURFACES]
-            answers = [{"force": law.force(d), "area": law.area(d)} for law, d in zip(laws, places, strict=True)]
+            answers = [
+                {"pressure": law.pressure(separation=d), "area": law.area(separation=d)}
+                for law, d in zip(laws, places, strict=True)
+            ]
             cost, _ = measure(functools.partial(make, island_model, rtol, timed))
             yield Row(island_model, at("law", rtol), "both", largest_error(answers), cost / len(timed))
     law, gaps = contact_law(SURFACES[3]), gaps_of(SURFACES[3], 10_000)
-    loads = law.force(gaps)
+    loads = law.pressure(separation=gaps)
     ways: dict[tuple[str, str], Callable[[], Any]] = {
-        ("lookup", "force"): lambda: law.force(gaps),
-        ("lookup", "area"): lambda: law.area(gaps),
-        ("lookup", "both"): lambda: (law.force(gaps), law.area(gaps)),
-        ("invert", "force"): lambda: law.separation(force=loads),
+        ("lookup", "pressure"): lambda: law.pressure(separation=gaps),
+        ("lookup", "area"): lambda: law.area(separation=gaps),
+        ("lookup", "both"): lambda: (law.pressure(separation=gaps), law.area(separation=gaps)),
+        ("invert", "pressure"): lambda: law.separation(pressure=loads),
     }
     for (name, quantity), run in ways.items():
         yield Row("law", name, quantity, None, measure(run)[0] / gaps.size)
@@ -226,7 +229,7 @@ def theory_rows() -> Iterator[Row]:
     for name in theories.THEORIES[1:]:
         u = np.linspace(0.1, 0.9, THEORY_GAPS[name]) * float(SURFACES[3].h_max)
         ask = functools.partial(contact, SURFACES[3], theory=name)
-        given: dict[str, Any] = {"pressure": ask(mean_separation=u).force}
+        given: dict[str, Any] = {"pressure": ask(mean_separation=u).pressure}
         one = measure(functools.partial(ask, mean_separation=u[:1]))[0]
         gap = measure(functools.partial(ask, mean_separation=u))[0]
         fixed = max((u.size * one - gap) / (u.size - 1), 1e-3 * one)

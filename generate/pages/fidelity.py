@@ -48,12 +48,12 @@ Quoted = tuple[str, str, float | str, Iterable[str], Values]  # case, what, the 
 def curve(surface: Surface, theory: str) -> tuple[FloatArray, FloatArray]:
     """Force and area at `DEPTHS`."""
     found = answer_where_finite(THEORIES[theory], surface, DEPTHS * surface.h_max)
-    return found.force, found.area
+    return found.pressure, found.area
 
 
 def force_at(surface: Surface, theory: str, ratio: Any) -> FloatArray:
     """F/(A0 E*) at mean separations u = ratio * h_rms; NaN where the theory has none, as Persson's at u = 0."""
-    return answer_where_finite(THEORIES[theory], surface, np.atleast_1d(ratio) * surface.h_rms).force
+    return answer_where_finite(THEORIES[theory], surface, np.atleast_1d(ratio) * surface.h_rms).pressure
 
 
 def show(value: Any, quoted: float | None = None) -> str:
@@ -72,7 +72,7 @@ def forces(name: str, ratio: float, unit: float = 1.0) -> Values:
 def kappa(surface: Surface, area: float) -> Values:
     """A/F sqrt(2 m2) E*, Eq. (51), at A/A0 = `area`, of every theory; (18) is Persson's in full and simplified."""
     asked = THEORIES | dict.fromkeys(PERSSON, THEORIES["Persson full"])
-    found = {name: contact(surface, area=area, theory=theory).force for name, theory in asked.items()}
+    found = {name: contact(surface, area=area, theory=theory).pressure for name, theory in asked.items()}
     return {name: float(area / force * surface.rms_gradient) for name, force in found.items()}
 
 

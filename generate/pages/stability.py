@@ -184,7 +184,7 @@ def totals() -> list[Tally]:
 
     def ask(surface: Surface, depth: float, variant: str, island_model: str, rtol: float) -> Answer:
         found = contact(surface, separation=TOP - depth, island_model=island_model, variant=variant, rtol=rtol)
-        return (float(found.force), float(found.area)), float(found.error) + TOTAL_TRUTH
+        return (float(found.pressure), float(found.area)), float(found.error) + TOTAL_TRUTH
 
     for variant, hurst, zeta_1, depth in itertools.product(VARIANTS, TOTAL_HURSTS, TOTAL_BANDS, DEPTHS):
         at = functools.partial(ask, Surface(hurst, 1.0, zeta_1, 1.0, TOP), depth, variant)

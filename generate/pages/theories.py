@@ -28,7 +28,7 @@ def measure() -> Measured:
     gap = float(road.h_max) * (1 - 2 * np.linspace(0.002, 1.0, 121))
     for name in THEORIES:
         line = other_theory(name, road, gap, 1.0)
-        known, u = np.isfinite(line.force), (road.h_max + gap) / (2 * road.h_rms)
+        known, u = np.isfinite(line.pressure), (road.h_max + gap) / (2 * road.h_rms)
         curves.append(Curve(theory_label(name), u[known], *(field[known] for field in line)))
     figure = draw_compression(curves, "concrete road of Lorenz, by every theory")
     by_gap, by_force = unmarked(figure)

@@ -88,7 +88,7 @@ class Calibrated(Theory):
 
     name = "calibrated"
 
-    def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+    def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
         """From full contact, or where a map's curve ends before, to last contact."""
         low, high = super().interval(surface, quantity)
         return (np.asarray(_own_law(surface).end) if isinstance(surface, MeasuredSurface) else low), high
@@ -98,8 +98,10 @@ class Calibrated(Theory):
         if isinstance(surface, MeasuredSurface):
             gap = np.asarray(mean_separation, float)
             require("mean_separation", gap, gap >= 0, "at least 0")
-            (force, area, stiffness), own_error = _own_law(surface).answer(gap)
-            return TheoryAnswer(force, area, stiffness, _error(own_error, own_error, gap / np.asarray(surface.h_max)))
+            (pressure, area, stiffness), own_error = _own_law(surface).answer(gap)
+            return TheoryAnswer(
+                pressure, area, stiffness, _error(own_error, own_error, gap / np.asarray(surface.h_max))
+            )
         assert isinstance(surface, Surface)
         table, places = calibrated_table.shipped(), Places(surface, mean_separation)
         u = places.flat / places.h_rms
@@ -110,9 +112,11 @@ class Calibrated(Theory):
         out[0] *= places.gradient
         out[2] *= places.gradient
         out[2] /= places.h_rms
-        force, area, stiffness = out.reshape(3, *places.shape)
+        pressure, area, stiffness = out.reshape(3, *places.shape)
         share = u / places.columns[2][places.owner]
-        return TheoryAnswer(force, area, stiffness, _error(table.error, 2 * table.error, share.reshape(places.shape)))
+        return TheoryAnswer(
+            pressure, area, stiffness, _error(table.error, 2 * table.error, share.reshape(places.shape))
+        )
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* or an area below 1; h_max at zero."""
@@ -134,11 +138,13 @@ class Calibrated(Theory):
         require(quantity, np.broadcast_to(wanted, places.shape), ~np.isnan(u).reshape(places.shape), "less: u is 0")
         return np.asarray(np.minimum((u * places.h_rms).reshape(places.shape), surface.h_max))
 
-    def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
+    def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E*, but for a map in closed form."""
         if isinstance(surface, MeasuredSurface):
-            return _own_law(surface).area(np.asarray(force, float))
-        return law_area(force / np.asarray(surface.rms_gradient), surface.alpha, calibrated_table.shipped().constants)
+            return _own_law(surface).area(np.asarray(pressure, float))
+        return law_area(
+            pressure / np.asarray(surface.rms_gradient), surface.alpha, calibrated_table.shipped().constants
+        )
 
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Share of heights above the level whose mean gap is u, and its derivative: measured heights, or Gaussian."""

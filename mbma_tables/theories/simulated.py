@@ -37,7 +37,7 @@ class BoundaryElements(Theory):
     ----------
     surface : MeasuredSurface
         The map; contacts of no other surface are answered.
-    force : array_like, shape (n,)
+    pressure : array_like, shape (n,)
         Loads over A0 E*, rising, at least four.
     area, mean_separation, energy : array_like, shape (n,)
         A/A0, u [length] and elastic energy over A0 E* [length] at these loads.
@@ -65,7 +65,7 @@ class BoundaryElements(Theory):
     def __init__(
         self,
         surface: AnySurface,
-        force: ArrayLike,
+        pressure: ArrayLike,
         area: ArrayLike,
         mean_separation: ArrayLike,
         energy: ArrayLike,
@@ -73,12 +73,12 @@ class BoundaryElements(Theory):
         elements: float = 1.0,
     ) -> None:
         self.surface, self.points, self.elements = surface, points, elements
-        columns = {"force": force, "area": area, "mean_separation": mean_separation, "energy": energy}
+        columns = {"pressure": pressure, "area": area, "mean_separation": mean_separation, "energy": energy}
         rows = np.stack([finite_array(name, column) for name, column in columns.items()])
         if rows.ndim != 2 or rows.shape[1] < MIN_LOADS:
             raise InputError(f"at least {MIN_LOADS} loads are needed, got shape {rows.shape[1:]}")
         require("loads", rows, rows > 0, "positive")
-        require("force", rows[0], np.diff(rows[0], prepend=0) > 0, "rising")
+        require("pressure", rows[0], np.diff(rows[0], prepend=0) > 0, "rising")
         require("area", rows[1], np.diff(rows[1], prepend=0) >= 0, "rising")
         require("mean_separation", rows[2], np.diff(rows[2], prepend=np.inf) < 0, "falling")
         self.rows = rows
@@ -166,7 +166,7 @@ class BoundaryElements(Theory):
         above, below = np.expm1(np.minimum(found - low, likely)), -np.expm1(-np.minimum(high - found, likely))
         return np.asarray(np.maximum(above, below).max(axis=0))
 
-    def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+    def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] that were simulated."""
         return np.asarray(self.rows[2, -1]), np.asarray(self.rows[2, 0])
 
@@ -175,9 +175,9 @@ class BoundaryElements(Theory):
         u = self._within(surface, mean_separation)
         log_u = np.log(u)
         found = self._curves(log_u)[:2]
-        force, area = np.exp(found)
-        stiffness = -self._curves(log_u, 1)[0] * force / u
-        return TheoryAnswer(force, area, stiffness, self._error(u, found))
+        pressure, area = np.exp(found)
+        stiffness = -self._curves(log_u, 1)[0] * pressure / u
+        return TheoryAnswer(pressure, area, stiffness, self._error(u, found))
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length]."""

@@ -33,7 +33,7 @@ def test_references_agree_with_the_solver():
     surface, truth = cost_rows.SURFACES[3], found[3]
     gap = cost_rows.gaps_of(surface)[:: cost_rows.EVERY]
     answer = contact(surface, separation=gap, island_model="exact", rtol=1e-10)
-    assert answer.force == pytest.approx(truth["force"], rel=1e-10, abs=0)
+    assert answer.pressure == pytest.approx(truth["pressure"], rel=1e-10, abs=0)
     assert answer.area == pytest.approx(truth["area"], rel=1e-10, abs=0)
     answers = list(found)
     assert cost_rows.largest_error(answers) == 0
@@ -62,7 +62,7 @@ def test_totals(few_totals):
     rows = by_variant(cost_rows.gap_rows())
     asked = {float(name.split("=")[1]) for _, name, what in rows if "rtol" in name and what == "both"}
     assert asked == {1e-1, 1e-2, 1e-4}
-    for what in ("both", "force", "area"):
+    for what in ("both", "pressure", "area"):
         row = rows["universal", "gap rtol=1e-02", what]
         assert row.error < 1e-2
         # a call's cost is taken off, down to next to nothing, and the rest is shared by the gaps
