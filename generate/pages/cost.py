@@ -104,7 +104,7 @@ def alone(costs: Costs) -> str:
             own = ratios.setdefault(method(row), {"pressure": [], "area": []})
             own[row.quantity].append(row.cost / both[row.island_model, row.variant])
     cells = ([name, *((min(own), max(own)) for own in found.values())] for name, found in ratios.items())
-    return table("method | force alone | area alone", cells, "{} | {:.2f} to {:.2f}")
+    return table("method | pressure alone | area alone", cells, "{} | {:.2f} to {:.2f}")
 
 
 def deviations(rows: Iterable[Distance], seconds: float) -> str:

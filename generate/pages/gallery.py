@@ -175,7 +175,7 @@ def measure() -> Measured:
         assert path is not None
         treated, surface = measured(path, example.options)
         surfaces[example.name], stem = surface, example.name.split(".")[0]
-        points = None if found is None else dict(zip(COLUMNS, found, strict=True))
+        points = None if found is None else dict(zip(("pressure", *COLUMNS[1:]), found, strict=True))
         picture = draw(treated, surface, curves(surface), example.name, "pressure  F/(A0 E*)", points)
         files[f"docs/figures/gallery_{stem}.svg"] = picture
         printed = "\n".join(described(surface))
