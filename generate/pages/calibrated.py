@@ -33,16 +33,8 @@ SHOWN = {  # sets and forms of the accuracy table
     "self-affine, greenwood_williamson": "self-affine: Greenwood-Williamson",
 }
 QUANTITIES = ("force", "area", "stiffness")
-COLOURS = {
-    "calibrated": "k",
-    "calibrated_map": "0.5",
-    "mbma": "C0",
-    "mbma_printed": "C9",
-    "mbma_fitted": "C1",
-    "persson": "C3",
-    "persson_simplified": "C6",
-    "greenwood_williamson": "C2",
-}
+COLOURS = {"calibrated": "k", "calibrated_map": "0.5", "mbma": "C0", "mbma_printed": "C9", "mbma_fitted": "C1"}
+COLOURS |= {"persson": "C3", "persson_simplified": "C6", "greenwood_williamson": "C2"}
 
 
 def accuracy(data: Any, number: int) -> str:

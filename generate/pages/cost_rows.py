@@ -153,8 +153,7 @@ def gaps_of(surface: Surface, count: int = GAPS) -> FloatArray:
 @functools.cache
 def reference() -> tuple[dict[str, FloatArray], ...]:
     """Force and area of every surface at every fifth of its gaps."""
-    options: dict[str, Any] = {"island_model": Doubled(), "rtol": REFERENCE_RTOL}
-    found = [contact(surface, separation=gaps_of(surface)[::EVERY], **options) for surface in SURFACES]
+    found = gap_batch(GAPS, EVERY, island_model=Doubled(), rtol=REFERENCE_RTOL)
     return tuple({"pressure": np.asarray(one.pressure), "area": np.asarray(one.area)} for one in found)
 
 
@@ -173,9 +172,9 @@ def scene_rows() -> Iterator[Row]:
     yield Row("scene", "call", "both", None, max(whole - step, 0.0))
 
 
-def gap_batch(count: int, **options: Any) -> list[Any]:
-    """Totals at `count` gaps of each surface, one call a surface."""
-    return [contact(surface, separation=gaps_of(surface, count), **options) for surface in SURFACES]
+def gap_batch(count: int, every: int = 1, **options: Any) -> list[Any]:
+    """Totals at `count` gaps of each surface, or at some of them, one call a surface."""
+    return [contact(surface, separation=gaps_of(surface, count)[::every], **options) for surface in SURFACES]
 
 
 def gap_rows() -> Iterator[Row]:
@@ -188,10 +187,10 @@ def gap_rows() -> Iterator[Row]:
         tolerances = (*RTOLS, 1e-9, 1e-10) if island_model == "exact" else RTOLS
         for rtol in tolerances if quantity == "both" else tolerances[1::3]:
             run = functools.partial(ask, GAPS, rtol=rtol)
-            found = run()
-            islands = sum(answer.islands for answer in found) / (len(SURFACES) * GAPS)
+            islands = sum(answer.islands for answer in run()) / (len(SURFACES) * GAPS)
             cost = max(measure(run)[0] / len(SURFACES) - fixed, 1e-9) / GAPS
-            error = largest_error([{name: getattr(answer, name)[::EVERY] for name in names} for answer in found])
+            answers = [{name: getattr(answer, name) for name in names} for answer in run(every=EVERY)]
+            error = largest_error(answers)
             yield Row(island_model, at("gap", rtol), quantity, error, cost, islands)
 
 

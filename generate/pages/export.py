@@ -63,7 +63,7 @@ def sizes() -> str:
 
 def compiled() -> str:
     """Laws in C, by gcc -O2: largest differences from the library's law, and the time of a value with its tangent."""
-    lines, pairs = [], {"pressure": "pressure", "area": "area", "energy": "energy", "tangent": "stiffness"}
+    lines, pairs = [], {name: name for name in ("pressure", "area", "energy")} | {"tangent": "stiffness"}
     for theory in THEORIES:
         own, rng = contact_law(Surface.named(NAMES[0]), E_star=E_STAR, theory=theory), np.random.default_rng(18)
         depths = (1 - 10 ** rng.uniform(-12, -0.3, 5000), rng.uniform(-0.99, 1, 5000))
