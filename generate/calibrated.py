@@ -16,14 +16,13 @@ from generate import calibrated_hardness
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import GAUSSIAN, MAX_AREA, MIN_WAVES, Case, cases
 from generate.calibrated_bars import measure
-from generate.calibrated_file import fitted
+from generate.calibrated_file import QUANTITIES, binned, fitted
 from generate.calibrated_table import write as write_table
 from generate.leakage_law import write as write_leakage
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws.calibrated import CONSTANTS, Constants, Law, Spectrum
 from mbma_tables.laws.map_curves import MAP_CONSTANTS, MapConstants, MapLaw
 
-QUANTITIES = ("area", "force", "stiffness")
 EDGES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9, MAX_AREA)  # contact fractions between which errors are told
 FOLDS = 5
 DIGITS = 4  # of constants
@@ -126,14 +125,13 @@ def errors(one: Case, law: Law | MapLaw, quantity: str) -> FloatArray:
 
 def summary(seen: Sequence[Case], make: Callable[[Case], Law | MapLaw]) -> dict[str, list[list[float]]]:
     """By contact fraction: mean, standard deviation, 90% quantile of the magnitude and number of errors."""
-    bins = np.digitize(np.concatenate([one.area for one in seen]), EDGES) - 1
+    area = np.concatenate([one.area for one in seen])
     told, laws = {}, [make(one) for one in seen]
     for quantity in QUANTITIES:
         values = np.concatenate([errors(one, law, quantity) for one, law in zip(seen, laws, strict=True)])
-        parts = [values[(bins == k) & np.isfinite(values)] for k in range(len(EDGES) - 1)]
         told[quantity] = [
             [float(p.mean()), float(p.std()), float(np.quantile(np.abs(p), 0.9)), len(p)] if len(p) else []
-            for p in parts
+            for p in binned(area, values, EDGES)
         ]
     return told
 

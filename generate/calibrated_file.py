@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import itertools
 import json
 import os
 import pathlib
@@ -20,6 +21,7 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, SEAL, read_sealed
 
+QUANTITIES = ("area", "force", "stiffness")  # as the file names them: the library's "pressure" is "force" there
 Fitted = TypeVar("Fitted", bound=Any)  # a dataclass of constants
 Variable = tuple[Any, Any, dict[str, Any]]
 
@@ -35,6 +37,12 @@ def fitted(
     first = [getattr(start, name) for name in names]
     found = least_squares(lambda x: np.concatenate([*residuals(trial(x))]), first, loss="soft_l1", **options)
     return trial(found.x)
+
+
+def binned(area: FloatArray, values: FloatArray, edges: Sequence[float]) -> list[FloatArray]:
+    """Finite values at contacts between edges, bin by bin."""
+    known = np.isfinite(values)
+    return [values[(area >= low) & (area < high) & known] for low, high in itertools.pairwise(edges)]
 
 
 def variable(dimensions: str | Sequence[str], values: Any, meaning: str, **attributes: Any) -> Variable:

@@ -15,17 +15,19 @@ import xarray as xr
 
 from generate.boundary_elements.design import SPLITS, TRAINING
 from generate.boundary_elements.evidence import GAUSSIAN, LEVELS, Capped, capped
-from generate.calibrated_file import fitted, made_by, variable, write_part
+from generate.calibrated_file import binned, fitted, made_by, variable, write_part
 from generate.pages.page import read_csv
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws import hardness as cap
 from mbma_tables.theories import calibrated_table, get_theory
-from mbma_tables.theories.yielding import GROUP, QUANTITIES, Scatter, Yielding
+from mbma_tables.theories.yielding import GROUP, Scatter, Yielding
 
 LIGHTEST, HEAVIEST = 0.01, 0.97  # A/A0 that constants are fitted to
 EDGES = (0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.95)  # contact fractions between which errors are told
 BARS = {"area": 0.05, "yielded": 0.05, "force": np.log(1.25), "stiffness": np.log(1.25)}
+QUANTITIES = ("area", "yielded", "force", "stiffness")  # as the file names them
+LIBRARY = {"area": "area", "force": "pressure", "stiffness": "stiffness"}  # and as the library does
 STATISTICS = ("bias", "standard_deviation", "share_within_bar", "largest", "number")
 # constants of each part, and errors that count alike: "planes" is the gap between mean planes
 PARTS: dict[str, tuple[tuple[str, ...], float]] = {
@@ -152,10 +154,8 @@ def by_contact(
     rms = np.full((len(etas), len(EDGES) - 1), np.nan)
     for row, eta in enumerate(etas):
         own = [k for k, one in enumerate(seen) if one.eta == eta]
-        bins = np.digitize(np.concatenate([areas[k] for k in own]), EDGES) - 1
-        e = np.concatenate([values[k] for k in own])
-        inside = ((bins == b) & np.isfinite(e) for b in range(len(EDGES) - 1))
-        rms[row] = [np.sqrt(np.mean(e[some] ** 2)) if some.any() else np.nan for some in inside]
+        parts = binned(np.concatenate([areas[k] for k in own]), np.concatenate([values[k] for k in own]), EDGES)
+        rms[row] = [np.sqrt(np.mean(part**2)) if part.size else np.nan for part in parts]
     return rms
 
 
@@ -225,15 +225,15 @@ def coverage(seen: Sequence[Capped], constants: cap.Constants, scatter: Scatter)
     told: dict[str, list[float]] = {}
     for name in (*FORMS, *OTHERS):
         own = [one for one in seen if name in FORMS or one.kind == "self_affine"]
-        for quantity in ("area", "force", "stiffness"):
+        for quantity, named in LIBRARY.items():
             sizes = []
             for one in own:
                 kept = (one.area > LIGHTEST) & (one.area < EDGES[-1])
                 told_here = told_errors(one, name, constants)
                 # of stiffness by the own area, as stated
                 area = one.area * np.exp(told_here["area"]) if quantity == "stiffness" else one.area
-                known = calibrated_table.shipped().standard_deviation(name, quantity, area)
-                sigma = scatter.standard_deviation(name, quantity, np.array(one.eta), area, known)
+                known = calibrated_table.shipped().standard_deviation(name, named, area)
+                sigma = scatter.standard_deviation(name, named, np.array(one.eta), area, known)
                 sizes.append((np.abs(told_here[quantity]) / sigma)[kept])
             size = np.concatenate(sizes)
             told[f"{name} {quantity}"] = [float(np.mean(size[np.isfinite(size)] < limit)) for limit in (1, 2)]
@@ -264,7 +264,7 @@ def stated(training: Sequence[Capped], constants: cap.Constants) -> Scatter:
             [one for one, _ in alike], [e["stiffness"] for e in found], etas, areas
         )
     weights = {
-        q: by_contact(training, [weight_of_elastic(one, q, constants) for one in training], etas)
+        LIBRARY[q]: by_contact(training, [weight_of_elastic(one, q, constants) for one in training], etas)
         for q in ("area", "force")
     }
     return Scatter(np.array(etas), np.log(np.sqrt(np.multiply(EDGES[1:], EDGES[:-1]))), rms, weights)

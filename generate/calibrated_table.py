@@ -17,12 +17,12 @@ import xarray as xr
 from scipy.interpolate import make_interp_spline
 
 from generate.boundary_elements.evidence import Case, TheoryCurve
-from generate.calibrated_file import bins_of, made_by, nodes_of, variable, write_part
+from generate.calibrated_file import QUANTITIES, bins_of, made_by, nodes_of, variable, write_part
 from generate.splines import coefficients
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws.calibrated import Constants, Law, Spectrum
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.theories.calibrated_table import AXES, QUANTITIES, load
+from mbma_tables.theories.calibrated_table import AXES, load
 from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.persson import Persson

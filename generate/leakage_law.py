@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import itertools
 import pathlib
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -17,7 +16,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import TheoryCurve
-from generate.calibrated_file import bins_of, fitted, made_by, nodes_of, variable, write_part
+from generate.calibrated_file import binned, bins_of, fitted, made_by, nodes_of, variable, write_part
 from generate.leakage_flow import MIN_WAVES, Case, Flow, cases, log_odds
 from generate.splines import coefficients
 from mbma_tables.common.arguments import FloatArray
@@ -122,8 +121,7 @@ def summary(parts: Sequence[tuple[FloatArray, FloatArray]], edges: Sequence[floa
     told = np.full((len(edges) - 1, 3), np.nan)
     if parts:
         area, miss = (np.concatenate(each) for each in zip(*parts, strict=True))
-        for k in range(len(edges) - 1):
-            own = miss[(area >= edges[k]) & (area < edges[k + 1])]
+        for k, own in enumerate(binned(area, miss, edges)):
             if own.size:
                 told[k] = own.mean(), np.sqrt(np.mean(own**2)), own.size
     return told
@@ -139,7 +137,7 @@ def noise_floor(found: Sequence[Case], edges: Sequence[float] = EDGES) -> FloatA
             areas.append(np.mean([one.area[:size] for one in own], axis=0))
             variances.append(np.var([one.log_k[:size] for one in own], axis=0, ddof=1))
     area, variance = np.concatenate(areas), np.concatenate(variances)
-    return np.sqrt([variance[(area >= low) & (area < high)].mean() for low, high in itertools.pairwise(edges)])
+    return np.sqrt([part.mean() for part in binned(area, variance, edges)])
 
 
 def of_theories(flows: Sequence[Flow], constants: FlowConstants) -> dict[str, FloatArray]:
@@ -184,7 +182,7 @@ def dataset(found: Sequence[Case], contact: Constants) -> xr.Dataset:
     certified = certificate(values, constants, contact)
     blocked = np.concatenate([one.blocked for one in found if one.isotropic], axis=1)
     edges = np.array(EDGES)
-    shares = [blocked[1][(blocked[0] >= a) & (blocked[0] < b)].mean() for a, b in itertools.pairwise(edges)]
+    shares = [part.mean() for part in binned(blocked[0], blocked[1], EDGES)]
     accuracy = np.array([list(laws.values()) for laws in told.values()])
     spline = coefficients(values, DEGREE, 3).astype("f4")
     splined = "coefficients of cardinal quintic B-splines of ln R, k = u^3 (1 - 1.5/(u^2 + 4)) R"

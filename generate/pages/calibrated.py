@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 from typing import Any
 
 import numpy as np
 
 from generate.boundary_elements.design import REFINEMENT, SPLITS
+from generate.calibrated_file import binned
 from generate.pages.page import DATA, Measured, dataset, panels, spans, table
 from mbma_tables import Surface
 from mbma_tables.common.files import shipped_file
@@ -95,11 +95,8 @@ def refinement(data: Any) -> str:
     rows = []
     for spacing, parts in sorted(found.items()):
         exact, *errors = np.concatenate(parts, axis=1)
-        cells = []
-        for low, high in itertools.pairwise(ends):
-            own = [e[(exact >= low) & (exact < high) & np.isfinite(e)] for e in errors]
-            cells.append(tuple(100 * e.mean() for e in own) if all(e.size for e in own) else "—")
-        rows.append([spacing, *cells])
+        pairs = zip(*(binned(exact, 100 * e, ends) for e in errors), strict=True)
+        rows.append([spacing, *((a.mean(), b.mean()) if a.size and b.size else "—" for a, b in pairs)])
     return table(f"grid points per shortest wavelength | {spans(ends)}", rows, "{:g} | {:+.1f}, {:+.1f}")
 
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case, TheoryCurve
-from generate.calibrated import QUANTITIES, errors
+from generate.calibrated import errors
+from generate.calibrated_file import QUANTITIES
 from generate.pages.page import DATA, evidence, read_csv
 from mbma_tables import theories
 from mbma_tables.common.arguments import FloatArray

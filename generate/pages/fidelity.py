@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from generate.calibrated import QUANTITIES
+from generate.calibrated_file import QUANTITIES, binned
 from generate.pages import distances
 from generate.pages.page import Measured, panels, percent, table
 from mbma_tables import Surface, contact, theories
@@ -265,11 +265,11 @@ def _ratio_axes(figure: Any, axes: Any, titles: Iterable[str]) -> None:
 def held_out() -> Figures:
     """Geometric mean of ratios on held-out surfaces by contact fraction, one standard deviation as a band."""
     seen = distances.held_out()
-    bins = np.digitize(np.concatenate([one.area for one in seen]), BINS) - 1
+    area = np.concatenate([one.area for one in seen])
     figure, axes = panels(3, 1, (9, 9), sharex=True, squeeze=False)
     for name, theory in distances.THEORIES.items():
         for ax, values in zip(axes[:, 0], distances.distances(seen, theory).values(), strict=True):
-            parts = [values[(bins == k) & np.isfinite(values)] for k in range(len(BINS) - 1)]
+            parts = binned(area, values, BINS)
             known = [k for k, part in enumerate(parts) if len(part) > 4]
             x = [np.sqrt(BINS[k] * BINS[k + 1]) for k in known]
             mean, spread = (np.array([measure(parts[k]) for k in known]) for measure in (np.mean, np.std))

@@ -11,6 +11,7 @@ import numpy as np
 
 from generate import timing
 from generate.boundary_elements.evidence import Capped, capped
+from generate.calibrated_file import binned
 from generate.calibrated_hardness import BARS, blind
 from generate.pages.page import DATA, Measured, dataset, panels, spans, table
 from mbma_tables import Surface, contact, materials
@@ -107,7 +108,7 @@ def frozen() -> str:
     for theory, eta in itertools.product(("mbma", "calibrated"), HARDNESSES):
         found = np.concatenate([deviations(theory, one) for one in seen if one.eta == eta], axis=1)
         area, error, stated = found
-        bins = [100 * error[(area > low) & (area < high)] for low, high in itertools.pairwise(BINS)]
+        bins = binned(area, 100 * error, BINS)
         sizes = (np.abs(error) / stated)[np.isfinite(stated)]
         within = f"{np.mean(sizes < 1):.0%} / {np.mean(sizes < 2):.0%}"
         rows.append([f"`{theory}`", f"{eta:g}", *((own.mean(), own.std()) for own in bins), within])
