@@ -7,6 +7,7 @@ import datetime
 import functools
 import json
 import os
+import pathlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,7 +17,6 @@ import xarray as xr
 from generate.boundary_elements.design import SPLITS, TRAINING
 from generate.boundary_elements.evidence import GAUSSIAN, LEVELS, Capped, capped
 from generate.calibrated_file import binned, fitted, made_by, variable, write_part
-from generate.pages.page import read_csv
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws import hardness as cap
@@ -44,6 +44,7 @@ OTHERS = ("mbma", "persson")  # theories of which what is said of their errors i
 LEAST = 1e-9  # mean separation at which theories end [h_rms]
 TURN = 0.01  # of ln A_el, for derivatives
 FOLDS = 5
+REFERENCE = pathlib.Path(__file__).parents[1] / "docs" / "data" / "hardness.csv"  # another code's surfaces
 WAVES = 3  # longest waves a side: with fewer h_max says little of the highest heights
 MODULES = ("mbma_tables.laws.hardness", "generate.calibrated_file", "generate.calibrated_hardness")
 
@@ -186,8 +187,9 @@ def by_magnification(seen: Sequence[Capped], constants: cap.Constants) -> dict[s
 
 
 def blind() -> dict[str, FloatArray]:
-    """Errors of `contact` on another code's surfaces, docs/data/hardness.csv, which no fit or choice of a form saw."""
-    table = read_csv("hardness.csv")
+    """Errors of `contact` on surfaces of another code, which no fit or choice of a form saw."""
+    with open(REFERENCE, encoding="utf-8") as stream:
+        table = np.genfromtxt((line for line in stream if not line.startswith("#")), delimiter=",", names=True)
     own = table[np.isfinite(table["eta"]) & (table["area"] > LIGHTEST) & (table["area"] < EDGES[-1])]
     surface = Surface(own["hurst"], 1.0, own["zeta_1"], 1.0, own["h_max_over_h_rms"])
     g = surface.rms_gradient
