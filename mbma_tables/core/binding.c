@@ -251,7 +251,6 @@ static mbma_spline spline_of(const argument *a) {
     FN(spline4, "D D L4 i w", \
        N(1) > 0 && N(1) == coefficients_of(&a[2]) && N(0) % 4 == 0 && N(4) == N(0) / 4 * (I(3) ? 10 : 2), \
        mbma_spline4(N(0) / 4, P(0), P(1), P(2), I(3) != 0, P(4))) \
-    FN(four_numbers, "Dn Dn Dn d i w4n", true, mbma_four_numbers(N(0), P(0), P(1), P(2), X(3), I(4) != 0, P(5))) \
     /* newton.c */ \
     FN(height_integrals, "i Dn wn", true, mbma_height_integrals(I(0), N(1), P(1), P(2))) \
     FN(islands_work, "i", I(0) >= 0 && I(0) < 1 << 20, MBMA_ISLANDS_WORK(I(0))) \
@@ -260,8 +259,6 @@ static mbma_spline spline_of(const argument *a) {
        mbma_solve_islands(N(0), P(0), P(1), X(2), BASIS(3), BASIS(7), P(11), P(12), P(13), P(14), P(15), P(16), \
                           P(17))) \
     FN(island_extents, "Dn Dn d wn", true, mbma_island_extents(N(0), P(0), P(1), X(2), P(3))) \
-    FN(damped_steps, "d d d d d i D wn wn w2 l1", N(7) > 0 && N(6) == N(7) * N(7), \
-       mbma_damped_steps(X(0), X(1), X(2), X(3), X(4), I(5), N(7), P(6), P(7), P(8), P(9), P(10))) \
     /* law.c */ \
     FN(law_fill, "Dn D w?n w?n w?n w?n w?n", LAW(1)->head, \
        mbma_law_fill(N(0), P(0), LAW(1), P(2), P(3), P(4), P(5), P(6))) \

@@ -137,12 +137,7 @@ void mbma_profile_totals(size_t n, const double *compression, size_t panels, con
 size_t mbma_spline4(size_t n, const double *places, const double *coefficients, const int64_t *nodes, int slopes,
                     double *out);
 
-/* Bands of the paper's four numbers, by zeta_u/zeta_d - 1 and (1.25/zeta_d)^(4 - 2 H), finite for every zeta_d. `out` is
- * (4, n): mu = 8/3 D sigma sqrt(2 R_u R_d); sigma zeta_d^H; F_hat zeta_d^(1 + H) per Phi_F, A_hat zeta_d^2 per Phi_A. */
-size_t mbma_four_numbers(size_t n, const double *spread, const double *sphere, const double *hurst,
-                         double density_divisor, int summit_sigma, double *out);
-
-/* ---- newton.c, damped.c: exact islands -------------------------------------------------------------------------- */
+/* ---- newton.c: exact islands ------------------------------------------------------------------------------------ */
 
 /* F_n(x) = integral_x^inf (z - x)^n phi(z) dz, phi the standard normal density, of twice_n = 1, 2, 3, 4 or 5. */
 size_t mbma_height_integrals(int64_t twice_n, size_t n, const double *x, double *out);
@@ -166,12 +161,6 @@ size_t mbma_solve_islands(size_t n, const double *X, const double *mu, double rt
 
 /* a^2 of the disc rho < a that holds all but `share` of the area of an island. */
 size_t mbma_island_extents(size_t n, const double *X, const double *mu, double share, double *squared);
-
-/* The damped iteration of Greenwood and Tripp on rings of equal width in rho < a: at most `most` steps on from `w`, to
- * which the pressures p, Phi_F and Phi_A belong. MBMA_OK where it has converged; NaN where it has diverged. */
-mbma_status mbma_damped_steps(double X, double mu, double a, double damping, double tolerance, int64_t most,
-                              size_t rings, const double *matrix, double *w, double *p, double phi[2],
-                              int64_t *steps);
 
 /* ---- law.c: contact laws ---------------------------------------------------------------------------------------- */
 

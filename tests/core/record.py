@@ -87,7 +87,7 @@ def use():
     surfaces = np.linspace(0.3, 0.9, 20), np.linspace(1.5, 6.0, 20), np.full(20, 3.0)
     core.calibrated_slopes(*shipped().core_table, *surfaces, None, None, np.linspace(0.3, 2.5, 20), np.empty((20, 10)))
     core.self_affine(*surfaces[:2], np.empty(20), np.empty(20))
-    greenwood_tripp.solve_classical(2.0, 0.5, 20, 0.3, 1e-6, 100)
+    greenwood_tripp.radius(2.0, 0.5, 1e-6)
     hardness.diffused(surfaces[0], 0.1, 1.0)
     hardness.BearingCurve(np.linspace(3.0, 1.0, FRACTIONS.size), 3.0)
     u = np.geomspace(2.9, 0.1, 12)
