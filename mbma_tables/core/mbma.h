@@ -406,15 +406,6 @@ size_t mbma_gaussian_level(size_t n, const double *u, double *level);
 /* Share Q of Gaussian heights above the level of mean gap u, and dQ/du; heights end at h_max, which may be infinite. */
 size_t mbma_bearing_share(size_t n, const double *u, const double *h_max, double *share, double *slope);
 
-/* Share of a diffusion from x in [0, 1] between walls at 0 and 1, after a variance of 2 tau, that has not ended at 0,
- * or that has ended at 1. */
-size_t mbma_diffused(size_t n, const double *x, const double *tau, int at_one, double *out);
-
-/* Contact area A/A0 at a load, or its yielded part. `spread` is the inverse error function of the elastic A/A0 at that
- * load; `power` and `scale` are the constants a and b of S^-a = S_el^-a + (eta^1.5/b)^-a. */
-size_t mbma_capped_area(size_t n, const double *load, const double *spread, const double *eta, double power,
-                        double scale, int yielded, double *out);
-
 /* Force F and -dF/du of F^-n = F_el^-n + (eta Q)^-n, n = light + by_eta eta + by_share Q, from the elastic force and
  * -dF_el/du and from the share Q and dQ/du at a mean gap. */
 size_t mbma_capped_force(size_t n, const double *elastic, const double *stiffness, const double *share,

@@ -88,7 +88,6 @@ def use():
     core.calibrated_slopes(*shipped().core_table, *surfaces, None, None, np.linspace(0.3, 2.5, 20), np.empty((20, 10)))
     core.self_affine(*surfaces[:2], np.empty(20), np.empty(20))
     greenwood_tripp.radius(2.0, 0.5, 1e-6)
-    hardness.diffused(surfaces[0], 0.1, 1.0)
     hardness.BearingCurve(np.linspace(3.0, 1.0, FRACTIONS.size), 3.0)
     u = np.geomspace(2.9, 0.1, 12)
     core.gap_start(1, u, np.exp(-u), np.exp(-u), 1, surfaces[0], surfaces[2], np.full((6, 20), 0.5))
