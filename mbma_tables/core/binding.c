@@ -262,14 +262,11 @@ static mbma_spline spline_of(const argument *a) {
     /* law.c */ \
     FN(law_fill, "Dn D w?n w?n w?n w?n w?n", LAW(1)->head, \
        mbma_law_fill(N(0), P(0), LAW(1), P(2), P(3), P(4), P(5), P(6))) \
-    FN(law_records, "Dn Dn D ln", LAW(2)->head, mbma_law_records(N(0), P(0), P(1), LAW(2), P(3))) \
     FN(inverse_nodes, "Dn D i d wn wn", LAW(1)->head, \
        mbma_inverse_nodes(N(0), P(0), LAW(1), (mbma_quantity)I(2), X(3), P(4), P(5))) \
     FN(law_invert, "Dn D D i wn w?n w?n", LAW(1)->head && INVERSE(2)->head, \
        mbma_law_invert(N(0), P(0), LAW(1), INVERSE(2), (mbma_quantity)I(3), P(4), P(5), P(6))) \
     FN(law_flow_fill, "Dn D d d wn", LAW(1)->head, mbma_law_flow_fill(N(0), P(0), LAW(1), X(2), X(3), P(4))) \
-    FN(law_fit, "Dn D16n D256 D32 D81 w", N(0) % 2 == 0 && N(5) == N(0) / 2 * (WORDS(mbma_law_record) + 3), \
-       mbma_law_fit(N(0) / 2, P(0), P(1), P(2), P(3), P(4), P(5))) \
     /* calibrated.c */ \
     FN(contact_area, "Dn Dn d wn", true, mbma_contact_area(N(0), P(0), P(1), X(2), P(3))) \
     FN(spline_pieces, SPLINE "D D D w", fits_spline(a) && !P(7) && N(8) == N(3) * 6 * (size_t)((int64_t *)P(2))[2], \

@@ -178,7 +178,7 @@ size_t mbma_island_extents(size_t n, const double *X, const double *mu, double s
  *
  * Below x = low the first record holds: F is t^power_force times its polynomial, and A likewise.
  */
-enum { MBMA_LAW_DEGREE = 8, MBMA_INVERSE_DEGREE = 5, MBMA_FIT_SAMPLES = 16 };
+enum { MBMA_LAW_DEGREE = 8, MBMA_INVERSE_DEGREE = 5 };
 
 typedef struct {
     double h_max, scale, low, high;              /* low and high: of x */
@@ -230,9 +230,6 @@ double mbma_law_and_slope(const mbma_law *law, mbma_quantity which, double c, do
 size_t mbma_law_fill(size_t n, const double *d, const mbma_law *law, double *force, double *area, double *stiffness,
                      double *area_slope, double *energy);
 
-/* Numbers of the records that hold at separations, whose x is known better. */
-size_t mbma_law_records(size_t n, const double *x, const double *d, const mbma_law *law, int64_t *record);
-
 /* The overclosure between two at which force (area) has a value, where it rises from one to the other. */
 double mbma_law_overclosure(const mbma_law *law, mbma_quantity which, double wanted, double low, double high);
 
@@ -268,12 +265,6 @@ size_t mbma_law_invert(size_t n, const double *wanted, const mbma_law *law, cons
  * force; bodies farther apart than it reaches are u^3 (1 - 1.5/(u^2/h_rms^2 + 4)). `by_c` may be NULL, or get dK/dc. */
 double mbma_law_flow(const mbma_law *flow, double h_max, double h_rms, double d, double *by_c);
 size_t mbma_law_flow_fill(size_t n, const double *d, const mbma_law *flow, double h_max, double h_rms, double *out);
-
-/* Records of intervals of x, (n, 2), from force and area at their Chebyshev points, (2, n, 16); behind each record
- * bounds on its errors: of value over F, of slope over F/x, of slope over itself. Matrices as law_pieces.py makes them:
- * series (16, 16), bounds (2, 16), monomials (9, 9). Not OK are intervals with values that are not positive. */
-size_t mbma_law_fit(size_t n, const double *ends, const double *found, const double *series, const double *bounds,
-                    const double *monomials, double *made);
 
 /* ---- calibrated.c: the law calibrated on boundary elements, by its table ------------------------------------------ */
 

@@ -29,8 +29,6 @@ EXACT = {
         "island_extents",
         "islands_work",
         "kronrod",
-        "law_fit",
-        "law_records",
     ),
     *("phi", "profile_missed", "self_affine", "solve_islands", "spline4", "spline_pieces", "table_fits"),
 }
