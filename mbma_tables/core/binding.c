@@ -286,7 +286,7 @@ static mbma_spline spline_of(const argument *a) {
     FN(words_of_spectrum_law, "", true, WORDS(mbma_spectrum_law)) \
     FN(inner_integrals, "w", N(0) == WORDS(mbma_inner), (mbma_inner_integrals(P(0)), 0)) \
     FN(spectrum_waves, "Dn Dn wm wm wm w4", true, mbma_spectrum_waves(N(0), P(0), P(1), N(2), P(2), P(3), P(4), P(5))) \
-    FN(spectrum_law_of, "D Dn Dn Dn D10 w9n w", N(0) == WORDS(mbma_inner) && N(6) == WORDS(mbma_spectrum_law), \
+    FN(spectrum_law_of, "D Dn Dn Dn D10 w3n w", N(0) == WORDS(mbma_inner) && N(6) == WORDS(mbma_spectrum_law), \
        mbma_spectrum_law_of(P(0), WAVES, CONSTANTS, NUMBER(9), P(5), P(6))) \
     FN(spectrum_law_persson, "D Dn wn wn", N(0) == WORDS(mbma_spectrum_law), \
        mbma_spectrum_law_persson(P(0), N(1), P(1), P(2), P(3))) \

@@ -346,7 +346,7 @@ typedef struct {
     double tail;                         /* forces fall by exp(-tail (1 - narrowness) u^3) */
 } mbma_law_constants;
 
-enum { MBMA_ORDER = 12, MBMA_INNER_CELLS = 30, MBMA_MOST_PANELS = 120 };
+enum { MBMA_ORDER = 12, MBMA_INNER_CELLS = 115, MBMA_MOST_PANELS = 120 };
 
 /* Inner integrals of P, P^3 and P^16, which all laws are made from. */
 typedef struct {
@@ -371,8 +371,8 @@ void mbma_inner_integrals(mbma_inner *inner);
 size_t mbma_spectrum_waves(size_t count, const double *q, const double *C, size_t most, double *x, double *variance,
                            double *below, double facts[4]);
 
-/* Prepares the law of a spectrum on surfaces that end at h_max, which may be infinite; `work` has room for nine numbers
- * a wave. */
+/* Prepares the law of a spectrum on surfaces that end at h_max, which may be infinite; `work` has room for three
+ * numbers a wave. */
 mbma_status mbma_spectrum_law_of(const mbma_inner *inner, const mbma_waves *waves, const mbma_law_constants *constants,
                                  double h_max, double *work, mbma_spectrum_law *law);
 

@@ -168,7 +168,7 @@ class Law:
         highest = np.inf if self.h_max is None else self.h_max
         constants = c.area_s0, c.area_slope, c.area_t0, c.weight, c.weight_slope, c.cubic, c.tail
         law = np.empty(core.words_of_spectrum_law())
-        numbers, work = np.array([s.gradient, s.alpha, *constants, highest]), np.empty(9 * s.x.size)
+        numbers, work = np.array([s.gradient, s.alpha, *constants, highest]), np.empty(3 * s.x.size)
         status = core.spectrum_law_of(_inner_integrals(), s.x, s.variance, s.below, numbers, work, law)
         if status == UNRESOLVED:
             raise ConvergenceError("the law of this spectrum has no curve that polynomials follow")
