@@ -266,9 +266,7 @@ static mbma_spline spline_of(const argument *a) {
        mbma_inverse_nodes(N(0), P(0), LAW(1), (mbma_quantity)I(2), X(3), P(4), P(5))) \
     FN(law_invert, "Dn D D i wn w?n w?n", LAW(1)->head && INVERSE(2)->head, \
        mbma_law_invert(N(0), P(0), LAW(1), INVERSE(2), (mbma_quantity)I(3), P(4), P(5), P(6))) \
-    FN(law_flow_fill, "Dn D d d wn", LAW(1)->head, mbma_law_flow_fill(N(0), P(0), LAW(1), X(2), X(3), P(4))) \
     /* calibrated.c */ \
-    FN(contact_area, "Dn Dn d wn", true, mbma_contact_area(N(0), P(0), P(1), X(2), P(3))) \
     FN(spline_pieces, SPLINE "D D D w", fits_spline(a) && !P(7) && N(8) == N(3) * 6 * (size_t)((int64_t *)P(2))[2], \
        mbma_spline_pieces(LOG_FORCE, SURFACES, P(8))) \
     FN(calibrated_ends, SPLINE "Dn D D w2n", fits_spline(a), mbma_calibrated_ends(CALIBRATED, SURFACES, P(8))) \

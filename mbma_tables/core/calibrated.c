@@ -204,16 +204,6 @@ MBMA_INLINE double area_at(double force, double s0, double t0) {
     return mbma_erf(force * sqrt(2.0 * (1.0 + t) / (s0 + t)));
 }
 
-size_t mbma_contact_area(size_t n, const double *force, const double *s0, double area_t0, double *area) {
-    size_t bad = 0;
-    for (size_t k = 0; k < n; k++) {
-        const bool good = force[k] >= 0.0 && s0[k] > 0.0 && area_t0 > 0.0;
-        area[k] = good ? area_at(mbma_min(force[k], 1e100), s0[k], area_t0) : NAN;
-        bad += !good;
-    }
-    return bad;
-}
-
 /* The next entries, and what these are asked; of no such surface, the first one and NaN. */
 static void take(const mbma_surfaces *surfaces, const int64_t *owner, const double *given, size_t n, chunk *c,
                  double asked[CHUNK]) {

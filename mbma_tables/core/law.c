@@ -359,13 +359,3 @@ double mbma_law_flow(const mbma_law *flow, double h_max, double h_rms, double d,
         *by_c = open ? -3.0 * u * u * (1.0 - 1.5 / w + v / (w * w)) : mbma_law_at(flow, MBMA_STIFFNESS, d);
     return open ? u * u * u * (1.0 - 1.5 / w) : mbma_law_at(flow, MBMA_FORCE, d);
 }
-
-size_t mbma_law_flow_fill(size_t n, const double *d, const mbma_law *flow, double h_max, double h_rms, double *out) {
-    size_t bad = mbma_law_fill(n, d, flow, out, NULL, NULL, NULL, NULL);
-    for (size_t k = 0; k < n && bad > 0; k++)
-        if (d[k] > flow->head->highest && d[k] < (double)INFINITY) {
-            out[k] = mbma_law_flow(flow, h_max, h_rms, d[k], NULL);
-            bad--;
-        }
-    return bad;
-}

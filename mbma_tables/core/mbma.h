@@ -264,7 +264,6 @@ size_t mbma_law_invert(size_t n, const double *wanted, const mbma_law *law, cons
 /* Flow conductance of the gaps at separations: `flow` is a block like that of a law, with the conductance in place of
  * force; bodies farther apart than it reaches are u^3 (1 - 1.5/(u^2/h_rms^2 + 4)). `by_c` may be NULL, or get dK/dc. */
 double mbma_law_flow(const mbma_law *flow, double h_max, double h_rms, double d, double *by_c);
-size_t mbma_law_flow_fill(size_t n, const double *d, const mbma_law *flow, double h_max, double h_rms, double *out);
 
 /* ---- calibrated.c: the law calibrated on boundary elements, by its table ------------------------------------------ */
 
@@ -300,9 +299,6 @@ typedef struct {
 
 /* Nayak's alpha of self-affine surfaces, and their rms gradient over q0 h_rms. */
 size_t mbma_self_affine(size_t n, const double *hurst, const double *log_zeta_1, double *alpha, double *gradient);
-
-/* A/A0 at forces, by s0 of each and t0. */
-size_t mbma_contact_area(size_t n, const double *force, const double *s0, double area_t0, double *area);
 
 /* Six coefficients for each cell of the third axis and each surface. With these, calls give the same bits in less time;
  * they are worth making from about 40 entries a surface on. */

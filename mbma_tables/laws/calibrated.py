@@ -33,6 +33,7 @@ NARROWNESS = 0.65  # that W's slope refers to
 LAW_ERROR = 1e-7  # of a measured spectrum's law
 TESTED_AREA = (1e-3, 0.97)  # A/A0 that was simulated
 KEPT = 256  # spectra and laws of surfaces that are kept while these are asked again
+MOST_FORCE = 1e100  # for which contact is full
 UNRESOLVED = 4  # the core's status where a quadrature did not reach its tolerance
 
 
@@ -65,7 +66,11 @@ def area_persson(force: ArrayLike) -> FloatArray:
 
 
 def _area(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
-    return answered(core.contact_area, (force, s0), 1, t0)[0]
+    from scipy.special import erf
+
+    F = np.minimum(force, MOST_FORCE)
+    F = np.where(F >= 0, F, np.nan)
+    return np.asarray(erf(F * np.sqrt(2 * (1 + F / t0) / (s0 + F / t0))))
 
 
 def force_of(e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
