@@ -211,7 +211,8 @@ def looped(module, name, given):
     _, more, outputs = LOOPS[name]
     out = np.full((outputs, given.shape[1]), 7.0)
     if name == "diffused":
-        out[0] = hardness.diffused(*given, *more)
+        with np.errstate(all="ignore"):
+            out[0] = hardness.diffused(*given, *more)
     elif name == "capped_area":
         hardness._area(*given, *more, *out)
     else:

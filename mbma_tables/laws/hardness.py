@@ -84,30 +84,29 @@ def _area(force: FloatArray, e: FloatArray, eta: FloatArray, power: float, scale
     joint = np.exp(np.log1p(np.exp(power * np.log(small / np.maximum(elastic, limit)))) / (2 * power))
     reach = np.where(elastic < limit, e, 0.5 * x / np.sqrt(limit)) * joint
     between = diffused(x, small / joint**2, -1.0 if yielded else 1.0, reach)
-    # rounding may cross the bounds
-    out[:] = np.clip(between, *((0.0, x) if yielded else (x, 1.0)))
-    # what is closed has no variance; and nothing touches, or nothing yields
-    out[np.isinf(e)] = 1.0
+    # rounding may cross the bounds; what is closed has no variance; and nothing touches, or nothing yields
     if yielded:
-        out[np.isinf(e) & (x < 1)] = 0.0
-    out[:] = np.where(x > 0, out, np.where(yielded | (force == 0), 0.0, erf(e)))
-    out[~((force >= 0) & (force < np.inf) & (e >= 0) & (eta > 0))] = np.nan
+        share = np.where(e < np.inf, np.maximum(np.minimum(between, x), 0.0), x == 1)
+    else:
+        share = np.where(e < np.inf, np.minimum(np.maximum(between, x), 1.0), 1.0)
+    share = np.where(x > 0, share, 0.0 if yielded else np.where(force > 0, erf(e), 0.0))
+    out[:] = np.where((force >= 0) & (force < np.inf) & (e >= 0) & (eta > 0), share, np.nan)
 
 
-@np.errstate(all="ignore")
 def diffused(x: FloatArray, tau: FloatArray, sign: float, reach: FloatArray | None = None) -> FloatArray:
     """Share of a diffusion from x, between walls at 0 and 1, after a variance of 2 tau.
 
     What has not ended at 0, or with a negative `sign` what has ended at 1; `reach` is x/sqrt(4 tau).
     """
-    width = 2 * np.sqrt(np.maximum(tau, SHARPEST))
-    reach = x / width if reach is None else reach
+    over = 0.5 / np.sqrt(np.maximum(tau, SHARPEST))
+    reach = x * over if reach is None else reach
     wide = tau >= IMAGES
     if sign > 0:
-        found, seen = erf(reach), ~wide & (2 / width - reach < SEEN)
-        found[seen] += _difference(2 / width[seen], reach[seen])
+        found, seen = erf(reach), ~wide & (2 * over - reach < SEEN)
+        if seen.any():
+            found[seen] += _difference(2 * over[seen], reach[seen])
     else:
-        found = _difference(1 / width, reach) + _difference(3 / width, reach)
+        found = _difference(over, reach) + _difference(3 * over, reach)
     if wide.any():
         own, first = x[wide], np.exp(-(np.pi**2) * tau[wide])
         # sign^n sin(n pi x), and exp(-n^2 pi^2 tau) by the odd powers between the squares
