@@ -74,7 +74,9 @@ def yielded_area(
 
 
 @np.errstate(all="ignore")
-def _area(force: FloatArray, e: FloatArray, eta: FloatArray, power: float, scale: float, yielded: bool, out: Any) -> None:
+def _area(
+    force: FloatArray, e: FloatArray, eta: FloatArray, power: float, scale: float, yielded: bool, out: Any
+) -> None:
     """A/A0, or its yielded part, at F/(A0 E* g) by e, erf(e) being the elastic A/A0 there."""
     x = np.minimum(force / eta, 1.0)
     # tau of the elastic contact and of the hardness alone
