@@ -274,8 +274,6 @@ static mbma_spline spline_of(const argument *a) {
        mbma_calibrated_contact(CALIBRATED, SURFACES, N(8), P(8), P(9), P(10), P(11), P(12))) \
     FN(calibrated_separation, SPLINE "Dn D2n D Lm Dm wm", fits_spline(a) && N(3) > 0, \
        mbma_calibrated_separation(CALIBRATED, SURFACES, N(8), P(8), P(9), P(10))) \
-    FN(calibrated_slopes, SPLINE "Dn D D Dn w10n", fits_spline(a) && !P(7), \
-       mbma_calibrated_slopes(CALIBRATED, SURFACES, P(8), P(9))) \
     FN(flow, SPLINE "D D D Lm Dm Dm wm", fits_spline(a) && N(3) > 0, \
        mbma_flow(FLOW, SURFACES, N(8), P(8), P(9), P(10), P(11))) \
     FN(self_affine, "Dn Dn wn wn", true, mbma_self_affine(N(0), P(0), P(1), P(2), P(3))) \

@@ -14,7 +14,6 @@ enum { CHUNK = 128, COLUMNS = 8, MOST_STEPS = 100 };
 #define LEAST 1e-300                /* u that counts as none */
 #define LEAST_LOG_SEPARATION -690.0 /* ln u at which full contact counts as reached */
 #define CLOSE 1e-9                  /* of ln F: the next miss would be about the square of this one */
-#define STEP 0.001                  /* of differences, in cells */
 
 /* The six cardinal quintic B-splines that reach a cell, at u in [0, 1] of it. */
 MBMA_INLINE void quintic(double u, double w[6]) {
@@ -323,57 +322,6 @@ size_t mbma_calibrated_separation(const mbma_calibrated_table *t, const mbma_sur
             }
         }
         bad += searched;
-    }
-    return bad;
-}
-
-/* By u and h_max the force of a surface without end has a slope; by Hurst exponent and ln zeta_1 the spline is smooth, and
- * differences of four further surfaces, towards its middle, leave rounding. */
-size_t mbma_calibrated_slopes(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, const double *u,
-                              double *out) {
-    enum { ITSELF = 0, SURFACES = 9, AT_END = SURFACES, ENTRIES };
-    static const double ONE_SIDED[5] = {-25.0 / 12.0, 4.0, -3.0, 4.0 / 3.0, -0.25};
-    const mbma_spline *const s = &t->log_force;
-    size_t bad = 0;
-    for (size_t k = 0; k < surfaces->count; k++, out += 10) {
-        const double own[2] = {surfaces->hurst[k], surfaces->log_zeta_1[k]}, h_max = surfaces->h_max[k];
-        const bool good = covers(s, own[0], own[1]) && h_max >= LEAST && h_max < INFINITY && u[k] > 0.0;
-        double number[2][SURFACES], end[SURFACES], ends[2 * SURFACES], gradient[SURFACES], step[2];
-        double gap[ENTRIES], force[ENTRIES], area[ENTRIES], steep[ENTRIES];
-        int64_t owner[ENTRIES];
-        const mbma_surfaces some = {SURFACES, number[0], number[1], end, ends, NULL};
-        for (int m = 0; m < 10 && !good; m++)
-            out[m] = NAN;
-        bad += !good;
-        if (!good)
-            continue;
-        for (int axis = 0; axis < 2; axis++)
-            step[axis] = (2.0 * own[axis] < s->low[axis] + s->high[axis] ? STEP : -STEP) / s->rate[axis];
-        for (int m = 0; m < ENTRIES; m++) {
-            owner[m] = m < SURFACES ? m : ITSELF;
-            gap[m] = m < SURFACES ? u[k] : h_max * (1.0 - DBL_EPSILON);
-            if (m == AT_END)
-                continue;
-            number[0][m] = own[0] + (m < 5 ? m * step[0] : 0.0);
-            number[1][m] = own[1] + (m < 5 ? 0.0 : (m - 4) * step[1]);
-            end[m] = h_max;
-            (void)self_affine(number[0][m], number[1][m], &gradient[m]);
-        }
-        (void)mbma_calibrated_ends(t, &some, ends);
-        (void)mbma_calibrated_contact(t, &some, ENTRIES, owner, gap, force, area, steep);
-        const double F = force[ITSELF], over = F / t->area_t0, s0 = ends[0], root = sqrt(2.0 * (1.0 + over) / (s0 + over));
-        const double bell = 2.0 / sqrt(MBMA_PI) * exp(-F * root * F * root);
-        const double area_by = bell * root * (1.0 + 0.5 * over * (s0 - 1.0) / ((1.0 + over) * (s0 + over)));
-        const double by_end = u[k] < h_max ? steep[AT_END] : 0.0;
-        const double made[10] = {gradient[0] * F, -gradient[0] * steep[ITSELF], gradient[0] * by_end, 0.0, 0.0,
-                                 area[ITSELF], -area_by * steep[ITSELF], area_by * by_end, 0.0, 0.0};
-        memcpy(out, made, sizeof made);
-        for (int axis = 0; axis < 2; axis++)
-            for (int j = 0; j < 5; j++) {
-                const int m = j == 0 ? ITSELF : j + 4 * axis;
-                out[3 + axis] += ONE_SIDED[j] * gradient[m] * force[m] / step[axis];
-                out[8 + axis] += ONE_SIDED[j] * area[m] / step[axis];
-            }
     }
     return bad;
 }

@@ -315,11 +315,6 @@ size_t mbma_calibrated_contact(const mbma_calibrated_table *table, const mbma_su
 size_t mbma_calibrated_separation(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, size_t n,
                                   const int64_t *owner, const double *force, double *u);
 
-/* Force over A0 E* q0 h_rms and area, each with its derivatives by u, h_max, Hurst exponent and ln zeta_1: ten numbers
- * an entry, which is of the surface of its own number; 0 < u. */
-size_t mbma_calibrated_slopes(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, const double *u,
-                              double *out);
-
 /* k at mean gaps over h_rms and at A/A0. With `pieces`, which may be those of any spectrum, nothing else of the
  * surfaces is read. */
 size_t mbma_flow(const mbma_flow_table *table, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,

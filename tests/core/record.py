@@ -81,7 +81,6 @@ def use():
     from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
     from mbma_tables.laws import hardness
     from mbma_tables.laws.bearing_curve import FRACTIONS
-    from mbma_tables.theories.calibrated_table import shipped
 
     core = package.core
     for which, first in enumerate([-700.0, -2.0, 1e-300, -0.9, -6.0]):
@@ -89,7 +88,6 @@ def use():
         core.elementary(which, x, np.empty(501))
     core.island_geometry(0.3, 0.7, 300.0, np.array([2.0, 0.37, 0.5, 1.5, 1.5, 1.0, 1.0, 0.0]), np.empty(14))
     surfaces = np.linspace(0.3, 0.9, 20), np.linspace(1.5, 6.0, 20), np.full(20, 3.0)
-    core.calibrated_slopes(*shipped().core_table, *surfaces, None, None, np.linspace(0.3, 2.5, 20), np.empty((20, 10)))
     core.self_affine(*surfaces[:2], np.empty(20), np.empty(20))
     greenwood_tripp.radius(2.0, 0.5, 1e-6)
     hardness.BearingCurve(np.linspace(3.0, 1.0, FRACTIONS.size), 3.0)
