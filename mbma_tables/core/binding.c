@@ -210,7 +210,6 @@ static mbma_spline spline_of(const argument *a) {
 #define CONSTANT(k) ((const double *)P(1))[10 + (k)]
 #define LOG_FORCE ((const mbma_spline[]){spline_of(a)})
 #define CALIBRATED ((const mbma_calibrated_table[]){{spline_of(a), CONSTANT(0), CONSTANT(1), CONSTANT(2)}})
-#define FLOW ((const mbma_flow_table[]){{spline_of(a), CONSTANT(0), CONSTANT(1)}})
 #define SURFACES ((const mbma_surfaces[]){{N(3), P(3), P(4), P(5), P(6), P(7)}})
 
 /* Of a law: gradient and alpha, seven constants and h_max. */
@@ -274,8 +273,8 @@ static mbma_spline spline_of(const argument *a) {
        mbma_calibrated_contact(CALIBRATED, SURFACES, N(8), P(8), P(9), P(10), P(11), P(12))) \
     FN(calibrated_separation, SPLINE "Dn D2n D Lm Dm wm", fits_spline(a) && N(3) > 0, \
        mbma_calibrated_separation(CALIBRATED, SURFACES, N(8), P(8), P(9), P(10))) \
-    FN(flow, SPLINE "D D D Lm Dm Dm wm", fits_spline(a) && N(3) > 0, \
-       mbma_flow(FLOW, SURFACES, N(8), P(8), P(9), P(10), P(11))) \
+    FN(spline_values, SPLINE "D D D Lm Dm wm wm", fits_spline(a) && N(3) > 0, \
+       mbma_spline_values(LOG_FORCE, SURFACES, N(8), P(8), P(9), P(10), P(11))) \
     FN(self_affine, "Dn Dn wn wn", true, mbma_self_affine(N(0), P(0), P(1), P(2), P(3))) \
     /* spectrum_laws.c */ \
     FN(words_of_inner, "", true, WORDS(mbma_inner)) \

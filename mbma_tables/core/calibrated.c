@@ -1,5 +1,4 @@
-/* The law calibrated on boundary elements and the flow through its gaps, by quintic splines over the numbers of a
- * surface and a third axis.
+/* The law calibrated on boundary elements, by quintic splines over the numbers of a surface and a third axis.
  *
  * Sums over the first two axes are made in the same order for one entry and for all cells of the third axis, so that
  * answers do not depend on what is asked beside them.
@@ -214,6 +213,25 @@ static void take(const mbma_surfaces *surfaces, const int64_t *owner, const doub
     }
 }
 
+size_t mbma_spline_values(const mbma_spline *s, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
+                          const double *x, double *restrict value, double *restrict slope) {
+    size_t bad = 0;
+    for (size_t begin = 0; begin < n; begin += CHUNK) {
+        chunk c;
+        take(surfaces, owner + begin, x + begin, n - begin, &c, c.x);
+        look_up(s, surfaces, &c);
+        for (size_t k = 0; k < c.count; k++) {
+            const size_t own = c.owner[k];
+            const bool good = c.x[k] == c.x[k] &&
+                              (surfaces->pieces || covers(s, surfaces->hurst[own], surfaces->log_zeta_1[own]));
+            value[begin + k] = good ? c.value[k] : NAN;
+            slope[begin + k] = good ? c.slope[k] : NAN;
+            bad += !good;
+        }
+    }
+    return bad;
+}
+
 size_t mbma_calibrated_ends(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, double *ends) {
     size_t bad = 0;
     for (size_t begin = 0; begin < surfaces->count; begin += CHUNK) {
@@ -323,37 +341,5 @@ size_t mbma_calibrated_separation(const mbma_calibrated_table *t, const mbma_sur
         }
         bad += searched;
     }
-    return bad;
-}
-
-/* ---- flow through gaps ------------------------------------------------------------------------------------------- */
-
-size_t mbma_flow(const mbma_flow_table *t, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
-                 const double *u, const double *area, double *restrict k) {
-    const mbma_spline *const s = &t->log_factor;
-    size_t bad = 0;
-    for (size_t begin = 0; begin < n; begin += CHUNK) {
-        const double *const A = area + begin;
-        double gap[CHUNK];
-        chunk c;
-        take(surfaces, owner + begin, u + begin, n - begin, &c, gap);
-        for (size_t m = 0; m < c.count; m++) {
-            const size_t own = c.owner[m];
-            if (!surfaces->pieces && !covers(s, surfaces->hurst[own], surfaces->log_zeta_1[own]))
-                gap[m] = NAN;
-            /* contact fractions of Greenwood and Williamson exceed 1 */
-            c.x[m] = mbma_log(mbma_max(A[m], LEAST) / mbma_max(t->threshold - A[m], LEAST));
-        }
-        look_up(s, surfaces, &c);
-        for (size_t m = 0; m < c.count; m++) {
-            const double beyond = mbma_fma(c.slope[m], mbma_max(c.x[m] - last_of(s), 0.0), c.value[m]);
-            const double log_factor = beyond * mbma_exp(t->obstruction * mbma_min(c.x[m] - s->first[2], 0.0));
-            const double wide = gap[m] * gap[m] * gap[m] * (1.0 - 1.5 / mbma_fma(gap[m], gap[m], 4.0));
-            const double known = gap[m] == gap[m] && A[m] == A[m] ? 0.0 : NAN;
-            k[begin + m] = (A[m] < t->threshold ? wide * mbma_exp(mbma_min(log_factor, 0.0)) : 0.0) + known;
-        }
-    }
-    for (size_t m = 0; m < n; m++)
-        bad += k[m] != k[m];
     return bad;
 }

@@ -282,12 +282,6 @@ typedef struct {
     double area_s0, area_slope, area_t0; /* A/A0 = erf(F sqrt(2 (1 + t)/(s0 + t))), t = F/t0; s0 at Nayak's alpha 10 */
 } mbma_calibrated_table;
 
-/* Flow through gaps of mean u: k = u^3 (1 - 1.5/(u^2 + 4)) R, and 0 from A/A0 = threshold on. */
-typedef struct {
-    mbma_spline log_factor; /* ln R over ln A/(threshold A0 - A) */
-    double threshold, obstruction;
-} mbma_flow_table;
-
 /* Surfaces that entries of calls share. */
 typedef struct {
     size_t count; /* at least 1 where entries ask for them */
@@ -315,10 +309,10 @@ size_t mbma_calibrated_contact(const mbma_calibrated_table *table, const mbma_su
 size_t mbma_calibrated_separation(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, size_t n,
                                   const int64_t *owner, const double *force, double *u);
 
-/* k at mean gaps over h_rms and at A/A0. With `pieces`, which may be those of any spectrum, nothing else of the
- * surfaces is read. */
-size_t mbma_flow(const mbma_flow_table *table, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
-                 const double *u, const double *area, double *k);
+/* The spline and its slope at places of the third axis, held at its ends. With `pieces`, which may be those of any
+ * spectrum, nothing else of the surfaces is read. */
+size_t mbma_spline_values(const mbma_spline *spline, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
+                          const double *x, double *value, double *slope);
 
 /* ---- spectrum_laws.c: Persson's theory and the calibrated law of a spectrum --------------------------------------- */
 

@@ -27,7 +27,7 @@ INTEL = platform.machine() in ("x86_64", "AMD64")
 EXACT = {
     *("calibrated_contact", "calibrated_ends", "calibrated_separation", "capped_force", "elementary"),
     *(
-        "flow",
+        "spline_values",
         "height_integrals",
         "island_extents",
         "islands_work",
