@@ -84,7 +84,8 @@ def _flow(given: tuple[Any, ...], owner: Owners, u: FloatArray, area: FloatArray
     in_blocks(lambda k: core.spline_values(*given, owner[k], odds[k], value[k], slope[k]), u.size, BLOCK)
     beyond = value + slope * np.maximum(odds - (first + cells[2] / numbers[5]), 0.0)
     log_factor = np.minimum(beyond * np.exp(obstruction * np.minimum(odds - first, 0.0)), 0.0)
-    k = np.where(area < threshold, u**3 * (1 - 1.5 / (u**2 + 4)) * np.exp(log_factor), 0.0)
+    wide = u * u * u * (1 - 1.5 / (u * u + 4))
+    k = np.where(area < threshold, wide * np.exp(log_factor), 0.0)
     return np.where(np.isnan(u) | np.isnan(value), np.nan, k)
 
 
