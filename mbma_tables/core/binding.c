@@ -213,8 +213,8 @@ static mbma_spline spline_of(const argument *a) {
 #define SURFACES ((const mbma_surfaces[]){{N(3), P(3), P(4), P(5), P(6), P(7)}})
 
 /* Of a law: gradient and alpha, seven constants and h_max. */
-#define WAVES ((const mbma_waves[]){{N(1), P(1), P(2), P(3), NUMBER(0), NUMBER(1)}})
-#define NUMBER(k) ((const double *)P(4))[k]
+#define WAVES ((const mbma_waves[]){{N(0), P(0), P(1), P(2), NUMBER(0), NUMBER(1)}})
+#define NUMBER(k) ((const double *)P(3))[k]
 #define CONSTANTS \
     ((const mbma_law_constants[]){{NUMBER(2), NUMBER(3), NUMBER(4), NUMBER(5), NUMBER(6), NUMBER(7), NUMBER(8)}})
 
@@ -277,12 +277,10 @@ static mbma_spline spline_of(const argument *a) {
        mbma_spline_values(LOG_FORCE, SURFACES, N(8), P(8), P(9), P(10), P(11))) \
     FN(self_affine, "Dn Dn wn wn", true, mbma_self_affine(N(0), P(0), P(1), P(2), P(3))) \
     /* spectrum_laws.c */ \
-    FN(words_of_inner, "", true, WORDS(mbma_inner)) \
     FN(words_of_spectrum_law, "", true, WORDS(mbma_spectrum_law)) \
-    FN(inner_integrals, "w", N(0) == WORDS(mbma_inner), (mbma_inner_integrals(P(0)), 0)) \
     FN(spectrum_waves, "Dn Dn wm wm wm w4", true, mbma_spectrum_waves(N(0), P(0), P(1), N(2), P(2), P(3), P(4), P(5))) \
-    FN(spectrum_law_of, "D Dn Dn Dn D10 w3n w", N(0) == WORDS(mbma_inner) && N(6) == WORDS(mbma_spectrum_law), \
-       mbma_spectrum_law_of(P(0), WAVES, CONSTANTS, NUMBER(9), P(5), P(6))) \
+    FN(spectrum_law_of, "Dn Dn Dn D10 w3n w", N(5) == WORDS(mbma_spectrum_law), \
+       mbma_spectrum_law_of(WAVES, CONSTANTS, NUMBER(9), P(4), P(5))) \
     FN(spectrum_law_persson, "D Dn wn wn", N(0) == WORDS(mbma_spectrum_law), \
        mbma_spectrum_law_persson(P(0), N(1), P(1), P(2), P(3))) \
     FN(spectrum_law_contact, "D Dn wn wn wn", N(0) == WORDS(mbma_spectrum_law), \

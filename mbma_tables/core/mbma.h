@@ -331,12 +331,7 @@ typedef struct {
     double tail;                         /* forces fall by exp(-tail (1 - narrowness) u^3) */
 } mbma_law_constants;
 
-enum { MBMA_ORDER = 12, MBMA_INNER_CELLS = 115, MBMA_MOST_PANELS = 120 };
-
-/* Inner integrals of P, P^3 and P^16, which all laws are made from. */
-typedef struct {
-    double p[3][MBMA_INNER_CELLS][MBMA_ORDER];
-} mbma_inner;
+enum { MBMA_ORDER = 12, MBMA_MOST_PANELS = 120 };
 
 /* A prepared law. */
 typedef struct {
@@ -347,8 +342,6 @@ typedef struct {
     double p[MBMA_MOST_PANELS][MBMA_ORDER];
 } mbma_spectrum_law;
 
-void mbma_inner_integrals(mbma_inner *inner);
-
 /* A quadrature rule for power laws between samples: q rising [1/length], a repeated one is a jump; C not negative
  * [length^4], both as in h_rms^2 = 2 pi integral C q dq. How many waves it has, 0 if there is no such spectrum; they are
  * written where `most` are enough, and what they belong to in `facts`: g over q0 h_rms with q0 the first q where C is not
@@ -358,8 +351,8 @@ size_t mbma_spectrum_waves(size_t count, const double *q, const double *C, size_
 
 /* Prepares the law of a spectrum on surfaces that end at h_max, which may be infinite; `work` has room for three
  * numbers a wave. */
-mbma_status mbma_spectrum_law_of(const mbma_inner *inner, const mbma_waves *waves, const mbma_law_constants *constants,
-                                 double h_max, double *work, mbma_spectrum_law *law);
+mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constants *constants, double h_max,
+                                 double *work, mbma_spectrum_law *law);
 
 /* Mean separation and its derivative by ln F of a surface without end, before the tail's factor. */
 size_t mbma_spectrum_law_persson(const mbma_spectrum_law *law, size_t n, const double *force, double *u, double *slope);

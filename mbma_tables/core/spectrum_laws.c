@@ -7,7 +7,7 @@
 #include "elementary.h"
 #include "mbma.h"
 
-enum { ORDER = MBMA_ORDER, CELLS = MBMA_INNER_CELLS, CHUNK = 128, LANES = 8, MOST_STEPS = 100 };
+enum { ORDER = MBMA_ORDER, CELLS = 115, CHUNK = 128, LANES = 8, MOST_STEPS = 100 };
 
 #define LOWEST -20.0   /* ln y of the first cell, up to whose end I is linear in ln y, */
 #define HIGHEST 3.0    /* and of the last, above which I is below 1e-350 */
@@ -76,48 +76,41 @@ static double powers_of(const fit *f, const double value[ORDER], double p[ORDER]
 /* ---- inner integrals I(y), times exp(2 y^2) ---------------------------------------------------------------------- */
 
 /* From ln y down to another, by steps over which exp(2 y^2) changes by a factor e at most. */
-static void integrate_down(double from, double to, double inner[3]) {
+static double integrated_down(double from, double to, const double weight[3], double inner) {
     const double span = 2.0 * (exp(2.0 * from) - exp(2.0 * to));
     const int steps = 1 + (int)span;
     for (int step = 0; step < steps; step++) {
         const double high = from + (to - from) * step / steps, low = from + (to - from) * (step + 1) / steps;
-        const double end = exp(2.0 * low), fall = mbma_exp(2.0 * (end - exp(2.0 * high)));
-        for (int n = 0; n < 3; n++)
-            inner[n] *= fall;
+        const double end = exp(2.0 * low);
+        inner *= mbma_exp(2.0 * (end - exp(2.0 * high)));
         for (int k = 0; k < RULE_NODES[2]; k++) {
             const double *rule = RULES[2][k / 2], s = 0.5 * (low + high + (high - low) * (k % 2 ? rule[0] : -rule[0]));
             const double y = mbma_exp(s), P = mbma_erf(1.4142135623730951 * y), P2 = P * P, P4 = P2 * P2, P8 = P4 * P4;
-            const double part = 0.5 * (high - low) * rule[1] * ROOT_8_PI * mbma_exp(2.0 * (end - y * y));
-            inner[0] += part;
-            inner[1] += 3.0 * part * P2;
-            inner[2] += 16.0 * part * (P8 * P4) * (P2 * P);
+            const double slope = weight[0] + 3.0 * weight[1] * P2 + 16.0 * weight[2] * (P8 * P4) * (P2 * P);
+            inner += 0.5 * (high - low) * rule[1] * ROOT_8_PI * mbma_exp(2.0 * (end - y * y)) * slope;
         }
     }
+    return inner;
 }
 
-void mbma_inner_integrals(mbma_inner *inner) {
+static void inner_integral(const fit *f, const double weight[3], double p[CELLS][ORDER]) {
     const double z = 2.0 * exp(2.0 * HIGHEST);
-    double series = 1.0, at = HIGHEST, value[3][ORDER];
-    fit f;
-    make_fit(&f);
+    double series = 1.0, at = HIGHEST, value[ORDER];
     /* exp(z) z E1(z) */
     for (int k = 8; k > 0; k--)
         series = 1.0 - k / z * series;
-    double own[3] = {0.5 * ROOT_8_PI / z * series, 1.5 * ROOT_8_PI / z * series, 8.0 * ROOT_8_PI / z * series};
+    double own = 0.5 * ROOT_8_PI / z * series * (weight[0] + 3.0 * weight[1] + 16.0 * weight[2]);
     for (int cell = CELLS - 1; cell >= 0; cell--) {
         for (int j = 0; j < ORDER; j++) {
-            const double next = LOWEST + (cell + 0.5 * (1.0 + f.node[j])) / CELL_RATE;
-            integrate_down(at, next, own);
+            const double next = LOWEST + (cell + 0.5 * (1.0 + f->node[j])) / CELL_RATE;
+            value[j] = own = integrated_down(at, next, weight, own);
             at = next;
-            for (int n = 0; n < 3; n++)
-                value[n][j] = own[n];
         }
-        for (int n = 0; n < 3; n++)
-            (void)powers_of(&f, value[n], inner->p[n][cell]);
+        (void)powers_of(f, value, p[cell]);
     }
-    for (int n = 0; n < 3; n++)
-        for (int m = 1; m < ORDER; m++)
-            inner->p[n][0][m] = n == 0 && m == 1 ? -0.5 * ROOT_8_PI / CELL_RATE : 0.0;
+    p[0][1] = -0.5 * ROOT_8_PI / CELL_RATE * weight[0];
+    for (int m = 2; m < ORDER; m++)
+        p[0][m] = 0.0;
 }
 
 /* ---- sums over waves --------------------------------------------------------------------------------------------- */
@@ -230,8 +223,8 @@ static double separation_of(const mbma_spectrum_law *law, double log_force, doub
 /* What the tail takes from ln F. */
 static double tail_at(const mbma_spectrum_law *law, double u) { return law->tail * u * u * u; }
 
-mbma_status mbma_spectrum_law_of(const mbma_inner *inner, const mbma_waves *waves, const mbma_law_constants *c,
-                                 double h_max, double *work, mbma_spectrum_law *law) {
+mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constants *c, double h_max, double *work,
+                                 mbma_spectrum_law *law) {
     const size_t n = waves->count;
     double mean = 0.0, inverse = 0.0, slope;
     wave_sum w = {{{0.0}}, n, work, work + n, work + 2 * n};
@@ -252,17 +245,14 @@ mbma_status mbma_spectrum_law_of(const mbma_inner *inner, const mbma_waves *wave
         return MBMA_INVALID;
     const double narrowness = 1.0 / (mean * inverse), a = c->weight + c->weight_slope * (narrowness - NARROWNESS);
     const double weight[3] = {a, c->cubic, 1.0 - a - c->cubic};
-    for (int cell = 0; cell < CELLS; cell++)
-        for (int m = 0; m < ORDER; m++)
-            for (int k = 0; k < 3; k++)
-                w.p[cell][m] += weight[k] * inner->p[k][cell][m];
+    make_fit(&f);
+    inner_integral(&f, weight, w.p);
     law->s0 = mbma_min(c->area_s0 + c->area_slope * log(waves->alpha / 10.0), 1.0);
     law->t0 = c->area_t0;
     law->tail = c->tail * (1.0 - narrowness);
     law->h_max = h_max;
     law->shift = 0.5 * log(waves->below[n - 1]);
     law->edge[0] = EDGES[0];
-    make_fit(&f);
     for (size_t k = 0; k + 1 < sizeof EDGES / sizeof *EDGES; k++)
         good = good && fill_panels(&w, &f, EDGES[k], EDGES[k + 1], law);
     for (size_t k = 0; k < law->panels; k++)

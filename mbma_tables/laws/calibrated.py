@@ -93,14 +93,6 @@ def light_factor(alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArr
     return np.minimum(constants.area_s0 + constants.area_slope * np.log(np.asarray(alpha) / 10), 1.0)
 
 
-@functools.cache
-def _inner_integrals() -> FloatArray:
-    """What the core makes all laws from."""
-    inner = np.empty(core.words_of_inner())
-    core.inner_integrals(inner)
-    return inner
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class Spectrum:
     """An isotropic spectrum as a quadrature rule, arrays of shape (n,)."""
@@ -174,7 +166,7 @@ class Law:
         constants = c.area_s0, c.area_slope, c.area_t0, c.weight, c.weight_slope, c.cubic, c.tail
         law = np.empty(core.words_of_spectrum_law())
         numbers, work = np.array([s.gradient, s.alpha, *constants, highest]), np.empty(3 * s.x.size)
-        status = core.spectrum_law_of(_inner_integrals(), s.x, s.variance, s.below, numbers, work, law)
+        status = core.spectrum_law_of(s.x, s.variance, s.below, numbers, work, law)
         if status == UNRESOLVED:
             raise ConvergenceError("the law of this spectrum has no curve that polynomials follow")
         if status:

@@ -37,7 +37,7 @@ EXACT = {
 }
 
 # coefficients of polynomials, of which small ones are differences of large numbers
-COEFFICIENTS = {"inner_integrals", "spectrum_law_of"}
+COEFFICIENTS = {"spectrum_law_of"}
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the core's compiler there is zig's alone")
 
