@@ -130,8 +130,8 @@ static double sum_at(const wave_sum *w, double log_force) {
         const size_t count = w->count - first < (size_t)CHUNK ? w->count - first : (size_t)CHUNK;
         const double *log_g = w->log_g + first, *fall = w->fall + first, *share = w->share + first;
         for (size_t k = 0; k < count; k++) {
-            const double at = mbma_min((log_force - log_g[k] - LOWEST) * CELL_RATE, CELLS);
-            cell[k] = (int32_t)mbma_held(at, 0.0, CELLS - 1.0);
+            const double at = mbma_min((log_force - log_g[k] - LOWEST) * CELL_RATE, (double)CELLS);
+            cell[k] = (int32_t)mbma_held(at, 0.0, (double)(CELLS - 1));
             place[k] = 2.0 * (at - cell[k]) - 1.0;
         }
         for (size_t k = 0; k < count; k++)

@@ -56,8 +56,8 @@ class LeakageLaw:
         core.law_fill(flat, self.block, found, *[None] * 4)
         # bodies farther apart
         apart = (flat > self.block[at.HIGHEST]) & (flat < np.inf)
-        u = (self.law.h_max + flat[apart]) / 2
-        found[apart] = u**3 * (1 - 1.5 / ((u / self.h_rms) ** 2 + 4))
+        gap = (self.law.h_max + flat[apart]) / 2
+        found[apart] = gap**3 * (1 - 1.5 / ((gap / self.h_rms) ** 2 + 4))
         return found.reshape(np.shape(d))[()]
 
 

@@ -70,7 +70,7 @@ def _area(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
 
     F = np.minimum(force, MOST_FORCE)
     F = np.where(F >= 0, F, np.nan)
-    return np.asarray(erf(F * np.sqrt(2 * (1 + F / t0) / (s0 + F / t0))))
+    return np.asarray(erf(F * np.sqrt(2 * (1 + F / t0) / (np.asarray(s0) + F / t0))))
 
 
 def force_of(e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:

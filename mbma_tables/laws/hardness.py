@@ -112,8 +112,8 @@ def diffused(x: FloatArray, tau: FloatArray, sign: float, reach: FloatArray | No
     if wide.any():
         own, first = x[wide], np.exp(-(np.pi**2) * tau[wide])
         # sign^n sin(n pi x), and exp(-n^2 pi^2 tau) by the odd powers between the squares
-        before, sine, twice = 0.0, sign * np.sin(np.pi * own), 2 * sign * np.cos(np.pi * own)
-        odd, factor, total = first, first, 0.0
+        before, sine, twice = np.zeros_like(own), sign * np.sin(np.pi * own), 2 * sign * np.cos(np.pi * own)
+        odd, factor, total = first, first, np.zeros_like(own)
         for n in range(1, TERMS):
             total = total + sine * factor / n
             before, sine, odd = sine, twice * sine - before, odd * first * first
@@ -127,9 +127,8 @@ def _difference(centre: FloatArray, half: FloatArray) -> FloatArray:
     a, b = (half * centre) ** 2, half**2
     series = 1 + (2 * a - b) / 3 + (a * (2 / 3 * a - 2 * b) + b * b / 2) / 5
     narrow = half * np.maximum(centre, 1.0) < NARROW
-    return np.where(
-        narrow, 4 / np.sqrt(np.pi) * half * np.exp(-centre * centre) * series, erfc(centre - half) - erfc(centre + half)
-    )
+    cancelled = 4 / np.sqrt(np.pi) * half * np.exp(-centre * centre) * series
+    return np.asarray(np.where(narrow, cancelled, erfc(centre - half) - erfc(centre + half)))
 
 
 def force(
