@@ -75,27 +75,19 @@ static plane plane_at(double u) {
         const double v = sqrt(sqrt(u)), high = mbma_horner(9.929421, v, -75.30938, 245.7741, -452.8998, 521.9537);
         d = mbma_fma(mbma_horner(high, v, -393.3206, 198.2552, -67.49275, 18.72423), v, -4.71472);
     }
-    const double density = exp(-0.5 * d * d) * SQRT_1_2PI, tail = 0.5 * erfc(fabs(d) * SQRT1_2);
-    if (u >= STRAIGHT_GAP) {
-        const plane straight = {d, density, 1.0 - tail, tail};
-        return straight;
+    for (bool moved = u >= STRAIGHT_GAP;; moved = true) {
+        const double density = exp(-0.5 * d * d) * SQRT_1_2PI, tail = 0.5 * erfc(fabs(d) * SQRT1_2);
+        const double below = d > 0.0 ? 1.0 - tail : tail;
+        const plane found = {d, density, below, d > 0.0 ? tail : 1.0 - tail};
+        if (moved)
+            return found;
+        /* what is missing of u; of positive d the large part goes first */
+        const double missing = d > 0.0 ? (u - d) + (d * tail - density) : (u - density) - d * tail;
+        const double r = missing / below, square = mbma_fma(d, d, -1.0);
+        const double a = density / (2.0 * below), b = -a * d / 3.0, c = a * square / 12.0;
+        const double third = 2.0 * a * a - b, fourth = 5.0 * a * (b - a * a) - c;
+        d += r * mbma_fma(r, mbma_fma(r, mbma_fma(r, fourth, third), -a), 1.0);
     }
-    const double below = d > 0.0 ? 1.0 - tail : tail;
-    /* what is missing of u; of positive d the large part goes first */
-    const double missing = d > 0.0 ? (u - d) + (d * tail - density) : (u - density) - d * tail;
-    const double r = missing / below, square = mbma_fma(d, d, -1.0);
-    const double a = density / (2.0 * below), b = -a * d / 3.0, c = a * square / 12.0;
-    const double third = 2.0 * a * a - b, fourth = 5.0 * a * (b - a * a) - c;
-    const double move = r * mbma_fma(r, mbma_fma(r, mbma_fma(r, fourth, third), -a), 1.0);
-    /* share and density there by their own series */
-    const double turn = mbma_fma(move, d * (2.0 - square) / 24.0, square / 6.0);
-    const double rise = density * move * mbma_fma(move, mbma_fma(move, turn, -0.5 * d), 1.0);
-    const double w = move * mbma_fma(0.5, move, d);
-    const double shrink = mbma_fma(w, mbma_fma(w, mbma_fma(w, 1.0 / 24.0, -1.0 / 6.0), 0.5), -1.0);
-    const double kept = d > 0.0 ? tail - rise : tail + rise;
-    const double rest = 1.0 - kept, shrunk = density * mbma_fma(w, shrink, 1.0);
-    const plane found = {d + move, shrunk, d > 0.0 ? rest : kept, d > 0.0 ? kept : rest};
-    return found;
 }
 
 size_t mbma_gaussian_level(size_t n, const double *u, double *level) {
