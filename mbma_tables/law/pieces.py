@@ -83,15 +83,16 @@ def _fit_intervals(values: Values, ends: FloatArray) -> FloatArray:
     """Records of intervals (n, 2) of x and bounds on their errors, (n, RECORD + 3)."""
     rule = _rule()
     found = positive(values((ends @ rule.places).ravel())).reshape(2, -1, SAMPLES)
-    terms = found @ rule.series
-    left = np.abs(terms) @ rule.bounds.T / found.min(axis=-1, keepdims=True)
+    # sums that no number of threads changes, as those of matrix products may be
+    terms = np.einsum("rki,ij->rkj", found, rule.series)
+    left = np.einsum("rki,ji->rkj", np.abs(terms), rule.bounds) / found.min(axis=-1, keepdims=True)
     low, high = ends.T
     half = (high - low) / 2
     reach = high / half
     steep = np.maximum(1.0, reach / 2 * (found.max(axis=-1) / found.min(axis=-1) - 1))
     errors = np.stack([left[..., 0], left[..., 1] * reach, left[..., 1] * reach / steep]).max(axis=1)
     errors[:, high - low <= NEAR * low] = 0.0
-    series = (terms[..., :KEPT] @ rule.monomials).transpose(1, 0, 2).reshape(len(ends), -1)
+    series = np.einsum("rki,ij->krj", terms[..., :KEPT], rule.monomials).reshape(len(ends), -1)
     return np.column_stack([(low + high) / 2, 1 / half, series, np.zeros(len(ends)), errors.T])
 
 
