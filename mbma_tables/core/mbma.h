@@ -84,7 +84,7 @@ int mbma_kronrod(int count, double *nodes, double *kronrod, double *gauss);
 
 /* ---- profile.c: one surface at many gaps ------------------------------------------------------------------------ */
 
-enum { MBMA_PANEL_NODES = 16, MBMA_PANEL_CHECKS = 3, MBMA_PANEL_GAPS = 10, MBMA_PANEL_ROWS = 4, MBMA_FAR_TERMS = 8 };
+enum { MBMA_PANEL_NODES = 16, MBMA_PANEL_CHECKS = 3, MBMA_PANEL_GAPS = 10, MBMA_PANEL_ROWS = 4 };
 
 /* Of panels of the approach with `count` nodes at places in [0, 1]: from the low to the high end delta rises like
  * place^power. Matrices take values at the nodes, their rows, to those at other places: checks between the nodes, nodes of
