@@ -7,13 +7,14 @@
 #include "elementary.h"
 #include "mbma.h"
 
-enum { ORDER = MBMA_ORDER, CELLS = 115, CHUNK = 128, LANES = 8, MOST_STEPS = 100 };
+enum { ORDER = MBMA_ORDER, CELLS = 85, CHUNK = 128, LANES = 8, MOST_STEPS = 100 };
 
-#define LOWEST -20.0   /* ln y of the first cell, up to whose end I is linear in ln y, */
+#define LOWEST -14.0   /* ln y of the first cell, up to whose end I is linear in ln y, */
 #define HIGHEST 3.0    /* and of the last, above which I is below 1e-350 */
 #define CELL_RATE 5.0  /* cells in 1 of ln y */
 #define TINY 2e-12     /* of the last two coefficients of a panel, over which it is halved */
 #define NARROWEST 0.02 /* panel */
+#define NOTHING 80.0   /* exp(-80) of the largest part */
 #define CLOSE 1e-12    /* of ln F */
 #define FARTHEST 1e80  /* u at which there is no force */
 #define NARROWNESS 0.65 /* that the slope of W's first coefficient refers to */
@@ -126,7 +127,10 @@ static double sum_at(const wave_sum *w, double log_force) {
     const double square = 2.0 * exp(2.0 * log_force);
     double lanes[LANES] = {0.0}, part[CHUNK], place[CHUNK];
     int32_t cell[CHUNK];
-    for (size_t first = 0; first < w->count; first += CHUNK) {
+    size_t heaviest = 0; /* wave that is not negligible */
+    while (heaviest + 1 < w->count && square * w->fall[heaviest] > NOTHING)
+        heaviest++;
+    for (size_t first = heaviest; first < w->count; first += CHUNK) {
         const size_t count = w->count - first < (size_t)CHUNK ? w->count - first : (size_t)CHUNK;
         const double *log_g = w->log_g + first, *fall = w->fall + first, *share = w->share + first;
         for (size_t k = 0; k < count; k++) {
