@@ -99,7 +99,7 @@ def test_hardness_is_about_three_tensile_strengths(name, tensile):
 
 
 @pytest.mark.parametrize(
-    ("name", "numbers", "pressure"), [("steel 4140", (200, 578), 3000), ("aluminium 6061", (30, 95), 500)]
+    ("name", "numbers", "force"), [("steel 4140", (200, 578), 3000), ("aluminium 6061", (30, 95), 500)]
 )
 def test_brinell_numbers_from_the_indentation(name, numbers, force):
     ball = 10.0  # mm

@@ -44,9 +44,9 @@ def rough(seed=1, count=60, h_max=3.5, gap=True):
 def test_a_sampled_power_law_has_the_totals_of_its_five_numbers(variant, hurst, zeta_1):
     surface = five_numbers(hurst, zeta_1)
     d = surface.h_max * (1 - DEPTHS[1:])
-    plain = contact(surface, separation=d, variant=variant, derivatives=True)
+    plain = contact(surface, separation=d, variant=variant, derivatives=True, theory="mbma")
     for count in (2, 200):
-        found = contact(sampled(surface, count), separation=d, variant=variant, derivatives=True)
+        found = contact(sampled(surface, count), separation=d, variant=variant, derivatives=True, theory="mbma")
         bound = float(np.max(plain.error + found.error))
         for name in ("pressure", "area"):
             np.testing.assert_allclose(getattr(found, name), getattr(plain, name), rtol=bound)
@@ -59,7 +59,8 @@ def test_exact_and_universal_island_models_agree():
     surface = rough(count=24)
     d = surface.h_max * (1 - DEPTHS[1:])
     exact, table = (
-        contact(surface, separation=d, island_model=island_model) for island_model in ("exact", "universal")
+        contact(surface, separation=d, island_model=island_model, theory="mbma")
+        for island_model in ("exact", "universal")
     )
     np.testing.assert_allclose(table.pressure, exact.pressure, rtol=1e-7)
     np.testing.assert_allclose(table.area, exact.area, rtol=1e-7)
@@ -133,20 +134,20 @@ def test_slopes_hold_in_thin_panels():
 
 def test_first_contact_is_a_power_of_depth():
     surface = rough()
-    found = contact(surface, separation=surface.h_max - np.array([2**-44, 2**-43]))
+    found = contact(surface, separation=surface.h_max - np.array([2**-44, 2**-43]), theory="mbma")
     assert np.log2(found.pressure[1] / found.pressure[0]) == pytest.approx(7 / 2, rel=1e-6)
     assert np.log2(found.area[1] / found.area[0]) == pytest.approx(10 / 3, rel=1e-6)
-    nothing = contact(surface, separation=surface.h_max + np.array([0.0, 1.0]))
+    nothing = contact(surface, separation=surface.h_max + np.array([0.0, 1.0]), theory="mbma")
     assert nothing.pressure.tolist() == nothing.area.tolist() == nothing.error.tolist() == [0, 0]
 
 
 @pytest.mark.parametrize(("count", "h_max"), [(60, 3.5), (2000, 3.5), (60, 13.0)])
 def test_a_law_is_the_contacts(count, h_max):
     surface = rough(count=count, h_max=h_max)
-    law = contact_law(surface)
+    law = contact_law(surface, "mbma")
     d = surface.h_max * (1 - DEPTHS)
     d = d[d >= law.lowest]
-    found = contact(surface, separation=d)
+    found = contact(surface, separation=d, theory="mbma")
     np.testing.assert_allclose(law.pressure(separation=d), found.pressure, rtol=2 * law.error)
     np.testing.assert_allclose(law.area(separation=d), found.area, rtol=2 * law.error)
     assert (law.theory, law.variant, law.island_model) == ("mbma", "reported", "universal")
@@ -155,19 +156,21 @@ def test_a_law_is_the_contacts(count, h_max):
 def test_a_law_ends_with_the_table():
     # high peaks: the islands of full compression lie outside of the table
     surface = rough(h_max=30.0)
-    law = contact_law(surface)
+    law = contact_law(surface, "mbma")
     assert -surface.h_max < law.lowest < surface.h_max / 2
     d = law.lowest + np.array([1e-9, 0.1, 1.0])
-    np.testing.assert_allclose(law.pressure(separation=d), contact(surface, separation=d).pressure, rtol=2 * law.error)
+    np.testing.assert_allclose(
+        law.pressure(separation=d), contact(surface, separation=d, theory="mbma").pressure, rtol=2 * law.error
+    )
     with pytest.raises(OutOfRangeError, match="where the theory ends"):
         law.pressure(separation=law.lowest - 0.1)
     np.testing.assert_allclose(law.separation(pressure=law.pressure(separation=d)), d, rtol=1e-6)
     # as far as there is a table, contacts are found by pressure and known to be valid or not
-    found = contact(surface, pressure=law.pressure(separation=d))
+    found = contact(surface, pressure=law.pressure(separation=d), theory="mbma")
     np.testing.assert_allclose(found.separation, d, rtol=1e-6)
     assert found.valid.shape == (3,)
     with pytest.raises(OutOfRangeError, match="at most what theory 'mbma' reaches"):
-        contact(surface, pressure=2 * law.pressure(separation=law.lowest))
+        contact(surface, pressure=2 * law.pressure(separation=law.lowest), theory="mbma")
 
 
 def test_islands():
@@ -189,10 +192,10 @@ def test_what_mbma_cannot_use_is_refused_with_the_mend():
     q = np.geomspace(1, 10, 30)
     blue = Surface.from_spectrum(q, q, h_max=3000.0)
     with pytest.raises(OutOfRangeError, match="measure shorter waves, or ask another theory"):
-        contact(blue, separation=1.0)
+        contact(blue, separation=1.0, theory="mbma")
     assert contact(blue, mean_separation=500.0, theory="calibrated").pressure > 0
     steep = Surface.from_spectrum(np.geomspace(1, 30, 50), np.geomspace(1, 30, 50) ** -2.1, h_max=30.0)
-    deep = contact(steep, separation=-29.0, island_model="universal", outside="nan").pressure
+    deep = contact(steep, separation=-29.0, island_model="universal", outside="nan", theory="mbma").pressure
     assert deep > 0 or np.isnan(deep)
 
 
@@ -212,6 +215,6 @@ class TestRollOff:
         surface, _ = self.surface(number)
         force, area = np.loadtxt(DATA / f"rolloff_{number}.csv", delimiter=",", usecols=(0, 1), unpack=True)
         tested = (area > 0.002) & (area < 0.25)
-        ratio = contact(surface, pressure=force[tested]).area / area[tested]
+        ratio = contact(surface, pressure=force[tested], theory="mbma").area / area[tested]
         assert (ratio > 0.85).all()
         assert (ratio < 1.1).all()
