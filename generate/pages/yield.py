@@ -107,7 +107,7 @@ def frozen() -> str:
                 by = contact(surface, pressure=one.force[k] * g, theory=theory, hardness=one.eta * g)
             except OutOfRangeError:  # MBMA ends before
                 break
-            yield one.area[k], np.log(by.incremental_stiffness / (one.frozen[k] * g)), by.stiffness_scatter
+            yield one.area[k], np.log(by.unloading_stiffness / (one.frozen[k] * g)), by.stiffness_scatter
 
     seen, rows = [one for one in capped(dataset(EVIDENCE)) if one.kind == "self_affine"], []
     for theory, eta in itertools.product(("mbma", "calibrated"), HARDNESSES):
@@ -170,7 +170,7 @@ def cost() -> str:
         for _, (hardness, times) in itertools.product(range(REPEATS), spent.items()):
             start = time.thread_time()
             found = contact(SURFACE, pressure=pressure, theory="calibrated", hardness=hardness)
-            _ = found.area, conductance(found.incremental_stiffness, 1.0, 1.0)
+            _ = found.area, conductance(found.unloading_stiffness, 1.0, 1.0)
             times.append(time.thread_time() - start)
         elastic, plastic = (min(times) for times in spent.values())
         rows.append([f"{count}", f"{plastic / elastic:.1f}"])

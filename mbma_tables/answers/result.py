@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from mbma_tables.answers.leakage import Leakage
 
-OF_HARDNESS = ("yielded", "incremental_stiffness", "plane_separation")
+OF_HARDNESS = ("yielded", "unloading_stiffness", "plane_separation")
 MOST_SHOWN = 10_000  # entries up to which a line says how far to trust them
 
 
@@ -171,12 +171,12 @@ class Contact(Displayed):
         if self._source.yields:
             raise InputError(
                 "energy: what a contact that yields gives back is not known, since the shape that stays is not; "
-                "contact_law(..., hardness=...).energy is the work of loading, incremental_stiffness what a small "
+                "contact_law(..., hardness=...).energy is the work of loading, unloading_stiffness what a small "
                 "unloading starts with"
             )
         return self._source.map(lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1)[0]
 
-    def conductance(self, k1: ArrayLike | str, k2: ArrayLike | str | None = None) -> Numbers:
+    def conductance(self, k1: ArrayLike | str | None = None, k2: ArrayLike | str | None = None) -> Numbers:
         """Conductance per nominal area of two bodies in contact, thermal or electrical, h = (k_s/E*) (-dF/du).
 
         By the incremental stiffness (Barber 2003), with a hardness that of the frozen contact.
@@ -184,7 +184,8 @@ class Contact(Displayed):
         Parameters
         ----------
         k1, k2 : array_like or str
-            Conductivities of the bodies, k_s = 2 k1 k2/(k1 + k2); without k2 both have k1.
+            Conductivities of the bodies, k_s = 2 k1 k2/(k1 + k2); without k2 both have k1, and without either they are
+            the thermal ones of the `materials` named.
 
         Returns
         -------
@@ -203,9 +204,13 @@ class Contact(Displayed):
         from mbma_tables.totals.conductance import conductance, mean_conductivity
 
         source = self._source
+        if k1 is None:
+            if source.materials is None:
+                raise InputError("conductance needs k1, the bodies' conductivity, where no materials are named")
+            k1, k2 = source.materials.conductivities
         (k1, k2), _ = source.units.conductivities(k1, k1 if k2 is None else k2)
         # linear in the stiffness, which may be NaN or a DataArray
-        found: Numbers = conductance(1.0, mean_conductivity(k1, k2), 1.0) / source.E_star * self.incremental_stiffness
+        found: Numbers = conductance(1.0, mean_conductivity(k1, k2), 1.0) / source.E_star * self.unloading_stiffness
         return found
 
     def _of_loading(self, name: str) -> Numbers:
@@ -223,11 +228,11 @@ class Contact(Displayed):
         return self._of_loading("yielded") if self._source.yields else 0.0 * self.mean_separation
 
     @described
-    def incremental_stiffness(self) -> Any:
+    def unloading_stiffness(self) -> Any:
         """-d(F/A0)/du [stress/length] of a small unloading, the contact area frozen; `stiffness` if nothing yields."""
         if not self._source.yields:
             return self.stiffness
-        return (self._source.E_star * self._of_loading("incremental_stiffness"))[()]
+        return (self._source.E_star * self._of_loading("unloading_stiffness"))[()]
 
     @described
     def plane_separation(self) -> Any:
@@ -266,7 +271,7 @@ class Contact(Displayed):
 
     @described
     def stiffness_scatter(self) -> Any:
-        """Standard deviation of ln of `incremental_stiffness` at this force, likewise: of conductance, too."""
+        """Standard deviation of ln of `unloading_stiffness` at this force, likewise: of conductance, too."""
         more = {"area": self._touching}
         (found,) = self._source.map(lambda by, s, u, E, A: (by.stiffness_scatter(s, A),), self, 1, more)
         return found
@@ -293,10 +298,11 @@ class Contact(Displayed):
         """Whether the theory was tested for contacts such as these; `reasons` says where and why not."""
 
         def none(theory: Theory, s: AnySurface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[FloatArray]:
-            masks = list(concerns(theory, s, u, TheoryAnswer(*answer)).values())
+            masks = list(concerns(source, theory, s, u, E, TheoryAnswer(*answer)).values())
             return (np.asarray(~np.logical_or.reduce(masks), dtype=float),)
 
-        return self._source.map(none, self, 1, self._answer._asdict())[0].astype(bool)
+        source = self._source
+        return source.map(none, self, 1, self._answer._asdict())[0].astype(bool)
 
     @functools.cached_property
     def reasons(self) -> dict[str, Any]:
@@ -311,5 +317,5 @@ class Contact(Displayed):
             fields = list(xr.broadcast(*map(xr.DataArray, fields)))
             surface = surface.with_numbers(*map(np.asarray, fields[7:]))
         *known, u, E_star, hardness = map(np.asarray, fields[:7])
-        found = concerns(source.theory_at(E_star, hardness), surface, u, TheoryAnswer(*known))
+        found = concerns(source, source.theory_at(E_star, hardness), surface, u, E_star, TheoryAnswer(*known))
         return {reason: mask for reason, mask in found.items() if mask.any()}

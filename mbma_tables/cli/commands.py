@@ -16,6 +16,7 @@ from mbma_tables.cli.progress import echo
 from mbma_tables.common.arguments import finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import unit_of
+from mbma_tables.materials import hardness_in
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.cases import CASES
 from mbma_tables.surfaces.surface import Surface
@@ -46,7 +47,7 @@ def contact_keywords(model: options.Model, specimen: Specimen) -> dict[str, Any]
     """Keywords for `contact`."""
     asked = {**vars(model), "E_star": 1.0 if specimen.E_star is None else specimen.E_star}
     cap = asked.pop("hardness")
-    return asked if cap == math.inf else asked | {"hardness": specimen.units.number("hardness", cap)}
+    return asked if cap == math.inf else asked | {"hardness": hardness_in(specimen.units, cap)}
 
 
 @click.command("contact", short_help="Force and area at given gaps, pressures or areas.")
@@ -85,8 +86,9 @@ def contact_command(
     from mbma_tables.answers.contact import contact
 
     asked = _numbers(name, numbers, specimen, over_h_rms)
-    answer = contact(specimen.surface, **{name: asked}, **contact_keywords(model, specimen))
-    yields = ("yielded", "incremental_stiffness") if model.hardness != math.inf else ()
+    keywords = contact_keywords(model, specimen) | {"E_star": specimen.modulus}
+    answer = contact(specimen.surface, **{name: asked}, **keywords)
+    yields = ("yielded", "unloading_stiffness") if model.hardness != math.inf else ()
     values = {column: getattr(answer, column) for column in (*COLUMNS[:-1], "stiffness", *yields, COLUMNS[-1])}
     values |= {"scatter": answer.scatter, "area_scatter": answer.area_scatter}
     values["valid"] = np.where(answer.valid, "yes", "no")
@@ -151,7 +153,7 @@ def curve_command(
     gap = curve_gaps(float(surface.h_max), points)
     if model.theory != "mbma":
         gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).pressure)]
-    answer = contact(surface, separation=gap, **asked)
+    answer = contact(surface, separation=gap, **asked | {"E_star": specimen.modulus})
     values = {name: getattr(answer, name) for name in COLUMNS} | (_leakage(answer) if leakage else {})
     units = {}
     others = {
@@ -171,7 +173,14 @@ def curve_command(
 def _draw(
     specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory], kind: str, leakage: bool, title: str
 ) -> bytes:
-    from mbma_tables.common.plots import Curve, draw_compression, leakage_label, pressure_label, theory_label, to_picture
+    from mbma_tables.common.plots import (
+        Curve,
+        draw_compression,
+        leakage_label,
+        pressure_label,
+        theory_label,
+        to_picture,
+    )
 
     gap = np.asarray(answer.mean_separation / specimen.surface.h_rms)
     curves = [answer.curve(leakage)]

@@ -253,7 +253,12 @@ theory_option = _option(
 )
 # of islands, which MBMA alone has
 model_options = _group("model", lambda given: Model(**given), *_MODEL_OPTIONS)
-hardness_option = _option("hardness", "Largest pressure that the softer body bears; none: elastic.")
+hardness_option = click.option(
+    "--hardness",
+    callback=lambda ctx, param, given: _parse_number(ctx, param, given) if (given or "1")[0].isdigit() else given,
+    metavar="X[UNIT]",
+    help="Largest pressure that the softer body bears, also '200 HV', '58 HRC' or 'steel 4140 hard'; none: elastic.",
+)
 theory_options = _group("model", lambda given: Model(**_given(given)), theory_option, *_MODEL_OPTIONS, hardness_option)
 
 output_options = _group(

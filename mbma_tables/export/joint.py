@@ -16,7 +16,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, factor, in_unit, resolve
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import contact_law
-from mbma_tables.materials import ELASTIC_PSI
+from mbma_tables.materials import ELASTIC_PSI, hardness_in
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories import get_theory
@@ -185,7 +185,7 @@ def frozen_joint(
     if surface.shape != ():
         raise InputError("a contact law is of one surface, not of a batch")
     modulus = number_in("E_star", plain["E_star"], 1e-300, 1e300)
-    cap = Units(length, stress).number("hardness", hardness)
+    cap = hardness_in(Units(length, stress), hardness)
     law = contact_law(surface, LAW_RTOL, variant=variant, E_star=modulus, theory=theory, hardness=cap)
     law = dataclasses.replace(law, units=Units(length, stress))
     own = Mbma(variant=variant) if theory == Mbma.name else get_theory(theory)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from mbma_tables.common.units import modulus_and_units
 from mbma_tables.law import block as at
 from mbma_tables.law import pieces as fit
 from mbma_tables.law.law import ROUNDING, ContactLaw
+from mbma_tables.materials import Metal, Pair, bodies, hardness_in
 from mbma_tables.models import MAX_RTOL, MIN_RTOL, AnyModel
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -52,7 +53,8 @@ def contact_law(
     E_star: float | str = 1.0,
     *,
     theory: str | Theory | UserTheory = "mbma",
-    hardness: float | str = math.inf,
+    hardness: float | str | None = None,
+    materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
 ) -> ContactLaw:
     """Force and area of one surface as functions of its gap: the way to answer many gaps, and to invert.
 
@@ -67,7 +69,7 @@ def contact_law(
         As for `contact`; `island_model` may be an island model of one's own.
     theory : str or theory
         By name, one of `mbma_tables.theories.THEORIES`, or an object, as for `contact`.
-    hardness : float
+    hardness, materials : optional
         As for `contact`: the law of loading. Its `energy` is then the work of loading, not what unloading gives back.
 
     Returns
@@ -91,6 +93,7 @@ def contact_law(
     >>> f"{persson.pressure(2.0):.4g}, {persson.at_pressure(1e-4).mean_separation:.3f}"
     '0.0001832, 2.276'
     """
+    E_star, hardness, _ = bodies(materials, E_star, hardness)
     given, units = modulus_and_units(E_star, surface)
     modulus = number_in("E_star", given, sys.float_info.min, sys.float_info.max)
     if isinstance(theory, str) and theory == Mbma.name:
@@ -98,8 +101,8 @@ def contact_law(
     else:
         refuse_options_of_mbma(island_model=island_model != "universal", variant=variant != "reported")
         chosen = get_theory(theory)
-    if hardness is not math.inf:
-        cap = checked_hardness(units.number("hardness", hardness))
+    if hardness is not None and hardness is not math.inf:
+        cap = checked_hardness(hardness_in(units, hardness))
         if cap.ndim:
             raise InputError(f"hardness must be one number, got shape {cap.shape}: a law is of one surface")
         if cap < math.inf:

@@ -57,6 +57,12 @@ class Specimen:
         """Of its lengths and stresses."""
         return Units(self.surface.unit, "1" if self.E_star is None else self.stress_unit)
 
+    @property
+    def modulus(self) -> float | str:
+        """E* for `contact`: with its unit where that is known, 1 where there is none."""
+        number = 1.0 if self.E_star is None else self.E_star
+        return number if self.stress_unit is None else f"{number!r} {self.stress_unit}"
+
     def in_units(self, length: str | None, stress: str | None) -> Specimen:
         """The same in units asked for: converted from those that are known, said to be in them otherwise."""
         modulus, unit = self.E_star, self.stress_unit
