@@ -34,6 +34,9 @@ class Surface(SelfAffine):
         Root-mean-square height, length.
     h_max : array_like
         Height of the highest point above the mid-plane, length; contact starts there.
+    nominal_area : array_like or str
+        Instead of h_max: A0, length^2. h_max is then the median highest point of Gaussian surfaces of that area and
+        spectrum (`mbma_tables.surfaces.extremes`), whose spread `provenance` holds.
     unit : str, optional
         The unit of length, such as "um"; None where it is not known. Results carry it.
     fit : SpectrumFit, optional
@@ -58,6 +61,8 @@ class Surface(SelfAffine):
     200, rms gradient 0.5414
     >>> Surface(hurst=[0.5, 0.8], q0=0.5, q1=100.0, h_rms=0.2, h_max=0.6).alpha.round(1)
     array([100.5, 387.8])
+    >>> Surface(hurst=0.8, q0=0.5, q1=100.0, h_rms=0.2, unit="mm", nominal_area="4 cm^2").h_max.round(3)
+    np.float64(0.702)
     """
 
     @classmethod
@@ -68,6 +73,7 @@ class Surface(SelfAffine):
         C: ArrayLike,
         *,
         h_max: float | None = None,
+        nominal_area: float | str | None = None,
         heights: ArrayLike | None = None,
         convention: str = "paper",
         unit: str | None = None,
@@ -85,6 +91,8 @@ class Surface(SelfAffine):
             leaves out what a masked array hides.
         h_max : float, optional
             Height of the highest point above the mid-plane [length]; that of `heights` if not given.
+        nominal_area : float or str, optional
+            Instead, A0 [length^2], as for `Surface`.
         heights : array_like, optional
             Heights measured anywhere on the surface [length], of any shape; their mean is taken off. A Gaussian that
             ends at h_max if not given.
@@ -126,9 +134,12 @@ class Surface(SelfAffine):
             from mbma_tables.surfaces.psd import fit_psd
 
             top = Heights.of(heights).h_max if h_max is None and heights is not None else h_max
-            return cls(**fit_psd(q, C, top, convention, band), unit=unit)
+            numbers = fit_psd(q, C, top if nominal_area is None or top is not None else 1.0, convention, band)
+            if nominal_area is not None:
+                numbers["h_max"] = h_max
+            return cls(**numbers, unit=unit, nominal_area=nominal_area)
         known = None if heights is None else Heights.of(heights)
-        return MeasuredSurface(*sorted_spectrum(q, C, convention), h_max, known, unit=unit)
+        return MeasuredSurface(*sorted_spectrum(q, C, convention), h_max, known, unit=unit, nominal_area=nominal_area)
 
     @classmethod
     @hinted
@@ -239,6 +250,7 @@ class Surface(SelfAffine):
         periodic: bool | None = None,
         detrend: str | None = None,
         h_max: float | None = None,
+        nominal_area: float | str | None = None,
         extrapolate_to: Any = None,
         extrapolate_hurst: float | None = None,
         outliers: float | None = None,
@@ -265,6 +277,8 @@ class Surface(SelfAffine):
         h_max : float, optional
             Height of the highest point above the mid-plane [length]; by default the line's, which lies below that of a
             surface.
+        nominal_area : float or str, optional
+            Instead, A0 [length^2], as for `Surface`.
 
         Returns
         -------
@@ -291,7 +305,8 @@ class Surface(SelfAffine):
         from mbma_tables.surfaces.resolution import measured_surface
 
         treated = prepared(heights, treatment, 1)
-        return MeasuredSurface.of(measured_surface(treated, h_max, extrapolate_to, extrapolate_hurst))
+        found = MeasuredSurface.of(measured_surface(treated, h_max, extrapolate_to, extrapolate_hurst))
+        return found if nominal_area is None else dataclasses.replace(found, h_max=h_max, nominal_area=nominal_area)
 
     def sampled(self) -> MeasuredSurface:
         """The same surface by its spectrum, two samples of which hold all of it; of a batch there are none."""
