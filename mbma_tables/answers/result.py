@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from mbma_tables.answers.leakage import Leakage
+    from mbma_tables.answers.tangential import Tangential
 
 OF_HARDNESS = ("yielded", "unloading_stiffness", "plane_separation")
 MOST_SHOWN = 10_000  # entries up to which a line says how far to trust them
@@ -212,6 +213,51 @@ class Contact(Displayed):
         # linear in the stiffness, which may be NaN or a DataArray
         found: Numbers = conductance(1.0, mean_conductivity(k1, k2), 1.0) / source.E_star * self.unloading_stiffness
         return found
+
+    def tangential(self, friction: float | None = None, nu: Any = None, E: Any = None) -> Tangential:
+        """Tangential stiffness of full stick, partial and gross slip, of isotropic surfaces; computed when called for.
+
+        Parameters
+        ----------
+        friction : float, optional
+            Coefficient of friction, for slip. With a hardness only full stick is known.
+        nu, E : float or pair of float, optional
+            Poisson's ratio of the bodies, or of each with their moduli, as `materials.tangential_ratio` takes them; by
+            default those of the `materials` named.
+
+        Returns
+        -------
+        Tangential
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact
+        >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
+        >>> joint = contact(face, pressure="10 MPa", E_star="100 GPa", theory="calibrated")
+        >>> sheared = joint.tangential(friction=0.2, nu=0.3)
+        >>> f"{sheared.stiffness:.3g} GPa/um, {sheared.shear('0.05 um'):.3g} GPa; slips from {sheared.gross_slip:.2g} um"
+        '0.0222 GPa/um, 0.000882 GPa; slips from 0.22 um'
+        """
+        from mbma_tables.answers.tangential import Tangential, ratio_of
+
+        source = self._source
+        ratio = ratio_of(nu, E, source.materials)
+        last = source.surface.h_max if source.theory.ends_at_h_max else np.inf
+
+        def at(u: Any) -> tuple[Any, ...]:
+            moved = dataclasses.replace(self, mean_separation=u)
+            return source.map(
+                lambda theory, s, u, E: (E * theory.answer(s, u).pressure, E * theory.energy(s, u)), moved, 2
+            )
+
+        def inverse(pressure: Any) -> Any:
+            find = lambda theory, s, u, E, p: (theory.mean_separation_at(s, "pressure", p / E),)  # noqa: E731
+            return source.map(find, self, 1, {"pressure": pressure})[0]
+
+        return Tangential(
+            ratio, friction, self.pressure, self.mean_separation, self.unloading_stiffness / ratio, last, source.units,
+            None if source.yields else at, inverse,
+        )  # fmt: skip
 
     def _of_loading(self, name: str) -> Numbers:
         """A number of `Loaded`, over E*."""

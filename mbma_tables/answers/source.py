@@ -127,8 +127,8 @@ def _beyond_metals(
     elastic = np.isinf(getattr(theory, "hardness", np.inf)) & (answer.pressure > 0)
     if pair is None:
         text = (
-            f"no hardness is given, and the mean contact pressure is above {HARDEST:g} GPa, the hardness of the hardest "
-            "metal of materials.METALS: give hardness= of the softer body, or infinity where it does not yield"
+            f"no hardness is given, and the mean contact pressure is above {HARDEST:g} GPa, the hardness of the "
+            "hardest metal of materials.METALS: give hardness= of the softer body, or infinity where it does not yield"
         )
         return {text: elastic & (mean > HARDEST * unit)}
     soft, hard = pair.softer.hardness

@@ -24,7 +24,10 @@ from mbma_tables.common.units import UNKNOWN, Units, unit_of
 from mbma_tables.core import core, in_blocks
 from mbma_tables.law import block as at
 from mbma_tables.law.block import AREA, FORCE, QUANTITIES, inverse_block, softening
+from mbma_tables.law.unloading import Unloading
+from mbma_tables.materials import Pair
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.theories.protocol import Theory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,7 +56,7 @@ DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polyno
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class ContactLaw(Law, Displayed):
+class ContactLaw(Law, Unloading, Displayed):
     """Force and area of one surface against its gap; made by `contact_law`, picklable, tens of kB with its surface.
 
     Every method takes the mean separation u, or ``separation=``, MBMA's d: numbers in the law's unit of length, or texts
@@ -82,6 +85,12 @@ class ContactLaw(Law, Displayed):
         Of lengths and stresses, as far as the surface and the modulus knew theirs.
     surface : Surface
         Whose law it is.
+    hardness : float
+        Infinite where nothing yields.
+    elastic_theory : Theory or None
+        Theory of the elastic contact, with a hardness.
+    materials : Pair or None
+        Where they are named.
 
     Examples
     --------
@@ -109,6 +118,9 @@ class ContactLaw(Law, Displayed):
     errors: FloatArray
     units: Units = UNKNOWN
     surface: AnySurface | None = None
+    hardness: float = math.inf
+    elastic_theory: Theory | None = None
+    materials: Pair | None = None
 
     @property
     def rows(self) -> Any:

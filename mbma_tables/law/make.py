@@ -93,7 +93,7 @@ def contact_law(
     >>> f"{persson.pressure(2.0):.4g}, {persson.at_pressure(1e-4).mean_separation:.3f}"
     '0.0001832, 2.276'
     """
-    E_star, hardness, _ = bodies(materials, E_star, hardness)
+    E_star, hardness, pair = bodies(materials, E_star, hardness)
     given, units = modulus_and_units(E_star, surface)
     modulus = number_in("E_star", given, sys.float_info.min, sys.float_info.max)
     if isinstance(theory, str) and theory == Mbma.name:
@@ -101,6 +101,7 @@ def contact_law(
     else:
         refuse_options_of_mbma(island_model=island_model != "universal", variant=variant != "reported")
         chosen = get_theory(theory)
+    yields: dict[str, Any] = {}
     if hardness is not None and hardness is not math.inf:
         cap = checked_hardness(hardness_in(units, hardness))
         if cap.ndim:
@@ -108,6 +109,7 @@ def contact_law(
         if cap < math.inf:
             from mbma_tables.theories.yielding import Yielding
 
+            yields = {"hardness": float(cap), "elastic_theory": chosen}
             chosen = Yielding(chosen, float(cap) / modulus)
     one = surface
     if one.labelled:
@@ -115,7 +117,7 @@ def contact_law(
     if one.shape != ():
         raise InputError(f"a law is of one surface, got a batch of shape {one.shape}")
     asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
-    facts = {"surface": one, "E_star": modulus, "units": units}
+    facts = {"surface": one, "E_star": modulus, "units": units, "materials": pair, **yields}
     if isinstance(chosen, Mbma):
         return _mbma_law(one, chosen.island_model, chosen.variant, asked, facts)
     try:

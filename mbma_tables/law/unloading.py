@@ -1,0 +1,83 @@
+"""What a law answers of small unloading, and of sliding: made when it is asked for."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import ArrayLike
+
+from mbma_tables.common.arguments import Numbers
+from mbma_tables.common.errors import InputError
+
+if TYPE_CHECKING:
+    from mbma_tables.answers.tangential import Tangential
+    from mbma_tables.law.law import ContactLaw
+
+
+class Unloading:
+    """Unloading and tangential stiffness of a `ContactLaw`."""
+
+    def unloading_stiffness(
+        self: Any, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None
+    ) -> Numbers:
+        """-dp/du of a small unloading, the contact area frozen [stress/length]; `stiffness` where nothing yields.
+
+        With a hardness it is made from the law of the elastic contact, which is fitted when this is first called.
+        """
+        found: Numbers = self._elastic.stiffness(mean_separation, separation=separation)
+        if math.isinf(self.hardness):
+            return found
+        from mbma_tables.laws.hardness import frozen_factor
+
+        return found * float(frozen_factor(self.hardness / (self.E_star * float(self.surface.rms_gradient))))
+
+    @functools.cached_property
+    def _elastic(self: Any) -> ContactLaw:
+        """The law of the elastic contact."""
+        if math.isinf(self.hardness):
+            return self  # type: ignore[no-any-return]
+        from mbma_tables.law.make import contact_law
+
+        law = contact_law(self.surface, theory=self.elastic_theory, E_star=self.E_star)
+        return dataclasses.replace(law, units=self.units)
+
+    def tangential(
+        self: Any,
+        mean_separation: ArrayLike | None = None,
+        *,
+        pressure: ArrayLike | str | None = None,
+        friction: float | None = None,
+        nu: Any = None,
+        E: Any = None,
+    ) -> Tangential:
+        """Tangential stiffness and slip at a mean separation or a pressure, as `Contact.tangential`.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact_law
+        >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
+        >>> law = contact_law(face, E_star="100 GPa", theory="calibrated")
+        >>> sheared = law.tangential(pressure="10 MPa", friction=0.2, nu=0.3)
+        >>> f"{sheared.stiffness:.3g} GPa/um; slips from {sheared.gross_slip:.3g} um on"
+        '0.0222 GPa/um; slips from 0.221 um on'
+        """
+        from mbma_tables.answers.tangential import Tangential, ratio_of
+
+        if (mean_separation is None) == (pressure is None):
+            raise InputError("give the mean separation, or pressure=, one of them")
+        if pressure is None:
+            u = self.units.number("mean_separation", mean_separation)
+            held = self.pressure(u)
+        else:
+            u, held = self.at_pressure(pressure).mean_separation, self.units.number("pressure", pressure)
+        ratio = ratio_of(nu, E, self.materials)
+        ends = math.isinf(self.highest)
+        return Tangential(
+            ratio, friction, held, u, self.unloading_stiffness(u) / ratio,
+            self.h_max if ends else math.inf, self.units,
+            None if self.hardness < math.inf else lambda u: (self.pressure(u), self.energy(u)),
+            lambda p: self.at_pressure(p).mean_separation,
+        )  # fmt: skip
