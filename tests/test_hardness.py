@@ -157,12 +157,12 @@ def test_held_out_surfaces_are_within_the_stated_bars():
     assert with_h_max["yielded"] > 0.95
     assert with_h_max["stiffness"] > 0.95
     assert with_heights["stiffness"] > 0.95
-    assert with_heights["pressure"] == 1
+    assert with_heights["force"] == 1
     # of surfaces with two longest waves a side h_max says little of the highest heights
-    assert numbers["three_waves"][0, quantities.index("pressure"), 2] > 0.97
+    assert numbers["three_waves"][0, quantities.index("force"), 2] > 0.97
     stretched = dict(zip(quantities, numbers["stretched"][1, :, 2], strict=True))
     assert stretched["area"] > 0.97
-    assert stretched["pressure"] == 1
+    assert stretched["force"] == 1
 
 
 def test_surfaces_of_another_code():
@@ -171,14 +171,14 @@ def test_surfaces_of_another_code():
     share = {quantity: np.mean(np.abs(e) < BARS[quantity]) for quantity, e in errors.items()}
     assert share["area"] > 0.97
     assert share["yielded"] > 0.95
-    assert share["pressure"] > 0.97
+    assert share["force"] > 0.97
     assert share["stiffness"] > 0.95
 
 
 def test_stated_scatter_is_what_held_out_errors_have():
     _, attributes = shipped_part("hardness")
     covered = json.loads(attributes["coverage"])
-    assert set(covered) == {f"{name} {q}" for name in (*FORMS, *OTHERS) for q in ("area", "pressure", "stiffness")}
+    assert set(covered) == {f"{name} {q}" for name in (*FORMS, *OTHERS) for q in ("area", "force", "stiffness")}
     for name, (one, two) in covered.items():
         assert 0.55 < one < 0.8, name
         # MBMA's stiffness is off by a bias more than by chance

@@ -52,7 +52,7 @@ def questions():
         ]
 
     def inverses(seed):
-        return [law.separation(force=law.pressure(separation=gaps(seed, 200)))]
+        return [law.separation(pressure=law.pressure(separation=gaps(seed, 200)))]
 
     def batches(seed):
         # 31 islands or more a gap
@@ -104,12 +104,12 @@ def test_ten_million_mixed_lookups_by_sixteen_threads_have_the_bits_of_one():
         blocks = [slice(k, k + size) for k in range(0, each, size)]
         found = [model.answer(X[block], mu[block]) for block in blocks]
         phi = [np.concatenate([getattr(part, name) for part in found]) for name in ("phi_F", "phi_A", "error")]
-        return [*phi, np.concatenate([law.force(gaps[block]) for block in blocks])]
+        return [*phi, np.concatenate([law.pressure(separation=gaps[block]) for block in blocks])]
 
     whole = answers(each)
     for k in range(0, each, each // 50):
         one = model.answer(X[k], mu[k])
-        assert [one.phi_F, one.phi_A, one.error, law.force(gaps[k])] == [column[k] for column in whole]
+        assert [one.phi_F, one.phi_A, one.error, law.pressure(separation=gaps[k])] == [column[k] for column in whole]
     with ThreadPoolExecutor(THREADS) as pool:
         for found in pool.map(answers, 4 * [997, 8192, 50_000, each]):
             for column, expected in zip(found, whole, strict=True):

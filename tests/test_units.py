@@ -153,7 +153,7 @@ def test_conflicts_in_python(case):
 
 
 SURFACE = '[surface]\nhurst = 0.8\nq0 = "0.1/mm"\nzeta_1 = 50\nh_rms = "800 um"\n'
-REST = '[effects]\non = ["force"]\n'
+REST = '[effects]\non = ["pressure"]\n'
 TOML = {
     "plain beside a unit": (SURFACE + "h_max = 3\n" + REST, "h_max without a unit beside numbers in mm"),
     "wrong power": (SURFACE + 'h_max = "3 1/mm"\n' + REST, "h_max|no known unit"),
@@ -254,7 +254,7 @@ def test_a_scene_file_with_units(tmp_path):
     path.write_text(
         SURFACE + 'h_max = "2.4 mm"\nlength_unit = "um"\n'
         '[material]\nE_star = "0.1 GPa"\n[prescribed]\npressures = ["100 kPa", "200 kPa"]\n'
-        '[effects]\non = ["force", "stiffness"]\n[accuracy]\nrtol = 1e-4\n'
+        '[effects]\non = ["pressure", "stiffness"]\n[accuracy]\nrtol = 1e-4\n'
     )
     found = Scene.from_toml(path).run()
     assert found["pressure"].values == pytest.approx([1e-4, 2e-4], rel=1e-4)
@@ -341,11 +341,11 @@ def test_a_law_keeps_its_units(theory):
     law = contact_law(CONCRETE.to("um"), 1e-5, E_star="13.3 MPa", theory=theory)
     assert law.units == Units("um", "MPa")
     assert law.pressure("0.7 mm") == law.pressure(700.0)
-    assert law.separation(force="10 kPa") == law.separation(force=0.01)
+    assert law.separation(pressure="10 kPa") == law.separation(pressure=0.01)
     assert law.at_pressure("10 kPa").area == law.at_pressure(0.01).area
     point = law.at_pressure("10 kPa")
     assert f"mean_separation {point.mean_separation:.4g} um," in repr(point)
-    assert "force 0.01 MPa" in repr(pickle.loads(pickle.dumps(point)))
+    assert "pressure 0.01 MPa" in repr(pickle.loads(pickle.dumps(point)))
     assert pickle.loads(pickle.dumps(law)).units == law.units
     with pytest.raises(InputError, match="needs a modulus"):
         contact_law(CONCRETE, 1e-3).at_pressure("10 kPa")

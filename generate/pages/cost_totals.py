@@ -32,8 +32,8 @@ FIRST_USE = (
 )
 # keywords of `contact` by quantity, and the answers that these give
 QUANTITIES: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
-    "both": ({}, ("force", "area")),
-    "force": ({"quantities": ("force",)}, ("force",)),
+    "both": ({}, ("pressure", "area")),
+    "pressure": ({"quantities": ("pressure",)}, ("pressure",)),
     "area": ({"quantities": ("area",)}, ("area",)),
 }
 
@@ -58,7 +58,7 @@ def reference() -> tuple[tuple[Surface, FloatArray, dict[str, FloatArray]], ...]
     for surface in held_out_surfaces():
         gap = measured_gaps(surface)[::EVERY]
         found = contact(surface, separation=gap, island_model=Doubled(), rtol=REFERENCE_RTOL)
-        rows.append((surface, gap, {"force": np.asarray(found.pressure), "area": np.asarray(found.area)}))
+        rows.append((surface, gap, {"pressure": np.asarray(found.pressure), "area": np.asarray(found.area)}))
     return tuple(rows)
 
 
@@ -75,8 +75,8 @@ def scene_rows() -> Iterator[Row]:
     """What a scene takes besides its steps: planning and making the result."""
     surface = held_out_surfaces()[0]
     gap = 0.9 * float(surface.h_max)
-    whole = measure(Scene(surface, effects=["force"], separations=gap, rtol=1e-4).run)[0]
-    step = measure(functools.partial(contact, surface, separation=gap, rtol=1e-4, quantities=["force"]))[0]
+    whole = measure(Scene(surface, effects=["pressure"], separations=gap, rtol=1e-4).run)[0]
+    step = measure(functools.partial(contact, surface, separation=gap, rtol=1e-4, quantities=["pressure"]))[0]
     yield Row("scene", "call", "both", None, max(whole - step, 0.0))
 
 
@@ -124,10 +124,10 @@ def law_rows() -> Iterator[Row]:
     law, gaps = contact_law(surface), measured_gaps(surface, 10_000)
     loads = law.pressure(separation=gaps)
     ways: dict[tuple[str, str], Callable[[], Any]] = {
-        ("lookup", "force"): lambda: law.pressure(separation=gaps),
+        ("lookup", "pressure"): lambda: law.pressure(separation=gaps),
         ("lookup", "area"): lambda: law.area(separation=gaps),
         ("lookup", "both"): lambda: (law.pressure(separation=gaps), law.area(separation=gaps)),
-        ("invert", "force"): lambda: law.separation(pressure=loads),
+        ("invert", "pressure"): lambda: law.separation(pressure=loads),
     }
     for (name, quantity), run in ways.items():
         yield Row("law", name, quantity, None, measure(run)[0] / gaps.size)

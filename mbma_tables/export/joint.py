@@ -146,7 +146,8 @@ class Joint:
         blocked, least = self.law.leakage.blocked_at, "never blocked"
         if blocked > -np.inf:
             c = (self.law.h_max - blocked) / 2
-            least = f"blocked, K = 0, from p = {float(self.law.pressure(separation=blocked)):.10g} {self.stress}, c = {c:.10g} on"
+            load = float(self.law.pressure(separation=blocked))
+            least = f"blocked, K = 0, from p = {load:.10g} {self.stress}, c = {c:.10g} on"
         return (
             f"leakage is the flow conductance K [{self.length}^3] of the gaps: flow per length of seal is "
             f"K dp/(12 viscosity width), viscosity in {self.stress} s: 1e-3 Pa s, as water's, is "

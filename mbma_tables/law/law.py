@@ -57,10 +57,10 @@ DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polyno
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ContactLaw(Law, Unloading, Displayed):
-    """Force and area of one surface against its gap; made by `contact_law`, picklable, tens of kB with its surface.
+    """Pressure and area of one surface against its gap; made by `contact_law`, picklable, tens of kB with its surface.
 
-    Every method takes the mean separation u, or ``separation=``, MBMA's d: numbers in the law's unit of length, or texts
-    with their own, "0.8 um".
+    Every method takes the mean separation u, or ``separation=``, MBMA's d: numbers in the law's unit of length, or
+    texts with their own, "0.8 um".
 
     Attributes
     ----------

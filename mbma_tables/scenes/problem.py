@@ -172,7 +172,7 @@ class Problem:
             raise InputError(f"{' and '.join(given)} are given: prescribe one of {', '.join(PRESCRIBED)}")
         if not at_gaps:
             if given:
-                raise InputError(f"{given[0]} are not needed by any effect: leave them out, or ask for 'force'")
+                raise InputError(f"{given[0]} are not needed by any effect: leave them out, or ask for 'pressure'")
             return None
         if not given:
             raise InputError(f"nothing is prescribed: give one of {', '.join(PRESCRIBED)}")
@@ -224,7 +224,9 @@ class Problem:
                 if "conductance" not in self.outputs or not (
                     "pressure" in self.outputs or self.prescribed == "pressures"
                 ):
-                    raise InputError(f"{name!r} is of conductance at a pressure: add effects 'conductance' and 'force'")
+                    raise InputError(
+                        f"{name!r} is of conductance at a pressure: add effects 'conductance' and 'pressure'"
+                    )
                 if name == CORRELATIONS[0] and self.hardness is None:
                     raise InputError(f"{name!r} needs a hardness: add effect 'yield'")
             elif name not in COMPARED:

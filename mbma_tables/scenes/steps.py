@@ -72,7 +72,7 @@ def _law(run: Run, step: Step) -> None:
         if step.theory or error <= run.rtol or asked <= MIN_LAW_RTOL:
             break
         asked = max(0.1 * asked, MIN_LAW_RTOL)
-    _keep(run, lambda name: getattr(law, name)(run.gap))
+    _keep(run, lambda name: getattr(law, name)(separation=run.gap))
     run.close(step, error, dataclasses.replace(step, island_model=island_model).island_model_name)
 
 
@@ -253,7 +253,7 @@ def comparison(run: Run, step: Step) -> None:
         return
     cap = math.inf if run.problem.hardness is None else run.problem.hardness
     other = other_theory(step.name, run.problem.surface, run.gap, run.problem.E_star, cap)
-    run.found |= {f"{step.name}_force": (("gap",), other.pressure), f"{step.name}_area": (("gap",), other.area)}
+    run.found |= {f"{step.name}_pressure": (("gap",), other.pressure), f"{step.name}_area": (("gap",), other.area)}
 
 
 STEPS = {

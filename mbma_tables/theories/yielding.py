@@ -217,7 +217,7 @@ class Yielding(Theory):
         return *self._closed(surface, mean_separation, pressure, steep), exact
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
-        """Mean separation u [length] at which "pressure" (over A0 E*, below the hardness) or "area" has a wanted value."""
+        """Mean separation u [length] at a "pressure" (over E*, below the hardness) or an "area"."""
         asked: Theory = self._elastic if np.isinf(self.hardness).all() else super()  # type: ignore[assignment]
         return asked.mean_separation_at(surface, quantity, wanted)
 
@@ -236,7 +236,7 @@ class Yielding(Theory):
         cap = np.reshape(self.hardness, (1,) * (len(shape) - self.hardness.ndim) + self.hardness.shape)
         both = self.changed(hardness=np.stack([cap, np.full(cap.shape, np.inf)]))
         u, missed = both.inverted(surface, "pressure", np.broadcast_to(pressure, (2, *shape)))
-        refuse_unfinished(~missed[0], "the separation at this force")
+        refuse_unfinished(~missed[0], "the separation at this pressure")
         return u[0], u[1]
 
     def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -142,7 +142,7 @@ def test_csv_holds_every_digit():
     for name in ("separation", "pressure", "area", "error"):
         assert [float(row[name]) for row in rows] == getattr(answer, name).tolist()
     assert any("variant reported" in line for line in comments)
-    assert any("force [-]" in line for line in comments)
+    assert any("pressure [-]" in line for line in comments)
 
 
 def test_every_source_is_the_same_surface(folder):
@@ -210,18 +210,18 @@ def test_curve_beside_other_theories(folder):
     surface = Surface.named("concrete")
     average, gap = np.array(found["mean_separation"]), np.array(found["separation"])
     asperities = contact(surface, separation=gap, theory="greenwood_williamson", E_star=3.0)
-    np.testing.assert_allclose(found["greenwood_williamson_force"], asperities.pressure, rtol=1e-13)
+    np.testing.assert_allclose(found["greenwood_williamson_pressure"], asperities.pressure, rtol=1e-13)
     np.testing.assert_allclose(found["greenwood_williamson_area"], asperities.area, rtol=1e-13)
-    assert found["persson_force"][-1] is None
+    assert found["persson_pressure"][-1] is None
     assert found["persson_area"][-1] is None
     full = theories.Persson().answer(surface, average[:-1])
-    np.testing.assert_allclose(found["persson_force"][:-1], 3.0 * full.pressure, rtol=1e-9)
+    np.testing.assert_allclose(found["persson_pressure"][:-1], 3.0 * full.pressure, rtol=1e-9)
     np.testing.assert_allclose(found["persson_area"][:-1], full.area, rtol=1e-9)
     simplified = theories.Persson("simplified").answer(surface, average)
-    np.testing.assert_allclose(found["persson_simplified_force"], 3.0 * simplified.pressure, rtol=1e-12)
+    np.testing.assert_allclose(found["persson_simplified_pressure"], 3.0 * simplified.pressure, rtol=1e-12)
     assert (folder / "c.png").is_file()
     names, *_, last = table_rows(run("curve", *arguments))
-    assert last[names.index("persson_force")] == last[names.index("persson_area")] == "-"
+    assert last[names.index("persson_pressure")] == last[names.index("persson_area")] == "-"
 
 
 def test_island_is_the_librarys_answer():

@@ -98,7 +98,7 @@ def test_c_outside_its_range(name: str, compiled: dict[str, ctypes.CDLL]) -> Non
 def test_leakage_apart_and_where_gaps_close(name: str, compiled: dict[str, ctypes.CDLL]) -> None:
     law, leakage = points(name).law, c_function(compiled[name], "leakage")
     apart = np.geomspace(1e-9, 1e3 if math.isinf(law.highest) else 26, 200)
-    np.testing.assert_allclose(leakage(-apart), law.leakage(law.h_max + 2 * apart), rtol=VALUES)
+    np.testing.assert_allclose(leakage(-apart), law.leakage(separation=law.h_max + 2 * apart), rtol=VALUES)
     if name != "mbma":
         blocked = (law.h_max - law.leakage.blocked_at) / 2
         assert ((leakage(blocked + np.array([-1e-12, 1e-12, 1e-3])) == 0) == [False, True, True]).all()

@@ -318,9 +318,9 @@ def test_rows_of_leakage_without_a_block():
     assert known.leakage.blocked_at == -np.inf
     assert "where contact blocks" not in " ".join(law.comments)
     d = np.linspace(known.lowest, known.h_max, 5000)
-    kept = known.leakage(d) > FLOOR * law.y[0]
+    kept = known.leakage(separation=d) > FLOOR * law.y[0]
     np.testing.assert_allclose(
-        np.interp(known.pressure(separation=d), law.x, law.y)[kept], known.leakage(d)[kept], rtol=1.01e-2
+        np.interp(known.pressure(separation=d), law.x, law.y)[kept], known.leakage(separation=d)[kept], rtol=1.01e-2
     )
 
 

@@ -33,9 +33,9 @@ def stated():
     ("effects", "prescribed", "name", "quantity"),
     [
         (["stiffness"], {"areas": [0.05]}, "stiffness", "stiffness"),
-        (["area"], {"areas": [0.05]}, "gap", "pressure"),
-        (["area", "energy"], {"areas": [0.02, 0.05, 0.9]}, "gap", "pressure"),
-        (["pressure"], {"mean_separations": [1.0, 4.0]}, "pressure", "pressure"),
+        (["area"], {"areas": [0.05]}, "gap", "force"),
+        (["area", "energy"], {"areas": [0.02, 0.05, 0.9]}, "gap", "force"),
+        (["pressure"], {"mean_separations": [1.0, 4.0]}, "pressure", "force"),
     ],
 )
 def test_it_tells_what_the_shipped_file_states(effects, prescribed, name, quantity, stated):

@@ -14,7 +14,7 @@ SOME = f"""# a comment
 unit,seconds,both,,0.002,
 universal,gap rtol=1e-02,both,1e-9,4,50
 universal,gap rtol=1e-06,both,1e-9,16,60
-universal,gap rtol=1e-06,force,1e-9,10,60
+universal,gap rtol=1e-06,pressure,1e-9,10,60
 universal,call,both,,3,
 """
 

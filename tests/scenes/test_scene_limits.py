@@ -163,4 +163,4 @@ def test_a_table_as_an_object_is_the_island_model_with_its_name():
 def test_no_contact_asked_by_area_is_answered():
     found = Scene(Surface.named("concrete"), effects=["pressure", "stiffness"], areas=[0.0]).run()
     assert found.separation.values == pytest.approx(1.1)
-    assert (found.force.values, found.stiffness.values) == (0, 0)
+    assert (found.pressure.values, found.stiffness.values) == (0, 0)

@@ -111,10 +111,9 @@ def test_validity_is_an_effect(theory):
 
 def test_theories_beside_one_another():
     found = scene_of("persson", effects=("pressure", "comparison"), theories=("mbma",), separations=[0.2]).run()
-    for theory, name in (("persson", "pressure"), ("mbma", "mbma_force")):
+    for theory, name in (("persson", "pressure"), ("mbma", "mbma_pressure")):
         assert found[name].item() == pytest.approx(
             contact(CONCRETE, separation=0.2, E_star=MODULUS, theory=theory).pressure
-        
         )
 
 

@@ -108,7 +108,7 @@ def test_prescribed_gaps():
     u = np.array([0.5, 1.5])
     scene = Scene(SURFACE, ["pressure", "yield"], mean_separations=u, E_star=100e3, hardness=1500.0, theory="persson")
     known = contact(SURFACE, mean_separation=u, E_star=100e3, hardness=1500.0, theory="persson")
-    assert scene.run().force.values == pytest.approx(known.pressure)
+    assert scene.run().pressure.values == pytest.approx(known.pressure)
 
 
 def test_older_conductances_beside():

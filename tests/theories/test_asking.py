@@ -273,7 +273,7 @@ def test_a_theory_object_with_its_own_options():
 def test_heights_without_an_end(theory):
     found = contact(SURFACE, mean_separation=[2.5, 3.1], theory=theory)
     assert found.valid.tolist() == [True, False]
-    with pytest.raises(OutOfRangeError, match="force must be positive"):
+    with pytest.raises(OutOfRangeError, match="pressure must be positive"):
         contact(SURFACE, pressure=0.0, theory=theory)
 
 

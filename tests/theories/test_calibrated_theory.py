@@ -176,7 +176,7 @@ class TestScatter:
     def test_stated_scatter_covers_held_out_errors(self, held_out, quantity):
         sizes = np.concatenate(
             [
-                np.abs(errors(one, one.law(CONSTANTS), quantity))
+                np.abs(errors(one, one.law(CONSTANTS), {"pressure": "force"}.get(quantity, quantity)))
                 / shipped().standard_deviation("calibrated", quantity, one.area)
                 for one in held_out
             ]

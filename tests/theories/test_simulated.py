@@ -115,7 +115,7 @@ def test_a_map_is_continued_by_its_mirror_images():
     ("change", "message"),
     [
         ({"pressure": [1.0, 2.0, 3.0]}, "at least 4 loads"),
-        ({"pressure": [1.0, 2.0, 2.0, 3.0]}, "force must be rising"),
+        ({"pressure": [1.0, 2.0, 2.0, 3.0]}, "pressure must be rising"),
         ({"area": [0.0, 0.1, 0.2, 0.3]}, "loads must be positive"),
         ({"area": [0.2, 0.1, 0.2, 0.3]}, "area must be rising"),
         ({"mean_separation": [1.0, 2.0, 3.0, 4.0]}, "mean_separation must be falling"),

@@ -175,7 +175,7 @@ def test_islands_do_not_jump(which, island_model, rtol, record_property):
         return island(surface, own["delta"], island_model=island_model, rtol=rtol, E_star=own["E_star"])
 
     one, other = answer(-STEP / 2), answer(STEP / 2)
-    for name in ("pressure", "area", "zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "eta", "X", "mu"):
+    for name in ("force", "area", "zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "eta", "X", "mu"):
         stated = one.error + other.error if name in ("pressure", "area") else 1e-12
         off = np.abs(getattr(other, name) / getattr(one, name) - 1)
         assert (off <= stated + 2 * own_motion(answer, name)).all(), name
@@ -368,7 +368,7 @@ def test_laws_do_not_jump_at_their_breaks(rtol, record_property):
         sides = [gaps - sign * STEP * depth for sign in (-0.5, 0.5)]
         for value, slope in with_slopes(law):
             a, b = (value(separation=side) for side in sides)
-            own = np.abs([slope(side) for side in sides]).max(axis=0) * 2 * np.abs(sides[1] - sides[0]) / a
+            own = np.abs([slope(separation=side) for side in sides]).max(axis=0) * 2 * np.abs(sides[1] - sides[0]) / a
             assert (np.abs(b / a - 1) <= 2 * law.error + own).all()
         compared += depth.size
     record_property("pairs compared", compared)

@@ -53,7 +53,7 @@ def test_fitted_area_at_equal_force_follows_boundary_elements():
         branch = slice(int(np.argmax(found.pressure)), None)
         log_force, log_area = (np.log(x[branch][::-1]) for x in (found.pressure / surface.rms_gradient, found.area))
         for row in own:
-            force, area = float(row["pressure"]), float(row["area"])
+            force, area = float(row["force"]), float(row["area"])
             if 0.01 < area < 0.97 and np.log(force) < log_force[-1]:
                 errors.append(np.interp(np.log(force), log_force, log_area) - np.log(area))
     assert len(errors) > 400

@@ -94,13 +94,13 @@ def test_dask_is_lazy_and_gives_the_same_answers(scheduler, derivatives):
         lazy = contact(lazy_surfaces, separation=gaps.chunk(gap=11), derivatives=derivatives)
         outputs = {name: getattr(lazy, name) for name in (*FIELDS, "mean_separation", "separation")}
         if derivatives:
-            outputs |= {f"force_{name}": slope for name, slope in lazy.pressure_by.items()}
+            outputs |= {f"pressure_{name}": slope for name, slope in lazy.pressure_by.items()}
             outputs |= {f"area_{name}": slope for name, slope in lazy.area_by.items()}
         assert all(dask.is_dask_collection(value) for value in outputs.values())
         assert tasks.ran == 0
     expected = {name: getattr(eager, name) for name in (*FIELDS, "mean_separation", "separation")}
     if derivatives:
-        expected |= {f"force_{name}": slope for name, slope in eager.pressure_by.items()}
+        expected |= {f"pressure_{name}": slope for name, slope in eager.pressure_by.items()}
         expected |= {f"area_{name}": slope for name, slope in eager.area_by.items()}
     with dask.config.set(scheduler=scheduler, num_workers=4), Tasks() as tasks:
         computed = dask.compute(outputs)[0]
@@ -230,7 +230,7 @@ def test_islands_of_labelled_surfaces_are_lazy_and_the_same():
         E_star=2.0,
     )
     assert dask.base.is_dask_collection(lazy.force)
-    for name in ("zeta_d", "mu", "pressure", "area", "error"):
+    for name in ("zeta_d", "mu", "force", "area", "error"):
         found = getattr(lazy, name).transpose("sample", "depth").compute()
         np.testing.assert_array_equal(found, getattr(plain, name))
 

@@ -62,7 +62,9 @@ def test_the_same_bits_however_asked(name):
         whole = ask(separation=d)
         assert np.isfinite(whole).all()
         for size in (1, 7, 1000, 1001):
-            np.testing.assert_array_equal(np.concatenate([ask(separation=d[k : k + size]) for k in range(0, d.size, size)]), whole)
+            np.testing.assert_array_equal(
+                np.concatenate([ask(separation=d[k : k + size]) for k in range(0, d.size, size)]), whole
+            )
         np.testing.assert_array_equal([ask(separation=gap) for gap in d.tolist()], whole)
         np.testing.assert_array_equal(ask(separation=d.tolist()), whole)
         np.testing.assert_array_equal(ask(separation=d.reshape(3, -1).T), whole.reshape(3, -1).T)
@@ -74,7 +76,9 @@ def test_the_same_bits_however_asked(name):
         u = (d[d > law.lowest + 1e-9] + law.h_max) / 2
         np.testing.assert_array_equal([ask(gap) for gap in u.tolist()], ask(u))
         np.testing.assert_array_equal([ask(separation=gap) for gap in d[:9].tolist()], whole[:9])
-    np.testing.assert_array_equal(law.values(separation=d), [getattr(law, what)(separation=d) for what in law.values(separation=d)._fields])
+    np.testing.assert_array_equal(
+        law.values(separation=d), [getattr(law, what)(separation=d) for what in law.values(separation=d)._fields]
+    )
 
 
 @pytest.mark.parametrize("name", SURFACES)
@@ -85,9 +89,9 @@ def test_inverses_have_the_same_bits_however_asked(name):
     whole = law.at_pressure(force)
     assert [law.at_pressure(value).separation for value in force] == whole.separation.tolist()
     assert [law.at_pressure(value).stiffness for value in force] == whole.stiffness.tolist()
-    np.testing.assert_array_equal(law.separation(force=force), whole.separation)
-    np.testing.assert_array_equal(law.separation(force=xr.DataArray(force, dims="a")), whole.separation)
-    np.testing.assert_array_equal(law.leakage(d), [law.leakage(gap) for gap in d])
+    np.testing.assert_array_equal(law.separation(pressure=force), whole.separation)
+    np.testing.assert_array_equal(law.separation(pressure=xr.DataArray(force, dims="a")), whole.separation)
+    np.testing.assert_array_equal(law.leakage(separation=d), [law.leakage(separation=gap) for gap in d])
 
 
 def filled(law, d, count=5):
@@ -109,7 +113,7 @@ def test_gaps_outside_are_nan_and_counted(name):
     assert core.law_flow_fill(d, law.leakage.block, law.h_max, law.leakage.h_rms, found) == outside.sum()
     assert (np.isnan(found) == outside).all()
     for gap in NO_GAPS:
-        for ask in (law.force, law.area, law.stiffness, law.area_slope, law.energy, law.values, law.leakage):
+        for ask in (law.pressure, law.area, law.stiffness, law.area_slope, law.energy, law.values, law.leakage):
             for given in (gap, np.array([gap]), np.array([1.0, gap]), np.full(2000, gap)):
                 with pytest.raises(OutOfRangeError, match=r"^separation must be") as caught:
                     ask(separation=given)
@@ -121,7 +125,7 @@ def test_gaps_outside_are_nan_and_counted(name):
 def test_values_that_no_gap_has_are_nan_and_counted(name, which):
     law = law_of(name)
     inverse = law._inverse_block(QUANTITIES[which])
-    most = float((law.force, law.area)[which](separation=inverse[5]))
+    most = float((law.pressure, law.area)[which](separation=inverse[5]))
     wanted = np.array([0.5 * most, math.nan, math.inf, -math.inf, -1.0, 1.001 * most, 1e300, 0.1 * most, -5e-324])
     gap, area, stiffness = np.empty((3, wanted.size))
     assert core.law_invert(wanted, law.block, inverse, which, gap, area, stiffness) == 7
@@ -150,7 +154,7 @@ def test_a_light_load_has_all_digits_of_its_overclosure():
 def test_leakage_apart(name):
     law = law_of(name)
     mean = law.h_max * np.array([1.0 + 1e-12, 1.5, 20.0, 1e6])
-    np.testing.assert_allclose(law.leakage(u=mean), mean**3 * wide_gap(mean / 0.7), rtol=1e-15)
+    np.testing.assert_allclose(law.leakage(mean), mean**3 * wide_gap(mean / 0.7), rtol=1e-15)
 
 
 def test_broken_blocks_are_refused():
@@ -207,13 +211,13 @@ def test_no_block_makes_the_core_read_elsewhere():
 
 def test_questions_that_are_none():
     law = law_of("mbma")
-    for ask in (law.force, law.energy):
-        with pytest.raises(TypeError, match="one separation, or u=, is taken, got 2 arguments"):
-            ask(separation=1.0, 2.0)
-        with pytest.raises(TypeError, match="unexpected keyword argument 'v': separation or u is taken"):
+    for ask in (law.pressure, law.energy):
+        with pytest.raises(TypeError, match="one mean separation is taken, or separation=, got 2 arguments"):
+            ask(1.0, 2.0)
+        with pytest.raises(TypeError, match="unexpected keyword argument 'v': mean_separation or separation is taken"):
             ask(v=1.0)
-        with pytest.raises(TypeError, match="unexpected keyword argument 'separation'"):
-            ask(separation=1.0, separation=1.0)
+        with pytest.raises(TypeError, match="unexpected keyword argument 'mean_separation'"):
+            ask(1.0, mean_separation=1.0)
 
 
 @pytest.mark.parametrize("name", SURFACES)

@@ -161,7 +161,7 @@ def test_a_law_ends_with_the_table():
     np.testing.assert_allclose(law.pressure(separation=d), contact(surface, separation=d).pressure, rtol=2 * law.error)
     with pytest.raises(OutOfRangeError, match="where the theory ends"):
         law.pressure(separation=law.lowest - 0.1)
-    np.testing.assert_allclose(law.separation(force=law.pressure(separation=d)), d, rtol=1e-6)
+    np.testing.assert_allclose(law.separation(pressure=law.pressure(separation=d)), d, rtol=1e-6)
     # as far as there is a table, contacts are found by pressure and known to be valid or not
     found = contact(surface, pressure=law.pressure(separation=d))
     np.testing.assert_allclose(found.separation, d, rtol=1e-6)

@@ -127,7 +127,7 @@ def models_jump(numbers, name, rule):
     sigma = surface.s * np.sqrt(m0 - (0.8968 * m2**2 / m4 if rule.summit_sigma else 0))
     height = numbers["h_max"] - (found.h_d if rule.offset else 0)
     weight = density * np.exp(-0.5 * (height / sigma) ** 2) / (math.sqrt(2 * math.pi) * sigma)
-    return step_of_K1(hurst, zeta_1, rule) * weight * getattr(found, name) * h_rms
+    return step_of_K1(hurst, zeta_1, rule) * weight * getattr(found, {"pressure": "force"}.get(name, name)) * h_rms
 
 
 def at_a_kink(rng, count, rule, which):
@@ -251,9 +251,9 @@ def test_laws_at_their_breaks(rtol, record_property):
         gaps = law.h_max - depth
         room = law.slope_error(separation=gaps + STEP * depth) + law.slope_error(separation=gaps - STEP * depth)
         for value, slope in with_slopes(law):
-            larger, smaller = (slope(gaps + sign * STEP * depth) for sign in (1, -1))
+            larger, smaller = (slope(separation=gaps + sign * STEP * depth) for sign in (1, -1))
             # what the slope itself changes by over two steps
-            further = [slope(gaps + sign * 1e-4 * depth) for sign in (1, -1)]
+            further = [slope(separation=gaps + sign * 1e-4 * depth) for sign in (1, -1)]
             own = 4e4 * STEP * np.abs(np.array(further) - [larger, smaller]).max(axis=0)
             assert (np.abs(smaller - larger) <= room * value(separation=gaps) / depth + own)[clear].all()
         compared += int(clear.sum())
