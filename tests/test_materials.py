@@ -192,7 +192,7 @@ def test_metals_that_yield_are_not_valid_without_a_hardness():
 
 def test_valid_of_data_arrays_knows_the_metals():
     xr = pytest.importorskip("xarray")
-    pressure = xr.DataArray([0.01, 0.1], dims="load")
+    pressure = xr.DataArray([0.05, 0.1], dims="load")
     found = contact(FACE, pressure=pressure, materials="steel 4140", theory="calibrated")
     assert not found.valid.values.any()
     assert [text[:17] for text in found.reasons] == ["steel 4140 yields"]

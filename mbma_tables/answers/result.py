@@ -235,8 +235,8 @@ class Contact(Displayed):
         >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
         >>> joint = contact(face, pressure="10 MPa", E_star="100 GPa", theory="calibrated")
         >>> sheared = joint.tangential(friction=0.2, nu=0.3)
-        >>> f"{sheared.stiffness:.3g} GPa/um, {sheared.shear('0.05 um'):.3g} GPa; slips from {sheared.gross_slip:.2g} um"
-        '0.0222 GPa/um, 0.000882 GPa; slips from 0.22 um'
+        >>> f"{sheared.stiffness:.3g} GPa/um, {sheared.shear('0.05 um'):.3g} GPa; slip from {sheared.gross_slip:.2g} um"
+        '0.0222 GPa/um, 0.000882 GPa; slip from 0.22 um'
         """
         from mbma_tables.answers.tangential import Tangential, ratio_of
 

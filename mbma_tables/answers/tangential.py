@@ -121,8 +121,8 @@ class Tangential:
         """The normal law, refused where there is no friction, or where it holds for loading alone."""
         if self._normal is None:
             raise InputError(
-                "slip of a contact that yields is not known: its normal law is of loading alone; only `stiffness`, that "
-                "of full stick, holds with a hardness"
+                "slip of a contact that yields is not known: its normal law is of loading alone; only `stiffness`, "
+                "that of full stick, holds with a hardness"
             )
         if self.friction is None:
             raise InputError("slip needs friction, the coefficient of friction: tangential(friction=...)")

@@ -1,4 +1,4 @@
-"""What a law answers of small unloading, and of sliding: made when it is asked for."""
+"""What follows from a law, made when it is asked for: unloading, sliding, softening, leakage, its picture."""
 
 from __future__ import annotations
 
@@ -11,14 +11,23 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import Numbers
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
+from mbma_tables.common.units import unit_of
+from mbma_tables.law.block import softening
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbma_tables.answers.tangential import Tangential
     from mbma_tables.law.law import ContactLaw
+    from mbma_tables.law.leakage import LeakageLaw
 
 
-class Unloading:
-    """Unloading and tangential stiffness of a `ContactLaw`."""
+DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polynomials'
+
+
+class Derived:
+    """The part of a `ContactLaw` that is made when it is asked for."""
 
     def unloading_stiffness(
         self: Any, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None
@@ -81,3 +90,36 @@ class Unloading:
             None if self.hardness < math.inf else lambda u: (self.pressure(u), self.energy(u)),
             lambda p: self.at_pressure(p).mean_separation,
         )  # fmt: skip
+
+    @functools.cached_property
+    def softening(self: Any) -> float | None:
+        """Mean separation u [length] below which stiffness falls with compression; None where it rises to the end."""
+        noise = DIGITS * self.error
+        return softening(lambda u: self.stiffness(u), self.h_max, max(self.lowest, -self.h_max), noise)
+
+    @functools.cached_property
+    def leakage(self: Any) -> LeakageLaw:
+        """Flow conductance at a mean separation, ``separation=`` or ``pressure=``, a `LeakageLaw`; made when read.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact_law
+        >>> seal = Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5, unit="um")
+        >>> law = contact_law(seal, E_star="10 MPa", theory="calibrated")
+        >>> f"{law.leakage(pressure='0.05 MPa'):.1g} um^3"
+        '0.001 um^3'
+        """
+        from mbma_tables.law.leakage import leakage_law
+
+        if self.surface is None:
+            raise InputError("leakage needs the surface, which this law does not hold")
+        return leakage_law(self, self.surface)
+
+    def _figure(self: Any) -> Figure:
+        held = self._variables()
+        unit = self.units.length or "length"
+        curve = Curve(
+            theory_label(self.theory), *(held[name].values for name in ("mean_separation", "pressure", "area"))
+        )
+        label = pressure_label(unit_of("pressure", self.units))
+        return draw_compression([curve], pressure_label=label, gap_label=f"mean separation u [{unit}]")
