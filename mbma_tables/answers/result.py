@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from mbma_tables.answers.interface import Interface
 from mbma_tables.answers.source import MEANINGS, Source, concerns, named
 from mbma_tables.common.arguments import FloatArray, Numbers, any_labelled, is_labelled
 from mbma_tables.common.display import Displayed, Variable, shown
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from mbma_tables.answers.leakage import Leakage
-    from mbma_tables.answers.tangential import Tangential
 
 OF_HARDNESS = ("yielded", "unloading_stiffness", "plane_separation")
 MOST_SHOWN = 10_000  # entries up to which a line says how far to trust them
@@ -42,7 +41,7 @@ def described(method: Callable[[Any], Any]) -> functools.cached_property[Numbers
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Contact(Displayed):
+class Contact(Interface, Displayed):
     """A contact: force, area and what follows from them; arrays of the broadcast shape, or DataArrays.
 
     Attributes
@@ -176,88 +175,6 @@ class Contact(Displayed):
                 "unloading starts with"
             )
         return self._source.map(lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1)[0]
-
-    def conductance(self, k1: ArrayLike | str | None = None, k2: ArrayLike | str | None = None) -> Numbers:
-        """Conductance per nominal area of two bodies in contact, thermal or electrical, h = (k_s/E*) (-dF/du).
-
-        By the incremental stiffness (Barber 2003), with a hardness that of the frozen contact.
-
-        Parameters
-        ----------
-        k1, k2 : array_like or str
-            Conductivities of the bodies, k_s = 2 k1 k2/(k1 + k2); without k2 both have k1, and without either they are
-            the thermal ones of the `materials` named.
-
-        Returns
-        -------
-        ndarray or DataArray
-            [unit of k/length of the surface], such as W/(m K um); in W/(m^2 K) for "45 W/(m K)", in S/m^2 for
-            "6e6 S/m", where the surface knows its unit. Its scatter is `stiffness_scatter`.
-
-        Examples
-        --------
-        >>> from mbma_tables import Surface, contact
-        >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
-        >>> joint = contact(face, pressure="10 MPa", E_star="100 GPa", theory="calibrated", hardness="1.5 GPa")
-        >>> f"{joint.conductance('45 W/(m K)', '167 W/(m K)'):.3g} W/(m^2 K)"
-        '2.36e+04 W/(m^2 K)'
-        """
-        from mbma_tables.totals.conductance import conductance, mean_conductivity
-
-        source = self._source
-        if k1 is None:
-            if source.materials is None:
-                raise InputError("conductance needs k1, the bodies' conductivity, where no materials are named")
-            k1, k2 = source.materials.conductivities
-        (k1, k2), _ = source.units.conductivities(k1, k1 if k2 is None else k2)
-        # linear in the stiffness, which may be NaN or a DataArray
-        found: Numbers = conductance(1.0, mean_conductivity(k1, k2), 1.0) / source.E_star * self.unloading_stiffness
-        return found
-
-    def tangential(self, friction: float | None = None, nu: Any = None, E: Any = None) -> Tangential:
-        """Tangential stiffness of full stick, partial and gross slip, of isotropic surfaces; computed when called for.
-
-        Parameters
-        ----------
-        friction : float, optional
-            Coefficient of friction, for slip. With a hardness only full stick is known.
-        nu, E : float or pair of float, optional
-            Poisson's ratio of the bodies, or of each with their moduli, as `materials.tangential_ratio` takes them; by
-            default those of the `materials` named.
-
-        Returns
-        -------
-        Tangential
-
-        Examples
-        --------
-        >>> from mbma_tables import Surface, contact
-        >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
-        >>> joint = contact(face, pressure="10 MPa", E_star="100 GPa", theory="calibrated")
-        >>> sheared = joint.tangential(friction=0.2, nu=0.3)
-        >>> f"{sheared.stiffness:.3g} GPa/um, {sheared.shear('0.05 um'):.3g} GPa; slip from {sheared.gross_slip:.2g} um"
-        '0.0222 GPa/um, 0.000882 GPa; slip from 0.22 um'
-        """
-        from mbma_tables.answers.tangential import Tangential, ratio_of
-
-        source = self._source
-        ratio = ratio_of(nu, E, source.materials)
-        last = source.surface.h_max if source.theory.ends_at_h_max else np.inf
-
-        def at(u: Any) -> tuple[Any, ...]:
-            moved = dataclasses.replace(self, mean_separation=u)
-            return source.map(
-                lambda theory, s, u, E: (E * theory.answer(s, u).pressure, E * theory.energy(s, u)), moved, 2
-            )
-
-        def inverse(pressure: Any) -> Any:
-            find = lambda theory, s, u, E, p: (theory.mean_separation_at(s, "pressure", p / E),)  # noqa: E731
-            return source.map(find, self, 1, {"pressure": pressure})[0]
-
-        return Tangential(
-            ratio, friction, self.pressure, self.mean_separation, self.unloading_stiffness / ratio, last, source.units,
-            None if source.yields else at, inverse,
-        )  # fmt: skip
 
     def _of_loading(self, name: str) -> Numbers:
         """A number of `Loaded`, over E*."""
