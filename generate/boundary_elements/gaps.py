@@ -6,6 +6,7 @@ second. Three minutes a set on one core.
 
 from __future__ import annotations
 
+import click
 import numpy as np
 
 from generate.boundary_elements.capped import CappedContact, load_at
@@ -57,7 +58,7 @@ def errors(kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 if __name__ == "__main__":
     for kind in SURFACES:
         law, plain, areas = errors(kind)
-        print(kind, "M/h_rms, root mean square and largest error; largest of k/(u + M) below 5% contact [%]")
+        click.echo(f"{kind}: M/h_rms, root mean square and largest error; largest of k/(u + M) below 5% contact [%]")
         columns = np.sqrt(np.mean(law**2, axis=0)), np.abs(law).max(axis=0), np.abs(plain[areas < LIGHT]).max(axis=0)
         for jump, row in zip(JUMPS, 100 * np.array(columns).T, strict=True):
-            print(f"{jump:5g}", *(f"{value:6.1f}" for value in row))
+            click.echo(" ".join([f"{jump:5g}", *(f"{value:6.1f}" for value in row)]))

@@ -48,10 +48,8 @@ class Derived:
         """The law of the elastic contact."""
         if math.isinf(self.hardness):
             return self  # type: ignore[no-any-return]
-        from mbma_tables.law.make import contact_law
-
-        law = contact_law(self.surface, theory=self.elastic_theory, E_star=self.E_star)
-        return dataclasses.replace(law, units=self.units)
+        law: ContactLaw = dataclasses.replace(self.elastic(), units=self.units)
+        return law
 
     def tangential(
         self: Any,

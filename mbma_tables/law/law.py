@@ -25,7 +25,6 @@ from mbma_tables.law.block import AREA, FORCE, QUANTITIES, inverse_block
 from mbma_tables.law.derived import Derived
 from mbma_tables.materials import Pair
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories.protocol import Theory
 
 if TYPE_CHECKING:
     from scipy import LowLevelCallable
@@ -81,8 +80,8 @@ class ContactLaw(Law, Derived, Displayed):
         Whose law it is.
     hardness : float
         Infinite where nothing yields.
-    elastic_theory : Theory or None
-        Theory of the elastic contact, with a hardness.
+    elastic : callable or None
+        With a hardness, what makes the law of the elastic contact.
     materials : Pair or None
         Where they are named.
 
@@ -113,7 +112,7 @@ class ContactLaw(Law, Derived, Displayed):
     units: Units = UNKNOWN
     surface: AnySurface | None = None
     hardness: float = math.inf
-    elastic_theory: Theory | None = None
+    elastic: Callable[[], ContactLaw] | None = None
     materials: Pair | None = None
 
     @property

@@ -6,6 +6,7 @@ the polynomials and bounds their errors.
 
 from __future__ import annotations
 
+import functools
 import math
 import sys
 from collections.abc import Callable, Sequence
@@ -109,7 +110,8 @@ def contact_law(
         if cap < math.inf:
             from mbma_tables.theories.yielding import Yielding
 
-            yields = {"hardness": float(cap), "elastic_theory": chosen}
+            elastic = functools.partial(contact_law, surface, rtol, E_star=modulus, theory=chosen)
+            yields = {"hardness": float(cap), "elastic": elastic}
             chosen = Yielding(chosen, float(cap) / modulus)
     one = surface
     if one.labelled:
