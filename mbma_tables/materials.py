@@ -164,12 +164,7 @@ def get(name: str) -> Metal:
 
 @dataclasses.dataclass(frozen=True)
 class Pair:
-    """Two metals in contact, made by `pair`.
-
-    Attributes
-    ----------
-    metals : tuple of Metal
-    """
+    """Two metals in contact, made by `pair`."""
 
     metals: tuple[Metal, Metal]
 
@@ -195,12 +190,6 @@ class Pair:
         """Thermal conductivities with their unit, the geometric means of what was found."""
         a, b = (f"{math.sqrt(low * high):.6g} W/(m K)" for low, high in (metal.conductivity for metal in self.metals))
         return a, b
-
-    @property
-    def tangential_ratio(self) -> float:
-        """Normal over tangential stiffness of the stuck contact, `tangential_ratio`."""
-        a, b = self.metals
-        return float(tangential_ratio((a.nu, b.nu), (a.E, b.E)))
 
 
 def pair(materials: str | Metal | Pair | Sequence[str | Metal]) -> Pair:
@@ -301,20 +290,20 @@ def bodies(materials: Any, E_star: Any, hardness: Any) -> tuple[Any, Any, Pair |
     return known.E_star, known.hardness if hardness is None else hardness, known
 
 
-def tangential_ratio(nu: ArrayLike | tuple[float, float], E: tuple[Any, Any] | None = None) -> Any:
+def tangential_ratio(nu: ArrayLike, E: Sequence[Any] | None = None) -> Any:
     """kappa, normal over tangential stiffness of a stuck isotropic contact (Mindlin 1949).
 
     Parameters
     ----------
-    nu : array_like or pair
-        Poisson's ratio of both bodies, or of the one that is not rigid; or one of each body.
+    nu : array_like
+        Poisson's ratio of both bodies, or of the one that is not rigid; with `E` one of each body.
     E : pair of float or str, optional
-        Young's moduli of the bodies, needed with two ratios.
+        Young's moduli of the bodies.
 
     Returns
     -------
     float or ndarray
-        (2 - nu)/(2 (1 - nu)), the compliances (2 - nu)/G and 2 (1 - nu)/G of two bodies added.
+        (2 - nu)/(2 (1 - nu)); of two bodies their compliances (2 - nu)/G over 2 (1 - nu)/G, both added.
 
     Examples
     --------
@@ -322,18 +311,14 @@ def tangential_ratio(nu: ArrayLike | tuple[float, float], E: tuple[Any, Any] | N
     >>> round(float(tangential_ratio(0.3)), 4), round(float(tangential_ratio((0.3, 0.3), (210.0, 70.0))), 4)
     (1.2143, 1.2143)
     """
-    if E is None:
-        ratio = finite_array("nu", nu)
-        if isinstance(nu, tuple | list):
-            raise InputError("two of Poisson's ratios need E=(E1, E2), the moduli of the bodies")
-        require("nu", ratio, (ratio > -1) & (ratio <= 0.5), "in (-1, 0.5]")
-        return ((2 - ratio) / (2 * (1 - ratio)))[()]
-    if np.shape(nu) != (2,) or len(E) != 2:
-        raise InputError("nu and E are two numbers each, of the two bodies")
-    plain, _ = resolve({"E1": E[0], "E2": E[1]}, kind="stress")
-    ratio, modulus = finite_array("nu", nu), finite_array("E", list(plain.values()))
+    ratio = finite_array("nu", nu)
     require("nu", ratio, (ratio > -1) & (ratio <= 0.5), "in (-1, 0.5]")
+    if (E is None) == (ratio.shape == (2,)) or (E is not None and len(E) != 2):
+        raise InputError("nu is one number, or two with E=(E1, E2), the moduli of the bodies")
+    above, below = 2 - ratio, 2 * (1 - ratio)
+    if E is None:
+        return (above / below)[()]
+    modulus = finite_array("E", list(resolve({"E1": E[0], "E2": E[1]}, kind="stress")[0].values()))
     require("E", modulus, modulus > 0, "positive")
-    # 1/G = 2 (1 + nu)/E
-    compliance = (1 + ratio) / modulus
-    return ((2 - ratio) * compliance).sum() / (2 * (1 - ratio) * compliance).sum()
+    compliance = (1 + ratio) / modulus  # 1/(2 G)
+    return (above * compliance).sum() / (below * compliance).sum()

@@ -66,9 +66,7 @@ class Interface:
     ) -> Numbers:
         """Conductance per nominal area of the gas in the gaps, parallel to `conductance` of the solid [W/(m^2 K)].
 
-        Within 4% of boundary elements where the temperature jump is h_rms, 7% at 0.3 h_rms and 13% at 0.1 h_rms, with
-        their mean gap; that of the contact has a `separation_scatter`. The law and data of gases are in
-        `mbma_tables.laws.gas`. Radiation is not included.
+        The law, data of gases and their accuracy are in `mbma_tables.laws.gas`; without radiation.
 
         Parameters
         ----------
@@ -113,13 +111,8 @@ class Interface:
         ----------
         friction : float, optional
             Coefficient of friction, for slip. With a hardness only full stick is known.
-        nu, E : float or pair of float, optional
-            Poisson's ratio of the bodies, or of each with their moduli, as `materials.tangential_ratio` takes them; by
-            default those of the `materials` named.
-
-        Returns
-        -------
-        Tangential
+        nu, E : optional
+            As for `materials.tangential_ratio`; by default those of the `materials` named.
 
         Examples
         --------
@@ -132,21 +125,20 @@ class Interface:
         """
         from mbma_tables.answers.tangential import Tangential, ratio_of
 
-        source = self._source
-        ratio = ratio_of(nu, E, source.materials)
+        source, ratio = self._source, ratio_of(nu, E, self._source.materials)
         last = source.surface.h_max if source.theory.ends_at_h_max else np.inf
 
-        def at(u: Any) -> tuple[Any, ...]:
-            moved = dataclasses.replace(self, mean_separation=u)
-            normal = lambda theory, s, u, E: (E * theory.answer(s, u).pressure, E * theory.energy(s, u))  # noqa: E731
-            found: tuple[Any, ...] = source.map(normal, moved, 2)
-            return found
+        def at(function: Any) -> Any:
+            return lambda u: source.map(function, dataclasses.replace(self, mean_separation=u), 1)[0]
 
         def inverse(pressure: Any) -> Any:
             find = lambda theory, s, u, E, p: (theory.mean_separation_at(s, "pressure", p / E),)  # noqa: E731
             return source.map(find, self, 1, {"pressure": pressure})[0]
 
+        normal = at(lambda theory, s, u, E: (E * theory.answer(s, u).pressure,))
+        energy = at(lambda theory, s, u, E: (E * theory.energy(s, u),))
         return Tangential(
-            ratio, friction, self.pressure, self.mean_separation, self.unloading_stiffness / ratio, last, source.units,
-            None if source.yields else at, inverse,
+            ratio, friction, self.mean_pressure * self._touching if self.pressure is None else self.pressure,
+            self.mean_separation, self.unloading_stiffness / ratio, last, source.units,
+            None if source.yields else (normal, energy, inverse),
         )  # fmt: skip

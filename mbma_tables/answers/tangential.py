@@ -8,10 +8,8 @@ With kappa the normal over the tangential stiffness (`materials.tangential_ratio
     energy of a cycle 8 times the integral of tau to its amplitude, less 4 tau delta (Masing 1926)
 
 Partial slip is the difference of two normal contacts (M. Ciavarella, J. Mech. Phys. Solids 46 (1998) 2391; J. Jaeger),
-for bodies whose normal pressures do not move them tangentially: nu = 0, or alike bodies nearly so. Boundary elements of
-isotropic surfaces have kappa k_t/k_n from 0.997 to 1.021 at nu = 0.3 and from 1.001 to 1.07 at nu = 0.5, and tau within
-0.013 f p of this at 5% and 21% contact. Surfaces stretched 4:1 are up to 16% stiffer across their lay, and as much
-softer along it, at nu = 0.3; 36% at nu = 0.5.
+for bodies whose normal pressures do not move them tangentially: nu = 0, or alike bodies nearly so. docs/joints.md has
+the distance from boundary elements, and how far surfaces with a lay differ.
 """
 
 from __future__ import annotations
@@ -28,34 +26,24 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units
 from mbma_tables.materials import Pair, tangential_ratio
 
+OF_YIELDING = (
+    "slip of a contact that yields is not known: its normal law is of loading alone; `stiffness` of full stick is"
+)
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Tangential:
-    """A contact under constant normal pressure that is sheared; made by `tangential` of contacts and laws.
+    """A contact that is sheared, made by `tangential` of contacts and laws; lengths and stresses as theirs."""
 
-    Attributes
-    ----------
-    ratio : ndarray
-        kappa, normal over tangential stiffness of the stuck contact.
-    friction : float or None
-        Coefficient of friction f, where it is given.
-    pressure, mean_separation : ndarray
-        p [stress] and u [length].
-    stiffness : ndarray
-        k_t of full stick, d(tau)/d(delta) [stress/length].
-    last : ndarray
-        Mean separation of last contact [length], infinite where the theory has none.
-    """
-
-    ratio: Any
+    ratio: Any  # kappa
     friction: float | None
     pressure: Numbers
     mean_separation: Numbers
-    stiffness: Numbers
-    last: Any
+    stiffness: Numbers  # k_t of full stick, d(tau)/d(delta) [stress/length]
+    last: Any  # mean separation of last contact, infinite where the theory has none
     units: Units
-    _normal: Callable[[Any], tuple[Any, Any]] | None  # pressure and energy at mean separations; None where it yields
-    _inverse: Callable[[Any], Any]  # mean separations at pressures
+    # pressure and energy at mean separations, these at pressures; None where it yields
+    _normal: tuple[Callable[[Any], Any], Callable[[Any], Any], Callable[[Any], Any]] | None
 
     def __post_init__(self) -> None:
         if self.friction is not None:
@@ -64,8 +52,7 @@ class Tangential:
     @property
     def gross_slip(self) -> Numbers:
         """Displacement from which all of the contact slips [length], f kappa (h_max - u)."""
-        self._needed()
-        found: Numbers = self._scale * (self.last - self.mean_separation)
+        found: Numbers = self._known()[3] * (self.last - self.mean_separation)
         return found
 
     def shear(self, displacement: ArrayLike | str) -> Numbers:
@@ -76,38 +63,33 @@ class Tangential:
         InputError, OutOfRangeError
             Without a friction, with a hardness, and for negative displacements.
         """
+        normal, _, _, scale = self._known()
         delta = self._checked("displacement", displacement)
-        found: Numbers = self.friction * (self.pressure - self._needed()(self._beyond(delta))[0])
+        found: Numbers = self.friction * (self.pressure - normal(self._moved(delta / scale)))
         return found
 
     def displacement(self, shear: ArrayLike | str) -> Numbers:
         """Tangential displacement at a shear stress of at most f p [length]; `gross_slip` at f p."""
-        self._needed()
+        _, _, inverse, scale = self._known()
         tau = self._checked("shear", shear)
         left = self.pressure - tau / self.friction
         if not is_labelled(left):
             left = np.where(np.abs(left) <= 4 * np.finfo(float).eps * np.asarray(self.pressure), 0.0, left)
             require("shear", np.broadcast_to(tau, np.shape(left)), left >= 0, "at most the friction times the pressure")
-        found: Numbers = self._scale * (self._inverse(left) - self.mean_separation)
+        found: Numbers = scale * (inverse(left) - self.mean_separation)
         return found
 
     def energy_loss(self, shear: ArrayLike | str) -> Numbers:
         """Energy per nominal area that a cycle between -shear and shear dissipates [stress length]."""
-        normal, delta = self._needed(), self.displacement(shear)
-        tau = self._checked("shear", shear)
-        released = normal(self.mean_separation)[1] - normal(self._beyond(delta))[1]
-        work = self.friction * (self.pressure * delta - self._scale * released)
-        found: Numbers = 8 * work - 4 * tau * delta
+        _, energy, _, scale = self._known()
+        tau, delta = self._checked("shear", shear), self.displacement(shear)
+        released = energy(self.mean_separation) - energy(self._moved(delta / scale))
+        found: Numbers = 8 * self.friction * (self.pressure * delta - scale * released) - 4 * tau * delta
         return found
 
-    @property
-    def _scale(self) -> Any:
-        """f kappa, tangential over normal displacement."""
-        return self.friction * self.ratio
-
-    def _beyond(self, delta: Any) -> Any:
+    def _moved(self, approach: Any) -> Any:
         """Mean separation of the contact that is taken off."""
-        return np.minimum(self.mean_separation + delta / self._scale, self.last)
+        return np.minimum(self.mean_separation + approach, self.last)
 
     def _checked(self, name: str, value: Any) -> Any:
         given = self.units.number(name, value)
@@ -117,16 +99,13 @@ class Tangential:
         require(name, array, array >= 0, "at least 0")
         return array
 
-    def _needed(self) -> Callable[[Any], tuple[Any, Any]]:
-        """The normal law, refused where there is no friction, or where it holds for loading alone."""
+    def _known(self) -> tuple[Any, ...]:
+        """The normal law and f kappa, tangential over normal displacement."""
         if self._normal is None:
-            raise InputError(
-                "slip of a contact that yields is not known: its normal law is of loading alone; only `stiffness`, "
-                "that of full stick, holds with a hardness"
-            )
+            raise InputError(OF_YIELDING)
         if self.friction is None:
             raise InputError("slip needs friction, the coefficient of friction: tangential(friction=...)")
-        return self._normal
+        return *self._normal, self.friction * self.ratio
 
 
 def ratio_of(nu: Any, E: Any, pair: Pair | None) -> Any:
@@ -135,4 +114,4 @@ def ratio_of(nu: Any, E: Any, pair: Pair | None) -> Any:
         return tangential_ratio(nu, E)
     if pair is None:
         raise InputError("tangential stiffness needs nu, Poisson's ratio of the bodies, where no materials are named")
-    return pair.tangential_ratio
+    return tangential_ratio(*zip(*((metal.nu, metal.E) for metal in pair.metals), strict=True))

@@ -81,12 +81,10 @@ class Derived:
         else:
             u, held = self.at_pressure(pressure).mean_separation, self.units.number("pressure", pressure)
         ratio = ratio_of(nu, E, self.materials)
-        ends = math.isinf(self.highest)
         return Tangential(
             ratio, friction, held, u, self.unloading_stiffness(u) / ratio,
-            self.h_max if ends else math.inf, self.units,
-            None if self.hardness < math.inf else lambda u: (self.pressure(u), self.energy(u)),
-            lambda p: self.at_pressure(p).mean_separation,
+            self.h_max if math.isinf(self.highest) else math.inf, self.units,
+            None if self.hardness < math.inf else (self.pressure, self.energy, lambda p: self.at_pressure(p)[1]),
         )  # fmt: skip
 
     @functools.cached_property

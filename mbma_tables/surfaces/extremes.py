@@ -4,8 +4,6 @@ The expected number of maxima above x = h/h_rms, of an area A0 and a variance m2
 Geometry of Random Fields, 1981), for high levels::
 
     N(x) = A0 (m2/h_rms^2) (2 pi)^(-3/2) x exp(-x^2/2),    P(max < x) = exp(-N(x))
-
-Medians of simulated surfaces are within 5% of it (`tests/surfaces/test_extremes.py`).
 """
 
 from __future__ import annotations
@@ -31,17 +29,11 @@ def highest_point(h_rms: ArrayLike, m2: ArrayLike, nominal_area: ArrayLike, prob
 
     Parameters
     ----------
-    h_rms, m2 : array_like
-        Root-mean-square height [length], variance of a profile's slope.
-    nominal_area : array_like
-        A0 [length^2].
+    h_rms, m2, nominal_area : array_like
+        Root-mean-square height [length], variance of a profile's slope, A0 [length^2]: so large that the highest point
+        is above 2 h_rms.
     probability : array_like
         In (0, 1).
-
-    Raises
-    ------
-    InputError, OutOfRangeError
-        Also for areas so small that the highest point is below 2 h_rms: of fewer than about one long wave.
 
     Examples
     --------
@@ -63,12 +55,8 @@ def highest_point(h_rms: ArrayLike, m2: ArrayLike, nominal_area: ArrayLike, prob
     area = np.broadcast_to(arrays["nominal_area"], broadcast_shape(**arrays))
     c = -np.log(chance) * (2 * math.pi) ** 1.5 * height / area * height / slope
     least = area * c / (LEAST * math.exp(-(LEAST**2) / 2))
-    require(
-        "nominal_area",
-        area,
-        area >= least,
-        f"at least {float(np.max(least)):.4g}, where the highest point is at 2 h_rms",
-    )
+    allowed = f"at least {float(np.max(least)):.4g}, where the highest point is at 2 h_rms"
+    require("nominal_area", area, area >= least, allowed)
     x = np.sqrt(-2 * np.log(np.minimum(c, 0.5)))
     for _ in range(STEPS):
         x = np.sqrt(2 * np.log(np.maximum(x, LEAST) / c))
@@ -80,9 +68,7 @@ def of_area(surface: Any, nominal_area: Any, h_max: Any) -> tuple[Any, tuple[Map
     if h_max is not None:
         raise InputError("h_max and nominal_area are both given: give one of them")
     if surface.labelled:
-        raise InputError(
-            "nominal_area is of numbers and arrays: give DataArrays their h_max, by extremes.highest_point"
-        )
+        raise InputError("nominal_area is of numbers and arrays: give DataArrays h_max, of extremes.highest_point")
     area = finite_array("nominal_area", Units(surface.unit).number("nominal_area", nominal_area))
     median, *ends = (highest_point(surface.h_rms, surface.m2, area, chance) for chance in (0.5, *ENDS))
     told = "h_max is the median of Gaussian surfaces of the nominal area, two of three of which are between from and to"
