@@ -131,12 +131,7 @@ HARDEST = max(metal.hardness[1] for metal in _METALS.values())
 
 
 def get(name: str) -> Metal:
-    """Ranges of a metal's constants; `METALS` lists the names.
-
-    Parameters
-    ----------
-    name : str
-        One of `METALS`, or one of one temper, such as "steel 4140 hard" or "aluminium 6061 soft".
+    """Ranges of a metal's constants; `METALS` lists the names, after which "soft" or "hard" may name a temper.
 
     Raises
     ------
@@ -217,21 +212,15 @@ def hardness(given: str | None = None, *, yield_stress: str | None = None) -> st
     Parameters
     ----------
     given : str
-        A Vickers number, "200 HV"; a Rockwell C number of steel from 20 to 68, "58 HRC", by table 1 of ASTM E140; a
-        metal by name, with its temper where these differ by more than a factor of 1.3, "aluminium 6061 hard"; or a
-        pressure, "1.5 GPa".
+        A Vickers number, "200 HV", force over the faces of the pyramid: p_m = 9.80665 MPa HV/sin(68 deg); a Rockwell C
+        number of steel from 20 to 68, "58 HRC", by table 1 of ASTM E140; a metal by name, with its temper where these
+        differ by more than a factor of 1.3, "aluminium 6061 hard"; or a pressure, "1.5 GPa".
     yield_stress : str
         Instead, with its unit: p_m = 3 Y (Tabor 1951), of a metal that does not harden.
-
-    Returns
-    -------
-    str
-        With a unit: a Vickers number is force over the faces of the pyramid, p_m = 9.80665 MPa HV/sin(68 deg).
 
     Raises
     ------
     InputError, OutOfRangeError
-        For an unknown metal or unit, for a metal whose temper is needed, and Rockwell numbers outside that range.
 
     Examples
     --------

@@ -40,7 +40,7 @@ MEANINGS = {
     "error": "bound on the relative numerical error against the theory",
     "scatter": "standard deviation of ln F at this mean separation from simulation to simulation",
     "area_scatter": "standard deviation of ln A at this force from simulation to simulation",
-    "stiffness_scatter": "standard deviation of ln of the incremental stiffness at this force, likewise",
+    "stiffness_scatter": "standard deviation of ln of the unloading stiffness at this force, likewise",
     "separation_scatter": "standard deviation of the mean separation at this force, likewise",
     "valid": "whether the theory was tested for contacts such as these",
 }
@@ -148,7 +148,7 @@ class _Point(NamedTuple):
 class LawPoint(_Point):
     """Where a law has a given pressure: separation d, mean separation u, A/A0, -dF/du and F/A0, of its shape.
 
-    `units` are the law's. What yields, and the incremental stiffness with it, no law holds: `contact` answers that.
+    `units` are the law's. What yields no law holds: `contact` answers that.
     """
 
     units = Units()

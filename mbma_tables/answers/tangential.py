@@ -84,7 +84,7 @@ class Tangential:
         _, energy, _, scale = self._known()
         tau, delta = self._checked("shear", shear), self.displacement(shear)
         released = energy(self.mean_separation) - energy(self._moved(delta / scale))
-        found: Numbers = 8 * self.friction * (self.pressure * delta - scale * released) - 4 * tau * delta
+        found: Numbers = 8 * (self.friction or 0.0) * (self.pressure * delta - scale * released) - 4 * tau * delta
         return found
 
     def _moved(self, approach: Any) -> Any:

@@ -47,7 +47,7 @@ def contact_keywords(model: options.Model, specimen: Specimen) -> dict[str, Any]
     """Keywords for `contact`."""
     asked = {**vars(model), "E_star": 1.0 if specimen.E_star is None else specimen.E_star}
     cap = asked.pop("hardness")
-    return asked if cap == math.inf else asked | {"hardness": hardness_in(specimen.units, cap)}
+    return asked if cap is None else asked | {"hardness": hardness_in(specimen.units, cap)}
 
 
 @click.command("contact", short_help="Force and area at given gaps, pressures or areas.")
@@ -88,7 +88,7 @@ def contact_command(
     asked = _numbers(name, numbers, specimen, over_h_rms)
     keywords = contact_keywords(model, specimen) | {"E_star": specimen.modulus}
     answer = contact(specimen.surface, **{name: asked}, **keywords)
-    yields = ("yielded", "unloading_stiffness") if model.hardness != math.inf else ()
+    yields = ("yielded", "unloading_stiffness") if model.yields else ()
     values = {column: getattr(answer, column) for column in (*COLUMNS[:-1], "stiffness", *yields, COLUMNS[-1])}
     values |= {"scatter": answer.scatter, "area_scatter": answer.area_scatter}
     values["valid"] = np.where(answer.valid, "yes", "no")
@@ -165,7 +165,7 @@ def curve_command(
         for quantity in ("pressure", "area"):
             values[f"{theory}_{quantity}"] = getattr(line, quantity)
             units[f"{theory}_{quantity}"] = shown_unit(quantity, specimen.units)
-    title = specimen.title + (f", hardness {model.hardness}" if model.hardness != math.inf else "")
+    title = specimen.title + (f", hardness {model.hardness}" if model.yields else "")
     picture = b"" if plot is None else _draw(specimen, answer, others, plot.suffix[1:], leakage, title)
     report_answer("curve", specimen, model, answer, values, units).write(output, plot, picture)
 

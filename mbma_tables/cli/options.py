@@ -42,7 +42,12 @@ class Model:
     variant: str
     rtol: float
     theory: str = "mbma"
-    hardness: float | str = math.inf
+    hardness: float | str | None = None
+
+    @property
+    def yields(self) -> bool:
+        """Whether there is a hardness, and not an infinite one."""
+        return self.hardness not in (None, math.inf)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -254,12 +259,13 @@ theory_option = _option(
 )
 # of islands, which MBMA alone has
 model_options = _group("model", lambda given: Model(**given), *_MODEL_OPTIONS)
-hardness_option = click.option(
-    "--hardness",
-    callback=lambda ctx, param, given: _parse_number(ctx, param, given) if (given or "1")[0].isdigit() else given,
+hardness_option = _option(
+    "hardness",
+    "Largest pressure that the softer body bears, also '200 HV', '58 HRC' or 'steel 4140 hard'; none: elastic.",
+    callback=lambda ctx, param, given: given if given and given[0].isalpha() and given != "inf"
+    else _parse_number(ctx, param, given),
     metavar="X[UNIT]",
-    help="Largest pressure that the softer body bears, also '200 HV', '58 HRC' or 'steel 4140 hard'; none: elastic.",
-)
+)  # fmt: skip
 theory_options = _group("model", lambda given: Model(**_given(given)), theory_option, *_MODEL_OPTIONS, hardness_option)
 
 output_options = _group(

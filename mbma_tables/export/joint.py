@@ -62,7 +62,7 @@ class Joint:
         if self.hardness < np.inf:
             plastic = (
                 f"hardness = {self.hardness:.10g} {stress}, plasticity index {gradient / self.hardness:.3g}: "
-                "loading only, unloading starts with the incremental stiffness"
+                "loading only, not for unloading, which is stiffer"
             )
         return (
             f"Contact law of a rough surface, {model}; mbma_tables {__version__}",
