@@ -107,7 +107,7 @@ def single_table(costs: Costs) -> str:
         [island_model, *(f"{min(own):.2f} to {max(own):.2f}" for own in found.values())]
         for island_model, found in ratios.items()
     ]
-    return table(["method", "force alone", "area alone"], cells)
+    return table(["method", "pressure alone", "area alone"], cells)
 
 
 def parts_of(costs: Costs, distances: Sequence[Distance]) -> dict[str, str]:

@@ -216,8 +216,8 @@ def island_command(
     asked = contact_keywords(model, specimen)
     del asked["theory"]
     answer = island(specimen.surface, _numbers("delta", delta, specimen, over_h_rms), **asked)
-    values = {name: getattr(answer, name) for name in ("delta", *ISLAND_FIELDS, "pressure", "area", "error")}
-    units = {name: unit_of(f"island_{name}", specimen.units) for name in ("pressure", "area")}
+    values = {name: getattr(answer, name) for name in ("delta", *ISLAND_FIELDS, "force", "area", "error")}
+    units = {name: unit_of(f"island_{name}", specimen.units) for name in ("force", "area")}
     report_answer("island", specimen, model, answer, values, units).write(output)
 
 
