@@ -66,7 +66,7 @@ class SpectralSurface(AnySurface):
     provenance : sequence of mapping, optional
         What was done to the measurement, a plain record each step: {"step": "detrend", "kind": "plane"}, ...
     nominal_area : float or str, optional
-        Instead of h_max: A0 [length^2], of whose Gaussian surfaces the median highest point is taken.
+        Instead of h_max, as for `Surface`.
 
     Raises
     ------
