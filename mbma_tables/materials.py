@@ -151,7 +151,7 @@ def get(name: str) -> Metal:
     if temper in TEMPERS and plain in _METALS:
         one = _METALS[plain].hardness[TEMPERS.index(temper)]
         return dataclasses.replace(_METALS[plain], name=name, hardness=(one, one))
-    if name not in _METALS:
+    if str(name) not in _METALS:
         near = difflib.get_close_matches(str(name), METALS, 3, 0.4) or METALS
         raise InputError(f"no metal is named {name!r}: there are {', '.join(near)}, each also with ' soft' or ' hard'")
     return _METALS[name]
@@ -199,7 +199,7 @@ def pair(materials: str | Metal | Pair | Sequence[str | Metal]) -> Pair:
     """
     if isinstance(materials, Pair):
         return materials
-    given = [materials] if isinstance(materials, str | Metal) else list(materials)
+    given: Sequence[Any] = materials if isinstance(materials, tuple | list) else [materials]
     if len(given) not in (1, 2):
         raise InputError(f"materials are one or two, got {len(given)}")
     one, other = (each if isinstance(each, Metal) else get(each) for each in (given[0], given[-1]))

@@ -1,10 +1,15 @@
+import json
+
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mbma_tables import Surface, contact, contact_law, materials, sensitivity
+from mbma_tables import Scene, Surface, contact, contact_law, materials, sensitivity
+from mbma_tables.cli import main
 from mbma_tables.common.errors import InputError, OutOfRangeError
+from mbma_tables.export.law_rows import describe_law
 from mbma_tables.materials import effective_modulus
 
 moduli = st.floats(1e-6, 1e12)
@@ -143,6 +148,9 @@ def test_hardnesses_that_are_refused():
     for names in ((), ("silver",) * 3):
         with pytest.raises(InputError, match="one or two"):
             materials.pair(names)
+    for names in (5, ("silver", 5), {"a": 1}):
+        with pytest.raises(InputError, match="no metal is named"):
+            materials.pair(names)
 
 
 FACE = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5, unit="um")
@@ -216,3 +224,26 @@ def test_sensitivities_hold_the_hardness(theory):
         np.testing.assert_allclose(known, slope, atol=1e-4)
     low, high = found.ranges["hardness"]["area"]
     assert high / low == pytest.approx(2, rel=0.1)
+
+
+def test_scenes_and_rows_take_every_hardness():
+    given = {"E_star": "115 GPa", "theory": "calibrated"}
+    scene = Scene(
+        surface=FACE, pressures=["10 MPa", "50 MPa"], effects={"pressure", "area", "yield"}, hardness="40 HRC", **given
+    )
+    known = contact(FACE, pressure=["10 MPa", "50 MPa"], hardness="392 HV", **given)
+    np.testing.assert_allclose(scene.run()["area"], known.area, rtol=1e-4)
+    rows = describe_law(FACE, "115 GPa", theory="calibrated", hardness="silver", rows=20)
+    assert any(line.startswith("hardness = 0.26 GPa") for line in rows.comments)
+
+
+def test_a_hardness_in_the_shell():
+    asked = ["contact", "--hurst", "0.8", "--q0", "0.06/um", "--q1", "3/um", "--h-rms", "1um", "--h-max", "3.5um"]
+    asked += ["--E-star", "115GPa", "-p", "50MPa", "--theory", "calibrated", "--json"]
+    for text, valid in (("40 HRC", "yes"), ("steel 4140 hard", "yes"), ("inf", "yes"), (None, "no")):
+        found = CliRunner().invoke(main, [*asked, *(["--hardness", text] if text else [])])
+        answer = json.loads(found.output)["columns"]
+        assert answer["valid"] == [valid], text
+        cap = {} if text is None else {"hardness": np.inf if text == "inf" else text}
+        known = contact(FACE, pressure="50 MPa", E_star="115 GPa", theory="calibrated", **cap)
+        assert answer["area"] == [pytest.approx(float(known.area), rel=1e-12)]
