@@ -394,7 +394,7 @@ def test_numbers_under_the_cursor_by_keyboard(visit):
 
 
 def test_concerns_are_those_of_the_library(visit):
-    state = {"hurst": 0.15, "q0": 1.0, "q1": 500.0, "h_rms": 0.001, "h_max": 0.006, "theory": "calibrated"}
+    state = {"hurst": 0.15, "q0": 1.0, "q1": 500.0, "h_rms": 0.001, "h_max": 0.009, "theory": "calibrated"}
     tab = visit(urllib.parse.urlencode(state))
     said = tab.inner_text("#concerns")
     gap = float(tab.locator("#readout th").first.inner_text().split()[2])
