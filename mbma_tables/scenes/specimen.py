@@ -109,17 +109,19 @@ def from_numbers(
     given: Mapping[str, Any], unit: str | None = None, title: str = "surface given by numbers"
 ) -> Specimen:
     """The surface with one complete set of numbers, plain ones in `unit`."""
-    if set(given) & set(ROUGHNESS):
+    if set(given) & set(ROUGHNESS) - {"nominal_area"}:
         alien = set(given) - {*ROUGHNESS, "hurst", "h_max"}
         if alien:
             raise InputError(
                 f"{', '.join(alien)} beside numbers of a drawing: leave them out, or give longest or shortest"
             )
         return Specimen(Surface.from_roughness(**{"hurst": None, **given}, unit=unit), title)
-    if set(given) not in (set(PARAMETERS), set(MAGNIFICATION), set(MOMENTS)):
+    if {"h_max" if key == "nominal_area" else key for key in given} not in map(
+        set, (PARAMETERS, MAGNIFICATION, MOMENTS)
+    ):
         raise InputError(
-            f"a surface needs {', '.join(PARAMETERS)} (or zeta_1 for q1), or {', '.join(MOMENTS)}, or "
-            f"roughness (Rq, ...); got {', '.join(given) or 'none of them'}"
+            f"a surface needs {', '.join(PARAMETERS)} (or zeta_1 for q1, nominal_area for h_max), or "
+            f"{', '.join(MOMENTS)}, or roughness (Rq, ...); got {', '.join(given) or 'none of them'}"
         )
     plain, unit = resolve(given, unit)
     numbers = {key: one_number(key, value) for key, value in plain.items()}

@@ -8,6 +8,7 @@ import pytest
 
 from generate.boundary_elements.surfaces import Recipe, heights
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, sensitivity
+from mbma_tables.scenes.specimen import from_numbers
 from mbma_tables.surfaces.extremes import highest_point
 
 NUMBERS = {"hurst": 0.8, "q0": 0.025, "q1": 3.0, "h_rms": 1.0, "unit": "um"}
@@ -68,6 +69,17 @@ def test_every_constructor_takes_the_area():
     # two faces alike: sqrt(2) times as high
     both = made.combined(made, "4 cm^2")
     assert both.h_max == pytest.approx(2**0.5 * made.h_max, rel=1e-3)
+
+
+def test_files_and_options_take_the_area():
+    made = Surface(**NUMBERS, nominal_area="4 cm^2")
+    five = {"hurst": 0.8, "q0": "0.025/um", "q1": "3/um", "h_rms": "1 um", "nominal_area": "400 mm^2"}
+    moments = {"hurst": 0.8, "m0": "1 um^2", "m2": float(made.m2), "m4": f"{made.m4} 1/um^2", "nominal_area": "4 cm^2"}
+    drawn = {"hurst": 0.8, "Rq": "1 um", "longest": f"{2 * np.pi / 0.025} um", "shortest": f"{2 * np.pi / 3} um"}
+    for given in (five, moments, drawn | {"nominal_area": "4e8 um^2"}):
+        assert float(from_numbers(given).surface.h_max) == pytest.approx(made.h_max, rel=1e-6)
+    with pytest.raises(InputError, match="nominal_area for h_max"):
+        from_numbers({"hurst": 0.8, "nominal_area": "4 cm^2"})
 
 
 def test_areas_that_are_refused():
