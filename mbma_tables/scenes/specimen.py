@@ -120,8 +120,8 @@ def from_numbers(
         set, (PARAMETERS, MAGNIFICATION, MOMENTS)
     ):
         raise InputError(
-            f"a surface needs {', '.join(PARAMETERS)} (or zeta_1 for q1, nominal_area for h_max), or "
-            f"{', '.join(MOMENTS)}, or roughness (Rq, ...); got {', '.join(given) or 'none of them'}"
+            f"a surface needs {', '.join(PARAMETERS)} (or zeta_1 for q1), or {', '.join(MOMENTS)}, or "
+            f"roughness (Rq, ...), with h_max or nominal_area; got {', '.join(given) or 'none of them'}"
         )
     plain, unit = resolve(given, unit)
     numbers = {key: one_number(key, value) for key, value in plain.items()}

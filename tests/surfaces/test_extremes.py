@@ -78,7 +78,7 @@ def test_files_and_options_take_the_area():
     drawn = {"hurst": 0.8, "Rq": "1 um", "longest": f"{2 * np.pi / 0.025} um", "shortest": f"{2 * np.pi / 3} um"}
     for given in (five, moments, drawn | {"nominal_area": "4e8 um^2"}):
         assert float(from_numbers(given).surface.h_max) == pytest.approx(made.h_max, rel=1e-6)
-    with pytest.raises(InputError, match="nominal_area for h_max"):
+    with pytest.raises(InputError, match="h_max or nominal_area"):
         from_numbers({"hurst": 0.8, "nominal_area": "4 cm^2"})
 
 
