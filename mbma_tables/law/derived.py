@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from mbma_tables.answers.tangential import Tangential
-    from mbma_tables.law.law import ContactLaw
     from mbma_tables.law.leakage import LeakageLaw
 
 
@@ -44,12 +43,11 @@ class Derived:
         return found * float(frozen_factor(self.hardness / (self.E_star * float(self.surface.rms_gradient))))
 
     @functools.cached_property
-    def _elastic(self: Any) -> ContactLaw:
+    def _elastic(self: Any) -> Any:
         """The law of the elastic contact."""
         if math.isinf(self.hardness):
-            return self  # type: ignore[no-any-return]
-        law: ContactLaw = dataclasses.replace(self.elastic(), units=self.units)
-        return law
+            return self
+        return dataclasses.replace(self.elastic(), units=self.units)
 
     def tangential(
         self: Any,
