@@ -27,6 +27,7 @@ from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.differences import differences
+from mbma_tables.theories.mbma import chosen_theory
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 STEP = 0.02  # of the logarithm of a parameter
@@ -93,7 +94,7 @@ def sensitivity(
     area: ArrayLike | None = None,
     E_star: float | str = 1.0,
     ranges: Mapping[str, tuple[Any, Any]] | None = None,
-    theory: str | Theory | UserTheory = "mbma",
+    theory: str | Theory | UserTheory | None = None,
     island_model: str | AnyModel = "universal",
     variant: str | Variant = "reported",
     rtol: float = 1e-8,
@@ -143,12 +144,12 @@ def sensitivity(
     >>> f"conductance goes like hardness^{found.slopes['hardness']['conductance']:.2f}"
     'conductance goes like hardness^-0.69'
     """
-    options: Any = {"theory": theory, "island_model": island_model, "variant": variant, "rtol": rtol}
+    chosen = chosen_theory(surface, theory, island_model=island_model, variant=variant, rtol=rtol)
     by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
     E_star, hardness, _ = bodies(materials, E_star, hardness)
     modulus, units = modulus_and_units(E_star, surface)
     cap = hardness_in(units, np.inf if hardness is None else hardness)
-    make, parameters = _parameters(surface) if isinstance(surface, Surface) else _of_spectrum(surface, theory)
+    make, parameters = _parameters(surface) if isinstance(surface, Surface) else _of_spectrum(surface, chosen)
     given = parameters | {"E_star": modulus, by: units.number(by, value)}
     given |= {} if np.equal(cap, np.inf).all() else {"hardness": cap}
     numbers = {name: float(one_number(name, number)) for name, number in given.items()}
@@ -157,7 +158,7 @@ def sensitivity(
 
     def found_at(**own: Any) -> Contact:
         modulus, place, cap = own.pop("E_star"), own.pop(by), own.pop("hardness", np.inf)
-        return contact(make(**own), **{by: place}, E_star=modulus, hardness=cap, **options)
+        return contact(make(**own), **{by: place}, E_star=modulus, hardness=cap, theory=chosen)
 
     def answers(moved: Mapping[str, Any]) -> Answers:
         own = {name: moved.get(name, number) for name, number in numbers.items()}

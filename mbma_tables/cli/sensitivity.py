@@ -41,6 +41,7 @@ def sensitivity_command(
     """
     from mbma_tables.answers.sensitivity import sensitivity
 
+    model = model.of(specimen.surface)
     asked = vars(model).copy()
     found = sensitivity(specimen.surface, **loads, E_star=specimen.modulus, ranges=dict(map(_pair, ranges)), **asked)
     parameters = list(found.parameters)
