@@ -61,11 +61,11 @@ def conductance_curve(points: int = 200) -> Curve:
         hardness: contact(JOINT, pressure=pressure, E_star=E_STAR, theory="calibrated", hardness=hardness)
         for hardness in (SOFT, middle, HARD, np.inf)
     }
-    h = {p_m: conductance(found.incremental_stiffness, K_MEAN, E_STAR) for p_m, found in joints.items()}
+    h = {p_m: conductance(found.unloading_stiffness, K_MEAN, E_STAR) for p_m, found in joints.items()}
     spread = np.exp(joints[middle].scatter)
     return Curve(
         pressure,
-        joints[middle].incremental_stiffness,
+        joints[middle].unloading_stiffness,
         h[middle],
         h[HARD] / spread,
         h[SOFT] * spread,

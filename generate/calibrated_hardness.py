@@ -200,7 +200,7 @@ def blind() -> dict[str, FloatArray]:
         "area": np.log(found.area / own["area"]),
         "yielded": np.asarray(found.yielded - own["area_yielded"] / own["area"]),
         "force": np.log(closer.pressure / (own["force"] * g)),
-        "stiffness": np.log(found.incremental_stiffness / (own["kappa"] * g)),
+        "stiffness": np.log(found.unloading_stiffness / (own["kappa"] * g)),
     }
 
 

@@ -1,8 +1,8 @@
 """Elastic constants of the two bodies, joined into the one modulus that contact needs, and ranges for common metals.
 
-Hardnesses are converted from Brinell or Vickers number to the mean pressure over the projected area, which is the
-pressure that counts here. A ground or polished face is harder than its bulk at depths of micrometres: measure where it
-matters. Where the numbers were read is in tables/metals.csv.
+Hardnesses are converted from Brinell, Vickers or Rockwell number to the mean pressure over the projected area, which is
+the pressure that counts here. A ground or polished face is harder than its bulk at depths of micrometres: measure where
+it matters. Where the numbers were read is in tables/metals.csv.
 """
 
 from __future__ import annotations
@@ -11,16 +11,27 @@ import csv
 import dataclasses
 import difflib
 import math
+import re
+from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import broadcast_shape, finite_array, one_number, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.common.units import resolve
+from mbma_tables.common.units import Units, resolve
 
 ELASTIC_PSI = 1.1  # plasticity index E* g/p_m up to which elastic areas are within 5% of those with a hardness
+ONE_TEMPER = 1.3  # hardest over softest temper up to which their geometric mean stands for both, within 14%
+TABOR = 3.0  # hardness over yield stress
+TEMPERS = ("soft", "hard")
+# Vickers number of non-austenitic steels at Rockwell C numbers: ASTM E140 table 1, as printed at
+# mikipulley.co.jp/EN/Services/Tech_data/tech20.html
+HRC = (20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0, 60.0, 65.0, 68.0)
+HV_OF_HRC = (238.0, 266.0, 302.0, 345.0, 392.0, 446.0, 513.0, 595.0, 697.0, 832.0, 940.0)
+_SCALE = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(HV|HRC)\s*")
 
 
 def effective_modulus(E1: ArrayLike | str, nu1: ArrayLike, E2: ArrayLike | str, nu2: ArrayLike) -> Any:
@@ -116,10 +127,11 @@ def _metals() -> dict[str, Metal]:
 
 _METALS = _metals()
 METALS = tuple(_METALS)
+HARDEST = max(metal.hardness[1] for metal in _METALS.values())
 
 
 def get(name: str) -> Metal:
-    """Ranges of a metal's constants; `METALS` lists the names.
+    """Ranges of a metal's constants; `METALS` lists the names, after which "soft" or "hard" may name a temper.
 
     Raises
     ------
@@ -132,8 +144,170 @@ def get(name: str) -> Metal:
     >>> steel = materials.get("steel 4140")
     >>> steel.hardness, steel.conductivity[0]
     ((2.06, 5.76), 42.7)
+    >>> materials.get("steel 4140 hard").hardness
+    (5.76, 5.76)
     """
-    if name not in _METALS:
+    plain, _, temper = str(name).rpartition(" ")
+    if temper in TEMPERS and plain in _METALS:
+        one = _METALS[plain].hardness[TEMPERS.index(temper)]
+        return dataclasses.replace(_METALS[plain], name=name, hardness=(one, one))
+    if str(name) not in _METALS:
         near = difflib.get_close_matches(str(name), METALS, 3, 0.4) or METALS
-        raise InputError(f"no metal is named {name!r}: there are {', '.join(near)}")
+        raise InputError(f"no metal is named {name!r}: there are {', '.join(near)}, each also with ' soft' or ' hard'")
     return _METALS[name]
+
+
+@dataclasses.dataclass(frozen=True)
+class Pair:
+    """Two metals in contact, made by `pair`."""
+
+    metals: tuple[Metal, Metal]
+
+    @property
+    def E_star(self) -> str:
+        """Effective modulus with its unit."""
+        a, b = self.metals
+        return f"{effective_modulus(a.E, a.nu, b.E, b.nu):.17g} GPa"
+
+    @property
+    def softer(self) -> Metal:
+        """The metal that yields."""
+        return min(self.metals, key=lambda metal: metal.hardness)
+
+    @property
+    def hardness(self) -> str | None:
+        """Hardness of the softer one with its unit; None where its tempers differ by more than a factor of 1.3."""
+        soft, hard = self.softer.hardness
+        return f"{math.sqrt(soft * hard):.6g} GPa" if hard <= ONE_TEMPER * soft else None
+
+    @property
+    def conductivities(self) -> tuple[str, str]:
+        """Thermal conductivities with their unit, the geometric means of what was found."""
+        a, b = (f"{math.sqrt(low * high):.6g} W/(m K)" for low, high in (metal.conductivity for metal in self.metals))
+        return a, b
+
+
+def pair(materials: str | Metal | Pair | Sequence[str | Metal]) -> Pair:
+    """Two metals in contact: names or `Metal` objects, or one that is in contact with itself.
+
+    Examples
+    --------
+    >>> from mbma_tables import materials
+    >>> joint = materials.pair(("steel 4140 hard", "aluminium 6061 hard"))
+    >>> joint.E_star[:4], joint.hardness, joint.softer.name
+    ('57.5', '0.95 GPa', 'aluminium 6061 hard')
+    """
+    if isinstance(materials, Pair):
+        return materials
+    given: Sequence[Any] = materials if isinstance(materials, tuple | list) else [materials]
+    if len(given) not in (1, 2):
+        raise InputError(f"materials are one or two, got {len(given)}")
+    one, other = (each if isinstance(each, Metal) else get(each) for each in (given[0], given[-1]))
+    return Pair((one, other))
+
+
+def hardness(given: str | None = None, *, yield_stress: str | None = None) -> str:
+    """Hardness as a mean pressure, with its unit: what ``hardness=`` takes.
+
+    Parameters
+    ----------
+    given : str
+        A Vickers number, "200 HV", force over the faces of the pyramid: p_m = 9.80665 MPa HV/sin(68 deg); a Rockwell C
+        number of steel from 20 to 68, "58 HRC", by table 1 of ASTM E140; a metal by name, with its temper where these
+        differ by more than a factor of 1.3, "aluminium 6061 hard"; or a pressure, "1.5 GPa".
+    yield_stress : str
+        Instead, with its unit: p_m = 3 Y (Tabor 1951), of a metal that does not harden.
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+
+    Examples
+    --------
+    >>> from mbma_tables import materials
+    >>> materials.hardness("200 HV"), materials.hardness("58 HRC"), materials.hardness(yield_stress="250 MPa")
+    ('2.11536 GPa', '6.9405 GPa', '750 MPa')
+    >>> materials.hardness("aluminium 6061 hard")
+    '0.95 GPa'
+    """
+    if (given is None) == (yield_stress is None):
+        raise InputError("give a hardness or yield_stress, one of them")
+    if yield_stress is not None:
+        plain, unit = resolve({"hardness": yield_stress}, kind="stress")
+        if unit is None:
+            raise InputError(f"yield_stress needs a unit, such as '250 MPa', got {yield_stress!r}")
+        return f"{TABOR * plain['hardness']:.6g} {unit}"
+    text = str(given)
+    if found := _SCALE.fullmatch(text):
+        number, scale = np.asarray(float(found[1])), found[2]
+        if scale == "HRC":
+            good = (number >= HRC[0]) & (number <= HRC[-1])
+            require("hardness [HRC]", number, good, f"from {HRC[0]:g} to {HRC[-1]:g}, where the scale is converted")
+            number = np.interp(number, HRC, HV_OF_HRC)
+        require("hardness [HV]", number, number > 0, "positive")
+        return f"{_mean_pressure('HV', float(number)):.6g} GPa"
+    if text[:1].isalpha():
+        try:
+            known = pair(text).hardness
+        except InputError as fault:
+            kinds = "a number, a text such as '1.5 GPa', '200 HV' or '58 HRC', or a metal"
+            raise InputError(f"hardness must be {kinds}: {fault}") from None
+        if known is None:
+            soft, hard = get(text).hardness
+            raise InputError(
+                f"the hardness of {text!r} depends on its temper: write '{text} soft' ({soft:g} GPa), '{text} hard' "
+                f"({hard:g} GPa), or a hardness such as '{soft:g} GPa', '200 HV' or '40 HRC'"
+            )
+        return known
+    return text
+
+
+def hardness_in(units: Units, value: Any) -> Any:
+    """A hardness in the given units, of all that `hardness` reads; numbers as they are."""
+    if isinstance(value, list | tuple):
+        return [hardness_in(units, each) for each in value]
+    return units.number("hardness", hardness(value) if isinstance(value, str) else value)
+
+
+def bodies(materials: Any, E_star: Any, hardness: Any) -> tuple[Any, Any, Pair | None]:
+    """Modulus and hardness of a contact as given, or of the materials that are named, and these."""
+    if materials is None:
+        return E_star, hardness, None
+    known = pair(materials)
+    if not (isinstance(E_star, int | float) and E_star == 1.0):
+        raise InputError("E_star and materials are both given: give one of them")
+    return known.E_star, known.hardness if hardness is None else hardness, known
+
+
+def tangential_ratio(nu: ArrayLike, E: Sequence[Any] | None = None) -> Any:
+    """kappa, normal over tangential stiffness of a stuck isotropic contact (Mindlin 1949).
+
+    Parameters
+    ----------
+    nu : array_like
+        Poisson's ratio of both bodies, or of the one that is not rigid; with `E` one of each body.
+    E : pair of float or str, optional
+        Young's moduli of the bodies.
+
+    Returns
+    -------
+    float or ndarray
+        (2 - nu)/(2 (1 - nu)); of two bodies their compliances (2 - nu)/G over 2 (1 - nu)/G, both added.
+
+    Examples
+    --------
+    >>> from mbma_tables.materials import tangential_ratio
+    >>> round(float(tangential_ratio(0.3)), 4), round(float(tangential_ratio((0.3, 0.3), (210.0, 70.0))), 4)
+    (1.2143, 1.2143)
+    """
+    ratio = finite_array("nu", nu)
+    require("nu", ratio, (ratio > -1) & (ratio <= 0.5), "in (-1, 0.5]")
+    if (E is None) == (ratio.shape == (2,)) or (E is not None and len(E) != 2):
+        raise InputError("nu is one number, or two with E=(E1, E2), the moduli of the bodies")
+    above, below = 2 - ratio, 2 * (1 - ratio)
+    if E is None:
+        return (above / below)[()]
+    modulus = finite_array("E", list(resolve({"E1": E[0], "E2": E[1]}, kind="stress")[0].values()))
+    require("E", modulus, modulus > 0, "positive")
+    compliance = (1 + ratio) / modulus  # 1/(2 G)
+    return (above * compliance).sum() / (below * compliance).sum()

@@ -394,14 +394,14 @@ def test_numbers_under_the_cursor_by_keyboard(visit):
 
 
 def test_concerns_are_those_of_the_library(visit):
-    state = {"hurst": 0.15, "q0": 1.0, "q1": 500.0, "h_rms": 0.001, "h_max": 0.006, "theory": "calibrated"}
+    state = {"hurst": 0.15, "q0": 1.0, "q1": 500.0, "h_rms": 0.001, "h_max": 0.009, "theory": "calibrated"}
     tab = visit(urllib.parse.urlencode(state))
     said = tab.inner_text("#concerns")
     gap = float(tab.locator("#readout th").first.inner_text().split()[2])
     known = contact(Surface(*(state[name] for name in NAMES)), mean_separation=gap, theory="calibrated").reasons
     assert len(known) > 2
     for reason in known:
-        assert reason.replace("zeta_1", "q₁/q₀").split(" (")[0] in said.replace(" to 5.5", "")
+        assert reason.replace("zeta_1", "q₁/q₀").split(" (")[0] in said.replace(" to 8", "")
 
 
 def test_where_a_theory_has_no_answer_the_page_says_why(visit):

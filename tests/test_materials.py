@@ -1,10 +1,15 @@
+import json
+
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mbma_tables import Surface, contact, materials
+from mbma_tables import Scene, Surface, contact, contact_law, materials, sensitivity
+from mbma_tables.cli import main
 from mbma_tables.common.errors import InputError, OutOfRangeError
+from mbma_tables.export.law_rows import describe_law
 from mbma_tables.materials import effective_modulus
 
 moduli = st.floats(1e-6, 1e12)
@@ -117,3 +122,128 @@ def test_vickers_numbers_from_the_indentation():
 def test_unknown_metal():
     with pytest.raises(InputError, match="steel 4140"):
         materials.get("steel 4141")
+
+
+# table 1 of ASTM E140 at numbers between those of the module, as printed in two manuals of hardness testers
+@pytest.mark.parametrize(("rockwell", "vickers"), [(42, 412), (48, 484), (53, 560), (58, 653), (62, 746), (66, 865)])
+def test_rockwell_numbers(rockwell, vickers):
+    both = (float(materials.hardness(text).removesuffix(" GPa")) for text in (f"{rockwell} HRC", f"{vickers}HV"))
+    assert next(both) == pytest.approx(next(both), rel=0.008)
+
+
+def test_hardnesses_that_are_refused():
+    for text, message in (
+        ("aluminium 6061", r"'aluminium 6061 soft' \(0.31 GPa\)"),
+        ("70 HRC", "from 20 to 68"),
+        ("unobtainium", "no metal is named"),
+        ("0 HV", "positive"),
+        ("3 um", "unit of stress"),
+    ):
+        with pytest.raises(InputError, match=message):
+            contact(FACE, pressure="1 MPa", E_star="100 GPa", hardness=text)
+    with pytest.raises(InputError, match="needs a unit"):
+        materials.hardness(yield_stress="250")
+    with pytest.raises(InputError, match="one of them"):
+        materials.hardness("200 HV", yield_stress="250 MPa")
+    for names in ((), ("silver",) * 3):
+        with pytest.raises(InputError, match="one or two"):
+            materials.pair(names)
+    for names in (5, ("silver", 5), {"a": 1}):
+        with pytest.raises(InputError, match="no metal is named"):
+            materials.pair(names)
+
+
+FACE = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5, unit="um")
+
+
+def test_metals_named_answer_as_their_numbers_do():
+    asked = {"pressure": ["10 MPa", "100 MPa"], "theory": "calibrated"}
+    named = contact(FACE, materials=("steel 4140 hard", "aluminium 6061 hard"), **asked)
+    modulus = effective_modulus(205.0, 0.29, 69.0, 0.33)
+    plain = contact(FACE, E_star=f"{modulus} GPa", hardness=["950 MPa"], **asked)
+    for name in ("area", "mean_separation", "stiffness", "unloading_stiffness"):
+        np.testing.assert_allclose(getattr(named, name), getattr(plain, name), rtol=1e-12)
+    steel, aluminium = "42.7 W/(m K)", f"{(154 * 180) ** 0.5} W/(m K)"
+    np.testing.assert_allclose(named.conductance(), plain.conductance(steel, aluminium), rtol=1e-5)
+    law = contact_law(FACE, materials=("steel 4140 hard", "aluminium 6061 hard"), theory="calibrated")
+    np.testing.assert_allclose(law.at_pressure("100 MPa").area, named.area[1], rtol=1e-4)
+    with pytest.raises(InputError, match="E_star and materials"):
+        contact(FACE, materials="silver", E_star="100 GPa", **asked)
+    with pytest.raises(InputError, match="no materials are named"):
+        plain.conductance()
+
+
+def test_metals_that_yield_are_not_valid_without_a_hardness():
+    def at(surface=FACE, **given):
+        return contact(surface, pressure="50 MPa", theory="calibrated", **given)
+
+    assert at(materials="steel 1020").valid  # one temper: it yields by default
+    assert at(materials="steel 1020").yielded > 0.9
+    (reason,) = at(materials="steel 4140").reasons
+    assert reason == "steel 4140 yields here: give hardness= of its temper, '2.06 GPa' to '5.76 GPa'"
+    assert at(materials="steel 4140", hardness="200 HV").valid
+    assert not at(materials=("steel 52100", "silver"), hardness=np.inf).valid
+    (reason,) = at(materials=("steel 52100", "silver"), hardness=np.inf).reasons
+    assert reason == "silver yields here: give hardness='0.26 GPa'"
+    # elastic up to gradients of 0.073, docs/yield.md
+    polished = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5).scaled(1.0, "um")
+    for gradient, elastic in ((0.07, True), (0.08, False)):
+        height = gradient / float(polished.rms_gradient)
+        face = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=height, h_max=3.5 * height, unit="um")
+        assert at(face, materials="steel 52100", hardness=np.inf).valid == elastic
+    # no material named: above what any of them bears
+    assert not at(E_star="115 GPa").valid
+    assert at(E_star="115 GPa", hardness=np.inf).valid
+    assert at(E_star="50 GPa").valid
+    assert contact(FACE, pressure=1e-3, theory="calibrated").valid  # over E*: no stress is known
+
+
+def test_valid_of_data_arrays_knows_the_metals():
+    xr = pytest.importorskip("xarray")
+    pressure = xr.DataArray([0.05, 0.1], dims="load")
+    found = contact(FACE, pressure=pressure, materials="steel 4140", theory="calibrated")
+    assert not found.valid.values.any()
+    assert [text[:17] for text in found.reasons] == ["steel 4140 yields"]
+
+
+@pytest.mark.parametrize("theory", ["calibrated", "mbma"])
+def test_sensitivities_hold_the_hardness(theory):
+    """Against differences of answers themselves."""
+    numbers = {"pressure": 0.1, "E_star": 115.0, "hardness": 3.0}
+    found = sensitivity(
+        FACE, pressure="0.1 GPa", E_star="115 GPa", hardness="3 GPa", theory=theory, ranges={"hardness": (2.0, 4.0)}
+    )
+    for name in numbers:
+        both = []
+        for factor in (0.999, 1.001):
+            own = numbers | {name: numbers[name] * factor}
+            one = contact(FACE, **own | {"E_star": f"{own['E_star']} GPa"}, theory=theory)
+            both.append([one.area, one.mean_separation, one.stiffness, one.unloading_stiffness / own["E_star"]])
+        slope = np.diff(np.log(both), axis=0)[0] / np.log(1.001 / 0.999)
+        known = [found.slopes[name][answer] for answer in ("area", "mean_separation", "stiffness", "conductance")]
+        np.testing.assert_allclose(known, slope, atol=1e-4)
+    low, high = found.ranges["hardness"]["area"]
+    assert high / low == pytest.approx(2, rel=0.1)
+
+
+def test_scenes_and_rows_take_every_hardness():
+    given = {"E_star": "115 GPa", "theory": "calibrated"}
+    scene = Scene(
+        surface=FACE, pressures=["10 MPa", "50 MPa"], effects={"pressure", "area", "yield"}, hardness="40 HRC", **given
+    )
+    known = contact(FACE, pressure=["10 MPa", "50 MPa"], hardness="392 HV", **given)
+    np.testing.assert_allclose(scene.run()["area"], known.area, rtol=1e-4)
+    rows = describe_law(FACE, "115 GPa", theory="calibrated", hardness="silver", rows=20)
+    assert any(line.startswith("hardness = 0.26 GPa") for line in rows.comments)
+
+
+def test_a_hardness_in_the_shell():
+    asked = ["contact", "--hurst", "0.8", "--q0", "0.06/um", "--q1", "3/um", "--h-rms", "1um", "--h-max", "3.5um"]
+    asked += ["--E-star", "115GPa", "-p", "50MPa", "--theory", "calibrated", "--json"]
+    for text, valid in (("40 HRC", "yes"), ("steel 4140 hard", "yes"), ("inf", "yes"), (None, "no")):
+        found = CliRunner().invoke(main, [*asked, *(["--hardness", text] if text else [])])
+        answer = json.loads(found.output)["columns"]
+        assert answer["valid"] == [valid], text
+        cap = {} if text is None else {"hardness": np.inf if text == "inf" else text}
+        known = contact(FACE, pressure="50 MPa", E_star="115 GPa", theory="calibrated", **cap)
+        assert answer["area"] == [pytest.approx(float(known.area), rel=1e-12)]

@@ -100,9 +100,7 @@ def frozen() -> str:
         except OutOfRangeError as fault:  # MBMA ends before
             kept[kept] = ~np.asarray(fault.mask)
             by = contact(one.surface, pressure=one.force[kept] * g, theory=theory, hardness=one.eta * g)
-        return np.stack(
-            [one.area[kept], np.log(by.incremental_stiffness / (one.frozen[kept] * g)), by.stiffness_scatter]
-        )
+        return np.stack([one.area[kept], np.log(by.unloading_stiffness / (one.frozen[kept] * g)), by.stiffness_scatter])
 
     seen, rows = [one for one in capped(dataset(EVIDENCE)) if one.kind == "self_affine"], []
     for theory, eta in itertools.product(("mbma", "calibrated"), HARDNESSES):
@@ -166,7 +164,7 @@ def cost() -> str:
 
     def run(pressure: FloatArray, hardness: float) -> Any:
         found = contact(SURFACE, pressure=pressure, theory="calibrated", hardness=hardness)
-        return found.area, conductance(found.incremental_stiffness, 1.0, 1.0)
+        return found.area, conductance(found.unloading_stiffness, 1.0, 1.0)
 
     for count in (1, 100, 10_000):
         pressure = g * 0.3 * 10 ** rng.uniform(-3, -0.1, count)

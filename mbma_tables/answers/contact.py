@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -27,6 +27,7 @@ from mbma_tables.common.arguments import (
 )
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.units import modulus_and_units
+from mbma_tables.materials import Metal, Pair, bodies, hardness_in
 from mbma_tables.models import QUANTITIES, AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.labels import apply_to_surface
@@ -46,7 +47,8 @@ def contact(
     pressure: ArrayLike | None = None,
     area: ArrayLike | None = None,
     theory: str | Theory | UserTheory | None = None,
-    hardness: ArrayLike | str = np.inf,
+    hardness: ArrayLike | str | None = None,
+    materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
     island_model: str | AnyModel = "universal",
     variant: str | Variant = "reported",
     E_star: ArrayLike = 1.0,
@@ -76,10 +78,14 @@ def contact(
         By name, one of `mbma_tables.theories.THEORIES`, or an object: one of `mbma_tables.theories`, or any with a
         `name` and ``answer(surface, u)``. Default: "calibrated" for a surface given by a spectrum or a map, unless
         an option of MBMA is given, and "mbma" for one given by its five numbers.
-    hardness : array_like
-        Largest pressure p_m that the softer body bears, in the unit of `E_star` (of E* itself where that is 1). The
+    hardness : array_like or str, optional
+        Largest pressure p_m that the softer body bears, in the unit of `E_star` (of E* itself where that is 1), or a
+        text that `mbma_tables.materials.hardness` reads: "1.5 GPa", "200 HV", "58 HRC", "aluminium 6061 hard". The
         theory's elastic answer goes through `mbma_tables.laws.hardness`; u is then the mean gap with yielded points
-        flattened. Infinite: nothing yields.
+        flattened. By default that of the softer of `materials`; infinite, or without either: nothing yields, and the
+        answer is not `valid` where the metals named, or any, would.
+    materials : str, pair of str, optional
+        Metals in contact, one of `mbma_tables.materials.METALS` each, or `Metal` objects; in place of `E_star`.
     island_model : {"universal", "island4d", "exact", "formula", "rigid"} or island model
         MBMA's island model: a table, the full solver, a closed form, or spheres that do not deform; or an object: a
         table from `open_table`, or a model of one's own with a `name` and ``answer(X, mu)``.
@@ -132,20 +138,30 @@ def contact(
     >>> joint = contact(surface, pressure=10.0, E_star=100e3, theory="calibrated", hardness=1500.0)
     >>> f"psi = {joint.psi:.1f}, {joint.yielded:.0%} of {joint.area:.3%} yields"
     'psi = 3.6, 87% of 0.701% yields'
+    >>> joint = contact(
+    ...     Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5, unit="um"),
+    ...     pressure="10 MPa",
+    ...     theory="calibrated",
+    ...     materials=("steel 4140 hard", "aluminium 6061 hard"),
+    ... )
+    >>> f"{joint.area:.2%}, {joint.yielded:.0%} of it yields; {joint.conductance():.2g} W/(m^2 K)"
+    '1.05%, 100% of it yields; 1e+05 W/(m^2 K)'
     >>> joint = contact(Surface.named("challenge").to("mm"), pressure="100 kPa", E_star="25 MPa")
     >>> f"{joint.mean_separation:.3e} {joint.units['separation']}, {joint.stiffness:.1f} {joint.units['stiffness']}"
     '1.642e-03 mm, 471.9 MPa/mm'
     """
     by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
+    E_star, hardness, pair = bodies(materials, E_star, hardness)
     E_star, units = modulus_and_units(E_star, surface)
-    value, hardness = units.number(by, value), units.number("hardness", hardness)
+    value, stated = units.number(by, value), hardness is not None
+    hardness = hardness_in(units, hardness) if stated else np.inf
     require_flag("derivatives", derivatives)
     chosen = chosen_theory(
         surface, theory, island_model=island_model, variant=variant, rtol=rtol, outside=outside, workers=workers
     )
     options: dict[str, Any] = {
         "by": by,
-        "source": Source(chosen, surface, E_star, hardness, units),
+        "source": Source(chosen, surface, E_star, hardness, units, materials=pair, stated=stated),
         "derivatives": derivatives,
         "quantities": wanted_quantities(quantities),
     }

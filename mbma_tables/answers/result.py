@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from mbma_tables.answers.interface import Interface
 from mbma_tables.answers.source import MEANINGS, Source, concerns, named
 from mbma_tables.common.arguments import FloatArray, Numbers, any_labelled, is_labelled
 from mbma_tables.common.display import Displayed, Variable, shown
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from mbma_tables.answers.leakage import Leakage
 
-OF_HARDNESS = ("yielded", "incremental_stiffness", "plane_separation")
+OF_HARDNESS = ("yielded", "unloading_stiffness", "plane_separation")
 MOST_SHOWN = 10_000  # entries up to which a line says how far to trust them
 
 
@@ -41,7 +41,7 @@ def described(method: Callable[[Any], Any]) -> functools.cached_property[Numbers
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Contact(Displayed):
+class Contact(Interface, Displayed):
     """A contact: force, area and what follows from them; arrays of the broadcast shape, or DataArrays.
 
     Attributes
@@ -171,42 +171,10 @@ class Contact(Displayed):
         if self._source.yields:
             raise InputError(
                 "energy: what a contact that yields gives back is not known, since the shape that stays is not; "
-                "contact_law(..., hardness=...).energy is the work of loading, incremental_stiffness what a small "
+                "contact_law(..., hardness=...).energy is the work of loading, unloading_stiffness what a small "
                 "unloading starts with"
             )
         return self._source.map(lambda theory, s, u, E: (E * theory.energy(s, u),), self, 1)[0]
-
-    def conductance(self, k1: ArrayLike | str, k2: ArrayLike | str | None = None) -> Numbers:
-        """Conductance per nominal area of two bodies in contact, thermal or electrical, h = (k_s/E*) (-dF/du).
-
-        By the incremental stiffness (Barber 2003), with a hardness that of the frozen contact.
-
-        Parameters
-        ----------
-        k1, k2 : array_like or str
-            Conductivities of the bodies, k_s = 2 k1 k2/(k1 + k2); without k2 both have k1.
-
-        Returns
-        -------
-        ndarray or DataArray
-            [unit of k/length of the surface], such as W/(m K um); in W/(m^2 K) for "45 W/(m K)", in S/m^2 for
-            "6e6 S/m", where the surface knows its unit. Its scatter is `stiffness_scatter`.
-
-        Examples
-        --------
-        >>> from mbma_tables import Surface, contact
-        >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
-        >>> joint = contact(face, pressure="10 MPa", E_star="100 GPa", theory="calibrated", hardness="1.5 GPa")
-        >>> f"{joint.conductance('45 W/(m K)', '167 W/(m K)'):.3g} W/(m^2 K)"
-        '2.36e+04 W/(m^2 K)'
-        """
-        from mbma_tables.totals.conductance import conductance, mean_conductivity
-
-        source = self._source
-        (k1, k2), _ = source.units.conductivities(k1, k1 if k2 is None else k2)
-        # linear in the stiffness, which may be NaN or a DataArray
-        found: Numbers = conductance(1.0, mean_conductivity(k1, k2), 1.0) / source.E_star * self.incremental_stiffness
-        return found
 
     def _of_loading(self, name: str) -> Numbers:
         """A number of `Loaded`, over E*."""
@@ -223,11 +191,11 @@ class Contact(Displayed):
         return self._of_loading("yielded") if self._source.yields else 0.0 * self.mean_separation
 
     @described
-    def incremental_stiffness(self) -> Any:
+    def unloading_stiffness(self) -> Any:
         """-d(F/A0)/du [stress/length] of a small unloading, the contact area frozen; `stiffness` if nothing yields."""
         if not self._source.yields:
             return self.stiffness
-        return (self._source.E_star * self._of_loading("incremental_stiffness"))[()]
+        return (self._source.E_star * self._of_loading("unloading_stiffness"))[()]
 
     @described
     def plane_separation(self) -> Any:
@@ -266,7 +234,7 @@ class Contact(Displayed):
 
     @described
     def stiffness_scatter(self) -> Any:
-        """Standard deviation of ln of `incremental_stiffness` at this force, likewise: of conductance, too."""
+        """Standard deviation of ln of `unloading_stiffness` at this force, likewise: of conductance, too."""
         more = {"area": self._touching}
         (found,) = self._source.map(lambda by, s, u, E, A: (by.stiffness_scatter(s, A),), self, 1, more)
         return found
@@ -293,10 +261,11 @@ class Contact(Displayed):
         """Whether the theory was tested for contacts such as these; `reasons` says where and why not."""
 
         def none(theory: Theory, s: AnySurface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[FloatArray]:
-            masks = list(concerns(theory, s, u, TheoryAnswer(*answer)).values())
+            masks = list(concerns(source, theory, s, u, E, TheoryAnswer(*answer)).values())
             return (np.asarray(~np.logical_or.reduce(masks), dtype=float),)
 
-        return self._source.map(none, self, 1, self._answer._asdict())[0].astype(bool)
+        source = self._source
+        return source.map(none, self, 1, self._answer._asdict())[0].astype(bool)
 
     @functools.cached_property
     def reasons(self) -> dict[str, Any]:
@@ -311,5 +280,5 @@ class Contact(Displayed):
             fields = list(xr.broadcast(*map(xr.DataArray, fields)))
             surface = surface.with_numbers(*map(np.asarray, fields[7:]))
         *known, u, E_star, hardness = map(np.asarray, fields[:7])
-        found = concerns(source.theory_at(E_star, hardness), surface, u, TheoryAnswer(*known))
+        found = concerns(source, source.theory_at(E_star, hardness), surface, u, E_star, TheoryAnswer(*known))
         return {reason: mask for reason, mask in found.items() if mask.any()}

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from mbma_tables.answers.result import Contact
 from mbma_tables.common.arguments import FloatArray, hinted, one_number
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, modulus_and_units, unit_of
+from mbma_tables.materials import Metal, Pair, bodies, hardness_in
 from mbma_tables.models import AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights
@@ -49,7 +50,8 @@ class Sensitivity:
     parameters : dict of float
         The surface's numbers, the modulus where there is one, and what is held.
     answers : dict of float
-        What is asked, at these numbers; conductance over the mean conductivity of the bodies [1/length].
+        What is asked, at these numbers; stiffness that of loading, conductance over the mean conductivity of the
+        bodies [1/length].
     slopes, errors : dict of dict of float
         d ln(answer)/d ln(parameter) by parameter and answer, the other parameters held, NaN where the answer jumps,
         and estimates of their errors.
@@ -96,6 +98,8 @@ def sensitivity(
     island_model: str | AnyModel = "universal",
     variant: str | Variant = "reported",
     rtol: float = 1e-8,
+    hardness: float | str | None = None,
+    materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
 ) -> Sensitivity:
     """How much each number of a surface matters to force, area, stiffness and conductance, by any theory.
 
@@ -114,8 +118,8 @@ def sensitivity(
         Effective modulus, as for `contact`.
     ranges : mapping of pairs, optional
         Between what a parameter may lie: {"hurst": (0.6, 0.9), "h_max": ("2 um", "4 um")}.
-    theory, island_model, variant, rtol : optional
-        As for `contact`.
+    theory, island_model, variant, rtol, hardness, materials : optional
+        As for `contact`; a hardness is one of the parameters.
 
     Returns
     -------
@@ -136,19 +140,25 @@ def sensitivity(
     >>> low, high = found.ranges["hurst"]["stiffness"]
     >>> f"stiffness {low:.3g} to {high:.3g} {unit_of('stiffness', found.units)}"
     'stiffness 0.0885 to 0.094 GPa/um'
+    >>> found = sensitivity(ground, pressure="10 MPa", materials="steel 1020", theory="calibrated")
+    >>> f"conductance goes like hardness^{found.slopes['hardness']['conductance']:.2f}"
+    'conductance goes like hardness^-0.69'
     """
     chosen = chosen_theory(surface, theory, island_model=island_model, variant=variant, rtol=rtol)
     by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
+    E_star, hardness, _ = bodies(materials, E_star, hardness)
     modulus, units = modulus_and_units(E_star, surface)
+    cap = hardness_in(units, np.inf if hardness is None else hardness)
     make, parameters = _parameters(surface) if isinstance(surface, Surface) else _of_spectrum(surface, chosen)
     given = parameters | {"E_star": modulus, by: units.number(by, value)}
+    given |= {} if np.equal(cap, np.inf).all() else {"hardness": cap}
     numbers = {name: float(one_number(name, number)) for name, number in given.items()}
     same = {"pressure": "pressure", "separation": "mean_separation"}.get(by, by)
     wanted, batches = [name for name in ANSWERS if name != same], isinstance(surface, Surface)
 
     def found_at(**own: Any) -> Contact:
-        modulus, place = own.pop("E_star"), own.pop(by)
-        return contact(make(**own), **{by: place}, E_star=modulus, theory=chosen)
+        modulus, place, cap = own.pop("E_star"), own.pop(by), own.pop("hardness", np.inf)
+        return contact(make(**own), **{by: place}, E_star=modulus, hardness=cap, theory=chosen)
 
     def answers(moved: Mapping[str, Any]) -> Answers:
         own = {name: moved.get(name, number) for name, number in numbers.items()}
@@ -169,7 +179,7 @@ def sensitivity(
 
 
 def _answers(found: Any, modulus: Any) -> Answers:
-    return {name: getattr(found, name) for name in ANSWERS[:-1]} | {"conductance": found.stiffness / modulus}
+    return {name: getattr(found, name) for name in ANSWERS[:-1]} | {"conductance": found.unloading_stiffness / modulus}
 
 
 def _parameters(surface: Surface) -> tuple[Callable[..., Surface], dict[str, Any]]:
@@ -226,10 +236,10 @@ def _slopes(
     wanted: list[str],
 ) -> tuple[dict[str, dict[str, float]], ...]:
     """Logarithmic derivatives and their errors, by differences at held gaps, and what is held in place of the gap."""
-    theory, batches = known._source.theory, isinstance(known._source.surface, Surface)
+    source, batches = known._source, isinstance(known._source.surface, Surface)
     u, depth = float(known.mean_separation), 1 - float(known.mean_separation / known._source.surface.h_max)
     # at a held pressure or area, the gap moves in place of that: next to last contact what is left to it
-    inverted, near = by in ("pressure", "area"), theory.ends_at_h_max and depth < 0.5
+    inverted, near = by in ("pressure", "area"), source.theory.ends_at_h_max and depth < 0.5
     moving = [name for name in varied if name != by or not inverted] + ["gap"] * inverted
     made = functools.cache(make)
 
@@ -237,7 +247,7 @@ def _slopes(
         shift = [np.exp(np.where(k == place, x, 0.0)) for place in range(len(moving))]
         own = {name: np.full(x.size, number) for name, number in numbers.items()}
         own |= {name: numbers[name] * times for name, times in zip(moving, shift, strict=True) if name != "gap"}
-        modulus, held = own.pop("E_star"), own.pop(by)
+        modulus, held, cap = own.pop("E_star"), own.pop(by), own.pop("hardness", np.full(x.size, np.inf))
         rows = [slice(None)] if batches else [np.array([row]) for row in range(x.size)]
         found = np.empty((len(ANSWERS), x.size))
         for row in rows:
@@ -245,9 +255,12 @@ def _slopes(
             gap = (surface.h_max + held[row]) / 2 if by == "separation" else held[row]
             if inverted:
                 gap = surface.h_max * (1 - depth * shift[-1][row]) if near else u * shift[-1][row]
-            answer = theory.answer(surface, gap)
+            theory: Any = source.theory_at(modulus[row], cap[row])
+            loaded = theory.loaded(surface, gap) if source.yields else None
+            answer = theory.answer(surface, gap) if loaded is None else loaded.answer
             stress = np.stack([answer.pressure, answer.stiffness]) * modulus[row]
-            found[:, row] = gap, stress[0], answer.area, stress[1], answer.stiffness
+            unloading = answer.stiffness if loaded is None else loaded.unloading_stiffness
+            found[:, row] = gap, stress[0], answer.area, stress[1], unloading
         return np.log(found)
 
     # exponents near their end, and cut-offs, which only take waves away

@@ -17,7 +17,8 @@ from mbma_tables.common.arguments import (
     is_labelled,
 )
 from mbma_tables.common.display import shown
-from mbma_tables.common.units import Units, unit_of
+from mbma_tables.common.units import Units, factor, unit_of
+from mbma_tables.materials import ELASTIC_PSI, HARDEST, Pair
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.labels import apply_to_surface
 from mbma_tables.theories.protocol import Theory, TheoryAnswer
@@ -34,12 +35,12 @@ MEANINGS = {
     "energy": "elastic energy per nominal area",
     "mean_pressure": "mean pressure in the contact",
     "yielded": "share of the contact area at the hardness",
-    "incremental_stiffness": "-dF/du per nominal area of a small unloading",
+    "unloading_stiffness": "-dF/du per nominal area of a small unloading",
     "plane_separation": "gap between mean planes",
     "error": "bound on the relative numerical error against the theory",
     "scatter": "standard deviation of ln F at this mean separation from simulation to simulation",
     "area_scatter": "standard deviation of ln A at this force from simulation to simulation",
-    "stiffness_scatter": "standard deviation of ln of the incremental stiffness at this force, likewise",
+    "stiffness_scatter": "standard deviation of ln of the unloading stiffness at this force, likewise",
     "separation_scatter": "standard deviation of the mean separation at this force, likewise",
     "valid": "whether the theory was tested for contacts such as these",
 }
@@ -64,6 +65,8 @@ class Source:
     units: Units
     answer: TheoryAnswer | None = None  # where it is known already
     loaded: Loaded | None = None  # likewise, with a hardness
+    materials: Pair | None = None  # where they are named
+    stated: bool = False  # whether the hardness is, infinite or not
 
     @property
     def yields(self) -> bool:
@@ -100,12 +103,38 @@ class Source:
         return tuple(part[()] for part in block(self.surface, *map(np.asarray, arrays.values())))
 
 
-def concerns(theory: Theory, surface: AnySurface, u: FloatArray, answer: TheoryAnswer) -> dict[str, Any]:
-    """Every reason against a theory's answers, with its mask."""
+def concerns(
+    source: Source, theory: Theory, surface: AnySurface, u: FloatArray, E_star: FloatArray, answer: TheoryAnswer
+) -> dict[str, Any]:
+    """Every reason against answers of a source's theory, perhaps with a hardness, with its mask."""
     steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.pressure))
     text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"
     measured = dict.fromkeys(theory.elastic.departures(surface), np.ones(np.shape(answer.pressure), dtype=bool))
-    return {text: steep, **measured, **theory.concerns(surface, answer, u)}
+    beyond = _beyond_metals(source, theory, surface, E_star, answer)
+    return {text: steep, **measured, **theory.concerns(surface, answer, u), **beyond}
+
+
+def _beyond_metals(
+    source: Source, theory: Theory, surface: AnySurface, E_star: FloatArray, answer: TheoryAnswer
+) -> dict[str, Any]:
+    """Elastic contacts whose pressure the metals named would not bear; without names, no metal."""
+    stress, pair = source.units.stress, source.materials
+    if stress in (None, "1") or (pair is None and source.stated):
+        return {}
+    unit = factor("GPa", stress, "stress")
+    with np.errstate(invalid="ignore"):
+        mean = E_star * answer.pressure / answer.area
+    elastic = np.isinf(getattr(theory, "hardness", np.inf)) & (answer.pressure > 0)
+    if pair is None:
+        text = (
+            f"no hardness is given, and the mean contact pressure is above {HARDEST:g} GPa, the hardness of the "
+            "hardest metal of materials.METALS: give hardness= of the softer body, or infinity where it does not yield"
+        )
+        return {text: elastic & (mean > HARDEST * unit)}
+    soft, hard = pair.softer.hardness
+    needed = f"'{soft:g} GPa'" if soft == hard else f" of its temper, '{soft:g} GPa' to '{hard:g} GPa'"
+    yields = E_star * np.asarray(surface.rms_gradient) > ELASTIC_PSI * soft * unit
+    return {f"{pair.softer.name} yields here: give hardness={needed}": elastic & (yields | (mean > soft * unit))}
 
 
 class _Point(NamedTuple):
@@ -119,7 +148,7 @@ class _Point(NamedTuple):
 class LawPoint(_Point):
     """Where a law has a given pressure: separation d, mean separation u, A/A0, -dF/du and F/A0, of its shape.
 
-    `units` are the law's. What yields, and the incremental stiffness with it, no law holds: `contact` answers that.
+    `units` are the law's. What yields no law holds: `contact` answers that.
     """
 
     units = Units()

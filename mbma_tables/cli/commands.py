@@ -16,6 +16,7 @@ from mbma_tables.cli.progress import echo
 from mbma_tables.common.arguments import finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import unit_of
+from mbma_tables.materials import hardness_in
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.cases import CASES
 from mbma_tables.surfaces.surface import Surface
@@ -46,7 +47,7 @@ def contact_keywords(model: options.Model, specimen: Specimen) -> dict[str, Any]
     """Keywords for `contact`."""
     asked = {**vars(model), "E_star": 1.0 if specimen.E_star is None else specimen.E_star}
     cap = asked.pop("hardness")
-    return asked if cap == math.inf else asked | {"hardness": specimen.units.number("hardness", cap)}
+    return asked if cap is None else asked | {"hardness": hardness_in(specimen.units, cap)}
 
 
 @click.command("contact", short_help="Force and area at given gaps, pressures or areas.")
@@ -86,8 +87,9 @@ def contact_command(
     from mbma_tables.answers.contact import contact
 
     asked = _numbers(name, numbers, specimen, over_h_rms)
-    answer = contact(specimen.surface, **{name: asked}, **contact_keywords(model, specimen))
-    yields = ("yielded", "incremental_stiffness") if model.hardness != math.inf else ()
+    keywords = contact_keywords(model, specimen) | {"E_star": specimen.modulus}
+    answer = contact(specimen.surface, **{name: asked}, **keywords)
+    yields = ("yielded", "unloading_stiffness") if model.yields else ()
     values = {column: getattr(answer, column) for column in (*COLUMNS[:-1], "stiffness", *yields, COLUMNS[-1])}
     values |= {"scatter": answer.scatter, "area_scatter": answer.area_scatter}
     values["valid"] = np.where(answer.valid, "yes", "no")
@@ -153,7 +155,7 @@ def curve_command(
     gap = curve_gaps(float(surface.h_max), points)
     if model.theory != "mbma":
         gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).pressure)]
-    answer = contact(surface, separation=gap, **asked)
+    answer = contact(surface, separation=gap, **asked | {"E_star": specimen.modulus})
     values = {name: getattr(answer, name) for name in COLUMNS} | (_leakage(answer) if leakage else {})
     units = {}
     others = {
@@ -165,7 +167,7 @@ def curve_command(
         for quantity in ("pressure", "area"):
             values[f"{theory}_{quantity}"] = getattr(line, quantity)
             units[f"{theory}_{quantity}"] = shown_unit(quantity, specimen.units)
-    title = specimen.title + (f", hardness {model.hardness}" if model.hardness != math.inf else "")
+    title = specimen.title + (f", hardness {model.hardness}" if model.yields else "")
     picture = b"" if plot is None else _draw(specimen, answer, others, plot.suffix[1:], leakage, title)
     report_answer("curve", specimen, model, answer, values, units).write(output, plot, picture)
 

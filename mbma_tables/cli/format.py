@@ -6,7 +6,6 @@ import csv
 import dataclasses
 import io
 import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -203,7 +202,7 @@ def report_answer(
     notes += [f"theory {model.theory}{made}; {scale}", "error: relative, numerical, beside the theory's scatter"]
     if hasattr(answer, "elastic_hardness"):
         limit = f"{answer.elastic_hardness:.4g} {specimen.stress_unit or ''}".rstrip()
-        if model.hardness == math.inf:
+        if not model.yields:
             notes.append(f"elastic: area within 5% for hardnesses from {limit} on")
         else:
             notes.append(f"hardness {model.hardness}: psi {answer.psi:.3g}, elastic up to 1.1 (from {limit} on)")
@@ -217,7 +216,7 @@ def report_answer(
         "variant": answer.variant or None,
         "island_model": answer.island_model or None,
         "rtol": model.rtol if model.theory == "mbma" else None,
-        "hardness": None if model.hardness == math.inf else model.hardness,
+        "hardness": model.hardness if model.yields else None,
         "E_star": specimen.E_star,
         "stress_unit": specimen.stress_unit,
         "surface": surface,

@@ -45,7 +45,12 @@ class Model:
     variant: str
     rtol: float
     theory: Any = None  # a name; by the surface where none is given
-    hardness: float | str = math.inf
+    hardness: float | str | None = None
+
+    @property
+    def yields(self) -> bool:
+        """Whether there is a hardness, and not an infinite one."""
+        return self.hardness not in (None, math.inf)
 
     def of(self, surface: AnySurface) -> Model:
         """The same with a theory by name."""
@@ -211,7 +216,8 @@ _SPECIMEN_OPTIONS = (
     _option("shortest", "or shortest wave [length],"),
     _option("Sds", "or summits per area [1/length^2],"),
     _option("Spd", "the same by its newer name;"),
-    _option("Sp", "highest point of a map [length] in place of --h-max."),
+    _option("Sp", "highest point of a map [length] in place of --h-max,"),
+    _option("nominal_area", "or the nominal area [length^2], of which the highest point follows."),
     _option("E_star", "Effective modulus; export needs one, elsewhere forces are over E* without it."),
     _option("E1", "Instead of --E-star: Young's modulus,"),
     _option("nu1", "and Poisson's ratio of one body,", type=float),
@@ -261,7 +267,13 @@ theory_option = _option(
 )
 # of islands, which MBMA alone has
 model_options = _group("model", lambda given: Model(**given), *_MODEL_OPTIONS)
-hardness_option = _option("hardness", "Largest pressure that the softer body bears; none: elastic.")
+hardness_option = _option(
+    "hardness",
+    "Largest pressure that the softer body bears, also '200 HV', '58 HRC' or 'steel 4140 hard'; none: elastic.",
+    callback=lambda ctx, param, given: given if given and given[0].isalpha() and given != "inf"
+    else _parse_number(ctx, param, given),
+    metavar="X[UNIT]",
+)  # fmt: skip
 theory_options = _group("model", lambda given: Model(**_given(given)), theory_option, *_MODEL_OPTIONS, hardness_option)
 
 output_options = _group(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import click
@@ -44,12 +43,7 @@ def sensitivity_command(
 
     model = model.of(specimen.surface)
     asked = vars(model).copy()
-    if asked.pop("hardness") != math.inf:
-        raise InputError("sensitivity is of elastic contacts: leave --hardness out")
-    modulus: Any = 1.0 if specimen.E_star is None else specimen.E_star
-    if specimen.stress_unit is not None:
-        modulus = f"{modulus!r} {specimen.stress_unit}"
-    found = sensitivity(specimen.surface, **loads, E_star=modulus, ranges=dict(map(_pair, ranges)), **asked)
+    found = sensitivity(specimen.surface, **loads, E_star=specimen.modulus, ranges=dict(map(_pair, ranges)), **asked)
     parameters = list(found.parameters)
     columns = [
         Column("parameter", "-", parameters),

@@ -16,7 +16,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, factor, in_unit, resolve
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import contact_law
-from mbma_tables.materials import ELASTIC_PSI
+from mbma_tables.materials import ELASTIC_PSI, hardness_in
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories.mbma import Mbma, chosen_theory
@@ -61,7 +61,7 @@ class Joint:
         if self.hardness < np.inf:
             plastic = (
                 f"hardness = {self.hardness:.10g} {stress}, plasticity index {gradient / self.hardness:.3g}: "
-                "loading only, unloading starts with the incremental stiffness"
+                "loading only, not for unloading, which is stiffer"
             )
         return (
             f"Contact law of a rough surface, {model}; mbma_tables {__version__}",
@@ -185,7 +185,7 @@ def frozen_joint(
     if surface.shape != ():
         raise InputError("a contact law is of one surface, not of a batch")
     modulus = number_in("E_star", plain["E_star"], 1e-300, 1e300)
-    cap = Units(length, stress).number("hardness", hardness)
+    cap = hardness_in(Units(length, stress), hardness)
     own = chosen_theory(surface, theory, variant=variant)
     law = contact_law(surface, own, rtol=LAW_RTOL, E_star=modulus, hardness=cap)
     law = dataclasses.replace(law, units=Units(length, stress))

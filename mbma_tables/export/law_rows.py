@@ -87,7 +87,7 @@ def _curve(joint: Joint, quantity: str, max_overclosure: float, k_s: float) -> t
         open_ = np.append(True, (np.diff(pressure) > 0) & (flow[:-1] > 0))
         return pressure[open_], flow[open_]
     if joint.hardness < np.inf:
-        stiffness[1:] = joint.answer(law.h_max - c[1:]).incremental_stiffness
+        stiffness[1:] = joint.answer(law.h_max - c[1:]).unloading_stiffness
     rises = np.concatenate([[True], np.diff(pressure) > 0])
     return pressure[rises], np.asarray(conductance(stiffness, k_s, joint.modulus))[rises]
 

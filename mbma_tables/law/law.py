@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
-import functools
 import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -19,18 +18,16 @@ from mbma_tables.answers.source import MEANINGS, LawPoint, LawValues
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, require
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
 from mbma_tables.common.units import UNKNOWN, Units, unit_of
 from mbma_tables.core import core, in_blocks
 from mbma_tables.law import block as at
-from mbma_tables.law.block import AREA, FORCE, QUANTITIES, inverse_block, softening
+from mbma_tables.law.block import AREA, FORCE, QUANTITIES, inverse_block
+from mbma_tables.law.derived import Derived
+from mbma_tables.materials import Pair
 from mbma_tables.surfaces.any_surface import AnySurface
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from scipy import LowLevelCallable
-
-    from mbma_tables.law.leakage import LeakageLaw
 
     class Law:
         """As `core/binding.c` has it, which answers floats and small arrays without Python."""
@@ -49,11 +46,10 @@ BLOCK = 1 << 16  # gaps between two looks for Ctrl-C
 SHOWN_POINTS = 200  # separations of a law as a Dataset, and of its picture
 SPACED = (1e-3, 0.2)  # of the way down: geometric up to here, then even
 ROUNDING = 4 * float(np.finfo(float).eps)
-DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polynomials'
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class ContactLaw(Law, Displayed):
+class ContactLaw(Law, Derived, Displayed):
     """Pressure and area of one surface against its gap; made by `contact_law`, picklable, tens of kB with its surface.
 
     Every method takes the mean separation u, or ``separation=``, MBMA's d: numbers in the law's unit of length, or
@@ -82,6 +78,12 @@ class ContactLaw(Law, Displayed):
         Of lengths and stresses, as far as the surface and the modulus knew theirs.
     surface : Surface
         Whose law it is.
+    hardness : float
+        Infinite where nothing yields.
+    elastic : callable or None
+        With a hardness, what makes the law of the elastic contact.
+    materials : Pair or None
+        Where they are named.
 
     Examples
     --------
@@ -109,6 +111,9 @@ class ContactLaw(Law, Displayed):
     errors: FloatArray
     units: Units = UNKNOWN
     surface: AnySurface | None = None
+    hardness: float = math.inf
+    elastic: Callable[[], ContactLaw] | None = None
+    materials: Pair | None = None
 
     @property
     def rows(self) -> Any:
@@ -253,30 +258,6 @@ class ContactLaw(Law, Displayed):
             made[name] = inverse_block(which, self.block, self.lowest if turn is None else turn)
         return made[name]
 
-    @functools.cached_property
-    def softening(self) -> float | None:
-        """Mean separation u [length] below which stiffness falls with compression; None where it rises to the end."""
-        noise = DIGITS * self.error
-        return softening(lambda u: self.stiffness(u), self.h_max, max(self.lowest, -self.h_max), noise)
-
-    @functools.cached_property
-    def leakage(self) -> LeakageLaw:
-        """Flow conductance at a mean separation, ``separation=`` or ``pressure=``, a `LeakageLaw`; made when read.
-
-        Examples
-        --------
-        >>> from mbma_tables import Surface, contact_law
-        >>> seal = Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5, unit="um")
-        >>> law = contact_law(seal, E_star="10 MPa", theory="calibrated")
-        >>> f"{law.leakage(pressure='0.05 MPa'):.1g} um^3"
-        '0.001 um^3'
-        """
-        from mbma_tables.law.leakage import leakage_law
-
-        if self.surface is None:
-            raise InputError("leakage needs the surface, which this law does not hold")
-        return leakage_law(self, self.surface)
-
     def slope_error(self, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None) -> Any:
         """Bound on the error of `stiffness` over 2F/l, and of `area_slope` over A/l, against those of the theory.
 
@@ -320,15 +301,6 @@ class ContactLaw(Law, Displayed):
         pressure, area, stiffness, energy = self.values(separation=d)
         values = (d, (d + self.h_max) / 2, pressure, area, stiffness, energy)
         return {n: Variable(v, unit_of(n, self.units), MEANINGS[n]) for n, v in zip(names, values, strict=True)}
-
-    def _figure(self) -> Figure:
-        held = self._variables()
-        unit = self.units.length or "length"
-        curve = Curve(
-            theory_label(self.theory), *(held[name].values for name in ("mean_separation", "pressure", "area"))
-        )
-        label = pressure_label(unit_of("pressure", self.units))
-        return draw_compression([curve], pressure_label=label, gap_label=f"mean separation u [{unit}]")
 
     def compiled(self, quantity: str = "pressure") -> LowLevelCallable:
         """A quantity at a separation as a function of C, ``double (double, void *)``, which scipy calls without Python.

@@ -6,9 +6,10 @@ the polynomials and bounds their errors.
 
 from __future__ import annotations
 
+import functools
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from mbma_tables.common.units import modulus_and_units
 from mbma_tables.law import block as at
 from mbma_tables.law import pieces as fit
 from mbma_tables.law.law import ROUNDING, ContactLaw
+from mbma_tables.materials import Metal, Pair, bodies, hardness_in
 from mbma_tables.models import MAX_RTOL, MIN_RTOL, AnyModel
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -51,7 +53,8 @@ def contact_law(
     island_model: str | AnyModel = "universal",
     variant: str | Variant = "reported",
     E_star: float | str = 1.0,
-    hardness: float | str = math.inf,
+    hardness: float | str | None = None,
+    materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
 ) -> ContactLaw:
     """Force and area of one surface as functions of its gap: the way to answer many gaps, and to invert.
 
@@ -66,7 +69,7 @@ def contact_law(
         tenth of its own error, the median over gaps, is asked of another theory's.
     island model, variant, E_star
         As for `contact`; `island_model` may be an island model of one's own.
-    hardness : float
+    hardness, materials : optional
         As for `contact`: the law of loading. Its `energy` is then the work of loading, not what unloading gives back.
 
     Returns
@@ -90,16 +93,20 @@ def contact_law(
     >>> f"{persson.pressure(2.0):.4g}, {persson.at_pressure(1e-4).mean_separation:.3f}"
     '0.0001832, 2.276'
     """
+    E_star, hardness, pair = bodies(materials, E_star, hardness)
     given, units = modulus_and_units(E_star, surface)
     modulus = number_in("E_star", given, sys.float_info.min, sys.float_info.max)
     chosen = chosen_theory(surface, theory, island_model=island_model, variant=variant)
-    if hardness is not math.inf:
-        cap = checked_hardness(units.number("hardness", hardness))
+    yields: dict[str, Any] = {}
+    if hardness is not None and hardness is not math.inf:
+        cap = checked_hardness(hardness_in(units, hardness))
         if cap.ndim:
             raise InputError(f"hardness must be one number, got shape {cap.shape}: a law is of one surface")
         if cap < math.inf:
             from mbma_tables.theories.yielding import Yielding
 
+            elastic = functools.partial(contact_law, surface, chosen, rtol=rtol, E_star=modulus)
+            yields = {"hardness": float(cap), "elastic": elastic}
             chosen = Yielding(chosen, float(cap) / modulus)
     one = surface
     if one.labelled:
@@ -107,7 +114,7 @@ def contact_law(
     if one.shape != ():
         raise InputError(f"a law is of one surface, got a batch of shape {one.shape}")
     asked = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
-    facts = {"surface": one, "E_star": modulus, "units": units}
+    facts = {"surface": one, "E_star": modulus, "units": units, "materials": pair, **yields}
     if isinstance(chosen, Mbma):
         return _mbma_law(one, chosen.island_model, chosen.variant, asked, facts)
     try:

@@ -11,6 +11,7 @@ import numpy as np
 from mbma_tables.common.arguments import finite_array, nearest, number_in, require, whole_number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, in_unit, known, modulus_and_units
+from mbma_tables.materials import hardness_in
 from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.theories import THEORIES, get_theory
 from mbma_tables.theories.mbma import theory_name
@@ -160,8 +161,9 @@ class Problem:
         surface = in_unit(self.surface, unit)
         E_star, units = modulus_and_units(self.E_star, surface, self.stress_unit)
         derived = {"surface": surface, "E_star": E_star, "units": units, "length_unit": surface.unit}
-        for name in ("separations", "mean_separations", "pressures", "deltas", "hardness"):
+        for name in ("separations", "mean_separations", "pressures", "deltas"):
             derived[name] = units.number(name, getattr(self, name))
+        derived["hardness"] = hardness_in(units, self.hardness)
         if self.conductivities is not None:
             derived["conductivities"], derived["conductance_unit"] = units.conductivities(*self.conductivities)
         for name, value in derived.items():

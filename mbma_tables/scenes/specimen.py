@@ -57,6 +57,12 @@ class Specimen:
         """Of its lengths and stresses."""
         return Units(self.surface.unit, "1" if self.E_star is None else self.stress_unit)
 
+    @property
+    def modulus(self) -> float | str:
+        """E* for `contact`: with its unit where that is known, 1 where there is none."""
+        number = 1.0 if self.E_star is None else self.E_star
+        return number if self.stress_unit is None else f"{number!r} {self.stress_unit}"
+
     def in_units(self, length: str | None, stress: str | None) -> Specimen:
         """The same in units asked for: converted from those that are known, said to be in them otherwise."""
         modulus, unit = self.E_star, self.stress_unit
@@ -103,17 +109,19 @@ def from_numbers(
     given: Mapping[str, Any], unit: str | None = None, title: str = "surface given by numbers"
 ) -> Specimen:
     """The surface with one complete set of numbers, plain ones in `unit`."""
-    if set(given) & set(ROUGHNESS):
+    if set(given) & set(ROUGHNESS) - {"nominal_area"}:
         alien = set(given) - {*ROUGHNESS, "hurst", "h_max"}
         if alien:
             raise InputError(
                 f"{', '.join(alien)} beside numbers of a drawing: leave them out, or give longest or shortest"
             )
         return Specimen(Surface.from_roughness(**{"hurst": None, **given}, unit=unit), title)
-    if set(given) not in (set(PARAMETERS), set(MAGNIFICATION), set(MOMENTS)):
+    if {"h_max" if key == "nominal_area" else key for key in given} not in map(
+        set, (PARAMETERS, MAGNIFICATION, MOMENTS)
+    ):
         raise InputError(
             f"a surface needs {', '.join(PARAMETERS)} (or zeta_1 for q1), or {', '.join(MOMENTS)}, or "
-            f"roughness (Rq, ...); got {', '.join(given) or 'none of them'}"
+            f"roughness (Rq, ...), with h_max or nominal_area; got {', '.join(given) or 'none of them'}"
         )
     plain, unit = resolve(given, unit)
     numbers = {key: one_number(key, value) for key, value in plain.items()}

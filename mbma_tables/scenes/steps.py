@@ -104,7 +104,7 @@ def _keep(run: Run, quantity: Callable[[str], Any]) -> None:
 
             assert problem.conductivities is not None
             # yielded points unload elastically
-            slope = quantity("stiffness" if problem.hardness is None else "incremental_stiffness")
+            slope = quantity("stiffness" if problem.hardness is None else "unloading_stiffness")
             values[name] = conductance(slope, mean_conductivity(*problem.conductivities), problem.E_star)
         elif name in wanted and not (name == "area" and "subscale_area" in problem.dropped):
             values[name] = quantity(name)
@@ -126,7 +126,7 @@ def _contact(run: Run, step: Step) -> None:
     run.gap = found.separation
     _keep(run, lambda name: getattr(found, name))
     if problem.hardness is not None:
-        names = ("yielded", "mean_pressure", "plane_separation", "incremental_stiffness")
+        names = ("yielded", "mean_pressure", "plane_separation", "unloading_stiffness")
         run.found |= {name: (("gap",), getattr(found, name)) for name in names}
     run.close(step, float(found.error.max()), step.island_model_name)
 

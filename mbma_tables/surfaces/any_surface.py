@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import dataclasses
 import functools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -165,13 +166,15 @@ class AnySurface(Displayed, abc.ABC):
         label = f"wavenumber q [1/{length}]"
         return draw_lines({"spectrum": (q, self.power_spectrum(q))}, label, f"spectrum C(q) [{length}^4]")
 
-    def combined(self, other: AnySurface) -> Any:
+    def combined(self, other: AnySurface, nominal_area: float | str | None = None) -> Any:
         """The one rough surface that stands for two that touch: spectra add, heights convolve.
 
         Parameters
         ----------
         other : AnySurface
             The other surface; both are independent of each other.
+        nominal_area : float or str, optional
+            A0 [length^2], of which the highest point is taken, as for `Surface`.
 
         Returns
         -------
@@ -193,4 +196,5 @@ class AnySurface(Displayed, abc.ABC):
         >>> f"h_rms = {both.h_rms:.2f}, h_max = {both.h_max:.1f}, q from {both.q0:g} to {both.q1:g}"
         'h_rms = 5.00, h_max = 15.0, q from 0.01 to 5'
         """
-        return self.sampled().added(other.sampled())
+        both = self.sampled().added(other.sampled())
+        return both if nominal_area is None else dataclasses.replace(both, h_max=None, nominal_area=nominal_area)

@@ -21,7 +21,8 @@ HEIGHTS = ("Rq", "Ra", "Sq", "Sa")
 SLOPES = ("Rdq", "Sdq", "Rsm")
 SUMMITS = ("Sds", "Spd")
 WAVES = ("longest", "shortest")
-ROUGHNESS = (*HEIGHTS, *SLOPES, *SUMMITS, *WAVES, "Sp")
+TOPS = ("h_max", "Sp", "nominal_area")
+ROUGHNESS = (*HEIGHTS, *SLOPES, *SUMMITS, *WAVES, *TOPS[1:])
 ASSUMED = "heights are Gaussian and the surface is isotropic: measure a map of a ground, milled or worn face"
 SAID = {
     "Rq": "h_rms = Rq: the profile is long and held no filter that takes out waves of the surface",
@@ -39,6 +40,7 @@ SAID = {
     "shortest": "q1 = 2 pi/shortest: no roughness of shorter waves",
     "hurst": "the spectrum is one power law with this Hurst exponent between its longest and its shortest wave",
     "h_max": "contact begins at h_max above the mid-plane",
+    "nominal_area": "contact begins at the highest point of a Gaussian surface of this area, the median",
     "Sp": "h_max = Sp: contact begins at the highest point of the map, which a larger one would exceed",
 }
 TYPICAL = "of Gaussian heights 3 to 4.5 times the rms height, near sqrt(2 ln N) times it of N independent points"
@@ -58,7 +60,7 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
     height = _one_of(HEIGHTS, given, "the height of roughness")
     slope = _one_of(SLOPES, given, "the slope of roughness", needed=False)
     summits = _one_of(SUMMITS, given, "the density of summits", needed=False)
-    top = _one_of(("h_max", "Sp"), given, f"the highest point, which Rq and Ra do not tell ({TYPICAL})")
+    top = _one_of(TOPS, given, f"the highest point, which Rq and Ra do not tell ({TYPICAL})")
     if "hurst" not in given:
         raise InputError(
             "hurst is missing: a drawing does not tell it; 0.8 is common, and `sensitivity` says what it costs"
@@ -79,7 +81,8 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
     assert top is not None
     h_rms = at[height] * (math.sqrt(math.pi / 2) if height in ("Ra", "Sa") else 1.0)
     said = f" [{unit}]" if unit else ""
-    require(f"{top}{said}", at[top], at[top] > h_rms, f"above the rms height; {TYPICAL}")
+    if top != "nominal_area":
+        require(f"{top}{said}", at[top], at[top] > h_rms, f"above the rms height; {TYPICAL}")
     if slope is None:
         long, short = at["longest"], at["shortest"]
         few = long <= spectrum.MIN_ZETA_1 * short
@@ -93,7 +96,8 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
         "unit": unit,
         "assumed": [ASSUMED, *(SAID[name] for name in used)],
     }
-    surface = {"hurst": at["hurst"], "q0": q0, "q1": q1, "h_rms": h_rms, "h_max": at[top]}
+    surface = {"hurst": at["hurst"], "q0": q0, "q1": q1, "h_rms": h_rms}
+    surface[top if top == "nominal_area" else "h_max"] = at[top]
     return surface | {"unit": unit, "provenance": (record,)}
 
 

@@ -17,6 +17,7 @@ from mbma_tables.common.units import Units
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.cases import get_case
+from mbma_tables.surfaces.extremes import of_area
 from mbma_tables.surfaces.roughness import surface_of_roughness
 
 if TYPE_CHECKING:
@@ -34,15 +35,20 @@ class SelfAffine(AnySurface):
     q0: Any
     q1: Any
     h_rms: Any
-    h_max: Any
+    h_max: Any = None
     parameters = PARAMETERS
     unit: str | None = dataclasses.field(default=None, kw_only=True)
     fit: SpectrumFit | None = dataclasses.field(default=None, repr=False, kw_only=True)
     provenance: tuple[Mapping[str, Any], ...] = dataclasses.field(default=(), repr=False, kw_only=True)
+    nominal_area: dataclasses.InitVar[Any] = dataclasses.field(default=None, kw_only=True)
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, nominal_area: Any) -> None:
         units = Units(self.unit)
         object.__setattr__(self, "unit", units.length)
+        if nominal_area is not None:
+            self._reach(nominal_area)
+        elif self.h_max is None:
+            raise InputError("h_max is missing: the highest point above the mid-plane, or give the nominal_area")
         if self.labelled:
             for name in PARAMETERS:
                 units.number(name, getattr(self, name))
@@ -61,6 +67,16 @@ class SelfAffine(AnySurface):
         require("q1/q0", zeta_1, zeta_1 > spectrum.MIN_ZETA_1, "greater than 3: q1 is the largest wavenumber")
         require("q1/q0", zeta_1, zeta_1 <= spectrum.MAX_ZETA_1, "at most 1e8")
 
+    def _reach(self, nominal_area: Any) -> None:
+        """Set the highest point of a Gaussian surface of that area."""
+        units = Units(self.unit)
+        numbers = [units.number(name, getattr(self, name)) for name in PARAMETERS[:-1]]
+        # what follows from the other numbers, checked as they are
+        like = dataclasses.replace(self, **dict(zip(PARAMETERS, [*numbers, 1.0], strict=True)), nominal_area=None)
+        found = of_area(like, nominal_area, self.h_max)
+        for name, value in zip(("h_max", "provenance"), found, strict=True):
+            object.__setattr__(self, name, value)
+
     def __repr__(self) -> str:
         numbers = [f"{name}={_shown(getattr(self, name))}" for name in PARAMETERS]
         return f"Surface({', '.join([*numbers, *([f'unit={self.unit!r}'] if self.unit else [])])})"
@@ -73,7 +89,15 @@ class SelfAffine(AnySurface):
     @classmethod
     @hinted
     def from_moments(
-        cls, *, hurst: ArrayLike, m0: ArrayLike, m2: ArrayLike, m4: ArrayLike, h_max: ArrayLike, unit: str | None = None
+        cls,
+        *,
+        hurst: ArrayLike,
+        m0: ArrayLike,
+        m2: ArrayLike,
+        m4: ArrayLike,
+        h_max: ArrayLike | None = None,
+        nominal_area: ArrayLike | str | None = None,
+        unit: str | None = None,
     ) -> Self:
         """The surface with these spectral moments (Eqs. 1, 7).
 
@@ -83,8 +107,8 @@ class SelfAffine(AnySurface):
             Hurst exponent, in (0, 1].
         m0, m2, m4 : array_like
             Variance of height [length^2], of a profile's slope, of its second derivative [1/length^2].
-        h_max : array_like
-            Height of the highest point above the mid-plane [length].
+        h_max, nominal_area : array_like, one of them
+            Height of the highest point above the mid-plane [length]; or A0 [length^2], as for `Surface`.
         unit : str, optional
             The unit of length.
 
@@ -105,7 +129,8 @@ class SelfAffine(AnySurface):
         >>> print(f"zeta_1 = {road.zeta_1:.4f}, q0 = {road.q0:.6f}")
         zeta_1 = 64.8598, q0 = 0.538132
         """
-        return cls(hurst, *spectrum.band_from_moments(hurst, m0, m2, m4), h_max, unit=unit)
+        band = spectrum.band_from_moments(hurst, m0, m2, m4)
+        return cls(hurst, *band, h_max, unit=unit, nominal_area=nominal_area)
 
     @classmethod
     @hinted
@@ -126,6 +151,7 @@ class SelfAffine(AnySurface):
         Spd: Any = None,
         longest: Any = None,
         shortest: Any = None,
+        nominal_area: Any = None,
         unit: str | None = None,
     ) -> Self:
         """The self-affine surface that numbers of a drawing or a profilometer describe.
@@ -139,8 +165,8 @@ class SelfAffine(AnySurface):
         ----------
         hurst : array_like
             Hurst exponent, in (0, 1].
-        h_max, Sp : array_like, one of them
-            Height of the highest point above the mid-plane [length].
+        h_max, Sp, nominal_area : array_like, one of them
+            Height of the highest point above the mid-plane [length], or A0 [length^2], as for `Surface`.
         Rq, Ra, Sq, Sa : array_like, one of them
             Root-mean-square or mean absolute height of a profile or of a map [length].
         Rdq, Sdq, Rsm : array_like, one of them, optional

@@ -17,6 +17,7 @@ from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.units import Units
 from mbma_tables.laws.bearing_curve import Bearing, RadialSpectrum
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.extremes import of_area
 from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.power_laws import PowerLaws, two_columns
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
@@ -64,6 +65,8 @@ class SpectralSurface(AnySurface):
         The unit of length, such as "um"; None where it is not known. Results carry it.
     provenance : sequence of mapping, optional
         What was done to the measurement, a plain record each step: {"step": "detrend", "kind": "plane"}, ...
+    nominal_area : float or str, optional
+        Instead of h_max, as for `Surface`.
 
     Raises
     ------
@@ -90,8 +93,9 @@ class SpectralSurface(AnySurface):
     anisotropy: float | None = None
     unit: str | None = None
     provenance: tuple[Mapping[str, Any], ...] = ()
+    nominal_area: dataclasses.InitVar[Any] = None
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, nominal_area: Any) -> None:
         q, C = two_columns(self.q, self.C)
         require("q", q, q > 0, "positive (leave q = 0 out)")
         require("q", q, np.diff(q, prepend=q[0]) >= 0, "rising")
@@ -117,13 +121,20 @@ class SpectralSurface(AnySurface):
         )
         if not all(math.isfinite(m) and m > 0 for m in (self.m0, self.m2, self.m4)):
             raise OutOfRangeError("the spectrum's moments overflow or vanish: choose another length unit")
+        object.__setattr__(self, "unit", Units(self.unit).length)
+        if nominal_area is not None:
+            for name, value in zip(("h_max", "provenance"), of_area(self, nominal_area, self.h_max), strict=True):
+                object.__setattr__(self, name, value)
+            if self.heights is not None and self.heights.is_gaussian:
+                object.__setattr__(self, "heights", None)
         if self.heights is None:
             if self.h_max is None:
-                raise InputError("h_max is missing: the highest point above the mid-plane, or heights= of the surface")
+                raise InputError(
+                    "h_max is missing: the highest point above the mid-plane, heights= of the surface, or nominal_area"
+                )
             object.__setattr__(self, "heights", Heights.gaussian(self.h_rms, one_height(self.h_max)))
         object.__setattr__(self, "h_max", self.heights.h_max if self.h_max is None else one_height(self.h_max))
         object.__setattr__(self, "provenance", tuple(self.provenance))
-        object.__setattr__(self, "unit", Units(self.unit).length)
 
     def __repr__(self) -> str:
         numbers = f"h_rms={self.h_rms:.4g}, h_max={self.h_max:.4g}, rms gradient {self.rms_gradient:.4g}"

@@ -32,8 +32,8 @@ class Surface(SelfAffine):
         Smallest and largest wavenumber, 1/length, with 3 < q1/q0 <= 1e8.
     h_rms : array_like
         Root-mean-square height, length.
-    h_max : array_like
-        Height of the highest point above the mid-plane, length; contact starts there.
+    h_max, nominal_area : array_like, one of them
+        Highest point above the mid-plane, length; or A0, length^2, from which `surfaces.extremes` takes its median.
     unit : str, optional
         The unit of length, such as "um"; None where it is not known. Results carry it.
     fit : SpectrumFit, optional
@@ -68,6 +68,7 @@ class Surface(SelfAffine):
         C: ArrayLike,
         *,
         h_max: float | None = None,
+        nominal_area: float | str | None = None,
         heights: ArrayLike | None = None,
         convention: str = "paper",
         unit: str | None = None,
@@ -83,8 +84,8 @@ class Surface(SelfAffine):
         C : array_like, shape (n,)
             Spectrum [length^4; a profile's length^3], not negative; a power law is taken between neighbours. A fit
             leaves out what a masked array hides.
-        h_max : float, optional
-            Height of the highest point above the mid-plane [length]; that of `heights` if not given.
+        h_max, nominal_area : float, optional
+            As for `Surface`; h_max is that of `heights` if neither is given.
         heights : array_like, optional
             Heights measured anywhere on the surface [length], of any shape; their mean is taken off. A Gaussian that
             ends at h_max if not given.
@@ -126,9 +127,11 @@ class Surface(SelfAffine):
             from mbma_tables.surfaces.psd import fit_psd
 
             top = Heights.of(heights).h_max if h_max is None and heights is not None else h_max
-            return cls(**fit_psd(q, C, top, convention, band), unit=unit)
+            numbers = fit_psd(q, C, top if nominal_area is None else 1.0, convention, band)
+            numbers |= {} if nominal_area is None else {"h_max": h_max, "nominal_area": nominal_area}
+            return cls(**numbers, unit=unit)
         known = None if heights is None else Heights.of(heights)
-        return MeasuredSurface(*sorted_spectrum(q, C, convention), h_max, known, unit=unit)
+        return MeasuredSurface(*sorted_spectrum(q, C, convention), h_max, known, unit=unit, nominal_area=nominal_area)
 
     @classmethod
     @hinted
@@ -239,6 +242,7 @@ class Surface(SelfAffine):
         periodic: bool | None = None,
         detrend: str | None = None,
         h_max: float | None = None,
+        nominal_area: float | str | None = None,
         extrapolate_to: Any = None,
         extrapolate_hurst: float | None = None,
         outliers: float | None = None,
@@ -262,9 +266,8 @@ class Surface(SelfAffine):
             Sampling step [length], of an array.
         periodic, detrend, extrapolate_to, extrapolate_hurst, outliers ... channel
             As for `from_map`; `tip_radius` is the stylus's.
-        h_max : float, optional
-            Height of the highest point above the mid-plane [length]; by default the line's, which lies below that of a
-            surface.
+        h_max, nominal_area : float, optional
+            As for `Surface`; by default h_max is the line's, which lies below that of a surface.
 
         Returns
         -------
@@ -290,8 +293,9 @@ class Surface(SelfAffine):
         from mbma_tables.surfaces.maps import prepared
         from mbma_tables.surfaces.resolution import measured_surface
 
-        treated = prepared(heights, treatment, 1)
-        return MeasuredSurface.of(measured_surface(treated, h_max, extrapolate_to, extrapolate_hurst))
+        known = measured_surface(prepared(heights, treatment, 1), h_max, extrapolate_to, extrapolate_hurst)
+        given = known.h_max if nominal_area is None else h_max
+        return dataclasses.replace(MeasuredSurface.of(known), h_max=given, nominal_area=nominal_area)
 
     def sampled(self) -> MeasuredSurface:
         """The same surface by its spectrum, two samples of which hold all of it; of a batch there are none."""

@@ -96,7 +96,7 @@ class Loaded:
         return np.where(np.isinf(self.eta) | (self.answer.area == 0), 0.0, share)
 
     @property
-    def incremental_stiffness(self) -> FloatArray:
+    def unloading_stiffness(self) -> FloatArray:
         """-dF/du of the frozen contact over A0 E* [1/length]."""
         return np.asarray(self.elastic.stiffness * law.frozen_factor(self.eta))
 

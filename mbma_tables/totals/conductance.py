@@ -1,6 +1,6 @@
 """Conductance of a contact from its incremental stiffness (Barber 2003), thermal or electrical; older correlations.
 
-Where the contact yields the incremental stiffness is that of the frozen contact, `Contact.incremental_stiffness`. The
+Where the contact yields the incremental stiffness is that of the frozen contact, `Contact.unloading_stiffness`. The
 slope of the loading curve is less, by up to ten times: yielded points do not unload along it.
 """
 

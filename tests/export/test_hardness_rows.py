@@ -33,5 +33,5 @@ def test_conductance_is_not_the_slope_of_loading():
     )  # fmt: skip
     some = law.x > 2.0
     found = contact(SURFACE, pressure=law.x[some], E_star=100e3, theory="calibrated", hardness=1500.0)
-    assert law.y[some] == pytest.approx(conductance(found.incremental_stiffness, 20.0, 100e3), rel=1e-2)
-    assert (np.asarray(found.incremental_stiffness) > 1.1 * found.stiffness).all()
+    assert law.y[some] == pytest.approx(conductance(found.unloading_stiffness, 20.0, 100e3), rel=1e-2)
+    assert (np.asarray(found.unloading_stiffness) > 1.1 * found.stiffness).all()

@@ -24,12 +24,12 @@ def test_a_scene_yields_as_contact_does(theory):
     assert step.error < 1e-4
     found = scene.run()
     known = contact(SURFACE, pressure=KNOWN["pressures"], E_star=100e3, hardness=1500.0, theory=theory)
-    for name in ("area", "yielded", "mean_pressure", "plane_separation", "incremental_stiffness"):
+    for name in ("area", "yielded", "mean_pressure", "plane_separation", "unloading_stiffness"):
         assert found[name].values == pytest.approx(getattr(known, name), rel=1e-6), name
     assert found.attrs["psi"] == pytest.approx(known.psi)
     assert found.stiffness.values == pytest.approx(known.stiffness, rel=1e-6)
     # not by the loading curve's slope
-    own = conductance(known.incremental_stiffness, mean_conductivity(16.0, 167.0), 100e3)
+    own = conductance(known.unloading_stiffness, mean_conductivity(16.0, 167.0), 100e3)
     assert found.conductance.values == pytest.approx(own, rel=1e-6)
     assert found.separation_scatter.values == pytest.approx(known.separation_scatter, rel=1e-6)
     assert (found.conductance.values > 1.05 * conductance(known.stiffness, mean_conductivity(16.0, 167.0), 100e3)).all()
@@ -83,7 +83,7 @@ def test_a_file_may_call_for_it():
     found = Scene.from_mapping(content).run()
     known = contact(SURFACE, pressure=30.0, E_star=100e3, hardness=1500.0, theory="calibrated")
     assert found.area.values == pytest.approx([known.area], rel=1e-9)
-    assert found.incremental_stiffness.units == "GPa/um"
+    assert found.unloading_stiffness.units == "GPa/um"
     assert found.conductance.units == "W/(m^2 K)"
     assert found.conductance.values == pytest.approx([1e6 * known.conductance(16.0, 167.0)], rel=1e-9)
 

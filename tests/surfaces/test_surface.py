@@ -92,7 +92,7 @@ def test_prints_plain_numbers():
 
 def test_constructors_show_their_options():
     assert {"periodic", "detrend", "h_max", "band"} <= set(inspect.signature(Surface.from_map).parameters)
-    assert list(inspect.signature(Surface).parameters) == [*GOOD, "unit", "fit", "provenance"]
+    assert list(inspect.signature(Surface).parameters) == [*GOOD, "unit", "fit", "provenance", "nominal_area"]
 
 
 @pytest.mark.parametrize(

@@ -155,7 +155,7 @@ class TestAnswers:
         assert np.all(np.diff(found.area) <= 0)
 
     def test_concerns(self):
-        odd = Surface([0.1, 0.8, 0.8], 1.0, [64.0, 1000.0, 64.0], 1.0, [3.0, 3.0, 8.0])
+        odd = Surface([0.1, 0.8, 0.8], 1.0, [64.0, 1000.0, 64.0], 1.0, [3.0, 3.0, 9.0])
         reasons = contact(odd, mean_separation=0.5, theory="calibrated").reasons
         assert [text.split(" is ")[0] for text in reasons if "gradient" not in text] == [
             "the Hurst exponent", "zeta_1", "h_max/h_rms"]  # fmt: skip

@@ -27,7 +27,7 @@ def test_without_yielding_answers_are_elastic_to_the_last_bit(theory):
     elastic = contact(SURFACE, mean_separation=u, E_star=MODULUS, theory=theory)
     for cap in (np.inf, [np.inf, np.inf, HARDNESS]):
         found = contact(SURFACE, mean_separation=u, E_star=MODULUS, theory=theory, hardness=cap)
-        for name in ("pressure", "area", "stiffness", "error", "incremental_stiffness"):
+        for name in ("pressure", "area", "stiffness", "error", "unloading_stiffness"):
             # MBMA's sums with derivatives, which yielding needs, add in another order than those without
             rel = (1e-8 if name == "error" else 1e-14) if theory == "mbma" and np.ndim(cap) else 0
             assert getattr(found, name)[:2] == pytest.approx(getattr(elastic, name)[:2], rel=rel, abs=0), name
@@ -68,7 +68,7 @@ def test_pressure_is_inverted_and_slopes_are_those_of_the_curve(theory):
     kept = found.mean_separation < 3.0 - 100 * step
     slope = (near[0].pressure - near[1].pressure) / (2 * step)
     assert found.stiffness[kept] == pytest.approx(slope[kept], rel=1e-5)
-    assert (found.incremental_stiffness > found.stiffness).all()
+    assert (found.unloading_stiffness > found.stiffness).all()
     assert (found.plane_separation <= found.mean_separation).all()
 
 
@@ -155,7 +155,7 @@ def test_batches_labels_and_units():
         hardness=xr.DataArray(caps, dims="metal"),
         theory="calibrated",
     )
-    for name in ("area", "yielded", "incremental_stiffness", "scatter", "psi", "valid"):
+    for name in ("area", "yielded", "unloading_stiffness", "scatter", "psi", "valid"):
         own = getattr(labelled, name)
         assert set(own.dims) <= {"load", "metal"}
         assert own.values == pytest.approx(np.broadcast_to(getattr(plain, name), own.shape), rel=1e-12), name
@@ -164,7 +164,7 @@ def test_batches_labels_and_units():
         theory="calibrated",
     )  # fmt: skip
     assert named.area == pytest.approx(one.area, rel=1e-12)
-    assert named.units["incremental_stiffness"] == "GPa/um"
+    assert named.units["unloading_stiffness"] == "GPa/um"
 
 
 def test_a_map_yields_by_its_own_heights():
@@ -266,7 +266,7 @@ def test_hardnesses_of_any_size(theory, cap):
             assert found.area == pytest.approx(found.pressure / cap, rel=1e-2 if cap < 1e-310 else 1e-12)
             assert found.yielded == pytest.approx(1, rel=1e-2 if cap < 1e-310 else 1e-12)
         else:
-            for name in ("mean_separation", "pressure", "area", "stiffness", "incremental_stiffness"):
+            for name in ("mean_separation", "pressure", "area", "stiffness", "unloading_stiffness"):
                 assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-10), name
             assert found.yielded == 0
 
@@ -289,7 +289,7 @@ def test_batches_are_their_contacts_one_by_one(theory, cap):
         for k in range(3):
             one = Surface(*(float(np.broadcast_to(getattr(batch, name), 3)[k]) for name in batch.parameters))
             alone = contact(one, **{name: values[k] for name, values in asked.items()}, **options)
-            for name in ("mean_separation", "pressure", "area", "stiffness", "incremental_stiffness"):
+            for name in ("mean_separation", "pressure", "area", "stiffness", "unloading_stiffness"):
                 assert getattr(whole, name)[k] == pytest.approx(getattr(alone, name), rel=1e-9), name
 
 

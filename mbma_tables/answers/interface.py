@@ -1,0 +1,144 @@
+"""What a contact conducts and how it shears: quantities of `Contact` that need numbers of the bodies or of a gas."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.common.arguments import FloatArray, Numbers
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import Units, factor
+from mbma_tables.surfaces.any_surface import AnySurface
+
+if TYPE_CHECKING:
+    from mbma_tables.answers.tangential import Tangential
+
+
+class Interface:
+    """Conductances and shear of a `Contact`."""
+
+    def conductance(self: Any, k1: ArrayLike | str | None = None, k2: ArrayLike | str | None = None) -> Numbers:
+        """Conductance per nominal area of two bodies in contact, thermal or electrical, h = (k_s/E*) (-dF/du).
+
+        By the incremental stiffness (Barber 2003), with a hardness that of the frozen contact.
+
+        Parameters
+        ----------
+        k1, k2 : array_like or str
+            Conductivities of the bodies, k_s = 2 k1 k2/(k1 + k2); without k2 both have k1, and without either they are
+            the thermal ones of the `materials` named.
+
+        Returns
+        -------
+        ndarray or DataArray
+            [unit of k/length of the surface], such as W/(m K um); in W/(m^2 K) for "45 W/(m K)", in S/m^2 for
+            "6e6 S/m", where the surface knows its unit. Its scatter is `stiffness_scatter`.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact
+        >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
+        >>> joint = contact(face, pressure="10 MPa", E_star="100 GPa", theory="calibrated", hardness="1.5 GPa")
+        >>> f"{joint.conductance('45 W/(m K)', '167 W/(m K)'):.3g} W/(m^2 K)"
+        '2.36e+04 W/(m^2 K)'
+        """
+        from mbma_tables.totals.conductance import conductance, mean_conductivity
+
+        source = self._source
+        if k1 is None:
+            if source.materials is None:
+                raise InputError("conductance needs k1, the bodies' conductivity, where no materials are named")
+            k1, k2 = source.materials.conductivities
+        (k1, k2), _ = source.units.conductivities(k1, k1 if k2 is None else k2)
+        # linear in the stiffness, which may be NaN or a DataArray
+        found: Numbers = conductance(1.0, mean_conductivity(k1, k2), 1.0) / source.E_star * self.unloading_stiffness
+        return found
+
+    def gap_conductance(
+        self: Any,
+        gas: str = "air",
+        temperature: ArrayLike = 300.0,
+        gas_pressure: ArrayLike | str = "1 atm",
+        accommodation: ArrayLike | None = None,
+    ) -> Numbers:
+        """Conductance per nominal area of the gas in the gaps, parallel to `conductance` of the solid [W/(m^2 K)].
+
+        The law, data of gases and their accuracy are in `mbma_tables.laws.gas`; without radiation.
+
+        Parameters
+        ----------
+        gas : {"air", "helium", "vacuum"}
+        temperature : array_like
+            Of the gas [K], from 200 to 600.
+        gas_pressure : array_like or str
+            [Pa], or with its unit.
+        accommodation : array_like, optional
+            Thermal accommodation coefficient of the faces; else that of machined metals.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact
+        >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
+        >>> joint = contact(face, pressure="1 MPa", theory="calibrated", materials="steel 1020")
+        >>> f"{joint.conductance():.0f} W/(m^2 K) and {joint.gap_conductance('air'):.0f}"
+        '3362 W/(m^2 K) and 9627'
+        """
+        from mbma_tables.laws.gas import jump_of, mean_inverse
+
+        source = self._source
+        if source.units.length is None:
+            raise InputError("gap_conductance beside lengths whose unit is not known: give the surface its unit")
+        if gas == "vacuum":
+            return 0.0 * self.mean_separation  # type: ignore[no-any-return]
+        metre = factor("m", source.units.length)
+        pressure = Units(stress="Pa").number("pressure", gas_pressure)
+        k, jump = jump_of(gas, temperature, pressure, accommodation)
+
+        def mean(theory: Any, surface: AnySurface, u: FloatArray, E: FloatArray, area: FloatArray) -> tuple[Any, ...]:
+            eta = getattr(theory, "hardness", np.inf) / np.asarray(surface.rms_gradient)
+            return (k * metre * mean_inverse(u, area, jump * metre, surface.h_rms, eta),)
+
+        found: Numbers = source.map(mean, self, 1, {"area": self._touching})[0]
+        return found
+
+    def tangential(self: Any, friction: float | None = None, nu: Any = None, E: Any = None) -> Tangential:
+        """Tangential stiffness of full stick, partial and gross slip, of isotropic surfaces; computed when called for.
+
+        Parameters
+        ----------
+        friction : float, optional
+            Coefficient of friction, for slip. With a hardness only full stick is known.
+        nu, E : optional
+            As for `materials.tangential_ratio`; by default those of the `materials` named.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact
+        >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
+        >>> joint = contact(face, pressure="10 MPa", E_star="100 GPa", theory="calibrated")
+        >>> sheared = joint.tangential(friction=0.2, nu=0.3)
+        >>> f"{sheared.stiffness:.3g} GPa/um, {sheared.shear('0.05 um'):.3g} GPa; slip from {sheared.gross_slip:.2g} um"
+        '0.0222 GPa/um, 0.000882 GPa; slip from 0.22 um'
+        """
+        from mbma_tables.answers.tangential import Tangential, ratio_of
+
+        source, ratio = self._source, ratio_of(nu, E, self._source.materials)
+        last = source.surface.h_max if source.theory.ends_at_h_max else np.inf
+
+        def at(function: Any) -> Any:
+            return lambda u: source.map(function, dataclasses.replace(self, mean_separation=u), 1)[0]
+
+        def inverse(pressure: Any) -> Any:
+            find = lambda theory, s, u, E, p: (theory.mean_separation_at(s, "pressure", p / E),)  # noqa: E731
+            return source.map(find, self, 1, {"pressure": pressure})[0]
+
+        normal = at(lambda theory, s, u, E: (E * theory.answer(s, u).pressure,))
+        energy = at(lambda theory, s, u, E: (E * theory.energy(s, u),))
+        return Tangential(
+            ratio, friction, self.mean_pressure * self._touching if self.pressure is None else self.pressure,
+            self.mean_separation, self.unloading_stiffness / ratio, last, source.units,
+            None if source.yields else (normal, energy, inverse),
+        )  # fmt: skip

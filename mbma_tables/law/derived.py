@@ -1,0 +1,119 @@
+"""What follows from a law, made when it is asked for: unloading, sliding, softening, leakage, its picture."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import ArrayLike
+
+from mbma_tables.common.arguments import Numbers
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
+from mbma_tables.common.units import unit_of
+from mbma_tables.law.block import softening
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from mbma_tables.answers.tangential import Tangential
+    from mbma_tables.law.leakage import LeakageLaw
+
+
+DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polynomials'
+
+
+class Derived:
+    """The part of a `ContactLaw` that is made when it is asked for."""
+
+    def unloading_stiffness(
+        self: Any, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None
+    ) -> Numbers:
+        """-dp/du of a small unloading, the contact area frozen [stress/length]; `stiffness` where nothing yields.
+
+        With a hardness it is made from the law of the elastic contact, which is fitted when this is first called.
+        """
+        found: Numbers = self._elastic.stiffness(mean_separation, separation=separation)
+        if math.isinf(self.hardness):
+            return found
+        from mbma_tables.laws.hardness import frozen_factor
+
+        return found * float(frozen_factor(self.hardness / (self.E_star * float(self.surface.rms_gradient))))
+
+    @functools.cached_property
+    def _elastic(self: Any) -> Any:
+        """The law of the elastic contact."""
+        if math.isinf(self.hardness):
+            return self
+        return dataclasses.replace(self.elastic(), units=self.units)
+
+    def tangential(
+        self: Any,
+        mean_separation: ArrayLike | None = None,
+        *,
+        pressure: ArrayLike | str | None = None,
+        friction: float | None = None,
+        nu: Any = None,
+        E: Any = None,
+    ) -> Tangential:
+        """Tangential stiffness and slip at a mean separation or a pressure, as `Contact.tangential`.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact_law
+        >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
+        >>> law = contact_law(face, E_star="100 GPa", theory="calibrated")
+        >>> sheared = law.tangential(pressure="10 MPa", friction=0.2, nu=0.3)
+        >>> f"{sheared.stiffness:.3g} GPa/um; slips from {sheared.gross_slip:.3g} um on"
+        '0.0222 GPa/um; slips from 0.221 um on'
+        """
+        from mbma_tables.answers.tangential import Tangential, ratio_of
+
+        if (mean_separation is None) == (pressure is None):
+            raise InputError("give the mean separation, or pressure=, one of them")
+        if pressure is None:
+            u = self.units.number("mean_separation", mean_separation)
+            held = self.pressure(u)
+        else:
+            u, held = self.at_pressure(pressure).mean_separation, self.units.number("pressure", pressure)
+        ratio = ratio_of(nu, E, self.materials)
+        return Tangential(
+            ratio, friction, held, u, self.unloading_stiffness(u) / ratio,
+            self.h_max if math.isinf(self.highest) else math.inf, self.units,
+            None if self.hardness < math.inf else (self.pressure, self.energy, lambda p: self.at_pressure(p)[1]),
+        )  # fmt: skip
+
+    @functools.cached_property
+    def softening(self: Any) -> float | None:
+        """Mean separation u [length] below which stiffness falls with compression; None where it rises to the end."""
+        noise = DIGITS * self.error
+        return softening(lambda u: self.stiffness(u), self.h_max, max(self.lowest, -self.h_max), noise)
+
+    @functools.cached_property
+    def leakage(self: Any) -> LeakageLaw:
+        """Flow conductance at a mean separation, ``separation=`` or ``pressure=``, a `LeakageLaw`; made when read.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact_law
+        >>> seal = Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5, unit="um")
+        >>> law = contact_law(seal, E_star="10 MPa", theory="calibrated")
+        >>> f"{law.leakage(pressure='0.05 MPa'):.1g} um^3"
+        '0.001 um^3'
+        """
+        from mbma_tables.law.leakage import leakage_law
+
+        if self.surface is None:
+            raise InputError("leakage needs the surface, which this law does not hold")
+        return leakage_law(self, self.surface)
+
+    def _figure(self: Any) -> Figure:
+        held = self._variables()
+        unit = self.units.length or "length"
+        curve = Curve(
+            theory_label(self.theory), *(held[name].values for name in ("mean_separation", "pressure", "area"))
+        )
+        label = pressure_label(unit_of("pressure", self.units))
+        return draw_compression([curve], pressure_label=label, gap_label=f"mean separation u [{unit}]")

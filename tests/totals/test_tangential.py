@@ -1,0 +1,136 @@
+"""Tangential stiffness, partial slip and unloading stiffness, against closed forms of spheres and of the normal law."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
+from mbma_tables.materials import tangential_ratio
+
+FACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
+RADIUS, FRICTION, NU = 5.0, 0.3, 0.25
+
+
+class Spheres:
+    """One sphere of `RADIUS` on each unit of area, in contact from h_max on."""
+
+    name = "spheres"
+
+    def answer(self, surface, mean_separation):
+        depth = np.maximum(np.asarray(surface.h_max) - mean_separation, 0)
+        return 4 / 3 * np.sqrt(RADIUS) * depth**1.5, np.pi * RADIUS * depth
+
+
+def sheared(u=2.5):
+    return contact(FACE, mean_separation=u, E_star=1e3, theory=Spheres()).tangential(FRICTION, NU)
+
+
+def test_spheres_are_those_of_cattaneo_mindlin_and_deresiewicz():
+    """K. L. Johnson, Contact Mechanics, Eqs. (7.42), (7.44) and (7.57), for two bodies alike."""
+    depth, modulus = 0.5, 1e3
+    found, a = sheared(3.0 - depth), np.sqrt(RADIUS * depth)
+    G = modulus * (1 - NU)  # 1/E* = 2 (1 - nu^2)/E = (1 - nu)/G
+    compliance = 2 * (2 - NU) / G
+    load = 4 / 3 * modulus * np.sqrt(RADIUS) * depth**1.5
+    share = np.array([0.05, 0.3, 0.7, 0.99])
+    shear = share * FRICTION * load
+    slid = 3 * FRICTION * load / (16 * a) * compliance * (1 - (1 - share) ** (2 / 3))
+    np.testing.assert_allclose(found.displacement(shear), slid, rtol=1e-6)
+    np.testing.assert_allclose(found.shear(slid), shear, rtol=1e-6)
+    assert found.stiffness == pytest.approx(8 * a / compliance, rel=1e-5)
+    assert found.gross_slip == pytest.approx(3 * FRICTION * load / (16 * a) * compliance)
+    assert found.shear(2 * found.gross_slip) == pytest.approx(FRICTION * load)
+    assert found.displacement(FRICTION * load) == pytest.approx(found.gross_slip, rel=1e-6)
+    lost = 9 * (FRICTION * load) ** 2 / (10 * a) * compliance
+    lost = lost * (1 - (1 - share) ** (5 / 3) - 5 * share / 6 * (1 + (1 - share) ** (2 / 3)))
+    np.testing.assert_allclose(found.energy_loss(shear)[1:], lost[1:], rtol=1e-5)
+
+
+@pytest.mark.parametrize("theory", ["calibrated", "mbma"])
+def test_laws_answer_as_contacts_do(theory):
+    one = contact(FACE, pressure="10 MPa", E_star="100 GPa", theory=theory).tangential(0.2, 0.3)
+    law = contact_law(FACE, E_star="100 GPa", theory=theory)
+    two = law.tangential(pressure="10 MPa", friction=0.2, nu=0.3)
+    assert two.stiffness == pytest.approx(one.stiffness, rel=1e-5)
+    assert law.tangential(one.mean_separation, nu=0.3).stiffness == pytest.approx(one.stiffness, rel=1e-5)
+    for slid in ("10 nm", ["0.05 um", "0.1 um"]):
+        np.testing.assert_allclose(two.shear(slid), one.shear(slid), rtol=1e-4)
+    np.testing.assert_allclose(two.energy_loss("1 MPa"), one.energy_loss("1 MPa"), rtol=1e-4)
+    # it begins with full stick
+    assert one.shear(1e-5) / 1e-5 == pytest.approx(one.stiffness, rel=1e-3)
+    # a cycle loses less than one that slips freely, and more than none
+    assert 0 < one.energy_loss("1 MPa") < 4e-3 * one.displacement("1 MPa")
+
+
+@pytest.mark.parametrize("theory", ["calibrated", "mbma", "persson"])
+def test_with_a_hardness_full_stick_alone(theory):
+    given = {"E_star": "100 GPa", "theory": theory, "hardness": "1.5 GPa"}
+    joint = contact(FACE, pressure=["1 MPa", "10 MPa"], **given)
+    law = pickle.loads(pickle.dumps(contact_law(FACE, **given)))
+    np.testing.assert_allclose(law.unloading_stiffness(joint.mean_separation), joint.unloading_stiffness, rtol=1e-5)
+    assert (joint.unloading_stiffness > 1.1 * joint.stiffness).all()
+    np.testing.assert_allclose(joint.tangential(nu=0.0).stiffness, joint.unloading_stiffness, rtol=1e-15)
+    np.testing.assert_allclose(
+        law.tangential(joint.mean_separation, nu=0.3).stiffness, joint.tangential(nu=0.3).stiffness, rtol=1e-5
+    )
+    for slips in (joint.tangential(0.2, 0.3), law.tangential(pressure="1 MPa", friction=0.2, nu=0.3)):
+        for ask in (lambda: slips.shear(0.1), lambda: slips.displacement(0.0), lambda: slips.energy_loss(0.0)):  # noqa: B023
+            with pytest.raises(InputError, match="contact that yields is not known"):
+                ask()
+    elastic = contact_law(FACE, E_star="100 GPa", theory=theory)
+    assert elastic.unloading_stiffness(2.0) == elastic.stiffness(2.0)
+
+
+def test_two_bodies_add_their_compliances():
+    # against a rigid one only the other counts
+    assert tangential_ratio((0.3, 0.1), (1.0, 1e12)) == pytest.approx(tangential_ratio(0.3))
+    assert tangential_ratio((0.3, 0.3), ("210 GPa", "7e4 MPa")) == pytest.approx(1.7 / 1.4)
+    # Mindlin's 4 (1 - nu)/(2 - nu) of half-spaces over the 2 of normal contact
+    assert tangential_ratio(0.5) == pytest.approx(1.5)
+    named = contact(FACE, pressure="10 MPa", theory="calibrated", materials=("steel 4140 hard", "aluminium 6061 hard"))
+    known = named.tangential()
+    assert known.ratio == pytest.approx(tangential_ratio((0.29, 0.33), (205.0, 69.0)))
+    assert known.stiffness == pytest.approx(named.unloading_stiffness / known.ratio)
+    for wrong in (
+        {"nu": (0.3, 0.3)},
+        {"nu": 0.6},
+        {"nu": (0.3, 0.3), "E": (1.0, -1.0)},
+        {"nu": 0.3, "E": (1.0, 1.0)},
+        {},
+    ):
+        with pytest.raises(InputError):
+            contact(FACE, pressure="10 MPa", E_star="100 GPa").tangential(**wrong)
+
+
+def test_what_is_refused():
+    found = sheared()
+    for ask in (found.shear, found.displacement, found.energy_loss):
+        with pytest.raises(OutOfRangeError, match="at least 0"):
+            ask(-0.1)
+    with pytest.raises(OutOfRangeError, match="at most the friction times the pressure"):
+        found.displacement(1e9)
+    with pytest.raises(InputError, match="pressure= takes"):
+        found.shear("1 MPa")
+    for friction in (0.0, -1.0, np.nan):
+        with pytest.raises(InputError, match="friction"):
+            contact(FACE, mean_separation=2.5, theory=Spheres()).tangential(friction, NU)
+    with pytest.raises(InputError, match="slip needs friction"):
+        _ = contact(FACE, mean_separation=2.5, theory=Spheres()).tangential(nu=NU).gross_slip
+    law = contact_law(FACE, theory="calibrated")
+    for given in ({}, {"mean_separation": 2.0, "pressure": 1e-3}):
+        with pytest.raises(InputError, match="one of them"):
+            law.tangential(**given, nu=0.3)
+
+
+def test_batches_and_data_arrays():
+    xr = pytest.importorskip("xarray")
+    u = np.array([1.5, 2.0, 2.5])
+    plain = contact(FACE, mean_separation=u, theory="calibrated").tangential(0.3, 0.3)
+    batch = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=[3.0, 3.5, 4.0])
+    many = contact(batch, mean_separation=u, theory="calibrated").tangential(0.3, 0.3)
+    assert many.shear(0.1).shape == (3,)
+    assert many.shear(0.1)[0] == pytest.approx(plain.shear(0.1)[0], rel=1e-9)
+    named = contact(FACE, mean_separation=xr.DataArray(u, dims="gap"), theory="calibrated").tangential(0.3, 0.3)
+    np.testing.assert_allclose(named.shear(0.1).values, plain.shear(0.1), rtol=1e-12)
+    assert named.stiffness.dims == ("gap",)
