@@ -108,7 +108,7 @@ def test_gaps_outside_are_nan_and_counted(name):
     bad, out = filled(law, d)
     assert bad == outside.sum()
     assert (np.isnan(out) == outside).all()
-    assert (law.leakage(d[~outside]) >= 0).all()
+    assert (law.leakage(separation=d[~outside]) >= 0).all()
     for gap in NO_GAPS:
         for ask in (law.pressure, law.area, law.stiffness, law.area_slope, law.energy, law.values, law.leakage):
             for given in (gap, np.array([gap]), np.array([1.0, gap]), np.full(2000, gap)):
