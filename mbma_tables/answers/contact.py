@@ -143,7 +143,7 @@ def contact(
     if isinstance(theory, str) and theory == Mbma.name:
         chosen: Theory = Mbma(island_model, variant, rtol, outside, workers)
     else:
-        chosen = get_theory(theory)
+        chosen = get_theory(theory, surface)
         refuse_options_of_mbma(
             island_model=island_model != "universal", variant=variant != "reported", rtol=rtol != 1e-8,
             outside=outside != "raise", workers=workers != 1,

@@ -25,7 +25,7 @@ from mbma_tables.scenes.specimen import (
 )
 from mbma_tables.surfaces.cases import CASES
 from mbma_tables.surfaces.variants import NAMED
-from mbma_tables.theories import THEORIES
+from mbma_tables.theories import OF_MAPS, THEORIES
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -248,7 +248,7 @@ theory_option = _option(
     "theory",
     "Theory; the others have no island model, variant or rtol.",
     default="mbma",
-    type=click.Choice([*THEORIES]),
+    type=click.Choice([*THEORIES, OF_MAPS]),
     **SHOWN,
 )
 # of islands, which MBMA alone has

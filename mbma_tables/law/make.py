@@ -97,7 +97,7 @@ def contact_law(
         chosen: Theory = Mbma(island_model, variant)
     else:
         refuse_options_of_mbma(island_model=island_model != "universal", variant=variant != "reported")
-        chosen = get_theory(theory)
+        chosen = get_theory(theory, surface)
     if hardness is not math.inf:
         cap = checked_hardness(units.number("hardness", hardness))
         if cap.ndim:

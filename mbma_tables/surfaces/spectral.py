@@ -20,6 +20,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.power_laws import PowerLaws, two_columns
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
+from mbma_tables.surfaces.treatment import Treated
 
 # of the surfaces of docs/data/boundary_elements.nc. As isotropic Gaussian ones they give area within 20% between 1% and
 # 10% contact, and beyond these it is wrong by 30% to factors; by their maps all of them stay within 10%
@@ -56,6 +57,8 @@ class SpectralSurface(AnySurface):
         Curves of a periodic map: what its tops and valleys look like (`mbma_tables.laws.bearing_curve`).
     bands : RadialSpectrum, optional
         The same map's spectrum by bands, unsmoothed; goes with `bearing`.
+    map : Treated, optional
+        The treated heights themselves, which `theory="simulated"` presses.
     samples : array_like, shape (n,), optional
         Independent samples behind each entry of C, as weights of a fit.
     anisotropy : float, optional
@@ -86,6 +89,7 @@ class SpectralSurface(AnySurface):
     heights: Any = None
     bearing: Bearing | None = None
     bands: RadialSpectrum | None = None
+    map: Treated | None = None
     samples: Any = None
     anisotropy: float | None = None
     unit: str | None = None
@@ -181,7 +185,7 @@ class SpectralSurface(AnySurface):
         if self.anisotropy is not None:
             known["anisotropy"] = self.anisotropy
         beyond = "beyond, only 'calibrated' by a map was tested"
-        mend = "solve the map itself, theories.BoundaryElements" if by_map else beyond
+        mend = "theory='simulated' presses the map itself" if by_map else beyond
         return tuple(
             f"{name} is {known[name]:.3g}, tested from {low:g} to {high:g}: {mend}"
             for name, (low, high) in tested.items()
@@ -204,7 +208,7 @@ class SpectralSurface(AnySurface):
 
     def resized(self, up: float, along: float) -> Self:
         """The surface with its heights `up` times as large, and its lengths along the plane `along` times."""
-        known, bands, slope = self.bearing, self.bands, up / along
+        known, bands, whole, slope = self.bearing, self.bands, self.map, up / along
         if known is not None:
             moved = dict.fromkeys(("h_rms", "h_max", "quantiles", "mean_height"), up)
             moved |= dict.fromkeys(("gradient", "tension_force", "tension"), slope)
@@ -218,6 +222,9 @@ class SpectralSurface(AnySurface):
                 gradient=bands.gradient * slope**2,
                 curvature=bands.curvature * (slope / along) ** 2,
             )
+        if whole is not None:
+            steps = tuple(along * step for step in whole.steps)
+            whole = dataclasses.replace(whole, heights=up * whole.heights, steps=steps)
         return dataclasses.replace(
             self,
             q=self.q / along,
@@ -226,6 +233,7 @@ class SpectralSurface(AnySurface):
             heights=self.heights.scaled(up),
             bearing=known,
             bands=bands,
+            map=whole,
         )
 
     def between(self, low: float, high: float) -> Self:
@@ -239,6 +247,7 @@ class SpectralSurface(AnySurface):
             samples=None,
             bearing=None,
             bands=None,
+            map=None,
         )
         return dataclasses.replace(less, heights=self.heights.scaled(float(less.h_rms / self.h_rms)))
 

@@ -27,7 +27,7 @@ STRAIGHT, SAME = 1.0, 1e-9  # of ln F, over which one stiffness is no curve; dif
 NODE_STEP, FINE = 0.2, 8  # of a map's curve, in ln F and ln u: its own nodes are rougher; integrated by so many parts
 
 
-ENDS = ", where the map's tops and valleys leave no gap: solve the map itself, theories.BoundaryElements"
+ENDS = ", where the map's tops and valleys leave no gap: theory='simulated' presses the map itself"
 
 
 class Curve:
