@@ -1,4 +1,7 @@
-"""Truth of one part: contact on the full grid at loads between those of `theory="simulated"`, and flow both ways."""
+"""Truth of one part: contact on the full grid at loads between those of `theory="simulated"`, and flow both ways.
+
+Beside it, what theories answer at these loads. Stiffness is -dF/du by a step of 3% of the force, of both alike.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from generate.machined.makers import Part, heights
-from mbma_tables import Surface
+from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.laws.boundary_elements import Contact
 from mbma_tables.laws.reynolds import flow_conductance
-from mbma_tables.theories.calibrated_curves import own_law
+from mbma_tables.theories.simulated import law_loads
 
 AREAS = (0.003, 0.025, 0.067, 0.14, 0.39, 0.58, 0.78)  # of the quick law, which never refuses them
 STEP = 1.03  # of force, of the stiffness
@@ -25,18 +29,11 @@ def surface_of(part: Part) -> tuple[FloatArray, Any]:
     return values, Surface.from_map(values, 1.0, periodic=True)
 
 
-def loads_at(surface: Any, areas: tuple[float, ...]) -> FloatArray:
-    """F/(A0 E*) at which the quick law has these areas."""
-    force = np.geomspace(1e-6, 5, 4000) * float(surface.rms_gradient)
-    found = np.maximum.accumulate(own_law(surface).area(force)) + 1e-15 * np.arange(force.size)
-    return np.asarray(np.exp(np.interp(np.log(areas), np.log(found), np.log(force))))
-
-
 def solved(part: Part) -> dict[str, Any]:
     """Contact and flow of a part; lengths in sampling steps."""
     values, surface = surface_of(part)
     contact, sizes, rows = Contact(values, values.shape), values.shape, []
-    for force in loads_at(surface, AREAS):
+    for force in law_loads(surface, AREAS):
         found = contact.press(float(force))
         gap = contact.gap
         beside = contact.press(float(force * STEP))["mean_separation"]
@@ -47,3 +44,22 @@ def solved(part: Part) -> dict[str, Any]:
     return dict(zip(names, np.array(rows).T, strict=True)) | {
         "engine": f"Tamaas {importlib.metadata.version('tamaas')}"
     }
+
+
+def answered(part: Part, theory: str, truth: dict[str, Any]) -> dict[str, Any]:
+    """A theory's answers at the loads of the truth, with its stated scatter; NaN where it refuses."""
+    _, surface = surface_of(part)
+    names = ["area", "mean_separation", "stiffness", "flow_x", "flow_y"]
+    names += [f"{name}_scatter" for name in ("force", "area", "stiffness", "flow")] + ["valid", "flow_valid"]
+    rows = np.full((len(names), truth["force"].size), np.nan)
+    for k, force in enumerate(map(float, truth["force"])):
+        try:
+            found, beside = (contact(surface, pressure=by * force, theory=theory) for by in (1.0, STEP))
+        except OutOfRangeError:
+            rows[-2:, k] = 0
+            continue
+        stiffness = force * (STEP - 1) / (found.mean_separation - beside.mean_separation)
+        leakage = found.leakage
+        of_it = (found.scatter, found.area_scatter, found.stiffness_scatter, leakage.scatter, found.valid)
+        rows[:, k] = found.area, found.mean_separation, stiffness, leakage.x, leakage.y, *of_it, leakage.valid
+    return dict(zip(names, rows, strict=True))

@@ -55,6 +55,7 @@ class Pressed:
     rows: FloatArray
     coarse_from: int
     gaps: tuple[FloatArray, ...]
+    cut: float = 0.0  # sampling steps of the coarse grid along its shortest waves, where shorter ones were left out
 
     def flow(self) -> FloatArray:
         """Flow conductance along both axes [length^3], shape (n, 2); 0 where blocked."""
@@ -75,7 +76,7 @@ class Pressed:
         gap = self.gaps[k].astype(float)
         if gap.shape == self.heights.shape:
             return gap
-        moved = gap + coarser(self.heights)
+        moved = gap + coarser(self.heights, self.cut)
         for axis, count in enumerate(self.heights.shape):
             moved = resample(moved, count, axis=axis)
         gap = moved - self.heights

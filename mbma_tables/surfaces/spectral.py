@@ -23,14 +23,22 @@ from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.treatment import Treated
 
 # of the surfaces of docs/data/boundary_elements.nc. As isotropic Gaussian ones they give area within 20% between 1% and
-# 10% contact, and beyond these it is wrong by 30% to factors; by their maps all of them stay within 10%
+# 10% contact, and beyond these it is wrong by 30% to factors
 BY_SPECTRUM = {
     "skewness of heights": (-0.4, 0.4),
     "kurtosis of heights": (2.4, 4.4),
     "kurtosis of slopes": (2.8, 3.3),
     "anisotropy": (1.0, 4.1),
 }
-BY_MAP = {"skewness of heights": (-3.1, 2.1), "kurtosis of slopes": (2.8, 16.5), "anisotropy": (1.0, 16.5)}
+# of maps like those whose law is as near as stated; of all of which several were pressed (docs/data/machined.nc, too),
+# whose law by their map is wrong by up to 80%
+BY_MAP = {
+    "skewness of heights": (-0.5, 0.5),
+    "kurtosis of heights": (2.0, 4.0),
+    "kurtosis of slopes": (2.0, 4.0),
+    "anisotropy": (1.0, 1.4),
+}
+PRESSED = {"skewness of heights": (-3.1, 3.3), "kurtosis of slopes": (2.6, 16.5), "anisotropy": (1.0, 17.6)}
 WIDEST, SCAN = 1.5, 400  # ends of the largest islands' band (27a); wavenumbers at which it is tried
 SAME_LAW = 0.01  # of ln C about one power law: a spectrum this straight counts as self-affine
 FINE = 1.02  # between wavenumbers of a sum of spectra: a sum of power laws is none, by 1e-4 at most
@@ -178,7 +186,10 @@ class SpectralSurface(AnySurface):
 
     def departures(self, by_map: bool = False) -> tuple[str, ...]:
         """Why it lies outside of the surfaces that BEM was compared with, as a map or as an isotropic Gaussian one."""
-        tested = BY_MAP if by_map else BY_SPECTRUM
+        return self.outside(BY_MAP if by_map else BY_SPECTRUM, by_map)
+
+    def outside(self, tested: Mapping[str, tuple[float, float]], by_map: bool = False) -> tuple[str, ...]:
+        """Which of its statistics lie outside of ranges that were tested, and the remedy."""
         known = {"skewness of heights": self.skewness, "kurtosis of heights": self.kurtosis}
         if self.bearing is not None:
             known["kurtosis of slopes"] = self.bearing.slope_kurtosis

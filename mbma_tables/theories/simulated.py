@@ -55,6 +55,23 @@ def law_loads(surface: MeasuredSurface, areas: Sequence[float]) -> FloatArray:
     return np.asarray(np.exp(np.interp(np.log(areas), np.log(area), np.log(force))))
 
 
+def map_of(surface: AnySurface) -> Treated:
+    """The map that a surface was made from.
+
+    Raises
+    ------
+    InputError
+        Where there is none.
+    """
+    whole = surface.map if isinstance(surface, MeasuredSurface) else None
+    if whole is None or whole.heights.ndim != 2:
+        raise InputError(
+            "theories 'simulated' and 'corrected' press a height map, and this surface has none: make it by "
+            "Surface.from_map, neither combined nor extrapolated nor fitted"
+        )
+    return whole
+
+
 class BoundaryElements(Theory):
     """What boundary elements found of one map at a list of loads, and curves between them.
 
@@ -130,12 +147,7 @@ class BoundaryElements(Theory):
         InputError
             For a surface that was not made from a map, or that was changed so that its map is no longer known.
         """
-        whole = surface.map if isinstance(surface, MeasuredSurface) else None
-        if whole is None or whole.heights.ndim != 2:
-            raise InputError(
-                "theory 'simulated' presses a height map, and this surface has none: make it by Surface.from_map, "
-                "neither combined nor extrapolated nor fitted"
-            )
+        whole = map_of(surface)
         assert isinstance(surface, MeasuredSurface)
         assert surface.bearing is not None
         values, sizes = continued(whole)
