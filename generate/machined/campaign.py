@@ -22,7 +22,7 @@ from generate.machined.solve import answered, solved, surface_of
 from generate.provenance import source_digest, versions
 
 NUMBERS = 5  # parts of each family
-FORMS = ("calibrated", "simulated")
+FORMS = ("calibrated", "corrected", "simulated")
 MODULES = ("generate.machined.makers", "generate.machined.solve", "mbma_tables.laws.boundary_elements")
 TARGET = pathlib.Path("docs/data/machined.nc")
 MEANINGS = {

@@ -248,7 +248,7 @@ theory_option = _option(
     "theory",
     "Theory; the others have no island model, variant or rtol.",
     default="mbma",
-    type=click.Choice([*THEORIES, OF_MAPS]),
+    type=click.Choice([*THEORIES, *OF_MAPS]),
     **SHOWN,
 )
 # of islands, which MBMA alone has

@@ -188,7 +188,7 @@ def frozen_joint(
     cap = Units(length, stress).number("hardness", hardness)
     law = contact_law(surface, LAW_RTOL, variant=variant, E_star=modulus, theory=theory, hardness=cap)
     law = dataclasses.replace(law, units=Units(length, stress))
-    own = Mbma(variant=variant) if theory == Mbma.name else get_theory(theory)
+    own = Mbma(variant=variant) if theory == Mbma.name else get_theory(theory, surface)
     return Joint(surface, law, own, modulus, float(cap), length, stress)
 
 

@@ -47,7 +47,7 @@ _NAMED = {
     "greenwood_williamson": "GreenwoodWilliamson",
 }
 THEORIES = tuple(_NAMED)
-OF_MAPS = "simulated"  # a theory of one map, made by pressing it
+OF_MAPS = ("corrected", "simulated")  # theories of one map, made by pressing it
 
 
 def __getattr__(name: str) -> Any:
@@ -59,13 +59,13 @@ def __getattr__(name: str) -> Any:
 def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory:
     """A theory by name, or as an object: one of this package's, or any with a `name` and an `answer`.
 
-    "simulated" is a theory of one `surface`, made from a map: `BoundaryElements.of` that surface, kept for the last
-    eight of them.
+    "simulated" and "corrected" are theories of one `surface`, made from a map, which they press: `BoundaryElements.of`
+    and `Corrected.of` that surface, kept for the last eight of them.
 
     Raises
     ------
     InputError
-        For an unknown name, an object that is no theory, and "simulated" for a surface without a map.
+        For an unknown name, an object that is no theory, and those of a map for a surface without one.
 
     Examples
     --------
@@ -75,16 +75,16 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
     """
     from mbma_tables.theories.protocol import Theory, UserTheory, Wrapped
 
-    if isinstance(theory, str) and theory == OF_MAPS:
-        from mbma_tables.theories.simulated import simulation_of
+    if isinstance(theory, str) and theory in OF_MAPS:
+        from mbma_tables.theories.corrected import of_map
 
-        return simulation_of(surface)
+        return of_map(theory, surface)
     found: Any = __getattr__(_NAMED[theory])() if isinstance(theory, str) and theory in _NAMED else theory
     if isinstance(found, Theory):
         return found
     if isinstance(found, UserTheory) and not isinstance(found, type):
         return Wrapped(found)
     raise InputError(
-        f"theory must be one of {(*THEORIES, OF_MAPS)} or an object with a name and answer(surface, u), "
+        f"theory must be one of {(*THEORIES, *OF_MAPS)} or an object with a name and answer(surface, u), "
         f"got {reprlib.repr(theory)}"
     )

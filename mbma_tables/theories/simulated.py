@@ -336,9 +336,3 @@ class BoundaryElements(Theory):
         good = (u >= low * (1 - 1e-12)) & (u <= high * (1 + 1e-12))
         require("mean_separation", u, good, f"between {low:.6g} and {high:.6g}, which were simulated")
         return np.asarray(np.clip(u, low, high))
-
-
-@functools.lru_cache(maxsize=8)
-def simulation_of(surface: AnySurface) -> BoundaryElements:
-    """Boundary elements of a surface's map, kept while it is asked again."""
-    return BoundaryElements.of(surface)

@@ -14,7 +14,8 @@ from mbma_tables.laws.boundary_elements import Contact
 from mbma_tables.laws.energy_spline import LoadCurve
 from mbma_tables.laws.reynolds import flow_conductance
 from mbma_tables.theories import BoundaryElements
-from mbma_tables.theories.simulated import law_loads, simulation_of
+from mbma_tables.theories.corrected import of_map
+from mbma_tables.theories.simulated import law_loads
 
 pytest.importorskip("tamaas")
 LOADS = (4e-3, 0.01, 0.025, 0.06, 0.12, 0.25, 0.5, 0.9)
@@ -198,7 +199,7 @@ class TestOfASurface:
         assert not leakage.valid[3]
 
     def test_heavier_loads_of_fine_grids_are_pressed_on_half_of_them(self, part):
-        pressed = simulation_of(part[1]).pressed
+        pressed = of_map("simulated", part[1]).pressed
         assert (pressed.coarse_from < pressed.rows.shape[1]) == (part[2] >= 8)
         assert pressed.rows[1, 0] <= 1e-3
         assert pressed.rows[1, -1] >= 0.9
@@ -209,6 +210,8 @@ class TestOfASurface:
         point = contact(surface, pressure="5 MPa", theory="simulated", E_star="1 GPa")
         assert law.at_pressure("5 MPa").area == pytest.approx(point.area, rel=0.01)
         assert law.theory == "simulated"
+        with pytest.raises(InputError, match=r"contact\(\.\.\.\)\.leakage has it along both axes"):
+            law.leakage(pressure="5 MPa")
         other = contact(surface.to("mm"), pressure=0.005, theory="simulated")
         assert other.mean_separation == pytest.approx(1e-3 * point.mean_separation, rel=1e-3)
         with pytest.raises(InputError, match="this surface has none"):
