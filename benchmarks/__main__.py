@@ -186,41 +186,41 @@ def laws(rng: np.random.Generator) -> None:
     start = time.perf_counter()
     law = contact_law(surface)
     spent = time.perf_counter() - start
-    gaps = rng.uniform(-surface.h_max, 0.9999 * surface.h_max, MANY_GAPS)
-    nodes = np.linspace(-surface.h_max, surface.h_max, 1000)
-    values = law.force(nodes)
+    gaps = rng.uniform(0, 0.99995 * surface.h_max, MANY_GAPS)
+    nodes = np.linspace(0, surface.h_max, 1000)
+    values = law.pressure(nodes)
     linear = RegularGridInterpolator((nodes,), values)
-    one, point, forces, fresh = float(gaps[0]), gaps[:1], law.force(gaps), itertools.count(1)
+    one, point, forces, fresh = float(gaps[0]), gaps[:1], law.pressure(gaps), itertools.count(1)
     taken = rounds(
         {
-            "law": lambda: law.force(gaps),
-            "slope": lambda: law.force_and_stiffness(gaps),
+            "law": lambda: law.pressure(gaps),
+            "slope": lambda: law.pressure_and_stiffness(gaps),
             "energy": lambda: law.energy(gaps),
             "inverse": lambda: law.at_pressure(forces),
             # a surface that nothing is kept of
             "making": lambda: contact_law(dataclasses.replace(surface, h_max=surface.h_max * (1 + 1e-9 * next(fresh)))),
             "numpy": lambda: np.interp(gaps, nodes, values),
-            "scalar law": lambda: [law.force(one) for _ in range(CALLS)],
+            "scalar law": lambda: [law.pressure(one) for _ in range(CALLS)],
             "scalar scipy": lambda: [linear(point) for _ in range(CALLS)],
         }
     )
     some = gaps[:2000]
-    truth = contact(surface, separation=some, rtol=1e-10).force
+    truth = contact(surface, mean_separation=some, rtol=1e-10).pressure
     click.echo("\ncontact_law of one surface, asphalt")
     report("making the first law", spent, "s")
     report("making a law", 1e3 * statistics.median(taken["making"]), "ms", at_most=2)
-    report("law.force, a random gap", 1e3 * microseconds(taken["law"], MANY_GAPS), "ns")
+    report("law.pressure, a random gap", 1e3 * microseconds(taken["law"], MANY_GAPS), "ns")
     for what, key, most in (
-        ("force", "law", 0.1),
-        ("force and stiffness", "slope", 0.12),
+        ("pressure", "law", 0.1),
+        ("pressure and stiffness", "slope", 0.12),
         ("energy", "energy", 0.12),
-        ("gap, area and stiffness at a force", "inverse", 0.3),
+        ("gap, area and stiffness at a pressure", "inverse", 0.3),
     ):
         name = f"{what} against numpy.interp on 1000 nodes, same points"
         report(name, times_faster(taken, key, "numpy"), "x", at_most=most)
     report("scalar call", microseconds(taken["scalar law"], CALLS), "us", at_most=0.3)
     report("scalar call against RegularGridInterpolator's", times_faster(taken, "scalar scipy", "scalar law"), "x", 25)
-    report("largest error of the law", np.abs(law.force(some) / truth - 1).max(), "")
+    report("largest error of the law", np.abs(law.pressure(some) / truth - 1).max(), "")
     report("largest error of numpy.interp", np.abs(np.interp(some, nodes, values) / truth - 1).max(), "")
 
 
@@ -235,7 +235,7 @@ def calibrated(rng: np.random.Generator) -> None:
         {
             "table": lambda: theory.answer(surface, u),
             "erf": lambda: erf(u),
-            "law": lambda: law.force_and_stiffness(some),
+            "law": lambda: law.pressure_and_stiffness(some),
         }
     )
     spent = microseconds(taken["table"], GAPS)
@@ -274,9 +274,9 @@ def few_numbers(rng: np.random.Generator) -> None:
     u = np.linspace(0.05, 0.9, 100) * surface.h_max
     law.at_pressure(1e-4)
     calls: dict[str, tuple[Callable[[], Any], int, float]] = {
-        "law.force(1.0)": (lambda: law.force(1.0), CALLS, 0.1),
-        "law.force(u=1.0)": (lambda: law.force(u=1.0), CALLS, 0.15),
-        "law.force of ten numbers": (lambda: law.force(ten), CALLS, 1.0),
+        "law.pressure(1.0)": (lambda: law.pressure(1.0), CALLS, 0.1),
+        "law.pressure(separation=1.0)": (lambda: law.pressure(separation=1.0), CALLS, 0.15),
+        "law.pressure of ten numbers": (lambda: law.pressure(ten), CALLS, 1.0),
         "contact at a pressure with a hardness": (lambda: contact(surface, pressure=1e-3, **yielding), 50, 500.0),
         "the same with derivatives": (
             lambda: contact(surface, pressure=1e-3, derivatives=True, **yielding),
@@ -297,7 +297,7 @@ def few_numbers(rng: np.random.Generator) -> None:
 FIRST = {
     "import mbma_tables": "m",
     "an answer": "m.contact(m.Surface(0.8, 1.0, 200.0, 1.0, 3.0), separation=1.0)",
-    "100,000 gaps of a law": "m.contact_law(S()).force(np.linspace(-2.9, 2.9, 100_000))",
+    "100,000 gaps of a law": "m.contact_law(S()).pressure(np.linspace(0.05, 2.95, 100_000))",
     "10,000 surfaces": "m.contact(S(10_000), separation=1.0)",
     "10,000 surfaces with derivatives": "m.contact(S(10_000), separation=1.0, derivatives=True)",
     "an exact total": "m.contact(S(), separation=1.0, island_model='exact')",

@@ -74,8 +74,8 @@ def exported(rng: np.random.Generator) -> None:
     click.echo(f"\nExported C, {' '.join(FLAGS[1:])} -march=native")
     for name, entries, found, right in (
         ("islands", POINTS, islands.T[:2], (phi.phi_F, phi.phi_A)),
-        ("totals", SURFACES, (unit * sums[:, 0], sums[:, 1]), (total.force, total.area)),
-        ("derivatives", GAPS, contacts.T[:2], (near.force, near.area)),
+        ("totals", SURFACES, (unit * sums[:, 0], sums[:, 1]), (total.pressure, total.area)),
+        ("derivatives", GAPS, contacts.T[:2], (near.pressure, near.area)),
     ):
         report(f"C, one of {entries} {name}", 1e3 * microseconds(taken[f"C {name}"], entries), "ns")
         most = 1.1 if name == "totals" else None

@@ -40,12 +40,12 @@ BEFORE: dict[str, float] = {
     "100,000 gaps on a new surface": 4.454,
     "one gap on a new surface": 1.036e05,
     "a law": 8.074e04,
-    "law: force": 0.4774,
-    "law: force and stiffness": 0.6982,
+    "law: pressure": 0.4774,
+    "law: pressure and stiffness": 0.6982,
     "law: energy": 0.6291,
-    "law: force, area, stiffness, energy": 1.371,
+    "law: pressure, area, stiffness, energy": 1.371,
     "law: gap, area and stiffness at a pressure": 1.731,
-    "law: force of one number": 21.55,
+    "law: pressure of one number": 21.55,
     "calibrated law, one surface": 3.809,
     "calibrated law, at a pressure": 14.11,
     "calibrated law, a new surface each": 30.37,
@@ -87,10 +87,10 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
         return dataclasses.replace(one, h_max=one.h_max * (1 + 1e-9 * next(fresh)))
 
     law = contact_law(one)
-    forces, place = law.force(many), float(many[0])
+    forces, place = law.pressure(separation=many), float(many[0])
     flat, u = Surface(0.8, 1.0, 64.0, 1.0, 3.3), rng.uniform(0.01, 3.3, MANY)
     mean = (gaps + surfaces.h_max) / 2
-    calibrated, loads = contact(flat, mean_separation=u, theory="calibrated").force, {}
+    calibrated, loads = contact(flat, mean_separation=u, theory="calibrated").pressure, {}
     for nodes in (28, 96):
         # nodes follow from the accuracy asked
         loads[nodes] = (rng.uniform(0, 20, 200), 10 ** rng.uniform(-2, 4, 200), {28: 1e-6, 96: 1e-13}[nodes])
@@ -116,12 +116,12 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
         "100,000 gaps on a new surface": (lambda: contact(another(), separation=many), MANY),
         "one gap on a new surface": (lambda: [contact(another(), separation=place) for _ in range(50)], 50),
         "a law": (lambda: [contact_law(another()) for _ in range(5)], 5),
-        "law: force": (lambda: law.force(many), MANY),
-        "law: force and stiffness": (lambda: law.force_and_stiffness(many), MANY),
-        "law: energy": (lambda: law.energy(many), MANY),
-        "law: force, area, stiffness, energy": (lambda: law.values(many), MANY),
+        "law: pressure": (lambda: law.pressure(separation=many), MANY),
+        "law: pressure and stiffness": (lambda: law.pressure_and_stiffness(separation=many), MANY),
+        "law: energy": (lambda: law.energy(separation=many), MANY),
+        "law: pressure, area, stiffness, energy": (lambda: law.values(separation=many), MANY),
         "law: gap, area and stiffness at a pressure": (lambda: law.at_pressure(forces), MANY),
-        "law: force of one number": (lambda: [law.force(place) for _ in range(CALLS)], CALLS),
+        "law: pressure of one number": (lambda: [law.pressure(place) for _ in range(CALLS)], CALLS),
         "calibrated law, one surface": (lambda: contact(flat, mean_separation=u, theory="calibrated"), MANY),
         "calibrated law, at a pressure": (lambda: contact(flat, pressure=calibrated, theory="calibrated"), MANY),
         "calibrated law, a new surface each": (

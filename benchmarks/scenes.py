@@ -15,27 +15,27 @@ from mbma_tables import InputError, Scene, Surface, contact
 SCENES, GAPS = 200, 4
 WARMED = 20  # scenes before times count: modules are loaded and tables opened by then
 EFFECTS = (
-    ("force", "area"),
+    ("pressure", "area"),
     ("energy",),
     ("stiffness",),
-    ("force", "energy"),
-    ("force", "area", "comparison"),
+    ("pressure", "energy"),
+    ("pressure", "area", "comparison"),
     ("area", "island_statistics"),
-    ("force", "conductance"),
+    ("pressure", "conductance"),
 )
 
 
 def truth(surface: Surface, gaps: np.ndarray, name: str) -> np.ndarray:
     """Exact force and area; stiffness and energy by other means than a law's."""
-    if name in ("force", "area"):
+    if name in ("pressure", "area"):
         return np.asarray(getattr(contact(surface, separation=gaps, island_model="exact", rtol=1e-10), name))
     if name == "stiffness":
-        return -2 * contact(surface, separation=gaps, rtol=1e-10, derivatives=True).force_by["separation"]
+        return -2 * contact(surface, separation=gaps, rtol=1e-10, derivatives=True).pressure_by["separation"]
     span = surface.h_max - gaps
 
     def integrand(t: float) -> np.ndarray:
         # t^2 for the power at first contact
-        return t * span * contact(surface, separation=surface.h_max - span * t**2, rtol=1e-10).force
+        return t * span * contact(surface, separation=surface.h_max - span * t**2, rtol=1e-10).pressure
 
     return np.asarray(quad_vec(integrand, 0, 1, epsrel=1e-9, norm="max")[0])
 
@@ -66,7 +66,7 @@ def scenes(rng: np.random.Generator) -> None:
         if number >= WARMED:
             ratios.append(spent / plan.seconds)
         # the truth of stiffness is known to 1e-7
-        names = [name for name in ("force", "area", "energy") if name in found]
+        names = [name for name in ("pressure", "area", "energy") if name in found]
         names += ["stiffness"] * ("stiffness" in found and rtol > 1e-6)
         above += [np.abs(found[name].values / truth(surface, gaps, name) - 1).max() / rtol for name in names]
     ratio = np.array(ratios)

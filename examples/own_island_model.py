@@ -50,11 +50,13 @@ def main(table_file: pathlib.Path) -> None:
         found = contact(surface, separation=gaps, island_model=model, rtol=1e-6)
         law = contact_law(surface, island_model=model, rtol=1e-6)
         one = island(surface, 0.01, island_model=model)
-        off = ", ".join(f"{ratio:.1e}" for ratio in found.force / exact.force - 1)
+        off = ", ".join(f"{ratio:.1e}" for ratio in found.pressure / exact.pressure - 1)
         bounds = ", ".join(f"{bound:.1e}" for bound in found.error)
         click.echo(f"{name}, which results call {found.island_model!r}")
         click.echo(f"  F/F_exact - 1 of totals {off}, where the model states {bounds}")
-        click.echo(f"  force by its law over force by its total: {law.force(gaps[0]) / found.force[0]:.6f}")
+        click.echo(
+            f"  force by its law over force by its total: {law.pressure(separation=gaps[0]) / found.pressure[0]:.6f}"
+        )
         click.echo(f"  force of an island pressed by 0.01 um: {one.force:.4g} E* um^2")
 
 

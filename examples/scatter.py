@@ -63,7 +63,7 @@ def sample_surfaces(count: int) -> Surface:
 
 def spread_of_force(count: int) -> Spread:
     """Forces of the samples at GAP and their quantiles."""
-    force = contact(sample_surfaces(count), separation=GAP, rtol=1e-6).force.compute(scheduler="threads").values
+    force = contact(sample_surfaces(count), separation=GAP, rtol=1e-6).pressure.compute(scheduler="threads").values
     levels = np.array(QUANTILES)
     # the rank of a quantile is binomial
     rank = np.sqrt(levels * (1 - levels) / count)
@@ -91,7 +91,7 @@ def main(out: pathlib.Path | None = None, samples: int = 200_000) -> Spread:
     """Sample, print and draw."""
     spread = spread_of_force(samples)
     middle = np.exp(LOG_H_RMS[0])
-    nominal = contact(Surface(HURST[0], Q0, np.exp(LOG_Q1[0]), middle, CREST * middle), separation=GAP).force
+    nominal = contact(Surface(HURST[0], Q0, np.exp(LOG_Q1[0]), middle, CREST * middle), separation=GAP).pressure
     mean, error = spread.force.mean(), spread.force.std(ddof=1) / np.sqrt(samples)
     click.echo(f"{samples} samples at d = {GAP} um, F/(A0 E*); the nominal surface gives {nominal:.4e}")
     click.echo(f"mean {mean:.4e} +- {error:.1e}")

@@ -59,7 +59,7 @@ def answer(points: np.ndarray) -> Contact:
 def log_answers(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """log(pressure/LOAD) and log(conductance), means of face and track, and their gradients (2, 4)."""
     found = answer(x + STEP * np.concatenate([np.zeros((1, 4)), np.eye(4), -np.eye(4)]))
-    both = np.log([found.force.mean(axis=1) / LOAD, found.leakage.conductance.mean(axis=1)])
+    both = np.log([found.pressure.mean(axis=1) / LOAD, found.leakage.conductance.mean(axis=1)])
     return both[:, 0], (both[:, 1:5] - both[:, 5:]) / (2 * STEP)
 
 
@@ -77,7 +77,7 @@ def simulate(best: Contact, x: np.ndarray, grid: int, seed: int) -> float:
     side = waves * LONGEST * gradient / h_rms
     engine = boundary_elements.Contact(heights / h_rms, (side, side))
     flows = []
-    for force in best.force[0, ::-1]:
+    for force in best.pressure[0, ::-1]:
         engine.press(force / E_STAR / gradient)
         flows.append(np.sqrt(np.prod(flow_conductance(engine.gap * h_rms))))
     return float(np.mean(flows))
@@ -105,7 +105,7 @@ def alike(x: np.ndarray, log_h_rms: np.ndarray) -> np.ndarray:
     low, high = (np.full(log_h_rms.size, end) for end in BOUNDS[3])
     for _ in range(40):
         points = np.stack([log_h_rms, *(np.full(low.size, value) for value in x[1:3]), (low + high) / 2], axis=1)
-        heavy = answer(points).force.mean(axis=1) > LOAD
+        heavy = answer(points).pressure.mean(axis=1) > LOAD
         low, high = np.where(heavy, points[:, 3], low), np.where(heavy, high, points[:, 3])
     return np.asarray(answer(points).leakage.conductance.mean(axis=1))
 
@@ -137,7 +137,7 @@ def main(out: pathlib.Path | None = None, cells: int = 3, grid: int = 256) -> Fo
     )
     for k, name in enumerate(("face", "track")):
         state = "blocked" if leakage.blocked[0, k] else f"leaks {leakage.liquid(**OIL)[0, k]:.3g} um^2/s of oil"
-        click.echo(f"{name}: {found.best.force[0, k]:.4f} MPa, contact {found.best.area[0, k]:.3f}, {state}")
+        click.echo(f"{name}: {found.best.pressure[0, k]:.4f} MPa, contact {found.best.area[0, k]:.3f}, {state}")
     law = np.exp(found.result.fun)
     click.echo(f"conductance {law:.4g} um^3, stated scatter of the track {leakage.scatter[0, 1]:.2f}")
     for conductance in found.simulated:

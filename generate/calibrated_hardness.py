@@ -129,7 +129,7 @@ def elastic_curve(node: tuple[float | str, ...], zeta_1: float, h_max: float, na
     """Force, stiffness and Q of a theory at `LEVELS` of a self-affine surface."""
     surface, u = Surface(node[1], 1.0, zeta_1, 1.0, h_max), h_max * LEVELS[:-1]
     found, g = get_theory(name).answer(surface, u), float(surface.rms_gradient)
-    return found.force / g, found.stiffness / g, get_theory(name).bearing_share(surface, u)[0]
+    return found.pressure / g, found.stiffness / g, get_theory(name).bearing_share(surface, u)[0]
 
 
 def accuracy(groups: dict[str, list[Capped]], constants: cap.Constants) -> FloatArray:
@@ -205,7 +205,7 @@ def blind() -> dict[str, FloatArray]:
     return {
         "area": np.log(found.area / own["area"]),
         "yielded": np.asarray(found.yielded - own["area_yielded"] / own["area"]),
-        "force": np.log(closer.force / (own["force"] * g)),
+        "force": np.log(closer.pressure / (own["force"] * g)),
         "stiffness": np.log(found.incremental_stiffness / (own["kappa"] * g)),
     }
 
@@ -219,8 +219,10 @@ def told_errors(one: Capped, name: str, constants: cap.Constants) -> dict[str, F
     force, area = np.full(one.u.shape, np.nan), np.full(one.u.shape, np.nan)
     # what the theory reaches
     loads, low = one.force * gradient, np.asarray(theory.interval(surface)[0])
-    held = (one.u < one.h_max) & (one.area > EDGES[0]) & (loads < theory.answer(surface, np.maximum(low, LEAST)).force)
-    force[held] = Yielding(theory, one.eta * gradient).answer(surface, one.u[held]).force / gradient
+    held = (
+        (one.u < one.h_max) & (one.area > EDGES[0]) & (loads < theory.answer(surface, np.maximum(low, LEAST)).pressure)
+    )
+    force[held] = Yielding(theory, one.eta * gradient).answer(surface, one.u[held]).pressure / gradient
     area[held] = cap.area(one.force[held], theory.area_at(surface, loads[held]), one.eta, constants)
     frozen = frozen_errors(one, elastic_curve(one.node, one.zeta_1, one.h_max, name), constants)
     return {"force": np.log(force / one.force), "area": np.log(area / one.area), "stiffness": frozen}

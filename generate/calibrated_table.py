@@ -72,9 +72,9 @@ class TheoryCurve:
         u = DEPTHS * one.h_max
         u = u[u > low]
         found = theory.answer(self._surface, u)
-        rising = np.append(True, np.diff(np.minimum(found.force, 1e300)) > 0) & (found.force > 0)
+        rising = np.append(True, np.diff(np.minimum(found.pressure, 1e300)) > 0) & (found.pressure > 0)
         self._u = u[rising]
-        self._log_force = np.log(found.force[rising] / self._gradient)
+        self._log_force = np.log(found.pressure[rising] / self._gradient)
         self._log_area = np.log(found.area[rising])
 
     def reaches(self, force: FloatArray) -> Any:
@@ -92,7 +92,7 @@ class TheoryCurve:
 
     def force(self, u: FloatArray) -> FloatArray:
         """F/(A0 E* g) at mean separations [h_rms]."""
-        return self._theory.answer(self._surface, np.minimum(u, self._surface.h_max)).force / self._gradient
+        return self._theory.answer(self._surface, np.minimum(u, self._surface.h_max)).pressure / self._gradient
 
 
 def _known(curves: dict[int, TheoryCurve]) -> Callable[[Case], TheoryCurve]:

@@ -17,8 +17,8 @@ def difference_weights(offsets):
 
 
 def with_slopes(law):
-    """Force and area of a law, each with its slope by -d."""
-    return (law.force, lambda d: law.stiffness(d) / 2), (law.area, law.area_slope)
+    """Pressure and area of a law, each with its slope by -d."""
+    return (law.pressure, lambda separation: law.stiffness(separation=separation) / 2), (law.area, law.area_slope)
 
 
 def random_map(points, low, high, power=1.8, seed=1, phases=False):

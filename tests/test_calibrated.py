@@ -44,7 +44,7 @@ def test_special_cases_are_perssons(constants, gamma):
     loads = np.array([0.003, 0.03, 0.3, 0.8])
     assert law.area(loads) == pytest.approx(erf(math.sqrt(2) * loads), rel=1e-12)
     if gamma == 0.42:
-        expected = Persson().mean_separation_at(surface, "force", loads * surface.rms_gradient)
+        expected = Persson().mean_separation_at(surface, "pressure", loads * surface.rms_gradient)
         np.testing.assert_allclose(law.separation(loads), expected, rtol=1e-6)
 
 
@@ -86,7 +86,7 @@ def assert_no_worse(law, force, contact, gap):
     """Nearer in area than the law before it, and in force within three of the standard deviations that are stated."""
     before = published_area(force, law.spectrum.alpha)
     assert np.all(np.abs(law.area(force) - contact) <= np.abs(before - contact))
-    scatter = shipped().standard_deviation("calibrated", "force", contact)
+    scatter = shipped().standard_deviation("calibrated", "pressure", contact)
     assert np.all(np.abs(np.log(law.force(gap) / force)) <= 3 * scatter)
 
 

@@ -56,7 +56,7 @@ def test_without_matplotlib_the_table_stands_alone(monkeypatch, thing):
 
 def test_without_xarray_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
-    for ask in (ROAD.to_dataset, Scene(ROAD, separations=[0.5], effects=["force"]).run):
+    for ask in (ROAD.to_dataset, Scene(ROAD, separations=[0.5], effects=["pressure"]).run):
         with pytest.raises(MbmaError, match=r"this needs xarray: pip install 'mbma_tables\[xarray\]'"):
             ask()
 
@@ -86,14 +86,14 @@ def test_every_variable_has_its_unit(thing):
 def test_a_dataset_holds_the_answers():
     answer = contact(ROAD, separation=[[0.8, 0.2], [0.1, 0.0]], E_star="13.3 MPa")
     found = answer.to_dataset()
-    for name in ("separation", "force", "area", "stiffness", "mean_pressure", "energy", "scatter", "valid", "error"):
+    for name in ("separation", "pressure", "area", "stiffness", "mean_pressure", "energy", "scatter", "valid", "error"):
         np.testing.assert_array_equal(found[name], getattr(answer, name))
     assert found["stiffness"].dims == ("dim_0", "dim_1")
-    assert (found["stiffness"].units, found["force"].units) == ("MPa/mm", "MPa")
+    assert (found["stiffness"].units, found["pressure"].units) == ("MPa/mm", "MPa")
     assert found.attrs["surface"] == repr(ROAD)
     law = contact_law(ROAD, E_star=13.3).to_dataset()
     np.testing.assert_allclose(
-        law["force"], contact(ROAD, separation=law["separation"].values, E_star=13.3).force, rtol=1e-8
+        law["pressure"], contact(ROAD, separation=law["separation"].values, E_star=13.3).pressure, rtol=1e-8
     )
     np.testing.assert_allclose(
         law["stiffness"], contact(ROAD, separation=law["separation"].values, E_star=13.3).stiffness, rtol=1e-6

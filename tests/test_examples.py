@@ -52,7 +52,7 @@ def direct(module, x):
     h_rms, h_max = np.exp(x[0]), module.CREST * np.exp(x[0])
     face = Surface(x[1], module.Q0, np.exp(x[2]), h_rms, h_max)
     both = [contact(face, mean_separation=x[3] * h_max + deeper, theory="calibrated") for deeper in (0, module.DEPTH)]
-    pressure = module.E_STAR * np.mean([half.force for half in both])
+    pressure = module.E_STAR * np.mean([half.pressure for half in both])
     return np.log([pressure / module.LOAD, np.mean([half.leakage.conductance for half in both])])
 
 
@@ -111,7 +111,7 @@ def test_scatter_is_the_exact_island_model_sample_by_sample(scatter):
     for k, (hurst, q1, h_rms, h_max) in enumerate(numbers):
         own = Surface(hurst, module.Q0, q1, h_rms, h_max)
         exact = contact(own, separation=module.GAP, island_model="exact", rtol=1e-7)
-        assert spread.force[k] == pytest.approx(exact.force, rel=1.2e-6, abs=0)
+        assert spread.force[k] == pytest.approx(exact.pressure, rel=1.2e-6, abs=0)
 
 
 @pytest.mark.slow

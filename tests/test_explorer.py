@@ -24,7 +24,7 @@ from mbma_tables.export.law_code import LAW_MODULE
 from mbma_tables.export.text import page_file
 from mbma_tables.theories import Mbma
 
-QUANTITIES = {"gap": "mean_separation", "force": "force", "area": "area", "stiffness": "stiffness"}
+QUANTITIES = {"gap": "mean_separation", "pressure": "pressure", "area": "area", "stiffness": "stiffness"}
 NAMES = ("hurst", "q0", "q1", "h_rms", "h_max")
 GO = """(text) => new Promise((done) => {
   addEventListener("hashchange", () => setTimeout(done), { once: true });
@@ -117,21 +117,21 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
     """Of the page's answers from the library's at the page's gaps, relative, in every quantity and theory."""
     surface, worst = Surface(*(state[name] for name in NAMES)), 0.0
     for theory in ("mbma", "calibrated", "persson"):
-        known = {name: found[f"{theory} {name}"] for name in ("gap", "force", "area", "stiffness")}
+        known = {name: found[f"{theory} {name}"] for name in ("gap", "pressure", "area", "stiffness")}
         answered = np.flatnonzero(np.isfinite(known["gap"]))[rows]
         assert answered.size > 3
         options = {"mean_separation": known["gap"][answered], "E_star": state["E_star"], "theory": theory}
         expected = contact(surface, **options, **({"variant": state["variant"]} if theory == "mbma" else {}))
         np.testing.assert_allclose(found[f"{theory} scatter of ln force"][answered], expected.scatter, rtol=1e-6)
         np.testing.assert_allclose(found[f"{theory} scatter of ln area"][answered], expected.area_scatter, rtol=1e-6)
-        force, area, stiffness = expected.force, expected.area, expected.stiffness
+        force, area, stiffness = expected.pressure, expected.area, expected.stiffness
         if theory == "mbma":
             # islands summed gap by gap, as the page does it, and with their derivatives
             gap = 2 * options["mean_separation"] - surface.h_max
             sums = Mbma(variant=state["variant"], rtol=1e-11).totals(surface, gap, derivatives=True)
             E_star = state["E_star"]
-            force, area, stiffness = E_star * sums.force, sums.area, -2 * E_star * sums.force_by["separation"]
-        for name, values in {"force": force, "area": area, "stiffness": stiffness}.items():
+            force, area, stiffness = E_star * sums.pressure, sums.area, -2 * E_star * sums.pressure_by["separation"]
+        for name, values in {"pressure": force, "area": area, "stiffness": stiffness}.items():
             worst = max(worst, np.abs(known[name][answered] / values - 1).max())
         assert np.allclose(
             found[f"{theory} conductance"] * state["E_star"], found[f"{theory} stiffness"], equal_nan=True
@@ -367,7 +367,7 @@ def test_the_law_as_c_is_the_theory_and_names_the_librarys_own(theory, visit, tm
     law, surface = compiled_law(path), dataclasses.replace(Surface.named("concrete"), h_rms=0.25)
     c = float(surface.h_max) * np.exp(np.random.default_rng(3).uniform(np.log(1e-4), np.log(0.99), 300))
     known = contact(surface, mean_separation=surface.h_max - c, E_star=13.3, theory=theory)
-    np.testing.assert_allclose(law("pressure", c), known.force, rtol=3e-8)
+    np.testing.assert_allclose(law("pressure", c), known.pressure, rtol=3e-8)
     np.testing.assert_allclose(law("area", c), known.area, rtol=3e-8)
     np.testing.assert_allclose(law("tangent", c), known.stiffness, rtol=3e-6)
     assert np.isnan(law("pressure", [1e-6, 2.0])).all()
@@ -388,7 +388,7 @@ def test_numbers_under_the_cursor_by_keyboard(visit):
     assert rows.nth(0).inner_text().startswith("u = 1.078 mm")
     known = contact(Surface.named("concrete"), mean_separation=1.078, E_star=13.3, theory="calibrated")
     shown = float(rows.nth(1).locator("td").first.inner_text().split(" ±")[0])
-    assert shown == pytest.approx(known.force, rel=1e-4)
+    assert shown == pytest.approx(known.pressure, rel=1e-4)
     assert not known.valid
     assert "calibrated: A/A0 is below 0.001." in tab.inner_text("#concerns")
 

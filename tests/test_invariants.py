@@ -106,9 +106,9 @@ def test_units_that_are_powers_of_two_change_no_bit(surface, share, variant, pow
             E_star=modulus,
             derivatives=derivatives,
         )
-        assert (found.force, found.area, found.error) == (one.force * modulus, one.area, one.error)
+        assert (found.pressure, found.area, found.error) == (one.pressure * modulus, one.area, one.error)
         for name, degree in SLOPE_DIMENSIONS.items() if derivatives else ():
-            assert found.force_by[name] == one.force_by[name] * modulus * unit**degree, name
+            assert found.pressure_by[name] == one.pressure_by[name] * modulus * unit**degree, name
             assert found.area_by[name] == one.area_by[name] * unit**degree, name
 
 
@@ -117,9 +117,9 @@ def test_laws_in_any_unit(surface, share, power, stress):
     unit, modulus, gap = 10**power, 10**stress, float(gaps_of(surface, share))
     law, other = contact_law(surface, 1e-9), contact_law(in_unit(surface, unit), 1e-9, E_star=modulus)
     room = law.error + other.error + lost_digits(surface, gap)
-    assert abs(other.force(gap * unit) / (law.force(gap) * modulus) - 1) <= room
-    assert abs(other.area(gap * unit) / law.area(gap) - 1) <= room
-    assert abs(other.energy(gap * unit) / (law.energy(gap) * modulus * unit) - 1) <= room
+    assert abs(other.pressure(separation=gap * unit) / (law.pressure(separation=gap) * modulus) - 1) <= room
+    assert abs(other.area(separation=gap * unit) / law.area(separation=gap) - 1) <= room
+    assert abs(other.energy(separation=gap * unit) / (law.energy(separation=gap) * modulus * unit) - 1) <= room
     assert (law.turning_point is None) == (other.turning_point is None)
     if law.turning_point is not None:
         # where force is flat, its error moves the end of the branch by a root
@@ -130,11 +130,11 @@ def test_laws_in_any_unit(surface, share, power, stress):
 @invariant(4, surface=surfaces, share=st.floats(0.05, 0.9), power=st.floats(-12, 12), stress=st.floats(-12, 12))
 def test_scenes_in_any_unit(surface, share, power, stress):
     unit, modulus, gap = 10**power, 10**stress, float(gaps_of(surface, share))
-    effects = ("force", "area", "stiffness", "energy", "conductance", "island_statistics")
+    effects = ("pressure", "area", "stiffness", "energy", "conductance", "island_statistics")
     parts = {"effects": effects, "rtol": 1e-6, "conductivities": (1.0, 3.0)}
     one = Scene(surface, separations=[gap], **parts).run()
     other = Scene(in_unit(surface, unit), separations=[gap * unit], E_star=modulus, **parts).run()
-    degrees = {"force": (1, 0), "area": (0, 0), "stiffness": (1, -1), "energy": (1, 1), "conductance": (0, -1)}
+    degrees = {"pressure": (1, 0), "area": (0, 0), "stiffness": (1, -1), "energy": (1, 1), "conductance": (0, -1)}
     degrees |= {"island_number": (0, -2), "island_delta": (0, 1), "island_force": (1, 2)}
     for name, (of_stress, of_length) in degrees.items():
         expected = one[name] * modulus**of_stress * unit**of_length
@@ -149,7 +149,7 @@ def test_force_and_area_fall_in_the_gap(surface, variant):
     found = contact(surface, separation=gaps, variant=variant, derivatives=True)
     cell = 1.001 * surface.h_max / 199
     for values, slopes, turn in (
-        (found.force, found.force_by["separation"], law.turning_point),
+        (found.pressure, found.pressure_by["separation"], law.turning_point),
         (found.area, found.area_by["separation"], law.area_turning_point),
     ):
         end = -surface.h_max if turn is None else turn
@@ -213,7 +213,7 @@ def test_first_contact_is_a_power_law(surface, variant):
     depth = surface.h_max - gaps
     found = contact(surface, separation=gaps, variant=variant, rtol=1e-11)
     for values, exponent, factor in zip(
-        (found.force, found.area), (3.5, 10 / 3), first_contact(surface, variant), strict=True
+        (found.pressure, found.area), (3.5, 10 / 3), first_contact(surface, variant), strict=True
     ):
         off = np.log(values / (factor * depth**exponent))
         slope = np.diff(np.log(values))[::2] / np.diff(np.log(depth))[::2]
@@ -246,7 +246,7 @@ def test_random_islands_add_up(surface, share, variant, seed):
     height = gap + delta - (found.h_d if variant.offset else 0)
     weight = measure * K1 * D * np.exp(-0.5 * (height / sigma) ** 2) / (math.sqrt(2 * math.pi) * sigma)
     total = contact(surface, separation=gap, variant=variant)
-    for carried, whole in ((found.force, total.force), (found.area, total.area)):
+    for carried, whole in ((found.force, total.pressure), (found.area, total.area)):
         terms = carried * weight
         scatter = math.sqrt(np.sum((terms[0] - terms[1]) ** 2)) / 2
         assert scatter <= 1e-3 * whole
@@ -264,9 +264,9 @@ def test_spheres_that_deform_carry_less(surface, shares, variant):
         contact(surface, separation=gaps, island_model=island_model, variant=variant)
         for island_model in ("rigid", "universal")
     ]
-    for rigid, elastic in (pairs, totals):
+    for (rigid, elastic), load in ((pairs, "force"), (totals, "pressure")):
         room = 1 + rigid.error + elastic.error
-        assert (elastic.force <= rigid.force * room).all()
+        assert (getattr(elastic, load) <= getattr(rigid, load) * room).all()
         assert (elastic.area <= rigid.area * room).all()
 
 
@@ -277,17 +277,19 @@ def test_a_law_and_its_inverse(surface, shares, variant, digits):
     """Both ways, on the branch of first contact."""
     law = contact_law(surface, 10.0**-digits, variant=variant)
     for name, value, slope, turn in (
-        ("force", law.force, lambda d: law.stiffness(d) / 2, law.turning_point),
+        ("pressure", law.pressure, lambda separation: law.stiffness(separation=separation) / 2, law.turning_point),
         ("area", law.area, law.area_slope, law.area_turning_point),
     ):
         span = law.h_max - (-law.h_max if turn is None else turn)
         # seldom where pieces meet, which they do within the law's error alone
         gaps = law.h_max - span * np.minimum(np.asarray(shares) * 0.49, 0.99)
-        there = value(gaps)
+        there = value(separation=gaps)
         back = law.separation(**{name: there})
         rounded = 1e-12 + lost_digits(surface, gaps)
-        assert (np.abs(value(back) / there - 1) <= rounded).all()
-        assert (np.abs(back - gaps) * slope(gaps) <= 2 * rounded * there)[slope(gaps) * span > 0.01 * there].all()
+        assert (np.abs(value(separation=back) / there - 1) <= rounded).all()
+        assert (np.abs(back - gaps) * slope(separation=gaps) <= 2 * rounded * there)[
+            slope(separation=gaps) * span > 0.01 * there
+        ].all()
 
 
 @invariant(12, surface=rough_surfaces, share=depths, variant=st.sampled_from(list(VARIANTS.values())))
@@ -305,11 +307,11 @@ def test_tiers_are_within_their_bounds_of_each_other(surface, share, variant):
             assert island_model != "universal"
             refused += 1
             continue
-        assert abs(found.force / exact.force - 1) <= found.error + exact.error, island_model
+        assert abs(found.pressure / exact.pressure - 1) <= found.error + exact.error, island_model
         assert abs(found.area / exact.area - 1) <= found.error + exact.error, island_model
     rigid = contact(surface, separation=gap, island_model="rigid", variant=variant)
     # a sphere that gives way carries less
-    assert exact.force <= rigid.force * (1 + rigid.error + exact.error)
+    assert exact.pressure <= rigid.pressure * (1 + rigid.error + exact.error)
     return refused
 
 
@@ -347,7 +349,7 @@ def test_no_entry_knows_the_others(island_model, seed):
         )
 
     for answer, names in (
-        (totals, ("force", "area", "error")),
+        (totals, ("pressure", "area", "error")),
         (islands, ("force", "area", "error", "X", "mu", "eta")),
     ):
         whole, mixed, folded = answer(np.arange(30)), answer(order), answer(order.reshape(5, 6))
@@ -384,7 +386,7 @@ def test_chunks_change_no_answer(island_model, seed, chunks):
     plain = contact(
         Surface(*(n.values[:, None] for n in named)), separation=d.values, island_model=island_model, rtol=1e-4
     )
-    for name in ("force", "area", "error"):
+    for name in ("pressure", "area", "error"):
         with dask.config.set(scheduler="synchronous"):
             computed = getattr(lazy, name).transpose("surface", "gap").compute()
         whole = getattr(eager, name).transpose("surface", "gap")

@@ -28,7 +28,7 @@ def test_texts_give_a_text_that_contact_takes():
     found = effective_modulus("210 GPa", 0.3, "7e4 MPa", 0.33)
     assert found == f"{effective_modulus(210.0, 0.3, 70.0, 0.33)} GPa"
     pressed = contact(Surface.named("challenge"), pressure="1 MPa", E_star=found)
-    assert pressed.units["force"] == "GPa"
+    assert pressed.units["pressure"] == "GPa"
     with pytest.raises(InputError, match="E2 without a unit beside numbers in GPa"):
         effective_modulus("210 GPa", 0.3, 70.0, 0.33)
     with pytest.raises(TypeError, match=r"E_star=materials\.effective_modulus"):
@@ -99,7 +99,7 @@ def test_hardness_is_about_three_tensile_strengths(name, tensile):
 
 
 @pytest.mark.parametrize(
-    ("name", "numbers", "force"), [("steel 4140", (200, 578), 3000), ("aluminium 6061", (30, 95), 500)]
+    ("name", "numbers", "pressure"), [("steel 4140", (200, 578), 3000), ("aluminium 6061", (30, 95), 500)]
 )
 def test_brinell_numbers_from_the_indentation(name, numbers, force):
     ball = 10.0  # mm

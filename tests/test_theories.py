@@ -16,7 +16,7 @@ SPHERES, FULL, LIGHT = theories.GreenwoodWilliamson(), theories.Persson(), theor
 
 
 def separation(surface, load, theory=FULL):
-    return theory.mean_separation_at(surface, "force", np.asarray(load))
+    return theory.mean_separation_at(surface, "pressure", np.asarray(load))
 
 
 def relative(value, expected):
@@ -90,7 +90,7 @@ def test_full_double_integral_equals_mpmath_computed_here(hurst, zeta_1, slope, 
 
 def test_simplified_force_of_the_yang_persson_case():
     """The value that follows from Eqs. (20, 21); the paper reads 3.5e-4 off its figure."""
-    force = LIGHT.answer(YANG_PERSSON, 3 * YANG_PERSSON.h_rms).force
+    force = LIGHT.answer(YANG_PERSSON, 3 * YANG_PERSSON.h_rms).pressure
     assert force == pytest.approx(3.64e-4, rel=1e-3)
 
 
@@ -135,7 +135,7 @@ def test_simplified_is_the_light_load_limit_of_full(hurst):
     assert constant == pytest.approx(4.047, rel=1e-3)
     # the next term is of first order in the load
     u = separation(surface, [1e-13, 1e-15], LIGHT)
-    full, simplified = (theory.answer(surface, u).force for theory in (FULL, LIGHT))
+    full, simplified = (theory.answer(surface, u).pressure for theory in (FULL, LIGHT))
     assert relative(full / simplified, constant / 4.047) < 1e-9
 
 
@@ -154,7 +154,7 @@ def test_force_and_separation_are_inverse(hurst, log_zeta_1, log_load, theory):
     except OutOfRangeError:
         assert theory is LIGHT
         return
-    again = theory.answer(surface, u).force
+    again = theory.answer(surface, u).pressure
     assert relative(again, load) < 1e-10
 
 
@@ -189,7 +189,7 @@ def test_greenwood_williamson_equals_mpmath():
         force = mpmath.mpf(4) / 3 * density * mpmath.sqrt(radius) * mean(1.5)
         area = mpmath.pi * density * radius * mean(1)
     found = contact(YANG_PERSSON, separation=d, theory="greenwood_williamson", E_star=2.5)
-    assert relative(found.force, 2.5 * float(force)) < 1e-11
+    assert relative(found.pressure, 2.5 * float(force)) < 1e-11
     assert relative(found.area, float(area)) < 1e-11
     assert found.mean_separation == (3 + d) / 2
 
@@ -199,14 +199,14 @@ def test_greenwood_williamson_deep_and_far():
     s = YANG_PERSSON
     deep = SPHERES.answer(s, (s.h_max - 1e6) / 2)
     expected = 4 / 3 * s.summit_density * math.sqrt(s.summit_radius) * 1e9
-    assert relative(deep.force, expected) < 1e-10
+    assert relative(deep.pressure, expected) < 1e-10
     assert relative(deep.area, math.pi * s.summit_density * s.summit_radius * 1e6) < 1e-10
     x = 36.0
     far = SPHERES.answer(s, (s.h_max + x * s.summit_sigma) / 2)
     # F_1/F_{3/2} -> sqrt(x)/Gamma(5/2), the next term below 3/x^2
-    ratio = (far.area / far.force) * 4 / (3 * math.pi) / np.sqrt(s.summit_radius / s.summit_sigma)
+    ratio = (far.area / far.pressure) * 4 / (3 * math.pi) / np.sqrt(s.summit_radius / s.summit_sigma)
     assert relative(ratio, math.sqrt(x) / math.gamma(2.5)) < 3 / x**2
-    assert SPHERES.answer(s, 31.5).force == 0
+    assert SPHERES.answer(s, 31.5).pressure == 0
 
 
 def test_everything_broadcasts_and_keeps_scalars():
@@ -215,7 +215,7 @@ def test_everything_broadcasts_and_keeps_scalars():
     x = np.array([0.5, 1.0, 1.5])
     for theory in (SPHERES, FULL, LIGHT):
         batch, single = (contact(s, mean_separation=u, theory=theory) for s, u in ((surface, x), (one, 1.0)))
-        for name in ("force", "area", "stiffness", "separation"):
+        for name in ("pressure", "area", "stiffness", "separation"):
             assert getattr(batch, name).shape == (2, 3)
             assert isinstance(getattr(single, name), np.float64)
             assert relative(getattr(batch, name)[1, 1], getattr(single, name)) < 1e-12
@@ -255,5 +255,5 @@ def test_extreme_loads_stay_numbers():
     assert (np.diff(vanishing) <= 0).all()
     assert vanishing[0] > 0 == vanishing[-1]
     loads = np.array([1e-290, 1e-100, 1e-10, 1.0, 10.0])
-    again = FULL.answer(YANG_PERSSON, separation(YANG_PERSSON, loads)).force
+    again = FULL.answer(YANG_PERSSON, separation(YANG_PERSSON, loads)).pressure
     assert relative(again, loads) < 1e-9

@@ -44,21 +44,26 @@ def questions():
 
     def law_values(seed):
         d = gaps(seed, ENTRIES)
-        return [law.force(d), law.area(d), law.stiffness(d), law.force(float(d[0]))]
+        return [
+            law.pressure(separation=d),
+            law.area(separation=d),
+            law.stiffness(separation=d),
+            law.pressure(separation=float(d[0])),
+        ]
 
     def inverses(seed):
-        return [law.separation(force=law.force(gaps(seed, 200)))]
+        return [law.separation(pressure=law.pressure(separation=gaps(seed, 200)))]
 
     def batches(seed):
         # 31 islands or more a gap
         rng = np.random.default_rng(seed)
         surfaces = Surface(rng.uniform(0.3, 1, 60), 0.2, 0.2 * 10 ** rng.uniform(0.5, 4, 60), 1.0, 3.0)
         found = contact(surfaces, separation=gaps(seed, 60), rtol=1e-6)
-        return [found.force, found.area, found.error]
+        return [found.pressure, found.area, found.error]
 
     def gradients(seed):
         found = contact(Surface(0.6, 0.2, 30.0, 1.0, 3.0), separation=gaps(seed, 10), rtol=1e-6, derivatives=True)
-        return [*found.force_by.values(), *found.area_by.values()]
+        return [*found.pressure_by.values(), *found.area_by.values()]
 
     return [values, slopes, law_values, inverses, batches, gradients]
 
@@ -99,12 +104,12 @@ def test_ten_million_mixed_lookups_by_sixteen_threads_have_the_bits_of_one():
         blocks = [slice(k, k + size) for k in range(0, each, size)]
         found = [model.answer(X[block], mu[block]) for block in blocks]
         phi = [np.concatenate([getattr(part, name) for part in found]) for name in ("phi_F", "phi_A", "error")]
-        return [*phi, np.concatenate([law.force(gaps[block]) for block in blocks])]
+        return [*phi, np.concatenate([law.pressure(separation=gaps[block]) for block in blocks])]
 
     whole = answers(each)
     for k in range(0, each, each // 50):
         one = model.answer(X[k], mu[k])
-        assert [one.phi_F, one.phi_A, one.error, law.force(gaps[k])] == [column[k] for column in whole]
+        assert [one.phi_F, one.phi_A, one.error, law.pressure(separation=gaps[k])] == [column[k] for column in whole]
     with ThreadPoolExecutor(THREADS) as pool:
         for found in pool.map(answers, 4 * [997, 8192, 50_000, each]):
             for column, expected in zip(found, whole, strict=True):
@@ -159,12 +164,12 @@ def test_workers_change_no_bit(derivatives):
     one, two = (
         contact(surfaces, separation=depth, rtol=1e-6, derivatives=derivatives, workers=workers) for workers in (1, 2)
     )
-    np.testing.assert_array_equal([two.force, two.area, two.error], [one.force, one.area, one.error])
+    np.testing.assert_array_equal([two.pressure, two.area, two.error], [one.pressure, one.area, one.error])
     gaps = np.linspace(-2.9, 2.9, 40_000)
     one, two = (
         contact(Surface(0.7, 0.2, 60.0, 1.0, 3.0), separation=gaps, rtol=1e-6, workers=workers) for workers in (1, 2)
     )
-    np.testing.assert_array_equal([two.force, two.area], [one.force, one.area])
+    np.testing.assert_array_equal([two.pressure, two.area], [one.pressure, one.area])
     with pytest.raises(InputError, match="workers must be a whole number"):
         contact(surfaces, separation=depth, workers=0)
 

@@ -106,7 +106,7 @@ def test_two_surfaces_in_their_own_units():
 
 
 def test_units_of_results():
-    expected = {"force": "MPa", "stiffness": "MPa/um", "energy": "MPa um", "q0": "1/um", "area": "1"}
+    expected = {"pressure": "MPa", "stiffness": "MPa/um", "energy": "MPa um", "q0": "1/um", "area": "1"}
     assert {name: unit_of(name, Units("um", "MPa")) for name in expected} == expected
     assert unit_of("stiffness", Units("um", "1")) == "1/um"
     assert unit_of("island_force", Units("um", "1")) == "um^2"
@@ -153,7 +153,7 @@ def test_conflicts_in_python(case):
 
 
 SURFACE = '[surface]\nhurst = 0.8\nq0 = "0.1/mm"\nzeta_1 = 50\nh_rms = "800 um"\n'
-REST = '[effects]\non = ["force"]\n'
+REST = '[effects]\non = ["pressure"]\n'
 TOML = {
     "plain beside a unit": (SURFACE + "h_max = 3\n" + REST, "h_max without a unit beside numbers in mm"),
     "wrong power": (SURFACE + 'h_max = "3 1/mm"\n' + REST, "h_max|no known unit"),
@@ -217,14 +217,14 @@ def asked(*arguments):
 def test_the_command_line_converts():
     plain = asked("--surface", "concrete", "--E-star", "13.3MPa", "-d", "0.5,0.2")
     moved = asked("--surface", "concrete", "--E-star", "13.3MPa", "-d", "500um,0.2mm", "--length-unit", "m")
-    assert (plain["units"]["separation"], plain["units"]["force"], plain["units"]["area"]) == ("mm", "MPa", "-")
+    assert (plain["units"]["separation"], plain["units"]["pressure"], plain["units"]["area"]) == ("mm", "MPa", "-")
     assert (moved["units"]["separation"], moved["units"]["stiffness"]) == ("m", "MPa/m")
-    for name, size in {"separation": 1e-3, "force": 1, "area": 1, "stiffness": 1e3}.items():
+    for name, size in {"separation": 1e-3, "pressure": 1, "area": 1, "stiffness": 1e3}.items():
         found, expected = (np.array(answer["columns"][name]) for answer in (moved, plain))
         np.testing.assert_allclose(found, size * expected, rtol=1e-8)
     pascals = asked("--surface", "concrete", "--E-star", "13.3MPa", "--stress-unit", "Pa", "-p", "1kPa")
-    assert pascals["columns"]["force"] == pytest.approx([1000.0], rel=1e-12)
-    assert (pascals["E_star"], pascals["stress_unit"], pascals["units"]["force"]) == (13.3e6, "Pa", "Pa")
+    assert pascals["columns"]["pressure"] == pytest.approx([1000.0], rel=1e-12)
+    assert (pascals["E_star"], pascals["stress_unit"], pascals["units"]["pressure"]) == (13.3e6, "Pa", "Pa")
 
 
 def test_h_rms_with_its_unit():
@@ -240,7 +240,7 @@ def test_a_surface_file_states_both_units(tmp_path):
     path = tmp_path / "s.toml"
     path.write_text('[surface]\nname = "concrete"\n[material]\nE_star = "0.0133 GPa"\nstress_unit = "MPa"\n')
     found = asked("--file", path, "-d", "0.5")
-    assert (found["E_star"], found["stress_unit"], found["units"]["force"]) == (pytest.approx(13.3), "MPa", "MPa")
+    assert (found["E_star"], found["stress_unit"], found["units"]["pressure"]) == (pytest.approx(13.3), "MPa", "MPa")
     # a modulus of the command line is in the file's unit, unless it has its own
     assert asked("--file", path, "--E-star", "20", "-d", "0.5")["E_star"] == 20
     assert asked("--file", path, "--E-star", "2GPa", "-d", "0.5")["stress_unit"] == "GPa"
@@ -254,12 +254,12 @@ def test_a_scene_file_with_units(tmp_path):
     path.write_text(
         SURFACE + 'h_max = "2.4 mm"\nlength_unit = "um"\n'
         '[material]\nE_star = "0.1 GPa"\n[prescribed]\npressures = ["100 kPa", "200 kPa"]\n'
-        '[effects]\non = ["force", "stiffness"]\n[accuracy]\nrtol = 1e-4\n'
+        '[effects]\non = ["pressure", "stiffness"]\n[accuracy]\nrtol = 1e-4\n'
     )
     found = Scene.from_toml(path).run()
-    assert found["force"].values == pytest.approx([1e-4, 2e-4], rel=1e-4)
-    assert {name: found[name].attrs["units"] for name in ("force", "stiffness", "separation")} == {
-        "force": "GPa",
+    assert found["pressure"].values == pytest.approx([1e-4, 2e-4], rel=1e-4)
+    assert {name: found[name].attrs["units"] for name in ("pressure", "stiffness", "separation")} == {
+        "pressure": "GPa",
         "stiffness": "GPa/um",
         "separation": "um",
     }
@@ -313,14 +313,14 @@ def test_the_factor_is_rounded_once():
 def test_a_contact_keeps_its_units(theory):
     plain = contact(CONCRETE, separation=[0.5, 0.2], E_star=13.3, theory=theory)
     found = contact(CONCRETE.to("um"), separation=["0.5 mm", "200 um"], E_star="0.0133 GPa", theory=theory)
-    expected = {"separation": "um", "force": "GPa", "area": "1", "stiffness": "GPa/um", "energy": "GPa um"}
+    expected = {"separation": "um", "pressure": "GPa", "area": "1", "stiffness": "GPa/um", "energy": "GPa um"}
     assert expected.items() <= found.units.items()
-    sizes = {"separation": 1e3, "force": 1e-3, "area": 1, "stiffness": 1e-6, "energy": 1, "mean_pressure": 1e-3}
+    sizes = {"separation": 1e3, "pressure": 1e-3, "area": 1, "stiffness": 1e-6, "energy": 1, "mean_pressure": 1e-3}
     for name, size in sizes.items():
         np.testing.assert_allclose(getattr(found, name), size * getattr(plain, name), rtol=1e-7)
     joint = contact(CONCRETE, pressure="10 kPa", E_star="13.3 MPa", theory=theory)
-    assert joint.force == pytest.approx(0.01, rel=1e-9)
-    assert plain.units["force"] == "stress"
+    assert joint.pressure == pytest.approx(0.01, rel=1e-9)
+    assert plain.units["pressure"] == "stress"
     assert contact(CONCRETE, separation=0.5, theory=theory).units["stiffness"] == "1/mm"
 
 
@@ -328,9 +328,9 @@ def test_a_labelled_contact_keeps_its_units():
     xr = pytest.importorskip("xarray")
     gaps = xr.DataArray([0.5, 0.2], dims="gap")
     found = contact(CONCRETE, separation=gaps, E_star="13.3 MPa")
-    assert (found.force.attrs["units"], found.units["mean_separation"]) == ("MPa", "mm")
-    assert contact(CONCRETE, separation=gaps.assign_attrs(units="mm")).force.values == pytest.approx(
-        found.force.values / 13.3
+    assert (found.pressure.attrs["units"], found.units["mean_separation"]) == ("MPa", "mm")
+    assert contact(CONCRETE, separation=gaps.assign_attrs(units="mm")).pressure.values == pytest.approx(
+        found.pressure.values / 13.3
     )
     with pytest.raises(InputError, match="separation is in 'um' by its attribute units, and asked for in 'mm'"):
         contact(CONCRETE, separation=gaps.assign_attrs(units="um"))
@@ -340,12 +340,12 @@ def test_a_labelled_contact_keeps_its_units():
 def test_a_law_keeps_its_units(theory):
     law = contact_law(CONCRETE.to("um"), 1e-5, E_star="13.3 MPa", theory=theory)
     assert law.units == Units("um", "MPa")
-    assert law.force(u="0.7 mm") == law.force(u=700.0)
-    assert law.separation(force="10 kPa") == law.separation(force=0.01)
+    assert law.pressure("0.7 mm") == law.pressure(700.0)
+    assert law.separation(pressure="10 kPa") == law.separation(pressure=0.01)
     assert law.at_pressure("10 kPa").area == law.at_pressure(0.01).area
     point = law.at_pressure("10 kPa")
     assert f"mean_separation {point.mean_separation:.4g} um," in repr(point)
-    assert "force 0.01 MPa" in repr(pickle.loads(pickle.dumps(point)))
+    assert "pressure 0.01 MPa" in repr(pickle.loads(pickle.dumps(point)))
     assert pickle.loads(pickle.dumps(law)).units == law.units
     with pytest.raises(InputError, match="needs a modulus"):
         contact_law(CONCRETE, 1e-3).at_pressure("10 kPa")
@@ -364,12 +364,12 @@ def test_a_surface_that_is_its_own_spectrum_has_the_same_rule(theory):
     plain = contact(surface, mean_separation=0.6, E_star="100 GPa", theory=theory)
     moved = contact(surface.to("mm"), mean_separation="600 nm", E_star="100 GPa", theory=theory)
     assert (plain.units["stiffness"], moved.units["stiffness"]) == ("GPa/um", "GPa/mm")
-    for name, size in {"force": 1, "area": 1, "stiffness": 1e3, "energy": 1e-3}.items():
+    for name, size in {"pressure": 1, "area": 1, "stiffness": 1e3, "energy": 1e-3}.items():
         assert getattr(moved, name) == pytest.approx(size * getattr(plain, name), rel=1e-9)
     law = describe_law(surface, "100 GPa", length_unit="mm", rows=20, theory=theory)
     assert (law.x_unit, law.y_unit) == ("mm", "GPa")
     assert law.x[-1] == pytest.approx(1e-3 * surface.h_max, rel=1e-3)
     found = Scene(surface, separations=["0.3e-3 mm"], E_star="100 GPa", theory=theory, rtol=1e-3).run()
-    assert (found["separation"].item(), found["force"].attrs["units"]) == (0.3, "GPa")
+    assert (found["separation"].item(), found["pressure"].attrs["units"]) == (0.3, "GPa")
     with pytest.raises(InputError, match="give the surface its unit"):
         contact(Surface.from_spectrum(q, 0.01 * q**-3.6, h_max=1.1), mean_separation="600 nm", theory=theory)

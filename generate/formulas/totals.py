@@ -20,7 +20,7 @@ from generate.formulas.printing import Form, Function, Step, evaluate, needed, s
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 
-NAMES = ("force", "area")
+NAMES = ("pressure", "area")
 RANGES = {
     "d_over_h_rms": (-4.5, 4.5),
     "h_max_over_h_rms": (3.0, 4.5),
@@ -35,7 +35,7 @@ DEGREE = 3
 # what a power of each variable counts towards DEGREE, by branch
 NEAR = {"t": 0.75, "b": 0.75, "q": 0.75, "c": 1.0, "z": 1.0, "h": 1.0}
 FAR = {"g": 0.5, "s": 0.5, "y": 1.0, "h": 1.0, "z": 1.0}
-TERMS = {"force": (22, 18), "area": (23, 17)}  # of the near and the far branch
+TERMS = {"pressure": (22, 18), "area": (23, 17)}  # of the near and the far branch
 POINTS, HELD_OUT = 40_000, 60_000
 EDGE = 0.3  # share of each property that lies on an end of its range, where the error is largest
 FIT_SEED, HELD_OUT_SEED = 41, 42
@@ -71,9 +71,9 @@ VARIABLES = steps_of(
 # what a branch starts from: the power of first contact, the layer and the Gaussian at the largest islands; beyond, the
 # tail of heights
 STARTS = {
-    ("force", False): "7/2*log(r/(1 + r*zeta_1**hurst)) - (h_max_over_h_rms - 4*r/9)**2/2",
+    ("pressure", False): "7/2*log(r/(1 + r*zeta_1**hurst)) - (h_max_over_h_rms - 4*r/9)**2/2",
     ("area", False): "10/3*log(r/(1 + r*zeta_1**hurst)) - (h_max_over_h_rms - 4*r/9)**2/2",
-    ("force", True): "-(d_over_h_rms + sqrt(d_over_h_rms**2 + 2))**2/8",
+    ("pressure", True): "-(d_over_h_rms + sqrt(d_over_h_rms**2 + 2))**2/8",
     ("area", True): "-(d_over_h_rms + sqrt(d_over_h_rms**2 + 2))**2/8",
 }
 
@@ -253,7 +253,7 @@ def totals_form() -> Form:
         digits = fewest_digits(lambda digits, errors=errors: float(errors(digits).max()), SLACK)  # type: ignore[misc]
         given, _ = samples(HELD_OUT, HELD_OUT_SEED)
         certificates[name] = certificate(sum(TERMS[name]), errors(digits, HELD_OUT, HELD_OUT_SEED), given)
-        quantity = {"force": "Force over E* q0 h_rms", "area": "A/A0"}[name]
+        quantity = {"pressure": "Pressure over E* q0 h_rms", "area": "A/A0"}[name]
         title = f"{quantity}, closed totals: within {certificates[name].largest:g}."
         functions.append(Function("totals", name, tuple(RANGES), title, function_steps(name, digits)))
     return Form("totals", RANGES | {"area": (MIN_AREA, 1.0)}, tuple(functions), certificates)

@@ -26,14 +26,14 @@ FORMS = ("calibrated", "corrected", "simulated")
 MODULES = ("generate.machined.makers", "generate.machined.solve", "mbma_tables.laws.boundary_elements")
 TARGET = pathlib.Path("docs/data/machined.nc")
 MEANINGS = {
-    "force": "F/(A0 E*)",
+    "pressure": "F/(A0 E*)",
     "area": "A/A0",
     "mean_separation": "u, the mean gap",
     "energy": "elastic energy over A0 E*",
-    "stiffness": "-dF/du over A0 E*, by a step of 3% of the force",
+    "stiffness": "-dF/du over A0 E*, by a step of 3% of the pressure",
     "flow_x": "flow conductance along the first axis; 0: blocked, NaN: not solved",
     "flow_y": "flow conductance along the second axis",
-    "force_scatter": "stated standard deviation of ln F at equal u",
+    "pressure_scatter": "stated standard deviation of ln F at equal u",
     "area_scatter": "of ln A at equal F",
     "stiffness_scatter": "of ln of the stiffness at equal F",
     "flow_scatter": "of ln of the flow conductance",

@@ -125,10 +125,12 @@ def draw(data: Any) -> bytes:
     g = float(surface.rms_gradient)
     for name in THEORIES:
         found = get_theory(name).answer(surface, gap)
-        left.semilogy(gap, found.force / g, color=COLOURS[name], label=name)
+        left.semilogy(gap, found.pressure / g, color=COLOURS[name], label=name)
         if name == "calibrated":
             spread = np.exp(get_theory(name).scatter(surface, found.area)[0])
-            left.fill_between(gap, found.force / g / spread, found.force / g * spread, color="0.8", label="its scatter")
+            left.fill_between(
+                gap, found.pressure / g / spread, found.pressure / g * spread, color="0.8", label="its scatter"
+            )
     left.semilogy(u, force, "ko", mfc="none", label="boundary elements")
     left.set(xlabel="u/h_rms", ylabel="F/(A0 E* g)", ylim=(1e-5, 3), title="H 0.8, zeta_1 64, h_max 3.4 h_rms")
     left.legend(fontsize="small")

@@ -30,7 +30,7 @@ def sample(surface: Surface, theory: str) -> tuple[FloatArray, FloatArray, Float
     first = surface.h_max + (0.0 if theory in VARIANTS else 1.5 * surface.h_rms)
     u = first * (1 - np.append(np.geomspace(0.005, 0.1, GAPS // 2)[:-1], np.linspace(0.1, 1, GAPS)))
     found = SEPARATIONS[theory].answer(surface, u)
-    return u, found.force, found.area
+    return u, found.pressure, found.area
 
 
 def force_at(surface: Surface, theory: str, ratio: Any) -> FloatArray:
@@ -40,7 +40,7 @@ def force_at(surface: Surface, theory: str, ratio: Any) -> FloatArray:
     some = (u > 0) | (theory != "Persson full")
     result = np.full(u.shape, np.nan)
     if some.any():
-        result[some] = SEPARATIONS[theory].answer(surface, u[some]).force
+        result[some] = SEPARATIONS[theory].answer(surface, u[some]).pressure
     return result
 
 
@@ -50,5 +50,5 @@ def kappa(surface: Surface, theory: str, area: float) -> float:
         force = np.sqrt(surface.m2) * erfinv(area)
     else:
         u = SEPARATIONS[theory].mean_separation_at(surface, "area", np.array([area]))
-        force = SEPARATIONS[theory].answer(surface, u).force[0]
+        force = SEPARATIONS[theory].answer(surface, u).pressure[0]
     return float(area / force * surface.rms_gradient)

@@ -101,13 +101,13 @@ def single_table(costs: Costs) -> str:
     ratios: dict[str, dict[str, list[float]]] = {}
     for row in costs.rows:
         if row.quantity != "both" and row.what == "gap":
-            of_island_model = ratios.setdefault(method(row), {"force": [], "area": []})
+            of_island_model = ratios.setdefault(method(row), {"pressure": [], "area": []})
             of_island_model[row.quantity].append(row.cost / both[row.island_model, row.variant])
     cells = [
         [island_model, *(f"{min(own):.2f} to {max(own):.2f}" for own in found.values())]
         for island_model, found in ratios.items()
     ]
-    return table(["method", "force alone", "area alone"], cells)
+    return table(["method", "pressure alone", "area alone"], cells)
 
 
 def parts_of(costs: Costs, distances: Sequence[Distance]) -> dict[str, str]:

@@ -32,8 +32,8 @@ FIRST_USE = (
 )
 # keywords of `contact` by quantity, and the answers that these give
 QUANTITIES: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
-    "both": ({}, ("force", "area")),
-    "force": ({"quantities": ("force",)}, ("force",)),
+    "both": ({}, ("pressure", "area")),
+    "pressure": ({"quantities": ("pressure",)}, ("pressure",)),
     "area": ({"quantities": ("area",)}, ("area",)),
 }
 
@@ -58,7 +58,7 @@ def reference() -> tuple[tuple[Surface, FloatArray, dict[str, FloatArray]], ...]
     for surface in held_out_surfaces():
         gap = measured_gaps(surface)[::EVERY]
         found = contact(surface, separation=gap, island_model=Doubled(), rtol=REFERENCE_RTOL)
-        rows.append((surface, gap, {"force": np.asarray(found.force), "area": np.asarray(found.area)}))
+        rows.append((surface, gap, {"pressure": np.asarray(found.pressure), "area": np.asarray(found.area)}))
     return tuple(rows)
 
 
@@ -75,8 +75,8 @@ def scene_rows() -> Iterator[Row]:
     """What a scene takes besides its steps: planning and making the result."""
     surface = held_out_surfaces()[0]
     gap = 0.9 * float(surface.h_max)
-    whole = measure(Scene(surface, effects=["force"], separations=gap, rtol=1e-4).run)[0]
-    step = measure(functools.partial(contact, surface, separation=gap, rtol=1e-4, quantities=["force"]))[0]
+    whole = measure(Scene(surface, effects=["pressure"], separations=gap, rtol=1e-4).run)[0]
+    step = measure(functools.partial(contact, surface, separation=gap, rtol=1e-4, quantities=["pressure"]))[0]
     yield Row("scene", "call", "both", None, max(whole - step, 0.0))
 
 
@@ -114,7 +114,7 @@ def law_rows() -> Iterator[Row]:
         for rtol in tolerances:
             laws: list[Any] = [contact_law(surface, rtol, island_model=island_model) for surface in surfaces]
             answers = [
-                {"force": law.force(gap), "area": law.area(gap)}
+                {"pressure": law.pressure(separation=gap), "area": law.area(separation=gap)}
                 for law, (_, gap, _) in zip(laws, reference(), strict=True)
             ]
             timed = surfaces[:2] if island_model == "exact" else surfaces
@@ -122,12 +122,12 @@ def law_rows() -> Iterator[Row]:
             yield Row(island_model, variant("law", rtol), "both", largest_error(answers), cost / len(timed))
     surface = surfaces[3]
     law, gaps = contact_law(surface), measured_gaps(surface, 10_000)
-    loads = law.force(gaps)
+    loads = law.pressure(separation=gaps)
     ways: dict[tuple[str, str], Callable[[], Any]] = {
-        ("lookup", "force"): lambda: law.force(gaps),
-        ("lookup", "area"): lambda: law.area(gaps),
-        ("lookup", "both"): lambda: (law.force(gaps), law.area(gaps)),
-        ("invert", "force"): lambda: law.separation(force=loads),
+        ("lookup", "pressure"): lambda: law.pressure(separation=gaps),
+        ("lookup", "area"): lambda: law.area(separation=gaps),
+        ("lookup", "both"): lambda: (law.pressure(separation=gaps), law.area(separation=gaps)),
+        ("invert", "pressure"): lambda: law.separation(pressure=loads),
     }
     for (name, quantity), run in ways.items():
         yield Row("law", name, quantity, None, measure(run)[0] / gaps.size)
@@ -141,7 +141,7 @@ def theory_rows() -> Iterator[Row]:
         ask = functools.partial(contact, surface, theory=name)
         known: dict[str, dict[str, Any]] = {
             "gap": {"mean_separation": u},
-            "invert": {"pressure": ask(mean_separation=u).force},
+            "invert": {"pressure": ask(mean_separation=u).pressure},
         }
         one = measure(functools.partial(ask, mean_separation=u[:1]))[0]
         batch = {what: measure(functools.partial(ask, **given))[0] for what, given in known.items()}

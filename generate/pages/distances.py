@@ -93,7 +93,7 @@ def _mbma(variant: str | Variant, island_model: str = "universal") -> Callable[[
 
     def answer(surface: AnySurface, u: FloatArray) -> Any:
         found = theory.totals(surface, 2 * u - np.asarray(surface.h_max))
-        return found.force, found.area
+        return found.pressure, found.area
 
     return lambda one: Curve(answer, surface_of(one))
 

@@ -118,13 +118,13 @@ def ratios(
 ) -> tuple[FloatArray, FloatArray]:
     """A theory's area at a force and force at a separation over simulated ones; NaN where it does not reach them."""
     fine = answer_where_finite(theory, surface, np.append(u, GAPS * float(surface.h_max)))
-    loads, areas = fine.force[u.size :], fine.area[u.size :]
+    loads, areas = fine.pressure[u.size :], fine.area[u.size :]
     order = np.argsort(np.where(np.isfinite(loads), loads, np.inf))[: np.isfinite(loads).sum()]
     loads, areas = loads[order], np.maximum.accumulate(areas[order])
     # of a force that vanishes nothing is to be read between the gaps
     held = loads > 0
     own = np.interp(np.log(force), np.log(loads[held]), np.log(areas[held]), np.nan, np.nan)
-    return np.exp(own) / area, fine.force[: u.size] / force
+    return np.exp(own) / area, fine.pressure[: u.size] / force
 
 
 def compared(surface: MeasuredSurface, rows: FloatArray) -> str:

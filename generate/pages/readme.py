@@ -35,7 +35,7 @@ def picture() -> bytes:
         found = contact(surface, mean_separation=u, theory=theory)
         # three bands would hide one another
         bands = (found.scatter, found.area_scatter) if theory == "calibrated" else (None, None)
-        fields: Any = (found.mean_separation, found.force, found.area, *bands)
+        fields: Any = (found.mean_separation, found.pressure, found.area, *bands)
         curves.append(Curve(theory_label(theory), *fields))
     figure = draw_compression(curves, f"H = {hurst:g}, q1/q0 = {zeta_1:g}: a spectrum that no constant was fitted to")
     by_gap, by_force = unmarked(figure)

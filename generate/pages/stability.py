@@ -183,7 +183,7 @@ def totals() -> list[Tally]:
 
     def ask(surface: Surface, depth: float, island_model: str, variant: str, rtol: float) -> Answer:
         found = contact(surface, separation=TOP - depth, island_model=island_model, variant=variant, rtol=rtol)
-        return (float(found.force), float(found.area)), float(found.error) + TOTAL_TRUTH
+        return (float(found.pressure), float(found.area)), float(found.error) + TOTAL_TRUTH
 
     for variant, hurst, zeta_1, depth in itertools.product(("reported", "printed"), TOTAL_HURSTS, TOTAL_BANDS, DEPTHS):
         surface = Surface(hurst, 1.0, zeta_1, 1.0, TOP)

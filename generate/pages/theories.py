@@ -21,10 +21,10 @@ def draw(road: Surface) -> bytes:
     for name in THEORIES:
         theory = get_theory(name)
         found = answer_where_finite(theory, road, u)
-        known = np.isfinite(found.force)
+        known = np.isfinite(found.pressure)
         scatter, area_scatter = theory.scatter(road, found.area[known])
         gap = u[known] / road.h_rms
-        curves.append(Curve(theory_label(name), gap, found.force[known], found.area[known], scatter, area_scatter))
+        curves.append(Curve(theory_label(name), gap, found.pressure[known], found.area[known], scatter, area_scatter))
     figure = draw_compression(curves, "concrete road of Lorenz, by every theory")
     by_gap, by_force = unmarked(figure)
     by_gap.legend()

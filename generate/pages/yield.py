@@ -59,9 +59,9 @@ def by_law() -> tuple[FloatArray, FloatArray]:
     """The same ratios of area and force by the law, on a surface of 32 magnifications, at 3% contact."""
     hardness = float(SURFACE.rms_gradient) / INDICES
     found = contact(SURFACE, area=0.03, theory="calibrated", hardness=hardness)
-    elastic = contact(SURFACE, pressure=found.force, theory="calibrated")
+    elastic = contact(SURFACE, pressure=found.pressure, theory="calibrated")
     closer = contact(SURFACE, mean_separation=found.mean_separation, theory="calibrated")
-    return np.asarray(elastic.area / found.area), np.asarray(closer.force / found.force)
+    return np.asarray(elastic.area / found.area), np.asarray(closer.pressure / found.pressure)
 
 
 def when() -> str:

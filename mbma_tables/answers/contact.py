@@ -92,9 +92,9 @@ def contact(
     outside : {"raise", "exact", "nan"}
         For surfaces with islands outside MBMA's table: an error, the exact solver, or NaN.
     derivatives : bool
-        Whether `force_by`, `area_by` and `separation_by` are asked for: MBMA's by its own differentiated sums, other
+        Whether `pressure_by`, `area_by` and `separation_by` are asked for: MBMA's by its own differentiated sums, other
         theories' by numerical differentiation, to 1e-6.
-    quantities : iterable of {"force", "area"}
+    quantities : iterable of {"pressure", "area"}
         What is wanted of MBMA. One alone costs less; the other is then None, and `error` is of the one.
     workers : int
         Threads that share MBMA's batches of surfaces, and of gaps; the bits are those of one.
@@ -120,7 +120,7 @@ def contact(
     >>> from mbma_tables import Surface, contact
     >>> surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)  # um
     >>> found = contact(surface, separation=[1.0, 0.5], E_star=100e3)  # MPa
-    >>> [f"{force:.4g} MPa on {area:.3%}" for force, area in zip(found.force, found.area)]
+    >>> [f"{pressure:.4g} MPa on {area:.3%}" for pressure, area in zip(found.pressure, found.area)]
     ['7.982 MPa on 0.287%', '20.28 MPa on 0.735%']
     >>> bool((found.error < 1e-8).all())
     True
@@ -189,9 +189,9 @@ def _contact(
     """`contact` of plain arrays."""
     theory = source.theory_at(E_star, hardness)
     value, E_star, places, lighter = _places(surface, value, E_star, hardness, by, theory, source.units.stress)
-    held = {"pressure": "force", "area": "area"}.get(by)
+    held = {"pressure": "pressure", "area": "area"}.get(by)
     capped: Any = theory
-    by_log_modulus: dict[str, Any] = {"force": 0.0, "area": 0.0}
+    by_log_modulus: dict[str, Any] = {"pressure": 0.0, "area": 0.0}
     if derivatives and held:
         require(by, value, np.asarray(value) > 0, "positive where derivatives are asked for: a gap has no slope there")
     if isinstance(theory, Mbma):
@@ -203,17 +203,17 @@ def _contact(
         loaded = None if theory is source.theory else capped.loaded(surface, u, lighter)
         found = theory.answer(surface, u) if loaded is None else loaded.answer
         source = dataclasses.replace(source, answer=found, loaded=loaded)
-        error = spread(found.error, np.shape(found.force))[()]
-        fields = {"force": (E_star * found.force)[()], "area": found.area[()], "error": error} | places
+        error = spread(found.error, np.shape(found.pressure))[()]
+        fields = {"pressure": (E_star * found.pressure)[()], "area": found.area[()], "error": error} | places
         fields["islands"] = None
         if derivatives:
-            force_by, area_by = differentiate(theory, surface, u, lighter)
-            by_log_modulus = {"force": force_by.pop("E_star", 0.0), "area": area_by.pop("E_star", 0.0)}
-            fields |= {"force_by": {name: (E_star * slope)[()] for name, slope in force_by.items()}}
+            pressure_by, area_by = differentiate(theory, surface, u, lighter)
+            by_log_modulus = {"pressure": pressure_by.pop("E_star", 0.0), "area": area_by.pop("E_star", 0.0)}
+            fields |= {"pressure_by": {name: (E_star * slope)[()] for name, slope in pressure_by.items()}}
             fields |= {"area_by": {name: slope[()] for name, slope in area_by.items()}}
     if derivatives and held:
-        slopes = {"force": fields["force_by"], "area": fields["area_by"]}
-        by_modulus = {"force": fields["force"] / E_star + by_log_modulus["force"]}
+        slopes = {"pressure": fields["pressure_by"], "area": fields["area_by"]}
+        by_modulus = {"pressure": fields["pressure"] / E_star + by_log_modulus["pressure"]}
         by_modulus["area"] = by_log_modulus["area"] / E_star
         fields |= _at_fixed(held, by, slopes, by_modulus)
     for name in QUANTITIES:
@@ -241,7 +241,7 @@ def _places(
     elif by == "mean_separation":
         average = asked
     else:
-        quantity, wanted = ("force", asked / modulus) if by == "pressure" else ("area", asked)
+        quantity, wanted = ("pressure", asked / modulus) if by == "pressure" else ("area", asked)
         try:
             if by == "pressure" and theory is not theory.elastic:
                 average, lighter = capped.pressed(surface, wanted)
@@ -263,8 +263,8 @@ def _refuse_pressures(
     name = "pressure" if unit in (None, "1") else f"pressure [{unit}]"
     limits = [(hardness, "the hardness")]
     with contextlib.suppress(OutOfRangeError):  # at full compression Persson's theory has no finite force
-        deepest = theory.interval(surface, "force" if theory.ends_at_h_max else "area")[0]
-        reached = modulus * theory.answer(surface, deepest).force
+        deepest = theory.interval(surface, "pressure" if theory.ends_at_h_max else "area")[0]
+        reached = modulus * theory.answer(surface, deepest).pressure
         limits.append((reached, f"what theory {theory.name!r} reaches on this surface"))
     for limit, what in limits:
         end = spread(np.asarray(limit), asked.shape)
@@ -273,13 +273,13 @@ def _refuse_pressures(
 
 def _at_fixed(held: str, by: str, slopes: dict[str, Any], by_modulus: dict[str, Any]) -> dict[str, Any]:
     """Derivatives where force or area is held: of the separation, and of the quantity that is not held."""
-    other = "area" if held == "force" else "force"
+    other = "area" if held == "pressure" else "pressure"
     steep, follows = slopes[held]["separation"], slopes[other]["separation"]
     names = [name for name in slopes[held] if name != "separation"]
     gap = {by: 1 / steep} | {name: -slopes[held][name] / steep for name in names}
     free = {by: follows / steep} | {name: slopes[other][name] + follows * gap[name] for name in names}
-    if held == "force":
-        gap["E_star"] = -by_modulus["force"] / steep
+    if held == "pressure":
+        gap["E_star"] = -by_modulus["pressure"] / steep
         free["E_star"] = by_modulus["area"] + follows * gap["E_star"]
     return {"separation_by": gap, f"{other}_by": free, f"{held}_by": None}
 
@@ -289,14 +289,14 @@ def _of_labelled(surface: AnySurface, value: Any, E_star: Any, hardness: Any, op
     by, theory, wanted = options["by"], options["source"].theory, options["quantities"]
     units = options["source"].units
     names: tuple[str, ...] = (*wanted, "error")
-    fields: dict[str, Any] = {"force": None, "area": None}
+    fields: dict[str, Any] = {"pressure": None, "area": None}
     if by not in ("separation", "mean_separation"):
         names = ("separation", "mean_separation", *names)
     slopes: list[tuple[str, str]] = []
     if options["derivatives"]:
-        held = {"pressure": "force", "area": "area"}.get(by)
+        held = {"pressure": "pressure", "area": "area"}.get(by)
         kinds = [f"{kind}_by" for kind in wanted if kind != held] + (["separation_by"] if held else [])
-        free = (by if held else "separation", *surface.parameters, *(("E_star",) if held == "force" else ()))
+        free = (by if held else "separation", *surface.parameters, *(("E_star",) if held == "pressure" else ()))
         slopes = [(kind, name) for kind in kinds for name in free]
 
     def answer(block: AnySurface, asked: Any, modulus: Any, cap: Any) -> tuple[Any, ...]:

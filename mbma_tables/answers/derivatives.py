@@ -23,7 +23,7 @@ from mbma_tables.theories.protocol import Theory, TheoryAnswer
 STEP = 0.02  # of a parameter, or of the room that it has
 RTOL = 1e-6  # of a derivative that is given out, or of the quantity over the parameter
 GAP, MODULUS = "mean_separation", "E_star"
-KINDS = ("force", "area")
+KINDS = ("pressure", "area")
 
 Slopes = tuple[dict[str, FloatArray], ...]  # of force and of area, by names
 
@@ -55,7 +55,7 @@ def _elastic(theory: Theory, surface: AnySurface, u: FloatArray) -> Slopes:
     whole, names = theory.answer(surface, u), (GAP, *surface.parameters)
 
     def answer(moved: AnySurface, own: Mapping[str, FloatArray], entry: tuple[Any, Any], x: FloatArray) -> TheoryAnswer:
-        return theory.at(np.shape(whole.force), entry[1]).answer(moved, own[GAP])
+        return theory.at(np.shape(whole.pressure), entry[1]).answer(moved, own[GAP])
 
     return _numerical(theory, surface, u, names, whole, answer)
 
@@ -70,11 +70,11 @@ class _Straight(Theory):
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         return self._answer
 
-    def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
+    def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
         if self._line is None:
-            return self._elastic.area_at(surface, force)
+            return self._elastic.area_at(surface, pressure)
         area, slope, at = self._line
-        return area + slope * (force - at)
+        return area + slope * (pressure - at)
 
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         return self._elastic.bearing_share(surface, mean_separation)
@@ -86,26 +86,26 @@ def _yielding(capped: Any, surface: AnySurface, u: FloatArray, lighter: FloatArr
     if lighter is None and not capped.knows_areas:
         lighter = capped.lighter(surface, u)
     whole = capped.loaded(surface, u, lighter)
-    shape = np.shape(whole.answer.force)
+    shape = np.shape(whole.answer.pressure)
     gaps = np.stack([np.broadcast_to(gap, shape) for gap in (u, lighter) if gap is not None])
     # by gap, name and flat place
-    force, area = (
+    pressure, area = (
         np.array([np.broadcast_to(slopes.get(name, 0.0), gaps.shape).reshape(len(gaps), -1) for name in names])
         for slopes in _elastic(elastic, surface, gaps)
     )
     at_force, rise = np.broadcast_to(whole.elastic_area, shape).ravel(), np.zeros(0)
     if lighter is not None:
         # of the area at a force by the force, and by parameters
-        rise = np.nan_to_num(area[0, 1] / force[0, 1])
-        tilt = area[:, 1] - force[:, 1] * rise
+        rise = np.nan_to_num(area[0, 1] / pressure[0, 1])
+        tilt = area[:, 1] - pressure[:, 1] * rise
 
     def answer(moved: AnySurface, own: Mapping[str, FloatArray], entry: tuple[Any, Any], x: FloatArray) -> TheoryAnswer:
         name, place = entry
-        known = zip(whole.elastic[:2], (force, area), strict=True)
+        known = zip(whole.elastic[:2], (pressure, area), strict=True)
         ends = (np.ravel(part)[place] + slope[name, 0, place] * x for part, slope in known)
         line = None
         if lighter is not None:
-            line = at_force[place] + tilt[name, place] * x, rise[place], np.ravel(whole.answer.force)[place]
+            line = at_force[place] + tilt[name, place] * x, rise[place], np.ravel(whole.answer.pressure)[place]
         straight = _Straight(elastic, TheoryAnswer(*ends, *np.zeros((2, x.size))), line)
         found: TheoryAnswer = (
             capped.at(shape, place).stiffer(own[MODULUS]).changed(_elastic=straight).answer(moved, own[GAP])
@@ -124,7 +124,7 @@ def _numerical(
     answer: Callable[..., TheoryAnswer],
 ) -> Slopes:
     """By differences of ``answer(moved, own, (name, place), x)``: surfaces, their numbers, and what was moved by x."""
-    shape = np.shape(whole.force)
+    shape = np.shape(whole.pressure)
     at = {name: getattr(surface, name) for name in (*PARAMETERS[1:], *surface.parameters)} | {GAP: u, MODULUS: 1.0}
     at = {name: np.broadcast_to(np.asarray(value, dtype=float), shape).ravel() for name, value in at.items()}
     size, values = at[GAP].size, np.stack([np.ravel(getattr(whole, kind)) for kind in KINDS])
@@ -138,7 +138,7 @@ def _numerical(
         for j, name in enumerate(names):
             own[name] = own[name] + np.where(number == j, x, 0.0)
         found = answer(surface.with_numbers(*(own[name] for name in surface.parameters)), own, (number, place), x)
-        return np.stack([found.force, found.area])
+        return np.stack([found.pressure, found.area])
 
     with np.errstate(all="ignore"):
         slopes, error = (each.reshape(2, len(names), *shape) for each in differences(moved, step, side, scale))

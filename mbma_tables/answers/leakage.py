@@ -14,7 +14,7 @@ from mbma_tables.answers.leakage_table import flow_of_spectrum, self_affine, shi
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, require, rows
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.plots import draw_compression, force_label, leakage_label
+from mbma_tables.common.plots import draw_compression, leakage_label, pressure_label
 from mbma_tables.common.units import unit_of
 from mbma_tables.laws.calibrated import spectrum_of
 from mbma_tables.laws.effective_medium import LARGEST_AREA
@@ -83,7 +83,7 @@ class Leakage(Displayed):
     def _figure(self) -> Figure:
         return draw_compression(
             [self._contact.curve(leakage=True)],
-            force_label=force_label(self._contact.units["force"]),
+            pressure_label=pressure_label(self._contact.units["pressure"]),
             leakage_label=leakage_label(self.units["conductance"]),
         )
 

@@ -66,8 +66,8 @@ def curves(surface: MeasuredSurface, E_star: float = 1.0) -> dict[str, dict[str,
             # a theory that has no answer is left out of a picture
             continue
         scatter, area_scatter = theory.scatter(surface, answer.area)
-        lines = {"force": E_star * answer.force, "area": answer.area, "mean_separation": u}
-        slopes = np.gradient(np.log(np.maximum(answer.force, 1e-300)), u)
+        lines = {"pressure": E_star * answer.pressure, "area": answer.area, "mean_separation": u}
+        slopes = np.gradient(np.log(np.maximum(answer.pressure, 1e-300)), u)
         # a factor of force at a separation is a step of separation at a force
         found[name] = lines | {"area_scatter": area_scatter, "separation_scatter": scatter / np.abs(slopes)}
     return found
@@ -164,17 +164,19 @@ def _by_pressure(
     y_label: str,
 ) -> None:
     for name, found in answers.items():
-        force, value, width = found["force"], found[what], found[scatter]
+        pressure, value, width = found["pressure"], found[what], found[scatter]
         # areas of MBMA's islands, which are added, may pass 1
-        held = np.isfinite(force) & (found["area"] > 1e-4) & (found["area"] <= 1) & (force > 0)
-        (line,) = axes.plot(force[held], value[held], label=theory_label(name))
+        held = np.isfinite(pressure) & (found["area"] > 1e-4) & (found["area"] <= 1) & (pressure > 0)
+        (line,) = axes.plot(pressure[held], value[held], label=theory_label(name))
         band = held & np.isfinite(width)
         low, high = (
             (value * np.exp(-width), value * np.exp(width)) if what == "area" else (value - width, value + width)
         )
-        axes.fill_between(force[band], low[band], high[band], alpha=0.2, color=line.get_color(), lw=0)
+        axes.fill_between(pressure[band], low[band], high[band], alpha=0.2, color=line.get_color(), lw=0)
     if simulated is not None:
-        axes.plot(simulated["force"], simulated[what], "ko", ms=4, mfc="none", label="boundary elements, this very map")
+        axes.plot(
+            simulated["pressure"], simulated[what], "ko", ms=4, mfc="none", label="boundary elements, this very map"
+        )
     axes.set_xscale("log")
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
@@ -197,7 +199,7 @@ def table_of_loads(surface: MeasuredSurface, E_star: float = 1.0) -> tuple[dict[
     reached = np.abs(np.asarray(found.area) / areas - 1) < REACHED
     if not reached.all():
         told.append(f"{_contacts(areas[~reached])} left out: the map's curve jumps over it")
-    names = ("area", "force", "mean_separation", "stiffness", "area_scatter", "scatter")
+    names = ("area", "pressure", "mean_separation", "stiffness", "area_scatter", "scatter")
     columns: dict[str, Any] = {name: np.asarray(getattr(found, name))[reached] for name in names}
     reasons, everywhere = found.reasons, surface.departures(by_map=surface.bearing is not None)
     told += [

@@ -14,7 +14,7 @@ from mbma_tables.answers.source import MEANINGS, Source, concerns, named
 from mbma_tables.common.arguments import FloatArray, Numbers, any_labelled, is_labelled
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.plots import Curve, draw_compression, force_label, theory_label
+from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
 from mbma_tables.common.units import unit_of
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -50,7 +50,7 @@ class Contact(Displayed):
         d, between the rigid plane and the mid-plane [length].
     mean_separation : ndarray
         u = (h_max + d)/2 (50) [length].
-    force : ndarray or None
+    pressure : ndarray or None
         F/A0 in the unit of E_star; F/(A0 E*) where that is 1. None where not asked for.
     area : ndarray or None
         A/A0, None where not asked for. MBMA does not end at 1 under full compression, and this is not clamped.
@@ -61,7 +61,7 @@ class Contact(Displayed):
         What made them; variant and island model are empty where the theory is not MBMA.
     islands : int or None
         Islands evaluated; None where that is left to dask, or where there are none.
-    force_by, area_by, separation_by : dict of ndarray, or None
+    pressure_by, area_by, separation_by : dict of ndarray, or None
         Partial derivatives by "separation", "hurst", "q0", "q1", "h_rms" and "h_max", the others held. Asked by
         pressure or area, that is held in place of the separation, whose own derivatives are `separation_by`, and
         "pressure" or "area" stands for "separation".
@@ -69,14 +69,14 @@ class Contact(Displayed):
 
     separation: Numbers
     mean_separation: Numbers
-    force: Numbers
+    pressure: Numbers
     area: Numbers
     error: Numbers
     theory: str
     variant: str
     island_model: str
     islands: int | None
-    force_by: dict[str, Numbers] | None = None
+    pressure_by: dict[str, Numbers] | None = None
     area_by: dict[str, Numbers] | None = None
     separation_by: dict[str, Numbers] | None = None
     _source: Source = dataclasses.field(repr=False, kw_only=True)
@@ -93,7 +93,7 @@ class Contact(Displayed):
         facts = {"theory": self.theory + chosen}
         if source.surface.resolution:
             facts["resolution"] = source.surface.resolution
-        for name in ("mean_separation", "force", "area"):
+        for name in ("mean_separation", "pressure", "area"):
             if getattr(self, name) is not None:
                 facts[name] = shown(getattr(self, name), units[name])
         if any_labelled(source.surface, self.mean_separation) or np.size(self.error) > MOST_SHOWN:
@@ -102,13 +102,13 @@ class Contact(Displayed):
         more = {name: getattr(self, name) for name in ("error", "scatter", "stiffness_scatter", "valid")}
         if source.yields:
             more |= {"psi": self.psi, "yielded": self.yielded}
-        elif units["force"] != "1":
-            facts["elastic_hardness"] = shown(self.elastic_hardness, units["force"])
+        elif units["pressure"] != "1":
+            facts["elastic_hardness"] = shown(self.elastic_hardness, units["pressure"])
             # a pressure in another unit than meant shows itself so
             light = self.elastic_hardness * ELASTIC_PSI / 2
-            if self.force is not None and np.any(self.force > light):
-                facts["force"] += (
-                    f" (above E* g/2 = {shown(light, units['force'])}, the mean pressure in light contact)"
+            if self.pressure is not None and np.any(self.pressure > light):
+                facts["pressure"] += (
+                    f" (above E* g/2 = {shown(light, units['pressure'])}, the mean pressure in light contact)"
                 )
         if source.theory.advice:
             facts["advice"] = source.theory.advice
@@ -127,20 +127,20 @@ class Contact(Displayed):
 
     def _origin(self) -> dict[str, str]:
         source = self._source
-        return {"E_star": shown(source.E_star, unit_of("force", source.units)), "surface": repr(source.surface)}
+        return {"E_star": shown(source.E_star, unit_of("pressure", source.units)), "surface": repr(source.surface)}
 
     def _figure(self) -> Figure:
-        source, unit = self._source, self.units["force"]
+        source, unit = self._source, self.units["pressure"]
         title = f"hardness {shown(source.hardness, unit)}" if source.yields else ""
-        return draw_compression([self.curve()], title, force_label(unit))
+        return draw_compression([self.curve()], title, pressure_label(unit))
 
     def curve(self, leakage: bool = False) -> Curve:
         """A line of pictures, of one surface at several separations; with its leakage where that is asked for."""
         surface = self._source.surface
-        if self.force is None or self.area is None or np.size(self.force) < 2 or surface.shape != ():
+        if self.pressure is None or self.area is None or np.size(self.pressure) < 2 or surface.shape != ():
             raise InputError("one surface's force and area at several separations make a curve, and this has none")
         order = np.argsort(-np.ravel(self.mean_separation), kind="stable")
-        fields = [self.mean_separation / surface.h_rms, self.force, self.area, self.scatter, self.area_scatter]
+        fields = [self.mean_separation / surface.h_rms, self.pressure, self.area, self.scatter, self.area_scatter]
         if leakage:
             fields += [self.leakage.conductance, self.leakage.scatter]
         label = theory_label(self.theory) + (f", {self.variant}" if self.variant else "")
@@ -250,9 +250,9 @@ class Contact(Displayed):
     @described
     def mean_pressure(self) -> Any:
         """Mean pressure in the contact, F/A [stress]; NaN where there is none."""
-        force = self._source.E_star * self._answer.force if self.force is None else self.force
+        pressure = self._source.E_star * self._answer.pressure if self.pressure is None else self.pressure
         with np.errstate(invalid="ignore"):
-            return force / self._touching
+            return pressure / self._touching
 
     @described
     def scatter(self) -> Any:
@@ -275,7 +275,7 @@ class Contact(Displayed):
     def separation_scatter(self) -> Any:
         """Standard deviation of the mean separation at this force [length], `scatter` times F/(-dF/du)."""
         with np.errstate(invalid="ignore", divide="ignore"):
-            return self.scatter * self._answer.force / np.abs(self._answer.stiffness)
+            return self.scatter * self._answer.pressure / np.abs(self._answer.stiffness)
 
     @functools.cached_property
     def _scatter(self) -> tuple[Numbers, ...]:
@@ -305,7 +305,7 @@ class Contact(Displayed):
         surface = source.surface
         own: list[Any] = [getattr(surface, name) for name in surface.parameters]
         fields: list[Any] = [*answer, self.mean_separation, source.E_star, source.hardness, *own]
-        if is_labelled(answer.force):
+        if is_labelled(answer.pressure):
             import xarray as xr
 
             fields = list(xr.broadcast(*map(xr.DataArray, fields)))

@@ -32,7 +32,7 @@ STEP = 0.02  # of the logarithm of a parameter
 MAX_HURST = 0.9  # from which its steps go down: two of them, and 1 is the end
 MAX_ERROR = 0.05  # of a slope that is told, over itself or 1
 POINTS = 33  # of a range, geometric
-ANSWERS = ("mean_separation", "force", "area", "stiffness", "conductance")
+ANSWERS = ("mean_separation", "pressure", "area", "stiffness", "conductance")
 
 Answers = dict[str, FloatArray]
 
@@ -142,7 +142,7 @@ def sensitivity(
     make, parameters = _parameters(surface) if isinstance(surface, Surface) else _of_spectrum(surface, theory)
     given = parameters | {"E_star": modulus, by: units.number(by, value)}
     numbers = {name: float(one_number(name, number)) for name, number in given.items()}
-    same = {"pressure": "force", "separation": "mean_separation"}.get(by, by)
+    same = {"pressure": "pressure", "separation": "mean_separation"}.get(by, by)
     wanted, batches = [name for name in ANSWERS if name != same], isinstance(surface, Surface)
 
     def found_at(**own: Any) -> Contact:
@@ -245,7 +245,7 @@ def _slopes(
             if inverted:
                 gap = surface.h_max * (1 - depth * shift[-1][row]) if near else u * shift[-1][row]
             answer = theory.answer(surface, gap)
-            stress = np.stack([answer.force, answer.stiffness]) * modulus[row]
+            stress = np.stack([answer.pressure, answer.stiffness]) * modulus[row]
             found[:, row] = gap, stress[0], answer.area, stress[1], answer.stiffness
         return np.log(found)
 
@@ -256,7 +256,7 @@ def _slopes(
     scale = np.ones((len(ANSWERS), len(moving)))
     df, error = differences(logarithms, np.full(len(moving), STEP), sides, scale, 3 if batches else 1)
     if inverted:
-        row, place = ANSWERS.index("force" if by == "pressure" else "area"), varied.index(by)
+        row, place = ANSWERS.index("pressure" if by == "pressure" else "area"), varied.index(by)
         steep, follows = df[row, -1], df[:, -1:] / df[row, -1]
         rough = (error[:, -1:] + np.abs(follows) * error[row, -1]) / np.abs(steep)
         error = error + np.abs(follows) * error[row] + rough * np.abs(df[row])

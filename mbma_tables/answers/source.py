@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 MEANINGS = {
     "separation": "d, rigid plane to mid-plane",
     "mean_separation": "u = (h_max + d)/2",
-    "force": "force over nominal area",
+    "pressure": "force over nominal area",
     "area": "real over nominal contact area",
     "stiffness": "-dF/du per nominal area",
     "energy": "elastic energy per nominal area",
@@ -102,9 +102,9 @@ class Source:
 
 def concerns(theory: Theory, surface: AnySurface, u: FloatArray, answer: TheoryAnswer) -> dict[str, Any]:
     """Every reason against a theory's answers, with its mask."""
-    steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.force))
+    steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, np.shape(answer.pressure))
     text = "the rms gradient is above 1: are heights and wavenumbers in one unit?"
-    measured = dict.fromkeys(theory.elastic.departures(surface), np.ones(np.shape(answer.force), dtype=bool))
+    measured = dict.fromkeys(theory.elastic.departures(surface), np.ones(np.shape(answer.pressure), dtype=bool))
     return {text: steep, **measured, **theory.concerns(surface, answer, u)}
 
 
@@ -113,7 +113,7 @@ class _Point(NamedTuple):
     mean_separation: Any
     area: Any
     stiffness: Any
-    force: Any
+    pressure: Any
 
 
 class LawPoint(_Point):
@@ -132,13 +132,13 @@ class LawPoint(_Point):
     def mean_pressure(self) -> Any:
         """Mean pressure in the contact, F/A; NaN where there is none."""
         with np.errstate(invalid="ignore"):
-            return self.force / self.area
+            return self.pressure / self.area
 
 
 class LawValues(NamedTuple):
     """What a law answers at separations: F/A0, A/A0, -dF/du and the energy, of their shape."""
 
-    force: Any
+    pressure: Any
     area: Any
     stiffness: Any
     energy: Any

@@ -28,7 +28,7 @@ MIN_DEPTH = 1e-3  # (h_max - d)/h_max at a curve's second point
 EVEN_FROM = 0.2  # and where its points, geometric so far, become evenly spaced
 MIN_POINTS = 5
 DRAWN = ("calibrated", "persson")  # theories beside the chosen one in a picture, where they are there
-COLUMNS = ("mean_separation", "separation", "force", "area", "error")
+COLUMNS = ("mean_separation", "separation", "pressure", "area", "error")
 ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
 
 
@@ -150,7 +150,7 @@ def curve_command(
     surface, asked = specimen.surface, contact_keywords(model, specimen)
     gap = curve_gaps(float(surface.h_max), points)
     if model.theory != "mbma":
-        gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).force)]
+        gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).pressure)]
     answer = contact(surface, separation=gap, **asked)
     values = {name: getattr(answer, name) for name in COLUMNS} | (_leakage(answer) if leakage else {})
     units = {}
@@ -160,7 +160,7 @@ def curve_command(
         if name != model.theory and (compare or (plot is not None and name in DRAWN))
     }
     for theory, line in others.items() if compare else ():
-        for quantity in ("force", "area"):
+        for quantity in ("pressure", "area"):
             values[f"{theory}_{quantity}"] = getattr(line, quantity)
             units[f"{theory}_{quantity}"] = shown_unit(quantity, specimen.units)
     title = specimen.title + (f", hardness {model.hardness}" if model.hardness != math.inf else "")
@@ -171,15 +171,25 @@ def curve_command(
 def _draw(
     specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory], kind: str, leakage: bool, title: str
 ) -> bytes:
-    from mbma_tables.common.plots import Curve, draw_compression, force_label, leakage_label, theory_label, to_picture
+    from mbma_tables.common.plots import (
+        Curve,
+        draw_compression,
+        leakage_label,
+        pressure_label,
+        theory_label,
+        to_picture,
+    )
 
     gap = np.asarray(answer.mean_separation / specimen.surface.h_rms)
     curves = [answer.curve(leakage)]
     for name, line in others.items():
-        known = np.isfinite(line.force)
+        known = np.isfinite(line.pressure)
         curves.append(Curve(theory_label(name), gap[known], *(field[known] for field in line)))
-    force, flow = force_label(unit_of("force", specimen.units)), leakage_label(unit_of("leakage", specimen.units))
-    return to_picture(draw_compression(curves, title, force, leakage_label=flow), kind)
+    pressure, flow = (
+        pressure_label(unit_of("pressure", specimen.units)),
+        leakage_label(unit_of("leakage", specimen.units)),
+    )
+    return to_picture(draw_compression(curves, title, pressure, leakage_label=flow), kind)
 
 
 @click.command("island", short_help="Contact islands at given approaches.")
@@ -261,7 +271,10 @@ def fit_command(
         "notes": told,
     }
     title = measurement.name
-    own = {name: unit_of(name, units) or "-" for name in columns} | {"area": "A/A0", "force": unit_of("force", units)}
+    own = {name: unit_of(name, units) or "-" for name in columns} | {
+        "area": "A/A0",
+        "pressure": unit_of("pressure", units),
+    }
     report = Report("fit", title, [*described(surface), *told], facts, to_columns(columns, own))
     picture = b""
     if plot is not None:

@@ -74,7 +74,7 @@ def run_command(file: Path, out: Path | None, plot: Path | None, as_json: bool) 
 
     scene = Scene.from_toml(file)
     if plot is not None:
-        scene = dataclasses.replace(scene, effects=(*scene.effects, "force", "area"))  # what is drawn
+        scene = dataclasses.replace(scene, effects=(*scene.effects, "pressure", "area"))  # what is drawn
     found = scene.run(lambda step, done, total: doing(f"{step}: {done} of {total}"))
     if plot is not None:
         write_file(plot, _picture(found, plot.suffix[1:]))
@@ -111,14 +111,14 @@ def _report(found: xarray.Dataset) -> Report:
 
 
 def _picture(found: xarray.Dataset, kind: str) -> bytes:
-    from mbma_tables.common.plots import Curve, draw_compression, force_label, theory_label, to_picture
+    from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label, to_picture
 
     gap = found["mean_separation"].values / found.attrs["surface_h_rms"]
     variant = found.attrs["variant"]
     label = theory_label(found.attrs["theory"]) + (f", {variant}" if variant else "")
     bands = [found[name].values if name in found else None for name in ("scatter", "area_scatter")]
-    curves: list[Any] = [Curve(label, gap, found["force"].values, found["area"].values, *bands)]
-    unit = found["force"].attrs["units"]
+    curves: list[Any] = [Curve(label, gap, found["pressure"].values, found["area"].values, *bands)]
+    unit = found["pressure"].attrs["units"]
     hardness = f", hardness {found.attrs['hardness']:.4g} {unit}" if "hardness" in found.attrs else ""
-    drawn = draw_compression(curves, found.attrs["title"] + hardness, force_label(unit))
+    drawn = draw_compression(curves, found.attrs["title"] + hardness, pressure_label(unit))
     return to_picture(drawn, kind)

@@ -33,7 +33,7 @@ def theory_label(name: str) -> str:
     return LABELS.get(name, name.replace("_", " ").capitalize())
 
 
-def force_label(unit: str) -> str:
+def pressure_label(unit: str) -> str:
     """The axis of force in a unit; "1" where it is over the modulus."""
     return FORCE_LABEL if unit == "1" else f"force  F/A0 [{unit}]"
 
@@ -49,7 +49,7 @@ class Curve:
 
     label: str  # in the legend
     gap: FloatArray  # mean separation u/h_rms (50)
-    force: FloatArray  # F/A0, or F/(A0 E*)
+    pressure: FloatArray  # F/A0, or F/(A0 E*)
     area: FloatArray  # A/A0
     scatter: FloatArray | None = None  # standard deviation of ln F at the gap, drawn as a band,
     area_scatter: FloatArray | None = None  # and of ln A at the force
@@ -58,7 +58,7 @@ class Curve:
 
     def __post_init__(self) -> None:
         shapes = set()
-        for name in ("gap", "force", "area"):
+        for name in ("gap", "pressure", "area"):
             array = finite_array(f"{name} of {self.label!r}", getattr(self, name))
             shapes.add(array.shape)
             object.__setattr__(self, name, array)
@@ -66,7 +66,7 @@ class Curve:
         shapes |= {np.shape(other) for other in others if other is not None}
         if len(shapes) > 1 or self.gap.ndim != 1:
             raise InputError(f"{self.label!r}: gap, force and area must be 1-D and of one length")
-        if not ((self.force > 0) & (self.area > 0)).any():
+        if not ((self.pressure > 0) & (self.area > 0)).any():
             raise InputError(f"{self.label!r} has no contact to draw on logarithmic axes")
 
 
@@ -94,7 +94,7 @@ def draw_lines(lines: Mapping[str, tuple[Any, Any]], x_label: str, y_label: str,
 def draw_compression(
     curves: Sequence[Curve],
     title: str = "",
-    force_label: str = FORCE_LABEL,
+    pressure_label: str = FORCE_LABEL,
     gap_label: str = GAP_LABEL,
     leakage_label: str = LEAKAGE_LABEL,
 ) -> Figure:
@@ -111,22 +111,22 @@ def draw_compression(
     by_gap, by_force, *flow = figure.subplots(1, panels)
     for curve in curves:
         marker = "." if curve is curves[0] else ""
-        by_gap.plot(curve.gap, curve.force, marker=marker, label=curve.label)
-        by_force.plot(curve.force, curve.area, marker=marker, label=curve.label)
-        _band(by_gap, curve.gap, curve.force, curve.scatter)
-        _band(by_force, curve.force, curve.area, curve.area_scatter)
+        by_gap.plot(curve.gap, curve.pressure, marker=marker, label=curve.label)
+        by_force.plot(curve.pressure, curve.area, marker=marker, label=curve.label)
+        _band(by_gap, curve.gap, curve.pressure, curve.scatter)
+        _band(by_force, curve.pressure, curve.area, curve.area_scatter)
     by_gap.set_yscale("log", nonpositive="mask")
     by_force.set_xscale("log", nonpositive="mask")
     by_force.set_yscale("log", nonpositive="mask")
-    by_gap.set(xlabel=gap_label, ylabel=force_label)
-    by_force.set(xlabel=force_label, ylabel="real contact area  A/A0")
+    by_gap.set(xlabel=gap_label, ylabel=pressure_label)
+    by_force.set(xlabel=pressure_label, ylabel="real contact area  A/A0")
     for axes, curve in itertools.product(flow, leaking):
         # blocked contacts have no place on a logarithmic axis, nor have gaps before contact
         k = np.asarray(curve.leakage, float)
-        k = np.where((k > 0) & (curve.force > 0), k, np.nan)
-        axes.loglog(curve.force, k, marker=".", label=curve.label)
-        _band(axes, curve.force, k, curve.leakage_scatter)
-        axes.set(xlabel=force_label, ylabel=leakage_label)
+        k = np.where((k > 0) & (curve.pressure > 0), k, np.nan)
+        axes.loglog(curve.pressure, k, marker=".", label=curve.label)
+        _band(axes, curve.pressure, k, curve.leakage_scatter)
+        axes.set(xlabel=pressure_label, ylabel=leakage_label)
     for axes in (by_gap, by_force, *flow):
         axes.grid(True, which="major", alpha=0.3)
     by_gap.legend()

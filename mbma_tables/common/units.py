@@ -58,7 +58,7 @@ DIMENSIONS = {
     **dict.fromkeys(("q0", "q1"), (-1, 0)),
     **dict.fromkeys(("D", "m4", "Sds", "Spd"), (-2, 0)),
     **dict.fromkeys(("E_star", "E1", "E2", "hardness", "elastic_hardness"), (0, 1)),
-    **dict.fromkeys(("pressure", "pressures", "mean_pressure", "force"), (0, 1)),
+    **dict.fromkeys(("pressure", "pressures", "mean_pressure", "pressure"), (0, 1)),
     "m0": (2, 0),
     **dict.fromkeys(("stiffness", "incremental_stiffness"), (-1, 1)),
     **dict.fromkeys(("plane_separation", "separation_scatter"), (1, 0)),

@@ -358,7 +358,7 @@ static void law_dealloc(PyObject *self) {
 }
 
 /* A quantity of a small array of doubles, numpy's own as the block is; NULL where Python is to answer. */
-static PyObject *ask_law_array(law_object *self, PyObject *gaps, int what) {
+static PyObject *ask_law_array(law_object *self, PyObject *gaps, bool by_mean, int what) {
     argument a[2] = {{0}};
     PyObject *found = NULL;
     if (self->law.head == NULL || Py_TYPE(gaps) != Py_TYPE(self->view.obj))
@@ -366,9 +366,12 @@ static PyObject *ask_law_array(law_object *self, PyObject *gaps, int what) {
     if (take(gaps, 'D', &a[0]) && a[0].view.ndim > 0 && N(0) > 0 && N(0) <= FEW)
         found = PyObject_CallMethod(gaps, "copy", NULL);
     if (found != NULL && take(found, 'w', &a[1])) {
-        double *out[5] = {NULL};
+        double *out[5] = {NULL}, separations[FEW];
+        const double *const known = P(0);
         out[what] = P(1);
-        if (mbma_law_fill(N(0), P(0), &self->law, out[0], out[1], out[2], out[3], out[4]) > 0)
+        for (size_t k = 0; by_mean && k < N(0); k++)
+            separations[k] = 2.0 * known[k] - self->law.head->h_max;
+        if (mbma_law_fill(N(0), by_mean ? separations : known, &self->law, out[0], out[1], out[2], out[3], out[4]) > 0)
             Py_CLEAR(found);
     }
     release(a, 2);
@@ -376,39 +379,43 @@ static PyObject *ask_law_array(law_object *self, PyObject *gaps, int what) {
     return found;
 }
 
+/* One gap or an array: the mean separation by position or by name, or the separation by name. */
 static PyObject *ask_law(PyObject *self, PyObject *const *given, Py_ssize_t count, PyObject *names, int what) {
     const Py_ssize_t named = names == NULL ? 0 : PyTuple_Size(names);
     PyObject *by[] = {count > 0 ? given[0] : Py_None, Py_None};
     if (count > 1)
-        return PyErr_Format(PyExc_TypeError, "one separation, or u=, is taken, got %zd arguments", count);
+        return PyErr_Format(PyExc_TypeError, "one mean separation is taken, or separation=, got %zd arguments", count);
     for (Py_ssize_t k = 0; k < named; k++) {
         PyObject *const name = PyTuple_GetItem(names, k);
-        const bool is_u = PyUnicode_CompareWithASCIIString(name, "u") == 0;
-        if (!is_u && (count > 0 || PyUnicode_CompareWithASCIIString(name, "separation") != 0))
-            return PyErr_Format(PyExc_TypeError, "unexpected keyword argument %R: separation or u is taken", name);
-        by[is_u] = given[count + k];
+        const bool is_d = PyUnicode_CompareWithASCIIString(name, "separation") == 0;
+        if (!is_d && (count > 0 || PyUnicode_CompareWithASCIIString(name, "mean_separation") != 0))
+            return PyErr_Format(PyExc_TypeError, "unexpected keyword argument %R: mean_separation or separation is taken",
+                                name);
+        by[is_d] = given[count + k];
     }
-    const bool by_u = by[0] == Py_None;
+    const bool by_d = by[0] == Py_None;
     PyObject *found = NULL;
-    if (PyFloat_CheckExact(by[by_u]) && by[!by_u] == Py_None) {
-        const mbma_law *const law = law_of(self);
-        if (law == NULL)
-            return NULL;
-        const double gap = PyFloat_AsDouble(by[by_u]);
-        const double value = mbma_law_at(law, (mbma_quantity)what, by_u ? 2.0 * gap - law->head->h_max : gap);
-        /* NaN: refused below, with a reason */
-        if (value == value)
-            return PyFloat_FromDouble(value);
-    } else if (!by_u)
-        found = ask_law_array((law_object *)self, by[0], what);
+    if (by[!by_d] == Py_None) {
+        if (PyFloat_CheckExact(by[by_d])) {
+            const mbma_law *const law = law_of(self);
+            if (law == NULL)
+                return NULL;
+            const double gap = PyFloat_AsDouble(by[by_d]);
+            const double value = mbma_law_at(law, (mbma_quantity)what, by_d ? gap : 2.0 * gap - law->head->h_max);
+            /* NaN: refused below, with a reason */
+            if (value == value)
+                return PyFloat_FromDouble(value);
+        } else
+            found = ask_law_array((law_object *)self, by[by_d], !by_d, what);
+    }
     return found != NULL ? found : PyObject_CallMethod(self, "_ask_one", "iOO", what, by[0], by[1]);
 }
 
 #define QUANTITIES(OF) \
-    OF(force, MBMA_FORCE, "F/A0 in the unit of E_star at d; where contact ends at h_max, zero from there on.") \
-    OF(area, MBMA_AREA, "A/A0 at d; where contact ends at h_max, zero from there on.") \
+    OF(pressure, MBMA_FORCE, "F/A0 in the unit of E_star; where contact ends at h_max, zero from there on.") \
+    OF(area, MBMA_AREA, "A/A0; where contact ends at h_max, zero from there on.") \
     OF(stiffness, MBMA_STIFFNESS, \
-       "-dF/du per nominal area, against the mean separation u = (h_max + d)/2: -2 dF/dd.\n\n" \
+       "-dp/du, against the mean separation u = (h_max + d)/2: -2 dp/dd.\n\n" \
        "MBMA's jumps where zeta_d reaches its floor, and belongs to the larger gap there.") \
     OF(area_slope, MBMA_AREA_SLOPE, "-d(A/A0)/dd.") \
     OF(energy, MBMA_ENERGY, "Elastic energy per nominal area, the integral of F/A0 over u to last contact.")
@@ -429,7 +436,7 @@ static PyObject *law_addresses(PyObject *self, PyObject *nothing) {
 
 #define METHOD(name, what, text) \
     {#name, (PyCFunction)(void (*)(void))law_##name, METH_FASTCALL | METH_KEYWORDS, \
-     #name "($self, separation=None, *, u=None)\n--\n\n" text},
+     #name "($self, mean_separation=None, *, separation=None)\n--\n\n" text},
 static PyMethodDef LAW_METHODS[] = {
     QUANTITIES(METHOD){"_addresses", law_addresses, METH_NOARGS, NULL},
     {NULL, NULL, 0, NULL},

@@ -89,8 +89,8 @@ def total_rows(surface: tuple[float, ...], separations: Any, variant: Variant, r
     slopes = _slopes_of(found)
     # at a maximum of force, stiffness is 0
     stiffness = -2 * slopes[0, 0]
-    least = np.maximum(np.abs(stiffness), np.where(found.force == 0, 1.0, found.force) / surface[4])
-    values = (found.force, found.area, stiffness, 0.0), (found.force, found.area, least, ANY)
+    least = np.maximum(np.abs(stiffness), np.where(found.pressure == 0, 1.0, found.pressure) / surface[4])
+    values = (found.pressure, found.area, stiffness, 0.0), (found.pressure, found.area, least, ANY)
     yield from _contact_rows("total", (*surface, gaps, 1.0, rtol), *values, slopes)
 
 
@@ -101,14 +101,14 @@ def calibrated_rows(surface: tuple[float, ...], shares: Any, E_star: float = 1.0
     slopes = _slopes_of(found)
     slopes[:, 5] -= slopes[:, 0]  # h_max at given u = (h_max + d)/2
     slopes[:, 0] *= 2
-    values = found.force, found.area, found.stiffness
+    values = found.pressure, found.area, found.stiffness
     yield from _contact_rows("calibrated", (*surface, u, E_star), (*values, 0.0), (*values, ANY), slopes)
-    yield from rows("separation", (*surface, found.force, E_star), (u,))
+    yield from rows("separation", (*surface, found.pressure, E_star), (u,))
 
 
 def _slopes_of(found: Contact) -> FloatArray:
     """Derivatives of force and area by `BY`."""
-    return np.array([[slopes[name] for name in BY] for slopes in (found.force_by, found.area_by) if slopes])
+    return np.array([[slopes[name] for name in BY] for slopes in (found.pressure_by, found.area_by) if slopes])
 
 
 def _contact_rows(kind: str, given: tuple[Any, ...], values: Any, units: Any, slopes: FloatArray) -> Rows:

@@ -87,16 +87,16 @@ class Joint:
         small = np.geomspace(NEAREST, 1 / LOOKED_AT, SMALL, endpoint=False)
         u = law.h_max - end * np.append(small, np.linspace(0, 1, LOOKED_AT + 1)[1:])
         found = self.answer(u)
-        pressure = np.asarray(law.force(u=u))
+        pressure = np.asarray(law.pressure(u))
         reasons = (found.leakage if leakage else found).reasons
         lines = [line for reason, bad in reasons.items() for line in self._not_valid(reason, u, bad, leakage)]
         if law.softening is not None:
             lines.append(
                 f"softening: stiffness falls with compression from c = {law.h_max - law.softening:.4g}, "
-                f"p = {float(law.force(u=law.softening)):.4g} {stress_unit} on, which no simulation shows"
+                f"p = {float(law.pressure(law.softening)):.4g} {stress_unit} on, which no simulation shows"
             )
         if law.highest < np.inf:
-            lines.append(f"no last contact: pressure is {float(law.force(law.h_max)):.4g} {stress_unit} at c = 0")
+            lines.append(f"no last contact: pressure is {float(law.pressure(law.h_max)):.4g} {stress_unit} at c = 0")
         spread = self._spread("one standard deviation of ln p at a given c", found.scatter, pressure)
         lines.append(f"scatter of simulations about the theory, {spread}")
         if leakage:
@@ -131,7 +131,7 @@ class Joint:
             mask = (found.leakage if leakage else found).reasons.get(reason, np.zeros(PARTS - 1, bool))
             k = 1 + int(np.argmax(np.append(mask, True)))
             good, bad = u[k - 1], u[k]
-        return float(self.law.force(u=good))
+        return float(self.law.pressure(good))
 
     def _spread(self, what: str, scatter: Numbers, pressure: FloatArray) -> str:
         """A scatter at five pressures where it is known."""
@@ -146,7 +146,8 @@ class Joint:
         blocked, least = self.law.leakage.blocked_at, "never blocked"
         if blocked > -np.inf:
             c = (self.law.h_max - blocked) / 2
-            least = f"blocked, K = 0, from p = {float(self.law.force(blocked)):.10g} {self.stress}, c = {c:.10g} on"
+            load = float(self.law.pressure(separation=blocked))
+            least = f"blocked, K = 0, from p = {load:.10g} {self.stress}, c = {c:.10g} on"
         return (
             f"leakage is the flow conductance K [{self.length}^3] of the gaps: flow per length of seal is "
             f"K dp/(12 viscosity width), viscosity in {self.stress} s: 1e-3 Pa s, as water's, is "

@@ -208,7 +208,7 @@ def _example(joint: Joint, language: Language) -> str:
     """One line with values of the library's law."""
     law = joint.law
     c = float(f"{(law.h_max - (law.lowest if law.turning_point is None else law.turning_point)) / 8:.3g}")
-    p, k = (float(value) for value in law.force_and_stiffness(law.h_max - 2 * c))
+    p, k = (float(value) for value in law.pressure_and_stiffness(law.h_max - c))
     answers = {"pressure": (c, p), "tangent": (c, k)} | ({"overclosure": (p, c)} if language.inverts else {})
     said = ", ".join(
         f"{language.call.format(name='{name}', what=what, x=language.number(float(f'{x:.7g}')))} = {y:.7g}"

@@ -77,12 +77,12 @@ def _curve(joint: Joint, quantity: str, max_overclosure: float, k_s: float) -> t
     u = law.h_max * np.geomspace(max(1 - max_overclosure / law.h_max, NEAREST_END), LAST_SHARE, LAST)
     c = np.union1d(c, law.h_max - u[1:-1]) if u[0] < u[-1] else c
     d = law.h_max - 2 * c
-    pressure, stiffness = np.asarray(law.force(d)), np.asarray(law.stiffness(d))
+    pressure, stiffness = np.asarray(law.pressure(separation=d)), np.asarray(law.stiffness(separation=d))
     pressure[0] = stiffness[0] = 0.0
     if quantity == "pressure":
         return c, pressure
     if quantity == "leakage":
-        flow = np.asarray(law.leakage(d))
+        flow = np.asarray(law.leakage(separation=d))
         # the first row that is blocked is the last
         open_ = np.append(True, (np.diff(pressure) > 0) & (flow[:-1] > 0))
         return pressure[open_], flow[open_]
@@ -193,7 +193,7 @@ def _table(
     if quantity == "leakage":
         floor = float(fine_y[-1])
         if law.at_pressure(fine_x[-1]).area > LARGEST_AREA:
-            floor = float(law.leakage(law.separation(area=LARGEST_AREA)))
+            floor = float(law.leakage(separation=law.separation(area=LARGEST_AREA)))
         # without so much contact gaps may close for want of a mean separation
         floor = (floor or FLOOR * float(fine_y[0])) * (1 - 1e-9)
     elif least is not None:
@@ -242,7 +242,7 @@ def _range(
         raise InputError(f"pressures must be two rising numbers, got {low:g} and {high:g}")
     found = (law.h_max - float(law.at_pressure(high).separation)) / 2
     if found <= 0:
-        least = f"{float(law.force(law.h_max)):.4g} {units.stress}"
+        least = f"{float(law.pressure(law.h_max)):.4g} {units.stress}"
         raise InputError(f"pressures must reach above {least}, that at c = 0, where rows begin, got {high:g}")
     return low, found
 

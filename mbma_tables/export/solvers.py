@@ -118,7 +118,7 @@ def exponential(
         if getattr(units, kind) in (None, "1"):
             raise InputError(f"{kind}_unit is missing: a law without units is read wrongly sooner or later")
     h_rms = float(surface.h_rms)
-    near, far = modulus * Persson("simplified").answer(surface, h_rms * np.array([1.0, 2.0])).force
+    near, far = modulus * Persson("simplified").answer(surface, h_rms * np.array([1.0, 2.0])).pressure
     u0 = h_rms / math.log(near / far)
     p0 = near * math.exp((h_rms - float(surface.h_max)) / u0)
     numbers = ", ".join(f"{key} = {float(getattr(surface, key)):.10g}" for key in surface.parameters)

@@ -22,7 +22,7 @@ DEGREE = 8
 CENTRE, RATE, FORCE_AT, AREA_AT, ENERGY_AT = 0, 1, 2, 3 + DEGREE, 4 + 2 * DEGREE  # in a record
 RECORD = 5 + 2 * DEGREE
 # quantities, by which questions name them
-QUANTITIES = ("force", "area", "stiffness", "area_slope", "energy")
+QUANTITIES = ("pressure", "area", "stiffness", "area_slope", "energy")
 FORCE, AREA = range(2)
 
 # words of the head

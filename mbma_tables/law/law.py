@@ -19,7 +19,7 @@ from mbma_tables.answers.source import MEANINGS, LawPoint, LawValues
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, require
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.plots import Curve, draw_compression, force_label, theory_label
+from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
 from mbma_tables.common.units import UNKNOWN, Units, unit_of
 from mbma_tables.core import core, in_blocks
 from mbma_tables.law import block as at
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     class Law:
         """As `core/binding.c` has it, which answers floats and small arrays without Python."""
 
-        force: Callable[..., Numbers]
+        pressure: Callable[..., Numbers]
         area: Callable[..., Numbers]
         stiffness: Callable[..., Numbers]
         area_slope: Callable[..., Numbers]
@@ -54,9 +54,9 @@ DIGITS = 10.0  # times a law's error: falls of stiffness below it are its polyno
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ContactLaw(Law, Displayed):
-    """Force and area of one surface against its gap; made by `contact_law`, picklable, tens of kB with its surface.
+    """Pressure and area of one surface against its gap; made by `contact_law`, picklable, tens of kB with its surface.
 
-    Every method takes the separation d, or the mean separation ``u=`` instead: numbers in the law's unit of length, or
+    Every method takes the mean separation u, or ``separation=``, MBMA's d: numbers in the law's unit of length, or
     texts with their own, "0.8 um".
 
     Attributes
@@ -87,9 +87,9 @@ class ContactLaw(Law, Displayed):
     --------
     >>> from mbma_tables import Surface, contact_law
     >>> law = contact_law(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0), E_star=100e3)  # um, MPa
-    >>> round(float(law.force(1.0)), 4), round(float(law.separation(force=7.9825)), 4)
+    >>> round(float(law.pressure(separation=1.0)), 4), round(float(law.separation(pressure=7.9825)), 4)
     (7.9825, 1.0)
-    >>> round(float(law.stiffness(u=2.0)), 3)  # -dF/du [MPa/um]
+    >>> round(float(law.stiffness(2.0)), 3)  # -dp/du [MPa/um]
     31.809
     >>> round(float(law.at_pressure(7.9825).area), 5), round(law.softening, 3)
     (0.00287, 1.06)
@@ -120,29 +120,42 @@ class ContactLaw(Law, Displayed):
         """Centre, rate, polynomials of force and area, and energy of each piece, shape (records, RECORD)."""
         return self.block[self.block.view(np.int64)[at.RECORDS] :].reshape(-1, at.RECORD)
 
-    def gaps(self, separation: Any, u: Any) -> FloatArray:
-        """Separations d, checked, of separations or of mean separations, one of them."""
-        separation, u = (self.units.number("separation", gap) for gap in (separation, u))
-        d = finite_array("separation", separation) if u is None else 2 * finite_array("u", u) - self.h_max
+    def separations(self, mean_separation: Any = None, separation: Any = None) -> FloatArray:
+        """Separations d, checked, of mean separations or of separations, one of them."""
+        name, given = self._known(mean_separation, separation)
+        return self._in_range(name, given)[1]
+
+    def _known(self, mean_separation: Any, separation: Any) -> tuple[str, Any]:
+        """The one that is given, and its name."""
+        if (mean_separation is None) == (separation is None):
+            raise InputError("give the mean separation, or separation=, one of them")
+        return ("mean_separation", mean_separation) if separation is None else ("separation", separation)
+
+    def _in_range(self, name: str, given: Any) -> tuple[FloatArray, FloatArray]:
+        """Gaps as they were given, and as separations d, within the law."""
+        gaps = finite_array(name, self.units.number(name, given))
+        mean = name == "mean_separation"
+        d, least, most = 2 * gaps - self.h_max if mean else gaps, self.lowest, self.highest
         # ends that are no round numbers are met but for rounding
-        limit, slack = ("-h_max = ", 0.0) if self.lowest == -self.h_max else ("", ROUNDING * self.h_max)
-        require("separation", d, d >= self.lowest - slack, f"at least {limit}{self.lowest:.17g}, where the theory ends")
-        if self.highest < math.inf:
-            good = d <= self.highest * (1 + ROUNDING)
-            require("separation", d, good, f"at most {self.highest:.17g}, where the law ends")
-        return d
+        slack = 0.0 if least == -self.h_max else ROUNDING * self.h_max
+        shown_least, shown_most = ((end + self.h_max) / 2 if mean else end for end in (least, most))
+        limit = "" if slack or mean else "-h_max = "
+        require(name, gaps, d >= least - slack, f"at least {limit}{shown_least:.17g}, where the theory ends")
+        if most < math.inf:
+            require(name, gaps, d <= most * (1 + ROUNDING), f"at most {shown_most:.17g}, where the law ends")
+        return gaps, d
 
     def _ask(
-        self, given: Any, count: int, check: Callable[[Any], FloatArray], fill: Callable[..., bool], plain: bool = True
+        self, given: Any, count: int, check: Callable[[Any], FloatArray], fill: Callable[..., bool]
     ) -> tuple[Any, ...]:
         """What `fill` writes of checked input, in blocks, where it says that all is in range; else `check` refuses."""
         if is_labelled(given):
             from mbma_tables.surfaces.labels import apply
 
-            found: tuple[Any, ...] = apply(lambda block: self._ask(block, count, check, fill, plain), (given,), count)
+            found: tuple[Any, ...] = apply(lambda block: self._ask(block, count, check, fill), (given,), count)
             return found
         # entries of plain arrays are checked as they are answered
-        plain = plain and type(given) is np.ndarray and given.dtype == np.float64 and given.size > 0
+        plain = type(given) is np.ndarray and given.dtype == np.float64 and given.size > 0
         known = given if plain else check(given)
         flat = np.ascontiguousarray(known).reshape(-1)
         out = np.empty((count, flat.size))
@@ -150,40 +163,40 @@ class ContactLaw(Law, Displayed):
             check(given)
         return tuple(values.reshape(known.shape)[()] for values in out)
 
-    def _values(self, wanted: tuple[str, ...], separation: Any, u: Any) -> tuple[Any, ...]:
+    def _values(self, wanted: tuple[str, ...], mean_separation: Any, separation: Any) -> tuple[Any, ...]:
         """The quantities wanted, in the order of `QUANTITIES`, in one pass."""
-        if separation is not None and u is not None:
-            raise InputError("separation and u: give one of them")
+        name, given = self._known(mean_separation, separation)
 
         def check(given: Any) -> FloatArray:
-            return self.gaps(given, None) if u is None else self.gaps(None, given)
+            return self._in_range(name, given)[0]
 
-        def fill(d: FloatArray, *out: FloatArray) -> bool:
+        def fill(gaps: FloatArray, *out: FloatArray) -> bool:
             found = dict(zip(wanted, out, strict=True))
+            d = gaps if name == "separation" else 2 * gaps - self.h_max
             return not core.law_fill(d, self.block, *map(found.get, QUANTITIES))
 
-        return self._ask(separation if u is None else u, len(wanted), check, fill, plain=u is None)
+        return self._ask(given, len(wanted), check, fill)
 
-    def _ask_one(self, what: int, separation: Any, u: Any) -> Any:
+    def _ask_one(self, what: int, mean_separation: Any, separation: Any) -> Any:
         """What a method of `Law` does not answer itself."""
-        return self._values((QUANTITIES[what],), separation, u)[0]
+        return self._values((QUANTITIES[what],), mean_separation, separation)[0]
 
-    def __call__(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> Numbers:
-        """The same as `force`."""
-        return self.force(separation, u=u)
+    def __call__(self, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None) -> Numbers:
+        """The same as `pressure`."""
+        return self.pressure(mean_separation, separation=separation)
 
-    def force_and_stiffness(
-        self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None
+    def pressure_and_stiffness(
+        self, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None
     ) -> tuple[Numbers, Numbers]:
-        """F/A0 and -dF/du in one pass, as iterations need them."""
-        force, stiffness = self._values(("force", "stiffness"), separation, u)
-        return force, stiffness
+        """F/A0 and -dp/du in one pass, as iterations need them."""
+        pressure, stiffness = self._values(("pressure", "stiffness"), mean_separation, separation)
+        return pressure, stiffness
 
-    def values(self, separation: ArrayLike | None = None, *, u: ArrayLike | None = None) -> LawValues:
-        """Force, area, stiffness -dF/du and energy in one pass."""
-        return LawValues(*self._values(("force", "area", "stiffness", "energy"), separation, u))
+    def values(self, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None) -> LawValues:
+        """Pressure, area, stiffness -dp/du and energy in one pass."""
+        return LawValues(*self._values(("pressure", "area", "stiffness", "energy"), mean_separation, separation))
 
-    def separation(self, *, force: ArrayLike | None = None, area: ArrayLike | None = None) -> Numbers:
+    def separation(self, *, pressure: ArrayLike | None = None, area: ArrayLike | None = None) -> Numbers:
         """Gap d at a given force or area, on the branch of first contact; where contact ends at h_max, that at zero.
 
         Raises
@@ -191,32 +204,34 @@ class ContactLaw(Law, Displayed):
         OutOfRangeError
             Where the branch does not reach the value; the message says how far it goes.
         """
-        if (force is None) == (area is None):
-            raise InputError("give force or area, one of them")
-        name, given = ("area", area) if force is None else ("force", self.units.number("force", force))
+        if (pressure is None) == (area is None):
+            raise InputError("give pressure or area, one of them")
+        name, given = ("area", area) if pressure is None else ("pressure", self.units.number("pressure", pressure))
         return self._inverse(name, given)[0]  # type: ignore[no-any-return]
 
     def at_pressure(self, pressure: ArrayLike) -> LawPoint:
         """Separations, area and stiffness -dF/du where F/A0 is `pressure`, on the branch of first contact."""
-        force = self.units.number("force", pressure)
-        d, area, stiffness = self._inverse("pressure", force, 3)
+        pressure = self.units.number("pressure", pressure)
+        d, area, stiffness = self._inverse("pressure", pressure, 3)
         mean = d + self.h_max
         mean *= 0.5
-        point = LawPoint(d, mean, area, stiffness, force if is_labelled(force) else np.asarray(force, float)[()])
+        point = LawPoint(
+            d, mean, area, stiffness, pressure if is_labelled(pressure) else np.asarray(pressure, float)[()]
+        )
         point.units = self.units
         return point
 
     def _inverse(self, name: str, given: Any, count: int = 1) -> tuple[Any, ...]:
         """Gaps of forces or areas, and with a `count` of 3 area and -dF/du there."""
-        key = "area" if name == "area" else "force"
-        which, inverse = (FORCE if key == "force" else AREA), self._inverse_block(key)
+        key = "area" if name == "area" else "pressure"
+        which, inverse = (FORCE if key == "pressure" else AREA), self._inverse_block(key)
         least, most, end = inverse[at.Y_LEAST], inverse[at.Y_HIGH], inverse[at.END]
 
         def check(given: Any) -> FloatArray:
             wanted = finite_array(name, given)
             if ((wanted >= max(least, 0.0)) & (wanted <= most)).all():
                 return wanted
-            known = self.units.length, self.units.stress if key == "force" else None
+            known = self.units.length, self.units.stress if key == "pressure" else None
             length, unit = ("" if own in (None, "1") else f" {own}" for own in known)
             low, high = f"at least {least:.6g}{unit}", f"at most {most:.6g}{unit}"
             require(name, wanted, wanted >= 0, "at least 0")
@@ -233,8 +248,8 @@ class ContactLaw(Law, Displayed):
         """Polynomials of x over force or area, made when first asked for."""
         made: dict[str, FloatArray] = self.__dict__.setdefault("_inverses", {})
         if name not in made:
-            turn = self.turning_point if name == "force" else self.area_turning_point
-            which = FORCE if name == "force" else AREA
+            turn = self.turning_point if name == "pressure" else self.area_turning_point
+            which = FORCE if name == "pressure" else AREA
             made[name] = inverse_block(which, self.block, self.lowest if turn is None else turn)
         return made[name]
 
@@ -242,11 +257,11 @@ class ContactLaw(Law, Displayed):
     def softening(self) -> float | None:
         """Mean separation u [length] below which stiffness falls with compression; None where it rises to the end."""
         noise = DIGITS * self.error
-        return softening(lambda u: self.stiffness(u=u), self.h_max, max(self.lowest, -self.h_max), noise)
+        return softening(lambda u: self.stiffness(u), self.h_max, max(self.lowest, -self.h_max), noise)
 
     @functools.cached_property
     def leakage(self) -> LeakageLaw:
-        """Flow conductance at d, ``u=`` or ``pressure=``, a `LeakageLaw`; made when read.
+        """Flow conductance at a mean separation, ``separation=`` or ``pressure=``, a `LeakageLaw`; made when read.
 
         Examples
         --------
@@ -262,13 +277,13 @@ class ContactLaw(Law, Displayed):
             raise InputError("leakage needs the surface, which this law does not hold")
         return leakage_law(self, self.surface)
 
-    def slope_error(self, separation: ArrayLike) -> Any:
+    def slope_error(self, mean_separation: ArrayLike | None = None, *, separation: ArrayLike | None = None) -> Any:
         """Bound on the error of `stiffness` over 2F/l, and of `area_slope` over A/l, against those of the theory.
 
         l = h_max - d where contact ends there, else h_max + d. It covers what the polynomials leave out, and for MBMA
         the error of the islands, which the sum over them passes on to slopes; not the own error of another theory.
         """
-        d = self.gaps(separation, None)
+        d = self.separations(mean_separation, separation)
         head = self.block
         x = (self.h_max + np.where(d < 0, head[at.MINUS], head[at.PLUS]) * d) * head[at.SCALE]
         bound = self.errors[self._records_at(d, x), 1]
@@ -285,7 +300,7 @@ class ContactLaw(Law, Displayed):
         return found
 
     def _facts(self) -> dict[str, str]:
-        unit, modulus = self.units.length or "1", unit_of("force", self.units)
+        unit, modulus = self.units.length or "1", unit_of("pressure", self.units)
         known = {"theory": self.theory, "variant": self.variant, "island_model": self.island_model}
         ends = np.array([max(self.lowest, -self.h_max), self.h_max if math.isinf(self.highest) else self.highest])
         known["resolution"] = "" if self.surface is None else self.surface.resolution
@@ -298,25 +313,27 @@ class ContactLaw(Law, Displayed):
         light, deep = np.geomspace(*SPACED, SHOWN_POINTS // 2)[:-1], np.linspace(SPACED[1], 1.0, SHOWN_POINTS // 2)
         d = ends[0] + (ends[1] - ends[0]) * np.concatenate([light, deep])
         d = np.maximum(d, ends[1])
-        names = ("separation", "mean_separation", "force", "area", "stiffness", "energy")
-        force, area, stiffness, energy = self.values(d)
-        values = (d, (d + self.h_max) / 2, force, area, stiffness, energy)
+        names = ("separation", "mean_separation", "pressure", "area", "stiffness", "energy")
+        pressure, area, stiffness, energy = self.values(separation=d)
+        values = (d, (d + self.h_max) / 2, pressure, area, stiffness, energy)
         return {n: Variable(v, unit_of(n, self.units), MEANINGS[n]) for n, v in zip(names, values, strict=True)}
 
     def _figure(self) -> Figure:
         held = self._variables()
         unit = self.units.length or "length"
-        curve = Curve(theory_label(self.theory), *(held[name].values for name in ("mean_separation", "force", "area")))
-        label = force_label(unit_of("force", self.units))
-        return draw_compression([curve], force_label=label, gap_label=f"mean separation u [{unit}]")
+        curve = Curve(
+            theory_label(self.theory), *(held[name].values for name in ("mean_separation", "pressure", "area"))
+        )
+        label = pressure_label(unit_of("pressure", self.units))
+        return draw_compression([curve], pressure_label=label, gap_label=f"mean separation u [{unit}]")
 
-    def compiled(self, quantity: str = "force") -> LowLevelCallable:
+    def compiled(self, quantity: str = "pressure") -> LowLevelCallable:
         """A quantity at a separation as a function of C, ``double (double, void *)``, which scipy calls without Python.
 
         Parameters
         ----------
         quantity : str
-            "force" (F/A0), "area" (A/A0), "stiffness" (-dF/du), "area_slope" (-d(A/A0)/dd) or "energy" (by u).
+            "pressure" (F/A0), "area" (A/A0), "stiffness" (-dF/du), "area_slope" (-d(A/A0)/dd) or "energy" (by u).
 
         Returns
         -------
@@ -329,11 +346,11 @@ class ContactLaw(Law, Displayed):
         >>> from scipy.integrate import quad
         >>> from mbma_tables import Surface, contact_law
         >>> law = contact_law(Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0))
-        >>> force = law.compiled()
-        >>> work, _ = quad(force, 1.0, 3.0, epsabs=0.0)
-        >>> bool(abs(work / 2 / law.energy(1.0) - 1) < 1e-7)  # u moves half as far as d
+        >>> pressure = law.compiled()
+        >>> work, _ = quad(pressure, 1.0, 3.0, epsabs=0.0)
+        >>> bool(abs(work / 2 / law.energy(separation=1.0) - 1) < 1e-7)  # u moves half as far as d
         True
-        >>> force.function(1.0, force.user_data) == law.force(1.0)
+        >>> pressure.function(1.0, pressure.user_data) == law.pressure(separation=1.0)
         True
         """
         from scipy import LowLevelCallable

@@ -39,19 +39,25 @@ class LeakageLaw:
 
     def __call__(
         self,
-        separation: ArrayLike | str | None = None,
+        mean_separation: ArrayLike | str | None = None,
         *,
-        u: ArrayLike | str | None = None,
+        separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
     ) -> Numbers:
-        """Flow conductance at separations, at mean separations, or at pressures; exactly 0 where blocked."""
-        given = [known for known in (separation, u, pressure) if known is not None]
+        """Flow conductance at mean separations, separations or pressures; exactly 0 where blocked."""
+        given = [known for known in (mean_separation, separation, pressure) if known is not None]
         if len(given) != 1:
-            raise InputError("give one of separation, u and pressure")
+            raise InputError("give one of mean_separation, separation and pressure")
         if is_labelled(given[0]):
-            name = "pressure" if pressure is not None else "separation" if u is None else "u"
+            name = (
+                "pressure" if pressure is not None else "separation" if mean_separation is None else "mean_separation"
+            )
             return apply(lambda known: (self(**{name: known}),), (given[0],), 1)[0]  # type: ignore[no-any-return]
-        d = self.law.separation(force=pressure) if pressure is not None else self.law.gaps(separation, u)
+        d = (
+            self.law.separation(pressure=pressure)
+            if pressure is not None
+            else self.law.separations(mean_separation, separation)
+        )
         flat = np.ascontiguousarray(d).reshape(-1)
         found = np.empty(flat.size)
         core.law_flow_fill(flat, self.block, self.law.h_max, self.h_rms, found)
@@ -74,14 +80,14 @@ def leakage_law(law: Any, surface: AnySurface) -> LeakageLaw:
     threshold, h_rms = shipped_flow().constants.threshold, float(surface.h_rms)
     rtol = max(RTOL, SHARE * law.error)
     deepest = law.lowest if law.area_turning_point is None else law.area_turning_point
-    blocked = bool(law.area(deepest) >= threshold)
+    blocked = bool(law.area(separation=deepest) >= threshold)
     bottom = float(law.separation(area=threshold)) if blocked else law.lowest
     top = min(law.h_max, law.highest) if law.block.view(np.int64)[at.ENDS] else law.highest
     span = top - bottom
 
     def values(x: FloatArray) -> FloatArray:
         d = bottom + span * x
-        conductance = h_rms**3 * flow(surface, (law.h_max + d) / 2, np.asarray(law.area(d)))
+        conductance = h_rms**3 * flow(surface, (law.h_max + d) / 2, np.asarray(law.area(separation=d)))
         return np.stack([conductance, np.cbrt(conductance)])
 
     # gaps close as u under full compression

@@ -83,12 +83,12 @@ def contact_law(
     >>> from mbma_tables import Surface, contact_law
     >>> surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
     >>> law = contact_law(surface, rtol=1e-6)
-    >>> f"{law.force(1.0):.4g}"
+    >>> f"{law.pressure(separation=1.0):.4g}"
     '7.982e-05'
     >>> law.error < 2e-6
     True
     >>> persson = contact_law(surface, theory="persson")
-    >>> f"{persson.force(u=2.0):.4g}, {persson.at_pressure(1e-4).mean_separation:.3f}"
+    >>> f"{persson.pressure(2.0):.4g}, {persson.at_pressure(1e-4).mean_separation:.3f}"
     '0.0001832, 2.276'
     """
     given, units = modulus_and_units(E_star, surface)
@@ -209,12 +209,12 @@ def _theory_law(surface: AnySurface, theory: Theory, rtol: float, facts: dict[st
     def answer(u: FloatArray) -> FloatArray:
         with np.errstate(all="ignore"):
             found = theory.answer(surface, u)
-        if not ((found.force > 0) & (found.area > 0) & np.isfinite(found.force)).all():
+        if not ((found.pressure > 0) & (found.area > 0) & np.isfinite(found.pressure)).all():
             raise OutOfRangeError(
                 f"theory {theory.name!r} has no positive force and area on all of this surface's gaps"
             )
         errors.append(np.nan_to_num(found.error))
-        return np.stack([found.force, found.area])
+        return np.stack([found.pressure, found.area])
 
     answer(lowest + (highest - lowest) * (np.arange(LOOKED_AT) + 0.5) / LOOKED_AT)
     # where it has far larger errors at some gaps, as at the lightest contact of a small map, these tell of no others
@@ -294,10 +294,10 @@ def _lowest(surface: AnySurface, theory: Theory, shares: tuple[float, ...]) -> f
     def answers(u: float) -> bool:
         try:
             with np.errstate(all="ignore"):
-                force = float(theory.answer(surface, np.array(u)).force)
+                pressure = float(theory.answer(surface, np.array(u)).pressure)
         except InputError:
             return False
-        return math.isfinite(force) and force > 0
+        return math.isfinite(pressure) and pressure > 0
 
     for share in shares:
         if answers(u := share * float(surface.h_max)):

@@ -20,7 +20,7 @@ from mbma_tables.islands.height_integrals import height_integral
 
 ISLAND_MODELS = ("exact", "universal", "island4d", "formula", "rigid")
 OUTSIDE = ("raise", "exact", "nan")  # what to do about islands that a table does not cover
-QUANTITIES = ("force", "area")
+QUANTITIES = ("pressure", "area")
 FORCE, AREA, BOTH = 0, 1, 2  # which of them is asked for
 MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # that totals and islands may be asked for
 CLOSED_FORM_ERROR = 1e-14

@@ -149,7 +149,7 @@ def long_phi_A(X: FloatArray, mu: FloatArray) -> FloatArray:
     return rigid/((1/3)*2**(1/3)*pi**(2/3)*mu*(X + 1)*exp(log_Q)/(mu*(X + 1) + 1)**(1/3) + 1)
 
 
-def totals_force(
+def totals_pressure(
     d_over_h_rms: FloatArray, h_max_over_h_rms: FloatArray, zeta_1: FloatArray, hurst: FloatArray
 ) -> FloatArray:
     """Force over E* q0 h_rms, closed totals: within 0.0906."""
@@ -227,7 +227,7 @@ CERTIFICATES: dict[str, dict[str, Certificate]] = {
     "long": {"phi_F": Certificate(coefficients=43, largest=0.00054, median=0.000138, points=20000, worst_at={"X":
         0.3042, "mu": 0.5951}), "phi_A": Certificate(coefficients=53, largest=0.000718, median=0.000205, points=20000,
         worst_at={"X": 8.683, "mu": 26.31})},
-    "totals": {"force": Certificate(coefficients=40, largest=0.0906, median=0.0272, points=46081,
+    "totals": {"pressure": Certificate(coefficients=40, largest=0.0906, median=0.0272, points=46081,
         worst_at={"d_over_h_rms": 3.328, "h_max_over_h_rms": 3.718, "zeta_1": 1000.0, "hurst": 0.5917}), "area":
         Certificate(coefficients=40, largest=0.0968, median=0.0329, points=46081, worst_at={"d_over_h_rms": 2.999,
         "h_max_over_h_rms": 4.5, "zeta_1": 615.1, "hurst": 1.0})},

@@ -80,7 +80,7 @@ class FormulaModel(Ranged):
 class ClosedTotals(NamedTuple):
     """Force over nominal area [unit of `E_star`], A/A0, and the largest relative error of either as certified."""
 
-    force: FloatArray
+    pressure: FloatArray
     area: FloatArray
     error: float
 
@@ -105,7 +105,7 @@ def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1
 
     Examples
     --------
-    >>> force, area, error = closed_totals(Surface(0.8, 1.0, 200.0, 1.0, 3.0), [-2.0, 0.0])
+    >>> pressure, area, error = closed_totals(Surface(0.8, 1.0, 200.0, 1.0, 3.0), [-2.0, 0.0])
     >>> area.round(2)
     array([0.21, 0.02])
     >>> error < 0.1
@@ -126,8 +126,8 @@ def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1
     gap, h_max = np.broadcast_to(gap, shape), np.broadcast_to(np.asarray(surface.h_max), shape)
     require("separation", gap, gap >= -h_max, "at least -h_max, where the model ends")
     require("separation", gap, gap < h_max, "below h_max: there is no contact from there on")
-    force, area = (FUNCTIONS[TOTALS][name](*given.values()) for name in ("force", "area"))
+    pressure, area = (FUNCTIONS[TOTALS][name](*given.values()) for name in ("pressure", "area"))
     low, _ = RANGES[TOTALS]["area"]
     require("area", np.asarray(area), area >= low, f"at least {low:g}, where the closed totals hold")
     scale = modulus * surface.q0 * surface.h_rms
-    return ClosedTotals(force * scale, area, max(found.largest for found in CERTIFICATES[TOTALS].values()))
+    return ClosedTotals(pressure * scale, area, max(found.largest for found in CERTIFICATES[TOTALS].values()))

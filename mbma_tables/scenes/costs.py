@@ -23,7 +23,7 @@ class Row(NamedTuple):
 
     island_model: str
     variant: str  # "gap rtol=1e-06", "island", "open"
-    quantity: str  # "both", "force" or "area"
+    quantity: str  # "both", "pressure" or "area"
     error: float | None
     cost: float  # time over that of the fixed work; seconds in the row of island model `UNIT`
     evaluations: float | None = None  # islands for a gap, pressures for an exact island, height integrals for a table

@@ -176,7 +176,7 @@ class _Planner:
     def plan(self) -> Plan:
         outputs, dropped = self.problem.outputs, self.problem.dropped
         hertz = "area" in outputs and "subscale_area" in dropped
-        totals = [name for name in ("force", "area") if name in outputs and not (name == "area" and hertz)]
+        totals = [name for name in ("pressure", "area") if name in outputs and not (name == "area" and hertz)]
         of_law = sorted(outputs & set(OF_LAW))
         if self.problem.prescribed in INVERTED:
             of_law.append(f"{self.problem.prescribed} prescribed")
@@ -233,7 +233,9 @@ class _Planner:
             best = factor * MIN_LAW_RTOL / (1 - ISLAND_SHARE)
             raise InputError(f"rtol = {self.rtol:g} is too tight for {', '.join(why)}: a law meets {best:.0e} at best")
         island_model = self.island_model(tolerance)
-        each = self.costs.of("law", "lookup") + (self.costs.of("law", "invert", quantity="force") if inverse else 0.0)
+        each = self.costs.of("law", "lookup") + (
+            self.costs.of("law", "invert", quantity="pressure") if inverse else 0.0
+        )
         seconds = self.costs.of(_name(island_model), "law", asked) + self.count * each
         error = factor * (asked + certified_error(island_model, asked))
         what = "the surface's force and area as piecewise polynomials of the gap, evaluated at every gap"
@@ -265,7 +267,9 @@ class _Planner:
         inverse = self.problem.prescribed in INVERTED
         rtol = max((1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_THEORY_LAW_RTOL)
         direct = seconds_by_theory(self.costs, theory, self.count, inverse, "energy" in outputs)
-        each = self.costs.of("law", "lookup") + (self.costs.of("law", "invert", quantity="force") if inverse else 0.0)
+        each = self.costs.of("law", "lookup") + (
+            self.costs.of("law", "invert", quantity="pressure") if inverse else 0.0
+        )
         by_law = self.costs.of(theory, "law", rtol) + self.count * each
         pays = self.count >= MIN_LAW_GAPS_OF_OTHERS if math.isnan(direct) else by_law < direct
         own = self.own_error()
@@ -273,7 +277,7 @@ class _Planner:
         if pays and not outputs & set(OF_LAW):
             name, asked, seconds = "law", rtol, by_law
             error = (AMPLIFICATION["inverse"] if inverse else 1.0) * (rtol + own)
-        what = f"force, area and what follows from them at {self.count} gaps"
+        what = f"pressure, area and what follows from them at {self.count} gaps"
         return Step(name, ", ".join(why), what, None, asked, self.count, error, seconds, theory=theory)
 
     def yielding(self, why: Sequence[str]) -> Step:
@@ -286,7 +290,7 @@ class _Planner:
         # the elastic errors of force and of area at that force may add up
         island_model, asked = (self.island_model(self.rtol / 2), ISLAND_SHARE * self.rtol / 2) if mbma else (None, None)
         error = 2 * (asked + certified_error(island_model, asked) if island_model and asked else self.own_error())
-        what = f"force, area and what yields at {self.count} gaps"
+        what = f"pressure, area and what yields at {self.count} gaps"
         return Step("contact", ", ".join(why), what, island_model, asked, self.count, error, seconds, theory=theory)
 
     def own_error(self) -> float:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # effects; docs/scenes.md says what each is
 OUTPUTS = (
-    "force",
+    "pressure",
     "area",
     "stiffness",
     "energy",
@@ -88,7 +88,7 @@ class Problem:
     """The parameters of `Scene`, with the derived fields `outputs`, `dropped`, `gaps` and `units`."""
 
     surface: AnySurface
-    effects: Sequence[str] = ("force", "area")
+    effects: Sequence[str] = ("pressure", "area")
     without: Sequence[str] = ()
     separations: Any = None
     mean_separations: Any = None
@@ -170,7 +170,7 @@ class Problem:
             raise InputError(f"{' and '.join(given)} are given: prescribe one of {', '.join(PRESCRIBED)}")
         if not at_gaps:
             if given:
-                raise InputError(f"{given[0]} are not needed by any effect: leave them out, or ask for 'force'")
+                raise InputError(f"{given[0]} are not needed by any effect: leave them out, or ask for 'pressure'")
             return None
         if not given:
             raise InputError(f"nothing is prescribed: give one of {', '.join(PRESCRIBED)}")
@@ -219,8 +219,12 @@ class Problem:
             require("deltas", deltas, deltas > 0, "positive")
         for name in self.theories:
             if name in CORRELATIONS:
-                if "conductance" not in self.outputs or not ("force" in self.outputs or self.prescribed == "pressures"):
-                    raise InputError(f"{name!r} is of conductance at a pressure: add effects 'conductance' and 'force'")
+                if "conductance" not in self.outputs or not (
+                    "pressure" in self.outputs or self.prescribed == "pressures"
+                ):
+                    raise InputError(
+                        f"{name!r} is of conductance at a pressure: add effects 'conductance' and 'pressure'"
+                    )
                 if name == CORRELATIONS[0] and self.hardness is None:
                     raise InputError(f"{name!r} needs a hardness: add effect 'yield'")
             elif name not in COMPARED:

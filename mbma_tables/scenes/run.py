@@ -76,7 +76,7 @@ def _units(problem: Problem) -> dict[str, tuple[str, str]]:
         "profile_gap": ("separation", "d(r), deformed sphere to mid-plane of the summits (Eq. 34)"),
     }
     for name in problem.theories:
-        quantities |= {f"{name}_force": ("force", f"F/A0 by {name}"), f"{name}_area": ("area", f"A/A0 by {name}")}
+        quantities |= {f"{name}_pressure": ("pressure", f"F/A0 by {name}"), f"{name}_area": ("area", f"A/A0 by {name}")}
     units = {name: (unit_of(like, problem.units), meaning) for name, (like, meaning) in quantities.items()}
     unit = problem.conductance_unit
     correlations = {f"{name}_conductance": (unit, f"conductance by {name}") for name in CORRELATIONS}

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 MAX_AREA = 0.99
 CANDIDATES = ("calibrated", "persson", "greenwood_williamson")
 # what is asked: the quantity of tables/calibrated.nc whose distance from simulations decides
-QUANTITIES = {"stiffness": "stiffness", "conductance": "stiffness", "force": "force", "energy": "force"}
+QUANTITIES = {"stiffness": "stiffness", "conductance": "stiffness", "pressure": "pressure", "energy": "pressure"}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -81,11 +81,11 @@ class Scene(Problem):
     Examples
     --------
     >>> from mbma_tables import Scene, Surface
-    >>> scene = Scene(Surface.named("concrete"), effects=["force"], separations=[0.2, 0.5], rtol=1e-5)
+    >>> scene = Scene(Surface.named("concrete"), effects=["pressure"], separations=[0.2, 0.5], rtol=1e-5)
     >>> [step.name for step in scene.plan().steps]
     ['totals']
     >>> found = scene.run()
-    >>> [f"{force:.3e}" for force in found["force"].values]
+    >>> [f"{pressure:.3e}" for pressure in found["pressure"].values]
     ['1.754e-03', '1.292e-04']
     >>> found.attrs["error"] <= 1e-5
     True
@@ -185,7 +185,7 @@ def advice(problem: Problem) -> str:
     """One line about a gap, stiffness or conductance asked of MBMA; empty where there is nothing to say."""
     asked = {name: quantity for name, quantity in QUANTITIES.items() if name in problem.outputs}
     if problem.prescribed in INVERTED:
-        asked = {"gap": "force"} | {name: quantity for name, quantity in asked.items() if quantity == "stiffness"}
+        asked = {"gap": "pressure"} | {name: quantity for name, quantity in asked.items() if quantity == "stiffness"}
     contacts = _contacts(problem) if problem.theory == "mbma" and asked else np.empty(0)
     if not contacts.size:
         return ""

@@ -64,21 +64,21 @@ def island_statistics(problem: Problem, surface: AnySurface, gap: FloatArray, st
     grid = source.layer * np.sinh(t) ** 2
     number, density = np.zeros(depth.size), np.zeros((depth.size, grid.size))
     # where no gap touches there is no distribution
-    force, area, error = np.zeros(grid.size), np.zeros(grid.size), 0.0
+    pressure, area, error = np.zeros(grid.size), np.zeros(grid.size), 0.0
     if deepest > 0:
         # islands are counted without an island model
         kept = profile(shape, RigidModel(), variant, rtol, rows=3)
         number[depth > 0] = kept.totals(depth[depth > 0])[2]
         g, s, q0 = islands_of(surface, grid * h_rms, variant)
         phi = answer_islands(model, g, _outside(island_model))
-        force = problem.E_star * s / q0 * scale_force(g) * phi.phi_F
+        pressure = problem.E_star * s / q0 * scale_force(g) * phi.phi_F
         share = g["eta"] if "subscale_area" in problem.dropped else 1.0
         area = scale_area(g) * phi.phi_A / share / q0**2
         shift, rate = source.heights(g, grid)
         spread = source.density(g, grid, shift - rate * depth[:, None])
         number, density = number * q0**2, np.where(grid <= depth[:, None], spread, 0.0) * q0**2 / s
         error = max(kept.error, float(np.max(phi.error)))
-    along = {"island_delta": grid * h_rms, "island_force": force, "island_area": area}
+    along = {"island_delta": grid * h_rms, "island_force": pressure, "island_area": area}
     fields: Fields = {
         "island_number": (("gap",), number),
         **{name: (("approach",), values) for name, values in along.items()},

@@ -72,22 +72,23 @@ def _law(run: Run, step: Step) -> None:
         if step.theory or error <= run.rtol or asked <= MIN_LAW_RTOL:
             break
         asked = max(0.1 * asked, MIN_LAW_RTOL)
-    _keep(run, lambda name: getattr(law, name)(run.gap))
+    _keep(run, lambda name: getattr(law, name)(separation=run.gap))
     run.close(step, error, dataclasses.replace(step, island_model=island_model).island_model_name)
 
 
 def _find_gaps(run: Run, law: ContactLaw) -> float:
     """Gaps at the pressures or areas prescribed; the bound on the error of force and area there."""
     if run.problem.prescribed == "pressures":
-        run.gap = law.separation(force=run.problem.gaps)
+        run.gap = law.separation(pressure=run.problem.gaps)
         # a gap found by force carries the error of the force, and area falls less steeply
         return 2 * law.error
     run.gap = law.separation(area=run.problem.gaps)
-    gap = run.gap[law.area(run.gap) > 0]
+    gap = run.gap[law.area(separation=run.gap) > 0]
     if not gap.size:
         return law.error
     # area falls by d, half as fast as by u
-    ratio = law.stiffness(gap) / 2 * law.area(gap) / (law.force(gap) * law.area_slope(gap))
+    ratio = law.stiffness(separation=gap) / 2 * law.area(separation=gap)
+    ratio /= law.pressure(separation=gap) * law.area_slope(separation=gap)
     return (1 + max(1.0, float(ratio.max(initial=0.0)))) * law.error
 
 
@@ -97,7 +98,7 @@ def _keep(run: Run, quantity: Callable[[str], Any]) -> None:
     values: dict[str, Any] = {}
     if problem.prescribed in INVERTED:
         values["nominal_pressure" if problem.prescribed == "pressures" else "prescribed_area"] = problem.gaps
-    for name in ("force", "area", "stiffness", "conductance", "energy"):
+    for name in ("pressure", "area", "stiffness", "conductance", "energy"):
         if name == "conductance" and name in wanted:
             from mbma_tables.totals.conductance import conductance, mean_conductivity
 
@@ -160,9 +161,11 @@ def _slope_error(law: ContactLaw, gap: Any, inverted: bool) -> float:
     if touching.size == 0:
         return law.error
     # F/l over the stiffness: large only next to a turning point
-    ratio = 2 * law.force(touching) / ((law.h_max - touching) * np.abs(law.stiffness(touching)))
+    ratio = (
+        2 * law.pressure(separation=touching) / ((law.h_max - touching) * np.abs(law.stiffness(separation=touching)))
+    )
     moved = MAX_SLOPE_OF_STIFFNESS * law.error if inverted else 0.0
-    return max(2 * law.error, float(((law.slope_error(touching) + moved) * ratio).max()))
+    return max(2 * law.error, float(((law.slope_error(separation=touching) + moved) * ratio).max()))
 
 
 def _totals(run: Run, step: Step) -> None:
@@ -171,7 +174,7 @@ def _totals(run: Run, step: Step) -> None:
     problem = run.problem
     assert step.rtol is not None
     assert step.island_model is not None
-    own = {"force"} if "subscale_area" in problem.dropped else {"force", "area"}
+    own = {"pressure"} if "subscale_area" in problem.dropped else {"pressure", "area"}
     wanted = tuple(sorted(problem.outputs & own, reverse=True))
     block = run.gap.size if step.island_model_name in ("universal", "rigid") else BLOCK
     answers = []
@@ -209,7 +212,7 @@ def _islands(run: Run, step: Step) -> None:
 class OtherTheory(NamedTuple):
     """Force and area by a theory, and standard deviations of their logarithms; NaN where there is no answer."""
 
-    force: FloatArray
+    pressure: FloatArray
     area: FloatArray
     scatter: FloatArray
     area_scatter: FloatArray
@@ -233,7 +236,7 @@ def other_theory(
 
         theory = Yielding(theory, hardness / E_star)
     found = answer_where_finite(theory, surface, (float(surface.h_max) + gap) / 2)
-    return OtherTheory(E_star * found.force, found.area, *theory.scatter(surface, found.area))
+    return OtherTheory(E_star * found.pressure, found.area, *theory.scatter(surface, found.area))
 
 
 def comparison(run: Run, step: Step) -> None:
@@ -243,14 +246,14 @@ def comparison(run: Run, step: Step) -> None:
 
         problem = run.problem
         assert problem.conductivities is not None
-        pressure = (run.found.get("nominal_pressure") or run.found["force"])[1]
+        pressure = (run.found.get("nominal_pressure") or run.found["pressure"])[1]
         k_s, cap = conductance.mean_conductivity(*problem.conductivities), problem.hardness or np.inf
         found = getattr(conductance, step.name)(problem.surface, pressure, k_s, problem.E_star, cap)
         run.found[f"{step.name}_conductance"] = (("gap",), found)
         return
     cap = math.inf if run.problem.hardness is None else run.problem.hardness
     other = other_theory(step.name, run.problem.surface, run.gap, run.problem.E_star, cap)
-    run.found |= {f"{step.name}_force": (("gap",), other.force), f"{step.name}_area": (("gap",), other.area)}
+    run.found |= {f"{step.name}_pressure": (("gap",), other.pressure), f"{step.name}_area": (("gap",), other.area)}
 
 
 STEPS = {

@@ -24,7 +24,7 @@ TESTED_HEIGHTS = (2.5, 5.5)  # h_max/h_rms
 NEAREST = 0.95  # of h_max: where the certificate of the table ends
 # standard deviations that come on top of what is stated for Gaussian maps, of maps without `departures` and of others;
 # of docs/data/machined.nc, where so many leave 70% within one and 93.5% within two
-MAP_SCATTER = {"area": (0.032, 0.075), "force": (0.046, 0.13), "stiffness": (0.13, 0.21)}
+MAP_SCATTER = {"area": (0.032, 0.075), "pressure": (0.046, 0.13), "stiffness": (0.13, 0.21)}
 ROUNDING = 1e-14  # what a separation loses beside h_max
 
 
@@ -92,7 +92,7 @@ class Calibrated(Theory):
 
     name = "calibrated"
 
-    def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+    def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
         """From full contact, or where a map's curve ends before, to last contact."""
         low, high = super().interval(surface, quantity)
         return (np.asarray(_own_law(surface).end) if isinstance(surface, MeasuredSurface) else low), high
@@ -102,8 +102,10 @@ class Calibrated(Theory):
         if isinstance(surface, MeasuredSurface):
             gap = np.asarray(mean_separation, float)
             require("mean_separation", gap, gap >= 0, "at least 0")
-            (force, area, stiffness), own_error = _own_law(surface).answer(gap)
-            return TheoryAnswer(force, area, stiffness, _error(own_error, own_error, gap / np.asarray(surface.h_max)))
+            (pressure, area, stiffness), own_error = _own_law(surface).answer(gap)
+            return TheoryAnswer(
+                pressure, area, stiffness, _error(own_error, own_error, gap / np.asarray(surface.h_max))
+            )
         assert isinstance(surface, Surface)
         table, places = calibrated_table.shipped(), Places(surface, mean_separation)
         u = places.flat / places.h_rms
@@ -114,9 +116,11 @@ class Calibrated(Theory):
         out[0] *= places.gradient
         out[2] *= places.gradient
         out[2] /= places.h_rms
-        force, area, stiffness = out.reshape(3, *places.shape)
+        pressure, area, stiffness = out.reshape(3, *places.shape)
         share = u / places.columns[2][places.owner]
-        return TheoryAnswer(force, area, stiffness, _error(table.error, 2 * table.error, share.reshape(places.shape)))
+        return TheoryAnswer(
+            pressure, area, stiffness, _error(table.error, 2 * table.error, share.reshape(places.shape))
+        )
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* or an area below 1; h_max at zero."""
@@ -138,11 +142,13 @@ class Calibrated(Theory):
         require(quantity, np.broadcast_to(wanted, places.shape), ~np.isnan(u).reshape(places.shape), "less: u is 0")
         return np.asarray(np.minimum((u * places.h_rms).reshape(places.shape), surface.h_max))
 
-    def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
+    def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E*, but for a map in closed form."""
         if isinstance(surface, MeasuredSurface):
-            return _own_law(surface).area(np.asarray(force, float))
-        return law_area(force / np.asarray(surface.rms_gradient), surface.alpha, calibrated_table.shipped().constants)
+            return _own_law(surface).area(np.asarray(pressure, float))
+        return law_area(
+            pressure / np.asarray(surface.rms_gradient), surface.alpha, calibrated_table.shipped().constants
+        )
 
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Share of heights above the level whose mean gap is u, and its derivative: measured heights, or Gaussian."""

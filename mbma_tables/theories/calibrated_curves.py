@@ -41,13 +41,13 @@ class Curve:
             last = nodes[-1]
             if log_force[k] - log_force[last] > NODE_STEP or np.log(u[last] / u[k]) > NODE_STEP:
                 nodes.append(k)
-        force, gap = np.append(0, np.exp(log_force[nodes])), np.append(h_max, u[nodes])
-        gap = convex(force, gap)
+        pressure, gap = np.append(0, np.exp(log_force[nodes])), np.append(h_max, u[nodes])
+        gap = convex(pressure, gap)
         # one stiffness between two nodes, at the middle
         log_u = np.log(gap)
         middle = (log_u[1:] + log_u[:-1])[::-1] / 2
         # equal ones differ by rounding
-        stiffness = np.minimum.accumulate(np.log(np.diff(force) / -np.diff(gap))[::-1])
+        stiffness = np.minimum.accumulate(np.log(np.diff(pressure) / -np.diff(gap))[::-1])
         self._log_stiffness = PchipInterpolator(middle, stiffness)
         self._h_max, self._top = h_max, float(np.exp(middle[-1]))
         self._lightest = float(np.exp(stiffness[-1])) * (h_max - self._top)
@@ -80,52 +80,52 @@ class Curve:
         inside = np.clip(log_u, self._log_u[0], self._log_u[-1])
         # 1 from the heaviest node up
         square = 1 + 2 * self._heaviest_rate * np.minimum(log_u - self._log_u[0], 0)
-        force = np.exp(self._log_force_at(inside)) * np.sqrt(square)
+        pressure = np.exp(self._log_force_at(inside)) * np.sqrt(square)
         with np.errstate(divide="ignore", invalid="ignore"):
-            full = np.where(u > 0, -force * self._heaviest_rate / square / u, np.inf)
+            full = np.where(u > 0, -pressure * self._heaviest_rate / square / u, np.inf)
         stiffness = np.where(log_u > self._log_u[0], np.exp(self._log_stiffness(inside)), full)
         above = u > self._top
         rest = np.clip((self._h_max - u) / (self._h_max - self._top), 0, 1)
-        force = np.where(above, self._lightest * rest, force)
+        pressure = np.where(above, self._lightest * rest, pressure)
         stiffness = np.where(above & (rest <= 0), 0.0, stiffness)
-        return force, self.area(force), stiffness
+        return pressure, self.area(pressure), stiffness
 
     def straight(self, u: FloatArray) -> NDArray[np.bool_]:
         """Where one stiffness stands for a whole range of forces."""
         found = [(u >= low) & (u <= high) for low, high in self._straight]
         return np.asarray(np.logical_or.reduce([np.zeros(np.shape(u), dtype=bool), *found]))
 
-    def area(self, force: FloatArray) -> FloatArray:
+    def area(self, pressure: FloatArray) -> FloatArray:
         """A/A0 at a force, in proportion below the law's lightest load."""
-        known = np.clip(force, np.exp(LOG_FORCE[0]), np.exp(LOG_FORCE[-1]))
-        area = self._law.area(known) * np.minimum(force / known, 1)
+        known = np.clip(pressure, np.exp(LOG_FORCE[0]), np.exp(LOG_FORCE[-1]))
+        area = self._law.area(known) * np.minimum(pressure / known, 1)
         # what is left to full contact falls on like that of Gaussian pressures
-        left = erfc(np.sqrt(2) * np.maximum(force, known)) / erfc(np.sqrt(2) * known)
-        return np.where(force > known, 1 - (1 - area) * left, area)
+        left = erfc(np.sqrt(2) * np.maximum(pressure, known)) / erfc(np.sqrt(2) * known)
+        return np.where(pressure > known, 1 - (1 - area) * left, area)
 
     def separation(self, quantity: str, wanted: FloatArray, gradient: float) -> FloatArray:
         """Mean separation [h_rms]: the inverse of `answer`."""
-        force = wanted / gradient
+        pressure = wanted / gradient
         if quantity == "area":
             known = self._law.area(np.exp(LOG_FORCE))
             require("area", wanted, wanted <= known[-1], f"at most {known[-1]:.9g}, where the map's curve ends")
             # the law interpolates in its odds
             share = np.maximum(wanted, known[0])
             log_force = np.interp(np.log(share / (1 - share)), np.log(known / (1 - known)), LOG_FORCE)
-            force = np.exp(log_force) * np.minimum(wanted / known[0], 1)
+            pressure = np.exp(log_force) * np.minimum(wanted / known[0], 1)
         if self.end:
-            most = gradient * self.heaviest if quantity == "force" else float(self.area(np.array(self.heaviest)))
-            require(quantity, wanted, force <= self.heaviest * (1 + 1e-9), f"at most {most:.4g}{ENDS}")
+            most = gradient * self.heaviest if quantity == "pressure" else float(self.area(np.array(self.heaviest)))
+            require(quantity, wanted, pressure <= self.heaviest * (1 + 1e-9), f"at most {most:.4g}{ENDS}")
         lightest, heaviest = np.exp(self._log_force[[-1, 0]])
-        goal = np.log(np.clip(force, lightest, heaviest))
+        goal = np.log(np.clip(pressure, lightest, heaviest))
         low, high = np.full(goal.shape, self._log_u[0]), np.full(goal.shape, self._log_u[-1])
         for _ in range(60):
             middle = (low + high) / 2
             more = self._log_force_at(middle) > goal
             low, high = np.where(more, middle, low), np.where(more, high, middle)
-        light = self._h_max - (self._h_max - self._top) * force / lightest
-        full = (np.maximum(force / heaviest, 1) ** 2 - 1) / (2 * self._heaviest_rate)
-        return np.asarray(np.where(force < lightest, light, np.exp((low + high) / 2 + full)))
+        light = self._h_max - (self._h_max - self._top) * pressure / lightest
+        full = (np.maximum(pressure / heaviest, 1) ** 2 - 1) / (2 * self._heaviest_rate)
+        return np.asarray(np.where(pressure < lightest, light, np.exp((low + high) / 2 + full)))
 
 
 @functools.lru_cache(maxsize=32)
@@ -181,9 +181,9 @@ class OwnLaw:
         scaled = [np.reshape(part, u.shape) * unit for part, unit in zip(parts, units, strict=True)]
         return scaled, LAW_ERROR if self.curve is None else MAP_ERROR
 
-    def area(self, force: FloatArray) -> FloatArray:
+    def area(self, pressure: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E*."""
-        return (self.law if self.curve is None else self.curve).area(force / self.gradient)
+        return (self.law if self.curve is None else self.curve).area(pressure / self.gradient)
 
     def separations(self, force: FloatArray) -> FloatArray:
         """Mean separations [length] of the bare law at forces over A0 E*, which may be below zero near full contact."""
@@ -196,9 +196,9 @@ class OwnLaw:
             u = self.curve.separation(quantity, wanted, self.gradient) * self.h_rms
         else:
             light = light_factor(self.law.spectrum.alpha)
-            force = force_at_area(wanted, light) if quantity == "area" else wanted / self.gradient
-            u = self.law.separation(np.maximum(force, 1e-300)) * self.h_rms
-            u = np.where(force > 0, np.minimum(u, self.h_max), self.h_max)
+            pressure = force_at_area(wanted, light) if quantity == "area" else wanted / self.gradient
+            u = self.law.separation(np.maximum(pressure, 1e-300)) * self.h_rms
+            u = np.where(pressure > 0, np.minimum(u, self.h_max), self.h_max)
         # beside h_max, with which it makes d
         require(quantity, wanted, u > np.finfo(float).eps * self.h_max, "less: the mean separation vanishes")
         return np.asarray(u)

@@ -24,7 +24,7 @@ from mbma_tables.tablefiles.netcdf import HDF5_LOCK, read_sealed
 
 NAME = "calibrated.nc"
 AXES = ("hurst", "log_zeta_1", "log_separation")
-QUANTITIES = ("area", "force", "stiffness")
+QUANTITIES = ("area", "pressure", "stiffness")
 BLOCK = 65536  # entries answered between two chances of Ctrl-C
 FEW, MIN_SHARED = 64, 40  # surfaces up to which, and entries a surface from which, its polynomials are worth making
 
@@ -101,10 +101,10 @@ class Table(SurfaceSpline):
         in_blocks(lambda k: core.calibrated_contact(*given, owner[k], u[k], *out[:, k]), u.size, BLOCK)
         return out
 
-    def separations(self, surfaces: FloatArray, owner: Owners, force: FloatArray) -> FloatArray:
+    def separations(self, surfaces: FloatArray, owner: Owners, pressure: FloatArray) -> FloatArray:
         """Mean separations [h_rms] at forces F/(A0 E* g) > 0; NaN where they lie beyond the table."""
-        given, out = self._given(surfaces, force.size), np.empty(force.size)
-        in_blocks(lambda k: core.calibrated_separation(*given, owner[k], force[k], out[k]), force.size, BLOCK)
+        given, out = self._given(surfaces, pressure.size), np.empty(pressure.size)
+        in_blocks(lambda k: core.calibrated_separation(*given, owner[k], pressure[k], out[k]), pressure.size, BLOCK)
         return out
 
     def standard_deviation(self, theory: str, quantity: str, area: FloatArray) -> FloatArray:

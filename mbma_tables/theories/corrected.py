@@ -43,7 +43,7 @@ FINE = 4000  # loads over which the law's change is integrated
 LOWEST, HIGHEST = 3e-3, 0.8  # A/A0 that was tested
 # a, b and c of the scatter, root of a^2 + (b D1)^2 + (c D2)^2: D1 is what the law differs by from the answer, D2 what
 # that by the quarter grid does; fitted to the 65 maps of `python -m generate machined`
-SCATTER = {"force": (0.019, 0.56, 0.42), "area": (0.0075, 0.34, 0.59), "stiffness": (0.035, 0.41, 0.46)}
+SCATTER = {"pressure": (0.019, 0.56, 0.42), "area": (0.0075, 0.34, 0.59), "stiffness": (0.035, 0.41, 0.46)}
 OF_FLOW = (0.065, 0.061, 0.16, 0.83, 2.8, 2.8, 2.8)  # of ln of the flow, at `TESTED_AREAS` of simulated maps
 
 
@@ -53,18 +53,18 @@ class Corrected(BoundaryElements):
     name = "corrected"
 
     def __init__(self, surface: MeasuredSurface, half: Pressed, quarter: FloatArray) -> None:
-        force, area, u, energy = half.rows
-        super().__init__(surface, force, area, u, energy, np.inf, map_of(surface).heights.size, half)
+        pressure, area, u, energy = half.rows
+        super().__init__(surface, pressure, area, u, energy, np.inf, map_of(surface).heights.size, half)
         law, other = own_law(surface), LoadCurve(quarter)
         x = self._curve.x
         inside = np.clip(x, other.x[0], other.x[-1])
-        gaps = np.array([law.separations(force), other.separation(inside)])
-        areas = np.array([law.area(force), other.area(inside)])
-        stiff = np.array([-force / np.gradient(gaps[0], x), other.stiffness(inside)])
+        gaps = np.array([law.separations(pressure), other.separation(inside)])
+        areas = np.array([law.area(pressure), other.area(inside)])
+        stiff = np.array([-pressure / np.gradient(gaps[0], x), other.stiffness(inside)])
         own = self._curve.stiffness(x)
         # by quantity, law or quarter grid, and load
         self._apart_by = {
-            "force": np.abs(gaps - u) * own / force,
+            "pressure": np.abs(gaps - u) * own / pressure,
             "area": np.abs(np.log(areas / area)),
             "stiffness": np.abs(np.log(np.maximum(stiff, 1e-6 * own) / own)),
         }
@@ -103,21 +103,21 @@ def _carried(surface: MeasuredSurface, halvings: int, tolerance: float) -> Press
     steps = tuple(side / count for side, count in zip(sizes, coarse.shape, strict=True))
     law, other = own_law(surface), OwnLaw(MeasuredSurface.of(measured_map(Treated(coarse, steps, True, None), None)))
     found = press(coarse, sizes, law_loads(surface, AREAS), MIN_POINTS, None, tolerance)
-    force, area, u, energy = found.rows
-    change = law.separations(force) - other.separations(force)
+    pressure, area, u, energy = found.rows
+    change = law.separations(pressure) - other.separations(pressure)
     # the coarse grid may be in full contact
     lower = u * np.exp(np.minimum(change, 0.0) / np.maximum(u, np.finfo(float).tiny))
     gap = np.where(change < 0, lower, u + change)
-    root = erfinv(np.minimum([area, law.area(force), other.area(force)], LARGEST_AREA))
+    root = erfinv(np.minimum([area, law.area(pressure), other.area(pressure)], LARGEST_AREA))
     carried = erf(root[0] * root[1] / root[2])
     weight = np.exp(-carried / LIGHT) / 2
-    carried = np.maximum.accumulate(carried ** (1 - weight) * law.area(force) ** weight)
+    carried = np.maximum.accumulate(carried ** (1 - weight) * law.area(pressure) ** weight)
     # dU = -F du of the change alone, which adds nothing at the lightest load
-    fine = np.geomspace(force[0], force[-1], FINE)
+    fine = np.geomspace(pressure[0], pressure[-1], FINE)
     changes = law.separations(fine) - other.separations(fine)
     added = np.append(0.0, np.cumsum((changes[1:] + changes[:-1]) / 2 * np.diff(fine)))
-    work = energy + force * u + np.interp(force, fine, added) + force[0] * (gap[0] - u[0])
-    rows = np.array([force, carried, gap, work - force * gap])
+    work = energy + pressure * u + np.interp(pressure, fine, added) + pressure[0] * (gap[0] - u[0])
+    rows = np.array([pressure, carried, gap, work - pressure * gap])
     kept = int(np.count_nonzero(np.cumprod((np.diff(gap, prepend=np.inf) < 0) & (rows[3] > 0))))
     if kept < MIN_LOADS:
         raise ConvergenceError("the law of this map changes so much with its grid that nothing is left to correct")

@@ -26,7 +26,7 @@ class GreenwoodWilliamson(Theory):
     --------
     >>> from mbma_tables import Surface, contact
     >>> found = contact(Surface.named("concrete"), separation=[0.2, 0.5], E_star=10.0, theory="greenwood_williamson")
-    >>> found.area.round(4), found.force.round(4)
+    >>> found.area.round(4), found.pressure.round(4)
     (array([0.064 , 0.0056]), array([0.4545, 0.0334]))
     """
 
@@ -38,12 +38,12 @@ class GreenwoodWilliamson(Theory):
         density, radius, sigma = surface.summit_density, surface.summit_radius, surface.summit_sigma
         x = (2 * np.asarray(mean_separation) - np.asarray(surface.h_max)) / sigma
         strength = density * np.sqrt(radius * sigma)
-        force = 4 / 3 * strength * sigma * height_integral(1.5, x)
+        pressure = 4 / 3 * strength * sigma * height_integral(1.5, x)
         area = math.pi * density * radius * sigma * height_integral(1.0, x)
         # d(F_3/2)/dx = -3/2 F_1/2, and du = dd/2
-        return TheoryAnswer(force, area, 4 * strength * height_integral(0.5, x), np.full(np.shape(x), EPSILON))
+        return TheoryAnswer(pressure, area, 4 * strength * height_integral(0.5, x), np.full(np.shape(x), EPSILON))
 
-    def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+    def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] from u = 0 to where force underflows."""
         high = np.asarray((surface.h_max + MAX_DEPTH * surface.summit_sigma) / 2, dtype=float)
         return np.zeros_like(high), high

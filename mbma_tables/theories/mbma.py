@@ -86,10 +86,10 @@ class Mbma(Theory):
         u = np.asarray(mean_separation, dtype=float)
         slopes = "separation" if self._has_slopes(surface) else False
         found = self.totals(surface, 2 * u - np.asarray(surface.h_max), derivatives=slopes)
-        if found.force_by is None:
-            return TheoryAnswer(found.force, found.area, self._differences(surface, u), found.error)
+        if found.pressure_by is None:
+            return TheoryAnswer(found.pressure, found.area, self._differences(surface, u), found.error)
         # du = dd/2
-        return TheoryAnswer(found.force, found.area, -2 * found.force_by["separation"], found.error)
+        return TheoryAnswer(found.pressure, found.area, -2 * found.pressure_by["separation"], found.error)
 
     def slopes(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[dict[str, FloatArray], ...] | None:
         """By its own differentiated sums."""
@@ -97,7 +97,7 @@ class Mbma(Theory):
             return None
         gap = 2 * np.asarray(mean_separation) - np.asarray(surface.h_max)
         found = self.totals(surface, gap, derivatives=True)
-        return tuple(_at_mean_separation(by) for by in (found.force_by, found.area_by))
+        return tuple(_at_mean_separation(by) for by in (found.pressure_by, found.area_by))
 
     def looks(self, surface: AnySurface) -> int:
         """Few of island models that take long."""
@@ -119,7 +119,7 @@ class Mbma(Theory):
         def force_at(k: Any, x: FloatArray) -> FloatArray:
             some = select(surface, shape, k)
             held = np.maximum(gap[k] - 2 * x, -np.asarray(some.h_max))
-            return np.asarray(self.totals(some, held, quantities=("force",)).force)[None]
+            return np.asarray(self.totals(some, held, quantities=("pressure",)).pressure)[None]
 
         # by what is less than u; not beyond full compression
         step, side = 0.1 * depth, np.where(np.broadcast_to(u, shape).ravel() < 0.1 * depth, -1.0, 0.0)
@@ -135,7 +135,7 @@ class Mbma(Theory):
         u = np.asarray(surface.h_max) - places / 2
         return np.asarray(u[u > 0] if surface.shape == () else np.maximum(u, 0))
 
-    def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+    def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] from where force or area is largest, or the table ends, to first contact."""
         lowest = np.zeros(surface.shape)
         if isinstance(surface, MeasuredSurface):

@@ -94,8 +94,8 @@ def _simplified_separations(law: Law, given: FloatArray) -> FloatArray:
 def _simplified_forces(law: Law, given: FloatArray) -> FloatArray:
     """Force over A0 E* g and -dF/du at u/h_rms, by Eq. (20)."""
     u0, log_lambda = _light(law)
-    force = np.exp(log_lambda - given[0] / u0)
-    return np.array([force, force / u0])
+    pressure = np.exp(log_lambda - given[0] / u0)
+    return np.array([pressure, pressure / u0])
 
 
 class Persson(Theory):
@@ -118,7 +118,7 @@ class Persson(Theory):
     >>> found.mean_separation.round(4), found.area.round(5)
     (array([0.6721, 0.3801]), array([0.00217, 0.02171]))
     >>> light = theories.Persson("simplified")
-    >>> print(f"{contact(Surface.named('concrete'), mean_separation=0.6, E_star=10.0, theory=light).force:.4f}")
+    >>> print(f"{contact(Surface.named('concrete'), mean_separation=0.6, E_star=10.0, theory=light).pressure:.4f}")
     0.0184
     """
 
@@ -146,9 +146,9 @@ class Persson(Theory):
         OutOfRangeError
             Also where u is so small or so large that the force of the full form is no normal number.
         """
-        force, stiffness = self._force(surface, mean_separation)
-        error = np.full(force.shape, LAW_ERROR if isinstance(surface, MeasuredSurface) else INVERSE_RTOL)
-        return TheoryAnswer(force, self.area_at(surface, force), stiffness, error)
+        pressure, stiffness = self._force(surface, mean_separation)
+        error = np.full(pressure.shape, LAW_ERROR if isinstance(surface, MeasuredSurface) else INVERSE_RTOL)
+        return TheoryAnswer(pressure, self.area_at(surface, pressure), stiffness, error)
 
     def _force(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Force over A0 E* at mean separations u [length], and -dF/du."""
@@ -161,19 +161,19 @@ class Persson(Theory):
             unit = np.asarray(surface.s if isinstance(surface, Surface) else h_rms)
             lightest = np.exp(MIN_LOG_FORCE) * np.asarray(surface.q0) * unit / gradient
             given = np.stack([u / h_rms, np.broadcast_to(lightest, u.shape)])
-            force, stiffness, most, least = _by_law(surface, given, _forces)
+            pressure, stiffness, most, least = _by_law(surface, given, _forces)
             inside = (u >= least * h_rms) & (u <= most * h_rms)
             reached = [np.max(least * h_rms / unit), np.min(most * h_rms / unit)]
             text = "within what normal numbers reach, {:.3g} to {:.6g}".format(*reached)
             require("mean_separation/s", u / unit, inside, text)
         else:
-            force, stiffness = _by_law(self._self_affine(surface), (u / h_rms)[None], _simplified_forces)
-        return force * gradient, stiffness * gradient / h_rms
+            pressure, stiffness = _by_law(self._self_affine(surface), (u / h_rms)[None], _simplified_forces)
+        return pressure * gradient, stiffness * gradient / h_rms
 
-    def _loaded(self, surface: AnySurface, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _loaded(self, surface: AnySurface, pressure: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean separation [length] at loads over A0 E*, negative beyond lambda E*, and -du/dlog F."""
         answer = _separations if self._is_full else _simplified_separations
-        load = (force / np.asarray(surface.rms_gradient))[None]
+        load = (pressure / np.asarray(surface.rms_gradient))[None]
         u, slope = _by_law(surface if self._is_full else self._self_affine(surface), load, answer)
         return u * np.asarray(surface.h_rms), -slope * np.asarray(surface.h_rms)
 
@@ -182,7 +182,7 @@ class Persson(Theory):
             raise InputError("the simplified form (20) is of self-affine surfaces: ask method='full', or surface.fit()")
         return surface
 
-    def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+    def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] of the theory, whose heights have no end."""
         low = np.zeros(surface.shape)
         return low, np.full_like(low, np.inf)
@@ -194,20 +194,20 @@ class Persson(Theory):
             from scipy.special import erfinv
 
             wanted = erfinv(wanted) * np.sqrt(surface.m2)
-        force = finite_array("force", wanted)
-        require("force", force, force > 0, "positive: u is infinite at zero load")
-        force = np.broadcast_to(force, np.broadcast_shapes(force.shape, surface.shape))
-        u = self._loaded(surface, force)[0]
-        require("force", force, u >= 0, "at most lambda E*, where the simplified form (20) reaches u = 0")
+        pressure = finite_array("pressure", wanted)
+        require("pressure", pressure, pressure > 0, "positive: u is infinite at zero load")
+        pressure = np.broadcast_to(pressure, np.broadcast_shapes(pressure.shape, surface.shape))
+        u = self._loaded(surface, pressure)[0]
+        require("pressure", pressure, u >= 0, "at most lambda E*, where the simplified form (20) reaches u = 0")
         return u
 
-    def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
+    def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
         """A/A0 = erf(p0/(2 sqrt(G))) at a force over A0 E*, G = E*^2 m2/4 at the largest magnification (18)."""
-        return area_persson(force / np.asarray(surface.rms_gradient))
+        return area_persson(pressure / np.asarray(surface.rms_gradient))
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], from dU = -F du = F (-du/dlog F) dlog F."""
-        force, _ = self._force(surface, mean_separation)
-        lighter = force[..., None] * np.exp(-_T)
-        batch = select(surface, force.shape, np.arange(force.size).reshape(*force.shape, 1))
+        pressure, _ = self._force(surface, mean_separation)
+        lighter = pressure[..., None] * np.exp(-_T)
+        batch = select(surface, pressure.shape, np.arange(pressure.size).reshape(*pressure.shape, 1))
         return np.asarray((lighter * self._loaded(batch, lighter)[1]) @ _T_WEIGHTS)

@@ -35,7 +35,7 @@ SCAN = 49  # compressions at which a law is looked at for a turning point
 class TheoryAnswer(NamedTuple):
     """Arrays of the shape that surface and mean separation broadcast to."""
 
-    force: FloatArray  # F/(A0 E*)
+    pressure: FloatArray  # F/(A0 E*)
     area: FloatArray  # A/A0
     stiffness: FloatArray  # -d(F/(A0 E*))/du [1/length]
     error: FloatArray  # bound on the relative numerical error of force and area, against the theory itself
@@ -87,9 +87,9 @@ class Theory(abc.ABC):
         """The theory at a modulus so many times as large, where it holds numbers over E*."""
         return self
 
-    def area_at(self, surface: AnySurface, force: FloatArray) -> FloatArray:
+    def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E*."""
-        return self.answer(surface, self.inverted(surface, "force", force)[0]).area
+        return self.answer(surface, self.inverted(surface, "pressure", pressure)[0]).area
 
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Share of heights above the level whose mean gap is u, and its derivative by u: Gaussian heights."""
@@ -101,8 +101,8 @@ class Theory(abc.ABC):
         share, slope = hardness.bearing_share(np.asarray(mean_separation) / h_rms, end)
         return share, slope / h_rms
 
-    def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
-        """Mean separations [length] between which "force" or "area" falls: full compression and last contact."""
+    def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
+        """Mean separations [length] between which "pressure" or "area" falls: full compression and last contact."""
         high = np.asarray(surface.h_max, dtype=float)
         return np.zeros_like(high), high
 
@@ -123,7 +123,7 @@ class Theory(abc.ABC):
         Root mean squares of ln(theory/simulation), of the boundary elements in the calibrated law's file; NaN where
         they are not known, as on surfaces unlike those.
         """
-        return self._stated(surface, "force", area), self._stated(surface, "area", area)
+        return self._stated(surface, "pressure", area), self._stated(surface, "area", area)
 
     def stiffness_scatter(self, surface: AnySurface, area: FloatArray) -> FloatArray:
         """Standard deviation of ln(-dF/du) at given F, likewise; with a hardness that of the frozen contact."""
@@ -154,7 +154,7 @@ class Theory(abc.ABC):
         # from bend to bend, across which no rule converges
         edges = np.sort([low, *(np.clip(bend, low, high) for bend in self.elastic.bends(surface)), high], axis=0)
         found = tanhsinh(
-            lambda x, place: self.at(u.shape, place).answer(select(surface, u.shape, place), x).force,
+            lambda x, place: self.at(u.shape, place).answer(select(surface, u.shape, place), x).pressure,
             edges[:-1],
             edges[1:],
             args=(np.arange(float(u.size)).reshape(u.shape),),  # of one type with x
@@ -180,13 +180,13 @@ class Theory(abc.ABC):
     def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
         """Force or area at mean separations, about -d/du of it, and whether that is exact; NaN where not known."""
         found = self.answer(surface, mean_separation)
-        if quantity == "force":
-            return found.force, found.stiffness, True
+        if quantity == "pressure":
+            return found.pressure, found.stiffness, True
         # area rises nearly as force does
-        return found.area, found.area * found.stiffness / found.force, False
+        return found.area, found.area * found.stiffness / found.pressure, False
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
-        """Mean separation u [length] at which "force" (over A0 E*) or "area" has a wanted value; h_max at zero.
+        """Mean separation u [length] at which "pressure" (over A0 E*) or "area" has a wanted value; h_max at zero.
 
         Raises
         ------
@@ -286,7 +286,7 @@ def answer_where_finite(theory: Theory, surface: AnySurface, mean_separation: Fl
                 raise
             places = places[~np.asarray(fault.mask)]
         else:
-            fields[:, places] = np.where(np.isfinite(found.force), found, np.nan)
+            fields[:, places] = np.where(np.isfinite(found.pressure), found, np.nan)
             break
     return TheoryAnswer(*fields)
 
@@ -305,7 +305,7 @@ class Wrapped(Theory):
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]; the error is not known."""
         u = np.asarray(mean_separation, dtype=float)
-        force, area = (
+        pressure, area = (
             np.array(np.broadcast_to(part, u.shape), dtype=float) for part in self._theory.answer(surface, u)
         )
 
@@ -314,7 +314,7 @@ class Wrapped(Theory):
 
         step = 0.01 * np.broadcast_to(np.asarray(surface.h_rms), u.shape).ravel()
         slope, _ = differences(force_at, step, np.zeros(u.size), np.zeros((1, u.size)))
-        return TheoryAnswer(force, area, -slope[0].reshape(u.shape), np.full(u.shape, np.nan))
+        return TheoryAnswer(pressure, area, -slope[0].reshape(u.shape), np.full(u.shape, np.nan))
 
     def looks(self, surface: AnySurface) -> int:
         """Few: an answer may take long."""

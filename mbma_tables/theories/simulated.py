@@ -32,7 +32,7 @@ STRAYS = 2.7  # roots of the elements that join between two loads: beyond strays
 TESTED_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39, 0.58, 0.78)
 SCATTER = {
     "area": (0.042, 0.022, 0.0071, 0.0097, 0.011, 0.0041, 0.0060),
-    "force": (0.0037, 0.0026, 0.0016, 0.0023, 0.0010, 0.0010, 0.0025),
+    "pressure": (0.0037, 0.0026, 0.0016, 0.0023, 0.0010, 0.0010, 0.0025),
     "stiffness": (0.026, 0.016, 0.0080, 0.0073, 0.010, 0.010, 0.0094),
     "flow": (0.0043, 0.031, 0.032, 0.55, 2.2, 2.2, 2.2),
 }
@@ -50,9 +50,9 @@ def continued(treated: Treated) -> tuple[FloatArray, tuple[float, float]]:
 def law_loads(surface: MeasuredSurface, areas: Sequence[float]) -> FloatArray:
     """F/(A0 E*) at which the quick law of a map has contact areas; its area never refuses, its separation may."""
     octaves = np.arange(-20 * REFINED, 4 * REFINED) / REFINED
-    force = float(surface.rms_gradient) * 2.0**octaves
-    area = np.maximum.accumulate(own_law(surface).area(force)) + 1e-15 * np.arange(force.size)
-    return np.asarray(np.exp(np.interp(np.log(areas), np.log(area), np.log(force))))
+    pressure = float(surface.rms_gradient) * 2.0**octaves
+    area = np.maximum.accumulate(own_law(surface).area(pressure)) + 1e-15 * np.arange(pressure.size)
+    return np.asarray(np.exp(np.interp(np.log(areas), np.log(area), np.log(pressure))))
 
 
 def map_of(surface: AnySurface) -> Treated:
@@ -79,7 +79,7 @@ class BoundaryElements(Theory):
     ----------
     surface : MeasuredSurface
         The map; contacts of no other surface are answered.
-    force : array_like, shape (n,)
+    pressure : array_like, shape (n,)
         Loads over A0 E*, rising, at least four.
     area, mean_separation, energy : array_like, shape (n,)
         A/A0, u [length] and elastic energy over A0 E* [length] at these loads.
@@ -111,7 +111,7 @@ class BoundaryElements(Theory):
     def __init__(
         self,
         surface: AnySurface,
-        force: ArrayLike,
+        pressure: ArrayLike,
         area: ArrayLike,
         mean_separation: ArrayLike,
         energy: ArrayLike,
@@ -122,12 +122,12 @@ class BoundaryElements(Theory):
     ) -> None:
         self.surface, self.points, self.elements = surface, points, elements
         self.pressed, self.own_loads = pressed, own_loads
-        columns = {"force": force, "area": area, "mean_separation": mean_separation, "energy": energy}
+        columns = {"pressure": pressure, "area": area, "mean_separation": mean_separation, "energy": energy}
         rows = np.stack([finite_array(name, column) for name, column in columns.items()])
         if rows.ndim != 2 or rows.shape[1] < MIN_LOADS:
             raise InputError(f"at least {MIN_LOADS} loads are needed, got shape {rows.shape[1:]}")
         require("loads", rows, rows > 0, "positive")
-        require("force", rows[0], np.diff(rows[0], prepend=0) > 0, "rising")
+        require("pressure", rows[0], np.diff(rows[0], prepend=0) > 0, "rising")
         require("area", rows[1], np.diff(rows[1], prepend=0) >= 0, "rising")
         require("mean_separation", rows[2], np.diff(rows[2], prepend=np.inf) < 0, "falling")
         self.rows = rows
@@ -158,8 +158,8 @@ class BoundaryElements(Theory):
             wanted = finite_array("loads", loads)
             require("loads", wanted, (wanted > 0) & (np.diff(wanted, prepend=0) > 0), "positive and rising")
             found = press(values, sizes, surface.bearing.gradient * wanted, points, None, tolerance)
-        force, area, u, energy = found.rows
-        return cls(surface, force, area, u, energy, points, whole.heights.size, found, loads is None)
+        pressure, area, u, energy = found.rows
+        return cls(surface, pressure, area, u, energy, points, whole.heights.size, found, loads is None)
 
     @classmethod
     def from_map(
@@ -224,7 +224,7 @@ class BoundaryElements(Theory):
         return np.asarray(np.lib.stride_tricks.sliding_window_view(changes, 4, axis=1).max(axis=-1))
 
     def _error(self, u: FloatArray, found: FloatArray) -> FloatArray:
-        """Bound on the relative error of force and area, from their logarithms at mean separations."""
+        """Bound on the relative error of pressure and area, from their logarithms at mean separations."""
         k = np.clip(np.searchsorted(-self.rows[2], -u) - 1, 0, self.rows.shape[1] - 2)
         low, high = np.log(self.rows[:2, k]), np.log(self.rows[:2, k + 1])
         joining = np.sqrt((self.rows[1, k + 1] - self.rows[1, k]) / self.elements) / np.exp(found[1])
@@ -232,7 +232,7 @@ class BoundaryElements(Theory):
         above, below = np.expm1(np.minimum(found - low, likely)), -np.expm1(-np.minimum(high - found, likely))
         return np.asarray(np.maximum(above, below).max(axis=0))
 
-    def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+    def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] that were simulated."""
         return np.asarray(self.rows[2, -1]), np.asarray(self.rows[2, 0])
 
@@ -244,12 +244,12 @@ class BoundaryElements(Theory):
         return TheoryAnswer(np.exp(x), area, self._curve.stiffness(x), self._error(u, np.array([x, np.log(area)])))
 
     def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """Mean separation [length] at a force over A0 E* or an area between those of the first and the last load."""
-        low, high = self.rows[0 if quantity == "force" else 1, [0, -1]]
+        """Mean separation [length] at a pressure over E* or an area between those of the first and the last load."""
+        low, high = self.rows[0 if quantity == "pressure" else 1, [0, -1]]
         good = (wanted >= low * (1 - 1e-12)) & (wanted <= high * (1 + 1e-12))
         require(quantity, wanted, good, f"between {low:.4g} and {high:.4g}, which were simulated")
         known = np.clip(wanted, low, high)
-        x = np.log(known) if quantity == "force" else self._curve.log_force_at(known)
+        x = np.log(known) if quantity == "pressure" else self._curve.log_force_at(known)
         return np.asarray(self._curve.separation(x)), np.zeros(np.shape(wanted), bool)
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
@@ -312,7 +312,7 @@ class BoundaryElements(Theory):
 
     def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Standard deviations against the full grid at tolerance 1e-6; NaN with loads of one's own."""
-        return self._tested("force", area), self._tested("area", area)
+        return self._tested("pressure", area), self._tested("area", area)
 
     def stiffness_scatter(self, surface: AnySurface, area: FloatArray) -> FloatArray:
         """Standard deviation of ln(-dF/du), likewise."""

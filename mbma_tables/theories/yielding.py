@@ -22,7 +22,7 @@ from mbma_tables.theories.calibrated_table import at_contact, shipped_part
 from mbma_tables.theories.protocol import FEW_LOOKS, Theory, TheoryAnswer, refuse_unfinished
 
 GROUP = "hardness"  # of the calibrated laws' file
-QUANTITIES = ("area", "yielded", "force", "stiffness")
+QUANTITIES = ("area", "yielded", "pressure", "stiffness")
 TESTED_ETA = 0.025  # p_m/(E* g) down to which boundary elements were solved
 REACHED = 1e-9  # relative, of forces at full compression
 HEAVIEST = 1e6  # F/(A0 E* g) from which on areas are those of full contact
@@ -72,7 +72,7 @@ def shipped() -> Scatter:
     """The shipped file's, read once."""
     variables, attributes = shipped_part(GROUP)
     known = zip(str(attributes["theories"]).split(), variables["stated_scatter"], strict=True)
-    weights = dict(zip(("area", "force"), variables["elastic_weight"], strict=True))
+    weights = dict(zip(("area", "pressure"), variables["elastic_weight"], strict=True))
     return Scatter(variables["eta"], np.log(variables["contact"]), dict(known), weights)
 
 
@@ -168,36 +168,38 @@ class Yielding(Theory):
             elastic, (_, at_force, *_) = (TheoryAnswer(*(part[k] for part in both)) for k in range(2))
         eta, gradient, endless = self._eta(surface), np.asarray(surface.rms_gradient), np.isinf(self.hardness)
         if endless.all():
-            return Loaded(u, h_rms, eta, elastic.force / gradient, elastic, elastic, elastic.area)
-        force, stiffness = self._closed(surface, u, elastic.force, elastic.stiffness)
+            return Loaded(u, h_rms, eta, elastic.pressure / gradient, elastic, elastic, elastic.area)
+        pressure, stiffness = self._closed(surface, u, elastic.pressure, elastic.stiffness)
         if at_force is None:
-            needed = (force > 0) & ~endless
+            needed = (pressure > 0) & ~endless
             # where nothing yields or touches, a force that the theory is sure to reach
-            known = np.minimum(np.where(needed, force, elastic.force), np.where(needed, HEAVIEST, 1.0) * gradient)
+            known = np.minimum(np.where(needed, pressure, elastic.pressure), np.where(needed, HEAVIEST, 1.0) * gradient)
             at_force = np.where(needed, self._elastic.area_at(surface, known), 0.0)
         # both of the elastic errors, force and area at that force, may add up
-        area = law.area(force / gradient, at_force, eta)
-        capped = TheoryAnswer(force, area, stiffness, 2 * elastic.error)
+        area = law.area(pressure / gradient, at_force, eta)
+        capped = TheoryAnswer(pressure, area, stiffness, 2 * elastic.error)
         if endless.any():
             capped = TheoryAnswer(*(np.where(endless, one, other) for one, other in zip(elastic, capped, strict=True)))
-        return Loaded(u, h_rms, eta, capped.force / gradient, capped, elastic, at_force)
+        return Loaded(u, h_rms, eta, capped.pressure / gradient, capped, elastic, at_force)
 
-    def _closed(self, surface: AnySurface, u: FloatArray, force: Any, stiffness: Any) -> tuple[FloatArray, FloatArray]:
+    def _closed(
+        self, surface: AnySurface, u: FloatArray, pressure: Any, stiffness: Any
+    ) -> tuple[FloatArray, FloatArray]:
         """Force over A0 E* and its -d/du between the elastic ones and the bearing curve."""
         gradient, bearing = np.asarray(surface.rms_gradient), self._elastic.bearing_share(surface, u)
-        load, steep = law.force(force / gradient, stiffness / gradient, *bearing, self._eta(surface))
+        load, steep = law.force(pressure / gradient, stiffness / gradient, *bearing, self._eta(surface))
         return load * gradient, steep * gradient
 
     def lighter(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Mean separations [length] of the elastic contact at the forces of this one."""
-        force, _, _ = self.values(surface, mean_separation, "force")
+        pressure, _, _ = self.values(surface, mean_separation, "pressure")
         # one without end has no gap without force
         least = 0.0 if self.ends_at_h_max else np.finfo(float).tiny
-        return self._elastic.inverted(surface, "force", np.maximum(force, least))[0]
+        return self._elastic.inverted(surface, "pressure", np.maximum(pressure, least))[0]
 
-    def interval(self, surface: AnySurface, quantity: str = "force") -> tuple[FloatArray, FloatArray]:
+    def interval(self, surface: AnySurface, quantity: str = "pressure") -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which the elastic force falls, and Gaussian heights end in numbers."""
-        low, high = self._elastic.interval(surface, "force")
+        low, high = self._elastic.interval(surface, "pressure")
         h_rms = np.asarray(surface.h_rms)
         # at zero, where a hardness leaves full contact, some theories have no finite force
         low = np.maximum(low, LEAST if self.ends_at_h_max else CLOSED * h_rms)
@@ -209,32 +211,32 @@ class Yielding(Theory):
 
     def values(self, surface: AnySurface, mean_separation: FloatArray, quantity: str) -> tuple[Any, Any, bool]:
         """Force without the area, which follows from it."""
-        if quantity != "force":
+        if quantity != "pressure":
             return super().values(surface, mean_separation, quantity)
-        force, steep, exact = self._elastic.values(surface, mean_separation, quantity)
-        return *self._closed(surface, mean_separation, force, steep), exact
+        pressure, steep, exact = self._elastic.values(surface, mean_separation, quantity)
+        return *self._closed(surface, mean_separation, pressure, steep), exact
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
-        """Mean separation u [length] at which "force" (over A0 E*, below the hardness) or "area" has a wanted value."""
+        """Mean separation u [length] at a "pressure" (over E*, below the hardness) or an "area"."""
         asked: Theory = self._elastic if np.isinf(self.hardness).all() else super()  # type: ignore[assignment]
         return asked.mean_separation_at(surface, quantity, wanted)
 
     def inverted(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
         """As of any theory; no force is beyond the hardness."""
         over = np.asarray(wanted > self.hardness)
-        if quantity == "force" and over.any():
+        if quantity == "pressure" and over.any():
             raise OutOfRangeError("pressure must be at most the hardness", over)
         return super().inverted(surface, quantity, np.broadcast_to(wanted, over.shape))
 
-    def pressed(self, surface: AnySurface, force: FloatArray) -> tuple[FloatArray, FloatArray | None]:
+    def pressed(self, surface: AnySurface, pressure: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """Mean separations u at forces over A0 E*, and `lighter` of `loaded` where areas need that."""
         if self.knows_areas or np.isinf(self.hardness).all():
-            return self.mean_separation_at(surface, "force", force), None
-        shape = np.broadcast_shapes(force.shape, surface.shape, self.hardness.shape)
+            return self.mean_separation_at(surface, "pressure", pressure), None
+        shape = np.broadcast_shapes(pressure.shape, surface.shape, self.hardness.shape)
         cap = np.reshape(self.hardness, (1,) * (len(shape) - self.hardness.ndim) + self.hardness.shape)
         both = self.changed(hardness=np.stack([cap, np.full(cap.shape, np.inf)]))
-        u, missed = both.inverted(surface, "force", np.broadcast_to(force, (2, *shape)))
-        refuse_unfinished(~missed[0], "the separation at this force")
+        u, missed = both.inverted(surface, "pressure", np.broadcast_to(pressure, (2, *shape)))
+        refuse_unfinished(~missed[0], "the separation at this pressure")
         return u[0], u[1]
 
     def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -244,8 +246,8 @@ class Yielding(Theory):
         own beside it. NaN where the elastic theory's is not known.
         """
         eta, table, name = self._eta(surface), shipped(), self._elastic.scatter_name(surface)
-        force, contact = self._elastic.scatter(surface, area)
-        found = table.standard_deviation(name, "force", eta, area, force)
+        pressure, contact = self._elastic.scatter(surface, area)
+        found = table.standard_deviation(name, "pressure", eta, area, pressure)
         return found, table.standard_deviation(name, "area", eta, area, contact)
 
     def stiffness_scatter(self, surface: AnySurface, area: FloatArray) -> FloatArray:

@@ -43,11 +43,11 @@ class Totals:
     do not deform, far from elastic ones. Derivatives on a surface that is its own spectrum are by the separation alone.
     """
 
-    force: Any
+    pressure: Any
     area: Any
     error: Any
     islands: int
-    force_by: dict[str, Any] | None = None
+    pressure_by: dict[str, Any] | None = None
     area_by: dict[str, Any] | None = None
 
 
@@ -59,7 +59,7 @@ def totals_at(
     shape, h_max = gap.shape, surface.h_max
     require("separation", gap, gap >= -h_max, "at least -h_max, where the model ends at full compression")
     depth = np.asarray(h_max - gap)
-    force_by = area_by = None
+    pressure_by = area_by = None
     try:
         stress = modulus
         if isinstance(surface, Surface):
@@ -69,16 +69,16 @@ def totals_at(
         if isinstance(surface, Surface) and derivatives is True:
             pairs = Pairs.of(surface, depth)
             sums, error, islands, _ = sums_by_table(model, pairs, variant, rtol, outside, workers)
-            force, area = sums[:, 0, 0], sums[:, 1, 0]
-            force_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
+            pressure, area = sums[:, 0, 0], sums[:, 1, 0]
+            pressure_by, area_by = _by_parameter(surface, sums.reshape((*shape, *sums.shape[1:])), pairs, stress)
         else:
             sums, error, islands = _totals(
                 model, surface, depth, variant, rtol, outside, which, bool(derivatives), workers
             )
-            force, area = sums[:2]
+            pressure, area = sums[:2]
             if derivatives:
                 force_slope, area_slope = sums[2:].reshape(2, *shape) / surface.h_rms
-                force_by, area_by = {"separation": -stress * force_slope}, {"separation": -area_slope}
+                pressure_by, area_by = {"separation": -stress * force_slope}, {"separation": -area_slope}
         if area_by is not None and variant.addition == "cover":
             kept = np.exp(-area.reshape(shape))  # dA = exp(-sum) dsum
             area_by = {name: (slope * kept)[()] for name, slope in area_by.items()}
@@ -87,15 +87,15 @@ def totals_at(
             fault.mask = fault.mask.reshape(shape)
         raise
     # what is nearly nothing has few digits
-    least = np.minimum(force, area)
-    if not least.min() >= LEAST and (tiny := (least < LEAST) & (np.maximum(force, area) > 0)).any():
+    least = np.minimum(pressure, area)
+    if not least.min() >= LEAST and (tiny := (least < LEAST) & (np.maximum(pressure, area) > 0)).any():
         error[tiny] = np.minimum(error[tiny] + SUBNORMAL / least[tiny].clip(SUBNORMAL), 1.0)
     return Totals(
-        force=(force.reshape(shape) * stress)[()] if which != AREA else None,
+        pressure=(pressure.reshape(shape) * stress)[()] if which != AREA else None,
         area=variant.area_of(area).reshape(shape)[()] if which != FORCE else None,
         error=error.reshape(shape)[()],
         islands=islands,
-        force_by=force_by if which != AREA else None,
+        pressure_by=pressure_by if which != AREA else None,
         area_by=area_by if which != FORCE else None,
     )
 

@@ -28,10 +28,10 @@ def test_lines_are_single_contacts(theory):
     surfaces = (Surface(0.8, 0.01, 2.0, 1.0, 3.0), Surface(0.7, 0.01, 3.0, 0.5, 1.5))  # um
     for k, (surface, modulus) in enumerate(zip(surfaces, (100.0, 50.0), strict=True)):  # GPa
         single = contact(surface, pressure=0.01, E_star=modulus, theory=theory)
-        for name in ("separation", "mean_separation", "force", "area", "stiffness", "scatter"):
+        for name in ("separation", "mean_separation", "pressure", "area", "stiffness", "scatter"):
             assert found["columns"][name][k] == pytest.approx(float(getattr(single, name)), rel=1e-8), name
         assert found["columns"]["valid"][k] == bool(single.valid)
-    assert (found["units"]["separation"], found["units"]["force"]) == ("um", "GPa")
+    assert (found["units"]["separation"], found["units"]["pressure"]) == ("um", "GPa")
 
 
 def test_named_surfaces_loads_in_columns_and_other_kinds_of_numbers():

@@ -55,7 +55,7 @@ def test_contact_gives_the_closed_check_values():
     text = run("contact", "--surface", "yang-persson", "-d", "2", "--over-h-rms", "--variant", "printed")
     names, units, row = table_rows(text)
     found = dict(zip(names, row, strict=True))
-    assert float(found["force"]) == pytest.approx(2.5114e-5, rel=2e-5)
+    assert float(found["pressure"]) == pytest.approx(2.5114e-5, rel=2e-5)
     assert float(found["area"]) == pytest.approx(3.1145e-5, rel=2e-5)
     assert float(found["mean_separation"]) == 2.5
     assert "variant printed, island model universal" in text
@@ -68,12 +68,12 @@ def test_contact_json_is_the_librarys_answer_digit_for_digit():
     answer = contact(
         Surface.named("concrete"), separation=[0.5, -0.2, -1.1], island_model="rigid", E_star=7.5, rtol=1e-6
     )
-    for name in ("separation", "mean_separation", "force", "area", "error"):
+    for name in ("separation", "mean_separation", "pressure", "area", "error"):
         assert found["columns"][name] == getattr(answer, name).tolist()
     assert (found["variant"], found["island_model"], found["rtol"], found["E_star"]) == ("reported", "rigid", 1e-6, 7.5)
     assert found["arguments"] == {"separation": [0.5, -0.2, -1.1], "surface": "concrete", "E_star": 7.5}
     assert found["units"]["separation"] == "mm"
-    assert found["units"]["force"] == "stress"
+    assert found["units"]["pressure"] == "stress"
     assert found["surface"]["zeta_1"] == Surface.named("concrete").zeta_1
 
 
@@ -85,14 +85,14 @@ def test_contact_by_pressure_and_by_area(theory):
     surface = Surface.named("concrete")
     by_pressure = asked("-p", "1e-3,0.002", "--E-star", "5")
     answer = contact(surface, pressure=[1e-3, 2e-3], E_star=5.0, theory=theory)
-    for name in ("separation", "mean_separation", "force", "area", "stiffness"):
+    for name in ("separation", "mean_separation", "pressure", "area", "stiffness"):
         assert by_pressure["columns"][name] == pytest.approx(getattr(answer, name).tolist(), rel=1e-12)
     assert (by_pressure["theory"], by_pressure["valid"]) == (theory, answer.valid.tolist())
     assert by_pressure["reasons"] == {why: np.flatnonzero(mask).tolist() for why, mask in answer.reasons.items()}
     assert by_pressure["scatter"] == pytest.approx(answer.scatter.tolist(), rel=1e-12)
     assert by_pressure["area_scatter"] == pytest.approx(answer.area_scatter.tolist(), rel=1e-12)
     by_area = asked("--area", repr(by_pressure["columns"]["area"][1]))
-    assert by_area["columns"]["force"] == pytest.approx([2e-3 / 5], rel=1e-7)
+    assert by_area["columns"]["pressure"] == pytest.approx([2e-3 / 5], rel=1e-7)
 
 
 def test_where_an_answer_is_not_valid_is_said_in_one_line():
@@ -124,10 +124,10 @@ def test_curve_of_any_theory(folder, theory):
     found = json.loads(run(*arguments))
     columns = found["columns"]
     # some, as Persson's, have no finite force at u = 0, the last gap
-    assert len(columns["force"]) == len(found["valid"])
-    assert len(columns["force"]) in ({8} if theory == "persson" else {9} if theory == "mbma" else {8, 9})
+    assert len(columns["pressure"]) == len(found["valid"])
+    assert len(columns["pressure"]) in ({8} if theory == "persson" else {9} if theory == "mbma" else {8, 9})
     answer = contact(Surface.named("concrete"), separation=columns["separation"], theory=theory)
-    assert columns["force"] == answer.force.tolist()
+    assert columns["pressure"] == answer.pressure.tolist()
     assert columns["area"] == answer.area.tolist()
     assert found["theory"] == theory
     assert (found["variant"] is None) == (theory != "mbma")
@@ -139,10 +139,10 @@ def test_csv_holds_every_digit():
     comments = [line for line in lines if line.startswith("#")]
     rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     answer = contact(Surface.named("asphalt"), separation=[0.9, 0.1])
-    for name in ("separation", "force", "area", "error"):
+    for name in ("separation", "pressure", "area", "error"):
         assert [float(row[name]) for row in rows] == getattr(answer, name).tolist()
     assert any("variant reported" in line for line in comments)
-    assert any("force [-]" in line for line in comments)
+    assert any("pressure [-]" in line for line in comments)
 
 
 def test_every_source_is_the_same_surface(folder):
@@ -168,7 +168,7 @@ def test_every_source_is_the_same_surface(folder):
         found = json.loads(run("contact", *source, "-d", "2,0.5", "--json"))
         for name in ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "m4", "alpha"):
             assert found["surface"][name] == pytest.approx(getattr(surface, name), rel=1e-11), (source, name)
-        assert found["columns"]["force"] == pytest.approx(expected.force.tolist(), rel=2e-8)
+        assert found["columns"]["pressure"] == pytest.approx(expected.pressure.tolist(), rel=2e-8)
         assert found["columns"]["area"] == pytest.approx(expected.area.tolist(), rel=2e-8)
 
 
@@ -190,11 +190,11 @@ def test_material_from_options_and_from_a_file(folder):
     (folder / "s.toml").write_text(toml(CONCRETE) + toml(material, "material"))
     (folder / "e.toml").write_text(toml(CONCRETE) + f"[material]\nE_star = {float(modulus)!r}\n")
     bodies = [part for key, value in material.items() for part in (f"--{key}", str(value))]
-    expected = float(contact(Surface.named("concrete"), separation=0.3, E_star=modulus).force)
+    expected = float(contact(Surface.named("concrete"), separation=0.3, E_star=modulus).pressure)
     for source in (["--surface", "concrete", *bodies], ["--file", "s.toml"], ["--file", "e.toml"]):
         found = json.loads(run("contact", *source, "-d", "0.3", "--json"))
         assert found["E_star"] == modulus
-        assert found["columns"]["force"] == pytest.approx([expected], rel=1e-12)
+        assert found["columns"]["pressure"] == pytest.approx([expected], rel=1e-12)
     other = json.loads(run("contact", "--file", "s.toml", "--E-star", "2", "-d", "0.3", "--json"))
     assert other["E_star"] == 2.0
     example = os.path.join(os.path.dirname(__file__), os.pardir, os.pardir, "examples", "concrete.toml")
@@ -210,18 +210,18 @@ def test_curve_beside_other_theories(folder):
     surface = Surface.named("concrete")
     average, gap = np.array(found["mean_separation"]), np.array(found["separation"])
     asperities = contact(surface, separation=gap, theory="greenwood_williamson", E_star=3.0)
-    np.testing.assert_allclose(found["greenwood_williamson_force"], asperities.force, rtol=1e-13)
+    np.testing.assert_allclose(found["greenwood_williamson_pressure"], asperities.pressure, rtol=1e-13)
     np.testing.assert_allclose(found["greenwood_williamson_area"], asperities.area, rtol=1e-13)
-    assert found["persson_force"][-1] is None
+    assert found["persson_pressure"][-1] is None
     assert found["persson_area"][-1] is None
     full = theories.Persson().answer(surface, average[:-1])
-    np.testing.assert_allclose(found["persson_force"][:-1], 3.0 * full.force, rtol=1e-9)
+    np.testing.assert_allclose(found["persson_pressure"][:-1], 3.0 * full.pressure, rtol=1e-9)
     np.testing.assert_allclose(found["persson_area"][:-1], full.area, rtol=1e-9)
     simplified = theories.Persson("simplified").answer(surface, average)
-    np.testing.assert_allclose(found["persson_simplified_force"], 3.0 * simplified.force, rtol=1e-12)
+    np.testing.assert_allclose(found["persson_simplified_pressure"], 3.0 * simplified.pressure, rtol=1e-12)
     assert (folder / "c.png").is_file()
     names, *_, last = table_rows(run("curve", *arguments))
-    assert last[names.index("persson_force")] == last[names.index("persson_area")] == "-"
+    assert last[names.index("persson_pressure")] == last[names.index("persson_area")] == "-"
 
 
 def test_island_is_the_librarys_answer():
@@ -232,9 +232,9 @@ def test_island_is_the_librarys_answer():
         assert values == getattr(answer, name).tolist(), name
     assert set(found["columns"]) == {
         *("delta", "zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu"),
-        *("force", "area", "error"),
+        *("pressure", "area", "error"),
     }
-    assert found["units"] | {"D": "1/mm^2", "force": "mm^2", "X": "-", "R_d": "mm"} == found["units"]
+    assert found["units"] | {"D": "1/mm^2", "pressure": "mm^2", "X": "-", "R_d": "mm"} == found["units"]
 
 
 def test_surfaces_lists_every_case():

@@ -55,7 +55,7 @@ def test_a_line_scan(line_file):
     assert {"errors", "unseen"} <= {entry["step"] for entry in found["provenance"]}
     assert found["anisotropy"] is None
     assert set(found["columns"]["valid"]) <= {"yes", "no"}
-    assert np.isfinite(found["columns"]["force"]).all()
+    assert np.isfinite(found["columns"]["pressure"]).all()
     assert found["h_rms"] == pytest.approx(float(Surface.from_profile(line_file).h_rms))
 
 

@@ -36,7 +36,7 @@ def test_run_to_netcdf_and_csv(tmp_path):
 
 def test_run_as_table_json_and_picture(tmp_path):
     picture = tmp_path / "road.png"
-    assert "persson_force" in run("run", ROAD, "--plot", picture)
+    assert "persson_pressure" in run("run", ROAD, "--plot", picture)
     assert picture.read_bytes().startswith(b"\x89PNG")
     content = json.loads(run("run", ROAD, "--json"))
     assert content["variables"]["profile_pressure"]["dims"] == ["island", "node"]

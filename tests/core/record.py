@@ -105,16 +105,16 @@ def use():
         contact(one, separation=[0.5, 1.0], derivatives=derivatives)
         contact(many, separation=np.linspace(-2, 2.9, 40), rtol=1e-6, derivatives=derivatives)
     law, gaps = contact_law(one), np.linspace(-2.9, 2.9, 100)
-    for quantity in (law.force, law.area, law.stiffness, law.area_slope, law.energy):
-        quantity(0.5)
-        quantity(np.linspace(-2.9, 2.9, 2000))
-    law.at_pressure(law.force(np.linspace(-2, 2.5, 30)))
-    law.leakage(gaps)
-    law.slope_error(gaps)
+    for quantity in (law.pressure, law.area, law.stiffness, law.area_slope, law.energy):
+        quantity(separation=0.5)
+        quantity(separation=np.linspace(-2.9, 2.9, 2000))
+    law.at_pressure(law.pressure(separation=np.linspace(-2, 2.5, 30)))
+    law.leakage(separation=gaps)
+    law.slope_error(separation=gaps)
     for theory in ("mbma", "calibrated", "persson"):
         for cap in (np.inf, 0.05):
             found = contact(one, mean_separation=np.linspace(0.2, 2.5, 30), theory=theory, hardness=cap)
-            contact(one, pressure=found.force, theory=theory, hardness=cap)
+            contact(one, pressure=found.pressure, theory=theory, hardness=cap)
     contact(many, mean_separation=1.0, theory="calibrated")
     # outside the calibrated table
     contact(Surface(0.05, 1.0, 30.0, 1.0, 3.0), pressure=[0.01, 0.1], theory="calibrated")

@@ -59,9 +59,9 @@ class Points:
     def assert_inverse(self, c: Any) -> None:
         """Overclosures at `pressures`: where the library has them, but for what pressure there leaves open."""
         wanted = self.pressures()
-        d, back = self.law.h_max - 2 * np.asarray(c), self.law.separation(force=wanted)
-        assert np.abs(np.asarray(self.law.force(d)) / wanted - 1).max() <= 1e-12
-        slope = np.asarray(self.law.stiffness(back))
+        d, back = self.law.h_max - 2 * np.asarray(c), self.law.separation(pressure=wanted)
+        assert np.abs(np.asarray(self.law.pressure(separation=d)) / wanted - 1).max() <= 1e-12
+        slope = np.asarray(self.law.stiffness(separation=back))
         known = (self.law.h_max - back) / 2
         assert (np.abs(c - known) <= 1e-12 * (np.abs(known) + np.abs(wanted / slope))).all()
 
@@ -81,9 +81,9 @@ def points(name: str) -> Points:
     d = h - 2 * c
     assert ((h - d) / 2 == c).all()
     turn = law.lowest if law.turning_point is None else law.turning_point
-    found = law.values(d)
-    flow = np.asarray(law.leakage(d))
-    return Points(law, c, found.force, found.stiffness, found.area, found.energy, flow, (h - turn) / 2)
+    found = law.values(separation=d)
+    flow = np.asarray(law.leakage(separation=d))
+    return Points(law, c, found.pressure, found.stiffness, found.area, found.energy, flow, (h - turn) / 2)
 
 
 def text(target: str, law: str, **options: Any) -> str:

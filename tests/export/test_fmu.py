@@ -99,7 +99,10 @@ def test_directional_derivatives(target: str, name: str, tmp_path: pathlib.Path)
     np.testing.assert_allclose(by_conductance, CONDUCTIVITY / 13.3 * by_tangent, rtol=1e-15)
     # those of area, tangent and leakage by differences of the library's law, but where a piece of it ends
     beside = [known.law.h_max - 2 * c * (1 + by) for by in (1e-5, -1e-5)]
-    (above, below), flows = map(known.law.values, beside), [np.asarray(known.law.leakage(d)) for d in beside]
+    (above, below), flows = (
+        (known.law.values(separation=d) for d in beside),
+        [np.asarray(known.law.leakage(separation=d)) for d in beside],
+    )
     for slope, difference, size in (
         (by_area, above.area - below.area, known.area),
         (by_tangent, above.stiffness - below.stiffness, known.tangent),

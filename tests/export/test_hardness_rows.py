@@ -19,7 +19,7 @@ def test_rows_of_a_law_with_a_hardness():
     kept = law.y > 1.0
     u = 3.0 - law.x[kept]
     found = contact(SURFACE, mean_separation=u, E_star="100 GPa", theory="calibrated", hardness="1500 MPa")
-    assert law.y[kept] == pytest.approx(1e3 * found.force, rel=1e-2)
+    assert law.y[kept] == pytest.approx(1e3 * found.pressure, rel=1e-2)
     text = " ".join(law.comments)
     assert "hardness = 1500 MPa, plasticity index 3.61" in text
     elastic = describe_law(SURFACE, "100 GPa", stress_unit="MPa", theory="calibrated", rtol=1e-2)

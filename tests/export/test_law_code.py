@@ -87,7 +87,7 @@ def test_c_outside_its_range(name: str, compiled: dict[str, ctypes.CDLL]) -> Non
         assert np.isnan(c_function(library, quantity)(beyond + before)).all()
         if not before and quantity != "leakage":
             assert (c_function(library, quantity)([0.0, -0.0, -1.0, -math.inf]) == 0).all()
-    most = float(law.force(law.lowest if law.turning_point is None else law.turning_point))
+    most = float(law.pressure(separation=law.lowest if law.turning_point is None else law.turning_point))
     assert np.isnan(c_function(library, "overclosure")([-1.0, math.nan, math.inf, 1.01 * most])).all()
     if not before:
         assert c_function(library, "overclosure")([0.0]) == 0
@@ -98,7 +98,7 @@ def test_c_outside_its_range(name: str, compiled: dict[str, ctypes.CDLL]) -> Non
 def test_leakage_apart_and_where_gaps_close(name: str, compiled: dict[str, ctypes.CDLL]) -> None:
     law, leakage = points(name).law, c_function(compiled[name], "leakage")
     apart = np.geomspace(1e-9, 1e3 if math.isinf(law.highest) else 26, 200)
-    np.testing.assert_allclose(leakage(-apart), law.leakage(law.h_max + 2 * apart), rtol=VALUES)
+    np.testing.assert_allclose(leakage(-apart), law.leakage(separation=law.h_max + 2 * apart), rtol=VALUES)
     if name != "mbma":
         blocked = (law.h_max - law.leakage.blocked_at) / 2
         assert ((leakage(blocked + np.array([-1e-12, 1e-12, 1e-3])) == 0) == [False, True, True]).all()
@@ -160,7 +160,7 @@ def test_two_laws_in_one_program(tmp_path: pathlib.Path) -> None:
     declared = "".join(f"double {name}_pressure(double c);" for name in names)
     (tmp_path / "ask.c").write_text(f"#include <stdio.h>\n{declared}\nint main(void) {{ {asks} return 0; }}\n")
     run("gcc", "-O1", "road.c", "seal.c", "ask.c", "-lm", "-o", "ask", folder=tmp_path)
-    known = [float(points(law).law.force(2.0)) for law in ("mbma", "persson")]
+    known = [float(points(law).law.pressure(separation=2.0)) for law in ("mbma", "persson")]
     np.testing.assert_allclose(np.array(run("./ask", folder=tmp_path).split(), dtype=float), known, rtol=VALUES)
 
 
@@ -299,7 +299,7 @@ def test_python_needs_numpy_alone(tmp_path: pathlib.Path) -> None:
         "import sys, road; print(road.conductance(0.1), sorted({'scipy', 'numba', 'mbma_tables'} & sys.modules.keys()))"
     )
     value, rest = run(sys.executable, "-c", code, folder=tmp_path).split(" ", 1)
-    stiffness = points("calibrated").law.stiffness(u=points("calibrated").law.h_max - 0.1)
+    stiffness = points("calibrated").law.stiffness(points("calibrated").law.h_max - 0.1)
     assert float(value) == pytest.approx(CONDUCTIVITY / 13.3 * stiffness, rel=1e-12)
     assert rest == "[]\n"
 
@@ -415,7 +415,7 @@ def test_abaqus_uinter(name: str, tmp_path: pathlib.Path) -> None:
     # the flux by the gap: differences of the library's slopes
     far = (known.c > 1e-3) & (known.c < 2.9)
     step = 1e-5 * known.c[far]
-    slopes = [known.law.stiffness(known.law.h_max - 2 * (known.c[far] + by)) for by in (step, -step)]
+    slopes = [known.law.stiffness(separation=known.law.h_max - 2 * (known.c[far] + by)) for by in (step, -step)]
     difference = 100 * CONDUCTIVITY / 13.3 * (slopes[0] - slopes[1]) / (2 * step)
     scale = np.abs(flux_1[inside] / known.c)[far]
     assert np.quantile(np.abs(by_gap[0][inside][far] - difference) / scale, 0.99) < 1e-5
@@ -550,7 +550,7 @@ def test_c_of_a_polynomial_over_many_decades(tmp_path: pathlib.Path) -> None:
     (tmp_path / "law.c").write_text(law_text("c-law", surface, "1 MPa", name="road", **asked))
     run("gcc", "-std=c99", *WARNINGS, "-shared", "-fPIC", "law.c", "-lm", "-o", "law.so", folder=tmp_path)
     u = 0.125 * (1 - np.geomspace(1e-12, 1, 500)[:-1])
-    known = contact_law(surface, E_star="1 MPa", **asked).force(u=u)
+    known = contact_law(surface, E_star="1 MPa", **asked).pressure(u)
     found = c_function(ctypes.CDLL(str(tmp_path / "law.so")), "pressure")(0.125 - u)
     np.testing.assert_allclose(found, known, rtol=1e-10)
 

@@ -29,7 +29,7 @@ def law_of(surface=CONCRETE, **changed):
 def test_rows_of_any_theory(theory):
     law = law_of(theory=theory, rows=50)
     x = np.random.default_rng(1).uniform(0, 0.99 * law.x[-1], 500)
-    model = contact(CONCRETE, mean_separation=CONCRETE.h_max - x, E_star=13.3, theory=theory).force
+    model = contact(CONCRETE, mean_separation=CONCRETE.h_max - x, E_star=13.3, theory=theory).pressure
     kept = model > FLOOR * law.y[-1]
     assert np.abs(np.interp(x, law.x, law.y) / model - 1)[kept].max() <= 1.02 * law.largest_error
     text = "\n".join(law.comments)
@@ -47,7 +47,7 @@ def test_the_header_says_from_where_a_law_is_valid(pressures):
     """Ends of validity are roots of the theory's area, whatever rows are asked for, and not points looked at."""
     surface = Surface.from_roughness(hurst=0.8, h_max=3.5e-3, Rq=1e-3, longest=0.1, shortest=2e-3, unit="mm")
     law = describe_law(surface, 115e3, stress_unit="MPa", theory="calibrated", rows=40, pressures=pressures)
-    root = contact(surface, area=1e-3, E_star=115e3, theory="calibrated").force
+    root = contact(surface, area=1e-3, E_star=115e3, theory="calibrated").pressure
     (light,) = (line for line in law.comments if line.startswith("not valid") and "0.001" in line)
     said = float(light.split("below p = ")[1].split()[0])
     assert root <= said <= root * 1.001
@@ -59,7 +59,7 @@ def test_the_header_says_up_to_where_a_law_is_valid():
     law = law_of()
     (areas,) = (line for line in law.comments if line.startswith("not valid") and "areas" in line)
     said = float(areas.split("above p = ")[1].split()[0])
-    root = contact(CONCRETE, area=0.1, E_star=13.3).force
+    root = contact(CONCRETE, area=0.1, E_star=13.3).pressure
     assert root * 0.999 <= said <= root
     assert any("scatter" in line and "ln p at a given c" in line for line in law_of().comments)
     own = dataclasses.replace(PRINTED, name="own", beta=0.3)
@@ -73,7 +73,9 @@ def test_the_stated_error_and_better_than_even_rows(name, rows):
     law = law_of(surface, rows=rows)
     # points of our own, through the totals
     x = np.random.default_rng(rows).uniform(0, law.x[-1], 2000)
-    model = contact(surface, separation=np.maximum(surface.h_max - 2 * x, -surface.h_max), E_star=13.3, rtol=1e-9).force
+    model = contact(
+        surface, separation=np.maximum(surface.h_max - 2 * x, -surface.h_max), E_star=13.3, rtol=1e-9
+    ).pressure
     kept = model > FLOOR * law.y[-1]
     error = np.abs(np.interp(x, law.x, law.y) / model - 1)[kept].max()
     assert error <= 1.02 * law.largest_error
@@ -184,7 +186,7 @@ def test_exponential_is_persson_for_light_loads():
     c0, p0 = numbers(text.splitlines()[-1])
     for u in (0.5, 1.0):
         p = p0 * np.exp((CONCRETE.h_max - u) / (c0 / np.log(100)))
-        assert p == pytest.approx(13.3 * theories.Persson("simplified").answer(CONCRETE, u).force, rel=1e-8, abs=0)
+        assert p == pytest.approx(13.3 * theories.Persson("simplified").answer(CONCRETE, u).pressure, rel=1e-8, abs=0)
 
 
 @pytest.mark.parametrize(("target", "package"), [("hdf5", "h5py"), ("parquet", "pyarrow")])
@@ -287,10 +289,10 @@ def test_rows_without_a_last_contact_begin_with_one_step():
     law = describe_law(surface, "1 MPa", theory="persson")
     known = contact_law(surface, theory="persson")
     assert (law.x[0], law.y[0]) == (0, 0)
-    assert law.y[1] == pytest.approx(known.force(known.h_max), rel=2e-3)
+    assert law.y[1] == pytest.approx(known.pressure(separation=known.h_max), rel=2e-3)
     assert law.x[1] == pytest.approx(5e-5 * law.x[-1])
     c = np.append(law.x[1], np.geomspace(law.x[1], law.x[-1], 3000)[1:-1])
-    found = np.interp(c, law.x, law.y) / known.force(u=known.h_max - c) - 1
+    found = np.interp(c, law.x, law.y) / known.pressure(known.h_max - c) - 1
     assert np.abs(found).max() <= 1.02 * law.largest_error
     assert "TABULAR" in calculix(law)
 
@@ -299,7 +301,7 @@ def test_rows_without_a_last_contact_begin_with_one_step():
 def test_the_stated_error_holds_up_to_full_compression(theory):
     law, known = law_of(theory=theory, rows=50), contact_law(CONCRETE, theory=theory, E_star=13.3)
     u = np.geomspace(max(known.h_max - law.x[-1], 1e-9), 0.5, 5000)[1:]
-    error = np.abs(np.interp(known.h_max - u, law.x, law.y) / known.force(u=u) - 1)
+    error = np.abs(np.interp(known.h_max - u, law.x, law.y) / known.pressure(u) - 1)
     assert error.max() <= 1.02 * law.largest_error
 
 
@@ -316,8 +318,10 @@ def test_rows_of_leakage_without_a_block():
     assert known.leakage.blocked_at == -np.inf
     assert "where contact blocks" not in " ".join(law.comments)
     d = np.linspace(known.lowest, known.h_max, 5000)
-    kept = known.leakage(d) > FLOOR * law.y[0]
-    np.testing.assert_allclose(np.interp(known.force(d), law.x, law.y)[kept], known.leakage(d)[kept], rtol=1.01e-2)
+    kept = known.leakage(separation=d) > FLOOR * law.y[0]
+    np.testing.assert_allclose(
+        np.interp(known.pressure(separation=d), law.x, law.y)[kept], known.leakage(separation=d)[kept], rtol=1.01e-2
+    )
 
 
 def test_rows_too_near_for_calculix():

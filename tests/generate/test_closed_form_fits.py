@@ -77,7 +77,7 @@ def small(monkeypatch):
         (islands, {"SIZES": sizes, "POINTS": 300, "HELD_OUT": 400, "GRID": 60, "TRIES": ((2, 1),)}),
         (terms, {"SHAPES": {"c": (1.5, 3.0), "b": (1.0,), "g": (1.0,)}, "POLISH": 20}),
         (totals, {"POINTS": 500, "HELD_OUT": 600, "DEGREE": 1.5, "TRIALS": 12, "THIN": 4, "ANNEAL_SEEDS": (43,)}),
-        (totals, {"TERMS": {"force": (6, 4), "area": (5, 3)}}),
+        (totals, {"TERMS": {"pressure": (6, 4), "area": (5, 3)}}),
     ):
         for name, value in changed.items():
             monkeypatch.setattr(module, name, value)

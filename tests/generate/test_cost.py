@@ -33,7 +33,7 @@ def test_references_agree_with_the_solver():
     assert len(found) == len(timing.HELD_OUT)
     surface, gap, truth = found[3]
     answer = contact(surface, separation=gap, island_model="exact", rtol=1e-10)
-    assert answer.force == pytest.approx(truth["force"], rel=1e-10, abs=0)
+    assert answer.pressure == pytest.approx(truth["pressure"], rel=1e-10, abs=0)
     assert answer.area == pytest.approx(truth["area"], rel=1e-10, abs=0)
     answers = [truth for _, _, truth in found]
     assert cost_totals.largest_error(answers) == 0
@@ -62,7 +62,7 @@ def test_totals(few_totals):
     rows = by_variant(cost_totals.gap_rows())
     asked = {float(name.split("=")[1]) for _, name, what in rows if "rtol" in name and what == "both"}
     assert asked == {1e-1, 1e-2, 1e-4}
-    for what in ("both", "force", "area"):
+    for what in ("both", "pressure", "area"):
         row = rows["universal", "gap rtol=1e-02", what]
         assert row.error < 1e-2
         # a call's cost is taken off, down to next to nothing, and the rest is shared by the gaps

@@ -24,10 +24,10 @@ def test_areas_and_forces_of_mbma_equal_roots_found_otherwise(bem):
     g = surface.rms_gradient
     found = distances.distances([bem], distances.THEORIES["MBMA reported"])
     for k, (force, area, u) in enumerate(zip(bem.force, bem.area, bem.u, strict=True)):
-        of_gap = contact(surface, mean_separation=u).force / g
+        of_gap = contact(surface, mean_separation=u).pressure / g
         assert found["force"][k] == pytest.approx(np.log(of_gap / force), abs=1e-5)
         if np.isfinite(found["area"][k]):
-            gap = brentq(lambda x, f=force: np.log(contact(surface, mean_separation=x).force / g / f), 0.3, 3.39)
+            gap = brentq(lambda x, f=force: np.log(contact(surface, mean_separation=x).pressure / g / f), 0.3, 3.39)
             expected = np.log(contact(surface, mean_separation=gap).area / area)
             assert found["area"][k] == pytest.approx(expected, abs=1e-4)
     # the heaviest loads are beyond the model
@@ -39,7 +39,7 @@ def test_perssons_theory_in_closed_form(bem):
     found = distances.distances([bem], distances.THEORIES["Persson"])
     assert found["area"] == pytest.approx(np.log(erf(np.sqrt(2) * bem.force) / bem.area), abs=1e-12)
     surface = Surface(0.8, 1.0, 64.0, 1.0, 3.3973)
-    back = Persson().mean_separation_at(surface, "force", bem.force * np.exp(found["force"]) * surface.rms_gradient)
+    back = Persson().mean_separation_at(surface, "pressure", bem.force * np.exp(found["force"]) * surface.rms_gradient)
     assert back[1:] == pytest.approx(bem.u[1:], rel=1e-4)
 
 

@@ -49,7 +49,7 @@ def test_separations_beyond_a_theory_are_left_open():
     surface = Surface.named("yang-persson")
     assert np.isnan(comparisons.force_at(surface, "Persson full", 0.0))
     assert comparisons.force_at(surface, "MBMA reported", 3.5) == 0
-    expected = theories.Persson("simplified").answer(surface, 0.0).force
+    expected = theories.Persson("simplified").answer(surface, 0.0).pressure
     assert comparisons.force_at(surface, "Persson simplified", 0.0) == expected
     # by Persson's theory A = erf(sqrt(2) F/g), nearly linear at light load
     assert comparisons.kappa(surface, "Persson", 1e-4) == pytest.approx(np.sqrt(8 / np.pi), rel=1e-6)

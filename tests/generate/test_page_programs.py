@@ -35,7 +35,7 @@ def test_ratios_of_a_theory_to_itself_are_one():
     surface = Surface(hurst=0.8, q0=0.01, q1=0.5, h_rms=1.0, h_max=3.0)
     u = np.array([1.2, 2.0, 2.5])
     found = contact(surface, mean_separation=u, theory="persson")
-    area, force = ratios(theories.Persson(), surface, found.force, 2 * found.area, u)
+    area, force = ratios(theories.Persson(), surface, found.pressure, 2 * found.area, u)
     np.testing.assert_allclose(area, 0.5, rtol=1e-3)
     np.testing.assert_allclose(force, 1.0, rtol=1e-9)
     assert np.isnan(ratios(theories.Persson(), surface, np.array([1e3]), np.array([1.0]), u[:1])[0])
@@ -45,7 +45,7 @@ def test_shapes_are_told_with_extremes_and_validity():
     surface = Surface.from_map(np.random.default_rng(1).normal(size=(32, 32)), 1e3, periodic=True)
     u = 0.5 * surface.h_max * np.ones(2)
     found = contact(surface, mean_separation=u, theory="calibrated")
-    rows = np.stack([found.force, np.full(2, 0.05), u])
+    rows = np.stack([found.pressure, np.full(2, 0.05), u])
     area, force, valid = maps.summary([("one", surface, rows)])[3:]
     assert force == "1.00 (1.00 to 1.00)"
     assert area.startswith(f"{found.area[0] / 0.05:.2f} (")

@@ -94,7 +94,7 @@ def test_totals_by_the_island_model_are_within_one_percent():
     surface = Surface(rng.uniform(0.35, 1, 150), 1.0, zeta_1, 1.0, h_max)
     gap = rng.uniform(-1, 0.999, 150) * h_max
     found, exact = contact(surface, separation=gap, island_model="formula", rtol=1e-3), contact(surface, separation=gap)
-    for name in ("force", "area"):
+    for name in ("pressure", "area"):
         error = np.abs(getattr(found, name) / getattr(exact, name) - 1)
         assert error.max() <= 0.01
         assert (error <= found.error).all()
@@ -145,7 +145,7 @@ def test_scalars_are_answered_as_arrays_are():
     assert (one.phi_F, one.phi_A, one.error) == (many.phi_F[0], many.phi_A[0], many.error[0])
     surface = Surface(0.8, 1.0, 100.0, 1.0, 3.0)
     assert island(surface, 0.5, island_model="formula").force == island(surface, [0.5], island_model="formula").force[0]
-    assert np.ndim(closed_totals(surface, 0.3).force) == 0
+    assert np.ndim(closed_totals(surface, 0.3).pressure) == 0
 
 
 def test_units_and_shapes_of_closed_totals():
@@ -154,7 +154,7 @@ def test_units_and_shapes_of_closed_totals():
     force, area, error = closed_totals(surface, gaps, 200.0)
     exact = contact(surface, separation=gaps, E_star=200.0)
     assert force.shape == area.shape == (2, 3)
-    assert np.abs(force / exact.force - 1).max() < error
+    assert np.abs(force / exact.pressure - 1).max() < error
     assert np.abs(area / exact.area - 1).max() < error
 
 

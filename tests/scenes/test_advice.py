@@ -35,7 +35,7 @@ def stated():
         (["stiffness"], {"areas": [0.05]}, "stiffness", "stiffness"),
         (["area"], {"areas": [0.05]}, "gap", "force"),
         (["area", "energy"], {"areas": [0.02, 0.05, 0.9]}, "gap", "force"),
-        (["force"], {"mean_separations": [1.0, 4.0]}, "force", "force"),
+        (["pressure"], {"mean_separations": [1.0, 4.0]}, "pressure", "force"),
     ],
 )
 def test_it_tells_what_the_shipped_file_states(effects, prescribed, name, quantity, stated):
@@ -62,7 +62,7 @@ def test_where_there_is_nothing_to_say():
     quiet = [
         Scene(SURFACE, theory="persson", pressures=[1e-4]),
         Scene(SURFACE, effects=["area"], mean_separations=[1.0]),
-        Scene(SURFACE, effects=["force"], mean_separations=[4.0]),
+        Scene(SURFACE, effects=["pressure"], mean_separations=[4.0]),
         Scene(SURFACE, effects=["pressure_profile"], deltas=[0.1]),
     ]
     assert [advice(scene) for scene in quiet] == [""] * 4

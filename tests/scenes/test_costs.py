@@ -14,7 +14,7 @@ SOME = f"""# a comment
 unit,seconds,both,,0.002,
 universal,gap rtol=1e-02,both,1e-9,4,50
 universal,gap rtol=1e-06,both,1e-9,16,60
-universal,gap rtol=1e-06,force,1e-9,10,60
+universal,gap rtol=1e-06,pressure,1e-9,10,60
 universal,call,both,,3,
 """
 
@@ -33,7 +33,7 @@ def read(tmp_path, text):
         (("universal", "gap", 1e-1), 4),
         (("universal", "gap", 1e-4), 16),
         (("universal", "gap", 1e-9), 16),
-        (("universal", "gap", 1e-6, "force"), 10),
+        (("universal", "gap", 1e-6, "pressure"), 10),
         # area alone was not measured
         (("universal", "gap", 1e-6, "area"), 16),
         (("universal", "call", 1e-6), 3),
@@ -55,7 +55,7 @@ def test_shipped_costs_have_what_plans_need():
     needed += [(name, what) for name in THEORIES[1:] for what in ("gap", "call", "invert", "energy", "law")]
     needed += [("island4d", "gap")]
     for island_model, what in needed:
-        assert 0 < costs.of(island_model, what, 1e-4, "force") < 10, (island_model, what)
+        assert 0 < costs.of(island_model, what, 1e-4, "pressure") < 10, (island_model, what)
     errors = [row.error for row in costs.rows if row.island_model == "universal" and row.what == "gap"]
     assert 0 < max(errors) <= 1e-8
     assert costs.of("exact", "gap", 1e-8) > 3 * costs.of("universal", "gap", 1e-8)

@@ -12,7 +12,7 @@ from mbma_tables.scenes.specimen import schema
 
 EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
 SURFACE = '[surface]\nname = "concrete"\n'
-ON = '[effects]\non = ["force"]\n'
+ON = '[effects]\non = ["pressure"]\n'
 AT = "[prescribed]\nseparations = [0.5]\n"
 
 MISTAKES = {
@@ -22,8 +22,8 @@ MISTAKES = {
     "unknown key of accuracy": (SURFACE + ON + AT + "[accuracy]\nrtoll = 1e-3\n", "did you mean 'rtol'"),
     "unknown key of material": (SURFACE + ON + AT + "[material]\nE = 3.0\n", "did you mean 'E[12]'"),
     "key of another table": (SURFACE + ON + AT + "[material]\nhardness = 3.0\n", r"it belongs to \[yield\]"),
-    "unknown effect": (SURFACE + '[effects]\non = ["forse"]\n' + AT, "did you mean 'force'"),
-    "unknown refinement": (SURFACE + '[effects]\non = ["force"]\noff = ["subscale"]\n' + AT, "subscale_area"),
+    "unknown effect": (SURFACE + '[effects]\non = ["presure"]\n' + AT, "did you mean 'pressure'"),
+    "unknown refinement": (SURFACE + '[effects]\non = ["pressure"]\noff = ["subscale"]\n' + AT, "subscale_area"),
     "unknown surface": ('[surface]\nname = "concret"\n' + ON + AT, "there are yang-persson"),
     "unknown variant": ('variant = "printd"\n' + SURFACE + ON + AT, "did you mean 'printed'"),
     "unknown theory": (
@@ -45,12 +45,12 @@ MISTAKES = {
     ),
     "no effects": (SURFACE + AT, "'effects' is a required property"),
     "empty effects": (SURFACE + "[effects]\non = []\n" + AT, "effects.on: .* should be non-empty"),
-    "only refinements": (SURFACE + '[effects]\non = ["finite_height"]\n' + AT, "needs at least one of force"),
+    "only refinements": (SURFACE + '[effects]\non = ["finite_height"]\n' + AT, "needs at least one of pressure"),
     "on and off": (
         SURFACE + '[effects]\non = ["area", "subscale_area"]\noff = ["subscale_area"]\n' + AT,
         "leave it in one of the two lists",
     ),
-    "off of an output": (SURFACE + '[effects]\non = ["force"]\noff = ["area"]\n' + AT, "did you mean|known are"),
+    "off of an output": (SURFACE + '[effects]\non = ["pressure"]\noff = ["area"]\n' + AT, "did you mean|known are"),
     "energy of no end": (
         SURFACE + '[effects]\non = ["energy"]\noff = ["finite_height"]\n' + AT,
         "leave finite_height on",
@@ -60,7 +60,7 @@ MISTAKES = {
         + '[effects]\non = ["pressure_profile"]\noff = ["sphere_deformation"]\n[pressure_profile]\ndeltas = [0.1]\n',
         "leave sphere_deformation on",
     ),
-    "effects as text": (SURFACE + '[effects]\non = "force"\n' + AT, "effects.on: 'force' is not of type 'array'"),
+    "effects as text": (SURFACE + '[effects]\non = "pressure"\n' + AT, "effects.on: 'pressure' is not of type 'array'"),
     "nothing prescribed": (SURFACE + ON, "give one of separations"),
     "unknown theory of the scene": ('theory = "persons"\n' + SURFACE + ON + AT, "did you mean 'persson'"),
     "areas over h_rms": (SURFACE + ON + "[prescribed]\nareas = [0.01]\nover_h_rms = true\n", "areas have none"),
@@ -81,7 +81,7 @@ MISTAKES = {
         "leave it out",
     ),
     "pressure without an end": (
-        SURFACE + '[effects]\non = ["force"]\noff = ["finite_height"]\n[prescribed]\npressures = [0.01]\n',
+        SURFACE + '[effects]\non = ["pressure"]\noff = ["finite_height"]\n[prescribed]\npressures = [0.01]\n',
         "leave finite_height on, or give separations",
     ),
     "text for a number": (

@@ -25,7 +25,7 @@ DEEP = Surface(0.8, 1.0, 200.0, 1.0, 45.0)
 
 
 def scene_of(surface=CONCRETE, **given):
-    return Scene(surface, **({"effects": ("force",), "separations": (0.2, 0.5)} | given))
+    return Scene(surface, **({"effects": ("pressure",), "separations": (0.2, 0.5)} | given))
 
 
 def with_island_model(scene, island_model):
@@ -44,8 +44,8 @@ def test_beyond_a_table_totals_are_solved(island_model):
     with pytest.raises(OutOfRangeError):
         contact(DEEP, separation=-44.0, island_model=island_model)
     found = run_plan(scene, with_island_model(scene, island_model))
-    truth = contact(DEEP, separation=[-44.0, 44.0], island_model="exact", rtol=1e-6).force
-    np.testing.assert_allclose(found["force"], truth, rtol=1e-3, atol=0)
+    truth = contact(DEEP, separation=[-44.0, 44.0], island_model="exact", rtol=1e-6).pressure
+    np.testing.assert_allclose(found["pressure"], truth, rtol=1e-3, atol=0)
 
 
 def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
@@ -63,12 +63,12 @@ def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
     found = run_plan(scene, with_island_model(scene, "universal"))
     assert made == ["universal", "exact"]
     assert found.attrs["island_models"] == '{"law": "exact"}'
-    np.testing.assert_allclose(found["energy"], contact_law(CONCRETE).energy([0.2, 0.5]), rtol=1e-2, atol=0)
+    np.testing.assert_allclose(found["energy"], contact_law(CONCRETE).energy(separation=[0.2, 0.5]), rtol=1e-2, atol=0)
 
 
 def test_gaps_that_do_not_touch_hold_no_islands():
-    found = scene_of(effects=("force", "island_statistics"), separations=(CONCRETE.h_max, 2.0), points=5).run()
-    for name in ("force", "island_number", "island_density", "island_force", "island_area", "island_delta"):
+    found = scene_of(effects=("pressure", "island_statistics"), separations=(CONCRETE.h_max, 2.0), points=5).run()
+    for name in ("pressure", "island_number", "island_density", "island_force", "island_area", "island_delta"):
         assert (found[name] == 0).all(), name
 
 
@@ -83,7 +83,7 @@ def test_progress_in_blocks():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"without": ("force",)}, "is both on and off"),
+        ({"without": ("pressure",)}, "is both on and off"),
         ({"without": ("energy",)}, "'energy' is off unless it is asked for"),
         ({"effects": ("energy",), "without": ("finite_height",)}, "comes from a law"),
         (
@@ -91,7 +91,7 @@ def test_progress_in_blocks():
             "does not touch single islands",
         ),
         (
-            {"effects": ("force", "pressure_profile"), "deltas": (0.1,), "without": ("sphere_deformation",)},
+            {"effects": ("pressure", "pressure_profile"), "deltas": (0.1,), "without": ("sphere_deformation",)},
             "pressure_profile is of the deformed sphere",
         ),
         ({"separations": None, "pressures": (-1.0,)}, "no adhesion in the model"),
@@ -124,8 +124,8 @@ def test_an_island_model_of_choice():
     """Given by name it is taken as it is, and a bound above the tolerance is an error."""
     found = scene_of(island_model="island4d", rtol=1e-3).run()
     assert found.attrs["island_models"] == '{"totals": "island4d"}'
-    alone = contact(CONCRETE, separation=[0.2, 0.5], island_model="island4d", rtol=5e-4, quantities=["force"])
-    np.testing.assert_array_equal(found["force"], alone.force)
+    alone = contact(CONCRETE, separation=[0.2, 0.5], island_model="island4d", rtol=5e-4, quantities=["pressure"])
+    np.testing.assert_array_equal(found["pressure"], alone.pressure)
     with pytest.raises(ConvergenceError, match=r"above rtol = 1\.00e-06: give a larger rtol"):
         scene_of(island_model="formula", rtol=1e-6).run()
 
@@ -141,26 +141,26 @@ class Hertzian:
 
 
 def test_island_models_as_objects():
-    effects = ("force", "area", "island_statistics")
+    effects = ("pressure", "area", "island_statistics")
     scene = scene_of(effects=effects, island_model=Hertzian(), rtol=1e-5)
     assert "by hertzian  (count=2, rtol=5.0e-06, error not certified, time=not measured)" in scene.explain()
     found, truth = scene.run(), scene_of(effects=effects, island_model="exact", rtol=1e-8).run()
-    for name in ("force", "area", "island_number", "island_force"):
+    for name in ("pressure", "area", "island_number", "island_force"):
         np.testing.assert_allclose(found[name], truth[name], rtol=1e-5)
     assert found.attrs["island_models"] == '{"totals": "hertzian", "island statistics": "hertzian"}'
     assert found.attrs["table_hashes"] == "{}"
     law = scene_of(effects=("energy",), island_model=Hertzian(), rtol=1e-2).run()
-    np.testing.assert_allclose(law["energy"], contact_law(CONCRETE).energy([0.2, 0.5]), rtol=1e-2)
+    np.testing.assert_allclose(law["energy"], contact_law(CONCRETE).energy(separation=[0.2, 0.5]), rtol=1e-2)
 
 
 def test_a_table_as_an_object_is_the_island_model_with_its_name():
     table = open_table("universal")
     found, same = scene_of(island_model=table).run(), scene_of(island_model="universal").run()
-    np.testing.assert_array_equal(found["force"], same["force"])
+    np.testing.assert_array_equal(found["pressure"], same["pressure"])
     assert found.attrs["table_hashes"] == same.attrs["table_hashes"]
 
 
 def test_no_contact_asked_by_area_is_answered():
-    found = Scene(Surface.named("concrete"), effects=["force", "stiffness"], areas=[0.0]).run()
+    found = Scene(Surface.named("concrete"), effects=["pressure", "stiffness"], areas=[0.0]).run()
     assert found.separation.values == pytest.approx(1.1)
-    assert (found.force.values, found.stiffness.values) == (0, 0)
+    assert (found.pressure.values, found.stiffness.values) == (0, 0)

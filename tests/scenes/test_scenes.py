@@ -39,9 +39,9 @@ def scene_of(*effects, **more):
 
 @pytest.mark.parametrize("rtol", [1e-1, 1e-3, 1e-5, 1e-7, 1e-9])
 def test_totals_are_within_the_tolerance(rtol):
-    found = scene_of("force", "area", rtol=rtol).run()
+    found = scene_of("pressure", "area", rtol=rtol).run()
     truth = contact(CONCRETE, separation=GAPS, island_model="exact", rtol=1e-10)
-    np.testing.assert_allclose(found["force"], truth.force, rtol=rtol)
+    np.testing.assert_allclose(found["pressure"], truth.pressure, rtol=rtol)
     np.testing.assert_allclose(found["area"], truth.area, rtol=rtol)
     assert found.attrs["error"] <= rtol
 
@@ -49,23 +49,25 @@ def test_totals_are_within_the_tolerance(rtol):
 @pytest.mark.parametrize("rtol", [1e-2, 1e-5])
 def test_pressures_stiffness_and_energy(rtol):
     exact = contact_law(CONCRETE, 1e-9, E_star=2.0)
-    pressures = exact.force(np.array(GAPS))
+    pressures = exact.pressure(separation=np.array(GAPS))
     more = {"pressures": pressures, "E_star": 2.0, "rtol": rtol}
-    found = scene_of("force", "area", "stiffness", "energy", "conductance", **more).run()
-    np.testing.assert_allclose(found["area"], exact.area(np.array(GAPS)), rtol=rtol)
+    found = scene_of("pressure", "area", "stiffness", "energy", "conductance", **more).run()
+    np.testing.assert_allclose(found["area"], exact.area(separation=np.array(GAPS)), rtol=rtol)
     # central differences of fresh totals, with an error of h^2
     h = 1e-4
-    ends = [contact(CONCRETE, separation=np.array(GAPS) + s * h, E_star=2.0, rtol=1e-10).force for s in (1, -1)]
+    ends = [contact(CONCRETE, separation=np.array(GAPS) + s * h, E_star=2.0, rtol=1e-10).pressure for s in (1, -1)]
     slope = (ends[1] - ends[0]) / h  # by u, which moves half as far
     np.testing.assert_allclose(found["stiffness"], slope, rtol=rtol + 2e-6)
     np.testing.assert_allclose(found["conductance"], 1.5 / 2 * slope, rtol=rtol + 2e-6)
     for gap, energy in zip(GAPS, found["energy"].values, strict=True):
-        assert energy == pytest.approx(quad(exact.force, gap, exact.h_max, epsrel=1e-9)[0] / 2, rel=rtol + 1e-8, abs=0)
+        assert energy == pytest.approx(
+            quad(lambda d: exact.pressure(separation=d), gap, exact.h_max, epsrel=1e-9)[0] / 2, rel=rtol + 1e-8, abs=0
+        )
 
 
 def test_mean_separations_are_gaps():
     average = (np.array(GAPS) + CONCRETE.h_max) / 2
-    found = scene_of("force", mean_separations=average).run()
+    found = scene_of("pressure", mean_separations=average).run()
     np.testing.assert_allclose(found["separation"], GAPS, rtol=1e-13)
 
 
@@ -90,24 +92,24 @@ def test_hertz_area_is_the_area_over_eta(surface):
 
 def test_the_whole_gaussian_adds_force_and_reaches_beyond_h_max():
     gaps = [0.3, 1.0, 1.3]
-    whole = scene_of("force", separations=gaps, without=("finite_height",), rtol=1e-5).run()
-    cut = scene_of("force", separations=gaps, rtol=1e-5).run()
+    whole = scene_of("pressure", separations=gaps, without=("finite_height",), rtol=1e-5).run()
+    cut = scene_of("pressure", separations=gaps, rtol=1e-5).run()
     # far below h_max what lies beyond it is less than the table's error
-    assert whole["force"][0] == pytest.approx(float(cut["force"][0]), rel=1e-9)
-    assert (whole["force"][1:] > cut["force"][1:]).all()
-    assert cut["force"][2] == 0
+    assert whole["pressure"][0] == pytest.approx(float(cut["pressure"][0]), rel=1e-9)
+    assert (whole["pressure"][1:] > cut["pressure"][1:]).all()
+    assert cut["pressure"][2] == 0
     # a higher top adds nothing any more
     higher = Surface(CONCRETE.hurst, CONCRETE.q0, CONCRETE.q1, CONCRETE.h_rms, 4.0)
     truth = contact(higher, separation=gaps, island_model="exact", rtol=1e-8)
-    np.testing.assert_allclose(whole["force"], truth.force, rtol=1e-5)
+    np.testing.assert_allclose(whole["pressure"], truth.pressure, rtol=1e-5)
 
 
 def test_island_statistics_add_up():
     """Force is the sum over islands of their loads; numbers are the sum of their density."""
-    found = scene_of("force", "island_statistics", points=4000).run()
+    found = scene_of("pressure", "island_statistics", points=4000).run()
     delta = found["island_delta"].values
     load = np.trapezoid(found["island_density"].values * found["island_force"].values, delta, axis=1)
-    np.testing.assert_allclose(load, found["force"], rtol=2e-3)
+    np.testing.assert_allclose(load, found["pressure"], rtol=2e-3)
     number = np.trapezoid(found["island_density"].values, delta, axis=1)
     np.testing.assert_allclose(number, found["island_number"], rtol=2e-2)
 
@@ -122,14 +124,14 @@ def test_profiles_carry_the_islands_load():
 
 @pytest.mark.parametrize("seconds", [0.002, 0.05, 10.0])
 def test_a_time_budget_is_kept_by_the_measured_costs(seconds):
-    plan = scene_of("force", "area", rtol=None, seconds=seconds).plan()
+    plan = scene_of("pressure", "area", rtol=None, seconds=seconds).plan()
     assert plan.seconds <= seconds
     tighter = [rtol for rtol in plans.LADDER if rtol < plan.rtol]
-    assert all(scene_of("force", "area", rtol=rtol).plan().seconds > seconds for rtol in tighter)
+    assert all(scene_of("pressure", "area", rtol=rtol).plan().seconds > seconds for rtol in tighter)
 
 
 def test_explain_names_steps_and_what_is_left_out():
-    text = scene_of("force", "area", without=("subscale_area",)).explain()
+    text = scene_of("pressure", "area", without=("subscale_area",)).explain()
     assert text.splitlines()[0].startswith("Scene  (rtol=1.0e-06, error=")
     assert "first use in a process" in text
     assert "-> totals by universal" in text
@@ -143,14 +145,14 @@ def test_many_gaps_go_through_a_law():
         fewest = plans.MIN_LAW_GAPS.get(island_model, plans.MIN_LAW_GAPS_OF_OTHERS)
         for count, name in ((fewest - 1, "totals"), (fewest, "law")):
             (step,) = (
-                scene_of("force", separations=np.linspace(0, 1, count), rtol=1e-6, island_model=island_model)
+                scene_of("pressure", separations=np.linspace(0, 1, count), rtol=1e-6, island_model=island_model)
                 .plan()
                 .steps
             )
             assert (step.name, step.island_model) == (name, island_model)
     fewest = plans.MIN_LAW_GAPS["universal"]
     # closer than a law can be
-    (step,) = scene_of("force", separations=np.linspace(0, 1, fewest), rtol=1.5e-10).plan().steps
+    (step,) = scene_of("pressure", separations=np.linspace(0, 1, fewest), rtol=1.5e-10).plan().steps
     assert (step.name, step.island_model) == ("totals", "exact")
 
 
@@ -159,9 +161,9 @@ def test_the_certificate_decides_between_table_and_solver(monkeypatch):
     certificate = open_table("universal").content.attributes
     assert bound == max(certificate["largest_error_F"], certificate["largest_error_A"])
     for rtol, island_model in ((2.02 * bound, "universal"), (1.98 * bound, "exact")):
-        assert scene_of("force", rtol=rtol).plan().steps[0].island_model == island_model
+        assert scene_of("pressure", rtol=rtol).plan().steps[0].island_model == island_model
     monkeypatch.setitem(certificate, "largest_error_A", 1e-3)
-    assert scene_of("force", rtol=1e-4).plan().steps[0].island_model == "exact"
+    assert scene_of("pressure", rtol=1e-4).plan().steps[0].island_model == "exact"
 
 
 HISTORY = """
@@ -175,14 +177,14 @@ if sys.argv[1] == "used":
     for island_model in ("exact", "universal", "island4d", "formula", "rigid"):
         contact(concrete, separation=[0.1, 0.7], island_model=island_model, rtol=1e-3)
     contact_law(concrete, 1e-4)
-    Scene(Surface.named("asphalt"), effects=["force", "energy"], separations=[0.1], rtol=0.05).run()
+    Scene(Surface.named("asphalt"), effects=["pressure", "energy"], separations=[0.1], rtol=0.05).run()
     Scene(concrete, effects=["pressure_profile"], deltas=[0.2]).run()
 for arguments in (
     {"rtol": 0.05},
     {"rtol": 1e-6},
     {"rtol": 1e-9},
     {"seconds": 0.01},
-    {"effects": ["force"], "without": ["sphere_deformation"], "rtol": 1e-3},
+    {"effects": ["pressure"], "without": ["sphere_deformation"], "rtol": 1e-3},
     {"effects": ["area", "stiffness", "island_statistics"], "rtol": 1e-3},
 ):
     scene = Scene(concrete, separations=[0.2, 0.5, 0.9], **arguments)
@@ -199,21 +201,21 @@ def test_answers_do_not_depend_on_what_ran_before():
         for history in ("fresh", "used")
     )
     assert fresh == used
-    assert "force" in fresh
+    assert "pressure" in fresh
 
 
 def test_a_result_names_what_made_it():
-    found = scene_of("force", rtol=1e-8, variant="printed").run()
+    found = scene_of("pressure", rtol=1e-8, variant="printed").run()
     assert found.attrs["variant"] == "printed"
     assert set(json.loads(found.attrs["table_hashes"])) <= set(json.loads(found.attrs["island_models"]).values())
-    assert found["force"].attrs["units"] == "1"
+    assert found["pressure"].attrs["units"] == "1"
     assert found["separation"].attrs["units"] == "mm"
 
 
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ({"effects": "force", "separations": 0.5}, "list of names"),
+        ({"effects": "pressure", "separations": 0.5}, "list of names"),
         ({"separations": [[0.5]]}, "one number or a list"),
         ({"separations": 0.5, "rtol": 1.0}, "rtol must be"),
         ({"separations": 0.5, "points": 1}, "points must be"),
@@ -227,7 +229,7 @@ def test_python_mistakes(more, words):
 
 
 WATCHED = {
-    "mbma_tables.answers.contact": {"force", "area", "validity", "yield", "leakage"},
+    "mbma_tables.answers.contact": {"pressure", "area", "validity", "yield", "leakage"},
     "mbma_tables.law.make": {"stiffness", "energy", "conductance"},
     "mbma_tables.answers.leakage": {"leakage"},
     "mbma_tables.theories.yielding": {"yield"},
@@ -298,7 +300,7 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
     yields = "yield" in asked
     of_law = bool(asked & {"stiffness", "energy", "conductance"}) and not yields
     expected = {
-        "contact": int(yields or (not of_law and bool(asked & {"force", "area"})))
+        "contact": int(yields or (not of_law and bool(asked & {"pressure", "area"})))
         + len(asked & {"validity", "leakage"}),
         "contact_law": int(of_law),
         "island_statistics": int("island_statistics" in asked),
@@ -313,8 +315,8 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
         found["greenwood_williamson"] = min(found["greenwood_williamson"], 1)
     assert found == expected
     assert ("yield" in calls) == yields
-    if not of_law and not yields and asked & {"force", "area"}:
-        assert calls["contact"][0]["quantities"] == tuple(name for name in ("force", "area") if name in asked)
+    if not of_law and not yields and asked & {"pressure", "area"}:
+        assert calls["contact"][0]["quantities"] == tuple(name for name in ("pressure", "area") if name in asked)
 
 
 @pytest.mark.parametrize("name", ["comparison", "pressure_profile"])
@@ -327,7 +329,7 @@ def test_tables_are_not_read_where_nothing_looks_up(name, monkeypatch):
     monkeypatch.setattr(tabulated, "read_table", refuse)
     tabulated._opened.cache_clear()
     scene_of(name).run()
-    scene_of("force", "area", without=("sphere_deformation",)).run()
+    scene_of("pressure", "area", without=("sphere_deformation",)).run()
 
 
 @pytest.mark.parametrize(
@@ -340,7 +342,7 @@ def test_tables_are_not_read_where_nothing_looks_up(name, monkeypatch):
 )
 def test_stiffness_at_the_end_of_a_laws_piece(surface, gap, rtol):
     found = Scene(surface, effects=("stiffness",), separations=[gap], rtol=rtol).run()
-    truth = -2 * contact(surface, separation=gap, rtol=1e-11, derivatives=True).force_by["separation"]
+    truth = -2 * contact(surface, separation=gap, rtol=1e-11, derivatives=True).pressure_by["separation"]
     assert abs(float(found["stiffness"][0]) / truth - 1) <= found.attrs["error"] <= rtol
 
 

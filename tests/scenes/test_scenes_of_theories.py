@@ -12,12 +12,12 @@ from mbma_tables.theories import THEORIES, Persson
 CONCRETE = Surface.named("concrete")
 MODULUS = 13.3
 PRESSURES = [0.01, 0.1]
-QUANTITIES = ("force", "area", "stiffness", "energy", "conductance")
+QUANTITIES = ("pressure", "area", "stiffness", "energy", "conductance")
 each = pytest.mark.parametrize("theory", THEORIES)
 
 
 def scene_of(theory, **more):
-    given = {"effects": ("force", "area"), "E_star": MODULUS, "rtol": 1e-4} | more
+    given = {"effects": ("pressure", "area"), "E_star": MODULUS, "rtol": 1e-4} | more
     return Scene(CONCRETE, theory=theory, **given)
 
 
@@ -28,7 +28,7 @@ def test_quantities_at_a_pressure_are_the_contacts(theory):
     expected = {
         "separation": truth.separation,
         "mean_separation": truth.mean_separation,
-        "force": PRESSURES,
+        "pressure": PRESSURES,
         "area": truth.area,
         "stiffness": truth.stiffness,
         "energy": truth.energy,
@@ -73,7 +73,7 @@ def test_many_gaps_go_through_the_law_where_that_costs_less(theory):
         (step,) = scene.plan().steps
         assert (step.name == "law") == by_law
         found = scene.run()
-        assert found["force"].values[seen] == pytest.approx(truth.force, rel=rtol)
+        assert found["pressure"].values[seen] == pytest.approx(truth.pressure, rel=rtol)
         assert found["area"].values[seen] == pytest.approx(truth.area, rel=rtol)
     # slopes are asked of the theory itself, or of MBMA's law, which bounds them
     slopes = scene_of(theory, effects=("stiffness",), mean_separations=u[some], rtol=rtol).run()
@@ -82,10 +82,10 @@ def test_many_gaps_go_through_the_law_where_that_costs_less(theory):
 
 def test_areas_that_mbma_reaches_within_the_bound_stated():
     law = contact_law(CONCRETE, 1e-9, E_star=MODULUS)
-    areas = law.area(np.array([0.9, 0.5, 0.0, -1.0]))
+    areas = law.area(separation=np.array([0.9, 0.5, 0.0, -1.0]))
     found = scene_of("mbma", areas=areas, rtol=1e-6).run()
-    truth = law.force(law.separation(area=areas))
-    assert np.abs(found["force"].values / truth - 1).max() <= found.attrs["error"] <= 1e-6
+    truth = law.pressure(separation=law.separation(area=areas))
+    assert np.abs(found["pressure"].values / truth - 1).max() <= found.attrs["error"] <= 1e-6
 
 
 @each
@@ -100,7 +100,7 @@ def test_a_plan_names_its_theory(theory):
 def test_validity_is_an_effect(theory):
     # of gaps that are numbers, so that both are asked the same
     u = (CONCRETE.h_max + np.array([0.5, -1.0])) / 2
-    found = scene_of(theory, effects=("force", "validity"), mean_separations=u).run()
+    found = scene_of(theory, effects=("pressure", "validity"), mean_separations=u).run()
     truth = contact(CONCRETE, mean_separation=u, theory=theory)
     assert found["valid"].values.tolist() == truth.valid.tolist()
     np.testing.assert_array_equal(found["scatter"], truth.scatter)
@@ -110,10 +110,10 @@ def test_validity_is_an_effect(theory):
 
 
 def test_theories_beside_one_another():
-    found = scene_of("persson", effects=("force", "comparison"), theories=("mbma",), separations=[0.2]).run()
-    for theory, name in (("persson", "force"), ("mbma", "mbma_force")):
+    found = scene_of("persson", effects=("pressure", "comparison"), theories=("mbma",), separations=[0.2]).run()
+    for theory, name in (("persson", "pressure"), ("mbma", "mbma_pressure")):
         assert found[name].item() == pytest.approx(
-            contact(CONCRETE, separation=0.2, E_star=MODULUS, theory=theory).force
+            contact(CONCRETE, separation=0.2, E_star=MODULUS, theory=theory).pressure
         )
 
 
@@ -140,11 +140,11 @@ def test_a_file_and_an_object_ask_the_same():
     content = {
         "theory": "persson",
         "surface": {"name": "concrete"},
-        "effects": {"on": ["force", "area"]},
+        "effects": {"on": ["pressure", "area"]},
         "prescribed": {"areas": [0.01, 0.1]},
     }
     by_file, by_object = Scene.from_mapping(content).run(), scene_of(Persson(), E_star=1.0, areas=[0.01, 0.1]).run()
-    assert by_file["force"].values.tolist() == by_object["force"].values.tolist()
+    assert by_file["pressure"].values.tolist() == by_object["pressure"].values.tolist()
     assert by_file["area"].values == pytest.approx([0.01, 0.1], rel=1e-9)
 
 
@@ -152,6 +152,6 @@ def test_energies_of_many_gaps_reach_beyond_a_law():
     surface = Surface.named("concrete")
     u = np.linspace(0.8, 0.98, 400) * surface.h_max
     known = {"theory": "greenwood_williamson", "mean_separations": u, "rtol": 1e-5}
-    found = Scene(surface, effects=["force", "energy"], **known).run()
+    found = Scene(surface, effects=["pressure", "energy"], **known).run()
     expected = contact(surface, mean_separation=u, theory="greenwood_williamson").energy
     assert found.energy.values == pytest.approx(expected, rel=1e-5)

@@ -17,7 +17,7 @@ KNOWN = {"surface": SURFACE, "pressures": [1.0, 30.0], "E_star": 100e3}
 
 @pytest.mark.parametrize("theory", ["calibrated", "mbma"])
 def test_a_scene_yields_as_contact_does(theory):
-    effects = ["force", "area", "stiffness", "conductance", "validity", "yield"]
+    effects = ["pressure", "area", "stiffness", "conductance", "validity", "yield"]
     scene = Scene(**KNOWN, effects=effects, hardness=1500.0, theory=theory, conductivities=(16.0, 167.0))
     step = scene.plan().steps[0]
     assert step.why.endswith("yield")
@@ -45,11 +45,11 @@ def test_what_a_yielding_scene_costs_is_stated():
 
 def test_theories_compared_yield_too():
     asked = {"mean_separations": [0.5, 1.5], "E_star": 100e3, "hardness": 1500.0}
-    effects, others = ["force", "area", "comparison", "yield"], ["persson", "calibrated"]
+    effects, others = ["pressure", "area", "comparison", "yield"], ["persson", "calibrated"]
     found = Scene(SURFACE, effects, theories=others, **asked).run()
     for name in others:
         known = contact(SURFACE, mean_separation=[0.5, 1.5], E_star=100e3, hardness=1500.0, theory=name)
-        for quantity in ("force", "area"):
+        for quantity in ("pressure", "area"):
             assert found[f"{name}_{quantity}"].values == pytest.approx(getattr(known, quantity), rel=1e-9)
 
 
@@ -59,7 +59,7 @@ def test_off_it_is_never_asked(monkeypatch):
 
     monkeypatch.setattr(Yielding, "__init__", refuse)
     for theory in ("mbma", "calibrated"):
-        assert "yielded" not in Scene(**KNOWN, effects=["force", "area"], theory=theory).run()
+        assert "yielded" not in Scene(**KNOWN, effects=["pressure", "area"], theory=theory).run()
         contact(SURFACE, pressure=1.0, theory=theory, E_star=100e3)
 
 
@@ -106,9 +106,9 @@ def test_what_contradicts(more, match):
 
 def test_prescribed_gaps():
     u = np.array([0.5, 1.5])
-    scene = Scene(SURFACE, ["force", "yield"], mean_separations=u, E_star=100e3, hardness=1500.0, theory="persson")
+    scene = Scene(SURFACE, ["pressure", "yield"], mean_separations=u, E_star=100e3, hardness=1500.0, theory="persson")
     known = contact(SURFACE, mean_separation=u, E_star=100e3, hardness=1500.0, theory="persson")
-    assert scene.run().force.values == pytest.approx(known.force)
+    assert scene.run().pressure.values == pytest.approx(known.pressure)
 
 
 def test_older_conductances_beside():
@@ -137,7 +137,7 @@ def test_older_conductances_beside():
 
 
 def test_a_plan_of_mbma_that_yields_keeps_the_tolerance():
-    known = {"surface": SURFACE, "mean_separations": [1.0], "effects": ["force", "yield"], "hardness": 0.01}
+    known = {"surface": SURFACE, "mean_separations": [1.0], "effects": ["pressure", "yield"], "hardness": 0.01}
     for rtol, island_model in ((1e-6, "universal"), (1e-10, "exact")):
         scene = Scene(**known, rtol=rtol)
         assert scene.plan().error <= rtol

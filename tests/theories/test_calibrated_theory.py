@@ -47,7 +47,7 @@ class TestTable:
         surface = Surface(hurst, 1.0, zeta_1, 0.01, 0.033)
         u = SHARES * surface.h_max
         found, (force, area, stiffness) = THEORY.answer(surface, u), quadrature(surface, u)
-        np.testing.assert_allclose(found.force, force, rtol=1e-5)
+        np.testing.assert_allclose(found.pressure, force, rtol=1e-5)
         np.testing.assert_allclose(found.area, area, rtol=1e-5)
         np.testing.assert_allclose(found.stiffness, stiffness, rtol=1e-4)
 
@@ -72,10 +72,10 @@ class TestTable:
         for k in range(3):
             one = Surface(batch.hurst[k], 1.0, batch.q1[k], 1.0, 3.2)
             force, area, stiffness = quadrature(one, np.array(0.7))
-            assert found.force[k] == pytest.approx(force, rel=1e-5)
+            assert found.pressure[k] == pytest.approx(force, rel=1e-5)
             assert found.area[k] == pytest.approx(area, rel=1e-5)
             assert found.stiffness[k] == pytest.approx(stiffness, rel=1e-4)
-        u = THEORY.mean_separation_at(batch, "force", found.force)
+        u = THEORY.mean_separation_at(batch, "pressure", found.pressure)
         np.testing.assert_allclose(u, 0.7, rtol=1e-6)
 
     def test_another_file_is_refused(self, tmp_path):
@@ -89,12 +89,12 @@ class TestTable:
 class TestAnswers:
     def test_limits(self):
         found = THEORY.answer(SURFACE, np.array([0.0, 1e-12, SURFACE.h_max, 2 * SURFACE.h_max]))
-        assert found.force[0] == np.inf
+        assert found.pressure[0] == np.inf
         assert found.area[:2] == pytest.approx([1, 1])
-        assert found.force[2:].tolist() == found.stiffness[2:].tolist() == [0, 0]
+        assert found.pressure[2:].tolist() == found.stiffness[2:].tolist() == [0, 0]
         # full contact: u falls as exp(-2 F^2), to leading order
         u = np.array([1e-7, 1e-9])
-        full = THEORY.answer(SURFACE, u * SURFACE.h_rms).force
+        full = THEORY.answer(SURFACE, u * SURFACE.h_rms).pressure
         np.testing.assert_allclose(full, quadrature(SURFACE, u * SURFACE.h_rms)[0], rtol=0.012)
         # light load: A/A0 = sqrt(8/(pi s0)) F^, s0 of the surface
         light = contact(SURFACE, pressure=1e-9 * SURFACE.rms_gradient, theory=THEORY).area * 1e9
@@ -106,16 +106,16 @@ class TestAnswers:
         batch = Surface([0.3, 0.8, 1.0], 1.0, [1000.0, 60.0, 30.0], [1.0, 0.1, 2.0], [3.0, 0.33, 7.5])
         u = np.array([[0.1], [0.5]]) * batch.h_max
         found = THEORY.answer(batch, u)
-        assert found.force.shape == (2, 3)
+        assert found.pressure.shape == (2, 3)
         for j in range(3):
             # lengths in another unit
             one = Surface(batch.hurst[j], 1.0 / 7, batch.q1[j] / 7, 7 * batch.h_rms[j], 7 * batch.h_max[j])
             alone = THEORY.answer(one, 7 * u[:, j])
-            np.testing.assert_allclose(alone.force, found.force[:, j], rtol=1e-12)
+            np.testing.assert_allclose(alone.pressure, found.pressure[:, j], rtol=1e-12)
             np.testing.assert_allclose(alone.area, found.area[:, j], rtol=1e-12)
             np.testing.assert_allclose(7 * alone.stiffness, found.stiffness[:, j], rtol=1e-12)
 
-    @pytest.mark.parametrize("quantity", ["force", "area"])
+    @pytest.mark.parametrize("quantity", ["pressure", "area"])
     def test_inverse(self, quantity):
         u = np.append(SHARES, 0.999) * SURFACE.h_max
         wanted = getattr(THEORY.answer(SURFACE, u), quantity)
@@ -136,10 +136,10 @@ class TestAnswers:
     def test_stiffness_is_the_slope_and_energy_the_work(self):
         u = SHARES[2:] * SURFACE.h_max
         step = 1e-4 * u
-        slope = (THEORY.answer(SURFACE, u - step).force - THEORY.answer(SURFACE, u + step).force) / (2 * step)
+        slope = (THEORY.answer(SURFACE, u - step).pressure - THEORY.answer(SURFACE, u + step).pressure) / (2 * step)
         np.testing.assert_allclose(THEORY.answer(SURFACE, u).stiffness, slope, rtol=1e-5)
         fine = np.linspace(u[1], SURFACE.h_max, 20001)
-        work = np.trapezoid(THEORY.answer(SURFACE, fine).force, fine)
+        work = np.trapezoid(THEORY.answer(SURFACE, fine).pressure, fine)
         assert THEORY.energy(SURFACE, u[1]) == pytest.approx(work, rel=1e-6)
 
     @given(st.floats(0.1, 1.0), st.floats(np.log(3.5), np.log(1e5)), st.floats(2.0, 6.0))
@@ -149,7 +149,7 @@ class TestAnswers:
         found = THEORY.answer(
             surface, np.concatenate([np.geomspace(1e-8, 0.1, 60), np.linspace(0.1, 0.9999 * top, 90)])
         )
-        for values in (found.force, found.stiffness):
+        for values in (found.pressure, found.stiffness):
             assert np.all(np.diff(values) <= 0)
             assert values[0] > values[-1] > 0
         assert np.all(np.diff(found.area) <= 0)
@@ -176,7 +176,7 @@ class TestScatter:
     def test_stated_scatter_covers_held_out_errors(self, held_out, quantity):
         sizes = np.concatenate(
             [
-                np.abs(errors(one, one.law(CONSTANTS), quantity))
+                np.abs(errors(one, one.law(CONSTANTS), {"pressure": "force"}.get(quantity, quantity)))
                 / shipped().standard_deviation("calibrated", quantity, one.area)
                 for one in held_out
             ]
@@ -209,7 +209,7 @@ def test_surfaces_with_a_plateau_by_their_own_spectrum(number):
     spectrum, h_rms = Spectrum.from_shares(q, variance), np.sqrt(variance.sum())
     law, g = Law(spectrum, ROLLOFF[number] / h_rms), spectrum.gradient * h_rms
     touching = area > 0.002
-    for quantity, found, exact in (("area", law.area(force / g), area), ("force", law.force(u / h_rms) * g, force)):
+    for quantity, found, exact in (("area", law.area(force / g), area), ("pressure", law.force(u / h_rms) * g, force)):
         errors_of = np.abs(np.log(found / exact))[touching]
         assert np.all(errors_of <= 2 * shipped().standard_deviation("calibrated", quantity, area[touching])), quantity
 
@@ -222,7 +222,7 @@ def test_an_older_set_of_boundary_elements():
     some = area > 0.005
     np.testing.assert_allclose(found.area[some], area[some], rtol=0.03)
     many = area > 0.01
-    back = contact(surface, mean_separation=u, theory="calibrated").force / g
+    back = contact(surface, mean_separation=u, theory="calibrated").pressure / g
     np.testing.assert_allclose(back[many], force[many], rtol=0.04)
 
 
@@ -264,7 +264,7 @@ class TestMap:
         top = float(surface.h_max)
         gaps = top * np.append(np.linspace(1, 0.01, 1500), np.geomspace(0.0099, 1e-6, 500))
         found = THEORY.answer(surface, gaps)
-        assert np.all(np.diff(found.force) > 0)
+        assert np.all(np.diff(found.pressure) > 0)
         assert np.all(np.diff(found.area) >= 0)
         assert np.all(np.diff(found.stiffness[1:]) >= -1e-12 * found.stiffness[2:])
 
@@ -272,21 +272,21 @@ class TestMap:
         top = float(surface.h_max)
         u = np.linspace(1e-5 * top, 1.05 * top, 200)
         found = THEORY.answer(surface, u)
-        assert np.all(np.diff(found.force) <= 0)
+        assert np.all(np.diff(found.pressure) <= 0)
         assert np.all(np.diff(found.area) <= 0)
-        assert found.force[u >= top].tolist() == [0] * int((u >= top).sum())
+        assert found.pressure[u >= top].tolist() == [0] * int((u >= top).sum())
         inside = (u < top) & (found.area < 0.9999)
-        for quantity, rtol in (("force", 1e-9), ("area", 1e-4)):
+        for quantity, rtol in (("pressure", 1e-9), ("area", 1e-4)):
             values = getattr(found, quantity)[inside]
             np.testing.assert_allclose(THEORY.mean_separation_at(surface, quantity, values), u[inside], rtol=rtol)
-        work = np.trapezoid(found.force[100:], u[100:])
+        work = np.trapezoid(found.pressure[100:], u[100:])
         assert THEORY.energy(surface, u[100]) == pytest.approx(work, rel=1e-2)
 
     def test_units_drop_out_and_mirrors_stand_for_edges(self, surface):
         longer = Surface.from_map(1000 * synthetic(), 1000 / 192, periodic=True, model="measured")
         loads = np.array([1e-4, 1e-2])
-        expected = THEORY.mean_separation_at(surface, "force", loads)
-        np.testing.assert_allclose(THEORY.mean_separation_at(longer, "force", loads), 1000 * expected, rtol=1e-9)
+        expected = THEORY.mean_separation_at(surface, "pressure", loads)
+        np.testing.assert_allclose(THEORY.mean_separation_at(longer, "pressure", loads), 1000 * expected, rtol=1e-9)
         mirrored = Surface.from_map(synthetic(), 1 / 192, model="measured")
         found = contact(mirrored, pressure=0.01, theory=THEORY).area
         assert found == pytest.approx(THEORY.answer(surface, expected[1:]).area, rel=0.1)
@@ -295,7 +295,7 @@ class TestMap:
         heights = Surface.from_spectrum(surface.q, surface.C, heights=synthetic())
         u = 0.003 * np.array([0.5, 1.0, 2.0])
         found, whole = (contact(s, mean_separation=u, theory=THEORY) for s in (heights, surface))
-        np.testing.assert_allclose(found.force, whole.force, rtol=0.12)
+        np.testing.assert_allclose(found.pressure, whole.pressure, rtol=0.12)
 
 
 class TestSpectrum:
@@ -306,10 +306,10 @@ class TestSpectrum:
         u = SHARES[1:] * SURFACE.h_max
         mine, tables = THEORY.answer(surface, u), THEORY.answer(SURFACE, u)
         bound = 3 * (float(np.max(tables.error)) + float(np.max(mine.error)))
-        np.testing.assert_allclose(mine.force, tables.force, rtol=bound)
+        np.testing.assert_allclose(mine.pressure, tables.pressure, rtol=bound)
         np.testing.assert_allclose(mine.area, tables.area, rtol=bound)
         np.testing.assert_allclose(mine.stiffness, tables.stiffness, rtol=3 * bound)
-        np.testing.assert_allclose(THEORY.mean_separation_at(surface, "force", mine.force), u, rtol=1e-8)
+        np.testing.assert_allclose(THEORY.mean_separation_at(surface, "pressure", mine.pressure), u, rtol=1e-8)
         some = mine.area < 1 - 1e-9
         back = THEORY.mean_separation_at(surface, "area", mine.area[some])
         np.testing.assert_allclose(back, u[some], rtol=1e-4)
@@ -319,16 +319,16 @@ class TestSpectrum:
         surface = SURFACE.sampled()
         u = np.array([0.05, 0.5, 1.0, 2.5]) * SURFACE.h_rms
         own, plain = (contact(s, mean_separation=u, theory="persson") for s in (surface, SURFACE))
-        for name in ("force", "area", "stiffness"):
+        for name in ("pressure", "area", "stiffness"):
             np.testing.assert_allclose(getattr(own, name), getattr(plain, name), rtol=1e-7)
         np.testing.assert_allclose(
-            contact(surface, pressure=own.force, theory="persson").mean_separation, u, rtol=1e-9)  # fmt: skip
+            contact(surface, pressure=own.pressure, theory="persson").mean_separation, u, rtol=1e-9)  # fmt: skip
         # far beyond h_max, where loads are below 1e-20
         far = np.array([4.0, 8.0, 15.0]) * SURFACE.h_max
-        loads = [contact(s, mean_separation=far, theory="persson").force for s in (surface, SURFACE)]
+        loads = [contact(s, mean_separation=far, theory="persson").pressure for s in (surface, SURFACE)]
         np.testing.assert_allclose(np.log(loads[0]), np.log(loads[1]), rtol=1e-9)
         law = contact_law(surface, theory="persson")
-        np.testing.assert_allclose(law.force(u=u), own.force, rtol=2 * law.error)
+        np.testing.assert_allclose(law.pressure(u), own.pressure, rtol=2 * law.error)
         with pytest.raises(InputError, match="simplified form"):
             contact(surface, mean_separation=u, theory=Persson("simplified"))
 
@@ -396,7 +396,7 @@ def test_loads_of_surfaces_with_a_peak_far_out(h_max, entries):
     with np.errstate(all="raise"):
         for force in (1e-10, 1e-2):
             found = contact(surface, pressure=np.full(entries, force), theory="calibrated")
-            np.testing.assert_allclose(found.force, force, rtol=1e-10)
+            np.testing.assert_allclose(found.pressure, force, rtol=1e-10)
             expected = contact(usual, pressure=force, theory="calibrated").mean_separation
             np.testing.assert_allclose(found.mean_separation, expected, rtol=1e-9)
 
@@ -411,4 +411,4 @@ def test_errors_hold_next_to_last_contact(hurst, zeta_1, top):
     depth = (top - u)[:, None]
     stiffness = law.force_and_stiffness((top - depth * (1 + nodes) / 2).ravel())[1].reshape(u.size, -1)
     exact = surface.rms_gradient * (stiffness * depth / 2) @ weights
-    assert (np.abs(found.force / exact - 1) <= found.error).all()
+    assert (np.abs(found.pressure / exact - 1) <= found.error).all()

@@ -46,7 +46,7 @@ def test_steps_are_halved_where_that_is_needed_alone():
 
 def test_a_force_without_bound_has_no_derivative():
     surface = Surface(0.8, 0.01, 2.0, 1.0, 3.0)
-    with pytest.raises(ConvergenceError, match="no derivative of force by mean_separation was found") as caught:
+    with pytest.raises(ConvergenceError, match="no derivative of pressure by mean_separation was found") as caught:
         contact(surface, mean_separation=[0.0, 1.0], theory="calibrated", derivatives=True)
     assert caught.value.mask.tolist() == [True, False]
 
@@ -58,10 +58,10 @@ def test_forces_that_no_gap_resolves_are_refused(theory, cap):
     if theory == "mbma":
         # lighter than what is left where h_max - u is rounding
         with pytest.raises(
-            ConvergenceError, match="the separation at this force was not found for 1 entries"
+            ConvergenceError, match="the separation at this pressure was not found for 1 entries"
         ) as caught:
             contact(surface, pressure=[1e-150, 1e-3], theory=theory, hardness=cap)
         assert caught.value.mask.tolist() == [True, False]
     else:
         found = contact(surface, pressure=[1e-150, 1e-3], theory=theory, hardness=cap)
-        assert found.force == pytest.approx([1e-150, 1e-3], rel=1e-10)
+        assert found.pressure == pytest.approx([1e-150, 1e-3], rel=1e-10)

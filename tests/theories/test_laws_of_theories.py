@@ -67,10 +67,10 @@ def test_within_its_bound_of_the_theory(theory, surface, rtol):
     true = chosen.answer(surface, u)
     own = np.nan_to_num(true.error).max()
     assert law.error <= max(rtol, 0.1 * own) + own + 1e-15
-    for found, wanted in ((law.force(u=u) / MODULUS, true.force), (law.area(u=u), true.area)):
+    for found, wanted in ((law.pressure(u) / MODULUS, true.pressure), (law.area(u), true.area)):
         assert np.abs(found / wanted - 1).max() <= law.error
     if isinstance(chosen, Persson | GreenwoodWilliamson) and rtol == 1e-8:
-        assert law.stiffness(u=u) / MODULUS == pytest.approx(true.stiffness, rel=2e-6)
+        assert law.stiffness(u) / MODULUS == pytest.approx(true.stiffness, rel=2e-6)
     assert (law.theory, law.variant, law.island_model) == (chosen.name, "", "")
 
 
@@ -78,8 +78,8 @@ def test_within_its_bound_of_the_theory(theory, surface, rtol):
 def test_force_and_stiffness_rise_with_compression(theory):
     law = law_of(theory)
     u = np.linspace(*places(law, 2)[[0, -1]], 3000)[::-1]
-    assert (np.diff(law.force(u=u)) > 0).all()
-    assert (np.diff(law.stiffness(u=u)) > 0).all()
+    assert (np.diff(law.pressure(u)) > 0).all()
+    assert (np.diff(law.stiffness(u)) > 0).all()
     assert law.turning_point is law.area_turning_point is law.softening is None
 
 
@@ -89,48 +89,50 @@ def test_slopes_and_energy_are_those_of_the_force(theory):
     d = 2 * np.array([0.9, 2.0, 3.3, 4.4]) - law.h_max
     step = 1e-4
     for value, slope in with_slopes(law):
-        assert slope(d) == pytest.approx((value(d - step) - value(d + step)) / (2 * step), rel=1e-6)
+        assert slope(separation=d) == pytest.approx(
+            (value(separation=d - step) - value(separation=d + step)) / (2 * step), rel=1e-6
+        )
     end = law.h_max if law.highest == math.inf else law.highest
-    for gap, energy in zip(d, law.energy(d), strict=True):
-        work = quad(law.force, gap, min(end, gap + 60), epsabs=0, epsrel=1e-9, limit=400)[0]
+    for gap, energy in zip(d, law.energy(separation=d), strict=True):
+        work = quad(lambda d: law.pressure(separation=d), gap, min(end, gap + 60), epsabs=0, epsrel=1e-9, limit=400)[0]
         assert energy == pytest.approx(work / 2, rel=1e-6)
     # over the mean separation, which moves half as far
     u = (law.h_max + d) / 2
-    assert law.energy(d) == pytest.approx(MODULUS * get_theory(theory).energy(SURFACE, u), rel=1e-6)
+    assert law.energy(separation=d) == pytest.approx(MODULUS * get_theory(theory).energy(SURFACE, u), rel=1e-6)
 
 
 @each
 def test_inverses(theory):
     law = law_of(theory)
     u = places(law, 3)
-    for name in ("force", "area"):
-        wanted = getattr(law, name)(u=u)
+    for name in ("pressure", "area"):
+        wanted = getattr(law, name)(u)
         gaps = law.separation(**{name: wanted})
-        assert getattr(law, name)(gaps) == pytest.approx(wanted, rel=1e-12)
-    found = law.at_pressure(law.force(u=u))
+        assert getattr(law, name)(separation=gaps) == pytest.approx(wanted, rel=1e-12)
+    found = law.at_pressure(law.pressure(u))
     # rounding of h_max - u limits the depth below first contact
     assert found.mean_separation == pytest.approx(u, abs=1e-12 * law.h_max)
     assert (found.mean_separation == (law.h_max + found.separation) / 2).all()
-    assert found.area == pytest.approx(law.area(u=u), rel=1e-9)
-    assert found.stiffness == pytest.approx(law.stiffness(u=u), rel=1e-6)
+    assert found.area == pytest.approx(law.area(u), rel=1e-9)
+    assert found.stiffness == pytest.approx(law.stiffness(u), rel=1e-6)
 
 
 def test_no_load_and_no_contact():
     law = contact_law(SURFACE, theory=Cones())
-    assert law.separation(force=0.0) == law.h_max
-    assert law.force([law.h_max, 2 * law.h_max]).tolist() == [0, 0]
-    assert law.energy(law.h_max) == law.stiffness(law.h_max) == 0
-    tiny = law.separation(force=1e-12)
-    assert law.force(tiny) == pytest.approx(1e-12, rel=1e-5)
+    assert law.separation(pressure=0.0) == law.h_max
+    assert law.pressure(separation=[law.h_max, 2 * law.h_max]).tolist() == [0, 0]
+    assert law.energy(separation=law.h_max) == law.stiffness(separation=law.h_max) == 0
+    tiny = law.separation(pressure=1e-12)
+    assert law.pressure(separation=tiny) == pytest.approx(1e-12, rel=1e-5)
     endless = contact_law(SURFACE, theory="persson")
-    assert endless.force(u=2 * endless.h_max) > 0
-    for asked in ({"force": 0.0}, {"force": 1e-60}, {"area": 1.0}, {"force": -1.0}):
+    assert endless.pressure(2 * endless.h_max) > 0
+    for asked in ({"pressure": 0.0}, {"pressure": 1e-60}, {"area": 1.0}, {"pressure": -1.0}):
         with pytest.raises(OutOfRangeError):
             endless.separation(**asked)
     with pytest.raises(OutOfRangeError, match="where the theory ends"):
-        endless.force(u=0.0)
+        endless.pressure(0.0)
     with pytest.raises(OutOfRangeError, match="where the law ends"):
-        endless.force(u=100 * endless.h_max)
+        endless.pressure(100 * endless.h_max)
 
 
 def test_a_force_that_turns_and_a_stiffness_that_passes_its_maximum():
@@ -139,10 +141,10 @@ def test_a_force_that_turns_and_a_stiffness_that_passes_its_maximum():
     assert law.turning_point == pytest.approx(2 * 1.0 - 3.0, abs=1e-6)
     assert law.area_turning_point is None
     assert law.softening == pytest.approx(2.0, abs=1e-4)
-    assert law.separation(force=law.force(u=1.5)) == pytest.approx(0.0, abs=1e-10)
-    assert law.separation(force=law.force(u=0.5)) > law.turning_point
+    assert law.separation(pressure=law.pressure(1.5)) == pytest.approx(0.0, abs=1e-10)
+    assert law.separation(pressure=law.pressure(0.5)) > law.turning_point
     with pytest.raises(OutOfRangeError, match="where the branch ends"):
-        law.separation(force=4.1)
+        law.separation(pressure=4.1)
 
 
 @pytest.mark.parametrize("surface", [SURFACE, STEEP, FINE, Surface.named("concrete")])
@@ -150,7 +152,7 @@ def test_softening_of_mbma_is_where_its_stiffness_is_largest(surface):
     law = contact_law(surface)
     assert law.theory == "mbma"
     assert law.softening == pytest.approx(float(Mbma().softening(surface)), rel=1e-4)
-    sides = law.stiffness(u=law.softening + np.array([-0.05, 0, 0.05]) * law.h_max)
+    sides = law.stiffness(law.softening + np.array([-0.05, 0, 0.05]) * law.h_max)
     assert sides[1] > max(sides[0], sides[2])
 
 
@@ -158,31 +160,35 @@ def test_mbma_by_object_and_by_mean_separation():
     law = contact_law(SURFACE, 1e-6, "rigid", "printed")
     same = contact_law(SURFACE, 1e-6, theory=Mbma("rigid", "printed"))
     d = np.array([0.5, 2.0])
-    assert law.force(d).tolist() == same.force(d).tolist() == law.force(u=(law.h_max + d) / 2).tolist()
-    point = law.at_pressure(law.force(d))
-    assert point.force.tolist() == law.force(d).tolist()
-    assert point.mean_pressure == pytest.approx(law.force(d) / law.area(d), rel=1e-9)
+    assert (
+        law.pressure(separation=d).tolist()
+        == same.pressure(separation=d).tolist()
+        == law.pressure((law.h_max + d) / 2).tolist()
+    )
+    point = law.at_pressure(law.pressure(separation=d))
+    assert point.pressure.tolist() == law.pressure(separation=d).tolist()
+    assert point.mean_pressure == pytest.approx(law.pressure(separation=d) / law.area(separation=d), rel=1e-9)
     assert point.separation == pytest.approx(d, rel=1e-12)
-    assert point.stiffness == pytest.approx(law.stiffness(d), rel=1e-9)
-    with pytest.raises(InputError, match="give one of them"):
-        law.force(0.5, u=1.0)
+    assert point.stiffness == pytest.approx(law.stiffness(separation=d), rel=1e-9)
+    with pytest.raises(InputError, match="one of them"):
+        law.pressure(0.5, separation=1.0)
 
 
 @each
 def test_forms_of_input_and_a_pickle(theory):
     law = law_of(theory)
-    expected = law.force(1.0)
+    expected = law.pressure(separation=1.0)
     assert np.shape(expected) == ()
-    assert law(1.0) == law.force(u=(law.h_max + 1.0) / 2) == expected
-    assert law.force([[1.0], [2.0]]).shape == (2, 1)
-    labelled = law.area(u=xr.DataArray([2.0, 3.0], dims="gap", coords={"gap": [1, 2]}))
+    assert law(separation=1.0) == law.pressure((law.h_max + 1.0) / 2) == expected
+    assert law.pressure(separation=[[1.0], [2.0]]).shape == (2, 1)
+    labelled = law.area(xr.DataArray([2.0, 3.0], dims="gap", coords={"gap": [1, 2]}))
     assert labelled.dims == ("gap",)
-    assert labelled.values.tolist() == law.area(u=[2.0, 3.0]).tolist()
-    gap = law.separation(force=law.force(xr.DataArray([1.0], dims="gap")))
+    assert labelled.values.tolist() == law.area([2.0, 3.0]).tolist()
+    gap = law.separation(pressure=law.pressure(separation=xr.DataArray([1.0], dims="gap")))
     assert gap.values == pytest.approx([1.0], rel=1e-10)
     back = pickle.loads(pickle.dumps(law))
     assert isinstance(back, ContactLaw)
-    assert back.energy([0.0, 1.0]).tolist() == law.energy([0.0, 1.0]).tolist()
+    assert back.energy(separation=[0.0, 1.0]).tolist() == law.energy(separation=[0.0, 1.0]).tolist()
 
 
 def test_a_law_is_the_contact():

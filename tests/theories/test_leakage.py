@@ -161,8 +161,8 @@ def over_bound(law, shares):
     """Largest error of a law's leakage over that stated, at shares of the gaps that are not blocked."""
     low, high = max(law.leakage.blocked_at, law.lowest), min(law.h_max, law.highest)
     d = low + (high - low) * shares
-    expected = law.surface.h_rms**3 * flow(law.surface, (law.h_max + d) / 2, law.area(d))
-    return np.abs(law.leakage(d) / expected - 1).max() / law.leakage.error
+    expected = law.surface.h_rms**3 * flow(law.surface, (law.h_max + d) / 2, law.area(separation=d))
+    return np.abs(law.leakage(separation=d) / expected - 1).max() / law.leakage.error
 
 
 class TestLaw:
@@ -178,25 +178,27 @@ class TestLaw:
         rng = np.random.default_rng(6)
         # from 1e-4 of the law above its blocked gap: nearer, the law's own error of the area is more than the rest
         d = low + (high - low) * np.concatenate([rng.uniform(1e-4, 1, 100), 10 ** rng.uniform(-4, 0, 100)])
-        found, expected = law.leakage(d), contact(surface, separation=d, theory=theory).leakage.conductance
+        found, expected = law.leakage(separation=d), contact(surface, separation=d, theory=theory).leakage.conductance
         np.testing.assert_allclose(found, expected, rtol=law.leakage.error + 2e-5)
         assert law.leakage.error < 2e-4
-        np.testing.assert_allclose(law.leakage(u=(d + law.h_max) / 2), found, rtol=1e-9)
+        np.testing.assert_allclose(law.leakage((d + law.h_max) / 2), found, rtol=1e-9)
 
     def test_blocked_below_its_gap_and_apart_above_h_max(self):
         law = contact_law(SEAL, E_star=10.0, theory="calibrated")
         at = law.leakage.blocked_at
-        assert law.area(at) == pytest.approx(shipped_flow().constants.threshold, rel=1e-9)
-        assert law.leakage([law.lowest, at - 0.1, at]).tolist() == [0.0, 0.0, 0.0]
-        assert law.leakage(at + 1e-6) > 0
+        assert law.area(separation=at) == pytest.approx(shipped_flow().constants.threshold, rel=1e-9)
+        assert law.leakage(separation=[law.lowest, at - 0.1, at]).tolist() == [0.0, 0.0, 0.0]
+        assert law.leakage(separation=at + 1e-6) > 0
         apart = np.array([3.5, 4.0, 400.0])
         np.testing.assert_allclose(
-            law.leakage(apart), contact(SEAL, separation=apart, theory="calibrated").leakage.conductance, rtol=1e-4
+            law.leakage(separation=apart),
+            contact(SEAL, separation=apart, theory="calibrated").leakage.conductance,
+            rtol=1e-4,
         )
 
     def test_falls_with_pressure_in_units_and_labels(self):
         law = contact_law(SEAL, E_star="10 MPa", theory="calibrated")
-        pressure = np.geomspace(1e-6, law.force(law.leakage.blocked_at), 300)
+        pressure = np.geomspace(1e-6, law.pressure(separation=law.leakage.blocked_at), 300)
         found = law.leakage(pressure=pressure)
         assert np.all(np.diff(found) < 0)
         assert law.leakage(pressure="1 kPa") == pytest.approx(law.leakage(pressure=1e-3), rel=1e-14)
@@ -208,7 +210,7 @@ class TestLaw:
         # the model's area stays far below the threshold here, and gaps close as u
         law = contact_law(Surface(0.3, 0.02, 160.0, 3.0, 9.0))
         assert law.leakage.blocked_at == -np.inf
-        k = law.leakage(-9.0 + np.array([1e-9, 1e-6]))
+        k = law.leakage(separation=-9.0 + np.array([1e-9, 1e-6]))
         assert k[1] / k[0] == pytest.approx(1e9, rel=1e-4)
 
     def test_of_a_map(self):
@@ -238,8 +240,8 @@ class TestLaw:
 
     def test_one_of_three(self):
         law = contact_law(SEAL, theory="calibrated")
-        for gaps in ({}, {"u": 1.0, "pressure": 1e-3}):
-            with pytest.raises(InputError, match="one of separation, u and pressure"):
+        for gaps in ({}, {"separation": 1.0, "pressure": 1e-3}):
+            with pytest.raises(InputError, match="one of mean_separation, separation and pressure"):
                 law.leakage(**gaps)
 
 
@@ -256,7 +258,7 @@ def test_leakage_is_not_computed_unless_read():
     program = (
         "import sys; from mbma_tables import Surface, contact, contact_law\n"
         "s = Surface(0.8, 0.01, 0.3, 1.0, 3.5)\n"
-        "contact(s, area=0.1, theory='calibrated'), contact_law(s, theory='calibrated').force(1.0)\n"
+        "contact(s, area=0.1, theory='calibrated'), contact_law(s, theory='calibrated').pressure(1.0)\n"
         "print([name for name in sys.modules if 'leak' in name])"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

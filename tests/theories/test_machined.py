@@ -49,16 +49,16 @@ class TestCorrected:
     def part(request):
         values = heights(Part(*request.param))
         surface = Surface.from_map(values, 1.0, periodic=True, unit="um")
-        engine, force = Contact(values, (128.0, 128.0)), law_loads(surface, (0.07, 0.14, 0.35, 0.55))
-        rows = [engine.press(float(each)) for each in force]
-        return surface, force, *np.array([(row["area"], row["mean_separation"]) for row in rows]).T
+        engine, pressure = Contact(values, (128.0, 128.0)), law_loads(surface, (0.07, 0.14, 0.35, 0.55))
+        rows = [engine.press(float(each)) for each in pressure]
+        return surface, pressure, *np.array([(row["area"], row["mean_separation"]) for row in rows]).T
 
     def test_it_is_nearer_than_the_law_and_within_its_scatter(self, part):
-        surface, force, area, u = part
-        found, law = (contact(surface, pressure=force, theory=theory) for theory in ("corrected", "calibrated"))
+        surface, pressure, area, u = part
+        found, law = (contact(surface, pressure=pressure, theory=theory) for theory in ("corrected", "calibrated"))
         assert found.theory == "corrected"
         errors = [
-            (np.log(one.area / area), (one.mean_separation - u) * found.stiffness / force) for one in (found, law)
+            (np.log(one.area / area), (one.mean_separation - u) * found.stiffness / pressure) for one in (found, law)
         ]
         assert np.square(errors[0]).mean() < np.square(errors[1]).mean()
         assert (np.abs(errors[0][0]) < 3 * found.area_scatter).all()
@@ -70,7 +70,7 @@ class TestCorrected:
         theory = of_map("corrected", surface)
         u = np.geomspace(*theory.rows[2, [-1, 0]], 2001)
         found = contact(surface, mean_separation=u, theory="corrected")
-        assert (np.diff(found.force) < 0).all()
-        work = np.sum((found.force[1:] + found.force[:-1]) / 2 * np.diff(u))
+        assert (np.diff(found.pressure) < 0).all()
+        work = np.sum((found.pressure[1:] + found.pressure[:-1]) / 2 * np.diff(u))
         assert work == pytest.approx(np.ptp(theory.rows[3]), rel=0.02)
         assert contact(surface, area=0.1, theory="corrected").leakage.x > 0

@@ -35,7 +35,7 @@ def errors(example):
     surface = Surface.from_map(path, **example.options)
     by_force = contact(surface, pressure=force, theory="calibrated")
     by_gap = contact(surface, mean_separation=u, theory="calibrated")
-    return area, by_force.area / area - 1, by_gap.force / force - 1
+    return area, by_force.area / area - 1, by_gap.pressure / force - 1
 
 
 @pytest.mark.slow
@@ -88,7 +88,7 @@ def test_they_are_answered_without_options(example):
     surface = Surface.from_map(path)
     for theory in ("calibrated", "mbma"):
         found = contact(surface, mean_separation=0.5 * surface.h_max, theory=theory)
-        assert found.force > 0
+        assert found.pressure > 0
         assert found.area > 0
     assert any("area is a matter of resolution" in entry.get("told", "") for entry in surface.provenance)
 
@@ -117,7 +117,7 @@ def test_no_answer_beyond_where_the_tops_and_valleys_of_a_map_leave_no_gap():
     law = contact_law(surface, theory="calibrated")
     last = contact(surface, separation=law.lowest, theory="calibrated")
     assert 0.1 < last.area < 0.12
-    assert law.force(law.lowest) == pytest.approx(last.force, rel=1e-6)
+    assert law.pressure(separation=law.lowest) == pytest.approx(last.pressure, rel=1e-6)
 
 
 def test_one_stiffness_over_a_range_of_forces_is_told():
@@ -168,4 +168,4 @@ def test_a_spoilt_map_answers_as_the_clean_one(seed):
     assert area[-1] > 0.57
     surface = Surface.from_map(spoilt(heights, seed), STEP, outliers=10, short_cutoff=8 * STEP * (1 - 1e-9))
     np.testing.assert_allclose(contact(surface, pressure=force, theory="calibrated").area, area, rtol=0.10)
-    np.testing.assert_allclose(contact(surface, mean_separation=u, theory="calibrated").force, force, rtol=0.20)
+    np.testing.assert_allclose(contact(surface, mean_separation=u, theory="calibrated").pressure, force, rtol=0.20)

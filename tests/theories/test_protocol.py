@@ -22,7 +22,8 @@ def test_stiffness_is_the_slope_of_force(theory):
     step = 1e-4 * u
     # Richardson's two central differences: error of order step^4
     coarse, fine = (
-        (theory.answer(SURFACE, u - h).force - theory.answer(SURFACE, u + h).force) / (2 * h) for h in (step, step / 2)
+        (theory.answer(SURFACE, u - h).pressure - theory.answer(SURFACE, u + h).pressure) / (2 * h)
+        for h in (step, step / 2)
     )
     assert theory.answer(SURFACE, u).stiffness == pytest.approx((4 * fine - coarse) / 3, rel=1e-5)
 
@@ -31,10 +32,10 @@ def test_mbma_inverts_and_integrates_as_its_law_does():
     law, theory = contact_law(SURFACE), Mbma()
     d = 2 * SHARES * SURFACE.h_max - SURFACE.h_max
     u = SHARES * SURFACE.h_max
-    assert theory.answer(SURFACE, u).stiffness == pytest.approx(law.stiffness(d), rel=1e-5)
-    assert theory.energy(SURFACE, u) == pytest.approx(law.energy(d), rel=1e-7)
-    loads = law.force(d)
-    assert theory.mean_separation_at(SURFACE, "force", loads) == pytest.approx(u, rel=1e-7)
+    assert theory.answer(SURFACE, u).stiffness == pytest.approx(law.stiffness(separation=d), rel=1e-5)
+    assert theory.energy(SURFACE, u) == pytest.approx(law.energy(separation=d), rel=1e-7)
+    loads = law.pressure(separation=d)
+    assert theory.mean_separation_at(SURFACE, "pressure", loads) == pytest.approx(u, rel=1e-7)
 
 
 def test_mbma_ends_where_its_force_turns():
@@ -57,7 +58,7 @@ def test_softening_is_the_maximum_of_stiffness():
 
 def test_a_load_beyond_the_branch_is_refused():
     with pytest.raises(OutOfRangeError, match="'mbma' reaches"):
-        Mbma().mean_separation_at(SURFACE, "force", np.array(1.0))
+        Mbma().mean_separation_at(SURFACE, "pressure", np.array(1.0))
     with pytest.raises(OutOfRangeError, match="below 1"):
         Persson().mean_separation_at(SURFACE, "area", np.array(1.0))
 
@@ -66,9 +67,9 @@ def test_a_users_own_object_is_a_theory():
     theory = get_theory(Springs())
     u = np.array([0.5, 2.0])
     found = theory.answer(SURFACE, u)
-    assert found.stiffness == pytest.approx(3 / SURFACE.h_rms * found.force, rel=1e-8)
-    assert theory.mean_separation_at(SURFACE, "force", found.force) == pytest.approx(u, rel=1e-10)
-    work = (found.force - np.exp(-3 * SURFACE.h_max / SURFACE.h_rms)) * SURFACE.h_rms / 3
+    assert found.stiffness == pytest.approx(3 / SURFACE.h_rms * found.pressure, rel=1e-8)
+    assert theory.mean_separation_at(SURFACE, "pressure", found.pressure) == pytest.approx(u, rel=1e-10)
+    work = (found.pressure - np.exp(-3 * SURFACE.h_max / SURFACE.h_rms)) * SURFACE.h_rms / 3
     assert theory.energy(SURFACE, u) == pytest.approx(work, rel=1e-8)
 
 

@@ -33,7 +33,7 @@ def truth():
 def test_it_answers_what_was_simulated(truth):
     force, area, u, _ = truth.rows
     found = contact(truth.surface, mean_separation=u, theory=truth)
-    np.testing.assert_allclose(found.force, force, rtol=1e-9)
+    np.testing.assert_allclose(found.pressure, force, rtol=1e-9)
     np.testing.assert_allclose(found.area, area, rtol=1e-9)
     # the last load is beyond what was tested
     assert found.valid.tolist() == [True] * 7 + [False]
@@ -45,7 +45,7 @@ def test_force_is_the_energys_slope(truth):
     # two things that the simulation measures apart
     _, _, u, energy = truth.rows
     fine = np.geomspace(u[-1], u[0], 4001)
-    force = contact(truth.surface, mean_separation=fine, theory=truth).force
+    force = contact(truth.surface, mean_separation=fine, theory=truth).pressure
     work = np.sum((force[1:] + force[:-1]) / 2 * np.diff(fine))
     assert work == pytest.approx(energy[-1] - energy[0], rel=0.01)
     np.testing.assert_allclose(truth.energy(truth.surface, u), energy, rtol=1e-9)
@@ -60,7 +60,7 @@ def over_bound(heights, loads, shares):
     theory = BoundaryElements(finer.surface, *finer.rows[:, ::2], elements=heights.size)
     force, area, u, _ = finer.rows[:, 1::2]
     found = contact(finer.surface, mean_separation=u, theory=theory)
-    return np.maximum(np.abs(found.force / force - 1), np.abs(found.area / area - 1)) / found.error, found.error
+    return np.maximum(np.abs(found.pressure / force - 1), np.abs(found.area / area - 1)) / found.error, found.error
 
 
 @pytest.mark.parametrize("phases", [False, True])
@@ -94,7 +94,7 @@ def test_a_law_of_light_loads_alone(truth):
     law = contact_law(few.surface, theory=few)
     assert law.lowest == pytest.approx(2 * truth.rows[2, 3] - few.surface.h_max)
     assert 0.01 < law.error < 1
-    np.testing.assert_allclose(law.force(u=truth.rows[2, 1:3]), truth.rows[0, 1:3], rtol=law.error)
+    np.testing.assert_allclose(law.pressure(truth.rows[2, 1:3]), truth.rows[0, 1:3], rtol=law.error)
 
 
 def test_what_was_not_simulated_is_refused(truth):
@@ -123,17 +123,21 @@ def test_a_map_is_continued_by_its_mirror_images():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"force": [1.0, 2.0, 3.0]}, "at least 4 loads"),
-        ({"force": [1.0, 2.0, 2.0, 3.0]}, "force must be rising"),
+        ({"pressure": [1.0, 2.0, 3.0]}, "at least 4 loads"),
+        ({"pressure": [1.0, 2.0, 2.0, 3.0]}, "pressure must be rising"),
         ({"area": [0.0, 0.1, 0.2, 0.3]}, "loads must be positive"),
         ({"area": [0.2, 0.1, 0.2, 0.3]}, "area must be rising"),
         ({"mean_separation": [1.0, 2.0, 3.0, 4.0]}, "mean_separation must be falling"),
     ],
 )
 def test_rows_that_make_no_law(truth, change, message):
-    rows = {"force": [1e-3, 0.01, 0.02, 0.1], "area": [0.01, 0.02, 0.1, 0.2], "mean_separation": [4.0, 3.0, 2.0, 1.0]}
+    rows = {
+        "pressure": [1e-3, 0.01, 0.02, 0.1],
+        "area": [0.01, 0.02, 0.1, 0.2],
+        "mean_separation": [4.0, 3.0, 2.0, 1.0],
+    }
     columns = rows | {"energy": [1.0, 2.0, 3.0, 4.0]} | change
-    if len(columns["force"]) == 3:
+    if len(columns["pressure"]) == 3:
         columns = {name: column[:3] for name, column in columns.items()}
     with pytest.raises(InputError, match=message):
         BoundaryElements(truth.surface, **columns)

@@ -20,8 +20,14 @@ SLOW = [pytest.param(name, marks=pytest.mark.slow if name == "persson" else ()) 
 def test_answers_scale_as_they_must(theory, by):
     """Another unit of length or stress changes no ratio, whatever the theory."""
     found = sensitivity(SURFACE, **{by: HELD[by]}, E_star="10 GPa", theory=theory)
-    lengths = {"mean_separation": (1, 0), "force": (0, 1), "area": (0, 0), "stiffness": (-1, 1), "conductance": (-1, 0)}
-    assert set(found.answers) == set(lengths) - {{"pressure": "force"}.get(by, by)}
+    lengths = {
+        "mean_separation": (1, 0),
+        "pressure": (0, 1),
+        "area": (0, 0),
+        "stiffness": (-1, 1),
+        "conductance": (-1, 0),
+    }
+    assert set(found.answers) == set(lengths) - {{"pressure": "pressure"}.get(by, by)}
     for answer in found.answers:
         slope = {name: row[answer] for name, row in found.slopes.items()}
         length = slope["h_rms"] + slope["h_max"] + slope.get("mean_separation", 0) - slope["q0"] - slope["q1"]
@@ -42,7 +48,9 @@ def test_derivatives_of_the_model(by):
         number = getattr(SURFACE, name)
         assert found.slopes[name]["area"] == pytest.approx(exact.area_by[name] * number / exact.area, abs=1e-5)
         if by == "separation":
-            assert found.slopes[name]["force"] == pytest.approx(exact.force_by[name] * number / exact.force, abs=1e-5)
+            assert found.slopes[name]["pressure"] == pytest.approx(
+                exact.pressure_by[name] * number / exact.pressure, abs=1e-5
+            )
         else:
             # u = (h_max + d)/2
             moved = (exact.separation_by[name] + (name == "h_max")) / 2 * number / exact.mean_separation
@@ -87,7 +95,7 @@ def test_a_hurst_exponent_of_one_is_stepped_down_from():
     smooth = Surface(1.0, 0.06, 12.0, 0.5, 1.7)
     found = sensitivity(smooth, mean_separation=1.1)
     exact = contact(smooth, mean_separation=1.1, derivatives=True)
-    assert found.slopes["hurst"]["force"] == pytest.approx(exact.force_by["hurst"] / exact.force, rel=1e-4)
+    assert found.slopes["hurst"]["pressure"] == pytest.approx(exact.pressure_by["hurst"] / exact.pressure, rel=1e-4)
     assert "E_star" not in found.parameters
 
 

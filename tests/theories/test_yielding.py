@@ -27,7 +27,7 @@ def test_without_yielding_answers_are_elastic_to_the_last_bit(theory):
     elastic = contact(SURFACE, mean_separation=u, E_star=MODULUS, theory=theory)
     for cap in (np.inf, [np.inf, np.inf, HARDNESS]):
         found = contact(SURFACE, mean_separation=u, E_star=MODULUS, theory=theory, hardness=cap)
-        for name in ("force", "area", "stiffness", "error", "incremental_stiffness"):
+        for name in ("pressure", "area", "stiffness", "error", "incremental_stiffness"):
             # MBMA's sums with derivatives, which yielding needs, add in another order than those without
             rel = (1e-8 if name == "error" else 1e-14) if theory == "mbma" and np.ndim(cap) else 0
             assert getattr(found, name)[:2] == pytest.approx(getattr(elastic, name)[:2], rel=rel, abs=0), name
@@ -42,7 +42,7 @@ def test_soft_metal_follows_the_bearing_curve(theory):
     found = contact(SURFACE, mean_separation=u, E_star=MODULUS, theory=theory, hardness=cap)
     ends = get_theory(theory).ends_at_h_max
     share = hardness.bearing_share(u, 3.0 if ends else None)[0]
-    assert found.force == pytest.approx(cap * share, rel=0.01)
+    assert found.pressure == pytest.approx(cap * share, rel=0.01)
     assert found.area == pytest.approx(share, rel=0.01)
     assert found.yielded == pytest.approx(np.ones(4), rel=1e-9)
 
@@ -51,7 +51,7 @@ def test_soft_metal_follows_the_bearing_curve(theory):
 def test_pressure_is_inverted_and_slopes_are_those_of_the_curve(theory):
     pressure = np.array([1e-3, 1.0, 30.0, 300.0])
     found = contact(SURFACE, pressure=pressure, E_star=MODULUS, theory=theory, hardness=HARDNESS)
-    assert found.force == pytest.approx(pressure, rel=1e-10)
+    assert found.pressure == pytest.approx(pressure, rel=1e-10)
     assert (found.area >= pressure / HARDNESS * (1 - 1e-10)).all()
     assert (found.mean_pressure <= HARDNESS * (1 + 1e-12)).all()
     step = 1e-5
@@ -66,7 +66,7 @@ def test_pressure_is_inverted_and_slopes_are_those_of_the_curve(theory):
         for way in (-1, 1)
     ]
     kept = found.mean_separation < 3.0 - 100 * step
-    slope = (near[0].force - near[1].force) / (2 * step)
+    slope = (near[0].pressure - near[1].pressure) / (2 * step)
     assert found.stiffness[kept] == pytest.approx(slope[kept], rel=1e-5)
     assert (found.incremental_stiffness > found.stiffness).all()
     assert (found.plane_separation <= found.mean_separation).all()
@@ -80,11 +80,11 @@ def test_many_pressures_on_one_surface(theory, cap):
         # beyond the gaps from which others start
         share = np.append(share, [1e-12, min(0.99, 0.1 / cap)])
     asked = Yielding(get_theory(theory), cap)
-    u = asked.mean_separation_at(SURFACE, "force", cap * share)
+    u = asked.mean_separation_at(SURFACE, "pressure", cap * share)
     found = asked.answer(SURFACE, u)
     # but for the last bits of u
     rounding = 16 * np.finfo(float).eps * (cap * share + u * found.stiffness)
-    assert (np.abs(found.force - cap * share) <= rounding + 1e-12 * cap * share).all()
+    assert (np.abs(found.pressure - cap * share) <= rounding + 1e-12 * cap * share).all()
 
 
 def test_ten_thousand_contacts_keep_bounds_and_order():
@@ -102,17 +102,17 @@ def test_ten_thousand_contacts_keep_bounds_and_order():
         return found.answer, found.yielded * found.answer.area
 
     answer, yielded = state(eta, u)
-    x = answer.force / eta
+    x = answer.pressure / eta
     assert (answer.area >= x * (1 - 1e-15)).all()
     assert (answer.area <= 1).all()
     assert (yielded <= x * (1 + 1e-14)).all()
     for closer, harder in ((0.99, 1.0), (1.0, 1.05)):
         other, _ = state(eta * harder, u * closer)
-        assert (other.force >= answer.force * (1 - 1e-13)).all()
+        assert (other.pressure >= answer.pressure * (1 - 1e-13)).all()
     # at one force: more area under more load, less of it if harder
-    elastic = theory.area_at(surface, answer.force)
-    force, cap = answer.force / surface.rms_gradient, eta / surface.rms_gradient
-    more = theory.area_at(surface, 1.01 * answer.force)
+    elastic = theory.area_at(surface, answer.pressure)
+    force, cap = answer.pressure / surface.rms_gradient, eta / surface.rms_gradient
+    more = theory.area_at(surface, 1.01 * answer.pressure)
     assert (hardness.area(np.minimum(1.01 * force, cap), more, cap) >= answer.area * (1 - 1e-12)).all()
     harder = hardness.area(force, elastic, 1.05 * cap)
     assert (harder <= answer.area * (1 + 1e-12)).all()
@@ -125,8 +125,8 @@ def test_a_law_with_a_hardness_is_a_law():
     found = contact(SURFACE, pressure=pressure, E_star=MODULUS, theory="calibrated", hardness=HARDNESS)
     again = law.at_pressure(pressure)
     assert again.mean_separation == pytest.approx(found.mean_separation, rel=1e-4)
-    assert law.area(u=found.mean_separation) == pytest.approx(found.area, rel=1e-4)
-    assert pickle.loads(pickle.dumps(law)).force(u=1.0) == law.force(u=1.0)
+    assert law.area(found.mean_separation) == pytest.approx(found.area, rel=1e-4)
+    assert pickle.loads(pickle.dumps(law)).pressure(1.0) == law.pressure(1.0)
     with pytest.raises(InputError, match="hardness must be one number"):
         contact_law(SURFACE, theory="calibrated", hardness=[0.01, 0.02])
 
@@ -138,8 +138,8 @@ def test_a_law_of_mbma_with_a_hardness_ends_before_full_compression():
     assert law.lowest == pytest.approx((2e-6 - 1) * surface.h_max)
     u = np.geomspace(1e-6, 0.999, 200) * surface.h_max
     found = contact(surface, mean_separation=u, hardness=0.5)
-    np.testing.assert_allclose(law.force(u=u), found.force, rtol=1e-7)
-    np.testing.assert_allclose(law.area(u=u), found.area, rtol=1e-7)
+    np.testing.assert_allclose(law.pressure(u), found.pressure, rtol=1e-7)
+    np.testing.assert_allclose(law.area(u), found.area, rtol=1e-7)
 
 
 def test_batches_labels_and_units():
@@ -175,7 +175,7 @@ def test_a_map_yields_by_its_own_heights():
     u = np.maximum(level - (heights - heights.mean()), 0).mean()
     found = contact(surface, mean_separation=u, theory="calibrated", hardness=soft)
     assert found.area == pytest.approx(0.2, rel=0.03)
-    assert found.scatter < shipped().standard_deviation("calibrated", "force", found.area)
+    assert found.scatter < shipped().standard_deviation("calibrated", "pressure", found.area)
     # single points at the top of a map make no steps in a law
     law = contact_law(surface, theory="calibrated", hardness=0.3 * float(surface.rms_gradient), rtol=1e-3)
     assert law.turning_point is None
@@ -258,15 +258,15 @@ def test_hardnesses_of_any_size(theory, cap):
         asked, expected = [{"pressure": 0.1 * cap}, {"mean_separation": 1.5}, {"area": 0.1}], None
     else:
         elastic = contact(SURFACE, mean_separation=1.5, theory=theory)
-        asked = [{"pressure": elastic.force}, {"mean_separation": 1.5}, {"area": elastic.area}]
+        asked = [{"pressure": elastic.pressure}, {"mean_separation": 1.5}, {"area": elastic.area}]
         expected = elastic
     for one in asked:
         found = contact(SURFACE, **one, theory=theory, hardness=cap)
         if expected is None:
-            assert found.area == pytest.approx(found.force / cap, rel=1e-2 if cap < 1e-310 else 1e-12)
+            assert found.area == pytest.approx(found.pressure / cap, rel=1e-2 if cap < 1e-310 else 1e-12)
             assert found.yielded == pytest.approx(1, rel=1e-2 if cap < 1e-310 else 1e-12)
         else:
-            for name in ("mean_separation", "force", "area", "stiffness", "incremental_stiffness"):
+            for name in ("mean_separation", "pressure", "area", "stiffness", "incremental_stiffness"):
                 assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-10), name
             assert found.yielded == 0
 
@@ -289,7 +289,7 @@ def test_batches_are_their_contacts_one_by_one(theory, cap):
         for k in range(3):
             one = Surface(*(float(np.broadcast_to(getattr(batch, name), 3)[k]) for name in batch.parameters))
             alone = contact(one, **{name: values[k] for name, values in asked.items()}, **options)
-            for name in ("mean_separation", "force", "area", "stiffness", "incremental_stiffness"):
+            for name in ("mean_separation", "pressure", "area", "stiffness", "incremental_stiffness"):
                 assert getattr(whole, name)[k] == pytest.approx(getattr(alone, name), rel=1e-9), name
 
 
@@ -323,8 +323,8 @@ def test_a_law_by_persson_with_a_hardness():
     law = contact_law(SURFACE, theory="persson", E_star=MODULUS, hardness=HARDNESS)
     u = np.geomspace(1e-5, 29, 20)
     found = contact(SURFACE, mean_separation=u, theory="persson", E_star=MODULUS, hardness=HARDNESS)
-    np.testing.assert_allclose(law.force(u=u), found.force, rtol=law.error)
-    np.testing.assert_allclose(law.area(u=u), found.area, rtol=law.error)
+    np.testing.assert_allclose(law.pressure(u), found.pressure, rtol=law.error)
+    np.testing.assert_allclose(law.area(u), found.area, rtol=law.error)
 
 
 @each
@@ -342,11 +342,11 @@ def test_derivatives_by_the_modulus_hold_the_hardness(theory):
 @each
 def test_pressures_short_of_the_hardness_are_held_or_refused(theory):
     concrete, known = Surface.named("concrete"), {"theory": theory, "hardness": 0.02}
-    deepest = contact(concrete, mean_separation=1e-9 * concrete.h_rms, **known).force
+    deepest = contact(concrete, mean_separation=1e-9 * concrete.h_rms, **known).pressure
     for share in (0.9, 0.9795, 0.99995, 1 - 5e-9):
         if 0.02 * share < deepest or (theory == "calibrated" and share < 1 - 1e-6):
             found = contact(concrete, pressure=0.02 * share, **known)
-            assert found.force == pytest.approx(0.02 * share, rel=1e-11)
+            assert found.pressure == pytest.approx(0.02 * share, rel=1e-11)
         else:
             with pytest.raises(OutOfRangeError, match="must be at most what theory"):
                 contact(concrete, pressure=0.02 * share, **known)
@@ -368,5 +368,5 @@ def test_the_lightest_pressures_are_held():
     surface = Surface(hurst=0.096, q0=0.0015, q1=0.27, h_rms=0.043, h_max=0.3)
     cap = 0.3 * float(surface.rms_gradient)
     for depth in np.geomspace(1e-5, 1e-3, 9):
-        force = contact(surface, mean_separation=0.3 * (1 - depth), hardness=cap).force
-        assert contact(surface, pressure=force, hardness=cap).force == pytest.approx(force, rel=1e-9)
+        force = contact(surface, mean_separation=0.3 * (1 - depth), hardness=cap).pressure
+        assert contact(surface, pressure=force, hardness=cap).pressure == pytest.approx(force, rel=1e-9)

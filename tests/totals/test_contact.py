@@ -86,9 +86,9 @@ def test_against_brute_force(hurst, zeta_1, share, variant):
     separation = share * surface.h_max
     found = contact(surface, separation=separation, variant=variant, rtol=1e-9)
     force, area = brute(surface, separation, variant)
-    assert abs(found.force / force - 1) <= 1e-9
+    assert abs(found.pressure / force - 1) <= 1e-9
     assert abs(found.area / area - 1) <= 1e-9
-    assert max(abs(found.force / force - 1), abs(found.area / area - 1)) <= found.error + 5e-12
+    assert max(abs(found.pressure / force - 1), abs(found.area / area - 1)) <= found.error + 5e-12
 
 
 @functools.cache
@@ -105,7 +105,7 @@ def fine_contact(variant, count):
 def test_bound_covers_the_true_error(variant, count, rtol):
     surfaces, separation, fine = fine_contact(variant, count)
     found = contact(surfaces, separation=separation, variant=variant, rtol=rtol)
-    error = np.maximum(np.abs(found.force / fine.force - 1), np.abs(found.area / fine.area - 1))
+    error = np.maximum(np.abs(found.pressure / fine.pressure - 1), np.abs(found.area / fine.area - 1))
     assert fine.error.max() <= 2e-11
     assert found.error.max() <= rtol
     assert (error <= found.error + fine.error).all()
@@ -113,7 +113,7 @@ def test_bound_covers_the_true_error(variant, count, rtol):
 
 def test_the_papers_yang_persson_case():
     found = contact(Surface.named("yang-persson"), separation=2.0, variant="printed")
-    assert found.force == pytest.approx(2.5114e-5, abs=5e-10)
+    assert found.pressure == pytest.approx(2.5114e-5, abs=5e-10)
     assert found.area == pytest.approx(3.1145e-5, abs=5e-10)
     assert found.mean_separation == 2.5
     assert (found.variant, found.island_model) == ("printed", "exact")
@@ -124,17 +124,17 @@ def test_no_cancellation_next_to_first_contact():
     surface = one_surface(0.8, 216.0, h_max=4.0)
     depth = np.array([2.0**-48, 2.0**-20])
     found = contact(surface, separation=4.0 - depth, rtol=1e-10)
-    assert found.force[0] / found.force[1] == pytest.approx((2.0**-28) ** 3.5, rel=1e-3, abs=0)
+    assert found.pressure[0] / found.pressure[1] == pytest.approx((2.0**-28) ** 3.5, rel=1e-3, abs=0)
 
 
 @pytest.mark.parametrize("island_model", ["exact", "rigid"])
 def test_no_contact_is_exactly_zero(island_model):
     surface = one_surface(0.8, 216.0)
     found = contact(surface, separation=[3.0, math.nextafter(3, 4), 50.0, 1e300], island_model=island_model)
-    assert found.force.tolist() == [0.0] * 4
+    assert found.pressure.tolist() == [0.0] * 4
     assert found.area.tolist() == [0.0] * 4
     assert found.error.tolist() == [0.0] * 4
-    assert contact(surface, separation=math.nextafter(3, 2), island_model=island_model).force > 0
+    assert contact(surface, separation=math.nextafter(3, 2), island_model=island_model).pressure > 0
 
 
 def test_the_argument_stays():
@@ -188,19 +188,19 @@ def test_bad_options(option, value):
 
 
 @pytest.mark.parametrize("island_model", ["universal", "exact", "rigid", "island4d"])
-@pytest.mark.parametrize("wanted", ["force", "area"])
+@pytest.mark.parametrize("wanted", ["pressure", "area"])
 def test_one_quantity_alone(island_model, wanted):
     surface = Surface([0.5, 0.8], 1.0, 100.0, 1.0, 3.0)
     gaps = [1.0, -2.0]
     both = contact_by_island_model(surface, separation=gaps, island_model=island_model)
     alone = contact_by_island_model(surface, separation=gaps, island_model=island_model, quantities=[wanted])
-    other = "area" if wanted == "force" else "force"
+    other = "area" if wanted == "pressure" else "pressure"
     assert getattr(alone, other) is None
     np.testing.assert_allclose(getattr(alone, wanted), getattr(both, wanted), rtol=max(1e-8, 2 * both.error.max()))
     assert alone.islands <= both.islands
 
 
-@pytest.mark.parametrize("wanted", [(), ["force", "stiffness"], "energy"])
+@pytest.mark.parametrize("wanted", [(), ["pressure", "stiffness"], "energy"])
 def test_unknown_quantities(wanted):
     with pytest.raises(InputError, match="quantities must be some of"):
         contact_by_island_model(Surface(0.8, 1.0, 100.0, 1.0, 3.0), separation=1.0, quantities=wanted)
@@ -231,7 +231,7 @@ def test_layout_does_not_matter(kind):
         contact_by_island_model(ROUGH, separation=KINDS[kind]),
         contact_by_island_model(ROUGH, separation=GAPS),
     )
-    np.testing.assert_array_equal(np.ravel(found.force), expected.force)
+    np.testing.assert_array_equal(np.ravel(found.pressure), expected.pressure)
     np.testing.assert_array_equal(np.ravel(found.area), expected.area)
 
 
@@ -243,7 +243,7 @@ def test_few_surfaces_keep_their_bound_with_any_variant(numbers, u):
     surface = Surface(*numbers)
     found = contact_by_island_model(surface, mean_separation=u, variant="fitted")
     known = Mbma(variant="fitted", rtol=1e-11).totals(surface, 2 * u - surface.h_max, derivatives=True)
-    assert abs(found.force / known.force - 1) <= found.error
+    assert abs(found.pressure / known.pressure - 1) <= found.error
 
 
 @pytest.mark.parametrize(
@@ -261,6 +261,6 @@ def test_many_surfaces_keep_their_bound_where_sums_agree_by_chance(variant, numb
     found, known = (
         contact_by_island_model(surfaces, separation=gaps, variant=variant, rtol=asked) for asked in (rtol, 1e-11)
     )
-    for name in ("force", "area"):
+    for name in ("pressure", "area"):
         assert (np.abs(getattr(found, name) / getattr(known, name) - 1) <= found.error).all()
     assert found.error.max() <= rtol

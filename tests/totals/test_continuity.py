@@ -93,10 +93,10 @@ def test_totals_do_not_jump(variant, which, island_model, rtol, count, record_pr
     options = {"variant": variant, "outside": "nan"}
     slopes = [totals_of(side, derivatives=True, **options) for side in (below, above)]
     one, other = (totals_of(side, island_model=island_model, rtol=rtol, **options) for side in (below, above))
-    some = np.isfinite(slopes[0].force) & np.isfinite(slopes[1].force)
+    some = np.isfinite(slopes[0].pressure) & np.isfinite(slopes[1].pressure)
     assert some.mean() > 0.6
     rounded = 8 * EPS * numbers["h_max"] / (numbers["h_max"] - numbers["separation"])
-    for name in ("force", "area"):
+    for name in ("pressure", "area"):
         low, high = (getattr(s, f"{name}_by")[which] * step / getattr(s, name) for s in slopes)
         off = apart(getattr(one, name), getattr(other, name), (low + high) / 2)
         # slopes differ where K1 switches
@@ -123,7 +123,7 @@ def test_totals_of_other_island_models_do_not_jump(island_model, which, record_p
         return totals_of(moved_by(numbers, which, share), island_model=island_model, rtol=1e-7, outside="exact")
 
     one, other = answer(-STEP / 2), answer(STEP / 2)
-    for name in ("force", "area"):
+    for name in ("pressure", "area"):
         off = np.abs(getattr(other, name) / getattr(one, name) - 1)
         assert (off <= one.error + other.error + 2 * own_motion(answer, name)).all()
     record_property("pairs compared", count)
@@ -140,13 +140,13 @@ def test_totals_do_not_jump_where_the_solver_takes_over(record_property):
         inside, outside = np.full(count, 4.5 - 1e-9), np.full(count, -4.4)
         for _ in range(60):
             middle = (inside + outside) / 2
-            gone = np.isnan(contact(surface, separation=middle, variant=variant, outside="nan").force)
+            gone = np.isnan(contact(surface, separation=middle, variant=variant, outside="nan").pressure)
             inside, outside = np.where(gone, inside, middle), np.where(gone, middle, outside)
         one, other = (contact(surface, separation=gap, variant=variant, outside="exact") for gap in (inside, outside))
-        left = np.isnan(contact(surface, separation=outside, variant=variant, outside="nan").force)
+        left = np.isnan(contact(surface, separation=outside, variant=variant, outside="nan").pressure)
         assert left.any()
         own = 10 * np.abs(inside - outside) / (4.5 - inside)
-        for name in ("force", "area"):
+        for name in ("pressure", "area"):
             off = apart(getattr(one, name), getattr(other, name), 0.0)
             assert (off <= one.error + other.error + own)[left].all()
         compared += int(left.sum())
@@ -176,7 +176,7 @@ def test_islands_do_not_jump(which, island_model, rtol, record_property):
 
     one, other = answer(-STEP / 2), answer(STEP / 2)
     for name in ("force", "area", "zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "eta", "X", "mu"):
-        stated = one.error + other.error if name in ("force", "area") else 1e-12
+        stated = one.error + other.error if name in ("pressure", "area") else 1e-12
         off = np.abs(getattr(other, name) / getattr(one, name) - 1)
         assert (off <= stated + 2 * own_motion(answer, name)).all(), name
     record_property("pairs compared", count)
@@ -367,8 +367,8 @@ def test_laws_do_not_jump_at_their_breaks(rtol, record_property):
         gaps = law.h_max - depth
         sides = [gaps - sign * STEP * depth for sign in (-0.5, 0.5)]
         for value, slope in with_slopes(law):
-            a, b = (value(side) for side in sides)
-            own = np.abs([slope(side) for side in sides]).max(axis=0) * 2 * np.abs(sides[1] - sides[0]) / a
+            a, b = (value(separation=side) for side in sides)
+            own = np.abs([slope(separation=side) for side in sides]).max(axis=0) * 2 * np.abs(sides[1] - sides[0]) / a
             assert (np.abs(b / a - 1) <= 2 * law.error + own).all()
         compared += depth.size
     record_property("pairs compared", compared)

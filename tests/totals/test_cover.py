@@ -21,12 +21,12 @@ GAPS = np.array([2.9, 2.0, 0.5, -1.0, -2.9])
 
 def test_cover_is_what_islands_at_random_leave_uncovered():
     added, covered = (contact(SURFACE, separation=GAPS, variant=r, derivatives=True) for r in (REPORTED, COVER))
-    assert covered.force == pytest.approx(added.force, rel=1e-15)
+    assert covered.pressure == pytest.approx(added.pressure, rel=1e-15)
     assert covered.area == pytest.approx(-np.expm1(-added.area), rel=1e-15)
     for name, slope in added.area_by.items():
         assert covered.area_by[name] == pytest.approx(slope * np.exp(-added.area), rel=1e-14)
     law = contact_law(SURFACE, variant=COVER)
-    assert law.area(GAPS) == pytest.approx(covered.area, rel=2e-8)
+    assert law.area(separation=GAPS) == pytest.approx(covered.area, rel=2e-8)
     assert not any("added" in reason for reason in covered.reasons)
 
 
@@ -50,8 +50,8 @@ def test_fitted_area_at_equal_force_follows_boundary_elements():
         own = [row for row in rows if tuple(row[k] for k in keys) == seed]
         surface = Surface(float(seed[0]), 1.0, float(seed[2]), 1.0, float(own[0]["h_max_over_h_rms"]))
         found = contact(surface, separation=np.linspace(-1, 0.99, 200) * surface.h_max, variant="fitted", rtol=1e-5)
-        branch = slice(int(np.argmax(found.force)), None)
-        log_force, log_area = (np.log(x[branch][::-1]) for x in (found.force / surface.rms_gradient, found.area))
+        branch = slice(int(np.argmax(found.pressure)), None)
+        log_force, log_area = (np.log(x[branch][::-1]) for x in (found.pressure / surface.rms_gradient, found.area))
         for row in own:
             force, area = float(row["force"]), float(row["area"])
             if 0.01 < area < 0.97 and np.log(force) < log_force[-1]:

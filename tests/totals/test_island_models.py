@@ -25,7 +25,7 @@ def solved(variant):
 
 
 def apart(found, true):
-    return np.maximum(np.abs(found.force / true.force - 1), np.abs(found.area / true.area - 1))
+    return np.maximum(np.abs(found.pressure / true.pressure - 1), np.abs(found.area / true.area - 1))
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
@@ -111,7 +111,7 @@ def test_outside_answered_by_the_solver():
     found = contact(ROUGH, separation=GAPS, outside="exact")
     true = contact(ROUGH, separation=GAPS, island_model="exact")
     table = contact(ROUGH, separation=GAPS, outside="nan")
-    for name in ("force", "area", "error"):
+    for name in ("pressure", "area", "error"):
         expected = np.where(MISSING, getattr(true, name), getattr(table, name))
         np.testing.assert_array_equal(getattr(found, name), expected)
     assert found.islands > table.islands
@@ -121,14 +121,14 @@ def test_outside_answered_by_the_solver():
 def test_outside_as_nan(derivatives):
     found = contact(ROUGH, separation=GAPS, outside="nan", derivatives=derivatives)
     inside = contact(Surface(0.8, 0.2, 0.2 * 1e8, 1.0, 3.0), separation=GAPS, derivatives=derivatives)
-    for name in ("force", "area", "error"):
+    for name in ("pressure", "area", "error"):
         np.testing.assert_array_equal(np.isnan(getattr(found, name)), MISSING)
         np.testing.assert_array_equal(getattr(found, name)[1], getattr(inside, name))
         assert getattr(found, name)[0, 3] == 0
     if derivatives:
-        for name, slope in found.force_by.items():
+        for name, slope in found.pressure_by.items():
             np.testing.assert_array_equal(np.isnan(slope), MISSING)
-            np.testing.assert_array_equal(slope[1], inside.force_by[name])
+            np.testing.assert_array_equal(slope[1], inside.pressure_by[name])
 
 
 def test_outside_in_X():
@@ -140,7 +140,7 @@ def test_outside_in_X():
     assert caught.value.mask.tolist() == [True, True, False]
     found = contact(surface, separation=gaps, variant=shallow, outside="exact")
     true = contact(surface, separation=gaps, variant=shallow, island_model="exact")
-    np.testing.assert_array_equal(found.force, true.force)
+    np.testing.assert_array_equal(found.pressure, true.pressure)
     np.testing.assert_array_equal(found.area, true.area)
 
 
@@ -150,7 +150,7 @@ def test_one_entry_outside_has_a_mask_without_dimensions():
         contact(surface, separation=0.0)
     assert caught.value.mask.shape == ()
     assert caught.value.mask
-    assert math.isnan(contact(surface, separation=0.0, outside="nan").force)
+    assert math.isnan(contact(surface, separation=0.0, outside="nan").pressure)
 
 
 def test_bad_options():
@@ -199,7 +199,7 @@ def test_the_floor_of_zeta_u_itself_is_refused(island_model):
     assert (
         contact(
             Surface(0.8, 1.0, math.nextafter(3.5, 4), 1.0, 3.0), separation=1.0, island_model=island_model, variant=OWN
-        ).force
+        ).pressure
         > 0
     )
 
@@ -210,7 +210,7 @@ def test_one_gap_more_changes_no_bit():
     many, fewer = contact(SURFACE, separation=gaps, rtol=1e-4), contact(SURFACE, separation=gaps[:-1], rtol=1e-4)
     few = contact(SURFACE, separation=gaps[::40], rtol=1e-4)
     single = contact(SURFACE, separation=gaps[80], rtol=1e-4)
-    for name in ("force", "area", "error"):
+    for name in ("pressure", "area", "error"):
         np.testing.assert_array_equal(getattr(fewer, name), getattr(many, name)[:-1])
         np.testing.assert_array_equal(getattr(few, name), getattr(many, name)[::40])
         assert getattr(single, name) == getattr(many, name)[80]
@@ -239,7 +239,7 @@ def test_long_batches_run_in_blocks(monkeypatch, derivatives):
     monkeypatch.setattr(island_sum, "BLOCK", 16)
     cut = contact(surfaces, separation=1.0, derivatives=derivatives)
     assert counted.calls == 4
-    np.testing.assert_array_equal(cut.force, whole.force)
+    np.testing.assert_array_equal(cut.pressure, whole.pressure)
     assert cut.islands == whole.islands
     monkeypatch.setattr(island_sum, "core", Counted(interrupted=True))
     with pytest.raises(KeyboardInterrupt):
@@ -255,5 +255,5 @@ def test_what_is_nearly_nothing_ends_and_states_its_digits(island_model):
         contact(surface, separation=gaps, island_model=island_model),
         contact(surface, separation=gaps, island_model="exact", rtol=1e-10),
     )
-    assert (np.abs(found.force - known.force) <= (found.error + known.error) * known.force).all()
+    assert (np.abs(found.pressure - known.pressure) <= (found.error + known.error) * known.pressure).all()
     assert found.error[2] > 1e-7

@@ -12,7 +12,7 @@ from dask.callbacks import Callback
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law, island, theories
 
-FIELDS = ("force", "area", "error")
+FIELDS = ("pressure", "area", "error")
 
 
 def gaps_over(n, **kwargs):
@@ -53,7 +53,7 @@ def test_dimensions_by_name():
         np.testing.assert_array_equal(values.transpose("surface", "case", "gap"), getattr(plain, name))
         assert values.surface.values.tolist() == ["a", "b", "c"]
         assert values.gap.values.tolist() == list(range(7))
-    assert found.force.attrs == {"long_name": "force over nominal area", "units": "1"}
+    assert found.pressure.attrs == {"long_name": "force over nominal area", "units": "1"}
     assert found.area.attrs["units"] == found.error.attrs["units"] == "1"
     assert found.separation is gaps
     assert gaps.attrs == {"units": "mm", "long_name": "separation"}
@@ -74,14 +74,14 @@ def test_one_labelled_argument_is_enough(which):
         separation=label["separation"]([0.5, 1.5]),
         E_star=label["E_star"]([1.0, 2.0]),
     )
-    assert found.force.dims == ("t",)
-    assert found.force.values[1] == contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=1.5, E_star=2.0).force
+    assert found.pressure.dims == ("t",)
+    assert found.pressure.values[1] == contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=1.5, E_star=2.0).pressure
 
 
 def test_no_dimensions_at_all():
     found = contact(Surface(xr.DataArray(0.8), 0.2, 40.0, 1.0, 3.0), separation=1.0)
-    assert found.force.shape == ()
-    assert float(found.force) == contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=1.0).force
+    assert found.pressure.shape == ()
+    assert float(found.pressure) == contact(Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=1.0).pressure
 
 
 @pytest.mark.parametrize("scheduler", ["synchronous", "threads"])
@@ -94,13 +94,13 @@ def test_dask_is_lazy_and_gives_the_same_answers(scheduler, derivatives):
         lazy = contact(lazy_surfaces, separation=gaps.chunk(gap=11), derivatives=derivatives)
         outputs = {name: getattr(lazy, name) for name in (*FIELDS, "mean_separation", "separation")}
         if derivatives:
-            outputs |= {f"force_{name}": slope for name, slope in lazy.force_by.items()}
+            outputs |= {f"pressure_{name}": slope for name, slope in lazy.pressure_by.items()}
             outputs |= {f"area_{name}": slope for name, slope in lazy.area_by.items()}
         assert all(dask.is_dask_collection(value) for value in outputs.values())
         assert tasks.ran == 0
     expected = {name: getattr(eager, name) for name in (*FIELDS, "mean_separation", "separation")}
     if derivatives:
-        expected |= {f"force_{name}": slope for name, slope in eager.force_by.items()}
+        expected |= {f"pressure_{name}": slope for name, slope in eager.pressure_by.items()}
         expected |= {f"area_{name}": slope for name, slope in eager.area_by.items()}
     with dask.config.set(scheduler=scheduler, num_workers=4), Tasks() as tasks:
         computed = dask.compute(outputs)[0]
@@ -114,7 +114,7 @@ def test_dask_is_lazy_and_gives_the_same_answers(scheduler, derivatives):
             assert (value <= 1e-8).all()
         else:
             np.testing.assert_allclose(value, expected[name], rtol=close)
-    assert lazy.force.attrs == eager.force.attrs
+    assert lazy.pressure.attrs == eager.pressure.attrs
 
 
 def test_the_bits_of_one_surface_depend_neither_on_the_kind_of_argument_nor_on_the_chunks():
@@ -122,7 +122,7 @@ def test_the_bits_of_one_surface_depend_neither_on_the_kind_of_argument_nor_on_t
     eager, plain = contact(surface, separation=gaps), contact(surface, separation=gaps.values)
     for k in (0, 17, 2500, 4999):
         one = contact(surface, separation=float(gaps[k]))
-        assert (one.force, one.area, one.error) == (plain.force[k], plain.area[k], plain.error[k])
+        assert (one.pressure, one.area, one.error) == (plain.pressure[k], plain.area[k], plain.error[k])
     lazy = contact(surface, separation=gaps.chunk(gap=(7, 493, 4500)))
     with dask.config.set(scheduler="threads", num_workers=4):
         for name in FIELDS:
@@ -133,9 +133,11 @@ def test_the_bits_of_one_surface_depend_neither_on_the_kind_of_argument_nor_on_t
 def test_chunks_without_entries():
     gaps = gaps_over(12).chunk(gap=(5, 0, 7))
     surface = Surface(0.8, 0.2, 40.0, 1.0, 3.0)
-    found = contact(surface, separation=gaps).force.compute()
-    np.testing.assert_array_equal(found, contact(surface, separation=gaps.values).force)
-    np.testing.assert_array_equal(contact_law(surface).area(gaps).compute(), contact_law(surface).area(gaps.values))
+    found = contact(surface, separation=gaps).pressure.compute()
+    np.testing.assert_array_equal(found, contact(surface, separation=gaps.values).pressure)
+    np.testing.assert_array_equal(
+        contact_law(surface).area(separation=gaps).compute(), contact_law(surface).area(separation=gaps.values)
+    )
     with pytest.raises(InputError, match="separation is empty"):
         contact(surface, separation=xr.DataArray(np.zeros(0), dims="gap"))
 
@@ -144,8 +146,8 @@ def test_outside_and_island_models_go_through():
     surfaces = Surface(xr.DataArray([0.05, 0.8], dims="s"), 0.2, 0.2e8, 1.0, 3.0)
     gaps = gaps_over(3)
     found = contact(surfaces, separation=gaps, outside="nan")
-    assert np.isnan(found.force.sel(s=0)).values.tolist() == [True, True, False]
-    assert np.isfinite(found.force.sel(s=1)).all()
+    assert np.isnan(found.pressure.sel(s=0)).values.tolist() == [True, True, False]
+    assert np.isfinite(found.pressure.sel(s=1)).all()
     with pytest.raises(OutOfRangeError, match="outside the universal table"):
         contact(surfaces, separation=gaps)
     rigid = contact(
@@ -155,7 +157,7 @@ def test_outside_and_island_models_go_through():
     plain = contact(
         Surface(0.8, 0.2, 40.0, 1.0, 3.0), separation=gaps.values, island_model="rigid", variant="printed", rtol=1e-4
     )
-    np.testing.assert_array_equal(rigid.force, plain.force)
+    np.testing.assert_array_equal(rigid.pressure, plain.pressure)
 
 
 def test_bad_input_is_refused_when_it_is_computed():
@@ -163,7 +165,7 @@ def test_bad_input_is_refused_when_it_is_computed():
     bad = xr.DataArray([1.0, np.nan], dims="t")
     with pytest.raises(InputError, match=r"separation must be finite, got nan at \(1,\)"):
         contact(surface, separation=bad)
-    lazy = contact(surface, separation=bad.chunk(t=1)).force
+    lazy = contact(surface, separation=bad.chunk(t=1)).pressure
     with pytest.raises(InputError, match="separation must be finite"):
         lazy.compute(scheduler="synchronous")
     wrong = Surface(xr.DataArray([0.8, 1.2], dims="s"), 0.2, 40.0, 1.0, 3.0)
@@ -196,7 +198,7 @@ surface = Surface(xr.DataArray([0.5, 0.8], dims="surface").chunk(surface=1), 0.2
 with dask.config.set(scheduler="threads", num_workers=8):
     few, many = gaps.chunk(gap=3), gaps.chunk(gap=15)
     lazy = contact(surface, separation=few), contact(surface, separation=many, island_model="island4d", rtol=1e-3)
-    first, second = dask.compute(lazy[0].force, lazy[1].force)
+    first, second = dask.compute(lazy[0].pressure, lazy[1].pressure)
 assert (abs(first - second) <= 0.01 * first).all()
 from mbma_tables.models.tables import shipped
 from mbma_tables.tablefiles.netcdf import read_table
@@ -237,7 +239,7 @@ LABELLED = Surface(xr.DataArray([0.5, 0.8], dims="s"), 0.3, 60.0, 0.7, 2.1)
 LABELLED_GAPS = xr.DataArray([-1.0, 0.4, 2.0], dims="d")
 
 
-@pytest.mark.parametrize(("wanted", "other"), [("force", "area"), ("area", "force")])
+@pytest.mark.parametrize(("wanted", "other"), [("pressure", "area"), ("area", "pressure")])
 def test_slopes_of_one_quantity_of_labelled_surfaces(wanted, other):
     found = contact(LABELLED, separation=LABELLED_GAPS, derivatives=True, quantities=[wanted])
     both = contact(LABELLED, separation=LABELLED_GAPS, derivatives=True)
@@ -245,7 +247,7 @@ def test_slopes_of_one_quantity_of_labelled_surfaces(wanted, other):
         np.testing.assert_array_equal(getattr(found, f"{wanted}_by")[name], slope)
     assert getattr(found, other) is getattr(found, f"{other}_by") is None
     none = contact(LABELLED, separation=LABELLED_GAPS)
-    assert none.force_by is none.area_by is None
+    assert none.pressure_by is none.area_by is None
 
 
 @pytest.mark.parametrize("method", ["full", "simplified"])
@@ -253,11 +255,11 @@ def test_theories_of_labelled_surfaces(method):
     h_rms = xr.DataArray(dask.array.from_array([1.0, 1.5, 2.0], chunks=2), dims="sample")
     gaps = xr.DataArray([0.4, 1.0], dims="gap")
     theory = theories.Persson(method)
-    lazy = contact(Surface(0.8, 1.0, 100.0, h_rms, 6.0), mean_separation=gaps, theory=theory).force
+    lazy = contact(Surface(0.8, 1.0, 100.0, h_rms, 6.0), mean_separation=gaps, theory=theory).pressure
     assert lazy.dims == ("sample", "gap")
     assert lazy.chunks is not None
     plain = Surface(0.8, 1.0, 100.0, np.array([1.0, 1.5, 2.0])[:, None], 6.0)
-    np.testing.assert_array_equal(lazy.compute(), contact(plain, mean_separation=gaps.values, theory=theory).force)
+    np.testing.assert_array_equal(lazy.compute(), contact(plain, mean_separation=gaps.values, theory=theory).pressure)
     summits = contact(Surface(0.8, 1.0, 100.0, h_rms, 6.0), separation=gaps, theory="greenwood_williamson")
     expected = contact(plain, separation=gaps.values, theory="greenwood_williamson")
     np.testing.assert_array_equal(summits.area.compute(), expected.area)

@@ -59,35 +59,39 @@ def test_the_same_bits_however_asked(name):
     named = xr.DataArray(d.reshape(-1, 3), dims=("a", "b"))
     for what in QUANTITIES:
         ask = getattr(law, what)
-        whole = ask(d)
+        whole = ask(separation=d)
         assert np.isfinite(whole).all()
         for size in (1, 7, 1000, 1001):
-            np.testing.assert_array_equal(np.concatenate([ask(d[k : k + size]) for k in range(0, d.size, size)]), whole)
-        np.testing.assert_array_equal([ask(gap) for gap in d.tolist()], whole)
-        np.testing.assert_array_equal(ask(d.tolist()), whole)
-        np.testing.assert_array_equal(ask(d.reshape(3, -1).T), whole.reshape(3, -1).T)
-        np.testing.assert_array_equal(ask(np.tile(d, 12)), np.tile(whole, 12))
-        np.testing.assert_array_equal(ask(named), whole.reshape(-1, 3))
-        np.testing.assert_array_equal(ask(named.chunk(500)), whole.reshape(-1, 3))
+            np.testing.assert_array_equal(
+                np.concatenate([ask(separation=d[k : k + size]) for k in range(0, d.size, size)]), whole
+            )
+        np.testing.assert_array_equal([ask(separation=gap) for gap in d.tolist()], whole)
+        np.testing.assert_array_equal(ask(separation=d.tolist()), whole)
+        np.testing.assert_array_equal(ask(separation=d.reshape(3, -1).T), whole.reshape(3, -1).T)
+        np.testing.assert_array_equal(ask(separation=np.tile(d, 12)), np.tile(whole, 12))
+        np.testing.assert_array_equal(ask(separation=named), whole.reshape(-1, 3))
+        np.testing.assert_array_equal(ask(separation=named.chunk(500)), whole.reshape(-1, 3))
         asked = law.compiled(what)
         np.testing.assert_array_equal([asked.function(gap, asked.user_data) for gap in d.tolist()], whole)
         u = (d[d > law.lowest + 1e-9] + law.h_max) / 2
-        np.testing.assert_array_equal([ask(u=gap) for gap in u.tolist()], ask(u=u))
+        np.testing.assert_array_equal([ask(gap) for gap in u.tolist()], ask(u))
         np.testing.assert_array_equal([ask(separation=gap) for gap in d[:9].tolist()], whole[:9])
-    np.testing.assert_array_equal(law.values(d), [getattr(law, what)(d) for what in law.values(d)._fields])
+    np.testing.assert_array_equal(
+        law.values(separation=d), [getattr(law, what)(separation=d) for what in law.values(separation=d)._fields]
+    )
 
 
 @pytest.mark.parametrize("name", SURFACES)
 def test_inverses_have_the_same_bits_however_asked(name):
     law = law_of(name)
     d = gaps_of(law, 300)
-    force = law.force(d[d > (law.lowest if law.turning_point is None else law.turning_point)])
+    force = law.pressure(separation=d[d > (law.lowest if law.turning_point is None else law.turning_point)])
     whole = law.at_pressure(force)
     assert [law.at_pressure(value).separation for value in force] == whole.separation.tolist()
     assert [law.at_pressure(value).stiffness for value in force] == whole.stiffness.tolist()
-    np.testing.assert_array_equal(law.separation(force=force), whole.separation)
-    np.testing.assert_array_equal(law.separation(force=xr.DataArray(force, dims="a")), whole.separation)
-    np.testing.assert_array_equal(law.leakage(d), [law.leakage(gap) for gap in d])
+    np.testing.assert_array_equal(law.separation(pressure=force), whole.separation)
+    np.testing.assert_array_equal(law.separation(pressure=xr.DataArray(force, dims="a")), whole.separation)
+    np.testing.assert_array_equal(law.leakage(separation=d), [law.leakage(separation=gap) for gap in d])
 
 
 def filled(law, d, count=5):
@@ -109,10 +113,10 @@ def test_gaps_outside_are_nan_and_counted(name):
     assert core.law_flow_fill(d, law.leakage.block, law.h_max, law.leakage.h_rms, found) == outside.sum()
     assert (np.isnan(found) == outside).all()
     for gap in NO_GAPS:
-        for ask in (law.force, law.area, law.stiffness, law.area_slope, law.energy, law.values, law.leakage):
+        for ask in (law.pressure, law.area, law.stiffness, law.area_slope, law.energy, law.values, law.leakage):
             for given in (gap, np.array([gap]), np.array([1.0, gap]), np.full(2000, gap)):
                 with pytest.raises(OutOfRangeError, match=r"^separation must be") as caught:
-                    ask(given)
+                    ask(separation=given)
                 assert caught.value.mask.sum() == np.size(given) - (np.size(given) == 2)
 
 
@@ -121,7 +125,7 @@ def test_gaps_outside_are_nan_and_counted(name):
 def test_values_that_no_gap_has_are_nan_and_counted(name, which):
     law = law_of(name)
     inverse = law._inverse_block(QUANTITIES[which])
-    most = float((law.force, law.area)[which](inverse[5]))
+    most = float((law.pressure, law.area)[which](separation=inverse[5]))
     wanted = np.array([0.5 * most, math.nan, math.inf, -math.inf, -1.0, 1.001 * most, 1e300, 0.1 * most, -5e-324])
     gap, area, stiffness = np.empty((3, wanted.size))
     assert core.law_invert(wanted, law.block, inverse, which, gap, area, stiffness) == 7
@@ -138,7 +142,7 @@ def test_values_that_no_gap_has_are_nan_and_counted(name, which):
 def test_a_light_load_has_all_digits_of_its_overclosure():
     """A power of it, where contact ends: what is left to last contact is found relative to itself."""
     law = law_of("mbma")
-    inverse = law._inverse_block("force")
+    inverse = law._inverse_block("pressure")
     x, side = np.empty((2, 60))
     wanted = np.geomspace(1e-280, 1e-60, 60)
     core.inverse_nodes(wanted, law.block, FORCE, inverse[5], x, side)
@@ -150,7 +154,7 @@ def test_a_light_load_has_all_digits_of_its_overclosure():
 def test_leakage_apart(name):
     law = law_of(name)
     mean = law.h_max * np.array([1.0 + 1e-12, 1.5, 20.0, 1e6])
-    np.testing.assert_allclose(law.leakage(u=mean), mean**3 * wide_gap(mean / 0.7), rtol=1e-15)
+    np.testing.assert_allclose(law.leakage(mean), mean**3 * wide_gap(mean / 0.7), rtol=1e-15)
 
 
 def test_broken_blocks_are_refused():
@@ -183,7 +187,7 @@ def test_no_block_makes_the_core_read_elsewhere():
     """Random words, of which some pass for a law's: answers are numbers or NaN, and nothing is read beyond the end."""
     law, rng = law_of("calibrated"), np.random.default_rng(2)
     d, wanted = np.concatenate([gaps_of(law, 200), NO_GAPS]), np.geomspace(1e-12, 1, 300)
-    inverse = law._inverse_block("force")
+    inverse = law._inverse_block("pressure")
     places = [*range(HEAD + 2 * len(law.rows)), *range(HEAD + 2 * len(law.rows), law.block.size, RECORD + 4)]
     accepted = 0
     for place, _ in itertools.product(places, range(6)):
@@ -207,13 +211,13 @@ def test_no_block_makes_the_core_read_elsewhere():
 
 def test_questions_that_are_none():
     law = law_of("mbma")
-    for ask in (law.force, law.energy):
-        with pytest.raises(TypeError, match="one separation, or u=, is taken, got 2 arguments"):
+    for ask in (law.pressure, law.energy):
+        with pytest.raises(TypeError, match="one mean separation is taken, or separation=, got 2 arguments"):
             ask(1.0, 2.0)
-        with pytest.raises(TypeError, match="unexpected keyword argument 'v': separation or u is taken"):
+        with pytest.raises(TypeError, match="unexpected keyword argument 'v': mean_separation or separation is taken"):
             ask(v=1.0)
-        with pytest.raises(TypeError, match="unexpected keyword argument 'separation'"):
-            ask(1.0, separation=1.0)
+        with pytest.raises(TypeError, match="unexpected keyword argument 'mean_separation'"):
+            ask(1.0, mean_separation=1.0)
 
 
 @pytest.mark.parametrize("name", SURFACES)
@@ -225,8 +229,8 @@ def test_two_generations_of_processors_have_the_same_bits(name):
     d, out = gaps_of(law), np.empty((5, gaps_of(law).size))
     assert other.law_fill(d, law.block, *out) == 0
     np.testing.assert_array_equal(out, filled(law, d)[1])
-    force, found = law.force(d[d > 0]), np.empty((3, (d > 0).sum()))
-    assert other.law_invert(force, law.block, law._inverse_block("force"), FORCE, *found) == 0
+    force, found = law.pressure(separation=d[d > 0]), np.empty((3, (d > 0).sum()))
+    assert other.law_invert(force, law.block, law._inverse_block("pressure"), FORCE, *found) == 0
     np.testing.assert_array_equal(
         found, [getattr(law.at_pressure(force), n) for n in ("separation", "area", "stiffness")]
     )
@@ -235,10 +239,10 @@ def test_two_generations_of_processors_have_the_same_bits(name):
 def test_a_law_is_answered_without_leaving_anything():
     law = law_of("mbma")
     d = np.linspace(0, 2, 10)
-    law.force(d), law.force(1.0)
+    law.pressure(separation=d), law.pressure(separation=1.0)
     before = sys.getrefcount(law.block), sys.getrefcount(d)
     for _ in range(100):
-        law.force(d), law.force(1.0), law.area(u=1.0)
+        law.pressure(separation=d), law.pressure(separation=1.0), law.area(1.0)
         with pytest.raises(OutOfRangeError):
-            law.force(np.array([math.nan]))
+            law.pressure(separation=np.array([math.nan]))
     assert (sys.getrefcount(law.block), sys.getrefcount(d)) == before

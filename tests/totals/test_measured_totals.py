@@ -48,7 +48,7 @@ def test_a_sampled_power_law_has_the_totals_of_its_five_numbers(variant, hurst, 
     for count in (2, 200):
         found = contact(sampled(surface, count), separation=d, variant=variant, derivatives=True)
         bound = float(np.max(plain.error + found.error))
-        for name in ("force", "area"):
+        for name in ("pressure", "area"):
             np.testing.assert_allclose(getattr(found, name), getattr(plain, name), rtol=bound)
         np.testing.assert_allclose(found.stiffness, plain.stiffness, rtol=10 * bound)
         slopes = (found.area_by["separation"], plain.area_by["separation"])
@@ -61,7 +61,7 @@ def test_exact_and_universal_island_models_agree():
     exact, table = (
         contact(surface, separation=d, island_model=island_model) for island_model in ("exact", "universal")
     )
-    np.testing.assert_allclose(table.force, exact.force, rtol=1e-7)
+    np.testing.assert_allclose(table.pressure, exact.pressure, rtol=1e-7)
     np.testing.assert_allclose(table.area, exact.area, rtol=1e-7)
 
 
@@ -134,10 +134,10 @@ def test_slopes_hold_in_thin_panels():
 def test_first_contact_is_a_power_of_depth():
     surface = rough()
     found = contact(surface, separation=surface.h_max - np.array([2**-44, 2**-43]))
-    assert np.log2(found.force[1] / found.force[0]) == pytest.approx(7 / 2, rel=1e-6)
+    assert np.log2(found.pressure[1] / found.pressure[0]) == pytest.approx(7 / 2, rel=1e-6)
     assert np.log2(found.area[1] / found.area[0]) == pytest.approx(10 / 3, rel=1e-6)
     nothing = contact(surface, separation=surface.h_max + np.array([0.0, 1.0]))
-    assert nothing.force.tolist() == nothing.area.tolist() == nothing.error.tolist() == [0, 0]
+    assert nothing.pressure.tolist() == nothing.area.tolist() == nothing.error.tolist() == [0, 0]
 
 
 @pytest.mark.parametrize(("count", "h_max"), [(60, 3.5), (2000, 3.5), (60, 13.0)])
@@ -147,8 +147,8 @@ def test_a_law_is_the_contacts(count, h_max):
     d = surface.h_max * (1 - DEPTHS)
     d = d[d >= law.lowest]
     found = contact(surface, separation=d)
-    np.testing.assert_allclose(law.force(d), found.force, rtol=2 * law.error)
-    np.testing.assert_allclose(law.area(d), found.area, rtol=2 * law.error)
+    np.testing.assert_allclose(law.pressure(separation=d), found.pressure, rtol=2 * law.error)
+    np.testing.assert_allclose(law.area(separation=d), found.area, rtol=2 * law.error)
     assert (law.theory, law.variant, law.island_model) == ("mbma", "reported", "universal")
 
 
@@ -158,16 +158,16 @@ def test_a_law_ends_with_the_table():
     law = contact_law(surface)
     assert -surface.h_max < law.lowest < surface.h_max / 2
     d = law.lowest + np.array([1e-9, 0.1, 1.0])
-    np.testing.assert_allclose(law.force(d), contact(surface, separation=d).force, rtol=2 * law.error)
+    np.testing.assert_allclose(law.pressure(separation=d), contact(surface, separation=d).pressure, rtol=2 * law.error)
     with pytest.raises(OutOfRangeError, match="where the theory ends"):
-        law.force(law.lowest - 0.1)
-    np.testing.assert_allclose(law.separation(force=law.force(d)), d, rtol=1e-6)
+        law.pressure(separation=law.lowest - 0.1)
+    np.testing.assert_allclose(law.separation(pressure=law.pressure(separation=d)), d, rtol=1e-6)
     # as far as there is a table, contacts are found by pressure and known to be valid or not
-    found = contact(surface, pressure=law.force(d))
+    found = contact(surface, pressure=law.pressure(separation=d))
     np.testing.assert_allclose(found.separation, d, rtol=1e-6)
     assert found.valid.shape == (3,)
     with pytest.raises(OutOfRangeError, match="at most what theory 'mbma' reaches"):
-        contact(surface, pressure=2 * law.force(law.lowest))
+        contact(surface, pressure=2 * law.pressure(separation=law.lowest))
 
 
 def test_islands():
@@ -190,9 +190,9 @@ def test_what_mbma_cannot_use_is_refused_with_the_mend():
     blue = Surface.from_spectrum(q, q, h_max=3000.0)
     with pytest.raises(OutOfRangeError, match="measure shorter waves, or ask another theory"):
         contact(blue, separation=1.0)
-    assert contact(blue, mean_separation=500.0, theory="calibrated").force > 0
+    assert contact(blue, mean_separation=500.0, theory="calibrated").pressure > 0
     steep = Surface.from_spectrum(np.geomspace(1, 30, 50), np.geomspace(1, 30, 50) ** -2.1, h_max=30.0)
-    deep = contact(steep, separation=-29.0, island_model="universal", outside="nan").force
+    deep = contact(steep, separation=-29.0, island_model="universal", outside="nan").pressure
     assert deep > 0 or np.isnan(deep)
 
 

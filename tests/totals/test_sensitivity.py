@@ -55,7 +55,7 @@ def differences(numbers, variant, step):
         spans.append(difference_weights(offsets) / span)
     points = np.stack(shifted, axis=1)
     found = contact(Surface(*points[:5]), separation=points[5], island_model="exact", variant=variant, rtol=1e-11)
-    return [np.einsum("nk,nk->n", spans, values) for values in (found.force, found.area)]
+    return [np.einsum("nk,nk->n", spans, values) for values in (found.pressure, found.area)]
 
 
 @functools.cache
@@ -68,7 +68,10 @@ def numbers_of(case):
 def against_differences(numbers, variant, step):
     found = contact(Surface(*numbers[:5]), separation=numbers[5], variant=variant, rtol=1e-10, derivatives=True)
     for value, by, true in zip(
-        (found.force, found.area), (found.force_by, found.area_by), differences(numbers, variant, step), strict=True
+        (found.pressure, found.area),
+        (found.pressure_by, found.area_by),
+        differences(numbers, variant, step),
+        strict=True,
     ):
         assert sorted(by) == sorted(NAMES)
         for name, parameter, slope in zip(NAMES, numbers, true, strict=True):
@@ -104,7 +107,7 @@ def test_lengths_scale_out(variant):
     share[::4] = 1 - 10 ** rng.uniform(-6, -1, 15)
     surface = Surface(hurst, 0.3, 0.3 * zeta_1, 0.7, 0.7 * top)
     found = contact(surface, separation=share * surface.h_max, variant=variant, derivatives=True)
-    for by in (found.force_by, found.area_by):
+    for by in (found.pressure_by, found.area_by):
         terms = np.stack(
             [
                 surface.h_rms * by["h_rms"],
@@ -122,7 +125,7 @@ def test_slopes_scale_out():
     surface = Surface([0.3, 0.7, 1.0], 0.3, [3.0, 60.0, 2e3], 0.7, 2.4)
     gap = np.array([2.39, 1.0, -2.0])
     found = contact(surface, separation=gap, derivatives=True)
-    for value, by, degree in ((found.force, found.force_by, 1), (found.area, found.area_by, 0)):
+    for value, by, degree in ((found.pressure, found.pressure_by, 1), (found.area, found.area_by, 0)):
         heights = surface.h_rms * by["h_rms"] + surface.h_max * by["h_max"] + gap * by["separation"]
         waves = surface.q0 * by["q0"] + surface.q1 * by["q1"]
         size = np.abs(surface.h_max * by["h_max"]) + np.abs(surface.q0 * by["q0"])
@@ -183,7 +186,7 @@ def test_next_to_the_floor_of_zeta_u(hurst, left, h_max, depth):
     surface = Surface(hurst, 1.0, 3.0 + left, 1.0, h_max)
     found = contact(surface, separation=h_max - depth, derivatives=True)
     true = by_zeta_1(hurst, surface.zeta_1, h_max, float(h_max - found.separation))
-    for by, value, slope in zip((found.force_by, found.area_by), (found.force, found.area), true, strict=True):
+    for by, value, slope in zip((found.pressure_by, found.area_by), (found.pressure, found.area), true, strict=True):
         assert abs(by["q1"] - slope) <= 1e-6 * max(abs(slope), value / 3)
         # the lengths' identity holds q0 to it
         terms = [surface.h_rms * by["h_rms"], h_max * by["h_max"], found.separation * by["separation"]]
@@ -196,16 +199,16 @@ def test_units_shapes_and_no_contact():
     found = contact(surface, separation=gap, derivatives=True)
     stiff = contact(surface, separation=gap, E_star=[2.0, 3.0, 4.0], derivatives=True)
     for name in NAMES:
-        assert found.force_by[name].shape == found.area_by[name].shape == (2, 3)
+        assert found.pressure_by[name].shape == found.area_by[name].shape == (2, 3)
         # no contact is flat
-        assert (found.force_by[name][:, 1:] == 0).all()
+        assert (found.pressure_by[name][:, 1:] == 0).all()
         assert (found.area_by[name][:, 1:] == 0).all()
-        np.testing.assert_allclose(stiff.force_by[name][:, 0], 2 * found.force_by[name][:, 0], rtol=1e-15)
+        np.testing.assert_allclose(stiff.pressure_by[name][:, 0], 2 * found.pressure_by[name][:, 0], rtol=1e-15)
         np.testing.assert_array_equal(stiff.area_by[name], found.area_by[name])
     one = contact(Surface(0.5, 0.3, 30.0, 0.7, 2.4), separation=1.0, derivatives=True)
     for name in NAMES:
-        assert np.shape(one.force_by[name]) == ()
-        assert one.force_by[name] == found.force_by[name][0, 0]
+        assert np.shape(one.pressure_by[name]) == ()
+        assert one.pressure_by[name] == found.pressure_by[name][0, 0]
 
 
 @pytest.mark.parametrize("rtol", [1e-2, 1e-6, 1e-9, 1e-11])
@@ -218,5 +221,5 @@ def test_slopes_refine_as_totals_do(rtol):
     slopes = contact(surfaces, separation=share * surfaces.h_max, rtol=rtol, derivatives=True)
     assert slopes.islands == plain.islands
     np.testing.assert_allclose(slopes.error, plain.error, rtol=1e-6)
-    np.testing.assert_allclose(slopes.force, plain.force, rtol=1e-12)
+    np.testing.assert_allclose(slopes.pressure, plain.pressure, rtol=1e-12)
     np.testing.assert_allclose(slopes.area, plain.area, rtol=1e-12)

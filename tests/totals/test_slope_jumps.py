@@ -32,7 +32,7 @@ ISLAND_KINKS = {
     "zeta_u": {"zeta_u", "R_u", "D", "sigma", "h_u", "eta", "X", "mu", "width"},
 }
 # totals whose slope jumps, in every input but E*, where the gap lets in islands at the floor: there K1 switches
-TOTAL_KINKS = {"zeta_d": {"force", "area"}, "zeta_u": set()}
+TOTAL_KINKS = {"zeta_d": {"pressure", "area"}, "zeta_u": set()}
 
 # slope at 0 from values at 0, 1, 2 ... steps on one side
 OFFSETS = np.arange(6.0)
@@ -127,7 +127,7 @@ def models_jump(numbers, name, rule):
     sigma = surface.s * np.sqrt(m0 - (0.8968 * m2**2 / m4 if rule.summit_sigma else 0))
     height = numbers["h_max"] - (found.h_d if rule.offset else 0)
     weight = density * np.exp(-0.5 * (height / sigma) ** 2) / (math.sqrt(2 * math.pi) * sigma)
-    return step_of_K1(hurst, zeta_1, rule) * weight * getattr(found, name) * h_rms
+    return step_of_K1(hurst, zeta_1, rule) * weight * getattr(found, {"pressure": "force"}.get(name, name)) * h_rms
 
 
 def at_a_kink(rng, count, rule, which):
@@ -158,7 +158,7 @@ def test_totals_at_the_floors(floor, which, rule, record_property):
     ends = [changed(numbers, which, (numbers[which] + sign * 1e-6 * step)[:, None]) for sign in (-1, 1)]
     turn = np.squeeze(np.subtract(*(beyond_the_kink(end, rule) for end in ends[::-1])), axis=1) / (2e-6 * step)
     by = [totals_of(end, rule, rtol=1e-10, derivatives=True) for end in ends]
-    for name in ("force", "area"):
+    for name in ("pressure", "area"):
 
         def value(p, name=name):
             return getattr(totals_of(changed(numbers, which, p), rule, rtol=1e-11), name)
@@ -193,7 +193,7 @@ def test_totals_elsewhere(which, rule, record_property):
     steps = STEP * (numbers["h_max"] - numbers["separation"] if which in INPUTS[4:] else numbers[which])
     sides = [numbers | {which: numbers[which] + sign * steps} for sign in (-1, 1)]
     found = [totals_of(side, rule, rtol=1e-10, derivatives=True) for side in sides]
-    for name in ("force", "area"):
+    for name in ("pressure", "area"):
         lower, upper = (getattr(side, f"{name}_by")[which] for side in found)
         scale = np.maximum(np.abs(lower), np.abs(getattr(found[0], name) / numbers[which]))
         assert (np.abs(upper - lower) <= PROMISED * scale)[clear].all(), name
@@ -249,12 +249,12 @@ def test_laws_at_their_breaks(rtol, record_property):
         depth = 2 * h_max * (law.records[1:, CENTRE] - 1 / law.records[1:, RATE])
         clear = np.abs(depth / kinks(hurst, zeta_1, rule)[0] - 1) > 1e-9
         gaps = law.h_max - depth
-        room = law.slope_error(gaps + STEP * depth) + law.slope_error(gaps - STEP * depth)
+        room = law.slope_error(separation=gaps + STEP * depth) + law.slope_error(separation=gaps - STEP * depth)
         for value, slope in with_slopes(law):
-            larger, smaller = (slope(gaps + sign * STEP * depth) for sign in (1, -1))
+            larger, smaller = (slope(separation=gaps + sign * STEP * depth) for sign in (1, -1))
             # what the slope itself changes by over two steps
-            further = [slope(gaps + sign * 1e-4 * depth) for sign in (1, -1)]
+            further = [slope(separation=gaps + sign * 1e-4 * depth) for sign in (1, -1)]
             own = 4e4 * STEP * np.abs(np.array(further) - [larger, smaller]).max(axis=0)
-            assert (np.abs(smaller - larger) <= room * value(gaps) / depth + own)[clear].all()
+            assert (np.abs(smaller - larger) <= room * value(separation=gaps) / depth + own)[clear].all()
         compared += int(clear.sum())
     record_property("pairs compared", compared)

@@ -26,7 +26,7 @@ let drawn = null,
 // of the rest at equal pressure.
 function band(state, curve, name) {
   const byGap = state.against === "gap",
-    scatter = curve.scatter[{ force: "force", gap: "force", area: "area" }[name] ?? "stiffness"];
+    scatter = curve.scatter[{ force: "pressure", gap: "pressure", area: "area" }[name] ?? "stiffness"];
   if (byGap !== (name === "force")) return null;
   const side = (sign) =>
     curve[name].map((value, k) => {

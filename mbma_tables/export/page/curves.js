@@ -111,7 +111,7 @@ function scatterOf(state, curve) {
     const [[x0, y0], [x1, y1]] = [row[above - 1], row[above]];
     return Math.exp(y0 + ((y1 - y0) * (x - x0)) / (x1 - x0));
   };
-  return Object.fromEntries(["force", "area", "stiffness"].map((name) => [name, curve.area.map(at(name))]));
+  return Object.fromEntries(["pressure", "area", "stiffness"].map((name) => [name, curve.area.map(at(name))]));
 }
 
 // Reasons against a theory's answers, as `Contact.reasons`: each with whether it holds at a point.
