@@ -336,7 +336,7 @@ def main(write: bool) -> None:
     if write:
         marks = {None: "", True: "met", False: "missed"}
         rows = [[x.name.strip(), f"{x.value:.3g} {x.unit}".strip(), x.wanted, marks[x.met]] for x in LINES]
-        measured = page.table(["what", "measured", "wanted", ""], rows)
+        measured = page.table("what | measured | wanted | ", rows)
         machine = f"{os.cpu_count()} cores, load average {load[0]:.1f}."
         page.write("lookup", {"times": f"{machine}\n\n{measured}"}, {}, page.ROOT)
 

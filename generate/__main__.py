@@ -71,8 +71,7 @@ def main() -> None:
 def pages(names: tuple[str, ...], out: pathlib.Path) -> None:
     """Write the measured tables and the figures of pages of the documentation."""
     for name in PAGES if "all" in names else names:
-        page = importlib.import_module(f"generate.pages.{name}")
-        parts, files = page.measure()
+        parts, files = importlib.import_module(f"generate.pages.{name}").measure()
         for path in write(name, parts, files, out):
             click.echo(path)
 

@@ -5,25 +5,24 @@ from __future__ import annotations
 import dataclasses
 import pathlib
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 import numpy as np
 import xarray as xr
 from scipy.interpolate import CubicSpline
-from scipy.optimize import least_squares
 
 from generate import calibrated_hardness
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import GAUSSIAN, MAX_AREA, MIN_WAVES, Case, cases
 from generate.calibrated_bars import measure
+from generate.calibrated_file import QUANTITIES, binned, fitted
 from generate.calibrated_table import write as write_table
 from generate.leakage_law import write as write_leakage
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws.calibrated import CONSTANTS, Constants, Law, Spectrum
 from mbma_tables.laws.map_curves import MAP_CONSTANTS, MapConstants, MapLaw
 
-QUANTITIES = ("area", "force", "stiffness")
 EDGES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9, MAX_AREA)  # contact fractions between which errors are told
 FOLDS = 5
 DIGITS = 4  # of constants
@@ -36,29 +35,10 @@ CLOSE = 1e-4  # relative changes of cost or constants that end a fit
 STEP = 0.01  # relative, of numerical derivatives: laws of maps are interpolated
 
 
-Fitted = TypeVar("Fitted", Constants, MapConstants)
+OPTIONS = {"x_scale": "jac", "diff_step": STEP, "ftol": CLOSE, "xtol": CLOSE}
 
 
-def _fitted(start: Fitted, names: Sequence[str], residuals: Callable[[Fitted], list[FloatArray]]) -> Fitted:
-    """Constants of which the named ones make the residuals small, by robust least squares."""
-
-    def trial(values: FloatArray) -> Fitted:
-        return dataclasses.replace(start, **dict(zip(names, map(float, values), strict=True)))
-
-    first = [getattr(start, name) for name in names]
-    found = least_squares(
-        lambda values: np.concatenate(residuals(trial(values))),
-        first,
-        loss="soft_l1",
-        x_scale="jac",
-        diff_step=STEP,
-        ftol=CLOSE,
-        xtol=CLOSE,
-    )
-    return trial(found.x)
-
-
-def _rounded(constants: Fitted) -> Fitted:
+def _rounded(constants: Any) -> Any:
     """Constants of so many digits as the library carries."""
     return type(constants)(*(float(f"{value:.{DIGITS}g}") for value in dataclasses.astuple(constants)))
 
@@ -110,8 +90,8 @@ def fit(training: Sequence[Case]) -> Constants:
     def forces(trial: Constants) -> list[FloatArray]:
         return [part.errors(one, trial) / noise(one, "force") for one, part in zip(seen, parts, strict=True)]
 
-    constants = _fitted(CONSTANTS, ("area_s0", "area_slope", "area_t0"), areas)
-    return _fitted(constants, ("weight", "weight_slope", "cubic", "tail"), forces)
+    constants = fitted(CONSTANTS, ("area_s0", "area_slope", "area_t0"), areas, **OPTIONS)
+    return fitted(constants, ("weight", "weight_slope", "cubic", "tail"), forces, **OPTIONS)
 
 
 def fit_map(training: Sequence[Case], constants: Constants) -> MapConstants:
@@ -126,7 +106,7 @@ def fit_map(training: Sequence[Case], constants: Constants) -> MapConstants:
         return [errors(one, one.map_law(constants, trial), "force") / noise(one, "map") for one in seen]
 
     names = [name for name in dataclasses.asdict(MAP_CONSTANTS) if name not in ("elliptic", "tension_area")]
-    return _fitted(_fitted(MAP_CONSTANTS, ("elliptic",), areas), names, forces)
+    return fitted(fitted(MAP_CONSTANTS, ("elliptic",), areas, **OPTIONS), names, forces, **OPTIONS)
 
 
 def errors(one: Case, law: Law | MapLaw, quantity: str) -> FloatArray:
@@ -145,14 +125,13 @@ def errors(one: Case, law: Law | MapLaw, quantity: str) -> FloatArray:
 
 def summary(seen: Sequence[Case], make: Callable[[Case], Law | MapLaw]) -> dict[str, list[list[float]]]:
     """By contact fraction: mean, standard deviation, 90% quantile of the magnitude and number of errors."""
-    bins = np.digitize(np.concatenate([one.area for one in seen]), EDGES) - 1
+    area = np.concatenate([one.area for one in seen])
     told, laws = {}, [make(one) for one in seen]
     for quantity in QUANTITIES:
         values = np.concatenate([errors(one, law, quantity) for one, law in zip(seen, laws, strict=True)])
-        parts = [values[(bins == k) & np.isfinite(values)] for k in range(len(EDGES) - 1)]
         told[quantity] = [
             [float(p.mean()), float(p.std()), float(np.quantile(np.abs(p), 0.9)), len(p)] if len(p) else []
-            for p in parts
+            for p in binned(area, values, EDGES)
         ]
     return told
 

@@ -1,16 +1,76 @@
-"""The library's file of calibrated laws, tables/calibrated.nc: a root, and groups that other commands write."""
+"""What fits of calibrated laws share, and their file tables/calibrated.nc: a root, and groups of other commands."""
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
+import itertools
+import json
 import os
 import pathlib
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeVar
 
 import netCDF4
+import numpy as np
 import xarray as xr
+from scipy.optimize import least_squares
 
+from generate.provenance import source_digest, versions
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.tablefiles.netcdf import HDF5_LOCK, SEAL, read_sealed
+
+QUANTITIES = ("area", "force", "stiffness")  # as the file names them: the library's "pressure" is "force" there
+Fitted = TypeVar("Fitted", bound=Any)  # a dataclass of constants
+Variable = tuple[Any, Any, dict[str, Any]]
+
+
+def fitted(
+    start: Fitted, names: Sequence[str], residuals: Callable[[Fitted], Iterable[FloatArray]], **options: Any
+) -> Fitted:
+    """Constants of which the named ones make the residuals small, by robust least squares with these options."""
+
+    def trial(values: FloatArray) -> Fitted:
+        return dataclasses.replace(start, **dict(zip(names, map(float, values), strict=True)))
+
+    first = [getattr(start, name) for name in names]
+    found = least_squares(lambda x: np.concatenate([*residuals(trial(x))]), first, loss="soft_l1", **options)
+    return trial(found.x)
+
+
+def binned(area: FloatArray, values: FloatArray, edges: Sequence[float]) -> list[FloatArray]:
+    """Finite values at contacts between edges, bin by bin."""
+    known = np.isfinite(values)
+    return [values[(area >= low) & (area < high) & known] for low, high in itertools.pairwise(edges)]
+
+
+def variable(dimensions: str | Sequence[str], values: Any, meaning: str, **attributes: Any) -> Variable:
+    """A variable without a unit."""
+    return dimensions, values, {"long_name": meaning, "units": "1", **attributes}
+
+
+def nodes_of(nodes: dict[str, FloatArray], meanings: dict[str, str], covered: dict[str, Any]) -> dict[str, Variable]:
+    """Coordinates of a table's nodes, with what of them is answered."""
+    return {name: variable(name, values, meanings[name], covered=covered[name]) for name, values in nodes.items()}
+
+
+def bins_of(edges: FloatArray, middles: FloatArray) -> dict[str, Variable]:
+    """Coordinates of bins of contact."""
+    return {
+        "contact": variable("contact", middles, "A/A0, middle of a bin"),
+        "contact_low": variable("contact", edges[:-1], "A/A0, low end of a bin"),
+        "contact_high": variable("contact", edges[1:], "A/A0, high end of a bin"),
+    }
+
+
+def made_by(modules: Sequence[str]) -> dict[str, str]:
+    """Attributes on what made a part."""
+    return {
+        "versions": json.dumps(versions(), sort_keys=True),
+        "source_sha256": source_digest(tuple(modules)),
+        "source_modules": " ".join(modules),
+    }
 
 
 def read_parts(path: os.PathLike[str] | str) -> dict[str, xr.Dataset]:

@@ -13,21 +13,21 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.optimize import least_squares
 
 from generate.boundary_elements.design import SPLITS, TRAINING
 from generate.boundary_elements.evidence import GAUSSIAN, LEVELS, Capped, capped
-from generate.calibrated_file import write_part
-from generate.provenance import source_digest, versions
+from generate.calibrated_file import binned, fitted, made_by, variable, write_part
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws import hardness as cap
 from mbma_tables.theories import calibrated_table, get_theory
-from mbma_tables.theories.yielding import GROUP, QUANTITIES, Scatter, Yielding
+from mbma_tables.theories.yielding import GROUP, Scatter, Yielding
 
 LIGHTEST, HEAVIEST = 0.01, 0.97  # A/A0 that constants are fitted to
 EDGES = (0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.95)  # contact fractions between which errors are told
 BARS = {"area": 0.05, "yielded": 0.05, "force": np.log(1.25), "stiffness": np.log(1.25)}
+QUANTITIES = ("area", "yielded", "force", "stiffness")  # as the file names them
+LIBRARY = {"area": "area", "force": "pressure", "stiffness": "stiffness"}  # and as the library does
 STATISTICS = ("bias", "standard_deviation", "share_within_bar", "largest", "number")
 # constants of each part, and errors that count alike: "planes" is the gap between mean planes
 PARTS: dict[str, tuple[tuple[str, ...], float]] = {
@@ -46,7 +46,7 @@ TURN = 0.01  # of ln A_el, for derivatives
 FOLDS = 5
 REFERENCE = pathlib.Path(__file__).parents[1] / "docs" / "data" / "hardness.csv"  # another code's surfaces
 WAVES = 3  # longest waves a side: with fewer h_max says little of the highest heights
-MODULES = ("mbma_tables.laws.hardness", "generate.calibrated_hardness")
+MODULES = ("mbma_tables.laws.hardness", "generate.calibrated_file", "generate.calibrated_hardness")
 
 
 def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> FloatArray:
@@ -62,26 +62,22 @@ def errors(one: Capped, part: str, constants: cap.Constants, share: int = 0) -> 
     return cap.plane_separation(one.u, one.force / one.eta, one.eta, constants) - one.planes
 
 
-def fitted(one: Capped) -> Any:
+def between(one: Capped) -> Any:
     """Loads that constants are fitted to."""
     return (one.area > LIGHTEST) & (one.area < HEAVIEST)
 
 
 def fit(seen: Sequence[Capped]) -> cap.Constants:
-    """Constants from these surfaces."""
-    start = cap.CONSTANTS
-    found: dict[str, float] = {}
+    """Constants from these surfaces, one part after the other."""
+
+    def residuals(part: str, noise: float, trial: cap.Constants) -> list[FloatArray]:
+        return [errors(one, part, trial)[between(one)] / noise for one in seen]
+
+    found = cap.CONSTANTS
     for part, (own, noise) in PARTS.items():
-
-        def residuals(
-            values: FloatArray, part: str = part, own: tuple[str, ...] = own, noise: float = noise
-        ) -> FloatArray:
-            trial = dataclasses.replace(start, **dict(zip(own, map(float, values), strict=True)))
-            return np.concatenate([errors(one, part, trial)[fitted(one)] / noise for one in seen])
-
-        best = least_squares(residuals, [getattr(start, name) for name in own], loss="soft_l1", x_scale="jac")
-        found |= {name: float(f"{value:.{DIGITS}g}") for name, value in zip(own, best.x, strict=True)}
-    return dataclasses.replace(start, **found)
+        best = fitted(cap.CONSTANTS, own, functools.partial(residuals, part, noise), x_scale="jac")
+        found = dataclasses.replace(found, **{name: float(f"{getattr(best, name):.{DIGITS}g}") for name in own})
+    return found
 
 
 def cross_validated(seen: Sequence[Capped]) -> list[cap.Constants]:
@@ -159,10 +155,8 @@ def by_contact(
     rms = np.full((len(etas), len(EDGES) - 1), np.nan)
     for row, eta in enumerate(etas):
         own = [k for k, one in enumerate(seen) if one.eta == eta]
-        bins = np.digitize(np.concatenate([areas[k] for k in own]), EDGES) - 1
-        e = np.concatenate([values[k] for k in own])
-        inside = ((bins == b) & np.isfinite(e) for b in range(len(EDGES) - 1))
-        rms[row] = [np.sqrt(np.mean(e[some] ** 2)) if some.any() else np.nan for some in inside]
+        parts = binned(np.concatenate([areas[k] for k in own]), np.concatenate([values[k] for k in own]), EDGES)
+        rms[row] = [np.sqrt(np.mean(part**2)) if part.size else np.nan for part in parts]
     return rms
 
 
@@ -183,7 +177,7 @@ def by_magnification(seen: Sequence[Capped], constants: cap.Constants) -> dict[s
         own = [one for one in seen if one.zeta_1 == zeta_1]
         means = [
             [
-                np.concatenate([errors(one, q, constants)[fitted(one)] for one in own if one.eta == eta]).mean()
+                np.concatenate([errors(one, q, constants)[between(one)] for one in own if one.eta == eta]).mean()
                 for eta in sorted({one.eta for one in own})
             ]
             for q in QUANTITIES
@@ -193,7 +187,7 @@ def by_magnification(seen: Sequence[Capped], constants: cap.Constants) -> dict[s
 
 
 def blind() -> dict[str, FloatArray]:
-    """Errors of `contact` on surfaces of an independent code, which no fit and no choice of a form saw."""
+    """Errors of `contact` on surfaces of another code, which no fit or choice of a form saw."""
     with open(REFERENCE, encoding="utf-8") as stream:
         table = np.genfromtxt((line for line in stream if not line.startswith("#")), delimiter=",", names=True)
     own = table[np.isfinite(table["eta"]) & (table["area"] > LIGHTEST) & (table["area"] < EDGES[-1])]
@@ -233,15 +227,15 @@ def coverage(seen: Sequence[Capped], constants: cap.Constants, scatter: Scatter)
     told: dict[str, list[float]] = {}
     for name in (*FORMS, *OTHERS):
         own = [one for one in seen if name in FORMS or one.kind == "self_affine"]
-        for quantity in ("area", "force", "stiffness"):
+        for quantity, named in LIBRARY.items():
             sizes = []
             for one in own:
                 kept = (one.area > LIGHTEST) & (one.area < EDGES[-1])
                 told_here = told_errors(one, name, constants)
                 # of stiffness by the own area, as stated
                 area = one.area * np.exp(told_here["area"]) if quantity == "stiffness" else one.area
-                known = calibrated_table.shipped().standard_deviation(name, quantity, area)
-                sigma = scatter.standard_deviation(name, quantity, np.array(one.eta), area, known)
+                known = calibrated_table.shipped().standard_deviation(name, named, area)
+                sigma = scatter.standard_deviation(name, named, np.array(one.eta), area, known)
                 sizes.append((np.abs(told_here[quantity]) / sigma)[kept])
             size = np.concatenate(sizes)
             told[f"{name} {quantity}"] = [float(np.mean(size[np.isfinite(size)] < limit)) for limit in (1, 2)]
@@ -272,7 +266,7 @@ def stated(training: Sequence[Capped], constants: cap.Constants) -> Scatter:
             [one for one, _ in alike], [e["stiffness"] for e in found], etas, areas
         )
     weights = {
-        q: by_contact(training, [weight_of_elastic(one, q, constants) for one in training], etas)
+        LIBRARY[q]: by_contact(training, [weight_of_elastic(one, q, constants) for one in training], etas)
         for q in ("area", "force")
     }
     return Scatter(np.array(etas), np.log(np.sqrt(np.multiply(EDGES[1:], EDGES[:-1]))), rms, weights)
@@ -280,30 +274,20 @@ def stated(training: Sequence[Capped], constants: cap.Constants) -> Scatter:
 
 def dataset(scatter: Scatter, told: FloatArray) -> xr.Dataset:
     """Variables of the library's file."""
-    unit = {"units": "1"}
+    known = "statistics of ln(law/simulation), of the difference for the yielded share"
+    stated = (
+        "root mean square of ln(law/simulation) on the training set, by constants from other spectra; of the theory "
+        "elastic with the simulated elastic contact; NaN: not measured"
+    )
+    passed_on = "root mean square of d ln(area, force) by d ln of the elastic one"
+    rms, weights = np.array([*scatter.rms.values()]), np.array([*scatter.weight.values()])
     return xr.Dataset(
         {
-            "accuracy": (
-                ("set", "form", "quantity", "statistic"),
-                told,
-                {"long_name": "statistics of ln(law/simulation), of the difference for the yielded share", **unit},
-            ),
-            "stated_scatter": (
-                ("theory", "quantity", "hardness", "contact"),
-                np.array([*scatter.rms.values()]),
-                {
-                    "long_name": "root mean square of ln(law/simulation) on the training set, by constants from other "
-                    "spectra; of the theory elastic with the simulated elastic contact; NaN: not measured",
-                    **unit,
-                },
-            ),
-            "elastic_weight": (
-                ("force_or_area", "hardness", "contact"),
-                np.array([*scatter.weight.values()]),
-                {"long_name": "root mean square of d ln(area, force) by d ln of the elastic one", **unit},
-            ),
-            "eta": ("hardness", scatter.eta, {"long_name": "p_m/(E* g)", **unit}),
-            "contact": ("contact", np.exp(scatter.log_area), {"long_name": "A/A0, middle of a bin", **unit}),
+            "accuracy": variable(("set", "form", "quantity", "statistic"), told, known),
+            "stated_scatter": variable(("theory", "quantity", "hardness", "contact"), rms, stated),
+            "elastic_weight": variable(("force_or_area", "hardness", "contact"), weights, passed_on),
+            "eta": variable("hardness", scatter.eta, "p_m/(E* g)"),
+            "contact": variable("contact", np.exp(scatter.log_area), "A/A0, middle of a bin"),
         }
     )
 
@@ -335,9 +319,7 @@ def write(evidence: xr.Dataset, path: os.PathLike[str] | str | None) -> tuple[ca
         "sets": " ".join(groups),
         **{f"law_{name}": value for name, value in dataclasses.asdict(constants).items()},
         "evidence": json.dumps({"code_sha256": evidence.attrs.get("code_sha256", ""), "contacts": len(found)}),
-        "versions": json.dumps(versions(), sort_keys=True),
-        "source_sha256": source_digest(MODULES),
-        "source_modules": " ".join(MODULES),
+        **made_by(MODULES),
     }
     if path is not None:
         write_part(path, data, GROUP)

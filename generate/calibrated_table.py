@@ -14,20 +14,18 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.interpolate import PchipInterpolator, make_interp_spline
+from scipy.interpolate import make_interp_spline
 
-from generate.boundary_elements.evidence import Case
-from generate.calibrated_file import write_part
-from generate.provenance import source_digest, versions
+from generate.boundary_elements.evidence import Case, TheoryCurve
+from generate.calibrated_file import QUANTITIES, bins_of, made_by, nodes_of, variable, write_part
 from generate.splines import coefficients
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws.calibrated import Constants, Law, Spectrum
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.theories.calibrated_table import AXES, QUANTITIES, load
+from mbma_tables.theories.calibrated_table import AXES, load
 from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
 from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.persson import Persson
-from mbma_tables.theories.protocol import Theory
 
 # answered inside; nodes reach further, since a spline is worst near its ends
 COVERED = {"hurst": (0.1, 1.0), "log_zeta_1": (np.log(3.0), np.log(1e5)), "log_separation": (np.log(1e-6), np.log(8.0))}
@@ -48,6 +46,7 @@ MODULES = (
     "mbma_tables.laws.map_curves",
     "generate.calibrated",
     "generate.calibrated_bars",
+    "generate.calibrated_file",
     "generate.calibrated_table",
 )
 LONG_NAMES = {
@@ -55,48 +54,12 @@ LONG_NAMES = {
     "log_zeta_1": "natural logarithm of q1/q0",
     "log_separation": "natural logarithm of the mean separation over h_rms",
 }
-# u/h_max at which a theory's curve is known
-DEPTHS = np.concatenate([1 - np.geomspace(1e-4, 0.5, 150), np.geomspace(0.5, 1e-6, 151)[1:]])
 
 Summary = Callable[[Sequence[Case], Callable[[Case], Any]], dict[str, Any]]
 
 
-class TheoryCurve:
-    """A theory on one simulated surface, in the units of the calibrated law."""
-
-    def __init__(self, theory: Theory, one: Case) -> None:
-        _, hurst, zeta_1, *_ = one.node
-        self._surface = Surface(float(hurst), 1.0, float(zeta_1), 1.0, one.h_max)
-        self._theory, self._gradient = theory, float(self._surface.rms_gradient)
-        low = float(theory.interval(self._surface)[0])
-        u = DEPTHS * one.h_max
-        u = u[u > low]
-        found = theory.answer(self._surface, u)
-        rising = np.append(True, np.diff(np.minimum(found.pressure, 1e300)) > 0) & (found.pressure > 0)
-        self._u = u[rising]
-        self._log_force = np.log(found.pressure[rising] / self._gradient)
-        self._log_area = np.log(found.area[rising])
-
-    def reaches(self, force: FloatArray) -> Any:
-        """Which loads lie on the theory's curve."""
-        log_force = np.log(force)
-        return (log_force > self._log_force[0]) & (log_force < self._log_force[-1])
-
-    def area(self, force: FloatArray) -> FloatArray:
-        """A/A0 at F/(A0 E* g)."""
-        return np.asarray(np.exp(PchipInterpolator(self._log_force, self._log_area)(np.log(force))))
-
-    def separation(self, force: FloatArray) -> FloatArray:
-        """Mean separation [h_rms] at F/(A0 E* g)."""
-        return np.asarray(PchipInterpolator(self._log_force, self._u)(np.log(force)))
-
-    def force(self, u: FloatArray) -> FloatArray:
-        """F/(A0 E* g) at mean separations [h_rms]."""
-        return self._theory.answer(self._surface, np.minimum(u, self._surface.h_max)).pressure / self._gradient
-
-
-def _known(curves: dict[int, TheoryCurve]) -> Callable[[Case], TheoryCurve]:
-    return lambda one: curves[id(one)]
+def _made(curves: dict[int, TheoryCurve], one: Case) -> TheoryCurve:
+    return curves[id(one)]
 
 
 def others(found: Sequence[Case], summary: Summary) -> dict[str, dict[str, Any]]:
@@ -104,17 +67,14 @@ def others(found: Sequence[Case], summary: Summary) -> dict[str, dict[str, Any]]
     told = {}
     variants = [Mbma(variant=name, outside="nan") for name in ("reported", "printed", "fitted")]
     for theory in (*variants, Persson(), Persson("simplified"), GreenwoodWilliamson()):
-        seen, curves = [], {}
-        for one in found:
-            if one.kind != "self_affine" or not one.gaussian:
-                continue
+        reached: list[tuple[Case, TheoryCurve]] = []
+        for one in (one for one in found if one.kind == "self_affine" and one.gaussian):
             curve = TheoryCurve(theory, one)
-            kept = curve.reaches(one.force)
+            kept = np.isfinite(curve.separation(one.force))
             if kept.sum() > 3:
-                part = dataclasses.replace(one, force=one.force[kept], area=one.area[kept], u=one.u[kept])
-                seen.append(part)
-                curves[id(part)] = curve
-        told[theory.scatter_name(SELF_AFFINE)] = summary(seen, _known(curves))
+                reached.append((one.at(kept), curve))
+        made = {id(one): curve for one, curve in reached}
+        told[theory.scatter_name(SELF_AFFINE)] = summary([one for one, _ in reached], functools.partial(_made, made))
     return told
 
 
@@ -202,9 +162,7 @@ def _attributes(told: dict[str, Any], constants: Constants, theories: list[str],
         "coverage": json.dumps(told["coverage"]),
         "bars": json.dumps(told["bars"]),
         "evidence": json.dumps(told["evidence"]),
-        "versions": json.dumps(versions(), sort_keys=True),
-        "source_sha256": source_digest(MODULES),
-        "source_modules": " ".join(MODULES),
+        **made_by(MODULES),
     }
 
 
@@ -223,34 +181,20 @@ def dataset(told: dict[str, Any], found: Sequence[Case], summary: Summary) -> xr
     }
     rows = {f"{name}, {form}": content for name, forms in told["errors"].items() for form, content in forms.items()}
     rows |= {f"self-affine, {name}": content for name, content in known.items()}
-    text = {"units": "1"}
+    scatter = np.array([_stated(cells) for cells in stated.values()])
+    accuracy = np.array([_cells(content, bins) for content in rows.values()])
+    spline = "ln F_G, F/(A0 E* g) of a surface without end: cardinal quintic B-splines"
+    known_from = "statistics of ln(theory/simulation), and their number"
     data = xr.Dataset(
         {
-            "spline": (
-                tuple(f"{name}_knot" for name in AXES),
-                coefficients(values, DEGREE, 3),
-                {"long_name": "ln F_G, F/(A0 E* g) of a surface without end: cardinal quintic B-splines", **text},
+            "spline": variable([f"{name}_knot" for name in AXES], coefficients(values, DEGREE, 3), spline),
+            "stated_scatter": variable(
+                ("theory", "quantity", "contact"), scatter, "root mean square of ln(theory/simulation)"
             ),
-            "stated_scatter": (
-                ("theory", "quantity", "contact"),
-                np.array([_stated(cells) for cells in stated.values()]),
-                {"long_name": "root mean square of ln(theory/simulation)", **text},
-            ),
-            "accuracy": (
-                ("set", "quantity", "contact", "statistic"),
-                np.array([_cells(content, bins) for content in rows.values()]),
-                {"long_name": "statistics of ln(theory/simulation), and their number", **text},
-            ),
+            "accuracy": variable(("set", "quantity", "contact", "statistic"), accuracy, known_from),
         },
-        {
-            **{
-                name: (name, nodes, {"long_name": LONG_NAMES[name], **text, "covered": COVERED[name]})
-                for name, nodes in zip(AXES, (HURST, LOG_ZETA, LOG_U), strict=True)
-            },
-            "contact": ("contact", np.sqrt(edges[1:] * edges[:-1]), {"long_name": "A/A0, middle of a bin", **text}),
-            "contact_low": ("contact", edges[:-1], {"long_name": "A/A0, low end of a bin", **text}),
-            "contact_high": ("contact", edges[1:], {"long_name": "A/A0, high end of a bin", **text}),
-        },
+        nodes_of(dict(zip(AXES, (HURST, LOG_ZETA, LOG_U), strict=True)), LONG_NAMES, COVERED)
+        | bins_of(edges, np.sqrt(edges[1:] * edges[:-1])),
     )
     data.attrs = _attributes(told, constants, list(stated), list(rows))
     return data

@@ -9,7 +9,6 @@ import pathlib
 import shutil
 import subprocess
 import sys
-import sysconfig
 import tempfile
 
 import click
@@ -24,30 +23,24 @@ def coverage(tests: tuple[str, ...]) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         shutil.copytree(ROOT / "mbma_tables", folder / "mbma_tables", ignore=shutil.ignore_patterns("__pycache__"))
-        for other in ("docs", "tables"):
+        for other in ("docs", "tables", "setup.py", "build_backend.py", "pyproject.toml", "README.md", "LICENSE"):
             (folder / other).symlink_to(ROOT / other)
-        core = folder / "mbma_tables" / "core"
         # atomic: tests have threads
-        options = ["-std=c11", "-O0", "-ffp-contract=off", "--coverage", "-fprofile-update=atomic", "-fPIC"]
-        include = f"-I{sysconfig.get_path('include')}"
-        sources = sorted(path.name for path in core.glob("*.c"))
-        subprocess.run(["gcc", *options, include, "-DMBMA_MODULE=_plain", "-c", *sources], cwd=core, check=True)
-        objects = [f"{pathlib.Path(source).stem}.o" for source in sources]
-        (core / "_plain.abi3.so").unlink(missing_ok=True)
-        subprocess.run(["gcc", "--coverage", "-shared", *objects, "-o", "_plain.abi3.so", "-lm"], cwd=core, check=True)
+        given = {"CC": "gcc", "CFLAGS": "-O0 --coverage -fprofile-update=atomic", "MBMA_TABLES_CORE": "plain"}
+        build = [sys.executable, "-W", "ignore", "setup.py", "--quiet", "build_ext", "--inplace"]
+        subprocess.run(build, cwd=folder, env=os.environ | given, check=True)
         paths = os.pathsep.join([name, os.environ.get("PYTHONPATH", "")])
-        environment = os.environ | {"PYTHONPATH": paths, "MBMA_TABLES_CORE": "plain"}
+        environment = os.environ | given | {"PYTHONPATH": paths}
         # -P: else the checkout would come first
         command = [sys.executable, "-P", "-m", "pytest", "-p", "no:cacheprovider", *tests]
         code = subprocess.run(command, cwd=ROOT, env=environment, check=False).returncode
         runs: dict[str, collections.Counter[int]] = collections.defaultdict(collections.Counter)
-        for data in sorted(core.glob("*.gcda")):
-            counted = subprocess.run(
-                ["gcov", "--json-format", "--stdout", data.name], cwd=core, check=True, capture_output=True
-            )
+        for data in sorted(folder.rglob("*.gcda")):
+            line = ["gcov", "--json-format", "--stdout", str(data)]
+            counted = subprocess.run(line, cwd=folder, check=True, capture_output=True)
             for file in json.loads(counted.stdout)["files"]:
-                for line in file["lines"]:
-                    runs[file["file"]][line["line_number"]] += line["count"]
+                for line in file["lines"] if file["file"].startswith("mbma_tables") else ():
+                    runs[pathlib.Path(file["file"]).name][line["line_number"]] += line["count"]
         for file, lines in sorted(runs.items()):
             missed = sorted(line for line, count in lines.items() if count == 0)
             share = 1 - len(missed) / len(lines)

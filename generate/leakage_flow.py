@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from generate.boundary_elements.evidence import Simulated, simulated
-from generate.calibrated_table import TheoryCurve
+from generate.boundary_elements.evidence import Simulated, TheoryCurve, simulated
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws import effective_medium as leakage
 from mbma_tables.laws.calibrated import Constants, Law
@@ -45,7 +44,7 @@ class Case(Simulated):
         """A/A0 and mean gap by the calibrated law, from the spectrum and h_max, and a hardness, the last of `node`."""
         if self.kind == "yielded":
             gradient = self.spectrum.gradient
-            curve = TheoryCurve(Yielding(get_theory("calibrated"), float(self.node[-1]) * gradient), cast(Any, self))
+            curve = TheoryCurve(Yielding(get_theory("calibrated"), float(self.node[-1]) * gradient), self)
             return curve.area(self.force), curve.separation(self.force)
         law = Law(self.spectrum, self.h_max, constants)
         return law.area(self.force), law.separation(self.force)

@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import itertools
-import json
 import pathlib
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from typing import Any, cast
+from typing import Any
 
 import click
 import numpy as np
 import xarray as xr
 from scipy.interpolate import RegularGridInterpolator
-from scipy.optimize import least_squares
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
-from generate.calibrated_file import write_part
-from generate.calibrated_table import TheoryCurve
+from generate.boundary_elements.evidence import TheoryCurve
+from generate.calibrated_file import binned, bins_of, fitted, made_by, nodes_of, variable, write_part
 from generate.leakage_flow import MIN_WAVES, Case, Flow, cases, log_odds
-from generate.provenance import source_digest, versions
 from generate.splines import coefficients
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws import effective_medium as leakage
@@ -51,7 +47,10 @@ LONG_NAMES = {
     "log_zeta_1": "natural logarithm of q1/q0",
     "log_odds": "ln A/(Ac - A), A = A/A0 and Ac = flow_threshold",
 }
-MODULES = ("mbma_tables.laws.calibrated", "mbma_tables.laws.effective_medium", "generate.leakage_law")
+MODULES = (
+    *("mbma_tables.laws.calibrated", "mbma_tables.laws.effective_medium"),
+    *("generate.calibrated_file", "generate.leakage_flow", "generate.leakage_law"),
+)
 PROCESSES = 2
 ROOT = pathlib.Path(__file__).parents[1]
 TABLE = ROOT / "tables" / "calibrated.nc"
@@ -62,29 +61,20 @@ def fit(training: Sequence[Flow], first: FlowConstants = DEFAULT) -> FlowConstan
     """Constants of the law and of the closed form, by robust least squares up to `leakage.LARGEST_AREA`."""
     seen = [(flow, flow.one.area < leakage.LARGEST_AREA) for flow in training if flow.one.isotropic]
 
-    def residuals(form: Callable[[Flow, FlowConstants], FloatArray], constants: FlowConstants) -> FloatArray:
+    def residuals(form: Callable[[Flow, FlowConstants], FloatArray], constants: FlowConstants) -> list[FloatArray]:
         parts = []
         for flow, kept in seen:
             miss = (form(flow, constants) - flow.one.log_k) / (NOISE[0] + NOISE[1] * flow.one.area**2)
             # the law may block what was open
             parts.append(np.maximum(miss[kept], BLOCKED))
-        return np.concatenate(parts)
+        return parts
 
-    found = least_squares(
-        lambda x: residuals(Flow.medium, FlowConstants(*map(float, x))),
-        [first.threshold, first.obstruction],
-        loss="soft_l1",
-        diff_step=0.01,
-        x_scale=[0.01, 0.1],
-    )
-    own = [round(float(x), 3) for x in found.x]
-    closed = least_squares(
-        lambda x: residuals(Flow.closed_form, FlowConstants(*own, *map(float, x))),
-        [first.prefactor, first.exponent],
-        loss="soft_l1",
-        diff_step=0.01,
-    )
-    return FlowConstants(*own, *(round(float(x), 3) for x in closed.x))
+    def found(start: FlowConstants, names: tuple[str, ...], form: Any, **options: Any) -> FlowConstants:
+        best = fitted(start, names, functools.partial(residuals, form), diff_step=0.01, **options)
+        return dataclasses.replace(best, **{name: round(getattr(best, name), 3) for name in names})
+
+    law = found(first, ("threshold", "obstruction"), Flow.medium, x_scale=[0.01, 0.1])
+    return found(law, ("prefactor", "exponent"), Flow.closed_form)
 
 
 def left_out(training: Sequence[Flow], constants: FlowConstants) -> FloatArray:
@@ -131,8 +121,7 @@ def summary(parts: Sequence[tuple[FloatArray, FloatArray]], edges: Sequence[floa
     told = np.full((len(edges) - 1, 3), np.nan)
     if parts:
         area, miss = (np.concatenate(each) for each in zip(*parts, strict=True))
-        for k in range(len(edges) - 1):
-            own = miss[(area >= edges[k]) & (area < edges[k + 1])]
+        for k, own in enumerate(binned(area, miss, edges)):
             if own.size:
                 told[k] = own.mean(), np.sqrt(np.mean(own**2)), own.size
     return told
@@ -148,7 +137,7 @@ def noise_floor(found: Sequence[Case], edges: Sequence[float] = EDGES) -> FloatA
             areas.append(np.mean([one.area[:size] for one in own], axis=0))
             variances.append(np.var([one.log_k[:size] for one in own], axis=0, ddof=1))
     area, variance = np.concatenate(areas), np.concatenate(variances)
-    return np.sqrt([variance[(area >= low) & (area < high)].mean() for low, high in itertools.pairwise(edges)])
+    return np.sqrt([part.mean() for part in binned(area, variance, edges)])
 
 
 def of_theories(flows: Sequence[Flow], constants: FlowConstants) -> dict[str, FloatArray]:
@@ -160,8 +149,8 @@ def of_theories(flows: Sequence[Flow], constants: FlowConstants) -> dict[str, Fl
             one = flow.one
             if one.kind != "self_affine" or not one.isotropic:
                 continue
-            curve = TheoryCurve(theory, cast(Any, one))
-            kept = curve.reaches(one.force)
+            curve = TheoryCurve(theory, one)
+            kept = np.isfinite(curve.separation(one.force))
             area, u = curve.area(one.force[kept]), curve.separation(one.force[kept])
             log_k = np.full(one.force.shape, -np.inf)
             log_k[kept] = flow.medium(constants, area, u)
@@ -193,44 +182,25 @@ def dataset(found: Sequence[Case], contact: Constants) -> xr.Dataset:
     certified = certificate(values, constants, contact)
     blocked = np.concatenate([one.blocked for one in found if one.isotropic], axis=1)
     edges = np.array(EDGES)
-    shares = [blocked[1][(blocked[0] >= a) & (blocked[0] < b)].mean() for a, b in itertools.pairwise(edges)]
-    text = {"units": "1"}
+    shares = [part.mean() for part in binned(blocked[0], blocked[1], EDGES)]
+    accuracy = np.array([list(laws.values()) for laws in told.values()])
+    spline = coefficients(values, DEGREE, 3).astype("f4")
+    splined = "coefficients of cardinal quintic B-splines of ln R, k = u^3 (1 - 1.5/(u^2 + 4)) R"
+    scatter, differ = np.array([rows[:, 1] for rows in stated.values()]), "standard deviation of ln k between cells"
     data = xr.Dataset(
         {
-            "spline": (
-                tuple(f"{name}_knot" for name in AXES),
-                coefficients(values, DEGREE, 3).astype("f4"),
-                {
-                    "long_name": "coefficients of cardinal quintic B-splines of ln R, k = u^3 (1 - 1.5/(u^2 + 4)) R",
-                    **text,
-                },
-            ),
-            "accuracy": (
+            "spline": variable([f"{name}_knot" for name in AXES], spline, splined),
+            "accuracy": variable(
                 ("set", "law", "contact", "statistic"),
-                np.array([list(laws.values()) for laws in told.values()]),
-                {"long_name": "bias, root mean square and number of ln(law/simulation)", **text},
+                accuracy,
+                "bias, root mean square and number of ln(law/simulation)",
             ),
-            "stated_scatter": (
-                ("theory", "contact"),
-                np.array([rows[:, 1] for rows in stated.values()]),
-                {"long_name": "root mean square of ln(k/simulation)", **text},
-            ),
-            "noise": (
-                "contact",
-                noise_floor(found),
-                {"long_name": "standard deviation of ln k between cells of one spectrum", **text},
-            ),
-            "share_blocked": ("contact", shares, {"long_name": "share of directions that are blocked", **text}),
+            "stated_scatter": variable(("theory", "contact"), scatter, "root mean square of ln(k/simulation)"),
+            "noise": variable("contact", noise_floor(found), f"{differ} of one spectrum"),
+            "share_blocked": variable("contact", shares, "share of directions that are blocked"),
         },
-        {
-            **{
-                name: (name, nodes, {"long_name": LONG_NAMES[name], **text, "covered": COVERED[name]})
-                for name, nodes in zip(AXES, (HURST, LOG_ZETA, LOG_ODDS), strict=True)
-            },
-            "contact": ("contact", (edges[1:] + edges[:-1]) / 2, {"long_name": "A/A0, middle of a bin", **text}),
-            "contact_low": ("contact", edges[:-1], {"long_name": "A/A0, low end of a bin", **text}),
-            "contact_high": ("contact", edges[1:], {"long_name": "A/A0, high end of a bin", **text}),
-        },
+        nodes_of(dict(zip(AXES, (HURST, LOG_ZETA, LOG_ODDS), strict=True)), LONG_NAMES, COVERED)
+        | bins_of(edges, (edges[1:] + edges[:-1]) / 2),
     )
     data.attrs = {
         "title": "Flow conductance of gaps: contact factor of an effective medium, and its errors against simulation",
@@ -245,8 +215,7 @@ def dataset(found: Sequence[Case], contact: Constants) -> xr.Dataset:
         "largest_error_simulated": certified[0],
         "largest_error_log_factor": certified[1],
         "coverage": np.array(coverage(flows, constants, stated["calibrated"])),
-        "versions": json.dumps(versions(), sort_keys=True),
-        "source_sha256": source_digest(MODULES),
+        **made_by(MODULES),
     }
     return data
 

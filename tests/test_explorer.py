@@ -122,7 +122,7 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
         assert answered.size > 3
         options = {"mean_separation": known["gap"][answered], "E_star": state["E_star"], "theory": theory}
         expected = contact(surface, **options, **({"variant": state["variant"]} if theory == "mbma" else {}))
-        np.testing.assert_allclose(found[f"{theory} scatter of ln force"][answered], expected.scatter, rtol=1e-6)
+        np.testing.assert_allclose(found[f"{theory} scatter of ln pressure"][answered], expected.scatter, rtol=1e-6)
         np.testing.assert_allclose(found[f"{theory} scatter of ln area"][answered], expected.area_scatter, rtol=1e-6)
         force, area, stiffness = expected.pressure, expected.area, expected.stiffness
         if theory == "mbma":
@@ -138,7 +138,7 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
         )
     if state["against"] == "pressure":
         # one column of pressures for all theories, which each meets
-        pressures = np.nanmax([found[f"{theory} force"] for theory in ("mbma", "calibrated", "persson")], axis=0)
+        pressures = np.nanmax([found[f"{theory} pressure"] for theory in ("mbma", "calibrated", "persson")], axis=0)
         assert np.allclose(np.diff(np.log(pressures)), np.log(1e5) / 99, rtol=1e-6)
     return worst
 
@@ -274,7 +274,7 @@ def test_a_pasted_spectrum_is_answered_as_the_library_does(visit):
     # in SurfaceTopography's convention
     tab.fill("#spectrum", rows(SAMPLES, 4 * np.pi**2 * SPECTRUM))
     tab.select_option("#convention", "isotropic")
-    np.testing.assert_allclose(columns(tab)["calibrated force"], found["calibrated force"], rtol=1e-9)
+    np.testing.assert_allclose(columns(tab)["calibrated pressure"], found["calibrated pressure"], rtol=1e-9)
     tab.select_option("#theory", "mbma")
     assert "needs five numbers" in tab.inner_text("#error-theory")
 

@@ -115,7 +115,7 @@ def test_units_that_are_powers_of_two_change_no_bit(surface, share, variant, pow
 @invariant(8, surface=surfaces, share=depths, power=st.floats(-12, 12), stress=st.floats(-12, 12))
 def test_laws_in_any_unit(surface, share, power, stress):
     unit, modulus, gap = 10**power, 10**stress, float(gaps_of(surface, share))
-    law, other = contact_law(surface, 1e-9), contact_law(in_unit(surface, unit), 1e-9, E_star=modulus)
+    law, other = contact_law(surface, rtol=1e-9), contact_law(in_unit(surface, unit), rtol=1e-9, E_star=modulus)
     room = law.error + other.error + lost_digits(surface, gap)
     assert abs(other.pressure(separation=gap * unit) / (law.pressure(separation=gap) * modulus) - 1) <= room
     assert abs(other.area(separation=gap * unit) / law.area(separation=gap) - 1) <= room
@@ -144,7 +144,7 @@ def test_scenes_in_any_unit(surface, share, power, stress):
 @invariant(12, surface=surfaces, variant=variants)
 def test_force_and_area_fall_in_the_gap(surface, variant):
     """Down to the model's own turning point, which is never above d = 0; beyond it they rise."""
-    law = contact_law(surface, 1e-6, variant=variant)
+    law = contact_law(surface, rtol=1e-6, variant=variant)
     gaps = gaps_of(surface, np.append(10 ** np.linspace(-9, 0, 40), np.linspace(1, 2, 200)[1:]))
     found = contact(surface, separation=gaps, variant=variant, derivatives=True)
     cell = 1.001 * surface.h_max / 199
@@ -275,7 +275,7 @@ def test_spheres_that_deform_carry_less(surface, shares, variant):
 )
 def test_a_law_and_its_inverse(surface, shares, variant, digits):
     """Both ways, on the branch of first contact."""
-    law = contact_law(surface, 10.0**-digits, variant=variant)
+    law = contact_law(surface, rtol=10.0**-digits, variant=variant)
     for name, value, slope, turn in (
         ("pressure", law.pressure, lambda separation: law.stiffness(separation=separation) / 2, law.turning_point),
         ("area", law.area, law.area_slope, law.area_turning_point),

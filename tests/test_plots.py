@@ -19,8 +19,8 @@ def test_lines_hold_the_arrays_as_given():
     curves = two_curves()
     by_gap, by_force = draw_compression(curves).axes
     for curve, left, right in zip(curves, by_gap.lines, by_force.lines, strict=True):
-        np.testing.assert_array_equal(left.get_xydata(), np.stack([curve.gap, curve.force], axis=1))
-        np.testing.assert_array_equal(right.get_xydata(), np.stack([curve.force, curve.area], axis=1))
+        np.testing.assert_array_equal(left.get_xydata(), np.stack([curve.gap, curve.pressure], axis=1))
+        np.testing.assert_array_equal(right.get_xydata(), np.stack([curve.pressure, curve.area], axis=1))
 
 
 def test_scatter_is_a_band_of_one_standard_deviation():

@@ -3,7 +3,7 @@
 import re
 
 from generate.pages import formula, readme
-from generate.pages.page import MARKED, ROOT
+from generate.pages.page import MARKED, ROOT, svg
 
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -21,8 +21,8 @@ def test_measured_parts_are_the_generators():
     assert {match[2]: match[0] for match in MARKED.finditer(TEXT)} == {
         name: f"<!-- measured: {name} -->\n\n{part}\n\n<!-- end -->" for name, part in parts.items()
     }
-    for name, content in files.items():
-        assert (ROOT / name).read_bytes()[:5] == content[:5] == b"<?xml"
+    for name, figure in files.items():
+        assert (ROOT / name).read_bytes()[:5] == svg(figure)[:5] == b"<?xml"
     assert formula.pocket_laws() in (ROOT / "docs" / "formula.md").read_text(encoding="utf-8")
 
 

@@ -338,7 +338,7 @@ def test_a_labelled_contact_keeps_its_units():
 
 @pytest.mark.parametrize("theory", ["mbma", "persson"])
 def test_a_law_keeps_its_units(theory):
-    law = contact_law(CONCRETE.to("um"), 1e-5, E_star="13.3 MPa", theory=theory)
+    law = contact_law(CONCRETE.to("um"), rtol=1e-5, E_star="13.3 MPa", theory=theory)
     assert law.units == Units("um", "MPa")
     assert law.pressure("0.7 mm") == law.pressure(700.0)
     assert law.separation(pressure="10 kPa") == law.separation(pressure=0.01)
@@ -348,7 +348,7 @@ def test_a_law_keeps_its_units(theory):
     assert "pressure 0.01 MPa" in repr(pickle.loads(pickle.dumps(point)))
     assert pickle.loads(pickle.dumps(law)).units == law.units
     with pytest.raises(InputError, match="needs a modulus"):
-        contact_law(CONCRETE, 1e-3).at_pressure("10 kPa")
+        contact_law(CONCRETE, rtol=1e-3).at_pressure("10 kPa")
 
 
 def test_islands_take_units():

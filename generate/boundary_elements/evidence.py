@@ -13,16 +13,23 @@ from scipy.interpolate import PchipInterpolator
 from scipy.special import erf, erfinv
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, SPLITS, TRAINING
+from mbma_tables import Surface
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.laws import hardness
 from mbma_tables.laws.calibrated import Constants, Law, Spectrum
 from mbma_tables.laws.map_curves import MapConstants, MapLaw
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.maps import matched
+from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.calibrated_curves import Curve
+from mbma_tables.theories.protocol import Theory
 
 GAUSSIAN = ("self_affine", "plateau", "filtered")
 MIN_WAVES = 2  # constants see no surface of one longest wave a side
 MAX_AREA = 0.98  # beyond, gaps are a few points
 LEVELS = np.geomspace(1e-5, 1.0, 400)  # u/h_max of a law's curve
+# u/h_max at which a theory's curve is known
+DEPTHS = np.concatenate([1 - np.geomspace(1e-4, 0.5, 150), np.geomspace(0.5, 1e-6, 151)[1:]])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -43,6 +50,56 @@ class Simulated:
         """q1/q0."""
         return float(self.node[2])
 
+    @property
+    def surface(self) -> AnySurface:
+        """What theories are given, q0 = h_rms = 1: five numbers, or the surface's own spectrum by bands."""
+        if self.kind in ("self_affine", "yielded"):
+            return Surface(float(self.node[1]), 1.0, self.zeta_1, 1.0, self.h_max)
+        x, variance = self.own_spectrum.x, self.own_spectrum.variance
+        middle = np.sqrt(x[1:] * x[:-1])
+        edges = np.concatenate([[x[0] ** 2 / middle[0]], middle, [x[-1] ** 2 / middle[-1]]])
+        level = variance / (np.pi * np.diff(edges**2))
+        q, C = np.repeat(edges, 2)[1:-1], np.repeat(level, 2)
+        # of the mean square wavenumber that it has
+        return MeasuredSurface(q, matched(q, C, 1.0, self.own_spectrum.gradient**2), self.h_max)
+
+
+class TheoryCurve:
+    """A theory on a simulated surface: forces over A0 E* g, lengths over h_rms; NaN where the theory does not reach.
+
+    Raises
+    ------
+    MbmaError
+        Where the theory does not take the surface.
+    """
+
+    def __init__(self, theory: Theory, one: Simulated) -> None:
+        self._theory, self._surface = theory, one.surface
+        self._g, self._h_rms = float(self._surface.rms_gradient), float(self._surface.h_rms)
+        u = DEPTHS * float(self._surface.h_max)
+        with np.errstate(all="ignore"):
+            found = theory.answer(self._surface, u)
+        # of a theory whose force falls again, the branch of first contact
+        end = np.flatnonzero(np.append(np.diff(found.pressure) <= 0, True))[0] + 1
+        kept = slice(int(np.argmax(found.pressure[:end] > 0)), end)
+        self._log_force, self._log_area = np.log(found.pressure[kept] / self._g), np.log(found.area[kept])
+        self._u = u[kept] / self._h_rms
+
+    def _at(self, values: FloatArray, force: FloatArray) -> FloatArray:
+        return np.asarray(PchipInterpolator(self._log_force, values, extrapolate=False)(np.log(force)))
+
+    def area(self, force: FloatArray) -> FloatArray:
+        """A/A0 at a force."""
+        return np.exp(self._at(self._log_area, force))
+
+    def separation(self, force: FloatArray) -> FloatArray:
+        """Mean separation at a force."""
+        return self._at(self._u, force)
+
+    def force(self, u: FloatArray) -> FloatArray:
+        """Force at mean separations."""
+        return self._theory.answer(self._surface, np.minimum(u * self._h_rms, self._surface.h_max)).pressure / self._g
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Case(Simulated):
@@ -57,6 +114,10 @@ class Case(Simulated):
     def gaussian(self) -> bool:
         """Whether constants of the spectrum's law are fitted to surfaces like it."""
         return self.kind in GAUSSIAN and self.waves >= MIN_WAVES
+
+    def at(self, kept: Any) -> Case:
+        """The same at some of its loads."""
+        return dataclasses.replace(self, force=self.force[kept], area=self.area[kept], u=self.u[kept])
 
     def law(self, constants: Constants) -> Law:
         """The spectrum's law with h_max."""

@@ -219,7 +219,7 @@ _LATEX = {
     "log_total": r"\ln T",
     "d_over_h_rms": r"\tilde d",
     "h_max_over_h_rms": r"\tilde h",
-    **{name: rf"\mathrm{{{name}}}" for name in ("near", "far", "force", "area")},
+    **{name: rf"\mathrm{{{name}}}" for name in ("near", "far", "pressure", "area")},
 }
 
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from generate.boundary_elements.design import REFINEMENT, SPLITS
-from generate.pages.page import DATA, Measured, dataset, panels, spans, svg, table
+from generate.calibrated_file import binned
+from generate.pages.page import DATA, Measured, dataset, panels, spans, table
 from mbma_tables import Surface
 from mbma_tables.common.files import shipped_file
 from mbma_tables.laws.calibrated import CONSTANTS
@@ -31,27 +32,19 @@ SHOWN = {  # sets and forms of the accuracy table
     "self-affine, persson": "self-affine: Persson",
     "self-affine, greenwood_williamson": "self-affine: Greenwood-Williamson",
 }
-COLOURS = {
-    "calibrated": "k",
-    "calibrated_map": "0.5",
-    "mbma": "C0",
-    "mbma_printed": "C9",
-    "mbma_fitted": "C1",
-    "persson": "C3",
-    "persson_simplified": "C6",
-    "greenwood_williamson": "C2",
-}
+QUANTITIES = ("force", "area", "stiffness")
+COLOURS = {"calibrated": "k", "calibrated_map": "0.5", "mbma": "C0", "mbma_printed": "C9", "mbma_fitted": "C1"}
+COLOURS |= {"persson": "C3", "persson_simplified": "C6", "greenwood_williamson": "C2"}
 
 
 def accuracy(data: Any, number: int) -> str:
     """Bias and standard deviation of a quantity in percent, by contact fraction."""
     edges = (*data.contact_low.values, data.contact_high.values[-1])
-    header = ["surfaces, and what is known of them", *(f"{ends}%" for ends in spans(edges))]
     sets, rows = data.attrs["sets"].split("; "), []
     for name in (name for name in SHOWN if name in sets):
         cells = data.accuracy.values[sets.index(name), number]
-        rows.append([SHOWN[name], *(f"{100 * c[0]:+.0f} ± {100 * c[1]:.0f}" if c[3] >= 1 else "—" for c in cells)])
-    return table(header, rows)
+        rows.append([SHOWN[name], *((100 * bias, 100 * spread) for bias, spread, *_ in cells)])
+    return table(f"surfaces, and what is known of them | {spans(edges)}", rows, "{} | {:+.0f} ± {:.0f}")
 
 
 def numbers(data: Any) -> str:
@@ -62,34 +55,28 @@ def numbers(data: Any) -> str:
     rows += [(f"`{name}` (map)", f"{value:.4g}") for name, value in maps.items()]
     evidence = json.loads(facts["evidence"])
     rows += [("surfaces simulated, of which in the training set", f"{evidence['surfaces']}, {evidence['training']}")]
-    for what in ("force", "area", "stiffness"):
+    for what in QUANTITIES:
         largest, most = facts[f"largest_error_{what}"], facts[f"p99_error_{what}"]
         rows.append((f"largest (99%) error of {what} by the table", f"{largest:.1e} ({most:.1e})"))
     for what, (one, two) in json.loads(facts["coverage"]).items():
         rows.append((f"held-out errors of {what} within one and two of the stated", f"{one:.0%}, {two:.0%}"))
-    return table(["quantity", "value"], rows)
+    return table("quantity | value", rows)
 
 
 def bars(data: Any) -> str:
     """Limits to nine errors in ten, what is reached, and the floor by surfaces of one spectrum."""
-
-    def percent(value: float) -> str:
-        return f"{100 * value:.1f}%" if np.isfinite(value) else "—"
-
-    large = "90% quantile on 512 and 1024 points a side"
-    header = ["case", "limit", "90% quantile", "mean", "surfaces", large, "lower bound"]
     rows = []
     for bar in json.loads(data.attrs["bars"]):
         over = bar["found"] - bar["limit"]
         judged = "met" if over <= 0 else f"missed by {100 * over:.1f}" if over > 0 else "no load there"
-        cells = [
-            bar["what"].replace("wave", "wavelength") + " a side",
-            f"{100 * bar['limit']:g}%",
-            f"{percent(bar['found'])}: {judged}",
-        ]
-        cells += [f"{100 * bar['mean']:+.1f}%", str(bar["surfaces"])]
-        rows.append([*cells, f"{percent(bar['large'])} ({bar['surfaces_large']})", percent(bar["noise"])])
-    return table(header, rows)
+        found = (100 * bar["found"], judged) if np.isfinite(bar["found"]) else f"—: {judged}"
+        large = (
+            (100 * bar["large"], bar["surfaces_large"]) if np.isfinite(bar["large"]) else f"— ({bar['surfaces_large']})"
+        )
+        what = bar["what"].replace("wave", "wavelength") + " a side"
+        rows.append([what, 100 * bar["limit"], found, 100 * bar["mean"], bar["surfaces"], large, 100 * bar["noise"]])
+    header = "case | limit | 90% quantile | mean | surfaces | 90% quantile on 512 and 1024 points a side | lower bound"
+    return table(header, rows, "{} | {:g}% | {:.1f}%: {} | {:+.1f}% | {} | {:.1f}% ({}) | {:.1f}%")
 
 
 def refinement(data: Any) -> str:
@@ -97,26 +84,23 @@ def refinement(data: Any) -> str:
     ends = (0.002, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9)
     one = data.isel(surface=data.split.values == SPLITS.index(REFINEMENT))
     finest = one.points.values == one.points.values.max()
-    found: dict[tuple[float, int], list[list[float]]] = {}
+    found: dict[float, list[Any]] = {}
     for number in np.flatnonzero(~finest):
-        same = np.flatnonzero(finest & (one.seed.values == one.seed.values[number]))[0]
-        exact = one.area.values[same]
+        exact = one.area.values[np.flatnonzero(finest & (one.seed.values == one.seed.values[number]))[0]]
         spacing = float(one.points.values[number] / (one.zeta_1.values[number] * one.waves.values[number]))
-        for name in ("area_raw", "area"):
-            for part in range(len(ends) - 1):
-                inside = (exact >= ends[part]) & (exact < ends[part + 1]) & (one[name].values[number] > 0)
-                cells = found.setdefault((spacing, part), [[], []])
-                cells[name == "area"] += list(np.log(one[name].values[number][inside] / exact[inside]))
-    header = ["grid points per shortest wavelength", *(f"{part}%" for part in spans(ends))]
+        pair = np.stack([one.area_raw.values[number], one.area.values[number]])
+        # a grid without any contact at a load says nothing of it
+        known = np.where(pair > 0, np.log(np.maximum(pair, 1e-300) / exact), np.nan)
+        found.setdefault(spacing, []).append(np.concatenate([exact[None], known]))
     rows = []
-    for spacing in sorted({key[0] for key in found}):
-        pairs = [found[spacing, part] for part in range(len(ends) - 1)]
-        told = [f"{100 * np.mean(raw):+.1f}, {100 * np.mean(c):+.1f}" if raw and c else "—" for raw, c in pairs]
-        rows.append([f"{spacing:g}", *told])
-    return table(header, rows)
+    for spacing, parts in sorted(found.items()):
+        exact, *errors = np.concatenate(parts, axis=1)
+        pairs = zip(*(binned(exact, 100 * e, ends) for e in errors), strict=True)
+        rows.append([spacing, *((a.mean(), b.mean()) if a.size and b.size else "—" for a, b in pairs)])
+    return table(f"grid points per shortest wavelength | {spans(ends)}", rows, "{:g} | {:+.1f}, {:+.1f}")
 
 
-def draw(data: Any) -> bytes:
+def draw(data: Any) -> Any:
     """One surface's curves with the stated scatter as a band, and every theory's scatter of force."""
     figure, (left, right) = panels(1, 2, (10, 3.6))
     force, _, _, u = np.loadtxt(DATA / "bem_hurst0.8_zeta64.csv", delimiter=",", skiprows=4).T[:4]
@@ -139,14 +123,14 @@ def draw(data: Any) -> bytes:
         right.loglog(data.contact, data.stated_scatter.values[k, number], "o-", color=COLOURS[name], label=name)
     right.set(xlabel="A/A0", ylabel="rms of ln(F/simulated) at equal u", title="Stated scatter of force")
     figure.legend(*right.get_legend_handles_labels(), fontsize="small", loc="outside right center")
-    return svg(figure)
+    return figure
 
 
 def measure() -> Measured:
     """The measured blocks of the page, and its figure."""
     data = dataset(shipped_file("calibrated.nc"))
     quantities = data.attrs["quantities"].split()
-    parts = {name: accuracy(data, quantities.index(name)) for name in ("area", "force", "stiffness")}
+    parts = {name: accuracy(data, quantities.index(name)) for name in QUANTITIES}
     parts |= {"numbers": numbers(data), "bars": bars(data)}
     parts |= {"refinement": refinement(dataset(DATA / "boundary_elements.nc"))}
     return parts, {"docs/figures/calibrated.svg": draw(data)}

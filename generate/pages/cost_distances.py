@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,8 @@ from scipy.interpolate import PchipInterpolator
 
 from generate.boundary_elements.grids import GRIDS, STARTS
 from generate.boundary_elements.surfaces import Recipe, heights
-from generate.pages.distances import COVER, HIGH, HUES, ISLAND_MODELS, LOW, THEORIES, distances, held_out, summed_up
-from generate.pages.page import duration, panels, percent, read_csv, svg, table, to_csv
+from generate.pages.distances import COVER, HIGH, ISLAND_MODELS, LOW, THEORIES, distances, held_out, summed_up
+from generate.pages.page import read_csv
 from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.common.arguments import FloatArray
@@ -24,7 +24,10 @@ DEEP = 0.1  # A/A0: deviations are given from LOW to DEEP and from DEEP to HIGH
 RANGES = ((LOW, DEEP), (DEEP, HIGH))
 SIMULATED = "boundary elements"
 POINTS, SLOW_POINTS = 1000, 50  # of each timed surface, in one call
-TIMED = ((0.3, 12.0, 3.4), (0.5, 21.0, 3.6), (0.9, 12.0, 3.0))  # H, zeta_1, h_max/h_rms: those of the grids
+TIMED = tuple(  # those of the grids
+    Surface(hurst, 1.0, zeta_1, 1.0, top)
+    for hurst, zeta_1, top in ((0.3, 12.0, 3.4), (0.5, 21.0, 3.6), (0.9, 12.0, 3.0))
+)
 MAP = Recipe("self_affine", 0.8, 16.0, 4, 1, 256)
 LAW_RTOL = 1e-6
 HEAD = """\
@@ -33,46 +36,38 @@ HEAD = """\
 # at 10-97%; reached is the share of simulated loads there that the theory reaches. cost is of one point, once of what
 # is made beforehand for a surface, both over the fixed piece of work of cost.csv.
 """
-SHAPES = {"MBMA": "o", "calibrated": "s", "Persson": "^", "G-W": "v"}
 
 
-def _each(answer: Callable[[Surface, FloatArray], Any], count: int = POINTS) -> float:
-    """Cost of a point: force and area at mean separations of each timed surface, one call a surface."""
-    surfaces = [Surface(hurst, 1.0, zeta_1, 1.0, top) for hurst, zeta_1, top in TIMED]
-    asked = [(surface, np.linspace(0.02, 0.98, count) * float(surface.h_max)) for surface in surfaces]
-    cost, _ = measure(lambda: [answer(surface, u) for surface, u in asked])
-    return cost / (len(asked) * count)
+def timed(answer: Callable[[Surface, FloatArray], Any], count: int = POINTS) -> tuple[float, float]:
+    """Cost of a point, of mean separations of each surface in one call a surface; nothing is made beforehand."""
+    pairs = [(surface, np.linspace(0.02, 0.98, count) * float(surface.h_max)) for surface in TIMED]
+    return measure(lambda: [answer(surface, u) for surface, u in pairs])[0] / (len(pairs) * count), 0.0
 
 
-def _asked(**options: Any) -> Callable[[Surface, FloatArray], Any]:
-    return lambda surface, u: contact(surface, mean_separation=u, **options)
+def asked(count: int = POINTS, **options: Any) -> tuple[float, float]:
+    """The same, of force and area by `contact`."""
+    return timed(lambda surface, u: contact(surface, mean_separation=u, **options), count)
 
 
-def _by_law(**options: Any) -> tuple[float, float]:
+def by_law(**options: Any) -> tuple[float, float]:
     """Costs of a point of a law, and of making it."""
 
-    def make() -> dict[float, Any]:
-        surfaces = (Surface(hurst, 1.0, zeta_1, 1.0, top) for hurst, zeta_1, top in TIMED)
-        return {float(surface.h_max): contact_law(surface, LAW_RTOL, **options) for surface in surfaces}
+    def make() -> dict[Surface, Any]:
+        return {surface: contact_law(surface, rtol=LAW_RTOL, **options) for surface in TIMED}
 
     laws = make()
-
-    def answer(surface: Surface, u: FloatArray) -> Any:
-        law = laws[float(surface.h_max)]
-        return law.force(u=u), law.area(u=u)
-
-    made = measure(make)[0] / len(laws)
-    return _each(answer), made
+    each, _ = timed(lambda surface, u: (laws[surface].pressure(u), laws[surface].area(u)))
+    return each, measure(make)[0] / len(laws)
 
 
-def _quadrature(surface: Surface, u: FloatArray) -> Any:
-    spectrum = Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1))
-    law = Law(spectrum, float(surface.h_max / surface.h_rms))
-    force = law.force(u / surface.h_rms)
+def quadrature(surface: Surface, u: FloatArray) -> Any:
+    """Force and area by the calibrated law's own integrals."""
+    law = Law(Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1)), float(surface.h_max))
+    force = law.force(u)
     return force, law.area(force)
 
 
-def _by_map() -> tuple[float, float]:
+def by_map() -> tuple[float, float]:
     """Costs of a point of the law of a map of 256 x 256 points, and of making it."""
     z = heights(MAP)
 
@@ -90,30 +85,26 @@ def _by_map() -> tuple[float, float]:
 
 def ways() -> Iterator[tuple[str, str, str, float, float]]:
     """Theory, way to it, name of its deviations, cost of a point and once a surface."""
-    closed_form = _each(lambda surface, force: area(force, surface.alpha))
-    yield "calibrated", "closed form, area of a force", "area alone", closed_form, 0
-    yield "calibrated", "quadrature", "calibrated", _each(_quadrature), 0
-    yield "calibrated", "table", "calibrated", _each(_asked(theory="calibrated")), 0
-    yield "calibrated", "law", "calibrated", *_by_law(theory="calibrated")
-    yield "calibrated, map", "map of 256 x 256", "calibrated, map", *_by_map()
-    yield "Persson", "inverse of (19)", "Persson", _each(_asked(theory="persson"), SLOW_POINTS), 0
-    yield "Persson", "law", "Persson", *_by_law(theory="persson")
-    name = "Persson simplified"
-    yield name, "inverse of (20)", name, _each(_asked(theory=Persson("simplified"))), 0
-    yield "G-W", "quadrature", "G-W", _each(_asked(theory="greenwood_williamson")), 0
-    yield "G-W", "law", "G-W", *_by_law(theory="greenwood_williamson")
-    for island_model in ("universal", "exact", "island4d", "formula", "rigid"):
-        count = SLOW_POINTS if island_model == "exact" else POINTS
-        known = island_model if island_model in ISLAND_MODELS else "MBMA reported"
-        options: dict[str, Any] = {
-            "island_model": island_model,
-            "rtol": 1e-4 if island_model in ("formula", "rigid") else LAW_RTOL,
-        }
-        yield "MBMA reported", island_model, known, _each(_asked(**options), count), 0
-    yield "MBMA reported", "law", "MBMA reported", *_by_law()
-    for name, variant in (("printed", "printed"), ("fitted", "fitted"), ("cover", COVER)):
-        cost = _each(_asked(variant=variant, rtol=LAW_RTOL))
-        yield f"MBMA {name}", "universal", f"MBMA {name}", cost, 0
+    area_alone = timed(lambda surface, force: area(force, surface.alpha))
+    yield "calibrated", "closed form, area of a force", "area alone", *area_alone
+    yield "calibrated", "quadrature", "calibrated", *timed(quadrature)
+    yield "calibrated", "table", "calibrated", *asked(theory="calibrated")
+    yield "calibrated", "law", "calibrated", *by_law(theory="calibrated")
+    yield "calibrated, map", "map of 256 x 256", "calibrated, map", *by_map()
+    yield "Persson", "inverse of (19)", "Persson", *asked(SLOW_POINTS, theory="persson")
+    yield "Persson", "law", "Persson", *by_law(theory="persson")
+    yield "Persson simplified", "inverse of (20)", "Persson simplified", *asked(theory=Persson("simplified"))
+    yield "G-W", "quadrature", "G-W", *asked(theory="greenwood_williamson")
+    yield "G-W", "law", "G-W", *by_law(theory="greenwood_williamson")
+    name = "MBMA reported"
+    yield name, "universal", name, *asked(rtol=LAW_RTOL)
+    yield name, "exact", name, *asked(SLOW_POINTS, island_model="exact", rtol=LAW_RTOL)
+    yield name, "island4d", name, *asked(island_model="island4d", rtol=LAW_RTOL)
+    for island_model in ISLAND_MODELS:
+        yield name, island_model, island_model, *asked(island_model=island_model, rtol=1e-4)
+    yield name, "law", name, *by_law()
+    for name, variant in (("MBMA printed", "printed"), ("MBMA fitted", "fitted"), ("MBMA cover", COVER)):
+        yield name, "universal", name, *asked(variant=variant, rtol=LAW_RTOL)
 
 
 def study() -> list[Distance]:
@@ -122,7 +113,7 @@ def study() -> list[Distance]:
     for name, theory in (THEORIES | ISLAND_MODELS).items():
         found = distances(seen, theory)
         parts = [summed_up(seen, found[quantity], *ends) for quantity in ("area", "force") for ends in RANGES]
-        known[name] = [part[0] for part in parts] + [part[2] for part in parts[:2]]
+        known[name] = [rms for rms, _ in parts] + [reached for _, reached in parts[:2]]
     known["area alone"] = [*known["calibrated"][:2], np.nan, np.nan, 1, 1]
     return [*(Distance(label, way, cost, once, *known[name]) for label, way, name, cost, once in ways()), *grid_rows()]
 
@@ -159,50 +150,3 @@ def grid_rows() -> list[Distance]:
         if timed.size:
             rows.append(Distance(SIMULATED, f"{grid} x {grid}, {start}", float(timed.mean()), 0, *[*parts, 1.0, 1.0]))
     return rows
-
-
-def file_of(rows: Sequence[Distance]) -> bytes:
-    """The rows as tables/distance.csv."""
-    cells = ([f"{v:.4g}" if isinstance(v, float | int) else v for v in row] for row in rows)
-    return to_csv(HEAD, Distance._fields, cells)
-
-
-def to_table(rows: Sequence[Distance], unit: float) -> str:
-    """The rows as a Markdown table, times in seconds."""
-    lines = [
-        [
-            row.theory,
-            row.way,
-            duration(row.cost * unit),
-            duration(row.once * unit) if row.once else "",
-            *(percent(v, "%") for v in (row.area_light, row.area_deep, row.force_light, row.force_deep)),
-            "" if row.reached_deep > 0.995 else f"{row.reached_light:.0%}, {row.reached_deep:.0%}",
-        ]
-        for row in rows
-    ]
-    kinds = [f"{what}, {ends}" for what in ("area", "force") for ends in ("1-10%", "10-97%")]
-    return table(["theory", "method", "time per point", "time per surface", *kinds, "reached"], lines)
-
-
-def draw(rows: Sequence[Distance], unit: float) -> bytes:
-    """Deviation against time: area above, force below, light contact left, deep contact right."""
-    figure, axes = panels(2, 2, (9, 7.4), sharex=True, sharey=True)
-    names = ("area_light", "area_deep", "force_light", "force_deep")
-    for panel, name in zip(axes.flat, names, strict=True):
-        for theory, colour in (HUES | {SIMULATED: "C5"}).items():
-            marker = next((shape for start, shape in SHAPES.items() if theory.startswith(start)), "*")
-            own = [row for row in rows if row.theory == theory]
-            x, y = [row.cost * unit for row in own], [100 * getattr(row, name) for row in own]
-            panel.loglog(x, y, marker, color=colour, ls="none", ms=6, label=theory)
-            for row, a, b in zip(own, x, y, strict=True):
-                if theory == SIMULATED and row.way.endswith("cold"):
-                    panel.annotate(row.way.split()[0], (a, b), (4, 3), textcoords="offset points", fontsize=7)
-        panel.grid(alpha=0.3)
-    for panel, title in zip(axes[0], ("1-10% contact", "10-97% contact"), strict=True):
-        panel.set_title(title)
-    axes[0, 0].set_ylabel("area at equal force, rms distance [%]")
-    axes[1, 0].set_ylabel("force at equal separation, rms distance [%]")
-    for panel in axes[1]:
-        panel.set(xlabel="processor time a point [s]", xlim=(1e-8, 1e3))
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="outside lower center", ncols=5)
-    return svg(figure)

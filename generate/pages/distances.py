@@ -11,21 +11,17 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from generate.boundary_elements.design import HELD_OUT_SPECTRUM, HELD_OUT_SURFACE, TRAINING
-from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case
-from generate.calibrated import QUANTITIES, errors
-from generate.calibrated_table import DEPTHS
+from generate.boundary_elements.evidence import MAX_AREA, MIN_WAVES, Case, TheoryCurve
+from generate.calibrated import errors
+from generate.calibrated_file import QUANTITIES
 from generate.pages.page import DATA, evidence, read_csv
-from mbma_tables import Surface, theories
+from mbma_tables import theories
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.laws.calibrated import CONSTANTS, YANG_PERSSON, Law, Spectrum
 from mbma_tables.laws.map_curves import MAP_CONSTANTS
-from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.maps import matched
-from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.variants import REPORTED, Variant
 
 LOW, HIGH = 0.01, 0.97  # A/A0 of the simulations between which distances are summed up
@@ -34,72 +30,12 @@ MEASURED = {"al3d-1": "measured: optical map", "di-1": "measured: AFM map"}
 ROLLOFF = (0.041954782, 0.037331897)  # h_max of the maps
 
 
-class Curve:
-    """A theory's force and area on the surface of a simulation, forces over A0 E* g, lengths over h_rms.
-
-    Raises
-    ------
-    MbmaError
-        Where the theory does not take the surface.
-    """
-
-    def __init__(self, answer: Callable[[AnySurface, FloatArray], Any], surface: AnySurface) -> None:
-        self._answer, self._surface = answer, surface
-        self._g, self._h_rms = float(surface.rms_gradient), float(surface.h_rms)
-        u = DEPTHS * surface.h_max
-        with np.errstate(all="ignore"):
-            force, area = answer(surface, u)
-        # of a theory whose force falls again, the branch of first contact
-        end = np.flatnonzero(np.append(np.diff(force) <= 0, True))[0] + 1
-        kept = slice(int(np.argmax(force[:end] > 0)), end)
-        self._log_force, self._log_area = np.log(force[kept] / self._g), np.log(area[kept])
-        self._u = u[kept] / self._h_rms
-
-    def _at(self, values: FloatArray, force: FloatArray) -> FloatArray:
-        return np.asarray(PchipInterpolator(self._log_force, values, extrapolate=False)(np.log(force)))
-
-    def area(self, force: FloatArray) -> FloatArray:
-        """A/A0 at a force, NaN where the theory does not reach it."""
-        return np.exp(self._at(self._log_area, force))
-
-    def separation(self, force: FloatArray) -> FloatArray:
-        """Mean separation at a force, likewise."""
-        return self._at(self._u, force)
-
-    def force(self, u: FloatArray) -> FloatArray:
-        """Force at mean separations."""
-        return np.asarray(
-            self._answer(self._surface, np.minimum(u * self._h_rms, float(self._surface.h_max)))[0] / self._g
-        )
-
-
-def surface_of(one: Case) -> AnySurface:
-    """What theories are given: five numbers, or the surface's own spectrum by bands."""
-    if one.kind == "self_affine":
-        return Surface(float(one.node[1]), 1.0, float(one.node[2]), 1.0, one.h_max)
-    x, variance = one.own_spectrum.x, one.own_spectrum.variance
-    middle = np.sqrt(x[1:] * x[:-1])
-    edges = np.concatenate([[x[0] ** 2 / middle[0]], middle, [x[-1] ** 2 / middle[-1]]])
-    level = variance / (np.pi * np.diff(edges**2))
-    q, C = np.repeat(edges, 2)[1:-1], np.repeat(level, 2)
-    # of the mean square wavenumber that it has
-    return MeasuredSurface(q, matched(q, C, 1.0, one.own_spectrum.gradient**2), one.h_max)
-
-
 def _mbma(variant: str | Variant, island_model: str = "universal") -> Callable[[Case], Any]:
-    theory = theories.Mbma(
-        island_model, variant, 1e-6, outside="nan" if island_model in ("universal", "island4d") else "raise"
-    )
-
-    def answer(surface: AnySurface, u: FloatArray) -> Any:
-        found = theory.totals(surface, 2 * u - np.asarray(surface.h_max))
-        return found.pressure, found.area
-
-    return lambda one: Curve(answer, surface_of(one))
+    return _theory(theories.Mbma(island_model, variant, 1e-6, "nan" if island_model == "universal" else "raise"))
 
 
 def _theory(theory: theories.Theory) -> Callable[[Case], Any]:
-    return lambda one: Curve(lambda surface, u: theory.answer(surface, u)[:2], surface_of(one))
+    return lambda one: TheoryCurve(theory, one)
 
 
 def _map(one: Case) -> Any:
@@ -120,8 +56,7 @@ THEORIES: dict[str, Callable[[Case], Any]] = {
     "G-W": _theory(theories.GreenwoodWilliamson()),
 }
 HUES = dict(zip(THEORIES, ("C0", "C1", "C9", "C4", "k", "0.5", "C3", "C6", "C2"), strict=True))
-ISLAND_MODELS = {"formula": _mbma("reported", "formula"), "rigid": _mbma("reported", "rigid")}
-FITTED_TO = {"training": ("calibrated", "calibrated, map"), "earlier": ("MBMA fitted",)}
+ISLAND_MODELS = {name: _mbma("reported", name) for name in ("formula", "rigid")}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -135,21 +70,20 @@ class DataSet:
 
 def distances(seen: Sequence[Case], theory: Callable[[Case], Any]) -> dict[str, FloatArray]:
     """ln(theory/simulation) at every load of every surface, NaN where the theory does not reach it."""
-    parts: dict[str, list[FloatArray]] = {name: [] for name in QUANTITIES}
-    for one in seen:
+    parts: dict[str, list[FloatArray]] = {
+        name: [np.full(one.force.shape, np.nan) for one in seen] for name in QUANTITIES
+    }
+    for number, one in enumerate(seen):
         with np.errstate(all="ignore"):
             try:
                 curve = theory(one)
                 reached = np.isfinite(curve.separation(one.force))
             except (MbmaError, ValueError):
-                curve, reached = None, np.zeros(one.force.shape, bool)
+                continue
             for name, values in parts.items():
-                known = np.isfinite(one.u) if name == "force" and curve else reached & np.isfinite(one.u)
-                found = np.full(one.force.shape, np.nan)
-                if curve and known.sum() > (2 if name == "stiffness" else 0):
-                    part = dataclasses.replace(one, force=one.force[known], area=one.area[known], u=one.u[known])
-                    found[known] = errors(part, curve, name)
-                values.append(found)
+                known = np.isfinite(one.u) & (reached | (name == "force"))
+                if known.sum() > (2 if name == "stiffness" else 0):
+                    values[number][known] = errors(one.at(known), curve, name)
     return {name: np.concatenate(values) for name, values in parts.items()}
 
 
@@ -158,25 +92,24 @@ def held_out() -> list[Case]:
     return [one for one in evidence() if one.kind == "self_affine" and one.gaussian and one.split != TRAINING]
 
 
-def _simulated(kind: str, spectrum: Spectrum, h_max: float, rows: Any, hurst: float = 0.8, zeta_1: float = 0) -> Case:
-    """A surface of a file of numbers; rows of F/(A0 E* g), A/A0 and u/h_rms."""
-    node = (kind, hurst, zeta_1, 0, 0.0)
+def _simulated(kind: str, rows: Any, h_max: float, spectrum: Spectrum | None = None, **more: Any) -> Case:
+    """A surface of a file of numbers: rows of F/(A0 E* g), A/A0 and u/h_rms; of a self-affine one H and zeta_1."""
+    hurst, zeta_1 = more.pop("hurst", 0.8), more.pop("zeta_1", 0.0)
+    spectrum = spectrum or Spectrum.self_affine(hurst, zeta_1)
     force, area, u = (np.asarray(row, dtype=float) for row in rows)
-    return Case(kind, "", node, MIN_WAVES, 0, spectrum, spectrum, h_max, {}, force, area, u)
-
-
-def _self_affine(hurst: float, zeta_1: float, h_max: float, rows: Any) -> Case:
-    return _simulated("self_affine", Spectrum.self_affine(hurst, zeta_1), h_max, rows, hurst, zeta_1)
+    node = (kind, hurst, zeta_1, 0, 0.0)
+    return Case(kind, "", node, MIN_WAVES, 0, spectrum, spectrum, h_max, more, force, area, u)
 
 
 def earlier() -> list[Case]:
     """The 105 surfaces of docs/data/boundary_elements.csv, to which the variant `fitted` was fitted."""
-    table, keys = read_csv("boundary_elements.csv"), ("hurst", "L_over_lambda0", "zeta_1", "seed", "n")
+    table, keys = read_csv("boundary_elements.csv"), ["hurst", "L_over_lambda0", "zeta_1", "seed", "n"]
     found = []
-    for node in dict.fromkeys(zip(*(table[key] for key in keys), strict=True)):
-        own = table[np.logical_and.reduce([table[key] == value for key, value in zip(keys, node, strict=True)])]
+    for node in np.unique(table[keys]):
+        own = table[table[keys] == node]
         rows = [own[name] for name in ("force", "area", "u_over_h_rms")]
-        found.append(_self_affine(float(node[0]), float(node[2]), float(own["h_max_over_h_rms"][0]), rows))
+        known: dict[str, Any] = {"hurst": float(node["hurst"]), "zeta_1": float(node["zeta_1"])}
+        found.append(_simulated("self_affine", rows, float(own["h_max_over_h_rms"][0]), **known))
     return found
 
 
@@ -190,12 +123,12 @@ def older(name: str) -> Case:
     table = read_csv(file)
     rows = [table["force"] / gradient, table["area"], table["mean_separation_over_h_rms"]]
     if name != "challenge":
-        return _self_affine(0.8, zeta_1, h_max, rows)
+        return _simulated("self_affine", rows, h_max, zeta_1=zeta_1)
     # a plateau from a fifth of the roll-off wavenumber
     edges = np.geomspace(0.2, zeta_1, 4001)
     middle = np.sqrt(edges[1:] * edges[:-1])
     shares = np.minimum(middle**2, middle**-1.6) * np.diff(np.log(edges))
-    return _simulated("plateau", Spectrum.from_shares(middle, shares), h_max, rows)
+    return _simulated("plateau", rows, h_max, Spectrum.from_shares(middle, shares))
 
 
 def rolloff(number: int) -> Case:
@@ -206,7 +139,7 @@ def rolloff(number: int) -> Case:
     spectrum, h_rms = Spectrum.from_shares(own["q"], own["variance"]), np.sqrt(own["variance"].sum())
     # wavenumbers over h_rms: their unit cancels
     rows = [force / (spectrum.gradient * h_rms), area, u / h_rms]
-    return _simulated("plateau", spectrum, ROLLOFF[number] / h_rms, rows)
+    return _simulated("plateau", rows, ROLLOFF[number] / h_rms, spectrum)
 
 
 def measured(name: str) -> Case:
@@ -214,13 +147,10 @@ def measured(name: str) -> Case:
     with np.load(DATA / f"measured_{name}.npz", allow_pickle=False) as content:
         one = dict(content)
     share, seen = one["band_variance"], (one["area"] > 0) & (one["area"] < MAX_AREA)
-    curves: dict[str, Any] = {
-        key: one[key].astype(float) for key in ("mean_height", "top_gradient", "tension_force", "tension")
-    }
-    curves["anisotropy"] = float(one["anisotropy"])
+    curves = {key: one[key].astype(float) for key in ("mean_height", "top_gradient", "tension_force", "tension")}
     spectrum = Spectrum.from_shares(one["band_q"][share > 0], share[share > 0])
     rows = [one[key][seen] for key in ("force", "area", "mean_separation")]
-    return dataclasses.replace(_simulated("measured", spectrum, float(one["h_max"]), rows), curves=curves)
+    return _simulated("measured", rows, float(one["h_max"]), spectrum, anisotropy=float(one["anisotropy"]), **curves)
 
 
 def data_sets() -> dict[str, DataSet]:
@@ -234,12 +164,12 @@ def data_sets() -> dict[str, DataSet]:
     return {
         "spectra": DataSet("new spectra", chosen(plain, (HELD_OUT_SPECTRUM,))),
         "surfaces": DataSet("new surfaces of fitted spectra", chosen(plain, (HELD_OUT_SURFACE,))),
-        "training": DataSet("the training set", chosen(plain, (TRAINING,)), FITTED_TO["training"]),
+        "training": DataSet("the training set", chosen(plain, (TRAINING,)), ("calibrated", "calibrated, map")),
         "one": DataSet("one longest wave a side", chosen(plain, (TRAINING, *tested), 1, 1)),
         "plateau": DataSet("with plateau or instrument's filter", chosen(("plateau", "filtered"), tested)),
         "stretched": DataSet("stretched", chosen(("stretched",), tested)),
         "transformed": DataSet("heights transformed", chosen(transformed, tested)),
-        "earlier": DataSet("105 earlier surfaces", earlier(), FITTED_TO["earlier"]),
+        "earlier": DataSet("105 earlier surfaces", earlier(), ("MBMA fitted",)),
         "bem": DataSet("an older set, mean of 4", [older("bem")]),
         "gfmd": DataSet("molecular dynamics", [older("gfmd")]),
         "challenge": DataSet("contact challenge", [older("challenge")]),
@@ -248,11 +178,9 @@ def data_sets() -> dict[str, DataSet]:
     }
 
 
-def summed_up(seen: Sequence[Case], found: FloatArray, low: float = LOW, high: float = HIGH) -> tuple[float, ...]:
-    """Root mean square of distances at contacts from `low` to `high`, 90% quantile of their size, share reached."""
+def summed_up(seen: Sequence[Case], found: FloatArray, low: float = LOW, high: float = HIGH) -> tuple[float, float]:
+    """Root mean square of distances at contacts from `low` to `high`, and the share of these that is reached."""
     area = np.concatenate([one.area for one in seen])
     values = found[(area >= low) & (area <= high)]
     known = values[np.isfinite(values)]
-    if not known.size:
-        return np.nan, np.nan, 0.0
-    return float(np.sqrt(np.mean(known**2))), float(np.quantile(np.abs(known), 0.9)), known.size / values.size
+    return (float(np.sqrt(np.mean(known**2))), known.size / values.size) if known.size else (np.nan, 0.0)

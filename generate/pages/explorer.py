@@ -7,7 +7,7 @@ import pathlib
 import shutil
 import statistics
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from generate.pages.page import Measured, table
@@ -26,17 +26,16 @@ STEP = """async (place) => {
 }"""
 
 
-class Processor:
-    """Processor time of a tab's main thread, which is independent of other programs' load."""
+def processor(tab: Any) -> Callable[[], float]:
+    """Milliseconds of the processor since a tab began, of its main thread, whatever other programs do."""
+    session = tab.context.new_cdp_session(tab)
+    session.send("Performance.enable", {"timeDomain": "threadTicks"})
 
-    def __init__(self, tab: Any) -> None:
-        self._session = tab.context.new_cdp_session(tab)
-        self._session.send("Performance.enable", {"timeDomain": "threadTicks"})
-
-    def spent(self) -> float:
-        """Milliseconds since the page began."""
-        metrics = {each["name"]: each["value"] for each in self._session.send("Performance.getMetrics")["metrics"]}
+    def spent() -> float:
+        metrics = {each["name"]: each["value"] for each in session.send("Performance.getMetrics")["metrics"]}
         return 1e3 * float(metrics["TaskDuration"])
+
+    return spent
 
 
 def program() -> str | None:
@@ -73,27 +72,27 @@ def openings(opened: Any, address: str) -> Iterator[tuple[float, float]]:
     """Milliseconds of each opening to the first curves, by the clock and of the processor."""
     for _ in range(OPENINGS):
         tab = opened.new_page()
-        processor = Processor(tab)
+        spent = processor(tab)
         go(tab, address)
-        yield float(tab.evaluate("document.documentElement.dataset.ready")), processor.spent()
+        yield float(tab.evaluate("document.documentElement.dataset.ready")), spent()
         tab.close()
 
 
 def steps(opened: Any, address: str) -> Iterator[tuple[float, float]]:
     """Milliseconds of each step of a slider, by the clock and of the processor."""
     tab = visit(opened, address)
-    processor = Processor(tab)
+    spent = processor(tab)
     tab.wait_for_timeout(1000)
     for k in range(STEPS):
-        before = processor.spent()
-        yield tab.evaluate(STEP, 400 + 10 * k), processor.spent() - before
+        before = spent()
+        yield tab.evaluate(STEP, 400 + 10 * k), spent() - before
     tab.context.close()
 
 
 def measure() -> Measured:
     """The measured block of the page, and its picture."""
     text = explorer_page(Surface.named("concrete"), 13.3, "MPa", "calibrated", title="concrete road of Lorenz")
-    rows = [["size of the file", f"{len(text.encode()) / 1e6:.2f} MB", "", ""]]
+    rows: list[list[Any]] = [["size of the file", f"{len(text.encode()) / 1e6:.2f} MB", "", ""]]
     with tempfile.TemporaryDirectory() as folder, browser() as opened:
         path = pathlib.Path(folder, "explorer.html")
         path.write_text(text, encoding="utf-8")
@@ -103,10 +102,9 @@ def measure() -> Measured:
             timed[f"a slider's step, three theories against {against}"] = steps(opened, address)
         for name, found in timed.items():
             clock, spent = zip(*found, strict=True)
-            numbers = (statistics.median(clock), max(clock), statistics.median(spent))
-            rows.append([name, *(f"{milliseconds:.0f} ms" for milliseconds in numbers)])
+            rows.append([name, statistics.median(clock), max(clock), statistics.median(spent)])
         tab = visit(opened, path.as_uri())
         tab.locator(".chart").first.hover(position={"x": 200, "y": 100})
         picture = tab.screenshot()
-    header = ["quantity", "median", "largest", "processor time of the page, median"]
-    return {"numbers": table(header, rows)}, {"docs/figures/explorer.png": picture}
+    header = "quantity | median | largest | processor time of the page, median"
+    return {"numbers": table(header, rows, "{} | {:.0f} ms")}, {"docs/figures/explorer.png": picture}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import itertools
 import pathlib
 import subprocess
 import tempfile
@@ -10,14 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from generate.pages.page import Measured, panels, svg, table
+from generate.pages.page import Measured, panels, table
 from mbma_tables import Surface, contact_law
 from mbma_tables.export import LAWS
 from mbma_tables.export.law_code import law_text
 from mbma_tables.export.law_rows import LawTable, describe_law
 
 NAMES = ("concrete", "asphalt", "yang-persson", "challenge")
-ROWS = (20, 50, 200)
 E_STAR = 13.3
 THEORIES = ("mbma", "calibrated", "persson")
 # sums pressure and tangent at random overclosures, in nanoseconds a value; the differences of single ones follow
@@ -45,27 +45,25 @@ def law(name: str, rows: int, evenly: bool = False) -> LawTable:
 def errors() -> str:
     """Largest errors of linear interpolation by surface and rows."""
     lines = []
-    for name in NAMES:
-        for rows in ROWS:
-            chosen, even = (law(name, rows, evenly).largest_error for evenly in (False, True))
-            lines.append([name, str(rows), f"{chosen:.1e}", f"{even:.1e}", f"{even / chosen:.1f}"])
-    return table(["surface", "rows", "chosen", "equally spaced", "ratio"], lines)
+    for name, rows in itertools.product(NAMES, (20, 50, 200)):
+        chosen, even = (law(name, rows, evenly).largest_error for evenly in (False, True))
+        lines.append([name, rows, chosen, even, even / chosen])
+    return table("surface | rows | chosen | equally spaced | ratio", lines, "{} | {} | {:.1e} | {:.1e} | {:.1f}")
 
 
 def sizes() -> str:
     """Characters of laws as code, in thousands."""
     heat: dict[str, Any] = {"conductivity": 1.0, "conductivity_unit": "W/(m K)", "stress_unit": "MPa"}
-
-    def size(target: str, theory: str) -> str:
-        return f"{len(law_text(target, Surface.named(NAMES[0]), E_STAR, theory=theory, **heat)) / 1e3:.1f}"
-
-    lines = [[target, *(size(target, theory) for theory in THEORIES)] for target in LAWS]
-    return table(["target", *(f"{theory} [kB]" for theory in THEORIES)], lines)
+    road = Surface.named(NAMES[0])
+    lines = [
+        [target, *(len(law_text(target, road, E_STAR, theory=t, **heat)) / 1e3 for t in THEORIES)] for target in LAWS
+    ]
+    return table(f"target | {' [kB] | '.join(THEORIES)} [kB]", lines, "{} | {:.1f}")
 
 
 def compiled() -> str:
     """Laws in C, by gcc -O2: largest differences from the library's law, and the time of a value with its tangent."""
-    lines, pairs = [], {"pressure": "force", "area": "area", "energy": "energy", "tangent": "stiffness"}
+    lines, pairs = [], {name: name for name in ("pressure", "area", "energy")} | {"tangent": "stiffness"}
     for theory in THEORIES:
         own, rng = contact_law(Surface.named(NAMES[0]), E_star=E_STAR, theory=theory), np.random.default_rng(18)
         depths = (1 - 10 ** rng.uniform(-12, -0.3, 5000), rng.uniform(-0.99, 1, 5000))
@@ -77,21 +75,22 @@ def compiled() -> str:
             command = ["gcc", "-std=c99", "-O2", "-shared", "-fPIC", "law.c", "-lm", "-o", "law.so"]
             subprocess.run(command, cwd=folder, check=True)
             library = ctypes.CDLL(f"{folder}/law.so")
-        known, cells = own.values(d), []
+        known, cells = own.values(separation=d), []
         for name, field in pairs.items():
             function = getattr(library, f"law_{name}")
             function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
             ratios = [abs(function(x) / y - 1) for x, y in zip(c, getattr(known, field), strict=True)]
-            cells.append(f"{max(ratios):.1e}")
+            cells.append(max(ratios))
         library.law_loop.restype = ctypes.c_double
         even = c[5000:].copy()
         address, total = even.ctypes.data_as(ctypes.c_void_p), ctypes.byref(ctypes.c_double())
         time = min(library.law_loop(address, even.size, 200, total) for _ in range(5))
-        lines.append([theory, *cells, f"{time:.0f} ns"])
-    return table(["theory", *pairs, "a value with its tangent"], lines)
+        lines.append([theory, *cells, time])
+    header = f"theory | {' | '.join(pairs)} | a value with its tangent"
+    return table(header, lines, f"{{}} | {'{:.1e} | ' * len(pairs)}{{:.0f}} ns")
 
 
-def draw() -> bytes:
+def draw() -> Any:
     """Rows of the concrete road, chosen by error and equally spaced, on the curve."""
     figure, axes = panels(size=(6, 4))
     fine = law("concrete", 500)
@@ -102,7 +101,7 @@ def draw() -> bytes:
     axes.set(xlabel="overclosure [mm]", ylabel="pressure [MPa]", ylim=(1e-4, 5))
     axes.grid(True, alpha=0.3)
     axes.legend()
-    return svg(figure)
+    return figure
 
 
 def measure() -> Measured:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import os
 import pathlib
 import time
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import resample
 
-from generate.pages.page import ROOT, Measured, read_csv, svg, table, to_csv
+from generate.pages.page import ROOT, Measured, read_csv, table, to_csv
 from mbma_tables import contact_law
 from mbma_tables.answers.measurement import curves, described, draw
 from mbma_tables.common.arguments import FloatArray
@@ -130,22 +131,15 @@ def ratios(
 def compared(surface: MeasuredSurface, rows: FloatArray) -> str:
     """The calibrated law and MBMA over boundary elements, as a table."""
     force, area, u, _ = rows[:, [int(np.argmin(np.abs(np.log(rows[1] / share)))) for share in SHOWN]]
-    columns = [[f"{share:.2%}" for share in area]]
+    columns = [area]
     for theory in map(get_theory, ("calibrated", "mbma")):
         try:
-            found = ratios(theory, surface, force, area, u)
+            columns += ratios(theory, surface, force, area, u)
         except MbmaError:
-            found = np.full(u.size, np.nan), np.full(u.size, np.nan)
-        columns += [[f"{ratio:.2f}".replace("nan", "-") for ratio in part] for part in found]
-    return table(
-        [
-            "contact",
-            "calibrated: area at given pressure",
-            "calibrated: force at given separation",
-            "MBMA: area",
-            "MBMA: force",
-        ],
-        list(zip(*columns, strict=True)),
+            columns += [np.full(u.size, np.nan)] * 2
+    header = "contact | calibrated: area at given pressure | calibrated: force at given separation"
+    return table(f"{header} | MBMA: area | MBMA: force", zip(*columns, strict=True), "{:.2%} | {:.2f}").replace(
+        "—", "-"
     )
 
 
@@ -159,17 +153,17 @@ def scattered() -> MeasuredSurface:
 def laws(surfaces: dict[str, MeasuredSurface]) -> str:
     """What contact laws of surfaces cover, their bounds, and the time to make one."""
     rows = []
-    for name, surface in surfaces.items():
-        for theory in LAWS:
-            own, times = contact_law(surface, theory=theory), []
-            # of another size each time, so that nothing is kept of it
-            for other in [surface.resized(up, 1.0) for up in (1.1, 1.2, 1.3)]:
-                started = time.process_time()
-                contact_law(other, theory=theory)
-                times.append(time.process_time() - started)
-            low = (own.h_max + max(own.lowest, -own.h_max)) / 2 / own.h_max
-            rows.append([name, theory, f"{low:.2g}", f"{own.error:.1e}", f"{min(times):.3f}"])
-    return table(["surface", "theory", "u/h_max from", "error", "time to make [s]"], rows)
+    for (name, surface), theory in itertools.product(surfaces.items(), LAWS):
+        own, times = contact_law(surface, theory=theory), []
+        # of another size each time, so that nothing is kept of it
+        for other in [surface.resized(up, 1.0) for up in (1.1, 1.2, 1.3)]:
+            started = time.process_time()
+            contact_law(other, theory=theory)
+            times.append(time.process_time() - started)
+        low = (own.h_max + max(own.lowest, -own.h_max)) / 2 / own.h_max
+        rows.append([name, theory, low, own.error, min(times)])
+    header = "surface | theory | u/h_max from | error | time to make [s]"
+    return table(header, rows, "{} | {} | {:.2g} | {:.1e} | {:.3f}")
 
 
 def measure() -> Measured:
@@ -181,9 +175,9 @@ def measure() -> Measured:
         assert path is not None
         treated, surface = measured(path, example.options)
         surfaces[example.name], stem = surface, example.name.split(".")[0]
-        points = None if found is None else dict(zip(COLUMNS, found, strict=True))
+        points = None if found is None else dict(zip(("pressure", *COLUMNS[1:]), found, strict=True))
         picture = draw(treated, surface, curves(surface), example.name, "pressure  F/(A0 E*)", points)
-        files[f"docs/figures/gallery_{stem}.svg"] = svg(picture)
+        files[f"docs/figures/gallery_{stem}.svg"] = picture
         printed = "\n".join(described(surface))
         text += [f"## {example.name}", example.about, f"```\n$ {example.command} --plot {stem}.png\n{printed}\n```"]
         text += [f"![{example.name}](figures/gallery_{stem}.svg)"]

@@ -56,7 +56,7 @@ def _by_family(data: xr.Dataset, form: str) -> str:
             cells.append("{:.3f}, {:.3f}".format(*np.quantile(found, (0.5, 0.9))) if found.size else "")
         valid = float(np.mean(own[f"{form}_valid"].values))
         lines.append([f"{family} ({own.sizes['surface']})", *cells, f"{valid:.0%}"])
-    return table(["family (maps)", "ln A", "ln F at equal u", "ln stiffness", "ln flow, A < 20%", "valid"], lines)
+    return table("family (maps) | ln A | ln F at equal u | ln stiffness | ln flow, A < 20% | valid", lines)
 
 
 def measure() -> Measured:
@@ -67,5 +67,4 @@ def measure() -> Measured:
             found = [coverage(data, form, quantity, valid) for quantity in QUANTITIES]
             lines.append([form, name, *(f"{a:.2f}, {b:.2f} ({n})" if n else "" for a, b, n in found)])
     parts = {form: _by_family(data, form) for form in FORMS}
-    header = ["theory", "entries", "area", "pressure", "stiffness", "flow"]
-    return parts | {"coverage": table(header, lines)}, {}
+    return parts | {"coverage": table("theory | entries | area | pressure | stiffness | flow", lines)}, {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -57,27 +58,27 @@ def from_files() -> Iterator[Seen]:
             yield f"measured: {example.name}", measured(path, example.options)[1], rows[:3]
 
 
-def summary(seen: list[Seen]) -> list[str]:
+def summary(seen: list[Seen]) -> list[Any]:
     """Cells of one row: area and force of both theories over simulation, and how many answers are valid."""
-    cells = []
+    cells: list[Any] = []
     for name, (low, high) in RANGES.items():
         theory, found = get_theory(name), []
         for _, surface, rows in seen:
             force, area, u = rows[:, (rows[1] >= low) & (rows[1] <= high)]
+            valid = np.full(u.size, np.nan)
             try:
                 # a map's curve may end before full contact
-                valid, reached = np.full(u.size, np.nan), u >= theory.interval(surface)[0]
+                reached = u >= theory.interval(surface)[0]
                 valid[reached] = contact(surface, mean_separation=u[reached], theory=theory).valid
                 found.append(np.stack([*ratios(theory, surface, force, area, u), valid]))
             except MbmaError:
                 found.append(np.full((3, u.size), np.nan))
-        columns = np.concatenate(found, axis=1)
-        for column in columns[:2]:
+        *columns, valid = np.concatenate(found, axis=1)
+        for column in columns:
             known = column[np.isfinite(column) & (column > 0)]
-            mean = np.exp(np.mean(np.log(known))) if known.size else np.nan
-            cells.append(f"{mean:.2f} ({known.min():.2f} to {known.max():.2f})" if known.size else "-")
-        answered = np.isfinite(columns[2])
-        cells.append(f"{columns[2][answered].mean():.0%}" if answered.any() else "-")
+            cells.append((np.exp(np.mean(np.log(known))), known.min(), known.max()) if known.size else "-")
+        answered = valid[np.isfinite(valid)]
+        cells.append(f"{answered.mean():.0%}" if answered.size else "-")
     return cells
 
 
@@ -91,16 +92,12 @@ def extrapolation() -> str:
         one, other = (contact(s, pressure=pressure, theory="persson") for s in (known, longer))
         # conductance over conductivity is stiffness over E*
         pairs = ((one.area, other.area), (one.stiffness, other.stiffness))
-        rows.append(
-            [
-                f"{pressure:g}",
-                *(f"{number:.{digits}}" for x, y in pairs for number, digits in ((x, "3g"), (y, "3g"), (y / x, "2f"))),
-            ]
-        )
+        rows.append([pressure, *(number for x, y in pairs for number in (x, y, y / x))])
     names = ("area", "stiffness/E* and conductance/k [1/nm]")
-    header = ["pressure/E*", *(cell for name in names for cell in (name, "extrapolated", "ratio"))]
+    header = " | ".join(["pressure/E*", *(f"{name} | extrapolated | ratio" for name in names)])
     note = next(entry["told"] for entry in longer.provenance if entry["step"] == "extrapolated")
-    return table(header, rows) + f"\n\nReported with it: {note}."
+    text = table(header, rows, "{:g} | {:.3g} | {:.3g} | {:.2f} | {:.3g} | {:.3g} | {:.2f}")
+    return f"{text}\n\nReported with it: {note}."
 
 
 def measure() -> Measured:
@@ -110,11 +107,12 @@ def measure() -> Measured:
         groups.setdefault(one[0], []).append(one)
     rows = []
     for name, seen in groups.items():
-        kurtosis, skewness, stretch = (
+        stretch, kurtosis, skewness = (
             np.mean([getattr(s.bearing, key, getattr(s, key, 0.0)) for _, s, _ in seen])
-            for key in ("slope_kurtosis", "skewness", "anisotropy")
+            for key in ("anisotropy", "slope_kurtosis", "skewness")
         )
-        rows.append([f"{name} ({len(seen)})", f"{stretch:.1f}", f"{kurtosis:.1f}", f"{skewness:.1f}", *summary(seen)])
-    header = ["surfaces (number)", "anisotropy", "kurtosis of slopes", "skewness"]
-    header += [f"{name}: {what}" for name in ("MBMA", "calibrated") for what in ("area", "force", "valid")]
-    return {"shapes": table(header, rows), "extrapolation": extrapolation()}, {}
+        rows.append([f"{name} ({len(seen)})", stretch, kurtosis, skewness, *summary(seen)])
+    columns = (f"{name}: {what}" for name in ("MBMA", "calibrated") for what in ("area", "force", "valid"))
+    header = f"surfaces (number) | anisotropy | kurtosis of slopes | skewness | {' | '.join(columns)}"
+    shapes = table(header, rows, "{} | {:.1f} | {:.1f} | {:.1f} | {:.2f} ({:.2f} to {:.2f})")
+    return {"shapes": shapes, "extrapolation": extrapolation()}, {}

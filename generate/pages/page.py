@@ -1,8 +1,8 @@
-"""Helpers of the programs that write the documentation's tables and figures.
+"""Pages of the documentation: hand-written Markdown, with blocks and figures that programs fill.
 
-A page is hand-written Markdown in ``docs``, except for the blocks between ``<!-- measured: NAME -->`` and
-``<!-- end -->``. The module of this folder with the page's name has a function ``measure`` that returns these blocks by
-name, and other files (figures, data) by their path in the checkout. ``python -m generate pages NAME`` writes them.
+The function `measure` of the module `generate.pages.NAME` returns what stands in the blocks between
+``<!-- measured: BLOCK -->`` and ``<!-- end -->`` of the page, and figures and data by their path in the checkout.
+``python -m generate pages NAME`` writes them.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ PAGES = (
     *("calibrated", "cost", "explorer", "export", "fidelity", "formula", "gallery", "leakage", "machined", "maps"),
     *("readme", "stability", "tables", "ten_minutes", "theories", "yield"),
 )
+Measured = tuple[dict[str, str], dict[str, Any]]  # what `measure` returns: blocks and files
 MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
-Measured = tuple[dict[str, str], dict[str, bytes]]  # what a page's `measure` returns: blocks and files
 
 
 def fill(text: str, parts: Mapping[str, str]) -> str:
@@ -43,19 +43,41 @@ def fill(text: str, parts: Mapping[str, str]) -> str:
     return MARKED.sub(lambda match: f"{match[1]}\n{parts[match[2]]}\n\n{match[3]}", text)
 
 
-def write(name: str, parts: Mapping[str, str], files: Mapping[str, bytes], out: pathlib.Path) -> list[pathlib.Path]:
-    """Write a page and its files below a folder; returns their paths."""
+def write(name: str, parts: Mapping[str, str], files: Mapping[str, Any], out: pathlib.Path) -> list[pathlib.Path]:
+    """Write a page and its files, given as bytes or as figures, below a folder; returns their paths."""
     page = "README.md" if name == "readme" else f"docs/{name}.md"
     contents = {page: fill((ROOT / page).read_text(encoding="utf-8"), parts).encode(), **files}
     for place, content in contents.items():
-        write_file(out / place, content, make_folders=True)
+        write_file(out / place, content if isinstance(content, bytes) else svg(content), make_folders=True)
     return [out / place for place in contents]
 
 
-def table(header: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
-    """A Markdown table."""
-    names = list(header)
-    return "\n".join("| " + " | ".join(line) + " |" for line in [names, ["---"] * len(names), *rows])
+def table(header: str, rows: Iterable[Iterable[Any]], formats: str = "{}") -> str:
+    """A Markdown table.
+
+    Parameters
+    ----------
+    header : str
+        Names of the columns, with bars between them.
+    rows : iterable of iterables
+        Cells. A text stands as it is, None leaves a cell empty, a number that is not finite becomes a dash, and a tuple
+        fills a format of several fields.
+    formats : str
+        Formats of the columns, likewise; the last one holds for all that follow.
+    """
+    known = formats.split(" | ")
+
+    def cell(column: int, value: Any) -> str:
+        if isinstance(value, str) or value is None:
+            return value or ""
+        values = value if isinstance(value, tuple) else (value,)
+        if not all(math.isfinite(x) for x in values if not isinstance(x, str)):
+            return "—"
+        return known[min(column, len(known) - 1)].format(*values)
+
+    names = header.split(" | ")
+    lines = ["| " + " | ".join(names) + " |", "|" + " --- |" * len(names)]
+    return "\n".join([*lines, *("| " + " | ".join(itertools.starmap(cell, enumerate(row))) + " |" for row in rows)])
 
 
 def percent(value: float, sign: str = "") -> str:
@@ -69,9 +91,9 @@ def duration(seconds: float) -> str:
     return f"{float(f'{seconds / size:.2g}'):g} {unit}"
 
 
-def spans(edges: Sequence[float], digits: str = "g") -> list[str]:
+def spans(edges: Sequence[float], form: str = "{:g}-{:g}%") -> str:
     """Headers of bins of contact in percent, from their edges as fractions."""
-    return [f"{100 * a:{digits}}-{100 * b:{digits}}" for a, b in itertools.pairwise(edges)]
+    return " | ".join(form.format(100 * a, 100 * b) for a, b in itertools.pairwise(edges))
 
 
 def to_csv(head: str, names: Sequence[str], rows: Iterable[Iterable[Any]]) -> bytes:
@@ -108,24 +130,18 @@ def evidence() -> tuple[Case, ...]:
 
 
 def panels(rows: int = 1, columns: int = 1, size: tuple[float, float] = (9, 3.4), **options: Any) -> tuple[Any, Any]:
-    """A figure and its axes, drawn without a display."""
-    import matplotlib as mpl
+    """A figure and its axes."""
+    from mbma_tables.common.plots import new_figure
 
-    mpl.use("Agg")
-    from matplotlib import pyplot
-
-    return pyplot.subplots(rows, columns, figsize=size, layout="constrained", **options)
+    figure = new_figure(*size)
+    return figure, figure.subplots(rows, columns, **options)
 
 
 def svg(figure: Any) -> bytes:
-    """A figure as the content of an SVG file, the same bytes for the same figure; closes it."""
-    from matplotlib import pyplot
-
+    """A figure as the content of an SVG file, the same bytes for the same figure."""
     from mbma_tables.common.plots import to_picture
 
-    content = to_picture(figure, "svg", dpi=100, outlines=True)
-    pyplot.close(figure)
-    return content
+    return to_picture(figure, "svg", dpi=100, outlines=True)
 
 
 def unmarked(figure: Any) -> Any:

@@ -1,6 +1,8 @@
-"""docs/stability.md: corners of parameter space, counted and drawn.
+"""docs/stability.md: corners of parameter space, counted and drawn, and the island solver beside another program's.
 
-The reference is mpmath at 40 digits or more where a closed form exists, else the exact solver at a tighter tolerance.
+The reference at corners is mpmath at 40 digits or more where a closed form exists, else the exact solver at a tighter
+tolerance. The other program is `GreenwoodTripp` of ContactMechanics, which solves (34), (36) and (37) too; it takes the
+gap in the middle, d(0), instead of X, and scales pressure by E* sqrt(sigma/8B), which is half of E* sigma/L.
 """
 
 from __future__ import annotations
@@ -15,30 +17,32 @@ from typing import Any
 
 import mpmath as mp
 import numpy as np
+from scipy.integrate import simpson
+from scipy.interpolate import BarycentricInterpolator
 
-from generate.pages import islands as another_program
-from generate.pages.page import Measured, panels, svg, table
+from generate.pages.page import Measured, panels, table
 from generate.tables.exact_geometry import DOUBLES, divisor, exact_island
+from generate.tables.height_coefficients import height_integral
 from mbma_tables import Surface, contact, greenwood_tripp
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.islands.geometry import geometry
+from mbma_tables.islands.greenwood_tripp import IslandSolution
 from mbma_tables.models import answer_islands
 from mbma_tables.models.named import get_model
-from mbma_tables.surfaces.variants import Variant, get_variant
+from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.totals.island_sum import kinks
 
 DIGITS = 40
 ULP = np.finfo(float).eps
-
 MIN_ERROR, MAX_ERROR = 1e-16, 1e0  # of the colour scale
+ISLAND_MODELS, VARIANTS = ("exact", "universal", "formula", "rigid"), ("reported", "printed")
 
 # islands
 X_CORNERS = np.concatenate([-np.geomspace(40, 0.5, 9), [0.0], np.geomspace(0.5, 1e4, 19)])
 MU_CORNERS = np.concatenate([[0.0], 10.0 ** np.array([-300, -200, -100, -30, -16]), np.geomspace(1e-12, 1e12, 25)])
 RIGID_MU = 1e-13  # below it mu Q is less than 1e-9 up to X = 1e4
 SOLVED, ISLAND_TRUTH = 1e-9, 1e-11
-ISLAND_MODELS = ("exact", "universal", "formula", "rigid")
 
 # geometry
 APPROACHES = np.geomspace(1e-12, 30, 44)
@@ -51,8 +55,13 @@ FIELDS = ("X", "mu", "eta", "D_d", "sigma_d", "R_u")
 DEPTHS = (1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 3.0, 6.0)  # h_max - d
 TOTAL_BANDS = (3.0000001, 3.1, 10.0, 216.0, 1e4, 1e6, 1e8)
 TOTAL_HURSTS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1 - ULP / 2, 1.0)
-TOP = 3.0
-TOTAL_TRUTH = 1e-10
+TOP, TOTAL_TRUTH = 3.0, 1e-10
+
+# islands of the comparison: X and mu
+CASES = ((2.0, 0.1), (0.0, 1.0), (5.0, 1.0), (8.0, 0.3), (5.0, 4.0))
+POINTS = (26, 51, 101, 201)  # each with half the step of the one before
+BEYOND = 1.02  # of our outer radius, beyond which both pressures vanish
+TOLERANCE, MAX_ITERATIONS = 1e-9, 10_000
 
 Answer = tuple[Sequence[Any], float]  # values, and a bound on their relative error
 
@@ -66,8 +75,8 @@ class Tally:
     refused: int = 0
     not_finite: int = 0
     warned: int = 0
+    largest: float = math.nan  # where nothing was compared, as of rigid spheres
     beyond: int = 0
-    largest: float = 0.0
 
     def add(self, answer: Callable[[], Answer], truth: Sequence[Any] | None) -> float:
         """Evaluate one corner; its error, NaN where it was refused, has no number, or its truth is not known."""
@@ -88,7 +97,7 @@ class Tally:
         if truth is None:
             return math.nan
         error = max(relative_error(value, exact) for value, exact in zip(values, truth, strict=True))
-        self.largest = max(self.largest, error)
+        self.largest = float(np.fmax(self.largest, error))
         self.beyond += error > bound
         return error
 
@@ -103,16 +112,11 @@ def relative_error(found: float, truth: Any) -> float:
 def rigid_truth(X: float) -> tuple[mp.mpf, mp.mpf]:
     """(pi/5) F_{5/2}(-X) and (pi/2) F_2(-X) by mpmath: parabolic cylinder functions."""
     with mp.workdps(DIGITS):
-        x = -mp.mpf(float(X))
-        # F_n(x) = Gamma(n + 1) exp(-x^2/4) U(n + 1/2, x)/sqrt(2 pi)
-        force, area = (
-            mp.gamma(n + 1) * mp.exp(-x * x / 4) * mp.pcfu(n + mp.mpf(1) / 2, x) / mp.sqrt(2 * mp.pi)
-            for n in (mp.mpf(5) / 2, mp.mpf(2))
-        )
+        force, area = (height_integral(mp.mpf(n), -mp.mpf(float(X))) for n in (2.5, 2))
         return mp.pi / 5 * force, mp.pi / 2 * area
 
 
-def island_truth(X: float, mu: float) -> tuple[Any, Any] | None:
+def island_truth(X: float, mu: float) -> Sequence[Any] | None:
     """Phi_F and Phi_A, or None where the solver refuses."""
     if mu <= RIGID_MU:
         force, area = rigid_truth(X)
@@ -126,11 +130,9 @@ def island_truth(X: float, mu: float) -> tuple[Any, Any] | None:
 
 def islands() -> tuple[list[Tally], dict[str, FloatArray]]:
     """Every island model at every corner of (X, mu); maps of the larger error of both functions, NaN where refused."""
-    tallies = {island_model: Tally(f"islands by {island_model}") for island_model in ISLAND_MODELS}
-    models = {
-        island_model: get_model(island_model, 10 * SOLVED, get_variant("reported")) for island_model in ISLAND_MODELS
-    }
-    maps = {island_model: np.full((X_CORNERS.size, MU_CORNERS.size), np.nan) for island_model in ISLAND_MODELS}
+    tallies = {name: Tally(f"islands by {name}") for name in ISLAND_MODELS}
+    models = {name: get_model(name, 10 * SOLVED, get_variant("reported")) for name in ISLAND_MODELS}
+    maps = {name: np.full((X_CORNERS.size, MU_CORNERS.size), np.nan) for name in ISLAND_MODELS}
 
     def ask(model: Any, X: float, mu: float) -> Answer:
         found = answer_islands(model, {"X": np.array([X]), "mu": np.array([mu])})
@@ -138,24 +140,22 @@ def islands() -> tuple[list[Tally], dict[str, FloatArray]]:
 
     for (i, X), (j, mu) in itertools.product(enumerate(X_CORNERS), enumerate(MU_CORNERS)):
         truth = island_truth(X, mu)
-        for island_model, model in models.items():
+        for name, model in models.items():
             # rigid spheres do not claim to be elastic ones
-            maps[island_model][i, j] = tallies[island_model].add(
-                functools.partial(ask, model, X, mu), None if island_model == "rigid" else truth
-            )
+            known = None if name == "rigid" else truth
+            maps[name][i, j] = tallies[name].add(functools.partial(ask, model, X, mu), known)
     return list(tallies.values()), maps
 
 
-def _approaches(hurst: float, zeta_1: float, variant: Variant) -> Iterator[float]:
+def _approaches(hurst: float, zeta_1: float, variant: str) -> Iterator[float]:
     """Values of delta/h_rms: those of the map, then one ulp around the floors of zeta_d and zeta_u."""
     yield from map(float, APPROACHES)
-    yield from (float(kink) * (1 + side * ULP) for kink in kinks(hurst, zeta_1, variant) for side in (-1, 0, 1))
+    found = kinks(hurst, zeta_1, get_variant(variant))
+    yield from (float(kink) * (1 + side * ULP) for kink in found for side in (-1, 0, 1))
 
 
 def island_geometry() -> tuple[list[Tally], dict[str, FloatArray]]:
     """Geometry by the library and by the paper's formulas as printed, against 60 digits."""
-    maps = {name: np.full((APPROACHES.size, BANDS.size), np.nan) for name in ("library", "direct")}
-    tallies = {"library": Tally("geometry, library"), "direct": Tally("geometry, the paper's formulas as printed")}
 
     def library(approach: float, hurst: float, zeta_1: float, variant: str) -> Answer:
         found = geometry(np.array([approach]), np.array([hurst]), np.array([zeta_1]), get_variant(variant))
@@ -165,43 +165,41 @@ def island_geometry() -> tuple[list[Tally], dict[str, FloatArray]]:
         found = exact_island(approach, hurst, zeta_1, float(divisor(variant)), DOUBLES)
         return [found[name] for name in FIELDS], math.inf
 
-    for hurst, variant, (j, zeta_1) in itertools.product(HURSTS, ("reported", "printed"), enumerate(map(float, BANDS))):
-        for i, approach in enumerate(_approaches(hurst, zeta_1, get_variant(variant))):
+    ways = {library: Tally("geometry, library"), direct: Tally("geometry, the paper's formulas as printed")}
+    maps = {way.__name__: np.full((APPROACHES.size, BANDS.size), np.nan) for way in ways}
+    for hurst, variant, (j, zeta_1) in itertools.product(HURSTS, VARIANTS, enumerate(map(float, BANDS))):
+        for i, approach in enumerate(_approaches(hurst, zeta_1, variant)):
             exact = exact_island(approach, hurst, zeta_1, divisor(variant))
-            for name, way in (("library", library), ("direct", direct)):
-                error = tallies[name].add(
-                    functools.partial(way, approach, hurst, zeta_1, variant), [exact[field] for field in FIELDS]
-                )
+            for way, tally in ways.items():
+                truth = [exact[field] for field in FIELDS]
+                error = tally.add(functools.partial(way, approach, hurst, zeta_1, variant), truth)
                 if hurst == MAP_HURST and variant == "reported" and i < APPROACHES.size:
-                    maps[name][i, j] = error
-    return list(tallies.values()), maps
+                    maps[way.__name__][i, j] = error
+    return list(ways.values()), maps
 
 
 def totals() -> list[Tally]:
     """Totals of every island model at corners of surfaces and gaps, both variants, against the exact one at 1e-10."""
-    tallies = {island_model: Tally(f"totals by {island_model}") for island_model in (*ISLAND_MODELS, "island4d")}
+    tallies = {name: Tally(f"totals by {name}") for name in (*ISLAND_MODELS, "island4d")}
 
-    def ask(surface: Surface, depth: float, island_model: str, variant: str, rtol: float) -> Answer:
+    def ask(surface: Surface, depth: float, variant: str, island_model: str, rtol: float) -> Answer:
         found = contact(surface, separation=TOP - depth, island_model=island_model, variant=variant, rtol=rtol)
         return (float(found.pressure), float(found.area)), float(found.error) + TOTAL_TRUTH
 
-    for variant, hurst, zeta_1, depth in itertools.product(("reported", "printed"), TOTAL_HURSTS, TOTAL_BANDS, DEPTHS):
-        surface = Surface(hurst, 1.0, zeta_1, 1.0, TOP)
+    for variant, hurst, zeta_1, depth in itertools.product(VARIANTS, TOTAL_HURSTS, TOTAL_BANDS, DEPTHS):
+        at = functools.partial(ask, Surface(hurst, 1.0, zeta_1, 1.0, TOP), depth, variant)
         try:
-            truth = ask(surface, depth, "exact", variant, TOTAL_TRUTH)[0]
+            truth = at("exact", TOTAL_TRUTH)[0]
         except MbmaError:
             truth = None
-        for island_model, tally in tallies.items():
+        for name, tally in tallies.items():
             # the four-number table is of one variant
-            if island_model != "island4d" or variant == "reported":
-                tally.add(
-                    functools.partial(ask, surface, depth, island_model, variant, 1e-8),
-                    None if island_model == "rigid" else truth,
-                )
+            if name != "island4d" or variant == "reported":
+                tally.add(functools.partial(at, name, 1e-8), None if name == "rigid" else truth)
     return list(tallies.values())
 
 
-def draw(geometry_maps: dict[str, FloatArray], island_maps: dict[str, FloatArray]) -> bytes:
+def draw(geometry_maps: dict[str, FloatArray], island_maps: dict[str, FloatArray]) -> Any:
     """Maps of error: geometry by the paper's formulas as printed and by the library, and islands."""
     from matplotlib import colormaps, colors
 
@@ -209,9 +207,8 @@ def draw(geometry_maps: dict[str, FloatArray], island_maps: dict[str, FloatArray
     colormap = colormaps["viridis"].with_extremes(bad="white")
     style = {"norm": colors.LogNorm(MIN_ERROR, MAX_ERROR), "cmap": colormap, "shading": "nearest", "rasterized": True}
     places = np.arange(MU_CORNERS.size), np.arange(X_CORNERS.size)
-    for panel, name, title in zip(
-        axes[0], ("direct", "library"), ("the paper's formulas as printed", "the library"), strict=True
-    ):
+    titles = {"direct": "the paper's formulas as printed", "library": "the library"}
+    for panel, (name, title) in zip(axes[0], titles.items(), strict=True):
         panel.pcolormesh(BANDS, APPROACHES, np.maximum(geometry_maps[name], MIN_ERROR), **style)
         panel.set(xscale="log", yscale="log", xlabel="zeta_1", ylabel="delta/h_rms", title=f"geometry: {title}")
     for panel, island_model in zip(axes[1], ("exact", "universal"), strict=True):
@@ -220,23 +217,61 @@ def draw(geometry_maps: dict[str, FloatArray], island_maps: dict[str, FloatArray
         panel.set_xticks(places[0][::4], [f"{mu:.0e}" for mu in MU_CORNERS[::4]], rotation=45)
         panel.set_yticks(places[1][::4], [f"{X:.3g}" for X in X_CORNERS[::4]])
     figure.colorbar(mesh, ax=axes, label="largest relative error")
-    return svg(figure)
+    return figure
 
 
 def corners(tallies: Sequence[Tally]) -> str:
     """The table of all corners."""
-    header = ["corners", "tried", "refused", "not finite", "warnings", "largest error of answers", "beyond their bound"]
-    rows = []
-    for tally in tallies:
-        largest = "-" if "rigid" in tally.name else f"{tally.largest:.1e}"
-        counts = (tally.tried, tally.refused, tally.not_finite, tally.warned)
-        rows.append([tally.name, *map(str, counts), largest, str(tally.beyond)])
-    return table(header, rows)
+    header = "corners | tried | refused | not finite | warnings | largest error of answers | beyond their bound"
+    rows = (vars(tally).values() for tally in tallies)
+    return table(header, rows, "{} | {} | {} | {} | {} | {:.1e} | {}").replace("—", "-")
+
+
+def theirs(solution: IslandSolution, points: int) -> tuple[FloatArray, FloatArray, float]:
+    """Radii over L, pressure over E* sigma/L and Phi_F by ContactMechanics on so many points."""
+    with warnings.catch_warnings():
+        # of its own optional parts
+        warnings.simplefilter("ignore")
+        from ContactMechanics.ReferenceSolutions.GreenwoodTripp import GreenwoodTripp
+
+    # profiles are polynomials of rho^2 through the Gauss nodes
+    middle = float(BarycentricInterpolator(solution.rho**2, solution.gap)(0.0))
+    mix = 0.1 if solution.mu < 2 else 0.02  # its iteration diverges with more
+    end = BEYOND * solution.rho[-1]
+    _, pressure, rho = GreenwoodTripp(middle, solution.mu, end, points, tol=TOLERANCE, mix=mix, maxiter=MAX_ITERATIONS)
+    return rho, pressure / 2, math.pi * float(simpson(rho * pressure, x=rho))
+
+
+def comparison() -> tuple[str, Any]:
+    """Forces and pressures of both solvers, and their differences against the other's number of points."""
+    figure, (left, right) = panels(1, 2, (10, 4))
+    rows, differences = [], []
+    for X, mu in CASES:
+        solution = greenwood_tripp.solve(X, mu)
+        found = [theirs(solution, points) for points in POINTS]
+        forces = np.array([force for _, _, force in found])
+        differences.append(forces / solution.phi_F - 1)
+        # what is left of an error of third order
+        extrapolated = abs((8 * forces[-1] - forces[-2]) / 7 / solution.phi_F - 1)
+        rows.append([X, mu, float(solution.phi_F), float(solution.error), *differences[-1], extrapolated])
+        rho, pressure, _ = found[1]
+        (line,) = left.plot(solution.rho, solution.pressure / pressure[0], label=f"X = {X:g}, mu = {mu:g}")
+        left.plot(rho[::3], pressure[::3] / pressure[0], ".", color=line.get_color())
+        right.loglog(POINTS, np.abs(differences[-1]), ".-", color=line.get_color())
+    right.loglog(POINTS, np.abs(differences).max() * (POINTS[0] / np.array(POINTS)) ** 3, "k:", label="third order")
+    left.set(xlabel="radius  rho/L", ylabel="pressure  p/p(0)", title="lines: this library; dots: ContactMechanics")
+    right.set(xlabel="points of ContactMechanics", ylabel="relative difference of force")
+    right.set_xticks(POINTS, [f"{points}" for points in POINTS], minor=False)
+    right.minorticks_off()
+    left.legend()
+    right.legend()
+    header = f"X | mu | Phi_F | its error | {' points | '.join(map(str, POINTS))} points | extrapolated"
+    return table(header, rows, "{:g} | {:g} | {:.10f} | {:.1e}"), figure
 
 
 def measure() -> Measured:
     """The measured blocks of the page, and its figures."""
     (island_tallies, island_maps), (geometry_tallies, geometry_maps) = islands(), island_geometry()
-    parts, files = another_program.measure()
-    parts |= {"corners": corners([*island_tallies, *geometry_tallies, *totals()])}
-    return parts, files | {"docs/figures/stability.svg": draw(geometry_maps, island_maps)}
+    compared, beside = comparison()
+    parts = {"corners": corners([*island_tallies, *geometry_tallies, *totals()]), "comparison": compared}
+    return parts, {"docs/figures/stability.svg": draw(geometry_maps, island_maps), "docs/figures/islands.svg": beside}

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from generate.pages.page import Measured, panels, svg, table
+from generate.pages.page import Measured, panels, table
 from generate.tables.build import evaluate
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.islands.four_numbers import to_axes
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.models.tables import shipped
@@ -24,14 +27,13 @@ LEAST_DRAWN = 1e-3  # mu
 def sizes() -> str:
     """Nodes, bytes and certified errors of the shipped files."""
     rows = []
-    for kind in KINDS:
+    for kind, f in itertools.product(KINDS, "FA"):
         content = read_table(shipped(kind), kind)
-        size = f"{shipped(kind).stat().st_size / 1e6:.2f} MB"
-        for f in ("F", "A"):
-            names = (f"largest_error_{f}", f"p99_error_{f}", f"median_error_{f}", f"visited_largest_error_{f}")
-            rows.append([kind, content.size, size, f, *(f"{content.attributes[name]:.1e}" for name in names)])
-    header = ["table", "cells or nodes", "file", "of", "largest error", "99% below", "half below", "largest at islands"]
-    return table(header, rows)
+        names = (f"largest_error_{f}", f"p99_error_{f}", f"median_error_{f}", f"visited_largest_error_{f}")
+        size = shipped(kind).stat().st_size / 1e6
+        rows.append([kind, content.size, size, f, *(content.attributes[name] for name in names)])
+    header = "table | cells or nodes | file | of | largest error | 99% below | half below | largest at islands"
+    return table(header, rows, "{} | {} | {:.2f} MB | {} | {:.1e}")
 
 
 def axes() -> str:
@@ -40,14 +42,19 @@ def axes() -> str:
     for axis in read_table(shipped(ISLAND4D), ISLAND4D).axes:
         shifted = f"{axis.name} + {axis.offset:g}" if axis.offset else axis.name
         t = f"log({shifted})" if axis.transform == "log" else shifted
-        rows.append([axis.name, axis.long_name, t, f"{axis.low:g}", f"{axis.high:g}", str(axis.nodes)])
-    return table(["axis", "what it is", "equally spaced in", "first", "last", "nodes"], rows)
+        rows.append([axis.name, axis.long_name, t, axis.low, axis.high, axis.nodes])
+    return table("axis | what it is | equally spaced in | first | last | nodes", rows, "{} | {} | {} | {:g}")
+
+
+def edges(content: TableContent) -> FloatArray:
+    """X_low, X_high, mu_low and mu_high of the cells."""
+    return np.stack([content.auxiliary[name][1] for name in CELL_EDGES])
 
 
 def cells() -> str:
     """The cells of the universal table."""
     content = read_table(shipped(UNIVERSAL), UNIVERSAL)
-    X_low, X_high, mu_low, mu_high = (content.auxiliary[name][1] for name in CELL_EDGES)
+    X_low, X_high, mu_low, mu_high = edges(content)
     first = mu_low == 0
     X, mu = content.axes
     widths, octaves = X_high - X_low, np.log2(mu_high[~first] / mu_low[~first])
@@ -58,111 +65,103 @@ def cells() -> str:
         ["first cell of a strip", "from 0", f"to {mu_high[first].min():g} at least"],
         ["other cells", "", f"{np.median(octaves):.2g} octaves of mu, half of them longer"],
     ]
-    return table(["", "range", "cells"], rows)
+    return table(" | range | cells", rows)
 
 
-def numbers(*values: float) -> str:
-    """Numbers to thirteen digits."""
-    return ", ".join(f"{value:.12e}" for value in values)
+def numbers(*values: float, form: str = ".12e") -> str:
+    """Numbers with commas."""
+    return ", ".join(f"{value:{form}}" for value in values)
 
 
-def bounds(values: np.ndarray) -> str:
-    """Bounds on errors."""
-    return ", ".join(f"{bound:.2e}" for bound in values)
-
-
-def _with_stored(content: TableContent, rows: list[list[str]]) -> str:
+def _with_stored(content: TableContent, rows: dict[str, str]) -> str:
     points = content.conformance
-    rows += [
-        [f"stored {what}_F, {what}_A", numbers(*(points[f"{what}_{f}"][EXAMPLE] for f in "FA"))]
-        for what in ("table", "exact")
-    ]
-    rows.append(["tolerance", f"{points['tolerance'][EXAMPLE]:.2e}"])
-    return f"Conformance point {EXAMPLE} (counted from 0):\n\n" + table(["step", "number"], rows)
+    for what in ("table", "exact"):
+        rows[f"stored {what}_F, {what}_A"] = numbers(*(points[f"{what}_{f}"][EXAMPLE] for f in "FA"))
+    rows["tolerance"] = numbers(points["tolerance"][EXAMPLE], form=".2e")
+    return f"Conformance point {EXAMPLE} (counted from 0):\n\n" + table("step | number", rows.items())
 
 
 def example_universal() -> str:
     """One conformance point of the universal table, step by step."""
     content = read_table(shipped(UNIVERSAL), UNIVERSAL)
     X, mu = (float(content.conformance[name][EXAMPLE]) for name in ("X", "mu"))
-    edges = np.stack([content.auxiliary[name][1] for name in CELL_EDGES])
-    inside = (edges[0] <= X) & (edges[1] >= X) & (edges[2] <= mu) & (edges[3] >= mu)
+    ends = edges(content)
+    inside = (ends[0] <= X) & (ends[1] >= X) & (ends[2] <= mu) & (ends[3] >= mu)
     cell = int(np.flatnonzero(inside)[0])
-    X_low, X_high, mu_low, mu_high = edges[:, cell]
+    X_low, X_high, mu_low, mu_high = ends[:, cell]
     x = (2 * X - X_low - X_high) / (X_high - X_low)
     a, b, c, d = fractions_of_mu(mu_low, mu_high)
     y = (a * mu + b) / (c * mu + d)
     sums = chebyshev.chebval2d(x, y, content.coefficients[cell])
-    rows = [
-        ["X, mu", f"{X!r}, {mu!r}"],
-        ["cell", str(cell)],
-        ["X_low, X_high, mu_low, mu_high", ", ".join(f"{edge:.10g}" for edge in edges[:, cell])],
-        ["x, y", f"{x:.12f}, {y:.12f}"],
-        ["first row of chebyshev_F", ", ".join(f"{term:.6e}" for term in content.coefficients[cell, 0, :, 0])],
-        ["Phi_F = mu times the sum of chebyshev_F", numbers(mu * sums[0])],
-        ["Phi_A = the sum of chebyshev_A", numbers(sums[1])],
-        ["error_F, error_A", bounds(content.local_error[cell])],
-    ]
+    rows = {
+        "X, mu": f"{X!r}, {mu!r}",
+        "cell": str(cell),
+        "X_low, X_high, mu_low, mu_high": numbers(*ends[:, cell], form=".10g"),
+        "x, y": numbers(x, y, form=".12f"),
+        "first row of chebyshev_F": numbers(*content.coefficients[cell, 0, :, 0], form=".6e"),
+        "Phi_F = mu times the sum of chebyshev_F": numbers(mu * sums[0]),
+        "Phi_A = the sum of chebyshev_A": numbers(sums[1]),
+        "error_F, error_A": numbers(*content.local_error[cell], form=".2e"),
+    }
     return _with_stored(content, rows)
 
 
 def example_island4d() -> str:
     """One conformance point of the four-parameter table, step by step."""
     content = read_table(shipped(ISLAND4D), ISLAND4D)
-    names = ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")
-    raw = [np.atleast_1d(content.conformance[name][EXAMPLE]) for name in names]
-    place = to_axes(raw[0], raw[1], raw[2], raw[3], get_variant(content.attributes["variant"]))
+    raw = {name: content.conformance[name][[EXAMPLE]] for name in ("delta_over_h_rms", "zeta_d", "zeta_u", "hurst")}
+    place = to_axes(**raw, variant=get_variant(content.attributes["variant"]))
     X, mu, spread, sphere, sigma = (float(a[0]) for a in (place.X, place.mu, place.spread, place.sphere, place.sigma))
-    positions = [axis.position(x) for axis, x in zip(content.axes, (X, spread, sphere, float(raw[3][0])), strict=True)]
-    p = [float(position) for position in positions]
-    nodes = [min(int(t), axis.nodes - 2) for axis, t in zip(content.axes, p, strict=True)]
-    g = evaluate(content.coefficients, [np.array([t]) for t in p])[0]
+    coordinates = zip(content.axes, (X, spread, sphere, float(raw["hurst"][0])), strict=True)
+    positions = [float(axis.position(x)) for axis, x in coordinates]
+    g = evaluate(content.coefficients, [np.array([p]) for p in positions])[0]
     F_52, F_2 = (float(height_integral(n, -X)) for n in (2.5, 2.0))
-    shape = content.local_error.shape[:-1]
-    where = tuple(int(error_cell(a, c, t)) for a, c, t in zip(content.axes, shape, p, strict=True))
-    rows = [[name, repr(float(value[0]))] for name, value in zip(names, raw, strict=True)]
-    rows += [
-        ["spread, sphere", numbers(spread, sphere)],
-        ["sigma, mu, X", f"{numbers(sigma, mu)}, {X:.12f}"],
-        ["F_hat/Phi_F = S sqrt(2 R_d S)", numbers(float(place.force[0]))],
-        ["A_hat/Phi_A = 2 pi D R_u R_d S^2", numbers(float(place.area[0]))],
-    ]
-    for axis, t, node in zip(content.axes, p, nodes, strict=True):
-        rows.append([f"position, cell and u on {axis.name}", f"{t:.12f}, {node}, {t - node:.12f}"])
-    rows += [
-        ["g_F, g_A", numbers(*g)],
-        ["F_5/2(-X), F_2(-X)", numbers(F_52, F_2)],
-        ["Phi_F = exp(g_F) pi mu F_5/2(-X)/5", numbers(math.exp(g[0]) * math.pi * mu * F_52 / 5)],
-        ["Phi_A = exp(g_A) pi F_2(-X)/2", numbers(math.exp(g[1]) * math.pi * F_2 / 2)],
-        ["cell of the error field, error_F, error_A there", f"{where}, {bounds(content.local_error[where])}"],
-    ]
+    along = list(zip(content.axes, positions, content.local_error.shape, strict=False))
+    where = tuple(int(error_cell(axis, count, p)) for axis, p, count in along)
+    bounds = numbers(*content.local_error[where], form=".2e")
+    rows = {name: repr(float(value[0])) for name, value in raw.items()} | {
+        "spread, sphere": numbers(spread, sphere),
+        "sigma, mu, X": f"{numbers(sigma, mu)}, {X:.12f}",
+        "F_hat/Phi_F = S sqrt(2 R_d S)": numbers(float(place.force[0])),
+        "A_hat/Phi_A = 2 pi D R_u R_d S^2": numbers(float(place.area[0])),
+    }
+    for axis, p, _ in along:
+        node = min(int(p), axis.nodes - 2)
+        rows[f"position, cell and u on {axis.name}"] = f"{p:.12f}, {node}, {p - node:.12f}"
+    rows |= {
+        "g_F, g_A": numbers(*g),
+        "F_5/2(-X), F_2(-X)": numbers(F_52, F_2),
+        "Phi_F = exp(g_F) pi mu F_5/2(-X)/5": numbers(math.exp(g[0]) * math.pi * mu * F_52 / 5),
+        "Phi_A = exp(g_A) pi F_2(-X)/2": numbers(math.exp(g[1]) * math.pi * F_2 / 2),
+        "cell of the error field, error_F, error_A there": f"{where}, {bounds}",
+    }
     return _with_stored(content, rows)
 
 
-def figure() -> bytes:
+def draw() -> Any:
     """Bound on the relative error of the universal table over X and mu."""
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import LogNorm
 
     content = read_table(shipped(UNIVERSAL), UNIVERSAL)
-    X_low, X_high, mu_low, mu_high = (content.auxiliary[name][1] for name in CELL_EDGES)
+    X_low, X_high, mu_low, mu_high = edges(content)
     bottom = np.maximum(mu_low, LEAST_DRAWN)
-    corners = [X_low, bottom, X_high, bottom, X_high, mu_high, X_low, mu_high]
-    drawn, plots = panels(1, 2, (9, 3.6), sharey=True)
+    corners = np.stack([X_low, bottom, X_high, bottom, X_high, mu_high, X_low, mu_high], axis=-1).reshape(-1, 4, 2)
+    figure, plots = panels(1, 2, (9, 3.6), sharey=True)
     norm = LogNorm(content.local_error.min(), content.local_error.max())
     for plot, errors, name in zip(plots, content.local_error.T, (r"$\Phi_F$", r"$\Phi_A$"), strict=True):
-        image = PolyCollection(list(np.stack(corners, axis=-1).reshape(-1, 4, 2)), array=errors)
+        image = PolyCollection(list(corners), array=errors)
         image.set(norm=norm, edgecolor="white", linewidth=0.2, rasterized=True)
         plot.add_collection(image)
         title = f"bound on the relative error of {name}"
         plot.set(yscale="log", xlim=(X_low[0], 12), ylim=(LEAST_DRAWN, mu_high[-1]), xlabel="X", title=title)
     plots[0].set_ylabel(r"$\mu$")
-    drawn.colorbar(image, ax=plots)
-    return svg(drawn)
+    figure.colorbar(image, ax=plots)
+    return figure
 
 
 def measure() -> Measured:
     """The measured blocks of the page, and its figure."""
     parts = {"sizes": sizes(), "cells": cells(), "axes": axes()}
     parts |= {"universal": example_universal(), "island4d": example_island4d()}
-    return parts, {"docs/figures/tables_universal_error.svg": figure()}
+    return parts, {"docs/figures/tables_universal_error.svg": draw()}

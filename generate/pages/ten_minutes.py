@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from generate.pages.page import Measured, panels, svg
+from generate.pages.page import Measured, panels
 
 INK, BODY, PLANE = "#1f3b57", "#b8c7d6", "#c0392b"
 
@@ -48,4 +48,4 @@ def measure() -> Measured:
     mean = float(pressed.mean())
     level(right, mean, "mean plane", INK, "--")
     arrow(right, -0.055, mean, d, "u")
-    return {}, {"docs/figures/sketch.svg": svg(figure)}
+    return {}, {"docs/figures/sketch.svg": figure}

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 import scipy.ndimage
+from scipy.interpolate import BSpline
 from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
@@ -126,20 +127,9 @@ def line_errors(
     values = solver.log_ratio(f"{axes[number].name} x {axes[number].nodes}", X, mu, rtol=rtol_for(configuration))
     nodes = axes[number].nodes
     coefs = coefficients(np.moveaxis(values[:, :nodes], 1, 0), DEGREE, 1)
-    fitted = _evaluate_1d(coefs, tests)
+    fitted = BSpline(np.arange(nodes + 2 * DEGREE) - DEGREE, coefs, DEGREE)(tests)
     worst: FloatArray = np.abs(fitted - np.moveaxis(values[:, nodes:], 1, 0)).max(axis=(0, 1))
     return worst
-
-
-def _evaluate_1d(coefs: FloatArray, positions: FloatArray) -> FloatArray:
-    nodes = coefs.shape[0] - DEGREE + 1
-    first = np.minimum(positions.astype(int), nodes - 2)
-    u = positions - first
-    v = 1 - u
-    weights = np.stack([v**3 / 6, 2 / 3 - u**2 * (1 - u / 2), 2 / 3 - v**2 * (1 - v / 2), u**3 / 6], axis=1)
-    taps = np.stack([coefs[first + k] for k in range(DEGREE + 1)])
-    fitted: FloatArray = np.einsum("nk,kn...->n...", weights, taps)
-    return fitted
 
 
 @dataclasses.dataclass(frozen=True)

@@ -12,6 +12,8 @@ import re
 from collections.abc import Callable
 
 import mpmath
+import numpy as np
+from numpy.polynomial import chebyshev
 
 from mbma_tables.common.files import write_file
 
@@ -50,21 +52,8 @@ def _on_unit_interval(function: Function, low: mpmath.mpf, high: mpmath.mpf) -> 
     """Monomial coefficients in t, for ``function((low + high)/2 + (high - low)/2 t)``, |t| <= 1."""
     angles = [mpmath.pi * (k + mpmath.mpf(1) / 2) / SAMPLES for k in range(SAMPLES)]
     values = [function((low + high) / 2 + (high - low) / 2 * mpmath.cos(a)) for a in angles]
-    chebyshev = [
-        2 * mpmath.fsum(v * mpmath.cos(j * a) for v, a in zip(values, angles, strict=True)) / SAMPLES
-        for j in range(TERMS)
-    ]
-    chebyshev[0] /= 2
-    monomial = [mpmath.mpf(0)] * TERMS
-    previous = [mpmath.mpf(1)] + [mpmath.mpf(0)] * (TERMS - 1)
-    current = [mpmath.mpf(0), mpmath.mpf(1)] + [mpmath.mpf(0)] * (TERMS - 2)
-    for coefficient in chebyshev:
-        monomial = [m + coefficient * p for m, p in zip(monomial, previous, strict=True)]
-        following = [-p for p in previous]
-        for power in range(TERMS - 1):
-            following[power + 1] += 2 * current[power]
-        previous, current = current, following
-    return monomial
+    series = [mpmath.fsum(v * mpmath.cos(j * a) for v, a in zip(values, angles, strict=True)) for j in range(TERMS)]
+    return list(chebyshev.cheb2poly(np.array([series[0] / 2, *series[1:]]) * 2 / SAMPLES))
 
 
 def scaled_pieces(twice_n: int) -> list[list[mpmath.mpf]]:

@@ -31,8 +31,7 @@ from mbma_tables.models import QUANTITIES, AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.labels import apply_to_surface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories import get_theory
-from mbma_tables.theories.mbma import Mbma, refuse_options_of_mbma
+from mbma_tables.theories.mbma import Mbma, chosen_theory
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by
@@ -46,7 +45,7 @@ def contact(
     mean_separation: ArrayLike | None = None,
     pressure: ArrayLike | None = None,
     area: ArrayLike | None = None,
-    theory: str | Theory | UserTheory = "mbma",
+    theory: str | Theory | UserTheory | None = None,
     hardness: ArrayLike | str = np.inf,
     island_model: str | AnyModel = "universal",
     variant: str | Variant = "reported",
@@ -73,9 +72,10 @@ def contact(
         F/A0 in the unit of `E_star`, or with its own; the answer is on the branch of first contact.
     area : array_like
         A/A0, likewise.
-    theory : str or theory
+    theory : str or theory, optional
         By name, one of `mbma_tables.theories.THEORIES`, or an object: one of `mbma_tables.theories`, or any with a
-        `name` and ``answer(surface, u)``.
+        `name` and ``answer(surface, u)``. Default: "calibrated" for a surface given by a spectrum or a map, unless
+        an option of MBMA is given, and "mbma" for one given by its five numbers.
     hardness : array_like
         Largest pressure p_m that the softer body bears, in the unit of `E_star` (of E* itself where that is 1). The
         theory's elastic answer goes through `mbma_tables.laws.hardness`; u is then the mean gap with yielded points
@@ -140,14 +140,9 @@ def contact(
     E_star, units = modulus_and_units(E_star, surface)
     value, hardness = units.number(by, value), units.number("hardness", hardness)
     require_flag("derivatives", derivatives)
-    if isinstance(theory, str) and theory == Mbma.name:
-        chosen: Theory = Mbma(island_model, variant, rtol, outside, workers)
-    else:
-        chosen = get_theory(theory, surface)
-        refuse_options_of_mbma(
-            island_model=island_model != "universal", variant=variant != "reported", rtol=rtol != 1e-8,
-            outside=outside != "raise", workers=workers != 1,
-        )  # fmt: skip
+    chosen = chosen_theory(
+        surface, theory, island_model=island_model, variant=variant, rtol=rtol, outside=outside, workers=workers
+    )
     options: dict[str, Any] = {
         "by": by,
         "source": Source(chosen, surface, E_star, hardness, units),

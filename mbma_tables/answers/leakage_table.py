@@ -23,6 +23,7 @@ from mbma_tables.theories.calibrated_table import BLOCK, Owners, SurfaceSpline, 
 GROUP = "leakage"
 AXES = ("hurst", "log_zeta_1", "log_odds")
 COVERED = np.array([[0.1, 1.0], [math.log(3.0), math.log(1e5)]])  # H and ln zeta_1, where the error was measured
+LEAST = 1e-300  # contact fraction that counts as none
 OWN_NODES = 64  # contact fractions at which a spectrum's own factor is found
 KEPT = 64  # spectra whose factors are kept
 
@@ -72,10 +73,20 @@ def shipped_flow() -> FlowTable:
     )
 
 
+@np.errstate(all="ignore")
 def _flow(given: tuple[Any, ...], owner: Owners, u: FloatArray, area: FloatArray) -> FloatArray:
-    out = np.empty(u.size)
-    in_blocks(lambda k: core.flow(*given, owner[k], u[k], area[k], out[k]), u.size, BLOCK)
-    return out
+    """u^3 (1 - 1.5/(u^2 + 4)) R, and 0 from A/A0 = threshold on; ln R over ln A/(threshold A0 - A)."""
+    numbers, cells = given[1:3]
+    threshold, obstruction, first = numbers[10], numbers[11], numbers[2]
+    # contact fractions of Greenwood and Williamson exceed 1
+    odds = np.log(np.maximum(area, LEAST) / np.maximum(threshold - area, LEAST))
+    value, slope = np.empty((2, u.size))
+    in_blocks(lambda k: core.spline_values(*given, owner[k], odds[k], value[k], slope[k]), u.size, BLOCK)
+    beyond = value + slope * np.maximum(odds - (first + cells[2] / numbers[5]), 0.0)
+    log_factor = np.minimum(beyond * np.exp(obstruction * np.minimum(odds - first, 0.0)), 0.0)
+    wide = u * u * u * (1 - 1.5 / (u * u + 4))
+    k = np.where(area < threshold, wide * np.exp(log_factor), 0.0)
+    return np.where(np.isnan(u) | np.isnan(value), np.nan, k)
 
 
 @functools.lru_cache(KEPT)

@@ -26,6 +26,7 @@ from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import Variant
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.differences import differences
+from mbma_tables.theories.mbma import chosen_theory
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 STEP = 0.02  # of the logarithm of a parameter
@@ -91,7 +92,7 @@ def sensitivity(
     area: ArrayLike | None = None,
     E_star: float | str = 1.0,
     ranges: Mapping[str, tuple[Any, Any]] | None = None,
-    theory: str | Theory | UserTheory = "mbma",
+    theory: str | Theory | UserTheory | None = None,
     island_model: str | AnyModel = "universal",
     variant: str | Variant = "reported",
     rtol: float = 1e-8,
@@ -136,10 +137,10 @@ def sensitivity(
     >>> f"stiffness {low:.3g} to {high:.3g} {unit_of('stiffness', found.units)}"
     'stiffness 0.0885 to 0.094 GPa/um'
     """
-    options: Any = {"theory": theory, "island_model": island_model, "variant": variant, "rtol": rtol}
+    chosen = chosen_theory(surface, theory, island_model=island_model, variant=variant, rtol=rtol)
     by, value = one_known(separation=separation, mean_separation=mean_separation, pressure=pressure, area=area)
     modulus, units = modulus_and_units(E_star, surface)
-    make, parameters = _parameters(surface) if isinstance(surface, Surface) else _of_spectrum(surface, theory)
+    make, parameters = _parameters(surface) if isinstance(surface, Surface) else _of_spectrum(surface, chosen)
     given = parameters | {"E_star": modulus, by: units.number(by, value)}
     numbers = {name: float(one_number(name, number)) for name, number in given.items()}
     same = {"pressure": "pressure", "separation": "mean_separation"}.get(by, by)
@@ -147,7 +148,7 @@ def sensitivity(
 
     def found_at(**own: Any) -> Contact:
         modulus, place = own.pop("E_star"), own.pop(by)
-        return contact(make(**own), **{by: place}, E_star=modulus, **options)
+        return contact(make(**own), **{by: place}, E_star=modulus, theory=chosen)
 
     def answers(moved: Mapping[str, Any]) -> Answers:
         own = {name: moved.get(name, number) for name, number in numbers.items()}

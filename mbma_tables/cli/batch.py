@@ -88,7 +88,7 @@ def batch_command(
     found: dict[str, Any] = {"name": names}
     found |= {name: getattr(answer, name) for name in (*COLUMNS[:-1], "stiffness", "scatter", "valid", "error")}
     notes = [
-        f"theory {answer.theory}" + (f", rtol {model.rtol:g}" if model.theory == "mbma" else ""),
+        f"theory {answer.theory}" + (f", rtol {model.rtol:g}" if answer.theory == "mbma" else ""),
         "scatter: of ln force at a separation, by simulations",
     ]
     shown = {name: shown_unit(name, first.units) for name in found}

@@ -77,6 +77,7 @@ def contact_command(
     """
     import numpy as np
 
+    model = model.of(specimen.surface)
     if len(loads) != 1:
         raise InputError("one of --separation, --mean-separation, --pressure and --area is needed")
     (name, numbers), *_ = loads.items()
@@ -147,6 +148,7 @@ def curve_command(
     from mbma_tables.scenes.problem import COMPARED
     from mbma_tables.scenes.steps import other_theory
 
+    model = model.of(specimen.surface)
     surface, asked = specimen.surface, contact_keywords(model, specimen)
     gap = curve_gaps(float(surface.h_max), points)
     if model.theory != "mbma":

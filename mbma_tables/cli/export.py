@@ -30,7 +30,7 @@ OPTIONS = {
     "calculix --exponential": frozenset({"specimen", "name", "exponential"}),
 }
 TARGETS = (*SOLVERS, *DATA, *LAWS, *FMUS, *GRAPHS, *CODE)
-DEFAULTS = {"theory": "mbma", "variant": "reported", "exponential": False, "leakage": False, "check": False}
+DEFAULTS = {"variant": "reported", "exponential": False, "leakage": False, "check": False}
 
 
 class _Target(click.Choice[str]):

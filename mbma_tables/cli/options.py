@@ -7,7 +7,7 @@ import functools
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -27,6 +27,9 @@ from mbma_tables.surfaces.cases import CASES
 from mbma_tables.surfaces.variants import NAMED
 from mbma_tables.theories import OF_MAPS, THEORIES
 
+if TYPE_CHECKING:
+    from mbma_tables.surfaces.any_surface import AnySurface
+
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 DEFAULT_RTOL = 1e-8
@@ -41,8 +44,15 @@ class Model:
     island_model: str
     variant: str
     rtol: float
-    theory: str = "mbma"
+    theory: Any = None  # a name; by the surface where none is given
     hardness: float | str = math.inf
+
+    def of(self, surface: AnySurface) -> Model:
+        """The same with a theory by name."""
+        from mbma_tables.theories.mbma import theory_name
+
+        own = {name: getattr(self, name) for name in ("island_model", "variant", "rtol")}
+        return dataclasses.replace(self, theory=theory_name(surface, self.theory, **own))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -246,10 +256,8 @@ _MODEL_OPTIONS = (
 )
 theory_option = _option(
     "theory",
-    "Theory; the others have no island model, variant or rtol.",
-    default="mbma",
+    "Theory; only mbma has an island model, variant and rtol. Default: calibrated for a spectrum or a map, else mbma.",
     type=click.Choice([*THEORIES, *OF_MAPS]),
-    **SHOWN,
 )
 # of islands, which MBMA alone has
 model_options = _group("model", lambda given: Model(**given), *_MODEL_OPTIONS)

@@ -42,6 +42,7 @@ def sensitivity_command(
     """
     from mbma_tables.answers.sensitivity import sensitivity
 
+    model = model.of(specimen.surface)
     asked = vars(model).copy()
     if asked.pop("hardness") != math.inf:
         raise InputError("sensitivity is of elastic contacts: leave --hardness out")

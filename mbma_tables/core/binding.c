@@ -210,12 +210,11 @@ static mbma_spline spline_of(const argument *a) {
 #define CONSTANT(k) ((const double *)P(1))[10 + (k)]
 #define LOG_FORCE ((const mbma_spline[]){spline_of(a)})
 #define CALIBRATED ((const mbma_calibrated_table[]){{spline_of(a), CONSTANT(0), CONSTANT(1), CONSTANT(2)}})
-#define FLOW ((const mbma_flow_table[]){{spline_of(a), CONSTANT(0), CONSTANT(1)}})
 #define SURFACES ((const mbma_surfaces[]){{N(3), P(3), P(4), P(5), P(6), P(7)}})
 
 /* Of a law: gradient and alpha, seven constants and h_max. */
-#define WAVES ((const mbma_waves[]){{N(1), P(1), P(2), P(3), NUMBER(0), NUMBER(1)}})
-#define NUMBER(k) ((const double *)P(4))[k]
+#define WAVES ((const mbma_waves[]){{N(0), P(0), P(1), P(2), NUMBER(0), NUMBER(1)}})
+#define NUMBER(k) ((const double *)P(3))[k]
 #define CONSTANTS \
     ((const mbma_law_constants[]){{NUMBER(2), NUMBER(3), NUMBER(4), NUMBER(5), NUMBER(6), NUMBER(7), NUMBER(8)}})
 
@@ -251,7 +250,6 @@ static mbma_spline spline_of(const argument *a) {
     FN(spline4, "D D L4 i w", \
        N(1) > 0 && N(1) == coefficients_of(&a[2]) && N(0) % 4 == 0 && N(4) == N(0) / 4 * (I(3) ? 10 : 2), \
        mbma_spline4(N(0) / 4, P(0), P(1), P(2), I(3) != 0, P(4))) \
-    FN(four_numbers, "Dn Dn Dn d i w4n", true, mbma_four_numbers(N(0), P(0), P(1), P(2), X(3), I(4) != 0, P(5))) \
     /* newton.c */ \
     FN(height_integrals, "i Dn wn", true, mbma_height_integrals(I(0), N(1), P(1), P(2))) \
     FN(islands_work, "i", I(0) >= 0 && I(0) < 1 << 20, MBMA_ISLANDS_WORK(I(0))) \
@@ -260,21 +258,14 @@ static mbma_spline spline_of(const argument *a) {
        mbma_solve_islands(N(0), P(0), P(1), X(2), BASIS(3), BASIS(7), P(11), P(12), P(13), P(14), P(15), P(16), \
                           P(17))) \
     FN(island_extents, "Dn Dn d wn", true, mbma_island_extents(N(0), P(0), P(1), X(2), P(3))) \
-    FN(damped_steps, "d d d d d i D wn wn w2 l1", N(7) > 0 && N(6) == N(7) * N(7), \
-       mbma_damped_steps(X(0), X(1), X(2), X(3), X(4), I(5), N(7), P(6), P(7), P(8), P(9), P(10))) \
     /* law.c */ \
     FN(law_fill, "Dn D w?n w?n w?n w?n w?n", LAW(1)->head, \
        mbma_law_fill(N(0), P(0), LAW(1), P(2), P(3), P(4), P(5), P(6))) \
-    FN(law_records, "Dn Dn D ln", LAW(2)->head, mbma_law_records(N(0), P(0), P(1), LAW(2), P(3))) \
     FN(inverse_nodes, "Dn D i d wn wn", LAW(1)->head, \
        mbma_inverse_nodes(N(0), P(0), LAW(1), (mbma_quantity)I(2), X(3), P(4), P(5))) \
     FN(law_invert, "Dn D D i wn w?n w?n", LAW(1)->head && INVERSE(2)->head, \
        mbma_law_invert(N(0), P(0), LAW(1), INVERSE(2), (mbma_quantity)I(3), P(4), P(5), P(6))) \
-    FN(law_flow_fill, "Dn D d d wn", LAW(1)->head, mbma_law_flow_fill(N(0), P(0), LAW(1), X(2), X(3), P(4))) \
-    FN(law_fit, "Dn D16n D256 D32 D81 w", N(0) % 2 == 0 && N(5) == N(0) / 2 * (WORDS(mbma_law_record) + 3), \
-       mbma_law_fit(N(0) / 2, P(0), P(1), P(2), P(3), P(4), P(5))) \
     /* calibrated.c */ \
-    FN(contact_area, "Dn Dn d wn", true, mbma_contact_area(N(0), P(0), P(1), X(2), P(3))) \
     FN(spline_pieces, SPLINE "D D D w", fits_spline(a) && !P(7) && N(8) == N(3) * 6 * (size_t)((int64_t *)P(2))[2], \
        mbma_spline_pieces(LOG_FORCE, SURFACES, P(8))) \
     FN(calibrated_ends, SPLINE "Dn D D w2n", fits_spline(a), mbma_calibrated_ends(CALIBRATED, SURFACES, P(8))) \
@@ -282,18 +273,14 @@ static mbma_spline spline_of(const argument *a) {
        mbma_calibrated_contact(CALIBRATED, SURFACES, N(8), P(8), P(9), P(10), P(11), P(12))) \
     FN(calibrated_separation, SPLINE "Dn D2n D Lm Dm wm", fits_spline(a) && N(3) > 0, \
        mbma_calibrated_separation(CALIBRATED, SURFACES, N(8), P(8), P(9), P(10))) \
-    FN(calibrated_slopes, SPLINE "Dn D D Dn w10n", fits_spline(a) && !P(7), \
-       mbma_calibrated_slopes(CALIBRATED, SURFACES, P(8), P(9))) \
-    FN(flow, SPLINE "D D D Lm Dm Dm wm", fits_spline(a) && N(3) > 0, \
-       mbma_flow(FLOW, SURFACES, N(8), P(8), P(9), P(10), P(11))) \
+    FN(spline_values, SPLINE "D D D Lm Dm wm wm", fits_spline(a) && N(3) > 0, \
+       mbma_spline_values(LOG_FORCE, SURFACES, N(8), P(8), P(9), P(10), P(11))) \
     FN(self_affine, "Dn Dn wn wn", true, mbma_self_affine(N(0), P(0), P(1), P(2), P(3))) \
     /* spectrum_laws.c */ \
-    FN(words_of_inner, "", true, WORDS(mbma_inner)) \
     FN(words_of_spectrum_law, "", true, WORDS(mbma_spectrum_law)) \
-    FN(inner_integrals, "w", N(0) == WORDS(mbma_inner), (mbma_inner_integrals(P(0)), 0)) \
     FN(spectrum_waves, "Dn Dn wm wm wm w4", true, mbma_spectrum_waves(N(0), P(0), P(1), N(2), P(2), P(3), P(4), P(5))) \
-    FN(spectrum_law_of, "D Dn Dn Dn D10 w9n w", N(0) == WORDS(mbma_inner) && N(6) == WORDS(mbma_spectrum_law), \
-       mbma_spectrum_law_of(P(0), WAVES, CONSTANTS, NUMBER(9), P(5), P(6))) \
+    FN(spectrum_law_of, "Dn Dn Dn D10 w3n w", N(5) == WORDS(mbma_spectrum_law), \
+       mbma_spectrum_law_of(WAVES, CONSTANTS, NUMBER(9), P(4), P(5))) \
     FN(spectrum_law_persson, "D Dn wn wn", N(0) == WORDS(mbma_spectrum_law), \
        mbma_spectrum_law_persson(P(0), N(1), P(1), P(2), P(3))) \
     FN(spectrum_law_contact, "D Dn wn wn wn", N(0) == WORDS(mbma_spectrum_law), \
@@ -303,8 +290,6 @@ static mbma_spline spline_of(const argument *a) {
     /* hardness.c */ \
     FN(gaussian_level, "Dn wn", true, mbma_gaussian_level(N(0), P(0), P(1))) \
     FN(bearing_share, "Dn Dn wn wn", true, mbma_bearing_share(N(0), P(0), P(1), P(2), P(3))) \
-    FN(diffused, "Dn Dn i wn", true, mbma_diffused(N(0), P(0), P(1), I(2) != 0, P(3))) \
-    FN(capped_area, "Dn Dn Dn d d i wn", true, mbma_capped_area(N(0), P(0), P(1), P(2), X(3), X(4), I(5) != 0, P(6))) \
     FN(capped_force, "Dn Dn Dn Dn Dn d d d wn wn", true, \
        mbma_capped_force(N(0), P(0), P(1), P(2), P(3), P(4), X(5), X(6), X(7), P(8), P(9))) \
     FN(gap_start, "i Dm Dm Dm i Dn Dn w6n", \

@@ -1,5 +1,4 @@
-/* The law calibrated on boundary elements and the flow through its gaps, by quintic splines over the numbers of a
- * surface and a third axis.
+/* The law calibrated on boundary elements, by quintic splines over the numbers of a surface and a third axis.
  *
  * Sums over the first two axes are made in the same order for one entry and for all cells of the third axis, so that
  * answers do not depend on what is asked beside them.
@@ -9,7 +8,7 @@
 #include "elementary.h"
 #include "mbma.h"
 
-enum { CHUNK = 128, COLUMNS = 8, MOST_STEPS = 100, NONE = -1 };
+enum { CHUNK = 128, COLUMNS = 8, MOST_STEPS = 100 };
 
 #define LEAST 1e-300                /* u that counts as none */
 #define LEAST_LOG_SEPARATION -690.0 /* ln u at which full contact counts as reached */
@@ -24,17 +23,6 @@ MBMA_INLINE void quintic(double u, double w[6]) {
     w[3] = mbma_fma(v2, mbma_fma(v2, mbma_fma(v, -10.0, 30.0), -60.0), 66.0) * part;
     w[4] = mbma_fma(v, mbma_fma(v, mbma_fma(v, mbma_fma(v, mbma_fma(v, 5.0, -20.0), 20.0), 20.0), -50.0), 26.0) * part;
     w[5] = u2 * u2 * u * part;
-}
-
-/* Their derivatives by u. */
-static void quintic_slopes(double u, double w[6]) {
-    const double v = 1.0 - u, u2 = u * u, v2 = v * v;
-    w[0] = -v2 * v2 / 24.0;
-    w[1] = (-50.0 + u * (40.0 + u * (60.0 + u * (-80.0 + 25.0 * u)))) / 120.0;
-    w[2] = u * (-120.0 + u2 * (120.0 - 50.0 * u)) / 120.0;
-    w[3] = -v * (-120.0 + v2 * (120.0 - 50.0 * v)) / 120.0;
-    w[4] = -(-50.0 + v * (40.0 + v * (60.0 + v * (-80.0 + 25.0 * v)))) / 120.0;
-    w[5] = u2 * u2 / 24.0;
 }
 
 /* From coefficients of B-splines to those of powers. */
@@ -80,8 +68,8 @@ static void find_places(const mbma_spline *s, chunk *c, int axis, const double *
     }
 }
 
-/* Where surfaces lie, by which sums are weighted; along the axis `steep`, for the derivative by it. */
-static void weigh(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c, int steep) {
+/* Where surfaces lie, by which sums are weighted. */
+static void weigh(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c) {
     for (int axis = 0; axis < 2; axis++) {
         const double *const given = axis == 0 ? surfaces->hurst : surfaces->log_zeta_1;
         double x[CHUNK];
@@ -93,12 +81,6 @@ static void weigh(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c,
             quintic(c->z[axis][n], w);
             for (int m = 0; m < 6; m++)
                 c->w[axis][m][n] = w[m];
-        }
-        for (size_t n = 0; n < c->count && axis == steep; n++) {
-            double w[6];
-            quintic_slopes(c->z[axis][n], w);
-            for (int m = 0; m < 6; m++)
-                c->w[axis][m][n] = w[m] * s->rate[axis];
         }
     }
 }
@@ -120,11 +102,11 @@ static void patch(const mbma_spline *s, const chunk *c, size_t n, size_t cell, d
     memcpy(sums, total, sizeof total);
 }
 
-/* Values and slopes of the spline, or of its derivative by the axis `steep`. */
-static void look_up(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c, int steep) {
+/* Values and slopes of the spline. */
+static void look_up(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c) {
     const bool direct = surfaces->pieces == NULL;
     if (direct)
-        weigh(s, surfaces, c, steep);
+        weigh(s, surfaces, c);
     find_places(s, c, 2, c->x);
     for (size_t n = 0; n < c->count; n++) {
         const size_t cell = (size_t)c->cell[2][n];
@@ -153,7 +135,7 @@ size_t mbma_spline_pieces(const mbma_spline *s, const mbma_surfaces *surfaces, d
     for (size_t k = 0; k < surfaces->count; k++) {
         const bool good = covers(s, surfaces->hurst[k], surfaces->log_zeta_1[k]);
         c.owner[0] = k;
-        weigh(s, surfaces, &c, NONE);
+        weigh(s, surfaces, &c);
         for (size_t cell = 0; cell < s->cells[2]; cell++, pieces += 6) {
             double sums[COLUMNS];
             patch(s, &c, 0, cell, sums);
@@ -180,30 +162,12 @@ MBMA_INLINE void continued(const mbma_spline *s, double log_u, double *value, do
 static void log_forces(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c) {
     const double first = s->first[2], last = last_of(s);
     double low = last, high = first;
-    look_up(s, surfaces, c, NONE);
+    look_up(s, surfaces, c);
     for (size_t n = 0; n < c->count; n++)
         low = mbma_min(low, c->x[n]), high = mbma_max(high, c->x[n]);
     if (low < first || high > last)
         for (size_t n = 0; n < c->count; n++)
             continued(s, c->x[n], &c->value[n], &c->slope[n]);
-}
-
-/* Likewise, and derivatives by ln u, H and ln zeta_1. */
-static void log_force_slopes(const mbma_spline *s, const mbma_surfaces *surfaces, chunk *c, double by[][3]) {
-    double rate[CHUNK][3];
-    for (int axis = 1; axis >= NONE; axis--) {
-        look_up(s, surfaces, c, axis);
-        for (size_t n = 0; n < c->count; n++)
-            by[n][1 + axis] = c->value[n], rate[n][1 + axis] = c->slope[n];
-    }
-    for (size_t n = 0; n < c->count; n++) {
-        const double beyond = mbma_expm1(mbma_max(c->x[n] - last_of(s), 0.0));
-        const double below = mbma_min(c->x[n] - s->first[2], 0.0), square = 1.0 + 2.0 * rate[n][0] * below;
-        for (int m = 1; m < 3; m++)
-            by[n][m] += rate[n][m] * (beyond + below / square);
-        continued(s, c->x[n], &c->value[n], &c->slope[n]);
-        by[n][0] = c->slope[n];
-    }
 }
 
 /* ---- the calibrated law ------------------------------------------------------------------------------------------ */
@@ -216,26 +180,6 @@ MBMA_INLINE double self_affine(double hurst, double log_zeta_1, double *gradient
     const double m0 = mbma_expm1(p0), m2 = mbma_expm1(p2), m4 = mbma_expm1(p4);
     *gradient = sqrt(m2 * p0 / (p2 * m0));
     return 1.5 * (m0 * m4 * p2 * p2) / (m2 * m2 * p0 * p4);
-}
-
-/* Derivative of ln((exp(x) - 1)/x), by its series where the difference loses digits. */
-static double growth_slope(double x) {
-    const double square = x * x;
-    return fabs(x) > 0.2 ? -1.0 / mbma_expm1(-x) - 1.0 / x
-                         : 0.5 + x / 12.0 * (1.0 - square / 60.0 * (1.0 - square / 42.0 * (1.0 - square / 40.0)));
-}
-
-/* How the logarithms of both change with H and ln zeta_1. */
-static void self_affine_slopes(double hurst, double log_zeta_1, double alpha_by[2], double gradient_by[2]) {
-    for (int p = 0; p < 2; p++) {
-        double m[3];
-        for (int k = 0; k < 3; k++) {
-            const double power = 2.0 * k - 2.0 * hurst;
-            m[k] = growth_slope(power * log_zeta_1) * (p == 0 ? -2.0 * log_zeta_1 : power);
-        }
-        alpha_by[p] = m[0] + m[2] - 2.0 * m[1];
-        gradient_by[p] = 0.5 * (m[1] - m[0]);
-    }
 }
 
 size_t mbma_self_affine(size_t n, const double *hurst, const double *log_zeta_1, double *alpha, double *gradient) {
@@ -258,16 +202,6 @@ MBMA_INLINE double area_at(double force, double s0, double t0) {
     return mbma_erf(force * sqrt(2.0 * (1.0 + t) / (s0 + t)));
 }
 
-size_t mbma_contact_area(size_t n, const double *force, const double *s0, double area_t0, double *area) {
-    size_t bad = 0;
-    for (size_t k = 0; k < n; k++) {
-        const bool good = force[k] >= 0.0 && s0[k] > 0.0 && area_t0 > 0.0;
-        area[k] = good ? area_at(mbma_min(force[k], 1e100), s0[k], area_t0) : NAN;
-        bad += !good;
-    }
-    return bad;
-}
-
 /* The next entries, and what these are asked; of no such surface, the first one and NaN. */
 static void take(const mbma_surfaces *surfaces, const int64_t *owner, const double *given, size_t n, chunk *c,
                  double asked[CHUNK]) {
@@ -277,6 +211,25 @@ static void take(const mbma_surfaces *surfaces, const int64_t *owner, const doub
         c->owner[k] = known ? (size_t)owner[k] : 0;
         asked[k] = known ? given[k] : NAN;
     }
+}
+
+size_t mbma_spline_values(const mbma_spline *s, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
+                          const double *x, double *restrict value, double *restrict slope) {
+    size_t bad = 0;
+    for (size_t begin = 0; begin < n; begin += CHUNK) {
+        chunk c;
+        take(surfaces, owner + begin, x + begin, n - begin, &c, c.x);
+        look_up(s, surfaces, &c);
+        for (size_t k = 0; k < c.count; k++) {
+            const size_t own = c.owner[k];
+            const bool good = c.x[k] == c.x[k] &&
+                              (surfaces->pieces || covers(s, surfaces->hurst[own], surfaces->log_zeta_1[own]));
+            value[begin + k] = good ? c.value[k] : NAN;
+            slope[begin + k] = good ? c.slope[k] : NAN;
+            bad += !good;
+        }
+    }
+    return bad;
 }
 
 size_t mbma_calibrated_ends(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, double *ends) {
@@ -388,80 +341,5 @@ size_t mbma_calibrated_separation(const mbma_calibrated_table *t, const mbma_sur
         }
         bad += searched;
     }
-    return bad;
-}
-
-size_t mbma_calibrated_slopes(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, const double *u,
-                              double *out) {
-    size_t bad = 0;
-    for (size_t k = 0; k < surfaces->count; k++, out += 10) {
-        const double H = surfaces->hurst[k], L = surfaces->log_zeta_1[k], h_max = surfaces->h_max[k];
-        const bool good = covers(&t->log_force, H, L) && h_max >= LEAST && h_max < INFINITY && u[k] > 0.0;
-        const double held = mbma_held(u[k], LEAST, h_max);
-        double gradient, alpha_by[2], gradient_by[2], by[2][3], F_by[4] = {0.0}, *const A_by = out + 6;
-        chunk c;
-        if (!good) {
-            for (int p = 0; p < 10; p++)
-                out[p] = NAN;
-            bad++;
-            continue;
-        }
-        c.count = 2;
-        c.owner[0] = c.owner[1] = k;
-        c.x[0] = mbma_log(held), c.x[1] = mbma_log(h_max);
-        log_force_slopes(&t->log_force, surfaces, &c, by);
-        const double value = c.value[0], end = c.value[1], endless = exp(value);
-        const double s0 = light_factor(t, self_affine(H, L, &gradient));
-        const double F = -endless * mbma_expm1(end - value), over = F / t->area_t0;
-        const double root = sqrt(2.0 * (1.0 + over) / (s0 + over));
-        const double bell = 2.0 / sqrt(MBMA_PI) * exp(-F * root * F * root);
-        const double by_s0 = -0.5 * bell * F * root / (s0 + over);
-        const double by_F = bell * root * (1.0 + 0.5 * over * (s0 - 1.0) / ((1.0 + over) * (s0 + over)));
-        self_affine_slopes(H, L, alpha_by, gradient_by);
-        if (u[k] < h_max) {
-            F_by[0] = by[0][0] / held * endless;
-            F_by[1] = -by[1][0] / h_max * exp(end);
-            for (int p = 1; p < 3; p++)
-                F_by[1 + p] = endless * (by[0][p] - by[1][p]) + F * by[1][p];
-        }
-        out[0] = gradient * F;
-        out[5] = mbma_erf(F * root);
-        for (int p = 0; p < 4; p++) {
-            out[1 + p] = gradient * (F_by[p] + (p < 2 ? 0.0 : F * gradient_by[p - 2]));
-            A_by[p] = by_F * F_by[p] + (p >= 2 && s0 < 1.0 ? by_s0 * t->area_slope * alpha_by[p - 2] : 0.0);
-        }
-    }
-    return bad;
-}
-
-/* ---- flow through gaps ------------------------------------------------------------------------------------------- */
-
-size_t mbma_flow(const mbma_flow_table *t, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
-                 const double *u, const double *area, double *restrict k) {
-    const mbma_spline *const s = &t->log_factor;
-    size_t bad = 0;
-    for (size_t begin = 0; begin < n; begin += CHUNK) {
-        const double *const A = area + begin;
-        double gap[CHUNK];
-        chunk c;
-        take(surfaces, owner + begin, u + begin, n - begin, &c, gap);
-        for (size_t m = 0; m < c.count; m++) {
-            const size_t own = c.owner[m];
-            if (!surfaces->pieces && !covers(s, surfaces->hurst[own], surfaces->log_zeta_1[own]))
-                gap[m] = NAN;
-            /* contact fractions of Greenwood and Williamson exceed 1 */
-            c.x[m] = mbma_log(mbma_max(A[m], LEAST) / mbma_max(t->threshold - A[m], LEAST));
-        }
-        look_up(s, surfaces, &c, NONE);
-        for (size_t m = 0; m < c.count; m++) {
-            const double beyond = mbma_fma(c.slope[m], mbma_max(c.x[m] - last_of(s), 0.0), c.value[m]);
-            const double log_factor = beyond * mbma_exp(t->obstruction * mbma_min(c.x[m] - s->first[2], 0.0));
-            const double wide = gap[m] * gap[m] * gap[m] * (1.0 - 1.5 / mbma_fma(gap[m], gap[m], 4.0));
-            const double known = gap[m] == gap[m] && A[m] == A[m] ? 0.0 : NAN;
-            k[begin + m] = (A[m] < t->threshold ? wide * mbma_exp(mbma_min(log_factor, 0.0)) : 0.0) + known;
-        }
-    }
-    for (size_t m = 0; m < n; m++)
-        bad += k[m] != k[m];
     return bad;
 }

@@ -1,8 +1,7 @@
 /* Contact whose pressure cannot exceed a hardness, from the elastic contact of the same surface.
  *
  * Lengths are in h_rms, forces in A0 E* g with g the rms gradient, hardnesses as eta = p_m/(E* g). The law is in
- * mbma_tables/laws/hardness.py: force is closed between the elastic force and the bearing curve, area is that of pressures
- * that diffuse between walls at zero and at the hardness.
+ * mbma_tables/laws/hardness.py: force is closed between the elastic force and the bearing curve.
  *
  * SPDX-License-Identifier: BSD-3-Clause. Copyright (c) 2026, mbma_tables contributors.
  */
@@ -12,7 +11,6 @@
 #define SQRT1_2 0.70710678118654752440
 #define SQRT_1_2PI 0.39894228040143267794
 #define LOG_SQRT_2PI 0.91893853320467274178
-#define TWO_OVER_SQRT_PI 1.12837916709551257390
 
 #define STRAIGHT_GAP 8.3 /* mean gap from which the level is the gap itself, */
 #define NEAR_GAP 3.0     /* from which it is nearly, */
@@ -77,27 +75,19 @@ static plane plane_at(double u) {
         const double v = sqrt(sqrt(u)), high = mbma_horner(9.929421, v, -75.30938, 245.7741, -452.8998, 521.9537);
         d = mbma_fma(mbma_horner(high, v, -393.3206, 198.2552, -67.49275, 18.72423), v, -4.71472);
     }
-    const double density = exp(-0.5 * d * d) * SQRT_1_2PI, tail = 0.5 * erfc(fabs(d) * SQRT1_2);
-    if (u >= STRAIGHT_GAP) {
-        const plane straight = {d, density, 1.0 - tail, tail};
-        return straight;
+    for (bool moved = u >= STRAIGHT_GAP;; moved = true) {
+        const double density = exp(-0.5 * d * d) * SQRT_1_2PI, tail = 0.5 * erfc(fabs(d) * SQRT1_2);
+        const double below = d > 0.0 ? 1.0 - tail : tail;
+        const plane found = {d, density, below, d > 0.0 ? tail : 1.0 - tail};
+        if (moved)
+            return found;
+        /* what is missing of u; of positive d the large part goes first */
+        const double missing = d > 0.0 ? (u - d) + (d * tail - density) : (u - density) - d * tail;
+        const double r = missing / below, square = mbma_fma(d, d, -1.0);
+        const double a = density / (2.0 * below), b = -a * d / 3.0, c = a * square / 12.0;
+        const double third = 2.0 * a * a - b, fourth = 5.0 * a * (b - a * a) - c;
+        d += r * mbma_fma(r, mbma_fma(r, mbma_fma(r, fourth, third), -a), 1.0);
     }
-    const double below = d > 0.0 ? 1.0 - tail : tail;
-    /* what is missing of u; of positive d the large part goes first */
-    const double missing = d > 0.0 ? (u - d) + (d * tail - density) : (u - density) - d * tail;
-    const double r = missing / below, square = mbma_fma(d, d, -1.0);
-    const double a = density / (2.0 * below), b = -a * d / 3.0, c = a * square / 12.0;
-    const double third = 2.0 * a * a - b, fourth = 5.0 * a * (b - a * a) - c;
-    const double move = r * mbma_fma(r, mbma_fma(r, mbma_fma(r, fourth, third), -a), 1.0);
-    /* share and density there by their own series */
-    const double turn = mbma_fma(move, d * (2.0 - square) / 24.0, square / 6.0);
-    const double rise = density * move * mbma_fma(move, mbma_fma(move, turn, -0.5 * d), 1.0);
-    const double w = move * mbma_fma(0.5, move, d);
-    const double shrink = mbma_fma(w, mbma_fma(w, mbma_fma(w, 1.0 / 24.0, -1.0 / 6.0), 0.5), -1.0);
-    const double kept = d > 0.0 ? tail - rise : tail + rise;
-    const double rest = 1.0 - kept, shrunk = density * mbma_fma(w, shrink, 1.0);
-    const plane found = {d + move, shrunk, d > 0.0 ? rest : kept, d > 0.0 ? kept : rest};
-    return found;
 }
 
 size_t mbma_gaussian_level(size_t n, const double *u, double *level) {
@@ -123,94 +113,6 @@ size_t mbma_bearing_share(size_t n, const double *u, const double *h_max, double
         }
     }
     return count_missing(n, share);
-}
-
-enum { TERMS = 9 };     /* of the series where images converge slower */
-#define BLOCK ((size_t)64) /* entries at a time, which vectors take */
-#define IMAGES 0.06     /* tau below which they converge faster */
-#define SHARPEST 1e-200 /* least tau */
-#define NOTHING 1e-20   /* a term that is less than rounding */
-#define NARROW 0.05     /* half-width over which a difference of complementary error functions is integrated */
-
-/* erfc(centre - half) - erfc(centre + half), to relative accuracy where half is small. */
-static double difference(double centre, double half) {
-    static const double NODE[4] = {0.1834346424956498, 0.525532409916329, 0.7966664774136267, 0.9602898564975363};
-    static const double WEIGHT[4] = {0.362683783378362, 0.31370664587788727, 0.22238103445337448, 0.10122853629037626};
-    if (half >= NARROW / mbma_max(centre, 1.0))
-        return erfc(centre - half) - erfc(centre + half);
-    double total = 0.0;
-    for (int k = 0; k < 4; k++) {
-        const double low = centre - half * NODE[k], high = centre + half * NODE[k];
-        total += WEIGHT[k] * (exp(-low * low) + exp(-high * high));
-    }
-    return total * half * TWO_OVER_SQRT_PI;
-}
-
-/* Share of a diffusion from x, between walls at 0 and 1, after a variance of 2 tau, that has not ended at 0 or that has
- * ended at 1; `reach` is x over the root of 4 tau, which need not be a normal number. */
-static double ended(double x, double tau, double reach, bool at_one) {
-    if (tau >= IMAGES) {
-        const double first = exp(-MBMA_PI * MBMA_PI * tau), twice = 2.0 * cos(MBMA_PI * x);
-        double before = 0.0, sine = sin(MBMA_PI * x), factor = first, odd = first, total = 0.0, turn = 1.0;
-        for (int n = 1; n <= TERMS && factor >= NOTHING; n++) {
-            turn = at_one ? -turn : turn;
-            total += turn * sine * factor / n;
-            const double following = twice * sine - before;
-            before = sine;
-            sine = following;
-            /* first^(n^2) by the odd powers between the squares */
-            odd *= first * first;
-            factor *= odd;
-        }
-        return x + total * (2.0 / MBMA_PI);
-    }
-    const double width = 2.0 * sqrt(mbma_max(tau, SHARPEST));
-    return at_one ? difference(1.0 / width, reach) + difference(3.0 / width, reach)
-                  : erf(reach) + difference(2.0 / width, reach);
-}
-
-size_t mbma_diffused(size_t n, const double *x, const double *tau, int at_one, double *out) {
-    for (size_t k = 0; k < n; k++) {
-        const bool good = x[k] >= 0.0 && x[k] <= 1.0 && tau[k] >= 0.0;
-        const double reach = 0.5 * x[k] / sqrt(mbma_max(tau[k], SHARPEST));
-        out[k] = good ? ended(x[k], tau[k], reach, at_one != 0) : NAN;
-    }
-    return count_missing(n, out);
-}
-
-size_t mbma_capped_area(size_t n, const double *load, const double *spread, const double *eta, double power,
-                        double scale, int yielded, double *out) {
-    double x[BLOCK], tau[BLOCK], reach[BLOCK];
-    for (size_t first = 0; first < n; first += BLOCK) {
-        const size_t count = n - first < BLOCK ? n - first : BLOCK;
-        for (size_t k = 0; k < count; k++) {
-            const double cap = eta[first + k], own = spread[first + k];
-            x[k] = mbma_min(load[first + k] / cap, 1.0);
-            /* tau = S/(8 eta^2) of the elastic contact and of the hardness alone */
-            const double half = 0.5 * x[k] / own, elastic = half * half, limit = 0.125 / (scale * sqrt(cap));
-            /* the smaller over the larger cannot overflow */
-            const double small = mbma_min(elastic, limit), quotient = small / mbma_max(elastic, limit);
-            const double joint = mbma_log1p(mbma_exp(power * mbma_log(mbma_max(quotient, LEAST_GAP)))) / power;
-            const double near = 0.5 * x[k] / sqrt(limit);
-            tau[k] = small * mbma_exp(-joint);
-            reach[k] = (elastic < limit ? own : near) * mbma_exp(0.5 * joint);
-        }
-        for (size_t k = 0; k < count; k++) {
-            const double force = load[first + k], own = spread[first + k];
-            double share = x[k];
-            if (!(force >= 0.0 && own >= 0.0 && eta[first + k] > 0.0 && force < INFINITY))
-                share = NAN;
-            else if (!(x[k] > 0.0)) /* nothing touches, or nothing yields */
-                share = yielded || force == 0.0 ? 0.0 : erf(own);
-            else if (own == INFINITY) /* what is closed has no variance */
-                share = !yielded || x[k] == 1.0 ? 1.0 : 0.0;
-            else /* rounding may cross the bounds */
-                share = yielded ? mbma_held(ended(share, tau[k], reach[k], true), 0.0, share)
-                                : mbma_held(ended(share, tau[k], reach[k], false), share, 1.0);
-            out[first + k] = share;
-        }
-    }
-    return count_missing(n, out);
 }
 
 #define MOST_ETA 1e100 /* what is larger leaves the same force */

@@ -1,12 +1,11 @@
-/* Contact laws: quantities at a gap, the gap at a force or area, leakage, and the fit of a law's polynomials. */
+/* Contact laws: quantities at a gap, the gap at a force or area, and leakage. */
 #include "elementary.h"
 #include "mbma.h"
 
-enum { CHUNK = 256, STEPS = 200, KEPT = MBMA_LAW_DEGREE + 1, INVERSE_BITS = 2 };
+enum { CHUNK = 256, STEPS = 200, INVERSE_BITS = 2 };
 enum { RECORD = sizeof(mbma_law_record) / sizeof(double), GUESS = sizeof(mbma_inverse_record) / sizeof(double) };
 static const double SURE = 3e-6;     /* steps, in halves of a record, after which another would change nothing */
 static const double EPSILON = 4e-16; /* steps that another would not shorten */
-static const double NARROW = 1e-7;   /* relative width of an interval that is too narrow to tell its errors */
 
 mbma_law mbma_law_open(const void *block, size_t words) {
     const size_t begin = sizeof(mbma_law_head) / sizeof(double);
@@ -238,13 +237,6 @@ size_t mbma_law_fill(size_t n, const double *d, const mbma_law *law, double *for
     return all_bad;
 }
 
-size_t mbma_law_records(size_t n, const double *x, const double *d, const mbma_law *law, int64_t *record) {
-    const mbma_law_head *const head = law->head;
-    for (size_t k = 0; k < n; k++)
-        record[k] = x[k] < head->low ? 0 : number_of(law, mbma_held(x[k], head->low, head->high), d[k]);
-    return 0;
-}
-
 double mbma_law_overclosure(const mbma_law *law, mbma_quantity which, double wanted, double low, double high) {
     const bool ends = law->head->ends != 0;
     const double first = low, last = high;
@@ -366,51 +358,4 @@ double mbma_law_flow(const mbma_law *flow, double h_max, double h_rms, double d,
     if (by_c)
         *by_c = open ? -3.0 * u * u * (1.0 - 1.5 / w + v / (w * w)) : mbma_law_at(flow, MBMA_STIFFNESS, d);
     return open ? u * u * u * (1.0 - 1.5 / w) : mbma_law_at(flow, MBMA_FORCE, d);
-}
-
-size_t mbma_law_flow_fill(size_t n, const double *d, const mbma_law *flow, double h_max, double h_rms, double *out) {
-    size_t bad = mbma_law_fill(n, d, flow, out, NULL, NULL, NULL, NULL);
-    for (size_t k = 0; k < n && bad > 0; k++)
-        if (d[k] > flow->head->highest && d[k] < (double)INFINITY) {
-            out[k] = mbma_law_flow(flow, h_max, h_rms, d[k], NULL);
-            bad--;
-        }
-    return bad;
-}
-
-size_t mbma_law_fit(size_t n, const double *ends, const double *found, const double *series, const double *bounds,
-                    const double *monomials, double *made) {
-    enum { SAMPLES = MBMA_FIT_SAMPLES, ROW = RECORD + 3 };
-    size_t bad = 0;
-    for (size_t k = 0; k < n; k++) {
-        const double low = ends[2 * k], high = ends[2 * k + 1], half = 0.5 * (high - low), reach = high / half;
-        double *const record = made + ROW * k, *const errors = record + RECORD;
-        memset(record, 0, ROW * sizeof *record);
-        record[0] = 0.5 * (low + high), record[1] = 1.0 / half;
-        for (size_t row = 0; row < 2; row++) {
-            const double *const values = found + SAMPLES * (n * row + k);
-            double *const sums = record + 2 + KEPT * row;
-            double terms[SAMPLES] = {0.0}, least = values[0], most = values[0], value = 0.0, slope = 0.0;
-            for (size_t i = 0; i < SAMPLES; i++) {
-                least = mbma_min(values[i], least), most = mbma_max(values[i], most);
-                for (size_t j = 0; j < SAMPLES; j++)
-                    terms[j] = mbma_fma(values[i], series[SAMPLES * i + j], terms[j]);
-            }
-            for (size_t i = 0; i < KEPT; i++)
-                for (size_t j = 0; j <= i; j++)
-                    sums[j] = mbma_fma(terms[i], monomials[KEPT * i + j], sums[j]);
-            for (size_t i = KEPT; i < SAMPLES; i++) {
-                value = mbma_fma(fabs(terms[i]), bounds[i], value);
-                slope = mbma_fma(fabs(terms[i]), bounds[SAMPLES + i], slope);
-            }
-            bad += !(least > 0.0 && most < (double)INFINITY && !isnan(value));
-            if (high - low > NARROW * low) {
-                const double steep = mbma_max(1.0, 0.5 * reach * (most / least - 1.0));
-                errors[0] = mbma_max(errors[0], value / least);
-                errors[1] = mbma_max(errors[1], slope * reach / least);
-                errors[2] = mbma_max(errors[2], slope * reach / least / steep);
-            }
-        }
-    }
-    return bad;
 }

@@ -84,7 +84,7 @@ int mbma_kronrod(int count, double *nodes, double *kronrod, double *gauss);
 
 /* ---- profile.c: one surface at many gaps ------------------------------------------------------------------------ */
 
-enum { MBMA_PANEL_NODES = 16, MBMA_PANEL_CHECKS = 3, MBMA_PANEL_GAPS = 10, MBMA_PANEL_ROWS = 4, MBMA_FAR_TERMS = 8 };
+enum { MBMA_PANEL_NODES = 16, MBMA_PANEL_CHECKS = 3, MBMA_PANEL_GAPS = 10, MBMA_PANEL_ROWS = 4 };
 
 /* Of panels of the approach with `count` nodes at places in [0, 1]: from the low to the high end delta rises like
  * place^power. Matrices take values at the nodes, their rows, to those at other places: checks between the nodes, nodes of
@@ -137,12 +137,7 @@ void mbma_profile_totals(size_t n, const double *compression, size_t panels, con
 size_t mbma_spline4(size_t n, const double *places, const double *coefficients, const int64_t *nodes, int slopes,
                     double *out);
 
-/* Bands of the paper's four numbers, by zeta_u/zeta_d - 1 and (1.25/zeta_d)^(4 - 2 H), finite for every zeta_d. `out` is
- * (4, n): mu = 8/3 D sigma sqrt(2 R_u R_d); sigma zeta_d^H; F_hat zeta_d^(1 + H) per Phi_F, A_hat zeta_d^2 per Phi_A. */
-size_t mbma_four_numbers(size_t n, const double *spread, const double *sphere, const double *hurst,
-                         double density_divisor, int summit_sigma, double *out);
-
-/* ---- newton.c, damped.c: exact islands -------------------------------------------------------------------------- */
+/* ---- newton.c: exact islands ------------------------------------------------------------------------------------ */
 
 /* F_n(x) = integral_x^inf (z - x)^n phi(z) dz, phi the standard normal density, of twice_n = 1, 2, 3, 4 or 5. */
 size_t mbma_height_integrals(int64_t twice_n, size_t n, const double *x, double *out);
@@ -167,12 +162,6 @@ size_t mbma_solve_islands(size_t n, const double *X, const double *mu, double rt
 /* a^2 of the disc rho < a that holds all but `share` of the area of an island. */
 size_t mbma_island_extents(size_t n, const double *X, const double *mu, double share, double *squared);
 
-/* The damped iteration of Greenwood and Tripp on rings of equal width in rho < a: at most `most` steps on from `w`, to
- * which the pressures p, Phi_F and Phi_A belong. MBMA_OK where it has converged; NaN where it has diverged. */
-mbma_status mbma_damped_steps(double X, double mu, double a, double damping, double tolerance, int64_t most,
-                              size_t rings, const double *matrix, double *w, double *p, double phi[2],
-                              int64_t *steps);
-
 /* ---- law.c: contact laws ---------------------------------------------------------------------------------------- */
 
 /* A contact law holds one surface's force and area as polynomials of the gap, of which there are three coordinates:
@@ -189,7 +178,7 @@ mbma_status mbma_damped_steps(double X, double mu, double a, double damping, dou
  *
  * Below x = low the first record holds: F is t^power_force times its polynomial, and A likewise.
  */
-enum { MBMA_LAW_DEGREE = 8, MBMA_INVERSE_DEGREE = 5, MBMA_FIT_SAMPLES = 16 };
+enum { MBMA_LAW_DEGREE = 8, MBMA_INVERSE_DEGREE = 5 };
 
 typedef struct {
     double h_max, scale, low, high;              /* low and high: of x */
@@ -241,9 +230,6 @@ double mbma_law_and_slope(const mbma_law *law, mbma_quantity which, double c, do
 size_t mbma_law_fill(size_t n, const double *d, const mbma_law *law, double *force, double *area, double *stiffness,
                      double *area_slope, double *energy);
 
-/* Numbers of the records that hold at separations, whose x is known better. */
-size_t mbma_law_records(size_t n, const double *x, const double *d, const mbma_law *law, int64_t *record);
-
 /* The overclosure between two at which force (area) has a value, where it rises from one to the other. */
 double mbma_law_overclosure(const mbma_law *law, mbma_quantity which, double wanted, double low, double high);
 
@@ -278,13 +264,6 @@ size_t mbma_law_invert(size_t n, const double *wanted, const mbma_law *law, cons
 /* Flow conductance of the gaps at separations: `flow` is a block like that of a law, with the conductance in place of
  * force; bodies farther apart than it reaches are u^3 (1 - 1.5/(u^2/h_rms^2 + 4)). `by_c` may be NULL, or get dK/dc. */
 double mbma_law_flow(const mbma_law *flow, double h_max, double h_rms, double d, double *by_c);
-size_t mbma_law_flow_fill(size_t n, const double *d, const mbma_law *flow, double h_max, double h_rms, double *out);
-
-/* Records of intervals of x, (n, 2), from force and area at their Chebyshev points, (2, n, 16); behind each record
- * bounds on its errors: of value over F, of slope over F/x, of slope over itself. Matrices as law_pieces.py makes them:
- * series (16, 16), bounds (2, 16), monomials (9, 9). Not OK are intervals with values that are not positive. */
-size_t mbma_law_fit(size_t n, const double *ends, const double *found, const double *series, const double *bounds,
-                    const double *monomials, double *made);
 
 /* ---- calibrated.c: the law calibrated on boundary elements, by its table ------------------------------------------ */
 
@@ -303,12 +282,6 @@ typedef struct {
     double area_s0, area_slope, area_t0; /* A/A0 = erf(F sqrt(2 (1 + t)/(s0 + t))), t = F/t0; s0 at Nayak's alpha 10 */
 } mbma_calibrated_table;
 
-/* Flow through gaps of mean u: k = u^3 (1 - 1.5/(u^2 + 4)) R, and 0 from A/A0 = threshold on. */
-typedef struct {
-    mbma_spline log_factor; /* ln R over ln A/(threshold A0 - A) */
-    double threshold, obstruction;
-} mbma_flow_table;
-
 /* Surfaces that entries of calls share. */
 typedef struct {
     size_t count; /* at least 1 where entries ask for them */
@@ -320,9 +293,6 @@ typedef struct {
 
 /* Nayak's alpha of self-affine surfaces, and their rms gradient over q0 h_rms. */
 size_t mbma_self_affine(size_t n, const double *hurst, const double *log_zeta_1, double *alpha, double *gradient);
-
-/* A/A0 at forces, by s0 of each and t0. */
-size_t mbma_contact_area(size_t n, const double *force, const double *s0, double area_t0, double *area);
 
 /* Six coefficients for each cell of the third axis and each surface. With these, calls give the same bits in less time;
  * they are worth making from about 40 entries a surface on. */
@@ -339,15 +309,10 @@ size_t mbma_calibrated_contact(const mbma_calibrated_table *table, const mbma_su
 size_t mbma_calibrated_separation(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, size_t n,
                                   const int64_t *owner, const double *force, double *u);
 
-/* Force over A0 E* q0 h_rms and area, each with its derivatives by u, h_max, Hurst exponent and ln zeta_1: ten numbers
- * an entry, which is of the surface of its own number; 0 < u. */
-size_t mbma_calibrated_slopes(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, const double *u,
-                              double *out);
-
-/* k at mean gaps over h_rms and at A/A0. With `pieces`, which may be those of any spectrum, nothing else of the
- * surfaces is read. */
-size_t mbma_flow(const mbma_flow_table *table, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
-                 const double *u, const double *area, double *k);
+/* The spline and its slope at places of the third axis, held at its ends. With `pieces`, which may be those of any
+ * spectrum, nothing else of the surfaces is read. */
+size_t mbma_spline_values(const mbma_spline *spline, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
+                          const double *x, double *value, double *slope);
 
 /* ---- spectrum_laws.c: Persson's theory and the calibrated law of a spectrum --------------------------------------- */
 
@@ -366,12 +331,7 @@ typedef struct {
     double tail;                         /* forces fall by exp(-tail (1 - narrowness) u^3) */
 } mbma_law_constants;
 
-enum { MBMA_ORDER = 12, MBMA_INNER_CELLS = 30, MBMA_MOST_PANELS = 120 };
-
-/* Inner integrals of P, P^3 and P^16, which all laws are made from. */
-typedef struct {
-    double p[3][MBMA_INNER_CELLS][MBMA_ORDER];
-} mbma_inner;
+enum { MBMA_ORDER = 12, MBMA_MOST_PANELS = 120 };
 
 /* A prepared law. */
 typedef struct {
@@ -382,8 +342,6 @@ typedef struct {
     double p[MBMA_MOST_PANELS][MBMA_ORDER];
 } mbma_spectrum_law;
 
-void mbma_inner_integrals(mbma_inner *inner);
-
 /* A quadrature rule for power laws between samples: q rising [1/length], a repeated one is a jump; C not negative
  * [length^4], both as in h_rms^2 = 2 pi integral C q dq. How many waves it has, 0 if there is no such spectrum; they are
  * written where `most` are enough, and what they belong to in `facts`: g over q0 h_rms with q0 the first q where C is not
@@ -391,10 +349,10 @@ void mbma_inner_integrals(mbma_inner *inner);
 size_t mbma_spectrum_waves(size_t count, const double *q, const double *C, size_t most, double *x, double *variance,
                            double *below, double facts[4]);
 
-/* Prepares the law of a spectrum on surfaces that end at h_max, which may be infinite; `work` has room for nine numbers
- * a wave. */
-mbma_status mbma_spectrum_law_of(const mbma_inner *inner, const mbma_waves *waves, const mbma_law_constants *constants,
-                                 double h_max, double *work, mbma_spectrum_law *law);
+/* Prepares the law of a spectrum on surfaces that end at h_max, which may be infinite; `work` has room for three
+ * numbers a wave. */
+mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constants *constants, double h_max,
+                                 double *work, mbma_spectrum_law *law);
 
 /* Mean separation and its derivative by ln F of a surface without end, before the tail's factor. */
 size_t mbma_spectrum_law_persson(const mbma_spectrum_law *law, size_t n, const double *force, double *u, double *slope);
@@ -416,15 +374,6 @@ size_t mbma_gaussian_level(size_t n, const double *u, double *level);
 
 /* Share Q of Gaussian heights above the level of mean gap u, and dQ/du; heights end at h_max, which may be infinite. */
 size_t mbma_bearing_share(size_t n, const double *u, const double *h_max, double *share, double *slope);
-
-/* Share of a diffusion from x in [0, 1] between walls at 0 and 1, after a variance of 2 tau, that has not ended at 0,
- * or that has ended at 1. */
-size_t mbma_diffused(size_t n, const double *x, const double *tau, int at_one, double *out);
-
-/* Contact area A/A0 at a load, or its yielded part. `spread` is the inverse error function of the elastic A/A0 at that
- * load; `power` and `scale` are the constants a and b of S^-a = S_el^-a + (eta^1.5/b)^-a. */
-size_t mbma_capped_area(size_t n, const double *load, const double *spread, const double *eta, double power,
-                        double scale, int yielded, double *out);
 
 /* Force F and -dF/du of F^-n = F_el^-n + (eta Q)^-n, n = light + by_eta eta + by_share Q, from the elastic force and
  * -dF_el/du and from the share Q and dQ/du at a mean gap. */

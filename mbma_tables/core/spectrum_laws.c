@@ -7,9 +7,9 @@
 #include "elementary.h"
 #include "mbma.h"
 
-enum { ORDER = MBMA_ORDER, CELLS = MBMA_INNER_CELLS, TERMS = 5, CHUNK = 128, LANES = 8, MOST_STEPS = 100 };
+enum { ORDER = MBMA_ORDER, CELLS = 85, CHUNK = 128, LANES = 8, MOST_STEPS = 100 };
 
-#define LOWEST -3.0    /* ln y of the first cell, below which a series has I, */
+#define LOWEST -14.0   /* ln y of the first cell, up to whose end I is linear in ln y, */
 #define HIGHEST 3.0    /* and of the last, above which I is below 1e-350 */
 #define CELL_RATE 5.0  /* cells in 1 of ln y */
 #define TINY 2e-12     /* of the last two coefficients of a panel, over which it is halved */
@@ -77,116 +77,65 @@ static double powers_of(const fit *f, const double value[ORDER], double p[ORDER]
 /* ---- inner integrals I(y), times exp(2 y^2) ---------------------------------------------------------------------- */
 
 /* From ln y down to another, by steps over which exp(2 y^2) changes by a factor e at most. */
-static void integrate_down(double from, double to, double inner[3]) {
+static double integrated_down(double from, double to, const double weight[3], double inner) {
     const double span = 2.0 * (exp(2.0 * from) - exp(2.0 * to));
     const int steps = 1 + (int)span;
     for (int step = 0; step < steps; step++) {
         const double high = from + (to - from) * step / steps, low = from + (to - from) * (step + 1) / steps;
-        const double end = exp(2.0 * low), fall = mbma_exp(2.0 * (end - exp(2.0 * high)));
-        for (int n = 0; n < 3; n++)
-            inner[n] *= fall;
+        const double end = exp(2.0 * low);
+        inner *= mbma_exp(2.0 * (end - exp(2.0 * high)));
         for (int k = 0; k < RULE_NODES[2]; k++) {
             const double *rule = RULES[2][k / 2], s = 0.5 * (low + high + (high - low) * (k % 2 ? rule[0] : -rule[0]));
             const double y = mbma_exp(s), P = mbma_erf(1.4142135623730951 * y), P2 = P * P, P4 = P2 * P2, P8 = P4 * P4;
-            const double part = 0.5 * (high - low) * rule[1] * ROOT_8_PI * mbma_exp(2.0 * (end - y * y));
-            inner[0] += part;
-            inner[1] += 3.0 * part * P2;
-            inner[2] += 16.0 * part * (P8 * P4) * (P2 * P);
+            const double slope = weight[0] + 3.0 * weight[1] * P2 + 16.0 * weight[2] * (P8 * P4) * (P2 * P);
+            inner += 0.5 * (high - low) * rule[1] * ROOT_8_PI * mbma_exp(2.0 * (end - y * y)) * slope;
         }
     }
+    return inner;
 }
 
-void mbma_inner_integrals(mbma_inner *inner) {
+static void inner_integral(const fit *f, const double weight[3], double p[CELLS][ORDER]) {
     const double z = 2.0 * exp(2.0 * HIGHEST);
-    double series = 1.0, at = HIGHEST, value[3][ORDER];
-    fit f;
-    make_fit(&f);
+    double series = 1.0, at = HIGHEST, value[ORDER];
     /* exp(z) z E1(z) */
     for (int k = 8; k > 0; k--)
         series = 1.0 - k / z * series;
-    double own[3] = {0.5 * ROOT_8_PI / z * series, 1.5 * ROOT_8_PI / z * series, 8.0 * ROOT_8_PI / z * series};
+    double own = 0.5 * ROOT_8_PI / z * series * (weight[0] + 3.0 * weight[1] + 16.0 * weight[2]);
     for (int cell = CELLS - 1; cell >= 0; cell--) {
         for (int j = 0; j < ORDER; j++) {
-            const double next = LOWEST + (cell + 0.5 * (1.0 + f.node[j])) / CELL_RATE;
-            integrate_down(at, next, own);
+            const double next = LOWEST + (cell + 0.5 * (1.0 + f->node[j])) / CELL_RATE;
+            value[j] = own = integrated_down(at, next, weight, own);
             at = next;
-            for (int n = 0; n < 3; n++)
-                value[n][j] = own[n];
         }
-        for (int n = 0; n < 3; n++)
-            (void)powers_of(&f, value[n], inner->p[n][cell]);
+        (void)powers_of(f, value, p[cell]);
     }
-}
-
-/* I(y) below the first cell: light[0] - light[1] ln y + sum over k > 1 of light[k] y^(2 k - 2). */
-static void light_series(const double weight[3], const double p[ORDER], double light[TERMS + 1]) {
-    const double log_y = LOWEST, square = exp(2.0 * log_y);
-    double bell[TERMS], cover[TERMS], cover_2[TERMS], start = 0.0, power = 1.0;
-    for (int k = 0; k < TERMS; k++) {
-        bell[k] = k == 0 ? 1.0 : -2.0 / k * bell[k - 1];
-        cover[k] = bell[k] / (2 * k + 1);
-        cover_2[k] = 0.0;
-        for (int i = 0; i <= k; i++)
-            cover_2[k] += cover[i] * cover[k - i];
-        /* of -dI/d ln y = dW/dP dP/dy, P being small */
-        double slope = weight[0] * bell[k];
-        for (int i = 0; i < k; i++)
-            slope += 3.0 * weight[1] * ROOT_8_PI * ROOT_8_PI * cover_2[i] * bell[k - 1 - i];
-        light[k + 1] = k == 0 ? ROOT_8_PI * slope : -ROOT_8_PI * slope / (2 * k);
-        start += k == 0 ? -light[1] * log_y : light[k + 1] * power;
-        power *= square;
-    }
-    light[0] = -start;
-    for (int m = ORDER - 1, sign = -1; m >= 0; m--, sign = -sign)
-        light[0] += sign * p[m] * exp(-2.0 * square);
+    p[0][1] = -0.5 * ROOT_8_PI / CELL_RATE * weight[0];
+    for (int m = 2; m < ORDER; m++)
+        p[0][m] = 0.0;
 }
 
 /* ---- sums over waves --------------------------------------------------------------------------------------------- */
 
 typedef struct {
-    double p[CELLS][ORDER], light[TERMS + 1]; /* I of a law's own W */
+    double p[CELLS][ORDER]; /* I of a law's own W */
     size_t count;
-    /* of waves, in terms of the last one's g(x): ln g(x) and 1/g(x)^2 - 1; then sums from each wave to the last, of
-     * shares and of shares times -ln g(x), 1/g(x)^2, 1/g(x)^4 and so on */
-    double *log_g, *fall, *share, *sums[TERMS + 1];
+    double *log_g, *fall, *share; /* of waves: ln g(x) and 1/g(x)^2 - 1, in terms of the last one's g(x) */
 } wave_sum;
-
-/* How many numbers, of so many that rise, do not exceed a limit; of such that fall, with `sign` -1, are at least it. */
-static size_t count_up_to(size_t n, const double *x, double sign, double limit) {
-    size_t low = 0, high = n;
-    while (low < high) {
-        const size_t middle = low + (high - low) / 2;
-        if (sign * x[middle] <= sign * limit)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
-}
 
 /* ln u + 2 F^2. */
 static double sum_at(const wave_sum *w, double log_force) {
-    const double square = 2.0 * exp(2.0 * log_force), far = 0.5 * log(NOTHING / square + 1.0);
-    const size_t light = count_up_to(w->count, w->log_g, 1.0, log_force - LOWEST);
-    double lanes[LANES] = {0.0}, part[CHUNK], place[CHUNK], total = 0.0, power = exp(square);
+    const double square = 2.0 * exp(2.0 * log_force);
+    double lanes[LANES] = {0.0}, part[CHUNK], place[CHUNK];
     int32_t cell[CHUNK];
-    if (light < w->count) {
-        total = power * (w->light[0] * w->sums[0][light] -
-                         w->light[1] * (log_force * w->sums[0][light] + w->sums[1][light]));
-        for (int k = 2; k <= TERMS; k++) {
-            power *= 0.5 * square;
-            total += power * w->light[k] * w->sums[k][light];
-        }
-    }
-    const size_t heavy = count_up_to(light, w->log_g, 1.0, log_force - fmin(HIGHEST, log_force + far));
-    for (size_t first = heavy; first < light; first += CHUNK) {
-        const size_t count = light - first < (size_t)CHUNK ? light - first : (size_t)CHUNK;
+    size_t heaviest = 0; /* wave that is not negligible */
+    while (heaviest + 1 < w->count && square * w->fall[heaviest] > NOTHING)
+        heaviest++;
+    for (size_t first = heaviest; first < w->count; first += CHUNK) {
+        const size_t count = w->count - first < (size_t)CHUNK ? w->count - first : (size_t)CHUNK;
         const double *log_g = w->log_g + first, *fall = w->fall + first, *share = w->share + first;
         for (size_t k = 0; k < count; k++) {
-            /* inside but for rounding */
-            const double at = (log_force - log_g[k] - LOWEST) * CELL_RATE;
-            const int32_t whole = (int32_t)at, last = CELLS - 1;
-            cell[k] = whole < last ? whole : last;
+            const double at = mbma_min((log_force - log_g[k] - LOWEST) * CELL_RATE, (double)CELLS);
+            cell[k] = (int32_t)mbma_held(at, 0.0, (double)(CELLS - 1));
             place[k] = 2.0 * (at - cell[k]) - 1.0;
         }
         for (size_t k = 0; k < count; k++)
@@ -201,8 +150,7 @@ static double sum_at(const wave_sum *w, double log_force) {
         for (size_t k = 0; k < count; k++)
             lanes[k % LANES] += part[k];
     }
-    total += ((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])) + ((lanes[4] + lanes[5]) + (lanes[6] + lanes[7]));
-    return log(total);
+    return log(((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])) + ((lanes[4] + lanes[5]) + (lanes[6] + lanes[7])));
 }
 
 /* Panels from `start` to `end`, halved until polynomials hold. */
@@ -237,14 +185,16 @@ static double log_u_in(const mbma_spectrum_law *law, size_t panel, double log_fo
 /* ln F at a mean separation before the tail's factor, by Newton's method in a bracket, and d ln u/d ln F. */
 static double log_force_of(const mbma_spectrum_law *law, double u, double *slope) {
     const double log_u = log(u), *edge = law->edge, *ends = law->log_u;
-    const size_t panel = count_up_to(law->panels - 1, ends + 1, -1.0, log_u);
+    size_t panel = 0;
     if (u >= law->lightest[0]) {
         *slope = law->lightest[1] / u;
         return edge[0] + (u - law->lightest[0]) / law->lightest[1];
     }
-    double low = edge[panel], high = edge[panel + 1], x = low, step = NAN;
     if (!(log_u >= ends[law->panels]))
         return NAN;
+    while (panel + 1 < law->panels && ends[panel + 1] >= log_u)
+        panel++;
+    double low = edge[panel], high = edge[panel + 1], x = low, step = NAN;
     x += (high - low) * (ends[panel] - log_u) / (ends[panel] - ends[panel + 1]);
     for (int k = 0; k < MOST_STEPS; k++) {
         const double miss = log_u_in(law, panel, x, slope) - log_u;
@@ -266,7 +216,9 @@ static double separation_of(const mbma_spectrum_law *law, double log_force, doub
     *slope = 0.0;
     if (log_force >= law->edge[law->panels])
         return 0.0;
-    const size_t panel = count_up_to(law->panels - 1, law->edge + 1, 1.0, log_force);
+    size_t panel = 0;
+    while (panel + 1 < law->panels && law->edge[panel + 1] <= log_force)
+        panel++;
     const double u = exp(log_u_in(law, panel, log_force, slope));
     *slope *= u;
     return u;
@@ -275,16 +227,14 @@ static double separation_of(const mbma_spectrum_law *law, double log_force, doub
 /* What the tail takes from ln F. */
 static double tail_at(const mbma_spectrum_law *law, double u) { return law->tail * u * u * u; }
 
-mbma_status mbma_spectrum_law_of(const mbma_inner *inner, const mbma_waves *waves, const mbma_law_constants *c,
-                                 double h_max, double *work, mbma_spectrum_law *law) {
+mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constants *c, double h_max, double *work,
+                                 mbma_spectrum_law *law) {
     const size_t n = waves->count;
     double mean = 0.0, inverse = 0.0, slope;
-    wave_sum w = {{{0.0}}, {0.0}, n, work, work + n, work + 2 * n, {NULL}};
+    wave_sum w = {{{0.0}}, n, work, work + n, work + 2 * n};
     bool good = n > 0 && h_max > 0.0 && waves->gradient > 0.0 && waves->gradient < INFINITY && waves->alpha > 0.0;
     fit f;
     memset(law, 0, sizeof *law);
-    for (size_t k = 0; k <= TERMS; k++)
-        w.sums[k] = work + (3 + k) * n;
     for (size_t k = 0; k < n && good; k++) {
         const double below = waves->below[k], last = waves->below[n - 1];
         good = below > 0.0 && below <= last && last < 1.0 + 1e-9 && waves->x[k] > 0.0 && waves->x[k] < INFINITY &&
@@ -299,25 +249,14 @@ mbma_status mbma_spectrum_law_of(const mbma_inner *inner, const mbma_waves *wave
         return MBMA_INVALID;
     const double narrowness = 1.0 / (mean * inverse), a = c->weight + c->weight_slope * (narrowness - NARROWNESS);
     const double weight[3] = {a, c->cubic, 1.0 - a - c->cubic};
-    for (int cell = 0; cell < CELLS; cell++)
-        for (int m = 0; m < ORDER; m++)
-            for (int k = 0; k < 3; k++)
-                w.p[cell][m] += weight[k] * inner->p[k][cell][m];
-    light_series(weight, w.p[0], w.light);
-    for (size_t k = n; k-- > 0;) {
-        double part = w.share[k];
-        for (int m = 0; m <= TERMS; m++) {
-            part *= m > 1 ? 1.0 + w.fall[k] : 1.0;
-            w.sums[m][k] = part * (m == 1 ? -w.log_g[k] : 1.0) + (k + 1 < n ? w.sums[m][k + 1] : 0.0);
-        }
-    }
+    make_fit(&f);
+    inner_integral(&f, weight, w.p);
     law->s0 = mbma_min(c->area_s0 + c->area_slope * log(waves->alpha / 10.0), 1.0);
     law->t0 = c->area_t0;
     law->tail = c->tail * (1.0 - narrowness);
     law->h_max = h_max;
     law->shift = 0.5 * log(waves->below[n - 1]);
     law->edge[0] = EDGES[0];
-    make_fit(&f);
     for (size_t k = 0; k + 1 < sizeof EDGES / sizeof *EDGES; k++)
         good = good && fill_panels(&w, &f, EDGES[k], EDGES[k + 1], law);
     for (size_t k = 0; k < law->panels; k++)

@@ -1,6 +1,6 @@
-/* Islands by the paper's four numbers: the spline of the four-number table, and the bands that its axes stand for. */
+/* Islands by the paper's four numbers: the spline of the four-number table. */
 #include "eight.h"
-#include "island.h"
+#include "mbma.h"
 
 #define BEYOND 1e-9 /* of a cell: how far rounding may take a place off the ends of its axis */
 
@@ -82,33 +82,4 @@ size_t mbma_spline4(size_t n, const double *places, const double *coefficients, 
                     double *out) {
     return slopes ? spline4(n, places, coefficients, nodes, true, out)
                   : spline4(n, places, coefficients, nodes, false, out);
-}
-
-/* (r^power - 1)/(power ln r) with x = power ln r: 1 where x is 0 */
-MBMA_INLINE double growth(double x) { return x == 0.0 ? 1.0 : mbma_expm1(x) / x; }
-
-size_t mbma_four_numbers(size_t n, const double *spread, const double *sphere, const double *hurst,
-                         double density_divisor, int summit_sigma, double *out) {
-    const double broadening = summit_sigma ? BROADENING / 1.5 : 0.0;
-    size_t bad = 0;
-    for (size_t k = 0; k < n; k++) {
-        const double H = hurst[k], power = 4.0 - 2.0 * H, width = mbma_log1p(spread[k]);
-        const double inverse = sphere[k] * mbma_exp(-0.22314355131420976 * power); /* log(1.25): zeta_d^(-p) */
-        const double g0 = growth(-2.0 * H * width), g2 = growth((2.0 - 2.0 * H) * width), g4 = growth(power * width);
-        const double D = 0.75 * (g4 / g2) / density_divisor;
-        /* alpha = 1.5 g0 g4/g2^2, Eq. (3), grouped so that nothing overflows */
-        const double share = 1.0 - broadening * (g2 / g0) * (g2 / g4);
-        const double sigma = sqrt(share * (2.0 * H * width * g0));
-        const double scale = 0.75 * H / power, top = mbma_expm1(power * width) + 1.0;
-        const double R_d = RADIUS / sqrt(scale * (1.0 - inverse)), R_u = RADIUS / sqrt(scale * (top - inverse));
-        const double mu = 8.0 / 3.0 * D * sigma * sqrt(2.0 * R_u * R_d);
-        const double found[4] = {mu, sigma, sigma * sqrt(2.0 * R_d * sigma),
-                                 2.0 * MBMA_PI * D * R_u * R_d * sigma * sigma};
-        /* beyond, exponentials are held and nothing is right */
-        const bool good = spread[k] > 0.0 && sphere[k] >= 0.0 && fabs(power * width) < 700.0 && mu > 0.0;
-        for (size_t m = 0; m < 4; m++)
-            out[m * n + k] = good ? found[m] : NAN;
-        bad += !good;
-    }
-    return bad;
 }

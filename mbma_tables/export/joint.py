@@ -19,8 +19,7 @@ from mbma_tables.law.make import contact_law
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories import get_theory
-from mbma_tables.theories.mbma import Mbma
+from mbma_tables.theories.mbma import Mbma, chosen_theory
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 LAW_RTOL = 1e-8
@@ -176,7 +175,7 @@ def frozen_joint(
     length_unit: str | None = None,
     stress_unit: str | None = None,
     variant: str | Variant = "reported",
-    theory: str | Theory | UserTheory = "mbma",
+    theory: str | Theory | UserTheory | None = None,
     hardness: float | str = np.inf,
 ) -> Joint:
     """The law of one surface in known units; a batch of surfaces and missing units are refused."""
@@ -187,9 +186,9 @@ def frozen_joint(
         raise InputError("a contact law is of one surface, not of a batch")
     modulus = number_in("E_star", plain["E_star"], 1e-300, 1e300)
     cap = Units(length, stress).number("hardness", hardness)
-    law = contact_law(surface, LAW_RTOL, variant=variant, E_star=modulus, theory=theory, hardness=cap)
+    own = chosen_theory(surface, theory, variant=variant)
+    law = contact_law(surface, own, rtol=LAW_RTOL, E_star=modulus, hardness=cap)
     law = dataclasses.replace(law, units=Units(length, stress))
-    own = Mbma(variant=variant) if theory == Mbma.name else get_theory(theory, surface)
     return Joint(surface, law, own, modulus, float(cap), length, stress)
 
 

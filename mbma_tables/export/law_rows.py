@@ -48,7 +48,7 @@ class LawTable(Displayed):
     y_unit: str
     largest_error: float  # relative, of linear interpolation between rows as written, where y is above `floor`
     comments: tuple[str, ...]  # what a reader of the file must know
-    theory: str = "mbma"  # whose law it is
+    theory: str  # whose law it is
     floor: float = 0.0  # value below which errors are relative to it
     behaviour: LawTable | None = None  # the pressure of the same joint, with its conductance
 
@@ -108,7 +108,7 @@ def describe_law(
     conductivity_unit: str | None = None,
     variant: str | Variant = "reported",
     evenly: bool = False,
-    theory: str | Theory | UserTheory = "mbma",
+    theory: str | Theory | UserTheory | None = None,
     hardness: float | str = np.inf,
 ) -> LawTable:
     """A contact law as rows for a code that interpolates linearly.

@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.core import core
+from mbma_tables.surfaces.spectrum import BROADENING, RADIUS
 from mbma_tables.surfaces.variants import Variant
 
+MOST_WIDTH = 700.0  # of (4 - 2H) ln(zeta_u/zeta_d), whose exponential is a number
 SPHERE_FLOOR = 1.25  # zeta_d at the end of the axis `sphere`, below the paper's floor of 1.5
 
 
@@ -22,12 +23,25 @@ def from_axes(sphere: Any, hurst: Any) -> Any:
 def band_fields(spread: FloatArray, sphere: FloatArray, hurst: FloatArray, variant: Variant) -> FloatArray:
     """(mu, sigma zeta_d^H, F_hat zeta_d^(1+H) per Phi_F, A_hat zeta_d^2 per Phi_A), stacked first.
 
-    Arrays of one shape. All are finite for every zeta_d, in which powers of it cancel.
+    Arrays of one shape. All are finite for every zeta_d, in which powers of it cancel; NaN of what is no band.
     """
-    out = np.empty((4, *spread.shape))
-    given = (np.ascontiguousarray(x, dtype=float) for x in (spread, sphere, hurst))
-    core.four_numbers(*given, variant.density_divisor, variant.summit_sigma, out)
-    return out
+    from scipy.special import exprel
+
+    with np.errstate(all="ignore"):
+        power, width = 4 - 2 * hurst, np.log1p(spread)
+        # zeta_d^(-p), and integrals of r^(order - 2H - 1) over the band and its width
+        inverse, growth = sphere * SPHERE_FLOOR**-power, [exprel((k - 2 * hurst) * width) for k in (0, 2, 4)]
+        D = 0.75 * (growth[2] / growth[1]) / variant.density_divisor
+        # alpha = 1.5 g0 g4/g2^2, Eq. (3), grouped so that nothing overflows
+        narrowness = growth[1] / growth[0] * (growth[1] / growth[2])
+        share = 1 - (BROADENING / 1.5 * narrowness if variant.summit_sigma else 0.0)
+        sigma = np.sqrt(share * (2 * hurst * width * growth[0]))
+        scale, top = 0.75 * hurst / power, np.exp(power * width)
+        R_d, R_u = (RADIUS / np.sqrt(scale * (end - inverse)) for end in (1.0, top))
+        mu = 8 / 3 * D * sigma * np.sqrt(2 * R_u * R_d)
+        found = np.array([mu, sigma, sigma * np.sqrt(2 * R_d * sigma), 2 * np.pi * D * R_u * R_d * sigma**2])
+        good = (spread > 0) & (sphere >= 0) & (np.abs(power * width) < MOST_WIDTH) & (mu > 0)
+    return np.where(good, found, np.nan)
 
 
 class Coordinates(NamedTuple):

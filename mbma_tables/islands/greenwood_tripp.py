@@ -33,7 +33,7 @@ MAX_NODES = {"newton": 1024, "classical": 2048}  # a few seconds for an island
 CLASSICAL_RINGS = 200
 BLOCK = 1 << 22  # islands times nodes^2 in one call of the core, well under a second, which no signal interrupts
 COARSE_NODES = 12  # of the first guess
-PRODUCTS = 1 << 26  # of a ring and a ring between two looks for Ctrl-C, at most about 0.1 s
+MAX_DEFORMATION = 1e12  # of the damped iteration: one this large is divergence
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -183,6 +183,7 @@ def ring_matrix(rings: int) -> FloatArray:
     return matrix
 
 
+@np.errstate(all="ignore")
 def iterate(
     X: float,
     mu: float,
@@ -195,16 +196,26 @@ def iterate(
     p: FloatArray,
 ) -> tuple[int, bool, float, float]:
     """Iterate from w = 0; returns iterations, whether it converged, Phi_F and Phi_A, NaN where it diverged."""
+    width = a / w.size
+    rho, loads = width * (np.arange(w.size) + 0.5), np.empty(w.size)
+    gap, iterations, converged = rho**2 - X, 0, False
     w[:] = 0.0
-    phi, used = np.zeros(2), np.zeros(1, dtype=np.int64)
-    iterations, converged = 0, False
-    # the core does not look for Ctrl-C: it gets a fraction of a second of work at a time
-    block = max(1, PRODUCTS // w.size**2)
-    while iterations < max_iterations and not converged and not np.isnan(phi[0]):
-        most = min(block, max_iterations - iterations)
-        converged = core.damped_steps(X, mu, a, damping, tolerance, most, matrix, w, p, phi, used) == 0
-        iterations += int(used[0])
-    return iterations, converged, float(phi[0]), float(phi[1])
+    while True:
+        core.height_integrals(3, gap + w, loads)
+        p[:] = mu / 2 * loads  # (36)
+        if converged or iterations == max_iterations:
+            break
+        change = damping * (a * (matrix @ p) - w)
+        w += change
+        iterations, scale = iterations + 1, np.abs(w).max()
+        if not scale < MAX_DEFORMATION:
+            return iterations, False, math.nan, math.nan
+        converged = bool(np.abs(change).max() <= tolerance * damping * scale)
+    core.height_integrals(2, gap + w, loads)
+    force, area = (float(2 * np.pi * width * (rho @ part)) for part in (p, loads))
+    if not math.isfinite(force + area):
+        return iterations, False, math.nan, math.nan
+    return iterations, converged, force, area
 
 
 def radius(X: float, mu: float, rtol: float) -> float:

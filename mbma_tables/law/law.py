@@ -295,9 +295,12 @@ class ContactLaw(Law, Displayed):
 
     def _records_at(self, d: FloatArray, x: FloatArray) -> Any:
         """Numbers of the records that hold gaps."""
-        found = np.empty(np.shape(x), dtype=np.int64)
-        core.law_records(np.ascontiguousarray(x), np.ascontiguousarray(d), self.block, found)
-        return found
+        head, words = self.block, self.block.view(np.int64)
+        bits = np.clip(x, head[at.LOW], head[at.HIGH]).view(np.int64)
+        row = self.rows[(bits >> 52) - words[at.EXPONENT] + np.where(d < 0, words[at.MINUS_ROWS], 0)]
+        kinks = sum(d * head[k] > head[k + 1] for k in (at.KINK_SIGN, at.KINK_SIGN_2))
+        number = (bits >> row[..., 0]) + row[..., 1] + kinks
+        return np.where(x < head[at.LOW], 0, np.clip(number, 0, len(self.records) - 1))
 
     def _facts(self) -> dict[str, str]:
         unit, modulus = self.units.length or "1", unit_of("pressure", self.units)

@@ -60,7 +60,11 @@ class LeakageLaw:
         )
         flat = np.ascontiguousarray(d).reshape(-1)
         found = np.empty(flat.size)
-        core.law_flow_fill(flat, self.block, self.law.h_max, self.h_rms, found)
+        core.law_fill(flat, self.block, found, *[None] * 4)
+        # bodies farther apart
+        apart = (flat > self.block[at.HIGHEST]) & (flat < np.inf)
+        gap = (self.law.h_max + flat[apart]) / 2
+        found[apart] = gap**3 * (1 - 1.5 / ((gap / self.h_rms) ** 2 + 4))
         return found.reshape(np.shape(d))[()]
 
 

@@ -24,8 +24,7 @@ from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories import get_theory
-from mbma_tables.theories.mbma import Mbma, refuse_options_of_mbma
+from mbma_tables.theories.mbma import Mbma, chosen_theory
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.totals.island_sum import Pairs, totals_of
 from mbma_tables.totals.profile import profile, source_of
@@ -46,12 +45,12 @@ SHARE = 0.1  # of the median of a theory's own errors: the polynomials need not 
 @hinted
 def contact_law(
     surface: AnySurface,
+    theory: str | Theory | UserTheory | None = None,
+    *,
     rtol: float = 1e-8,
     island_model: str | AnyModel = "universal",
     variant: str | Variant = "reported",
     E_star: float | str = 1.0,
-    *,
-    theory: str | Theory | UserTheory = "mbma",
     hardness: float | str = math.inf,
 ) -> ContactLaw:
     """Force and area of one surface as functions of its gap: the way to answer many gaps, and to invert.
@@ -60,13 +59,13 @@ def contact_law(
     ----------
     surface : Surface
         One surface, not a batch.
+    theory : str or theory, optional
+        As for `contact`.
     rtol : float
         Relative error asked of the polynomials against the theory (MBMA's island model), in [1e-9, 0.1]; no more than a
         tenth of its own error, the median over gaps, is asked of another theory's.
     island model, variant, E_star
         As for `contact`; `island_model` may be an island model of one's own.
-    theory : str or theory
-        By name, one of `mbma_tables.theories.THEORIES`, or an object, as for `contact`.
     hardness : float
         As for `contact`: the law of loading. Its `energy` is then the work of loading, not what unloading gives back.
 
@@ -93,11 +92,7 @@ def contact_law(
     """
     given, units = modulus_and_units(E_star, surface)
     modulus = number_in("E_star", given, sys.float_info.min, sys.float_info.max)
-    if isinstance(theory, str) and theory == Mbma.name:
-        chosen: Theory = Mbma(island_model, variant)
-    else:
-        refuse_options_of_mbma(island_model=island_model != "universal", variant=variant != "reported")
-        chosen = get_theory(theory, surface)
+    chosen = chosen_theory(surface, theory, island_model=island_model, variant=variant)
     if hardness is not math.inf:
         cap = checked_hardness(units.number("hardness", hardness))
         if cap.ndim:

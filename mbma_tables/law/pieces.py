@@ -18,13 +18,12 @@ from numpy.polynomial import chebyshev
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
-from mbma_tables.core import core
 from mbma_tables.law import block as at
 
 SAMPLES = 16
 MAX_RECORDS = 4000
 TAIL_SHARE = 4.0  # of the last two coefficients, for all that follow: they fall by 2 at least
-NEAR = 1e-7  # relative width of a bucket below which it takes its neighbour's polynomials
+NEAR = 1e-7  # relative width of a bucket that tells no errors, and takes its neighbour's polynomials
 FIRST_BUCKETS = {-1: 16, -2: 8, -3: 4}  # of the octaves below x = 1, where Gaussians of heights bend; 2 below
 SLOPES = 100.0  # times the tolerance of values: that of slopes, over F/x where they are smaller
 COARSE, COARSE_SLOPES = 1e-7, 10.0  # tolerance above which octaves begin with one bucket; and that of slopes there
@@ -82,11 +81,19 @@ def _rule() -> Rule:
 
 def _fit_intervals(values: Values, ends: FloatArray) -> FloatArray:
     """Records of intervals (n, 2) of x and bounds on their errors, (n, RECORD + 3)."""
-    rule, made = _rule(), np.empty((len(ends), at.RECORD + 3))
-    found = np.ascontiguousarray(values((ends @ rule.places).ravel()))
-    if core.law_fit(ends, found, rule.series, rule.bounds, rule.monomials, made):
-        positive(found)
-    return made
+    rule = _rule()
+    found = positive(values((ends @ rule.places).ravel())).reshape(2, -1, SAMPLES)
+    # sums that no number of threads changes, as those of matrix products may be
+    terms = np.einsum("rki,ij->rkj", found, rule.series)
+    left = np.einsum("rki,ji->rkj", np.abs(terms), rule.bounds) / found.min(axis=-1, keepdims=True)
+    low, high = ends.T
+    half = (high - low) / 2
+    reach = high / half
+    steep = np.maximum(1.0, reach / 2 * (found.max(axis=-1) / found.min(axis=-1) - 1))
+    errors = np.stack([left[..., 0], left[..., 1] * reach, left[..., 1] * reach / steep]).max(axis=1)
+    errors[:, high - low <= NEAR * low] = 0.0
+    series = np.einsum("rki,ij->krj", terms[..., :KEPT], rule.monomials).reshape(len(ends), -1)
+    return np.column_stack([(low + high) / 2, 1 / half, series, np.zeros(len(ends)), errors.T])
 
 
 def side_pieces(side: Side, rtol: float) -> Pieces:

@@ -33,6 +33,7 @@ NARROWNESS = 0.65  # that W's slope refers to
 LAW_ERROR = 1e-7  # of a measured spectrum's law
 TESTED_AREA = (1e-3, 0.97)  # A/A0 that was simulated
 KEPT = 256  # spectra and laws of surfaces that are kept while these are asked again
+MOST_FORCE = 1e100  # for which contact is full
 UNRESOLVED = 4  # the core's status where a quadrature did not reach its tolerance
 
 
@@ -65,7 +66,11 @@ def area_persson(force: ArrayLike) -> FloatArray:
 
 
 def _area(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
-    return answered(core.contact_area, (force, s0), 1, t0)[0]
+    from scipy.special import erf
+
+    F = np.minimum(force, MOST_FORCE)
+    F = np.where(F >= 0, F, np.nan)
+    return np.asarray(erf(F * np.sqrt(2 * (1 + F / t0) / (np.asarray(s0) + F / t0))))
 
 
 def force_of(e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
@@ -86,14 +91,6 @@ def force_of(e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS) -
 def light_factor(alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """s0, the value of S at light loads."""
     return np.minimum(constants.area_s0 + constants.area_slope * np.log(np.asarray(alpha) / 10), 1.0)
-
-
-@functools.cache
-def _inner_integrals() -> FloatArray:
-    """What the core makes all laws from."""
-    inner = np.empty(core.words_of_inner())
-    core.inner_integrals(inner)
-    return inner
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -168,8 +165,8 @@ class Law:
         highest = np.inf if self.h_max is None else self.h_max
         constants = c.area_s0, c.area_slope, c.area_t0, c.weight, c.weight_slope, c.cubic, c.tail
         law = np.empty(core.words_of_spectrum_law())
-        numbers, work = np.array([s.gradient, s.alpha, *constants, highest]), np.empty(9 * s.x.size)
-        status = core.spectrum_law_of(_inner_integrals(), s.x, s.variance, s.below, numbers, work, law)
+        numbers, work = np.array([s.gradient, s.alpha, *constants, highest]), np.empty(3 * s.x.size)
+        status = core.spectrum_law_of(s.x, s.variance, s.below, numbers, work, law)
         if status == UNRESOLVED:
             raise ConvergenceError("the law of this spectrum has no curve that polynomials follow")
         if status:

@@ -19,17 +19,21 @@ A = A_yield = x and F = eta Q(u), as it falls.
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
-from scipy.special import erfinv, ndtr, ndtri
+from scipy.special import erf, erfc, erfinv, ndtr, ndtri
 
 from mbma_tables.common.arguments import FloatArray, answered
 from mbma_tables.common.errors import InputError
 from mbma_tables.core import core
 from mbma_tables.laws.bearing_curve import FRACTIONS
 
+IMAGES, TERMS = 0.06, 10  # tau below which images converge faster than a series; its terms, and one
+SHARPEST, NARROW = 1e-200, 3e-3  # least tau; half-width over which a difference goes by powers
+SEEN = 6.0  # from which erfc is less than a rounding of 1
 MOST_SHARE = 0.9  # of a map's heights up to which a node stands for its own
 DEPTH = 30.0  # of a map's valleys below the last node, in levels
 MIN_SPACING = 0.02  # relative, of mean gaps between nodes of a map's bearing curve
@@ -58,8 +62,7 @@ CONSTANTS = Constants()
 def area(force: ArrayLike, elastic_area: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """A/A0 at F/(A0 E* g), at most eta, from the elastic A/A0 at that force; above 1 only where that is."""
     given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
-    share = answered(core.capped_area, given, 1, c.area_power, c.area_scale, 0)[0]
-    return share * np.maximum(elastic_area, 1.0)
+    return answered(_area, given, 1, c.area_power, c.area_scale, False)[0] * np.maximum(elastic_area, 1.0)
 
 
 def yielded_area(
@@ -67,15 +70,65 @@ def yielded_area(
 ) -> FloatArray:
     """Yielded part of A/A0, likewise."""
     given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
-    return answered(core.capped_area, given, 1, c.yield_power, c.yield_scale, 1)[0]
+    return answered(_area, given, 1, c.yield_power, c.yield_scale, True)[0]
 
 
-def diffused(x: ArrayLike, tau: ArrayLike, sign: float) -> FloatArray:
+@np.errstate(all="ignore")
+def _area(
+    force: FloatArray, e: FloatArray, eta: FloatArray, power: float, scale: float, yielded: bool, out: Any
+) -> None:
+    """A/A0, or its yielded part, at F/(A0 E* g) by e, erf(e) being the elastic A/A0 there."""
+    x = np.minimum(force / eta, 1.0)
+    # tau of the elastic contact and of the hardness alone
+    half, limit = 0.5 * x / e, 0.125 / (scale * np.sqrt(eta))
+    elastic = half * half
+    small = np.minimum(elastic, limit)
+    joint = np.exp(np.log1p(np.exp(power * np.log(small / np.maximum(elastic, limit)))) / (2 * power))
+    reach = np.where(elastic < limit, e, 0.5 * x / np.sqrt(limit)) * joint
+    between = diffused(x, small / joint**2, -1.0 if yielded else 1.0, reach)
+    # rounding may cross the bounds; what is closed has no variance; and nothing touches, or nothing yields
+    if yielded:
+        share = np.where(e < np.inf, np.maximum(np.minimum(between, x), 0.0), x == 1)
+    else:
+        share = np.where(e < np.inf, np.minimum(np.maximum(between, x), 1.0), 1.0)
+    share = np.where(x > 0, share, 0.0 if yielded else np.where(force > 0, erf(e), 0.0))
+    out[:] = np.where((force >= 0) & (force < np.inf) & (e >= 0) & (eta > 0), share, np.nan)
+
+
+def diffused(x: FloatArray, tau: FloatArray, sign: float, reach: FloatArray | None = None) -> FloatArray:
     """Share of a diffusion from x, between walls at 0 and 1, after a variance of 2 tau.
 
-    What has not ended at 0, or with a negative `sign` what has ended at 1.
+    What has not ended at 0, or with a negative `sign` what has ended at 1; `reach` is x/sqrt(4 tau).
     """
-    return answered(core.diffused, (x, tau), 1, int(sign < 0))[0]
+    over = 0.5 / np.sqrt(np.maximum(tau, SHARPEST))
+    reach = x * over if reach is None else reach
+    wide = tau >= IMAGES
+    if sign > 0:
+        found, seen = erf(reach), ~wide & (2 * over - reach < SEEN)
+        if seen.any():
+            found[seen] += _difference(2 * over[seen], reach[seen])
+    else:
+        found = _difference(over, reach) + _difference(3 * over, reach)
+    if wide.any():
+        own, first = x[wide], np.exp(-(np.pi**2) * tau[wide])
+        # sign^n sin(n pi x), and exp(-n^2 pi^2 tau) by the odd powers between the squares
+        before, sine, twice = np.zeros_like(own), sign * np.sin(np.pi * own), 2 * sign * np.cos(np.pi * own)
+        odd, factor, total = first, first, np.zeros_like(own)
+        for n in range(1, TERMS):
+            total = total + sine * factor / n
+            before, sine, odd = sine, twice * sine - before, odd * first * first
+            factor = factor * odd
+        found[wide] = own + 2 / np.pi * total
+    return np.where((x >= 0) & (x <= 1) & (tau >= 0), found, np.nan)
+
+
+def _difference(centre: FloatArray, half: FloatArray) -> FloatArray:
+    """erfc(centre - half) - erfc(centre + half); by powers where that would cancel."""
+    a, b = (half * centre) ** 2, half**2
+    series = 1 + (2 * a - b) / 3 + (a * (2 / 3 * a - 2 * b) + b * b / 2) / 5
+    narrow = half * np.maximum(centre, 1.0) < NARROW
+    cancelled = 4 / np.sqrt(np.pi) * half * np.exp(-centre * centre) * series
+    return np.asarray(np.where(narrow, cancelled, erfc(centre - half) - erfc(centre + half)))
 
 
 def force(

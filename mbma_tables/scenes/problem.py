@@ -13,12 +13,12 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, in_unit, known, modulus_and_units
 from mbma_tables.surfaces.variants import get_variant
 from mbma_tables.theories import THEORIES, get_theory
+from mbma_tables.theories.mbma import theory_name
 
 if TYPE_CHECKING:
     from mbma_tables.models import AnyModel
     from mbma_tables.surfaces.any_surface import AnySurface
     from mbma_tables.surfaces.variants import Variant
-    from mbma_tables.theories.protocol import Theory, UserTheory
 
 # effects; docs/scenes.md says what each is
 OUTPUTS = (
@@ -100,7 +100,7 @@ class Problem:
     seconds: float | None = None
     variant: str | Variant = "reported"
     island_model: str | AnyModel | None = None
-    theory: str | Theory | UserTheory = "mbma"
+    theory: Any = None  # str, Theory or UserTheory; by the surface where none is given
     conductivities: tuple[float | str, float | str] | None = None
     deltas: Any = None
     theories: Sequence[str] = ()
@@ -125,6 +125,10 @@ class Problem:
         if self.rtol is not None and self.seconds is not None:
             raise InputError("rtol and seconds are both given: give the accuracy or the time budget, one of them")
         number_in("E_star", self.E_star, 1e-300, 1e300)
+        if self.theory is None:
+            of_mbma = bool(dropped) or bool(outputs.intersection(OF_ISLANDS)) or self.island_model is not None
+            named = "mbma" if of_mbma else theory_name(self.surface, None, variant=self.variant)
+            object.__setattr__(self, "theory", named)
         rtol: float | None = DEFAULT_RTOL if self.theory == "mbma" else DEFAULT_RTOL_OF_OTHERS
         if self.rtol is not None:
             rtol = number_in("rtol", self.rtol, MIN_RTOL, MAX_RTOL)

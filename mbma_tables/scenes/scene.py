@@ -55,9 +55,9 @@ class Scene(Problem):
         Which variant of the paper's equations.
     island_model : str or IslandModel, optional
         Island model, as for `contact`; without it the plan chooses between "universal" and "exact".
-    theory : str or theory
-        "mbma", another one of `mbma_tables.theories.THEORIES`, or an object, as for `contact`. Refinements, island
-        model and variant are MBMA's.
+    theory : str or theory, optional
+        One of `mbma_tables.theories.THEORIES` or an object, as for `contact`. Refinements, island model and variant
+        are MBMA's.
     conductivities : pair of float or str, optional
         Of the two bodies, thermal or electrical, for "conductance", as for `Contact.conductance`.
     deltas : array_like, optional

@@ -60,7 +60,7 @@ def _law(run: Run, step: Step) -> None:
             {"theory": problem.theory} if step.theory else {"island_model": island_model, "variant": problem.variant}
         )
         try:
-            law = contact_law(run.surface, asked, E_star=problem.E_star, **own)
+            law = contact_law(run.surface, rtol=asked, E_star=problem.E_star, **own)
         except OutOfRangeError:
             if not isinstance(island_model, str) or island_model not in TABLES:
                 raise

@@ -232,9 +232,9 @@ def test_island_is_the_librarys_answer():
         assert values == getattr(answer, name).tolist(), name
     assert set(found["columns"]) == {
         *("delta", "zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu"),
-        *("pressure", "area", "error"),
+        *("force", "area", "error"),
     }
-    assert found["units"] | {"D": "1/mm^2", "pressure": "mm^2", "X": "-", "R_d": "mm"} == found["units"]
+    assert found["units"] | {"D": "1/mm^2", "force": "mm^2", "X": "-", "R_d": "mm"} == found["units"]
 
 
 def test_surfaces_lists_every_case():
@@ -404,7 +404,7 @@ def test_a_dash_is_standard_input_and_output(folder):
     text = run(*law, "-")
     run(*law, "law.inp")
     assert text == (folder / "law.inp").read_text(encoding="utf-8")
-    scene = "[surface]\nname = 'concrete'\n[prescribed]\nseparations = [0.5]\n[effects]\non = ['force']\n"
+    scene = "[surface]\nname = 'concrete'\n[prescribed]\nseparations = [0.5]\n[effects]\non = ['pressure']\n"
     found = CliRunner().invoke(main, ["run", "-", "--out", "-"], input=scene)
     assert (found.exit_code, found.stdout.splitlines()[0][:8]) == (0, "# mbma 0"), found.output
     assert [path.name for path in folder.iterdir()] == ["law.inp"]

@@ -1,16 +1,18 @@
-"""Record calls of the compiled core, as the library makes them, for replay.c: ``python record.py FILE``."""
+"""Record calls of the compiled core, as the library makes them: ``python record.py FILE``."""
 
 import operator
 import pathlib
+import pickle
 import struct
 import sys
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mbma_tables import core as package
 
 MOST_CALLS = 12  # of each function
-MOST_BYTES = 20_000_000  # of an array
+MOST_BYTES = 5_000_000  # of an array
 
 
 def functions():
@@ -19,57 +21,59 @@ def functions():
     return [(name, one) for name, one in found if type(one).__name__ == "builtin_function_or_method"]
 
 
-class Recorder:
-    """Stands in for every function of the core, and writes down the first calls of each."""
+def copied(given):
+    """Arguments that nothing else changes."""
+    return [np.copy(one) if isinstance(one, np.ndarray) else one for one in given]
 
-    def __init__(self):
-        self.numbers, self.arrays, self.trusted, self.calls = {}, [], set(), {}
-        for name, function in functions():
-            self.calls[name] = []
-            setattr(package.core, name, self.recording(name, function))
 
-    def number(self, array):
-        """Of an array in the file, where equal ones are one."""
-        view = memoryview(array)
-        key = ({"q": "l", "?": "B"}.get(view.format, view.format), view.itemsize, view.tobytes())
-        return self.numbers.setdefault(key, len(self.numbers))
+class Call(NamedTuple):
+    """A call of a function of the core."""
 
-    def before(self, given):
-        """Arguments as they are written, but for what becomes of arrays."""
-        for one in given:
+    name: str
+    given: list[Any]  # arguments, arrays as they were before
+    returned: int
+    after: list[Any]  # and as they were after it
+
+    def packed(self):
+        """For replay.c."""
+        parts = [struct.pack("<64si", self.name.encode(), len(self.given))]
+        for one in self.given:
             if one is None:
-                yield struct.pack("<I", ord("N"))
+                parts.append(struct.pack("<i", ord("N")))
             elif isinstance(one, np.ndarray):
-                yield struct.pack("<III", ord("A"), one.flags.writeable, self.number(one))
+                kind = {"q": "l", "?": "B"}.get(one.dtype.char, one.dtype.char)
+                parts += [struct.pack("<iiiI", ord("A"), ord(kind), one.itemsize, one.nbytes), one.tobytes()]
             elif isinstance(one, float):
-                yield struct.pack("<Id", ord("d"), one)
+                parts.append(struct.pack("<id", ord("d"), one))
             else:
-                yield struct.pack("<Iq", ord("i"), operator.index(one))
+                parts.append(struct.pack("<iq", ord("i"), operator.index(one)))
+        return b"".join(parts)
 
-    def recording(self, name, function):
+
+def recorded(using):
+    """The first calls of every function that something makes."""
+    calls = {}
+
+    def recording(name, function):
         def call(*given):
-            arrays = [one for one in given if isinstance(one, np.ndarray)]
-            if len(self.calls[name]) == MOST_CALLS or any(one.nbytes > MOST_BYTES for one in arrays):
+            found = calls.setdefault(name, [])
+            big = any(one.nbytes > MOST_BYTES for one in given if isinstance(one, np.ndarray))
+            if len(found) == MOST_CALLS or big:
                 return function(*given)
-            before = list(self.before(given))
+            before = copied(given)
             returned = function(*given)
-            after = [struct.pack("<I", self.number(one)) if isinstance(one, np.ndarray) else b"" for one in given]
-            arguments = b"".join(part for pair in zip(before, after, strict=True) for part in pair)
-            head = struct.pack(f"<I{len(name)}sqI", len(name), name.encode(), returned, len(given))
-            self.calls[name].append(head + arguments)
-            if name.endswith("_fits") and returned:
-                self.trusted |= {self.number(one) for one in arrays}
+            found.append(Call(name, before, int(returned), copied(given)))
             return returned
 
         return call
 
-    def write(self, path):
-        """A file for replay.c."""
-        parts = [struct.pack("<I", len(self.numbers))]
-        for (kind, size, content), number in self.numbers.items():
-            parts += [struct.pack("<IIII", ord(kind), size, number in self.trusted, len(content)), content]
-        calls = [call for recorded in self.calls.values() for call in recorded]
-        pathlib.Path(path).write_bytes(b"".join([*parts, struct.pack("<I", len(calls)), *calls]))
+    for name, function in functions():
+        calls[name] = []
+        setattr(package.core, name, recording(name, function))
+    using()
+    missing = [name for name, found in calls.items() if not found]
+    assert not missing, f"nothing is called of {', '.join(missing)}"
+    return [call for found in calls.values() for call in found]
 
 
 def use():
@@ -77,7 +81,6 @@ def use():
     from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
     from mbma_tables.laws import hardness
     from mbma_tables.laws.bearing_curve import FRACTIONS
-    from mbma_tables.theories.calibrated_table import shipped
 
     core = package.core
     for which, first in enumerate([-700.0, -2.0, 1e-300, -0.9, -6.0]):
@@ -85,10 +88,8 @@ def use():
         core.elementary(which, x, np.empty(501))
     core.island_geometry(0.3, 0.7, 300.0, np.array([2.0, 0.37, 0.5, 1.5, 1.5, 1.0, 1.0, 0.0]), np.empty(14))
     surfaces = np.linspace(0.3, 0.9, 20), np.linspace(1.5, 6.0, 20), np.full(20, 3.0)
-    core.calibrated_slopes(*shipped().core_table, *surfaces, None, None, np.linspace(0.3, 2.5, 20), np.empty((20, 10)))
     core.self_affine(*surfaces[:2], np.empty(20), np.empty(20))
-    greenwood_tripp.solve_classical(2.0, 0.5, 20, 0.3, 1e-6, 100)
-    hardness.diffused(surfaces[0], 0.1, 1.0)
+    greenwood_tripp.radius(2.0, 0.5, 1e-6)
     hardness.BearingCurve(np.linspace(3.0, 1.0, FRACTIONS.size), 3.0)
     u = np.geomspace(2.9, 0.1, 12)
     core.gap_start(1, u, np.exp(-u), np.exp(-u), 1, surfaces[0], surfaces[2], np.full((6, 20), 0.5))
@@ -121,9 +122,6 @@ def use():
 
 
 if __name__ == "__main__":
-    recorder = Recorder()
-    use()
-    recorder.write(sys.argv[1])
-    missing = [name for name, calls in recorder.calls.items() if not calls]
-    if missing:
-        sys.exit(f"use() calls nothing of {', '.join(missing)}")
+    from record import recorded, use  # whose calls others can read
+
+    pathlib.Path(sys.argv[1]).write_bytes(pickle.dumps(recorded(use)))

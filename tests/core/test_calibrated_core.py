@@ -9,6 +9,7 @@ import pytest
 from scipy.interpolate import NdBSpline
 
 from generate.splines import TAPS
+from mbma_tables.answers import leakage_table
 from mbma_tables.answers.leakage_table import shipped_flow
 from mbma_tables.core import GENERATIONS, core
 from mbma_tables.laws.calibrated import Spectrum
@@ -51,12 +52,9 @@ def separations(rows, owner, force, used=core, pieces=None):
     return out
 
 
-def flow(rows, owner, u, area, used=core, pieces=None):
+def flow(rows, owner, u, area, pieces=None):
     """Flow conductance."""
-    out = np.empty(u.size)
-    bad = used.flow(*FLOW.core_table, *rows[:2], None, None, pieces, owner, u, area, out)
-    assert bad == np.isnan(out).sum()
-    return out
+    return leakage_table._flow((*FLOW.core_table, *rows[:2], None, None, pieces), owner, u, area)
 
 
 def pieces_of(table, rows, used=core):
@@ -160,17 +158,16 @@ class TestBits:
     @pytest.mark.skipif(len(FUSED) < 2, reason="one generation of processor")
     def test_of_generations(self):
         rows, u = batch(3000, seed=5)
-        everyone, area = np.arange(3000), np.random.default_rng(1).uniform(0, 0.5, 3000)
+        everyone, odds = np.arange(3000), np.random.default_rng(1).uniform(-20, 5, 3000)
         force = 10.0 ** np.random.default_rng(2).uniform(-12, 0, 3000)
-        slopes = np.empty((2, 3000, 10))
         found = []
-        for used, out in zip(FUSED, slopes, strict=True):
-            used.calibrated_slopes(*TABLE.core_table, *rows, None, None, u, out)
+        for used in FUSED:
             own = fill(rows, everyone, u, used), separations(rows, everyone, force, used)
-            found.append([*own, flow(rows, everyone, u, area, used), pieces_of(TABLE, rows[:, :20], used)])
+            values = np.empty((2, 3000))
+            used.spline_values(*FLOW.core_table, *rows[:2], None, None, None, everyone, odds, *values)
+            found.append([*own, values, pieces_of(TABLE, rows[:, :20], used)])
         for one, two in zip(*found, strict=True):
             np.testing.assert_array_equal(one, two)
-        np.testing.assert_allclose(*slopes, rtol=1e-15)
 
 
 @pytest.mark.parametrize("used", CORES)
@@ -194,7 +191,7 @@ class TestAnyInput:
             assert u[3] == pytest.approx(rows[2, 0], rel=1e-12)
         for pieces in (None, pieces_of(FLOW, rows, used)):
             for area in BAD:
-                k = flow(rows, np.zeros(x.size, np.int64), x, np.full(x.size, area), used, pieces)
+                k = flow(rows, np.zeros(x.size, np.int64), x, np.full(x.size, area), pieces)
                 assert np.isnan(k).tolist() == (np.isnan(x) | np.isnan(area)).tolist()
                 assert area < 0.4 or not np.nan_to_num(k).any()
 
@@ -207,12 +204,8 @@ class TestAnyInput:
         assert np.isfinite(out).all(axis=0).tolist() == inside.tolist()
         assert inside.sum() == 2  # h_max of infinity and 1e308
         assert np.isfinite(separations(rows, everyone, np.full(u.size, 1e-3), used)).tolist() == inside.tolist()
-        k = flow(rows, everyone, np.full(u.size, 0.5), np.full(u.size, 0.1), used)
+        k = flow(rows, everyone, np.full(u.size, 0.5), np.full(u.size, 0.1))
         assert np.isfinite(k).tolist() == FLOW.covers(*rows[:2]).tolist()
-        slopes = np.empty((u.size, 10))
-        bad = used.calibrated_slopes(*TABLE.core_table, *rows, None, None, np.full(u.size, 0.5), slopes)
-        assert np.isfinite(slopes).all(axis=1).tolist() == (inside & (rows[2] < np.inf)).tolist()
-        assert bad == np.isnan(slopes).any(axis=1).sum()
         rows, _ = batch(3)
         wrong = np.array([-1, 3, 2**62, -(2**62), 1])
         for pieces in (None, pieces_of(TABLE, rows, used)):
@@ -221,9 +214,11 @@ class TestAnyInput:
             ]
             assert np.isfinite(separations(rows, wrong, np.full(5, 0.1), used, pieces)).tolist() == [False] * 4 + [True]
         nobody, half = np.empty((3, 0)), np.full(5, 0.5)
-        for ask, given in ((fill, (half,)), (separations, (half,)), (flow, (half, half))):
+        for ask in (fill, separations):
             with pytest.raises(ValueError, match="sizes"):
-                ask(nobody, wrong, *given, used)
+                ask(nobody, wrong, half, used)
+        with pytest.raises(ValueError, match="sizes"):
+            flow(nobody, wrong, half, half)
 
     def test_sizes_that_do_not_match_are_refused(self, used):
         rows, u = batch(5)
@@ -241,40 +236,7 @@ class TestAnyInput:
         with pytest.raises(ValueError, match="sizes"):
             used.calibrated_contact(*TABLE.core_table, *rows, ends[:4], None, np.arange(5), u, out, out, out)
         with pytest.raises(ValueError, match="sizes"):
-            used.flow(None, numbers, cells, *rows[:2], None, None, None, np.arange(5), u, u, out)
-
-
-def test_slopes_are_those_of_the_contact():
-    rows, u = batch(300, seed=8)
-    # inside the table, and beyond its separations
-    rows[0], rows[1] = rows[0].clip(0.12, 0.98), rows[1].clip(1.2, 11.4)
-    u[:20], u[20:40], rows[2, 20:40] = np.geomspace(1e-12, 1e-7, 20), np.linspace(10.2, 11, 20), 12.0
-    known = u < 0.99 * rows[2]
-    rows, u = np.ascontiguousarray(rows[:, known]), u[known]
-    out, alpha, gradient = np.empty((u.size, 10)), *np.empty((2, u.size))
-    assert core.calibrated_slopes(*TABLE.core_table, *rows, None, None, u, out) == 0
-
-    def contact(h, z, top, x):
-        core.self_affine(h, z, alpha, gradient)
-        found = fill(np.array([h, z, top]), np.arange(x.size), x)
-        return np.array([found[0] * gradient, found[1]]), found[2] * gradient
-
-    given = [rows[0], rows[1], rows[2], u]
-    here, stiffness = contact(*given)
-    np.testing.assert_allclose(out[:, [0, 5]].T, here, rtol=1e-14)
-    np.testing.assert_allclose(out[:, 1], -stiffness, rtol=1e-13)
-    for column, number in ((1, 3), (2, 2), (3, 0), (4, 1)):
-        step = 1e-4 * (u if number == 3 else 1.0)
-        ends = []
-        for times in (-2, -1, 1, 2):
-            moved = [x.copy() for x in given]
-            moved[number] = given[number] + times * step
-            ends.append(contact(*moved)[0])
-        slope = (ends[0] - ends[3] + 8 * (ends[2] - ends[1])) / (12 * step)
-        for first, row in ((0, 0), (5, 1)):
-            # differences lose digits where little depends on a number
-            scale = np.abs(here[row]) / np.broadcast_to(step, u.shape)
-            np.testing.assert_allclose(out[:, first + column], slope[row], rtol=1e-6, atol=1e-13 * scale.max())
+            used.spline_values(None, numbers, cells, *rows[:2], None, None, None, np.arange(5), u, u, out)
 
 
 @pytest.mark.parametrize(("hurst", "log_zeta_1"), [(0.1, 1.1), (0.37, 5.0), (1.0, 11.5), (1e-9, 2.0), (1 - 1e-12, 3.0)])

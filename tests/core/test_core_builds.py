@@ -1,7 +1,9 @@
 """The core as compilers see it: no warnings, the same bits on other processors, and nothing that sanitizers find."""
 
+import hashlib
 import importlib.util
 import pathlib
+import pickle
 import platform
 import re
 import shlex
@@ -10,6 +12,7 @@ import subprocess
 import sys
 import sysconfig
 
+import numpy as np
 import pytest
 
 from mbma_tables.core import core
@@ -22,22 +25,19 @@ SANITIZERS = ["-O1", "-g", "-fsanitize=address,undefined,float-cast-overflow", "
 INTEL = platform.machine() in ("x86_64", "AMD64")
 # what calls no function of the C library: the same bits wherever a processor has an fma
 EXACT = {
-    *("calibrated_contact", "calibrated_ends", "calibrated_separation", "capped_force", "damped_steps", "elementary"),
+    *("calibrated_contact", "calibrated_ends", "calibrated_separation", "capped_force", "elementary"),
     *(
-        "flow",
-        "four_numbers",
+        "spline_values",
         "height_integrals",
         "island_extents",
         "islands_work",
         "kronrod",
-        "law_fit",
-        "law_records",
     ),
     *("phi", "profile_missed", "self_affine", "solve_islands", "spline4", "spline_pieces", "table_fits"),
 }
 
 # coefficients of polynomials, of which small ones are differences of large numbers
-COEFFICIENTS = {"inner_integrals", "spectrum_law_of"}
+COEFFICIENTS = {"spectrum_law_of"}
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the core's compiler there is zig's alone")
 
@@ -139,10 +139,9 @@ def test_declarations_of_python_are_those_of_its_headers(tmp_path):
     assert shown[0] == shown[1]
 
 
-@pytest.fixture(scope="module")
-def calls(tmp_path_factory):
+def recording(folder):
     """Calls of every function, as the library makes them."""
-    path = tmp_path_factory.mktemp("calls") / "calls"
+    path = folder / "calls"
     run(sys.executable, ROOT / "tests" / "core" / "record.py", path)
     return path
 
@@ -155,16 +154,46 @@ def replay(compiler, folder, *options):
     return program
 
 
+def off(found, expected):
+    """How far numbers are from others, relatively; of less than 1e-3 as if they were as much."""
+    if found.dtype.kind != "f":
+        return 0.0 if (found == expected).all() else np.inf
+    with np.errstate(all="ignore"):
+        scale = np.maximum(1e-3, np.maximum(abs(found), abs(expected)))
+        apart = np.where(
+            (found == expected) | (np.isnan(found) & np.isnan(expected)), 0.0, abs(found - expected) / scale
+        )
+    return np.nan_to_num(apart, nan=np.inf).max(initial=0.0)
+
+
 def answers(calls, *command):
     """Of each function: hash of its answers, and how far from what was recorded they are."""
-    lines = run(*command, calls, "inf").splitlines()
-    return {name: (bits, float(off)) for name, _, bits, off in map(str.split, lines)}
+    given = b"".join(call.packed() for call in calls)
+    done = subprocess.run(command, input=given, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    said, bits, worst = memoryview(done.stdout), {}, {}
+    for call in calls:
+        (returned,), said = np.frombuffer(said[:8], np.int64), said[8:]
+        parts, far = [int(returned).to_bytes(8, "little", signed=True)], [0.0 if returned == call.returned else np.inf]
+        for one in call.after:
+            if isinstance(one, np.ndarray):
+                found, said = np.frombuffer(said[: one.nbytes], one.dtype), said[one.nbytes :]
+                far.append(off(found, one.ravel()))
+                # every NaN is one, as processors differ in its sign
+                parts.append(
+                    np.where(np.isnan(found), 0, found).tobytes() if one.dtype.kind == "f" else found.tobytes()
+                )
+        bits.setdefault(call.name, hashlib.sha256()).update(b"".join(parts))
+        worst[call.name] = max(*far, worst.get(call.name, 0.0))
+    assert not said
+    return {name: (bits[name].hexdigest(), worst[name]) for name in bits}
 
 
 @pytest.mark.slow
-def test_answers_of_other_processors(calls, tmp_path, record_property):
+def test_answers_of_other_processors(tmp_path, record_property):
     """Roundings depend on fma alone, and on the C library where a function calls it."""
     compiler, seen = [found("cc")], {}
+    calls = pickle.loads(recording(tmp_path).read_bytes())
     for generation in GENERATIONS:
         if generation == "_plain" or getattr(core, "generation", 0) >= int(generation[-1]):
             seen[generation] = answers(calls, replay(compiler, tmp_path, *BUILD.LEVELS[generation]))
@@ -176,18 +205,10 @@ def test_answers_of_other_processors(calls, tmp_path, record_property):
         line = "  ".join(f"{build} {found[name][0]} {found[name][1]:.1e}" for build, found in seen.items())
         record_property(name, line)
     assert set(seen["_plain"]) > EXACT
-    assert all(off < 1e-6 for _, off in seen["_plain"].values())
+    assert all(far < 1e-6 for _, far in seen["_plain"].values())
     fused = [build for build in seen if build != "_plain"]
     for name in seen["_plain"]:
         libraries = {seen[build][name][0] for build in fused if name in EXACT or build != "arm64"}
         assert len(libraries) <= 1, name
         most = 1e-6 if name in COEFFICIENTS else 1e-12
         assert all(seen[build][name][1] < most for build in fused if core.arithmetic == "fma"), name
-
-
-@pytest.mark.slow
-def test_sanitizers_find_nothing(calls, tmp_path):
-    program = replay([found("cc")], tmp_path, *SANITIZERS)
-    run(program, calls, "1e-6")
-    tried = run(program, calls, "mutate", "100")
-    assert int(tried.split()[0]) > 10_000

@@ -8,7 +8,7 @@ import sys
 import sysconfig
 
 import pytest
-from test_core_builds import BUILD, CORE, SANITIZERS, SOURCES, found, run
+from test_core_builds import BUILD, CORE, SANITIZERS, SOURCES, found, recording, run
 
 from mbma_tables.core import GENERATIONS, core
 
@@ -71,3 +71,6 @@ def test_under_sanitizers(tmp_path):
     )  # fmt: skip
     assert said.startswith(str(package))
     passed(QUICK, PYTHONPATH=paths, **sanitizer)
+    calls, script = recording(tmp_path), ROOT / "tests" / "core" / "mutate.py"
+    exact = {"PYTHONMALLOC": "malloc", "PYTHONPATH": paths}
+    assert int(run(sys.executable, script, calls, "100", env=os.environ | sanitizer | exact, cwd=tmp_path)) > 10_000

@@ -1,5 +1,6 @@
 """The compiled core's laws of spectra: against quadrature by numpy and mpmath, and on any input."""
 
+import dataclasses
 import importlib
 import math
 
@@ -10,7 +11,7 @@ from scipy.special import erf
 
 from mbma_tables import ConvergenceError, InputError, Surface
 from mbma_tables.core import GENERATIONS, core
-from mbma_tables.laws.calibrated import CONSTANTS, LAW_ERROR, PERSSON, YANG_PERSSON, Law, Spectrum, _inner_integrals
+from mbma_tables.laws.calibrated import CONSTANTS, LAW_ERROR, PERSSON, POWERS, YANG_PERSSON, Law, Spectrum
 
 PLAIN = importlib.import_module("mbma_tables.core._plain")
 FUSED = [importlib.import_module(f"mbma_tables.core._{name}") for name, least in GENERATIONS.items()
@@ -69,24 +70,22 @@ def self_affine(hurst, zeta_1):
     return np.array([1.0, zeta_1]), np.array([1.0, zeta_1 ** (-2 - 2 * hurst)])
 
 
-@pytest.mark.parametrize("used", CORES)
-def test_inner_integrals_equal_mpmath(used):
-    found = np.empty(used.words_of_inner())
-    used.inner_integrals(found)
-    with mpmath.workdps(20):
-        for place in (-3.0, -1.1, 0.01, 0.45, 1.3, 2.9):
-            y, at = mpmath.exp(place), (place + 3) * 5
-            cell = min(int(at), 29)
-            for power, rows in zip((1, 3, 16), found.reshape(3, 30, 12), strict=True):
+@pytest.mark.parametrize("constants", [PERSSON, YANG_PERSSON, dataclasses.replace(PERSSON, weight=0.0)])
+def test_one_wave_has_the_inner_integral_of_mpmath(constants):
+    law = Law(Spectrum(*np.ones((3, 1)), 1.0, 10.0), None, constants)
+    for place in (-40.0, -19.9, -10.0, -3.0, -1.1, 0.01, 0.45, 1.3, 2.9):
+        with mpmath.workdps(20):
+            y = mpmath.exp(place)
 
-                def integrand(v, y=y, power=power):
-                    square = y * y + v / 2
-                    return mpmath.erf(mpmath.sqrt(2 * square)) ** (power - 1) * mpmath.exp(-v) / (4 * square)
+            def integrand(v, y=y):
+                P = mpmath.erf(mpmath.sqrt(2 * (y * y + v / 2)))
+                slope = sum(n * a * P ** (n - 1) for n, a in zip(POWERS, law.coefficients.tolist(), strict=True))
+                return slope * mpmath.exp(-v) / (4 * (y * y + v / 2))
 
-                edges = [0, *(mpmath.mpf(10) ** k for k in range(-5, 1)), 2, 4, 8, 16, 32, 64]
-                expected = power * mpmath.sqrt(8 / mpmath.pi) * mpmath.quad(integrand, edges)
-                value = np.polynomial.polynomial.polyval(2 * (at - cell) - 1, rows[cell])
-                assert value == pytest.approx(float(expected), rel=3e-14), (place, power)
+            edges = [0, *(mpmath.mpf(10) ** k for k in range(-40, 1)), 2, 4, 8, 16, 32, 64]
+            expected = mpmath.sqrt(8 / mpmath.pi) * mpmath.quad(integrand, edges) / 4
+        found = math.log(law.separation_persson(math.exp(place))[0]) + 2 * math.exp(2 * place)
+        assert found == pytest.approx(float(mpmath.log(expected)), abs=2e-12), place
 
 
 class TestCurve:
@@ -172,20 +171,19 @@ def test_waves_hold_the_moments_of_the_spectrum():
 def test_bits_are_those_of_any_generation():
     found = []
     for used in FUSED:
-        inner_of, law = np.empty(used.words_of_inner()), np.empty(used.words_of_spectrum_law())
-        used.inner_integrals(inner_of)
+        law = np.empty(used.words_of_spectrum_law())
         facts, none, given = np.empty(4), np.empty(0), self_affine(0.8, 64.0)
         count = used.spectrum_waves(*given, none, none, none, facts)
         spectrum = np.empty((3, count))
         used.spectrum_waves(*given, *spectrum, facts)
         constants = np.array([*facts[:2], 0.5, 0.03, 0.34, 0.44, 0.09, 0.43, 0.06, 3.2])
-        assert used.spectrum_law_of(inner_of, *spectrum, constants, np.empty(9 * count), law) == 0
+        assert used.spectrum_law_of(*spectrum, constants, np.empty(3 * count), law) == 0
         u = np.linspace(1e-3, 3.1, 500)
         out, more = np.empty((3, 500)), np.empty((3, 500))
         used.spectrum_law_contact(law, u, *out)
         used.spectrum_law_persson(law, out[0], *more[:2])
         used.spectrum_law_separation(law, out[0], more[2])
-        found.append([inner_of, spectrum, law, out, more])
+        found.append([spectrum, law, out, more])
         # one by one
         one = np.empty((3, 1))
         for k in range(0, 500, 50):
@@ -222,7 +220,7 @@ class TestAnyInput:
             used.spectrum_law_contact(law[:-1], one, *out)
 
     def test_of_spectra(self, used):
-        none, facts, inner_of = np.empty(0), np.empty(4), _inner_integrals()
+        none, facts = np.empty(0), np.empty(4)
         spectrum = Spectrum.self_affine(0.8, 64.0)
         count = spectrum.x.size
         for number in range(len(BAD)):
@@ -234,7 +232,7 @@ class TestAnyInput:
                     numbers = constants.copy()
                     (numbers if column == 3 else own[column])[place] = BAD[number]
                     law, out = np.empty(used.words_of_spectrum_law()), np.empty((3, 3))
-                    status = used.spectrum_law_of(inner_of, *own, numbers, np.empty(9 * count), law)
+                    status = used.spectrum_law_of(*own, numbers, np.empty(3 * count), law)
                     bad = used.spectrum_law_contact(law, np.array([0.01, 1.0, 2.5]), *out)
                     assert bad == 3 or status == 0
             for q, C in (

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from generate.pages import stability as cases
+from generate.pages.page import svg
 from mbma_tables import InputError
 
 
@@ -32,7 +33,7 @@ def test_corners(monkeypatch):
     # the comparison would show it if the formulas as printed were fine
     assert direct.not_finite > 0
     assert library.largest < 1e-13
-    assert cases.draw(geometry_maps, island_maps).startswith(b"<?xml")
+    assert svg(cases.draw(geometry_maps, island_maps)).startswith(b"<?xml")
     tallies = [*islands, *geometry, *totals]
     assert len(cases.corners(tallies).splitlines()) == len(tallies) + 2
 

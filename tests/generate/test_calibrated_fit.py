@@ -8,9 +8,9 @@ import xarray as xr
 
 from generate.boundary_elements.design import HELD_OUT_SURFACE, TRAINING
 from generate.boundary_elements.evidence import Case
-from generate.calibrated import EDGES, QUANTITIES, coverage, cross_validate, errors, fit, summary
+from generate.calibrated import EDGES, coverage, cross_validate, errors, fit, summary
 from generate.calibrated_bars import measure
-from generate.calibrated_file import read_parts, write_part
+from generate.calibrated_file import QUANTITIES, read_parts, write_part
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.laws.calibrated import CONSTANTS, Law, Spectrum
 

@@ -37,4 +37,4 @@ def test_a_file_of_heights_becomes_a_case(tmp_path, monkeypatch):
     force = one.force[one.area > 0.02] * surface.bearing.gradient
     mine = distances.THEORIES["calibrated, map"](one).area(one.force[one.area > 0.02])
     assert mine == pytest.approx(contact(surface, pressure=force, theory="calibrated").area, rel=0.02)
-    assert isinstance(distances.surface_of(one), MeasuredSurface)  # no self-affine surface stands in for it
+    assert isinstance(one.surface, MeasuredSurface)  # no self-affine surface stands in for it

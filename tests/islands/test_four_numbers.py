@@ -1,12 +1,12 @@
 """Bands of the paper's four numbers against plain formulas at fifty digits, and from numbers that are none."""
 
+import dataclasses
 import importlib
 
 import mpmath
 import numpy as np
 import pytest
 
-from mbma_tables.core import core
 from mbma_tables.islands.four_numbers import band_fields
 from mbma_tables.surfaces.spectrum import BROADENING
 from mbma_tables.surfaces.variants import REPORTED
@@ -38,8 +38,7 @@ def test_bands_at_fifty_digits(summits):
     rng = np.random.default_rng(7)
     given = np.stack([10 ** rng.uniform(-15, 4, 60), 10 ** rng.uniform(-9, 0, 60), rng.uniform(0.05, 1, 60)])
     given[2, :10] = 1.0
-    out = np.empty((4, 60))
-    assert core.four_numbers(*given, REPORTED.density_divisor, summits, out) == 0
+    out = band_fields(*given, dataclasses.replace(REPORTED, summit_sigma=summits))
     with mpmath.workdps(60):
         for row, found in zip(given.T, out.T, strict=True):
             right = [float(x) for x in exact(*row, summits)]
@@ -57,8 +56,7 @@ def test_spheres_without_end_are_finite():
 def test_what_is_no_band_is_nan(bad, position):
     given = [np.full(3, x) for x in (0.5, 0.3, 0.8)]
     given[position][1] = bad
-    out = np.empty((4, 3))
-    assert core.four_numbers(*given, 30.0, True, out) == 1
+    out = band_fields(*given, REPORTED)
     assert np.isnan(out[:, 1]).all()
     assert np.isfinite(out[:, ::2]).all()
 
@@ -73,13 +71,8 @@ def test_generations_of_processor_give_the_same_bits():
     rng = np.random.default_rng(8)
     coefs = rng.normal(size=(9, 8, 7, 6, 2))
     places = rng.uniform(0, 1, (4, 1000)) * np.array([[6.0], [5.0], [4.0], [3.0]])
-    given = [10 ** rng.uniform(-12, 4, 1000), rng.uniform(0, 1, 1000), rng.uniform(0.01, 1, 1000)]
     for slopes in (False, True):
         found = [np.empty((10 if slopes else 2, 1000)) for _ in cores]
         for one, out in zip(cores, found, strict=True):
             one.spline4(places, coefs, np.array([7, 6, 5, 4]), slopes, out)
         np.testing.assert_array_equal(*found)
-    found = [np.empty((4, 1000)) for _ in cores]
-    for one, out in zip(cores, found, strict=True):
-        one.four_numbers(*given, 30.0, True, out)
-    np.testing.assert_array_equal(*found)

@@ -56,7 +56,7 @@ def test_beyond_a_table_a_law_is_made_of_the_solver(monkeypatch):
         if island_model != "exact":
             raise OutOfRangeError("islands outside", True)
         # as good, and quicker
-        return contact_law(surface, rtol, "universal", **rest)
+        return contact_law(surface, rtol=rtol, island_model="universal", **rest)
 
     monkeypatch.setattr("mbma_tables.law.make.contact_law", law)
     scene = scene_of(effects=("energy",), rtol=1e-2)

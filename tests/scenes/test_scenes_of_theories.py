@@ -81,7 +81,7 @@ def test_many_gaps_go_through_the_law_where_that_costs_less(theory):
 
 
 def test_areas_that_mbma_reaches_within_the_bound_stated():
-    law = contact_law(CONCRETE, 1e-9, E_star=MODULUS)
+    law = contact_law(CONCRETE, rtol=1e-9, E_star=MODULUS)
     areas = law.area(separation=np.array([0.9, 0.5, 0.0, -1.0]))
     found = scene_of("mbma", areas=areas, rtol=1e-6).run()
     truth = law.pressure(separation=law.separation(area=areas))

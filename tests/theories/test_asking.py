@@ -323,7 +323,7 @@ def test_energies_hold_where_the_force_bends():
     u = np.linspace(0.1, 0.9, 9)[:, None] * 0.26
     found = contact(batch, mean_separation=u).energy
     for k in range(3):
-        law = contact_law(Surface(hurst[k], 0.25, 0.25 * zeta_1[k], 0.1, 0.26), 1e-9)
+        law = contact_law(Surface(hurst[k], 0.25, 0.25 * zeta_1[k], 0.1, 0.26), rtol=1e-9)
         expected = law.energy(u[:, 0])
         assert found[:, k] == pytest.approx(expected, rel=1e-8)
         assert contact(law.surface, mean_separation=u[:, 0]).energy == pytest.approx(expected, rel=1e-8)

@@ -47,7 +47,7 @@ each = pytest.mark.parametrize(
 
 @functools.cache
 def law_of(theory, surface=SURFACE, rtol=1e-8):
-    return contact_law(surface, rtol, E_star=MODULUS, theory=theory)
+    return contact_law(surface, rtol=rtol, E_star=MODULUS, theory=theory)
 
 
 def places(law, seed, count=400):
@@ -157,8 +157,8 @@ def test_softening_of_mbma_is_where_its_stiffness_is_largest(surface):
 
 
 def test_mbma_by_object_and_by_mean_separation():
-    law = contact_law(SURFACE, 1e-6, "rigid", "printed")
-    same = contact_law(SURFACE, 1e-6, theory=Mbma("rigid", "printed"))
+    law = contact_law(SURFACE, rtol=1e-6, island_model="rigid", variant="printed")
+    same = contact_law(SURFACE, rtol=1e-6, theory=Mbma("rigid", "printed"))
     d = np.array([0.5, 2.0])
     assert (
         law.pressure(separation=d).tolist()
@@ -233,4 +233,4 @@ class Negative:
 def test_what_is_no_law(asked, match):
     with pytest.raises((InputError, ConvergenceError), match=match):
         contact_law(**({"surface": SURFACE} | asked))
-    assert contact_law(SURFACE, 1e-3, theory=Noisy()).error < 2e-3
+    assert contact_law(SURFACE, rtol=1e-3, theory=Noisy()).error < 2e-3

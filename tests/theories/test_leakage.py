@@ -231,12 +231,12 @@ class TestLaw:
         for batch in range(count):
             hurst, zeta_1, h_max, part = rng.uniform((0.1, 3.1, 2.6, -8), (1, 300, 5, -3))
             rtol, d = 10**part, np.append(rng.uniform(0, 1, 1000), 10 ** rng.uniform(-6, 0, 1000))
-            assert over_bound(contact_law(Surface(hurst, 1, zeta_1, 1, h_max), rtol, theory=theory), d) < 1
+            assert over_bound(contact_law(Surface(hurst, 1, zeta_1, 1, h_max), rtol=rtol, theory=theory), d) < 1
             if theory != "mbma":
                 low, high, power = rng.uniform((0.014, 0.15, 0), (0.025, 0.3, 2.2))
                 made = random_map(64, low, high, power, batch, batch % 2)
                 surface = Surface.from_map(made, dx=1.0, periodic=True)
-                assert over_bound(contact_law(surface, rtol, theory=theory), d) < 1
+                assert over_bound(contact_law(surface, rtol=rtol, theory=theory), d) < 1
 
     def test_one_of_three(self):
         law = contact_law(SEAL, theory="calibrated")

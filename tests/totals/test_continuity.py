@@ -362,7 +362,7 @@ def test_laws_do_not_jump_at_their_breaks(rtol, record_property):
     for _ in range(2 * SCALE):
         variant = sorted(VARIANTS)[rng.integers(2)]
         surface = Surface(rng.uniform(0.3, 1), 1.0, 10 ** rng.uniform(0.5, 4), 1.0, rng.uniform(2.5, 4.5))
-        law = contact_law(surface, rtol, variant=variant)
+        law = contact_law(surface, rtol=rtol, variant=variant)
         depth = 2 * law.h_max * (law.records[1:, CENTRE] - 1 / law.records[1:, RATE])
         gaps = law.h_max - depth
         sides = [gaps - sign * STEP * depth for sign in (-0.5, 0.5)]

@@ -203,7 +203,7 @@ def test_the_turning_point_at_low_hurst():
 def test_a_turn_within_a_hundredth_of_the_range(rtol):
     """Force falls by 4e-6 and rises again, between places that are further apart."""
     surface = Surface(0.5, 0.2, 0.2 * 334390.7992055036, 0.3, 0.3 * 3.163258089330122)
-    law = contact_law(surface, rtol)
+    law = contact_law(surface, rtol=rtol)
     gaps = np.linspace(-0.53, -0.49, 4001)
     falls = contact(surface, separation=gaps, rtol=1e-9, derivatives=True).pressure_by["separation"] >= 0
     assert 0 < falls.sum() < 1000
@@ -361,7 +361,7 @@ def test_no_bound_is_exceeded_on_fresh_points_of_300_laws():
         top, rtol = rng.uniform(2.0, 5.0), 10 ** rng.uniform(-9, -2)
         zeta_1 = 3 + 10 ** rng.uniform(-6, 5)
         surface = Surface(rng.uniform(0.25, 1.0), 1.0, zeta_1, 1.0, top)
-        law = contact_law(surface, rtol, variant=("reported", "printed")[rng.integers(2)])
+        law = contact_law(surface, rtol=rtol, variant=("reported", "printed")[rng.integers(2)])
         gap = top - 2 * top * np.append(10 ** rng.uniform(-6, 0, 40), rng.uniform(0, 1, 40))
         truth = contact(surface, separation=np.maximum(gap, -top), rtol=1e-10, variant=law.variant)
         assert np.abs(law.pressure(separation=truth.separation) / truth.pressure - 1).max() <= law.error
@@ -472,7 +472,7 @@ def test_a_labelled_surface():
 def test_the_error_bounds_what_samples_miss():
     """Between its samples a polynomial errs by more than at them; both are next to their worst."""
     surface = Surface(0.7981690190189619, 0.2, 0.2 * 3.6, 0.3, 0.3 * 3.2804122866615386)
-    law = contact_law(surface, 0.1)
+    law = contact_law(surface, rtol=0.1)
     truth = contact(surface, separation=0.0, rtol=1e-10).pressure
     assert abs(law.pressure(separation=0.0) / truth - 1) <= law.error
 
@@ -483,7 +483,7 @@ def test_slopes_are_within_their_bound(rtol):
     for _ in range(8):
         top = rng.uniform(2.5, 4.5)
         surface = Surface(rng.uniform(0.3, 1), 1.0, 10 ** rng.uniform(0.7, 5), 1.0, top)
-        law = contact_law(surface, rtol)
+        law = contact_law(surface, rtol=rtol)
         # next to the ends of pieces, where slopes are worst, and between
         ends = pieces_of(law)[0]
         depth = np.concatenate([ends * (1 - 1e-7), ends * (1 + 1e-7), top * 10 ** rng.uniform(-6, 0, 80)])
@@ -534,7 +534,7 @@ def slope_misses(surface, law, gap, variant="reported"):
 def test_slopes_next_to_first_contact_are_within_their_bound():
     """There the logarithm's slope is exact, and what is left is the error of the value itself."""
     surface = Surface(0.8, 1.0, 100.0, 1.0, 3.0)
-    law = contact_law(surface, 1e-6)
+    law = contact_law(surface, rtol=1e-6)
     gap = 3.0 - 10.0 ** np.arange(-15, -3)
     bound = law.slope_error(separation=gap)
     for missed in slope_misses(surface, law, gap):
@@ -552,7 +552,7 @@ def test_the_error_at_loose_tolerances_next_to_the_floor_of_zeta_u():
     )  # fmt: skip
     for hurst, left, h_max, rtol in found:
         surface = Surface(hurst, 1.0, 3.0 + left, 1.0, h_max)
-        law = contact_law(surface, rtol)
+        law = contact_law(surface, rtol=rtol)
         gap = h_max - 2 * h_max * np.geomspace(1e-9, 1, 2000)
         truth = contact(surface, separation=np.maximum(gap, -h_max), rtol=1e-9)
         for value, true in (
@@ -571,7 +571,7 @@ def test_a_steep_and_high_surface_has_a_law():
     np.testing.assert_allclose(law.pressure(separation=gap), truth.pressure, rtol=law.error + 1e-9)
     assert law.error < 2e-8
     with pytest.raises(OutOfRangeError, match="so high that force or area underflow"):
-        contact_law(Surface(1.0, 1.0, 100.0, 1.0, 60.0), 1e-3, island_model="rigid")
+        contact_law(Surface(1.0, 1.0, 100.0, 1.0, 60.0), rtol=1e-3, island_model="rigid")
 
 
 def test_inverses_stay_within_the_law():
@@ -580,7 +580,7 @@ def test_inverses_stay_within_the_law():
     for _ in range(12):
         h_rms = 10 ** rng.uniform(-9, 3)
         surface = Surface(rng.uniform(0.5, 1), 1 / h_rms, 10 ** rng.uniform(0.6, 5) / h_rms, h_rms, 3.1 * h_rms)
-        law = contact_law(surface, 1e-4, E_star=10 ** rng.uniform(-5, 12))
+        law = contact_law(surface, rtol=1e-4, E_star=10 ** rng.uniform(-5, 12))
         for name in ("pressure", "area"):
             value = getattr(law, name)
             end = law.turning_point if name == "pressure" else law.area_turning_point

@@ -37,7 +37,7 @@ def test_totals_laws_islands_and_scenes():
         assert found.island_model == "own"
         for name in ("pressure" if hasattr(found, "pressure") else "force", "area", "error"):
             np.testing.assert_allclose(getattr(found, name), getattr(known, name), rtol=1e-13)
-    law, known = (contact_law(SURFACE, 1e-4, island_model=island_model) for island_model in (Own(), "rigid"))
+    law, known = (contact_law(SURFACE, rtol=1e-4, island_model=island_model) for island_model in (Own(), "rigid"))
     assert law.island_model == "own"
     np.testing.assert_allclose(law.pressure(separation=GAPS), known.pressure(separation=GAPS), rtol=1e-12)
     scene = Scene(SURFACE, effects=("pressure",), separations=[1.0], rtol=1e-4, island_model=Own()).run()

@@ -245,7 +245,7 @@ def test_laws_at_their_breaks(rtol, record_property):
     for _ in range(4 * SCALE):
         rule = list(VARIANTS.values())[rng.integers(2)]
         hurst, zeta_1, h_max = (float(numbers[0]) for numbers in surfaces(rng, 1))
-        law = contact_law(Surface(hurst, 1.0, zeta_1, 1.0, h_max), rtol, variant=rule)
+        law = contact_law(Surface(hurst, 1.0, zeta_1, 1.0, h_max), rtol=rtol, variant=rule)
         depth = 2 * h_max * (law.records[1:, CENTRE] - 1 / law.records[1:, RATE])
         clear = np.abs(depth / kinks(hurst, zeta_1, rule)[0] - 1) > 1e-9
         gaps = law.h_max - depth

@@ -4,14 +4,14 @@ const STRESS_LABEL = OVER_E ? "E*" : (STRESS ?? "stress"),
   LENGTH_LABEL = LENGTH ?? "length";
 const UNITS = {
   gap: LENGTH_LABEL,
-  force: STRESS_LABEL,
+  pressure: STRESS_LABEL,
   area: "",
   stiffness: `${STRESS_LABEL}/${LENGTH_LABEL}`,
   conductance: `k_s/${LENGTH_LABEL}`,
 };
 const TITLES = {
   gap: "mean separation u",
-  force: "force F/A0",
+  pressure: "pressure F/A0",
   area: "contact area A/A0",
   stiffness: "stiffness −dF/du",
   conductance: "conductance",
@@ -22,18 +22,18 @@ const charts = new Map();
 let drawn = null,
   cursor = null; // the curves in the pictures; the place under the cursor
 
-// One standard deviation to either side of a quantity, where its scatter is stated: of the force at equal separation,
+// One standard deviation to either side of a quantity, where its scatter is stated: of the pressure at equal separation,
 // of the rest at equal pressure.
 function band(state, curve, name) {
   const byGap = state.against === "gap",
-    scatter = curve.scatter[{ force: "pressure", gap: "pressure", area: "area" }[name] ?? "stiffness"];
-  if (byGap !== (name === "force")) return null;
+    scatter = curve.scatter[{ pressure: "pressure", gap: "pressure", area: "area" }[name] ?? "stiffness"];
+  if (byGap !== (name === "pressure")) return null;
   const side = (sign) =>
     curve[name].map((value, k) => {
       if (value === null || scatter[k] === null) return null;
-      // a separation differs by what the force does over the stiffness
+      // a separation differs by what the pressure does over the stiffness
       return name === "gap"
-        ? Math.max(value + (sign * scatter[k] * curve.force[k]) / curve.stiffness[k], 0)
+        ? Math.max(value + (sign * scatter[k] * curve.pressure[k]) / curve.stiffness[k], 0)
         : value * Math.exp(sign * scatter[k]);
     });
   return [side(1), side(-1)];
@@ -77,7 +77,7 @@ function chartFor(name, state, theories, hasBand) {
         x: { time: false, distr: logX ? 3 : 1, range: (_, low, high) => [low ?? 0.1, high ?? 1] },
         y: { distr: log ? 3 : 1, range: rangeOf(log) },
       },
-      axes: [axis(withUnit(logX ? "force" : "gap").replace("force F/A0", "pressure"), logX), axis("", log)],
+      axes: [axis(withUnit(logX ? "pressure" : "gap"), logX), axis("", log)],
       series: [
         {},
         ...theories.map((theory, k) => ({
@@ -136,7 +136,7 @@ function tickTexts(own, splits) {
 function draw(state, found) {
   drawn = found;
   const theories = found.curves.map(({ theory }) => theory);
-  const names = [state.against === "gap" ? "force" : "gap", "area", "stiffness", "conductance"];
+  const names = [state.against === "gap" ? "pressure" : "gap", "area", "stiffness", "conductance"];
   for (const [name, { chart, element }] of charts) {
     if (!names.includes(name)) {
       chart.destroy();
@@ -171,7 +171,7 @@ function draw(state, found) {
 function read(k) {
   cursor = k;
   const byGap = drawn.state.against === "gap",
-    names = QUANTITIES.filter((name) => name !== (byGap ? "gap" : "force"));
+    names = QUANTITIES.filter((name) => name !== (byGap ? "gap" : "pressure"));
   const cell = (kind, text, title) =>
     Object.assign(document.createElement(kind), { textContent: text, title: title ?? "" });
   const row = (...cells) => {
@@ -180,7 +180,7 @@ function read(k) {
     return made;
   };
   const head = row(
-    cell("th", `${byGap ? "u" : "p"} = ${shown(drawn.x[k], 5)} ${UNITS[byGap ? "gap" : "force"]}`),
+    cell("th", `${byGap ? "u" : "p"} = ${shown(drawn.x[k], 5)} ${UNITS[byGap ? "gap" : "pressure"]}`),
     ...names.map((name) => cell("th", withUnit(name))),
     cell("th", "valid"),
   );

@@ -1,10 +1,10 @@
-// Curves of a state: force, area, stiffness and conductance of each theory at common separations or pressures.
+// Curves of a state: pressure, area, stiffness and conductance of each theory at common separations or pressures.
 
 const GAPS = 100,
   PRESSURES = 100;
 const LIGHTEST = 1e-5,
   HEAVIEST = 1; // pressures drawn, over E* times the rms gradient
-const QUANTITIES = ["gap", "force", "area", "stiffness", "conductance"];
+const QUANTITIES = ["gap", "pressure", "area", "stiffness", "conductance"];
 const NAMES = { mbma: "MBMA", calibrated: "calibrated", persson: "Persson" };
 
 function curvesOf(state) {
@@ -37,7 +37,7 @@ function curvesOf(state) {
       }
       const { force, area, stiffness } = found,
         conductance = (state.k_s / state.E_star) * stiffness;
-      Object.entries({ gap: u, force, area, stiffness, conductance }).forEach(
+      Object.entries({ gap: u, pressure: force, area, stiffness, conductance }).forEach(
         ([name, number]) => (curve[name][k] = number),
       );
     });
