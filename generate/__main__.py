@@ -21,6 +21,7 @@ GROUPS = {
     "explorer": "generate.explorer",
     "formulas": "generate.formulas.commands",
     "grids": "generate.boundary_elements.grids",
+    "machined": "generate.machined.campaign",
     "measured_maps": "generate.boundary_elements.measured_maps",
     "tables": "generate.tables.commands",
     "wheels": "generate.wheels",

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 ROOT = pathlib.Path(__file__).parents[2]
 DATA = ROOT / "docs" / "data"
 PAGES = (
-    *("calibrated", "cost", "explorer", "export", "fidelity", "formula", "gallery", "leakage", "maps", "readme"),
-    *("stability", "tables", "ten_minutes", "theories", "yield"),
+    *("calibrated", "cost", "explorer", "export", "fidelity", "formula", "gallery", "leakage", "machined", "maps"),
+    *("readme", "stability", "tables", "ten_minutes", "theories", "yield"),
 )
 Measured = tuple[dict[str, str], dict[str, Any]]  # what `measure` returns: blocks and files
 MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)

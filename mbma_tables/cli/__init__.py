@@ -15,7 +15,8 @@ from typing import Any
 import click
 
 from mbma_tables import __version__
-from mbma_tables.cli import batch, commands, export, progress, scene, sensitivity, tables
+from mbma_tables.cli import batch, commands, export, scene, sensitivity, tables
+from mbma_tables.common import progress
 from mbma_tables.common.errors import MbmaError
 
 BAD_INPUT = 2

@@ -13,9 +13,9 @@ import click
 from mbma_tables.cli import options
 from mbma_tables.cli.commands import COLUMNS, contact_keywords
 from mbma_tables.cli.format import Report, shown_unit, to_columns
-from mbma_tables.cli.progress import doing
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file
+from mbma_tables.common.progress import doing
 from mbma_tables.scenes.specimen import MATERIAL, NUMBERS, Specimen, effective_modulus_of, from_name, from_numbers
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface

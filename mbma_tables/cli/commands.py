@@ -12,9 +12,9 @@ import numpy as np
 
 from mbma_tables.cli import options
 from mbma_tables.cli.format import SURFACE_NUMBERS, Report, report_answer, shown_unit, to_columns, to_json
-from mbma_tables.cli.progress import echo
 from mbma_tables.common.arguments import finite_array
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.progress import echo
 from mbma_tables.common.units import unit_of
 from mbma_tables.materials import hardness_in
 from mbma_tables.scenes.specimen import Specimen

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mbma_tables.cli import options
-from mbma_tables.cli.progress import echo
 from mbma_tables.common.arguments import nearest
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
+from mbma_tables.common.progress import echo
 from mbma_tables.export import CODE, DATA, FMUS, GRAPHS, LAWS, SOLVERS, SUBROUTINES
 from mbma_tables.scenes.specimen import Specimen
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from mbma_tables import __version__
 from mbma_tables.cli.options import Model, Output
-from mbma_tables.cli.progress import echo
 from mbma_tables.common.files import write_file
+from mbma_tables.common.progress import echo
 from mbma_tables.common.units import Units, unit_of
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.roughness import ASSUMED

@@ -25,7 +25,7 @@ from mbma_tables.scenes.specimen import (
 )
 from mbma_tables.surfaces.cases import CASES
 from mbma_tables.surfaces.variants import NAMED
-from mbma_tables.theories import THEORIES
+from mbma_tables.theories import OF_MAPS, THEORIES
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.any_surface import AnySurface
@@ -263,7 +263,7 @@ _MODEL_OPTIONS = (
 theory_option = _option(
     "theory",
     "Theory; only mbma has an island model, variant and rtol. Default: calibrated for a spectrum or a map, else mbma.",
-    type=click.Choice([*THEORIES]),
+    type=click.Choice([*THEORIES, *OF_MAPS]),
 )
 # of islands, which MBMA alone has
 model_options = _group("model", lambda given: Model(**given), *_MODEL_OPTIONS)

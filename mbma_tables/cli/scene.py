@@ -11,9 +11,9 @@ import click
 
 from mbma_tables.cli.format import Report, to_columns, to_json
 from mbma_tables.cli.options import check_plot, json_option, plot_option
-from mbma_tables.cli.progress import doing, echo
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file, written_bytes
+from mbma_tables.common.progress import doing, echo
 
 if TYPE_CHECKING:
     import xarray

@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from mbma_tables.cli.progress import echo
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.progress import echo
 
 
 def _path(name: str) -> Path:

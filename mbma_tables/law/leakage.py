@@ -17,6 +17,7 @@ from mbma_tables.law import block as at
 from mbma_tables.law import pieces as fit
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.labels import apply
+from mbma_tables.theories import OF_MAPS
 
 RTOL, SHARE = 1e-4, 0.1  # of the polynomials, or this share of the law's own error
 MOST_OCTAVES = 20  # of gaps, from the blocked one on, next to which the flow is a power
@@ -68,7 +69,18 @@ class LeakageLaw:
 
 
 def leakage_law(law: Any, surface: AnySurface) -> LeakageLaw:
-    """Leakage of a contact law's surface, as polynomials of the gap that begin where contact percolates."""
+    """Leakage of a contact law's surface, as polynomials of the gap that begin where contact percolates.
+
+    Raises
+    ------
+    InputError
+        For theories that press a map, whose leakage differs by axis.
+    """
+    if law.theory in OF_MAPS:
+        raise InputError(
+            f"a law holds the leakage of isotropic gaps alone; by theory {law.theory!r} contact(...).leakage has it "
+            "along both axes, .x and .y"
+        )
     threshold, h_rms = shipped_flow().constants.threshold, float(surface.h_rms)
     rtol = max(RTOL, SHARE * law.error)
     deepest = law.lowest if law.area_turning_point is None else law.area_turning_point

@@ -33,6 +33,7 @@ from mbma_tables.laws.calibrated import CONSTANTS, Constants, Law, Spectrum, are
 LARGEST_AREA = 0.3  # above it cells of one spectrum differ by factors
 BANDS = 64  # of a spectrum, graded towards both ends
 NODES, LOWEST_GAP, REACH = 80, 1e-6, 8.0  # quadrature in ln(h/s), from u1/s - 8 or 1e-6 to u1/s + 8
+NO_SLOPE = 1e-12  # share of the squared gradient that the last bands hold at least
 NO_COVER = 1e-13  # share of the surface between two magnifications
 NEAREST = 1e-4  # of A/A0 to the threshold
 LOADS = 4000  # between which the load of a contact fraction is interpolated
@@ -93,7 +94,8 @@ def _shares(spectrum: Spectrum) -> tuple[FloatArray, FloatArray, FloatArray]:
     band = np.clip(np.searchsorted(edges, log_x, side="right") - 1, 0, BANDS - 1)
     x, variance = spectrum.x, spectrum.variance
     parts = [np.bincount(band, v, BANDS).astype(float) for v in (variance, variance * x**2, variance * x)]
-    held = parts[0] > 0
+    # the last waves of a map may be rounding
+    held = (parts[0] > 0) & (np.cumsum(parts[1][::-1])[::-1] > NO_SLOPE * parts[1].sum())
     return parts[0][held], parts[1][held] / parts[1].sum(), parts[2][held]
 
 

@@ -263,12 +263,12 @@ def measured_map(treated: Treated, h_max: float | None) -> SpectralSurface:
         own,
         curves,
         bearing.radial_spectrum(values, sizes),
-        1 / (1 / bins.weight - SCATTER**2),
-        curves.anisotropy,
+        samples=1 / (1 / bins.weight - SCATTER**2),
+        anisotropy=curves.anisotropy,
     ).scaled(scale, treated.unit)
-    return dataclasses.replace(
-        known, provenance=treated.history(*notes, more="" if treated.periodic else ", mirrored for the curves")
-    )
+    more = "" if treated.periodic else ", mirrored for the curves"
+    kept = dataclasses.replace(treated, uncut=None)
+    return dataclasses.replace(known, map=kept, provenance=treated.history(*notes, more=more))
 
 
 def _with_anisotropy(

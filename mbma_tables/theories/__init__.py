@@ -47,6 +47,7 @@ _NAMED = {
     "greenwood_williamson": "GreenwoodWilliamson",
 }
 THEORIES = tuple(_NAMED)
+OF_MAPS = ("corrected", "simulated")  # theories of one map, made by pressing it
 
 
 def __getattr__(name: str) -> Any:
@@ -55,13 +56,16 @@ def __getattr__(name: str) -> Any:
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-def get_theory(theory: str | Theory | UserTheory) -> Theory:
+def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory:
     """A theory by name, or as an object: one of this package's, or any with a `name` and an `answer`.
+
+    "simulated" and "corrected" are theories of one `surface`, made from a map, which they press: `BoundaryElements.of`
+    and `Corrected.of` that surface, kept for the last eight of them.
 
     Raises
     ------
     InputError
-        For an unknown name, or an object that is no theory.
+        For an unknown name, an object that is no theory, and those of a map for a surface without one.
 
     Examples
     --------
@@ -71,11 +75,16 @@ def get_theory(theory: str | Theory | UserTheory) -> Theory:
     """
     from mbma_tables.theories.protocol import Theory, UserTheory, Wrapped
 
+    if isinstance(theory, str) and theory in OF_MAPS:
+        from mbma_tables.theories.corrected import of_map
+
+        return of_map(theory, surface)
     found: Any = __getattr__(_NAMED[theory])() if isinstance(theory, str) and theory in _NAMED else theory
     if isinstance(found, Theory):
         return found
     if isinstance(found, UserTheory) and not isinstance(found, type):
         return Wrapped(found)
     raise InputError(
-        f"theory must be one of {THEORIES} or an object with a name and answer(surface, u), got {reprlib.repr(theory)}"
+        f"theory must be one of {(*THEORIES, *OF_MAPS)} or an object with a name and answer(surface, u), "
+        f"got {reprlib.repr(theory)}"
     )

@@ -27,7 +27,7 @@ STRAIGHT, SAME = 1.0, 1e-9  # of ln F, over which one stiffness is no curve; dif
 NODE_STEP, FINE = 0.2, 8  # of a map's curve, in ln F and ln u: its own nodes are rougher; integrated by so many parts
 
 
-ENDS = ", where the map's tops and valleys leave no gap: solve the map itself, theories.BoundaryElements"
+ENDS = ", where the map's tops and valleys leave no gap: theory='simulated' presses the map itself"
 
 
 class Curve:
@@ -184,6 +184,11 @@ class OwnLaw:
     def area(self, pressure: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E*."""
         return (self.law if self.curve is None else self.curve).area(pressure / self.gradient)
+
+    def separations(self, force: FloatArray) -> FloatArray:
+        """Mean separations [length] of the bare law at forces over A0 E*, which may be below zero near full contact."""
+        known = self.law if self._known is None else self._known
+        return known.separation(force / self.gradient) * self.h_rms
 
     def mean_separation(self, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* or an area below 1; h_max at zero."""

@@ -239,4 +239,4 @@ def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None,
     given = ", ".join(name for name, value in options.items() if value != OPTIONS[name])
     if given:
         raise InputError(f"{given}: options of theory 'mbma' alone, asked for by its name")
-    return get_theory(named)
+    return get_theory(named, surface)

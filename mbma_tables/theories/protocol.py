@@ -134,6 +134,16 @@ class Theory(abc.ABC):
             return np.full(np.broadcast_shapes(np.shape(area), surface.shape), np.nan)
         return calibrated_table.shipped().standard_deviation(self.scatter_name(surface), quantity, area)
 
+    def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray | None:
+        """Flow conductance [length^3] along both axes, shape (2, ...), of gaps that it knows; None: it knows none."""
+        return None
+
+    def flow_trust(
+        self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
+    ) -> tuple[FloatArray, dict[str, Any]] | None:
+        """Standard deviation of ln of that flow, and reasons against it with their masks."""
+        return None
+
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], the integral of F/(A0 E*) from u to last contact."""
         from scipy.integrate import tanhsinh

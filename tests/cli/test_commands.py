@@ -416,7 +416,8 @@ def test_a_terminal_sees_that_work_goes_on():
 
     code = (
         "import sys, time, click\n"
-        "from mbma_tables.cli import main, progress\n"
+        "from mbma_tables.cli import main\n"
+        "from mbma_tables.common import progress\n"
         "progress.PATIENCE = 0.2\n"
         "@main.command('wait')\n"
         "def wait():\n"

@@ -311,3 +311,14 @@ def test_rates_of_named_arrays_keep_their_dimensions_and_units():
         plain.liquid("1e-3 Pa s", "0.1 MPa", width.assign_attrs(units="mm"))
     with pytest.raises(InputError, match="beside DataArrays, width"):
         named.liquid("1e-3 Pa s", "0.1 MPa", width.values[:2])
+
+
+def test_waves_of_a_map_that_are_rounding_alone_do_not_stop_it():
+    rough = Spectrum.self_affine(0.8, 30.0)
+    x, variance = (np.append(a, b) for a, b in ((rough.x, [35.0, 40.0]), (rough.variance, [1e-23, 3e-24])))
+    area = np.linspace(1e-3, 0.4, 20)
+    factors = [
+        leakage.contact_factor(one, area, shipped_flow().constants)
+        for one in (Spectrum.from_shares(x, variance), rough)
+    ]
+    np.testing.assert_allclose(factors[0], factors[1], atol=0.05)

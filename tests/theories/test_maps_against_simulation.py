@@ -102,7 +102,8 @@ def test_held_out_maps_that_are_stretched_or_not_gaussian():
         assert np.abs(by_force - 1).max() < 0.12, name
         if name.startswith("stretched"):
             assert np.abs(by_gap - 1).max() < 0.15, name
-        assert contact(surface, mean_separation=u, theory="calibrated").valid.all()
+            # others with a lay as strong are off by more
+            assert not contact(surface, mean_separation=u, theory="calibrated").valid.any()
         seen.add(name)
     assert len(seen) >= 18
 

@@ -30,18 +30,31 @@ def echo(text: object, nl: bool = True, err: bool = False) -> None:
 
 @contextlib.contextmanager
 def shown(what: str) -> Iterator[None]:
-    """Show on standard error, if that is a terminal, what is being done and for how long."""
-    _ended.clear()
+    """Show on standard error, if that is a terminal, what is being done and for how long.
+
+    Within another such call, only what is being done changes until its end.
+    """
+    outer = _state.get("running")
+    before = _state["doing"]
     doing(what)
+    if outer:
+        try:
+            yield
+        finally:
+            doing(before)
+        return
+    _ended.clear()
     if not sys.stderr.isatty():
         yield
         return
     thread = threading.Thread(target=_beat, args=(time.monotonic(),), daemon=True)
     _state.pop("shown", None)
+    _state["running"] = "yes"
     thread.start()
     try:
         yield
     finally:
+        _state.pop("running", None)
         _end()
         thread.join()
 

@@ -1,0 +1,1 @@
+"""Maps as machines make them, pressed flat by boundary elements: evidence for laws of a map."""

@@ -1,0 +1,109 @@
+"""`python -m generate machined`: press maps as machines make them, and gather truth and answers into one file."""
+
+from __future__ import annotations
+
+import datetime
+import functools
+import json
+import pathlib
+from collections.abc import Callable
+from typing import Any, cast
+
+import click
+import numpy as np
+import xarray as xr
+
+from generate.boundary_elements.collect import collect
+from generate.boundary_elements.design import Task
+from generate.boundary_elements.run import run
+from generate.boundary_elements.solve import simulate_to
+from generate.machined.makers import FAMILIES, Part
+from generate.machined.solve import answered, solved, surface_of
+from generate.provenance import source_digest, versions
+
+NUMBERS = 5  # parts of each family
+FORMS = ("calibrated", "corrected", "simulated")
+MODULES = ("generate.machined.makers", "generate.machined.solve", "mbma_tables.laws.boundary_elements")
+TARGET = pathlib.Path("docs/data/machined.nc")
+MEANINGS = {
+    "pressure": "F/(A0 E*)",
+    "area": "A/A0",
+    "mean_separation": "u, the mean gap",
+    "energy": "elastic energy over A0 E*",
+    "stiffness": "-dF/du over A0 E*, by a step of 3% of the pressure",
+    "flow_x": "flow conductance along the first axis; 0: blocked, NaN: not solved",
+    "flow_y": "flow conductance along the second axis",
+    "pressure_scatter": "stated standard deviation of ln F at equal u",
+    "area_scatter": "of ln A at equal F",
+    "stiffness_scatter": "of ln of the stiffness at equal F",
+    "flow_scatter": "of ln of the flow conductance",
+    "valid": "1 where the contact is stated to be like those tested",
+    "flow_valid": "1 where its flow is",
+}
+
+
+def parts() -> list[Part]:
+    """Every part, families in turn, so that stopping early leaves a balanced set."""
+    return [Part(family, number) for number in range(NUMBERS) for family in FAMILIES]
+
+
+def answers(part: Part, form: str, folder: pathlib.Path) -> dict[str, Any]:
+    """A theory's answers of a part that is solved."""
+    with np.load(folder / f"{part.name}.npz") as truth:
+        return answered(part, form, dict(truth))
+
+
+def gathered(folder: pathlib.Path) -> xr.Dataset:
+    """All parts that are solved and answered."""
+    have = [p for p in parts() if all((folder / form / f"{p.name}.npz").exists() for form in FORMS)]
+    data = xr.Dataset(coords={"surface": [part.name for part in have], "family": ("surface", [p.family for p in have])})
+    engine = ""
+    for prefix, place in (("", folder), *((f"{form}_", folder / form) for form in FORMS)):
+        read = [dict(np.load(place / f"{part.name}.npz")) for part in have]
+        engine = engine or str(read[0]["engine"])
+        for name in (name for name in MEANINGS if name in read[0]):
+            attributes = {"long_name": MEANINGS[name], "units": "1"}
+            data[prefix + name] = (("surface", "load"), np.array([one[name] for one in read]), attributes)
+    surfaces = [surface_of(part)[1] for part in have]
+    for name, values in {
+        "shortest": [part.shortest for part in have],
+        "h_rms": [float(one.h_rms) for one in surfaces],
+        "skewness": [one.skewness for one in surfaces],
+        "kurtosis": [one.kurtosis for one in surfaces],
+        "anisotropy": [one.bearing.anisotropy for one in surfaces],
+        "slope_kurtosis": [one.bearing.slope_kurtosis for one in surfaces],
+    }.items():
+        data[name] = ("surface", values)
+    data.attrs = {
+        "Conventions": "CF-1.11",
+        "title": "Maps of machined surfaces pressed flat by boundary elements, and what theories answer",
+        "institution": "mbma_tables contributors",
+        "source": f"{engine}, tolerance 1e-6; periodic, frictionless; flow by Reynolds' equation on the gaps",
+        "history": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d} python -m generate machined",
+        "comment": "Lengths in sampling steps, rms gradient 0.1. generate.machined.makers.heights makes the maps anew. "
+        f"Names with {' or '.join(FORMS)} in front are answers of these theories.",
+        "versions": json.dumps(versions()),
+        "code_sha256": source_digest(MODULES),
+    }
+    return data
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--folder", type=click.Path(path_type=pathlib.Path), default="machined", show_default=True)
+@click.option("--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
+@click.option("--out", type=click.Path(path_type=pathlib.Path), default=TARGET, show_default=True)
+def machined(folder: pathlib.Path, workers: int, out: pathlib.Path) -> None:
+    """Press maps of machined surfaces by boundary elements (Tamaas): half an hour on one core.
+
+    Stopped and called again, it goes on where it was. Answers of theories are kept in folders of their own: remove
+    these to ask a changed library again.
+    """
+    from generate.tables.commands import executor
+
+    tasks: list[Any] = [Task(cast(Any, part), "") for part in parts()]
+    solvers: dict[str, Callable[[Part], dict[str, Any]]] = {"": solved}
+    solvers |= {form: functools.partial(answers, form=form, folder=folder) for form in FORMS}
+    with executor(workers, None) as pool:
+        for form, solve in solvers.items():
+            run(tasks, folder / form, pool, functools.partial(simulate_to, solve=cast(Any, solve)))
+    click.echo(f"{out}: {collect(gathered(folder), out)} of {len(tasks)} surfaces")

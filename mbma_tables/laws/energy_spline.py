@@ -1,0 +1,122 @@
+"""Curves through loads at which one surface was simulated, with the elastic energy as a second source of information.
+
+Lengths in one unit, force and energy over A0 E*. Since dU = -F du, the integral of u over F between two loads is known
+exactly, ::
+
+    integral from F1 to F2 of u dF = G2 - G1,    G = U + F u
+
+so a cubic spline of u over ln F has a knot between each two loads, whose value follows from that. A/A0 = erf(F exp(s))
+with a natural cubic spline s of ln(erfinv(A)/F) over ln F. Where a spline is not monotone, as of few loads far apart,
+monotone cubics through the loads take its place.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.special import erf, erfinv
+
+from mbma_tables.common.arguments import FloatArray
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
+FINE = 64  # parts of an interval between loads: for inverses, and to see whether a spline is monotone
+HALVINGS = 60
+LARGEST_AREA = 1 - 1e-12
+
+
+class LoadCurve:
+    """Mean separation, area and energy between loads, by ln F; arguments are not checked.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (4, n)
+        F/(A0 E*), rising, A/A0, rising, u [length], falling, and U/(A0 E*) [length].
+    apart : int, optional
+        Interval (its first load) whose ends are of two grids, between which energies cannot be compared.
+    """
+
+    def __init__(self, rows: FloatArray, apart: int = -1) -> None:
+        force, area, mean_separation, energy = rows
+        self.x = np.log(force)
+        self.work = energy + force * mean_separation
+        fine = self.x[:-1, None] + np.diff(self.x)[:, None] * np.arange(FINE) / FINE
+        self._fine = np.append(fine, self.x[-1])
+        self.separation: Any = _constrained(self.x, mean_separation, np.diff(self.work), apart)
+        self._slope = self.separation.derivative()
+        if not (self._slope(self._fine) < 0).all():
+            self.separation = PchipInterpolator(self.x, mean_separation)
+            self._slope = self.separation.derivative()
+        self._fine_u = np.minimum.accumulate(self.separation(self._fine))
+        root = np.log(erfinv(np.minimum(area, LARGEST_AREA)))
+        self._root: Any = CubicSpline(self.x, root - self.x, bc_type="natural")
+        self._line = 1.0  # the spline is of what is left beside ln F
+        if not (self._root(self._fine, 1) > -1).all():
+            self._root, self._line = PchipInterpolator(self.x, root), 0.0
+
+    def stiffness(self, x: FloatArray) -> FloatArray:
+        """-dF/du at ln F; infinite where u does not change."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.exp(x) / -self._slope(x))
+
+    def area(self, x: FloatArray) -> FloatArray:
+        """A/A0 at ln F."""
+        return np.asarray(erf(np.exp(self._root(x) + self._line * x)))
+
+    def log_force(self, u: FloatArray) -> FloatArray:
+        """ln F at mean separations between those of the first and the last load."""
+        place = np.clip(np.searchsorted(-self._fine_u, -u) - 1, 0, self._fine.size - 2)
+        low, high = self._fine[place], self._fine[place + 1]
+        x = (low + high) / 2
+        for _ in range(HALVINGS):
+            over = self.separation(x) - u
+            low, high = np.where(over > 0, x, low), np.where(over > 0, high, x)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                step = x - over / self._slope(x)
+            step = np.where((step >= low) & (step <= high), step, (low + high) / 2)
+            if np.allclose(step, x, rtol=0, atol=1e-14 * np.abs(self.x).max()):
+                break
+            x = step
+        return np.asarray(x)
+
+    def log_force_at(self, area: FloatArray) -> FloatArray:
+        """ln F at A/A0 between those of the first and the last load."""
+        low, high = np.full(np.shape(area), self.x[0]), np.full(np.shape(area), self.x[-1])
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            more = self.area(middle) > area
+            low, high = np.where(more, low, middle), np.where(more, middle, high)
+        return np.asarray((low + high) / 2)
+
+    def energy(self, x: FloatArray) -> FloatArray:
+        """U/(A0 E*) at ln F."""
+        k = np.clip(np.searchsorted(self.x, x, side="right") - 1, 0, self.x.size - 2)
+        force, start, end = np.exp(x), np.exp(self.x[k]), np.exp(self.x[k + 1])
+        missed = np.diff(self.work)[k] - self._integral(self.x[k], self.x[k + 1])
+        work = self.work[k] + self._integral(self.x[k], x) + missed * (force - start) / (end - start)
+        return np.asarray(work - force * self.separation(x))
+
+    def _integral(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """Integral of u over F; the knot between two loads costs no accuracy that matters."""
+        half = (high - low)[..., None] / 2
+        t = low[..., None] + half * (1 + NODES)
+        return np.asarray((self.separation(t) * np.exp(t) * half) @ WEIGHTS)
+
+
+def _constrained(x: FloatArray, u: FloatArray, work: FloatArray, apart: int) -> CubicSpline:
+    """Cubic spline of u over ln F, not-a-knot, with the integrals of u over F between loads."""
+    free = np.delete(np.arange(x.size - 1), apart) if apart >= 0 else np.arange(x.size - 1)
+    middle = (x[1:] + x[:-1])[free] / 2
+    knots = np.sort(np.append(x, middle))
+    at, between = np.searchsorted(knots, x), np.searchsorted(knots, middle)
+    basis = CubicSpline(knots, np.eye(knots.size))
+    # each half of an interval is one polynomial
+    half = np.diff(knots)[:, None] / 2
+    t = knots[:-1, None] + half * (1 + NODES)
+    parts = np.einsum("ij,ijk->ik", np.exp(t) * half * WEIGHTS, basis(t))
+    sums = parts[at[free]] + parts[between]
+    values = np.zeros(knots.size)
+    values[at] = u
+    values[between] = np.linalg.solve(sums[:, between], work[free] - sums[:, at] @ u)
+    return CubicSpline(knots, values)

@@ -1,0 +1,141 @@
+"""One map pressed at a list of loads by boundary elements, on a coarser grid where that resolves its contacts.
+
+Grids of eight or more sampling steps along the shortest wavelength are halved for the heavier loads. Flow is solved on
+gaps of the full grid: displacements of a coarser one are smooth, the heights are not, so the former are interpolated.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.progress import doing, shown
+from mbma_tables.laws.boundary_elements import Contact
+from mbma_tables.laws.reynolds import flow_conductance
+
+MIN_POINTS = 4.0  # sampling steps a wave, below which areas of boundary elements are too large
+HALVED = 8.0  # sampling steps a wave, from which on heavier loads are pressed on half of the grid
+LIGHT = 0.06  # contact from which on that is so
+TOLERANCE = 1e-3
+LOWEST, HIGHEST = 1e-3, 0.9  # A/A0 that the loads reach at least
+MORE, LIGHTER, HEAVIER = 6, 0.5, 1.2  # loads added for that, at most, and their factors
+ROUNDING = 1e-6
+QUANTITIES = ("area", "mean_separation", "energy")
+
+
+def coarser(values: FloatArray, points: float = 0.0) -> FloatArray:
+    """A periodic map on every second sampling step along each axis, by its waves of at least `points` of these."""
+    from scipy.signal import resample
+
+    if points:
+        q2 = np.add.outer(*(np.fft.fftfreq(count) ** 2 for count in values.shape))
+        values = np.fft.ifft2(np.where(q2 <= (0.5 / points) ** 2 * (1 + ROUNDING), np.fft.fft2(values), 0)).real
+    for axis, count in enumerate(values.shape):
+        values = resample(values, count // 2, axis=axis)
+    return np.asarray(values)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Pressed:
+    """A periodic map at some loads; lengths of the map.
+
+    Attributes
+    ----------
+    rows : ndarray, shape (4, n)
+        F/(A0 E*), A/A0, u and U/(A0 E*).
+    coarse_from : int
+        First load on half of the grid; n if there is none.
+    """
+
+    heights: FloatArray
+    sizes: tuple[float, float]
+    rows: FloatArray
+    coarse_from: int
+    gaps: tuple[FloatArray, ...]
+    cut: float = 0.0  # sampling steps of the coarse grid along its shortest waves, where shorter ones were left out
+
+    def flow(self) -> FloatArray:
+        """Flow conductance along both axes [length^3], shape (n, 2); 0 where blocked."""
+        found = np.zeros((len(self.gaps), 2))
+        with shown("flow through the gaps"):
+            for k in range(len(self.gaps)):
+                doing(f"flow through the gaps, load {k + 1} of {len(self.gaps)}")
+                found[k] = flow_conductance(self.gap(k), self.sizes)
+                # once blocked both ways, heavier loads are
+                if not found[k].any():
+                    break
+        return found
+
+    def gap(self, k: int) -> FloatArray:
+        """Gaps [length] on the full grid, of mean u."""
+        from scipy.signal import resample
+
+        gap = self.gaps[k].astype(float)
+        if gap.shape == self.heights.shape:
+            return gap
+        moved = gap + coarser(self.heights, self.cut)
+        for axis, count in enumerate(self.heights.shape):
+            moved = resample(moved, count, axis=axis)
+        gap = moved - self.heights
+        # the level at which what is cut at zero has the mean gap
+        ordered = np.sort(gap, axis=None)
+        below = np.cumsum(ordered[::-1])[::-1] - ordered * np.arange(gap.size, 0, -1)
+        level = np.interp(-self.rows[2, k] * gap.size, -below, ordered)
+        return np.asarray(np.maximum(gap - level, 0.0))
+
+
+def press(
+    heights: FloatArray,
+    sizes: tuple[float, float],
+    loads: FloatArray,
+    points: float,
+    area: Any = None,
+    tolerance: float = TOLERANCE,
+) -> Pressed:
+    """Press a periodic map; `loads` over A0 E*, `points` along its shortest wave.
+
+    Where its approximate `area` at a load is known, heavier loads are pressed on half of the grid, and loads are added
+    until contacts from `LOWEST` to `HIGHEST` are covered.
+    """
+    # of rms gradient one, heights of order one
+    scale = float(np.abs(heights).max())
+    gradient = _gradient(heights, sizes)
+    stretched = sizes[0] * gradient / scale, sizes[1] * gradient / scale
+    halved = area is not None and points >= HALVED * (1 - ROUNDING)
+    engines: dict[bool, Contact] = {}
+    found: dict[float, tuple[bool, dict[str, float], FloatArray]] = {}
+
+    def add(load: float, coarse: bool, told: str) -> float:
+        doing(f"boundary elements, {told}")
+        if coarse not in engines:
+            values = coarser(heights) if coarse else heights
+            engines[coarse] = Contact(values / scale, stretched, tolerance)
+        result = engines[coarse].press(load / gradient)
+        found[load] = coarse, result, engines[coarse].gap.astype(np.float32)
+        return result["area"]
+
+    with shown("boundary elements"):
+        for number, load in enumerate(map(float, loads)):
+            add(load, halved and float(area(np.array(load))) > LIGHT, f"load {number + 1} of {len(loads)}")
+        for _ in range(MORE if area is not None else 0):
+            low, high = min(found), max(found)
+            if found[low][1]["area"] > LOWEST:
+                add(low * LIGHTER, False, "one more load")
+            if found[high][1]["area"] < HIGHEST:
+                add(high * HEAVIER, halved, "one more load")
+    order = sorted(found)
+    rows = np.array([[load, *(found[load][1][name] for name in QUANTITIES)] for load in order]).T
+    rows[2:] *= np.array([[scale], [gradient * scale]])
+    fine = sum(not found[load][0] for load in order)
+    gaps = tuple(found[load][2] * np.float32(scale) for load in order)
+    return Pressed(heights, sizes, rows, fine, gaps)
+
+
+def _gradient(heights: FloatArray, sizes: tuple[float, float]) -> float:
+    """Its rms gradient."""
+    waves = [2 * np.pi * np.fft.fftfreq(count, side / count) for count, side in zip(heights.shape, sizes, strict=True)]
+    power = np.abs(np.fft.fft2(heights) / heights.size) ** 2
+    return float(np.sqrt(np.sum(power * np.add.outer(waves[0] ** 2, waves[1] ** 2))))

@@ -1,0 +1,109 @@
+"""Maps of machined surfaces: their makers, what the file holds, and how near answers on them are."""
+
+import dataclasses
+import pathlib
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from generate.machined import campaign
+from generate.machined.makers import FAMILIES, GRADIENT, Part, heights
+from generate.machined.solve import STEP, solved, surface_of
+from generate.pages import machined as page
+from mbma_tables.laws.map_curves import MapLaw, PlateauConstants
+
+FILE = pathlib.Path("docs/data/machined.nc")
+
+
+@pytest.fixture(scope="module")
+def data():
+    with xr.open_dataset(FILE) as opened:
+        return opened.load()
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_map_is_periodic_within_its_band_and_made_anew(family):
+    part = Part(family, 2, 64)
+    values = heights(part)
+    np.testing.assert_array_equal(values, heights(part))
+    assert not np.array_equal(values, heights(Part(family, 1, 64)))
+    q = 2 * np.pi * np.fft.fftfreq(64)
+    q = np.hypot(q[:, None], q)
+    power = np.abs(np.fft.fft2(values) / values.size) ** 2
+    assert power[q > 2 * np.pi / part.shortest * 1.001].max() < 1e-20 * power.max()
+    assert np.sum(power * q**2) == pytest.approx(GRADIENT**2)
+    assert abs(values.mean()) < 1e-12
+
+
+def test_truth_of_a_part(tmp_path):
+    pytest.importorskip("tamaas")
+    found = solved(Part("gaussian", 2, 64))
+    assert (np.diff(found["area"]) > 0).all()
+    # the stiffness is the slope of u, and flow falls
+    slope = np.diff(np.log(found["pressure"])) / -np.diff(found["mean_separation"])
+    middle = found["stiffness"] / found["pressure"]
+    # a map of few waves, whose stiffness has steps at light contact
+    assert ((slope > 0.6 * middle[:-1]) & (slope < 1.2 * middle[1:])).all()
+    assert (np.diff(found["flow_x"][:4]) <= 0).all()
+    assert STEP > 1
+
+
+def test_the_file_is_of_these_makers(data):
+    assert data.sizes["surface"] >= 60
+    assert set(data.family.values) == set(FAMILIES)
+    for name in ("honed_1_n256", "eroded_2_n256"):
+        family, number, _ = name.split("_")
+        values = heights(Part(family, int(number)))
+        assert float(data.h_rms.sel(surface=name)) == pytest.approx(values.std(), rel=1e-6)
+    assert {part.name for part in campaign.parts()} >= set(data.surface.values)
+
+
+@pytest.mark.parametrize(("quantity", "bar"), [("area", 0.03), ("pressure", 0.02), ("stiffness", 0.05)])
+def test_a_pressed_map_is_as_near_to_the_full_grid_as_asked(data, quantity, bar):
+    found = page.errors(data, "simulated", quantity)
+    kept = page.seen(data, "simulated", quantity)
+    for family in FAMILIES:
+        own = kept & (data.family.values == family)[:, None, None]
+        # lattices of dimples touch along rings, one after the other
+        allowed = 2 * bar if (family, quantity) == ("dimpled", "area") else bar
+        assert np.quantile(np.abs(found[own]), 0.9) < allowed, family
+
+
+@pytest.mark.parametrize("form", campaign.FORMS)
+@pytest.mark.parametrize("quantity", page.QUANTITIES)
+def test_where_valid_the_scatter_covers_the_errors(data, form, quantity):
+    once, twice, number = page.coverage(data, form, quantity, valid=True)
+    assert number > 30
+    assert 0.6 < once < 0.95
+    assert twice > 0.92
+
+
+def test_the_quick_law_is_wrong_where_it_is_not_valid(data):
+    for quantity in ("area", "pressure", "stiffness"):
+        error, kept = np.abs(page.errors(data, "calibrated", quantity)), page.seen(data, "calibrated", quantity)
+        valid = data.calibrated_valid.values[..., None] > 0.5
+        assert np.median(error[kept & ~valid]) > np.median(error[kept & valid])
+        once, twice, _ = page.coverage(data, "calibrated", quantity, valid=False)
+        assert once > 0.6
+        assert twice > 0.88
+
+
+def test_plateaus_are_nearer_by_the_constants_that_were_fitted_to_them(data):
+    missed = {shift: [] for shift in (0.0, PlateauConstants().shift)}
+    names = [name for name in data.surface.values if name.startswith(("honed", "worn", "gaussian"))]
+    for name in names:
+        one = data.sel(surface=name)
+        family, number, _ = name.split("_")
+        own = surface_of(Part(family, int(number)))[1]
+        law = MapLaw.from_curves(own.bearing, own.bands)
+        for shift, found in missed.items():
+            other = dataclasses.replace(law, plateau_constants=PlateauConstants(shift))
+            u = other.separation(one.pressure.values / own.bearing.gradient) * own.bearing.h_rms
+            found.append((u - one.mean_separation.values) * one.stiffness.values / one.pressure.values)
+    before, after = (np.sqrt(np.mean(np.square(found), axis=1)) for found in missed.values())
+    for family in ("honed", "worn"):
+        chosen = [name.startswith(family) for name in names]
+        assert np.sqrt(np.mean(after[chosen] ** 2)) < 0.8 * np.sqrt(np.mean(before[chosen] ** 2))
+    plain = [name.startswith("gaussian") for name in names]
+    np.testing.assert_allclose(after[plain], before[plain], rtol=0.02)
