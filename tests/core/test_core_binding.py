@@ -113,4 +113,4 @@ for name, ask in requests.items():
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_control_c_ends_long_requests_within_a_second():
-    assert run(["-c", LONG]) == ""
+    assert run(["-c", LONG], timeout=600) == ""
