@@ -238,7 +238,7 @@ def theory_rows() -> Iterator[Row]:
         for what, cost in {"gap": gap - fixed, "invert": inverse - fixed, "energy": energy - gap}.items():
             yield Row(name, what, "both", None, max(cost, 1e-9) / u.size)
         for rtol in THEORY_LAW_RTOLS:
-            cost, _ = measure(functools.partial(contact_law, SURFACES[3], rtol, theory=name))
+            cost, _ = measure(functools.partial(contact_law, SURFACES[3], name, rtol=rtol))
             yield Row(name, at("law", rtol), "both", None, cost)
 
 
