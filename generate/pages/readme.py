@@ -20,7 +20,7 @@ ROWS = {
     ("calibrated", "law"): '`"calibrated"`: fitted to boundary-element (BEM) simulations',
     ("calibrated, map", "map of 256 x 256"): '`"calibrated"`, from a measured map',
     ("Persson", "law"): '`"persson"`: no fitted constants',
-    ("MBMA reported", "law"): '`"mbma"`, the default: the paper\'s model',
+    ("MBMA reported", "law"): '`"mbma"`: the paper\'s model',
     ("boundary elements", "256 x 256, cold"): "for comparison: BEM on 256 x 256 points",
 }
 

@@ -92,17 +92,17 @@ def press(
     sizes: tuple[float, float],
     loads: FloatArray,
     points: float,
+    gradient: float,
     area: Any = None,
     tolerance: float = TOLERANCE,
 ) -> Pressed:
-    """Press a periodic map; `loads` over A0 E*, `points` along its shortest wave.
+    """Press a periodic map; `loads` over A0 E*, `points` along its shortest wave, about its rms gradient.
 
     Where its approximate `area` at a load is known, heavier loads are pressed on half of the grid, and loads are added
     until contacts from `LOWEST` to `HIGHEST` are covered.
     """
     # of rms gradient one, heights of order one
     scale = float(np.abs(heights).max())
-    gradient = _gradient(heights, sizes)
     stretched = sizes[0] * gradient / scale, sizes[1] * gradient / scale
     halved = area is not None and points >= HALVED * (1 - ROUNDING)
     engines: dict[bool, Contact] = {}
@@ -132,10 +132,3 @@ def press(
     fine = sum(not found[load][0] for load in order)
     gaps = tuple(found[load][2] * np.float32(scale) for load in order)
     return Pressed(heights, sizes, rows, fine, gaps)
-
-
-def _gradient(heights: FloatArray, sizes: tuple[float, float]) -> float:
-    """Its rms gradient."""
-    waves = [2 * np.pi * np.fft.fftfreq(count, side / count) for count, side in zip(heights.shape, sizes, strict=True)]
-    power = np.abs(np.fft.fft2(heights) / heights.size) ** 2
-    return float(np.sqrt(np.sum(power * np.add.outer(waves[0] ** 2, waves[1] ** 2))))

@@ -298,7 +298,7 @@ class _Planner:
         from mbma_tables.theories import get_theory
 
         surface = self.problem.surface
-        return float(get_theory(self.problem.theory).answer(surface, 0.5 * surface.h_max).error)
+        return float(get_theory(self.problem.theory, surface).answer(surface, 0.5 * surface.h_max).error)
 
     def seconds_of_slopes(self) -> float:
         """Of totals with derivatives, which cost about four times those without."""

@@ -13,7 +13,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, in_unit, known, modulus_and_units
 from mbma_tables.materials import hardness_in
 from mbma_tables.surfaces.variants import get_variant
-from mbma_tables.theories import THEORIES, get_theory, theory_name
+from mbma_tables.theories import OF_MAPS, THEORIES, get_theory, theory_name
 
 if TYPE_CHECKING:
     from mbma_tables.models import AnyModel
@@ -251,8 +251,8 @@ class Problem:
 
     def _check_theory(self) -> None:
         """What is MBMA's alone is refused beside other theories."""
-        if isinstance(self.theory, str) and self.theory not in THEORIES:
-            raise InputError(f"no theory is named {self.theory!r}; {nearest(self.theory, THEORIES)}")
+        if isinstance(self.theory, str) and self.theory not in (*THEORIES, *OF_MAPS):
+            raise InputError(f"no theory is named {self.theory!r}; {nearest(self.theory, (*THEORIES, *OF_MAPS))}")
         if not isinstance(self.theory, str):
             get_theory(self.theory)
         for name in self.theories:

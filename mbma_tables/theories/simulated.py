@@ -151,13 +151,14 @@ class BoundaryElements(Theory):
         assert isinstance(surface, MeasuredSurface)
         assert surface.bearing is not None
         values, sizes = continued(whole)
-        points = 2 * np.pi / float(surface.q1) / max(whole.steps)
+        points, gradient = 2 * np.pi / float(surface.q1) / max(whole.steps), surface.bearing.gradient
         if loads is None:
-            found = press(values, sizes, law_loads(surface, AREAS), points, own_law(surface).area, tolerance)
+            wanted, law_area = law_loads(surface, AREAS), own_law(surface).area
         else:
-            wanted = finite_array("loads", loads)
-            require("loads", wanted, (wanted > 0) & (np.diff(wanted, prepend=0) > 0), "positive and rising")
-            found = press(values, sizes, surface.bearing.gradient * wanted, points, None, tolerance)
+            given = finite_array("loads", loads)
+            require("loads", given, (given > 0) & (np.diff(given, prepend=0) > 0), "positive and rising")
+            wanted, law_area = gradient * given, None
+        found = press(values, sizes, wanted, points, gradient, law_area, tolerance)
         pressure, area, u, energy = found.rows
         return cls(surface, pressure, area, u, energy, points, whole.heights.size, found, loads is None)
 

@@ -435,6 +435,28 @@ def test_a_terminal_sees_that_work_goes_on():
     assert said.endswith(b"\r\x1b[K")
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals")
+def test_within_a_command_what_takes_long_is_named():
+    import pty
+
+    code = (
+        "import time\n"
+        "from mbma_tables.common import progress\n"
+        "progress.PATIENCE = 0.2\n"
+        "with progress.shown('outside'):\n"
+        "    with progress.shown('inside'):\n"
+        "        time.sleep(0.8)\n"
+        "    time.sleep(0.8)\n"
+    )
+    ours, theirs = pty.openpty()
+    subprocess.run([sys.executable, "-c", code], stderr=theirs, check=True)
+    os.close(theirs)
+    said = os.read(ours, 10_000)
+    os.close(ours)
+    assert 0 < said.index(b"mbma: inside, 0 s") < said.index(b"mbma: outside, 1 s")
+    assert said.endswith(b"\r\x1b[K")
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 @pytest.mark.parametrize("module", ["click", "mbma_tables.islands.greenwood_tripp"])
 def test_control_c_ends_it_with_130(folder, module):

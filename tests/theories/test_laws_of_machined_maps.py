@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from generate.machined.makers import Part, heights
-from mbma_tables import Surface, contact
+from mbma_tables import Scene, Surface, contact
 from mbma_tables.laws.boundary_elements import Contact
 from mbma_tables.theories.corrected import of_map
 from mbma_tables.theories.simulated import law_loads
@@ -74,3 +74,12 @@ class TestCorrected:
         work = np.sum((found.pressure[1:] + found.pressure[:-1]) / 2 * np.diff(u))
         assert work == pytest.approx(np.ptp(theory.rows[3]), rel=0.02)
         assert contact(surface, area=0.1, theory="corrected").leakage.x > 0
+
+
+def test_a_scene_presses_the_map():
+    surface = Surface.from_map(heights(Part("honed", 1, 64)), 1.0, periodic=True, unit="um")
+    scene = Scene(surface, pressures=[0.01, 0.02], effects=["pressure", "area"], theory="simulated", rtol=0.1)
+    found = scene.run()
+    direct = contact(surface, pressure=[0.01, 0.02], theory="simulated")
+    np.testing.assert_allclose(found.area, direct.area)
+    assert found.attrs["theory"] == "simulated"
