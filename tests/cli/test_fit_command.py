@@ -47,7 +47,7 @@ def test_it_tells_what_was_found_and_done(map_file, tmp_path):
 def test_it_says_what_is_left_out():
     found = json.loads(run("fit", "docs/data/maps/top-1.top", "--short-cutoff", "9.4nm", "--json"))
     assert found["columns"]["area"] == pytest.approx([0.002, 0.01, 0.03, 0.1])
-    assert any(note.startswith("contact of 0.3, 0.6 left out: area must be at most 0.11") for note in found["notes"])
+    assert any(note.startswith("contact of 0.3, 0.6 left out: area must be at most 0.1062") for note in found["notes"])
 
 
 def test_a_line_scan(line_file):
