@@ -32,7 +32,8 @@ from mbma_tables.models import QUANTITIES, AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.labels import apply_to_surface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories.mbma import Mbma, chosen_theory
+from mbma_tables.theories import chosen_theory
+from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 KNOWN = ("separation", "mean_separation", "pressure", "area")  # what a contact may be asked by

@@ -25,9 +25,9 @@ from mbma_tables.surfaces.resolution import extrapolated
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import Variant
+from mbma_tables.theories import chosen_theory
 from mbma_tables.theories.calibrated import Calibrated
 from mbma_tables.theories.differences import differences
-from mbma_tables.theories.mbma import chosen_theory
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 STEP = 0.02  # of the logarithm of a parameter

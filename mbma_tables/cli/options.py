@@ -54,7 +54,7 @@ class Model:
 
     def of(self, surface: AnySurface) -> Model:
         """The same with a theory by name."""
-        from mbma_tables.theories.mbma import theory_name
+        from mbma_tables.theories import theory_name
 
         own = {name: getattr(self, name) for name in ("island_model", "variant", "rtol")}
         return dataclasses.replace(self, theory=theory_name(surface, self.theory, **own))

@@ -19,7 +19,8 @@ from mbma_tables.law.make import contact_law
 from mbma_tables.materials import ELASTIC_PSI, hardness_in
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories.mbma import Mbma, chosen_theory
+from mbma_tables.theories import chosen_theory
+from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 
 LAW_RTOL = 1e-8

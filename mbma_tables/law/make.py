@@ -26,7 +26,8 @@ from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.surfaces.variants import Variant
-from mbma_tables.theories.mbma import Mbma, chosen_theory
+from mbma_tables.theories import chosen_theory
+from mbma_tables.theories.mbma import Mbma
 from mbma_tables.theories.protocol import Theory, UserTheory
 from mbma_tables.totals.island_sum import Pairs, totals_of
 from mbma_tables.totals.profile import profile, source_of

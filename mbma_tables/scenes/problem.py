@@ -13,8 +13,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, in_unit, known, modulus_and_units
 from mbma_tables.materials import hardness_in
 from mbma_tables.surfaces.variants import get_variant
-from mbma_tables.theories import OF_MAPS, THEORIES, get_theory
-from mbma_tables.theories.mbma import theory_name
+from mbma_tables.theories import OF_MAPS, THEORIES, get_theory, theory_name
 
 if TYPE_CHECKING:
     from mbma_tables.models import AnyModel

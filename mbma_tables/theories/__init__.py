@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mbma_tables.common.errors import InputError
 
 if TYPE_CHECKING:
+    from mbma_tables.surfaces.any_surface import AnySurface
     from mbma_tables.theories.calibrated import Calibrated
     from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
     from mbma_tables.theories.mbma import Mbma
@@ -27,7 +28,9 @@ __all__ = [
     "Theory",
     "TheoryAnswer",
     "UserTheory",
+    "chosen_theory",
     "get_theory",
+    "theory_name",
 ]
 
 # a theory's module is imported when it is first asked for
@@ -48,6 +51,13 @@ _NAMED = {
 }
 THEORIES = tuple(_NAMED)
 OF_MAPS = ("corrected", "simulated")  # theories of one map, made by pressing it
+OPTIONS = {
+    "island_model": "universal",
+    "variant": "reported",
+    "rtol": 1e-8,
+    "outside": "raise",
+    "workers": 1,
+}  # of MBMA
 
 
 def __getattr__(name: str) -> Any:
@@ -88,3 +98,26 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
         f"theory must be one of {(*THEORIES, *OF_MAPS)} or an object with a name and answer(surface, u), "
         f"got {reprlib.repr(theory)}"
     )
+
+
+def theory_name(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Any:
+    """The theory as asked; without one "calibrated" for a measured surface, and "mbma" for others or its options."""
+    from mbma_tables.surfaces.surface import Surface
+
+    if theory is not None:
+        return theory
+    asked = any(value != OPTIONS[name] for name, value in options.items())
+    return "mbma" if isinstance(surface, Surface) or asked else "calibrated"
+
+
+def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Theory:
+    """The theory asked for, with MBMA's `options`, which others refuse."""
+    named = theory_name(surface, theory, **options)
+    if isinstance(named, str) and named == "mbma":
+        from mbma_tables.theories.mbma import Mbma
+
+        return Mbma(**options)
+    given = ", ".join(name for name, value in options.items() if value != OPTIONS[name])
+    if given:
+        raise InputError(f"{given}: options of theory 'mbma' alone, asked for by its name")
+    return get_theory(named, surface)

@@ -11,15 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import FloatArray, whole_number_in
-from mbma_tables.common.errors import InputError
 from mbma_tables.models import BOTH, ISLAND_MODELS, QUANTITIES, AnyModel, check_outside, island_model_name
 from mbma_tables.models.named import get_model
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import NAMED, Variant, get_variant
-from mbma_tables.theories import get_theory
 from mbma_tables.theories.differences import differences
-from mbma_tables.theories.protocol import FEW_LOOKS, SCAN, Theory, TheoryAnswer, UserTheory, select
+from mbma_tables.theories.protocol import FEW_LOOKS, SCAN, Theory, TheoryAnswer, select
 from mbma_tables.totals.contact import Totals, totals_at
 from mbma_tables.totals.island_sum import QUADRATURE_SHARE, kinks
 from mbma_tables.totals.profile import profile
@@ -218,25 +216,3 @@ def _highest(value: Callable[[FloatArray], FloatArray], low: FloatArray, high: F
         fresh = value(np.where(below, inner, outer))
         at_inner, at_outer = np.where(below, fresh, at_kept), np.where(below, at_kept, fresh)
     return (low + high) / 2
-
-
-OPTIONS = {"island_model": "universal", "variant": "reported", "rtol": 1e-8, "outside": "raise", "workers": 1}
-
-
-def theory_name(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Any:
-    """The theory as asked; without one "calibrated" for a measured surface, and "mbma" for others or its options."""
-    if theory is not None:
-        return theory
-    asked = any(value != OPTIONS[name] for name, value in options.items())
-    return "mbma" if isinstance(surface, Surface) or asked else "calibrated"
-
-
-def chosen_theory(surface: AnySurface, theory: str | Theory | UserTheory | None, **options: Any) -> Theory:
-    """The theory asked for, with MBMA's `options`, which others refuse."""
-    named = theory_name(surface, theory, **options)
-    if isinstance(named, str) and named == Mbma.name:
-        return Mbma(**options)
-    given = ", ".join(name for name, value in options.items() if value != OPTIONS[name])
-    if given:
-        raise InputError(f"{given}: options of theory 'mbma' alone, asked for by its name")
-    return get_theory(named, surface)
