@@ -136,7 +136,7 @@ class TestRates:
         assert found.liquid("1e-3 Pa s", "0.1 MPa", "2 mm") == pytest.approx(plain, rel=1e-12)
         assert found.liquid(1e-9, 0.1, 2000.0) == pytest.approx(plain, rel=1e-12)
         assert found.units == {"K": "um^3", "hydraulic_aperture": "um"}
-    assert found.hydraulic_aperture**3 == pytest.approx(found.K)
+        assert found.hydraulic_aperture**3 == pytest.approx(found.K)
 
     def test_gas_tends_to_the_liquid_and_slips(self):
         found = contact(SEAL, area=[0.05, 0.2], E_star="10 MPa", theory="calibrated").leakage
