@@ -15,7 +15,7 @@ from mbma_tables.core import core
 from mbma_tables.islands.four_numbers import band_fields, from_axes, to_axes
 from mbma_tables.law.block import CENTRE, RATE
 from mbma_tables.models import answer_islands
-from mbma_tables.models.closed_form_functions import RANGES
+from mbma_tables.models.closed_form_certificates import RANGES
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.island4d import RAW
 from mbma_tables.models.tables import open_table, universal_model
