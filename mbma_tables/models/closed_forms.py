@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, answered, broadcast_shape, finite_array, positive_modulus, require
+from mbma_tables.common.arguments import FloatArray, answered, broadcast_shape, finite_array, positive_array, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.core import core
 from mbma_tables.models import BOTH, IslandAnswer
@@ -118,7 +118,7 @@ def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1
     >>> error < 0.1
     True
     """
-    gap, modulus = finite_array("separation", separation), positive_modulus(E_star)
+    gap, modulus = finite_array("separation", separation), positive_array("E_star", E_star)
     shape = broadcast_shape(separation=gap, surface=surface.h_rms, E_star=modulus)
     fields = {
         "d_over_h_rms": gap / surface.h_rms,
