@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.common.arguments import FloatArray, number_in
+from mbma_tables.common.arguments import FloatArray, number_in, require_flag
 from mbma_tables.common.errors import InputError, NotSelfAffineError
 from mbma_tables.common.units import Units, factor, known, resolve
 from mbma_tables.laws import bearing_curve as bearing
@@ -84,8 +84,7 @@ def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2
     """A map or line scan, treated, with options of `Surface.from_map`; without `dimensions` a file decides which."""
     given = {name: value for name, value in options.items() if value is not None}
     for name in given.keys() & {"periodic", "reliable"}:
-        if not isinstance(given[name], bool | np.bool_):
-            raise InputError(f"{name} must be True or False, got {given[name]!r}")
+        require_flag(name, given[name])
     lengths, unit = resolve({name: given.pop(name) for name in ("dx", "dy") if name in given}, given.pop("unit", None))
     channel, periodic = given.pop("channel", None), given.pop("periodic", None)
     if isinstance(source, str | os.PathLike):
