@@ -1,6 +1,9 @@
 """``python -m mbma_tables`` is the command line `mbma`."""
 
+import os
 import sys
+
+INTERRUPTED = 130  # as shells report Ctrl-C
 
 
 def main() -> None:
@@ -9,8 +12,13 @@ def main() -> None:
         from mbma_tables.cli import main
 
         main(prog_name="mbma")
-    except KeyboardInterrupt:
-        sys.exit(130)
+    except (KeyboardInterrupt, SystemExit) as end:
+        if isinstance(end, SystemExit) and end.code != INTERRUPTED:
+            raise
+        # Python would end by the signal instead where it fell into code that `exec` ran, such as a dataclass
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+        os._exit(INTERRUPTED)
 
 
 if __name__ == "__main__":

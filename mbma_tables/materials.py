@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import broadcast_shape, finite_array, one_number, require
+from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, one_number, positive_array, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.common.units import Units, resolve
@@ -32,6 +32,13 @@ TEMPERS = ("soft", "hard")
 HRC = (20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0, 60.0, 65.0, 68.0)
 HV_OF_HRC = (238.0, 266.0, 302.0, 345.0, 392.0, 446.0, 513.0, 595.0, 697.0, 832.0, 940.0)
 _SCALE = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(HV|HRC)\s*")
+
+
+def _poisson(name: str, value: ArrayLike) -> FloatArray:
+    """Poisson's ratios."""
+    ratio = finite_array(name, value)
+    require(name, ratio, (ratio > -1) & (ratio <= 0.5), "in (-1, 0.5]")
+    return ratio
 
 
 def effective_modulus(E1: ArrayLike | str, nu1: ArrayLike, E2: ArrayLike | str, nu2: ArrayLike) -> Any:
@@ -66,13 +73,10 @@ def effective_modulus(E1: ArrayLike | str, nu1: ArrayLike, E2: ArrayLike | str, 
     '40.0 GPa'
     """
     plain, unit = resolve({"E1": E1, "nu1": nu1, "E2": E2, "nu2": nu2}, kind="stress")
-    given = {name: finite_array(name, value) for name, value in plain.items()}
-    for name in ("E1", "E2"):
-        require(name, given[name], given[name] > 0, "positive")
-    for name in ("nu1", "nu2"):
-        require(name, given[name], (given[name] > -1) & (given[name] <= 0.5), "in (-1, 0.5]")
-    broadcast_shape(**given)
-    a, b = ((1 - nu) * (1 + nu) / E for nu, E in ((given["nu1"], given["E1"]), (given["nu2"], given["E2"])))
+    moduli = [positive_array(name, plain[name]) for name in ("E1", "E2")]
+    ratios = [_poisson(name, plain[name]) for name in ("nu1", "nu2")]
+    broadcast_shape(E1=moduli[0], nu1=ratios[0], E2=moduli[1], nu2=ratios[1])
+    a, b = ((1 - nu) * (1 + nu) / E for nu, E in zip(ratios, moduli, strict=True))
     found = (1 / (a + b))[()]
     return found if unit is None or not isinstance(E1, str) else f"{one_number('E_star', found)} {unit}"
 
@@ -300,14 +304,12 @@ def tangential_ratio(nu: ArrayLike, E: Sequence[Any] | None = None) -> Any:
     >>> round(float(tangential_ratio(0.3)), 4), round(float(tangential_ratio((0.3, 0.3), (210.0, 70.0))), 4)
     (1.2143, 1.2143)
     """
-    ratio = finite_array("nu", nu)
-    require("nu", ratio, (ratio > -1) & (ratio <= 0.5), "in (-1, 0.5]")
+    ratio = _poisson("nu", nu)
     if (E is None) == (ratio.shape == (2,)) or (E is not None and len(E) != 2):
         raise InputError("nu is one number, or two with E=(E1, E2), the moduli of the bodies")
     above, below = 2 - ratio, 2 * (1 - ratio)
     if E is None:
         return (above / below)[()]
-    modulus = finite_array("E", list(resolve({"E1": E[0], "E2": E[1]}, kind="stress")[0].values()))
-    require("E", modulus, modulus > 0, "positive")
+    modulus = positive_array("E", list(resolve({"E1": E[0], "E2": E[1]}, kind="stress")[0].values()))
     compliance = (1 + ratio) / modulus  # 1/(2 G)
     return (above * compliance).sum() / (below * compliance).sum()

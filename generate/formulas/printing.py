@@ -1,7 +1,7 @@
-"""Closed forms as steps of sympy expressions: evaluated, written as numpy functions, read back, shown in LaTeX.
+"""Closed forms as steps of sympy expressions: evaluated, written as C, read back, shown in LaTeX.
 
-`models/closed_form_functions.py` is the one place where the forms are kept. The exported C and the equations of
-docs/formula.md are made from its functions, and `evaluate` runs the same text: what is certified is what is shipped.
+`core/closed_forms.h` is the one place where the forms are kept: the core is compiled with it, exports hold its text,
+and the equations of docs/formula.md are made from it. `models/closed_form_certificates.py` has ranges and errors.
 """
 
 from __future__ import annotations
@@ -9,7 +9,9 @@ from __future__ import annotations
 import ast
 import dataclasses
 import itertools
+import math
 import pathlib
+import re
 import textwrap
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -23,10 +25,11 @@ from sympy.printing.precedence import PRECEDENCE
 import mbma_tables
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file
-from mbma_tables.models.closed_form_functions import Certificate
+from mbma_tables.models.closed_form_certificates import Certificate
 
 PACKAGE = pathlib.Path(mbma_tables.__file__).parent
-MODULE = PACKAGE / "models" / "closed_form_functions.py"
+HEADER = PACKAGE / "core" / "closed_forms.h"
+MODULE = PACKAGE / "models" / "closed_form_certificates.py"
 MAX_PRODUCT = 8  # whole powers up to this are written as products: faster than pow, and rounded alike everywhere
 WIDTH = 120
 MADE_BY = "Made by `python -m generate formulas`; do not edit."
@@ -35,22 +38,22 @@ NUMPY_NAMES = ("exp", "log", "pi", "sqrt", "where")
 Step = tuple[str, sympy.Expr]
 Ranges = dict[str, tuple[float, float]]
 
-_HEAD = f'''"""Closed forms of the island functions and of total force and area, with their certificates.
+_HEAD_OF_C = f"""/* Closed forms of the island functions and of total force and area. {MADE_BY}
+ *
+ * A fitted coefficient that is a whole number is written 23e0, any other whole number 23.0. */
+#include <math.h>
+"""
+_WHERE = "static double where(int condition, double a, double b) { return condition ? a : b; }"
+_HEAD = f'''"""Ranges of the closed forms, and their certificates; the forms are in `core/closed_forms.h`.
 
 {MADE_BY}
 """
 
 # fmt: off
-# numpy's ufuncs return Any
-# mypy: disable-error-code="no-any-return"
 
 from __future__ import annotations
 
 from typing import NamedTuple
-
-from numpy import {", ".join(NUMPY_NAMES)}
-
-from mbma_tables.common.arguments import FloatArray
 
 
 class Certificate(NamedTuple):
@@ -124,7 +127,7 @@ def _python(value: sympy.Expr) -> str:
 
 
 def evaluate(steps: Iterable[Step], given: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Values of all steps, by the text of the numpy functions.
+    """Values of all steps, by numpy functions.
 
     Examples
     --------
@@ -143,17 +146,40 @@ def _wrapped(text: str, first: str = "    ", rest: str = "        ") -> str:
     return wrapper.fill(text)
 
 
-def _python_function(function: Function) -> str:
-    given = ", ".join(f"{name}: FloatArray" for name in function.arguments)
-    if len(given) > WIDTH - 40:
-        given = f"\n    {given}\n"
-    lines = [f"def {function.name}({given}) -> FloatArray:", f'    """{function.title}"""']
+class _InC(ast.NodeTransformer):
+    """Arithmetic that Python and C read alike: doubles for whole numbers, pow for **."""
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        return ast.Call(ast.Name("pow"), [node.left, node.right], []) if isinstance(node.op, ast.Pow) else node
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        value: Any = node.value
+        fitted = isinstance(value, float) and value.is_integer()
+        return ast.Name(f"{value:.0f}e0") if fitted else ast.Constant(float(value))
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        return ast.Constant(math.pi) if node.id == "pi" else node
+
+
+def _c_head(function: Function) -> str:
+    return f"double mbma_{function.name}({', '.join(f'double {name}' for name in function.arguments)})"
+
+
+def _c_function(function: Function) -> str:
+    lines = [f"/* {function.title} */", f"{_c_head(function)} {{"]
     for name, value in function.steps:
-        left, right = "return" if name == function.result else f"{name} =", _python(value)
-        if len(left) + len(right) > WIDTH - 5:
-            right = f"(\n{_wrapped(right, first='        ')}\n    )"
-        lines.append(f"    {left} {right}")
-    return "\n".join([*lines, "", ""])
+        left = "return" if name == function.result else f"const double {name} ="
+        text = ast.unparse(_InC().visit(ast.parse(_python(value), mode="eval")))
+        lines += textwrap.wrap(f"{left} {text};", WIDTH, initial_indent="    ", subsequent_indent="        ")
+    return "\n".join([*lines, "}\n"])
+
+
+def header_text(functions: Iterable[Function]) -> str:
+    """The header of the closed forms: what it includes, declarations, `where`, and definitions."""
+    known = list(functions)
+    heads = "".join(f"{_c_head(function)};\n" for function in known)
+    return "\n".join([_HEAD_OF_C, heads, f"{_WHERE}\n", *map(_c_function, known)])
 
 
 def _dictionary(head: str, rows: Mapping[str, str]) -> str:
@@ -161,13 +187,13 @@ def _dictionary(head: str, rows: Mapping[str, str]) -> str:
     return "\n".join([f"{head} = {{", *lines, "}", ""])
 
 
-def module_text(functions: Iterable[Function], ranges: dict[str, Ranges], certificates: dict[str, Any]) -> str:
-    """The module of closed forms; `ranges` and `certificates` by form, the latter by result too."""
+def module_text(ranges: dict[str, Ranges], certificates: dict[str, Any]) -> str:
+    """The module of certificates; `ranges` and `certificates` by form, the latter by result too."""
     data = {
         "RANGES: dict[str, dict[str, tuple[float, float]]]": {f: repr(row) for f, row in ranges.items()},
         "CERTIFICATES: dict[str, dict[str, Certificate]]": {f: repr(row) for f, row in certificates.items()},
     }
-    return _HEAD + "\n".join([*map(_python_function, functions), *itertools.starmap(_dictionary, data.items())])
+    return _HEAD + "\n".join(itertools.starmap(_dictionary, data.items()))
 
 
 def _otherwise(condition: sympy.Expr, value: sympy.Expr, other: sympy.Expr) -> sympy.Expr:
@@ -176,7 +202,7 @@ def _otherwise(condition: sympy.Expr, value: sympy.Expr, other: sympy.Expr) -> s
 
 def steps_of(assignments: Iterable[tuple[str, str]], arguments: Iterable[str]) -> tuple[Step, ...]:
     """Steps from their text; a name means an argument or an earlier step."""
-    known: dict[str, Any] = {name: sympy.Symbol(name) for name in arguments} | {"where": _otherwise}
+    known: dict[str, Any] = {name: sympy.Symbol(name) for name in arguments} | {"where": _otherwise, "pow": sympy.Pow}
     steps = []
     for name, text in assignments:
         steps.append((name, sympy.sympify(text, locals=known)))
@@ -195,20 +221,17 @@ def needed(steps: list[Step]) -> tuple[Step, ...]:
     return tuple(kept)
 
 
-def read_functions(module: str) -> dict[str, Function]:
-    """The functions of a module's text by name, their right-hand sides as sympy expressions."""
+def read_functions(header: str) -> dict[str, Function]:
+    """The functions of a header's text by name, their right-hand sides as sympy expressions."""
     found = {}
-    for node in ast.parse(module).body:
-        if isinstance(node, ast.FunctionDef):
-            form, _, result = node.name.partition("_")
-            arguments = tuple(argument.arg for argument in node.args.args)
-            assignments = [
-                (ast.unparse(line.targets[0]) if isinstance(line, ast.Assign) else result, ast.unparse(line.value))
-                for line in node.body
-                if isinstance(line, ast.Assign | ast.Return) and line.value
-            ]
-            steps = steps_of(assignments, arguments)
-            found[node.name] = Function(form, result, arguments, ast.get_docstring(node) or "", steps)
+    exact = re.sub(r"\b(\d+)\.0\b", r"\1", header.replace(repr(math.pi), "pi"))
+    definition = r"/\* ([^\n]*) \*/\ndouble mbma_(\w+)\(([^\n]*)\) \{\n(.*?)\n\}"
+    for title, name, given, body in re.findall(definition, exact, re.DOTALL):
+        form, _, result = name.partition("_")
+        arguments = tuple(given.replace("double ", "").split(", "))
+        lines = [line.split() for line in body.replace("return", f"const double {result} =").split(";")]
+        steps = steps_of([(words[2], " ".join(words[4:])) for words in lines if words], arguments)
+        found[name] = Function(form, result, arguments, title, steps)
     return found
 
 
@@ -237,11 +260,8 @@ def latex_steps(function: Function) -> list[str]:
 
 
 def write_forms(forms: Iterable[Form]) -> None:
-    """Write the module."""
+    """Write the header and the module."""
     forms = list(forms)
-    text = module_text(
-        [function for form in forms for function in form.functions],
-        {form.name: form.ranges for form in forms},
-        {form.name: form.certificates for form in forms},
-    )
-    write_file(MODULE, text.encode())
+    write_file(HEADER, header_text(function for form in forms for function in form.functions).encode())
+    certificates = {form.name: form.certificates for form in forms}
+    write_file(MODULE, module_text({form.name: form.ranges for form in forms}, certificates).encode())

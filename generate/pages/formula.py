@@ -10,10 +10,10 @@ from scipy.special import erf
 
 from generate.boundary_elements.design import TRAINING
 from generate.boundary_elements.evidence import MIN_WAVES
-from generate.formulas.printing import MODULE, latex_steps, read_functions
+from generate.formulas.printing import HEADER, latex_steps, read_functions
 from generate.pages.page import Measured, evidence, table
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.models.closed_form_functions import CERTIFICATES, RANGES, Certificate
+from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES, Certificate
 
 POCKET_AREAS = (0.01, 0.97)  # contact fractions at which the pocket laws are compared with simulations
 
@@ -53,7 +53,7 @@ def pocket_laws() -> str:
 
 def equations(form: str) -> str:
     """A form in LaTeX."""
-    functions = read_functions(MODULE.read_text(encoding="utf-8")).values()
+    functions = read_functions(HEADER.read_text(encoding="utf-8")).values()
     # steps that functions of a form share are printed once
     steps = dict.fromkeys(line for function in functions if function.form == form for line in latex_steps(function))
     return "\n\n".join(f"$${line}$$" for line in steps)

@@ -22,7 +22,7 @@ from generate.tables.configuration import Configuration, make_axis
 from generate.tables.universal import MAX_DRAWS, visited_surfaces
 from generate.tables.writing import SYMBOLS, numbered
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.islands.four_numbers import SPHERE_FLOOR, band_fields, from_axes, to_axes
+from mbma_tables.islands.four_numbers import SPHERE_FLOOR, band_fields, to_axes
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.height_integrals import height_integral
 from mbma_tables.surfaces.spectrum import BROADENING
@@ -52,6 +52,12 @@ LOOKUP = (
 )
 VISITED = {"hurst": (0.3, 1.0), "log10_zeta_1": (math.log10(3.001), 4.0), "log10_approach": (-8.0, 1.0)}
 COVER_TRIALS = 4096
+
+
+def from_axes(sphere: Any, hurst: Any) -> Any:
+    """zeta_d at a coordinate of the axis `sphere`; infinite at 0."""
+    with np.errstate(divide="ignore"):
+        return SPHERE_FLOOR * np.asarray(sphere, dtype=float) ** (-1 / (4 - 2 * np.asarray(hurst)))
 
 
 class Island4d:

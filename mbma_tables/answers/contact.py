@@ -20,7 +20,7 @@ from mbma_tables.common.arguments import (
     describe_entries,
     finite_array,
     hinted,
-    positive_modulus,
+    positive_array,
     require,
     require_flag,
     spread,
@@ -241,7 +241,7 @@ def _places(
     surface: AnySurface, value: Any, E_star: Any, hardness: Any, by: str, theory: Theory, unit: str | None
 ) -> tuple[FloatArray, FloatArray, dict[str, Any], Any]:
     """What is known, the modulus, and both separations, all of the broadcast shape; `lighter` of `Yielding.loaded`."""
-    asked, modulus = finite_array(by, value), positive_modulus(E_star)
+    asked, modulus = finite_array(by, value), positive_array("E_star", E_star)
     shape = broadcast_shape(**{by: asked, "surface": surface.h_rms, "E_star": modulus, "hardness": hardness})
     asked, modulus = spread(asked, shape), spread(modulus, shape)
     h_max, lighter, capped = np.asarray(surface.h_max), None, cast(Any, theory)

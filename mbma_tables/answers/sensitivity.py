@@ -21,7 +21,7 @@ from mbma_tables.materials import Metal, Pair, bodies, hardness_in
 from mbma_tables.models import AnyModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights
-from mbma_tables.surfaces.resolution import extrapolated
+from mbma_tables.surfaces.maps import extrapolated
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.variants import Variant

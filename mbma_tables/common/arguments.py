@@ -181,11 +181,11 @@ def require(name: str, value: FloatArray, good: Any, allowed: str, unit: str = "
         raise OutOfRangeError(f"{name} must be {allowed}, got {describe_entries(value, bad)}{unit}", bad)
 
 
-def positive_modulus(E_star: ArrayLike) -> FloatArray:
-    """E* as an array of positive numbers."""
-    modulus = finite_array("E_star", E_star)
-    require("E_star", modulus, modulus > 0, "positive")
-    return modulus
+def positive_array(name: str, value: ArrayLike) -> FloatArray:
+    """`value` as an array of positive numbers."""
+    array = finite_array(name, value)
+    require(name, array, array > 0, "positive")
+    return array
 
 
 def checked_hardness(hardness: ArrayLike) -> FloatArray:

@@ -34,29 +34,22 @@ def shown(what: str) -> Iterator[None]:
 
     Within another such call, only what is being done changes until its end.
     """
-    outer = _state.get("running")
-    before = _state["doing"]
+    before, thread = _state["doing"], None
     doing(what)
-    if outer:
-        try:
-            yield
-        finally:
-            doing(before)
-        return
-    _ended.clear()
-    if not sys.stderr.isatty():
-        yield
-        return
-    thread = threading.Thread(target=_beat, args=(time.monotonic(),), daemon=True)
-    _state.pop("shown", None)
-    _state["running"] = "yes"
-    thread.start()
+    if "running" not in _state and sys.stderr.isatty():
+        _ended.clear()
+        _state.pop("shown", None)
+        _state["running"] = "yes"
+        thread = threading.Thread(target=_beat, args=(time.monotonic(),), daemon=True)
+        thread.start()
     try:
         yield
     finally:
-        _state.pop("running", None)
-        _end()
-        thread.join()
+        doing(before)
+        if thread is not None:
+            _state.pop("running", None)
+            _end()
+            thread.join()
 
 
 def _beat(start: float) -> None:

@@ -15,6 +15,7 @@
 #include <immintrin.h>
 #endif
 
+#include "closed_forms.h"
 #include "elementary.h"
 #include "mbma.h"
 
@@ -134,6 +135,21 @@ static size_t elementary(int64_t which, size_t n, const double *x, double *out) 
     return 0;
 }
 
+static int of_islands(double (*form)(double, double), size_t n, const double *X, const double *mu, double *out) {
+    for (size_t k = 0; k < n; k++)
+        out[k] = form(X[k], mu[k]);
+    return 0;
+}
+#define OF_ISLANDS(name) of_islands(mbma_##name, N(0), P(0), P(1), P(2))
+
+static int of_gaps(double (*form)(double, double, double, double), const argument *a) {
+    const double *const d = P(0), *const h_max = P(1), *const zeta_1 = P(2), *const hurst = P(3);
+    double *const out = P(4);
+    for (size_t k = 0; k < N(0); k++)
+        out[k] = form(d[k], h_max[k], zeta_1[k], hurst[k]);
+    return 0;
+}
+
 /* The table from three arrays: cells, places, and X_low, X_high, X_rate, mu_high, first_bucket, buckets. */
 static mbma_cells cells_of(const argument *a) {
     const double *const n = P(2);
@@ -222,6 +238,15 @@ static mbma_spline spline_of(const argument *a) {
 #define FUNCTIONS(FN) \
     /* elementary.h */ \
     FN(elementary, "i Dn wn", true, elementary(I(0), N(1), P(1), P(2))) \
+    /* closed_forms.h */ \
+    FN(pocket_phi_F, "Dn Dn wn", true, OF_ISLANDS(pocket_phi_F)) \
+    FN(pocket_phi_A, "Dn Dn wn", true, OF_ISLANDS(pocket_phi_A)) \
+    FN(standard_phi_F, "Dn Dn wn", true, OF_ISLANDS(standard_phi_F)) \
+    FN(standard_phi_A, "Dn Dn wn", true, OF_ISLANDS(standard_phi_A)) \
+    FN(long_phi_F, "Dn Dn wn", true, OF_ISLANDS(long_phi_F)) \
+    FN(long_phi_A, "Dn Dn wn", true, OF_ISLANDS(long_phi_A)) \
+    FN(totals_pressure, "Dn Dn Dn Dn wn", true, of_gaps(mbma_totals_pressure, a)) \
+    FN(totals_area, "Dn Dn Dn Dn wn", true, of_gaps(mbma_totals_area, a)) \
     /* phi.c */ \
     FN(table_fits, "D J D", true, N(2) == 6 && is_table(a)) \
     FN(phi, "Dn Dn D J D6 i w b?n", N(6) == N(0) * (I(5) ? 7 : 3), \

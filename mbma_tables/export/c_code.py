@@ -6,9 +6,7 @@ any machine; 150,000 numbers are 3 MB of text and a fraction of a second of comp
 
 from __future__ import annotations
 
-import ast
 import dataclasses
-import inspect
 import math
 import re
 import textwrap
@@ -22,7 +20,7 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.export.text import core_file, filled, opening
 from mbma_tables.laws.calibrated import LAW_ERROR, YANG_PERSSON
-from mbma_tables.models import closed_form_functions
+from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.models.universal import RECORD, UniversalModel
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1
 from mbma_tables.surfaces.variants import Variant
@@ -82,7 +80,7 @@ def c_texts(model: UniversalModel, variant: Variant) -> dict[str, str]:
 
 def model_texts(heads: dict[str, str]) -> dict[str, str]:
     """The calls of one surface, under the opening comments of their files."""
-    form, certificates = closed_form_functions.RANGES[FORM], closed_form_functions.CERTIFICATES[FORM]
+    form, certificates = RANGES[FORM], CERTIFICATES[FORM]
     prototypes, forms = closed_forms()
     parts = {
         "PROTOTYPES": prototypes,
@@ -101,33 +99,10 @@ def model_texts(heads: dict[str, str]) -> dict[str, str]:
     return {name: filled(name, **parts, HEADER=heads[name]) for name in ("mbma_model.h", "mbma_model.c")}
 
 
-class _InC(ast.NodeTransformer):
-    """Arithmetic that Python and C read alike: doubles for whole numbers, pow for **."""
-
-    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
-        self.generic_visit(node)
-        return ast.Call(ast.Name("pow"), [node.left, node.right], []) if isinstance(node.op, ast.Pow) else node
-
-    def visit_Constant(self, node: ast.Constant) -> ast.AST:
-        return ast.Constant(float(ast.unparse(node)))
-
-    def visit_Name(self, node: ast.Name) -> ast.AST:
-        return ast.Constant(math.pi) if node.id == "pi" else node
-
-
 def closed_forms() -> tuple[str, str]:
-    """Prototypes and definitions of the closed forms, from the text of the Python functions."""
-    heads, definitions = [], []
-    for node in ast.parse(inspect.getsource(closed_form_functions)).body:
-        if isinstance(node, ast.FunctionDef):
-            heads.append(f"double mbma_{node.name}({', '.join(f'double {given.arg}' for given in node.args.args)})")
-            lines = [f"/* {ast.get_docstring(node)} */", f"{heads[-1]} {{"]
-            for step in node.body[1:]:
-                text = ast.unparse(_InC().visit(step)).replace("\n", " ")
-                text = f"{'' if isinstance(step, ast.Return) else 'const double '}{text};"
-                lines += textwrap.wrap(text, 120, initial_indent="    ", subsequent_indent="        ")
-            definitions.append("\n".join([*lines, "}\n"]))
-    return "".join(f"{head};\n" for head in heads), "\n".join(definitions)
+    """Declarations and definitions of the closed forms."""
+    _, declarations, _, definitions = core_file("closed_forms.h").split("\n\n", 3)
+    return f"{declarations}\n", re.sub(r"(\d)e0\b", r"\1.0", definitions)
 
 
 def tables(model: UniversalModel) -> dict[str, Any]:
@@ -207,7 +182,7 @@ def about_model(model: UniversalModel, variant: Variant) -> list[str]:
     worst, visited = (
         max(float(found[f"{which}largest_error_{name}"]) for name in ("F", "A")) for which in ("", "visited_")
     )
-    form, certificates = closed_form_functions.RANGES[FORM], closed_form_functions.CERTIFICATES[FORM]
+    form, certificates = RANGES[FORM], CERTIFICATES[FORM]
     return [
         "MBMA model of rough contact (Guo, Ma and Zhu): Phi_F and Phi_A of a contact island over (X, mu) by local "
         "polynomials or a closed form, islands of a self-affine surface, and the surface's force and area at a gap.",

@@ -18,7 +18,7 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.export.c_code import FORM
 from mbma_tables.export.text import comment
 from mbma_tables.islands.geometry import FIELDS, geometry
-from mbma_tables.models.closed_form_functions import CERTIFICATES, RANGES
+from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.models.closed_forms import FUNCTIONS
 from mbma_tables.models.universal import UniversalModel
 from mbma_tables.surfaces.surface import Surface

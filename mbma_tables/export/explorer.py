@@ -17,7 +17,7 @@ import numpy as np
 
 from mbma_tables import __version__
 from mbma_tables.answers import source
-from mbma_tables.common.arguments import number_in, positive_modulus
+from mbma_tables.common.arguments import number_in, positive_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units
 from mbma_tables.export import c_code
@@ -141,7 +141,7 @@ def explorer_page(
         raise InputError(f"the page has the theories {THEORIES}, got {theory!r}")
     if get_variant(variant) not in SHOWN_READINGS:
         raise InputError(f"the page has the variants {tuple(shown.name for shown in SHOWN_READINGS)}, got {variant!r}")
-    modulus = 1.0 if E_star is None else number_in("E_star", float(positive_modulus(E_star)), 1e-300, 1e300)
+    modulus = 1.0 if E_star is None else number_in("E_star", float(positive_array("E_star", E_star)), 1e-300, 1e300)
     units = Units(surface.unit, "1" if E_star is None else stress_unit)
     start = _start(surface) | {"E_star": modulus, "k_s": 1.0, "theory": theory, "variant": get_variant(variant).name}
     data = {

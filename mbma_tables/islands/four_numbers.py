@@ -14,12 +14,6 @@ MOST_WIDTH = 700.0  # of (4 - 2H) ln(zeta_u/zeta_d), whose exponential is a numb
 SPHERE_FLOOR = 1.25  # zeta_d at the end of the axis `sphere`, below the paper's floor of 1.5
 
 
-def from_axes(sphere: Any, hurst: Any) -> Any:
-    """zeta_d at a coordinate of the axis `sphere`; infinite at 0."""
-    with np.errstate(divide="ignore"):
-        return SPHERE_FLOOR * np.asarray(sphere, dtype=float) ** (-1 / (4 - 2 * np.asarray(hurst)))
-
-
 def band_fields(spread: FloatArray, sphere: FloatArray, hurst: FloatArray, variant: Variant) -> FloatArray:
     """(mu, sigma zeta_d^H, F_hat zeta_d^(1+H) per Phi_F, A_hat zeta_d^2 per Phi_A), stacked first.
 

@@ -7,7 +7,6 @@ rigid sphere.
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -16,7 +15,6 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.height_integrals import height_integral
 
 ISLAND_MODELS = ("exact", "universal", "island4d", "formula", "rigid")
 OUTSIDE = ("raise", "exact", "nan")  # what to do about islands that a table does not cover
@@ -116,15 +114,8 @@ class RigidModel:
 
     def answer(self, X: FloatArray, mu: FloatArray) -> IslandAnswer:
         """Phi_F = (mu/2) pi F_{5/2}(-X)/(5/2), Phi_A = pi F_2(-X)/2."""
-        return self.of_islands({"X": X, "mu": mu})
-
-    def of_islands(self, islands: Mapping[str, FloatArray], outside: str = "raise", which: int = BOTH) -> IslandAnswer:
-        """Phi_F and Phi_A of islands, or the one asked for."""
-        X, mu = np.broadcast_arrays(islands["X"], islands["mu"])
-        none = np.full(X.shape, np.nan)
-        force = none if which == AREA else math.pi / 5 * mu * height_integral(2.5, -X)
-        area = none if which == FORCE else math.pi / 2 * height_integral(2.0, -X)
-        return IslandAnswer(force, area, np.full(X.shape, CLOSED_FORM_ERROR))
+        force, area = greenwood_tripp.rigid_sphere(*np.broadcast_arrays(X, mu))
+        return IslandAnswer(force, area, np.full(force.shape, CLOSED_FORM_ERROR))
 
 
 def exact_model(rtol: float) -> ExactModel:

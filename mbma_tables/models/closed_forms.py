@@ -1,28 +1,35 @@
 """Closed forms: the island model "formula", and total force and area without a sum over islands.
 
-The functions themselves are in `closed_form_functions`, which the generator writes; docs/formula.md shows them.
+The forms are in `core/closed_forms.h`, which the generator writes; docs/formula.md shows them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, broadcast_shape, finite_array, positive_modulus, require
+from mbma_tables.common.arguments import FloatArray, answered, broadcast_shape, finite_array, positive_array, require
 from mbma_tables.common.errors import InputError
+from mbma_tables.core import core
 from mbma_tables.models import BOTH, IslandAnswer
-from mbma_tables.models import closed_form_functions as printed
-from mbma_tables.models.closed_form_functions import CERTIFICATES, RANGES
+from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.models.universal import Ranged
 from mbma_tables.surfaces.surface import Surface
 
 ISLAND_FORMS = ("pocket", "standard", "long")
 TOTALS = "totals"
 RESULTS = ("phi_F", "phi_A")
-FUNCTIONS = {form: {name: getattr(printed, f"{form}_{name}") for name in own} for form, own in CERTIFICATES.items()}
+
+
+def _of_core(name: str) -> Callable[..., Any]:
+    """A closed form of arrays, which broadcast."""
+    return lambda *given: answered(getattr(core, name), given)[0][()]
+
+
+FUNCTIONS = {form: {name: _of_core(f"{form}_{name}") for name in own} for form, own in CERTIFICATES.items()}
 
 
 class FormulaModel(Ranged):
@@ -111,7 +118,7 @@ def closed_totals(surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1
     >>> error < 0.1
     True
     """
-    gap, modulus = finite_array("separation", separation), positive_modulus(E_star)
+    gap, modulus = finite_array("separation", separation), positive_array("E_star", E_star)
     shape = broadcast_shape(separation=gap, surface=surface.h_rms, E_star=modulus)
     fields = {
         "d_over_h_rms": gap / surface.h_rms,

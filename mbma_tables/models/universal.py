@@ -162,7 +162,7 @@ class UniversalModel(Ranged, Displayed):
         by_X = np.einsum("cijf,ip->cfjp", self.content.coefficients, powers)
         records[:, 8:] = np.einsum("cfjp,jq->cfqp", by_X, powers).reshape(count, -1)
 
-        first, last = (int(bits >> BUCKET_BITS) for bits in _bits([mu_high.min(), self._mu.high]))
+        first, last = (int(bits >> BUCKET_BITS) for bits in np.array([mu_high.min(), self._mu.high]).view(np.int64))
         # the bucket below the first edge stands for all that is less
         buckets = ((np.arange(first - 1, last + 1)) << BUCKET_BITS).view(float)
         buckets[0] = 0.0
@@ -181,10 +181,6 @@ class UniversalModel(Ranged, Displayed):
         if not core.table_fits(*found):
             raise TableFileError("the cells of the universal table do not cover its range")
         return found
-
-
-def _bits(values: ArrayLike) -> NDArray[np.int64]:
-    return np.asarray(values, dtype=float).view(np.int64)
 
 
 def fractions_of_mu(low: FloatArray, high: FloatArray) -> FloatArray:

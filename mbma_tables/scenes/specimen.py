@@ -91,8 +91,7 @@ def from_map(path: pathlib.Path, treatment: Mapping[str, Any]) -> Specimen:
 
 def measured(path: pathlib.Path, treatment: Mapping[str, Any]) -> tuple[Treated, MeasuredSurface]:
     """Treated heights of a map or line scan, and the surface that they are."""
-    from mbma_tables.surfaces.maps import prepared
-    from mbma_tables.surfaces.resolution import measured_surface
+    from mbma_tables.surfaces.maps import measured_surface, prepared
 
     options = dict(treatment)
     further = [options.pop(name, None) for name in ("extrapolate_to", "extrapolate_hurst")]

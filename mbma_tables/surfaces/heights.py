@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, finite_array, one_number, require
+from mbma_tables.common.arguments import FloatArray, finite_array, one_number, positive_array
 from mbma_tables.common.errors import InputError
 
 _TAIL = np.logspace(-6, -1, 61)[:-1]
@@ -97,6 +97,4 @@ class Heights:
 
 def one_height(h_max: Any) -> float:
     """h_max as one positive number."""
-    height = one_number("h_max", h_max)
-    require("h_max", height, height > 0, "positive")
-    return float(height)
+    return float(positive_array("h_max", one_number("h_max", h_max)))

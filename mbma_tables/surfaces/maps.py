@@ -1,4 +1,7 @@
-"""Height maps: their radial power spectrum, the surface that is its own spectrum, and the one fitted to it."""
+"""Height maps: their radial power spectrum, the surface that is its own spectrum, and the one fitted to it.
+
+Also what a power law beyond the shortest waves of a map or a line scan would change: area is a matter of resolution.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,12 @@ import dataclasses
 import math
 import os
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray, number_in, require_flag
 from mbma_tables.common.errors import InputError, NotSelfAffineError
 from mbma_tables.common.units import Units, factor, known, resolve
 from mbma_tables.laws import bearing_curve as bearing
@@ -19,14 +22,17 @@ from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.measurements import grid_of, read_measurement
 from mbma_tables.surfaces.power_law import SCATTER, log_bins
 from mbma_tables.surfaces.power_laws import PowerLaws
+from mbma_tables.surfaces.profiles import measured_profile
 from mbma_tables.surfaces.psd import check_band, fit_spectrum
-from mbma_tables.surfaces.spectral import SpectralSurface
+from mbma_tables.surfaces.spectral import SpectralSurface, resolution
 from mbma_tables.surfaces.treatment import LENGTHS, MIN_POWER, Treated, Treatment, mirrored, squares, treat
 
 RINGS = 8  # per grid step in wavenumber: narrow enough that C hardly changes across a ring
 WINDOW_LOBE = 2.0  # half-width of a Hann window's main lobe, in grid steps: closer to q = 0 it mixes with the mean
 WINDOW_OVERLAP = (35 / 18) ** 2  # waves under that window that carry what one independent wave does
 MAX_KURTOSIS = 50.0  # all slopes on 2% of the points; Gaussian surfaces have 3, worn or scratched ones up to 10 or 20
+S = TypeVar("S", bound=SpectralSurface)
+STEPS_PER_OCTAVE = 8  # of an extrapolated spectrum
 MAX_ANISOTROPY = 0.3  # of a cosine around the circle: four times the power one way than across it
 
 
@@ -78,8 +84,7 @@ def prepared(source: Any, options: Mapping[str, Any], dimensions: int | None = 2
     """A map or line scan, treated, with options of `Surface.from_map`; without `dimensions` a file decides which."""
     given = {name: value for name, value in options.items() if value is not None}
     for name in given.keys() & {"periodic", "reliable"}:
-        if not isinstance(given[name], bool | np.bool_):
-            raise InputError(f"{name} must be True or False, got {given[name]!r}")
+        require_flag(name, given[name])
     lengths, unit = resolve({name: given.pop(name) for name in ("dx", "dy") if name in given}, given.pop("unit", None))
     channel, periodic = given.pop("channel", None), given.pop("periodic", None)
     if isinstance(source, str | os.PathLike):
@@ -286,3 +291,47 @@ def _with_anisotropy(
             f"{fit.q_high:.4g}, more than {MAX_ANISOTROPY} (1: all power in one direction)"
         )
     return fitted | {"fit": dataclasses.replace(fit, anisotropy=anisotropy), "unit": fit.length_unit}
+
+
+def measured_surface(
+    treated: Treated, h_max: float | None = None, shortest: Any = None, hurst: Any = None
+) -> SpectralSurface:
+    """The surface of a treated map or line scan, continued to a shorter wavelength where that is asked for."""
+    if (shortest is None) != (hurst is None):
+        raise InputError("extrapolate_to and extrapolate_hurst: give both or neither")
+    surface = (measured_profile if treated.heights.ndim == 1 else measured_map)(treated, h_max)
+    known = dataclasses.replace(surface, provenance=(*surface.provenance, resolution(surface)))
+    return known if shortest is None else extrapolated(known, shortest, hurst)
+
+
+def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
+    """A measured spectrum continued to a shorter wavelength [length] by a power law that is stated, not measured."""
+    wave, exponent = (
+        number_in("extrapolate_to", Units(surface.unit).number("extrapolate_to", shortest), 1e-30, 1e30),
+        number_in("extrapolate_hurst", hurst, 0.0, 1.0),
+    )
+    last, end = float(surface.q1), 2 * math.pi / wave
+    if not end > last:
+        raise InputError(
+            f"extrapolate_to must be below the shortest measured wavelength, {2 * math.pi / last:.6g}, got {wave:g}"
+        )
+    # from the mean level of the last measured octave
+    slope = 2 + 2 * exponent
+    octave = last / 2 * 2 ** ((np.arange(STEPS_PER_OCTAVE) + 0.5) / STEPS_PER_OCTAVE)
+    known = np.asarray(surface.power_spectrum(octave))
+    level = float(np.mean(np.log(known[known > 0]) + slope * np.log(octave[known > 0])))
+    q = np.geomspace(last, end, max(2, math.ceil(math.log2(end / last) * STEPS_PER_OCTAVE) + 1))
+    samples = None if surface.samples is None else np.append(surface.samples, np.full(q.size, surface.samples[-1]))
+    # curves of the map's tops and valleys are not known of the waves added
+    C = np.append(surface.C, np.exp(level - slope * np.log(q)))
+    plain = dataclasses.replace(surface, bearing=None, bands=None, map=None)
+    longer = dataclasses.replace(plain, q=np.append(surface.q, q), C=C, samples=samples)
+    area = float(surface.rms_gradient / longer.rms_gradient)
+    stiffness = float(surface.h_rms / longer.h_rms)
+    told = (
+        f"continued to waves of {wave:.4g} {surface.unit or ''}".rstrip()
+        + f" by a power law with H = {exponent:g}, which was not measured: area at light load is {area:.3g} times "
+        f"that of the measured waves, stiffness and conductance at a pressure {stiffness:.3g} times"
+    )
+    record = {"step": "extrapolated", "shortest": wave, "hurst": exponent, "area": area, "stiffness": stiffness}
+    return dataclasses.replace(longer, provenance=(*surface.provenance, record | {"told": told}))

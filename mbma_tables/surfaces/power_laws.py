@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.common.arguments import FloatArray, finite_array
 from mbma_tables.common.errors import InputError
+from mbma_tables.surfaces.spectrum import growth
 
 SHARES = {0: 1.0, 2: 1 / 2, 4: 3 / 8}  # m_n = share 2 pi integral C q^(n + 1) dq, Eq. (7)
 
@@ -47,12 +48,6 @@ def sorted_spectrum(q: ArrayLike, C: ArrayLike, convention: str) -> tuple[FloatA
     return wavenumber[order], spectrum[order] * (1.0 if convention == "paper" else 1 / (4 * math.pi**2))
 
 
-def growth(x: FloatArray) -> FloatArray:
-    """(exp(x) - 1)/x, 1 at x = 0."""
-    zero = x == 0
-    return np.where(zero, 1.0, np.expm1(x) / np.where(zero, 1.0, x))
-
-
 class PowerLaws:
     """Power laws between samples of C(q) [length^4], h_rms^2 = 2 pi integral C q dq, not negative.
 
@@ -84,14 +79,14 @@ class PowerLaws:
         """What a width from a piece's lower end up adds to a moment."""
         power = self.slope[piece] + order + 2
         start = 2 * math.pi * SHARES[order] * self.low[piece] * np.exp((order + 2) * self.log_low[piece])
-        return np.asarray(start * width * growth(power * width))
+        return np.asarray(start * width * growth(power, width))
 
     def _down(self, order: int, place: Place, width: Any) -> FloatArray:
         """What a width from a place up adds to a moment, inside its piece."""
         piece, rest = place
         power = self.slope[piece] + order + 2
         start = 2 * math.pi * SHARES[order] * self.high[piece] * np.exp((order + 2) * self.log_high[piece])
-        return np.asarray(start * np.exp(-power * rest) * width * growth(power * width))
+        return np.asarray(start * np.exp(-power * rest) * width * growth(power, width))
 
     def place(self, q: Any) -> Place:
         """The place of wavenumbers inside the band; between two pieces, the end of the lower."""
@@ -123,11 +118,8 @@ class PowerLaws:
 
     def below(self, order: int, place: Place) -> FloatArray:
         """m_n of all longer waves."""
-        return self.below_rise(order, place.piece, self.width[place.piece] - place.rest)
-
-    def below_rise(self, order: int, piece: Any, rise: Any) -> FloatArray:
-        """m_n of all waves longer than those at ln(q/lower end of the piece): exact where that is small."""
-        return np.asarray(self._before[order][piece] + self._up(order, piece, rise))
+        rise = self.width[place.piece] - place.rest
+        return np.asarray(self._before[order][place.piece] + self._up(order, place.piece, rise))
 
     def between(self, order: int, start: Place, end: Place) -> FloatArray:
         """m_n of the waves from one place to a higher one."""

@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import broadcast_shape, finite_array, hinted, is_labelled, require, spread
+from mbma_tables.common.arguments import (
+    broadcast_shape,
+    finite_array,
+    hinted,
+    is_labelled,
+    positive_array,
+    require,
+    spread,
+)
 from mbma_tables.common.display import shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units
@@ -252,8 +260,7 @@ class SelfAffine(AnySurface):
 
     def power_spectrum(self, q: ArrayLike) -> Any:
         """C(q) of Eq. (6) [length^4], zero outside [q0, q1]; for one surface or broadcasting against it."""
-        wavenumber = finite_array("q", q)
-        require("q", wavenumber, wavenumber > 0, "positive")
+        wavenumber = positive_array("q", q)
         scale = self.hurst / math.pi * (self.s / self.q0) ** 2
         inside = (wavenumber >= self.q0) & (wavenumber <= self.q1)
         return np.where(inside, scale * (wavenumber / self.q0) ** (-2 - 2 * self.hurst), 0.0)[()]

@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import finite_array, require
+from mbma_tables.common.arguments import positive_array, require
 from mbma_tables.common.display import Variable
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.units import Units
@@ -116,8 +116,7 @@ class SpectralSurface(AnySurface):
         inside = slice(held[0], held[-1] + 1) if held.size else slice(0)
         keep = {"q": q[inside].copy(), "C": C[inside].copy()}
         if self.samples is not None:
-            samples = finite_array("samples", self.samples)
-            require("samples", samples, samples > 0, "positive")
+            samples = positive_array("samples", self.samples)
             keep["samples"] = np.broadcast_to(samples, q.shape)[inside].copy()
         for name, array in keep.items():
             array.setflags(write=False)
@@ -216,9 +215,7 @@ class SpectralSurface(AnySurface):
 
     def power_spectrum(self, q: ArrayLike) -> Any:
         """C(q) [length^4], a power law between samples, zero outside [q0, q1]."""
-        wavenumber = finite_array("q", q)
-        require("q", wavenumber, wavenumber > 0, "positive")
-        return self.laws.at(wavenumber)[()]
+        return self.laws.at(positive_array("q", q))[()]
 
     def sampled(self) -> Self:
         """Itself."""

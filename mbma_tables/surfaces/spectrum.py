@@ -22,7 +22,7 @@ BISECTIONS = 56  # of log(zeta_1), to rounding
 TINY = 1e-300  # in place of 0, where a quotient tends to 1
 
 
-def _growth(power: Any, log_ratio: Any) -> Any:
+def growth(power: Any, log_ratio: Any) -> Any:
     """(r^power - 1)/(power log r) with r = exp(log_ratio): 1 where either is 0."""
     x = power * log_ratio
     x = x + TINY * (x == 0.0)
@@ -31,32 +31,32 @@ def _growth(power: Any, log_ratio: Any) -> Any:
 
 def m0_of(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
     """Variance of height over the band, Eq. (7), in s^2."""
-    return 2.0 * hurst * np.exp(-2.0 * hurst * log_za) * log_ratio * _growth(-2.0 * hurst, log_ratio)
+    return 2.0 * hurst * np.exp(-2.0 * hurst * log_za) * log_ratio * growth(-2.0 * hurst, log_ratio)
 
 
 def m2_of(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
     """Variance of a profile's slope over the band, Eq. (7), in (s q0)^2."""
     power = 2.0 - 2.0 * hurst
-    return hurst * np.exp(power * log_za) * log_ratio * _growth(power, log_ratio)
+    return hurst * np.exp(power * log_za) * log_ratio * growth(power, log_ratio)
 
 
 def m4_of(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
     """Variance of a profile's second derivative over the band, Eq. (7), in (s q0^2)^2."""
     power = 4.0 - 2.0 * hurst
-    return 0.75 * hurst * np.exp(power * log_za) * log_ratio * _growth(power, log_ratio)
+    return 0.75 * hurst * np.exp(power * log_za) * log_ratio * growth(power, log_ratio)
 
 
 def alpha_of(hurst: Any, log_ratio: Any) -> Any:
     """Nayak's bandwidth parameter m0 m4/m2^2, Eq. (3): a function of zb/za alone, 1.5 where that is 1."""
-    g2 = _growth(2.0 - 2.0 * hurst, log_ratio)
+    g2 = growth(2.0 - 2.0 * hurst, log_ratio)
     # grouped so that nothing overflows
-    return 1.5 * (_growth(-2.0 * hurst, log_ratio) / g2) * (_growth(4.0 - 2.0 * hurst, log_ratio) / g2)
+    return 1.5 * (growth(-2.0 * hurst, log_ratio) / g2) * (growth(4.0 - 2.0 * hurst, log_ratio) / g2)
 
 
 def summit_rate(hurst: Any, log_za: Any, log_ratio: Any) -> Any:
     """m4/m2 over the band [q0^2], which summit densities are made of, Eq. (2); finite for a band of no width."""
-    growth = _growth(4.0 - 2.0 * hurst, log_ratio) / _growth(2.0 - 2.0 * hurst, log_ratio)
-    return 0.75 * np.exp(2.0 * log_za) * growth
+    ratio = growth(4.0 - 2.0 * hurst, log_ratio) / growth(2.0 - 2.0 * hurst, log_ratio)
+    return 0.75 * np.exp(2.0 * log_za) * ratio
 
 
 def band_moment(order: int, hurst: Any, zeta_a: Any, zeta_b: Any) -> Any:

@@ -221,8 +221,7 @@ class Surface(SelfAffine):
         H = 0.80, q0 = 6.283, fitted at 32 points
         """
         treatment = {name: value for name, value in locals().items() if name in OPTIONS}
-        from mbma_tables.surfaces.maps import fit_map, prepared
-        from mbma_tables.surfaces.resolution import measured_surface
+        from mbma_tables.surfaces.maps import fit_map, measured_surface, prepared
 
         check_model(model, band)
         if model != "measured" and (extrapolate_to is not None or extrapolate_hurst is not None):
@@ -290,8 +289,7 @@ class Surface(SelfAffine):
         h_rms is known to 5.2% and the rms gradient to 1.4% (one standard error, of a Gaussian surface)
         """
         treatment = {name: value for name, value in locals().items() if name in OPTIONS}
-        from mbma_tables.surfaces.maps import prepared
-        from mbma_tables.surfaces.resolution import measured_surface
+        from mbma_tables.surfaces.maps import measured_surface, prepared
 
         known = measured_surface(prepared(heights, treatment, 1), h_max, extrapolate_to, extrapolate_hurst)
         given = known.h_max if nominal_area is None else h_max

@@ -11,14 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import Numbers, broadcast_shape, finite_array, positive_modulus, require
+from mbma_tables.common.arguments import Numbers, broadcast_shape, finite_array, positive_array
 
 
 def mean_conductivity(k1: ArrayLike, k2: ArrayLike) -> Numbers:
     """k_s = 2 k1 k2/(k1 + k2) of two bodies, positive conductivities in one unit."""
-    first, second = finite_array("k1", k1), finite_array("k2", k2)
-    require("k1", first, first > 0, "positive")
-    require("k2", second, second > 0, "positive")
+    first, second = positive_array("k1", k1), positive_array("k2", k2)
     broadcast_shape(k1=first, k2=second)
     # the smaller over the larger cannot overflow
     return (2 / (1 / first + 1 / second))[()]
@@ -56,8 +54,7 @@ def conductance(stiffness: ArrayLike, k_s: ArrayLike, E_star: ArrayLike) -> Numb
     80000.0
     """
     slope = finite_array("stiffness", stiffness)
-    mean, modulus = finite_array("k_s", k_s), positive_modulus(E_star)
-    require("k_s", mean, mean > 0, "positive")
+    mean, modulus = positive_array("k_s", k_s), positive_array("E_star", E_star)
     broadcast_shape(stiffness=slope, k_s=mean, E_star=modulus)
     return (mean / modulus * slope)[()]
 

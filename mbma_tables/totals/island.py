@@ -14,9 +14,8 @@ from mbma_tables.common.arguments import (
     Numbers,
     any_labelled,
     broadcast_shape,
-    finite_array,
     hinted,
-    positive_modulus,
+    positive_array,
     require,
 )
 from mbma_tables.common.errors import InputError
@@ -133,9 +132,8 @@ def island(
     delta = units.number("delta", delta)
     if any_labelled(surface, delta, E_star):
         return _of_labelled(surface, delta, island_model, variant, E_star, rtol)
-    approach = finite_array("delta", delta)
-    require("delta", approach, approach > 0, "positive")
-    modulus = positive_modulus(E_star)
+    approach = positive_array("delta", delta)
+    modulus = positive_array("E_star", E_star)
     rule = get_variant(variant)
     model = get_model(island_model, rtol, rule)
     broadcast_shape(delta=approach, surface=surface.h_rms, E_star=modulus)

@@ -143,13 +143,6 @@ def _edges(source: Source, last: float) -> FloatArray:
     return np.array([*(low for low, high in itertools.pairwise(edges) if high - low > 1e-12 * low), last])
 
 
-def _kinds(low: FloatArray, high: FloatArray) -> NDArray[np.intp]:
-    """Numbers of panels' rules."""
-    # above delta = h_rms/2 it is the Gaussian that bends
-    narrow = high - low <= NARROW * np.minimum(low, 0.5)
-    return np.where(narrow, 2, (low > 0).astype(np.intp))
-
-
 class _EndOfTable(Exception):
     """Islands beyond the approach given are not known."""
 
@@ -204,7 +197,9 @@ def _answered(
 def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float) -> Profile:
     """Panels, halved until polynomials through their islands, and those of their sums, are good to `rtol`."""
     low, high, last = edges[:-1], edges[1:], float(edges[-1])
-    kind, islands, worst, known, errors = _kinds(low, high), 0, 0.0, None, edges[:0]
+    # above delta = h_rms/2 it is the Gaussian that bends
+    kind = np.where(high - low <= NARROW * np.minimum(low, 0.5), 2, (low > 0).astype(np.intp))
+    islands, worst, known, errors = 0, 0.0, None, edges[:0]
     for _ in range(MAX_ROUNDS):
         fresh, missed, count, error = _answered(fields, kind, low, high, last)
         order = np.argsort(np.append(known.low, low)) if known else slice(None)

@@ -17,7 +17,7 @@ from mbma_tables.export.conformance import (
     status_rows,
     total_rows,
 )
-from mbma_tables.models import closed_form_functions
+from mbma_tables.models import closed_form_certificates
 from mbma_tables.models.tables import universal_model
 from mbma_tables.surfaces.variants import get_variant
 
@@ -45,7 +45,7 @@ def random_islands() -> tuple[np.ndarray, np.ndarray]:
 def random_formula_islands() -> tuple[np.ndarray, np.ndarray]:
     """X and mu over the closed form's range, both ends and no roughness included."""
     rng = np.random.default_rng(26)
-    (low, high), (_, mu_high) = (closed_form_functions.RANGES[FORM][name] for name in ("X", "mu"))
+    (low, high), (_, mu_high) = (closed_form_certificates.RANGES[FORM][name] for name in ("X", "mu"))
     X, mu = rng.uniform(low, high, POINTS), np.exp(rng.uniform(np.log(1e-6), np.log(mu_high), POINTS))
     X[:2], mu[:2] = (low, high), mu_high
     return X, mu

@@ -1,20 +1,16 @@
-"""The closed forms in Python, in C99 and as sympy expressions: one text, one value."""
+"""The closed forms in the core, in exported C and as sympy expressions: one text, one value."""
 
 import ctypes
-import pathlib
 import shutil
 import subprocess
 
 import numpy as np
 import pytest
 
-import mbma_tables
-from generate.formulas.printing import module_text, read_functions
+from generate.formulas.printing import HEADER, MODULE, header_text, module_text, read_functions
 from mbma_tables.export.code import SOURCES, write_code
 from mbma_tables.models import closed_forms as shipped
 
-PACKAGE = pathlib.Path(mbma_tables.__file__).parent
-MODULE = (PACKAGE / "models" / "closed_form_functions.py").read_text()
 NAMES = [f"{form}_{result}" for form, results in shipped.FUNCTIONS.items() for result in results]
 
 
@@ -30,7 +26,7 @@ def points(form):
 
 @pytest.fixture(scope="module")
 def functions():
-    return read_functions(MODULE)
+    return read_functions(HEADER.read_text(encoding="utf-8"))
 
 
 @pytest.fixture(scope="module")
@@ -47,11 +43,12 @@ def library(tmp_path_factory):
 
 
 def test_the_shipped_text_is_what_the_generator_prints(functions):
-    assert module_text(functions.values(), shipped.RANGES, shipped.CERTIFICATES) == MODULE
+    assert header_text(functions.values()) == HEADER.read_text(encoding="utf-8")
+    assert module_text(shipped.RANGES, shipped.CERTIFICATES) == MODULE.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_c_agrees_with_numpy(library, name):
+def test_exported_c_agrees_with_the_core(library, name):
     form, _, result = name.partition("_")
     given = points(form)
     function = getattr(library, f"mbma_{name}")
@@ -63,7 +60,7 @@ def test_c_agrees_with_numpy(library, name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_numpy_agrees_with_sympy_in_30_digits(functions, name):
+def test_the_core_agrees_with_sympy_in_30_digits(functions, name):
     form, _, result = name.partition("_")
     given = [values[:2] for values in points(form)]
     function = functions[name]

@@ -7,7 +7,7 @@ from helpers import random_map
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.common.errors import InputError
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.surfaces.resolution import extrapolated
+from mbma_tables.surfaces.maps import extrapolated
 from mbma_tables.surfaces.spectral import resolution
 
 WHOLE = Surface(0.7, 1.0, 400.0, 0.3, 1.0)

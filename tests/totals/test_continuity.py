@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from helpers import SCALE, with_slopes
 
+from generate.tables.island4d import from_axes
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, height_integral, island
 from mbma_tables.core import core
-from mbma_tables.islands.four_numbers import band_fields, from_axes, to_axes
+from mbma_tables.islands.four_numbers import band_fields, to_axes
 from mbma_tables.law.block import CENTRE, RATE
 from mbma_tables.models import answer_islands
-from mbma_tables.models.closed_form_functions import RANGES
+from mbma_tables.models.closed_form_certificates import RANGES
 from mbma_tables.models.closed_forms import FormulaModel
 from mbma_tables.models.island4d import RAW
 from mbma_tables.models.tables import open_table, universal_model

@@ -11,8 +11,9 @@ import pytest
 from catalogue import LEVEL, OWN
 from helpers import SCALE, difference_weights, with_slopes
 
+from generate.tables.island4d import from_axes
 from mbma_tables import Surface, contact, contact_law, island
-from mbma_tables.islands.four_numbers import from_axes, to_axes
+from mbma_tables.islands.four_numbers import to_axes
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.law.block import CENTRE, RATE
 from mbma_tables.models.island4d import RAW
