@@ -65,7 +65,7 @@ def curves(surface: MeasuredSurface, E_star: float = 1.0) -> dict[str, dict[str,
         except MbmaError:
             # a theory that has no answer is left out of a picture
             continue
-        scatter, area_scatter = theory.scatter(surface, answer.area)
+        scatter, area_scatter = (theory.scatter(surface, what, answer.area) for what in ("pressure", "area"))
         lines = {"pressure": E_star * answer.pressure, "area": answer.area, "mean_separation": u}
         slopes = np.gradient(np.log(np.maximum(answer.pressure, 1e-300)), u)
         # a factor of force at a separation is a step of separation at a force

@@ -225,19 +225,17 @@ class Contact(Interface, Displayed):
     @described
     def scatter(self) -> Any:
         """Standard deviation of ln F at this mean separation from simulation to simulation; NaN where not known."""
-        return self._scatter[0]
+        return self._scatter("pressure")
 
     @described
     def area_scatter(self) -> Any:
         """Standard deviation of ln A at this force, likewise."""
-        return self._scatter[1]
+        return self._scatter("area")
 
     @described
     def stiffness_scatter(self) -> Any:
         """Standard deviation of ln of `unloading_stiffness` at this force, likewise: of conductance, too."""
-        more = {"area": self._touching}
-        (found,) = self._source.map(lambda by, s, u, E, A: (by.stiffness_scatter(s, A),), self, 1, more)
-        return found
+        return self._scatter("stiffness")
 
     @described
     def separation_scatter(self) -> Any:
@@ -245,9 +243,8 @@ class Contact(Interface, Displayed):
         with np.errstate(invalid="ignore", divide="ignore"):
             return self.scatter * self._answer.pressure / np.abs(self._answer.stiffness)
 
-    @functools.cached_property
-    def _scatter(self) -> tuple[Numbers, ...]:
-        return self._source.map(lambda theory, s, u, E, A: theory.scatter(s, A), self, 2, {"area": self._touching})
+    def _scatter(self, of: str) -> Numbers:
+        return self._source.map(lambda by, s, u, E, A: (by.scatter(s, of, A),), self, 1, {"area": self._touching})[0]
 
     @functools.cached_property
     def leakage(self) -> Leakage:

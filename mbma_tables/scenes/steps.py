@@ -236,7 +236,9 @@ def other_theory(
 
         theory = Yielding(theory, hardness / E_star)
     found = answer_where_finite(theory, surface, (float(surface.h_max) + gap) / 2)
-    return OtherTheory(E_star * found.pressure, found.area, *theory.scatter(surface, found.area))
+    return OtherTheory(
+        E_star * found.pressure, found.area, *(theory.scatter(surface, name, found.area) for name in found._fields[:2])
+    )
 
 
 def comparison(run: Run, step: Step) -> None:

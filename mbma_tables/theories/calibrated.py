@@ -184,9 +184,10 @@ class Calibrated(Theory):
         """Why a measured surface is not like those that boundary elements have tested."""
         return surface.departures(by_map=self.scatter_name(surface) != self.name)
 
-    def _stated(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+    def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+        """As of any theory; of maps with what comes on top of that of Gaussian ones."""
         if self.scatter_name(surface) == self.name:
-            return super()._stated(surface, quantity, area)
+            return super().scatter(surface, quantity, area)
         assert isinstance(surface, MeasuredSurface)
         if surface.outside(PRESSED):
             return np.full(np.shape(area), np.nan)

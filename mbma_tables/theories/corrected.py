@@ -84,7 +84,8 @@ class Corrected(BoundaryElements):
         low, high = answer.area < LOWEST, answer.area > HIGHEST
         return odd | {f"A/A0 is below {LOWEST:g}": low, f"A/A0 is above {HIGHEST:g}": high}
 
-    def _tested(self, quantity: str, area: FloatArray) -> FloatArray:
+    def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+        """Standard deviation against the full grid, by what the law and the quarter grid differ from the answer."""
         if quantity == "flow":
             with np.errstate(divide="ignore"):
                 return np.interp(np.log(area), np.log(TESTED_AREAS), OF_FLOW)
