@@ -243,9 +243,8 @@ class _Planner:
         asked = (1 - ISLAND_SHARE) * self.rtol
         priced = priced_as or _name(island_model)
         seconds = self.costs.of(priced, "call") + self.count * self.costs.of(priced, "gap", asked, quantity)
-        return Step(
-            name, why, what, island_model, asked, self.count, asked + certified_error(island_model, asked), seconds
-        )
+        error = asked + certified_error(island_model, asked)
+        return Step(name, why, what, island_model, asked, self.count, error, seconds)
 
     def profiles(self) -> Step:
         islands, asked = int(np.size(self.problem.deltas)), ISLAND_SHARE * self.rtol / AMPLIFICATION["profile"]

@@ -217,9 +217,8 @@ def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str, u
     h_max = Units(unit).number("h_max", numbers["h_max"])
     # a profile's spectrum is no isotropic one: five numbers are fitted to it
     model = "self-affine" if convention == "profile" else "measured"
-    surface = Surface.from_spectrum(
-        columns[:, 0], columns[:, 1], h_max=h_max, convention=convention, unit=unit, model=model
-    )
+    q, C = columns.T
+    surface = Surface.from_spectrum(q, C, h_max=h_max, convention=convention, unit=unit, model=model)
     return Specimen(surface, f"fitted to {path.name}" if convention == "profile" else f"spectrum {path.name}")
 
 

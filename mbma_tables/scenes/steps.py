@@ -161,9 +161,8 @@ def _slope_error(law: ContactLaw, gap: Any, inverted: bool) -> float:
     if touching.size == 0:
         return law.error
     # F/l over the stiffness: large only next to a turning point
-    ratio = (
-        2 * law.pressure(separation=touching) / ((law.h_max - touching) * np.abs(law.stiffness(separation=touching)))
-    )
+    steep = (law.h_max - touching) * np.abs(law.stiffness(separation=touching))
+    ratio = 2 * law.pressure(separation=touching) / steep
     moved = MAX_SLOPE_OF_STIFFNESS * law.error if inverted else 0.0
     return max(2 * law.error, float(((law.slope_error(separation=touching) + moved) * ratio).max()))
 

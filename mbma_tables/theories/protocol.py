@@ -83,10 +83,6 @@ class Theory(abc.ABC):
         """The theory at flat places of a broadcast shape, where it holds arrays of its own."""
         return self
 
-    def stiffer(self, times: FloatArray) -> Theory:
-        """The theory at a modulus so many times as large, where it holds numbers over E*."""
-        return self
-
     def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E*."""
         return self.answer(surface, self.inverted(surface, "pressure", pressure)[0]).area
@@ -299,9 +295,8 @@ class Wrapped(Theory):
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]; the error is not known."""
         u = np.asarray(mean_separation, dtype=float)
-        pressure, area = (
-            np.array(np.broadcast_to(part, u.shape), dtype=float) for part in self._theory.answer(surface, u)
-        )
+        found = self._theory.answer(surface, u)
+        pressure, area = (np.array(np.broadcast_to(part, u.shape), dtype=float) for part in found)
 
         def force_at(k: Any, x: FloatArray) -> FloatArray:
             return np.asarray(self._theory.answer(select(surface, u.shape, k), u.ravel()[k] + x)[0], dtype=float)[None]

@@ -323,9 +323,8 @@ class BoundaryElements(Theory):
             own, given = float(getattr(self.surface, name)), np.asarray(getattr(surface, name))
             good = np.abs(given - own) <= MATCHED * own
             require(name, given, good, f"{own:.9g}: boundary elements of one map know that map alone, their .surface")
-        u = np.broadcast_to(
-            np.asarray(mean_separation, float), np.broadcast_shapes(np.shape(mean_separation), surface.shape)
-        )
+        shape = np.broadcast_shapes(np.shape(mean_separation), surface.shape)
+        u = np.broadcast_to(np.asarray(mean_separation, float), shape)
         low, high = self.rows[2, -1], self.rows[2, 0]
         good = (u >= low * (1 - 1e-12)) & (u <= high * (1 + 1e-12))
         require("mean_separation", u, good, f"between {low:.6g} and {high:.6g}, which were simulated")

@@ -141,8 +141,8 @@ class Yielding(Theory):
         chosen = np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)]
         return self.changed(hardness=chosen)
 
-    def stiffer(self, times: FloatArray) -> Theory:
-        """With hardnesses that are less of the modulus."""
+    def stiffer(self, times: FloatArray) -> Yielding:
+        """At a modulus so many times as large, of which hardnesses are less."""
         return self.changed(hardness=np.asarray(self.hardness / times))
 
     def _eta(self, surface: AnySurface) -> FloatArray:
