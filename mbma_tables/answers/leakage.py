@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.answers.leakage_table import flow_of_spectrum, self_affine, shipped_flow
+from mbma_tables.answers.source import Source
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, require, rows
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
@@ -25,8 +26,6 @@ from mbma_tables.theories.protocol import Theory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from mbma_tables.answers.source import Source
 
 LARGEST_KNUDSEN = 0.1  # mean free path over the channel, to which slip of first order holds
 SLIP = 6.0  # of a plane channel: flow is 1 + 6 Kn times that without slip

@@ -107,9 +107,8 @@ class Contact(Interface, Displayed):
             # a pressure in another unit than meant shows itself so
             light = self.elastic_hardness * ELASTIC_PSI / 2
             if self.pressure is not None and np.any(self.pressure > light):
-                facts["pressure"] += (
-                    f" (above E* g/2 = {shown(light, units['pressure'])}, the mean pressure in light contact)"
-                )
+                limit = shown(light, units["pressure"])
+                facts["pressure"] += f" (above E* g/2 = {limit}, the mean pressure in light contact)"
         if source.theory.advice:
             facts["advice"] = source.theory.advice
         return facts | {name: shown(value) for name, value in more.items()}

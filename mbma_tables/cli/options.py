@@ -7,19 +7,17 @@ import functools
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from mbma_tables.common.errors import InputError
 from mbma_tables.scenes import specimen as specimens
 from mbma_tables.scenes.specimen import Specimen
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.cases import CASES
 from mbma_tables.surfaces.variants import NAMED
 from mbma_tables.theories import OF_MAPS, THEORIES
-
-if TYPE_CHECKING:
-    from mbma_tables.surfaces.any_surface import AnySurface
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 

@@ -12,13 +12,12 @@ from mbma_tables.common.arguments import finite_array, nearest, number_in, requi
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, in_unit, known, modulus_and_units
 from mbma_tables.materials import hardness_in
-from mbma_tables.surfaces.variants import get_variant
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.variants import Variant, get_variant
 from mbma_tables.theories import OF_MAPS, THEORIES, get_theory, theory_name
 
 if TYPE_CHECKING:
     from mbma_tables.models import AnyModel
-    from mbma_tables.surfaces.any_surface import AnySurface
-    from mbma_tables.surfaces.variants import Variant
 
 # effects; docs/scenes.md says what each is
 OUTPUTS = (

@@ -13,11 +13,11 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.scenes.plan import Step
 from mbma_tables.scenes.problem import CORRELATIONS, INVERTED, Problem
+from mbma_tables.surfaces.any_surface import AnySurface
 
 if TYPE_CHECKING:
     from mbma_tables.answers.result import Contact
     from mbma_tables.law.law import ContactLaw
-    from mbma_tables.surfaces.any_surface import AnySurface
     from mbma_tables.theories.protocol import Theory
 
 Progress = Callable[[str, int, int], None]

@@ -96,9 +96,8 @@ def _carried(surface: MeasuredSurface, halvings: int, tolerance: float) -> Press
         coarse = coarser(coarse, MIN_POINTS)
     steps = tuple(side / count for side, count in zip(sizes, coarse.shape, strict=True))
     law, other = own_law(surface), OwnLaw(MeasuredSurface.of(measured_map(Treated(coarse, steps, True, None), None)))
-    found = press(
-        coarse, sizes, simulated.law_loads(surface, simulated.AREAS), MIN_POINTS, law.gradient, None, tolerance
-    )
+    loads = simulated.law_loads(surface, simulated.AREAS)
+    found = press(coarse, sizes, loads, MIN_POINTS, law.gradient, None, tolerance)
     pressure, area, u, energy = found.rows
     change = law.separations(pressure) - other.separations(pressure)
     # the coarse grid may be in full contact
