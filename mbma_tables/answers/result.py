@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbma_tables.answers.interface import Interface
-from mbma_tables.answers.source import MEANINGS, Source, concerns, named
+from mbma_tables.answers.source import MEANINGS, Source, concerns, named, untroubled
 from mbma_tables.common.arguments import FloatArray, Numbers, any_labelled, is_labelled
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
@@ -257,8 +257,7 @@ class Contact(Interface, Displayed):
         """Whether the theory was tested for contacts such as these; `reasons` says where and why not."""
 
         def none(theory: Theory, s: AnySurface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[FloatArray]:
-            masks = list(concerns(source, theory, s, u, E, TheoryAnswer(*answer)).values())
-            return (np.asarray(~np.logical_or.reduce(masks), dtype=float),)
+            return (untroubled(concerns(source, theory, s, u, E, TheoryAnswer(*answer))),)
 
         source = self._source
         return source.map(none, self, 1, self._answer._asdict())[0].astype(bool)
