@@ -235,7 +235,7 @@ def calibrated(rng: np.random.Generator) -> None:
         {
             "table": lambda: theory.answer(surface, u),
             "erf": lambda: erf(u),
-            "law": lambda: law.pressure_and_stiffness(some),
+            "law": lambda: law.force_and_stiffness(some),
         }
     )
     spent = microseconds(taken["table"], GAPS)

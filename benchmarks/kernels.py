@@ -87,7 +87,7 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
         return dataclasses.replace(one, h_max=one.h_max * (1 + 1e-9 * next(fresh)))
 
     law = contact_law(one)
-    forces, place = law.pressure(separation=many), float(many[0])
+    forces, place = law.pressure(separation=many), float((one.h_max + many[0]) / 2)
     flat, u = Surface(0.8, 1.0, 64.0, 1.0, 3.3), rng.uniform(0.01, 3.3, MANY)
     mean = (gaps + surfaces.h_max) / 2
     calibrated, loads = contact(flat, mean_separation=u, theory="calibrated").pressure, {}
@@ -114,7 +114,7 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
             SOME * DESIGNS,
         ),
         "100,000 gaps on a new surface": (lambda: contact(another(), separation=many), MANY),
-        "one gap on a new surface": (lambda: [contact(another(), separation=place) for _ in range(50)], 50),
+        "one gap on a new surface": (lambda: [contact(another(), mean_separation=place) for _ in range(50)], 50),
         "a law": (lambda: [contact_law(another()) for _ in range(5)], 5),
         "law: pressure": (lambda: law.pressure(separation=many), MANY),
         "law: pressure and stiffness": (lambda: law.pressure_and_stiffness(separation=many), MANY),

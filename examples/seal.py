@@ -59,12 +59,12 @@ def answer(points: np.ndarray) -> Contact:
 def log_answers(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """log(pressure/LOAD) and log(conductance), means of face and track, and their gradients (2, 4)."""
     found = answer(x + STEP * np.concatenate([np.zeros((1, 4)), np.eye(4), -np.eye(4)]))
-    both = np.log([found.pressure.mean(axis=1) / LOAD, found.leakage.conductance.mean(axis=1)])
+    both = np.log([found.pressure.mean(axis=1) / LOAD, found.leakage.K.mean(axis=1)])
     return both[:, 0], (both[:, 1:5] - both[:, 5:]) / (2 * STEP)
 
 
 def simulate(best: Contact, x: np.ndarray, grid: int, seed: int) -> float:
-    """Mean flow conductance of face and track by boundary elements and Reynolds' equation, of one random cell."""
+    """Mean flow coefficient of face and track by boundary elements and Reynolds' equation, of one random cell."""
     h_rms, hurst, zeta_1 = np.exp(x[0]), x[1], np.exp(x[2]) / Q0
     waves = round(grid / 4 / zeta_1)  # four points on the shortest
     k = np.hypot(np.fft.fftfreq(grid, 1 / grid)[:, None], np.fft.rfftfreq(grid, 1 / grid))
@@ -107,7 +107,7 @@ def alike(x: np.ndarray, log_h_rms: np.ndarray) -> np.ndarray:
         points = np.stack([log_h_rms, *(np.full(low.size, value) for value in x[1:3]), (low + high) / 2], axis=1)
         heavy = answer(points).pressure.mean(axis=1) > LOAD
         low, high = np.where(heavy, points[:, 3], low), np.where(heavy, high, points[:, 3])
-    return np.asarray(answer(points).leakage.conductance.mean(axis=1))
+    return np.asarray(answer(points).leakage.K.mean(axis=1))
 
 
 def draw(found: Found) -> Figure:

@@ -203,7 +203,7 @@ def dataset(found: Sequence[Case], contact: Constants) -> xr.Dataset:
         | bins_of(edges, (edges[1:] + edges[:-1]) / 2),
     )
     data.attrs = {
-        "title": "Flow conductance of gaps: contact factor of an effective medium, and its errors against simulation",
+        "title": "Flow coefficient of gaps: contact factor of an effective medium, and its errors against simulation",
         "source": "mbma_tables.laws.effective_medium, its constants fitted to the training set of docs/data/leakage.nc",
         "references": "docs/leakage.md",
         "theories": " ".join(stated),

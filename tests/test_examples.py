@@ -53,7 +53,7 @@ def direct(module, x):
     face = Surface(x[1], module.Q0, np.exp(x[2]), h_rms, h_max)
     both = [contact(face, mean_separation=x[3] * h_max + deeper, theory="calibrated") for deeper in (0, module.DEPTH)]
     pressure = module.E_STAR * np.mean([half.pressure for half in both])
-    return np.log([pressure / module.LOAD, np.mean([half.leakage.conductance for half in both])])
+    return np.log([pressure / module.LOAD, np.mean([half.leakage.K for half in both])])
 
 
 def test_seal_gradients(seal):

@@ -21,7 +21,7 @@ QUANTITIES = ("area", "area_raw", "mean_separation", "residual", "seconds")
 
 
 def solve_flow(recipe: Recipe) -> dict[str, Any]:
-    """Contact and flow conductance of one surface up to its blocking: lengths in h_rms, force in A0 E* g."""
+    """Contact and flow coefficient of one surface up to its blocking: lengths in h_rms, force in A0 E* g."""
     surface, spectrum, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
     h_rms = float(surface.std())
     contact: Contact | CappedContact = Contact(surface, recipe.sizes)

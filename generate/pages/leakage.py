@@ -96,7 +96,7 @@ def draw(seen: Sequence[Any]) -> Any:
                 axes.plot(one.area, np.exp(one.log_k), ".", color=colour, ms=4, alpha=0.6, label=label)
         for zeta, style in ((16.0, "-"), (64.0, "--"), (1024.0, ":")):
             answer = contact(Surface(hurst, 1.0, zeta, 1.0, 4.0), area=area, theory="calibrated")
-            k = np.where(answer.leakage.blocked, np.nan, answer.leakage.k)
+            k = np.where(answer.leakage.blocked, np.nan, answer.leakage.K)
             axes.plot(area, k, f"C0{style}", label=f"calibrated, zeta_1 {zeta:g}")
             if zeta == 16:
                 spread = np.exp(answer.leakage.scatter)
@@ -107,7 +107,7 @@ def draw(seen: Sequence[Any]) -> Any:
                 axes.plot(area, u**3, "C2-", lw=1, label="u^3, zeta_1 16")
         axes.set(xlabel="real contact area  A/A0", yscale="log", ylim=(1e-7, 20), title=f"H = {hurst:g}")
         axes.grid(alpha=0.3)
-    axes_of[0].set_ylabel("flow conductance over h_rms^3,  k")
+    axes_of[0].set_ylabel("flow coefficient over h_rms^3,  k")
     # one entry for all simulations of a colour
     entries = {text: handle for handle, text in zip(*axes_of[0].get_legend_handles_labels(), strict=True)}
     axes_of[0].legend(entries.values(), entries.keys(), fontsize="small")

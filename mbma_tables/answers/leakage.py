@@ -1,4 +1,4 @@
-"""Leakage of a contact: its flow conductance, how far that is to be trusted, and rates of liquids and gases."""
+"""Leakage of a contact: its flow coefficient, how far that is to be trusted, and rates of liquids and gases."""
 
 from __future__ import annotations
 
@@ -46,18 +46,16 @@ class Leakage(Displayed):
 
     Attributes
     ----------
-    k : ndarray
-        Flow conductance over h_rms^3: flow per length of seal is k h_rms^3 (p1 - p2)/(12 viscosity width). Exactly 0
-        where `blocked`.
-    conductance : ndarray
-        k h_rms^3 [length^3]; of `theory="simulated"` the geometric mean of both axes.
+    K : ndarray
+        Flow coefficient [length^3], the cube of the `hydraulic_aperture`: flow per length of seal is
+        K (p1 - p2)/(12 viscosity width). Exactly 0 where `blocked`; of `theory="simulated"` the geometric mean of
+        both axes.
     x, y : ndarray
-        Flow conductance along the first and the second axis of the map [length^3]: its own with `theory="simulated"`,
-        whose gaps are solved for flow, else that of isotropic roughness, `conductance`.
+        Flow coefficient along the first and the second axis of the map [length^3]: its own with `theory="simulated"`,
+        whose gaps are solved for flow, else that of isotropic roughness, `K`.
     """
 
-    k: Numbers
-    conductance: Numbers
+    K: Numbers
     x: Numbers
     y: Numbers
     _source: Source = dataclasses.field(repr=False)
@@ -70,11 +68,12 @@ class Leakage(Displayed):
 
     def _variables(self) -> dict[str, Variable]:
         return {
-            "conductance": Variable(self.conductance, self.units["conductance"], "flow conductance k h_rms^3"),
-            "x": Variable(self.x, self.units["conductance"], "flow conductance along the first axis"),
-            "y": Variable(self.y, self.units["conductance"], "flow conductance along the second axis"),
-            "k": Variable(self.k, "1", "flow conductance over h_rms^3"),
-            "scatter": Variable(self.scatter, "1", "standard deviation of ln k from simulation to simulation"),
+            "K": Variable(self.K, self.units["K"], "flow coefficient"),
+            "x": Variable(self.x, self.units["K"], "flow coefficient along the first axis"),
+            "y": Variable(self.y, self.units["K"], "flow coefficient along the second axis"),
+            "hydraulic_aperture": Variable(self.hydraulic_aperture, self.units["hydraulic_aperture"], "K^(1/3)"),
+            "flow_factor": Variable(self.flow_factor, "1", "K over the cube of the mean separation"),
+            "scatter": Variable(self.scatter, "1", "standard deviation of ln K from simulation to simulation"),
             "valid": Variable(self.valid, "1", "whether flow through such contacts was simulated"),
             "blocked": Variable(self.blocked, "1", "whether contact percolates"),
         }
@@ -87,17 +86,28 @@ class Leakage(Displayed):
         return draw_compression(
             [self._contact.curve(leakage=True)],
             pressure_label=pressure_label(self._contact.units["pressure"]),
-            leakage_label=leakage_label(self.units["conductance"]),
+            leakage_label=leakage_label(self.units["K"]),
         )
 
     @property
     def blocked(self) -> Any:
         """Whether contact percolates, A/A0 at or above about 0.41: what then passes no law of gaps tells."""
-        return self.k == 0
+        return self.K == 0
+
+    @property
+    def hydraulic_aperture(self) -> Numbers:
+        """K^(1/3) [length], the gap of parallel plates that pass as much."""
+        return np.cbrt(self.K)
+
+    @property
+    def flow_factor(self) -> Numbers:
+        """K/u^3, Patir and Cheng's pressure flow factor of the mean separation u."""
+        factor: Numbers = self.K / self._contact.mean_separation**3
+        return factor
 
     @functools.cached_property
     def scatter(self) -> Numbers:
-        """Standard deviation of ln k from simulation to simulation, cells of four or more longest waves a side.
+        """Standard deviation of ln K from simulation to simulation, cells of four or more longest waves a side.
 
         NaN where not known, and where blocked.
         """
@@ -118,7 +128,7 @@ class Leakage(Displayed):
 
     @functools.cached_property
     def closed_form(self) -> Numbers:
-        """k by a closed form of gap and area alone, good to zeta_1 of 32: a second opinion."""
+        """K/h_rms^3 by a closed form of gap and area alone, good to zeta_1 of 32: a second opinion."""
         constants = shipped_flow().constants
         return self._map(lambda theory, s, u, E, area: constants.closed_form(u / np.asarray(s.h_rms), area))
 
@@ -144,7 +154,10 @@ class Leakage(Displayed):
     @property
     def units(self) -> dict[str, str]:
         """Units of the quantities that have one."""
-        return {"conductance": unit_of("leakage", self._source.units)}
+        return {
+            "K": unit_of("leakage", self._source.units),
+            "hydraulic_aperture": unit_of("separation", self._source.units),
+        }
 
     def liquid(self, viscosity: ArrayLike | str, pressure_drop: ArrayLike | str, width: ArrayLike | str) -> Numbers:
         """Volume that leaks per time and length of seal [length^2/time].
@@ -173,8 +186,8 @@ class Leakage(Displayed):
         '3.0e+02 um^2/s'
         """
         eta, drop, length = self._positive(viscosity=viscosity, pressure_drop=pressure_drop, width=width)
-        agree(k=self.k, viscosity=eta, pressure_drop=drop, width=length)
-        return self.conductance * (drop / (12 * eta * length))
+        agree(K=self.K, viscosity=eta, pressure_drop=drop, width=length)
+        return self.K * (drop / (12 * eta * length))
 
     def gas(
         self,
@@ -215,12 +228,12 @@ class Leakage(Displayed):
         )
         path = self._number("mean_free_path", mean_free_path)
         require("mean_free_path", np.asarray(path), np.asarray(path >= 0), "at least 0")
-        channel = np.cbrt(self.conductance)
-        agree(k=self.k, viscosity=eta, pressure_in=high, pressure_out=low, width=length, mean_free_path=path)
+        channel = self.hydraulic_aperture
+        agree(K=self.K, viscosity=eta, pressure_in=high, pressure_out=low, width=length, mean_free_path=path)
         knudsen = path / np.maximum(channel, np.finfo(float).tiny) * (channel > 0)
         limit = f"at most {LARGEST_KNUDSEN} of the channel k^(1/3) h_rms: beyond, flow is not that of slip"
         require("mean_free_path", np.asarray(path + 0 * knudsen), np.asarray(knudsen <= LARGEST_KNUDSEN), limit)
-        return self.conductance * (1 + SLIP * knudsen) * ((high - low) / low * (high + low) / (24 * eta * length))
+        return self.K * (1 + SLIP * knudsen) * ((high - low) / low * (high + low) / (24 * eta * length))
 
     def _positive(self, **given: Any) -> list[FloatArray]:
         found = []
@@ -248,17 +261,16 @@ def leakage_of(source: Source, contact: Any, area: Any) -> Leakage:
     def answer(theory: Theory, surface: Any, u: FloatArray, E: FloatArray, share: FloatArray) -> tuple[FloatArray, ...]:
         own, volume = theory.elastic.flow(surface, u), np.asarray(surface.h_rms) ** 3
         if own is not None:
-            mean = np.sqrt(own[0]) * np.sqrt(own[1])
-            return mean / volume, mean, own[0], own[1]
-        k = flow(surface, u, share)
-        return k, k * volume, k * volume, k * volume
+            return np.sqrt(own[0]) * np.sqrt(own[1]), own[0], own[1]
+        K = flow(surface, u, share) * volume
+        return K, K, K
 
-    k, conductance, x, y = source.map(answer, contact, 4, {"area": area})
-    return Leakage(k, conductance, x, y, source, contact, area)
+    K, x, y = source.map(answer, contact, 3, {"area": area})
+    return Leakage(K, x, y, source, contact, area)
 
 
 def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatArray:
-    """k of mean separations u [length] and A/A0; 0 where blocked."""
+    """K/h_rms^3 of mean separations u [length] and A/A0; 0 where blocked."""
     (u, contact), shape = rows(np.asarray(mean_separation) / np.asarray(surface.h_rms), area)
     if isinstance(surface, MeasuredSurface):
         return flow_of_spectrum(spectrum_of(surface), u, contact).reshape(shape)

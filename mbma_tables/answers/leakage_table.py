@@ -1,4 +1,4 @@
-"""Flow conductance of contacts: the contact factor's table of self-affine surfaces, and its scatter.
+"""Flow coefficient of contacts: the contact factor's table of self-affine surfaces, and its scatter.
 
 The table holds ln R of `mbma_tables.laws.effective_medium` over Hurst exponent, ln zeta_1 and ln A/(Ac - A).
 Below its least contact ln R goes as A^m, as what obstructs; above its largest it is linear in the odds: R is a power

@@ -141,7 +141,7 @@ class Contact(Interface, Displayed):
         order = np.argsort(-np.ravel(self.mean_separation), kind="stable")
         fields = [self.mean_separation / surface.h_rms, self.pressure, self.area, self.scatter, self.area_scatter]
         if leakage:
-            fields += [self.leakage.conductance, self.leakage.scatter]
+            fields += [self.leakage.K, self.leakage.scatter]
         label = theory_label(self.theory) + (f", {self.variant}" if self.variant else "")
         return Curve(label, *(np.ravel(field)[order] for field in fields))
 

@@ -102,9 +102,9 @@ def contact_command(
 
 
 def _leakage(answer: Contact) -> dict[str, Any]:
-    """Columns of the flow conductance of the gaps."""
+    """Columns of the flow coefficient of the gaps."""
     found = answer.leakage
-    return {"leakage": found.conductance, "leakage_scatter": found.scatter, "leakage_valid": found.valid}
+    return {"leakage": found.K, "leakage_scatter": found.scatter, "leakage_valid": found.valid}
 
 
 def curve_gaps(h_max: float, points: int) -> Any:

@@ -53,7 +53,7 @@ class _Target(click.Choice[str]):
 @options.quantity_option("--largest-overclosure", help="Where the rows end; else at full compression.")
 @click.option("--conductivity", type=float, help="k_s = 2 k1 k2/(k1 + k2): conductance against pressure, or as well.")
 @click.option("--conductivity-unit", help="Unit of k_s, such as mW/(mm K); conductance is in that over length.")
-@click.option("--leakage", is_flag=True, help="Flow conductance of the gaps: rows of it alone, laws as code with it.")
+@click.option("--leakage", is_flag=True, help="Flow coefficient of the gaps: rows of it alone, laws as code with it.")
 @click.option(
     "--pressures", metavar="X:X", help="Smallest and largest pressure: where the error holds, and the rows end."
 )

@@ -272,7 +272,7 @@ output_options = _group(
     click.option("--csv", "as_csv", is_flag=True, help="Print CSV with '#' comments instead of a table."),
     _option("out", "Write to a file instead.", type=PATH, metavar="FILE"),
 )
-leakage_option = _option("leakage", "Add the flow conductance of the gaps [length^3].", is_flag=True)
+leakage_option = _option("leakage", "Add the flow coefficient of the gaps [length^3].", is_flag=True)
 plot_option = _option("plot", "Draw a picture: FILE.png, .svg or .pdf.", type=PATH, metavar="FILE")
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 KINDS = ("png", "svg", "pdf")  # of files of pictures
 GAP_LABEL = "mean separation  u/h_rms"
 FORCE_LABEL = "force  F/(A0 E*)"
-LEAKAGE_LABEL = "flow conductance  k h_rms^3"
+LEAKAGE_LABEL = "flow coefficient  k h_rms^3"
 LABELS = {"mbma": "MBMA", "greenwood_williamson": "Greenwood-Williamson", "persson_simplified": "Persson, simplified"}
 
 
@@ -39,7 +39,7 @@ def pressure_label(unit: str) -> str:
 
 
 def leakage_label(unit: str) -> str:
-    """The axis of flow conductance in a unit; "1" where that is not known."""
+    """The axis of flow coefficient in a unit; "1" where that is not known."""
     return LEAKAGE_LABEL if unit == "1" else f"{LEAKAGE_LABEL} [{unit}]"
 
 
@@ -53,7 +53,7 @@ class Curve:
     area: FloatArray  # A/A0
     scatter: FloatArray | None = None  # standard deviation of ln F at the gap, drawn as a band,
     area_scatter: FloatArray | None = None  # and of ln A at the force
-    leakage: FloatArray | None = None  # flow conductance of the gaps, zero where blocked,
+    leakage: FloatArray | None = None  # flow coefficient of the gaps, zero where blocked,
     leakage_scatter: FloatArray | None = None  # and standard deviation of its logarithm
 
     def __post_init__(self) -> None:
@@ -100,7 +100,7 @@ def draw_compression(
 ) -> Figure:
     """Two panels: force (logarithmic) against u/h_rms, and area against force (both logarithmic).
 
-    A third one, flow conductance against force, where a curve has leakage. Each curve is a line with its points as they
+    A third one, flow coefficient against force, where a curve has leakage. Each curve is a line with its points as they
     are; those without contact have no place on a logarithmic axis and are left out by it.
     """
     if not curves:

@@ -261,7 +261,7 @@ size_t mbma_inverse_nodes(size_t n, const double *wanted, const mbma_law *law, m
 size_t mbma_law_invert(size_t n, const double *wanted, const mbma_law *law, const mbma_inverse *inverse,
                        mbma_quantity which, double *d, double *area, double *stiffness);
 
-/* Flow conductance of the gaps at separations: `flow` is a block like that of a law, with the conductance in place of
+/* Flow coefficient of the gaps at separations: `flow` is a block like that of a law, with the conductance in place of
  * force; bodies farther apart than it reaches are u^3 (1 - 1.5/(u^2/h_rms^2 + 4)). `by_c` may be NULL, or get dK/dc. */
 double mbma_law_flow(const mbma_law *flow, double h_max, double h_rms, double d, double *by_c);
 

@@ -26,7 +26,7 @@ STANDARDS = {
 }
 SAID = {
     "conductance": "through the contact, over nominal area",
-    "leakage": "flow conductance K: K dp/(12 viscosity width) per length of seal, viscosity in stress times s",
+    "leakage": "flow coefficient K: K dp/(12 viscosity width) per length of seal, viscosity in stress times s",
 }
 INPUT = 1  # value reference of overclosure, after time
 

@@ -149,7 +149,7 @@ class Joint:
             load = float(self.law.pressure(separation=blocked))
             least = f"blocked, K = 0, from p = {load:.10g} {self.stress}, c = {c:.10g} on"
         return (
-            f"leakage is the flow conductance K [{self.length}^3] of the gaps: flow per length of seal is "
+            f"leakage is the flow coefficient K [{self.length}^3] of the gaps: flow per length of seal is "
             f"K dp/(12 viscosity width), viscosity in {self.stress} s: 1e-3 Pa s, as water's, is "
             f"{1e-3 * factor('Pa', self.stress, 'stress'):.4g} {self.stress} s",
             least,

@@ -43,7 +43,7 @@ def law_text(
     name : str
         What functions, modules or packages are called, or begin with.
     leakage : bool
-        The function `leakage` as well, the flow conductance K of the gaps [length^3], as `ContactLaw.leakage`.
+        The function `leakage` as well, the flow coefficient K of the gaps [length^3], as `ContactLaw.leakage`.
 
     Returns
     -------

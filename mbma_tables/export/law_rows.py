@@ -122,7 +122,7 @@ def describe_law(
     length_unit, stress_unit : str, optional
         Units of the rows. A surface or modulus that has another one is converted; one that has none is in these.
     quantity : {"pressure", "conductance", "leakage"}
-        Pressure against overclosure, or conductance against pressure, or the flow conductance k h_rms^3 of the gaps
+        Pressure against overclosure, or conductance against pressure, or the flow coefficient k h_rms^3 of the gaps
         (`ContactLaw.leakage`) against pressure.
     rows : int, optional
         How many; else as few as `rtol` needs, 1e-3 where neither is given.

@@ -123,7 +123,7 @@ def _law(graph: _Graph, found: AskedLaw) -> list[str]:
 
 
 def _flow(graph: _Graph, numbers: LawNumbers, flow: FlowNumbers) -> str:
-    """Nodes from overclosure to the flow conductance within the law's range."""
+    """Nodes from overclosure to the flow coefficient within the law's range."""
     c = "overclosure"
     d = graph("Sub", numbers.h_max, graph("Mul", c, 2.0))
     x = graph("Mul", graph("Sub", d, flow.blocked), flow.scale)

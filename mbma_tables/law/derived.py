@@ -91,7 +91,7 @@ class Derived:
 
     @functools.cached_property
     def leakage(self: Any) -> LeakageLaw:
-        """Flow conductance at a mean separation, ``separation=`` or ``pressure=``, a `LeakageLaw`; made when read.
+        """Flow coefficient at a mean separation, ``separation=`` or ``pressure=``, a `LeakageLaw`; made when read.
 
         Examples
         --------

@@ -1,4 +1,4 @@
-"""Leakage of a contact law: flow conductance as polynomials of the gap, from that at which contact percolates."""
+"""Leakage of a contact law: flow coefficient as polynomials of the gap, from that at which contact percolates."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_OCTAVES = 20  # of gaps, from the blocked one on, next to which the flow is
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LeakageLaw:
-    """Flow conductance k h_rms^3 [length^3] of one surface against its gap, as `ContactLaw.leakage` has it."""
+    """Flow coefficient k h_rms^3 [length^3] of one surface against its gap, as `ContactLaw.leakage` has it."""
 
     law: Any  # the ContactLaw whose area and mean separation it is of
     h_rms: float  # [length]
@@ -44,7 +44,7 @@ class LeakageLaw:
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
     ) -> Numbers:
-        """Flow conductance at mean separations, separations or pressures; exactly 0 where blocked."""
+        """Flow coefficient at mean separations, separations or pressures; exactly 0 where blocked."""
         asked = {"mean_separation": mean_separation, "separation": separation, "pressure": pressure}
         given = {name: known for name, known in asked.items() if known is not None}
         if len(given) != 1:

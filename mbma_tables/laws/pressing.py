@@ -58,7 +58,7 @@ class Pressed:
     cut: float = 0.0  # sampling steps of the coarse grid along its shortest waves, where shorter ones were left out
 
     def flow(self) -> FloatArray:
-        """Flow conductance along both axes [length^3], shape (n, 2); 0 where blocked."""
+        """Flow coefficient along both axes [length^3], shape (n, 2); 0 where blocked."""
         found = np.zeros((len(self.gaps), 2))
         with shown("flow through the gaps"):
             for k in range(len(self.gaps)):

@@ -144,7 +144,7 @@ def _asked(run: Run) -> Contact:
 
 def _leakage(run: Run, step: Step) -> None:
     found = _asked(run).leakage
-    fields = {"": found.conductance, "_valid": found.valid, "_scatter": found.scatter, "_blocked": found.blocked}
+    fields = {"": found.K, "_valid": found.valid, "_scatter": found.scatter, "_blocked": found.blocked}
     run.found |= {f"leakage{end}": (("gap",), values) for end, values in fields.items()}
 
 

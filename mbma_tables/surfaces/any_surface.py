@@ -111,7 +111,7 @@ class AnySurface(Displayed, abc.ABC):
         told = [entry["told"] for entry in self.provenance if entry["step"] in ("resolution", "extrapolated")]
         return "; ".join(told)
 
-    @property
+    @functools.cached_property
     def zeta_1(self) -> Any:
         """Largest magnification q1/q0 (Eq. 13)."""
         return self.q1 / self.q0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Self
@@ -225,12 +226,12 @@ class SelfAffine(AnySurface):
         """Whether any parameter is an xarray DataArray."""
         return any(is_labelled(getattr(self, name)) for name in PARAMETERS)
 
-    @property
+    @functools.cached_property
     def shape(self) -> tuple[int, ...]:
         """Shape of the batch; () for one surface."""
         return np.shape(self.hurst)
 
-    @property
+    @functools.cached_property
     def s(self) -> Any:
         """Unit of height, h_rms/sqrt(1 - zeta_1^(-2H)) [length]."""
         return self.h_rms / np.sqrt(-np.expm1(-2 * self.hurst * np.log(self.zeta_1)))

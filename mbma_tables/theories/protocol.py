@@ -125,7 +125,7 @@ class Theory(abc.ABC):
         return calibrated_table.shipped().standard_deviation(self.scatter_name(surface), quantity, area)
 
     def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray | None:
-        """Flow conductance [length^3] along both axes, shape (2, ...), of gaps that it knows; None: it knows none."""
+        """Flow coefficient [length^3] along both axes, shape (2, ...), of gaps that it knows; None: it knows none."""
         return None
 
     def flow_trust(

@@ -264,7 +264,7 @@ class BoundaryElements(Theory):
         return self.pressed.flow()
 
     def flow(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray | None:
-        """Flow conductance [length^3] along both axes, by the gaps; 0 from the load at which an axis is blocked."""
+        """Flow coefficient [length^3] along both axes, by the gaps; 0 from the load at which an axis is blocked."""
         if self.pressed is None:
             return None
         u = self._within(surface, mean_separation)

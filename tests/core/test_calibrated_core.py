@@ -53,7 +53,7 @@ def separations(rows, owner, force, used=core, pieces=None):
 
 
 def flow(rows, owner, u, area, pieces=None):
-    """Flow conductance."""
+    """Flow coefficient."""
     return leakage_table._flow((*FLOW.core_table, *rows[:2], None, None, pieces), owner, u, area)
 
 

@@ -377,7 +377,7 @@ def test_rows_against_pressure_reach_the_largest(quantity):
     law = law_of(theory="calibrated", quantity=quantity, pressures=(1e-4, 0.1234567890123), rows=20, **heat)
     assert law.x[-1] >= 0.1234567890123
     found = contact(CONCRETE, pressure=0.1234567890123, E_star=13.3, theory="calibrated")
-    model = found.stiffness * 50.0 / 13.3 if heat else found.leakage.conductance
+    model = found.stiffness * 50.0 / 13.3 if heat else found.leakage.K
     assert law.y[-1] == pytest.approx(model, rel=law.largest_error + 1e-4)
     if law.behaviour:
         assert law.behaviour.y[-1] >= 0.1234567890123
@@ -434,7 +434,7 @@ class TestLeakage:
         pressure = np.geomspace(law.x[1], law.x[-2], 400)
         model = contact(CONCRETE, pressure=pressure, E_star=13.3, theory="calibrated")
         kept = model.area < 0.3
-        error = np.interp(pressure, law.x, law.y) / np.where(kept, model.leakage.conductance, np.nan) - 1
+        error = np.interp(pressure, law.x, law.y) / np.where(kept, model.leakage.K, np.nan) - 1
         assert np.nanmax(np.abs(error)) < 1.05e-3 + 1e-4
         text = "\n".join(law.comments)
         assert "blocked, K = 0, from p = " in text

@@ -196,7 +196,7 @@ class TestOfASurface:
             np.testing.assert_allclose(np.log(own[0] / true[0]), 0, atol=0.15)
             assert (own[:2] > 0).all()
             assert (own[-1] > 0) == (true[-1] > 0)
-        np.testing.assert_allclose(leakage.conductance, np.sqrt(leakage.x * leakage.y))
+        np.testing.assert_allclose(leakage.K, np.sqrt(leakage.x * leakage.y))
         assert leakage.scatter[0] < 0.1
         assert (np.diff(leakage.scatter[:3]) > 0).all()
         assert leakage.valid[:2].all()
