@@ -111,7 +111,7 @@ def draw(data: Any) -> Any:
         found = get_theory(name).answer(surface, gap)
         left.semilogy(gap, found.pressure / g, color=COLOURS[name], label=name)
         if name == "calibrated":
-            spread = np.exp(get_theory(name).scatter(surface, found.area)[0])
+            spread = np.exp(get_theory(name).scatter(surface, "pressure", found.area))
             left.fill_between(
                 gap, found.pressure / g / spread, found.pressure / g * spread, color="0.8", label="its scatter"
             )

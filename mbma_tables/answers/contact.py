@@ -201,7 +201,7 @@ def _contact(
     """`contact` of plain arrays."""
     theory = source.theory_at(E_star, hardness)
     value, E_star, places, lighter = _places(surface, value, E_star, hardness, by, theory, source.units.stress)
-    held = {"pressure": "pressure", "area": "area"}.get(by)
+    held = by if by in QUANTITIES else None
     capped: Any = theory
     by_log_modulus: dict[str, Any] = {"pressure": 0.0, "area": 0.0}
     if derivatives and held:
@@ -231,10 +231,13 @@ def _contact(
     for name in QUANTITIES:
         if name not in quantities:
             fields |= {name: None, f"{name}_by": None}
-    own = source.theory
-    return Contact(
-        theory=own.name, variant=own.variant_name, island_model=own.island_model_name, _source=source, **fields
-    )
+    return _made(source, fields)
+
+
+def _made(source: Source, fields: dict[str, Any]) -> Contact:
+    by = source.theory
+    names: dict[str, Any] = {"theory": by.name, "variant": by.variant_name, "island_model": by.island_model_name}
+    return Contact(**names, **fields, _source=source)
 
 
 def _places(
@@ -298,15 +301,14 @@ def _at_fixed(held: str, by: str, slopes: dict[str, Any], by_modulus: dict[str, 
 
 def _of_labelled(surface: AnySurface, value: Any, E_star: Any, hardness: Any, options: dict[str, Any]) -> Contact:
     """`contact` of DataArrays, lazily where they are."""
-    by, theory, wanted = options["by"], options["source"].theory, options["quantities"]
-    units = options["source"].units
+    by, wanted, units = options["by"], options["quantities"], options["source"].units
     names: tuple[str, ...] = (*wanted, "error")
-    fields: dict[str, Any] = {"pressure": None, "area": None}
+    fields: dict[str, Any] = {"pressure": None, "area": None, "islands": None}
     if by not in ("separation", "mean_separation"):
         names = ("separation", "mean_separation", *names)
     slopes: list[tuple[str, str]] = []
     if options["derivatives"]:
-        held = {"pressure": "pressure", "area": "area"}.get(by)
+        held = by if by in QUANTITIES else None
         kinds = [f"{kind}_by" for kind in wanted if kind != held] + (["separation_by"] if held else [])
         free = (by if held else "separation", *surface.parameters, *(("E_star",) if held == "pressure" else ()))
         slopes = [(kind, name) for kind in kinds for name in free]
@@ -326,12 +328,4 @@ def _of_labelled(surface: AnySurface, value: Any, E_star: Any, hardness: Any, op
         fields |= {by: value, "mean_separation": named((surface.h_max + value) / 2, "mean_separation", units)}
     elif by == "mean_separation":
         fields |= {by: value, "separation": named(2 * value - surface.h_max, "separation", units)}
-    source = options["source"]
-    return Contact(
-        theory=theory.name,
-        variant=theory.variant_name,
-        island_model=theory.island_model_name,
-        islands=None,
-        _source=source,
-        **fields,
-    )
+    return _made(options["source"], fields)

@@ -107,10 +107,8 @@ def _yielding(capped: Any, surface: AnySurface, u: FloatArray, lighter: FloatArr
         if lighter is not None:
             line = at_force[place] + tilt[name, place] * x, rise[place], np.ravel(whole.answer.pressure)[place]
         straight = _Straight(elastic, TheoryAnswer(*ends, *np.zeros((2, x.size))), line)
-        found: TheoryAnswer = (
-            capped.at(shape, place).stiffer(own[MODULUS]).changed(_elastic=straight).answer(moved, own[GAP])
-        )
-        return found
+        stiffer = capped.at(shape, place).stiffer(own[MODULUS])
+        return stiffer.changed(_elastic=straight).answer(moved, own[GAP])  # type: ignore[no-any-return]
 
     return _numerical(capped, surface, u, names, whole.answer, answer)
 

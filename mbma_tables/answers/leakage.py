@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.answers.leakage_table import flow_of_spectrum, self_affine, shipped_flow
+from mbma_tables.answers.source import Source, untroubled
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, is_labelled, require, rows
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
@@ -25,8 +26,6 @@ from mbma_tables.theories.protocol import Theory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from mbma_tables.answers.source import Source
 
 LARGEST_KNUDSEN = 0.1  # mean free path over the channel, to which slip of first order holds
 SLIP = 6.0  # of a plane channel: flow is 1 + 6 Kn times that without slip
@@ -136,12 +135,8 @@ class Leakage(Displayed):
     @functools.cached_property
     def valid(self) -> Any:
         """Whether flow through contacts such as these was simulated; `reasons` says why not."""
-
-        def good(theory: Theory, surface: Any, u: FloatArray, E: FloatArray, area: FloatArray) -> FloatArray:
-            against = concerns(theory, surface, u, area)
-            return np.asarray(~np.logical_or.reduce(list(against.values())), float)
-
-        return self._contact.valid & self._map(good).astype(bool)
+        good = self._map(lambda theory, s, u, E, area: untroubled(concerns(theory, s, u, area)))
+        return self._contact.valid & good.astype(bool)
 
     @functools.cached_property
     def reasons(self) -> dict[str, Any]:

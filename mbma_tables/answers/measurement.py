@@ -65,7 +65,7 @@ def curves(surface: MeasuredSurface, E_star: float = 1.0) -> dict[str, dict[str,
         except MbmaError:
             # a theory that has no answer is left out of a picture
             continue
-        scatter, area_scatter = theory.scatter(surface, answer.area)
+        scatter, area_scatter = (theory.scatter(surface, what, answer.area) for what in ("pressure", "area"))
         lines = {"pressure": E_star * answer.pressure, "area": answer.area, "mean_separation": u}
         slopes = np.gradient(np.log(np.maximum(answer.pressure, 1e-300)), u)
         # a factor of force at a separation is a step of separation at a force
@@ -92,7 +92,7 @@ def draw(
     unit = surface.unit or "length"
     _heights(above, panels["A"], treated, unit)
     _spectrum(panels["B"], surface, unit)
-    _distribution(panels["C"], surface, unit)
+    _distribution(panels["C"], surface)
     _by_pressure(panels["D"], answers, simulated, "area", "area_scatter", pressure_label, "real contact area  A/A0")
     names = ("mean_separation", "separation_scatter", pressure_label, f"mean separation u [{unit}]")
     _by_pressure(panels["E"], answers, simulated, *names)
@@ -139,7 +139,7 @@ def _spectrum(axes: Axes, surface: MeasuredSurface, unit: str) -> None:
     axes.legend()
 
 
-def _distribution(axes: Axes, surface: MeasuredSurface, unit: str) -> None:
+def _distribution(axes: Axes, surface: MeasuredSurface) -> None:
     from mbma_tables.surfaces.heights import SHARES
 
     # density of heights from their quantiles, smoothed over a few
@@ -169,9 +169,8 @@ def _by_pressure(
         held = np.isfinite(pressure) & (found["area"] > 1e-4) & (found["area"] <= 1) & (pressure > 0)
         (line,) = axes.plot(pressure[held], value[held], label=theory_label(name))
         band = held & np.isfinite(width)
-        low, high = (
-            (value * np.exp(-width), value * np.exp(width)) if what == "area" else (value - width, value + width)
-        )
+        times = np.exp(width)
+        low, high = (value / times, value * times) if what == "area" else (value - width, value + width)
         axes.fill_between(pressure[band], low[band], high[band], alpha=0.2, color=line.get_color(), lw=0)
     if simulated is not None:
         axes.plot(

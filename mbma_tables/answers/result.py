@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbma_tables.answers.interface import Interface
-from mbma_tables.answers.source import MEANINGS, Source, concerns, named
+from mbma_tables.answers.source import MEANINGS, Source, concerns, named, untroubled
 from mbma_tables.common.arguments import FloatArray, Numbers, any_labelled, is_labelled
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
@@ -107,9 +107,8 @@ class Contact(Interface, Displayed):
             # a pressure in another unit than meant shows itself so
             light = self.elastic_hardness * ELASTIC_PSI / 2
             if self.pressure is not None and np.any(self.pressure > light):
-                facts["pressure"] += (
-                    f" (above E* g/2 = {shown(light, units['pressure'])}, the mean pressure in light contact)"
-                )
+                limit = shown(light, units["pressure"])
+                facts["pressure"] += f" (above E* g/2 = {limit}, the mean pressure in light contact)"
         if source.theory.advice:
             facts["advice"] = source.theory.advice
         return facts | {name: shown(value) for name, value in more.items()}
@@ -225,19 +224,17 @@ class Contact(Interface, Displayed):
     @described
     def scatter(self) -> Any:
         """Standard deviation of ln F at this mean separation from simulation to simulation; NaN where not known."""
-        return self._scatter[0]
+        return self._scatter("pressure")
 
     @described
     def area_scatter(self) -> Any:
         """Standard deviation of ln A at this force, likewise."""
-        return self._scatter[1]
+        return self._scatter("area")
 
     @described
     def stiffness_scatter(self) -> Any:
         """Standard deviation of ln of `unloading_stiffness` at this force, likewise: of conductance, too."""
-        more = {"area": self._touching}
-        (found,) = self._source.map(lambda by, s, u, E, A: (by.stiffness_scatter(s, A),), self, 1, more)
-        return found
+        return self._scatter("stiffness")
 
     @described
     def separation_scatter(self) -> Any:
@@ -245,9 +242,8 @@ class Contact(Interface, Displayed):
         with np.errstate(invalid="ignore", divide="ignore"):
             return self.scatter * self._answer.pressure / np.abs(self._answer.stiffness)
 
-    @functools.cached_property
-    def _scatter(self) -> tuple[Numbers, ...]:
-        return self._source.map(lambda theory, s, u, E, A: theory.scatter(s, A), self, 2, {"area": self._touching})
+    def _scatter(self, of: str) -> Numbers:
+        return self._source.map(lambda by, s, u, E, A: (by.scatter(s, of, A),), self, 1, {"area": self._touching})[0]
 
     @functools.cached_property
     def leakage(self) -> Leakage:
@@ -261,8 +257,7 @@ class Contact(Interface, Displayed):
         """Whether the theory was tested for contacts such as these; `reasons` says where and why not."""
 
         def none(theory: Theory, s: AnySurface, u: FloatArray, E: FloatArray, *answer: FloatArray) -> tuple[FloatArray]:
-            masks = list(concerns(source, theory, s, u, E, TheoryAnswer(*answer)).values())
-            return (np.asarray(~np.logical_or.reduce(masks), dtype=float),)
+            return (untroubled(concerns(source, theory, s, u, E, TheoryAnswer(*answer))),)
 
         source = self._source
         return source.map(none, self, 1, self._answer._asdict())[0].astype(bool)

@@ -114,6 +114,11 @@ def concerns(
     return {text: steep, **measured, **theory.concerns(surface, answer, u), **beyond}
 
 
+def untroubled(against: Mapping[str, Any]) -> FloatArray:
+    """1 where no reason holds, 0 elsewhere."""
+    return np.asarray(~np.logical_or.reduce(list(against.values())), dtype=float)
+
+
 def _beyond_metals(
     source: Source, theory: Theory, surface: AnySurface, E_star: FloatArray, answer: TheoryAnswer
 ) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from typing import Any
 import click
 
 from mbma_tables import __version__
-from mbma_tables.cli import batch, commands, export, scene, sensitivity, tables
+from mbma_tables.cli import batch, commands, export, scene, tables
 from mbma_tables.common import progress
 from mbma_tables.common.errors import MbmaError
 
@@ -124,7 +124,7 @@ for command in (
     commands.island_command,
     commands.surfaces_command,
     commands.fit_command,
-    sensitivity.sensitivity_command,
+    batch.sensitivity_command,
     tables.tables_group,
     scene.plan_command,
     scene.run_command,

@@ -76,8 +76,6 @@ def contact_command(
 
     Example: mbma contact --surface challenge --E-star 25MPa --length-unit mm -p 100kPa
     """
-    import numpy as np
-
     model = model.of(specimen.surface)
     if len(loads) != 1:
         raise InputError("one of --separation, --mean-separation, --pressure and --area is needed")
@@ -113,10 +111,8 @@ def curve_gaps(h_max: float, points: int) -> Any:
     """Separations from h_max to -h_max: the first, then half geometric in h_max - d, then half even."""
     light = (points - 1) // 2
     deep = points - 1 - light
-    approach = np.concatenate(
-        [[0.0], np.geomspace(MIN_DEPTH, EVEN_FROM, light + 1)[:-1], np.linspace(EVEN_FROM, 2.0, deep)]
-    )
-    return h_max * (1 - approach)
+    graded, even = np.geomspace(MIN_DEPTH, EVEN_FROM, light + 1)[:-1], np.linspace(EVEN_FROM, 2.0, deep)
+    return h_max * (1 - np.concatenate([[0.0], graded, even]))
 
 
 @click.command("curve", short_help="Force and area from first contact to full compression.")
@@ -175,25 +171,16 @@ def curve_command(
 def _draw(
     specimen: Specimen, answer: Contact, others: Mapping[str, OtherTheory], kind: str, leakage: bool, title: str
 ) -> bytes:
-    from mbma_tables.common.plots import (
-        Curve,
-        draw_compression,
-        leakage_label,
-        pressure_label,
-        theory_label,
-        to_picture,
-    )
+    from mbma_tables.common import plots
 
     gap = np.asarray(answer.mean_separation / specimen.surface.h_rms)
     curves = [answer.curve(leakage)]
     for name, line in others.items():
         known = np.isfinite(line.pressure)
-        curves.append(Curve(theory_label(name), gap[known], *(field[known] for field in line)))
-    pressure, flow = (
-        pressure_label(unit_of("pressure", specimen.units)),
-        leakage_label(unit_of("leakage", specimen.units)),
-    )
-    return to_picture(draw_compression(curves, title, pressure, leakage_label=flow), kind)
+        curves.append(plots.Curve(plots.theory_label(name), gap[known], *(field[known] for field in line)))
+    pressure = plots.pressure_label(unit_of("pressure", specimen.units))
+    flow = plots.leakage_label(unit_of("leakage", specimen.units))
+    return plots.to_picture(plots.draw_compression(curves, title, pressure, leakage_label=flow), kind)
 
 
 @click.command("island", short_help="Contact islands at given approaches.")
@@ -275,10 +262,7 @@ def fit_command(
         "notes": told,
     }
     title = measurement.name
-    own = {name: unit_of(name, units) or "-" for name in columns} | {
-        "area": "A/A0",
-        "pressure": unit_of("pressure", units),
-    }
+    own = {name: unit_of(name, units) or "-" for name in columns} | {"area": "A/A0"}
     report = Report("fit", title, [*described(surface), *told], facts, to_columns(columns, own))
     picture = b""
     if plot is not None:

@@ -110,10 +110,8 @@ def _law_files(target: str, out: Path, joint: dict[str, Any], given: dict[str, A
     from mbma_tables.export.law_rows import describe_law
 
     if target in LAWS:
-        files, beside = (
-            {out: law_code.law_text(target, **joint, **given).encode()},
-            law_languages.LANGUAGES[target].beside,
-        )
+        files = {out: law_code.law_text(target, **joint, **given).encode()}
+        beside = law_languages.LANGUAGES[target].beside
         if beside and str(out) == "-":
             raise InputError(f"{target} is two files: --out must be that of the first")
         if beside:

@@ -57,9 +57,7 @@ class Report:
     def to_table(self) -> str:
         """Aligned columns under their names, and their units where they have any."""
         with_units = any(c.unit != "-" for c in self.columns)
-        cells = [
-            [c.name, *([c.unit] if with_units else []), *(_rounded(value) for value in c.values)] for c in self.columns
-        ]
+        cells = [[c.name, *([c.unit] if with_units else []), *map(_rounded, c.values)] for c in self.columns]
         widths = [max(map(len, column)) for column in cells]
         texts = [any(isinstance(value, str) for value in c.values) for c in self.columns]
         lines = [

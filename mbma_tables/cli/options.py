@@ -7,28 +7,17 @@ import functools
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from mbma_tables.common.errors import InputError
-from mbma_tables.scenes.specimen import (
-    MAP_OPTIONS,
-    MATERIAL,
-    NUMBERS,
-    Specimen,
-    effective_modulus_of,
-    from_map,
-    from_name,
-    from_numbers,
-    read_specimen,
-)
+from mbma_tables.scenes import specimen as specimens
+from mbma_tables.scenes.specimen import Specimen
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.cases import CASES
 from mbma_tables.surfaces.variants import NAMED
 from mbma_tables.theories import OF_MAPS, THEORIES
-
-if TYPE_CHECKING:
-    from mbma_tables.surfaces.any_surface import AnySurface
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -130,27 +119,27 @@ def _given(values: Mapping[str, Any]) -> dict[str, Any]:
 def _specimen(given: Mapping[str, Any]) -> Specimen:
     """The surface that the options describe, with its modulus; a modulus option overrides that of a file."""
     length, stress = given["length_unit"], given["stress_unit"]
-    numbers = {key: given[key] for key in NUMBERS if given[key] is not None}
+    numbers = {key: given[key] for key in specimens.NUMBERS if given[key] is not None}
     used = [f"--{key}" for key in ("surface", "file", "map") if given[key] is not None] + ["numbers"] * bool(numbers)
     if len(used) != 1:
         raise InputError(
             "one surface is needed: --surface NAME, --file TOML, --map MAP, --hurst --q0 --q1 (or --zeta-1) "
             f"--h-rms --h-max, or --hurst --m0 --m2 --m4 --h-max; got {' and '.join(used) or 'none'}"
         )
-    treatment = _given({name: given[name] for name in (*MAP_OPTIONS, "model")})
+    treatment = _given({name: given[name] for name in (*specimens.MAP_OPTIONS, "model")})
     if treatment and given["map"] is None:
         raise InputError(f"--{next(iter(treatment)).replace('_', '-')} is about a measured map: it goes with --map")
     if given["file"] is not None:
-        specimen = read_specimen(given["file"])
+        specimen = specimens.read_specimen(given["file"])
     elif given["map"] is not None:
-        specimen = from_map(given["map"], treatment | {"unit": length})
+        specimen = specimens.from_map(given["map"], treatment | {"unit": length})
     elif given["surface"] is not None:
-        specimen = from_name(given["surface"])
+        specimen = specimens.from_name(given["surface"])
     else:
-        specimen = from_numbers(numbers, length)
-    material = {key: given[key] for key in MATERIAL if given[key] is not None}
+        specimen = specimens.from_numbers(numbers, length)
+    material = {key: given[key] for key in specimens.MATERIAL if given[key] is not None}
     if material:
-        modulus, unit = effective_modulus_of(material, stress)
+        modulus, unit = specimens.effective_modulus_of(material, stress)
         specimen = dataclasses.replace(specimen, E_star=modulus, stress_unit=unit or specimen.stress_unit)
     return specimen.in_units(length, stress)
 

@@ -4,16 +4,8 @@
 SOLVERS = ("calculix", "abaqus", "lsdyna", "optistruct", "comsol", "moose", "modelica")  # functions of `solvers`
 DATA = ("csv", "json", "matlab", "netcdf", "hdf5", "parquet")  # functions of `data`, named to_csv and so on
 SUBROUTINES = ("abaqus-uinter", "abaqus-gapcon", "calculix-gapcon")
-LAWS = (
-    "c-law",
-    "fortran-law",
-    "javascript-law",
-    "python-law",
-    "jax-law",
-    "matlab-law",
-    "modelica-law",
-    *SUBROUTINES,
-)  # keys of `law_code.LANGUAGES`
+# keys of `law_code.LANGUAGES`
+LAWS = ("c-law", "fortran-law", "javascript-law", "python-law", "jax-law", "matlab-law", "modelica-law", *SUBROUTINES)
 FMUS = ("fmu", "fmu3")  # of FMI 2.0 and 3.0, keys of `fmu.STANDARDS`
 GRAPHS = ("onnx",)
 CODE = ("c", "fortran", "javascript")  # keys of `code.LANGUAGES`

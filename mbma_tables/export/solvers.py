@@ -24,14 +24,10 @@ MAX_ID = 99_999_999  # of a card: eight columns
 MAX_NAME = 80  # letters of a name in CalculiX and Abaqus
 
 
-def _is_pressure(law: LawTable, target: str) -> None:
-    if law.y_name != "pressure":
+def _is_contact(law: LawTable, target: str, conducts: bool = True) -> None:
+    """Refuse all but pressure, and, where the target `conducts`, conductance with its pressure."""
+    if law.y_name != "pressure" and not (conducts and law.behaviour):
         raise InputError(f"{target} takes pressure against overclosure here, got {law.y_name} against {law.x_name}")
-
-
-def _is_contact(law: LawTable, target: str) -> None:
-    if law.behaviour is None:
-        _is_pressure(law, target)
 
 
 def _interaction(name: str, *cards: str) -> str:
@@ -144,7 +140,7 @@ def lsdyna(law: LawTable, curve: int = 1) -> str:
 
 def optistruct(law: LawTable, contact: int = 1, table: int = 2) -> str:
     """PCONT and TABLES1 for OptiStruct, in long fields of 16 columns."""
-    _is_pressure(law, "OptiStruct")
+    _is_contact(law, "OptiStruct", conducts=False)
     contact, table = (whole_number_in(n, k, 1, MAX_ID) for n, k in (("contact", contact), ("table", table)))
     pairs = [f"{value:<16.9E}" for row in zip(law.x, law.y, strict=True) for value in row]
     # the keyword stands where a line begins: on the first one that field is the friction coefficient

@@ -94,7 +94,5 @@ def softening(stiffness: Callable[[Any], Any], h_max: float, lowest: float, nois
         return None
     peak = int(falls.argmax())
     low, high = u[peak + 1], min(u[peak] + step, h_max)
-    found = minimize_scalar(
-        lambda x: -stiffness(x), bounds=(low, high), method="bounded", options={"xatol": 1e-7 * high}
-    )
-    return float(found.x)
+    near = {"xatol": 1e-7 * high}
+    return float(minimize_scalar(lambda x: -stiffness(x), bounds=(low, high), method="bounded", options=near).x)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from mbma_tables.answers.interface import Tangential, ratio_of
 from mbma_tables.common.arguments import Numbers
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
@@ -18,7 +19,6 @@ from mbma_tables.law.block import softening
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mbma_tables.answers.tangential import Tangential
     from mbma_tables.law.leakage import LeakageLaw
 
 
@@ -69,8 +69,6 @@ class Derived:
         >>> f"{sheared.stiffness:.3g} GPa/um; slips from {sheared.gross_slip:.3g} um on"
         '0.0222 GPa/um; slips from 0.221 um on'
         """
-        from mbma_tables.answers.tangential import Tangential, ratio_of
-
         if (mean_separation is None) == (pressure is None):
             raise InputError("give the mean separation, or pressure=, one of them")
         if pressure is None:

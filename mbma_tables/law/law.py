@@ -220,9 +220,8 @@ class ContactLaw(Law, Derived, Displayed):
         d, area, stiffness = self._inverse("pressure", pressure, 3)
         mean = d + self.h_max
         mean *= 0.5
-        point = LawPoint(
-            d, mean, area, stiffness, pressure if is_labelled(pressure) else np.asarray(pressure, float)[()]
-        )
+        given = pressure if is_labelled(pressure) else np.asarray(pressure, float)[()]
+        point = LawPoint(d, mean, area, stiffness, given)
         point.units = self.units
         return point
 

@@ -45,19 +45,14 @@ class LeakageLaw:
         pressure: ArrayLike | str | None = None,
     ) -> Numbers:
         """Flow coefficient at mean separations, separations or pressures; exactly 0 where blocked."""
-        given = [known for known in (mean_separation, separation, pressure) if known is not None]
+        asked = {"mean_separation": mean_separation, "separation": separation, "pressure": pressure}
+        given = {name: known for name, known in asked.items() if known is not None}
         if len(given) != 1:
             raise InputError("give one of mean_separation, separation and pressure")
-        if is_labelled(given[0]):
-            name = (
-                "pressure" if pressure is not None else "separation" if mean_separation is None else "mean_separation"
-            )
-            return apply(lambda known: (self(**{name: known}),), (given[0],), 1)[0]  # type: ignore[no-any-return]
-        d = (
-            self.law.separation(pressure=pressure)
-            if pressure is not None
-            else self.law.separations(mean_separation, separation)
-        )
+        ((name, known),) = given.items()
+        if is_labelled(known):
+            return apply(lambda known: (self(**{name: known}),), (known,), 1)[0]  # type: ignore[no-any-return]
+        d = (self.law.separations if pressure is None else self.law.separation)(**given)
         flat = np.ascontiguousarray(d).reshape(-1)
         found = np.empty(flat.size)
         core.law_fill(flat, self.block, found, *[None] * 4)

@@ -173,9 +173,8 @@ def power_record(values: Values, start: float, powers: tuple[float, float]) -> F
     made = _fit_intervals(lambda x: values(x) / (x / start) ** exponents, np.array([[0.0, start]]))[0]
     record, (value, slope, _) = made[: at.RECORD], made[at.RECORD :]
     record[at.CENTRE], record[at.RATE] = 0.0, 1 / start
-    record[at.FORCE_AT : at.ENERGY_AT] = (
-        record[at.FORCE_AT : at.ENERGY_AT].reshape(2, KEPT) @ _rule().from_zero
-    ).ravel()
+    series = record[at.FORCE_AT : at.ENERGY_AT].reshape(2, KEPT)
+    series[:] = series @ _rule().from_zero
     return record, np.array([value, max(powers) * value + slope]), powers
 
 

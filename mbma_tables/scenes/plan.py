@@ -52,11 +52,7 @@ class Step:
     @property
     def island_model_name(self) -> str | None:
         """The island model's name."""
-        return (
-            self.island_model
-            if self.island_model is None or isinstance(self.island_model, str)
-            else self.island_model.name
-        )
+        return getattr(self.island_model, "name", self.island_model)  # type: ignore[arg-type]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,9 +143,7 @@ def certified_error(island_model: str | AnyModel, asked: float) -> float:
         certificate = open_table(island_model).content.attributes
         return max(float(certificate["largest_error_F"]), float(certificate["largest_error_A"]))
     # the exact solver works to a tenth of what is asked
-    return (
-        {"exact": 0.1 * asked, "rigid": 0.0}.get(island_model, math.nan) if isinstance(island_model, str) else math.nan
-    )
+    return {"exact": 0.1 * asked, "rigid": 0.0}.get(_name(island_model), math.nan)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -198,12 +192,13 @@ class _Planner:
             steps.append(self.summed("island statistics", "island_statistics", what, "rigid"))
         if "pressure_profile" in outputs:
             steps.append(self.profiles())
-        if "validity" in outputs:
-            what = f"where the theory is tested, and its scatter, at {self.count} gaps"
-            steps.append(Step("validity", "validity", what, None, None, self.count, 0.0, self.seconds_of_slopes()))
-        if "leakage" in outputs:
-            what = f"flow through the gaps of contacts at {self.count} gaps"
-            steps.append(Step("leakage", "leakage", what, None, None, self.count, 0.0, self.seconds_of_slopes()))
+        followed = {
+            "validity": f"where the theory is tested, and its scatter, at {self.count} gaps",
+            "leakage": f"flow through the gaps of contacts at {self.count} gaps",
+        }
+        for name in filter(outputs.__contains__, followed):
+            step = Step(name, name, followed[name], None, None, self.count, 0.0, self.seconds_of_slopes())
+            steps.append(step)
         steps += [self.other_theory(name) for name in self.problem.theories]
         theory = self.problem.theory_name
         left_out = tuple(name for name in OUTPUTS if name not in outputs)
@@ -233,10 +228,7 @@ class _Planner:
             best = factor * MIN_LAW_RTOL / (1 - ISLAND_SHARE)
             raise InputError(f"rtol = {self.rtol:g} is too tight for {', '.join(why)}: a law meets {best:.0e} at best")
         island_model = self.island_model(tolerance)
-        each = self.costs.of("law", "lookup") + (
-            self.costs.of("law", "invert", quantity="pressure") if inverse else 0.0
-        )
-        seconds = self.costs.of(_name(island_model), "law", asked) + self.count * each
+        seconds = self.costs.of(_name(island_model), "law", asked) + self.seconds_of_law(inverse)
         error = factor * (asked + certified_error(island_model, asked))
         what = "the surface's force and area as piecewise polynomials of the gap, evaluated at every gap"
         return Step("law", ", ".join(why), what, island_model, asked, self.count, error, seconds)
@@ -251,9 +243,8 @@ class _Planner:
         asked = (1 - ISLAND_SHARE) * self.rtol
         priced = priced_as or _name(island_model)
         seconds = self.costs.of(priced, "call") + self.count * self.costs.of(priced, "gap", asked, quantity)
-        return Step(
-            name, why, what, island_model, asked, self.count, asked + certified_error(island_model, asked), seconds
-        )
+        error = asked + certified_error(island_model, asked)
+        return Step(name, why, what, island_model, asked, self.count, error, seconds)
 
     def profiles(self) -> Step:
         islands, asked = int(np.size(self.problem.deltas)), ISLAND_SHARE * self.rtol / AMPLIFICATION["profile"]
@@ -267,10 +258,7 @@ class _Planner:
         inverse = self.problem.prescribed in INVERTED
         rtol = max((1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_THEORY_LAW_RTOL)
         direct = seconds_by_theory(self.costs, theory, self.count, inverse, "energy" in outputs)
-        each = self.costs.of("law", "lookup") + (
-            self.costs.of("law", "invert", quantity="pressure") if inverse else 0.0
-        )
-        by_law = self.costs.of(theory, "law", rtol) + self.count * each
+        by_law = self.costs.of(theory, "law", rtol) + self.seconds_of_law(inverse)
         pays = self.count >= MIN_LAW_GAPS_OF_OTHERS if math.isnan(direct) else by_law < direct
         own = self.own_error()
         name, asked, error, seconds = "contact", None, own, direct
@@ -299,6 +287,11 @@ class _Planner:
 
         surface = self.problem.surface
         return float(get_theory(self.problem.theory, surface).answer(surface, 0.5 * surface.h_max).error)
+
+    def seconds_of_law(self, inverse: bool) -> float:
+        """Of a law's answers at the gaps."""
+        found = self.costs.of("law", "invert", quantity="pressure") if inverse else 0.0
+        return self.count * (self.costs.of("law", "lookup") + found)
 
     def seconds_of_slopes(self) -> float:
         """Of totals with derivatives, which cost about four times those without."""

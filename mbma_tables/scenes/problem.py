@@ -12,13 +12,12 @@ from mbma_tables.common.arguments import finite_array, nearest, number_in, requi
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, in_unit, known, modulus_and_units
 from mbma_tables.materials import hardness_in
-from mbma_tables.surfaces.variants import get_variant
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.variants import Variant, get_variant
 from mbma_tables.theories import OF_MAPS, THEORIES, get_theory, theory_name
 
 if TYPE_CHECKING:
     from mbma_tables.models import AnyModel
-    from mbma_tables.surfaces.any_surface import AnySurface
-    from mbma_tables.surfaces.variants import Variant
 
 # effects; docs/scenes.md says what each is
 OUTPUTS = (
@@ -128,7 +127,7 @@ class Problem:
         if self.theory is None:
             of_mbma = bool(dropped) or bool(outputs.intersection(OF_ISLANDS)) or self.island_model is not None
             named = "mbma" if of_mbma else theory_name(self.surface, None, variant=self.variant)
-            object.__setattr__(self, "theory", named)
+            vars(self).update(theory=named)
         rtol: float | None = DEFAULT_RTOL if self.theory == "mbma" else DEFAULT_RTOL_OF_OTHERS
         if self.rtol is not None:
             rtol = number_in("rtol", self.rtol, MIN_RTOL, MAX_RTOL)
@@ -136,16 +135,9 @@ class Problem:
             number_in("seconds", self.seconds, 1e-9, MAX_SECONDS)
             rtol = None
         whole_number_in("points", self.points, 2, 10_000)
-        derived = {
-            "rtol": rtol,
-            "variant": get_variant(self.variant),
-            "outputs": outputs,
-            "dropped": dropped,
-            "theories": tuple(self.theories),
-        }
-        for name, value in derived.items():
-            object.__setattr__(self, name, value)
-        object.__setattr__(self, "gaps", self._checked_gaps(outputs - {"pressure_profile"}))
+        vars(self).update(rtol=rtol, variant=get_variant(self.variant), theories=tuple(self.theories))
+        vars(self).update(outputs=outputs, dropped=dropped)
+        vars(self).update(gaps=self._checked_gaps(outputs - {"pressure_profile"}))
         self._check_parameters_of_effects()
         self._check_island_model()
         self._check_theory()
@@ -165,8 +157,7 @@ class Problem:
         derived["hardness"] = hardness_in(units, self.hardness)
         if self.conductivities is not None:
             derived["conductivities"], derived["conductance_unit"] = units.conductivities(*self.conductivities)
-        for name, value in derived.items():
-            object.__setattr__(self, name, value)
+        vars(self).update(derived)
 
     def _checked_gaps(self, at_gaps: frozenset[str]) -> Any:
         """The prescribed numbers; None where nothing asks for gaps."""

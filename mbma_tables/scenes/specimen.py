@@ -10,7 +10,7 @@ import pathlib
 import tomllib
 import warnings
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,15 +19,13 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import read_file
 from mbma_tables.common.units import Units, factor, in_unit, known, resolve
 from mbma_tables.materials import effective_modulus
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.cases import get_case
 from mbma_tables.surfaces.roughness import ROUGHNESS
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.treatment import OPTIONS, Treated
-
-if TYPE_CHECKING:
-    from mbma_tables.surfaces.any_surface import AnySurface
 
 MAGNIFICATION = ("hurst", "q0", "zeta_1", "h_rms", "h_max")
 MOMENTS = ("hurst", "m0", "m2", "m4", "h_max")
@@ -216,9 +214,8 @@ def _from_psd(path: pathlib.Path, numbers: Mapping[str, Any], convention: str, u
     h_max = Units(unit).number("h_max", numbers["h_max"])
     # a profile's spectrum is no isotropic one: five numbers are fitted to it
     model = "self-affine" if convention == "profile" else "measured"
-    surface = Surface.from_spectrum(
-        columns[:, 0], columns[:, 1], h_max=h_max, convention=convention, unit=unit, model=model
-    )
+    q, C = columns.T
+    surface = Surface.from_spectrum(q, C, h_max=h_max, convention=convention, unit=unit, model=model)
     return Specimen(surface, f"fitted to {path.name}" if convention == "profile" else f"spectrum {path.name}")
 
 

@@ -13,11 +13,11 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.scenes.plan import Step
 from mbma_tables.scenes.problem import CORRELATIONS, INVERTED, Problem
+from mbma_tables.surfaces.any_surface import AnySurface
 
 if TYPE_CHECKING:
     from mbma_tables.answers.result import Contact
     from mbma_tables.law.law import ContactLaw
-    from mbma_tables.surfaces.any_surface import AnySurface
     from mbma_tables.theories.protocol import Theory
 
 Progress = Callable[[str, int, int], None]
@@ -161,9 +161,8 @@ def _slope_error(law: ContactLaw, gap: Any, inverted: bool) -> float:
     if touching.size == 0:
         return law.error
     # F/l over the stiffness: large only next to a turning point
-    ratio = (
-        2 * law.pressure(separation=touching) / ((law.h_max - touching) * np.abs(law.stiffness(separation=touching)))
-    )
+    steep = (law.h_max - touching) * np.abs(law.stiffness(separation=touching))
+    ratio = 2 * law.pressure(separation=touching) / steep
     moved = MAX_SLOPE_OF_STIFFNESS * law.error if inverted else 0.0
     return max(2 * law.error, float(((law.slope_error(separation=touching) + moved) * ratio).max()))
 
@@ -236,7 +235,9 @@ def other_theory(
 
         theory = Yielding(theory, hardness / E_star)
     found = answer_where_finite(theory, surface, (float(surface.h_max) + gap) / 2)
-    return OtherTheory(E_star * found.pressure, found.area, *theory.scatter(surface, found.area))
+    return OtherTheory(
+        E_star * found.pressure, found.area, *(theory.scatter(surface, name, found.area) for name in found._fields[:2])
+    )
 
 
 def comparison(run: Run, step: Step) -> None:

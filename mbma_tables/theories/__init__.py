@@ -33,31 +33,14 @@ __all__ = [
     "theory_name",
 ]
 
+THEORIES = ("mbma", "calibrated", "persson", "greenwood_williamson")  # also their modules
+_NAMED = dict(zip(THEORIES, ("Mbma", "Calibrated", "Persson", "GreenwoodWilliamson"), strict=True))
 # a theory's module is imported when it is first asked for
-_MODULES = {
-    "greenwood_williamson": ("GreenwoodWilliamson",),
-    "calibrated": ("Calibrated",),
-    "mbma": ("Mbma",),
-    "persson": ("Method", "Persson"),
-    "protocol": ("Theory", "TheoryAnswer", "UserTheory"),
-    "simulated": ("BoundaryElements",),
-}
-_HOMES = {name: module for module, names in _MODULES.items() for name in names}
-_NAMED = {
-    "mbma": "Mbma",
-    "calibrated": "Calibrated",
-    "persson": "Persson",
-    "greenwood_williamson": "GreenwoodWilliamson",
-}
-THEORIES = tuple(_NAMED)
+_HOMES = {kind: module for module, kind in _NAMED.items()} | {"Method": "persson", "BoundaryElements": "simulated"}
+_HOMES |= dict.fromkeys(("Theory", "TheoryAnswer", "UserTheory"), "protocol")
 OF_MAPS = ("corrected", "simulated")  # theories of one map, made by pressing it
-OPTIONS = {
-    "island_model": "universal",
-    "variant": "reported",
-    "rtol": 1e-8,
-    "outside": "raise",
-    "workers": 1,
-}  # of MBMA
+# of MBMA
+OPTIONS = {"island_model": "universal", "variant": "reported", "rtol": 1e-8, "outside": "raise", "workers": 1}
 
 
 def __getattr__(name: str) -> Any:

@@ -77,10 +77,7 @@ class Places:
 def area_concerns(area: FloatArray) -> dict[str, Any]:
     """Contact fractions that were not simulated, or hardly."""
     low, high = TESTED_AREA
-    return {
-        f"A/A0 is below {low:g}": (area > 0) & (area < low),
-        f"A/A0 is above {high:g}": area > high,
-    }
+    return {f"A/A0 is below {low:g}": (area > 0) & (area < low), f"A/A0 is above {high:g}": area > high}
 
 
 class Calibrated(Theory):
@@ -104,9 +101,8 @@ class Calibrated(Theory):
             gap = np.asarray(mean_separation, float)
             require("mean_separation", gap, gap >= 0, "at least 0")
             (pressure, area, stiffness), own_error = _own_law(surface).answer(gap)
-            return TheoryAnswer(
-                pressure, area, stiffness, _error(own_error, own_error, gap / np.asarray(surface.h_max))
-            )
+            error = _error(own_error, own_error, gap / np.asarray(surface.h_max))
+            return TheoryAnswer(pressure, area, stiffness, error)
         assert isinstance(surface, Surface)
         table, places = calibrated_table.shipped(), Places(surface, mean_separation)
         u = places.flat / places.h_rms
@@ -118,10 +114,8 @@ class Calibrated(Theory):
         out[2] *= places.gradient
         out[2] /= places.h_rms
         pressure, area, stiffness = out.reshape(3, *places.shape)
-        share = u / places.columns[2][places.owner]
-        return TheoryAnswer(
-            pressure, area, stiffness, _error(table.error, 2 * table.error, share.reshape(places.shape))
-        )
+        share = (u / places.columns[2][places.owner]).reshape(places.shape)
+        return TheoryAnswer(pressure, area, stiffness, _error(table.error, 2 * table.error, share))
 
     def mean_separation_at(self, surface: AnySurface, quantity: str, wanted: FloatArray) -> FloatArray:
         """Mean separation u [length] at a force over A0 E* or an area below 1; h_max at zero."""
@@ -175,18 +169,17 @@ class Calibrated(Theory):
             f"zeta_1 is above {TESTED_ZETA_1:g}": np.asarray(surface.zeta_1) > TESTED_ZETA_1 * (1 + 1e-9),
             f"h_max/h_rms is outside {TESTED_HEIGHTS}": (heights < TESTED_HEIGHTS[0]) | (heights > TESTED_HEIGHTS[1]),
         }
-        return {
-            **{text: np.broadcast_to(mask, answer.area.shape) for text, mask in reasons.items()},
-            **area_concerns(answer.area),
-        }
+        found = {text: np.broadcast_to(mask, answer.area.shape) for text, mask in reasons.items()}
+        return found | area_concerns(answer.area)
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """Why a measured surface is not like those that boundary elements have tested."""
         return surface.departures(by_map=self.scatter_name(surface) != self.name)
 
-    def _stated(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+    def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+        """As of any theory; of maps with what comes on top of that of Gaussian ones."""
         if self.scatter_name(surface) == self.name:
-            return super()._stated(surface, quantity, area)
+            return super().scatter(surface, quantity, area)
         assert isinstance(surface, MeasuredSurface)
         if surface.outside(PRESSED):
             return np.full(np.shape(area), np.nan)

@@ -26,17 +26,10 @@ from mbma_tables.surfaces.maps import measured_map
 from mbma_tables.surfaces.spectral import PRESSED
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
+from mbma_tables.theories import simulated
 from mbma_tables.theories.calibrated_curves import OwnLaw, own_law
 from mbma_tables.theories.protocol import TheoryAnswer
-from mbma_tables.theories.simulated import (
-    AREAS,
-    MIN_LOADS,
-    TESTED_AREAS,
-    BoundaryElements,
-    continued,
-    law_loads,
-    map_of,
-)
+from mbma_tables.theories.simulated import BoundaryElements
 
 LIGHT = 0.01  # contact below which the law's own area counts, too
 FINE = 4000  # loads over which the law's change is integrated
@@ -54,7 +47,7 @@ class Corrected(BoundaryElements):
 
     def __init__(self, surface: MeasuredSurface, half: Pressed, quarter: FloatArray) -> None:
         pressure, area, u, energy = half.rows
-        super().__init__(surface, pressure, area, u, energy, np.inf, map_of(surface).heights.size, half)
+        super().__init__(surface, pressure, area, u, energy, np.inf, simulated.map_of(surface).heights.size, half)
         law, other = own_law(surface), LoadCurve(quarter)
         x = self._curve.x
         inside = np.clip(x, other.x[0], other.x[-1])
@@ -72,7 +65,7 @@ class Corrected(BoundaryElements):
     @classmethod
     def of(cls, surface: AnySurface, loads: Any = None, tolerance: float = TOLERANCE) -> Corrected:
         """Press half and quarter of the grid of a surface from `mbma_tables.Surface.from_map`."""
-        map_of(surface)
+        simulated.map_of(surface)
         assert isinstance(surface, MeasuredSurface)
         return cls(surface, _carried(surface, 1, tolerance), _carried(surface, 2, tolerance).rows)
 
@@ -84,10 +77,11 @@ class Corrected(BoundaryElements):
         low, high = answer.area < LOWEST, answer.area > HIGHEST
         return odd | {f"A/A0 is below {LOWEST:g}": low, f"A/A0 is above {HIGHEST:g}": high}
 
-    def _tested(self, quantity: str, area: FloatArray) -> FloatArray:
+    def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+        """Standard deviation against the full grid, by what the law and the quarter grid differ from the answer."""
         if quantity == "flow":
             with np.errstate(divide="ignore"):
-                return np.interp(np.log(area), np.log(TESTED_AREAS), OF_FLOW)
+                return np.interp(np.log(area), np.log(simulated.TESTED_AREAS), OF_FLOW)
         inside = np.clip(area, *self.rows[1, [0, -1]])
         a, *slopes = SCATTER[quantity]
         apart = [np.interp(self._curve.log_force_at(inside), self._curve.x, d) for d in self._apart_by[quantity]]
@@ -96,13 +90,14 @@ class Corrected(BoundaryElements):
 
 def _carried(surface: MeasuredSurface, halvings: int, tolerance: float) -> Pressed:
     """The map pressed on a coarser grid, and carried to the full one; loads end where the gap no longer falls."""
-    values, sizes = continued(map_of(surface))
+    values, sizes = simulated.continued(simulated.map_of(surface))
     coarse = values
     for _ in range(halvings):
         coarse = coarser(coarse, MIN_POINTS)
     steps = tuple(side / count for side, count in zip(sizes, coarse.shape, strict=True))
     law, other = own_law(surface), OwnLaw(MeasuredSurface.of(measured_map(Treated(coarse, steps, True, None), None)))
-    found = press(coarse, sizes, law_loads(surface, AREAS), MIN_POINTS, law.gradient, None, tolerance)
+    loads = simulated.law_loads(surface, simulated.AREAS)
+    found = press(coarse, sizes, loads, MIN_POINTS, law.gradient, None, tolerance)
     pressure, area, u, energy = found.rows
     change = law.separations(pressure) - other.separations(pressure)
     # the coarse grid may be in full contact
@@ -119,7 +114,7 @@ def _carried(surface: MeasuredSurface, halvings: int, tolerance: float) -> Press
     work = energy + pressure * u + np.interp(pressure, fine, added) + pressure[0] * (gap[0] - u[0])
     rows = np.array([pressure, carried, gap, work - pressure * gap])
     kept = int(np.count_nonzero(np.cumprod((np.diff(gap, prepend=np.inf) < 0) & (rows[3] > 0))))
-    if kept < MIN_LOADS:
+    if kept < simulated.MIN_LOADS:
         raise ConvergenceError("the law of this map changes so much with its grid that nothing is left to correct")
     return dataclasses.replace(
         found, heights=values, rows=rows[:, :kept], coarse_from=kept, gaps=found.gaps[:kept], cut=MIN_POINTS

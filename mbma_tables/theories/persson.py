@@ -30,10 +30,7 @@ MIN_LOG_FORCE = -690.0  # log p0/(E* q0 s) of the lightest load that the inverse
 INVERSE_RTOL = 1e-10  # of a load found from its separation
 
 # exp(-t) over [0, DECAY]: 64 nodes leave 1e-15
-_T, _T_WEIGHTS = (
-    DECAY / 2 * (np.polynomial.legendre.leggauss(64)[0] + 1),
-    DECAY / 2 * np.polynomial.legendre.leggauss(64)[1],
-)
+_T, _T_WEIGHTS = DECAY / 2 * np.add(np.polynomial.legendre.leggauss(64), [[1], [0]])
 
 
 @functools.lru_cache(maxsize=32)

@@ -83,10 +83,6 @@ class Theory(abc.ABC):
         """The theory at flat places of a broadcast shape, where it holds arrays of its own."""
         return self
 
-    def stiffer(self, times: FloatArray) -> Theory:
-        """The theory at a modulus so many times as large, where it holds numbers over E*."""
-        return self
-
     def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
         """A/A0 at a force over A0 E*."""
         return self.answer(surface, self.inverted(surface, "pressure", pressure)[0]).area
@@ -117,19 +113,13 @@ class Theory(abc.ABC):
         beyond = mean_separation > np.asarray(surface.h_max)
         return {"u is above h_max, where the surface has no contact and the theory's heights have no end": beyond}
 
-    def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Standard deviations of ln F at given u and of ln A at given F against simulations, at A/A0 = `area`.
+    def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+        """Standard deviation of ln of a quantity against simulations, at A/A0 = `area`.
 
-        Root mean squares of ln(theory/simulation), of the boundary elements in the calibrated law's file; NaN where
-        they are not known, as on surfaces unlike those.
+        "pressure" at given u, "area" at given F, "stiffness" -dF/du at given F, with a hardness that of the frozen
+        contact. Root mean squares of ln(theory/simulation), of the boundary elements in the calibrated law's file; NaN
+        where they are not known, as on surfaces unlike those.
         """
-        return self._stated(surface, "pressure", area), self._stated(surface, "area", area)
-
-    def stiffness_scatter(self, surface: AnySurface, area: FloatArray) -> FloatArray:
-        """Standard deviation of ln(-dF/du) at given F, likewise; with a hardness that of the frozen contact."""
-        return self._stated(surface, "stiffness", area)
-
-    def _stated(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         if self.departures(surface):
             return np.full(np.broadcast_shapes(np.shape(area), surface.shape), np.nan)
         return calibrated_table.shipped().standard_deviation(self.scatter_name(surface), quantity, area)
@@ -305,9 +295,8 @@ class Wrapped(Theory):
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]; the error is not known."""
         u = np.asarray(mean_separation, dtype=float)
-        pressure, area = (
-            np.array(np.broadcast_to(part, u.shape), dtype=float) for part in self._theory.answer(surface, u)
-        )
+        found = self._theory.answer(surface, u)
+        pressure, area = (np.array(np.broadcast_to(part, u.shape), dtype=float) for part in found)
 
         def force_at(k: Any, x: FloatArray) -> FloatArray:
             return np.asarray(self._theory.answer(select(surface, u.shape, k), u.ravel()[k] + x)[0], dtype=float)[None]

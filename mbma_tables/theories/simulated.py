@@ -295,7 +295,7 @@ class BoundaryElements(Theory):
             "leakage: the map may be blocked, which it is at the next simulated load": np.logical_or(*near),
             f"leakage: A/A0 is above {AREA_OF_FLOW:g}": area > AREA_OF_FLOW,
         }
-        return self._tested("flow", area), reasons
+        return self.scatter(surface, "flow", area), reasons
 
     def bearing_share(self, surface: AnySurface, mean_separation: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Share of the map's heights above the level whose mean gap is u, and its derivative, for a hardness."""
@@ -311,15 +311,8 @@ class BoundaryElements(Theory):
             f"A/A0 is above {HIGHEST:g}": answer.area > HIGHEST,
         }
 
-    def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Standard deviations against the full grid at tolerance 1e-6; NaN with loads of one's own."""
-        return self._tested("pressure", area), self._tested("area", area)
-
-    def stiffness_scatter(self, surface: AnySurface, area: FloatArray) -> FloatArray:
-        """Standard deviation of ln(-dF/du), likewise."""
-        return self._tested("stiffness", area)
-
-    def _tested(self, quantity: str, area: FloatArray) -> FloatArray:
+    def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+        """Standard deviation against the full grid at tolerance 1e-6; NaN with loads of one's own."""
         if not self.own_loads:
             return np.full(np.shape(area), np.nan)
         with np.errstate(divide="ignore"):
@@ -330,9 +323,8 @@ class BoundaryElements(Theory):
             own, given = float(getattr(self.surface, name)), np.asarray(getattr(surface, name))
             good = np.abs(given - own) <= MATCHED * own
             require(name, given, good, f"{own:.9g}: boundary elements of one map know that map alone, their .surface")
-        u = np.broadcast_to(
-            np.asarray(mean_separation, float), np.broadcast_shapes(np.shape(mean_separation), surface.shape)
-        )
+        shape = np.broadcast_shapes(np.shape(mean_separation), surface.shape)
+        u = np.broadcast_to(np.asarray(mean_separation, float), shape)
         low, high = self.rows[2, -1], self.rows[2, 0]
         good = (u >= low * (1 - 1e-12)) & (u <= high * (1 + 1e-12))
         require("mean_separation", u, good, f"between {low:.6g} and {high:.6g}, which were simulated")

@@ -141,8 +141,8 @@ class Yielding(Theory):
         chosen = np.broadcast_to(self.hardness, shape).ravel()[np.asarray(place).astype(np.intp)]
         return self.changed(hardness=chosen)
 
-    def stiffer(self, times: FloatArray) -> Theory:
-        """With hardnesses that are less of the modulus."""
+    def stiffer(self, times: FloatArray) -> Yielding:
+        """At a modulus so many times as large, of which hardnesses are less."""
         return self.changed(hardness=np.asarray(self.hardness / times))
 
     def _eta(self, surface: AnySurface) -> FloatArray:
@@ -239,21 +239,14 @@ class Yielding(Theory):
         refuse_unfinished(~missed[0], "the separation at this pressure")
         return u[0], u[1]
 
-    def scatter(self, surface: AnySurface, area: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Standard deviations of ln F at given u and of ln A at given F against boundary elements with a hardness.
+    def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+        """Standard deviation against boundary elements with a hardness; "stiffness" is the frozen contact's.
 
         Those of the calibrated law are measured; others are what the elastic theory's become, and the hardness law's
-        own beside it. NaN where the elastic theory's is not known.
+        own beside it. NaN where the elastic theory's is not known, and for a stiffness that was not measured.
         """
-        eta, table, name = self._eta(surface), shipped(), self._elastic.scatter_name(surface)
-        pressure, contact = self._elastic.scatter(surface, area)
-        found = table.standard_deviation(name, "pressure", eta, area, pressure)
-        return found, table.standard_deviation(name, "area", eta, area, contact)
-
-    def stiffness_scatter(self, surface: AnySurface, area: FloatArray) -> FloatArray:
-        """Standard deviation of ln of the frozen contact's stiffness at given F; NaN where it was not measured."""
-        eta, elastic = self._eta(surface), self._elastic.stiffness_scatter(surface, area)
-        return shipped().standard_deviation(self._elastic.scatter_name(surface), "stiffness", eta, area, elastic)
+        eta, elastic = self._eta(surface), self._elastic.scatter(surface, quantity, area)
+        return shipped().standard_deviation(self._elastic.scatter_name(surface), quantity, eta, area, elastic)
 
     def concerns(self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray) -> Mapping[str, Any]:
         """The elastic theory's reasons, and hardnesses below those that were simulated."""

@@ -113,7 +113,8 @@ def test_where_an_answer_is_not_valid_is_said_in_one_line():
 def test_scatter_is_said_where_it_is_known(folder, monkeypatch):
     from mbma_tables.theories.persson import Persson
 
-    monkeypatch.setattr(Persson, "scatter", lambda self, surface, area: (0.3 + area, 0.02 + 0 * area))
+    known = {"pressure": lambda area: 0.3 + area, "area": lambda area: 0.02 + 0 * area, "stiffness": lambda area: area}
+    monkeypatch.setattr(Persson, "scatter", lambda self, surface, quantity, area: known[quantity](area))
     text = run("contact", "--surface", "concrete", "--theory", "persson", "-a", "0.01,0.1")
     assert "scatter against simulations: ln force 0.31 to 0.4 at a separation, ln area 0.02 to 0.02 at a force" in text
 

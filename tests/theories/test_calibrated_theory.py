@@ -192,13 +192,15 @@ class TestScatter:
         assert np.all(found.area_scatter < found.scatter)
         # theories that nothing was fitted for are further off
         for name in ("mbma", "persson", "greenwood_williamson"):
-            other = get_theory(name).scatter(SURFACE, np.array([0.05]))
-            assert other[0] > found.scatter[1]
-            assert other[1] > found.area_scatter[1]
-        fitted, printed = (Mbma(variant=name).scatter(SURFACE, np.array(0.05)) for name in ("fitted", "printed"))
-        assert fitted[1] < get_theory("mbma").scatter(SURFACE, np.array(0.05))[1] < printed[1]  # as area is
+            other = get_theory(name)
+            assert other.scatter(SURFACE, "pressure", np.array([0.05])) > found.scatter[1]
+            assert other.scatter(SURFACE, "area", np.array([0.05])) > found.area_scatter[1]
+        fitted, reported, printed = (
+            Mbma(variant=name).scatter(SURFACE, "area", np.array(0.05)) for name in ("fitted", "reported", "printed")
+        )
+        assert fitted < reported < printed  # as area is
         own = dataclasses.replace(get_variant("printed"), beta=0.3)
-        assert np.isnan(Mbma(variant=own).scatter(SURFACE, np.array(0.05))).all()
+        assert np.isnan(Mbma(variant=own).scatter(SURFACE, "pressure", np.array(0.05)))
 
 
 @pytest.mark.parametrize("number", [0, 1])

@@ -227,13 +227,18 @@ def test_scatter_of_any_theory():
     area, soft = np.array([0.02, 0.2]), 0.05 * float(SURFACE.rms_gradient)
     for name in ("mbma", "persson", "greenwood_williamson"):
         theory = get_theory(name)
-        known = np.array(theory.scatter(SURFACE, area))
-        found = np.array(Yielding(theory, soft).scatter(SURFACE, area))
-        own = np.array(Yielding(get_theory("calibrated"), soft).scatter(SURFACE, area))
+        known, found, own, hard = (
+            np.array([one.scatter(SURFACE, what, area) for what in ("pressure", "area")])
+            for one in (
+                theory,
+                Yielding(theory, soft),
+                Yielding(get_theory("calibrated"), soft),
+                Yielding(theory, 50 * soft),
+            )
+        )
         assert (np.isfinite(found) == np.isfinite(known)).all()
         assert (found < known)[np.isfinite(known)].all()  # the area of a soft contact is F/p_m by any theory
         assert (found[1] < 2 * own[1])[np.isfinite(known[1])].all()
-        hard = np.array(Yielding(theory, 50 * soft).scatter(SURFACE, area))
         np.testing.assert_array_equal(hard, known)
 
 
