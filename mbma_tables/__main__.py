@@ -1,5 +1,6 @@
 """``python -m mbma_tables`` is the command line `mbma`."""
 
+import contextlib
 import os
 import sys
 
@@ -17,7 +18,8 @@ def main() -> None:
             raise
         # Python would end by the signal instead where it fell into code that `exec` ran, such as a dataclass
         for stream in (sys.stdout, sys.stderr):
-            stream.flush()
+            with contextlib.suppress(OSError):
+                stream.flush()
         os._exit(INTERRUPTED)
 
 
