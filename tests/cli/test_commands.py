@@ -562,7 +562,7 @@ def test_leakage_is_a_column_where_it_is_asked_for():
     arguments = ("--surface", "concrete", "--theory", "calibrated")
     found = json.loads(run("contact", *arguments, "-a", "0.1,0.5", "--leakage", "--json"))
     own = contact(Surface.named("concrete"), area=[0.1, 0.5], theory="calibrated").leakage
-    assert found["columns"]["leakage"] == own.conductance.tolist()
+    assert found["columns"]["leakage"] == own.K.tolist()
     assert found["columns"]["leakage"][1] == 0
     assert found["units"]["leakage"] == "mm^3"
     assert found["columns"]["leakage_valid"] == [bool(valid) for valid in own.valid]
