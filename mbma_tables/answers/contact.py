@@ -1,4 +1,4 @@
-"""`contact`: force, area and stiffness of a surface by any theory, asked by what is known of the contact."""
+"""`contact`: pressure, area and stiffness of a surface by any theory, asked by what is known of the contact."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def contact(
     quantities: Iterable[str] = QUANTITIES,
     workers: int = 1,
 ) -> Contact:
-    """Force, real contact area and stiffness of a surface, by what is known: separation, pressure or area.
+    """Pressure, real contact area and stiffness of a surface, by what is known: separation, pressure or area.
 
     Parameters
     ----------
@@ -287,7 +287,7 @@ def _refuse_pressures(
 
 
 def _at_fixed(held: str, by: str, slopes: dict[str, Any], by_modulus: dict[str, Any]) -> dict[str, Any]:
-    """Derivatives where force or area is held: of the separation, and of the quantity that is not held."""
+    """Derivatives where pressure or area is held: of the separation, and of the quantity that is not held."""
     other = "area" if held == "pressure" else "pressure"
     steep, follows = slopes[held]["separation"], slopes[other]["separation"]
     names = [name for name in slopes[held] if name != "separation"]

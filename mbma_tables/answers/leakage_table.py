@@ -18,11 +18,12 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.core import core, in_blocks
 from mbma_tables.laws.calibrated import Spectrum
 from mbma_tables.laws.effective_medium import FlowConstants, contact_factor
-from mbma_tables.theories.calibrated_table import BLOCK, Owners, SurfaceSpline, nodes_of, shipped_part
+from mbma_tables.theories.calibrated_table import Owners, SurfaceSpline, nodes_of, shipped_part
 
 GROUP = "leakage"
 AXES = ("hurst", "log_zeta_1", "log_odds")
 COVERED = np.array([[0.1, 1.0], [math.log(3.0), math.log(1e5)]])  # H and ln zeta_1, where the error was measured
+FEW = 8192  # entries whose numbers stay in the processor's cache
 LEAST = 1e-300  # contact fraction that counts as none
 OWN_NODES = 64  # contact fractions at which a spectrum's own factor is found
 KEPT = 64  # spectra whose factors are kept
@@ -78,15 +79,21 @@ def _flow(given: tuple[Any, ...], owner: Owners, u: FloatArray, area: FloatArray
     """u^3 (1 - 1.5/(u^2 + 4)) R, and 0 from A/A0 = threshold on; ln R over ln A/(threshold A0 - A)."""
     numbers, cells = given[1:3]
     threshold, obstruction, first = numbers[10], numbers[11], numbers[2]
-    # contact fractions of Greenwood and Williamson exceed 1
-    odds = np.log(np.maximum(area, LEAST) / np.maximum(threshold - area, LEAST))
-    value, slope = np.empty((2, u.size))
-    in_blocks(lambda k: core.spline_values(*given, owner[k], odds[k], value[k], slope[k]), u.size, BLOCK)
-    beyond = value + slope * np.maximum(odds - (first + cells[2] / numbers[5]), 0.0)
-    log_factor = np.minimum(beyond * np.exp(obstruction * np.minimum(odds - first, 0.0)), 0.0)
-    wide = u * u * u * (1 - 1.5 / (u * u + 4))
-    k = np.where(area < threshold, wide * np.exp(log_factor), 0.0)
-    return np.where(np.isnan(u) | np.isnan(value), np.nan, k)
+    last, found = first + cells[2] / numbers[5], np.empty(u.shape)
+
+    def fill(k: slice) -> None:
+        # contact fractions of Greenwood and Williamson exceed 1
+        a, squared = area[k], u[k] * u[k]
+        odds = np.log(np.maximum(a, LEAST) / np.maximum(threshold - a, LEAST))
+        value, slope = np.empty((2, odds.size))
+        core.spline_values(*given, owner[k], odds, value, slope)
+        value += slope * np.maximum(odds - last, 0.0)
+        log_factor = np.minimum(value * np.exp(obstruction * np.minimum(odds - first, 0.0)), 0.0)
+        wide = u[k] * squared * (1 - 1.5 / (squared + 4)) * np.exp(log_factor)
+        found[k] = np.where(np.isnan(squared + value), np.nan, np.where(a < threshold, wide, 0.0))
+
+    in_blocks(fill, u.size, FEW)
+    return found
 
 
 @functools.lru_cache(KEPT)

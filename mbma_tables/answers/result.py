@@ -1,4 +1,4 @@
-"""What `contact` answers: force and area, and what follows from them when it is read."""
+"""The result of `contact`: pressure, area and what follows from them when it is read."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def described(method: Callable[[Any], Any]) -> functools.cached_property[Numbers
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Contact(Interface, Displayed):
-    """A contact: force, area and what follows from them; arrays of the broadcast shape, or DataArrays.
+    """A contact: pressure, area and what follows from them; arrays of the broadcast shape, or DataArrays.
 
     Attributes
     ----------
@@ -228,17 +228,17 @@ class Contact(Interface, Displayed):
 
     @described
     def area_scatter(self) -> Any:
-        """Standard deviation of ln A at this force, likewise."""
+        """Standard deviation of ln A at this pressure, likewise."""
         return self._scatter("area")
 
     @described
     def stiffness_scatter(self) -> Any:
-        """Standard deviation of ln of `unloading_stiffness` at this force, likewise: of conductance, too."""
+        """Standard deviation of ln of `unloading_stiffness` at this pressure, likewise: of conductance, too."""
         return self._scatter("stiffness")
 
     @described
     def separation_scatter(self) -> Any:
-        """Standard deviation of the mean separation at this force [length], `scatter` times F/(-dF/du)."""
+        """Standard deviation of the mean separation at this pressure [length], `scatter` times F/(-dF/du)."""
         with np.errstate(invalid="ignore", divide="ignore"):
             return self.scatter * self._answer.pressure / np.abs(self._answer.stiffness)
 

@@ -101,7 +101,7 @@ def sensitivity(
     hardness: float | str | None = None,
     materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
 ) -> Sensitivity:
-    """How much each number of a surface matters to force, area, stiffness and conductance, by any theory.
+    """How much each number of a surface matters to pressure, area, stiffness and conductance, by any theory.
 
     Parameters
     ----------

@@ -104,7 +104,7 @@ class Program(click.Group):
 @click.version_option(__version__, prog_name="mbma")
 @click.pass_context
 def main(context: click.Context) -> None:
-    """Contact of rough surfaces: force, real contact area and stiffness against gap or pressure.
+    """Contact of rough surfaces: pressure, real contact area and stiffness against gap or pressure.
 
     A file named - is standard input or output. Bash completes options and names after
     eval "$(_MBMA_COMPLETE=bash_source mbma)"; zsh and fish likewise.

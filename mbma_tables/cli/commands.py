@@ -50,7 +50,7 @@ def contact_keywords(model: options.Model, specimen: Specimen) -> dict[str, Any]
     return asked if cap is None else asked | {"hardness": hardness_in(specimen.units, cap)}
 
 
-@click.command("contact", short_help="Force and area at given gaps, pressures or areas.")
+@click.command("contact", short_help="Pressure and area at given gaps, pressures or areas.")
 @options.load_options(options.numbers_option)
 @options.over_h_rms
 @options.leakage_option
@@ -69,7 +69,7 @@ def contact_command(
     model: options.Model,
     output: options.Output,
 ) -> None:
-    """Force, real contact area and stiffness -dF/du at given gaps, pressures or areas.
+    """Pressure, real contact area and stiffness -dF/du at given gaps, pressures or areas.
 
     Plain numbers are in the units of the surface and of the modulus, "0.8um" is converted to them. Force is
     F/(A0 E*), or F/A0 where a modulus is given; area is A/A0.
@@ -115,7 +115,7 @@ def curve_gaps(h_max: float, points: int) -> Any:
     return h_max * (1 - np.concatenate([[0.0], graded, even]))
 
 
-@click.command("curve", short_help="Force and area from first contact to full compression.")
+@click.command("curve", short_help="Pressure and area from first contact to full compression.")
 @click.option("--points", type=click.IntRange(min=MIN_POINTS), default=41, show_default=True, help="How many gaps.")
 @click.option("--compare", is_flag=True, help="Add all other theories, and Persson's simplified form.")
 @options.leakage_option
@@ -132,7 +132,7 @@ def curve_command(
     model: options.Model,
     output: options.Output,
 ) -> None:
-    """Force and area from first contact (d = h_max) to full compression (d = -h_max).
+    """Pressure and area from first contact (d = h_max) to full compression (d = -h_max).
 
     Half of the points are geometric in (h_max - d)/h_max, from 0.001 to 0.2, since the force falls like its
     power 7/2 at light contact; the rest are even, up to 2. Gaps where a theory has no finite force are left out.

@@ -1,4 +1,4 @@
-"""Pictures of compression: force against gap, and real contact area against force, with the scatter of theories.
+"""Pictures of compression: pressure against gap, and real contact area against pressure, with the scatter of theories.
 
 Figures are drawn without pyplot, so nothing of the caller's matplotlib state is read or changed.
 """
@@ -34,7 +34,7 @@ def theory_label(name: str) -> str:
 
 
 def pressure_label(unit: str) -> str:
-    """The axis of force in a unit; "1" where it is over the modulus."""
+    """The axis of pressure in a unit; "1" where it is over the modulus."""
     return FORCE_LABEL if unit == "1" else f"force  F/A0 [{unit}]"
 
 
@@ -98,7 +98,7 @@ def draw_compression(
     gap_label: str = GAP_LABEL,
     leakage_label: str = LEAKAGE_LABEL,
 ) -> Figure:
-    """Two panels: force (logarithmic) against u/h_rms, and area against force (both logarithmic).
+    """Two panels: pressure (logarithmic) against u/h_rms, and area against pressure (both logarithmic).
 
     A third one, flow coefficient against force, where a curve has leakage. Each curve is a line with its points as they
     are; those without contact have no place on a logarithmic axis and are left out by it.

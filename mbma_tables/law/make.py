@@ -1,4 +1,4 @@
-"""`contact_law`: one surface's force and area by any theory, frozen into polynomials of the gap.
+"""`contact_law`: one surface's pressure and area by any theory, frozen into polynomials of the gap.
 
 MBMA's laws are made from a profile of the surface's islands, other theories' from their answers; `law_pieces` fits
 the polynomials and bounds their errors.
@@ -57,7 +57,7 @@ def contact_law(
     hardness: float | str | None = None,
     materials: str | Metal | Pair | Sequence[str | Metal] | None = None,
 ) -> ContactLaw:
-    """Force and area of one surface as functions of its gap: the way to answer many gaps, and to invert.
+    """Pressure and area of one surface as functions of its gap: the way to answer many gaps, and to invert.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a theory is: anything that answers a surface and a mean separation with force, area and stiffness.
+"""What a theory is: anything that answers a surface and a mean separation with pressure, area and stiffness.
 
 MBMA, Persson's theory, Greenwood and Williamson's and the law calibrated on boundary elements are theories, and so is a
 user's own object with a `name` and an ``answer(surface, mean_separation)``. What a theory does not know in closed form
@@ -64,7 +64,7 @@ class Theory(abc.ABC):
 
     @abc.abstractmethod
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
-        """Force, area and stiffness at mean separations u [length]."""
+        """Pressure, area and stiffness at mean separations u [length]."""
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """Why a measured surface is not one that the theory is of, or was tested on."""
