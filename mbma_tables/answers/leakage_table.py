@@ -87,10 +87,11 @@ def _flow(given: tuple[Any, ...], owner: Owners, u: FloatArray, area: FloatArray
         odds = np.log(np.maximum(a, LEAST) / np.maximum(threshold - a, LEAST))
         value, slope = np.empty((2, odds.size))
         core.spline_values(*given, owner[k], odds, value, slope)
+        unknown = np.isnan(u[k]) | np.isnan(value)
         value += slope * np.maximum(odds - last, 0.0)
         log_factor = np.minimum(value * np.exp(obstruction * np.minimum(odds - first, 0.0)), 0.0)
         wide = u[k] * squared * (1 - 1.5 / (squared + 4)) * np.exp(log_factor)
-        found[k] = np.where(np.isnan(squared + value), np.nan, np.where(a < threshold, wide, 0.0))
+        found[k] = np.where(unknown, np.nan, np.where(a < threshold, wide, 0.0))
 
     in_blocks(fill, u.size, FEW)
     return found
