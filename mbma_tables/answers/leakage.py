@@ -262,11 +262,10 @@ def leakage_of(source: Source, contact: Any, area: Any) -> Leakage:
         own, volume = theory.elastic.flow(surface, u), np.asarray(surface.h_rms) ** 3
         if own is not None:
             return np.sqrt(own[0]) * np.sqrt(own[1]), own[0], own[1]
-        return (flow(surface, u, share) * volume,)
+        K = flow(surface, u, share) * volume
+        return K, K, K
 
-    by_axis = type(source.theory.elastic).flow is not Theory.flow
-    found = source.map(answer, contact, 3 if by_axis else 1, {"area": area})
-    K, x, y = found if by_axis else 3 * found
+    K, x, y = source.map(answer, contact, 3, {"area": area})
     return Leakage(K, x, y, source, contact, area)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.core import core, in_blocks
 from mbma_tables.laws.calibrated import Spectrum
-from mbma_tables.laws.effective_medium import FlowConstants, contact_factor
+from mbma_tables.laws.effective_medium import FlowConstants, contact_factor, wide_gap
 from mbma_tables.theories.calibrated_table import Owners, SurfaceSpline, nodes_of, shipped_part
 
 GROUP = "leakage"
@@ -83,14 +83,14 @@ def _flow(given: tuple[Any, ...], owner: Owners, u: FloatArray, area: FloatArray
 
     def fill(k: slice) -> None:
         # contact fractions of Greenwood and Williamson exceed 1
-        a, squared = area[k], u[k] * u[k]
+        a = area[k]
         odds = np.log(np.maximum(a, LEAST) / np.maximum(threshold - a, LEAST))
         value, slope = np.empty((2, odds.size))
         core.spline_values(*given, owner[k], odds, value, slope)
         unknown = np.isnan(u[k]) | np.isnan(value)
         value += slope * np.maximum(odds - last, 0.0)
         log_factor = np.minimum(value * np.exp(obstruction * np.minimum(odds - first, 0.0)), 0.0)
-        wide = u[k] * squared * (1 - 1.5 / (squared + 4)) * np.exp(log_factor)
+        wide = u[k] * u[k] * u[k] * wide_gap(u[k]) * np.exp(log_factor)
         found[k] = np.where(unknown, np.nan, np.where(a < threshold, wide, 0.0))
 
     in_blocks(fill, u.size, FEW)

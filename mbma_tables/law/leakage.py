@@ -15,6 +15,7 @@ from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.core import core
 from mbma_tables.law import block as at
 from mbma_tables.law import pieces as fit
+from mbma_tables.laws.effective_medium import wide_gap
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.labels import apply
 from mbma_tables.theories import OF_MAPS
@@ -33,8 +34,8 @@ class LeakageLaw:
     # bound on the relative error of the polynomials, against the flow at the law's area; errors of that area come on
     # top, times -d ln k/d ln A, which grows without limit towards `blocked_at`
     error: float
-    # in the layout of a law's block: the conductance in place of force, and its cube root, the gap of parallel plates
-    # that pass as much, in place of area; from `blocked_at` to h_max, or to the end of a law without last contact
+    # in the layout of a law's block: the coefficient in place of force, and the hydraulic aperture in place of area;
+    # from `blocked_at` to h_max, or to the end of a law without last contact
     block: FloatArray
 
     def __call__(
@@ -59,7 +60,7 @@ class LeakageLaw:
         # bodies farther apart
         apart = (flat > self.block[at.HIGHEST]) & (flat < np.inf)
         gap = (self.law.h_max + flat[apart]) / 2
-        found[apart] = gap**3 * (1 - 1.5 / ((gap / self.h_rms) ** 2 + 4))
+        found[apart] = gap**3 * wide_gap(gap / self.h_rms)
         return found.reshape(np.shape(d))[()]
 
 
@@ -86,8 +87,8 @@ def leakage_law(law: Any, surface: AnySurface) -> LeakageLaw:
 
     def values(x: FloatArray) -> FloatArray:
         d = bottom + span * x
-        conductance = h_rms**3 * flow(surface, (law.h_max + d) / 2, np.asarray(law.area(separation=d)))
-        return np.stack([conductance, np.cbrt(conductance)])
+        K = h_rms**3 * flow(surface, (law.h_max + d) / 2, np.asarray(law.area(separation=d)))
+        return np.stack([K, np.cbrt(K)])
 
     # gaps close as u under full compression
     known = (3.0, 1.0) if bottom == -law.h_max else (0.0, 0.0)

@@ -8,6 +8,7 @@ from scipy.special import erf
 from generate.machined import makers
 from generate.machined.makers import Part
 from mbma_tables import Surface, contact, contact_law
+from mbma_tables.answers.leakage import flow
 from mbma_tables.common.errors import InputError, MbmaError, OutOfRangeError
 from mbma_tables.laws.boundary_elements import LOADS as SHIPPED_LOADS
 from mbma_tables.laws.boundary_elements import Contact
@@ -95,6 +96,14 @@ def test_a_law_of_light_loads_alone(truth):
     assert law.lowest == pytest.approx(2 * truth.rows[2, 3] - few.surface.h_max)
     assert 0.01 < law.error < 1
     np.testing.assert_allclose(law.pressure(truth.rows[2, 1:3]), truth.rows[0, 1:3], rtol=law.error)
+
+
+def test_without_gaps_leakage_is_that_of_isotropic_ones(truth):
+    bare = BoundaryElements(truth.surface, *truth.rows)
+    found = contact(truth.surface, area=[0.05, 0.2], theory=bare)
+    expected = truth.surface.h_rms**3 * flow(truth.surface, found.mean_separation, found.area)
+    for own in (found.leakage.K, found.leakage.x, found.leakage.y):
+        np.testing.assert_array_equal(own, expected)
 
 
 def test_what_was_not_simulated_is_refused(truth):
