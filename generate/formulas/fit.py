@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.models.closed_form_certificates import Certificate
+from mbma_tables.models import Certificate
 
 DATA_DIGITS = 10
 SCORE_DIGITS = 6

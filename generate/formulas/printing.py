@@ -25,7 +25,7 @@ from sympy.printing.precedence import PRECEDENCE
 import mbma_tables
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file
-from mbma_tables.models.closed_form_certificates import Certificate
+from mbma_tables.models import Certificate
 
 PACKAGE = pathlib.Path(mbma_tables.__file__).parent
 HEADER = PACKAGE / "core" / "closed_forms.h"
@@ -53,18 +53,7 @@ _HEAD = f'''"""Ranges of the closed forms, and their certificates; the forms are
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-
-class Certificate(NamedTuple):
-    """Relative errors of one function on points that no fit saw, and its number of fitted coefficients."""
-
-    coefficients: int
-    largest: float
-    median: float
-    points: int
-    worst_at: dict[str, float]
-
+from mbma_tables.models import Certificate
 
 '''
 

@@ -13,7 +13,8 @@ from generate.boundary_elements.evidence import MIN_WAVES
 from generate.formulas.printing import HEADER, latex_steps, read_functions
 from generate.pages.page import Measured, evidence, table
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES, Certificate
+from mbma_tables.models import Certificate
+from mbma_tables.models.closed_form_certificates import CERTIFICATES, RANGES
 
 POCKET_AREAS = (0.01, 0.97)  # contact fractions at which the pocket laws are compared with simulations
 

@@ -30,6 +30,16 @@ def check_outside(outside: str) -> None:
         raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
 
 
+class Certificate(NamedTuple):
+    """Relative errors of one function on points that no fit saw, and its number of fitted coefficients."""
+
+    coefficients: int
+    largest: float
+    median: float
+    points: int
+    worst_at: dict[str, float]
+
+
 class IslandAnswer(NamedTuple):
     """Phi_F and Phi_A of islands, with a bound on their relative error; arrays of one shape.
 

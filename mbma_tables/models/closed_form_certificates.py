@@ -7,18 +7,7 @@ Made by `python -m generate formulas`; do not edit.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-
-class Certificate(NamedTuple):
-    """Relative errors of one function on points that no fit saw, and its number of fitted coefficients."""
-
-    coefficients: int
-    largest: float
-    median: float
-    points: int
-    worst_at: dict[str, float]
-
+from mbma_tables.models import Certificate
 
 RANGES: dict[str, dict[str, tuple[float, float]]] = {
     "pocket": {"X": (0.8, 25.0), "mu": (0.0, 2000.0)},

@@ -411,10 +411,20 @@ def test_a_dash_is_standard_input_and_output(folder):
     assert [path.name for path in folder.iterdir()] == ["law.inp"]
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals")
-def test_a_terminal_sees_that_work_goes_on():
+def on_terminal(code):
+    """What a program prints, and what it writes to the terminal that is its standard error."""
     import pty
 
+    ours, theirs = pty.openpty()
+    found = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=theirs, check=True)
+    os.close(theirs)
+    said = os.read(ours, 10_000)
+    os.close(ours)
+    return found.stdout, said
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals")
+def test_a_terminal_sees_that_work_goes_on():
     code = (
         "import sys, time, click\n"
         "from mbma_tables.cli import main\n"
@@ -426,20 +436,14 @@ def test_a_terminal_sees_that_work_goes_on():
         "    progress.echo('done')\n"
         "main(['wait'])\n"
     )
-    ours, theirs = pty.openpty()
-    found = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=theirs, check=True)
-    os.close(theirs)
-    said = os.read(ours, 10_000)
-    os.close(ours)
-    assert found.stdout == b"done\n"
+    printed, said = on_terminal(code)
+    assert printed == b"done\n"
     assert b"mbma: wait, 0 s (Ctrl-C ends it)" in said
     assert said.endswith(b"\r\x1b[K")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals")
 def test_within_a_command_what_takes_long_is_named():
-    import pty
-
     code = (
         "import time\n"
         "from mbma_tables.common import progress\n"
@@ -449,11 +453,7 @@ def test_within_a_command_what_takes_long_is_named():
         "        time.sleep(0.8)\n"
         "    time.sleep(0.8)\n"
     )
-    ours, theirs = pty.openpty()
-    subprocess.run([sys.executable, "-c", code], stderr=theirs, check=True)
-    os.close(theirs)
-    said = os.read(ours, 10_000)
-    os.close(ours)
+    _, said = on_terminal(code)
     assert 0 < said.index(b"mbma: inside, 0 s") < said.index(b"mbma: outside, 1 s")
     assert said.endswith(b"\r\x1b[K")
 
