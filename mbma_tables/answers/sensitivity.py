@@ -153,7 +153,7 @@ def sensitivity(
     given = parameters | {"E_star": modulus, by: units.number(by, value)}
     given |= {} if np.equal(cap, np.inf).all() else {"hardness": cap}
     numbers = {name: float(one_number(name, number)) for name, number in given.items()}
-    same = {"pressure": "pressure", "separation": "mean_separation"}.get(by, by)
+    same = "mean_separation" if by == "separation" else by
     wanted, batches = [name for name in ANSWERS if name != same], isinstance(surface, Surface)
 
     def found_at(**own: Any) -> Contact:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 KINDS = ("png", "svg", "pdf")  # of files of pictures
 GAP_LABEL = "mean separation  u/h_rms"
-FORCE_LABEL = "force  F/(A0 E*)"
+PRESSURE_LABEL = "pressure  F/(A0 E*)"
 LEAKAGE_LABEL = "flow coefficient  k h_rms^3"
 LABELS = {"mbma": "MBMA", "greenwood_williamson": "Greenwood-Williamson", "persson_simplified": "Persson, simplified"}
 
@@ -35,7 +35,7 @@ def theory_label(name: str) -> str:
 
 def pressure_label(unit: str) -> str:
     """The axis of pressure in a unit; "1" where it is over the modulus."""
-    return FORCE_LABEL if unit == "1" else f"force  F/A0 [{unit}]"
+    return PRESSURE_LABEL if unit == "1" else f"pressure  F/A0 [{unit}]"
 
 
 def leakage_label(unit: str) -> str:
@@ -94,32 +94,32 @@ def draw_lines(lines: Mapping[str, tuple[Any, Any]], x_label: str, y_label: str,
 def draw_compression(
     curves: Sequence[Curve],
     title: str = "",
-    pressure_label: str = FORCE_LABEL,
+    pressure_label: str = PRESSURE_LABEL,
     gap_label: str = GAP_LABEL,
     leakage_label: str = LEAKAGE_LABEL,
 ) -> Figure:
     """Two panels: pressure (logarithmic) against u/h_rms, and area against pressure (both logarithmic).
 
-    A third one, flow coefficient against force, where a curve has leakage. Each curve is a line with its points as they
-    are; those without contact have no place on a logarithmic axis and are left out by it.
+    A third one, flow coefficient against pressure, where a curve has leakage. Each curve is a line with its points as
+    they are; those without contact have no place on a logarithmic axis and are left out by it.
     """
     if not curves:
         raise InputError("no curves to draw: at least one is needed")
     leaking = [curve for curve in curves if curve.leakage is not None]
     panels = 3 if leaking else 2
     figure = new_figure(5 * panels, 4.5)
-    by_gap, by_force, *flow = figure.subplots(1, panels)
+    by_gap, by_pressure, *flow = figure.subplots(1, panels)
     for curve in curves:
         marker = "." if curve is curves[0] else ""
         by_gap.plot(curve.gap, curve.pressure, marker=marker, label=curve.label)
-        by_force.plot(curve.pressure, curve.area, marker=marker, label=curve.label)
+        by_pressure.plot(curve.pressure, curve.area, marker=marker, label=curve.label)
         _band(by_gap, curve.gap, curve.pressure, curve.scatter)
-        _band(by_force, curve.pressure, curve.area, curve.area_scatter)
+        _band(by_pressure, curve.pressure, curve.area, curve.area_scatter)
     by_gap.set_yscale("log", nonpositive="mask")
-    by_force.set_xscale("log", nonpositive="mask")
-    by_force.set_yscale("log", nonpositive="mask")
+    by_pressure.set_xscale("log", nonpositive="mask")
+    by_pressure.set_yscale("log", nonpositive="mask")
     by_gap.set(xlabel=gap_label, ylabel=pressure_label)
-    by_force.set(xlabel=pressure_label, ylabel="real contact area  A/A0")
+    by_pressure.set(xlabel=pressure_label, ylabel="real contact area  A/A0")
     for axes, curve in itertools.product(flow, leaking):
         # blocked contacts have no place on a logarithmic axis, nor have gaps before contact
         k = np.asarray(curve.leakage, float)
@@ -127,7 +127,7 @@ def draw_compression(
         axes.loglog(curve.pressure, k, marker=".", label=curve.label)
         _band(axes, curve.pressure, k, curve.leakage_scatter)
         axes.set(xlabel=pressure_label, ylabel=leakage_label)
-    for axes in (by_gap, by_force, *flow):
+    for axes in (by_gap, by_pressure, *flow):
         axes.grid(True, which="major", alpha=0.3)
     by_gap.legend()
     figure.suptitle(title)

@@ -226,16 +226,15 @@ class ContactLaw(Law, Derived, Displayed):
         return point
 
     def _inverse(self, name: str, given: Any, count: int = 1) -> tuple[Any, ...]:
-        """Gaps of forces or areas, and with a `count` of 3 area and -dF/du there."""
-        key = "area" if name == "area" else "pressure"
-        which, inverse = (FORCE if key == "pressure" else AREA), self._inverse_block(key)
+        """Gaps of pressures or areas, and with a `count` of 3 area and -dF/du there."""
+        which, inverse = (FORCE if name == "pressure" else AREA), self._inverse_block(name)
         least, most, end = inverse[at.Y_LEAST], inverse[at.Y_HIGH], inverse[at.END]
 
         def check(given: Any) -> FloatArray:
             wanted = finite_array(name, given)
             if ((wanted >= max(least, 0.0)) & (wanted <= most)).all():
                 return wanted
-            known = self.units.length, self.units.stress if key == "pressure" else None
+            known = self.units.length, self.units.stress if name == "pressure" else None
             length, unit = ("" if own in (None, "1") else f" {own}" for own in known)
             low, high = f"at least {least:.6g}{unit}", f"at most {most:.6g}{unit}"
             require(name, wanted, wanted >= 0, "at least 0")
