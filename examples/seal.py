@@ -40,7 +40,7 @@ STEP = 1e-5  # of central differences, all in one call
 
 @dataclasses.dataclass(frozen=True)
 class Found:
-    """Optimum of the minimiser, its contact (face and track), objective on its way, and conductances of simulations."""
+    """Optimum of the minimiser, its contact (face and track), objective on its way, and flow by simulations."""
 
     result: OptimizeResult
     best: Contact
@@ -57,7 +57,7 @@ def answer(points: np.ndarray) -> Contact:
 
 
 def log_answers(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """log(pressure/LOAD) and log(conductance), means of face and track, and their gradients (2, 4)."""
+    """log(pressure/LOAD) and log(flow coefficient), means of face and track, and their gradients (2, 4)."""
     found = answer(x + STEP * np.concatenate([np.zeros((1, 4)), np.eye(4), -np.eye(4)]))
     both = np.log([found.pressure.mean(axis=1) / LOAD, found.leakage.K.mean(axis=1)])
     return both[:, 0], (both[:, 1:5] - both[:, 5:]) / (2 * STEP)
@@ -111,17 +111,17 @@ def alike(x: np.ndarray, log_h_rms: np.ndarray) -> np.ndarray:
 
 
 def draw(found: Found) -> Figure:
-    """The objective along the iterations, and conductance against h_rms with the optimum and its simulations."""
+    """The objective along the iterations, and flow coefficient against h_rms with the optimum and its simulations."""
     figure = Figure(figsize=(10, 4), layout="constrained")
     left, right = figure.subplots(1, 2)
     left.semilogy(np.exp(found.path), "o-")
-    left.set(xlabel="iteration", ylabel="conductance [um^3] (load not yet kept)")
+    left.set(xlabel="iteration", ylabel="flow coefficient [um^3] (load not yet kept)")
     x = found.result.x
     log_h_rms = x[0] + np.linspace(-0.7, 0.7, 41)
     right.loglog(np.exp(log_h_rms), alike(x, log_h_rms), label="same load, hurst and q1")
     right.plot(np.exp(x[0]), np.exp(found.result.fun), "r*", markersize=14, label="SLSQP with gradients")
     right.plot(np.full(found.simulated.size, np.exp(x[0])), found.simulated, "k_", label="simulated cells")
-    right.set(xlabel="h_rms [um]", ylabel="conductance [um^3]")
+    right.set(xlabel="h_rms [um]", ylabel="flow coefficient [um^3]")
     right.legend()
     return figure
 
@@ -139,9 +139,9 @@ def main(out: pathlib.Path | None = None, cells: int = 3, grid: int = 256) -> Fo
         state = "blocked" if leakage.blocked[0, k] else f"leaks {leakage.liquid(**OIL)[0, k]:.3g} um^2/s of oil"
         click.echo(f"{name}: {found.best.pressure[0, k]:.4f} MPa, contact {found.best.area[0, k]:.3f}, {state}")
     law = np.exp(found.result.fun)
-    click.echo(f"conductance {law:.4g} um^3, stated scatter of the track {leakage.scatter[0, 1]:.2f}")
-    for conductance in found.simulated:
-        click.echo(f"boundary elements {conductance:.4g} um^3: ln(law/simulation) = {np.log(law / conductance):+.2f}")
+    click.echo(f"flow coefficient {law:.4g} um^3, stated scatter of the track {leakage.scatter[0, 1]:.2f}")
+    for simulated in found.simulated:
+        click.echo(f"boundary elements {simulated:.4g} um^3: ln(law/simulation) = {np.log(law / simulated):+.2f}")
     if out is not None:
         out.write_bytes(to_picture(draw(found), out.suffix[1:], outlines=True))
     return found
