@@ -30,6 +30,7 @@ EVEN_FROM = 0.2  # and where its points, geometric so far, become evenly spaced
 MIN_POINTS = 5
 DRAWN = ("calibrated", "persson")  # theories beside the chosen one in a picture, where they are there
 COLUMNS = ("mean_separation", "separation", "pressure", "area", "error")
+MEASURED = ("h_rms", "h_max", "rms_gradient", "skewness", "kurtosis", "anisotropy")
 ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
 
 
@@ -79,7 +80,7 @@ def contact_command(
     model = model.of(specimen.surface)
     if len(loads) != 1:
         raise InputError("one of --separation, --mean-separation, --pressure and --area is needed")
-    (name, numbers), *_ = loads.items()
+    ((name, numbers),) = loads.items()
     if over_h_rms and name in ("pressure", "area"):
         raise InputError(f"--over-h-rms is about lengths: leave it out with --{name}")
     from mbma_tables.answers.contact import contact
@@ -240,8 +241,8 @@ def fit_command(
     """
     options.check_plot(plot, output.out)
     from mbma_tables.answers.measurement import curves, described, draw, table_of_loads
-    from mbma_tables.common.plots import to_picture
-    from mbma_tables.common.units import Units, unit_of
+    from mbma_tables.common.plots import pressure_label, to_picture
+    from mbma_tables.common.units import Units
     from mbma_tables.scenes.specimen import effective_modulus_of, measured
 
     modulus, stress_unit = effective_modulus_of({} if E_star is None else {"E_star": E_star})
@@ -249,24 +250,14 @@ def fit_command(
     scale = 1.0 if modulus is None else modulus
     columns, told = table_of_loads(surface, scale)
     units = Units(surface.unit, "1" if modulus is None else stress_unit)
-    facts = {
-        "length_unit": surface.unit,
-        "stress_unit": stress_unit,
-        "h_rms": float(surface.h_rms),
-        "h_max": float(surface.h_max),
-        "rms_gradient": float(surface.rms_gradient),
-        "skewness": surface.skewness,
-        "kurtosis": surface.kurtosis,
-        "anisotropy": surface.anisotropy,
-        "provenance": list(surface.provenance),
-        "notes": told,
-    }
+    facts = {"length_unit": surface.unit, "stress_unit": stress_unit}
+    facts |= {name: getattr(surface, name) for name in MEASURED} | {"provenance": surface.provenance, "notes": told}
     title = measurement.name
     own = {name: unit_of(name, units) or "-" for name in columns} | {"area": "A/A0"}
     report = Report("fit", title, [*described(surface), *told], facts, to_columns(columns, own))
     picture = b""
     if plot is not None:
-        label = "pressure  F/(A0 E*)" if modulus is None else f"pressure [{stress_unit or 'stress'}]"
+        label = pressure_label(unit_of("pressure", units))
         picture = to_picture(draw(treated, surface, curves(surface, scale), title, label), plot.suffix[1:])
     report.write(output, plot, picture)
 
