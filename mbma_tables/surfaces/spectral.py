@@ -16,7 +16,7 @@ from mbma_tables.common.display import Variable
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.units import Units
 from mbma_tables.laws.bearing_curve import Bearing, RadialSpectrum
-from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.any_surface import AnySurface, frozen
 from mbma_tables.surfaces.extremes import of_area
 from mbma_tables.surfaces.heights import Heights, one_height
 from mbma_tables.surfaces.power_laws import PowerLaws, two_columns
@@ -114,38 +114,32 @@ class SpectralSurface(AnySurface):
         require("C", C, C >= 0, "zero or positive")
         held = np.flatnonzero(C > 0)
         inside = slice(held[0], held[-1] + 1) if held.size else slice(0)
-        keep = {"q": q[inside].copy(), "C": C[inside].copy()}
+        keep = {"q": q, "C": C}
         if self.samples is not None:
-            samples = positive_array("samples", self.samples)
-            keep["samples"] = np.broadcast_to(samples, q.shape)[inside].copy()
-        for name, array in keep.items():
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+            keep["samples"] = np.broadcast_to(positive_array("samples", self.samples), q.shape)
+        vars(self).update({name: frozen(array[inside].copy()) for name, array in keep.items()})
         if held.size < 2 or not self.laws.width.size:
             raise InputError("the spectrum holds no height: no two neighbours in q have positive C")
         numbers = {"q0": self.q[0], "q1": self.q[-1], "h_rms": math.sqrt(self.laws.moment(0))}
         numbers |= {f"m{order}": self.laws.moment(order) for order in (2, 4)}
-        for name, number in numbers.items():
-            object.__setattr__(self, name, np.float64(number))
+        vars(self).update({name: np.float64(number) for name, number in numbers.items()})
         require(
             "largest q over smallest", np.asarray(self.zeta_1), self.zeta_1 > MIN_ZETA_1, "greater than 3 (more waves)"
         )
         if not all(math.isfinite(m) and m > 0 for m in (self.m0, self.m2, self.m4)):
             raise OutOfRangeError("the spectrum's moments overflow or vanish: choose another length unit")
-        object.__setattr__(self, "unit", Units(self.unit).length)
+        vars(self).update(unit=Units(self.unit).length)
+        heights, top, provenance = self.heights, self.h_max, tuple(self.provenance)
         if nominal_area is not None:
-            for name, value in zip(("h_max", "provenance"), of_area(self, nominal_area, self.h_max), strict=True):
-                object.__setattr__(self, name, value)
-            if self.heights is not None and self.heights.is_gaussian:
-                object.__setattr__(self, "heights", None)
-        if self.heights is None:
-            if self.h_max is None:
-                raise InputError(
-                    "h_max is missing: the highest point above the mid-plane, heights= of the surface, or nominal_area"
-                )
-            object.__setattr__(self, "heights", Heights.gaussian(self.h_rms, one_height(self.h_max)))
-        object.__setattr__(self, "h_max", self.heights.h_max if self.h_max is None else one_height(self.h_max))
-        object.__setattr__(self, "provenance", tuple(self.provenance))
+            top, provenance = of_area(self, nominal_area, top)
+            heights = None if heights is None or heights.is_gaussian else heights
+        if heights is None and top is None:
+            raise InputError(
+                "h_max is missing: the highest point above the mid-plane, heights= of the surface, or nominal_area"
+            )
+        top = heights.h_max if top is None else one_height(top)
+        heights = Heights.gaussian(self.h_rms, top) if heights is None else heights
+        vars(self).update(heights=heights, h_max=top, provenance=provenance)
 
     def __repr__(self) -> str:
         numbers = f"h_rms={self.h_rms:.4g}, h_max={self.h_max:.4g}, rms gradient {self.rms_gradient:.4g}"
@@ -206,7 +200,7 @@ class SpectralSurface(AnySurface):
         if self.anisotropy is not None:
             known["anisotropy"] = self.anisotropy
         beyond = "beyond, only 'calibrated' by a map was tested"
-        mend = "theory='simulated' presses the map itself" if by_map else beyond
+        mend = "theory='simulated' simulates the map" if by_map else beyond
         return tuple(
             f"{name} is {known[name]:.3g}, tested from {low:g} to {high:g}: {mend}"
             for name, (low, high) in tested.items()
@@ -290,7 +284,9 @@ class SpectralSurface(AnySurface):
         kept = np.append(True, (np.diff(q) > 0) | (np.abs(np.diff(C)) > 1e-9 * C[1:]))
         told = []
         if self.bearing is not None or other.bearing is not None:
-            told = ["curves of a map's tops and valleys are left out, since how the two lie on each other is not known"]
+            told.append(
+                "curves of the maps' summits and valleys are left out: how the two lie on each other is not known"
+            )
         if (stretch := _anisotropy(self, other)) is not None:
             told.append(f"lays are taken to be parallel: anisotropy {stretch:.3g} at most")
         record = {"step": "combined", "of": [list(self.provenance), list(other.provenance)]}

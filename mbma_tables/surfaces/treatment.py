@@ -125,9 +125,10 @@ class Treated:
         if self.window is None:
             windows = [np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2 for count in self.heights.shape]
         else:
-            ones = (wrapped(np.ones(count), (1.0,), False) for count in self.heights.shape)
+            from scipy.signal import get_window
+
             try:
-                windows = [np.asarray(one.window(self.window).heights()) for one in ones]
+                windows = [get_window(self.window, count) for count in self.heights.shape]
             except ValueError:
                 raise InputError(f"window must be one of scipy.signal.get_window, got {self.window!r}") from None
         window = windows[0] if len(windows) == 1 else np.outer(*windows)
